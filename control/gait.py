@@ -1,0 +1,145 @@
+"""The crutching gait (paper, section II-A): insertion, stance, extraction, swing, as a table of phases.
+
+Both flippers follow the same target. The edge goes down at the front of the sweep, holds its depth through the
+stance while the flipper sweeps back, comes up at the back and swings forward above the mud. A phase's duration is
+its path length over its speed, as in the authors' controller, so stride times equal theirs; within a phase the
+speed rises and falls as half a cosine, so joint velocities are continuous and zero where phases meet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, pi, radians, sin
+from typing import Annotated, NamedTuple
+
+from control.bounds import Bounds
+from control.geometry import FlipperGeometry
+from control.records import GaitTarget, Phase
+
+RAMP_S = 0.05  # to reach full speed: half the authors' 0.1 s acceleration time, for each end of a phase
+
+
+@dataclass(frozen=True)
+class GaitParameters:
+    sweep_angle_deg: Annotated[float, Bounds(1.0, 60.0)] = 30.0  # the stance sweeps from plus to minus this
+    insertion_speed_m_s: Annotated[float, Bounds(0.005, 1.0)] = 0.1
+    stance_speed_m_s: Annotated[float, Bounds(0.005, 2.0)] = 0.5
+    extraction_speed_m_s: Annotated[float, Bounds(0.005, 2.0)] = 0.5
+    swing_speed_m_s: Annotated[float, Bounds(0.005, 2.0)] = 0.5
+    swing_duration_s: Annotated[float, Bounds(0.0, 10.0)] = 0.8  # the authors' robot; 0 follows swing_speed_m_s
+    pause_s: Annotated[float, Bounds(0.0, 60.0)] = 0.0  # after insertion, stance and extraction
+
+
+# Section II-B of the paper's experiments with a fixed base: slow everywhere, the mud relaxes between phases.
+SINGLE_FLIPPER = GaitParameters(
+    stance_speed_m_s=0.1, extraction_speed_m_s=0.1, swing_speed_m_s=0.1, swing_duration_s=0.0, pause_s=3.0
+)
+PROTOCOLS = {"walking": GaitParameters(), "single_flipper": SINGLE_FLIPPER}
+
+
+class PhaseRow(NamedTuple):
+    phase: Phase
+    duration_s: float
+    sweep_start_rad: float
+    sweep_end_rad: float
+    depth_start_m: float
+    depth_end_m: float
+
+
+def stride_table(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -> tuple[PhaseRow, ...]:
+    """One stride at `depth_m` below the nominal surface, row by row in time."""
+    front = radians(gait.sweep_angle_deg)
+    raised_m = -geometry.clearance_m
+    travel_m = depth_m - raised_m
+    arc_m = 2.0 * front * geometry.flipper_length_m
+    swing_s = gait.swing_duration_s or arc_m / gait.swing_speed_m_s
+    rows = (
+        PhaseRow(Phase.INSERTION, travel_m / gait.insertion_speed_m_s, front, front, raised_m, depth_m),
+        PhaseRow(Phase.PAUSE, gait.pause_s, front, front, depth_m, depth_m),
+        PhaseRow(Phase.STANCE, arc_m / gait.stance_speed_m_s, front, -front, depth_m, depth_m),
+        PhaseRow(Phase.PAUSE, gait.pause_s, -front, -front, depth_m, depth_m),
+        PhaseRow(Phase.EXTRACTION, travel_m / gait.extraction_speed_m_s, -front, -front, depth_m, raised_m),
+        PhaseRow(Phase.PAUSE, gait.pause_s, -front, -front, raised_m, raised_m),
+        PhaseRow(Phase.SWING, swing_s, -front, front, raised_m, raised_m),
+    )
+    return tuple(row for row in rows if row.duration_s > 0.0)
+
+
+def stride_duration_s(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -> float:
+    return sum(row.duration_s for row in stride_table(gait, geometry, depth_m))
+
+
+def smooth_progress(time_s: float, duration_s: float) -> tuple[float, float]:
+    """Fraction of a path covered after `time_s`, and its rate per second.
+
+    The rate is u(t) = ½ (1 - cos(π t/r)) · v over the first r seconds, v between, and the mirror image at the end,
+    with v = 1 / (T - r) so that the whole path takes T. r is RAMP_S, or half of a shorter path.
+    """
+    if time_s >= duration_s:
+        return 1.0, 0.0
+    if time_s <= 0.0:
+        return 0.0, 0.0
+    ramp_s = min(RAMP_S, duration_s / 2.0)
+    rate = 1.0 / (duration_s - ramp_s)
+    if time_s > duration_s / 2.0:
+        fraction, speed = _first_half(duration_s - time_s, ramp_s, rate)
+        return 1.0 - fraction, speed
+    return _first_half(time_s, ramp_s, rate)
+
+
+def _first_half(time_s: float, ramp_s: float, rate: float) -> tuple[float, float]:
+    if time_s >= ramp_s:
+        return rate * (time_s - ramp_s / 2.0), rate
+    angle = pi * time_s / ramp_s
+    return rate / 2.0 * (time_s - ramp_s / pi * sin(angle)), rate / 2.0 * (1.0 - cos(angle))
+
+
+class Gait:
+    """Owns the place in the stride. The depth of the next stride may be set until its insertion begins."""
+
+    def __init__(self, parameters: GaitParameters, geometry: FlipperGeometry) -> None:
+        self.parameters = parameters
+        self.geometry = geometry
+        self.reset(0.0)
+
+    def reset(self, depth_m: float) -> None:
+        """Back to the start of stride 0, at `depth_m`."""
+        self.next_depth_m = depth_m
+        self.stride = 0
+        self._begin_stride()
+
+    def _begin_stride(self) -> None:
+        self._rows = stride_table(self.parameters, self.geometry, self.next_depth_m)
+        self._row = 0
+        self._time_s = 0.0
+
+    @property
+    def commanded_depth_m(self) -> float:
+        """Of the stride under way."""
+        return self._rows[0].depth_end_m
+
+    def step(self, dt_s: float) -> GaitTarget:
+        """Advance by `dt_s`. Time left over at the end of a phase counts for the next, so strides keep their rate."""
+        self._time_s += dt_s
+        while self._time_s >= self._rows[self._row].duration_s:
+            self._time_s -= self._rows[self._row].duration_s
+            self._row += 1
+            if self._row == len(self._rows):
+                left_over_s = self._time_s
+                self.stride += 1
+                self._begin_stride()
+                self._time_s = left_over_s
+        return self._target()
+
+    def _target(self) -> GaitTarget:
+        phase, duration_s, sweep_start, sweep_end, depth_start, depth_end = self._rows[self._row]
+        fraction, rate = smooth_progress(self._time_s, duration_s)
+        sweep_span, depth_span = sweep_end - sweep_start, depth_end - depth_start
+        return GaitTarget(
+            phase,
+            self.stride,
+            sweep_start + sweep_span * fraction,
+            sweep_span * rate,
+            depth_start + depth_span * fraction,
+            depth_span * rate,
+        )

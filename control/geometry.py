@@ -1,0 +1,105 @@
+"""Kinematics of one flipper.
+
+The adduction axis is fixed to the body and points fore and aft; the sweep axis tilts with it. With the sweep angle
+α, the adduction angle β (up positive), the arm length l and the drop h from the arm down to the plate's lower edge,
+the lower edge's middle lies at
+
+    p = R_x(β) · [l sin α, l cos α, -h]
+      = (l sin α, l cos α cos β + h sin β, l cos α sin β - h cos β)        x forward, y outward, z up
+
+from the crossing of the axes, which is the height H above the mud. The paper gives this robot without its drop
+(figure 2); with h = 0 its force matrix is rows x and z of J / l². Drop and height are from the authors' controller.
+The published lengths disagree (0.115 m in the paper, 0.120 m in the controller): measure your own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import asin, atan2, cos, hypot, radians, sin
+from typing import Annotated, NamedTuple
+
+from control.bounds import Bounds
+
+MIN_LEVER_M = 0.01  # below it the adduction joint moves the plate sideways, not down: refuse to command it
+
+
+class Jacobian(NamedTuple):
+    """Metres of the lower edge per radian of joint angle."""
+
+    x_sweep: float
+    x_adduction: float
+    y_sweep: float
+    y_adduction: float
+    z_sweep: float
+    z_adduction: float
+
+
+@dataclass(frozen=True)
+class FlipperGeometry:
+    flipper_length_m: Annotated[float, Bounds(0.02, 1.0)] = 0.120
+    drop_m: Annotated[float, Bounds(0.0, 0.5)] = 0.050
+    axis_height_m: Annotated[float, Bounds(0.0, 1.0)] = 0.0645
+    plate_width_m: Annotated[float, Bounds(0.002, 0.5)] = 0.025
+    plate_thickness_m: Annotated[float, Bounds(0.0002, 0.1)] = 0.004
+
+    @property
+    def clearance_m(self) -> float:
+        """Height of the lower edge above the mud with the arm level."""
+        return self.axis_height_m - self.drop_m
+
+    def edge_position(self, sweep_rad: float, adduction_rad: float) -> tuple[float, float, float]:
+        """(x, y, z) in metres from the crossing of the axes."""
+        l, h = self.flipper_length_m, self.drop_m  # noqa: E741
+        sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
+        return l * sa, l * ca * cb + h * sb, l * ca * sb - h * cb
+
+    def jacobian(self, sweep_rad: float, adduction_rad: float) -> Jacobian:
+        l, h = self.flipper_length_m, self.drop_m  # noqa: E741
+        sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
+        return Jacobian(l * ca, 0.0, -l * sa * cb, h * cb - l * ca * sb, -l * sa * sb, h * sb + l * ca * cb)
+
+    def depth_m(self, sweep_rad: float, adduction_rad: float) -> float:
+        """Of the lower edge below the nominal surface: h cos β - l cos α sin β - H."""
+        tilted_drop = self.drop_m * cos(adduction_rad)
+        return tilted_drop - self.flipper_length_m * cos(sweep_rad) * sin(adduction_rad) - self.axis_height_m
+
+    def adduction_rad(self, sweep_rad: float, depth_m: float) -> float:
+        """The adduction angle that puts the lower edge at `depth_m`: the depth law solved for β.
+
+        -β = asin((z + H) / √((l cos α)² + h²)) - atan2(h, l cos α). Raises ValueError where the arm does not reach.
+        """
+        reach_m = self.flipper_length_m * cos(sweep_rad)
+        radius_m = hypot(reach_m, self.drop_m)
+        below_axis_m = depth_m + self.axis_height_m
+        if abs(below_axis_m) > radius_m:
+            raise ValueError(f"depth {depth_m:.4f} m at sweep {sweep_rad:.3f} rad is out of the flipper's reach")
+        return atan2(self.drop_m, reach_m) - asin(below_axis_m / radius_m)
+
+    def adduction_velocity_rad_s(
+        self, sweep_rad: float, adduction_rad: float, sweep_velocity_rad_s: float, depth_velocity_m_s: float
+    ) -> float:
+        """The depth law differentiated: ż = l sin α sin β · α̇ - (l cos α cos β + h sin β) · β̇."""
+        sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
+        lever_m = self.flipper_length_m * ca * cb + self.drop_m * sb
+        return (self.flipper_length_m * sa * sb * sweep_velocity_rad_s - depth_velocity_m_s) / lever_m
+
+    def vertical_lever_m(self, sweep_rad: float, adduction_rad: float) -> float:
+        """Metres that the lower edge rises per radian of adduction: the lever of a vertical force."""
+        return self.flipper_length_m * cos(sweep_rad) * cos(adduction_rad) + self.drop_m * sin(adduction_rad)
+
+    def deepest_m(self, sweep_angle_deg: float) -> float:
+        """The greatest depth that can be held over a sweep of ±`sweep_angle_deg`, with MIN_LEVER_M left.
+
+        At the end of the sweep the edge moves on a circle of radius √((l cos α)² + h²); where the lever is d, the
+        edge hangs √(radius² - d²) below the axis.
+        """
+        radius_m = hypot(self.flipper_length_m * cos(radians(sweep_angle_deg)), self.drop_m)
+        if radius_m <= MIN_LEVER_M:
+            return -self.axis_height_m
+        return (radius_m * radius_m - MIN_LEVER_M * MIN_LEVER_M) ** 0.5 - self.axis_height_m
+
+    def is_reachable(self, sweep_rad: float, depth_m: float) -> bool:
+        """Whether the pose exists and leaves the adduction joint a vertical lever of at least MIN_LEVER_M."""
+        radius_squared = (self.flipper_length_m * cos(sweep_rad)) ** 2 + self.drop_m**2
+        below_axis_m = depth_m + self.axis_height_m
+        return below_axis_m * below_axis_m <= radius_squared - MIN_LEVER_M * MIN_LEVER_M

@@ -1,0 +1,95 @@
+"""`apply_limits`, the last pure function before the wire.
+
+Whatever the controller wants, each torque that leaves is finite, within the torque limit, no more than one slew
+step from the one sent before, and does not push a joint further past its position or velocity limit; a hot motor
+gets less and less of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Annotated, NamedTuple
+
+from control.bounds import Bounds
+from control.records import DriveState, DriveStates, Torques
+
+VELOCITY_FADE = 0.2  # torque that speeds a joint up fades out over this last part of the velocity limit
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    torque_nm: Annotated[float, Bounds(0.0, 5.0)] = 0.75  # the authors' optimiser's figure for the R60
+    torque_rate_nm_s: Annotated[float, Bounds(1.0, 10000.0)] = 150.0
+    velocity_rad_s: Annotated[float, Bounds(0.1, 200.0)] = 15.0
+    sweep_min_deg: Annotated[float, Bounds(-180.0, 180.0)] = -60.0
+    sweep_max_deg: Annotated[float, Bounds(-180.0, 180.0)] = 60.0
+    adduction_min_deg: Annotated[float, Bounds(-180.0, 180.0)] = -75.0
+    adduction_max_deg: Annotated[float, Bounds(-180.0, 180.0)] = 45.0
+    temperature_warm_c: Annotated[float, Bounds(0.0, 150.0)] = 70.0  # full torque up to here
+    temperature_hot_c: Annotated[float, Bounds(0.0, 150.0)] = 90.0  # none from here on, and a fault
+    position_margin_deg: Annotated[float, Bounds(0.0, 90.0)] = 10.0  # beyond the limit by this much is a fault
+
+
+class JointRange(NamedTuple):
+    """Position limits of one joint in radians."""
+
+    min_rad: float
+    max_rad: float
+
+
+class LimitedTorques(NamedTuple):
+    torques_nm: Torques
+    limited: bool  # something was cut
+    finite: bool  # False: a torque was NaN or infinite, which is a bug; all four are zero
+
+
+def limited_torque_nm(
+    wanted_nm: float, previous_nm: float, state: DriveState, limits: JointLimits, span: JointRange, dt_s: float
+) -> float:
+    """One joint's torque, given the one sent `dt_s` ago. A joint whose state is unknown gets none."""
+    largest_nm = limits.torque_nm * _cool_fraction(state.temperature_c, limits)
+    upward_nm = largest_nm if state.angle_rad < span.max_rad else 0.0
+    downward_nm = largest_nm if state.angle_rad > span.min_rad else 0.0
+    upward_nm *= _slow_fraction(state.velocity_rad_s, limits.velocity_rad_s)
+    downward_nm *= _slow_fraction(-state.velocity_rad_s, limits.velocity_rad_s)
+    torque_nm = min(max(wanted_nm, -downward_nm), upward_nm)
+    slew_nm = limits.torque_rate_nm_s * dt_s
+    return min(max(torque_nm, previous_nm - slew_nm), previous_nm + slew_nm)
+
+
+def _cool_fraction(temperature_c: float, limits: JointLimits) -> float:
+    """1 when cool, falling to 0 when hot. Drives without a thermistor report NaN or 0, which counts as cool."""
+    if not temperature_c > limits.temperature_warm_c:
+        return 1.0
+    span_c = max(limits.temperature_hot_c - limits.temperature_warm_c, 1e-9)
+    return max(0.0, (limits.temperature_hot_c - temperature_c) / span_c)
+
+
+def _slow_fraction(velocity_rad_s: float, limit_rad_s: float) -> float:
+    """1 while slower than the fade, 0 from the limit on: for torque in the direction of `velocity_rad_s`."""
+    if velocity_rad_s <= (1.0 - VELOCITY_FADE) * limit_rad_s:
+        return 1.0
+    if velocity_rad_s >= limit_rad_s:
+        return 0.0
+    return (limit_rad_s - velocity_rad_s) / (VELOCITY_FADE * limit_rad_s)
+
+
+def apply_limits(
+    wanted_nm: Torques,
+    previous_nm: Torques,
+    states: DriveStates,
+    limits: JointLimits,
+    ranges: tuple[JointRange, JointRange, JointRange, JointRange],
+    dt_s: float,
+) -> LimitedTorques:
+    """See the module. Anything that is not a finite number, wanted or measured, turns all four torques to zero."""
+    a, b, c, d = (
+        limited_torque_nm(wanted, previous, state, limits, span, dt_s)
+        if isfinite(wanted) and isfinite(state.angle_rad) and isfinite(state.velocity_rad_s)
+        else float("nan")
+        for wanted, previous, state, span in zip(wanted_nm, previous_nm, states, ranges, strict=True)
+    )
+    if not isfinite(a + b + c + d):
+        return LimitedTorques((0.0, 0.0, 0.0, 0.0), True, False)
+    return LimitedTorques((a, b, c, d), (a, b, c, d) != wanted_nm, True)

@@ -1,0 +1,121 @@
+"""The records that cross from one part of the program to another, and the names of joints and phases.
+
+Everything here is immutable and carries its unit in its name. Angles follow the paper (section II-A): the sweep
+angle is positive with the flipper in front of its joint, the adduction angle is positive with the flipper raised,
+for the left and the right flipper alike; a mirrored motor is turned round where its bytes are decoded. Stamps are
+seconds of the monotonic clock. A value that was never measured is NaN, a stamp that was never set is -inf.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+JOINTS = ("left_sweep", "left_adduction", "right_sweep", "right_adduction")
+FLIPPERS = ("left", "right")
+NEVER_S = float("-inf")
+UNKNOWN = float("nan")
+
+
+class Phase(IntEnum):
+    """Where in the stride a flipper is. REST is outside of any stride, PAUSE a still moment between two phases."""
+
+    REST = 0
+    INSERTION = 1
+    STANCE = 2
+    EXTRACTION = 3
+    SWING = 4
+    PAUSE = 5
+
+
+class DriveState(NamedTuple):
+    """One joint as its drive last reported it; each signal with the time at which it arrived."""
+
+    angle_rad: float = UNKNOWN
+    velocity_rad_s: float = UNKNOWN
+    angle_stamp_s: float = NEVER_S
+    current_a: float = UNKNOWN  # measured, not the set-point
+    current_stamp_s: float = NEVER_S
+    closed_loop: bool = False
+    error_flags: int = 0
+    heartbeat_stamp_s: float = NEVER_S
+    temperature_c: float = UNKNOWN
+    bus_voltage_v: float = UNKNOWN
+
+
+DriveStates = tuple[DriveState, DriveState, DriveState, DriveState]  # in the order of JOINTS
+Torques = tuple[float, float, float, float]  # N·m, in the order of JOINTS
+NO_TORQUE: Torques = (0.0, 0.0, 0.0, 0.0)
+
+
+class JointTarget(NamedTuple):
+    angle_rad: float
+    velocity_rad_s: float
+
+
+class FlipperTarget(NamedTuple):
+    sweep: JointTarget
+    adduction: JointTarget
+
+
+class GaitTarget(NamedTuple):
+    """What the gait wants of both flippers at one moment."""
+
+    phase: Phase
+    stride: int
+    sweep_rad: float
+    sweep_velocity_rad_s: float
+    depth_m: float  # of the flipper's lowest point below the mud's nominal surface; negative above it
+    depth_velocity_m_s: float
+
+
+class FlipperLoad(NamedTuple):
+    """What the mud does to one flipper: torques about its joints, the force by the paper's map, and the depth."""
+
+    sweep_torque_nm: float
+    adduction_torque_nm: float
+    force_x_n: float  # forward
+    force_z_n: float  # up
+    depth_m: float
+
+
+NO_LOAD = FlipperLoad(UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN)
+
+
+class Estimate(NamedTuple):
+    """One coefficient with its doubt. `reason` says why it is not valid and is empty where it is."""
+
+    value: float  # N/m³
+    std_error: float  # N/m³
+    samples: int
+    valid: bool
+    reason: str = ""
+
+
+class StrideEstimate(NamedTuple):
+    """All that one flipper learned from one stride."""
+
+    flipper: str
+    index: int
+    t_start_s: float
+    t_end_s: float
+    insertion_s: float
+    stance_s: float
+    extraction_s: float
+    k_p: Estimate
+    k_s: Estimate
+    k_e: Estimate
+    surface_m: float  # depth of the mud's surface below its nominal height
+    depth_m: float  # deepest point reached below that surface
+    released: bool  # the flipper was out of the mud when the extraction ended
+    insertion_force_n: float  # largest upward force in insertion
+    stance_force_n: float  # largest forward force in stance
+    extraction_force_n: float  # most negative upward force in extraction
+    step_m: float  # the body's advance since the stride before; NaN without a pose
+
+
+class BodyPose(NamedTuple):
+    """The body's place along the track, from motion capture or a rail encoder."""
+
+    stamp_s: float = NEVER_S
+    x_m: float = UNKNOWN
