@@ -15,7 +15,7 @@ The published lengths disagree (0.115 m in the paper, 0.120 m in the controller)
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import asin, atan2, cos, hypot, radians, sin
+from math import asin, atan2, cos, hypot, radians, sin, sqrt
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
@@ -96,7 +96,7 @@ class FlipperGeometry:
         radius_m = hypot(self.flipper_length_m * cos(radians(sweep_angle_deg)), self.drop_m)
         if radius_m <= MIN_LEVER_M:
             return -self.axis_height_m
-        return (radius_m * radius_m - MIN_LEVER_M * MIN_LEVER_M) ** 0.5 - self.axis_height_m
+        return sqrt(radius_m * radius_m - MIN_LEVER_M * MIN_LEVER_M) - self.axis_height_m
 
     def is_reachable(self, sweep_rad: float, depth_m: float) -> bool:
         """Whether the pose exists and leaves the adduction joint a vertical lever of at least MIN_LEVER_M."""

@@ -10,27 +10,29 @@ from math import cos, sin
 from typing import Annotated
 
 from control.bounds import Bounds
-from control.records import DriveState, FlipperTarget, JointTarget
+from control.records import DriveState, DriveStates, JointTarget, JointTargets, Torques
 
 GRAVITY_M_S2 = 9.81
 
 
 @dataclass(frozen=True)
 class JointGains:
-    """At 380 Hz with samples up to 2 ms old, damping over arm inertia should stay under about 150 rad/s."""
+    """At 380 Hz with samples up to 2 ms old, damping over arm inertia should stay under about 150 1/s."""
 
-    sweep_stiffness_nm_rad: Annotated[float, Bounds(0.0, 200.0)] = 12.0
-    sweep_damping_nm_s_rad: Annotated[float, Bounds(0.0, 5.0)] = 0.10
-    adduction_stiffness_nm_rad: Annotated[float, Bounds(0.0, 200.0)] = 18.0
-    adduction_damping_nm_s_rad: Annotated[float, Bounds(0.0, 5.0)] = 0.15
+    sweep_stiffness_nm_rad: Annotated[float, Bounds(0.0, 200.0)] = 8.0
+    sweep_damping_nm_s_rad: Annotated[float, Bounds(0.0, 5.0)] = 0.06
+    adduction_stiffness_nm_rad: Annotated[float, Bounds(0.0, 200.0)] = 10.0
+    adduction_damping_nm_s_rad: Annotated[float, Bounds(0.0, 5.0)] = 0.08
 
 
 @dataclass(frozen=True)
 class ArmMass:
-    """Of one flipper arm with all that its adduction joint lifts, as a point on the arm."""
+    """Of one flipper arm with all that its adduction joint lifts: a point on the arm, and inertia about the axes."""
 
     arm_mass_kg: Annotated[float, Bounds(0.0, 20.0)] = 0.08
     center_of_mass_m: Annotated[float, Bounds(0.0, 1.0)] = 0.06  # from the axes, along the arm
+    sweep_inertia_kg_m2: Annotated[float, Bounds(0.0, 1.0)] = 0.0004  # arm and plate of PLA, rotor of a 60 mm motor
+    adduction_inertia_kg_m2: Annotated[float, Bounds(0.0, 1.0)] = 0.0006  # the same, and the sweep motor at the axis
 
     def gravity_torques_nm(self, sweep_rad: float, adduction_rad: float) -> tuple[float, float]:
         """What gravity does to (sweep, adduction): -∂/∂q of m g r cos α sin β."""
@@ -47,13 +49,26 @@ def pd_torque_nm(
     )
 
 
-def flipper_torques_nm(
-    target: FlipperTarget, sweep: DriveState, adduction: DriveState, gains: JointGains, mass: ArmMass, gain: float
+def joint_torques_nm(
+    targets: JointTargets, states: DriveStates, gains: JointGains, mass: ArmMass, fade: float
+) -> Torques:
+    """Of all four joints; `fade` goes from 0 to 1 after arming, so that nothing jerks."""
+    left = _flipper_torques_nm(targets[0], targets[1], states[0], states[1], gains, mass)
+    right = _flipper_torques_nm(targets[2], targets[3], states[2], states[3], gains, mass)
+    return fade * left[0], fade * left[1], fade * right[0], fade * right[1]
+
+
+def _flipper_torques_nm(
+    sweep_target: JointTarget,
+    adduction_target: JointTarget,
+    sweep: DriveState,
+    adduction: DriveState,
+    gains: JointGains,
+    mass: ArmMass,
 ) -> tuple[float, float]:
-    """(sweep, adduction) torques; `gain` from 0 to 1 fades the joints in after arming."""
     gravity_sweep_nm, gravity_adduction_nm = mass.gravity_torques_nm(sweep.angle_rad, adduction.angle_rad)
-    sweep_nm = pd_torque_nm(target.sweep, sweep, gains.sweep_stiffness_nm_rad, gains.sweep_damping_nm_s_rad)
+    sweep_nm = pd_torque_nm(sweep_target, sweep, gains.sweep_stiffness_nm_rad, gains.sweep_damping_nm_s_rad)
     adduction_nm = pd_torque_nm(
-        target.adduction, adduction, gains.adduction_stiffness_nm_rad, gains.adduction_damping_nm_s_rad
+        adduction_target, adduction, gains.adduction_stiffness_nm_rad, gains.adduction_damping_nm_s_rad
     )
-    return gain * (sweep_nm - gravity_sweep_nm), gain * (adduction_nm - gravity_adduction_nm)
+    return sweep_nm - gravity_sweep_nm, adduction_nm - gravity_adduction_nm

@@ -8,6 +8,7 @@ seconds of the monotonic clock. A value that was never measured is NaN, a stamp 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -53,9 +54,8 @@ class JointTarget(NamedTuple):
     velocity_rad_s: float
 
 
-class FlipperTarget(NamedTuple):
-    sweep: JointTarget
-    adduction: JointTarget
+JointTargets = tuple[JointTarget, JointTarget, JointTarget, JointTarget]  # in the order of JOINTS
+JointAngles = tuple[float, float, float, float]  # rad, in the order of JOINTS
 
 
 class GaitTarget(NamedTuple):
@@ -92,7 +92,8 @@ class Estimate(NamedTuple):
     reason: str = ""
 
 
-class StrideEstimate(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class StrideEstimate:
     """All that one flipper learned from one stride."""
 
     flipper: str

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 CDR_HEADER = b"\x00\x01\x00\x00"  # CDR, little-endian, no options
 FORMAT_OF = {"float64": "d", "float32": "f", "uint32": "I", "int32": "i", "uint8": "B", "bool": "?"}
 
 
-class Field(NamedTuple):
+@dataclass(frozen=True)
+class Field:
     name: str
     kind: str  # a ROS 2 primitive, or "string" in the last place of a row
     count: int = 1  # more than one makes a fixed-size array
@@ -47,7 +49,7 @@ class RowKind:
         """Values flat, arrays spread out; a text row's text last."""
         if not self.has_text:
             return self.layout.pack(CDR_HEADER, *values)
-        text = values[-1].encode() + b"\x00"
+        text: bytes = values[-1].encode() + b"\x00"
         fixed = self.layout.pack(CDR_HEADER, *values[:-1])
         padding = b"\x00" * (-(len(fixed) - len(CDR_HEADER)) % 4)
         return fixed + padding + struct.pack("<I", len(text)) + text

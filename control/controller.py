@@ -1,0 +1,137 @@
+"""From a mode to the torques that it wants: hold a pose, walk, or raise the flippers.
+
+Owns the gait and the paths into and out of it. Modes without torque want none; what leaves for the drives is decided
+by the limits, not here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+from typing import Annotated, NamedTuple
+
+from control.bounds import Bounds
+from control.gait import Gait, GaitParameters
+from control.geometry import FlipperGeometry
+from control.joint_path import JointPath, still
+from control.joint_pd import ArmMass, JointGains, joint_torques_nm
+from control.modes import MOVING, Mode
+from control.records import (
+    NO_TORQUE,
+    DriveStates,
+    GaitTarget,
+    JointAngles,
+    JointTarget,
+    JointTargets,
+    Phase,
+    Torques,
+)
+
+
+@dataclass(frozen=True)
+class MotionParameters:
+    """Of everything that is not the gait."""
+
+    path_speed_rad_s: Annotated[float, Bounds(0.05, 10.0)] = 1.0
+    fade_in_s: Annotated[float, Bounds(0.0, 10.0)] = 0.5  # stiffness after arming
+
+
+class WalkOrder(NamedTuple):
+    depth_m: float  # of every stride, or of the first one if adaptive
+    adaptive: bool = True
+    strides: int = 0  # 0: until told to stop
+
+
+def measured_angles(states: DriveStates) -> JointAngles:
+    return states[0].angle_rad, states[1].angle_rad, states[2].angle_rad, states[3].angle_rad
+
+
+RESTING = GaitTarget(Phase.REST, -1, 0.0, 0.0, 0.0, 0.0)
+
+
+class Controller:
+    def __init__(
+        self,
+        gait: GaitParameters,
+        geometry: FlipperGeometry,
+        gains: JointGains,
+        mass: ArmMass,
+        motion: MotionParameters,
+    ) -> None:
+        self.gait = Gait(gait, geometry)
+        self.geometry = geometry
+        self.gains = gains
+        self.mass = mass
+        self.motion = motion
+        self.order = WalkOrder(0.0)
+        self.reset()
+
+    def reset(self) -> None:
+        self._mode = Mode.IDLE
+        self._path: JointPath | None = None
+        self._pose: JointTargets = still((0.0, 0.0, 0.0, 0.0))
+        self._fade = 0.0
+        self.target = RESTING
+
+    @property
+    def walk_finished(self) -> bool:
+        """The strides of the order are done."""
+        return 0 < self.order.strides <= self.target.stride
+
+    @property
+    def raised(self) -> bool:
+        """The path that ends a walk has arrived."""
+        return self._mode is Mode.STOPPING and self._path is not None and self._path.finished
+
+    def step(self, dt_s: float, mode: Mode, states: DriveStates) -> Torques:
+        """Torques wanted of the four joints; `target` then says where in the stride they belong to."""
+        if mode is not self._mode:
+            self._enter(mode, states)
+        if mode not in MOVING:
+            self.target = RESTING
+            return NO_TORQUE
+        self._fade = min(1.0, self._fade + dt_s / max(self.motion.fade_in_s, dt_s))
+        return joint_torques_nm(self._targets(dt_s, mode), states, self.gains, self.mass, self._fade)
+
+    def _enter(self, mode: Mode, states: DriveStates) -> None:
+        here = measured_angles(states)
+        if mode is Mode.HOLD:
+            self._pose = self._pose if self._mode is Mode.STOPPING else still(here)
+        elif mode is Mode.WALKING:
+            self._path = self._path_to_start(here)
+            self.gait.reset(self.order.depth_m)
+        elif mode is Mode.STOPPING:
+            self._path = JointPath(here, [self._raised(here)], self.motion.path_speed_rad_s)
+        if mode not in MOVING:
+            self._fade = 0.0
+        self._mode = mode
+
+    def _raised(self, angles: JointAngles) -> JointAngles:
+        """Arms level: the lower edge clears the mud by H - h."""
+        return angles[0], 0.0, angles[2], 0.0
+
+    def _path_to_start(self, here: JointAngles) -> JointPath:
+        front = radians(self.gait.parameters.sweep_angle_deg)
+        way_points = [self._raised(here), (front, 0.0, front, 0.0)]
+        return JointPath(here, way_points, self.motion.path_speed_rad_s)
+
+    def _targets(self, dt_s: float, mode: Mode) -> JointTargets:
+        if mode is Mode.HOLD or self._path is None:
+            self.target = RESTING
+            return self._pose
+        if mode is Mode.STOPPING or not self._path.finished:
+            self.target = RESTING
+            self._pose = self._path.step(dt_s)
+            return self._pose
+        self.target = self.gait.step(dt_s)
+        return self._follow(self.target)
+
+    def _follow(self, target: GaitTarget) -> JointTargets:
+        """The gait's target as joint targets: the same for both flippers."""
+        sweep = JointTarget(target.sweep_rad, target.sweep_velocity_rad_s)
+        angle_rad = self.geometry.adduction_rad(target.sweep_rad, target.depth_m)
+        velocity_rad_s = self.geometry.adduction_velocity_rad_s(
+            target.sweep_rad, angle_rad, target.sweep_velocity_rad_s, target.depth_velocity_m_s
+        )
+        adduction = JointTarget(angle_rad, velocity_rad_s)
+        return sweep, adduction, sweep, adduction

@@ -1,0 +1,87 @@
+"""One CAN bus as the drives see it: frames in, frames out, losses counted.
+
+python-can opens the interface (`socketcan` on the robot, `virtual` in tests, `mudskipper_local` between processes
+without CAN) and carries the frames. Its Message objects stay on this side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import can
+
+from drivers.frames import Frame
+
+MOST_FRAMES_PER_READ = 256  # a babbling node must not hold the loop
+
+
+class CanPort(Protocol):
+    """What the drives need of a bus. `failed_sends` and `error_frames` only grow."""
+
+    failed_sends: int
+    error_frames: int
+
+    def receive(self) -> Sequence[Frame]:
+        """All data frames that have arrived, oldest first; never waits."""
+
+    def send(self, frame: Frame) -> None:
+        """Never waits; a frame that cannot be queued is dropped and counted, the next tick brings a newer one."""
+
+    def close(self) -> None: ...
+
+
+class PythonCanPort:
+    """A CanPort over any python-can interface."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self._bus = bus
+        self.failed_sends = 0
+        self.error_frames = 0
+        self.last_error = ""
+
+    def receive(self) -> list[Frame]:
+        frames: list[Frame] = []
+        receive = self._bus.recv
+        try:
+            for _ in range(MOST_FRAMES_PER_READ):
+                message = receive(0.0)
+                if message is None:
+                    break
+                if message.is_error_frame:  # first: its class bits look like a drive's id
+                    self.error_frames += 1
+                else:
+                    frames.append(
+                        Frame(
+                            message.arbitration_id,
+                            bytes(message.data),
+                            message.is_remote_frame,
+                            False,
+                            message.is_extended_id,
+                        )
+                    )
+        except can.CanError as problem:  # the interface went down: the drives fall silent, which is a fault
+            self.error_frames += 1
+            self.last_error = str(problem)
+        return frames
+
+    def send(self, frame: Frame) -> None:
+        message = can.Message(
+            arbitration_id=frame.arbitration_id,
+            data=frame.data,
+            is_extended_id=frame.is_extended,
+            is_remote_frame=frame.is_remote,
+        )
+        try:
+            self._bus.send(message)
+        except can.CanError as problem:  # a full transmit queue (ENOBUFS) or an interface that is down
+            self.failed_sends += 1
+            self.last_error = str(problem)
+
+    def close(self) -> None:
+        self._bus.shutdown()
+
+
+def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool]) -> PythonCanPort:
+    """Raises can.CanError, OSError or ValueError with python-can's sentence where the interface does not open."""
+    return PythonCanPort(can.Bus(interface=interface, channel=channel, **options))  # type: ignore[arg-type]

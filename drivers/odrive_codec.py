@@ -1,0 +1,102 @@
+"""ODrive CANSimple, firmware 0.6: the bytes of each message, in both directions.
+
+An 11-bit arbitration id is (node id << 5) | command; payloads are little-endian, floats IEEE-754 binary32, positions
+in turns. A value is asked for by a remote frame of its own id. Source: ODrive's CANSimple documentation and its
+published DBC for 0.6.10, against which the tests hold this table. Some commands meant other things in 0.5, so a
+drive's version is read before it is armed.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from struct import Struct, error
+from typing import Any
+
+
+class GarbledMessageError(ValueError):
+    """A payload of the wrong length, or with a number that is none."""
+
+
+class Message:
+    """One command with its payload's layout: the only scale and order table, for encoding and decoding."""
+
+    def __init__(self, command: int, layout: str) -> None:
+        self.command = command
+        self._struct = Struct(layout)
+
+    def encode(self, *values: Any) -> bytes:
+        return self._struct.pack(*values)
+
+    def decode(self, data: bytes) -> tuple[Any, ...]:
+        """Raises GarbledMessageError where the payload is shorter or longer than the layout."""
+        try:
+            return self._struct.unpack(data)
+        except error as problem:
+            raise GarbledMessageError(f"command 0x{self.command:02x} with {len(data)} bytes") from problem
+
+
+GET_VERSION = Message(0x00, "<8B")  # protocol, product line, hw version, hw variant, major, minor, revision, unreleased
+HEARTBEAT = Message(0x01, "<IBBB1x")  # axis error, axis state, procedure result, bit 0 trajectory done
+ESTOP = Message(0x02, "<")
+GET_ERROR = Message(0x03, "<II")  # active errors, disarm reason
+SET_AXIS_STATE = Message(0x07, "<I")
+GET_ENCODER_ESTIMATES = Message(0x09, "<ff")  # turns, turns/s
+SET_CONTROLLER_MODE = Message(0x0B, "<II")  # control mode, input mode
+SET_INPUT_TORQUE = Message(0x0E, "<f")  # N·m
+SET_LIMITS = Message(0x0F, "<ff")  # turns/s, A
+GET_IQ = Message(0x14, "<ff")  # set-point A, measured A
+GET_TEMPERATURE = Message(0x15, "<ff")  # FET °C, motor °C
+GET_BUS_VOLTAGE_CURRENT = Message(0x17, "<ff")  # V, A
+CLEAR_ERRORS = Message(0x18, "<B")  # identify flag
+
+
+class AxisState(IntEnum):
+    UNDEFINED = 0
+    IDLE = 1
+    CLOSED_LOOP = 8
+
+
+TORQUE_CONTROL = 1  # control mode
+PASSTHROUGH = 1  # input mode
+
+# Flags of active errors and disarm reasons that the simulated drive raises itself (odrive.enums.ODriveError).
+ERROR_WATCHDOG = 0x1000000
+ERROR_ESTOP = 0x2000000
+ERROR_VELOCITY_LIMIT = 0x8000
+
+ERROR_NAMES = {
+    0x1: "initializing",
+    0x2: "system level",
+    0x4: "timing error",
+    0x8: "missing estimate",
+    0x10: "bad configuration",
+    0x20: "gate driver fault",
+    0x40: "missing input",
+    0x100: "bus over-voltage",
+    0x200: "bus under-voltage",
+    0x400: "bus over-current",
+    0x800: "bus over-regeneration",
+    0x1000: "current limit violation",
+    0x2000: "motor over-temperature",
+    0x4000: "inverter over-temperature",
+    ERROR_VELOCITY_LIMIT: "velocity limit violation",
+    0x10000: "position limit violation",
+    0x20000: "requested current too high",
+    ERROR_WATCHDOG: "watchdog expired",
+    ERROR_ESTOP: "emergency stop requested",
+    0x4000000: "spin-out",
+    0x8000000: "brake resistor disarmed",
+    0x10000000: "thermistor disconnected",
+    0x40000000: "calibration error",
+}
+
+
+def error_text(flags: int) -> str:
+    """Active errors in words; unknown bits as a number."""
+    names = [name for bit, name in ERROR_NAMES.items() if flags & bit]
+    unknown = flags & ~sum(ERROR_NAMES)
+    return ", ".join(names + ([f"unknown flag 0x{unknown:x}"] if unknown else []))
+
+
+def arbitration_id(node_id: int, message: Message) -> int:
+    return node_id << 5 | message.command

@@ -1,0 +1,280 @@
+"""The robot's configuration: one TOML file, checked once, before anything is energised.
+
+Only what differs from machine to machine is configuration. Every section is a record of the part that uses it, with
+default, unit and bounds beside each field there; this module reads the file, refuses unknown keys and values out of
+bounds, all of them at once and by name, and checks what only the whole can show: that the gait is within reach of
+the geometry and of the joint limits.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from math import degrees, radians
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from control.adaptation import AdaptationParameters
+from control.bounds import Bounds
+from control.controller import MotionParameters
+from control.gait import PROTOCOLS, GaitParameters
+from control.geometry import FlipperGeometry
+from control.joint_pd import ArmMass, JointGains
+from control.limits import JointLimits, JointRange
+from control.records import JOINTS
+from drivers.odrive_drives import DriveParameters
+
+EXIT_CONFIGURATION = 78  # EX_CONFIG of sysexits.h; systemd is told not to restart on it
+
+
+class ConfigurationError(Exception):
+    """Everything that is wrong with a file, one sentence each, naming key, value and bound."""
+
+    def __init__(self, problems: list[str]) -> None:
+        super().__init__("\n".join(problems))
+        self.problems = problems
+
+
+@dataclass(frozen=True)
+class RobotIdentity:
+    name: str = "mudskipper"
+
+
+@dataclass(frozen=True)
+class BusParameters:
+    """Any python-can interface; `options` go to it as they are."""
+
+    interface: str
+    channel: str
+    options: dict[str, str | int | float | bool] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class LoopParameters:
+    silence_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0263  # 10 ticks without position or current: a fault
+    priority: Annotated[int, Bounds(0, 99)] = 45  # SCHED_FIFO, under the interrupt threads' 50; 0: none
+    cpu: Annotated[int, Bounds(-1, 1023)] = -1  # to run on; -1: any
+    lock_memory: bool = True
+
+
+@dataclass(frozen=True)
+class LogParameters:
+    directory: str = "logs"
+    enabled: bool = True
+
+
+@dataclass(frozen=True)
+class StatusParameters:
+    socket: str = "/run/mudskipper/mudskipper.sock"
+
+
+@dataclass(frozen=True)
+class PoseParameters:
+    socket: str = ""  # where a motion-capture bridge sends the body's place; empty: there is none
+
+
+@dataclass(frozen=True)
+class Configuration:
+    bus: dict[str, BusParameters]
+    drive: dict[str, DriveParameters]
+    robot: RobotIdentity = RobotIdentity()
+    geometry: FlipperGeometry = FlipperGeometry()
+    arm: ArmMass = ArmMass()
+    gait: GaitParameters = GaitParameters()
+    gains: JointGains = JointGains()
+    motion: MotionParameters = MotionParameters()
+    limits: JointLimits = JointLimits()
+    adaptation: AdaptationParameters = AdaptationParameters()
+    loop: LoopParameters = LoopParameters()
+    log: LogParameters = LogParameters()
+    status: StatusParameters = StatusParameters()
+    pose: PoseParameters = PoseParameters()
+    text: str = ""  # the file itself, which goes into every log
+
+    @property
+    def torque_constants_nm_a(self) -> tuple[float, float, float, float]:
+        a, b, c, d = (self.drive[joint].torque_constant_nm_a for joint in JOINTS)
+        return a, b, c, d
+
+    @property
+    def joint_ranges(self) -> tuple[JointRange, JointRange, JointRange, JointRange]:
+        limits = self.limits
+        sweep = JointRange(radians(limits.sweep_min_deg), radians(limits.sweep_max_deg))
+        adduction = JointRange(radians(limits.adduction_min_deg), radians(limits.adduction_max_deg))
+        return sweep, adduction, sweep, adduction
+
+
+def load_configuration(path: Path) -> Configuration:
+    """Raises ConfigurationError, also where the file cannot be read."""
+    try:
+        return parse_configuration(path.read_text(encoding="utf-8"))
+    except OSError as problem:
+        raise ConfigurationError([f"{path}: {problem.strerror}"]) from problem
+    except UnicodeDecodeError as problem:
+        raise ConfigurationError([f"{path}: not UTF-8 text at byte {problem.start}"]) from problem
+
+
+def parse_configuration(text: str) -> Configuration:
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as problem:
+        raise ConfigurationError([f"not a TOML file: {problem}"]) from problem
+    _apply_protocol(document)
+    values = _validated(document)
+    configuration = Configuration(**values, text=text)
+    problems = list(_contradictions(configuration))
+    if problems:
+        raise ConfigurationError(problems)
+    return configuration
+
+
+def _apply_protocol(document: dict[str, Any]) -> None:
+    """`gait.protocol` names the preset that the other keys of [gait] change."""
+    gait = document.get("gait")
+    if not isinstance(gait, dict) or "protocol" not in gait:
+        return
+    name = gait.pop("protocol")
+    if not isinstance(name, str) or name not in PROTOCOLS:
+        raise ConfigurationError([f"gait.protocol = {name!r}: must be one of {', '.join(PROTOCOLS)}"])
+    document["gait"] = asdict(PROTOCOLS[name]) | gait
+
+
+def _validated(document: Mapping[str, Any]) -> dict[str, Any]:
+    try:
+        checked = _DOCUMENT_MODEL.model_validate(document)
+    except ValidationError as problem:
+        raise ConfigurationError([_sentence(error) for error in problem.errors()]) from problem
+    return {name: _as_records(hint, getattr(checked, name)) for name, hint in _hints(Configuration).items()}
+
+
+def _hints(record: type) -> dict[str, Any]:
+    """Annotations of a record's fields; of the Configuration those that a file may hold."""
+    return {name: hint for name, hint in get_type_hints(record, include_extras=True).items() if name != "text"}
+
+
+def _model_of(record: type) -> type[BaseModel]:
+    """A pydantic model with a record's fields, defaults and bounds, which refuses anything else."""
+    hints = _hints(record)
+    definitions: dict[str, Any] = {}
+    for item in fields(record):
+        if item.name not in hints:
+            continue
+        default = item.default if item.default is not MISSING else ...
+        if item.default_factory is not MISSING:
+            default = Field(default_factory=item.default_factory)
+        definitions[item.name] = (_checked_hint(hints[item.name]), default)
+    settings = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+    return create_model(record.__name__, __config__=settings, **definitions)
+
+
+def _checked_hint(hint: Any) -> Any:
+    if get_origin(hint) is Annotated:
+        kind, bounds = get_args(hint)
+        return Annotated[kind, Field(ge=bounds.minimum, le=bounds.maximum)]
+    if get_origin(hint) is dict and is_dataclass(get_args(hint)[1]):
+        return dict[str, _model_of(get_args(hint)[1])]  # type: ignore[misc]
+    return _model_of(hint) if is_dataclass(hint) and isinstance(hint, type) else hint
+
+
+def _as_records(hint: Any, value: Any) -> Any:
+    """Models back to the records that they were made from."""
+    if get_origin(hint) is dict:
+        record = get_args(hint)[1]
+        return {name: record(**dict(model)) for name, model in value.items()}
+    return hint(**dict(value)) if isinstance(value, BaseModel) else value
+
+
+_DOCUMENT_MODEL = _model_of(Configuration)
+
+
+def _sentence(error: Any) -> str:
+    """`limits.torque_nm = 9.0: must be at most 5.0`."""
+    key = ".".join(str(part) for part in error["loc"])
+    bounds = error.get("ctx", {})
+    match error["type"]:
+        case "extra_forbidden":
+            return f"{key}: there is no such key"
+        case "missing":
+            return f"{key} is missing"
+        case "greater_than_equal":
+            return f"{key} = {error['input']}: must be at least {bounds['ge']}"
+        case "less_than_equal":
+            return f"{key} = {error['input']}: must be at most {bounds['le']}"
+        case _:
+            return f"{key} = {error['input']!r}: {error['msg'].removeprefix('Input ').lower()}"
+
+
+def _contradictions(configuration: Configuration) -> Iterator[str]:
+    yield from _drive_problems(configuration)
+    yield from _depth_problems(configuration)
+    yield from _range_problems(configuration)
+
+
+def _drive_problems(configuration: Configuration) -> Iterator[str]:
+    places: dict[tuple[str, int], str] = {}
+    for joint in JOINTS:
+        if joint not in configuration.drive:
+            yield f"drive.{joint} is missing: all of {', '.join(JOINTS)} are needed"
+    for joint, drive in configuration.drive.items():
+        if joint not in JOINTS:
+            yield f"drive.{joint}: there is no such joint; the joints are {', '.join(JOINTS)}"
+        if drive.bus not in configuration.bus:
+            known = ", ".join(configuration.bus) or "none"
+            yield f"drive.{joint}.bus = {drive.bus!r}: no such bus; there is {known}"
+        if drive.sign == 0:
+            yield f"drive.{joint}.sign = 0: must be 1 or -1"
+        twin = places.setdefault((drive.bus, drive.node_id), joint)
+        if twin != joint:
+            yield f"drive.{joint}.node_id = {drive.node_id}: {twin} has the same on bus {drive.bus!r}"
+
+
+def _depth_problems(configuration: Configuration) -> Iterator[str]:
+    geometry, gait, adaptation = configuration.geometry, configuration.gait, configuration.adaptation
+    if geometry.clearance_m <= 0.0:
+        yield (
+            f"geometry.axis_height_m = {geometry.axis_height_m}: must be more than geometry.drop_m = {geometry.drop_m},"
+            " or the raised flipper stays in the mud"
+        )
+    deepest_m = geometry.deepest_m(gait.sweep_angle_deg)
+    if adaptation.max_depth_m > deepest_m:
+        yield (
+            f"adaptation.max_depth_m = {adaptation.max_depth_m}: out of reach, must be at most {deepest_m:.4f}"
+            f" for this geometry and a sweep of ±{gait.sweep_angle_deg:g} degrees"
+        )
+    if adaptation.min_depth_m > adaptation.max_depth_m:
+        yield (
+            f"adaptation.min_depth_m = {adaptation.min_depth_m}: must be at most"
+            f" adaptation.max_depth_m = {adaptation.max_depth_m}"
+        )
+    if not adaptation.min_depth_m <= adaptation.initial_depth_m <= adaptation.max_depth_m:
+        yield (
+            f"adaptation.initial_depth_m = {adaptation.initial_depth_m}: must be from {adaptation.min_depth_m}"
+            f" to {adaptation.max_depth_m}, adaptation.min_depth_m and max_depth_m"
+        )
+
+
+def _range_problems(configuration: Configuration) -> Iterator[str]:
+    limits, sweep_deg = configuration.limits, configuration.gait.sweep_angle_deg
+    if limits.sweep_min_deg > -sweep_deg:
+        yield f"limits.sweep_min_deg = {limits.sweep_min_deg}: must be at most {-sweep_deg:g} for gait.sweep_angle_deg"
+    if limits.sweep_max_deg < sweep_deg:
+        yield f"limits.sweep_max_deg = {limits.sweep_max_deg}: must be at least {sweep_deg:g} for gait.sweep_angle_deg"
+    if limits.temperature_hot_c < limits.temperature_warm_c:
+        yield (
+            f"limits.temperature_hot_c = {limits.temperature_hot_c}: must be at least"
+            f" limits.temperature_warm_c = {limits.temperature_warm_c}"
+        )
+    if limits.adduction_max_deg < 0.0:
+        yield f"limits.adduction_max_deg = {limits.adduction_max_deg}: must be at least 0, the raised arm"
+    depth_m = configuration.adaptation.max_depth_m
+    if depth_m > configuration.geometry.deepest_m(sweep_deg):
+        return  # said already
+    lowest_deg = degrees(configuration.geometry.adduction_rad(radians(sweep_deg), depth_m))
+    if limits.adduction_min_deg > lowest_deg:
+        yield (
+            f"limits.adduction_min_deg = {limits.adduction_min_deg}: must be at most {lowest_deg:.1f}"
+            f" to reach adaptation.max_depth_m = {depth_m}"
+        )

@@ -1,0 +1,208 @@
+"""mudskipperd: the process on the robot.
+
+Reads the configuration, opens the buses, and runs the loop until it is told to end. SIGTERM and SIGINT let it finish
+safely: flippers out of the mud, torque to zero, drives idle, log closed. What nobody expected ends in one place,
+which idles the drives, says what happened, and exits with status 1; systemd starts it again, disarmed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from datetime import UTC, datetime
+from pathlib import Path
+
+import can
+
+from control.modes import ENERGISED, Mode, Request
+from drivers.can_port import PythonCanPort, open_port
+from drivers.odrive_drives import OdriveDrives
+from drivers.pose_port import PosePort
+from firmware_host.configuration import (
+    EXIT_CONFIGURATION,
+    Configuration,
+    ConfigurationError,
+    load_configuration,
+)
+from firmware_host.loop import Loop
+from firmware_host.operator_calls import OperatorCalls, software_version
+from firmware_host.realtime import prepare_loop
+from firmware_host.recorder import NullRecorder, Recorder
+from firmware_host.sd_notify import SystemdNotifier
+from firmware_host.status_socket import AlreadyServedError, StatusSocket
+from firmware_host.ticker import RATE_HZ, Beat, Ticker
+
+EXIT_FAILED = 1
+LONGEST_SHUTDOWN_S = 5.0
+GOODBYE_S = 0.3  # for idle requests to leave and be obeyed
+NOTIFY_TICKS = int(RATE_HZ / 4)
+
+
+class StartError(Exception):
+    """The daemon cannot start; the text says what to do."""
+
+
+class Heartbeat:
+    """Feeds systemd's watchdog from the ticks themselves: a loop that misses more than it makes is not healthy."""
+
+    def __init__(self, notifier: SystemdNotifier) -> None:
+        self._notifier = notifier
+        self._made = self._missed = 0
+
+    def beat(self, beat: Beat, mode: Mode) -> None:
+        self._made += 1
+        self._missed += beat.missed
+        if self._made < NOTIFY_TICKS:
+            return
+        if self._missed <= self._made:
+            self._notifier.send("WATCHDOG=1", f"STATUS={mode.name.lower()}")
+        self._made = self._missed = 0
+
+
+class Shutdown:
+    """Owns the wish to end, and asks the loop for one step towards it per tick."""
+
+    def __init__(self) -> None:
+        self.wanted = False
+        self._since_s: float | None = None
+        self._idle_since_s: float | None = None
+
+    def ask(self, number: int, frame: object) -> None:
+        """A signal handler."""
+        self.wanted = True
+
+    def step(self, loop: Loop, now_s: float) -> bool:
+        """Whether the loop may end now."""
+        if not self.wanted:
+            return False
+        self._since_s = self._since_s or now_s
+        if loop.mode not in ENERGISED:
+            self._idle_since_s = self._idle_since_s or now_s
+            return not loop.health.closed_loop or now_s - self._idle_since_s > GOODBYE_S
+        if now_s - self._since_s > LONGEST_SHUTDOWN_S or loop.mode in (Mode.HOLD, Mode.ARMING):
+            loop.request(Request.DISARM, now_s)
+        elif loop.mode is Mode.WALKING:
+            loop.request(Request.STOP, now_s)
+        return False
+
+
+def new_log_path(configuration: Configuration) -> Path | None:
+    if not configuration.log.enabled:
+        return None
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
+    return Path(configuration.log.directory) / f"{configuration.robot.name}-{stamp}.mcap"
+
+
+def open_recorder(configuration: Configuration, path: Path | None) -> Recorder | NullRecorder:
+    if path is None:
+        return NullRecorder()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    metadata = {"robot": configuration.robot.name, "version": software_version()}
+    return Recorder(path, configuration.text, metadata)
+
+
+def open_ports(configuration: Configuration) -> dict[str, PythonCanPort]:
+    ports: dict[str, PythonCanPort] = {}
+    for name, bus in configuration.bus.items():
+        try:
+            ports[name] = open_port(bus.interface, bus.channel, bus.options)
+        except (can.CanError, OSError, ValueError, TypeError) as problem:
+            for port in ports.values():
+                port.close()
+            raise StartError(f"bus.{name} ({bus.interface} {bus.channel}) does not open: {problem}") from problem
+    return ports
+
+
+def run(configuration: Configuration, shutdown: Shutdown) -> int:
+    """Until `shutdown` is wanted and done. Raises StartError, AlreadyServedError or OSError before it has begun."""
+    with ExitStack() as stack:
+        ports = open_ports(configuration)
+        drives = OdriveDrives(configuration.drive, ports)
+        stack.callback(drives.close)
+        pose = PosePort(Path(configuration.pose.socket) if configuration.pose.socket else None)
+        stack.callback(pose.close)
+        log_path = new_log_path(configuration)
+        recorder = open_recorder(configuration, log_path)
+        stack.callback(recorder.close, timeout_s=10.0)
+        loop = Loop(configuration, drives, pose, recorder)
+        warnings: list[str] = []
+        calls = OperatorCalls(loop, recorder, str(log_path) if log_path else None, warnings, time.monotonic)
+        status = StatusSocket(Path(configuration.status.socket), calls.methods)
+        stack.callback(status.close)
+        notifier = SystemdNotifier()
+        stack.callback(notifier.close)
+        options = configuration.loop
+        warnings += prepare_loop(options.priority, options.cpu, options.lock_memory)
+        for warning in warnings:
+            print(f"warning: {warning}", file=sys.stderr)
+        return _run_loop(loop, status, notifier, shutdown)
+
+
+def _run_loop(loop: Loop, status: StatusSocket, notifier: SystemdNotifier, shutdown: Shutdown) -> int:
+    ticker, heartbeat = Ticker(), Heartbeat(notifier)
+    notifier.send("READY=1", "STATUS=running")
+    now_s = time.monotonic()
+    try:
+        while not shutdown.step(loop, now_s):
+            beat = ticker.wait()
+            now_s = beat.now_s
+            loop.tick(beat)
+            status.serve()
+            heartbeat.beat(beat, loop.mode)
+        notifier.send("STOPPING=1")
+        return 0
+    except Exception as problem:  # noqa: BLE001 - the one place where surprises end
+        return _end_safely(loop, problem)
+
+
+def _end_safely(loop: Loop, problem: Exception) -> int:
+    """Idle the drives, whatever state the rest is in, and say what happened."""
+    for _ in range(5):
+        loop.drives.disarm(time.monotonic(), at_once=True)
+    place = traceback.extract_tb(problem.__traceback__)[-1]
+    sentence = f"{type(problem).__name__}: {problem} ({Path(place.filename).name}, line {place.lineno})"
+    loop.event(time.monotonic(), f"stopped by a bug: {sentence}")
+    print(f"mudskipperd: stopped by a bug, the drives are idle: {sentence}", file=sys.stderr)
+    return EXIT_FAILED
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="mudskipperd", description="The robot's real-time controller.")
+    parser.add_argument("--config", type=Path, default=Path("/etc/mudskipper/mudskipper.toml"))
+    parser.add_argument("--check-config", action="store_true", help="read the configuration, say what is wrong, end")
+    options = parser.parse_args(arguments)
+    try:
+        configuration = load_configuration(options.config)
+    except ConfigurationError as problem:
+        return _refuse([f"mudskipperd: {sentence}" for sentence in problem.problems], EXIT_CONFIGURATION)
+    if options.check_config:
+        return 0
+    shutdown = Shutdown()
+    _on_signals(shutdown.ask)
+    try:
+        return run(configuration, shutdown)
+    except (StartError, AlreadyServedError) as problem:
+        return _refuse([f"mudskipperd: {problem}"], EXIT_FAILED)
+    except OSError as problem:
+        place = f" {problem.filename}" if problem.filename else ""
+        return _refuse([f"mudskipperd: cannot start:{place} {problem.strerror}"], EXIT_FAILED)
+
+
+def _on_signals(handler: Callable[[int, object], None]) -> None:
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, handler)
+
+
+def _refuse(sentences: Sequence[str], status: int) -> int:
+    for sentence in sentences:
+        print(sentence, file=sys.stderr)
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,230 @@
+"""What a person can ask of the running daemon: the methods of the status socket.
+
+Reports are plain dicts of numbers and strings, units in the names. A number that is not known is None.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from math import isfinite, radians
+from typing import Any
+
+from control.controller import WalkOrder
+from control.modes import Mode, Request
+from control.records import JOINTS, DriveState, Estimate, StrideEstimate
+from drivers.odrive_codec import error_text
+from firmware_host.loop import ClosedStride, Loop
+from firmware_host.recorder import Recording
+from firmware_host.status_socket import Methods, RefusedError
+
+MOST_STRIDES = 100000
+
+
+def software_version() -> str:
+    try:
+        return version("mudskipper")
+    except PackageNotFoundError:
+        return "not installed"
+
+
+class OperatorCalls:
+    def __init__(
+        self,
+        loop: Loop,
+        recorder: Recording,
+        log_path: str | None,
+        warnings: list[str],
+        clock: Callable[[], float],
+    ) -> None:
+        self._loop = loop
+        self._recorder = recorder
+        self._log_path = log_path
+        self._warnings = warnings
+        self._clock = clock
+
+    @property
+    def methods(self) -> Methods:
+        return {
+            "hello": self.hello,
+            "status": self.status,
+            "strides": self.strides,
+            "check": self.check,
+            "arm": lambda params: self._request(Request.ARM),
+            "walk": self.walk,
+            "stop": lambda params: self._request(Request.STOP),
+            "disarm": lambda params: self._request(Request.DISARM),
+            "clear": lambda params: self._request(Request.CLEAR),
+            "reset_timing": self.reset_timing,
+        }
+
+    def hello(self, params: dict[str, Any]) -> dict[str, Any]:
+        return {"name": self._loop.configuration.robot.name, "version": software_version()}
+
+    def status(self, params: dict[str, Any]) -> dict[str, Any]:
+        loop = self._loop
+        return {
+            "schema": "status/1",
+            "robot": loop.configuration.robot.name,
+            "version": software_version(),
+            "mode": loop.mode.name.lower(),
+            "fault": _fault(loop),
+            "phase": loop.target.phase.name.lower(),
+            "stride": loop.target.stride,
+            "depth_m": loop.controller.gait.commanded_depth_m,
+            "body_x_m": _known(loop.body.x_m),
+            "drives": [self._drive(place) for place in range(len(JOINTS))],
+            "strides_closed": loop.strides_closed,
+            "loop": loop.timing.summary(),
+            "warnings": self._warnings,
+            "bus": self._bus(),
+            "log": {
+                "path": self._log_path,
+                "dropped": self._recorder.dropped,
+                "writer_alive": self._recorder.writer_alive,
+            },
+        }
+
+    def _drive(self, place: int) -> dict[str, Any]:
+        state, axis, now_s = self._loop.states[place], self._loop.drives.axes[place], self._clock()
+        return {
+            "joint": JOINTS[place],
+            "angle_rad": _known(state.angle_rad),
+            "velocity_rad_s": _known(state.velocity_rad_s),
+            "current_a": _known(state.current_a),
+            "torque_command_nm": self._loop.sent.torques_nm[place],
+            "closed_loop": state.closed_loop,
+            "errors": error_text(state.error_flags),
+            "temperature_c": _known(state.temperature_c),
+            "bus_voltage_v": _known(state.bus_voltage_v),
+            "firmware": ".".join(map(str, axis.version)) if axis.version else None,
+            "angle_age_s": _known(now_s - state.angle_stamp_s),
+            "current_age_s": _known(now_s - state.current_stamp_s),
+            "heartbeat_age_s": _known(now_s - state.heartbeat_stamp_s),
+        }
+
+    def _bus(self) -> dict[str, Any]:
+        drives = self._loop.drives
+        return {
+            "unknown_frames": drives.unknown_frames,
+            "garbled_frames": drives.garbled_frames,
+            "error_frames": sum(port.error_frames for port in drives.ports.values()),
+            "failed_sends": sum(port.failed_sends for port in drives.ports.values()),
+        }
+
+    def strides(self, params: dict[str, Any]) -> list[dict[str, Any]]:
+        """Those closed from number `since` on, oldest first, as far back as they are kept."""
+        since = _integer(params, "since", 0, MOST_STRIDES)
+        return [stride_report(closed) for closed in self._loop.strides if closed.number >= since]
+
+    def walk(self, params: dict[str, Any]) -> str:
+        """`depth_m` for a fixed depth, else adaptive from the configured start; `strides`, 0 without end."""
+        configuration = self._loop.configuration
+        strides = _integer(params, "strides", 0, MOST_STRIDES)
+        depth_m = params.get("depth_m")
+        if depth_m is None:
+            return self._request(Request.WALK, WalkOrder(configuration.adaptation.initial_depth_m, True, strides))
+        if isinstance(depth_m, bool) or not isinstance(depth_m, int | float) or not isfinite(depth_m):
+            raise RefusedError(f"depth_m = {depth_m!r}: must be a number")
+        deepest_m = configuration.adaptation.max_depth_m
+        if not 0.0 < depth_m <= deepest_m:
+            raise RefusedError(f"depth_m = {depth_m}: must be more than 0 and at most {deepest_m}")
+        assert configuration.geometry.is_reachable(radians(configuration.gait.sweep_angle_deg), depth_m)
+        return self._request(Request.WALK, WalkOrder(float(depth_m), False, strides))
+
+    def _request(self, request: Request, order: WalkOrder | None = None) -> str:
+        refused = self._loop.request(request, self._clock(), order)
+        if refused:
+            raise RefusedError(refused)
+        return "accepted"
+
+    def reset_timing(self, params: dict[str, Any]) -> str:
+        """Start the loop's statistics anew."""
+        self._loop.timing.reset()
+        return "accepted"
+
+    def check(self, params: dict[str, Any]) -> list[dict[str, Any]]:
+        """What stands between this robot and a walk, item by item."""
+        items = [self._check_drive(joint, state) for joint, state in zip(JOINTS, self._loop.states, strict=True)]
+        items.append(self._check_arming())
+        alive = self._recorder.writer_alive
+        items.append(_item("log", alive, "rows are written" if alive else "the log's writer has died", "restart"))
+        for warning in self._warnings:
+            items.append(_item("realtime", True, f"warning: {warning}", ""))
+        return items
+
+    def _check_drive(self, joint: str, state: DriveState) -> dict[str, Any]:
+        now_s, silence_s = self._clock(), self._loop.configuration.loop.silence_s
+        missing = [
+            signal
+            for signal, stamp_s, longest_s in (
+                ("position", state.angle_stamp_s, silence_s),
+                ("current", state.current_stamp_s, silence_s),
+                ("heartbeat", state.heartbeat_stamp_s, 0.5),
+            )
+            if now_s - stamp_s > longest_s
+        ]
+        if missing:
+            fix = "check its power, wiring, node id and cyclic message periods (README, 'Setting up the drives')"
+            return _item(f"drive.{joint}", False, f"no {', '.join(missing)}", fix)
+        if state.error_flags:
+            return _item(f"drive.{joint}", False, error_text(state.error_flags), "mend the cause, 'mudskipper clear'")
+        return _item(f"drive.{joint}", True, "heard", "")
+
+    def _check_arming(self) -> dict[str, Any]:
+        loop = self._loop
+        if loop.mode is Mode.BOOT:
+            return _item("arming", False, "not every drive was heard yet", "see the drives above")
+        fault = loop.fault or loop.health.fault
+        if fault is not None:
+            return _item("arming", False, fault.sentence, "mend the cause, then 'mudskipper clear'")
+        return _item("arming", True, f"nothing against it; the mode is {loop.mode.name.lower()}", "")
+
+
+def _item(identity: str, ok: bool, text: str, fix: str) -> dict[str, Any]:
+    return {"id": identity, "ok": ok, "text": text, "fix": fix}
+
+
+def _fault(loop: Loop) -> dict[str, str] | None:
+    """The latched one, or what stands against arming now."""
+    fault = loop.fault or (loop.health.fault if loop.mode is not Mode.BOOT else None)
+    return {"name": fault.name, "sentence": fault.sentence} if fault else None
+
+
+def _known(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def _integer(params: dict[str, Any], name: str, low: int, high: int) -> int:
+    value = params.get(name, low)
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise RefusedError(f"{name} = {value!r}: must be a whole number from {low} to {high}")
+    return value
+
+
+def estimate_report(estimate: Estimate) -> dict[str, Any]:
+    return {
+        "value": _known(estimate.value),
+        "std_error": _known(estimate.std_error),
+        "samples": estimate.samples,
+        "valid": estimate.valid,
+        "reason": estimate.reason,
+    }
+
+
+def estimates_report(stride: StrideEstimate) -> dict[str, Any]:
+    """A stride as `replay --json` and the status socket print it; k in N/m³."""
+    report = {
+        name: _known(value) if isinstance(value, float) else value
+        for name, value in asdict(stride).items()
+        if name not in ("k_p", "k_s", "k_e")
+    }
+    return report | {name: estimate_report(getattr(stride, name)) for name in ("k_p", "k_s", "k_e")}
+
+
+def stride_report(closed: ClosedStride) -> dict[str, Any]:
+    return estimates_report(closed.estimate) | {
+        "number": closed.number,
+        "chosen_depth_m": closed.chosen_depth_m,
+    }

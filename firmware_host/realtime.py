@@ -1,0 +1,56 @@
+"""What the operating system can do for the loop's punctuality, where it is permitted.
+
+SCHED_FIFO for this thread alone (children start as ordinary processes), memory locked against paging, one processor,
+no garbage collection while moving. Each that is refused gives a sentence for the operator; the robot runs without.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import os
+import sys
+
+MCL_CURRENT, MCL_FUTURE = 1, 2
+SWITCH_INTERVAL_S = 1e-4  # should any other Python thread ever run, it gives way quickly
+
+
+def prepare_loop(priority: int, cpu: int, lock_memory: bool) -> list[str]:
+    """Apply all of it; what could not be had, one sentence each."""
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    warnings = [_pin(cpu) if cpu >= 0 else "", _lock_memory() if lock_memory else "", _schedule(priority)]
+    freeze_garbage()
+    return [warning for warning in warnings if warning]
+
+
+def freeze_garbage() -> None:
+    """A full collection takes several ticks: do it once now, and none while the loop runs."""
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+
+
+def _pin(cpu: int) -> str:
+    try:
+        os.sched_setaffinity(0, {cpu})
+    except OSError as problem:
+        return f"not pinned to processor {cpu}: {problem.strerror}"
+    return ""
+
+
+def _lock_memory() -> str:
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.mlockall(MCL_CURRENT | MCL_FUTURE) != 0:
+        return f"memory not locked: {os.strerror(ctypes.get_errno())}; raise the memlock limit"
+    return ""
+
+
+def _schedule(priority: int) -> str:
+    if priority == 0:
+        return "no real-time priority: loop.priority is 0"
+    try:
+        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+        os.sched_setscheduler(0, policy, os.sched_param(priority))
+    except OSError as problem:
+        return f"no real-time priority {priority}: {problem.strerror}; raise the rtprio limit"
+    return ""

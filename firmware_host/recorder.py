@@ -1,0 +1,158 @@
+"""The loop's side of the log: rows leave through a pipe to the writer, and the loop never waits for a disk.
+
+Compressing and writing a log takes milliseconds, a memory card now and then a second. So a writer of its own does
+that (`firmware_host.log_writer`), and `put` is one non-blocking write into a pipe that holds several seconds of rows.
+A row is smaller than PIPE_BUF, so it goes in whole or not at all. When the pipe is full the row is dropped and
+counted, and an event in the log says so before the next row that gets through.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import struct
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from fcntl import F_SETPIPE_SZ, fcntl
+from pathlib import Path
+from typing import Protocol
+
+from firmware_host.log_rows import EVENT, ROW_KINDS
+
+PIPE_BYTES = 1 << 20  # 2,560 ticks, ten to a page: almost seven seconds at 380 Hz
+HEADER = struct.Struct("<BI")  # index in ROW_KINDS, length of the payload; the opening comes first, as kind 0
+STAMP = struct.Struct("<4xd")  # every row: four bytes of encapsulation, then its stamp
+REPORT_BYTES = 256  # kept free for the report of a loss, which goes in together with a row
+LARGEST_ROW = select.PIPE_BUF - HEADER.size - REPORT_BYTES
+LONGEST_TEXT = LARGEST_ROW - len(EVENT.encode(0.0, ""))  # bytes
+EVENT_KIND = ROW_KINDS.index(EVENT)
+
+
+class Recording(Protocol):
+    """Where rows go."""
+
+    dropped: int
+    writer_alive: bool
+
+    def put(self, kind_index: int, payload: bytes) -> bool: ...
+
+    def close(self, timeout_s: float) -> bool: ...
+
+
+class NullRecorder:
+    """Takes every row and keeps none."""
+
+    dropped = 0
+    writer_alive = True
+
+    def put(self, kind_index: int, payload: bytes) -> bool:
+        return True
+
+    def close(self, timeout_s: float) -> bool:
+        return True
+
+
+class Recorder:
+    """Owns the writer and the pipe to it. Start it before the loop takes real-time priority."""
+
+    def __init__(self, path: Path, configuration_text: str, metadata: dict[str, str]) -> None:
+        self.path = path
+        self.dropped = 0
+        self.writer_alive = True
+        self._unreported = 0
+        self._loss_stamp_s = 0.0
+        self._writer = _start_writer(path)
+        self.writer_pid = self._writer.pid
+        assert self._writer.stdin is not None
+        self._pipe = self._writer.stdin.fileno()
+        with suppress(PermissionError):  # beyond the user's limit: the pipe keeps its 64 KiB
+            fcntl(self._pipe, F_SETPIPE_SZ, PIPE_BYTES)
+        self._send_opening(configuration_text, metadata)
+        os.set_blocking(self._pipe, False)
+
+    def _send_opening(self, configuration_text: str, metadata: dict[str, str]) -> None:
+        opening = json.dumps(
+            {
+                "configuration_text": configuration_text,
+                "metadata": metadata,
+                "wall_minus_monotonic_ns": time.time_ns() - time.monotonic_ns(),
+            }
+        ).encode()
+        unsent = memoryview(HEADER.pack(0, len(opening)) + opening)
+        try:
+            while unsent:
+                unsent = unsent[os.write(self._pipe, unsent) :]
+        except BrokenPipeError:
+            self.writer_alive = False
+
+    def put(self, kind_index: int, payload: bytes) -> bool:
+        """Hand one row over without waiting; False where it was lost."""
+        if len(payload) > LARGEST_ROW:
+            payload = _shorten(payload)
+        record = HEADER.pack(kind_index, len(payload)) + payload
+        if self._write(self._loss_report() + record if self._unreported else record):
+            self._unreported = 0
+            return True
+        self.dropped += 1
+        self._unreported += 1
+        (self._loss_stamp_s,) = STAMP.unpack_from(payload)
+        return False
+
+    def _write(self, records: bytes) -> bool:
+        if not self.writer_alive:
+            return False
+        try:
+            os.write(self._pipe, records)
+        except BlockingIOError:
+            return False
+        except BrokenPipeError:
+            self.writer_alive = False
+            return False
+        return True
+
+    def _loss_report(self) -> bytes:
+        """In one write with the row after it: alone it would slip into gaps that are too small for any row."""
+        text = f"{self._unreported} rows are missing here: the log's writer did not keep up"
+        payload = EVENT.encode(self._loss_stamp_s, text)
+        return HEADER.pack(EVENT_KIND, len(payload)) + payload
+
+    def close(self, timeout_s: float) -> bool:
+        """End the log; True once it is whole on the disk. A writer that needs longer is left to finish alone."""
+        assert self._writer.stdin is not None
+        deadline_s = time.monotonic() + timeout_s
+        if self._unreported and self.writer_alive:
+            _wait_for_room(self._pipe, timeout_s)
+            self._write(self._loss_report())
+        self.writer_alive = False
+        self._writer.stdin.close()
+        try:
+            return self._writer.wait(max(0.0, deadline_s - time.monotonic())) == 0
+        except subprocess.TimeoutExpired:
+            return False
+
+
+def _start_writer(path: Path) -> subprocess.Popen[bytes]:
+    """Ctrl-C and the service's stop reach the writer too: it is born with both blocked, so no moment is unguarded."""
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        command = [sys.executable, "-m", "firmware_host.log_writer", str(path)]
+        return subprocess.Popen(command, stdin=subprocess.PIPE, bufsize=0)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+
+
+def _wait_for_room(pipe: int, timeout_s: float) -> None:
+    poll = select.poll()
+    poll.register(pipe, select.POLLOUT)
+    poll.poll(timeout_s * 1e3)
+
+
+def _shorten(payload: bytes) -> bytes:
+    """Only an event can be this long."""
+    event = EVENT.decode(payload)
+    text = event["text"].encode()[:LONGEST_TEXT].decode(errors="ignore")
+    return EVENT.encode(event["stamp_s"], text)

@@ -1,0 +1,63 @@
+"""The other end of the status socket, for the command line: standard library and msgpack only, so it starts at once."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+from typing import Any
+
+import msgpack
+
+REQUEST = 0
+ANSWER_S = 5.0
+
+
+class NoDaemonError(Exception):
+    """Nobody answers on the socket."""
+
+
+class NotPermittedError(Exception):
+    """The socket is there and may not be used."""
+
+
+class CallRefusedError(Exception):
+    """The daemon will not do it; the text says why."""
+
+
+class StatusClient:
+    def __init__(self, path: Path, timeout_s: float = ANSWER_S) -> None:
+        self._path = path
+        self._number = 0
+        self._unpacker = msgpack.Unpacker(raw=False)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._socket.settimeout(timeout_s)
+        try:
+            self._socket.connect(str(path))
+        except PermissionError as problem:
+            raise NotPermittedError(f"no permission to use {path}") from problem
+        except OSError as problem:
+            raise NoDaemonError(f"no daemon answers on {path}") from problem
+
+    def call(self, method: str, **params: Any) -> Any:
+        """The result; raises CallRefusedError with the daemon's sentence, or NoDaemonError where it is gone."""
+        self._number += 1
+        try:
+            self._socket.sendall(msgpack.packb([REQUEST, self._number, method, params]))
+            _, _, problem, result = self._receive()
+        except OSError as problem_reading:
+            raise NoDaemonError(f"the daemon on {self._path} does not answer") from problem_reading
+        if problem is not None:
+            raise CallRefusedError(problem)
+        return result
+
+    def _receive(self) -> list[Any]:
+        while True:
+            for message in self._unpacker:
+                return list(message)
+            data = self._socket.recv(65536)
+            if not data:
+                raise ConnectionResetError
+            self._unpacker.feed(data)
+
+    def close(self) -> None:
+        self._socket.close()

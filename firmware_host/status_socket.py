@@ -1,0 +1,209 @@
+"""MessagePack-RPC over a Unix stream socket, served between two ticks.
+
+A request is [0, id, method, params], its answer [1, id, error, result] (the MessagePack-RPC specification). The loop
+calls `serve` once a tick: it never waits, answers at most one request, and gives every client bounded buffers, so no
+client costs the robot a deadline. Whoever sends something else is told so and disconnected.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import msgpack
+
+REQUEST, RESPONSE = 0, 1
+MOST_CLIENTS = 16
+LONGEST_REQUEST = 64 * 1024  # bytes
+LONGEST_BACKLOG = 1024 * 1024  # bytes of answers that a client has not fetched
+READ_BYTES = 16 * 1024
+SOCKET_MODE = 0o660
+
+Methods = Mapping[str, Callable[[dict[str, Any]], Any]]
+
+
+class RefusedError(Exception):
+    """A request that was understood and will not be done; the text says why."""
+
+
+class AlreadyServedError(Exception):
+    """Another daemon answers on this socket."""
+
+
+class Client:
+    """Owns what one connection has sent and not yet fetched."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self.connection = connection
+        self.unpacker = msgpack.Unpacker(max_buffer_size=LONGEST_REQUEST, raw=False)
+        self.outgoing = bytearray()
+        self.closing = False  # once everything has been sent
+
+    def send(self, message: list[Any]) -> None:
+        self.outgoing += msgpack.packb(message)
+
+    def flush(self) -> None:
+        """Raises OSError where the client is gone."""
+        while self.outgoing:
+            try:
+                sent = self.connection.send(self.outgoing[:READ_BYTES])
+            except BlockingIOError:
+                return
+            del self.outgoing[:sent]
+
+
+class StatusSocket:
+    """Bound and listening from the start on; `methods` take the params of a request as a dict."""
+
+    def __init__(self, path: Path, methods: Methods) -> None:
+        self.path = path
+        self._methods = methods
+        self._listener = _listen(path)
+        self._poll = select.epoll()
+        self._poll.register(self._listener.fileno(), select.EPOLLIN)
+        self._clients: dict[int, Client] = {}
+        self._waiting: list[int] = []  # clients with a request not yet answered
+        self.refused_clients = self.garbled_requests = 0
+
+    def serve(self) -> None:
+        for descriptor, events in self._poll.poll(0.0):
+            if descriptor == self._listener.fileno():
+                self._accept()
+            elif descriptor in self._clients:
+                self._attend(descriptor, events)
+        if self._waiting:
+            self._answer_one(self._waiting.pop(0))
+
+    def _accept(self) -> None:
+        try:
+            connection, _ = self._listener.accept()
+        except OSError:  # the client left again before it was let in
+            return
+        if len(self._clients) >= MOST_CLIENTS:
+            self.refused_clients += 1
+            connection.close()
+            return
+        connection.setblocking(False)
+        self._clients[connection.fileno()] = Client(connection)
+        self._poll.register(connection.fileno(), select.EPOLLIN)
+
+    def _attend(self, descriptor: int, events: int) -> None:
+        client = self._clients[descriptor]
+        try:
+            if events & select.EPOLLOUT:
+                client.flush()
+            if events & (select.EPOLLIN | select.EPOLLHUP) and not client.closing:
+                data = client.connection.recv(READ_BYTES)
+                if not data:
+                    return self._drop(descriptor)
+                client.unpacker.feed(data)
+                self._waiting.append(descriptor)
+        except msgpack.BufferFull:
+            self._reject(client, None, f"a request must be shorter than {LONGEST_REQUEST} bytes")
+        except OSError:
+            return self._drop(descriptor)
+        return self._settle(descriptor)
+
+    def _answer_one(self, descriptor: int) -> None:
+        client = self._clients.get(descriptor)
+        if client is None or client.closing:
+            return
+        try:
+            message = next(client.unpacker, None)
+            if message is not None:
+                self._waiting.append(descriptor)  # there may be another one behind it
+                self._answer(client, message)
+        except (ValueError, msgpack.UnpackException, RecursionError):  # bytes that are not MessagePack
+            self._reject(client, None, "not a MessagePack message")
+        self._settle(descriptor)
+
+    def _answer(self, client: Client, message: Any) -> None:
+        if not _is_request(message):
+            return self._reject(client, None, "a request is [0, id, method, params]")
+        _, number, method, params = message
+        if method not in self._methods:
+            known = ", ".join(sorted(self._methods))
+            return client.send([RESPONSE, number, f"no method {method!r}; there are {known}", None])
+        try:
+            return client.send([RESPONSE, number, None, self._methods[method](_as_dict(params))])
+        except RefusedError as refusal:
+            return client.send([RESPONSE, number, str(refusal), None])
+
+    def _reject(self, client: Client, number: int | None, sentence: str) -> None:
+        self.garbled_requests += 1
+        client.send([RESPONSE, number, sentence, None])
+        client.closing = True
+
+    def _settle(self, descriptor: int) -> None:
+        """Send what can be sent; drop a client that is done or does not fetch its answers."""
+        client = self._clients[descriptor]
+        try:
+            client.flush()
+        except OSError:
+            return self._drop(descriptor)
+        if (client.closing and not client.outgoing) or len(client.outgoing) > LONGEST_BACKLOG:
+            return self._drop(descriptor)
+        wanted = select.EPOLLIN | (select.EPOLLOUT if client.outgoing else 0)
+        return self._poll.modify(descriptor, wanted)
+
+    def _drop(self, descriptor: int) -> None:
+        client = self._clients.pop(descriptor)
+        self._poll.unregister(descriptor)
+        client.connection.close()
+        self._waiting = [other for other in self._waiting if other != descriptor]
+
+    def close(self) -> None:
+        for descriptor in list(self._clients):
+            self._drop(descriptor)
+        self._poll.close()
+        self._listener.close()
+        self.path.unlink(missing_ok=True)
+
+
+def _is_request(message: Any) -> bool:
+    return (
+        isinstance(message, list)
+        and len(message) == 4
+        and message[0] == REQUEST
+        and isinstance(message[1], int)
+        and isinstance(message[2], str)
+        and isinstance(message[3], list | dict)
+    )
+
+
+def _as_dict(params: list[Any] | dict[Any, Any]) -> dict[str, Any]:
+    """Params come as a dict, or as the specification's list holding one."""
+    if isinstance(params, list):
+        params = params[0] if params else {}
+    if not isinstance(params, dict) or not all(isinstance(key, str) for key in params):
+        raise RefusedError("params must be a map from names to values")
+    return params
+
+
+def _listen(path: Path) -> socket.socket:
+    """Raises AlreadyServedError, or OSError where the path cannot be bound."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _remove_stale(path)
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    listener.setblocking(False)
+    listener.bind(str(path))
+    os.chmod(path, SOCKET_MODE)
+    listener.listen(MOST_CLIENTS)
+    return listener
+
+
+def _remove_stale(path: Path) -> None:
+    """A socket that nobody answers was left behind by a daemon that died."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        try:
+            probe.connect(str(path))
+        except FileNotFoundError:
+            return
+        except ConnectionRefusedError:
+            path.unlink()
+            return
+    raise AlreadyServedError(f"another daemon is already running on {path}")

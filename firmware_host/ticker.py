@@ -1,0 +1,52 @@
+"""The beat of the loop, and the only place that sleeps.
+
+Deadlines are absolute, start + n · period, so the rate does not drift with the work done in a tick. A deadline that
+is missed by a whole period or more is skipped and counted, never made up for: two control ticks in a row on one
+stale sample are worse than a gap.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+RATE_HZ = 380.0  # the rate at which the paper's robot logged and controlled
+PERIOD_S = 1.0 / RATE_HZ
+
+
+class Beat(NamedTuple):
+    now_s: float
+    late_s: float  # after the deadline that this beat serves
+    number: int  # of the deadline, missed ones included
+    missed: int  # deadlines skipped just now
+
+
+class Ticker:
+    def __init__(
+        self,
+        period_s: float = PERIOD_S,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self.period_s = period_s
+        self._clock = clock
+        self._sleep = sleep
+        self.reset()
+
+    def reset(self) -> None:
+        """The first deadline is one period from now."""
+        self._start_s = self._clock()
+        self._number = 0
+
+    def wait(self) -> Beat:
+        self._number += 1
+        deadline_s = self._start_s + self._number * self.period_s
+        now_s = self._clock()
+        while now_s < deadline_s:
+            self._sleep(deadline_s - now_s)
+            now_s = self._clock()
+        missed = int((now_s - deadline_s) / self.period_s)
+        self._number += missed
+        late_s = now_s - (self._start_s + self._number * self.period_s)
+        return Beat(now_s, late_s, self._number, missed)

@@ -1,0 +1,83 @@
+"""How the loop keeps time: histograms in buckets of one microsecond, so a percentile is exact to that."""
+
+from __future__ import annotations
+
+from array import array
+from typing import Any
+
+LONGEST_US = 20000  # everything longer falls into the last bucket; `max` stays exact
+
+
+class Histogram:
+    def __init__(self) -> None:
+        self._counts = array("L", [0]) * (LONGEST_US + 1)
+        self.reset()
+
+    def reset(self) -> None:
+        for place in range(len(self._counts)):
+            self._counts[place] = 0
+        self.count = 0
+        self.max_us = 0.0
+
+    def add(self, duration_s: float) -> None:
+        duration_us = duration_s * 1e6
+        self._counts[min(max(int(duration_us), 0), LONGEST_US)] += 1
+        self.count += 1
+        if duration_us > self.max_us:
+            self.max_us = duration_us
+
+    def percentile_us(self, share: float) -> float:
+        """The duration that `share` of all did not exceed, rounded up to a microsecond."""
+        wanted, seen = share * self.count, 0
+        for place, count in enumerate(self._counts):
+            seen += count
+            if count and seen >= wanted:
+                return self.max_us if place == LONGEST_US else float(place + 1)
+        return 0.0
+
+    def summary(self) -> dict[str, Any]:
+        return {
+            "p50": self.percentile_us(0.50),
+            "p99": self.percentile_us(0.99),
+            "max": round(self.max_us, 1),
+        }
+
+
+class LoopTiming:
+    """Owns the counts since `reset`."""
+
+    def __init__(self) -> None:
+        self.wake_late = Histogram()
+        self.tick = Histogram()
+        self.reset()
+
+    def reset(self) -> None:
+        self.wake_late.reset()
+        self.tick.reset()
+        self.ticks = self.missed_ticks = 0
+        self._first_s = self._last_s = 0.0
+
+    def update(self, now_s: float, late_s: float, missed: int, tick_s: float) -> None:
+        if self.ticks == 0:
+            self._first_s = now_s - late_s
+        else:
+            self.missed_ticks += missed
+        self._last_s = now_s - late_s
+        self.ticks += 1
+        self.wake_late.add(late_s)
+        self.tick.add(tick_s)
+
+    @property
+    def rate_hz(self) -> float:
+        """Ticks that ran, per second: missed ones lower it."""
+        elapsed_s = self._last_s - self._first_s
+        return (self.ticks - 1) / elapsed_s if elapsed_s > 0.0 else 0.0
+
+    def summary(self) -> dict[str, Any]:
+        return {
+            "ticks": self.ticks,
+            "rate_hz": round(self.rate_hz, 4),
+            "missed_ticks": self.missed_ticks,
+            "wake_late_us": self.wake_late.summary(),
+            "tick_us": self.tick.summary(),
+        }

@@ -1,0 +1,122 @@
+"""The simulated robot and the daemon's own loop in one process, in step: as fast as they compute, without a clock.
+
+Every tick the robot lives on until the tick's moment, then the loop runs exactly as in the daemon. All frames are
+encoded and decoded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+
+from control.controller import WalkOrder
+from control.modes import Mode, Request
+from control.records import JOINTS, BodyPose
+from drivers.mock_bus import MockBus
+from drivers.odrive_drives import OdriveDrives
+from drivers.pose_port import PosePort
+from firmware_host.configuration import Configuration
+from firmware_host.loop import Loop
+from firmware_host.recorder import NullRecorder, Recording
+from firmware_host.ticker import PERIOD_S, Beat
+from simulation.odrive import OdriveParameters
+from simulation.plant import PlantParameters
+from simulation.robot import SimulatedRobot
+from simulation.track import Track
+
+POSE_NOISE_M = 1e-4  # of a motion-capture system at the scale of this track
+
+
+def drives_of(configuration: Configuration, **changes: float) -> dict[str, OdriveParameters]:
+    """Simulated drives that fit a configuration's bus: ids, signs, zeros and torque constants."""
+    return {
+        joint: OdriveParameters(
+            node_id=drive.node_id,
+            sign=drive.sign,
+            zero_turn=drive.zero_turn,
+            torque_constant_nm_a=drive.torque_constant_nm_a,
+            **changes,  # type: ignore[arg-type]
+        )
+        for joint, drive in configuration.drive.items()
+    }
+
+
+def plant_of(configuration: Configuration) -> PlantParameters:
+    return PlantParameters(geometry=configuration.geometry, arm_mass=configuration.arm)
+
+
+class SimulatedPose(PosePort):
+    """The robot's true place with a little noise, as motion capture would send it."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(None)
+        self._random = Random(seed)
+        self.x_m: Callable[[], float] = lambda: float("nan")
+
+    def read(self, now_s: float) -> BodyPose:
+        return BodyPose(now_s, self.x_m() + self._random.gauss(0.0, POSE_NOISE_M))
+
+
+class Lockstep:
+    """Owns the common time of robot and loop."""
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        track: Track,
+        seed: int = 1,
+        recorder: Recording | None = None,
+        plant: PlantParameters | None = None,
+    ) -> None:
+        buses = {name: MockBus() for name in configuration.bus}
+        self.robot = SimulatedRobot(
+            plant or plant_of(configuration),
+            track,
+            drives_of(configuration),
+            {joint: configuration.drive[joint].bus for joint in JOINTS},
+            {name: bus.open() for name, bus in buses.items()},
+            seed,
+        )
+        drives = OdriveDrives(configuration.drive, {name: bus.open() for name, bus in buses.items()})
+        pose = SimulatedPose(seed + 1)
+        pose.x_m = lambda: self.robot.plant.body_m
+        self.loop = Loop(configuration, drives, pose, recorder or NullRecorder(), clock=lambda: self.now_s)
+        self.tick_number = 0
+
+    @property
+    def now_s(self) -> float:
+        return self.tick_number * PERIOD_S
+
+    def step(self) -> None:
+        self.tick_number += 1
+        self.robot.advance(self.now_s)
+        self.loop.tick(Beat(self.now_s, 0.0, self.tick_number, 0))
+
+    def run_for(self, duration_s: float) -> None:
+        for _ in range(round(duration_s / PERIOD_S)):
+            self.step()
+
+    def run_until(self, done: Callable[[], bool], longest_s: float) -> bool:
+        """Whether it came to that within `longest_s` of simulated time."""
+        for _ in range(round(longest_s / PERIOD_S)):
+            if done():
+                return True
+            self.step()
+        return done()
+
+    def arm(self) -> None:
+        """From power-on to holding the pose. Raises RuntimeError with the reason where that fails."""
+        self.run_until(lambda: self.loop.health.fault is None and self.loop.mode is Mode.IDLE, 3.0)
+        refused = self.loop.request(Request.ARM, self.now_s)
+        if refused or not self.run_until(lambda: self.loop.mode is Mode.HOLD, 3.0):
+            raise RuntimeError(refused or f"not armed: {self.loop.fault}")
+
+    def walk(self, order: WalkOrder) -> None:
+        refused = self.loop.request(Request.WALK, self.now_s, order)
+        if refused:
+            raise RuntimeError(refused)
+
+
+def default_configuration_path() -> Path:
+    return Path(__file__).parent.parent / "systemd" / "mudskipper.toml"

@@ -1,0 +1,131 @@
+"""The robot's mechanics: two arms with two joints each, and a body on a rail.
+
+Arms have a constant inertia about each joint, gravity and a little viscous friction; their mass is small beside the
+body's, so they do not throw it about. The rail's drag and the drag pad in the mud hold the body elastically until
+they yield. Semi-implicit Euler at STEP_S: the stiffest spring, mud on an arm, swings at about 150 rad/s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+
+from control.geometry import FlipperGeometry
+from control.joint_pd import ArmMass
+from control.records import JointAngles, Torques
+from simulation.clay import rate_factor
+from simulation.flipper_contact import NO_CONTACT, FlipperContact
+from simulation.track import Track
+
+STEP_S = 0.001
+DRAG_STIFFNESS_N_M = 5000.0
+END_STOPS_RAD = (radians(100.0), radians(85.0))  # sweep, adduction: the arm meets the body
+
+
+@dataclass(frozen=True)
+class PlantParameters:
+    geometry: FlipperGeometry = FlipperGeometry()
+    arm_mass: ArmMass = ArmMass()
+    joint_friction_nm_s: float = 0.002
+    body_mass_kg: float = 1.02  # of the walking model that was fitted to Table I
+    rail_drag_n: float = 2.5  # the paper's, without the pad
+    pad_width_m: float = 0.015
+    pad_depth_m: float = 0.02
+
+
+class Arm:
+    """Owns the motion of one flipper arm."""
+
+    def __init__(self, parameters: PlantParameters) -> None:
+        self.parameters = parameters
+        self.contact = FlipperContact(parameters.geometry)
+        self.reset()
+
+    def reset(self) -> None:
+        """At rest with the plate's edge on the mud, as a robot lies when its motors are off."""
+        self.sweep_rad = 0.0
+        self.adduction_rad = self.parameters.geometry.adduction_rad(0.0, 0.0)
+        self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = 0.0
+        self.contact.reset()
+        self.force = NO_CONTACT
+
+    def step(self, dt_s: float, track: Track, body_m: float, body_m_s: float, sweep_nm: float, lift_nm: float) -> None:
+        parameters = self.parameters
+        edge_m = body_m + parameters.geometry.flipper_length_m * self.sweep_rad  # small error beside a segment
+        self.force = self.contact.step(
+            dt_s,
+            track.clay_at(edge_m),
+            self.sweep_rad,
+            self.adduction_rad,
+            self.sweep_velocity_rad_s,
+            self.adduction_velocity_rad_s,
+            body_m_s,
+        )
+        gravity_sweep_nm, gravity_lift_nm = parameters.arm_mass.gravity_torques_nm(self.sweep_rad, self.adduction_rad)
+        friction_nm_s = parameters.joint_friction_nm_s
+        sweep_nm += self.force.sweep_nm + gravity_sweep_nm - friction_nm_s * self.sweep_velocity_rad_s
+        lift_nm += self.force.adduction_nm + gravity_lift_nm - friction_nm_s * self.adduction_velocity_rad_s
+        self.sweep_velocity_rad_s += dt_s * sweep_nm / parameters.arm_mass.sweep_inertia_kg_m2
+        self.adduction_velocity_rad_s += dt_s * lift_nm / parameters.arm_mass.adduction_inertia_kg_m2
+        self.sweep_rad, self.sweep_velocity_rad_s = _move(
+            self.sweep_rad, self.sweep_velocity_rad_s, dt_s, END_STOPS_RAD[0]
+        )
+        self.adduction_rad, self.adduction_velocity_rad_s = _move(
+            self.adduction_rad, self.adduction_velocity_rad_s, dt_s, END_STOPS_RAD[1]
+        )
+
+
+def _move(angle_rad: float, velocity_rad_s: float, dt_s: float, stop_rad: float) -> tuple[float, float]:
+    angle_rad += velocity_rad_s * dt_s
+    if -stop_rad < angle_rad < stop_rad:
+        return angle_rad, velocity_rad_s
+    return min(max(angle_rad, -stop_rad), stop_rad), 0.0
+
+
+class Plant:
+    """Owns the mechanical state of the robot on its track."""
+
+    def __init__(self, parameters: PlantParameters, track: Track) -> None:
+        self.parameters = parameters
+        self.track = track
+        self.arms = (Arm(parameters), Arm(parameters))
+        self.reset()
+
+    def reset(self) -> None:
+        for arm in self.arms:
+            arm.reset()
+        self.body_m = self.body_m_s = 0.0
+        self._drag_m = 0.0
+
+    @property
+    def angles_rad(self) -> JointAngles:
+        left, right = self.arms
+        return left.sweep_rad, left.adduction_rad, right.sweep_rad, right.adduction_rad
+
+    @property
+    def velocities_rad_s(self) -> JointAngles:
+        left, right = self.arms
+        return (
+            left.sweep_velocity_rad_s,
+            left.adduction_velocity_rad_s,
+            right.sweep_velocity_rad_s,
+            right.adduction_velocity_rad_s,
+        )
+
+    def step(self, dt_s: float, torques_nm: Torques) -> None:
+        left, right = self.arms
+        left.step(dt_s, self.track, self.body_m, self.body_m_s, torques_nm[0], torques_nm[1])
+        right.step(dt_s, self.track, self.body_m, self.body_m_s, torques_nm[2], torques_nm[3])
+        thrust_n = left.force.thrust_n + right.force.thrust_n
+        self.body_m_s += dt_s * (thrust_n + self._drag_n(dt_s)) / self.parameters.body_mass_kg
+        self.body_m += dt_s * self.body_m_s
+
+    def _drag_n(self, dt_s: float) -> float:
+        """Rail and pad together: elastic up to their yield force, then sliding."""
+        parameters, clay = self.parameters, self.track.clay_at(self.body_m)
+        pad_n = clay.lateral_n(parameters.pad_depth_m, parameters.pad_width_m) if parameters.pad_width_m else 0.0
+        largest_n = parameters.rail_drag_n + rate_factor(abs(self.body_m_s)) * pad_n
+        self._drag_m += dt_s * self.body_m_s
+        force_n = min(max(-DRAG_STIFFNESS_N_M * self._drag_m, -largest_n), largest_n)
+        self._drag_m = -force_n / DRAG_STIFFNESS_N_M
+        return force_n
