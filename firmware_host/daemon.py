@@ -17,12 +17,10 @@ from contextlib import ExitStack
 from datetime import UTC, datetime
 from pathlib import Path
 
-import can
-
 from control.modes import ENERGISED, Mode, Request
-from drivers.can_port import PythonCanPort, open_port
 from drivers.odrive_drives import OdriveDrives
 from drivers.pose_port import PosePort
+from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration import (
     EXIT_CONFIGURATION,
     Configuration,
@@ -41,10 +39,6 @@ EXIT_FAILED = 1
 LONGEST_SHUTDOWN_S = 5.0
 GOODBYE_S = 0.3  # for idle requests to leave and be obeyed
 NOTIFY_TICKS = int(RATE_HZ / 4)
-
-
-class StartError(Exception):
-    """The daemon cannot start; the text says what to do."""
 
 
 class Heartbeat:
@@ -106,22 +100,10 @@ def open_recorder(configuration: Configuration, path: Path | None) -> Recorder |
     return Recorder(path, configuration.text, metadata)
 
 
-def open_ports(configuration: Configuration) -> dict[str, PythonCanPort]:
-    ports: dict[str, PythonCanPort] = {}
-    for name, bus in configuration.bus.items():
-        try:
-            ports[name] = open_port(bus.interface, bus.channel, bus.options)
-        except (can.CanError, OSError, ValueError, TypeError) as problem:
-            for port in ports.values():
-                port.close()
-            raise StartError(f"bus.{name} ({bus.interface} {bus.channel}) does not open: {problem}") from problem
-    return ports
-
-
 def run(configuration: Configuration, shutdown: Shutdown) -> int:
-    """Until `shutdown` is wanted and done. Raises StartError, AlreadyServedError or OSError before it has begun."""
+    """Until `shutdown` is wanted and done. Raises BusError, AlreadyServedError or OSError before it has begun."""
     with ExitStack() as stack:
-        ports = open_ports(configuration)
+        ports = open_ports(configuration.bus)
         drives = OdriveDrives(configuration.drive, ports)
         stack.callback(drives.close)
         pose = PosePort(Path(configuration.pose.socket) if configuration.pose.socket else None)
@@ -186,7 +168,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _on_signals(shutdown.ask)
     try:
         return run(configuration, shutdown)
-    except (StartError, AlreadyServedError) as problem:
+    except (BusError, AlreadyServedError) as problem:
         return _refuse([f"mudskipperd: {problem}"], EXIT_FAILED)
     except OSError as problem:
         place = f" {problem.filename}" if problem.filename else ""

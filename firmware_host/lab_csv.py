@@ -1,10 +1,10 @@
 """The authors' CSV of a run, read into this program's conventions, and written from one of our logs.
 
-Mirrored motors were logged with signs that differ from file to file, of the position and of the current separately,
-so no table of signs can be right. They are found from the motion itself. A flipper goes down in insertion and back in
-stance, so there its angles fall; and there its motors push through mud, so they do positive work: the current has the
-sign of the change of angle. A joint without such a motion keeps the signs it was logged with. Forward is where the
-stances moved the body.
+Mirrored motors were logged with signs that differ from file to file, of the position and of the current
+separately, so no table of signs can be right. They are found from the motion itself. A flipper goes down in
+insertion and back in stance, so there its angles fall; and there its motors push through mud, so they do
+positive work: the current has the sign of the change of angle. A joint without such a motion keeps the signs
+it was logged with. Forward is where the stances moved the body.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ GAIT_HEADER = "# gait header:"
 JOINT_COLUMNS = ("leftsweeping", "leftadduction", "rightsweeping", "rightadduction")  # in the order of JOINTS
 WRITTEN_ORDER = (1, 0, 3, 2)  # the authors put adduction first
 BODY_COLUMNS = ("OptitrackPosition_x", "OptitrackPosition_y", "OptitrackPosition_z")
-NEEDED_COLUMNS = ("time", "turtle_state", *(name + signal for signal in ("_pos", "_curr") for name in JOINT_COLUMNS))
+JOINT_SIGNALS = [joint + signal for signal in ("_pos", "_curr") for joint in JOINT_COLUMNS]
+NEEDED_COLUMNS = ("time", "turtle_state", *JOINT_SIGNALS)
 FIRST_ROW_LINE = 3
 
 PHASE_OF_STATE = {
@@ -50,7 +51,7 @@ STATE_OF_PHASE = {
     Phase.EXTRACTION: 4,
     Phase.PAUSE: 5,
 }
-PUSHING = (Phase.STANCE, Phase.INSERTION, Phase.STANCE, Phase.INSERTION)  # when each of JOINTS works on the mud
+PUSHING = (Phase.STANCE, Phase.INSERTION, Phase.STANCE, Phase.INSERTION)  # when each of JOINTS works on mud
 
 BACKWARDS_S = 1.0  # rows written out of order by less are kept as they are
 FROZEN_S, LEAP_M = 0.5, 0.02  # a pose that stands still so long and then leaps so far was lost, not measured
@@ -194,7 +195,7 @@ def _blank_absent(angle_rad: Floats, current_a: Floats, flippers: tuple[str, ...
 
 
 def _orient(angle_rad: Floats, current_a: Floats, phase: Integers) -> None:
-    """Turn each joint's angle round unless it falls while pushing, then its current unless that does work there."""
+    """Turn a joint's angle round unless it falls while pushing, then its current unless that does work."""
     for joint, pushing in enumerate(PUSHING):
         inside = _steps_inside(phase, pushing)
         if np.nansum(np.diff(angle_rad[:, joint])[inside]) > 0.0:
@@ -211,8 +212,10 @@ def _steps_inside(phase: Integers, wanted: Phase) -> Truths:
 
 
 def _body_advance(position_columns_m: list[Floats], stamp_s: Floats, phase: Integers) -> Floats:
-    """The body's place along the direction in which the stances moved it. The first principal axis would not do:
-    a body that rises or sinks by as much as it advances, as in two of the authors' walks, has none along the track."""
+    """The body's place along the direction in which the stances moved it.
+
+    Not along its first principal axis: in two of the authors' walks the body heaves as far as it advances.
+    """
     if not position_columns_m:
         return np.full(len(stamp_s), UNKNOWN)
     position_m = np.column_stack(position_columns_m)
@@ -226,14 +229,16 @@ def _body_advance(position_columns_m: list[Floats], stamp_s: Floats, phase: Inte
 
 
 def _is_lost(position_m: Floats, stamp_s: Floats) -> Truths:
-    """Rows in which motion capture repeats an old pose until it leaps to the true one, or gives nothing but zeros."""
-    first = np.flatnonzero(np.any(np.diff(position_m, axis=0, prepend=UNKNOWN) != 0.0, axis=1))  # of each pose
-    rows = np.diff(first, append=len(stamp_s))
+    """Rows in which the pose is old, held until it leaps to the true one, or is three zeros."""
+    is_new = np.any(np.diff(position_m, axis=0, prepend=UNKNOWN) != 0.0, axis=1)
+    first = np.flatnonzero(is_new)
+    rows = np.diff(first, append=len(stamp_s))  # that show each pose
     held_s = stamp_s[first + rows - 1] - stamp_s[first]
     leap_m = np.append(np.linalg.norm(np.diff(position_m[first], axis=0), axis=1), 0.0)
-    frozen: Truths = np.repeat((held_s > FROZEN_S) & (leap_m > LEAP_M), rows)
-    frozen[np.all(position_m == 0.0, axis=1)] = True
-    return frozen
+    lost: Truths = np.repeat((held_s > FROZEN_S) & (leap_m > LEAP_M), rows)
+    if position_m.shape[1] == len(BODY_COLUMNS):
+        lost[np.all(position_m == 0.0, axis=1)] = True
+    return lost
 
 
 def write_lab_csv(log: Log, out: TextIO) -> None:

@@ -1,8 +1,9 @@
 """A log as arrays: every row of a file that the recorder wrote, whether or not it was finished.
 
-An MCAP file is a sequence of records, and so is each of its chunks, so one walk serves for both. No index is needed:
-a log whose writer was killed is read up to the place where it breaks off. What was damaged rather than cut off is
-refused, and the refusal names the place. The ticks become one numpy array laid over the stored bytes.
+An MCAP file is a sequence of records, and so is each of its chunks, so one walk serves for both. No index is
+needed: a log whose writer was killed is read up to the place where it breaks off. What was damaged rather
+than cut off is refused, and the refusal names the place. The ticks become one numpy array laid over the
+stored bytes.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def read_log(path: Path) -> Log:
             found.add(opcode, body)
         except (ValueError, struct.error, McapError) as error:
             raise LogError(f"{path}: damaged at byte {place}: {error or 'a record ends early'}") from None
-    complete = contents.endswith(MCAP0_MAGIC)
+    complete = contents.endswith(MCAP0_MAGIC, len(MCAP0_MAGIC))  # not the same one at the beginning
     if complete and not found.everything:
         raise LogError(f"{path}: damaged: only {found.messages} of its rows can be found")
     return Log(
@@ -141,7 +142,7 @@ class _Findings:
                 self.everything = record.message_count == self.messages
 
     def _rows_for(self, channel: Channel) -> list[bytes]:
-        """The list that this channel's rows belong in; a channel that is not ours has a list that nobody reads."""
+        """Where this channel's rows belong; those of a channel that is not ours are not kept."""
         for kind in ROW_KINDS:
             if kind.topic == channel.topic:
                 schema = self._schemas.get(channel.schema_id)
@@ -185,7 +186,7 @@ def tick_type() -> np.dtype[np.void]:
 def _tick_array(path: Path, rows: list[bytes]) -> NDArray[np.void]:
     for number, row in enumerate(rows, 1):
         if len(row) != TICK.layout.size:
-            raise LogError(f"{path}: row {number} of /tick has {len(row)} bytes instead of {TICK.layout.size}")
+            raise LogError(f"{path}: row {number} of /tick has {len(row)} bytes, not {TICK.layout.size}")
     return np.frombuffer(b"".join(rows), dtype=tick_type())
 
 

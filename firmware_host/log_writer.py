@@ -1,9 +1,9 @@
 """The writer of a log: rows from standard input into an MCAP file, in a process of its own.
 
-The loop must never wait for a disk, so it hands rows over in a pipe and this program packs, compresses and writes
-them. It ends when its input ends, and only then: signals meant for the loop pass it by, so the log is finished after
-the last row whatever ended the loop. Chunks are small and the file is synchronised every second, so a power cut
-costs the last second or two and leaves the rest readable (`firmware_host.log_reader`).
+The loop must never wait for a disk, so it hands rows over in a pipe and this program compresses and writes
+them. It ends when its input ends, and only then: signals meant for the loop pass it by, so the log is
+finished after the last row, whatever ended the loop. Chunks are small and the file is synchronised every
+second, so a power cut costs the last second or two and leaves the rest readable (`firmware_host.log_reader`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from firmware_host.recorder import HEADER, PIPE_BYTES, STAMP
 
 CHUNK_BYTES = 64 * 1024  # half a second of ticks: what a crash may cost
 SYNC_INTERVAL_S = 1.0
-GATHER_S = 0.05  # a writer asleep between batches need not be woken by every row, which the loop would pay for
+GATHER_S = 0.05  # asleep between batches, the writer is not woken by every row, which the loop would pay for
 
 Rows = list[tuple[int, bytes]]  # index in ROW_KINDS, payload
 
@@ -135,7 +135,7 @@ def _split(unread: bytes) -> tuple[Rows, bytes]:
 
 
 def _keep_out_of_the_way() -> None:
-    """Of the loop: no signal meant for it, no real-time priority inherited from it, last in line for the CPU."""
+    """Of the loop: take no signal meant for it, none of its real-time priority, and the CPU last."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     with suppress(PermissionError):  # a hardened service may refuse both; the log is written all the same

@@ -1,9 +1,9 @@
 """The loop's side of the log: rows leave through a pipe to the writer, and the loop never waits for a disk.
 
-Compressing and writing a log takes milliseconds, a memory card now and then a second. So a writer of its own does
-that (`firmware_host.log_writer`), and `put` is one non-blocking write into a pipe that holds several seconds of rows.
-A row is smaller than PIPE_BUF, so it goes in whole or not at all. When the pipe is full the row is dropped and
-counted, and an event in the log says so before the next row that gets through.
+Compressing and writing a log takes milliseconds, a memory card now and then a second. So a writer of its own
+does that (`firmware_host.log_writer`), and `put` is one non-blocking write into a pipe that holds several
+seconds of rows. A row is smaller than PIPE_BUF, so it goes in whole or not at all. When the pipe is full the
+row is dropped and counted, and an event in the log says so before the next row that gets through.
 """
 
 from __future__ import annotations
@@ -115,13 +115,13 @@ class Recorder:
         return True
 
     def _loss_report(self) -> bytes:
-        """In one write with the row after it: alone it would slip into gaps that are too small for any row."""
+        """Written together with the row after it: alone it would slip into gaps too small for a row."""
         text = f"{self._unreported} rows are missing here: the log's writer did not keep up"
         payload = EVENT.encode(self._loss_stamp_s, text)
         return HEADER.pack(EVENT_KIND, len(payload)) + payload
 
     def close(self, timeout_s: float) -> bool:
-        """End the log; True once it is whole on the disk. A writer that needs longer is left to finish alone."""
+        """End the log; True once it is whole on the disk. A writer that needs longer finishes alone."""
         assert self._writer.stdin is not None
         deadline_s = time.monotonic() + timeout_s
         if self._unreported and self.writer_alive:
@@ -136,7 +136,7 @@ class Recorder:
 
 
 def _start_writer(path: Path) -> subprocess.Popen[bytes]:
-    """Ctrl-C and the service's stop reach the writer too: it is born with both blocked, so no moment is unguarded."""
+    """Ctrl-C and the service's stop reach the writer too, so it is born with both blocked."""
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         command = [sys.executable, "-m", "firmware_host.log_writer", str(path)]

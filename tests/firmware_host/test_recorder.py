@@ -1,4 +1,4 @@
-"""The recorder with its real writer: what is put in comes out bit for bit, and whatever is lost is said to be lost.
+"""The recorder with its real writer: what is put in comes out bit for bit, and a loss is told.
 
 Two readers that share no code with the project, rosbags and mcap-ros2-support, must see the same values.
 """
@@ -128,8 +128,9 @@ def test_our_reader_finds_every_row(recorder: Recorder, golden: list[Row]) -> No
     log = read_log(recorder.path)
     assert (log.complete, log.configuration_text, log.metadata["robot"]) == (True, CONFIGURATION, "test")
     assert log.ticks.tobytes() == b"".join(row.payload for row in golden if row.kind is TICK)
-    assert [event["text"] for event in log.events] == [row.values[-1] for row in golden if row.kind is EVENT]
-    assert [stride["k_p"] for stride in log.strides] == [row.values[5] for row in golden if row.kind is STRIDE]
+    assert log.events == [EVENT.decode(row.payload) for row in golden if row.kind is EVENT]
+    strides = [row.values for row in golden if row.kind is STRIDE]
+    assert [stride["k_p"] for stride in log.strides] == [values[5] for values in strides]
 
 
 def test_mcap_ros2_decodes_the_same_values(recorder: Recorder, golden: list[Row]) -> None:
@@ -263,7 +264,8 @@ def test_a_log_is_never_written_over(tmp_path: Path, capfd: pytest.CaptureFixtur
     assert capfd.readouterr().err == f"The log {path} cannot be written: File exists.\n"
 
 
-def test_a_full_disk_is_told_in_a_sentence(capfd: pytest.CaptureFixture[str], recorder: Recorder) -> None:
+def test_a_full_disk_is_told_in_a_sentence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    recorder = Recorder(tmp_path / "run.mcap", "", {})
     resource.prlimit(recorder.writer_pid, resource.RLIMIT_FSIZE, (200_000, 200_000))
     for number in range(2000):
         recorder.put(TICK_KIND, make_tick(float(number)))

@@ -1,0 +1,292 @@
+"""`mudskipper demo`: a simulated robot as a process of its own, the real daemon against it, and a walk over three muds.
+
+Everything happens in real time and through the interfaces that a person or a program would use. It ends with a
+summary, a plot and the log.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from command_line import exit_codes
+from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
+from control.modes import Mode
+from firmware_host.log_reader import Log, LogError, read_log
+from firmware_host.status_client import CallRefusedError, NoDaemonError, StatusClient
+from simulation.local_setup import write_local_setup
+from simulation.peer import end_with_parent
+from simulation.track import Track, paper_track
+
+LONGEST_WALK_S = 60.0
+STARTING_S = 20.0
+MODE_S = 10.0
+ENDING_S = 15.0
+POLL_S = 0.05
+FINISH_M = 0.02  # before the end of the track
+LEAD_M = 0.06  # the flippers are in the mud about this far ahead of the body's middle when a stride begins
+
+
+class DemoError(Exception):
+    """The demo cannot go on; the text says why."""
+
+
+class Demo:
+    """Owns the two processes, the client and what was learned so far."""
+
+    def __init__(self, folder: Path, logs: Path, seed: int) -> None:
+        self.folder = folder
+        self.seed = seed
+        self.track: Track = paper_track()
+        self.configuration_path = write_local_setup(folder, logs)
+        self.output = (folder / "output.txt").open("w+", encoding="utf-8")
+        self.robot = self._start("simulation.peer", "--seed", str(seed))
+        self.daemon = self._start("firmware_host.daemon")
+        self.client: StatusClient | None = None
+        self.strides: list[dict[str, Any]] = []
+        self.walk_start_s = 0.0
+
+    def _start(self, module: str, *arguments: str) -> subprocess.Popen[bytes]:
+        """In a session of its own, so that Ctrl-C reaches only us and we end things in order."""
+        return subprocess.Popen(
+            [sys.executable, "-m", module, "--config", str(self.configuration_path), *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=self.output,
+            stderr=self.output,
+            start_new_session=True,
+            preexec_fn=end_with_parent,  # noqa: PLW1509 - no threads here
+        )
+
+    def connect(self) -> StatusClient:
+        deadline_s = time.monotonic() + STARTING_S
+        while time.monotonic() < deadline_s:
+            self._look_after_processes()
+            try:
+                self.client = StatusClient(self.folder / "mudskipper.sock")
+                return self.client
+            except NoDaemonError:
+                time.sleep(POLL_S)
+        raise DemoError("the daemon does not answer")
+
+    def _look_after_processes(self) -> None:
+        for name, process in (("simulated robot", self.robot), ("daemon", self.daemon)):
+            if process.poll() is not None:
+                raise DemoError(f"the {name} ended with status {process.returncode}: {self.last_words()}")
+
+    def last_words(self) -> str:
+        self.output.flush()
+        lines = (self.folder / "output.txt").read_text(encoding="utf-8", errors="replace").strip().splitlines()
+        return lines[-1] if lines else "it said nothing"
+
+    def wait_for(self, done: Callable[[dict[str, Any]], bool], longest_s: float = MODE_S) -> dict[str, Any]:
+        assert self.client is not None
+        deadline_s = time.monotonic() + longest_s
+        while time.monotonic() < deadline_s:
+            self._look_after_processes()
+            report: dict[str, Any] = self.client.call("status")
+            if report["mode"] == "fault":
+                raise DemoError(f"fault: {report['fault']['sentence']}")
+            if done(report):
+                return report
+            time.sleep(POLL_S)
+        raise DemoError(f"still {report['mode']} after {longest_s:g} s: {report['fault']}")
+
+    def arm(self) -> None:
+        assert self.client is not None
+        self.wait_for(lambda report: report["mode"] == "idle" and report["fault"] is None)
+        self.client.call("arm")
+        self.wait_for(lambda report: bool(report["mode"] == "hold"))
+
+    def walk(self, depth_cm: float | None, show: Callable[[dict[str, Any]], None]) -> None:
+        """To the end of the track, or as long as there is patience."""
+        assert self.client is not None
+        self.client.call("reset_timing")
+        params = {} if depth_cm is None else {"depth_m": depth_cm / 100.0}
+        self.client.call("walk", **params)
+        self.walk_start_s = time.monotonic()
+        end_m = self.track.length_m - FINISH_M
+        while time.monotonic() < self.walk_start_s + LONGEST_WALK_S:
+            report = self.wait_for(lambda _: True)
+            self.fetch_strides(show)
+            if report["body_x_m"] is not None and report["body_x_m"] >= end_m:
+                return
+            time.sleep(POLL_S)
+
+    def fetch_strides(self, show: Callable[[dict[str, Any]], None]) -> None:
+        assert self.client is not None
+        since = self.strides[-1]["number"] + 1 if self.strides else 0
+        for stride in self.client.call("strides", since=since):
+            self.strides.append(stride)
+            show(stride)
+
+    def stop(self) -> dict[str, Any]:
+        """Flippers up, torque off; the last status."""
+        assert self.client is not None
+        self.client.call("stop")
+        self.wait_for(lambda report: bool(report["mode"] in ("hold", "idle")))
+        report: dict[str, Any] = self.client.call("status")
+        self.client.call("disarm")
+        return report
+
+    def end(self) -> None:
+        """The daemon first: it stops the robot by itself if it has to, and needs it alive for that."""
+        if self.client is not None:
+            self.client.close()
+        for process in (self.daemon, self.robot):
+            process.send_signal(signal.SIGTERM)
+            try:
+                process.wait(ENDING_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        self.output.close()
+
+
+@contextmanager
+def running_demo(logs: Path, seed: int) -> Iterator[Demo]:
+    """A demo whose processes and folder are gone afterwards, whatever happens."""
+    folder = Path(tempfile.mkdtemp(prefix="mudskipper-"))  # short, as the path of a Unix socket must be
+    try:
+        demo = Demo(folder, logs, seed)
+        try:
+            yield demo
+        finally:
+            demo.end()
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def demo(options: argparse.Namespace) -> int:
+    options.out.mkdir(parents=True, exist_ok=True)
+    before = set(options.out.glob("*.mcap"))
+    report: dict[str, Any] | None = None
+    try:
+        report, demonstration = _perform(options)
+    except (DemoError, CallRefusedError, NoDaemonError) as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
+    except KeyboardInterrupt:
+        _say_where(set(options.out.glob("*.mcap")) - before)
+        complain("stopped: the flippers were raised, torque is off, the log is closed")
+        return exit_codes.INTERRUPTED
+    try:
+        _conclude(options, report, demonstration)
+    except LogError as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
+    return exit_codes.OK
+
+
+def _perform(options: argparse.Namespace) -> tuple[dict[str, Any], Demo]:
+    print("Starting a simulated robot and the daemon ...", flush=True)
+    with running_demo(options.out, options.seed) as demonstration:
+        demonstration.connect()
+        print("Arming ...", flush=True)
+        demonstration.arm()
+        muds = ", ".join(f"{segment.clay.name} %" for segment in demonstration.track.segments)
+        print(f"Walking {demonstration.track.length_m:.2f} m over mud with {muds} water.\n")
+        print(f"{STRIDE_HEAD}\n{STRIDE_UNITS}", flush=True)
+
+        def show(stride: dict[str, Any]) -> None:
+            print(stride_line(stride, demonstration.walk_start_s), flush=True)
+
+        demonstration.walk(options.depth, show)
+        report = demonstration.stop()
+        demonstration.fetch_strides(show)
+        return report, demonstration
+
+
+def _say_where(logs: set[Path]) -> None:
+    for path in logs:
+        print(f"\nlog   {path}")
+
+
+def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration: Demo) -> None:
+    """Summary, plot, and the JSON if wanted."""
+    log_path = Path(report["log"]["path"])
+    log = read_log(log_path)
+    plot_path = log_path.with_suffix(".png")
+    print("\nDrawing ...", flush=True)
+    from command_line.plots import plot_walk  # matplotlib takes its time; the walk must not wait for it
+
+    plot_walk(log, demonstration.track, plot_path)
+    summary = summarise(report, demonstration, log, log_path, plot_path)
+    print(summary_text(summary))
+    if options.json:
+        options.json.write_text(json.dumps(summary, indent=1) + os.linesep, encoding="utf-8")
+
+
+def summarise(
+    report: dict[str, Any], demonstration: Demo, log: Log, log_path: Path, plot_path: Path
+) -> dict[str, Any]:
+    track = demonstration.track
+    stamps_s, places_m = walked_path(log)
+    strides = []
+    for stride in demonstration.strides:
+        start_m = float(np.interp(stride["t_start_s"], stamps_s, places_m)) if len(stamps_s) else 0.0
+        strides.append(stride | {"mud": track.clay_at(start_m + LEAD_M).name})
+    return {
+        **report["loop"],
+        "strides": strides,
+        "speed_cm_s": speeds_cm_s(stamps_s, places_m, track),
+        "dropped_rows": report["log"]["dropped"],
+        "warnings": report["warnings"],
+        "log": str(log_path),
+        "plot": str(plot_path),
+    }
+
+
+def walked_path(log: Log) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    """(time in s, body's place in m) of the ticks in which the robot walked and its pose was known."""
+    rows = log.ticks[(log.ticks["mode"] == Mode.WALKING) & np.isfinite(log.ticks["body_x_m"])]
+    return rows["stamp_s"], rows["body_x_m"]
+
+
+def speeds_cm_s(
+    stamps_s: np.ndarray[Any, Any], places_m: np.ndarray[Any, Any], track: Track
+) -> dict[str, float | None]:
+    """Mean speed between the first arrival in each mud and the first arrival in the next."""
+    speeds: dict[str, float | None] = {}
+    start_m = float(places_m[0]) if len(places_m) else 0.0
+    for segment in track.segments:
+        inside = np.flatnonzero(places_m >= start_m)
+        beyond = np.flatnonzero(places_m >= segment.end_m)
+        first = int(inside[0]) if len(inside) else -1
+        last = int(beyond[0]) if len(beyond) else len(places_m) - 1
+        speeds[segment.clay.name] = None
+        if 0 <= first < last:
+            distance_m, duration_s = places_m[last] - places_m[first], stamps_s[last] - stamps_s[first]
+            speeds[segment.clay.name] = round(100.0 * float(distance_m / duration_s), 2)
+        start_m = segment.end_m
+    return speeds
+
+
+def summary_text(summary: dict[str, Any]) -> str:
+    late, tick = summary["wake_late_us"], summary["tick_us"]
+    speeds = ", ".join(
+        f"{mud} %: {'-' if speed is None else f'{speed:.1f} cm/s'}" for mud, speed in summary["speed_cm_s"].items()
+    )
+    lines = [
+        f"strides  {len(summary['strides'])} of both flippers",
+        f"speed    {speeds}",
+        f"loop     {summary['rate_hz']:.2f} Hz over {summary['ticks']} ticks, {summary['missed_ticks']} missed",
+        f"wake-up  {late['p50']:.0f} us late at the median, {late['p99']:.0f} p99, {late['max']:.0f} worst",
+        f"tick     {tick['p50']:.0f} us at the median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst",
+        *(f"warning  {warning}" for warning in summary["warnings"]),
+        f"plot     {summary['plot']}",
+        f"log      {summary['log']}",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,120 @@
+"""`mudskipper`, the command that people type. Each sub-command is loaded only when it is used, so `status` starts at
+once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from pathlib import Path
+
+from command_line import exit_codes
+from command_line.screen import complain
+
+DEFAULT_SOCKET = "/run/mudskipper/mudskipper.sock"
+DEFAULT_CONFIG = "/etc/mudskipper/mudskipper.toml"
+
+
+def build_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="mudskipper",
+        description="Operates a robot that crawls over mud on two flippers.",
+        epilog="Exit status: 0 done, 1 unhealthy, 2 usage, 3 no daemon, 4 not permitted, 5 refused, 78 configuration,"
+        " 124 timed out.",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="command")
+    _add_operation(commands)
+    _add_simulation(commands)
+    _add_logs(commands)
+    return parser
+
+
+Commands = "argparse._SubParsersAction[argparse.ArgumentParser]"
+
+
+def _add(commands: Commands, name: str, place: str, text: str) -> argparse.ArgumentParser:  # type: ignore[valid-type]
+    """`place` is `module.function` of this package, imported when the command is used."""
+    command: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)  # type: ignore[attr-defined]
+    command.set_defaults(place=place)
+    return command
+
+
+def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
+    described = {
+        "status": "How the robot is.",
+        "watch": "The status, again and again, until Ctrl-C.",
+        "arm": "Switch torque on; the robot holds its pose.",
+        "walk": "Walk, with the depth adapted to the mud or fixed.",
+        "stop": "End a walk: raise the flippers and hold.",
+        "disarm": "Switch torque off, at once, in any state.",
+        "clear": "Clear a fault and the drives' errors.",
+        "check": "What stands between this robot and a walk.",
+    }
+    parsers = {name: _add(commands, name, f"operation.{name}", text) for name, text in described.items()}
+    for parser in parsers.values():
+        parser.add_argument(
+            "--socket",
+            type=Path,
+            default=Path(os.environ.get("MUDSKIPPER_SOCKET", DEFAULT_SOCKET)),
+            help="of the daemon (default: $MUDSKIPPER_SOCKET or %(default)s)",
+        )
+    for name in ("status", "check"):
+        parsers[name].add_argument("--json", action="store_true", help="for machines")
+    parsers["watch"].add_argument("--period", type=float, default=0.5, metavar="S", help="between two looks")
+    depth = parsers["walk"].add_mutually_exclusive_group()
+    depth.add_argument("--depth", type=float, metavar="CM", help="the same in every stride")
+    depth.add_argument("--adaptive", action="store_true", help="chosen from the mud, once a stride (default)")
+    parsers["walk"].add_argument("--strides", type=int, default=0, metavar="N", help="then stop (default: go on)")
+    parsers["check"].add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
+
+
+def _add_simulation(commands: Commands) -> None:  # type: ignore[valid-type]
+    demo = _add(commands, "demo", "demo.demo", "A simulated robot walks over three muds, in real time.")
+    demo.add_argument("--json", type=Path, metavar="PATH", help="write the summary there too")
+    demo.add_argument("--out", type=Path, default=Path("mudskipper-demo"), metavar="DIR", help="for log and plot")
+    demo.add_argument("--seed", type=int, default=1)
+    demo.add_argument("--depth", type=float, metavar="CM", help="fixed instead of adaptive")
+    simulate = _add(commands, "simulate", "simulate.simulate", "The simulated robot alone, on a bus, until Ctrl-C.")
+    simulate.add_argument("--bus", default="robot", metavar="NAME", help="of the local bus (default: %(default)s)")
+    simulate.add_argument("--config", type=Path, help="on the buses of this configuration instead")
+    simulate.add_argument("--mud", action="append", metavar="W", help="water content, repeatable: 48.5, 53.1, 45.3")
+    simulate.add_argument("--seed", type=int, default=1)
+
+
+def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
+    replay = _add(commands, "replay", "logs.replay", "The estimator over a recorded log: ours, or the authors' CSV.")
+    replay.add_argument("file", type=Path)
+    replay.add_argument("--json", action="store_true")
+    replay.add_argument("--config", type=Path, help="instead of the one in the log")
+    log = commands.add_parser("log", help="Look into a log.")  # type: ignore[attr-defined]
+    actions = log.add_subparsers(dest="action", required=True, metavar="action")
+    info = _add(actions, "info", "logs.info", "What a log holds.")
+    info.add_argument("file", type=Path)
+    info.add_argument("--json", action="store_true")
+    export = _add(actions, "export", "logs.export", "A log in the columns of the authors' plotter.")
+    export.add_argument("file", type=Path)
+    export.add_argument("--csv", action="store_true", required=True, help="the format; there is one so far")
+    export.add_argument("--out", type=Path, help="file to write (default: standard output)")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    options = build_parser().parse_args(arguments)
+    module, function = options.place.split(".")
+    run: Callable[[argparse.Namespace], int] = getattr(import_module(f"command_line.{module}"), function)
+    try:
+        return run(options)
+    except KeyboardInterrupt:
+        return exit_codes.INTERRUPTED
+    except BrokenPipeError:  # the reader of our output, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return exit_codes.OK
+    except OSError as problem:
+        complain(f"{problem.filename or ''}: {problem.strerror}".lstrip(": "))
+        return exit_codes.UNHEALTHY
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,179 @@
+"""Commands to the running daemon. Standard library and msgpack only, so they start in a blink."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable
+from math import degrees
+from typing import Any
+
+from command_line import exit_codes
+from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain, number, table
+from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
+
+Options = argparse.Namespace
+ARMING_S = 5.0
+STOPPING_S = 10.0
+CLEARING_S = 1.5
+MODE_COLOURS = {"fault": RED, "walking": GREEN, "hold": GREEN, "stopping": YELLOW, "arming": YELLOW}
+
+
+def _with_daemon(options: Options, act: Callable[[StatusClient], int]) -> int:
+    try:
+        client = StatusClient(options.socket)
+        try:
+            return act(client)
+        finally:
+            client.close()
+    except NoDaemonError as problem:
+        complain(f"{problem}. Start it with 'systemctl start mudskipper', or name its socket with --socket.")
+        return exit_codes.NO_DAEMON
+    except NotPermittedError as problem:
+        complain(f"{problem}. Join the group that owns it.")
+        return exit_codes.NOT_PERMITTED
+    except CallRefusedError as problem:
+        complain(str(problem))
+        return exit_codes.REFUSED
+
+
+def status(options: Options) -> int:
+    def show(client: StatusClient) -> int:
+        report = client.call("status")
+        print(json.dumps(report) if options.json else status_text(report))
+        return exit_codes.UNHEALTHY if report["fault"] and report["mode"] == "fault" else exit_codes.OK
+
+    return _with_daemon(options, show)
+
+
+def watch(options: Options) -> int:
+    def show(client: StatusClient) -> int:
+        while True:
+            print("\033[H\033[J" + status_text(client.call("status")), flush=True)
+            time.sleep(max(0.05, options.period))
+
+    return _with_daemon(options, show)
+
+
+def arm(options: Options) -> int:
+    return _with_daemon(options, lambda client: _request(client, "arm", ("hold",), ARMING_S))
+
+
+def walk(options: Options) -> int:
+    params: dict[str, Any] = {"strides": options.strides}
+    if options.depth is not None:
+        params["depth_m"] = options.depth / 100.0
+    return _with_daemon(options, lambda client: _request(client, "walk", ("walking",), ARMING_S, **params))
+
+
+def stop(options: Options) -> int:
+    at_rest = ("hold", "idle", "boot", "fault")
+    return _with_daemon(options, lambda client: _request(client, "stop", at_rest, STOPPING_S))
+
+
+def disarm(options: Options) -> int:
+    return _with_daemon(options, lambda client: _request(client, "disarm", ("idle", "boot", "fault"), ARMING_S))
+
+
+def clear(options: Options) -> int:
+    def act(client: StatusClient) -> int:
+        client.call("clear")
+        deadline_s = time.monotonic() + CLEARING_S
+        while time.monotonic() < deadline_s:
+            report = client.call("status")
+            if report["fault"] is None and report["mode"] in ("idle", "boot"):
+                print(report["mode"])
+                return exit_codes.OK
+            time.sleep(0.05)
+        complain(f"the cause persists: {report['fault']['sentence'] if report['fault'] else report['mode']}")
+        return exit_codes.REFUSED
+
+    return _with_daemon(options, act)
+
+
+def _request(client: StatusClient, method: str, modes: tuple[str, ...], longest_s: float, **params: Any) -> int:
+    """Ask, then wait until the robot is in one of `modes`."""
+    client.call(method, **params)
+    deadline_s = time.monotonic() + longest_s
+    while time.monotonic() < deadline_s:
+        report = client.call("status")
+        if report["mode"] in modes:
+            print(report["mode"])
+            return exit_codes.OK
+        if report["mode"] == "fault":
+            complain(report["fault"]["sentence"])
+            return exit_codes.REFUSED
+        time.sleep(0.05)
+    complain(f"still {report['mode']} after {longest_s:g} s")
+    return exit_codes.TIMED_OUT
+
+
+def check(options: Options) -> int:
+    """Ask the daemon; where none runs, try what it would need."""
+    try:
+        client = StatusClient(options.socket)
+    except (NoDaemonError, NotPermittedError) as problem:
+        from command_line.desk_check import desk_check  # brings python-can and pydantic, which `status` must not load
+
+        items = desk_check(options.config, str(problem))
+    else:
+        items = client.call("check")
+    if options.json:
+        print(json.dumps(items))
+    else:
+        for item in items:
+            print(_check_line(item))
+    return exit_codes.OK if all(item["ok"] for item in items) else exit_codes.UNHEALTHY
+
+
+def _check_line(item: dict[str, Any]) -> str:
+    mark = coloured("ok  ", GREEN) if item["ok"] else coloured("FAIL", RED)
+    fix = f"\n       -> {item['fix']}" if item["fix"] and not item["ok"] else ""
+    return f"{mark} {item['id']:22} {item['text']}{fix}"
+
+
+def status_text(report: dict[str, Any]) -> str:
+    mode = coloured(report["mode"], MODE_COLOURS.get(report["mode"], BOLD))
+    lines = [f"{report['robot']}: {mode}, stride {report['stride']}, {report['phase']}"]
+    lines[0] += f", depth {100 * report['depth_m']:.1f} cm, body {number(report['body_x_m'])} m"
+    if report["fault"]:
+        lines.append(coloured(f"fault: {report['fault']['sentence']}", RED))
+    lines += [coloured(f"warning: {warning}", YELLOW) for warning in report["warnings"]]
+    lines += ["", _drives_table(report["drives"]), "", _loop_text(report)]
+    return "\n".join(lines)
+
+
+def _drives_table(drives: list[dict[str, Any]]) -> str:
+    rows = [("joint", "angle deg", "current A", "torque N·m", "motor C", "bus V", "age ms", "torque", "errors")]
+    for drive in drives:
+        angle_rad, age_s = drive["angle_rad"], drive["angle_age_s"]
+        rows.append(
+            (
+                drive["joint"],
+                number(None if angle_rad is None else degrees(angle_rad), 1),
+                number(drive["current_a"], 2),
+                number(drive["torque_command_nm"], 3),
+                number(drive["temperature_c"], 0),
+                number(drive["bus_voltage_v"], 1),
+                number(None if age_s is None else 1e3 * age_s, 1),
+                "on" if drive["closed_loop"] else "off",
+                drive["errors"] or "-",
+            )
+        )
+    return table(rows)
+
+
+def _loop_text(report: dict[str, Any]) -> str:
+    loop, bus, log = report["loop"], report["bus"], report["log"]
+    late, tick = loop["wake_late_us"], loop["tick_us"]
+    return "\n".join(
+        (
+            f"loop   {loop['rate_hz']:.2f} Hz, {loop['ticks']} ticks, {loop['missed_ticks']} missed",
+            f"late   {late['p50']:.0f} us median, {late['p99']:.0f} p99, {late['max']:.0f} worst",
+            f"tick   {tick['p50']:.0f} us median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst",
+            f"bus    {bus['unknown_frames']} unknown, {bus['garbled_frames']} garbled,"
+            f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends",
+            f"log    {log['path'] or 'off'}, {log['dropped']} rows dropped",
+        )
+    )

@@ -1,0 +1,69 @@
+"""How things look on a terminal: colours where a person sees them, none where the output is piped."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from math import isfinite
+from typing import Any
+
+RED, GREEN, YELLOW, BOLD, PLAIN = "\033[31m", "\033[32m", "\033[33m", "\033[1m", "\033[0m"
+
+
+def coloured(text: str, colour: str) -> str:
+    if not sys.stdout.isatty() or "NO_COLOR" in os.environ:
+        return text
+    return f"{colour}{text}{PLAIN}"
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Columns as wide as their widest cell, the first row as the head."""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    )
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A dash where nothing is known."""
+    return "-" if value is None or not isfinite(value) else f"{value:.{digits}f}"
+
+
+def complain(sentence: str) -> None:
+    """To a person, beside the data."""
+    print(f"mudskipper: {sentence}", file=sys.stderr)
+
+
+def coefficient(estimate: dict[str, Any]) -> str:
+    """In N/cm³ with its standard error; in brackets where it is not valid."""
+    if estimate["value"] is None:
+        return "-"
+    text = f"{estimate['value'] / 1e6:.2f}±{estimate['std_error'] / 1e6:.2f}"
+    return text if estimate["valid"] else f"({text})"
+
+
+STRIDE_HEAD = (
+    f"{'flipper':7} {'no':>3} {'at s':>7} {'insert':>6} {'stance':>6} {'extract':>7} "
+    f"{'k_p':>13} {'k_s':>13} {'k_e':>13} {'depth':>6} {'next':>5} {'step':>6}"
+)
+STRIDE_UNITS = (
+    f"{'':7} {'':3} {'':7} {'s':>6} {'s':>6} {'s':>7} "
+    f"{'N/cm³':>13} {'N/cm³':>13} {'N/cm³':>13} {'cm':>6} {'cm':>5} {'cm':>6}"
+)
+
+
+def stride_line(stride: dict[str, Any], start_s: float = 0.0) -> str:
+    """One stride of one flipper: when, how long its phases took, what it said of the mud, and what came of it."""
+    chosen_m = stride.get("chosen_depth_m")
+    return (
+        f"{stride['flipper']:7} {stride['index']:3d} {stride['t_end_s'] - start_s:7.2f} "
+        f"{stride['insertion_s']:6.2f} {stride['stance_s']:6.2f} {stride['extraction_s']:7.2f} "
+        f"{coefficient(stride['k_p']):>13} {coefficient(stride['k_s']):>13} {coefficient(stride['k_e']):>13} "
+        f"{number(_in_cm(stride['depth_m']), 1):>6} {number(_in_cm(chosen_m), 2):>5} "
+        f"{number(_in_cm(stride['step_m']), 1):>6}{'' if stride['released'] else '  stuck'}"
+    )
+
+
+def _in_cm(value_m: float | None) -> float | None:
+    return None if value_m is None else 100.0 * value_m

@@ -1,0 +1,75 @@
+"""A folder in which a simulated robot and a real daemon find each other on a machine without CAN.
+
+It holds the daemon's configuration, the two local buses, the status socket and the pose socket. The configuration is
+that of a robot: nothing in it says that the drives are simulated, only that the buses are local ones. Two processors
+that everything shares are less punctual than a robot's, so signals may be older before they count as lost.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+CONFIGURATION = """\
+# A robot whose drives are simulated on local buses.
+
+[robot]
+name = "simulated"
+
+[bus.left]
+interface = "mudskipper_local"
+channel = "{folder}/left"
+
+[bus.right]
+interface = "mudskipper_local"
+channel = "{folder}/right"
+
+[drive.left_sweep]
+bus = "left"
+node_id = 0
+sign = 1
+
+[drive.left_adduction]
+bus = "left"
+node_id = 1
+sign = -1
+
+[drive.right_sweep]
+bus = "right"
+node_id = 3
+sign = -1
+
+[drive.right_adduction]
+bus = "right"
+node_id = 2
+sign = 1
+
+[loop]
+silence_s = 0.25
+
+[log]
+directory = "{logs}"
+
+[status]
+socket = "{folder}/mudskipper.sock"
+
+[pose]
+socket = "{folder}/pose.sock"
+"""
+
+
+def named_folder(name: str) -> Path:
+    """The same for every process of this user: short, since the path of a Unix socket must be."""
+    folder = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"mudskipper-{os.geteuid()}" / name
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    return folder
+
+
+def write_local_setup(folder: Path, logs: Path) -> Path:
+    """Path of the configuration, for `mudskipperd --config` and for the simulated robot."""
+    for name in ("left", "right"):
+        (folder / name).mkdir(mode=0o700, exist_ok=True)
+    path = folder / "mudskipper.toml"
+    path.write_text(CONFIGURATION.format(folder=folder, logs=logs.absolute()), encoding="utf-8")
+    return path

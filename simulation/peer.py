@@ -1,0 +1,113 @@
+"""The simulated robot as a process of its own, in real time, on the buses that a configuration names.
+
+It reads of the configuration what a real robot's wiring would fix: buses, node ids, signs, geometry. The body's place
+goes to the pose socket at motion-capture rate.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from random import Random
+
+from control.records import JOINTS
+from drivers.pose_port import PoseSender
+from firmware_host.buses import BusError, open_ports
+from firmware_host.configuration import EXIT_CONFIGURATION, Configuration, ConfigurationError, load_configuration
+from firmware_host.ticker import Ticker
+from simulation.clay import MUDS
+from simulation.lockstep import POSE_NOISE_M, drives_of, plant_of
+from simulation.robot import SimulatedRobot
+from simulation.track import COMPARTMENT_M, Track
+
+STEP_S = 0.002  # the period of the drives' fastest messages
+POSE_PERIOD_S = 1.0 / 120.0  # the paper's motion capture
+WATCHDOG_S = 0.25  # of the simulated drives, on processors that everything shares
+LONGEST_CATCH_UP_S = 0.5  # a robot that was stopped for longer has lost that time
+PR_SET_PDEATHSIG = 1
+
+
+class PoseBroadcast:
+    """Sends the body's place when it is due."""
+
+    def __init__(self, path: str, seed: int) -> None:
+        self._sender = PoseSender(Path(path)) if path else None
+        self._random = Random(seed)
+        self._due_s = 0.0
+
+    def step(self, now_s: float, x_m: float) -> None:
+        if self._sender is not None and now_s >= self._due_s:
+            self._due_s = max(self._due_s + POSE_PERIOD_S, now_s)
+            self._sender.send(now_s, x_m + self._random.gauss(0.0, POSE_NOISE_M))
+
+
+class Peer:
+    def __init__(self, configuration: Configuration, track: Track, seed: int) -> None:
+        self.ticker = Ticker(STEP_S)
+        self._ports = open_ports(configuration.bus)
+        self.robot = SimulatedRobot(
+            plant_of(configuration),
+            track,
+            drives_of(configuration, watchdog_s=WATCHDOG_S),
+            {joint: configuration.drive[joint].bus for joint in JOINTS},
+            self._ports,
+            seed,
+            start_s=self.ticker.wait().now_s,
+        )
+        self._pose = PoseBroadcast(configuration.pose.socket, seed + 1)
+        self.ended = False
+
+    def end(self, number: int, frame: object) -> None:
+        """A signal handler."""
+        self.ended = True
+
+    def run(self) -> None:
+        while not self.ended:
+            now_s = self.ticker.wait().now_s
+            if now_s - self.robot.now_s > LONGEST_CATCH_UP_S:
+                self.robot.now_s = now_s
+            self.robot.advance(now_s)
+            self._pose.step(now_s, self.robot.plant.body_m)
+        for port in self._ports.values():
+            port.close()
+
+
+def track_of(waters: Sequence[str], length_m: float = COMPARTMENT_M) -> Track:
+    """Compartments of the named water contents, one after the other."""
+    return Track([(length_m, MUDS[water]) for water in waters])
+
+
+def end_with_parent() -> None:
+    """Ask the kernel for SIGTERM when the starting process dies, so that no robot is left behind."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="simulation.peer", description=__doc__)
+    parser.add_argument("--config", type=Path, required=True)
+    parser.add_argument("--mud", action="append", choices=sorted(MUDS), help="water content in percent; repeatable")
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args(arguments)
+    try:
+        configuration = load_configuration(options.config)
+        peer = Peer(configuration, track_of(options.mud or list(MUDS)), options.seed)
+    except ConfigurationError as problem:
+        print("\n".join(problem.problems), file=sys.stderr)
+        return EXIT_CONFIGURATION
+    except BusError as problem:
+        print(problem, file=sys.stderr)
+        return 1
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, peer.end)
+    os.nice(5)  # the controller comes first
+    peer.run()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
