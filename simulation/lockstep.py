@@ -113,9 +113,11 @@ class Lockstep:
             raise RuntimeError(refused or f"not armed: {self.loop.fault}")
 
     def walk(self, order: WalkOrder) -> None:
+        """Begin a walk. Raises RuntimeError where it is refused."""
         refused = self.loop.request(Request.WALK, self.now_s, order)
         if refused:
             raise RuntimeError(refused)
+        self.step()
 
 
 def default_configuration_path() -> Path:

@@ -1,0 +1,36 @@
+# `make` lists what there is. Everything lives in .venv; nothing else on the machine is touched.
+
+PYTHON ?= python3
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
+
+.PHONY: help setup demo test lint clean
+
+help:  ## this list
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+
+setup: .venv/setup  ## the environment, with all that running and plotting need
+
+demo: .venv/setup  ## a simulated robot walks over three muds, in real time
+	@$(BIN)/mudskipper demo $(ARGS)
+
+test: .venv/test  ## every test, without network
+	$(BIN)/python -m pytest -q $(ARGS)
+
+lint: .venv/test  ## ruff and mypy --strict
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+clean:  ## remove the environment and what was built
+	rm -rf .venv build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+
+.venv/setup: pyproject.toml
+	@echo "Installing into .venv (a minute or two) ..."
+	@$(PYTHON) -m venv .venv
+	@$(PIP) --editable ".[plots,serial]"
+	@touch $@
+
+.venv/test: .venv/setup
+	@echo "Installing what the tests need ..."
+	@$(PIP) --editable ".[plots,serial,test]"
+	@touch $@

@@ -1,0 +1,31 @@
+"""Fixtures that tests of several layers share."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from firmware_host.configuration import Configuration, load_configuration
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.fixture(scope="session")
+def example_text() -> str:
+    """The configuration that the README tells a robot's owner to start from."""
+    return (ROOT / "systemd" / "mudskipper.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
+def configuration() -> Configuration:
+    return load_configuration(ROOT / "systemd" / "mudskipper.toml")
+
+
+@pytest.fixture
+def short_folder() -> Iterator[Path]:
+    """A folder whose path leaves room for the name of a Unix socket."""
+    with tempfile.TemporaryDirectory(prefix="mud-") as folder:
+        yield Path(folder)

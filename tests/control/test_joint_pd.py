@@ -1,0 +1,87 @@
+"""The PD law's signs, and its gravity term against the numeric gradient of potential energy."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.joint_path import still
+from control.joint_pd import ArmMass, JointGains, joint_torques_nm, pd_torque_nm
+from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, JointTarget
+
+WEIGHTLESS = ArmMass(arm_mass_kg=0.0)
+angles = st.floats(-pi / 2, pi / 2)
+poses = st.tuples(angles, angles, angles, angles)
+masses = st.builds(ArmMass, arm_mass_kg=st.floats(0.0, 20.0), center_of_mass_m=st.floats(0.0, 1.0))
+
+
+def resting(pose: JointAngles) -> DriveStates:
+    a, b, c, d = (DriveState(angle_rad=angle, velocity_rad_s=0.0) for angle in pose)
+    return a, b, c, d
+
+
+def potential_energy_j(mass: ArmMass, sweep_rad: float, adduction_rad: float) -> float:
+    """m g times the height of a point on the arm, which rotation matrices put there."""
+    arm = np.array([np.sin(sweep_rad), np.cos(sweep_rad), 0.0]) * mass.center_of_mass_m
+    about_x = np.array([np.sin(adduction_rad), np.cos(adduction_rad)])
+    return float(mass.arm_mass_kg * 9.81 * about_x @ arm[1:])
+
+
+@given(masses, angles, angles)
+def test_gravity_torques_are_the_downhill_gradient_of_potential_energy(
+    mass: ArmMass, sweep: float, adduction: float
+) -> None:
+    step = 1e-5
+    by_sweep = potential_energy_j(mass, sweep + step, adduction) - potential_energy_j(mass, sweep - step, adduction)
+    by_adduction = potential_energy_j(mass, sweep, adduction + step) - potential_energy_j(mass, sweep, adduction - step)
+    expected = (-by_sweep / (2.0 * step), -by_adduction / (2.0 * step))
+    assert mass.gravity_torques_nm(sweep, adduction) == pytest.approx(expected, abs=1e-6)
+
+
+@given(masses, poses)
+def test_an_arm_at_its_target_gets_exactly_what_balances_gravity(mass: ArmMass, pose: JointAngles) -> None:
+    torques = joint_torques_nm(still(pose), resting(pose), JointGains(), mass, 1.0)
+    for flipper in (0, 2):
+        gravity = mass.gravity_torques_nm(pose[flipper], pose[flipper + 1])
+        assert torques[flipper] + gravity[0] == 0.0
+        assert torques[flipper + 1] + gravity[1] == 0.0
+
+
+def test_a_level_arm_is_held_up_by_its_weight_times_its_lever() -> None:
+    level = (0.0, 0.0, 0.0, 0.0)
+    torques = joint_torques_nm(still(level), resting(level), JointGains(), ArmMass(0.5, 0.1), 1.0)
+    assert torques == pytest.approx((0.0, 0.4905, 0.0, 0.4905))
+
+
+@pytest.mark.parametrize("joint", range(4))
+def test_each_joint_is_pushed_toward_its_own_target_with_its_own_gains(joint: int) -> None:
+    gains = JointGains(8.0, 0.06, 10.0, 0.08)
+    target = [JointTarget(0.0, 0.0)] * 4
+    target[joint] = JointTarget(0.1, 2.0)
+    torques = joint_torques_nm(
+        (target[0], target[1], target[2], target[3]), resting((0.0, 0.0, 0.0, 0.0)), gains, WEIGHTLESS, 1.0
+    )
+    expected = [0.0] * 4
+    expected[joint] = (0.8 + 0.12) if joint % 2 == 0 else (1.0 + 0.16)
+    assert torques == pytest.approx(expected)
+
+
+def test_the_torque_opposes_the_error_in_angle_and_in_velocity() -> None:
+    target = JointTarget(0.0, 0.0)
+    assert pd_torque_nm(target, DriveState(angle_rad=0.1, velocity_rad_s=0.0), 8.0, 0.06) == pytest.approx(-0.8)
+    assert pd_torque_nm(target, DriveState(angle_rad=0.0, velocity_rad_s=2.0), 8.0, 0.06) == pytest.approx(-0.12)
+    assert pd_torque_nm(target, DriveState(angle_rad=-0.1, velocity_rad_s=-2.0), 8.0, 0.06) == pytest.approx(0.92)
+
+
+@given(masses, poses, poses)
+def test_faded_out_there_is_no_torque_at_all(mass: ArmMass, target: JointAngles, pose: JointAngles) -> None:
+    assert joint_torques_nm(still(target), resting(pose), JointGains(), mass, 0.0) == NO_TORQUE
+
+
+@given(poses, poses, st.floats(0.0, 1.0))
+def test_the_fade_scales_every_torque_alike(target: JointAngles, pose: JointAngles, fade: float) -> None:
+    whole = joint_torques_nm(still(target), resting(pose), JointGains(), ArmMass(), 1.0)
+    faded = joint_torques_nm(still(target), resting(pose), JointGains(), ArmMass(), fade)
+    assert faded == pytest.approx([fade * torque for torque in whole], abs=1e-12)

@@ -1,0 +1,245 @@
+"""The loop on simulated drives: what a tick does with requests, garbage and trouble."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from control.controller import WalkOrder
+from control.modes import Mode, Request
+from control.records import NO_TORQUE
+from drivers.frames import Frame
+from drivers.mock_bus import MockPort
+from drivers.odrive_codec import ERROR_WATCHDOG, SET_INPUT_TORQUE
+from firmware_host.configuration import Configuration
+from firmware_host.log_rows import EVENT
+from firmware_host.loop import EVENT_KIND, STRIDE_KIND, TICK_KIND
+from firmware_host.recorder import NullRecorder
+from simulation.clay import MUDS
+from simulation.lockstep import Lockstep
+from simulation.track import Track
+
+FIRM = Track([(5.0, MUDS["48.5"])])
+Make = Callable[..., Lockstep]
+
+
+class ListRecorder(NullRecorder):
+    """Keeps every row."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[int, bytes]] = []
+
+    def put(self, kind_index: int, payload: bytes) -> bool:
+        self.rows.append((kind_index, payload))
+        return True
+
+    def texts(self) -> list[str]:
+        return [EVENT.decode(payload)["text"] for kind, payload in self.rows if kind == EVENT_KIND]
+
+
+@pytest.fixture
+def robot(configuration: Configuration) -> Lockstep:
+    return Lockstep(configuration, FIRM, recorder=ListRecorder())
+
+
+def recorder_of(robot: Lockstep) -> ListRecorder:
+    recorder = robot.loop.recorder
+    assert isinstance(recorder, ListRecorder)
+    return recorder
+
+
+def stranger_on(robot: Lockstep, bus: str) -> MockPort:
+    port = robot.loop.drives.ports[bus]
+    assert isinstance(port, MockPort)
+    return port._bus.open()
+
+
+def torque_frames(port: MockPort) -> list[Frame]:
+    return [frame for frame in port.receive() if frame.arbitration_id & 0x1F == SET_INPUT_TORQUE.command]
+
+
+def test_nothing_is_transmitted_before_every_drive_was_heard(configuration: Configuration) -> None:
+    robot = Lockstep(configuration, FIRM)
+    listener = stranger_on(robot, "left")
+    robot.robot.advance = lambda until_s: None  # type: ignore[method-assign] # drives without power
+    robot.run_for(1.0)
+    assert robot.loop.mode is Mode.BOOT
+    assert listener.receive() == []
+
+
+def test_it_arms_only_when_asked(robot: Lockstep) -> None:
+    robot.run_for(2.0)
+    assert robot.loop.mode is Mode.IDLE
+    assert not any(state.closed_loop for state in robot.loop.states)
+
+
+def test_arming_holds_the_pose_it_finds_without_a_jerk(robot: Lockstep) -> None:
+    robot.run_for(0.5)
+    before = robot.robot.plant.angles_rad
+    robot.arm()
+    largest_nm = 0.0
+    for _ in range(190):
+        robot.step()
+        largest_nm = max(largest_nm, *(abs(torque_nm) for torque_nm in robot.loop.sent.torques_nm))
+    assert robot.loop.mode is Mode.HOLD
+    assert robot.robot.plant.angles_rad == pytest.approx(before, abs=0.02)
+    assert largest_nm < 0.1
+
+
+def test_a_walk_of_three_strides_ends_raised_and_holding(robot: Lockstep) -> None:
+    robot.arm()
+    robot.walk(WalkOrder(0.03, False, 3))
+    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 15.0)
+    robot.run_for(0.5)
+    assert robot.loop.strides_closed == 6
+    assert robot.robot.plant.angles_rad[1] == pytest.approx(0.0, abs=0.03)
+
+
+def test_stop_raises_the_flippers_from_any_phase(configuration: Configuration) -> None:
+    for delay_s in (0.9, 1.5, 1.9, 2.1, 2.6):
+        robot = Lockstep(configuration, FIRM)
+        robot.arm()
+        robot.walk(WalkOrder(0.03))
+        robot.run_for(delay_s)
+        robot.loop.request(Request.STOP, robot.now_s)
+        assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 3.0), delay_s  # noqa: B023
+        robot.run_for(0.3)
+        assert robot.robot.plant.angles_rad[1] == pytest.approx(0.0, abs=0.05)
+
+
+def test_disarm_takes_the_torque_at_once_in_every_phase(robot: Lockstep) -> None:
+    robot.arm()
+    robot.walk(WalkOrder(0.03))
+    robot.run_for(2.0)
+    robot.loop.request(Request.DISARM, robot.now_s)
+    robot.step()
+    assert robot.loop.mode is Mode.IDLE
+    assert robot.loop.sent.torques_nm == NO_TORQUE
+    robot.run_for(0.02)
+    assert not any(drive.axis_state == 8 for drive in robot.robot.drives)
+
+
+def test_requests_that_do_not_fit_are_refused_with_what_to_do(robot: Lockstep) -> None:
+    robot.run_for(0.5)
+    assert "arm" in (robot.loop.request(Request.WALK, robot.now_s) or "")
+    robot.arm()
+    assert "holds" in (robot.loop.request(Request.ARM, robot.now_s) or "")
+    robot.walk(WalkOrder(0.03))
+    robot.run_for(1.0)
+    assert "stop" in (robot.loop.request(Request.WALK, robot.now_s, WalkOrder(0.03)) or "")
+
+
+def test_a_drive_error_ends_in_fault_with_the_drives_own_words(robot: Lockstep) -> None:
+    robot.arm()
+    robot.walk(WalkOrder(0.03))
+    robot.run_for(1.5)
+    robot.robot.drives[2]._disarm(ERROR_WATCHDOG)
+    assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
+    assert robot.loop.fault is not None
+    assert "right_sweep" in robot.loop.fault.sentence and "watchdog expired" in robot.loop.fault.sentence
+    robot.run_for(0.02)
+    assert not any(drive.axis_state == 8 for drive in robot.robot.drives)
+
+
+def test_a_fault_is_latched_until_somebody_clears_it(robot: Lockstep) -> None:
+    robot.arm()
+    robot.robot.drives[0]._disarm(ERROR_WATCHDOG)
+    assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
+    robot.run_for(1.0)
+    assert robot.loop.mode is Mode.FAULT
+    assert robot.loop.request(Request.CLEAR, robot.now_s) is None
+    assert robot.run_until(lambda: robot.loop.mode is Mode.IDLE, 0.6)
+    robot.run_for(1.0)
+    assert robot.loop.mode is Mode.IDLE and robot.loop.fault is None
+
+
+def test_clearing_does_not_help_while_the_cause_lasts(configuration: Configuration) -> None:
+    robot = Lockstep(configuration, FIRM)
+    robot.arm()
+    robot.robot.drives = (robot.robot.drives[0],) * 4  # three boards are gone
+    assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
+    robot.loop.request(Request.CLEAR, robot.now_s)
+    robot.run_for(1.0)
+    assert robot.loop.mode is Mode.FAULT
+
+
+def test_a_silent_drive_is_a_fault_within_its_bound(configuration: Configuration) -> None:
+    robot = Lockstep(configuration, FIRM)
+    robot.arm()
+    robot.robot.drives[3].cyclic_frames = lambda now_s: iter(())  # type: ignore[method-assign]
+    ticks = 0
+    while robot.loop.mode is not Mode.FAULT and ticks < 50:
+        robot.step()
+        ticks += 1
+    assert ticks <= configuration.loop.silence_s * 380 + 2
+    assert robot.loop.fault is not None and "right_adduction" in robot.loop.fault.sentence
+
+
+def test_a_torque_that_is_no_number_never_leaves(robot: Lockstep) -> None:
+    robot.arm()
+    robot.loop.controller.gains = replace(robot.loop.controller.gains, sweep_stiffness_nm_rad=float("nan"))
+    listener = stranger_on(robot, "left")
+    robot.run_for(0.1)
+    assert robot.loop.mode is Mode.FAULT
+    assert robot.loop.fault is not None and robot.loop.fault.name == "not_finite"
+    for frame in torque_frames(listener):
+        (torque_nm,) = SET_INPUT_TORQUE.decode(frame.data)
+        assert torque_nm == torque_nm
+
+
+def test_firmware_of_another_family_is_not_armed(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("simulation.odrive.VERSION_FIELDS", (2, 3, 6, 56, 0, 5, 6, 0))
+    robot = Lockstep(configuration, FIRM)
+    robot.run_for(1.0)
+    refused = robot.loop.request(Request.ARM, robot.now_s)
+    assert refused is not None and "firmware 0.5.6" in refused
+
+
+def test_garbage_on_the_bus_is_counted_and_changes_nothing(configuration: Configuration) -> None:
+    quiet, noisy = Lockstep(configuration, FIRM), Lockstep(configuration, FIRM)
+    garbage = stranger_on(noisy, "left")
+    for robot in (quiet, noisy):
+        robot.arm()
+        robot.walk(WalkOrder(0.03))
+    for number in range(1500):
+        quiet.step()
+        garbage.send(Frame(0x700 | number % 256, bytes(number % 9)))
+        garbage.send(Frame(0x009, b"\x00\x00\xc0\x7f\x00\x00\x00\x00"))  # a drive of ours that says NaN
+        garbage.send(Frame(0x029, b"\x01"))
+        noisy.step()
+    assert noisy.loop.drives.unknown_frames >= 1500 and noisy.loop.drives.garbled_frames >= 3000
+    assert [s.estimate for s in noisy.loop.strides] == [s.estimate for s in quiet.loop.strides]
+
+
+def test_a_missed_tick_costs_no_place_in_the_gait(robot: Lockstep) -> None:
+    from firmware_host.ticker import PERIOD_S, Beat
+
+    robot.arm()
+    robot.walk(WalkOrder(0.03))
+    robot.run_until(lambda: robot.loop.target.stride == 0, 5.0)
+    robot.run_for(0.2)
+    before = robot.loop.controller.gait._time_s
+    robot.tick_number += 3
+    robot.robot.advance(robot.now_s)
+    robot.loop.tick(Beat(robot.now_s, 0.0, robot.tick_number, 2))
+    assert robot.loop.controller.gait._time_s - before == pytest.approx(3 * PERIOD_S)
+
+
+def test_every_tick_and_every_stride_is_recorded(robot: Lockstep) -> None:
+    robot.arm()
+    robot.walk(WalkOrder(0.03, True, 2))
+    robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 10.0)
+    kinds = [kind for kind, _ in recorder_of(robot).rows]
+    assert kinds.count(TICK_KIND) == robot.tick_number
+    assert kinds.count(STRIDE_KIND) == robot.loop.strides_closed == 4
+    assert "request walk" in recorder_of(robot).texts()
+    assert "mode hold to walking" in recorder_of(robot).texts()
+
+
+def test_a_fixed_depth_stays_fixed(robot: Lockstep) -> None:
+    robot.arm()
+    robot.walk(WalkOrder(0.04, False, 3))
+    robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 15.0)
+    assert {stride.chosen_depth_m for stride in robot.loop.strides} == {0.04}

@@ -1,0 +1,74 @@
+"""The beat keeps its grid whatever the ticks do, on a clock made for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import pytest
+
+from firmware_host.ticker import PERIOD_S, RATE_HZ, Ticker
+
+
+@dataclass
+class FakeClock:
+    """Time passes by sleeping, and by `work_s`."""
+
+    now_s: float = 100.0
+    oversleep_s: float = 0.0
+    slept_s: list[float] = field(default_factory=list)
+
+    def read(self) -> float:
+        return self.now_s
+
+    def sleep(self, duration_s: float) -> None:
+        assert duration_s > 0.0
+        self.slept_s.append(duration_s)
+        self.now_s += max(duration_s + self.oversleep_s, 1e-6)
+
+
+def make_ticker(clock: FakeClock) -> Ticker:
+    return Ticker(PERIOD_S, clock.read, clock.sleep)
+
+
+def test_the_rate_does_not_drift_with_the_work() -> None:
+    clock = FakeClock(oversleep_s=50e-6)
+    ticker = make_ticker(clock)
+    for _ in range(38000):
+        ticker.wait()
+        clock.now_s += 0.7 * PERIOD_S
+    assert (clock.now_s - 0.7 * PERIOD_S - 100.0) * RATE_HZ == pytest.approx(38000, abs=0.03)
+
+
+def test_deadlines_that_were_missed_are_skipped_and_counted() -> None:
+    clock = FakeClock()
+    ticker = make_ticker(clock)
+    ticker.wait()
+    clock.now_s += 3.4 * PERIOD_S
+    beat = ticker.wait()
+    assert (beat.missed, beat.number) == (2, 4)
+    assert beat.late_s == pytest.approx(0.4 * PERIOD_S)
+
+
+def test_a_stall_is_not_made_up_for() -> None:
+    clock = FakeClock()
+    ticker = make_ticker(clock)
+    ticker.wait()
+    clock.now_s += 100.0 * PERIOD_S
+    ticker.wait()
+    before_s = clock.now_s
+    ticker.wait()
+    assert clock.now_s - before_s > 0.0  # it slept until the next deadline instead of running at once
+
+
+def test_lateness_is_told_after_its_own_deadline() -> None:
+    clock = FakeClock(oversleep_s=123e-6)
+    beat = make_ticker(clock).wait()
+    assert beat.late_s == pytest.approx(123e-6)
+    assert beat.missed == 0
+
+
+def test_a_sleep_that_ends_early_is_continued() -> None:
+    clock = FakeClock(oversleep_s=-1e-4)
+    beat = make_ticker(clock).wait()
+    assert beat.late_s >= 0.0
+    assert len(clock.slept_s) > 1
