@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 from pathlib import Path
 from statistics import median
 from time import perf_counter
-from typing import Any, Iterator, NamedTuple
+from typing import Any, NamedTuple
 
 from benchmarks.report import Progress, new_parser, print_report, summary_us, verdict
 from command_line.screen import table
@@ -180,11 +180,11 @@ def _call_s(method: Callable[[object], None]) -> float:
 
 
 class Samples:
-    """Durations in seconds, apart for ticks that close a stride: only those choose a depth."""
+    """Durations in seconds. Only ticks that close a stride choose a depth: their `adapt` is kept apart."""
 
     def __init__(self) -> None:
         self.whole: list[float] = []
-        self.whole_closing: list[float] = []
+        self.whole_closing: list[float] = []  # of those, the ones that close a stride
         self.stages: dict[str, list[float]] = {stage: [] for stage in STAGES}
         self.adapt_closing: list[float] = []
         self.record_unrecorded: list[float] = []
@@ -224,7 +224,9 @@ class TimedWalk:
         """One block of each kind."""
         for _ in range(BLOCK_TICKS):
             duration_s, closing = self._tick()
-            (self.samples.whole_closing if closing else self.samples.whole).append(duration_s)
+            self.samples.whole.append(duration_s)
+            if closing:
+                self.samples.whole_closing.append(duration_s)
         with self.marks.attached():
             for _ in range(BLOCK_TICKS):
                 self._keep_stages(*self._marked_tick())
@@ -305,7 +307,7 @@ def text_of(report: dict[str, Any]) -> str:
 
 def _rows(figures: dict[str, Any]) -> list[list[str]]:
     whole, closing, adapting = figures["whole_us"], figures["whole_closing_us"], figures["adapt_closing_us"]
-    rows = [["us", "median", "p99", "max", ""], _row("whole tick", whole, f"{whole['ticks']} ticks")]
+    rows = [["us", "median", "p99", "max", ""], _row("whole tick", whole, f"all {whole['ticks']} ticks")]
     rows.append(_row("whole tick, closing", closing, f"{closing['ticks']} ticks that close a stride"))
     rows += [_row(f"  {stage}", figures["stages_us"][stage], meaning) for stage, meaning in MEANINGS.items()]
     rows.append(_row("  adapt, closing", adapting, f"{adapting['ticks']} ticks that choose a depth"))

@@ -13,6 +13,7 @@ import can
 
 from drivers.frames import Frame
 
+RECEIVE_ERRORS = (can.CanError, OSError, ValueError, IndexError)  # the last two: slcan's parser on a garbled line
 MOST_FRAMES_PER_READ = 256  # a babbling node must not hold the loop
 
 
@@ -60,7 +61,7 @@ class PythonCanPort:
                             message.is_extended_id,
                         )
                     )
-        except can.CanError as problem:  # the interface went down: the drives fall silent, which is a fault
+        except RECEIVE_ERRORS as problem:  # an interface that is down is a fault by the silence of its drives
             self.error_frames += 1
             self.last_error = str(problem)
         return frames
@@ -73,7 +74,7 @@ class PythonCanPort:
             is_remote_frame=frame.is_remote,
         )
         try:
-            self._bus.send(message)
+            self._bus.send(message, 0.0)
         except can.CanError as problem:  # a full transmit queue (ENOBUFS) or an interface that is down
             self.failed_sends += 1
             self.last_error = str(problem)

@@ -33,7 +33,8 @@ class MockPort:
                 port.queue.append(frame)
 
     def close(self) -> None:
-        self._bus.ports.remove(self)
+        if self in self._bus.ports:
+            self._bus.ports.remove(self)
 
 
 class MockBus:

@@ -94,13 +94,15 @@ class OdriveAxis:
         return {arbitration_id(self.parameters.node_id, message): receive for message, receive in table.items()}
 
     def _receive_encoder(self, data: bytes, now_s: float) -> None:
-        turns, turns_s = _finite(*GET_ENCODER_ESTIMATES.decode(data))
+        turns, turns_s = GET_ENCODER_ESTIMATES.decode(data)
+        _require_finite(turns + turns_s)
         self._angle_rad = (turns - self.parameters.zero_turn) * self._rad_per_turn
         self._velocity_rad_s = turns_s * self._rad_per_turn
         self._angle_stamp_s = now_s
 
     def _receive_current(self, data: bytes, now_s: float) -> None:
-        _, measured_a = _finite(*GET_IQ.decode(data))
+        _, measured_a = GET_IQ.decode(data)
+        _require_finite(measured_a)
         self._current_a = self.parameters.sign * measured_a
         self._current_stamp_s = now_s
 
@@ -173,10 +175,9 @@ class OdriveAxis:
         self._port.send(Frame(arbitration_id(self.parameters.node_id, message), message.encode(*values)))
 
 
-def _finite(first: float, second: float) -> tuple[float, float]:
-    if not isfinite(first + second):
+def _require_finite(value: float) -> None:
+    if not isfinite(value):
         raise GarbledMessageError("not a finite number")
-    return first, second
 
 
 class OdriveDrives:
@@ -238,9 +239,9 @@ class OdriveDrives:
         """Zero torque and idle: for all drives `at_once`, else every REPEAT_S for those still in closed loop."""
         if not at_once and now_s - self._last_request_s < REPEAT_S:
             return
-        self._last_request_s = now_s
         for axis in self.axes:
             if at_once or axis.state.closed_loop:
+                self._last_request_s = now_s
                 axis.disarm()
 
     def clear_errors(self) -> None:

@@ -7,6 +7,7 @@ metres. The newest one wins; its stamp is the time it was read.
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
 from math import isfinite
 from pathlib import Path
@@ -16,6 +17,8 @@ from control.records import BodyPose
 
 POSE = Struct("<dd")
 STALE_S = 0.5
+SOCKET_MODE = 0o660  # a bridge run by an operator may send
+MOST_MESSAGES_PER_READ = 64  # a sender gone wild must not hold the loop
 
 
 class PosePort:
@@ -36,7 +39,7 @@ class PosePort:
         return self._pose if now_s - self._pose.stamp_s <= STALE_S else BodyPose()
 
     def _drain(self, listener: socket.socket, now_s: float) -> None:
-        while True:
+        for _ in range(MOST_MESSAGES_PER_READ):
             try:
                 data = listener.recv(64)
             except BlockingIOError:
@@ -59,6 +62,7 @@ def _listen(path: Path) -> socket.socket:
     with contextlib.suppress(FileNotFoundError):
         path.unlink()
     listener.bind(str(path))
+    os.chmod(path, SOCKET_MODE)
     return listener
 
 

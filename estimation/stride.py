@@ -69,7 +69,7 @@ class FlipperEstimator:
         self._steady_rad = 0.0
         self._extraction_start_m = UNKNOWN
         self._insertion_force_n = self._stance_force_n = self._extraction_force_n = UNKNOWN
-        if not isfinite(self._body_at_close_m):
+        if self._index == 0 and not isfinite(self._body_at_close_m):
             self._body_at_close_m = body_x_m
 
     def update(
@@ -173,7 +173,8 @@ class FlipperEstimator:
         closed = None
         if phase in (Phase.SWING, Phase.INSERTION, Phase.REST):
             complete = all(duration_s > 0.0 for duration_s in self._duration_s.values())
-            closed = self._close(now_s, body_x_m) if complete else None
+            cut_short = phase is Phase.REST  # the walk was ended within the stride
+            closed = self._close(now_s, body_x_m) if complete and not cut_short else None
             self._begin_stride(now_s, body_x_m)
         self._phase = phase
         self._phase_start_s = now_s

@@ -37,6 +37,7 @@ from firmware_host.ticker import RATE_HZ, Beat, Ticker
 
 EXIT_FAILED = 1
 LONGEST_SHUTDOWN_S = 5.0
+LONGEST_LOG_CLOSE_S = 10.0
 GOODBYE_S = 0.3  # for idle requests to leave and be obeyed
 NOTIFY_TICKS = int(RATE_HZ / 4)
 
@@ -110,7 +111,7 @@ def run(configuration: Configuration, shutdown: Shutdown) -> int:
         stack.callback(pose.close)
         log_path = new_log_path(configuration)
         recorder = open_recorder(configuration, log_path)
-        stack.callback(recorder.close, timeout_s=10.0)
+        stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
         loop = Loop(configuration, drives, pose, recorder)
         warnings: list[str] = []
         calls = OperatorCalls(loop, recorder, str(log_path) if log_path else None, warnings, time.monotonic)
@@ -139,6 +140,7 @@ def _run_loop(loop: Loop, status: StatusSocket, notifier: SystemdNotifier, shutd
         notifier.send("STOPPING=1")
         return 0
     except Exception as problem:  # noqa: BLE001 - the one place where surprises end
+        notifier.send("STOPPING=1")
         return _end_safely(loop, problem)
 
 

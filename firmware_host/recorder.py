@@ -116,7 +116,7 @@ class Recorder:
 
     def _loss_report(self) -> bytes:
         """Written together with the row after it: alone it would slip into gaps too small for a row."""
-        text = f"{self._unreported} rows are missing here: the log's writer did not keep up"
+        text = f"rows missing here: {self._unreported}, the log's writer did not keep up"
         payload = EVENT.encode(self._loss_stamp_s, text)
         return HEADER.pack(EVENT_KIND, len(payload)) + payload
 
@@ -136,8 +136,8 @@ class Recorder:
 
 
 def _start_writer(path: Path) -> subprocess.Popen[bytes]:
-    """Ctrl-C and the service's stop reach the writer too, so it is born with both blocked."""
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    """Ctrl-C, the service's stop and its watchdog reach the writer too, so it is born with their signals blocked."""
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGABRT})
     try:
         command = [sys.executable, "-m", "firmware_host.log_writer", str(path)]
         return subprocess.Popen(command, stdin=subprocess.PIPE, bufsize=0)

@@ -46,7 +46,7 @@ node_id = 2
 sign = 1
 
 [loop]
-silence_s = 0.25
+silence_s = 0.5
 
 [log]
 directory = "{logs}"

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from math import pi
+from math import isfinite, pi
 from random import Random
 
 from drivers.frames import Frame
@@ -101,18 +101,28 @@ class SimulatedOdrive:
 
     def _obey(self, command: int, data: bytes, now_s: float) -> None:
         if command == SET_INPUT_TORQUE.command:
-            (self._setpoint_nm,) = SET_INPUT_TORQUE.decode(data)
-            self._fed_s = now_s
+            self._set_torque(*SET_INPUT_TORQUE.decode(data), now_s)
         elif command == SET_AXIS_STATE.command:
             self._change_state(SET_AXIS_STATE.decode(data)[0], now_s)
         elif command == SET_CONTROLLER_MODE.command:
             self._modes = SET_CONTROLLER_MODE.decode(data)
         elif command == SET_LIMITS.command:
-            self._velocity_limit_turn_s, self._current_limit_a = SET_LIMITS.decode(data)
+            self._set_limits(*SET_LIMITS.decode(data))
         elif command == CLEAR_ERRORS.command:
             self.errors = 0
         elif command == ESTOP.command:
             self._disarm(ERROR_ESTOP)
+
+    def _set_torque(self, torque_nm: float, now_s: float) -> None:
+        if not isfinite(torque_nm):
+            raise GarbledMessageError("not a finite number")
+        self._setpoint_nm = torque_nm
+        self._fed_s = now_s
+
+    def _set_limits(self, velocity_turn_s: float, current_a: float) -> None:
+        if not isfinite(velocity_turn_s + current_a):
+            raise GarbledMessageError("not a finite number")
+        self._velocity_limit_turn_s, self._current_limit_a = velocity_turn_s, current_a
 
     def _change_state(self, state: int, now_s: float) -> None:
         if state == AxisState.CLOSED_LOOP and not self.errors:

@@ -19,6 +19,7 @@ from simulation.track import Track
 
 STEP_S = 0.001
 DRAG_STIFFNESS_N_M = 5000.0
+DRAG_DAMPING_N_S_M = 71.0  # half of critical with the body's mass: dry friction lets nothing ring
 END_STOPS_RAD = (radians(100.0), radians(85.0))  # sweep, adduction: the arm meets the body
 
 
@@ -126,6 +127,6 @@ class Plant:
         pad_n = clay.lateral_n(parameters.pad_depth_m, parameters.pad_width_m) if parameters.pad_width_m else 0.0
         largest_n = parameters.rail_drag_n + rate_factor(abs(self.body_m_s)) * pad_n
         self._drag_m += dt_s * self.body_m_s
-        force_n = min(max(-DRAG_STIFFNESS_N_M * self._drag_m, -largest_n), largest_n)
-        self._drag_m = -force_n / DRAG_STIFFNESS_N_M
-        return force_n
+        elastic_n = min(max(-DRAG_STIFFNESS_N_M * self._drag_m, -largest_n), largest_n)
+        self._drag_m = -elastic_n / DRAG_STIFFNESS_N_M
+        return min(max(elastic_n - DRAG_DAMPING_N_S_M * self.body_m_s, -largest_n), largest_n)

@@ -242,3 +242,10 @@ def test_a_reset_starts_the_first_stride_again() -> None:
     gait.next_depth_m = 0.045
     gait.reset(0.03)
     assert [gait.step(TICK_S) for _ in range(1000)] == first
+
+
+@pytest.mark.parametrize("depth_m", DEPTHS_M)
+def test_no_joint_is_asked_for_more_than_its_velocity_limit(depth_m: float) -> None:
+    limit = JointLimits().velocity_rad_s
+    for target in islice(targets(TICK_S, depth_m), 1000):
+        assert max(abs(target.sweep_velocity_rad_s), abs(adduction_velocity_rad_s(target))) < limit

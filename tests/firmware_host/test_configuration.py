@@ -104,7 +104,8 @@ def test_a_wider_sweep_reaches_less_deep(example_text: str) -> None:
 
 
 def test_depths_in_the_wrong_order_are_refused(example_text: str) -> None:
-    assert any("initial_depth_m = 0.06" in told for told in problems_of(changed(example_text, "initial_depth_m", "0.06")))
+    text = changed(example_text, "initial_depth_m", "0.06")
+    assert any("initial_depth_m = 0.06" in sentence for sentence in problems_of(text))
     told = problems_of(changed(changed(example_text, "min_depth_m", "0.04"), "max_depth_m", "0.035"))
     assert any("min_depth_m = 0.04: must be at most" in sentence for sentence in told)
 

@@ -140,16 +140,25 @@ def test_an_unfinished_log_is_read_up_to_its_cut(path: Path, whole: Log, tmp_pat
     assert (counts[0], counts[-1]) == (0, TICKS)
 
 
-def test_a_tail_of_zeros_after_a_power_cut_is_a_cut(path: Path, whole: Log, tmp_path: Path) -> None:
-    contents = path.read_bytes()
+def chunk_places(path: Path) -> list[int]:
     with path.open("rb") as file:
         summary = make_reader(file).get_summary()
     assert summary is not None
-    third = summary.chunk_indexes[3].chunk_start_offset
-    log = read_bytes(tmp_path, contents[:third] + bytes(4096))
+    return [chunk.chunk_start_offset for chunk in summary.chunk_indexes]
+
+
+def test_a_tail_of_zeros_after_a_power_cut_is_a_cut(path: Path, whole: Log, tmp_path: Path) -> None:
+    log = read_bytes(tmp_path, path.read_bytes()[: chunk_places(path)[3]] + bytes(4096))
     assert not log.complete
     assert len(log.ticks) > TICKS / 3
     assert holds_first_rows_of(log, whole)
+
+
+def test_a_chunk_that_no_longer_looks_like_one_is_missed(path: Path, tmp_path: Path) -> None:
+    damaged = bytearray(path.read_bytes())
+    damaged[chunk_places(path)[3]] = 0x7F
+    with pytest.raises(LogError, match=r"changed\.mcap: damaged: only \d+ of its rows can be found"):
+        read_bytes(tmp_path, bytes(damaged))
 
 
 def test_damage_is_refused_or_does_not_touch_the_rows(path: Path, whole: Log, tmp_path: Path) -> None:

@@ -167,7 +167,7 @@ def test_a_full_pipe_drops_at_once_and_the_log_says_how_many(recorder: Recorder)
         topics = [row.topic for _, row, _ in make_reader(file).iter_messages(log_time_order=False)]
     assert topics == ["/tick"] * accepted + ["/event", "/tick"]
     (event,) = read_log(recorder.path).events
-    assert event["text"].startswith(f"{recorder.dropped} rows are missing here")
+    assert event["text"].startswith(f"rows missing here: {recorder.dropped},")
 
 
 def test_rows_lost_at_the_very_end_are_reported_too(recorder: Recorder) -> None:
@@ -177,7 +177,7 @@ def test_rows_lost_at_the_very_end_are_reported_too(recorder: Recorder) -> None:
     os.kill(recorder.writer_pid, signal.SIGCONT)
     assert recorder.close(TIMEOUT_S)
     (event,) = read_log(recorder.path).events
-    assert event["text"].startswith("1 rows are missing here")
+    assert event["text"].startswith("rows missing here: 1,")
 
 
 def test_close_does_not_wait_longer_than_it_was_told(recorder: Recorder) -> None:
@@ -191,7 +191,7 @@ def test_close_does_not_wait_longer_than_it_was_told(recorder: Recorder) -> None
     assert recorder.close(TIMEOUT_S)
 
 
-@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM, signal.SIGABRT])
 def test_signals_do_not_cut_the_log(recorder: Recorder, signal_number: int) -> None:
     os.kill(recorder.writer_pid, signal_number)  # while it is still starting
     recorder.put(TICK_KIND, make_tick(1.0))

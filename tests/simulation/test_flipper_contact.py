@@ -55,13 +55,13 @@ def test_the_plate_yields_sideways_at_the_limit_of_the_clay(direction: float) ->
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_the_plate_yields_in_insertion_and_extraction_at_the_limits_of_the_clay(direction: float) -> None:
-    contact = FlipperContact(GEOMETRY)
-    below_arm_m = GEOMETRY.drop_m - (0.03 - CLAY.lateral_center_m(0.03, GEOMETRY.plate_width_m)) / cos(
-        GEOMETRY.adduction_rad(0.0, 0.03)
-    )
+    contact, depth_m = FlipperContact(GEOMETRY), 0.005  # where the two limits differ
+    above_edge_m = depth_m - CLAY.lateral_center_m(depth_m, GEOMETRY.plate_width_m)
+    below_arm_m = GEOMETRY.drop_m - above_edge_m / cos(GEOMETRY.adduction_rad(0.0, depth_m))
     speed_per_rad_s = np.hypot(GEOMETRY.flipper_length_m, below_arm_m)
-    force = hold(contact, 0.0, 0.03, (0.0, direction * 0.1 / speed_per_rad_s, 0.0), 1.0)
-    limit_n = CLAY.extraction_n(0.03, contact.plate) if direction > 0.0 else CLAY.insertion_n(0.03, contact.plate)
+    force = hold(contact, 0.0, depth_m, (0.0, direction * 0.1 / speed_per_rad_s, 0.0), 1.0)
+    law = CLAY.extraction_n if direction > 0.0 else CLAY.insertion_n
+    limit_n = law(depth_m, contact.plate)
     assert force.upward_n == pytest.approx(-direction * limit_n)
 
 

@@ -239,7 +239,6 @@ def test_commands_of_another_length_change_nothing(message: Message, size: int) 
     assert drive.torque_nm(0.0) == 0.25
 
 
-@pytest.mark.xfail(strict=True, reason="SimulatedOdrive obeys a torque of NaN, which then breaks plant and encoder")
 def test_a_torque_that_is_no_number_is_ignored() -> None:
     drive = make_armed_drive()
     tell(drive, SET_INPUT_TORQUE, float("nan"))

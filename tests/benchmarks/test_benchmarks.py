@@ -1,0 +1,110 @@
+"""Every benchmark runs, in a form too short to mean anything, and prints the keys that it promises.
+
+No figure of time or memory is asserted: on a shared machine it would fail by itself.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.report import Progress, summary_us, verdict
+from benchmarks.tick_time import STAGES, VARIANTS
+
+ROOT = Path(__file__).parent.parent.parent
+TIMEOUT_S = 60.0
+ALWAYS = {"benchmark", "reached", "verdict"}
+SUMMARY = {"median", "p99", "max"}
+
+
+def run_benchmark(name: str, *arguments: str) -> str:
+    """In a process of its own, since a benchmark switches garbage collection off."""
+    command = [sys.executable, "-m", f"benchmarks.{name}", *arguments]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=TIMEOUT_S)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+def report_of(name: str, *arguments: str) -> dict[str, Any]:
+    report = json.loads(run_benchmark(name, "--json", *arguments))
+    assert isinstance(report, dict)
+    assert report["benchmark"] == name
+    assert report.keys() >= ALWAYS
+    return report
+
+
+def test_tick_time() -> None:
+    """Position and current come every 2 ms, four other messages every 100 ms, of four drives; four torques go out."""
+    report = report_of("tick_time", "--seconds", "1")
+    assert report["bar_us"] == 200.0
+    assert set(report["variants"]) == set(VARIANTS)
+    for figures in report["variants"].values():
+        assert set(figures["stages_us"]) == set(STAGES)
+        assert all(set(stage) == SUMMARY for stage in figures["stages_us"].values())
+        assert set(figures["whole_us"]) == SUMMARY | {"ticks"}
+        assert set(figures["record_unrecorded_us"]) == SUMMARY
+        assert figures.keys() >= {"whole_closing_us", "adapt_closing_us", "marking_us", "dropped_rows"}
+        assert figures["frames_received"] == pytest.approx(4 * (2 / 0.002 + 4 / 0.1) / 380.0, abs=0.1)
+        assert figures["frames_sent"] == 4.0
+
+
+def test_loop_jitter() -> None:
+    report = report_of("loop_jitter", "--seconds", "0.5", "--show-gil")
+    assert set(report["ratios"]) == {"p50", "p99"}
+    assert set(report["gil"]) == {"5 ms", "0.1 ms"}
+    for loop in (report["loop"], report["bare"]):
+        assert set(loop["late_us"]) == {"p50", "p99", "p99.9", "max"}
+        assert loop["beats"] > 0
+        assert loop["missed"] >= 0
+    assert report.keys() >= {"warnings", "faults", "dropped_rows", "bar_ratio"}
+
+
+def test_lockstep_speed() -> None:
+    report = report_of("lockstep_speed", "--rounds", "1", "--longest", "2")
+    (walk,) = report["rounds"]
+    assert walk["simulated_s"] == pytest.approx(2.0, abs=0.01)
+    assert walk["times"] == report["median_times"] > 0.0
+    assert walk["arrived"] is False
+
+
+def test_memory_growth() -> None:
+    report = report_of("memory_growth", "--seconds", "3", "--every", "1")
+    assert [reading["walked_s"] for reading in report["readings"]] == [1.0, 2.0, 3.0]
+    assert all(reading["resident_kib"] > 0.0 for reading in report["readings"])
+    assert report["growth_kib"] == report["readings"][-1]["resident_kib"] - report["readings"][0]["resident_kib"]
+    assert report.keys() >= {"dropped_rows", "strides", "walked_m", "bar_kib"}
+
+
+def test_a_person_gets_a_table_that_ends_in_the_verdict() -> None:
+    lines = run_benchmark("lockstep_speed", "--rounds", "1", "--longest", "1").splitlines()
+    assert lines[0].split()[0] == "round"
+    assert lines[-1].startswith("at least 5 times faster than real time: ")
+
+
+@pytest.mark.parametrize("name", ["tick_time", "loop_jitter", "lockstep_speed", "memory_growth"])
+def test_help_says_what_is_measured(name: str) -> None:
+    module = (ROOT / "benchmarks" / f"{name}.py").read_text(encoding="utf-8")
+    assert module.split('"""')[1].splitlines()[0] in run_benchmark(name, "--help")
+
+
+def test_summary_is_of_ordered_microseconds() -> None:
+    durations_s = [place * 1e-6 for place in range(101)]
+    assert summary_us(durations_s[::-1]) == {"median": 50.0, "p99": 99.0, "max": 100.0}
+    assert summary_us([]) == {"median": 0.0, "p99": 0.0, "max": 0.0}
+
+
+def test_verdict() -> None:
+    assert verdict("fast", True) == "fast: reached"
+    assert verdict("fast", False) == "fast: not reached"
+
+
+def test_progress_is_silent_where_nobody_watches(capsys: pytest.CaptureFixture[str]) -> None:
+    progress = Progress(2.0)
+    progress.show(1.0, "walking")
+    progress.clear()
+    assert capsys.readouterr().err == ""

@@ -1,0 +1,70 @@
+"""The demo, once to its end and once interrupted."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from command_line import exit_codes
+from firmware_host.log_reader import read_log
+
+
+def start_demo(out: Path, *arguments: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-u", "-m", "command_line.main", "demo", "--out", str(out), *arguments]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def children_of(out: Path) -> list[str]:
+    """Command lines of processes that still use the demo's files."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit() and int(entry.name) != os.getpid():
+            try:
+                line = (entry / "cmdline").read_bytes().decode(errors="replace")
+            except OSError:
+                continue
+            if str(out) in line and "pytest" not in line:
+                found.append(line)
+    return found
+
+
+def test_the_demo_walks_three_muds_and_sums_up(tmp_path: Path) -> None:
+    with start_demo(tmp_path / "out", "--json", str(tmp_path / "demo.json")) as demo:
+        printed, complaints = demo.communicate(timeout=120)
+    assert (demo.returncode, complaints) == (exit_codes.OK, "")
+    summary = json.loads((tmp_path / "demo.json").read_text(encoding="utf-8"))
+    assert set(summary) >= {
+        "ticks", "rate_hz", "missed_ticks", "wake_late_us", "tick_us", "strides", "speed_cm_s", "log", "plot"
+    }  # fmt: skip
+    assert set(summary["wake_late_us"]) == set(summary["tick_us"]) == {"p50", "p99", "max"}
+    assert {stride["mud"] for stride in summary["strides"]} == {"48.5", "53.1", "45.3"}
+    assert {stride["flipper"] for stride in summary["strides"]} == {"left", "right"}
+    assert all(speed > 3.0 for speed in summary["speed_cm_s"].values())
+    assert summary["log"] in printed and summary["plot"] in printed
+    assert Path(summary["plot"]).read_bytes().startswith(b"\x89PNG")
+    log = read_log(Path(summary["log"]))
+    assert log.complete and len(log.strides) == len(summary["strides"])
+    lines = [line for line in printed.splitlines() if line.startswith(("left ", "right "))]
+    assert len(lines) == len(summary["strides"])
+
+
+def test_ctrl_c_ends_the_demo_cleanly(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with start_demo(out) as demo:
+        assert demo.stdout is not None
+        for line in demo.stdout:
+            if line.startswith("left "):
+                break
+        demo.send_signal(signal.SIGINT)
+        printed, complaints = demo.communicate(timeout=60)
+    assert demo.returncode == exit_codes.INTERRUPTED
+    assert "torque is off" in complaints and "Traceback" not in complaints
+    (path,) = out.glob("*.mcap")
+    assert str(path) in printed
+    log = read_log(path)
+    assert log.complete and log.events[-1]["text"] == "mode hold to idle"
+    assert children_of(out) == []

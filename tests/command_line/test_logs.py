@@ -1,0 +1,102 @@
+"""Commands that read logs print what a person and what a machine wants."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from control.controller import WalkOrder
+from control.modes import Mode
+from firmware_host.configuration import Configuration
+from firmware_host.recorder import Recorder
+from simulation.lockstep import Lockstep
+from simulation.track import paper_track
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "command_line.main", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
+    """A recorded walk of two strides."""
+    path = tmp_path_factory.mktemp("logs") / "walk.mcap"
+    recorder = Recorder(path, configuration.text, {"robot": "test"})
+    robot = Lockstep(configuration, paper_track(), recorder=recorder)
+    robot.arm()
+    robot.walk(WalkOrder(0.03, True, 2))
+    robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
+    assert recorder.close(20.0)
+    return path
+
+
+def test_replay_prints_one_line_a_stride(walk: Path) -> None:
+    lines = run("replay", str(walk)).stdout.splitlines()
+    assert len(lines) == 2 + 4
+    assert lines[0].split()[:2] == ["flipper", "no"]
+
+
+def test_replay_json_has_the_promised_keys(walk: Path) -> None:
+    (first, *_) = json.loads(run("replay", str(walk), "--json").stdout)["strides"]
+    assert set(first) >= {"flipper", "index", "t_start_s", "k_p", "k_s", "k_e", "depth_m"}
+    assert set(first["k_p"]) >= {"value", "std_error", "samples", "valid"}
+    assert 1e5 < first["k_p"]["value"] < 1e7
+
+
+def test_log_info_counts(walk: Path) -> None:
+    told = json.loads(run("log", "info", str(walk), "--json").stdout)
+    assert told["robot"] == "test" and told["complete"] is True
+    assert told["missed_ticks"] == 0 and told["strides"] == 4
+    assert "ticks" in run("log", "info", str(walk)).stdout
+
+
+def test_an_exported_log_replays_like_the_log(walk: Path, tmp_path: Path) -> None:
+    """Up to what the authors' columns do not hold: velocity, and the arm's weight."""
+    path = tmp_path / "walk.csv"
+    assert run("log", "export", str(walk), "--csv", "--out", str(path)).returncode == exit_codes.OK
+    assert path.read_text(encoding="utf-8").splitlines()[1].startswith("time,turtle_state,leftadduction_pos")
+    ours = json.loads(run("replay", str(walk), "--json").stdout)["strides"]
+    theirs = json.loads(run("replay", str(path), "--json").stdout)["strides"]
+    assert [stride["index"] for stride in ours] == [stride["index"] for stride in theirs]
+    for one, other in zip(ours, theirs, strict=True):
+        assert other["k_s"]["value"] == pytest.approx(one["k_s"]["value"], rel=0.1)
+        assert other["stance_force_n"] == pytest.approx(one["stance_force_n"], abs=0.5)
+
+
+@pytest.mark.parametrize("contents", [b"", b"not a log"])
+def test_a_broken_log_is_a_sentence(tmp_path: Path, contents: bytes) -> None:
+    path = tmp_path / "broken.mcap"
+    path.write_bytes(contents)
+    for command in (("replay",), ("log", "info")):
+        ended = run(*command, str(path))
+        assert ended.returncode == exit_codes.UNHEALTHY
+        assert ended.stderr.startswith("mudskipper: ") and "broken.mcap" in ended.stderr
+        assert "Traceback" not in ended.stderr
+
+
+def test_a_log_that_is_not_there_is_a_sentence(tmp_path: Path) -> None:
+    for name in ("none.mcap", "none.csv"):
+        ended = run("replay", str(tmp_path / name))
+        assert ended.returncode == exit_codes.UNHEALTHY and "No such file" in ended.stderr
+
+
+def test_a_malformed_row_is_named_by_its_line(tmp_path: Path, walk: Path) -> None:
+    path = tmp_path / "walk.csv"
+    lines = run("log", "export", str(walk), "--csv").stdout.splitlines()
+    lines[100] = lines[100].replace(",", ",x", 1)
+    path.write_text("\n".join(lines), encoding="utf-8")
+    ended = run("replay", str(path))
+    assert ended.returncode == exit_codes.UNHEALTHY and "line 101" in ended.stderr
+
+
+def test_a_reader_that_stops_reading_is_no_error(walk: Path) -> None:
+    command = f"{sys.executable} -m command_line.main log export {walk} --csv | head -n 3"
+    ended = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=60, check=False, env=os.environ)
+    assert len(ended.stdout.splitlines()) == 3 and ended.stderr == ""

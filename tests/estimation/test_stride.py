@@ -1,0 +1,510 @@
+"""Strokes through made-up mud whose law is known, and whether the estimator finds that law again."""
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from math import cos, inf, isfinite, nan, radians, sin
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+import pytest
+
+from control.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_duration_s
+from control.geometry import FlipperGeometry
+from control.joint_pd import ArmMass
+from control.records import NO_LOAD, Phase, StrideEstimate
+from estimation.mud import MudEstimator
+from estimation.stride import MOBILISED_M, RELEASED_M, STEADY_SHARE, SURFACE_FORCE_N, FlipperEstimator
+
+TICK_S = 1.0 / 380.0
+GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
+EDGE_M2, WIDTH_M, LENGTH_M = 0.025 * 0.004, 0.025, 0.12
+SWEEP_NM_A, ADDUCTION_NM_A = 0.083, 0.09
+WEIGHTLESS = ArmMass(0.0, 0.0, 0.0, 0.0)
+HEAVY = ArmMass(0.3, 0.07, 0.0004, 0.0006)
+EXACT = 1e-6
+
+
+class Mud(NamedTuple):
+    k_p: float = 1.0e6  # N/m³
+    k_s: float = 0.6e6
+    k_e: float = 0.7e6
+    surface_m: float = 0.004
+
+
+class Sample(NamedTuple):
+    now_s: float
+    phase: Phase
+    sweep_rad: float
+    adduction_rad: float
+    sweep_velocity_rad_s: float
+    adduction_velocity_rad_s: float
+    sweep_current_a: float
+    adduction_current_a: float
+    body_x_m: float = 0.0
+
+    @property
+    def depth_m(self) -> float:
+        return GEOMETRY.depth_m(self.sweep_rad, self.adduction_rad)
+
+
+Force = tuple[float, float]  # forward and up, N
+Law = Callable[[Sample], Force]
+MUD = Mud()
+
+
+def law_of(mud: Mud) -> Law:
+    """The paper's three laws below the mud's surface."""
+
+    def force_n(sample: Sample) -> Force:
+        submerged_m = max(0.0, sample.depth_m - mud.surface_m)
+        if sample.phase is Phase.INSERTION:
+            return 0.0, mud.k_p * EDGE_M2 * submerged_m
+        if sample.phase is Phase.STANCE:
+            return mud.k_s * WIDTH_M * submerged_m**2 / 2.0, 1.5  # no law of the upward force: it must not matter
+        if sample.phase is Phase.EXTRACTION:
+            return 0.0, -mud.k_e * EDGE_M2 * submerged_m
+        return 0.0, 0.0
+
+    return force_n
+
+
+@cache
+def motion(depth_m: float = 0.03, gait: GaitParameters = GAIT, strides: int = 1) -> Sequence[Sample]:
+    """Joints that follow the gait exactly, without any current."""
+    walk, samples = Gait(gait, GEOMETRY), list[Sample]()
+    walk.reset(depth_m)
+    for tick in range(int(strides * stride_duration_s(gait, GEOMETRY, depth_m) / TICK_S)):
+        target = walk.step(TICK_S)
+        adduction_rad = GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m)
+        velocity_rad_s = GEOMETRY.adduction_velocity_rad_s(
+            target.sweep_rad, adduction_rad, target.sweep_velocity_rad_s, target.depth_velocity_m_s
+        )
+        angles = (target.sweep_rad, adduction_rad, target.sweep_velocity_rad_s, velocity_rad_s)
+        samples.append(Sample((tick + 1) * TICK_S, target.phase, *angles, 0.0, 0.0))
+    return samples
+
+
+def first_below(samples: Iterable[Sample], depth_m: float) -> Sample:
+    return next(sample for sample in samples if sample.depth_m > depth_m)
+
+
+def loaded(samples: Sequence[Sample], law: Law, mass: ArmMass = WEIGHTLESS) -> list[Sample]:
+    """The currents that carry the law's forces: the paper's map inverted, gravity and inertia added."""
+    result, before = [], samples[0]
+    for sample in samples:
+        force_x_n, force_z_n = law(sample)
+        sa, ca, sb, cb = (
+            trig(angle) for angle in (sample.sweep_rad, sample.adduction_rad) for trig in (sin, cos)
+        )
+        mud_sweep_nm = LENGTH_M * force_x_n / ca
+        mud_adduction_nm = (LENGTH_M * force_z_n + sb * sa * mud_sweep_nm) / (cb * ca)
+        weight_nm = mass.arm_mass_kg * 9.81 * mass.center_of_mass_m
+        dt_s = sample.now_s - before.now_s or inf
+        sweep_rad_s2 = (sample.sweep_velocity_rad_s - before.sweep_velocity_rad_s) / dt_s
+        adduction_rad_s2 = (sample.adduction_velocity_rad_s - before.adduction_velocity_rad_s) / dt_s
+        sweep_nm = mass.sweep_inertia_kg_m2 * sweep_rad_s2 - mud_sweep_nm - weight_nm * sa * sb
+        adduction_nm = mass.adduction_inertia_kg_m2 * adduction_rad_s2 - mud_adduction_nm + weight_nm * ca * cb
+        before = sample
+        result.append(
+            sample._replace(
+                sweep_current_a=sweep_nm / SWEEP_NM_A, adduction_current_a=adduction_nm / ADDUCTION_NM_A
+            )
+        )
+    return result
+
+
+def triggered(samples: Sequence[Sample], mud: Mud, mass: ArmMass = WEIGHTLESS) -> list[Sample]:
+    """As `loaded`, with the law starting at a sample whose jump in force is what the trigger takes for the surface.
+
+    There is no mud above it, so nothing is biased by finding the surface late.
+    """
+    start = first_below(samples, mud.surface_m)
+    law = law_of(mud._replace(surface_m=start.depth_m))
+    return loaded(samples, lambda sample: (0.0, 2.0 * SURFACE_FORCE_N) if sample is start else law(sample), mass)
+
+
+def estimator(mass: ArmMass = WEIGHTLESS) -> FlipperEstimator:
+    return FlipperEstimator("left", GEOMETRY, mass, SWEEP_NM_A, ADDUCTION_NM_A)
+
+
+def closed(samples: Iterable[Sample], flipper: FlipperEstimator | None = None) -> list[StrideEstimate]:
+    flipper = flipper or estimator()
+    strides = [flipper.update(*sample)[1] for sample in samples]
+    return [stride for stride in strides if stride is not None]
+
+
+def one(samples: Iterable[Sample], flipper: FlipperEstimator | None = None) -> StrideEstimate:
+    (stride,) = closed(samples, flipper)
+    return stride
+
+
+def assert_found(stride: StrideEstimate, mud: Mud, relative: float = EXACT) -> None:
+    assert stride.k_p.valid
+    assert stride.k_s.valid
+    assert stride.k_e.valid
+    assert stride.k_p.value == pytest.approx(mud.k_p, rel=relative)
+    assert stride.k_s.value == pytest.approx(mud.k_s, rel=relative)
+    assert stride.k_e.value == pytest.approx(mud.k_e, rel=relative)
+
+
+# the law is found
+
+
+@pytest.mark.parametrize("depth_m", [0.025, 0.03, 0.04, 0.05])
+@pytest.mark.parametrize("mud", [MUD, Mud(0.25e6, 0.137e6, 0.25e6, 0.0), Mud(2.2e6, 1.1e6, 2.06e6, -0.005)])
+def test_the_three_coefficients_of_known_mud_are_found(mud: Mud, depth_m: float) -> None:
+    assert_found(one(triggered(motion(depth_m), mud)), mud)
+
+
+def test_the_law_is_found_through_the_pauses_of_the_single_flipper_protocol() -> None:
+    assert_found(one(triggered(motion(gait=SINGLE_FLIPPER), MUD)), MUD)
+
+
+def test_each_stride_of_a_walk_tells_the_same_law() -> None:
+    single = motion()
+    period_s = single[-1].now_s
+    samples = [
+        sample._replace(now_s=sample.now_s + turn * period_s)
+        for turn in range(3)
+        for sample in triggered(single, MUD)
+    ]
+    strides = closed(samples)
+    assert [stride.index for stride in strides] == [0, 1, 2]
+    for stride in strides:
+        assert_found(stride, MUD)
+
+
+def test_the_load_is_the_force_that_the_mud_exerts() -> None:
+    law, flipper = law_of(MUD), estimator()
+    for sample in loaded(motion(), law):
+        load, _ = flipper.update(*sample)
+        assert (load.force_x_n, load.force_z_n) == pytest.approx(law(sample), abs=1e-12)
+        assert load.depth_m == sample.depth_m
+
+
+def test_forces_and_durations_of_the_stride_are_told() -> None:
+    samples = triggered(motion(), MUD)
+    stride = one(samples)
+    start = first_below(samples, MUD.surface_m)
+    submerged_m = 0.03 - start.depth_m
+    assert stride.surface_m == start.depth_m
+    assert stride.depth_m == pytest.approx(submerged_m, abs=1e-5)
+    assert stride.insertion_force_n == pytest.approx(MUD.k_p * EDGE_M2 * submerged_m, rel=1e-3)
+    assert stride.stance_force_n == pytest.approx(MUD.k_s * WIDTH_M * submerged_m**2 / 2.0)
+    assert stride.extraction_force_n == pytest.approx(-MUD.k_e * EDGE_M2 * submerged_m, rel=1e-2)
+    assert stride.insertion_s == pytest.approx(0.0445 / 0.1, abs=1.5 * TICK_S)
+    assert stride.stance_s == pytest.approx(2.0 * radians(30.0) * 0.12 / 0.5, abs=1.5 * TICK_S)
+    assert stride.extraction_s == pytest.approx(0.0445 / 0.5, abs=1.5 * TICK_S)
+    assert stride.t_start_s == samples[0].now_s
+    assert stride.t_end_s == next(sample.now_s for sample in samples if sample.phase is Phase.SWING)
+
+
+def test_the_force_outside_of_the_steady_part_of_stance_does_not_count() -> None:
+    law, steady_rad = law_of(MUD), STEADY_SHARE * radians(30.0)
+    samples = motion()
+
+    def slow_to_mobilise(sample: Sample) -> Force:
+        unsteady = sample.phase is Phase.STANCE and abs(sample.sweep_rad) > steady_rad
+        return (0.0, 0.0) if unsteady else law(sample)
+
+    assert one(loaded(samples, slow_to_mobilise)).k_s == one(loaded(samples, law)).k_s
+
+
+def test_the_first_rise_of_the_extraction_does_not_count() -> None:
+    law, samples = law_of(MUD), motion()
+
+    def springy(sample: Sample) -> Force:
+        springing = sample.phase is Phase.EXTRACTION and sample.depth_m > 0.03 - 0.9 * MOBILISED_M
+        return (0.0, 2.0) if springing else law(sample)
+
+    assert one(loaded(samples, springy)).k_e == one(loaded(samples, law)).k_e
+
+
+# the trigger's known bias
+
+
+@pytest.mark.parametrize("slope_n_m", [50.0, 100.0, 160.0, 300.0])
+def test_the_trigger_finds_the_surface_too_deep_by_its_force_over_the_slope(slope_n_m: float) -> None:
+    mud = Mud(k_p=slope_n_m / EDGE_M2, surface_m=0.0)
+    stride = one(loaded(motion(), law_of(mud)))
+    late_m = stride.surface_m - mud.surface_m
+    per_tick_m = 0.1 / 0.88 * TICK_S
+    assert SURFACE_FORCE_N / slope_n_m < late_m <= SURFACE_FORCE_N / slope_n_m + per_tick_m
+    bias = 1.0 + 1.5 * late_m / stride.depth_m  # of a line through the wrong origin, evenly sampled
+    assert stride.k_p.value / mud.k_p == pytest.approx(bias, rel=0.05)
+
+
+@pytest.mark.parametrize("slope_n_m", [50.0, 100.0, 160.0, 300.0])
+def test_the_bias_of_each_coefficient_is_that_of_the_late_surface(slope_n_m: float) -> None:
+    mud = Mud(k_p=slope_n_m / EDGE_M2, surface_m=0.0)
+    samples = motion()
+    stride = one(loaded(samples, law_of(mud)))
+    late_m = stride.surface_m
+
+    def line_bias(phase: Phase, shallowest_m: float, deepest_m: float) -> float:
+        depths = np.array([sample.depth_m for sample in samples if sample.phase is phase])
+        u = depths[(depths >= shallowest_m) & (depths < deepest_m)] - late_m
+        return float((u @ (u + late_m)) / (u @ u))
+
+    top_m = next(sample.depth_m for sample in samples if sample.phase is Phase.EXTRACTION)
+    assert stride.k_p.value / mud.k_p == pytest.approx(line_bias(Phase.INSERTION, late_m, inf))
+    assert stride.k_e.value / mud.k_e == pytest.approx(line_bias(Phase.EXTRACTION, late_m, top_m - MOBILISED_M))
+    assert stride.k_s.value / mud.k_s == pytest.approx((0.03 / (0.03 - late_m)) ** 2)
+
+
+def test_firmer_mud_is_biased_less() -> None:
+    biases = []
+    for slope_n_m in (50.0, 100.0, 160.0, 300.0):
+        mud = Mud(k_p=slope_n_m / EDGE_M2, surface_m=0.0)
+        biases.append(one(loaded(motion(), law_of(mud))).k_p.value / mud.k_p - 1.0)
+    assert biases == sorted(biases, reverse=True)
+    assert biases[-1] > 0.0
+
+
+# noise, duplicates, gaps
+
+
+def noisy(samples: list[Sample], seed: int, noise_a: float) -> list[Sample]:
+    noise = np.random.default_rng(seed).normal(0.0, noise_a, (len(samples), 2)).tolist()
+    return [
+        sample._replace(sweep_current_a=sample.sweep_current_a + a, adduction_current_a=sample.adduction_current_a + b)
+        for sample, (a, b) in zip(samples, noise, strict=True)
+    ]
+
+
+def test_with_current_noise_the_truth_is_within_a_few_standard_errors() -> None:
+    samples = triggered(motion(), MUD)
+    scores = []
+    for seed in range(60):
+        stride = one(noisy(samples, seed, 0.1))
+        found = ((stride.k_p, MUD.k_p), (stride.k_s, MUD.k_s), (stride.k_e, MUD.k_e))
+        scores.append([(estimate.value - truth) / estimate.std_error for estimate, truth in found])
+    assert np.abs(scores).max() < 5.0
+    assert np.std(scores, axis=0)[1:] == pytest.approx([1.0, 1.0], abs=0.3)  # of k_p the jump alone adds doubt
+
+
+def test_more_noise_makes_more_doubt() -> None:
+    samples = triggered(motion(), MUD)
+    little, much = (one(noisy(samples, 1, noise_a)) for noise_a in (0.01, 0.1))
+    assert much.k_s.std_error == pytest.approx(10.0 * little.k_s.std_error, rel=1e-3)
+    assert much.k_e.std_error == pytest.approx(10.0 * little.k_e.std_error, rel=1e-3)
+
+
+@pytest.mark.parametrize("mass", [WEIGHTLESS, HEAVY])
+@pytest.mark.parametrize("times", [2, 5])
+def test_a_sample_that_is_read_again_counts_once(times: int, mass: ArmMass) -> None:
+    samples = noisy(triggered(motion(), MUD, mass), 2, 0.05)
+    repeated = [
+        sample._replace(now_s=sample.now_s + again * TICK_S / times) for sample in samples for again in range(times)
+    ]
+    assert one(repeated, estimator(mass)) == one(samples, estimator(mass))
+
+
+def test_a_sample_that_is_read_again_shows_the_same_load() -> None:
+    flipper = estimator()
+    for sample in loaded(motion(), law_of(MUD)):
+        load, _ = flipper.update(*sample)
+        assert flipper.update(*sample) == (load, None)
+
+
+@pytest.mark.parametrize("field", ["sweep_rad", "adduction_rad", "sweep_current_a", "adduction_current_a"])
+@pytest.mark.parametrize("bad", [nan, inf, -inf])
+def test_samples_that_are_not_finite_are_skipped(field: str, bad: float) -> None:
+    samples, change = triggered(motion(), MUD), cast(dict[str, Any], {field: bad})
+    between = [each for sample in samples for each in (sample, sample._replace(**change))]
+    assert one(between) == one(samples)
+
+
+def test_a_sample_that_is_not_finite_has_no_load() -> None:
+    lost = motion()[0]._replace(sweep_current_a=nan)
+    assert estimator().update(*lost) == (NO_LOAD, None)
+
+
+def test_the_law_is_found_from_every_other_sample() -> None:
+    samples = motion()
+    start = samples.index(first_below(samples, MUD.surface_m)) % 2
+    thinned = [
+        sample if index % 2 == start else sample._replace(adduction_rad=nan)
+        for index, sample in enumerate(triggered(samples, MUD))
+    ]
+    assert_found(one(thinned), MUD)
+
+
+# gravity and inertia
+
+
+def test_gravity_and_inertia_are_taken_off() -> None:
+    samples = triggered(motion(), MUD, HEAVY)
+    assert_found(one(samples, estimator(HEAVY)), MUD)
+
+
+def test_gravity_left_in_would_be_taken_for_mud() -> None:
+    samples = triggered(motion(), MUD, HEAVY)
+    fooled = one(samples, estimator(WEIGHTLESS))
+    assert abs(fooled.k_e.value / MUD.k_e - 1.0) > 0.1
+
+
+def test_unknown_velocities_leave_only_inertia_in() -> None:
+    slow = ArmMass(0.3, 0.07, 0.0, 0.0)
+    samples = [
+        sample._replace(sweep_velocity_rad_s=nan, adduction_velocity_rad_s=nan)
+        for sample in triggered(motion(), MUD, slow)
+    ]
+    assert_found(one(samples, estimator(HEAVY)), MUD)
+
+
+# what closes a stride, and what it then says
+
+
+@pytest.mark.parametrize("last", [Phase.INSERTION, Phase.STANCE])
+def test_a_stroke_cut_short_does_not_close(last: Phase) -> None:
+    samples = triggered(motion(), MUD)
+    begun = [sample for sample in samples if sample.phase <= last][:-10]
+    stop = begun[-1]._replace(now_s=begun[-1].now_s + TICK_S, phase=Phase.REST)
+    flipper = estimator()
+    assert closed([*begun, stop], flipper) == []
+    assert one(samples, flipper) == one(samples)
+
+
+def test_an_extraction_cut_short_does_not_close() -> None:
+    samples = triggered(motion(), MUD)
+    begun = [sample for sample in samples if sample.phase <= Phase.EXTRACTION][:-20]
+    stop = begun[-1]._replace(now_s=begun[-1].now_s + TICK_S, phase=Phase.REST)
+    assert closed([*begun, stop]) == []
+
+
+def test_a_stride_without_stance_does_not_close() -> None:
+    assert closed(sample for sample in triggered(motion(), MUD) if sample.phase is not Phase.STANCE) == []
+
+
+def test_without_contact_nothing_is_valid_and_every_reason_is_given() -> None:
+    stride = one(motion())
+    assert stride.k_p.reason == "no force above 0.5 N in insertion"
+    for estimate in (stride.k_p, stride.k_s, stride.k_e):
+        assert not estimate.valid
+        assert estimate.reason
+    assert stride.surface_m == 0.0
+    assert stride.released
+
+
+def test_a_flipper_that_comes_up_is_released() -> None:
+    assert one(triggered(motion(), MUD)).released
+
+
+def test_a_flipper_that_stays_down_is_not_released() -> None:
+    samples = triggered(motion(), MUD)
+    bottom = GEOMETRY.adduction_rad(radians(-30.0), 0.03)
+    stuck = [
+        sample._replace(adduction_rad=bottom) if sample.phase is Phase.EXTRACTION else sample for sample in samples
+    ]
+    stride = one(noisy(stuck, 5, 0.01))
+    assert not stride.released
+    assert stride.k_p.valid
+    assert not stride.k_e.valid
+
+
+@pytest.mark.parametrize(("above_m", "released"), [(-1e-6, False), (1e-6, True)])
+def test_a_flipper_is_released_from_three_millimetres_below_the_surface_on(above_m: float, released: bool) -> None:
+    samples = triggered(motion(), MUD)
+    surface_m = one(samples).surface_m
+    highest_m = surface_m + RELEASED_M - above_m
+    held = [
+        sample._replace(adduction_rad=GEOMETRY.adduction_rad(sample.sweep_rad, max(sample.depth_m, highest_m)))
+        if sample.phase is Phase.EXTRACTION
+        else sample
+        for sample in samples
+    ]
+    assert one(held).released is released
+
+
+def test_the_step_is_the_bodys_advance_from_close_to_close() -> None:
+    samples = triggered(motion(strides=3), MUD)
+    moving = [sample._replace(body_x_m=7.0 + 0.05 * sample.now_s) for sample in samples]
+    strides = closed(moving)
+    assert len(strides) == 3
+    first, *later = strides
+    assert first.step_m == pytest.approx(0.05 * (first.t_end_s - moving[0].now_s))
+    for before, after in zip(strides, later, strict=False):
+        assert after.step_m == pytest.approx(0.05 * (after.t_end_s - before.t_end_s))
+
+
+def test_without_a_pose_the_step_is_not_a_number() -> None:
+    lost = [sample._replace(body_x_m=nan) for sample in triggered(motion(), MUD)]
+    assert not isfinite(one(lost).step_m)
+
+
+def test_a_pose_lost_where_a_stride_closes_leaves_two_steps_unknown() -> None:
+    samples = triggered(motion(strides=3), MUD)
+    times = [stride.t_end_s for stride in closed(samples)]
+    seen = [sample._replace(body_x_m=nan if sample.now_s == times[0] else sample.now_s) for sample in samples]
+    lost, after, good = closed(seen)
+    assert good.step_m == pytest.approx(times[2] - times[1])
+    assert not isfinite(lost.step_m)
+    assert not isfinite(after.step_m)
+
+
+def test_a_reset_forgets_the_stride_under_way_and_the_count() -> None:
+    samples = triggered(motion(strides=2), MUD)
+    moving = [sample._replace(body_x_m=sample.now_s) for sample in samples]
+    flipper = estimator()
+    closed(moving[: len(moving) * 2 // 3], flipper)
+    flipper.reset()
+    assert closed(moving, flipper) == closed(moving)
+
+
+def test_a_reset_forgets_the_velocities_before_it() -> None:
+    moving = motion()[30]
+    flipper = estimator(HEAVY)
+    flipper.update(*moving._replace(now_s=0.0, adduction_velocity_rad_s=-5.0))
+    flipper.reset()
+    assert flipper.update(*moving) == estimator(HEAVY).update(*moving)
+
+
+def test_the_same_samples_give_the_same_bits() -> None:
+    samples = [sample._replace(body_x_m=0.0) for sample in noisy(triggered(motion(strides=3), MUD), 3, 0.1)]
+    first, again = closed(samples), closed(samples)
+    assert len(first) == 3
+    assert first == again
+    assert repr(first) == repr(again)
+
+
+# both flippers
+
+
+def both(left: list[Sample], right: list[Sample]) -> list[StrideEstimate]:
+    mud = MudEstimator(GEOMETRY, WEIGHTLESS, (SWEEP_NM_A, ADDUCTION_NM_A, SWEEP_NM_A, ADDUCTION_NM_A))
+    strides: list[StrideEstimate] = []
+    for a, b in zip(left, right, strict=True):
+        reading = mud.update(
+            a.now_s,
+            a.phase,
+            (a.sweep_rad, a.adduction_rad, b.sweep_rad, b.adduction_rad),
+            (a.sweep_velocity_rad_s, a.adduction_velocity_rad_s, b.sweep_velocity_rad_s, b.adduction_velocity_rad_s),
+            (a.sweep_current_a, a.adduction_current_a, b.sweep_current_a, b.adduction_current_a),
+            0.0,
+        )
+        strides += reading.strides
+    return strides
+
+
+def test_each_flipper_finds_its_own_mud() -> None:
+    other = Mud(0.5e6, 0.2e6, 1.5e6, 0.001)
+    left, right = both(triggered(motion(), MUD), triggered(motion(), other))
+    assert (left.flipper, right.flipper) == ("left", "right")
+    assert_found(left, MUD)
+    assert_found(right, other)
+
+
+def test_a_flipper_that_is_not_heard_does_not_disturb_the_other_one() -> None:
+    samples = triggered(motion(), MUD)
+    lost = [sample._replace(sweep_rad=nan, adduction_current_a=nan) for sample in samples]
+    assert both(samples, lost)[0] == both(samples, samples)[0]
+    assert both(lost, samples)[1] == both(samples, samples)[1]
+
+
+def test_each_joint_has_its_own_torque_constant() -> None:
+    constants = (0.05, 0.06, 0.07, 0.08)
+    mud = MudEstimator(GEOMETRY, WEIGHTLESS, constants)
+    reading = mud.update(0.0, Phase.REST, (0.0,) * 4, (0.0,) * 4, (1.0, 1.0, 1.0, 1.0), 0.0)
+    torques = [getattr(load, name) for load in reading[:2] for name in ("sweep_torque_nm", "adduction_torque_nm")]
+    assert torques == [-constant for constant in constants]

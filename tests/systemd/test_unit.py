@@ -1,0 +1,206 @@
+"""The service files agree with the example configuration and with the code, and systemd accepts them."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from control.records import JOINTS
+from drivers.frames import Frame
+from drivers.odrive_drives import OdriveDrives
+from firmware_host import daemon
+from firmware_host.configuration import EXIT_CONFIGURATION, Configuration, ConfigurationError, StatusParameters
+from firmware_host.ticker import RATE_HZ
+
+ROOT = Path(__file__).resolve().parents[2]
+SYSTEMD = ROOT / "systemd"
+LINUX_QUEUE_LENGTH = 10  # of a CAN interface that nobody configured
+
+Settings = dict[str, list[str]]
+
+
+def read_settings(name: str) -> Settings:
+    """Every `Key=value` of a unit: the words of all its lines."""
+    settings: Settings = {}
+    for line in (SYSTEMD / name).read_text(encoding="utf-8").splitlines():
+        key, separator, value = line.partition("=")
+        if separator and not line.startswith("#"):
+            settings.setdefault(key, []).extend(value.split())
+    return settings
+
+
+@pytest.fixture(scope="module")
+def unit() -> Settings:
+    return read_settings("mudskipper.service")
+
+
+def only(settings: Settings, key: str) -> str:
+    (value,) = settings[key]
+    return value
+
+
+def seconds(settings: Settings, key: str) -> float:
+    return float(only(settings, key))
+
+
+def interfaces(configuration: Configuration) -> set[str]:
+    return {bus.channel for bus in configuration.bus.values() if bus.interface == "socketcan"}
+
+
+def systemd_analyze(*arguments: str) -> subprocess.CompletedProcess[str]:
+    if shutil.which("systemd-analyze") is None:
+        pytest.skip("systemd-analyze is not installed")
+    return subprocess.run(["systemd-analyze", *arguments], capture_output=True, text=True, timeout=30.0)
+
+
+def test_the_unit_starts_the_daemon_that_this_project_installs(unit: Settings) -> None:
+    program, option, path = unit["ExecStart"]
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
+    assert scripts[Path(program).name] == "firmware_host.daemon:main"
+    assert (option, path) == ("--config", f"/etc/{only(unit, 'ConfigurationDirectory')}/mudskipper.toml")
+
+
+def test_a_person_who_starts_the_daemon_without_options_gets_the_same_configuration(
+    unit: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Path] = []
+
+    def refuse(path: Path) -> Configuration:
+        asked.append(path)
+        raise ConfigurationError([])
+
+    monkeypatch.setattr(daemon, "load_configuration", refuse)
+    daemon.main([])
+    assert asked == [Path(unit["ExecStart"][-1])]
+
+
+def test_the_socket_is_in_the_unit_s_runtime_directory_which_the_group_may_enter(
+    unit: Settings, configuration: Configuration
+) -> None:
+    assert Path(configuration.status.socket).parent == Path("/run") / only(unit, "RuntimeDirectory")
+    assert configuration.status.socket == StatusParameters().socket
+    assert only(unit, "RuntimeDirectoryMode") == "0750"
+
+
+def test_logs_go_into_the_unit_s_state_directory(unit: Settings, configuration: Configuration) -> None:
+    state = Path("/var/lib") / only(unit, "StateDirectory")
+    assert Path(configuration.log.directory).is_relative_to(state)
+    assert only(unit, "ProtectSystem") == "strict"  # so nothing else could be written
+
+
+def test_the_unit_s_user_and_group_are_the_ones_that_sysusers_makes(unit: Settings) -> None:
+    lines = (SYSTEMD / "mudskipper.sysusers").read_text(encoding="utf-8").splitlines()
+    users = [line.split()[1] for line in lines if line.startswith("u ")]  # `u` makes the group as well
+    assert users == [only(unit, "User")] == [only(unit, "Group")]
+
+
+def test_a_wrong_configuration_is_not_tried_again(unit: Settings) -> None:
+    assert only(unit, "RestartPreventExitStatus") == str(EXIT_CONFIGURATION)
+    assert only(unit, "Restart") == "on-failure"
+    assert "ExecStartPre" not in unit  # whose status RestartPreventExitStatus does not look at
+
+
+def test_systemd_waits_longer_than_the_daemon_ever_takes_to_end(unit: Settings) -> None:
+    longest_s = daemon.LONGEST_SHUTDOWN_S + daemon.GOODBYE_S + daemon.LONGEST_LOG_CLOSE_S
+    assert seconds(unit, "TimeoutStopSec") > longest_s + 2.0
+
+
+def test_a_healthy_loop_feeds_the_watchdog_several_times_over(unit: Settings) -> None:
+    slowest_s = 2 * daemon.NOTIFY_TICKS / RATE_HZ  # a loop that misses every other tick still counts as healthy
+    assert seconds(unit, "WatchdogSec") >= 3 * slowest_s
+    assert only(unit, "Type") == "notify"
+    assert only(unit, "NotifyAccess") == "main"
+
+
+def test_the_loop_may_have_its_priority_but_not_that_of_the_interrupts(
+    unit: Settings, configuration: Configuration
+) -> None:
+    assert configuration.loop.priority <= int(only(unit, "LimitRTPRIO")) < 50
+    assert only(unit, "LimitMEMLOCK") == "infinity"
+    assert "RestrictRealtime" not in unit
+    assert "CPUSchedulingPolicy" not in unit  # it would make the log's writer a real-time process too
+
+
+def test_the_log_s_writer_may_finish_before_it_is_killed(unit: Settings) -> None:
+    assert only(unit, "KillMode") == "control-group"
+    assert only(unit, "KillSignal") == "SIGTERM"  # which the writer does not take
+
+
+def test_the_unit_lives_and_dies_with_the_buses_of_the_example_configuration(
+    unit: Settings, configuration: Configuration
+) -> None:
+    devices = {f"sys-subsystem-net-devices-{name}.device" for name in interfaces(configuration)}
+    assert devices
+    assert set(unit["BindsTo"]) == devices
+    assert devices <= set(unit["After"])
+    assert devices <= set(unit["WantedBy"])
+
+
+def test_the_network_files_configure_the_same_buses(configuration: Configuration) -> None:
+    network, link = read_settings("80-can.network"), read_settings("80-can.link")
+    assert set(network["Name"]) == set(link["OriginalName"]) == interfaces(configuration)
+    assert only(network, "BitRate") == "1M"
+    assert only(network, "RestartSec") == "100ms"
+    assert only(network, "RequiredForOnline") == "no"
+
+
+class CountingPort:
+    failed_sends = error_frames = 0
+
+    def __init__(self) -> None:
+        self.sent = 0
+
+    def receive(self) -> list[Frame]:
+        return []
+
+    def send(self, frame: Frame) -> None:
+        self.sent += 1
+
+    def close(self) -> None:
+        return
+
+
+def test_the_transmit_queue_holds_the_tick_that_arms_where_linux_s_own_would_not(configuration: Configuration) -> None:
+    ports = {name: CountingPort() for name in configuration.bus}
+    drives = OdriveDrives(configuration.drive, ports)
+    drives.request_versions(0.0)
+    drives.arm(0.0)
+    drives.send((0.0,) * len(JOINTS))  # type: ignore[arg-type]
+    most = max(port.sent for port in ports.values())
+    assert LINUX_QUEUE_LENGTH < most <= int(only(read_settings("80-can.link"), "TransmitQueueLength"))
+
+
+def test_the_filter_lets_through_what_the_loop_and_the_writer_call(unit: Settings) -> None:
+    allowed = expand(unit["SystemCallFilter"][0]) - expand(unit["SystemCallFilter"][1].removeprefix("~"))
+    needed = {"sched_setscheduler", "sched_setaffinity", "setpriority", "mlockall", "vfork", "execve", "chmod"}
+    assert len(unit["SystemCallFilter"]) == 2
+    assert needed <= allowed
+    assert not {"setuid", "chown", "reboot", "ptrace"} & allowed
+
+
+def expand(name: str) -> set[str]:
+    """The system calls of one of systemd's sets."""
+    listing = systemd_analyze("syscall-filter", name).stdout
+    words = {line.strip() for line in listing.splitlines()[1:] if line.startswith("    ")}
+    calls = {word for word in words if word[0] not in "@#"}
+    return calls.union(*(expand(word) for word in words if word[0] == "@"))
+
+
+def test_systemd_finds_nothing_wrong_with_the_unit(unit: Settings, tmp_path: Path) -> None:
+    """`verify` wants the program to be there, so the copy that it reads starts this Python instead."""
+    copy = tmp_path / "mudskipper.service"
+    text = (SYSTEMD / "mudskipper.service").read_text(encoding="utf-8")
+    copy.write_text(text.replace(unit["ExecStart"][0], sys.executable), encoding="utf-8")
+    done = systemd_analyze("verify", "--man=no", str(copy))
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_the_service_is_exposed_no_more_than_a_well_hardened_one() -> None:
+    """1.3 of 10 on systemd's scale; most of what is left is the robot's need of CAN and of real time."""
+    done = systemd_analyze("security", "--offline=true", "--threshold=13", str(SYSTEMD / "mudskipper.service"))
+    assert done.returncode == 0, done.stdout
