@@ -73,7 +73,6 @@ class Punctuality:
             "missed": self.missed,
             "late_us": {name: self.late.percentile_us(share) for name, share in SHARES.items()}
             | {"max": round(self.late.max_us, 1)},
-            "work_us": self.work.summary(),
         }
 
 
@@ -220,7 +219,8 @@ def measure(seconds: float) -> dict[str, Any]:
             bare_loop.run(turn_s, bare)
     progress.clear()
     seen = {"faults": daemon.faults, "dropped_rows": daemon.recorder.dropped, "warnings": warnings}
-    return {"rounds": rounds, "turn_s": turn_s, "loop": real.report(), "bare": bare.report()} | seen
+    loop = real.report() | {"work_us": real.work.summary()}
+    return {"rounds": rounds, "turn_s": turn_s, "loop": loop, "bare": bare.report()} | seen
 
 
 def ratios(real: dict[str, Any], bare: dict[str, Any]) -> dict[str, float]:

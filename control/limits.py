@@ -1,8 +1,8 @@
 """`apply_limits`, the last pure function before the wire.
 
-Whatever the controller wants, each torque that leaves is finite, within the torque limit, no more than one slew
-step from the one sent before, and does not push a joint further past its position or velocity limit; a hot motor
-gets less and less of it.
+Whatever the controller wants, each torque that leaves is finite, within the torque limit, and no more than one slew
+step from the one sent before. At a position limit, beyond the velocity limit and in a hot motor the torque fades out,
+as fast as the slew rate lets it. Only what is not a number goes to zero at once.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ VELOCITY_FADE = 0.2  # torque that speeds a joint up fades out over this last pa
 class JointLimits:
     torque_nm: Annotated[float, Bounds(0.0, 5.0)] = 0.75  # the authors' optimiser's figure for the R60
     torque_rate_nm_s: Annotated[float, Bounds(1.0, 10000.0)] = 150.0
-    velocity_rad_s: Annotated[float, Bounds(0.1, 200.0)] = 15.0
+    velocity_rad_s: Annotated[float, Bounds(0.1, 200.0)] = 20.0  # the extraction from 5 cm takes 14
     sweep_min_deg: Annotated[float, Bounds(-180.0, 180.0)] = -60.0
     sweep_max_deg: Annotated[float, Bounds(-180.0, 180.0)] = 60.0
     adduction_min_deg: Annotated[float, Bounds(-180.0, 180.0)] = -75.0
@@ -40,7 +40,7 @@ class JointRange(NamedTuple):
 
 class LimitedTorques(NamedTuple):
     torques_nm: Torques
-    limited: bool  # something was cut
+    limited: bool  # not what was wanted, or given up for want of numbers
     finite: bool  # False: a torque was NaN or infinite, which is a bug; all four are zero
 
 

@@ -100,4 +100,4 @@ def refusal(mode: Mode, request: Request, health: Health) -> str | None:
         return health.fault.sentence
     if request is Request.CLEAR and health.fault is not None:
         return f"the cause persists: {health.fault.sentence}"
-    return None if mode in ACCEPTED_IN[request] else WHAT_TO_DO[mode]
+    return None if mode in ACCEPTED_IN.get(request, Mode) else WHAT_TO_DO[mode]

@@ -34,11 +34,13 @@ class LineFit:
         self.n += 1
 
     def estimate(self) -> Estimate:
-        if self.n < MIN_SAMPLES or not self.s > 0.0:
+        if self.n < MIN_SAMPLES:
             return Estimate(UNKNOWN, UNKNOWN, self.n, False, f"fewer than {MIN_SAMPLES} samples in the mud")
+        if not self.s > 0.0:
+            return Estimate(UNKNOWN, UNKNOWN, self.n, False, "no depth in any sample")
         k = self.b / self.s
-        variance = max(0.0, self.q - self.b * k) / (self.n - 1)
-        std_error = sqrt(variance / self.s) if isfinite(variance) else inf
+        residual = self.q - self.b * k
+        std_error = sqrt(max(0.0, residual) / (self.n - 1) / self.s) if isfinite(residual) else inf
         return Estimate(k, std_error, self.n, *_verdict(k, std_error))
 
 

@@ -146,7 +146,9 @@ class OperatorCalls:
 
     def check(self, params: dict[str, Any]) -> list[dict[str, Any]]:
         """What stands between this robot and a walk, item by item."""
-        items = [self._check_drive(joint, state) for joint, state in zip(JOINTS, self._loop.states, strict=True)]
+        items = [_item("configuration", True, f"accepted for {self._loop.configuration.robot.name}", "")]
+        items += [self._check_drive(joint, state) for joint, state in zip(JOINTS, self._loop.states, strict=True)]
+        items.append(self._check_bus())
         items.append(self._check_arming())
         alive = self._recorder.writer_alive
         items.append(_item("log", alive, "rows are written" if alive else "the log's writer has died", "restart"))
@@ -171,6 +173,13 @@ class OperatorCalls:
         if state.error_flags:
             return _item(f"drive.{joint}", False, error_text(state.error_flags), "mend the cause, 'mudskipper clear'")
         return _item(f"drive.{joint}", True, "heard", "")
+
+    def _check_bus(self) -> dict[str, Any]:
+        counts = self._bus()
+        trouble = counts["error_frames"] + counts["failed_sends"]
+        text = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counts.items())
+        fix = "check wiring, termination and bit rate; 'ip -s -d link show' tells more"
+        return _item("bus", trouble == 0, text, fix)
 
     def _check_arming(self) -> dict[str, Any]:
         loop = self._loop

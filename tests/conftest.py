@@ -7,8 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from firmware_host.configuration import Configuration, load_configuration
+
+settings.register_profile("any_machine", deadline=None)  # a busy one is not wrong
+settings.load_profile("any_machine")
 
 ROOT = Path(__file__).parent.parent
 

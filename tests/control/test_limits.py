@@ -167,7 +167,7 @@ def test_a_small_torque_is_not_scaled_but_capped_by_the_velocity_fade() -> None:
 
 
 def test_the_velocity_fade_has_no_step_at_its_ends() -> None:
-    for edge in (12.0, 15.0):
+    for edge in (0.8 * LIMITS.velocity_rad_s, LIMITS.velocity_rad_s):
         below, above = (settled_nm(9.0, state(velocity_rad_s=nextafter(edge, to))) for to in (0.0, inf))
         assert below == pytest.approx(above, abs=1e-12)
         assert above >= 0.0

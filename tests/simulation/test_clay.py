@@ -38,11 +38,9 @@ def test_the_sideways_force_and_its_depth_are_those_of_the_pressure(
 def test_the_forces_on_the_edge_have_these_values() -> None:
     clay, edge_m2, faces_m = Clay("1 kPa", 1000.0), 0.025 * 0.004, 2.0 * 0.029
     assert clay.insertion_n(0.0, PLATE) == pytest.approx(5.14 * 1000.0 * edge_m2)
-    assert clay.insertion_n(0.010, PLATE) == pytest.approx(
-        5.14 * 1.5 * 1000.0 * edge_m2 + 0.25 * 1000.0 * faces_m * 0.010
-    )
-    deep_n = 9.0 * 1000.0 * edge_m2 + 0.25 * 1000.0 * faces_m * 0.050
-    assert clay.insertion_n(0.050, PLATE) == clay.extraction_n(0.050, PLATE) == pytest.approx(deep_n)
+    adhesion_n = 0.25 * 1000.0 * faces_m * 0.050
+    assert clay.insertion_n(0.050, PLATE) == pytest.approx(5.14 * 1000.0 * edge_m2 + adhesion_n)
+    assert clay.extraction_n(0.050, PLATE) == pytest.approx(9.0 * 1000.0 * edge_m2 + adhesion_n)
     assert clay.edgewise_n(0.050, PLATE) == pytest.approx(
         9.0 * 1000.0 * 0.004 * 0.050 + 0.25 * 1000.0 * faces_m * 0.050
     )

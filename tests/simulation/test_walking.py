@@ -31,6 +31,12 @@ def walk(configuration: Configuration, clay: Clay, depth_m: float) -> tuple[floa
     return 100.0 * (end_m - start_m) / (STRIDES - 2), 100.0 * (end_m - start_m) / (end_s - start_s)
 
 
+def test_five_centimetres_stick_in_the_stiff_mud(configuration: Configuration) -> None:
+    stuck_cm, _ = walk(configuration, MUDS["45.3"], 0.05)
+    free_cm, _ = walk(configuration, MUDS["45.3"], 0.03)
+    assert stuck_cm < 0.5 * free_cm
+
+
 @pytest.mark.parametrize("water", MUDS)
 def test_it_moves_forward_in_every_mud(configuration: Configuration, water: str) -> None:
     step_cm, _ = walk(configuration, MUDS[water], 0.03)
