@@ -101,7 +101,8 @@ class SimulatedOdrive:
 
     def _obey(self, command: int, data: bytes, now_s: float) -> None:
         if command == SET_INPUT_TORQUE.command:
-            self._set_torque(*SET_INPUT_TORQUE.decode(data), now_s)
+            (torque_nm,) = SET_INPUT_TORQUE.decode(data)
+            self._set_torque(torque_nm, now_s)
         elif command == SET_AXIS_STATE.command:
             self._change_state(SET_AXIS_STATE.decode(data)[0], now_s)
         elif command == SET_CONTROLLER_MODE.command:
