@@ -223,14 +223,15 @@ class Loop:
         )
 
     def _command(self, now_s: float) -> None:
-        """Torque where it is due; else see to it that the drives are idle. Before all are heard, nothing is sent."""
-        if self.mode in ENERGISED:
-            if self.mode is Mode.ARMING:
-                self.drives.arm(now_s)
-            self.drives.send(self.sent.torques_nm)
-        elif self.mode is not Mode.BOOT:
+        """Before all drives are heard, nothing is sent. Idle ones get zero torque, which feeds their watchdogs."""
+        if self.mode is Mode.BOOT:
+            return
+        if self.mode is Mode.ARMING:
+            self.drives.arm(now_s)
+        elif self.mode not in ENERGISED:
             self.drives.disarm(now_s)
             self.drives.request_versions(now_s)
+        self.drives.send(self.sent.torques_nm)
 
     def _record(self, beat: Beat) -> None:
         tick_s = self._clock() - beat.now_s
