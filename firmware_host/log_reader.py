@@ -1,41 +1,26 @@
 """A log as arrays: every row of a file that the recorder wrote, whether or not it was finished.
 
-An MCAP file is a sequence of records, and so is each of its chunks, so one walk serves for both. No index is
-needed: a log whose writer was killed is read up to the place where it breaks off. What was damaged rather
-than cut off is refused, and the refusal names the place. The ticks become one numpy array laid over the
-stored bytes.
+The records are read in order, without the index at the end, so a log whose writer was killed is read up to the
+place where it breaks off. What was damaged rather than cut off is refused, and the refusal names the place. The
+ticks become one numpy array laid over the stored bytes.
 """
 
 from __future__ import annotations
 
 import struct
-import zlib
-from collections.abc import Iterator
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import lz4.frame
 import numpy as np
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
-from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Metadata, Schema, Statistics
+from mcap.exceptions import EndOfFile, McapError, RecordLengthLimitExceeded
+from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema, Statistics
+from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
 from firmware_host.log_rows import CDR_HEADER, EVENT, FORMAT_OF, ROW_KINDS, STRIDE, TICK, RowKind
-
-FRAME = struct.Struct("<BQ")  # of every MCAP record: opcode, length
-MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time; then the row
-RECORD_OF: dict[int, Any] = {
-    Opcode.CHUNK: Chunk,
-    Opcode.SCHEMA: Schema,
-    Opcode.CHANNEL: Channel,
-    Opcode.METADATA: Metadata,
-    Opcode.STATISTICS: Statistics,
-}
 
 
 class LogError(ValueError):
@@ -53,15 +38,20 @@ class Log(NamedTuple):
 
 def read_log(path: Path) -> Log:
     contents = _read_contents(path)
-    found = _Findings()
-    for place, opcode, body in _walk(contents, len(MCAP0_MAGIC)):
-        try:
-            found.add(opcode, body)
-        except (ValueError, struct.error, McapError) as error:
-            raise LogError(f"{path}: damaged at byte {place}: {error or 'a record ends early'}") from None
-    complete = contents.endswith(MCAP0_MAGIC, len(MCAP0_MAGIC))  # not the same one at the beginning
-    if complete and not found.everything:
-        raise LogError(f"{path}: damaged: only {found.messages} of its rows can be found")
+    stream, found = BytesIO(contents), _Findings()
+    try:
+        for record in StreamReader(stream, validate_crcs=True, record_size_limit=len(contents)).records:
+            found.add(record)
+        complete = True
+    except (EndOfFile, RecordLengthLimitExceeded):  # the writer was cut off in the middle of a record
+        complete = False
+    except (McapError, ValueError, RuntimeError, MemoryError, struct.error) as error:
+        cut_in_a_head = isinstance(error, struct.error) and stream.tell() == len(contents)
+        if not cut_in_a_head:
+            raise LogError(f"{path}: damaged before byte {stream.tell()}: {error}") from None
+        complete = False
+    if complete and found.messages != found.messages_promised:
+        raise LogError(f"{path}: damaged: only {found.messages} of its {found.messages_promised} rows can be found")
     return Log(
         found.metadata,
         found.configuration_text,
@@ -82,64 +72,37 @@ def _read_contents(path: Path) -> bytes:
     return contents
 
 
-def _walk(contents: bytes, place: int = 0) -> Iterator[tuple[int, int, bytes]]:
-    """Place, opcode and body of every whole record."""
-    while place + FRAME.size <= len(contents):
-        opcode, length = FRAME.unpack_from(contents, place)
-        start = place + FRAME.size
-        if length > len(contents) - start:
-            return
-        yield place, opcode, contents[start : start + length]
-        place = start + length
-
-
 class _Findings:
-    """What the walk through a file has found so far."""
+    """What the records read so far have said."""
 
     def __init__(self) -> None:
         self.metadata: dict[str, str] = {}
         self.configuration_text = ""
         self.rows: dict[RowKind, list[bytes]] = {kind: [] for kind in ROW_KINDS}
-        self.messages = 0
-        self.everything = False  # the file's own count was found and agrees
+        self.messages = self.messages_promised = 0
         self._schemas: dict[int, Schema] = {}
         self._rows_of_channel: dict[int, list[bytes]] = {}
 
-    def add(self, opcode: int, body: bytes) -> None:
-        if opcode == Opcode.MESSAGE:
-            self._add_row(body)
-        elif opcode == Opcode.ATTACHMENT:
-            self._add_attachment(body)
-        elif opcode in RECORD_OF:
-            self._add_record(RECORD_OF[opcode].read(ReadDataStream(BytesIO(body))))
-
-    def _add_row(self, body: bytes) -> None:
-        channel = MESSAGE.unpack_from(body)[0]
-        if channel not in self._rows_of_channel:
-            raise ValueError(f"a row of channel {channel}, which was not described")
-        self._rows_of_channel[channel].append(body[MESSAGE.size :])
-        self.messages += 1
-
-    def _add_attachment(self, body: bytes) -> None:
-        attachment = Attachment.read(ReadDataStream(BytesIO(body)))
-        if zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
-            raise ValueError(f"the attachment {attachment.name} does not match its checksum")
-        if attachment.name == "configuration.toml":
-            self.configuration_text = attachment.data.decode()
-
-    def _add_record(self, record: McapRecord) -> None:
+    def add(self, record: McapRecord) -> None:
         match record:
-            case Chunk():
-                for _, opcode, body in _walk(_unpack(record)):
-                    self.add(opcode, body)
+            case Message():
+                self._add_row(record)
             case Schema():
                 self._schemas[record.id] = record
             case Channel():
                 self._rows_of_channel[record.id] = self._rows_for(record)
+            case Attachment(name="configuration.toml"):
+                self.configuration_text = record.data.decode()
             case Metadata(name="mudskipper"):
                 self.metadata = record.metadata
             case Statistics():
-                self.everything = record.message_count == self.messages
+                self.messages_promised = record.message_count
+
+    def _add_row(self, message: Message) -> None:
+        if message.channel_id not in self._rows_of_channel:
+            raise ValueError(f"a row of channel {message.channel_id}, which was not described")
+        self._rows_of_channel[message.channel_id].append(message.data)
+        self.messages += 1
 
     def _rows_for(self, channel: Channel) -> list[bytes]:
         """Where this channel's rows belong; those of a channel that is not ours are not kept."""
@@ -150,18 +113,6 @@ class _Findings:
                     raise ValueError(f"rows of {kind.topic} have another layout than this version's")
                 return self.rows[kind]
         return []
-
-
-def _unpack(chunk: Chunk) -> bytes:
-    if chunk.compression != "lz4":
-        raise ValueError(f"a chunk is compressed by '{chunk.compression}', where only lz4 can be read")
-    try:
-        contents: bytes = lz4.frame.decompress(chunk.data)
-    except (RuntimeError, MemoryError) as error:
-        raise ValueError(f"a chunk cannot be decompressed: {error}") from None
-    if zlib.crc32(contents) != chunk.uncompressed_crc:
-        raise ValueError("a chunk does not match its checksum")
-    return contents
 
 
 def _layout(ros_text: str) -> list[str]:

@@ -157,7 +157,7 @@ def test_a_tail_of_zeros_after_a_power_cut_is_a_cut(path: Path, whole: Log, tmp_
 def test_a_chunk_that_no_longer_looks_like_one_is_missed(path: Path, tmp_path: Path) -> None:
     damaged = bytearray(path.read_bytes())
     damaged[chunk_places(path)[3]] = 0x7F
-    with pytest.raises(LogError, match=r"changed\.mcap: damaged: only \d+ of its rows can be found"):
+    with pytest.raises(LogError, match=r"changed\.mcap: damaged: only \d+ of its \d+ rows can be found"):
         read_bytes(tmp_path, bytes(damaged))
 
 
@@ -239,7 +239,7 @@ def test_a_row_that_ends_early_is_named_by_its_number(kind: RowKind, tmp_path: P
 
 def test_rows_of_another_layout_are_refused(tmp_path: Path) -> None:
     path = write_foreign(tmp_path / "old.mcap", [make_tick(0)], ros_text="float64 stamp_s\n")
-    with pytest.raises(LogError, match=r"old\.mcap: damaged at byte \d+: rows of /tick have another layout"):
+    with pytest.raises(LogError, match=r"old\.mcap: damaged before byte \d+: rows of /tick have another layout"):
         read_log(path)
 
 
@@ -253,13 +253,12 @@ def test_channels_of_others_are_passed_over(tmp_path: Path) -> None:
     assert (len(log.ticks), log.complete) == (0, True)
 
 
-def test_another_compression_is_refused_by_name(tmp_path: Path) -> None:
+def test_a_log_that_a_tool_has_compressed_again_is_read(tmp_path: Path) -> None:
     path = write_foreign(tmp_path / "zstd.mcap", [make_tick(0)], compression=CompressionType.ZSTD)
-    with pytest.raises(LogError, match="compressed by 'zstd', where only lz4 can be read"):
-        read_log(path)
+    assert len(read_log(path).ticks) == 1
 
 
 def test_a_row_before_its_channel_is_refused(tmp_path: Path) -> None:
     message = struct.pack("<BQHIQQ", 5, 22, 7, 0, 0, 0)
-    with pytest.raises(LogError, match="damaged at byte 8: a row of channel 7, which was not described"):
+    with pytest.raises(LogError, match="damaged before byte 39: a row of channel 7, which was not described"):
         read_bytes(tmp_path, MCAP0_MAGIC + message)
