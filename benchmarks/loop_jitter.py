@@ -30,7 +30,7 @@ from drivers.odrive_drives import OdriveDrives
 from drivers.pose_port import PosePort
 from firmware_host.buses import open_ports
 from firmware_host.configuration import Configuration, load_configuration
-from firmware_host.daemon import Heartbeat, Shutdown
+from firmware_host.daemon import Shutdown, WatchdogFeed
 from firmware_host.loop import Loop
 from firmware_host.operator_calls import OperatorCalls
 from firmware_host.realtime import SWITCH_INTERVAL_S, prepare_loop
@@ -114,7 +114,7 @@ class DaemonLoop:
         calls = OperatorCalls(self.loop, self.recorder, None, [], time.monotonic)
         self._status = StatusSocket(Path(configuration.status.socket), calls.methods)
         stack.callback(self._status.close)
-        self._heartbeat, self._shutdown = Heartbeat(SystemdNotifier("")), Shutdown()
+        self._watchdog, self._shutdown = WatchdogFeed(SystemdNotifier("")), Shutdown()
         self.faults = 0
 
     def beat(self, ticker: Ticker) -> Beat:
@@ -122,7 +122,7 @@ class DaemonLoop:
         beat = ticker.wait()
         self.loop.tick(beat)
         self._status.serve()
-        self._heartbeat.beat(beat, self.loop.mode)
+        self._watchdog.update(beat, self.loop.mode)
         self._shutdown.step(self.loop, beat.now_s)
         return beat
 
@@ -133,17 +133,14 @@ class DaemonLoop:
         beat = self.beat(ticker)
         while beat.now_s < end_s:
             beat = self.beat(ticker)
-            late_s = beat.late_s + beat.missed * PERIOD_S
-            punctuality.add(late_s, beat.missed, time.monotonic() - beat.now_s)
+            punctuality.add(beat.late_s, beat.missed, time.monotonic() - beat.now_s)
         self.faults += self.loop.mode is not Mode.WALKING
         self.loop.request(Request.DISARM, time.monotonic())
-        self._run_until(lambda: not self.loop.health.closed_loop)
+        self._run_until(lambda: not any(state.closed_loop for state in self.loop.states))
 
     def _begin_walk(self) -> None:
         """From whatever was before: nobody drained the buses while the bare loop ran."""
-        self.loop.reset()
-        self.loop.drives.reset()
-        self._run_until(lambda: self.loop.drives.heard)
+        self._run_until(lambda: self.loop.mode in (Mode.IDLE, Mode.FAULT))
         self.loop.request(Request.CLEAR, time.monotonic())
         self._run_until(lambda: self.loop.mode is Mode.IDLE and self.loop.health.fault is None)
         self.loop.request(Request.ARM, time.monotonic())

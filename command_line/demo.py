@@ -127,10 +127,10 @@ class Demo:
 
     def fetch_strides(self, show: Callable[[dict[str, Any]], None]) -> None:
         assert self.client is not None
-        since = self.strides[-1]["number"] + 1 if self.strides else 0
-        for stride in self.client.call("strides", since=since):
-            self.strides.append(stride)
-            show(stride)
+        while fetched := self.client.call("strides", since=len(self.strides)):
+            for stride in fetched:
+                self.strides.append(stride)
+                show(stride)
 
     def stop(self) -> dict[str, Any]:
         """Flippers up, torque off; the last status."""

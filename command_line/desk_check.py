@@ -14,17 +14,19 @@ from typing import Any
 from drivers.odrive_drives import OdriveDrives
 from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration import Configuration, ConfigurationError, load_configuration
+from firmware_host.reports import check_item
 
 LISTENING_S = 0.6  # six heartbeats
 
 
 def desk_check(path: Path, why_no_daemon: str) -> list[dict[str, Any]]:
-    items = [_item("daemon", False, why_no_daemon, "'systemctl start mudskipper', or name its socket with --socket")]
+    fix = "start it ('systemctl start mudskipper'), name its socket with --socket, or join the group that owns it"
+    items = [check_item("daemon", False, why_no_daemon, fix)]
     try:
         configuration = load_configuration(path)
     except ConfigurationError as problem:
-        return items + [_item("configuration", False, sentence, f"edit {path}") for sentence in problem.problems]
-    items.append(_item("configuration", True, str(path), ""))
+        return items + [check_item("configuration", False, sentence, f"edit {path}") for sentence in problem.problems]
+    items.append(check_item("configuration", True, str(path), ""))
     return items + _drive_items(configuration) + _host_items(configuration)
 
 
@@ -32,7 +34,7 @@ def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
     try:
         ports = open_ports(configuration.bus)
     except BusError as problem:
-        return [_item("bus", False, str(problem), "bring the interface up: README, 'On the robot'")]
+        return [check_item("bus", False, str(problem), "bring the interface up: README, 'On the robot'")]
     drives = OdriveDrives(configuration.drive, ports)
     deadline_s = time.monotonic() + LISTENING_S
     while not drives.heard and time.monotonic() < deadline_s:
@@ -40,7 +42,8 @@ def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
         time.sleep(0.01)
     fix = "check its power, wiring, node id and cyclic message periods"
     items = [
-        _item(f"drive.{axis.joint}", axis.heard, "heard" if axis.heard else "not heard", fix) for axis in drives.axes
+        check_item(f"drive.{axis.joint}", axis.heard, "heard" if axis.heard else "not heard", fix)
+        for axis in drives.axes
     ]
     drives.close()
     return items
@@ -53,19 +56,15 @@ def _host_items(configuration: Configuration) -> list[dict[str, Any]]:
         nearest = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
         writable = os.access(nearest, os.W_OK)
         text = f"{folder}: {'writable' if writable else 'not writable'}"
-        items.append(_item("log", writable, text, f"own {nearest}"))
+        items.append(check_item("log", writable, text, f"own {nearest}"))
     priority = configuration.loop.priority
     if priority:
         permitted = _may_schedule(priority)
         text = f"real-time priority {priority} is {'permitted' if permitted else 'not permitted: the loop may be late'}"
-        items.append(_item("realtime", permitted, text, "raise the rtprio limit (LimitRTPRIO= in the unit)"))
+        items.append(check_item("realtime", permitted, text, "raise the rtprio limit (LimitRTPRIO= in the unit)"))
     return items
 
 
 def _may_schedule(priority: int) -> bool:
     limit, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
     return os.geteuid() == 0 or limit == resource.RLIM_INFINITY or limit >= priority
-
-
-def _item(identity: str, ok: bool, text: str, fix: str) -> dict[str, Any]:
-    return {"id": identity, "ok": ok, "text": text, "fix": fix}

@@ -12,8 +12,8 @@ from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
 from firmware_host.configuration import ConfigurationError, load_configuration
 from firmware_host.lab_csv import write_lab_csv
 from firmware_host.log_reader import LogError, log_summary, read_log
-from firmware_host.operator_calls import estimates_report
 from firmware_host.replay import Replay, replay_file
+from firmware_host.reports import stride_report
 
 Options = argparse.Namespace
 
@@ -34,7 +34,7 @@ def replay(options: Options) -> int:
 
 
 def _show_replay(replayed: Replay, as_json: bool) -> None:
-    strides = [estimates_report(stride) for stride in replayed.strides]
+    strides = [stride_report(stride) for stride in replayed.strides]
     if as_json:
         print(json.dumps({"strides": strides, "flippers": replayed.flippers, "complete": replayed.complete}))
         return

@@ -100,6 +100,8 @@ def _request(client: StatusClient, method: str, modes: tuple[str, ...], longest_
         report = client.call("status")
         if report["mode"] in modes:
             print(report["mode"])
+            if report["notice"]:
+                complain(report["notice"])
             return exit_codes.OK
         if report["mode"] == "fault":
             complain(report["fault"]["sentence"])
@@ -110,15 +112,20 @@ def _request(client: StatusClient, method: str, modes: tuple[str, ...], longest_
 
 
 def check(options: Options) -> int:
-    """Ask the daemon; where none runs, try what it would need."""
+    """Ask the daemon; where none answers, try what it would need."""
     try:
         client = StatusClient(options.socket)
+        try:
+            items = client.call("check")
+        finally:
+            client.close()
     except (NoDaemonError, NotPermittedError) as problem:
         from command_line.desk_check import desk_check  # brings python-can and pydantic, which `status` must not load
 
         items = desk_check(options.config, str(problem))
-    else:
-        items = client.call("check")
+    except CallRefusedError as problem:
+        complain(str(problem))
+        return exit_codes.REFUSED
     if options.json:
         print(json.dumps(items))
     else:
@@ -139,7 +146,8 @@ def status_text(report: dict[str, Any]) -> str:
     lines[0] += f", depth {100 * report['depth_m']:.1f} cm, body {number(report['body_x_m'])} m"
     if report["fault"]:
         lines.append(coloured(f"fault: {report['fault']['sentence']}", RED))
-    lines += [coloured(f"warning: {warning}", YELLOW) for warning in report["warnings"]]
+    notices = [report["notice"]] if report["notice"] else []
+    lines += [coloured(f"warning: {warning}", YELLOW) for warning in notices + report["warnings"]]
     lines += ["", _drives_table(report["drives"]), "", _loop_text(report)]
     return "\n".join(lines)
 

@@ -66,7 +66,7 @@ class DepthAdaptation:
     def _grid(self) -> tuple[float, ...]:
         low_m = self.parameters.min_depth_m
         high_m = min(self.parameters.max_depth_m, self.geometry.deepest_m(self.gait.sweep_angle_deg))
-        count = max(0, round((high_m - low_m) / GRID_M - 0.5 + 1e-9)) + 1
+        count = max(0, int((high_m - low_m) / GRID_M + 1e-9)) + 1
         return tuple(low_m + i * GRID_M for i in range(count))
 
     def step(self, strides: Sequence[StrideEstimate]) -> DepthChoice:

@@ -36,6 +36,10 @@ class MotionParameters:
     fade_in_s: Annotated[float, Bounds(0.0, 10.0)] = 0.5  # stiffness after arming
 
 
+UP_RAD = 0.12  # from level: the edge of a 12 cm arm is then 1.4 cm lower, still out of the mud
+RAISING_S = 1.0  # to wait for flippers that the mud holds
+
+
 class WalkOrder(NamedTuple):
     depth_m: float  # of every stride, or of the first one if adaptive
     adaptive: bool = True
@@ -71,6 +75,8 @@ class Controller:
         self._path: JointPath | None = None
         self._pose: JointTargets = still((0.0, 0.0, 0.0, 0.0))
         self._fade = 0.0
+        self._up = False
+        self._waited_s = 0.0  # since the path that ends a walk arrived
         self.target = RESTING
 
     @property
@@ -80,8 +86,11 @@ class Controller:
 
     @property
     def raised(self) -> bool:
-        """The path that ends a walk has arrived."""
-        return self._mode is Mode.STOPPING and self._path is not None and self._path.finished
+        """The flippers are up at the end of a walk, or would be by now if the mud let them."""
+        return self._mode is Mode.STOPPING and (self._up or self._waited_s > RAISING_S)
+
+    def is_up(self, states: DriveStates) -> bool:
+        return all(abs(states[joint].angle_rad) < UP_RAD for joint in (1, 3))
 
     def step(self, dt_s: float, mode: Mode, states: DriveStates) -> Torques:
         """Torques wanted of the four joints; `target` then says where in the stride they belong to."""
@@ -91,6 +100,9 @@ class Controller:
             self.target = RESTING
             return NO_TORQUE
         self._fade = min(1.0, self._fade + dt_s / max(self.motion.fade_in_s, dt_s))
+        if mode is Mode.STOPPING and self._path is not None and self._path.finished:
+            self._up = self.is_up(states)
+            self._waited_s += dt_s
         return joint_torques_nm(self._targets(dt_s, mode), states, self.gains, self.mass, self._fade)
 
     def _enter(self, mode: Mode, states: DriveStates) -> None:
@@ -102,6 +114,7 @@ class Controller:
             self.gait.reset(self.order.depth_m)
         elif mode is Mode.STOPPING:
             self._path = JointPath(here, [self._raised(here)], self.motion.path_speed_rad_s)
+            self._up, self._waited_s = False, 0.0
         if mode not in MOVING:
             self._fade = 0.0
         self._mode = mode

@@ -1,12 +1,13 @@
 """Faults as data: what the last states of the drives say against having torque on.
 
-`find_fault` is pure and runs every tick. It looks at the drives only; bugs and the bus report theirs by the same
-record.
+`find_fault` is pure and runs every tick: a silent drive, a drive's own error, a drive that left closed loop, a joint
+out of its range, a hot motor. What the loop sees of itself (a stall, a bus that takes no commands, a torque that is
+no number, slow arming, wrong firmware) it reports by the same record: `Loop._find_fault`.
 """
 
 from __future__ import annotations
 
-from math import degrees, isfinite
+from math import degrees, inf, isfinite
 from typing import NamedTuple
 
 from control.limits import JointLimits, JointRange
@@ -19,6 +20,7 @@ class Fault(NamedTuple):
 
 
 HEARTBEAT_SILENCE_S = 0.5  # drives send one every 100 ms: five in a row are missing
+TEMPERATURE_SILENCE_S = 1.0  # of a drive that has told its temperature before
 
 
 def find_fault(
@@ -35,6 +37,7 @@ def find_fault(
             _silence(joint, state, silence_s, now_s)
             or _drive_error(joint, state)
             or _out_of_range(joint, state, span, limits)
+            or _hot(joint, state, limits)
         )
         if fault:
             return fault
@@ -43,17 +46,28 @@ def find_fault(
     return None
 
 
+def silent_signals(state: DriveState, silence_s: float, now_s: float) -> list[tuple[str, float]]:
+    """(signal, age in s) of what a drive should have sent by now; infinite age: never heard."""
+    told_temperature = isfinite(state.temperature_stamp_s)
+    return [
+        (signal, now_s - stamp_s)
+        for signal, stamp_s, longest_s in (
+            ("position", state.angle_stamp_s, silence_s),
+            ("current", state.current_stamp_s, silence_s),
+            ("heartbeat", state.heartbeat_stamp_s, HEARTBEAT_SILENCE_S),
+            ("temperature", state.temperature_stamp_s, TEMPERATURE_SILENCE_S if told_temperature else inf),
+        )
+        if now_s - stamp_s > longest_s
+    ]
+
+
 def _silence(joint: str, state: DriveState, silence_s: float, now_s: float) -> Fault | None:
-    for signal, stamp_s, longest_s in (
-        ("position", state.angle_stamp_s, silence_s),
-        ("current", state.current_stamp_s, silence_s),
-        ("heartbeat", state.heartbeat_stamp_s, HEARTBEAT_SILENCE_S),
-    ):
-        age_s = now_s - stamp_s
-        if age_s > longest_s:
-            ago = f"for {age_s * 1e3:.0f} ms" if isfinite(age_s) else "at all"
-            return Fault("drive_silent", f"No {signal} came from the {joint} drive {ago}.")
-    return None
+    silent = silent_signals(state, silence_s, now_s)
+    if not silent:
+        return None
+    signal, age_s = silent[0]
+    ago = f"for {age_s * 1e3:.0f} ms" if isfinite(age_s) else "at all"
+    return Fault("drive_silent", f"No {signal} came from the {joint} drive {ago}.")
 
 
 def _drive_error(joint: str, state: DriveState) -> Fault | None:
@@ -70,6 +84,10 @@ def _out_of_range(joint: str, state: DriveState, span: JointRange, limits: Joint
             "joint_position",
             f"The {joint} joint is at {angle_deg:.1f} degrees, outside of {low_deg:.0f} to {high_deg:.0f}.",
         )
+    return None
+
+
+def _hot(joint: str, state: DriveState, limits: JointLimits) -> Fault | None:
     if state.temperature_c >= limits.temperature_hot_c:
         return Fault("motor_hot", f"The {joint} motor has {state.temperature_c:.0f} degrees C.")
     return None

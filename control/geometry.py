@@ -79,27 +79,25 @@ class FlipperGeometry:
         self, sweep_rad: float, adduction_rad: float, sweep_velocity_rad_s: float, depth_velocity_m_s: float
     ) -> float:
         """The depth law differentiated: ż = l sin α sin β · α̇ - (l cos α cos β + h sin β) · β̇."""
-        sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
-        lever_m = self.flipper_length_m * ca * cb + self.drop_m * sb
-        return (self.flipper_length_m * sa * sb * sweep_velocity_rad_s - depth_velocity_m_s) / lever_m
+        lever_m = self.vertical_lever_m(sweep_rad, adduction_rad)
+        sinking_m = self.flipper_length_m * sin(sweep_rad) * sin(adduction_rad)
+        return (sinking_m * sweep_velocity_rad_s - depth_velocity_m_s) / lever_m
 
     def vertical_lever_m(self, sweep_rad: float, adduction_rad: float) -> float:
         """Metres that the lower edge rises per radian of adduction: the lever of a vertical force."""
         return self.flipper_length_m * cos(sweep_rad) * cos(adduction_rad) + self.drop_m * sin(adduction_rad)
 
     def deepest_m(self, sweep_angle_deg: float) -> float:
-        """The greatest depth that can be held over a sweep of ±`sweep_angle_deg`, with MIN_LEVER_M left.
-
-        At the end of the sweep the edge moves on a circle of radius √((l cos α)² + h²); where the lever is d, the
-        edge hangs √(radius² - d²) below the axis.
-        """
-        radius_m = hypot(self.flipper_length_m * cos(radians(sweep_angle_deg)), self.drop_m)
-        if radius_m <= MIN_LEVER_M:
-            return -self.axis_height_m
-        return sqrt(radius_m * radius_m - MIN_LEVER_M * MIN_LEVER_M) - self.axis_height_m
+        """The greatest depth that can be held over a sweep of ±`sweep_angle_deg`."""
+        return self._deepest_at_m(radians(sweep_angle_deg))
 
     def is_reachable(self, sweep_rad: float, depth_m: float) -> bool:
         """Whether the pose exists and leaves the adduction joint a vertical lever of at least MIN_LEVER_M."""
-        radius_squared = (self.flipper_length_m * cos(sweep_rad)) ** 2 + self.drop_m**2
-        below_axis_m = depth_m + self.axis_height_m
-        return below_axis_m * below_axis_m <= radius_squared - MIN_LEVER_M * MIN_LEVER_M
+        return abs(depth_m + self.axis_height_m) <= self._deepest_at_m(sweep_rad) + self.axis_height_m
+
+    def _deepest_at_m(self, sweep_rad: float) -> float:
+        """Raising and lowering, the edge moves on a circle of radius √((l cos α)² + h²); where the vertical lever is
+        still d, it hangs √(radius² - d²) below the axis.
+        """
+        radius_m = hypot(self.flipper_length_m * cos(sweep_rad), self.drop_m)
+        return sqrt(max(0.0, radius_m * radius_m - MIN_LEVER_M * MIN_LEVER_M)) - self.axis_height_m

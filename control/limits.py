@@ -1,8 +1,8 @@
 """`apply_limits`, the last pure function before the wire.
 
 Whatever the controller wants, each torque that leaves is finite, within the torque limit, and no more than one slew
-step from the one sent before. At a position limit, beyond the velocity limit and in a hot motor the torque fades out,
-as fast as the slew rate lets it. Only what is not a number goes to zero at once.
+step from the one sent before. Torque that would push a joint past its position limit is cut, near the velocity limit
+and in a hot motor it fades; each as fast as the slew rate lets it. Only what is not a number goes to zero at once.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ VELOCITY_FADE = 0.2  # torque that speeds a joint up fades out over this last pa
 class JointLimits:
     torque_nm: Annotated[float, Bounds(0.0, 5.0)] = 0.75  # the authors' optimiser's figure for the R60
     torque_rate_nm_s: Annotated[float, Bounds(1.0, 10000.0)] = 150.0
-    velocity_rad_s: Annotated[float, Bounds(0.1, 200.0)] = 20.0  # the extraction from 5 cm takes 14
+    velocity_rad_s: Annotated[float, Bounds(0.1, 200.0)] = 20.0  # the extraction from 5 cm takes up to 16
     sweep_min_deg: Annotated[float, Bounds(-180.0, 180.0)] = -60.0
     sweep_max_deg: Annotated[float, Bounds(-180.0, 180.0)] = 60.0
     adduction_min_deg: Annotated[float, Bounds(-180.0, 180.0)] = -75.0

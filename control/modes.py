@@ -2,8 +2,8 @@
 
     BOOT ──heard──▶ IDLE ──arm──▶ ARMING ──closed loop──▶ HOLD ──walk──▶ WALKING ──stop──▶ STOPPING ──raised──▶ HOLD
 
-A fault while torque is on leads to FAULT, which only `clear` leaves, to IDLE. `disarm` leads to IDLE from everywhere
-else. Nothing arms by itself.
+A fault while torque is on leads to FAULT, which only `clear` leaves, to IDLE. `disarm` leads to IDLE wherever torque
+is on, and idles the drives in every mode. Nothing arms by itself.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from control.faults import Fault
 
 
 class Mode(IntEnum):
-    BOOT = 0  # not every drive was heard yet; nothing is transmitted
+    BOOT = 0  # not every drive was heard yet
     IDLE = 1  # drives without torque
     ARMING = 2  # drives asked into closed loop, with zero torque
     HOLD = 3  # the measured pose is held
@@ -43,7 +43,7 @@ class Health(NamedTuple):
     drives_heard: bool = False
     closed_loop: bool = False  # all four drives
     walk_finished: bool = False  # the strides asked for are done
-    raised: bool = False  # the flippers are out of the mud
+    raised: bool = False  # the flippers are up, or the wait for them is over
     fault: Fault | None = None
 
 
@@ -71,9 +71,8 @@ def next_mode(mode: Mode, request: Request, health: Health) -> Mode:
 
 
 def _after_idle(request: Request, health: Health) -> Mode:
-    if not health.drives_heard:
-        return Mode.BOOT
-    return Mode.ARMING if request is Request.ARM and health.fault is None else Mode.IDLE
+    well = health.drives_heard and health.fault is None
+    return Mode.ARMING if request is Request.ARM and well else Mode.IDLE
 
 
 ACCEPTED_IN: dict[Request, frozenset[Mode]] = {

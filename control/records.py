@@ -41,6 +41,7 @@ class DriveState(NamedTuple):
     error_flags: int = 0
     heartbeat_stamp_s: float = NEVER_S
     temperature_c: float = UNKNOWN
+    temperature_stamp_s: float = NEVER_S
     bus_voltage_v: float = UNKNOWN
 
 

@@ -13,8 +13,8 @@ import can
 
 from drivers.frames import Frame
 
-RECEIVE_ERRORS = (can.CanError, OSError, ValueError, IndexError)  # the last two: slcan's parser on a garbled line
-MOST_FRAMES_PER_READ = 256  # a babbling node must not hold the loop
+PORT_ERRORS = (can.CanError, OSError, ValueError, IndexError)  # slcan: an unplugged adapter, a garbled line
+MOST_FRAMES_PER_READ = 4096  # half a second of a full bus; a babbling node must not hold the loop for ever
 
 
 class CanPort(Protocol):
@@ -22,12 +22,15 @@ class CanPort(Protocol):
 
     failed_sends: int
     error_frames: int
+    last_error: str
 
     def receive(self) -> Sequence[Frame]:
         """All data frames that have arrived, oldest first; never waits."""
 
     def send(self, frame: Frame) -> None:
-        """Never waits; a frame that cannot be queued is dropped and counted, the next tick brings a newer one."""
+        """Does not wait for room; a frame that cannot be queued is dropped and counted, the next tick brings a newer
+        one. (python-can's serial interfaces wait until the bytes have left.)
+        """
 
     def close(self) -> None: ...
 
@@ -61,7 +64,7 @@ class PythonCanPort:
                             message.is_extended_id,
                         )
                     )
-        except RECEIVE_ERRORS as problem:  # an interface that is down is a fault by the silence of its drives
+        except PORT_ERRORS as problem:  # an interface that is down is a fault by the silence of its drives
             self.error_frames += 1
             self.last_error = str(problem)
         return frames
@@ -75,7 +78,7 @@ class PythonCanPort:
         )
         try:
             self._bus.send(message, 0.0)
-        except can.CanError as problem:  # a full transmit queue (ENOBUFS) or an interface that is down
+        except PORT_ERRORS as problem:  # a full transmit queue (ENOBUFS) or an interface that is gone
             self.failed_sends += 1
             self.last_error = str(problem)
 

@@ -51,7 +51,6 @@ CLEAR_ERRORS = Message(0x18, "<B")  # identify flag
 
 
 class AxisState(IntEnum):
-    UNDEFINED = 0
     IDLE = 1
     CLOSED_LOOP = 8
 
@@ -59,10 +58,9 @@ class AxisState(IntEnum):
 TORQUE_CONTROL = 1  # control mode
 PASSTHROUGH = 1  # input mode
 
-# Flags of active errors and disarm reasons that the simulated drive raises itself (odrive.enums.ODriveError).
+# Flags of active errors and disarm reasons (odrive.enums.ODriveError).
 ERROR_WATCHDOG = 0x1000000
 ERROR_ESTOP = 0x2000000
-ERROR_VELOCITY_LIMIT = 0x8000
 
 ERROR_NAMES = {
     0x1: "initializing",
@@ -79,7 +77,7 @@ ERROR_NAMES = {
     0x1000: "current limit violation",
     0x2000: "motor over-temperature",
     0x4000: "inverter over-temperature",
-    ERROR_VELOCITY_LIMIT: "velocity limit violation",
+    0x8000: "velocity limit violation",
     0x10000: "position limit violation",
     0x20000: "requested current too high",
     ERROR_WATCHDOG: "watchdog expired",

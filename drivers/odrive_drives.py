@@ -74,6 +74,7 @@ class OdriveAxis:
         self._angle_rad = self._velocity_rad_s = self._current_a = UNKNOWN
         self._angle_stamp_s = self._current_stamp_s = self._heartbeat_stamp_s = NEVER_S
         self._temperature_c = self._bus_voltage_v = UNKNOWN
+        self._temperature_stamp_s = NEVER_S
         self._closed_loop = False
         self._error_flags = 0
         self.disarm_reason = 0
@@ -116,6 +117,7 @@ class OdriveAxis:
 
     def _receive_temperature(self, data: bytes, now_s: float) -> None:
         _, self._temperature_c = GET_TEMPERATURE.decode(data)
+        self._temperature_stamp_s = now_s
 
     def _receive_bus_voltage(self, data: bytes, now_s: float) -> None:
         self._bus_voltage_v, _ = GET_BUS_VOLTAGE_CURRENT.decode(data)
@@ -136,6 +138,7 @@ class OdriveAxis:
             self._error_flags,
             self._heartbeat_stamp_s,
             self._temperature_c,
+            self._temperature_stamp_s,
             self._bus_voltage_v,
         )
 
@@ -194,7 +197,7 @@ class OdriveDrives:
             axis.reset()
         self.unknown_frames = 0  # of other ids, remote or extended
         self.garbled_frames = 0  # of a drive of ours, with a payload that makes no sense
-        self._last_request_s = self._version_asked_s = NEVER_S
+        self._armed_s = self._disarmed_s = self._version_asked_s = NEVER_S
 
     def read(self, now_s: float) -> DriveStates:
         """The newest of every signal after draining the ports; `now_s` stamps what arrived."""
@@ -226,22 +229,22 @@ class OdriveDrives:
         for axis, torque_nm in zip(self.axes, torques_nm, strict=True):
             axis.send_torque(torque_nm)
 
-    def arm(self, now_s: float) -> None:
-        """Ask the drives that are not in closed loop to go there; repeated calls ask again every REPEAT_S."""
-        if now_s - self._last_request_s < REPEAT_S:
+    def arm(self, now_s: float, at_once: bool = False) -> None:
+        """Ask for closed loop: all drives `at_once`, else every REPEAT_S those that are not in it yet."""
+        if not at_once and now_s - self._armed_s < REPEAT_S:
             return
-        self._last_request_s = now_s
+        self._armed_s = now_s
         for axis in self.axes:
-            if not axis.state.closed_loop:
+            if at_once or not axis.state.closed_loop:
                 axis.arm()
 
     def disarm(self, now_s: float, at_once: bool = False) -> None:
         """Zero torque and idle: for all drives `at_once`, else every REPEAT_S for those still in closed loop."""
-        if not at_once and now_s - self._last_request_s < REPEAT_S:
+        if not at_once and now_s - self._disarmed_s < REPEAT_S:
             return
         for axis in self.axes:
             if at_once or axis.state.closed_loop:
-                self._last_request_s = now_s
+                self._disarmed_s = now_s
                 axis.disarm()
 
     def clear_errors(self) -> None:

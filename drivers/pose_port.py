@@ -59,7 +59,7 @@ class PosePort:
 def _listen(path: Path) -> socket.socket:
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     listener.setblocking(False)
-    with contextlib.suppress(FileNotFoundError):
+    if path.is_socket():  # left behind; anything else makes bind refuse
         path.unlink()
     listener.bind(str(path))
     os.chmod(path, SOCKET_MODE)

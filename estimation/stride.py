@@ -143,7 +143,8 @@ class FlipperEstimator:
                 return
             self._surface_m = load.depth_m
         self._deepest_m = max(self._deepest_m, load.depth_m)
-        self._penetration.update(self.edge_m2 * (load.depth_m - self._surface_m), load.force_z_n)
+        if load.depth_m >= self._surface_m:
+            self._penetration.update(self.edge_m2 * (load.depth_m - self._surface_m), load.force_z_n)
 
     def _learn_stance(self, sweep_rad: float, load: FlipperLoad) -> None:
         self._stance_force_n = _larger(load.force_x_n, self._stance_force_n)

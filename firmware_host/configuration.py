@@ -211,6 +211,7 @@ def _contradictions(configuration: Configuration) -> Iterator[str]:
     yield from _drive_problems(configuration)
     yield from _depth_problems(configuration)
     yield from _range_problems(configuration)
+    yield from _torque_problems(configuration)
 
 
 def _drive_problems(configuration: Configuration) -> Iterator[str]:
@@ -229,6 +230,18 @@ def _drive_problems(configuration: Configuration) -> Iterator[str]:
         twin = places.setdefault((drive.bus, drive.node_id), joint)
         if twin != joint:
             yield f"drive.{joint}.node_id = {drive.node_id}: {twin} has the same on bus {drive.bus!r}"
+
+
+def _torque_problems(configuration: Configuration) -> Iterator[str]:
+    """A drive must be able to give what the limits allow, or it clamps torque without a word."""
+    torque_nm = configuration.limits.torque_nm
+    for joint, drive in configuration.drive.items():
+        possible_nm = drive.current_limit_a * drive.torque_constant_nm_a
+        if possible_nm < torque_nm:
+            yield (
+                f"drive.{joint}.current_limit_a = {drive.current_limit_a}: must be at least"
+                f" {torque_nm / drive.torque_constant_nm_a:.2f} for limits.torque_nm = {torque_nm}"
+            )
 
 
 def _depth_problems(configuration: Configuration) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """mudskipperd: the process on the robot.
 
-Reads the configuration, opens the buses, and runs the loop until it is told to end. SIGTERM and SIGINT let it finish
-safely: flippers out of the mud, torque to zero, drives idle, log closed. What nobody expected ends in one place,
+Reads the configuration, opens the buses, and runs the loop until it is told to end. SIGTERM, SIGINT and SIGHUP let it
+finish safely: flippers out of the mud, torque to zero, drives idle, log closed. What nobody expected ends in one place,
 which idles the drives, says what happened, and exits with status 1; systemd starts it again, disarmed.
 """
 
@@ -13,7 +13,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -39,17 +39,18 @@ EXIT_FAILED = 1
 LONGEST_SHUTDOWN_S = 5.0
 LONGEST_LOG_CLOSE_S = 10.0
 GOODBYE_S = 0.3  # for idle requests to leave and be obeyed
+GOODBYE_FRAMES = 5  # to each drive when a bug ends the loop
 NOTIFY_TICKS = int(RATE_HZ / 4)
 
 
-class Heartbeat:
+class WatchdogFeed:
     """Feeds systemd's watchdog from the ticks themselves: a loop that misses more than it makes is not healthy."""
 
     def __init__(self, notifier: SystemdNotifier) -> None:
         self._notifier = notifier
         self._made = self._missed = 0
 
-    def beat(self, beat: Beat, mode: Mode) -> None:
+    def update(self, beat: Beat, mode: Mode) -> None:
         self._made += 1
         self._missed += beat.missed
         if self._made < NOTIFY_TICKS:
@@ -75,10 +76,12 @@ class Shutdown:
         """Whether the loop may end now."""
         if not self.wanted:
             return False
+        loop.ending = True
         self._since_s = self._since_s or now_s
         if loop.mode not in ENERGISED:
             self._idle_since_s = self._idle_since_s or now_s
-            return not loop.health.closed_loop or now_s - self._idle_since_s > GOODBYE_S
+            all_idle = not any(state.closed_loop for state in loop.states)
+            return all_idle or now_s - self._idle_since_s > GOODBYE_S
         if now_s - self._since_s > LONGEST_SHUTDOWN_S or loop.mode in (Mode.HOLD, Mode.ARMING):
             loop.request(Request.DISARM, now_s)
         elif loop.mode is Mode.WALKING:
@@ -104,8 +107,9 @@ def open_recorder(configuration: Configuration, path: Path | None) -> Recorder |
 def run(configuration: Configuration, shutdown: Shutdown) -> int:
     """Until `shutdown` is wanted and done. Raises BusError, AlreadyServedError or OSError before it has begun."""
     with ExitStack() as stack:
-        ports = open_ports(configuration.bus)
-        drives = OdriveDrives(configuration.drive, ports)
+        status = StatusSocket(Path(configuration.status.socket), {})  # first: it refuses to be the second daemon
+        stack.callback(status.close)
+        drives = OdriveDrives(configuration.drive, open_ports(configuration.bus))
         stack.callback(drives.close)
         pose = PosePort(Path(configuration.pose.socket) if configuration.pose.socket else None)
         stack.callback(pose.close)
@@ -115,8 +119,8 @@ def run(configuration: Configuration, shutdown: Shutdown) -> int:
         loop = Loop(configuration, drives, pose, recorder)
         warnings: list[str] = []
         calls = OperatorCalls(loop, recorder, str(log_path) if log_path else None, warnings, time.monotonic)
-        status = StatusSocket(Path(configuration.status.socket), calls.methods)
-        stack.callback(status.close)
+        status.methods = calls.methods
+        status.report_bug = lambda sentence: loop.event(time.monotonic(), sentence)
         notifier = SystemdNotifier()
         stack.callback(notifier.close)
         options = configuration.loop
@@ -127,7 +131,7 @@ def run(configuration: Configuration, shutdown: Shutdown) -> int:
 
 
 def _run_loop(loop: Loop, status: StatusSocket, notifier: SystemdNotifier, shutdown: Shutdown) -> int:
-    ticker, heartbeat = Ticker(), Heartbeat(notifier)
+    ticker, watchdog = Ticker(), WatchdogFeed(notifier)
     notifier.send("READY=1", "STATUS=running")
     now_s = time.monotonic()
     try:
@@ -136,7 +140,7 @@ def _run_loop(loop: Loop, status: StatusSocket, notifier: SystemdNotifier, shutd
             now_s = beat.now_s
             loop.tick(beat)
             status.serve()
-            heartbeat.beat(beat, loop.mode)
+            watchdog.update(beat, loop.mode)
         notifier.send("STOPPING=1")
         return 0
     except Exception as problem:  # noqa: BLE001 - the one place where surprises end
@@ -146,8 +150,9 @@ def _run_loop(loop: Loop, status: StatusSocket, notifier: SystemdNotifier, shutd
 
 def _end_safely(loop: Loop, problem: Exception) -> int:
     """Idle the drives, whatever state the rest is in, and say what happened."""
-    for _ in range(5):
-        loop.drives.disarm(time.monotonic(), at_once=True)
+    for axis in loop.drives.axes * GOODBYE_FRAMES:
+        with suppress(Exception):  # what broke may be one bus; the others' drives still have to hear it
+            axis.disarm()
     place = traceback.extract_tb(problem.__traceback__)[-1]
     sentence = f"{type(problem).__name__}: {problem} ({Path(place.filename).name}, line {place.lineno})"
     loop.event(time.monotonic(), f"stopped by a bug: {sentence}")
@@ -178,7 +183,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _on_signals(handler: Callable[[int, object], None]) -> None:
-    for number in (signal.SIGTERM, signal.SIGINT):
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         signal.signal(number, handler)
 
 

@@ -14,9 +14,10 @@ from control.adaptation import DepthAdaptation
 from control.controller import RESTING, Controller, WalkOrder
 from control.faults import Fault, find_fault
 from control.limits import LimitedTorques, apply_limits
-from control.modes import ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
+from control.modes import ACCEPTED_IN, ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
 from control.records import (
     JOINTS,
+    NEVER_S,
     NO_TORQUE,
     BodyPose,
     DriveState,
@@ -37,6 +38,8 @@ from firmware_host.timing import LoopTiming
 
 ARMING_S = 2.0  # a drive that takes longer to go into closed loop does not mean to
 CLEARING_S = 0.5  # for the drives to report that their errors are gone
+LONGEST_STEP_TICKS = 3  # what the controller may advance at once: after a longer gap the gait goes on where it was
+REFUSED_TICKS = 5  # in a row in which a bus took no command
 KEPT_STRIDES = 200  # for clients that ask what happened
 TICK_KIND, STRIDE_KIND, EVENT_KIND = ROW_KINDS.index(TICK), ROW_KINDS.index(STRIDE), ROW_KINDS.index(EVENT)
 
@@ -76,10 +79,6 @@ class Loop:
         )
         self._clock = clock
         self._ranges = configuration.joint_ranges
-        self.reset()
-
-    def reset(self) -> None:
-        """As after the start: nothing is armed, nothing is known."""
         self.mode = Mode.BOOT
         self.fault: Fault | None = None
         self.states: DriveStates = (DriveState(), DriveState(), DriveState(), DriveState())
@@ -89,24 +88,27 @@ class Loop:
         self.strides: list[ClosedStride] = []
         self.strides_closed = 0
         self.health = Health()
-        self._request, self._request_until_s = Request.NONE, 0.0
+        self.missed_ticks = 0  # since the start
+        self.notice = ""  # the last thing that a person should know and that is no fault
+        self.ending = False  # the daemon is about to end: nothing is armed any more
+        self.target_before: GaitTarget = RESTING  # commanded while the states of this tick came about
+        self._request, self._clear_until_s = Request.NONE, 0.0
         self._mode_since_s = 0.0
-        self.target: GaitTarget = RESTING
-        self.estimator.reset()
-        self.controller.reset()
+        self._failed_sends = self._refused_ticks = 0
 
     def tick(self, beat: Beat) -> None:
         """Everything that happens once in PERIOD_S."""
-        dt_s = (1 + beat.missed) * PERIOD_S
-        self.target = self.controller.target  # what was commanded while the states below came about
+        self.missed_ticks += beat.missed
+        self.target_before = self.controller.target
         self.states = self.drives.read(beat.now_s)
         self.body = self.pose.read(beat.now_s)
         self.reading = self._estimate(beat.now_s)
         self._adapt(beat.now_s)
-        self.health = self._examine(beat.now_s)
+        self.health = self._examine(beat)
         self._change_mode(next_mode(self.mode, self._request_now(beat.now_s), self.health), beat.now_s)
-        wanted = self.controller.step(dt_s, self.mode, self.states)
-        self.sent = self._limit(wanted, dt_s)
+        step_s = min(1 + beat.missed, LONGEST_STEP_TICKS) * PERIOD_S
+        wanted = self.controller.step(step_s, self.mode, self.states)
+        self.sent = self._limit(wanted)
         self._command(beat.now_s)
         self._record(beat)
 
@@ -117,7 +119,7 @@ class Loop:
         velocities_rad_s = (a.velocity_rad_s, b.velocity_rad_s, c.velocity_rad_s, d.velocity_rad_s)
         currents_a = (a.current_a, b.current_a, c.current_a, d.current_a)
         return self.estimator.update(
-            now_s, self.target.phase, angles_rad, velocities_rad_s, currents_a, self.body.x_m
+            now_s, self.target_before.phase, angles_rad, velocities_rad_s, currents_a, self.body.x_m
         )
 
     def _adapt(self, now_s: float) -> None:
@@ -126,7 +128,10 @@ class Loop:
             return
         depth_m = self.controller.order.depth_m
         if self.controller.order.adaptive:
-            depth_m = self.adaptation.step(self.reading.strides).depth_m
+            choice = self.adaptation.step(self.reading.strides)
+            depth_m = choice.depth_m
+            if depth_m != self.controller.gait.next_depth_m:
+                self.event(now_s, f"depth {depth_m:.4f} m: {choice.reason}{', slips' if choice.slips else ''}")
         self.controller.gait.next_depth_m = depth_m
         for estimate in self.reading.strides:
             self.strides.append(ClosedStride(self.strides_closed, estimate, depth_m))
@@ -134,19 +139,29 @@ class Loop:
             self.recorder.put(STRIDE_KIND, stride_row(now_s, estimate, depth_m))
         del self.strides[:-KEPT_STRIDES]
 
-    def _examine(self, now_s: float) -> Health:
+    def _examine(self, beat: Beat) -> Health:
         heard = self.mode is not Mode.BOOT or self.drives.heard
         return Health(
             drives_heard=heard,
-            closed_loop=all(state.closed_loop for state in self.states),
+            closed_loop=self._all_in_closed_loop(),
             walk_finished=self.controller.walk_finished,
             raised=self.controller.raised,
-            fault=self._find_fault(now_s) if heard else None,
+            fault=self._find_fault(beat) if heard else None,
         )
 
-    def _find_fault(self, now_s: float) -> Fault | None:
+    def _all_in_closed_loop(self) -> bool:
+        """By heartbeats that are younger than the wish, while arming: an older one tells of before."""
+        oldest_s = self._mode_since_s if self.mode is Mode.ARMING else NEVER_S
+        return all(state.closed_loop and state.heartbeat_stamp_s > oldest_s for state in self.states)
+
+    def _find_fault(self, beat: Beat) -> Fault | None:
+        now_s = beat.now_s
         if not self.sent.finite:
             return Fault("not_finite", "A torque was not a finite number: this is a bug, please report it.")
+        if beat.missed * PERIOD_S > self.configuration.loop.silence_s:
+            return Fault("loop_stalled", f"The loop stood still for {1e3 * beat.late_s:.0f} ms.")
+        if self._bus_refuses():
+            return Fault("bus_refuses", f"The bus took no command for {REFUSED_TICKS} ticks: {self._bus_says()}.")
         if self.mode is Mode.ARMING and now_s - self._mode_since_s > ARMING_S:
             return Fault("arming", f"Not every drive went into closed loop: {self._slow_to_arm()}.")
         limits, silence_s = self.configuration.limits, self.configuration.loop.silence_s
@@ -154,6 +169,17 @@ class Loop:
         if fault and fault.name in ("drive_error", "drive_disarmed"):
             return fault._replace(sentence=f"{fault.sentence} {self._drives_say()}".rstrip())
         return fault or self._wrong_version()
+
+    def _bus_refuses(self) -> bool:
+        """Called once a tick."""
+        failed_sends = sum(port.failed_sends for port in self.drives.ports.values())
+        self._refused_ticks = self._refused_ticks + 1 if failed_sends > self._failed_sends else 0
+        self._failed_sends = failed_sends
+        return self._refused_ticks >= REFUSED_TICKS
+
+    def _bus_says(self) -> str:
+        said = [f"{name}: {port.last_error}" for name, port in self.drives.ports.items() if port.last_error]
+        return ", ".join(said) or "it did not say why"
 
     def _slow_to_arm(self) -> str:
         return ", ".join(joint for joint, state in zip(JOINTS, self.states, strict=True) if not state.closed_loop)
@@ -178,25 +204,38 @@ class Loop:
 
     def request(self, request: Request, now_s: float, order: WalkOrder | None = None) -> str | None:
         """A person's wish, for the next tick. Returns why it is refused, or None."""
-        if request is Request.CLEAR and self.mode not in ENERGISED:
+        refused = self._refusal(request, order)
+        if refused:
+            return refused
+        self.event(now_s, f"request {request.name.lower()}")
+        if request is Request.DISARM and self.mode not in ENERGISED:
+            self.drives.disarm(now_s, at_once=True)  # also while not all drives are heard
+        elif request is Request.CLEAR:
             self.drives.clear_errors()
-            self._request_until_s = now_s + CLEARING_S
-        else:
-            refused = refusal(self.mode, request, self.health)
-            if refused:
-                return refused
-            self._request_until_s = now_s + PERIOD_S
+            self._clear_until_s = now_s + CLEARING_S
         if order is not None:
             self.controller.order = order
             self.adaptation.reset(order.depth_m)
-        self._request = request
-        self.event(now_s, f"request {request.name.lower()}")
+        if self._request is not Request.DISARM:  # which nothing that comes in the same tick may undo
+            self._request = request
         return None
 
+    def _refusal(self, request: Request, order: WalkOrder | None) -> str | None:
+        if self.ending and request in (Request.ARM, Request.WALK):
+            return "the daemon is ending"
+        if order is not None and not self._reaches(order.depth_m):
+            return f"depth {order.depth_m:g} m: out of the flippers' reach over the sweep"
+        if request is Request.CLEAR and self.mode in ACCEPTED_IN[request]:
+            return None  # whether the cause persists is known once the drives have answered
+        return refusal(self.mode, request, self.health)
+
+    def _reaches(self, depth_m: float) -> bool:
+        return depth_m <= self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
+
     def _request_now(self, now_s: float) -> Request:
-        """The request to act on in this tick; it lapses once it is obeyed or its time is over."""
+        """The request to act on in this tick. A clear lasts until the drives had time to report no errors."""
         request = self._request
-        if request is not Request.CLEAR or now_s > self._request_until_s:
+        if request is not Request.CLEAR or now_s > self._clear_until_s:
             self._request = Request.NONE
         return request
 
@@ -208,28 +247,38 @@ class Loop:
         elif mode is Mode.IDLE:
             self.fault = None
         if mode is Mode.WALKING:
+            self.notice = ""
             self.estimator.reset()
+        if self.mode is Mode.STOPPING and mode is Mode.HOLD and not self.controller.is_up(self.states):
+            self._tell(now_s, "the flippers did not come out of the mud")
         because = f": {self.fault.sentence}" if self.fault else ""
         self.event(now_s, f"mode {self.mode.name.lower()} to {mode.name.lower()}{because}")
-        if self.mode in ENERGISED and mode not in ENERGISED:
+        if mode is Mode.ARMING:
+            self.drives.arm(now_s, at_once=True)
+        elif self.mode in ENERGISED and mode not in ENERGISED:
             self.drives.disarm(now_s, at_once=True)
         self.mode, self._mode_since_s = mode, now_s
 
-    def _limit(self, wanted: Torques, dt_s: float) -> LimitedTorques:
+    def _limit(self, wanted: Torques) -> LimitedTorques:
+        """One tick's slew, however long the last gap was."""
         if self.mode not in MOVING:
             return LimitedTorques(NO_TORQUE, False, True)
         return apply_limits(
-            wanted, self.sent.torques_nm, self.states, self.configuration.limits, self._ranges, dt_s
+            wanted, self.sent.torques_nm, self.states, self.configuration.limits, self._ranges, PERIOD_S
         )
 
     def _command(self, now_s: float) -> None:
-        """Before all drives are heard, nothing is sent. Idle ones get zero torque, which feeds their watchdogs."""
-        if self.mode is Mode.BOOT:
-            return
+        """Before all drives are heard, those in closed loop are told to go idle, and nothing else is sent.
+
+        Idle ones get zero torque, which feeds their watchdogs.
+        """
         if self.mode is Mode.ARMING:
             self.drives.arm(now_s)
         elif self.mode not in ENERGISED:
             self.drives.disarm(now_s)
+        if self.mode is Mode.BOOT:
+            return
+        if self.mode is Mode.IDLE:
             self.drives.request_versions(now_s)
         self.drives.send(self.sent.torques_nm)
 
@@ -241,7 +290,7 @@ class Loop:
     def _tick_row(self, beat: Beat, tick_s: float) -> bytes:
         a, b, c, d = self.states
         left, right = self.reading.left, self.reading.right
-        target, now_s = self.target, beat.now_s
+        target, now_s = self.target_before, beat.now_s
         return TICK.encode(
             now_s, beat.late_s, tick_s,
             a.angle_rad, b.angle_rad, c.angle_rad, d.angle_rad,
@@ -255,8 +304,12 @@ class Loop:
             left.force_x_n, right.force_x_n, left.force_z_n, right.force_z_n, left.depth_m, right.depth_m,
             target.depth_m, self.controller.gait.commanded_depth_m, self.body.x_m,
             a.temperature_c, b.temperature_c, c.temperature_c, d.temperature_c,
-            beat.number, self.timing.missed_ticks, target.stride, self.mode, target.phase, self.sent.limited,
+            beat.number, self.missed_ticks, target.stride, self.mode, target.phase, self.sent.limited,
         )  # fmt: skip
+
+    def _tell(self, now_s: float, notice: str) -> None:
+        self.notice = notice
+        self.event(now_s, notice)
 
     def event(self, now_s: float, text: str) -> None:
         """A sentence into the log."""

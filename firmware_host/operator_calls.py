@@ -1,25 +1,25 @@
-"""What a person can ask of the running daemon: the methods of the status socket.
-
-Reports are plain dicts of numbers and strings, units in the names. A number that is not known is None.
-"""
+"""What a person can ask of the running daemon: the methods of the status socket."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
-from math import isfinite, radians
+from math import isfinite
 from typing import Any
 
 from control.controller import WalkOrder
+from control.faults import silent_signals
 from control.modes import Mode, Request
-from control.records import JOINTS, DriveState, Estimate, StrideEstimate
+from control.records import JOINTS, DriveState
 from drivers.odrive_codec import error_text
-from firmware_host.loop import ClosedStride, Loop
+from firmware_host.loop import Loop
 from firmware_host.recorder import Recording
+from firmware_host.reports import check_item, known, stride_report
 from firmware_host.status_socket import Methods, RefusedError
 
-MOST_STRIDES = 100000
+MOST_STRIDES = 100000  # that a walk may be ordered
+STRIDES_PER_ANSWER = 20  # an answer is made between two ticks
+LARGEST_NUMBER = 2**63 - 1
 
 
 def software_version() -> str:
@@ -43,6 +43,7 @@ class OperatorCalls:
         self._log_path = log_path
         self._warnings = warnings
         self._clock = clock
+        self._version = software_version()
 
     @property
     def methods(self) -> Methods:
@@ -60,20 +61,21 @@ class OperatorCalls:
         }
 
     def hello(self, params: dict[str, Any]) -> dict[str, Any]:
-        return {"name": self._loop.configuration.robot.name, "version": software_version()}
+        return {"name": self._loop.configuration.robot.name, "version": self._version}
 
     def status(self, params: dict[str, Any]) -> dict[str, Any]:
         loop = self._loop
         return {
             "schema": "status/1",
             "robot": loop.configuration.robot.name,
-            "version": software_version(),
+            "version": self._version,
             "mode": loop.mode.name.lower(),
             "fault": _fault(loop),
-            "phase": loop.target.phase.name.lower(),
-            "stride": loop.target.stride,
+            "notice": loop.notice,
+            "phase": loop.target_before.phase.name.lower(),
+            "stride": loop.target_before.stride,
             "depth_m": loop.controller.gait.commanded_depth_m,
-            "body_x_m": _known(loop.body.x_m),
+            "body_x_m": known(loop.body.x_m),
             "drives": [self._drive(place) for place in range(len(JOINTS))],
             "strides_closed": loop.strides_closed,
             "loop": loop.timing.summary(),
@@ -90,18 +92,18 @@ class OperatorCalls:
         state, axis, now_s = self._loop.states[place], self._loop.drives.axes[place], self._clock()
         return {
             "joint": JOINTS[place],
-            "angle_rad": _known(state.angle_rad),
-            "velocity_rad_s": _known(state.velocity_rad_s),
-            "current_a": _known(state.current_a),
+            "angle_rad": known(state.angle_rad),
+            "velocity_rad_s": known(state.velocity_rad_s),
+            "current_a": known(state.current_a),
             "torque_command_nm": self._loop.sent.torques_nm[place],
             "closed_loop": state.closed_loop,
             "errors": error_text(state.error_flags),
-            "temperature_c": _known(state.temperature_c),
-            "bus_voltage_v": _known(state.bus_voltage_v),
+            "temperature_c": known(state.temperature_c),
+            "bus_voltage_v": known(state.bus_voltage_v),
             "firmware": ".".join(map(str, axis.version)) if axis.version else None,
-            "angle_age_s": _known(now_s - state.angle_stamp_s),
-            "current_age_s": _known(now_s - state.current_stamp_s),
-            "heartbeat_age_s": _known(now_s - state.heartbeat_stamp_s),
+            "angle_age_s": known(now_s - state.angle_stamp_s),
+            "current_age_s": known(now_s - state.current_stamp_s),
+            "heartbeat_age_s": known(now_s - state.heartbeat_stamp_s),
         }
 
     def _bus(self) -> dict[str, Any]:
@@ -114,9 +116,13 @@ class OperatorCalls:
         }
 
     def strides(self, params: dict[str, Any]) -> list[dict[str, Any]]:
-        """Those closed from number `since` on, oldest first, as far back as they are kept."""
-        since = _integer(params, "since", 0, MOST_STRIDES)
-        return [stride_report(closed) for closed in self._loop.strides if closed.number >= since]
+        """The first STRIDES_PER_ANSWER closed from number `since` on, as far back as they are kept."""
+        since = _integer(params, "since", 0, LARGEST_NUMBER)
+        wanted = [closed for closed in self._loop.strides if closed.number >= since]
+        return [
+            stride_report(closed.estimate) | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
+            for closed in wanted[:STRIDES_PER_ANSWER]
+        ]
 
     def walk(self, params: dict[str, Any]) -> str:
         """`depth_m` for a fixed depth, else adaptive from the configured start; `strides`, 0 without end."""
@@ -130,7 +136,6 @@ class OperatorCalls:
         deepest_m = configuration.adaptation.max_depth_m
         if not 0.0 < depth_m <= deepest_m:
             raise RefusedError(f"depth_m = {depth_m}: must be more than 0 and at most {deepest_m}")
-        assert configuration.geometry.is_reachable(radians(configuration.gait.sweep_angle_deg), depth_m)
         return self._request(Request.WALK, WalkOrder(float(depth_m), False, strides))
 
     def _request(self, request: Request, order: WalkOrder | None = None) -> str:
@@ -146,53 +151,43 @@ class OperatorCalls:
 
     def check(self, params: dict[str, Any]) -> list[dict[str, Any]]:
         """What stands between this robot and a walk, item by item."""
-        items = [_item("configuration", True, f"accepted for {self._loop.configuration.robot.name}", "")]
+        items = [check_item("configuration", True, f"accepted for {self._loop.configuration.robot.name}", "")]
         items += [self._check_drive(joint, state) for joint, state in zip(JOINTS, self._loop.states, strict=True)]
         items.append(self._check_bus())
         items.append(self._check_arming())
         alive = self._recorder.writer_alive
-        items.append(_item("log", alive, "rows are written" if alive else "the log's writer has died", "restart"))
+        items.append(check_item("log", alive, "rows are written" if alive else "its writer has died", "restart"))
         for warning in self._warnings:
-            items.append(_item("realtime", True, f"warning: {warning}", ""))
+            items.append(check_item("realtime", True, f"warning: {warning}", ""))
         return items
 
     def _check_drive(self, joint: str, state: DriveState) -> dict[str, Any]:
-        now_s, silence_s = self._clock(), self._loop.configuration.loop.silence_s
-        missing = [
-            signal
-            for signal, stamp_s, longest_s in (
-                ("position", state.angle_stamp_s, silence_s),
-                ("current", state.current_stamp_s, silence_s),
-                ("heartbeat", state.heartbeat_stamp_s, 0.5),
-            )
-            if now_s - stamp_s > longest_s
-        ]
+        silence_s = self._loop.configuration.loop.silence_s
+        missing = [signal for signal, _ in silent_signals(state, silence_s, self._clock())]
         if missing:
             fix = "check its power, wiring, node id and cyclic message periods (README, 'Setting up the drives')"
-            return _item(f"drive.{joint}", False, f"no {', '.join(missing)}", fix)
+            return check_item(f"drive.{joint}", False, f"no {', '.join(missing)}", fix)
         if state.error_flags:
-            return _item(f"drive.{joint}", False, error_text(state.error_flags), "mend the cause, 'mudskipper clear'")
-        return _item(f"drive.{joint}", True, "heard", "")
+            fix = "mend the cause, then 'mudskipper clear'"
+            return check_item(f"drive.{joint}", False, error_text(state.error_flags), fix)
+        unwatched = "" if isfinite(state.temperature_stamp_s) else ", but never its temperature: no limit guards it"
+        return check_item(f"drive.{joint}", True, f"heard{unwatched}", "")
 
     def _check_bus(self) -> dict[str, Any]:
         counts = self._bus()
         trouble = counts["error_frames"] + counts["failed_sends"]
         text = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counts.items())
         fix = "check wiring, termination and bit rate; 'ip -s -d link show' tells more"
-        return _item("bus", trouble == 0, text, fix)
+        return check_item("bus", trouble == 0, text, fix)
 
     def _check_arming(self) -> dict[str, Any]:
         loop = self._loop
         if loop.mode is Mode.BOOT:
-            return _item("arming", False, "not every drive was heard yet", "see the drives above")
+            return check_item("arming", False, "not every drive was heard yet", "see the drives above")
         fault = loop.fault or loop.health.fault
         if fault is not None:
-            return _item("arming", False, fault.sentence, "mend the cause, then 'mudskipper clear'")
-        return _item("arming", True, f"nothing against it; the mode is {loop.mode.name.lower()}", "")
-
-
-def _item(identity: str, ok: bool, text: str, fix: str) -> dict[str, Any]:
-    return {"id": identity, "ok": ok, "text": text, "fix": fix}
+            return check_item("arming", False, fault.sentence, "mend the cause, then 'mudskipper clear'")
+        return check_item("arming", True, f"nothing against it; the mode is {loop.mode.name.lower()}", "")
 
 
 def _fault(loop: Loop) -> dict[str, str] | None:
@@ -201,39 +196,8 @@ def _fault(loop: Loop) -> dict[str, str] | None:
     return {"name": fault.name, "sentence": fault.sentence} if fault else None
 
 
-def _known(value: float) -> float | None:
-    return value if isfinite(value) else None
-
-
 def _integer(params: dict[str, Any], name: str, low: int, high: int) -> int:
     value = params.get(name, low)
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
         raise RefusedError(f"{name} = {value!r}: must be a whole number from {low} to {high}")
     return value
-
-
-def estimate_report(estimate: Estimate) -> dict[str, Any]:
-    return {
-        "value": _known(estimate.value),
-        "std_error": _known(estimate.std_error),
-        "samples": estimate.samples,
-        "valid": estimate.valid,
-        "reason": estimate.reason,
-    }
-
-
-def estimates_report(stride: StrideEstimate) -> dict[str, Any]:
-    """A stride as `replay --json` and the status socket print it; k in N/m³."""
-    report = {
-        name: _known(value) if isinstance(value, float) else value
-        for name, value in asdict(stride).items()
-        if name not in ("k_p", "k_s", "k_e")
-    }
-    return report | {name: estimate_report(getattr(stride, name)) for name in ("k_p", "k_s", "k_e")}
-
-
-def stride_report(closed: ClosedStride) -> dict[str, Any]:
-    return estimates_report(closed.estimate) | {
-        "number": closed.number,
-        "chosen_depth_m": closed.chosen_depth_m,
-    }

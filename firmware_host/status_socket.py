@@ -1,12 +1,14 @@
 """MessagePack-RPC over a Unix stream socket, served between two ticks.
 
 A request is [0, id, method, params], its answer [1, id, error, result] (the MessagePack-RPC specification). The loop
-calls `serve` once a tick: it never waits, answers at most one request, and gives every client bounded buffers, so no
-client costs the robot a deadline. Whoever sends something else is told so and disconnected.
+calls `serve` once a tick: it never waits, answers at most one request, clients in turn, and gives every client bounded
+buffers. Whoever sends something else is told so and disconnected; when there is no room, the client that has been
+still for longest makes some. A method that fails answers so and is reported: no report stops a robot.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import select
 import socket
@@ -18,10 +20,13 @@ import msgpack
 
 REQUEST, RESPONSE = 0, 1
 MOST_CLIENTS = 16
-LONGEST_REQUEST = 64 * 1024  # bytes
+LONGEST_REQUEST = 4 * 1024  # bytes
 LONGEST_BACKLOG = 1024 * 1024  # bytes of answers that a client has not fetched
-READ_BYTES = 16 * 1024
+READ_BYTES = LONGEST_REQUEST
+WRITE_BYTES = 64 * 1024
 SOCKET_MODE = 0o660
+
+NOTHING = object()
 
 Methods = Mapping[str, Callable[[dict[str, Any]], Any]]
 
@@ -41,7 +46,7 @@ class Client:
         self.connection = connection
         self.unpacker = msgpack.Unpacker(max_buffer_size=LONGEST_REQUEST, raw=False)
         self.outgoing = bytearray()
-        self.closing = False  # once everything has been sent
+        self.closing = False
 
     def send(self, message: list[Any]) -> None:
         self.outgoing += msgpack.packb(message)
@@ -50,24 +55,25 @@ class Client:
         """Raises OSError where the client is gone."""
         while self.outgoing:
             try:
-                sent = self.connection.send(self.outgoing[:READ_BYTES])
+                sent = self.connection.send(self.outgoing[:WRITE_BYTES])
             except BlockingIOError:
                 return
             del self.outgoing[:sent]
 
 
 class StatusSocket:
-    """Bound and listening from the start on; `methods` take the params of a request as a dict."""
+    """Bound and listening from the start on; `methods`, once set, take the params of a request as a dict."""
 
-    def __init__(self, path: Path, methods: Methods) -> None:
+    def __init__(self, path: Path, methods: Methods, report_bug: Callable[[str], None] = lambda sentence: None) -> None:
         self.path = path
-        self._methods = methods
+        self.methods = methods
+        self.report_bug = report_bug
         self._listener = _listen(path)
         self._poll = select.epoll()
         self._poll.register(self._listener.fileno(), select.EPOLLIN)
-        self._clients: dict[int, Client] = {}
-        self._waiting: list[int] = []  # clients with a request not yet answered
-        self.refused_clients = self.garbled_requests = 0
+        self._clients: dict[int, Client] = {}  # the one that has been still for longest comes first
+        self._waiting: dict[int, None] = {}  # in turn: clients that may have a request not yet answered
+        self.displaced_clients = self.garbled_requests = 0
 
     def serve(self) -> None:
         for descriptor, events in self._poll.poll(0.0):
@@ -76,7 +82,9 @@ class StatusSocket:
             elif descriptor in self._clients:
                 self._attend(descriptor, events)
         if self._waiting:
-            self._answer_one(self._waiting.pop(0))
+            descriptor = next(iter(self._waiting))
+            del self._waiting[descriptor]
+            self._answer_one(descriptor)
 
     def _accept(self) -> None:
         try:
@@ -84,15 +92,14 @@ class StatusSocket:
         except OSError:  # the client left again before it was let in
             return
         if len(self._clients) >= MOST_CLIENTS:
-            self.refused_clients += 1
-            connection.close()
-            return
+            self.displaced_clients += 1
+            self._drop(next(iter(self._clients)))
         connection.setblocking(False)
         self._clients[connection.fileno()] = Client(connection)
         self._poll.register(connection.fileno(), select.EPOLLIN)
 
     def _attend(self, descriptor: int, events: int) -> None:
-        client = self._clients[descriptor]
+        client = self._clients[descriptor] = self._clients.pop(descriptor)  # to the end of the order
         try:
             if events & select.EPOLLOUT:
                 client.flush()
@@ -101,7 +108,7 @@ class StatusSocket:
                 if not data:
                     return self._drop(descriptor)
                 client.unpacker.feed(data)
-                self._waiting.append(descriptor)
+                self._waiting[descriptor] = None
         except msgpack.BufferFull:
             self._reject(client, None, f"a request must be shorter than {LONGEST_REQUEST} bytes")
         except OSError:
@@ -113,25 +120,29 @@ class StatusSocket:
         if client is None or client.closing:
             return
         try:
-            message = next(client.unpacker, None)
-            if message is not None:
-                self._waiting.append(descriptor)  # there may be another one behind it
-                self._answer(client, message)
+            message = next(client.unpacker, NOTHING)
         except (ValueError, msgpack.UnpackException, RecursionError):  # bytes that are not MessagePack
             self._reject(client, None, "not a MessagePack message")
+        else:
+            if message is not NOTHING:
+                self._waiting[descriptor] = None  # there may be another one behind it
+                self._answer(client, message)
         self._settle(descriptor)
 
     def _answer(self, client: Client, message: Any) -> None:
         if not _is_request(message):
             return self._reject(client, None, "a request is [0, id, method, params]")
         _, number, method, params = message
-        if method not in self._methods:
-            known = ", ".join(sorted(self._methods))
+        if method not in self.methods:
+            known = ", ".join(sorted(self.methods))
             return client.send([RESPONSE, number, f"no method {method!r}; there are {known}", None])
         try:
-            return client.send([RESPONSE, number, None, self._methods[method](_as_dict(params))])
+            return client.send([RESPONSE, number, None, self.methods[method](_as_dict(params))])
         except RefusedError as refusal:
             return client.send([RESPONSE, number, str(refusal), None])
+        except Exception as problem:  # noqa: BLE001 - the robot walks on while a report fails
+            self.report_bug(f"{method} failed: {type(problem).__name__}: {problem}")
+            return client.send([RESPONSE, number, f"{method} failed: this is a bug, the log says more", None])
 
     def _reject(self, client: Client, number: int | None, sentence: str) -> None:
         self.garbled_requests += 1
@@ -139,13 +150,13 @@ class StatusSocket:
         client.closing = True
 
     def _settle(self, descriptor: int) -> None:
-        """Send what can be sent; drop a client that is done or does not fetch its answers."""
+        """Send what can be sent; drop a client that is told off or does not fetch its answers."""
         client = self._clients[descriptor]
         try:
             client.flush()
         except OSError:
             return self._drop(descriptor)
-        if (client.closing and not client.outgoing) or len(client.outgoing) > LONGEST_BACKLOG:
+        if client.closing or len(client.outgoing) > LONGEST_BACKLOG:
             return self._drop(descriptor)
         wanted = select.EPOLLIN | (select.EPOLLOUT if client.outgoing else 0)
         return self._poll.modify(descriptor, wanted)
@@ -154,7 +165,7 @@ class StatusSocket:
         client = self._clients.pop(descriptor)
         self._poll.unregister(descriptor)
         client.connection.close()
-        self._waiting = [other for other in self._waiting if other != descriptor]
+        self._waiting.pop(descriptor, None)
 
     def close(self) -> None:
         for descriptor in list(self._clients):
@@ -204,6 +215,8 @@ def _remove_stale(path: Path) -> None:
         except FileNotFoundError:
             return
         except ConnectionRefusedError:
+            if not path.is_socket():
+                raise FileExistsError(errno.EEXIST, "is a file and no socket", str(path)) from None
             path.unlink()
             return
     raise AlreadyServedError(f"another daemon is already running on {path}")

@@ -17,7 +17,7 @@ PERIOD_S = 1.0 / RATE_HZ
 
 class Beat(NamedTuple):
     now_s: float
-    late_s: float  # after the deadline that this beat serves
+    late_s: float  # after the deadline that was waited for
     number: int  # of the deadline, missed ones included
     missed: int  # deadlines skipped just now
 
@@ -46,7 +46,7 @@ class Ticker:
         while now_s < deadline_s:
             self._sleep(deadline_s - now_s)
             now_s = self._clock()
-        missed = int((now_s - deadline_s) / self.period_s)
+        late_s = now_s - deadline_s
+        missed = int(late_s / self.period_s)
         self._number += missed
-        late_s = now_s - (self._start_s + self._number * self.period_s)
         return Beat(now_s, late_s, self._number, missed)

@@ -10,12 +10,10 @@ LONGEST_US = 20000  # everything longer falls into the last bucket; `max` stays 
 
 class Histogram:
     def __init__(self) -> None:
-        self._counts = array("L", [0]) * (LONGEST_US + 1)
         self.reset()
 
     def reset(self) -> None:
-        for place in range(len(self._counts)):
-            self._counts[place] = 0
+        self._counts = array("L", [0]) * (LONGEST_US + 1)
         self.count = 0
         self.max_us = 0.0
 
@@ -28,6 +26,8 @@ class Histogram:
 
     def percentile_us(self, share: float) -> float:
         """The duration that `share` of all did not exceed, rounded up to a microsecond."""
+        if self.count == 0:
+            return 0.0
         wanted, seen = share * self.count, 0
         for place, count in enumerate(self._counts):
             seen += count
@@ -59,10 +59,10 @@ class LoopTiming:
 
     def update(self, now_s: float, late_s: float, missed: int, tick_s: float) -> None:
         if self.ticks == 0:
-            self._first_s = now_s - late_s
+            self._first_s = now_s
         else:
             self.missed_ticks += missed
-        self._last_s = now_s - late_s
+        self._last_s = now_s
         self.ticks += 1
         self.wake_late.add(late_s)
         self.tick.add(tick_s)

@@ -9,16 +9,18 @@ import pytest
 
 from control.controller import WalkOrder
 from control.modes import Mode, Request
-from control.records import NO_TORQUE
+from control.records import NO_TORQUE, Phase
 from drivers.frames import Frame
 from drivers.mock_bus import MockPort
-from drivers.odrive_codec import ERROR_WATCHDOG, SET_INPUT_TORQUE
+from drivers.odrive_codec import ERROR_WATCHDOG, SET_INPUT_TORQUE, AxisState
 from firmware_host.configuration import Configuration
 from firmware_host.log_rows import EVENT
 from firmware_host.loop import EVENT_KIND, STRIDE_KIND, TICK_KIND
 from firmware_host.recorder import NullRecorder
-from simulation.clay import MUDS
+from firmware_host.ticker import PERIOD_S, Beat
+from simulation.clay import MUDS, Clay
 from simulation.lockstep import Lockstep
+from simulation.odrive import SimulatedOdrive
 from simulation.track import Track
 
 FIRM = Track([(5.0, MUDS["48.5"])])
@@ -54,6 +56,10 @@ def stranger_on(robot: Lockstep, bus: str) -> MockPort:
     port = robot.loop.drives.ports[bus]
     assert isinstance(port, MockPort)
     return port._bus.open()
+
+
+def energised_drives(robot: Lockstep) -> list[SimulatedOdrive]:
+    return [drive for drive in robot.robot.drives if drive.axis_state is AxisState.CLOSED_LOOP]
 
 
 def torque_frames(port: MockPort) -> list[Frame]:
@@ -109,16 +115,123 @@ def test_stop_raises_the_flippers_from_any_phase(configuration: Configuration) -
         assert robot.robot.plant.angles_rad[1] == pytest.approx(0.0, abs=0.05)
 
 
-def test_disarm_takes_the_torque_at_once_in_every_phase(robot: Lockstep) -> None:
+@pytest.mark.parametrize("walked_s", [0.0, 0.3, 0.9, 1.5, 1.8, 2.1, 2.6])
+def test_disarm_takes_the_torque_at_once_in_every_phase(robot: Lockstep, walked_s: float) -> None:
     robot.arm()
     robot.walk(WalkOrder(0.03))
-    robot.run_for(2.0)
+    robot.run_for(walked_s)
     robot.loop.request(Request.DISARM, robot.now_s)
     robot.step()
     assert robot.loop.mode is Mode.IDLE
     assert robot.loop.sent.torques_nm == NO_TORQUE
     robot.run_for(0.02)
-    assert not any(drive.axis_state == 8 for drive in robot.robot.drives)
+    assert not energised_drives(robot)
+
+
+def test_disarm_idles_drives_even_before_all_are_heard(configuration: Configuration) -> None:
+    """A daemon that starts anew beside a running motor and a dead one."""
+    robot = Lockstep(configuration, FIRM)
+    running = robot.robot.drives[0]
+    running.axis_state = AxisState.CLOSED_LOOP
+    robot.robot.drives = (running,) * 4
+    robot.run_for(0.02)
+    assert robot.loop.mode is Mode.BOOT
+    assert robot.loop.request(Request.DISARM, robot.now_s) is None
+    robot.run_for(0.01)
+    assert running.axis_state is AxisState.IDLE
+
+
+def test_a_drive_found_in_closed_loop_is_idled_before_all_are_heard(configuration: Configuration) -> None:
+    robot = Lockstep(configuration, FIRM)
+    running = robot.robot.drives[0]
+    running.axis_state = AxisState.CLOSED_LOOP
+    robot.robot.drives = (running,) * 4
+    robot.run_for(0.2)
+    assert robot.loop.mode is Mode.BOOT
+    assert running.axis_state is AxisState.IDLE
+
+
+def test_clear_transmits_nothing_before_all_are_heard(configuration: Configuration) -> None:
+    robot = Lockstep(configuration, FIRM)
+    listeners = [stranger_on(robot, bus) for bus in ("left", "right")]
+    assert robot.loop.request(Request.CLEAR, robot.now_s) is not None
+    assert [listener.receive() for listener in listeners] == [[], []]
+
+
+def test_nothing_undoes_a_disarm_of_the_same_tick(robot: Lockstep) -> None:
+    robot.arm()
+    robot.loop.request(Request.DISARM, robot.now_s)
+    robot.loop.request(Request.WALK, robot.now_s, WalkOrder(0.03))
+    robot.step()
+    assert robot.loop.mode is Mode.IDLE
+
+
+def test_arming_believes_only_heartbeats_that_are_younger_than_the_wish(robot: Lockstep) -> None:
+    robot.arm()
+    robot.loop.request(Request.DISARM, robot.now_s)
+    robot.step()
+    robot.loop.request(Request.ARM, robot.now_s)
+    modes = []
+    for _ in range(5):
+        robot.step()
+        modes.append(robot.loop.mode)
+    assert modes == [Mode.ARMING] * 5  # although the last heartbeats still say closed loop
+    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 1.0)
+    assert len(energised_drives(robot)) == 4
+    robot.run_for(0.5)
+    assert robot.loop.mode is Mode.HOLD
+
+
+def test_a_loop_that_stood_still_lets_go(robot: Lockstep) -> None:
+    robot.arm()
+    robot.walk(WalkOrder(0.03))
+    robot.run_for(1.7)
+    robot.tick_number += 200
+    robot.robot.advance(robot.now_s)
+    robot.loop.tick(Beat(robot.now_s, 200 * PERIOD_S, robot.tick_number, 199))
+    assert robot.loop.mode is Mode.FAULT
+    assert robot.loop.fault is not None and robot.loop.fault.name == "loop_stalled"
+    assert robot.loop.sent.torques_nm == NO_TORQUE
+
+
+def test_the_slew_limit_does_not_grow_with_missed_ticks(robot: Lockstep) -> None:
+    robot.arm()
+    robot.walk(WalkOrder(0.03))
+    robot.run_for(1.7)
+    before_nm = robot.loop.sent.torques_nm
+    robot.tick_number += 8
+    robot.robot.advance(robot.now_s)
+    robot.loop.tick(Beat(robot.now_s, 8 * PERIOD_S, robot.tick_number, 7))
+    largest_nm = robot.loop.configuration.limits.torque_rate_nm_s * PERIOD_S
+    for before, after in zip(before_nm, robot.loop.sent.torques_nm, strict=True):
+        assert abs(after - before) <= largest_nm + 1e-12
+
+
+def test_a_bus_that_takes_no_commands_is_a_fault(robot: Lockstep) -> None:
+    robot.arm()
+    port = robot.loop.drives.ports["left"]
+    assert isinstance(port, MockPort)
+
+    def fail(frame: Frame) -> None:
+        port.failed_sends += 1
+        port.last_error = "No buffer space available"
+
+    port.send = fail  # type: ignore[method-assign]
+    robot.run_for(10 * PERIOD_S)
+    assert robot.loop.fault is not None and robot.loop.fault.name == "bus_refuses"
+    assert "No buffer space" in robot.loop.fault.sentence
+
+
+def test_flippers_that_stay_in_the_mud_are_told(configuration: Configuration) -> None:
+    robot = Lockstep(configuration, Track([(5.0, Clay("9 kPa", 9000.0))]))
+    robot.arm()
+    robot.walk(WalkOrder(0.05, False))
+    robot.run_until(lambda: robot.loop.target_before.phase is Phase.STANCE, 5.0)
+    for arm in robot.robot.plant.arms:  # deeper than the torque could have pushed them
+        arm.adduction_rad = configuration.geometry.adduction_rad(arm.sweep_rad, 0.05)
+    robot.loop.request(Request.STOP, robot.now_s)
+    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 5.0)
+    assert robot.loop.notice == "the flippers did not come out of the mud"
 
 
 def test_requests_that_do_not_fit_are_refused_with_what_to_do(robot: Lockstep) -> None:
@@ -140,7 +253,7 @@ def test_a_drive_error_ends_in_fault_with_the_drives_own_words(robot: Lockstep) 
     assert robot.loop.fault is not None
     assert "right_sweep" in robot.loop.fault.sentence and "watchdog expired" in robot.loop.fault.sentence
     robot.run_for(0.02)
-    assert not any(drive.axis_state == 8 for drive in robot.robot.drives)
+    assert not energised_drives(robot)
 
 
 def test_a_fault_is_latched_until_somebody_clears_it(robot: Lockstep) -> None:
@@ -209,15 +322,14 @@ def test_garbage_on_the_bus_is_counted_and_changes_nothing(configuration: Config
         garbage.send(Frame(0x029, b"\x01"))
         noisy.step()
     assert noisy.loop.drives.unknown_frames >= 1500 and noisy.loop.drives.garbled_frames >= 3000
+    assert len(quiet.loop.strides) >= 2
     assert [s.estimate for s in noisy.loop.strides] == [s.estimate for s in quiet.loop.strides]
 
 
 def test_a_missed_tick_costs_no_place_in_the_gait(robot: Lockstep) -> None:
-    from firmware_host.ticker import PERIOD_S, Beat
-
     robot.arm()
     robot.walk(WalkOrder(0.03))
-    robot.run_until(lambda: robot.loop.target.stride == 0, 5.0)
+    robot.run_until(lambda: robot.loop.target_before.stride == 0, 5.0)
     robot.run_for(0.2)
     before = robot.loop.controller.gait._time_s
     robot.tick_number += 3

@@ -155,13 +155,44 @@ def test_a_slow_client_still_gets_a_long_answer_whole(served: StatusSocket) -> N
     assert len(result) == 300_000
 
 
-def test_more_clients_than_there_is_room_for_are_turned_away(served: StatusSocket) -> None:
+def test_a_newcomer_takes_the_place_of_the_client_that_was_still_for_longest(served: StatusSocket) -> None:
     clients = [connect(served) for _ in range(MOST_CLIENTS)]
     serve(served, MOST_CLIENTS + 2)
-    late = connect(served)
-    serve(served)
-    assert late.recv(1) == b"" and served.refused_clients == 1
     assert ask(served, clients[0], msgpack.packb([0, 1, "echo", {}]))
+    late = connect(served)
+    assert ask(served, late, msgpack.packb([0, 2, "echo", {}])) == [[1, 2, None, {}]]
+    assert clients[1].recv(1) == b"" and served.displaced_clients == 1
+    assert ask(served, clients[0], msgpack.packb([0, 3, "echo", {}]))
+
+
+def test_a_busy_client_does_not_delay_the_others(served: StatusSocket) -> None:
+    busy, other = connect(served), connect(served)
+    serve(served)
+    for number in range(200):
+        busy.sendall(msgpack.packb([0, number, "echo", {}]))
+        served.serve()
+        busy.recv(4096)
+    busy.sendall(b"".join(msgpack.packb([0, number, "echo", {}]) for number in range(50)))
+    other.sendall(msgpack.packb([0, 1, "echo", {}]))
+    serve(served, 3)
+    other.setblocking(False)
+    assert list(_unpacked(other.recv(4096))) == [[1, 1, None, {}]]
+
+
+def test_a_method_with_a_bug_answers_so_and_is_reported(served: StatusSocket) -> None:
+    said: list[str] = []
+    served.report_bug = said.append
+    served.methods = {"broken": lambda params: params["missing"]}
+    ((_, _, error, _),) = ask(served, connect(served), msgpack.packb([0, 1, "broken", {}]))
+    assert "bug" in error and said == ["broken failed: KeyError: 'missing'"]
+
+
+def test_a_file_that_is_no_socket_is_left_alone(short_folder: Path) -> None:
+    path = short_folder / "notes"
+    path.write_text("mine", encoding="utf-8")
+    with pytest.raises(FileExistsError):
+        StatusSocket(path, METHODS)
+    assert path.read_text(encoding="utf-8") == "mine"
 
 
 def test_a_client_that_vanishes_with_a_request_under_way_does_no_harm(served: StatusSocket) -> None:

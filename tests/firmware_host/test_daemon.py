@@ -1,0 +1,121 @@
+"""How the daemon ends: asked, or by a bug, with the drives idle either way."""
+
+from __future__ import annotations
+
+import pytest
+
+from control.controller import WalkOrder
+from control.modes import Mode, Request
+from drivers.frames import Frame
+from drivers.mock_bus import MockPort
+from drivers.odrive_codec import SET_AXIS_STATE, AxisState
+from firmware_host.configuration import Configuration
+from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, _end_safely
+from firmware_host.sd_notify import SystemdNotifier
+from firmware_host.ticker import Beat
+from simulation.clay import MUDS
+from simulation.lockstep import Lockstep
+from simulation.track import Track
+
+FIRM = Track([(5.0, MUDS["48.5"])])
+
+
+@pytest.fixture
+def robot(configuration: Configuration) -> Lockstep:
+    robot = Lockstep(configuration, FIRM)
+    robot.arm()
+    return robot
+
+
+def run_shutdown(robot: Lockstep, shutdown: Shutdown, longest_s: float = 8.0) -> bool:
+    return robot.run_until(lambda: shutdown.step(robot.loop, robot.now_s), longest_s)
+
+
+def states_of(robot: Lockstep) -> list[AxisState]:
+    return [drive.axis_state for drive in robot.robot.drives]
+
+
+@pytest.mark.parametrize("walked_s", [0.0, 1.0, 1.7, 1.9, 2.5])
+def test_a_shutdown_in_a_walk_raises_the_flippers_and_idles_the_drives(robot: Lockstep, walked_s: float) -> None:
+    robot.walk(WalkOrder(0.03))
+    robot.run_for(walked_s)
+    shutdown = Shutdown()
+    shutdown.ask(15, None)
+    assert run_shutdown(robot, shutdown)
+    assert states_of(robot) == [AxisState.IDLE] * 4
+    assert robot.loop.notice == ""  # it would say if they had stayed in the mud
+
+
+def test_a_shutdown_that_nobody_wants_does_nothing(robot: Lockstep) -> None:
+    assert not Shutdown().step(robot.loop, robot.now_s)
+    robot.run_for(0.1)
+    assert robot.loop.mode is Mode.HOLD
+
+
+def test_a_shutdown_waits_for_the_last_drive_to_be_idle(robot: Lockstep) -> None:
+    lose_first_idle_requests(robot, ["left", "right"], lost=3)
+    shutdown = Shutdown()
+    shutdown.ask(15, None)
+    assert run_shutdown(robot, shutdown)
+    assert states_of(robot) == [AxisState.IDLE] * 4
+
+
+def lose_first_idle_requests(robot: Lockstep, buses: list[str], lost: int) -> None:
+    left = [lost]
+    for bus in buses:
+        port = robot.loop.drives.ports[bus]
+        assert isinstance(port, MockPort)
+        send = port.send
+
+        def lossy(frame: Frame, send: object = send) -> None:
+            if frame.arbitration_id & 0x1F == SET_AXIS_STATE.command and left[0] > 0:
+                left[0] -= 1
+            else:
+                send(frame)  # type: ignore[operator]
+
+        port.send = lossy  # type: ignore[method-assign]
+
+
+def test_nothing_is_armed_while_the_daemon_ends(robot: Lockstep) -> None:
+    shutdown = Shutdown()
+    shutdown.ask(15, None)
+    shutdown.step(robot.loop, robot.now_s)
+    robot.step()
+    assert robot.loop.request(Request.ARM, robot.now_s) == "the daemon is ending"
+
+
+def test_a_bug_idles_all_drives_that_can_be_reached(robot: Lockstep, capsys: pytest.CaptureFixture[str]) -> None:
+    port = robot.loop.drives.ports["left"]
+    assert isinstance(port, MockPort)
+
+    def broken(frame: Frame) -> None:
+        raise OSError("the adapter was unplugged")
+
+    port.send = broken  # type: ignore[method-assign]
+    try:
+        raise ZeroDivisionError("somewhere in a tick")
+    except ZeroDivisionError as problem:
+        assert _end_safely(robot.loop, problem) == EXIT_FAILED
+    robot.robot.advance(robot.now_s + 0.01)
+    assert states_of(robot)[2:] == [AxisState.IDLE] * 2
+    said = capsys.readouterr().err
+    assert "ZeroDivisionError: somewhere in a tick (test_daemon.py, line" in said
+    assert "Traceback" not in said
+
+
+class Notices(SystemdNotifier):
+    def __init__(self) -> None:
+        super().__init__("")
+        self.sent: list[str] = []
+
+    def send(self, *lines: str) -> None:
+        self.sent.append(lines[0])
+
+
+@pytest.mark.parametrize(("missed", "fed"), [(0, True), (1, True), (2, False)])
+def test_only_a_loop_that_makes_more_than_it_misses_feeds_the_watchdog(missed: int, fed: bool) -> None:
+    notices = Notices()
+    feed = WatchdogFeed(notices)
+    for number in range(NOTIFY_TICKS):
+        feed.update(Beat(0.0, 0.0, number, missed), Mode.IDLE)
+    assert (notices.sent == ["WATCHDOG=1"]) is fed
