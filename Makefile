@@ -19,6 +19,7 @@ test: .venv/test  ## every test, without network
 
 lint: .venv/test  ## ruff and mypy --strict
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
 
 clean:  ## remove the environment and what was built

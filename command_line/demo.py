@@ -229,9 +229,7 @@ def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration
         options.json.write_text(json.dumps(summary, indent=1) + os.linesep, encoding="utf-8")
 
 
-def summarise(
-    report: dict[str, Any], demonstration: Demo, log: Log, log_path: Path, plot_path: Path
-) -> dict[str, Any]:
+def summarise(report: dict[str, Any], demonstration: Demo, log: Log, log_path: Path, plot_path: Path) -> dict[str, Any]:
     track = demonstration.track
     stamps_s, places_m = walked_path(log)
     strides = []

@@ -51,9 +51,7 @@ class DepthChoice(NamedTuple):
 class DepthAdaptation:
     """Owns the depth of the next stride."""
 
-    def __init__(
-        self, parameters: AdaptationParameters, geometry: FlipperGeometry, gait: GaitParameters
-    ) -> None:
+    def __init__(self, parameters: AdaptationParameters, geometry: FlipperGeometry, gait: GaitParameters) -> None:
         self.parameters = parameters
         self.geometry = geometry
         self.gait = gait

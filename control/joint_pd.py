@@ -41,9 +41,7 @@ class ArmMass:
         return sweep_nm, -moment_nm * cos(sweep_rad) * cos(adduction_rad)
 
 
-def pd_torque_nm(
-    target: JointTarget, state: DriveState, stiffness_nm_rad: float, damping_nm_s_rad: float
-) -> float:
+def pd_torque_nm(target: JointTarget, state: DriveState, stiffness_nm_rad: float, damping_nm_s_rad: float) -> float:
     return stiffness_nm_rad * (target.angle_rad - state.angle_rad) + damping_nm_s_rad * (
         target.velocity_rad_s - state.velocity_rad_s
     )

@@ -14,28 +14,10 @@ from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
 from control.records import JOINTS, NEVER_S, UNKNOWN, DriveState, DriveStates, Torques
+from drivers import odrive_codec as codec
 from drivers.can_port import CanPort
 from drivers.frames import Frame
-from drivers.odrive_codec import (
-    CLEAR_ERRORS,
-    GET_BUS_VOLTAGE_CURRENT,
-    GET_ENCODER_ESTIMATES,
-    GET_ERROR,
-    GET_IQ,
-    GET_TEMPERATURE,
-    GET_VERSION,
-    HEARTBEAT,
-    PASSTHROUGH,
-    SET_AXIS_STATE,
-    SET_CONTROLLER_MODE,
-    SET_INPUT_TORQUE,
-    SET_LIMITS,
-    TORQUE_CONTROL,
-    AxisState,
-    GarbledMessageError,
-    Message,
-    arbitration_id,
-)
+from drivers.odrive_codec import AxisState, GarbledMessageError, Message, arbitration_id
 
 REPEAT_S = 0.1  # between two requests to change the axis state, of which the heartbeat tells the result
 VERSION_REPEAT_S = 0.5
@@ -67,7 +49,7 @@ class OdriveAxis:
         self.parameters = parameters
         self._port = port
         self._rad_per_turn = parameters.sign * TURN_RAD
-        self._torque_id = arbitration_id(parameters.node_id, SET_INPUT_TORQUE)
+        self._torque_id = arbitration_id(parameters.node_id, codec.SET_INPUT_TORQUE)
         self.reset()
 
     def reset(self) -> None:
@@ -84,46 +66,46 @@ class OdriveAxis:
     def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
         """What to do with the payload of each arbitration id that this drive sends."""
         table: dict[Message, Callable[[bytes, float], None]] = {
-            GET_ENCODER_ESTIMATES: self._receive_encoder,
-            GET_IQ: self._receive_current,
-            HEARTBEAT: self._receive_heartbeat,
-            GET_ERROR: self._receive_error,
-            GET_TEMPERATURE: self._receive_temperature,
-            GET_BUS_VOLTAGE_CURRENT: self._receive_bus_voltage,
-            GET_VERSION: self._receive_version,
+            codec.GET_ENCODER_ESTIMATES: self._receive_encoder,
+            codec.GET_IQ: self._receive_current,
+            codec.HEARTBEAT: self._receive_heartbeat,
+            codec.GET_ERROR: self._receive_error,
+            codec.GET_TEMPERATURE: self._receive_temperature,
+            codec.GET_BUS_VOLTAGE_CURRENT: self._receive_bus_voltage,
+            codec.GET_VERSION: self._receive_version,
         }
         return {arbitration_id(self.parameters.node_id, message): receive for message, receive in table.items()}
 
     def _receive_encoder(self, data: bytes, now_s: float) -> None:
-        turns, turns_s = GET_ENCODER_ESTIMATES.decode(data)
+        turns, turns_s = codec.GET_ENCODER_ESTIMATES.decode(data)
         _require_finite(turns + turns_s)
         self._angle_rad = (turns - self.parameters.zero_turn) * self._rad_per_turn
         self._velocity_rad_s = turns_s * self._rad_per_turn
         self._angle_stamp_s = now_s
 
     def _receive_current(self, data: bytes, now_s: float) -> None:
-        _, measured_a = GET_IQ.decode(data)
+        _, measured_a = codec.GET_IQ.decode(data)
         _require_finite(measured_a)
         self._current_a = self.parameters.sign * measured_a
         self._current_stamp_s = now_s
 
     def _receive_heartbeat(self, data: bytes, now_s: float) -> None:
-        self._error_flags, state, _, _ = HEARTBEAT.decode(data)
+        self._error_flags, state, _, _ = codec.HEARTBEAT.decode(data)
         self._closed_loop = state == AxisState.CLOSED_LOOP
         self._heartbeat_stamp_s = now_s
 
     def _receive_error(self, data: bytes, now_s: float) -> None:
-        self._error_flags, self.disarm_reason = GET_ERROR.decode(data)
+        self._error_flags, self.disarm_reason = codec.GET_ERROR.decode(data)
 
     def _receive_temperature(self, data: bytes, now_s: float) -> None:
-        _, self._temperature_c = GET_TEMPERATURE.decode(data)
+        _, self._temperature_c = codec.GET_TEMPERATURE.decode(data)
         self._temperature_stamp_s = now_s
 
     def _receive_bus_voltage(self, data: bytes, now_s: float) -> None:
-        self._bus_voltage_v, _ = GET_BUS_VOLTAGE_CURRENT.decode(data)
+        self._bus_voltage_v, _ = codec.GET_BUS_VOLTAGE_CURRENT.decode(data)
 
     def _receive_version(self, data: bytes, now_s: float) -> None:
-        fields = GET_VERSION.decode(data)
+        fields = codec.GET_VERSION.decode(data)
         self.version = Version(*fields[4:7])
 
     @property
@@ -148,7 +130,7 @@ class OdriveAxis:
         return isfinite(self._angle_stamp_s + self._current_stamp_s + self._heartbeat_stamp_s)
 
     def send_torque(self, torque_nm: float) -> None:
-        data = SET_INPUT_TORQUE.encode(self.parameters.sign * torque_nm)
+        data = codec.SET_INPUT_TORQUE.encode(self.parameters.sign * torque_nm)
         self._port.send(Frame(self._torque_id, data))
 
     def arm(self) -> None:
@@ -158,17 +140,17 @@ class OdriveAxis:
         velocity limit is set here so that the clamp lies above every torque that we command.
         """
         limits = (self.parameters.velocity_limit_turn_s, self.parameters.current_limit_a)
-        self._transmit(SET_CONTROLLER_MODE, TORQUE_CONTROL, PASSTHROUGH)
-        self._transmit(SET_LIMITS, *limits)
-        self._transmit(SET_INPUT_TORQUE, 0.0)
-        self._transmit(SET_AXIS_STATE, AxisState.CLOSED_LOOP)
+        self._transmit(codec.SET_CONTROLLER_MODE, codec.TORQUE_CONTROL, codec.PASSTHROUGH)
+        self._transmit(codec.SET_LIMITS, *limits)
+        self._transmit(codec.SET_INPUT_TORQUE, 0.0)
+        self._transmit(codec.SET_AXIS_STATE, AxisState.CLOSED_LOOP)
 
     def disarm(self) -> None:
-        self._transmit(SET_INPUT_TORQUE, 0.0)
-        self._transmit(SET_AXIS_STATE, AxisState.IDLE)
+        self._transmit(codec.SET_INPUT_TORQUE, 0.0)
+        self._transmit(codec.SET_AXIS_STATE, AxisState.IDLE)
 
     def clear_errors(self) -> None:
-        self._transmit(CLEAR_ERRORS, 0)
+        self._transmit(codec.CLEAR_ERRORS, 0)
 
     def request(self, message: Message) -> None:
         """Ask for one message by a remote frame."""
@@ -258,7 +240,7 @@ class OdriveDrives:
         self._version_asked_s = now_s
         for axis in self.axes:
             if axis.version is None:
-                axis.request(GET_VERSION)
+                axis.request(codec.GET_VERSION)
 
     def close(self) -> None:
         for port in self.ports.values():

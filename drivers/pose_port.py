@@ -12,6 +12,7 @@ import socket
 from math import isfinite
 from pathlib import Path
 from struct import Struct
+from typing import Protocol
 
 from control.records import BodyPose
 
@@ -19,6 +20,11 @@ POSE = Struct("<dd")
 STALE_S = 0.5
 SOCKET_MODE = 0o660  # a bridge run by an operator may send
 MOST_MESSAGES_PER_READ = 64  # a sender gone wild must not hold the loop
+
+
+class PoseSource(Protocol):
+    def read(self, now_s: float) -> BodyPose:
+        """The newest pose, or an empty one where none is known."""
 
 
 class PosePort:

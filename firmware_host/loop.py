@@ -28,7 +28,7 @@ from control.records import (
 )
 from drivers.odrive_codec import error_text
 from drivers.odrive_drives import OdriveDrives
-from drivers.pose_port import PosePort
+from drivers.pose_port import PoseSource
 from estimation.mud import MudEstimator, MudReading
 from firmware_host.configuration import Configuration
 from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK
@@ -57,7 +57,7 @@ class Loop:
         self,
         configuration: Configuration,
         drives: OdriveDrives,
-        pose: PosePort,
+        pose: PoseSource,
         recorder: Recording,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -66,9 +66,7 @@ class Loop:
         self.pose = pose
         self.recorder = recorder
         self.timing = LoopTiming()
-        self.estimator = MudEstimator(
-            configuration.geometry, configuration.arm, configuration.torque_constants_nm_a
-        )
+        self.estimator = MudEstimator(configuration.geometry, configuration.arm, configuration.torque_constants_nm_a)
         self.adaptation = DepthAdaptation(configuration.adaptation, configuration.geometry, configuration.gait)
         self.controller = Controller(
             configuration.gait,

@@ -13,7 +13,7 @@ is, as the robot of Table I did.) None of this is the k-law that the estimator a
 The three strengths, and c, come from a fit of a point model with these laws to the six fixed-depth speeds of the
 paper's Table I; the adaptive speeds were not used. In this plant, which has more mechanics than that model, they give
 the order of those speeds and both failures, not each number: 9.1, 1.5 and 8.1 cm/s at 3 cm, 7.1, 5.1 and 1.8 at 5 cm,
-where the paper has 7.6, 2.1, 7.2 and 6.6, 5.5, 3.0.
+where the paper has 7.6, 2.1, 7.2 and 6.6, 5.5, 3.0. In firm mud the body leaves the stance at 0.9 m/s and coasts on.
 """
 
 from __future__ import annotations

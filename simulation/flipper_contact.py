@@ -61,9 +61,26 @@ class FlipperContact:
         sa, ca, length_m = sin(sweep_rad), cos(sweep_rad), self.geometry.flipper_length_m
         center_m = depth_m - clay.lateral_center_m(depth_m, self.plate.width_m)
         arm_m = self.geometry.drop_m - center_m / cos(adduction_rad)
-        normal_m_s = length_m * sweep_velocity_rad_s + body_velocity_m_s * ca - arm_m * sa * adduction_velocity_rad_s
-        outward_m_s = body_velocity_m_s * sa + arm_m * ca * adduction_velocity_rad_s
-        upward_m_s = length_m * ca * adduction_velocity_rad_s
+        normal_n, outward_n, upward_n = self._yield(
+            dt_s,
+            clay,
+            depth_m,
+            length_m * sweep_velocity_rad_s + body_velocity_m_s * ca - arm_m * sa * adduction_velocity_rad_s,
+            body_velocity_m_s * sa + arm_m * ca * adduction_velocity_rad_s,
+            length_m * ca * adduction_velocity_rad_s,
+        )
+        return ContactForce(
+            length_m * normal_n,
+            arm_m * (ca * outward_n - sa * normal_n) + length_m * ca * upward_n,
+            ca * normal_n + sa * outward_n,
+            normal_n,
+            upward_n,
+        )
+
+    def _yield(
+        self, dt_s: float, clay: Clay, depth_m: float, normal_m_s: float, outward_m_s: float, upward_m_s: float
+    ) -> tuple[float, float, float]:
+        """Forces along the plate's directions after it moved on for `dt_s`."""
         rate = rate_factor(sqrt(normal_m_s**2 + outward_m_s**2 + upward_m_s**2))
         lateral_n = rate * clay.lateral_n(depth_m, self.plate.width_m)
         edgewise_n = rate * clay.edgewise_n(depth_m, self.plate)
@@ -78,13 +95,7 @@ class FlipperContact:
         self._upward_m, upward_n = _yielding(
             self._upward_m + upward_m_s * dt_s, EDGE_STIFFNESS_N_M, insertion_n, extraction_n
         )
-        return ContactForce(
-            length_m * normal_n,
-            arm_m * (ca * outward_n - sa * normal_n) + length_m * ca * upward_n,
-            ca * normal_n + sa * outward_n,
-            normal_n,
-            upward_n,
-        )
+        return normal_n, outward_n, upward_n
 
 
 def _yielding(

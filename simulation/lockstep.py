@@ -15,7 +15,6 @@ from control.modes import Mode, Request
 from control.records import JOINTS, BodyPose
 from drivers.mock_bus import MockBus
 from drivers.odrive_drives import OdriveDrives
-from drivers.pose_port import PosePort
 from firmware_host.configuration import Configuration
 from firmware_host.loop import Loop
 from firmware_host.recorder import NullRecorder, Recording
@@ -46,16 +45,15 @@ def plant_of(configuration: Configuration) -> PlantParameters:
     return PlantParameters(geometry=configuration.geometry, arm_mass=configuration.arm)
 
 
-class SimulatedPose(PosePort):
+class SimulatedPose:
     """The robot's true place with a little noise, as motion capture would send it."""
 
-    def __init__(self, seed: int) -> None:
-        super().__init__(None)
+    def __init__(self, robot: SimulatedRobot, seed: int) -> None:
+        self._robot = robot
         self._random = Random(seed)
-        self.x_m: Callable[[], float] = lambda: float("nan")
 
     def read(self, now_s: float) -> BodyPose:
-        return BodyPose(now_s, self.x_m() + self._random.gauss(0.0, POSE_NOISE_M))
+        return BodyPose(now_s, self._robot.plant.body_m + self._random.gauss(0.0, POSE_NOISE_M))
 
 
 class Lockstep:
@@ -79,8 +77,7 @@ class Lockstep:
             seed,
         )
         drives = OdriveDrives(configuration.drive, {name: bus.open() for name, bus in buses.items()})
-        pose = SimulatedPose(seed + 1)
-        pose.x_m = lambda: self.robot.plant.body_m
+        pose = SimulatedPose(self.robot, seed + 1)
         self.loop = Loop(configuration, drives, pose, recorder or NullRecorder(), clock=lambda: self.now_s)
         self.tick_number = 0
 

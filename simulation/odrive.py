@@ -13,30 +13,9 @@ from dataclasses import dataclass
 from math import isfinite, pi
 from random import Random
 
+from drivers import odrive_codec as codec
 from drivers.frames import Frame
-from drivers.odrive_codec import (
-    CLEAR_ERRORS,
-    ERROR_ESTOP,
-    ERROR_WATCHDOG,
-    ESTOP,
-    GET_BUS_VOLTAGE_CURRENT,
-    GET_ENCODER_ESTIMATES,
-    GET_ERROR,
-    GET_IQ,
-    GET_TEMPERATURE,
-    GET_VERSION,
-    HEARTBEAT,
-    PASSTHROUGH,
-    SET_AXIS_STATE,
-    SET_CONTROLLER_MODE,
-    SET_INPUT_TORQUE,
-    SET_LIMITS,
-    TORQUE_CONTROL,
-    AxisState,
-    GarbledMessageError,
-    Message,
-    arbitration_id,
-)
+from drivers.odrive_codec import AxisState, GarbledMessageError, Message, arbitration_id
 
 TURN_RAD = 2.0 * pi
 VERSION_FIELDS = (2, 4, 4, 58, 0, 6, 11, 0)  # protocol 2, an ODrive Pro, firmware 0.6.11
@@ -80,10 +59,10 @@ class SimulatedOdrive:
         self._turns = self._turns_s = 0.0
         periods = self.parameters
         self._schedule: list[tuple[float, tuple[Message, ...]]] = [
-            (periods.encoder_period_s, (GET_ENCODER_ESTIMATES,)),
-            (periods.current_period_s, (GET_IQ,)),
-            (periods.heartbeat_period_s, (HEARTBEAT,)),
-            (periods.slow_period_s, (GET_ERROR, GET_TEMPERATURE, GET_BUS_VOLTAGE_CURRENT)),
+            (periods.encoder_period_s, (codec.GET_ENCODER_ESTIMATES,)),
+            (periods.current_period_s, (codec.GET_IQ,)),
+            (periods.heartbeat_period_s, (codec.HEARTBEAT,)),
+            (periods.slow_period_s, (codec.GET_ERROR, codec.GET_TEMPERATURE, codec.GET_BUS_VOLTAGE_CURRENT)),
         ]
         # Boards are switched on at different moments: their messages do not come all at once.
         self._due_s = [now_s + period_s * self._random.random() for period_s, _ in self._schedule]
@@ -100,19 +79,19 @@ class SimulatedOdrive:
         return []
 
     def _obey(self, command: int, data: bytes, now_s: float) -> None:
-        if command == SET_INPUT_TORQUE.command:
-            (torque_nm,) = SET_INPUT_TORQUE.decode(data)
+        if command == codec.SET_INPUT_TORQUE.command:
+            (torque_nm,) = codec.SET_INPUT_TORQUE.decode(data)
             self._set_torque(torque_nm, now_s)
-        elif command == SET_AXIS_STATE.command:
-            self._change_state(SET_AXIS_STATE.decode(data)[0], now_s)
-        elif command == SET_CONTROLLER_MODE.command:
-            self._modes = SET_CONTROLLER_MODE.decode(data)
-        elif command == SET_LIMITS.command:
-            self._set_limits(*SET_LIMITS.decode(data))
-        elif command == CLEAR_ERRORS.command:
+        elif command == codec.SET_AXIS_STATE.command:
+            self._change_state(codec.SET_AXIS_STATE.decode(data)[0], now_s)
+        elif command == codec.SET_CONTROLLER_MODE.command:
+            self._modes = codec.SET_CONTROLLER_MODE.decode(data)
+        elif command == codec.SET_LIMITS.command:
+            self._set_limits(*codec.SET_LIMITS.decode(data))
+        elif command == codec.CLEAR_ERRORS.command:
             self.errors = 0
-        elif command == ESTOP.command:
-            self._disarm(ERROR_ESTOP)
+        elif command == codec.ESTOP.command:
+            self._disarm(codec.ERROR_ESTOP)
 
     def _set_torque(self, torque_nm: float, now_s: float) -> None:
         if not isfinite(torque_nm):
@@ -142,8 +121,8 @@ class SimulatedOdrive:
         """At the joint, as the motor exerts it now."""
         parameters = self.parameters
         if self.axis_state is AxisState.CLOSED_LOOP and 0.0 < parameters.watchdog_s < now_s - self._fed_s:
-            self._disarm(ERROR_WATCHDOG)
-        if self.axis_state is not AxisState.CLOSED_LOOP or self._modes != (TORQUE_CONTROL, PASSTHROUGH):
+            self._disarm(codec.ERROR_WATCHDOG)
+        if self.axis_state is not AxisState.CLOSED_LOOP or self._modes != (codec.TORQUE_CONTROL, codec.PASSTHROUGH):
             self._current_a = 0.0
             return 0.0
         gain, limit = parameters.velocity_gain_nm_s_turn, self._velocity_limit_turn_s
@@ -175,34 +154,34 @@ class SimulatedOdrive:
         return Frame(arbitration_id(self.parameters.node_id, message), self._PAYLOADS[message](self))
 
     def _encoder(self) -> bytes:
-        return GET_ENCODER_ESTIMATES.encode(self._turns, self._turns_s)
+        return codec.GET_ENCODER_ESTIMATES.encode(self._turns, self._turns_s)
 
     def _iq(self) -> bytes:
         noise_a = self.parameters.current_noise_a
         measured_a = self._current_a + (self._random.gauss(0.0, noise_a) if noise_a else 0.0)
-        return GET_IQ.encode(self._current_a, measured_a)
+        return codec.GET_IQ.encode(self._current_a, measured_a)
 
     def _heartbeat(self) -> bytes:
-        return HEARTBEAT.encode(self.errors, self.axis_state, 0, 0)
+        return codec.HEARTBEAT.encode(self.errors, self.axis_state, 0, 0)
 
     def _error(self) -> bytes:
-        return GET_ERROR.encode(self.errors, self.disarm_reason)
+        return codec.GET_ERROR.encode(self.errors, self.disarm_reason)
 
     def _temperature(self) -> bytes:
-        return GET_TEMPERATURE.encode(self.parameters.temperature_c, self.parameters.temperature_c)
+        return codec.GET_TEMPERATURE.encode(self.parameters.temperature_c, self.parameters.temperature_c)
 
     def _bus_voltage(self) -> bytes:
-        return GET_BUS_VOLTAGE_CURRENT.encode(self.parameters.bus_voltage_v, abs(self._current_a) * 0.1)
+        return codec.GET_BUS_VOLTAGE_CURRENT.encode(self.parameters.bus_voltage_v, abs(self._current_a) * 0.1)
 
     def _version(self) -> bytes:
-        return GET_VERSION.encode(*VERSION_FIELDS)
+        return codec.GET_VERSION.encode(*VERSION_FIELDS)
 
     _PAYLOADS = {
-        GET_ENCODER_ESTIMATES: _encoder,
-        GET_IQ: _iq,
-        HEARTBEAT: _heartbeat,
-        GET_ERROR: _error,
-        GET_TEMPERATURE: _temperature,
-        GET_BUS_VOLTAGE_CURRENT: _bus_voltage,
-        GET_VERSION: _version,
+        codec.GET_ENCODER_ESTIMATES: _encoder,
+        codec.GET_IQ: _iq,
+        codec.HEARTBEAT: _heartbeat,
+        codec.GET_ERROR: _error,
+        codec.GET_TEMPERATURE: _temperature,
+        codec.GET_BUS_VOLTAGE_CURRENT: _bus_voltage,
+        codec.GET_VERSION: _version,
     }

@@ -62,9 +62,7 @@ class SimulatedRobot:
 
     def _measure(self) -> None:
         plant = self.plant
-        for drive, angle_rad, velocity_rad_s in zip(
-            self.drives, plant.angles_rad, plant.velocities_rad_s, strict=True
-        ):
+        for drive, angle_rad, velocity_rad_s in zip(self.drives, plant.angles_rad, plant.velocities_rad_s, strict=True):
             drive.measure(angle_rad, velocity_rad_s)
 
     def _report(self) -> None:

@@ -14,7 +14,8 @@ from typing import Any
 import msgpack
 import pytest
 
-from command_line import exit_codes
+from command_line import exit_codes, main
+from firmware_host.configuration import EXIT_CONFIGURATION, StatusParameters
 from firmware_host.log_reader import read_log
 from firmware_host.replay import replay_file
 from simulation.peer import WATCHDOG_S
@@ -169,3 +170,9 @@ def test_ctrl_c_ends_a_watch_quietly(bench: Any) -> None:
         watch.send_signal(signal.SIGINT)
         assert watch.wait(10) == exit_codes.INTERRUPTED
         assert watch.stderr.read() == ""
+
+
+def test_the_command_line_and_the_daemon_agree() -> None:
+    """What the command line must not import from the daemon, since `status` has to start at once."""
+    assert exit_codes.CONFIGURATION == EXIT_CONFIGURATION
+    assert StatusParameters().socket == main.DEFAULT_SOCKET

@@ -55,9 +55,7 @@ def chosen(*strides: StrideEstimate) -> DepthChoice:
 coefficients = st.floats(0.0, 1e8)
 doubts = st.floats(0.0, 1e7)
 estimates = st.builds(told, coefficients, doubts) | st.just(UNKNOWN_K)
-strides = st.builds(
-    stride, estimates, estimates, st.floats(0.0, 0.06), st.booleans(), st.floats(-0.02, 0.04)
-)
+strides = st.builds(stride, estimates, estimates, st.floats(0.0, 0.06), st.booleans(), st.floats(-0.02, 0.04))
 
 
 FIRM, SOFT = told(1.5e6), told(0.3e6)

@@ -93,9 +93,7 @@ def loaded(samples: Sequence[Sample], law: Law, mass: ArmMass = WEIGHTLESS) -> l
     result, before = [], samples[0]
     for sample in samples:
         force_x_n, force_z_n = law(sample)
-        sa, ca, sb, cb = (
-            trig(angle) for angle in (sample.sweep_rad, sample.adduction_rad) for trig in (sin, cos)
-        )
+        sa, ca, sb, cb = (trig(angle) for angle in (sample.sweep_rad, sample.adduction_rad) for trig in (sin, cos))
         mud_sweep_nm = LENGTH_M * force_x_n / ca
         mud_adduction_nm = (LENGTH_M * force_z_n + sb * sa * mud_sweep_nm) / (cb * ca)
         weight_nm = mass.arm_mass_kg * 9.81 * mass.center_of_mass_m
@@ -106,9 +104,7 @@ def loaded(samples: Sequence[Sample], law: Law, mass: ArmMass = WEIGHTLESS) -> l
         adduction_nm = mass.adduction_inertia_kg_m2 * adduction_rad_s2 - mud_adduction_nm + weight_nm * ca * cb
         before = sample
         result.append(
-            sample._replace(
-                sweep_current_a=sweep_nm / SWEEP_NM_A, adduction_current_a=adduction_nm / ADDUCTION_NM_A
-            )
+            sample._replace(sweep_current_a=sweep_nm / SWEEP_NM_A, adduction_current_a=adduction_nm / ADDUCTION_NM_A)
         )
     return result
 
@@ -164,9 +160,7 @@ def test_each_stride_of_a_walk_tells_the_same_law() -> None:
     single = motion()
     period_s = single[-1].now_s
     samples = [
-        sample._replace(now_s=sample.now_s + turn * period_s)
-        for turn in range(3)
-        for sample in triggered(single, MUD)
+        sample._replace(now_s=sample.now_s + turn * period_s) for turn in range(3) for sample in triggered(single, MUD)
     ]
     strides = closed(samples)
     assert [stride.index for stride in strides] == [0, 1, 2]

@@ -63,12 +63,8 @@ def test_an_unknown_section_is_refused_by_name(example_text: str) -> None:
 
 
 def test_a_value_out_of_bounds_is_refused_with_key_value_and_bound(example_text: str) -> None:
-    assert problems_of(changed(example_text, "torque_nm", "9.5")) == [
-        "limits.torque_nm = 9.5: must be at most 5.0"
-    ]
-    assert problems_of(changed(example_text, "node_id", "-1")) == [
-        "drive.left_sweep.node_id = -1: must be at least 0"
-    ]
+    assert problems_of(changed(example_text, "torque_nm", "9.5")) == ["limits.torque_nm = 9.5: must be at most 5.0"]
+    assert problems_of(changed(example_text, "node_id", "-1")) == ["drive.left_sweep.node_id = -1: must be at least 0"]
 
 
 def test_all_problems_are_told_at_once(example_text: str) -> None:

@@ -247,9 +247,7 @@ def test_the_writer_is_last_in_line_for_the_cpu(recorder: Recorder) -> None:
     assert recorder.close(TIMEOUT_S)
 
 
-def test_a_path_that_cannot_be_made_is_told_in_a_sentence(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_path_that_cannot_be_made_is_told_in_a_sentence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").touch()
     recorder = Recorder(tmp_path / "file" / "run.mcap", "", {})
     assert not recorder.close(TIMEOUT_S)
