@@ -44,6 +44,10 @@ class DemoError(Exception):
     """The demo cannot go on; the text says why."""
 
 
+class InterruptedDemoError(Exception):
+    """A person has ended the demo; the text says in which state."""
+
+
 class Demo:
     """Owns the two processes, the client and what was learned so far."""
 
@@ -58,11 +62,12 @@ class Demo:
         self.client: StatusClient | None = None
         self.strides: list[dict[str, Any]] = []
         self.walk_start_s = 0.0
+        self.armed = False
 
     def _start(self, module: str, *arguments: str) -> subprocess.Popen[bytes]:
         """In a session of its own, so that Ctrl-C reaches only us and we end things in order."""
         return subprocess.Popen(
-            [sys.executable, "-m", module, "--config", str(self.configuration_path), *arguments],
+            [sys.executable, "-P", "-m", module, "--config", str(self.configuration_path), *arguments],
             stdin=subprocess.DEVNULL,
             stdout=self.output,
             stderr=self.output,
@@ -108,6 +113,7 @@ class Demo:
         assert self.client is not None
         self.wait_for(lambda report: report["mode"] == "idle" and report["fault"] is None)
         self.client.call("arm")
+        self.armed = True
         self.wait_for(lambda report: bool(report["mode"] == "hold"))
 
     def walk(self, depth_cm: float | None, show: Callable[[dict[str, Any]], None]) -> None:
@@ -141,11 +147,21 @@ class Demo:
         self.client.call("disarm")
         return report
 
+    def last_state(self) -> str:
+        """After the end, in words."""
+        if not self.armed:
+            return "stopped before torque was on"
+        if self.daemon.returncode == 0:
+            return "stopped: torque is off, the log is closed"
+        return f"stopped, but the daemon ended with status {self.daemon.returncode}"
+
     def end(self) -> None:
         """The daemon first: it stops the robot by itself if it has to, and needs it alive for that."""
         if self.client is not None:
             self.client.close()
         for process in (self.daemon, self.robot):
+            if process.poll() is not None:
+                continue
             process.send_signal(signal.SIGTERM)
             try:
                 process.wait(ENDING_S)
@@ -160,39 +176,43 @@ def running_demo(logs: Path, seed: int) -> Iterator[Demo]:
     """A demo whose processes and folder are gone afterwards, whatever happens."""
     folder = Path(tempfile.mkdtemp(prefix="mudskipper-"))  # short, as the path of a Unix socket must be
     try:
-        demo = Demo(folder, logs, seed)
+        demonstration = Demo(folder, logs, seed)
         try:
-            yield demo
+            yield demonstration
+        except KeyboardInterrupt:
+            demonstration.end()
+            raise InterruptedDemoError(demonstration.last_state()) from None
         finally:
-            demo.end()
+            demonstration.end()
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
 def demo(options: argparse.Namespace) -> int:
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)  # they end the demo as Ctrl-C does
     options.out.mkdir(parents=True, exist_ok=True)
+    if options.json:
+        options.json.touch()  # a path that cannot be written is told now, not after the walk
     before = set(options.out.glob("*.mcap"))
-    report: dict[str, Any] | None = None
     try:
         report, demonstration = _perform(options)
-    except (DemoError, CallRefusedError, NoDaemonError) as problem:
-        complain(str(problem))
-        return exit_codes.UNHEALTHY
-    except KeyboardInterrupt:
-        _say_where(set(options.out.glob("*.mcap")) - before)
-        complain("stopped: the flippers were raised, torque is off, the log is closed")
-        return exit_codes.INTERRUPTED
-    try:
         _conclude(options, report, demonstration)
-    except LogError as problem:
+    except (DemoError, CallRefusedError, NoDaemonError, LogError) as problem:
         complain(str(problem))
         return exit_codes.UNHEALTHY
+    except (InterruptedDemoError, KeyboardInterrupt) as problem:
+        for path in set(options.out.glob("*.mcap")) - before:
+            print(f"\nlog      {path}")
+        complain(str(problem) or "stopped")
+        return exit_codes.INTERRUPTED
     return exit_codes.OK
 
 
 def _perform(options: argparse.Namespace) -> tuple[dict[str, Any], Demo]:
     print("Starting a simulated robot and the daemon ...", flush=True)
     with running_demo(options.out, options.seed) as demonstration:
+        os.nice(5)  # whoever watches gives way to those who work
         demonstration.connect()
         print("Arming ...", flush=True)
         demonstration.arm()
@@ -209,22 +229,17 @@ def _perform(options: argparse.Namespace) -> tuple[dict[str, Any], Demo]:
         return report, demonstration
 
 
-def _say_where(logs: set[Path]) -> None:
-    for path in logs:
-        print(f"\nlog   {path}")
-
-
 def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration: Demo) -> None:
     """Summary, plot, and the JSON if wanted."""
     log_path = Path(report["log"]["path"])
     log = read_log(log_path)
     plot_path = log_path.with_suffix(".png")
-    print("\nDrawing ...", flush=True)
+    summary = summarise(report, demonstration, log, log_path, plot_path)
+    print(f"\n{summary_text(summary)}\nDrawing ...", flush=True)
     from command_line.plots import plot_walk  # matplotlib takes its time; the walk must not wait for it
 
     plot_walk(log, demonstration.track, plot_path)
-    summary = summarise(report, demonstration, log, log_path, plot_path)
-    print(summary_text(summary))
+    print(f"plot     {plot_path}")
     if options.json:
         options.json.write_text(json.dumps(summary, indent=1) + os.linesep, encoding="utf-8")
 
@@ -283,8 +298,8 @@ def summary_text(summary: dict[str, Any]) -> str:
         f"loop     {summary['rate_hz']:.2f} Hz over {summary['ticks']} ticks, {summary['missed_ticks']} missed",
         f"wake-up  {late['p50']:.0f} us late at the median, {late['p99']:.0f} p99, {late['max']:.0f} worst",
         f"tick     {tick['p50']:.0f} us at the median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst",
+        *([f"lost     {summary['dropped_rows']} rows of the log"] if summary["dropped_rows"] else []),
         *(f"warning  {warning}" for warning in summary["warnings"]),
-        f"plot     {summary['plot']}",
         f"log      {summary['log']}",
     ]
     return "\n".join(lines)

@@ -42,6 +42,8 @@ def _show_replay(replayed: Replay, as_json: bool) -> None:
     for report, stride in zip(strides, replayed.strides, strict=True):
         forces = f"{stride.insertion_force_n:7.1f} {stride.stance_force_n:6.1f} {stride.extraction_force_n:7.1f}"
         print(f"{stride_line(report)}  {forces}")
+    if not strides:
+        complain("no complete stride in this log")
     if not replayed.complete:
         complain("the log is not finished: its writer was cut off; everything up to there was read")
 
@@ -69,6 +71,9 @@ def export(options: Options) -> int:
     if options.out is None:
         write_lab_csv(log, sys.stdout)
         return exit_codes.OK
+    if options.out.exists() and options.out.samefile(options.file):
+        complain(f"{options.out} is the log itself; name another file")
+        return exit_codes.USAGE
     with Path(options.out).open("w", encoding="utf-8") as out:
         write_lab_csv(log, out)
     return exit_codes.OK

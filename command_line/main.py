@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from io import TextIOWrapper
 from pathlib import Path
 
 from command_line import exit_codes
@@ -23,7 +24,7 @@ def build_parser() -> argparse.ArgumentParser:
         prog="mudskipper",
         description="Operates a robot that crawls over mud on two flippers.",
         epilog="Exit status: 0 done, 1 unhealthy, 2 usage, 3 no daemon, 4 not permitted, 5 refused, 78 configuration,"
-        " 124 timed out.",
+        " 124 timed out, 130 interrupted.",
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="command")
     _add_operation(commands)
@@ -63,12 +64,33 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
         )
     for name in ("status", "check"):
         parsers[name].add_argument("--json", action="store_true", help="for machines")
-    parsers["watch"].add_argument("--period", type=float, default=0.5, metavar="S", help="between two looks")
+    parsers["watch"].add_argument("--period", type=_seconds, default=0.5, metavar="S", help="between two looks")
     depth = parsers["walk"].add_mutually_exclusive_group()
-    depth.add_argument("--depth", type=float, metavar="CM", help="the same in every stride")
+    depth.add_argument("--depth", type=_depth_cm, metavar="CM", help="the same in every stride")
     depth.add_argument("--adaptive", action="store_true", help="chosen from the mud, once a stride (default)")
-    parsers["walk"].add_argument("--strides", type=int, default=0, metavar="N", help="then stop (default: go on)")
+    parsers["walk"].add_argument("--strides", type=_count, default=0, metavar="N", help="then stop (default: go on)")
     parsers["check"].add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.05 <= value <= 3600.0:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 0.05 to 3600")
+    return value
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if not 0 <= value <= 100000:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 0 to 100000")
+    return value
+
+
+def _depth_cm(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value <= 20.0:
+        raise argparse.ArgumentTypeError(f"{text}: must be more than 0 and at most 20")
+    return value
 
 
 def _add_simulation(commands: Commands) -> None:  # type: ignore[valid-type]
@@ -76,7 +98,7 @@ def _add_simulation(commands: Commands) -> None:  # type: ignore[valid-type]
     demo.add_argument("--json", type=Path, metavar="PATH", help="write the summary there too")
     demo.add_argument("--out", type=Path, default=Path("mudskipper-demo"), metavar="DIR", help="for log and plot")
     demo.add_argument("--seed", type=int, default=1)
-    demo.add_argument("--depth", type=float, metavar="CM", help="fixed instead of adaptive")
+    demo.add_argument("--depth", type=_depth_cm, metavar="CM", help="fixed instead of adaptive")
     simulate = _add(commands, "simulate", "simulate.simulate", "The simulated robot alone, on a bus, until Ctrl-C.")
     simulate.add_argument("--bus", default="robot", metavar="NAME", help="of the local bus (default: %(default)s)")
     simulate.add_argument("--config", type=Path, help="on the buses of this configuration instead")
@@ -101,10 +123,13 @@ def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    options = build_parser().parse_args(arguments)
-    module, function = options.place.split(".")
-    run: Callable[[argparse.Namespace], int] = getattr(import_module(f"command_line.{module}"), function)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that knows no ± or ³ shows a question mark
     try:
+        options = build_parser().parse_args(arguments)
+        module, function = options.place.split(".")
+        run: Callable[[argparse.Namespace], int] = getattr(import_module(f"command_line.{module}"), function)
         return run(options)
     except KeyboardInterrupt:
         return exit_codes.INTERRUPTED
@@ -112,7 +137,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return exit_codes.OK
     except OSError as problem:
-        complain(f"{problem.filename or ''}: {problem.strerror}".lstrip(": "))
+        complain(f"{problem.filename or ''}: {problem.strerror or problem}".lstrip(": "))
         return exit_codes.UNHEALTHY
 
 

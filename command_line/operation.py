@@ -51,7 +51,7 @@ def watch(options: Options) -> int:
     def show(client: StatusClient) -> int:
         while True:
             print("\033[H\033[J" + status_text(client.call("status")), flush=True)
-            time.sleep(max(0.05, options.period))
+            time.sleep(options.period)
 
     return _with_daemon(options, show)
 
@@ -182,6 +182,7 @@ def _loop_text(report: dict[str, Any]) -> str:
             f"tick   {tick['p50']:.0f} us median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst",
             f"bus    {bus['unknown_frames']} unknown, {bus['garbled_frames']} garbled,"
             f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends",
-            f"log    {log['path'] or 'off'}, {log['dropped']} rows dropped",
+            f"log    {log['path'] or 'off'}, {log['dropped']} rows dropped"
+            + ("" if log["writer_alive"] else coloured(", its writer has died: nothing is recorded", RED)),
         )
     )

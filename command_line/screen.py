@@ -37,7 +37,7 @@ def complain(sentence: str) -> None:
 
 def coefficient(estimate: dict[str, Any]) -> str:
     """In N/cm³ with its standard error; in brackets where it is not valid."""
-    if estimate["value"] is None:
+    if estimate["value"] is None or estimate["std_error"] is None:
         return "-"
     text = f"{estimate['value'] / 1e6:.2f}±{estimate['std_error'] / 1e6:.2f}"
     return text if estimate["valid"] else f"({text})"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from command_line import exit_codes
@@ -18,7 +19,11 @@ def simulate(options: argparse.Namespace) -> int:
     if unknown:
         complain(f"--mud {unknown[0]}: known water contents are {', '.join(MUDS)}")
         return exit_codes.USAGE
-    path = options.config or _local_configuration(options.bus)
+    try:
+        path = options.config or _local_configuration(options.bus)
+    except ValueError as problem:
+        complain(f"--bus {problem}")
+        return exit_codes.USAGE
     arguments = ["--config", str(path), "--seed", str(options.seed)]
     for water in waters:
         arguments += ["--mud", water]
@@ -28,6 +33,7 @@ def simulate(options: argparse.Namespace) -> int:
 def _local_configuration(bus: str) -> Path:
     folder = named_folder(bus)
     path = write_local_setup(folder, Path("logs"))
-    print(f"The robot is on the bus. In other terminals:\n  mudskipperd --config {path}")
-    print(f"  export MUDSKIPPER_SOCKET={folder}/mudskipper.sock; mudskipper status", flush=True)
+    programs = Path(sys.executable).parent
+    print(f"Simulating, until Ctrl-C. In other terminals:\n  {programs}/mudskipperd --config {path}")
+    print(f"  export MUDSKIPPER_SOCKET={folder}/mudskipper.sock; {programs}/mudskipper status", flush=True)
     return path

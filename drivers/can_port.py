@@ -14,6 +14,7 @@ import can
 from drivers.frames import Frame
 
 PORT_ERRORS = (can.CanError, OSError, ValueError, IndexError)  # slcan: an unplugged adapter, a garbled line
+MOST_FAILURES_PER_READ = 32
 MOST_FRAMES_PER_READ = 4096  # half a second of a full bus; a babbling node must not hold the loop for ever
 
 
@@ -46,27 +47,23 @@ class PythonCanPort:
 
     def receive(self) -> list[Frame]:
         frames: list[Frame] = []
-        receive = self._bus.recv
-        try:
-            for _ in range(MOST_FRAMES_PER_READ):
-                message = receive(0.0)
-                if message is None:
+        failures = 0
+        for _ in range(MOST_FRAMES_PER_READ):
+            try:
+                message = self._bus.recv(0.0)
+            except PORT_ERRORS as problem:  # garbage, with good frames behind it; or an interface that is down
+                self.error_frames += 1
+                self.last_error = str(problem)
+                failures += 1
+                if failures == MOST_FAILURES_PER_READ:
                     break
-                if message.is_error_frame:  # first: its class bits look like a drive's id
-                    self.error_frames += 1
-                else:
-                    frames.append(
-                        Frame(
-                            message.arbitration_id,
-                            bytes(message.data),
-                            message.is_remote_frame,
-                            False,
-                            message.is_extended_id,
-                        )
-                    )
-        except PORT_ERRORS as problem:  # an interface that is down is a fault by the silence of its drives
-            self.error_frames += 1
-            self.last_error = str(problem)
+                continue
+            if message is None:
+                break
+            if message.is_error_frame:  # first: its class bits look like a drive's id
+                self.error_frames += 1
+            else:
+                frames.append(_as_frame(message))
         return frames
 
     def send(self, frame: Frame) -> None:
@@ -84,6 +81,11 @@ class PythonCanPort:
 
     def close(self) -> None:
         self._bus.shutdown()
+
+
+def _as_frame(message: can.Message) -> Frame:
+    data, is_remote, is_extended = bytes(message.data), message.is_remote_frame, message.is_extended_id
+    return Frame(message.arbitration_id, data, is_remote, False, is_extended)
 
 
 def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool]) -> PythonCanPort:

@@ -20,7 +20,7 @@ def open_ports(buses: Mapping[str, BusParameters]) -> dict[str, PythonCanPort]:
     for name, bus in buses.items():
         try:
             ports[name] = open_port(bus.interface, bus.channel, bus.options)
-        except (can.CanError, OSError, ValueError, TypeError) as problem:
+        except (can.CanError, OSError, ValueError, TypeError, ImportError) as problem:
             for port in ports.values():
                 port.close()
             raise BusError(f"bus.{name} ({bus.interface} {bus.channel}) does not open: {problem}") from problem

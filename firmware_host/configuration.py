@@ -8,6 +8,7 @@ the geometry and of the joint limits.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
@@ -27,6 +28,7 @@ from control.limits import JointLimits, JointRange
 from control.records import JOINTS
 from drivers.odrive_drives import DriveParameters
 
+LONGEST_SOCKET_PATH = 107  # sun_path of unix(7) has 108 bytes with its final zero
 EXIT_CONFIGURATION = 78  # EX_CONFIG of sysexits.h; systemd is told not to restart on it
 
 
@@ -110,7 +112,7 @@ class Configuration:
 def load_configuration(path: Path) -> Configuration:
     """Raises ConfigurationError, also where the file cannot be read."""
     try:
-        return parse_configuration(path.read_text(encoding="utf-8"))
+        return parse_configuration(path.read_text(encoding="utf-8-sig"))
     except OSError as problem:
         raise ConfigurationError([f"{path}: {problem.strerror}"]) from problem
     except UnicodeDecodeError as problem:
@@ -120,7 +122,7 @@ def load_configuration(path: Path) -> Configuration:
 def parse_configuration(text: str) -> Configuration:
     try:
         document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as problem:
+    except (ValueError, RecursionError) as problem:  # of which tomllib's own error is one
         raise ConfigurationError([f"not a TOML file: {problem}"]) from problem
     _apply_protocol(document)
     values = _validated(document)
@@ -208,10 +210,26 @@ def _sentence(error: Any) -> str:
 
 
 def _contradictions(configuration: Configuration) -> Iterator[str]:
+    yield from _text_problems(configuration)
     yield from _drive_problems(configuration)
     yield from _depth_problems(configuration)
     yield from _range_problems(configuration)
     yield from _torque_problems(configuration)
+
+
+def _text_problems(configuration: Configuration) -> Iterator[str]:
+    name, status, pose = configuration.robot.name, configuration.status.socket, configuration.pose.socket
+    if not re.fullmatch(r"[\w.-]{1,64}", name) or name.startswith("."):
+        yield f"robot.name = {name!r}: must be 1 to 64 letters, digits, dots, dashes or underscores"
+    for key, path in (("status.socket", status), ("pose.socket", pose)):
+        if "\0" in path or len(path.encode()) > LONGEST_SOCKET_PATH:
+            yield f"{key} = {path!r}: must be at most {LONGEST_SOCKET_PATH} bytes long, without a zero byte"
+    if not status:
+        yield "status.socket = '': must name a socket"
+    if pose and pose == status:
+        yield f"pose.socket = {pose!r}: must not be status.socket"
+    if "\0" in configuration.log.directory:
+        yield f"log.directory = {configuration.log.directory!r}: must be without a zero byte"
 
 
 def _drive_problems(configuration: Configuration) -> Iterator[str]:

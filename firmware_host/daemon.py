@@ -179,7 +179,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse([f"mudskipperd: {problem}"], EXIT_FAILED)
     except OSError as problem:
         place = f" {problem.filename}" if problem.filename else ""
-        return _refuse([f"mudskipperd: cannot start:{place} {problem.strerror}"], EXIT_FAILED)
+        return _refuse([f"mudskipperd: cannot start:{place} {problem.strerror or problem}"], EXIT_FAILED)
 
 
 def _on_signals(handler: Callable[[int, object], None]) -> None:

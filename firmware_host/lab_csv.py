@@ -90,7 +90,7 @@ def _read_lines(path: Path) -> list[str]:
     """At least the two lines of the head and one row."""
     contents = _unpack(path)
     try:
-        lines = contents.decode().splitlines()
+        lines = contents.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
         line = contents.count(b"\n", 0, error.start) + 1
         raise LogError(f"{path}: line {line} is not text") from None
@@ -164,8 +164,8 @@ def _is_number(text: str) -> bool:
 
 def _check_time(path: Path, stamp_s: Floats) -> Floats:
     _refuse_where(~np.isfinite(stamp_s), path, "has no time")
-    steps_s = np.diff(stamp_s, prepend=stamp_s[:1])
-    _refuse_where(steps_s < -BACKWARDS_S, path, f"goes back in time by more than {BACKWARDS_S:g} s")
+    behind_s = np.maximum.accumulate(stamp_s) - stamp_s
+    _refuse_where(behind_s > BACKWARDS_S, path, f"goes back in time by more than {BACKWARDS_S:g} s")
     return stamp_s
 
 

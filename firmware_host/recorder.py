@@ -139,7 +139,7 @@ def _start_writer(path: Path) -> subprocess.Popen[bytes]:
     """Ctrl-C, the service's stop and its watchdog reach the writer too, so it is born with their signals blocked."""
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGABRT})
     try:
-        command = [sys.executable, "-m", "firmware_host.log_writer", str(path)]
+        command = [sys.executable, "-P", "-m", "firmware_host.log_writer", str(path)]
         return subprocess.Popen(command, stdin=subprocess.PIPE, bufsize=0)
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)

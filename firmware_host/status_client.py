@@ -46,6 +46,8 @@ class StatusClient:
             _, _, problem, result = self._receive()
         except OSError as problem_reading:
             raise NoDaemonError(f"the daemon on {self._path} does not answer") from problem_reading
+        except (ValueError, TypeError, KeyError, msgpack.UnpackException) as problem_reading:
+            raise NoDaemonError(f"what answers on {self._path} is no mudskipper daemon") from problem_reading
         if problem is not None:
             raise CallRefusedError(problem)
         return result
@@ -53,7 +55,9 @@ class StatusClient:
     def _receive(self) -> list[Any]:
         while True:
             for message in self._unpacker:
-                return list(message)
+                if not isinstance(message, list):
+                    raise TypeError(message)
+                return message
             data = self._socket.recv(65536)
             if not data:
                 raise ConnectionResetError

@@ -7,6 +7,7 @@ that everything shares are less punctual than a robot's, so signals may be older
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 from pathlib import Path
@@ -19,11 +20,11 @@ name = "simulated"
 
 [bus.left]
 interface = "mudskipper_local"
-channel = "{folder}/left"
+channel = {left}
 
 [bus.right]
 interface = "mudskipper_local"
-channel = "{folder}/right"
+channel = {right}
 
 [drive.left_sweep]
 bus = "left"
@@ -49,18 +50,23 @@ sign = 1
 silence_s = 0.5
 
 [log]
-directory = "{logs}"
+directory = {logs}
 
 [status]
-socket = "{folder}/mudskipper.sock"
+socket = {status}
 
 [pose]
-socket = "{folder}/pose.sock"
+socket = {pose}
 """
 
 
 def named_folder(name: str) -> Path:
-    """The same for every process of this user: short, since the path of a Unix socket must be."""
+    """The same for every process of this user: short, since the path of a Unix socket must be.
+
+    Raises ValueError for a name that is not plain.
+    """
+    if Path(name).name != name or name == "..":
+        raise ValueError(f"{name!r} is no plain name")
     folder = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"mudskipper-{os.geteuid()}" / name
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     return folder
@@ -71,5 +77,17 @@ def write_local_setup(folder: Path, logs: Path) -> Path:
     for name in ("left", "right"):
         (folder / name).mkdir(mode=0o700, exist_ok=True)
     path = folder / "mudskipper.toml"
-    path.write_text(CONFIGURATION.format(folder=folder, logs=logs.absolute()), encoding="utf-8")
+    path.write_text(configuration_text(folder, logs.absolute()), encoding="utf-8")
     return path
+
+
+def configuration_text(folder: Path, logs: Path) -> str:
+    """Paths as JSON strings, which are TOML strings too, whatever is in them."""
+    paths = {
+        "left": folder / "left",
+        "right": folder / "right",
+        "logs": logs,
+        "status": folder / "mudskipper.sock",
+        "pose": folder / "pose.sock",
+    }
+    return CONFIGURATION.format(**{name: json.dumps(str(path)) for name, path in paths.items()})

@@ -27,7 +27,7 @@ from simulation.track import COMPARTMENT_M, Track
 
 STEP_S = 0.002  # the period of the drives' fastest messages
 POSE_PERIOD_S = 1.0 / 120.0  # the paper's motion capture
-WATCHDOG_S = 0.5  # of the simulated drives, on processors that everything shares
+WATCHDOG_S = 0.25  # of the simulated drives, on processors that everything shares
 LONGEST_CATCH_UP_S = 0.5  # a robot that was stopped for longer has lost that time
 PR_SET_PDEATHSIG = 1
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +14,8 @@ from firmware_host.configuration import Configuration, load_configuration
 
 settings.register_profile("any_machine", deadline=None)  # a busy one is not wrong
 settings.load_profile("any_machine")
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job starts with it ignored, and so its children
 
 ROOT = Path(__file__).parent.parent
 

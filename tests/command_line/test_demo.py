@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from command_line import exit_codes
 from firmware_host.log_reader import read_log
 
@@ -68,3 +70,34 @@ def test_ctrl_c_ends_the_demo_cleanly(tmp_path: Path) -> None:
     log = read_log(path)
     assert log.complete and log.events[-1]["text"] == "mode hold to idle"
     assert children_of(out) == []
+
+
+def test_an_early_ctrl_c_says_that_nothing_moved(tmp_path: Path) -> None:
+    with start_demo(tmp_path / "out") as demo:
+        assert demo.stdout is not None
+        demo.stdout.readline()
+        demo.send_signal(signal.SIGINT)
+        _, complaints = demo.communicate(timeout=60)
+    assert demo.returncode == exit_codes.INTERRUPTED
+    assert "stopped" in complaints and "Traceback" not in complaints
+    assert children_of(tmp_path / "out") == []
+
+
+def test_sigterm_ends_the_demo_as_ctrl_c_does(tmp_path: Path) -> None:
+    with start_demo(tmp_path / "out") as demo:
+        assert demo.stdout is not None
+        for line in demo.stdout:
+            if line.startswith("Arming"):
+                break
+        demo.send_signal(signal.SIGTERM)
+        _, complaints = demo.communicate(timeout=60)
+    assert demo.returncode == exit_codes.INTERRUPTED and "Traceback" not in complaints
+    assert children_of(tmp_path / "out") == []
+
+
+@pytest.mark.parametrize("arguments", [("--depth", "nan"), ("--depth", "-1"), ("--json", "/nonexistent/x.json")])
+def test_what_cannot_work_is_told_before_anything_starts(tmp_path: Path, arguments: tuple[str, str]) -> None:
+    with start_demo(tmp_path / "out", *arguments) as demo:
+        printed, complaints = demo.communicate(timeout=60)
+    assert demo.returncode in (exit_codes.USAGE, exit_codes.UNHEALTHY)
+    assert printed == "" and complaints and "Traceback" not in complaints

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -97,6 +98,8 @@ def test_a_malformed_row_is_named_by_its_line(tmp_path: Path, walk: Path) -> Non
 
 
 def test_a_reader_that_stops_reading_is_no_error(walk: Path) -> None:
-    command = f"{sys.executable} -m command_line.main log export {walk} --csv | head -n 3"
+    command = (
+        f"{shlex.quote(sys.executable)} -m command_line.main log export {shlex.quote(str(walk))} --csv | head -n 3"
+    )
     ended = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=60, check=False, env=os.environ)
     assert len(ended.stdout.splitlines()) == 3 and ended.stderr == ""

@@ -7,7 +7,7 @@ from pathlib import Path
 import can
 import pytest
 
-from drivers.can_port import MOST_FRAMES_PER_READ, PythonCanPort, open_port
+from drivers.can_port import MOST_FAILURES_PER_READ, MOST_FRAMES_PER_READ, PythonCanPort, open_port
 from drivers.frames import Frame
 
 FRAMES = [
@@ -121,8 +121,23 @@ def test_failed_sends_are_counted_and_do_not_raise() -> None:
 def test_a_failed_receive_is_counted_and_does_not_raise() -> None:
     port = PythonCanPort(FakeBus(can.CanOperationError("Network is down", errno.ENETDOWN)))
     assert port.receive() == []
-    assert port.error_frames == 1
+    assert port.error_frames == MOST_FAILURES_PER_READ
     assert "Network is down" in port.last_error
+
+
+def test_garbage_does_not_hide_the_good_frames_behind_it() -> None:
+    class Noisy(FakeBus):
+        def recv(self, timeout: float | None = None) -> can.Message | None:
+            self.answers -= 1
+            if self.answers % 10 == 0:
+                return can.Message(arbitration_id=9, is_extended_id=False)
+            if self.answers < 10**6 - 30:
+                return None
+            raise ValueError("invalid literal for int() with base 16: 'G'")
+
+    port = PythonCanPort(Noisy())
+    assert len(port.receive()) == 3
+    assert port.error_frames == 27
 
 
 def test_ports_talk_over_the_local_bus(tmp_path: Path) -> None:

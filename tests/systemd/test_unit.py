@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+import tempfile
 import tomllib
 from pathlib import Path
 
@@ -195,8 +196,10 @@ def expand(name: str) -> set[str]:
 def test_systemd_finds_nothing_wrong_with_the_unit(unit: Settings, tmp_path: Path) -> None:
     """`verify` wants the program to be there, so the copy that it reads starts this Python instead."""
     copy = tmp_path / "mudskipper.service"
+    program = Path(tempfile.mkdtemp(prefix="mud-")) / "python"  # a path without spaces, wherever this lies
+    program.symlink_to(sys.executable)
     text = (SYSTEMD / "mudskipper.service").read_text(encoding="utf-8")
-    copy.write_text(text.replace(unit["ExecStart"][0], sys.executable), encoding="utf-8")
+    copy.write_text(text.replace(unit["ExecStart"][0], str(program)), encoding="utf-8")
     done = systemd_analyze("verify", "--man=no", str(copy))
     assert (done.returncode, done.stderr) == (0, "")
 
