@@ -103,3 +103,43 @@ def test_a_reader_that_stops_reading_is_no_error(walk: Path) -> None:
     )
     ended = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=60, check=False, env=os.environ)
     assert len(ended.stdout.splitlines()) == 3 and ended.stderr == ""
+
+
+def test_an_export_never_overwrites_its_own_log(walk: Path) -> None:
+    before = walk.read_bytes()
+    ended = run("log", "export", str(walk), "--csv", "--out", str(walk))
+    assert ended.returncode == exit_codes.USAGE and "is the log itself" in ended.stderr
+    assert walk.read_bytes() == before
+
+
+def test_a_terminal_without_unicode_gets_question_marks(walk: Path) -> None:
+    environment = os.environ | {"PYTHONUTF8": "0", "LC_ALL": "C", "PYTHONIOENCODING": "ascii"}
+    command = [sys.executable, "-m", "command_line.main", "replay", str(walk)]
+    ended = subprocess.run(command, capture_output=True, timeout=60, check=False, env=environment)
+    assert ended.returncode == exit_codes.OK and b"N/cm?" in ended.stdout and ended.stderr == b""
+
+
+def test_a_reversed_log_names_the_line(tmp_path: Path, walk: Path) -> None:
+    lines = run("log", "export", str(walk), "--csv").stdout.splitlines()
+    path = tmp_path / "reversed.csv"
+    path.write_text("\n".join(lines[:2] + lines[:1:-1]), encoding="utf-8")
+    ended = run("replay", str(path))
+    assert ended.returncode == exit_codes.UNHEALTHY and "goes back in time" in ended.stderr
+
+
+def test_a_byte_order_mark_is_no_error(tmp_path: Path, walk: Path) -> None:
+    path = tmp_path / "bom.csv"
+    path.write_text("\ufeff" + run("log", "export", str(walk), "--csv").stdout, encoding="utf-8")
+    assert run("replay", str(path)).returncode == exit_codes.OK
+
+
+def test_numbers_beyond_all_measure_are_shown_as_unknown(tmp_path: Path, walk: Path) -> None:
+    lines = run("log", "export", str(walk), "--csv").stdout.splitlines()
+    column = lines[1].split(",").index("rightsweeping_curr")
+    rows = [line.split(",") for line in lines[2:]]
+    for row in rows[::7]:
+        row[column] = "1e154"
+    path = tmp_path / "huge.csv"
+    path.write_text("\n".join(lines[:2] + [",".join(row) for row in rows]), encoding="utf-8")
+    ended = run("replay", str(path))
+    assert ended.returncode == exit_codes.OK and "Traceback" not in ended.stderr

@@ -140,6 +140,32 @@ def test_something_that_is_no_toml_names_the_line(example_text: str) -> None:
     assert told.startswith("not a TOML file") and "line 1" in told
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('name = "mudskipper"', 'name = "../../x"', "robot.name = '../../x': must be 1 to 64"),
+        ('name = "mudskipper"', 'name = ""', "robot.name = '': must be 1 to 64"),
+        ("/run/mudskipper/mudskipper.sock", "a\\u0000b", "status.socket = 'a\\x00b': must be at most 107 bytes"),
+        ("/run/mudskipper/mudskipper.sock", "x" * 120, "must be at most 107 bytes"),
+        ("/run/mudskipper/mudskipper.sock", "", "status.socket = '': must name a socket"),
+    ],
+)
+def test_texts_that_cannot_be_used_are_refused(example_text: str, old: str, new: str, told: str) -> None:
+    assert told in problems_of(example_text.replace(old, new))[0]
+
+
+def test_a_current_limit_below_the_torque_limit_is_refused(example_text: str) -> None:
+    text = example_text.replace("node_id = 0", "node_id = 0\ncurrent_limit_a = 5.0")
+    assert problems_of(text) == [
+        "drive.left_sweep.current_limit_a = 5.0: must be at least 9.04 for limits.torque_nm = 0.75"
+    ]
+
+
+def test_endless_numbers_and_nesting_are_no_toml() -> None:
+    assert problems_of("x = " + "9" * 5000)[0].startswith("not a TOML file")
+    assert problems_of("x = " + "[" * 5000)[0].startswith("not a TOML file")
+
+
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="No such file"):
         load_configuration(tmp_path / "none.toml")
