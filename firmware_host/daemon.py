@@ -8,6 +8,8 @@ which idles the drives, says what happened, and exits with status 1; systemd sta
 from __future__ import annotations
 
 import argparse
+import errno
+import os
 import signal
 import sys
 import time
@@ -100,6 +102,8 @@ def open_recorder(configuration: Configuration, path: Path | None) -> Recorder |
     if path is None:
         return NullRecorder()
     path.parent.mkdir(parents=True, exist_ok=True)
+    if not os.access(path.parent, os.W_OK):
+        raise PermissionError(errno.EACCES, "is not writable", str(path.parent))
     metadata = {"robot": configuration.robot.name, "version": software_version()}
     return Recorder(path, configuration.text, metadata)
 

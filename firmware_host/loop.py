@@ -93,6 +93,7 @@ class Loop:
         self._request, self._clear_until_s = Request.NONE, 0.0
         self._mode_since_s = 0.0
         self._failed_sends = self._refused_ticks = 0
+        self._recording = True
 
     def tick(self, beat: Beat) -> None:
         """Everything that happens once in PERIOD_S."""
@@ -245,7 +246,7 @@ class Loop:
         elif mode is Mode.IDLE:
             self.fault = None
         if mode is Mode.WALKING:
-            self.notice = ""
+            self.notice = self.notice if not self._recording else ""
             self.estimator.reset()
         if self.mode is Mode.STOPPING and mode is Mode.HOLD and not self.controller.is_up(self.states):
             self._tell(now_s, "the flippers did not come out of the mud")
@@ -284,6 +285,9 @@ class Loop:
         tick_s = self._clock() - beat.now_s
         self.recorder.put(TICK_KIND, self._tick_row(beat, tick_s))
         self.timing.update(beat.now_s, beat.late_s, beat.missed, tick_s)
+        if not self.recorder.writer_alive and self._recording:
+            self._recording = False
+            self.notice = "the log's writer has died: nothing is recorded any more"
 
     def _tick_row(self, beat: Beat, tick_s: float) -> bytes:
         a, b, c, d = self.states

@@ -13,7 +13,7 @@ from control.records import NO_TORQUE, Phase
 from drivers.frames import Frame
 from drivers.mock_bus import MockPort
 from drivers.odrive_codec import ERROR_WATCHDOG, SET_INPUT_TORQUE, AxisState
-from firmware_host.configuration import Configuration
+from firmware_host.configuration import Configuration, parse_configuration
 from firmware_host.log_rows import EVENT
 from firmware_host.loop import EVENT_KIND, STRIDE_KIND, TICK_KIND
 from firmware_host.recorder import NullRecorder
@@ -354,3 +354,19 @@ def test_a_fixed_depth_stays_fixed(robot: Lockstep) -> None:
     robot.walk(WalkOrder(0.04, False, 3))
     robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 15.0)
     assert {stride.chosen_depth_m for stride in robot.loop.strides} == {0.04}
+
+
+def test_a_log_that_is_lost_is_told(robot: Lockstep) -> None:
+    robot.run_for(0.1)
+    recorder_of(robot).writer_alive = False
+    robot.step()
+    assert robot.loop.notice == "the log's writer has died: nothing is recorded any more"
+
+
+def test_four_drives_on_one_bus_walk_as_well(example_text: str) -> None:
+    text = example_text.replace('bus = "right"', 'bus = "left"')
+    robot = Lockstep(parse_configuration(text), FIRM)
+    robot.arm()
+    robot.walk(WalkOrder(0.03, True, 2))
+    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 10.0)
+    assert robot.robot.plant.body_m > 0.15
