@@ -2,7 +2,7 @@
 
 `find_fault` is pure and runs every tick: a silent drive, a drive's own error, a drive that left closed loop, a joint
 out of its range, a hot motor. What the loop sees of itself (a stall, a bus that takes no commands, a torque that is
-no number, slow arming, wrong firmware) it reports by the same record: `Loop._find_fault`.
+no number, slow arming, wrong firmware) it reports by the same record.
 """
 
 from __future__ import annotations

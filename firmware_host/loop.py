@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from control.adaptation import DepthAdaptation
 from control.controller import RESTING, Controller, WalkOrder
-from control.faults import Fault, find_fault
+from control.faults import Fault
 from control.limits import LimitedTorques, apply_limits
 from control.modes import ACCEPTED_IN, ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
 from control.records import (
-    JOINTS,
     NEVER_S,
     NO_TORQUE,
     BodyPose,
@@ -26,20 +25,19 @@ from control.records import (
     StrideEstimate,
     Torques,
 )
-from drivers.odrive_codec import error_text
 from drivers.odrive_drives import OdriveDrives
 from drivers.pose_port import PoseSource
 from estimation.mud import MudEstimator, MudReading
 from firmware_host.configuration import Configuration
+from firmware_host.fault_watch import FaultWatch
 from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK
 from firmware_host.recorder import Recording
+from firmware_host.row_packing import Moment, stride_row, tick_row
 from firmware_host.ticker import PERIOD_S, Beat
 from firmware_host.timing import LoopTiming
 
-ARMING_S = 2.0  # a drive that takes longer to go into closed loop does not mean to
 CLEARING_S = 0.5  # for the drives to report that their errors are gone
 LONGEST_STEP_TICKS = 3  # what the controller may advance at once: after a longer gap the gait goes on where it was
-REFUSED_TICKS = 5  # in a row in which a bus took no command
 KEPT_STRIDES = 200  # for clients that ask what happened
 TICK_KIND, STRIDE_KIND, EVENT_KIND = ROW_KINDS.index(TICK), ROW_KINDS.index(STRIDE), ROW_KINDS.index(EVENT)
 
@@ -92,7 +90,7 @@ class Loop:
         self.target_before: GaitTarget = RESTING  # commanded while the states of this tick came about
         self._request, self._clear_until_s = Request.NONE, 0.0
         self._mode_since_s = 0.0
-        self._failed_sends = self._refused_ticks = 0
+        self._fault_watch = FaultWatch(configuration, drives)
         self._recording = True
 
     def tick(self, beat: Beat) -> None:
@@ -140,66 +138,21 @@ class Loop:
 
     def _examine(self, beat: Beat) -> Health:
         heard = self.mode is not Mode.BOOT or self.drives.heard
+        fault = None
+        if heard:
+            fault = self._fault_watch.update(beat, self.mode, self._mode_since_s, self.states, self.sent)
         return Health(
             drives_heard=heard,
             closed_loop=self._all_in_closed_loop(),
             walk_finished=self.controller.walk_finished,
             raised=self.controller.raised,
-            fault=self._find_fault(beat) if heard else None,
+            fault=fault,
         )
 
     def _all_in_closed_loop(self) -> bool:
         """By heartbeats that are younger than the wish, while arming: an older one tells of before."""
         oldest_s = self._mode_since_s if self.mode is Mode.ARMING else NEVER_S
         return all(state.closed_loop and state.heartbeat_stamp_s > oldest_s for state in self.states)
-
-    def _find_fault(self, beat: Beat) -> Fault | None:
-        now_s = beat.now_s
-        if not self.sent.finite:
-            return Fault("not_finite", "A torque was not a finite number: this is a bug, please report it.")
-        if beat.missed * PERIOD_S > self.configuration.loop.silence_s:
-            return Fault("loop_stalled", f"The loop stood still for {1e3 * beat.late_s:.0f} ms.")
-        if self._bus_refuses():
-            return Fault("bus_refuses", f"The bus took no command for {REFUSED_TICKS} ticks: {self._bus_says()}.")
-        if self.mode is Mode.ARMING and now_s - self._mode_since_s > ARMING_S:
-            return Fault("arming", f"Not every drive went into closed loop: {self._slow_to_arm()}.")
-        limits, silence_s = self.configuration.limits, self.configuration.loop.silence_s
-        fault = find_fault(self.states, self._ranges, limits, silence_s, self.mode in MOVING, now_s)
-        if fault and fault.name in ("drive_error", "drive_disarmed"):
-            return fault._replace(sentence=f"{fault.sentence} {self._drives_say()}".rstrip())
-        return fault or self._wrong_version()
-
-    def _bus_refuses(self) -> bool:
-        """Called once a tick."""
-        failed_sends = sum(port.failed_sends for port in self.drives.ports.values())
-        self._refused_ticks = self._refused_ticks + 1 if failed_sends > self._failed_sends else 0
-        self._failed_sends = failed_sends
-        return self._refused_ticks >= REFUSED_TICKS
-
-    def _bus_says(self) -> str:
-        said = [f"{name}: {port.last_error}" for name, port in self.drives.ports.items() if port.last_error]
-        return ", ".join(said) or "it did not say why"
-
-    def _slow_to_arm(self) -> str:
-        return ", ".join(joint for joint, state in zip(JOINTS, self.states, strict=True) if not state.closed_loop)
-
-    def _drives_say(self) -> str:
-        said = [
-            f"{axis.joint}: {error_text(axis.state.error_flags | axis.disarm_reason)}"
-            for axis in self.drives.axes
-            if axis.state.error_flags | axis.disarm_reason
-        ]
-        return f"({'; '.join(said)})" if said else ""
-
-    def _wrong_version(self) -> Fault | None:
-        """Asked for once every drive was heard; messages mean other things in other firmware."""
-        for axis in self.drives.axes:
-            if axis.version is None:
-                return Fault("drive_version", f"The {axis.joint} drive did not tell its firmware version yet.")
-            if (axis.version.major, axis.version.minor) != (0, 6):
-                version = ".".join(map(str, axis.version))
-                return Fault("drive_version", f"The {axis.joint} drive runs firmware {version}; 0.6 is supported.")
-        return None
 
     def request(self, request: Request, now_s: float, order: WalkOrder | None = None) -> str | None:
         """A person's wish, for the next tick. Returns why it is refused, or None."""
@@ -283,31 +236,23 @@ class Loop:
 
     def _record(self, beat: Beat) -> None:
         tick_s = self._clock() - beat.now_s
-        self.recorder.put(TICK_KIND, self._tick_row(beat, tick_s))
+        moment = Moment(
+            beat,
+            tick_s,
+            self.missed_ticks,
+            self.mode,
+            self.target_before,
+            self.controller.gait.commanded_depth_m,
+            self.states,
+            self.reading,
+            self.body,
+            self.sent,
+        )
+        self.recorder.put(TICK_KIND, tick_row(moment))
         self.timing.update(beat.now_s, beat.late_s, beat.missed, tick_s)
         if not self.recorder.writer_alive and self._recording:
             self._recording = False
             self.notice = "the log's writer has died: nothing is recorded any more"
-
-    def _tick_row(self, beat: Beat, tick_s: float) -> bytes:
-        a, b, c, d = self.states
-        left, right = self.reading.left, self.reading.right
-        target, now_s = self.target_before, beat.now_s
-        return TICK.encode(
-            now_s, beat.late_s, tick_s,
-            a.angle_rad, b.angle_rad, c.angle_rad, d.angle_rad,
-            a.velocity_rad_s, b.velocity_rad_s, c.velocity_rad_s, d.velocity_rad_s,
-            a.current_a, b.current_a, c.current_a, d.current_a,
-            now_s - a.angle_stamp_s, now_s - b.angle_stamp_s, now_s - c.angle_stamp_s, now_s - d.angle_stamp_s,
-            now_s - a.current_stamp_s, now_s - b.current_stamp_s,
-            now_s - c.current_stamp_s, now_s - d.current_stamp_s,
-            *self.sent.torques_nm,
-            left.sweep_torque_nm, right.sweep_torque_nm, left.adduction_torque_nm, right.adduction_torque_nm,
-            left.force_x_n, right.force_x_n, left.force_z_n, right.force_z_n, left.depth_m, right.depth_m,
-            target.depth_m, self.controller.gait.commanded_depth_m, self.body.x_m,
-            a.temperature_c, b.temperature_c, c.temperature_c, d.temperature_c,
-            beat.number, self.missed_ticks, target.stride, self.mode, target.phase, self.sent.limited,
-        )  # fmt: skip
 
     def _tell(self, now_s: float, notice: str) -> None:
         self.notice = notice
@@ -316,18 +261,3 @@ class Loop:
     def event(self, now_s: float, text: str) -> None:
         """A sentence into the log."""
         self.recorder.put(EVENT_KIND, EVENT.encode(now_s, text))
-
-
-def stride_row(now_s: float, stride: StrideEstimate, chosen_depth_m: float) -> bytes:
-    k_p, k_s, k_e = stride.k_p, stride.k_s, stride.k_e
-    values: tuple[Any, ...] = (
-        now_s, stride.t_start_s, stride.insertion_s, stride.stance_s, stride.extraction_s,
-        k_p.value, k_p.std_error, k_s.value, k_s.std_error, k_e.value, k_e.std_error,
-        stride.surface_m, stride.depth_m,
-        stride.insertion_force_n, stride.stance_force_n, stride.extraction_force_n,
-        stride.step_m, chosen_depth_m,
-        stride.index, k_p.samples, k_s.samples, k_e.samples,
-        0 if stride.flipper == "left" else 1,
-        k_p.valid, k_s.valid, k_e.valid, stride.released,
-    )  # fmt: skip
-    return STRIDE.encode(*values)
