@@ -81,7 +81,7 @@ def _plot_depth(panel: Axes, time_s: Array, rows: Array, strides: list[dict[str,
     panel.axhline(0.0, color="saddlebrown", linewidth=0.8)
     panel.invert_yaxis()
     panel.set(ylabel="depth (cm)")
-    panel.legend(loc="lower left", ncols=3, fontsize="small")
+    panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=3, fontsize="small", frameon=False)
 
 
 def _shade_muds(panels: Any, time_s: Array, places_m: Array, track: Track) -> None:
