@@ -34,8 +34,9 @@ from simulation.track import Track, paper_track
 LONGEST_WALK_S = 60.0
 STARTING_S = 20.0
 MODE_S = 10.0
-ENDING_S = 15.0
+ENDING_S = 15.0  # for one process, after which it is killed
 POLL_S = 0.05
+ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 FINISH_M = 0.02  # before the end of the track
 LEAD_M = 0.06  # the flippers are in the mud about this far ahead of the body's middle when a stride begins
 
@@ -112,8 +113,8 @@ class Demo:
     def arm(self) -> None:
         assert self.client is not None
         self.wait_for(lambda report: report["mode"] == "idle" and report["fault"] is None)
-        self.client.call("arm")
         self.armed = True
+        self.client.call("arm")
         self.wait_for(lambda report: bool(report["mode"] == "hold"))
 
     def walk(self, depth_cm: float | None, show: Callable[[dict[str, Any]], None]) -> None:
@@ -156,7 +157,11 @@ class Demo:
         return f"stopped, but the daemon ended with status {self.daemon.returncode}"
 
     def end(self) -> None:
-        """The daemon first: it stops the robot by itself if it has to, and needs it alive for that."""
+        """The daemon first: it stops the robot by itself if it has to, and needs it alive for that.
+
+        It takes a moment, in which no further Ctrl-C is heard.
+        """
+        handlers = {number: signal.signal(number, signal.SIG_IGN) for number in ENDING_SIGNALS}
         if self.client is not None:
             self.client.close()
         for process in (self.daemon, self.robot):
@@ -169,6 +174,8 @@ class Demo:
                 process.kill()
                 process.wait()
         self.output.close()
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
 
 
 @contextmanager
@@ -189,11 +196,13 @@ def running_demo(logs: Path, seed: int) -> Iterator[Demo]:
 
 
 def demo(options: argparse.Namespace) -> int:
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.default_int_handler)  # they end the demo as Ctrl-C does
+    for number in ENDING_SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup wants it
+            signal.signal(number, signal.default_int_handler)  # they all end the demo as Ctrl-C does
     options.out.mkdir(parents=True, exist_ok=True)
-    if options.json:
-        options.json.touch()  # a path that cannot be written is told now, not after the walk
+    if options.json and not os.access(options.json if options.json.exists() else options.json.parent, os.W_OK):
+        complain(f"{options.json} cannot be written")
+        return exit_codes.UNHEALTHY
     before = set(options.out.glob("*.mcap"))
     try:
         report, demonstration = _perform(options)

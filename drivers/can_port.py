@@ -23,7 +23,7 @@ class CanPort(Protocol):
 
     failed_sends: int
     error_frames: int
-    last_error: str
+    last_send_error: str
 
     def receive(self) -> Sequence[Frame]:
         """All data frames that have arrived, oldest first; never waits."""
@@ -43,7 +43,8 @@ class PythonCanPort:
         self._bus = bus
         self.failed_sends = 0
         self.error_frames = 0
-        self.last_error = ""
+        self.last_error = ""  # of receiving
+        self.last_send_error = ""
 
     def receive(self) -> list[Frame]:
         frames: list[Frame] = []
@@ -77,7 +78,7 @@ class PythonCanPort:
             self._bus.send(message, 0.0)
         except PORT_ERRORS as problem:  # a full transmit queue (ENOBUFS) or an interface that is gone
             self.failed_sends += 1
-            self.last_error = str(problem)
+            self.last_send_error = str(problem)
 
     def close(self) -> None:
         self._bus.shutdown()
@@ -89,5 +90,5 @@ def _as_frame(message: can.Message) -> Frame:
 
 
 def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool]) -> PythonCanPort:
-    """Raises can.CanError, OSError or ValueError with python-can's sentence where the interface does not open."""
+    """Raises what python-can raises where the interface does not open: see firmware_host/buses.py."""
     return PythonCanPort(can.Bus(interface=interface, channel=channel, **options))  # type: ignore[arg-type]

@@ -21,7 +21,7 @@ class MockPort:
         self.queue: deque[Frame] = deque(maxlen=LONGEST_QUEUE)
         self.failed_sends = 0
         self.error_frames = 0
-        self.last_error = ""
+        self.last_send_error = ""
 
     def receive(self) -> list[Frame]:
         frames = list(self.queue)

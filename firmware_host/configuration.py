@@ -12,7 +12,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
-from math import degrees, radians
+from math import ceil, degrees, radians
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
@@ -219,7 +219,7 @@ def _contradictions(configuration: Configuration) -> Iterator[str]:
 
 def _text_problems(configuration: Configuration) -> Iterator[str]:
     name, status, pose = configuration.robot.name, configuration.status.socket, configuration.pose.socket
-    if not re.fullmatch(r"[\w.-]{1,64}", name) or name.startswith("."):
+    if not re.fullmatch(r"[\w.-]{1,64}", name, re.ASCII) or name.startswith("."):
         yield f"robot.name = {name!r}: must be 1 to 64 letters, digits, dots, dashes or underscores"
     for key, path in (("status.socket", status), ("pose.socket", pose)):
         if "\0" in path or len(path.encode()) > LONGEST_SOCKET_PATH:
@@ -254,11 +254,11 @@ def _torque_problems(configuration: Configuration) -> Iterator[str]:
     """A drive must be able to give what the limits allow, or it clamps torque without a word."""
     torque_nm = configuration.limits.torque_nm
     for joint, drive in configuration.drive.items():
-        possible_nm = drive.current_limit_a * drive.torque_constant_nm_a
-        if possible_nm < torque_nm:
+        needed_a = ceil(100.0 * torque_nm / drive.torque_constant_nm_a) / 100.0
+        if drive.current_limit_a < torque_nm / drive.torque_constant_nm_a:
             yield (
                 f"drive.{joint}.current_limit_a = {drive.current_limit_a}: must be at least"
-                f" {torque_nm / drive.torque_constant_nm_a:.2f} for limits.torque_nm = {torque_nm}"
+                f" {needed_a:.2f} for limits.torque_nm = {torque_nm}"
             )
 
 

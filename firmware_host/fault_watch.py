@@ -15,18 +15,19 @@ from firmware_host.configuration import Configuration
 from firmware_host.ticker import PERIOD_S, Beat
 
 ARMING_S = 2.0  # a drive that takes longer to go into closed loop does not mean to
-REFUSED_TICKS = 5  # in a row in which a bus took no command
+REFUSED_TICKS = 5  # in a row, in each of which one bus lost a command
 FIRMWARE = (0, 6)  # major and minor version whose messages the codec knows
 
 
 class FaultWatch:
-    """Owns the count of ticks whose commands did not leave."""
+    """Owns the counts of ticks in a row in which a bus lost commands."""
 
     def __init__(self, configuration: Configuration, drives: OdriveDrives) -> None:
         self._configuration = configuration
         self._ranges = configuration.joint_ranges
         self._drives = drives
-        self._failed_sends = self._refused_ticks = 0
+        self._failed_sends = dict.fromkeys(drives.ports, 0)
+        self._refused_ticks = dict.fromkeys(drives.ports, 0)
 
     def update(
         self, beat: Beat, mode: Mode, mode_since_s: float, states: DriveStates, sent: LimitedTorques
@@ -41,19 +42,20 @@ class FaultWatch:
         )
 
     def _count_refused(self) -> None:
-        failed_sends = sum(port.failed_sends for port in self._drives.ports.values())
-        self._refused_ticks = self._refused_ticks + 1 if failed_sends > self._failed_sends else 0
-        self._failed_sends = failed_sends
+        for name, port in self._drives.ports.items():
+            lost = port.failed_sends > self._failed_sends[name]
+            self._refused_ticks[name] = self._refused_ticks[name] + 1 if lost else 0
+            self._failed_sends[name] = port.failed_sends
 
     def _of_the_loop(self, beat: Beat, sent: LimitedTorques) -> Fault | None:
         if not sent.finite:
             return Fault("not_finite", "A torque was not a finite number: this is a bug, please report it.")
         if beat.missed * PERIOD_S > self._configuration.loop.silence_s:
             return Fault("loop_stalled", f"The loop stood still for {1e3 * beat.late_s:.0f} ms.")
-        if self._refused_ticks >= REFUSED_TICKS:
-            said = [f"{name}: {port.last_error}" for name, port in self._drives.ports.items() if port.last_error]
-            why = ", ".join(said) or "it did not say why"
-            return Fault("bus_refuses", f"The bus took no command for {REFUSED_TICKS} ticks: {why}.")
+        for name, refused_ticks in self._refused_ticks.items():
+            if refused_ticks >= REFUSED_TICKS:
+                why = self._drives.ports[name].last_send_error
+                return Fault("bus_refuses", f"The {name} bus lost commands in {refused_ticks} ticks in a row: {why}.")
         return None
 
     def _of_arming(self, now_s: float, mode: Mode, mode_since_s: float, states: DriveStates) -> Fault | None:

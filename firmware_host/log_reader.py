@@ -43,11 +43,9 @@ def read_log(path: Path) -> Log:
         for record in StreamReader(stream, validate_crcs=True, record_size_limit=len(contents)).records:
             found.add(record)
         complete = True
-    except (EndOfFile, RecordLengthLimitExceeded):  # the writer was cut off in the middle of a record
-        complete = False
     except (McapError, ValueError, RuntimeError, MemoryError, struct.error) as error:
-        cut_in_a_head = isinstance(error, struct.error) and stream.tell() == len(contents)
-        if not cut_in_a_head:
+        finished = len(contents) > len(MCAP0_MAGIC) and contents.endswith(MCAP0_MAGIC)
+        if finished or not _is_cut(error, stream.tell() == len(contents)):
             raise LogError(f"{path}: damaged before byte {stream.tell()}: {error}") from None
         complete = False
     if complete and found.messages != found.messages_promised:
@@ -60,6 +58,11 @@ def read_log(path: Path) -> Log:
         _decode_rows(path, EVENT, found.rows[EVENT]),
         complete,
     )
+
+
+def _is_cut(error: Exception, at_the_end: bool) -> bool:
+    """Whether a file just ends where a record should go on: the writer was killed."""
+    return isinstance(error, EndOfFile | RecordLengthLimitExceeded) or (isinstance(error, struct.error) and at_the_end)
 
 
 def _read_contents(path: Path) -> bytes:

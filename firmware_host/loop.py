@@ -88,10 +88,9 @@ class Loop:
         self.notice = ""  # the last thing that a person should know and that is no fault
         self.ending = False  # the daemon is about to end: nothing is armed any more
         self.target_before: GaitTarget = RESTING  # commanded while the states of this tick came about
-        self._request, self._clear_until_s = Request.NONE, 0.0
+        self._request, self._clear_until_s = Request.NONE, NEVER_S
         self._mode_since_s = 0.0
         self._fault_watch = FaultWatch(configuration, drives)
-        self._recording = True
 
     def tick(self, beat: Beat) -> None:
         """Everything that happens once in PERIOD_S."""
@@ -168,7 +167,7 @@ class Loop:
         if order is not None:
             self.controller.order = order
             self.adaptation.reset(order.depth_m)
-        if self._request is not Request.DISARM:  # which nothing that comes in the same tick may undo
+        if request is not Request.CLEAR and self._request is not Request.DISARM:  # which nothing may undo
             self._request = request
         return None
 
@@ -186,9 +185,11 @@ class Loop:
 
     def _request_now(self, now_s: float) -> Request:
         """The request to act on in this tick. A clear lasts until the drives had time to report no errors."""
-        request = self._request
-        if request is not Request.CLEAR or now_s > self._clear_until_s:
-            self._request = Request.NONE
+        request, self._request = self._request, Request.NONE
+        if self.ending and request in (Request.ARM, Request.WALK):
+            request = Request.NONE
+        if request is Request.NONE and now_s <= self._clear_until_s:
+            return Request.CLEAR
         return request
 
     def _change_mode(self, mode: Mode, now_s: float) -> None:
@@ -198,8 +199,9 @@ class Loop:
             self.fault = self.health.fault
         elif mode is Mode.IDLE:
             self.fault = None
+        if mode in (Mode.ARMING, Mode.WALKING):
+            self.notice = ""
         if mode is Mode.WALKING:
-            self.notice = self.notice if not self._recording else ""
             self.estimator.reset()
         if self.mode is Mode.STOPPING and mode is Mode.HOLD and not self.controller.is_up(self.states):
             self._tell(now_s, "the flippers did not come out of the mud")
@@ -250,9 +252,6 @@ class Loop:
         )
         self.recorder.put(TICK_KIND, tick_row(moment))
         self.timing.update(beat.now_s, beat.late_s, beat.missed, tick_s)
-        if not self.recorder.writer_alive and self._recording:
-            self._recording = False
-            self.notice = "the log's writer has died: nothing is recorded any more"
 
     def _tell(self, now_s: float, notice: str) -> None:
         self.notice = notice

@@ -71,7 +71,7 @@ class OperatorCalls:
             "version": self._version,
             "mode": loop.mode.name.lower(),
             "fault": _fault(loop),
-            "notice": loop.notice,
+            "notice": loop.notice if self._recorder.writer_alive else "the log's writer has died: nothing is recorded",
             "phase": loop.target_before.phase.name.lower(),
             "stride": loop.target_before.stride,
             "depth_m": loop.controller.gait.commanded_depth_m,

@@ -44,9 +44,10 @@ class Client:
 
     def __init__(self, connection: socket.socket) -> None:
         self.connection = connection
-        self.unpacker = msgpack.Unpacker(max_buffer_size=LONGEST_REQUEST, raw=False)
+        self.unpacker = msgpack.Unpacker(max_buffer_size=LONGEST_REQUEST + READ_BYTES, raw=False)
         self.outgoing = bytearray()
-        self.closing = False
+        self.closing = False  # told off: no more is read or answered
+        self.ended = False  # it has hung up: what it asked before still counts
 
     def send(self, message: list[Any]) -> None:
         self.outgoing += msgpack.packb(message)
@@ -73,7 +74,7 @@ class StatusSocket:
         self._poll.register(self._listener.fileno(), select.EPOLLIN)
         self._clients: dict[int, Client] = {}  # the one that has been still for longest comes first
         self._waiting: dict[int, None] = {}  # in turn: clients that may have a request not yet answered
-        self.displaced_clients = self.garbled_requests = 0
+        self.garbled_requests = 0
 
     def serve(self) -> None:
         for descriptor, events in self._poll.poll(0.0):
@@ -92,42 +93,42 @@ class StatusSocket:
         except OSError:  # the client left again before it was let in
             return
         if len(self._clients) >= MOST_CLIENTS:
-            self.displaced_clients += 1
-            self._drop(next(iter(self._clients)))
+            still = (descriptor for descriptor in self._clients if descriptor not in self._waiting)
+            self._drop(next(still, next(iter(self._clients))))
         connection.setblocking(False)
         self._clients[connection.fileno()] = Client(connection)
         self._poll.register(connection.fileno(), select.EPOLLIN)
 
     def _attend(self, descriptor: int, events: int) -> None:
+        """Read, unless something of this client still waits for its turn: the kernel keeps the rest."""
         client = self._clients[descriptor] = self._clients.pop(descriptor)  # to the end of the order
-        try:
-            if events & select.EPOLLOUT:
-                client.flush()
-            if events & (select.EPOLLIN | select.EPOLLHUP) and not client.closing:
+        if events & (select.EPOLLIN | select.EPOLLHUP) and descriptor not in self._waiting and not client.ended:
+            try:
                 data = client.connection.recv(READ_BYTES)
-                if not data:
-                    return self._drop(descriptor)
+                client.ended = not data
                 client.unpacker.feed(data)
                 self._waiting[descriptor] = None
-        except msgpack.BufferFull:
-            self._reject(client, None, f"a request must be shorter than {LONGEST_REQUEST} bytes")
-        except OSError:
-            return self._drop(descriptor)
+            except msgpack.BufferFull:
+                self._reject(client, None, f"a request must be shorter than {LONGEST_REQUEST} bytes")
+            except OSError:
+                return self._drop(descriptor)
         return self._settle(descriptor)
 
     def _answer_one(self, descriptor: int) -> None:
         client = self._clients.get(descriptor)
         if client is None or client.closing:
-            return
+            return None
         try:
             message = next(client.unpacker, NOTHING)
         except (ValueError, msgpack.UnpackException, RecursionError):  # bytes that are not MessagePack
             self._reject(client, None, "not a MessagePack message")
         else:
+            if message is NOTHING and client.ended:
+                return self._drop(descriptor)
             if message is not NOTHING:
                 self._waiting[descriptor] = None  # there may be another one behind it
                 self._answer(client, message)
-        self._settle(descriptor)
+        return self._settle(descriptor)
 
     def _answer(self, client: Client, message: Any) -> None:
         if not _is_request(message):
@@ -154,12 +155,14 @@ class StatusSocket:
         client = self._clients[descriptor]
         try:
             client.flush()
-        except OSError:
-            return self._drop(descriptor)
+        except OSError:  # nobody fetches the answers any more; what was asked before still counts
+            client.ended = True
+            client.outgoing.clear()
+            self._waiting.setdefault(descriptor)
         if client.closing or len(client.outgoing) > LONGEST_BACKLOG:
             return self._drop(descriptor)
-        wanted = select.EPOLLIN | (select.EPOLLOUT if client.outgoing else 0)
-        return self._poll.modify(descriptor, wanted)
+        wanted = 0 if client.ended else select.EPOLLIN
+        return self._poll.modify(descriptor, wanted | (select.EPOLLOUT if client.outgoing else 0))
 
     def _drop(self, descriptor: int) -> None:
         client = self._clients.pop(descriptor)

@@ -115,7 +115,7 @@ def test_failed_sends_are_counted_and_do_not_raise() -> None:
     port.send(Frame(1))
     port.send(Frame(2))
     assert port.failed_sends == 2
-    assert "No buffer space" in port.last_error
+    assert "No buffer space" in port.last_send_error
 
 
 def test_a_failed_receive_is_counted_and_does_not_raise() -> None:

@@ -16,6 +16,7 @@ from drivers.odrive_codec import ERROR_WATCHDOG, SET_INPUT_TORQUE, AxisState
 from firmware_host.configuration import Configuration, parse_configuration
 from firmware_host.log_rows import EVENT
 from firmware_host.loop import EVENT_KIND, STRIDE_KIND, TICK_KIND
+from firmware_host.operator_calls import OperatorCalls
 from firmware_host.recorder import NullRecorder
 from firmware_host.ticker import PERIOD_S, Beat
 from simulation.clay import MUDS, Clay
@@ -214,7 +215,7 @@ def test_a_bus_that_takes_no_commands_is_a_fault(robot: Lockstep) -> None:
 
     def fail(frame: Frame) -> None:
         port.failed_sends += 1
-        port.last_error = "No buffer space available"
+        port.last_send_error = "No buffer space available"
 
     port.send = fail  # type: ignore[method-assign]
     robot.run_for(10 * PERIOD_S)
@@ -358,9 +359,28 @@ def test_a_fixed_depth_stays_fixed(robot: Lockstep) -> None:
 
 def test_a_log_that_is_lost_is_told(robot: Lockstep) -> None:
     robot.run_for(0.1)
-    recorder_of(robot).writer_alive = False
+    recorder = recorder_of(robot)
+    recorder.writer_alive = False
+    calls = OperatorCalls(robot.loop, recorder, None, [], lambda: robot.now_s)
+    assert calls.status({})["notice"] == "the log's writer has died: nothing is recorded"
+
+
+def test_nothing_cancels_a_clear_that_waits_for_the_drives(robot: Lockstep) -> None:
+    robot.arm()
+    robot.robot.drives[0]._disarm(ERROR_WATCHDOG)
+    assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
+    robot.loop.request(Request.CLEAR, robot.now_s)
     robot.step()
-    assert robot.loop.notice == "the log's writer has died: nothing is recorded any more"
+    robot.loop.request(Request.STOP, robot.now_s)
+    assert robot.run_until(lambda: robot.loop.mode is Mode.IDLE, 0.6)
+
+
+def test_single_lost_commands_on_both_buses_are_no_fault(robot: Lockstep) -> None:
+    robot.arm()
+    for number in range(20):
+        robot.loop.drives.ports["left" if number % 2 else "right"].failed_sends += 1
+        robot.step()
+    assert robot.loop.mode is Mode.HOLD
 
 
 def test_four_drives_on_one_bus_walk_as_well(example_text: str) -> None:

@@ -152,7 +152,7 @@ def test_the_network_files_configure_the_same_buses(configuration: Configuration
 
 class CountingPort:
     failed_sends = error_frames = 0
-    last_error = ""
+    last_send_error = ""
 
     def __init__(self) -> None:
         self.sent = 0
