@@ -13,18 +13,18 @@ from statistics import median
 from time import perf_counter
 from typing import Any
 
+from benchmarks.example_robot import load_example
 from benchmarks.report import Progress, new_parser, print_report, verdict
 from command_line.screen import table
 from control.controller import WalkOrder
-from firmware_host.configuration import load_configuration
-from simulation.lockstep import Lockstep, default_configuration_path
+from simulation.lockstep import Lockstep
 from simulation.track import paper_track
 
 BAR_TIMES = 5.0
 
 
 def walk_once(longest_s: float) -> dict[str, Any]:
-    configuration, track = load_configuration(default_configuration_path()), paper_track()
+    configuration, track = load_example(), paper_track()
     walk = Lockstep(configuration, track)
     walk.arm()
     walk.walk(WalkOrder(configuration.adaptation.initial_depth_m))

@@ -16,15 +16,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.example_robot import load_example
 from benchmarks.report import Progress, new_parser, print_report, verdict
 from command_line.screen import table
 from control.controller import WalkOrder
 from control.modes import Mode
-from firmware_host.configuration import load_configuration
 from firmware_host.realtime import freeze_garbage
 from firmware_host.recorder import Recorder
 from simulation.clay import MUDS
-from simulation.lockstep import Lockstep, default_configuration_path
+from simulation.lockstep import Lockstep
 from simulation.track import Track
 
 BAR_KIB = 1024.0
@@ -44,7 +44,7 @@ def long_track() -> Track:
 
 
 def walk_long(seconds: float, every_s: float, folder: Path, progress: Progress) -> dict[str, Any]:
-    configuration = load_configuration(default_configuration_path())
+    configuration = load_example()
     recorder = Recorder(folder / "walk.mcap", configuration.text, {})
     try:
         walk = Lockstep(configuration, long_track(), recorder=recorder)

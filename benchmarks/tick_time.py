@@ -21,6 +21,7 @@ from statistics import median
 from time import perf_counter
 from typing import Any, NamedTuple
 
+from benchmarks.example_robot import load_example
 from benchmarks.report import Progress, new_parser, print_report, summary_us, verdict
 from command_line.screen import table
 from control.controller import WalkOrder
@@ -29,12 +30,12 @@ from control.records import JOINTS
 from drivers.can_port import CanPort, open_port
 from drivers.mock_bus import MockBus
 from drivers.odrive_drives import OdriveDrives
-from firmware_host.configuration import Configuration, load_configuration
+from firmware_host.configuration import Configuration
 from firmware_host.loop import Loop
 from firmware_host.realtime import freeze_garbage
 from firmware_host.recorder import NullRecorder, Recorder, Recording
 from firmware_host.ticker import PERIOD_S, RATE_HZ, Beat
-from simulation.lockstep import Lockstep, default_configuration_path, drives_of, plant_of
+from simulation.lockstep import Lockstep, drives_of, plant_of
 from simulation.robot import SimulatedRobot
 from simulation.track import paper_track
 
@@ -279,7 +280,7 @@ class TimedWalk:
 
 
 def measure(variant: str, seconds: int, progress: Progress, done: int) -> dict[str, Any]:
-    configuration = load_configuration(default_configuration_path())
+    configuration = load_example()
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mudskipper-")))
         wiring = VARIANTS[variant](configuration.bus, folder)

@@ -96,8 +96,8 @@ class Controller:
         """Torques wanted of the four joints; `target` then says where in the stride they belong to."""
         if mode is not self._mode:
             self._enter(mode, states)
+        self.target = RESTING
         if mode not in MOVING:
-            self.target = RESTING
             return NO_TORQUE
         self._fade = min(1.0, self._fade + dt_s / max(self.motion.fade_in_s, dt_s))
         if mode is Mode.STOPPING and self._path is not None and self._path.finished:
@@ -130,10 +130,8 @@ class Controller:
 
     def _targets(self, dt_s: float, mode: Mode) -> JointTargets:
         if mode is Mode.HOLD or self._path is None:
-            self.target = RESTING
             return self._pose
         if mode is Mode.STOPPING or not self._path.finished:
-            self.target = RESTING
             self._pose = self._path.step(dt_s)
             return self._pose
         self.target = self.gait.step(dt_s)

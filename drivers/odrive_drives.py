@@ -57,7 +57,7 @@ class OdriveAxis:
         self._angle_stamp_s = self._current_stamp_s = self._heartbeat_stamp_s = NEVER_S
         self._temperature_c = self._bus_voltage_v = UNKNOWN
         self._temperature_stamp_s = NEVER_S
-        self._closed_loop = False
+        self.closed_loop = False
         self._error_flags = 0
         self.disarm_reason = 0
         self.version: Version | None = None
@@ -91,7 +91,7 @@ class OdriveAxis:
 
     def _receive_heartbeat(self, data: bytes, now_s: float) -> None:
         self._error_flags, state, _, _ = codec.HEARTBEAT.decode(data)
-        self._closed_loop = state == AxisState.CLOSED_LOOP
+        self.closed_loop = state == AxisState.CLOSED_LOOP
         self._heartbeat_stamp_s = now_s
 
     def _receive_error(self, data: bytes, now_s: float) -> None:
@@ -116,7 +116,7 @@ class OdriveAxis:
             self._angle_stamp_s,
             self._current_a,
             self._current_stamp_s,
-            self._closed_loop,
+            self.closed_loop,
             self._error_flags,
             self._heartbeat_stamp_s,
             self._temperature_c,
@@ -217,7 +217,7 @@ class OdriveDrives:
             return
         self._armed_s = now_s
         for axis in self.axes:
-            if at_once or not axis.state.closed_loop:
+            if at_once or not axis.closed_loop:
                 axis.arm()
 
     def disarm(self, now_s: float, at_once: bool = False) -> None:
@@ -225,7 +225,7 @@ class OdriveDrives:
         if not at_once and now_s - self._disarmed_s < REPEAT_S:
             return
         for axis in self.axes:
-            if at_once or axis.state.closed_loop:
+            if at_once or axis.closed_loop:
                 self._disarmed_s = now_s
                 axis.disarm()
 

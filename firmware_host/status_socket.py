@@ -117,18 +117,16 @@ class StatusSocket:
     def _answer_one(self, descriptor: int) -> None:
         client = self._clients.get(descriptor)
         if client is None or client.closing:
-            return None
+            return
         try:
             message = next(client.unpacker, NOTHING)
         except (ValueError, msgpack.UnpackException, RecursionError):  # bytes that are not MessagePack
             self._reject(client, None, "not a MessagePack message")
         else:
-            if message is NOTHING and client.ended:
-                return self._drop(descriptor)
             if message is not NOTHING:
                 self._waiting[descriptor] = None  # there may be another one behind it
                 self._answer(client, message)
-        return self._settle(descriptor)
+        self._settle(descriptor)
 
     def _answer(self, client: Client, message: Any) -> None:
         if not _is_request(message):
@@ -151,7 +149,7 @@ class StatusSocket:
         client.closing = True
 
     def _settle(self, descriptor: int) -> None:
-        """Send what can be sent; drop a client that is told off or does not fetch its answers."""
+        """Send what can be sent; drop a client that is told off, does not fetch its answers, or is done with."""
         client = self._clients[descriptor]
         try:
             client.flush()
@@ -159,7 +157,8 @@ class StatusSocket:
             client.ended = True
             client.outgoing.clear()
             self._waiting.setdefault(descriptor)
-        if client.closing or len(client.outgoing) > LONGEST_BACKLOG:
+        done = client.ended and descriptor not in self._waiting and not client.outgoing
+        if done or client.closing or len(client.outgoing) > LONGEST_BACKLOG:
             return self._drop(descriptor)
         wanted = 0 if client.ended else select.EPOLLIN
         return self._poll.modify(descriptor, wanted | (select.EPOLLOUT if client.outgoing else 0))

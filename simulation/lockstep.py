@@ -7,7 +7,6 @@ encoded and decoded.
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from random import Random
 
 from control.controller import WalkOrder
@@ -115,7 +114,3 @@ class Lockstep:
         if refused:
             raise RuntimeError(refused)
         self.step()
-
-
-def default_configuration_path() -> Path:
-    return Path(__file__).parent.parent / "systemd" / "mudskipper.toml"

@@ -193,6 +193,22 @@ def test_a_wish_counts_although_its_client_has_hung_up(served: StatusSocket) -> 
     assert len(served._clients) == 1
 
 
+def test_a_client_that_has_no_more_to_ask_still_gets_a_long_answer_whole(served: StatusSocket) -> None:
+    client = connect(served)
+    client.sendall(msgpack.packb([0, 1, "long", {}]))
+    client.shutdown(socket.SHUT_WR)
+    serve(served, 10)  # before it fetches anything
+    client.setblocking(False)
+    received = bytearray()
+    for _ in range(50):
+        served.serve()
+        with contextlib.suppress(BlockingIOError):
+            received += client.recv(65536)
+    ((_, _, _, result),) = _unpacked(bytes(received))
+    assert len(result) == 300_000
+    assert served._clients == {}
+
+
 def test_many_short_requests_at_once_are_all_answered(served: StatusSocket) -> None:
     client = connect(served)
     client.sendall(b"".join(msgpack.packb([0, number, "echo", {}]) for number in range(600)))

@@ -1,0 +1,9 @@
+"""The robot that the benchmarks run: the one of the example configuration."""
+
+from pathlib import Path
+
+from firmware_host.configuration import Configuration, load_configuration
+
+
+def load_example() -> Configuration:
+    return load_configuration(Path(__file__).parent.parent / "systemd" / "mudskipper.toml")
