@@ -13,7 +13,7 @@ from firmware_host.configuration import ConfigurationError, load_configuration
 from firmware_host.lab_csv import write_lab_csv
 from firmware_host.log_reader import LogError, log_summary, read_log
 from firmware_host.replay import Replay, replay_file
-from firmware_host.reports import stride_report
+from firmware_host.reports import map_report, stride_report
 
 Options = argparse.Namespace
 
@@ -21,7 +21,7 @@ Options = argparse.Namespace
 def replay(options: Options) -> int:
     try:
         configuration = load_configuration(options.config) if options.config else None
-        replayed = replay_file(options.file, configuration)
+        replayed = replay_file(options.file, configuration, options.method)
     except ConfigurationError as problem:
         for sentence in problem.problems:
             complain(sentence)
@@ -36,7 +36,8 @@ def replay(options: Options) -> int:
 def _show_replay(replayed: Replay, as_json: bool) -> None:
     strides = [stride_report(stride) for stride in replayed.strides]
     if as_json:
-        print(json.dumps({"strides": strides, "flippers": replayed.flippers, "complete": replayed.complete}))
+        report = {"strides": strides, "map": map_report(replayed.map), "flippers": replayed.flippers}
+        print(json.dumps(report | {"complete": replayed.complete}))
         return
     print(f"{STRIDE_HEAD}  {'f_z in':>7} {'f_x':>6} {'f_z out':>7}\n{STRIDE_UNITS}  {'N':>7} {'N':>6} {'N':>7}")
     for report, stride in zip(strides, replayed.strides, strict=True):

@@ -16,6 +16,7 @@ from command_line import exit_codes
 from command_line.screen import complain
 
 DEFAULT_SOCKET = "/run/mudskipper/mudskipper.sock"
+METHODS = ("default", "paper")  # of estimation
 DEFAULT_CONFIG = "/etc/mudskipper/mudskipper.toml"
 
 
@@ -30,6 +31,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_operation(commands)
     _add_simulation(commands)
     _add_logs(commands)
+    _add_experiments(commands)
     return parser
 
 
@@ -111,6 +113,7 @@ def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
     replay.add_argument("file", type=Path)
     replay.add_argument("--json", action="store_true")
     replay.add_argument("--config", type=Path, help="instead of the one in the log")
+    replay.add_argument("--method", choices=METHODS, help="of estimation, instead of the configured one")
     log = commands.add_parser("log", help="Look into a log.")  # type: ignore[attr-defined]
     actions = log.add_subparsers(dest="action", required=True, metavar="action")
     info = _add(actions, "info", "logs.info", "What a log holds.")
@@ -120,6 +123,35 @@ def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
     export.add_argument("file", type=Path)
     export.add_argument("--csv", action="store_true", required=True, help="the format; there is one so far")
     export.add_argument("--out", type=Path, help="file to write (default: standard output)")
+
+
+def _add_experiments(commands: Commands) -> None:  # type: ignore[valid-type]
+    experiment = commands.add_parser("experiment", help="The paper's experiments.")  # type: ignore[attr-defined]
+    names = experiment.add_subparsers(dest="name", required=True, metavar="name")
+    estimation = _add(names, "estimation", "experiment.estimation", "Estimated coefficients against a load cell.")
+    estimation.add_argument("--simulated", action="store_true", help="the load cell is a virtual one")
+    estimation.add_argument("--json", action="store_true", help="for machines")
+    estimation.add_argument("--out", type=Path, metavar="DIR", help="write JSON and picture there")
+    estimation.add_argument("--setup", choices=("single", "walking", "both"), default="both")
+    estimation.add_argument("--seeds", type=_seeds, default=10, metavar="N", help="trials of each mud (default: 10)")
+    muds = estimation.add_mutually_exclusive_group()
+    muds.add_argument("--mud", action="append", type=float, metavar="W", help="water content in percent, repeatable")
+    muds.add_argument("--strength", action="append", type=_strength_pa, metavar="PA", help="instead, repeatable")
+    estimation.add_argument("--layers", metavar="A,B", help="disturbances, separated by commas, or none (default: all)")
+
+
+def _seeds(text: str) -> int:
+    value = int(text)
+    if not 1 <= value <= 1000:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 1 to 1000")
+    return value
+
+
+def _strength_pa(text: str) -> float:
+    value = float(text)
+    if not 50.0 <= value <= 50000.0:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 50 to 50000 Pa")
+    return value
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

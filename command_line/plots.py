@@ -49,20 +49,26 @@ def _plot_forces(panel: Axes, time_s: Array, rows: Array) -> None:
 
 
 def _plot_coefficient(panel: Axes, strides: list[dict[str, Any]], name: str, start_s: float) -> None:
-    """Full dots are valid, hollow ones are not; bars are two standard errors."""
+    """Full dots are values, triangles lower bounds, hollow dots not valid; bars are two standard errors."""
     for number, flipper in enumerate(("left", "right")):
-        for valid in (True, False):
-            told = [s for s in strides if s["flipper"] == number and s[f"{name}_valid"] == valid and s[name] == s[name]]
+        for valid, at_least, mark in ((True, False, "o"), (True, True, "^"), (False, False, "o")):
+            told = [
+                s
+                for s in strides
+                if s["flipper"] == number
+                and (s[f"{name}_valid"], s[f"{name}_at_least"] and valid) == (valid, at_least)
+                and s[name] == s[name]
+            ]
             panel.errorbar(
                 [s["stamp_s"] - start_s for s in told],
                 [s[name] / 1e6 for s in told],
                 [2.0 * s[f"{name}_std_error"] / 1e6 for s in told],
-                fmt="o",
+                fmt=mark,
                 markersize=4,
                 linewidth=1,
                 color=FLIPPER_COLOURS[flipper],
                 markerfacecolor=FLIPPER_COLOURS[flipper] if valid else "white",
-                label=flipper if valid else None,
+                label=flipper if mark == "o" and valid else None,
             )
     panel.set(ylabel=f"${name}$ (N/cm³)", ylim=(0, None))
     panel.legend(loc="upper left", ncols=2, fontsize="small")

@@ -30,16 +30,33 @@ def number(value: float | None, digits: int = 3) -> str:
     return "-" if value is None or not isfinite(value) else f"{value:.{digits}f}"
 
 
+class Progress:
+    """One line on a terminal's standard error while something takes its time; silent anywhere else."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._shown = sys.stderr.isatty()
+
+    def show(self, done: int, total: int) -> None:
+        if self._shown:
+            print(f"\r\033[K{done} of {total} {self._what}", end="", file=sys.stderr, flush=True)
+
+    def clear(self) -> None:
+        if self._shown:
+            print("\r\033[K", end="", file=sys.stderr, flush=True)
+
+
 def complain(sentence: str) -> None:
     """To a person, beside the data."""
     print(f"mudskipper: {sentence}", file=sys.stderr)
 
 
 def coefficient(estimate: dict[str, Any]) -> str:
-    """In N/cm³ with its standard error; in brackets where it is not valid."""
+    """In N/cm³ with its standard error; after a ≥ where it is a lower bound, in brackets where it is not valid."""
     if estimate["value"] is None or estimate["std_error"] is None:
         return "-"
     text = f"{estimate['value'] / 1e6:.2f}±{estimate['std_error'] / 1e6:.2f}"
+    text = f"≥{text}" if estimate["at_least"] else text
     return text if estimate["valid"] else f"({text})"
 
 

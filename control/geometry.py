@@ -41,6 +41,7 @@ class FlipperGeometry:
     axis_height_m: Annotated[float, Bounds(0.0, 1.0)] = 0.0645
     plate_width_m: Annotated[float, Bounds(0.002, 0.5)] = 0.025
     plate_thickness_m: Annotated[float, Bounds(0.0002, 0.1)] = 0.004
+    plate_height_m: Annotated[float, Bounds(0.002, 0.5)] = 0.070
 
     @property
     def clearance_m(self) -> float:

@@ -84,13 +84,14 @@ NO_LOAD = FlipperLoad(UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN)
 
 
 class Estimate(NamedTuple):
-    """One coefficient with its doubt. `reason` says why it is not valid and is empty where it is."""
+    """One coefficient with its doubt. `reason` says why it is not valid, or why it is only a lower bound."""
 
     value: float  # N/m³
     std_error: float  # N/m³
-    samples: int
+    samples: int  # distinct ones
     valid: bool
     reason: str = ""
+    at_least: bool = False  # the mud did not yield: its coefficient is this or more
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +115,11 @@ class StrideEstimate:
     stance_force_n: float  # largest forward force in stance
     extraction_force_n: float  # most negative upward force in extraction
     step_m: float  # the body's advance since the stride before; NaN without a pose
+    surface_std_error_m: float = UNKNOWN
+    place_m: float = UNKNOWN  # of the body along the track when the insertion ended; NaN without a pose
+    stance: str = "unknown"  # yield, body, mixed, saturated or unknown: whether the mud sheared or the body moved
+    tare_n: float = UNKNOWN  # weight of what clings to the flipper
+    tare_drift_n: float = UNKNOWN  # since the stride before
 
 
 class BodyPose(NamedTuple):

@@ -6,6 +6,7 @@ without CAN) and carries the frames. Its Message objects stay on this side.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -49,6 +50,7 @@ class PythonCanPort:
     def receive(self) -> list[Frame]:
         frames: list[Frame] = []
         failures = 0
+        clock_s = time.monotonic() - time.time()  # python-can stamps with the clock on the wall
         for _ in range(MOST_FRAMES_PER_READ):
             try:
                 message = self._bus.recv(0.0)
@@ -64,7 +66,7 @@ class PythonCanPort:
             if message.is_error_frame:  # first: its class bits look like a drive's id
                 self.error_frames += 1
             else:
-                frames.append(_as_frame(message))
+                frames.append(_as_frame(message, clock_s))
         return frames
 
     def send(self, frame: Frame) -> None:
@@ -84,9 +86,9 @@ class PythonCanPort:
         self._bus.shutdown()
 
 
-def _as_frame(message: can.Message) -> Frame:
+def _as_frame(message: can.Message, clock_s: float) -> Frame:
     data, is_remote, is_extended = bytes(message.data), message.is_remote_frame, message.is_extended_id
-    return Frame(message.arbitration_id, data, is_remote, False, is_extended)
+    return Frame(message.arbitration_id, data, is_remote, False, is_extended, message.timestamp + clock_s)
 
 
 def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool]) -> PythonCanPort:

@@ -11,6 +11,8 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
+from control.records import NEVER_S
+
 FRAME_LAYOUT = struct.Struct("<IB3x8s")
 EXTENDED_FLAG, REMOTE_FLAG, ERROR_FLAG = 0x80000000, 0x40000000, 0x20000000
 STANDARD_MASK, EXTENDED_MASK = 0x7FF, 0x1FFFFFFF
@@ -23,10 +25,11 @@ class Frame(NamedTuple):
     is_remote: bool = False
     is_error: bool = False
     is_extended: bool = False
+    stamp_s: float = NEVER_S  # monotonic clock when it was on the bus, where the port knows; not among the 16 bytes
 
 
 def encode_frame(frame: Frame) -> bytes:
-    identifier, data, is_remote, is_error, is_extended = frame
+    identifier, data, is_remote, is_error, is_extended, _ = frame
     largest = EXTENDED_MASK if is_extended or is_error else STANDARD_MASK
     if not 0 <= identifier <= largest:
         raise ValueError(f"Identifier {identifier:#x} lies outside of 0 to {largest:#x}.")

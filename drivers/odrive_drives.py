@@ -20,6 +20,7 @@ from drivers.frames import Frame
 from drivers.odrive_codec import AxisState, GarbledMessageError, Message, arbitration_id
 
 REPEAT_S = 0.1  # between two requests to change the axis state, of which the heartbeat tells the result
+LONGEST_IN_QUEUE_S = 0.05  # a stamp older than that is of another clock
 VERSION_REPEAT_S = 0.5
 TURN_RAD = 2.0 * pi
 
@@ -182,7 +183,7 @@ class OdriveDrives:
         self._armed_s = self._disarmed_s = self._version_asked_s = NEVER_S
 
     def read(self, now_s: float) -> DriveStates:
-        """The newest of every signal after draining the ports; `now_s` stamps what arrived."""
+        """The newest of every signal after draining the ports, with the stamp of its frame."""
         for port, receivers in self._receivers:
             for frame in port.receive():
                 receive = None if frame.is_remote or frame.is_extended else receivers.get(frame.arbitration_id)
@@ -190,7 +191,7 @@ class OdriveDrives:
                     self.unknown_frames += 1
                     continue
                 try:
-                    receive(frame.data, now_s)
+                    receive(frame.data, _stamp_s(frame, now_s))
                 except GarbledMessageError:
                     self.garbled_frames += 1
         a, b, c, d = self.axes
@@ -245,3 +246,8 @@ class OdriveDrives:
     def close(self) -> None:
         for port in self.ports.values():
             port.close()
+
+
+def _stamp_s(frame: Frame, now_s: float) -> float:
+    """When a frame was on the bus, or now, where its port does not know or its clock is another one."""
+    return frame.stamp_s if 0.0 <= now_s - frame.stamp_s < LONGEST_IN_QUEUE_S else now_s

@@ -1,20 +1,41 @@
-"""The estimator that the loop, the replay and the simulator's tests share: both flippers, one sample a tick.
+"""The estimator that the loop, the replay and the experiments share: both flippers, one sample a tick, and what is
+known of the mud from stride to stride.
 
 It sees angles, currents, the gait's phase and the body's place, and nothing else: no bus, no clock. The same samples
-give the same numbers to the last digit, live or from a log.
+give the same numbers to the last digit, live or from a log. Two methods share its interface: `default`, in torque
+space, and `paper`, the published one, with its biases.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, Literal, NamedTuple
 
+from control.bounds import Bounds
+from control.coefficient import NOTHING_KNOWN, MudBelief
 from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass
-from control.records import NO_LOAD, FlipperLoad, JointAngles, Phase, StrideEstimate
-from estimation.stride import FlipperEstimator
+from control.records import FLIPPERS, NO_LOAD, FlipperLoad, JointAngles, Phase, StrideEstimate
+from estimation.flipper import FlipperEstimator
+from estimation.joint_load import FlipperDrive, JointSample
+from estimation.knowledge import MudKnowledge
+from estimation.mud_map import MudMap
+from estimation.paper import PaperEstimator
+from estimation.shear import Base
 
 JointVelocities = tuple[float, float, float, float]  # rad/s, in the order of JOINTS
 Currents = tuple[float, float, float, float]  # A, in the order of JOINTS
+Ages = tuple[float, float, float, float]  # s, in the order of JOINTS
+FRESH: Ages = (0.0, 0.0, 0.0, 0.0)
+PAPER_DRAG_N = 2.5  # of the body on its rail
+Method = Literal["default", "paper"]
+
+
+@dataclass(frozen=True)
+class EstimationParameters:
+    method: Method = "default"
+    fixed_base: bool = False  # the flippers hang from a bench: all their travel shears mud
+    surface_error_m: Annotated[float, Bounds(0.0001, 0.05)] = 0.001  # of the mud's nominal height, at one stride
+    paper_compensation: bool = False  # method "paper" adds that drag while the body advances
 
 
 class MudReading(NamedTuple):
@@ -24,16 +45,30 @@ class MudReading(NamedTuple):
 
 
 class MudEstimator:
+    """Owns both flippers' estimators, the memory from stride to stride, and the map along the way."""
+
     def __init__(
-        self, geometry: FlipperGeometry, mass: ArmMass, torque_constants_nm_a: tuple[float, float, float, float]
+        self,
+        geometry: FlipperGeometry,
+        drives: tuple[FlipperDrive, FlipperDrive],
+        parameters: EstimationParameters = EstimationParameters(),
+        body_drag_n: float = PAPER_DRAG_N,
     ) -> None:
-        a, b, c, d = torque_constants_nm_a
-        self.left = FlipperEstimator("left", geometry, mass, a, b)
-        self.right = FlipperEstimator("right", geometry, mass, c, d)
+        """`drives`: of the left and the right flipper; `body_drag_n`: less thrust cannot have moved the body."""
+        self.left, self.right = (
+            _flipper_estimator(flipper, geometry, drive, parameters, body_drag_n)
+            for flipper, drive in zip(FLIPPERS, drives, strict=True)
+        )
+        self._knowledge = MudKnowledge()
+        self.map = MudMap()
+        self.belief: MudBelief = NOTHING_KNOWN
 
     def reset(self) -> None:
         self.left.reset()
         self.right.reset()
+        self._knowledge.reset()
+        self.map.reset()
+        self.belief = NOTHING_KNOWN
 
     def update(
         self,
@@ -43,14 +78,30 @@ class MudEstimator:
         velocities_rad_s: JointVelocities,
         currents_a: Currents,
         body_x_m: float,
+        angle_ages_s: Ages = FRESH,
+        current_ages_s: Ages = FRESH,
     ) -> MudReading:
-        """One sample of everything, in the order of JOINTS; what is not known is NaN."""
-        a1, a2, a3, a4 = angles_rad
-        v1, v2, v3, v4 = velocities_rad_s
-        i1, i2, i3, i4 = currents_a
-        left, left_stride = self.left.update(now_s, phase, a1, a2, v1, v2, i1, i2, body_x_m)
-        right, right_stride = self.right.update(now_s, phase, a3, a4, v3, v4, i3, i4, body_x_m)
+        """One sample of everything, in the order of JOINTS, with the ages of its messages; what is not known is NaN."""
+        a, b, c, d = (
+            JointSample(angle_rad, velocity_rad_s, current_a, now_s - angle_age_s, now_s - current_age_s)
+            for angle_rad, velocity_rad_s, current_a, angle_age_s, current_age_s in zip(
+                angles_rad, velocities_rad_s, currents_a, angle_ages_s, current_ages_s, strict=True
+            )
+        )
+        left, left_stride = self.left.update(now_s, phase, a, b, body_x_m)
+        right, right_stride = self.right.update(now_s, phase, c, d, body_x_m)
         if left_stride is None and right_stride is None:
             return MudReading(left, right)
         strides = tuple(stride for stride in (left_stride, right_stride) if stride is not None)
+        self.belief = self._knowledge.update(strides)
+        self.map.update(body_x_m, strides)
         return MudReading(left, right, strides)
+
+
+def _flipper_estimator(
+    flipper: str, geometry: FlipperGeometry, drive: FlipperDrive, parameters: EstimationParameters, body_drag_n: float
+) -> FlipperEstimator | PaperEstimator:
+    if parameters.method == "paper":
+        return PaperEstimator(flipper, geometry, drive, body_drag_n if parameters.paper_compensation else 0.0)
+    base = Base.FIXED if parameters.fixed_base else Base.FREE
+    return FlipperEstimator(flipper, geometry, drive, base, body_drag_n, parameters.surface_error_m)

@@ -23,10 +23,13 @@ from control.bounds import Bounds
 from control.controller import MotionParameters
 from control.gait import PROTOCOLS, GaitParameters
 from control.geometry import FlipperGeometry
+from control.joint_friction import NO_FRICTION, JointFriction
 from control.joint_pd import ArmMass, JointGains
 from control.limits import JointLimits, JointRange
 from control.records import JOINTS
 from drivers.odrive_drives import DriveParameters
+from estimation.joint_load import FlipperDrive
+from estimation.mud import EstimationParameters
 
 LONGEST_SOCKET_PATH = 107  # sun_path of unix(7) has 108 bytes with its final zero
 EXIT_CONFIGURATION = 78  # EX_CONFIG of sysexits.h; systemd is told not to restart on it
@@ -89,6 +92,8 @@ class Configuration:
     gains: JointGains = JointGains()
     motion: MotionParameters = MotionParameters()
     limits: JointLimits = JointLimits()
+    estimation: EstimationParameters = EstimationParameters()
+    friction: dict[str, JointFriction] = field(default_factory=dict)  # by joint, where it was measured
     adaptation: AdaptationParameters = AdaptationParameters()
     loop: LoopParameters = LoopParameters()
     log: LogParameters = LogParameters()
@@ -100,6 +105,24 @@ class Configuration:
     def torque_constants_nm_a(self) -> tuple[float, float, float, float]:
         a, b, c, d = (self.drive[joint].torque_constant_nm_a for joint in JOINTS)
         return a, b, c, d
+
+    @property
+    def flipper_drives(self) -> tuple[FlipperDrive, FlipperDrive]:
+        """What the estimator knows of the left and the right flipper's motors."""
+        left, right = (self._flipper_drive(*JOINTS[place : place + 2]) for place in (0, 2))
+        return left, right
+
+    def _flipper_drive(self, sweep: str, adduction: str) -> FlipperDrive:
+        drives = (self.drive[sweep], self.drive[adduction])
+        limits_a = [min(d.current_limit_a, self.limits.torque_nm / d.torque_constant_nm_a) for d in drives]
+        return FlipperDrive(
+            self.arm,
+            drives[0].torque_constant_nm_a,
+            drives[1].torque_constant_nm_a,
+            self.friction.get(sweep, NO_FRICTION),
+            self.friction.get(adduction, NO_FRICTION),
+            min(limits_a),
+        )
 
     @property
     def joint_ranges(self) -> tuple[JointRange, JointRange, JointRange, JointRange]:
@@ -212,6 +235,7 @@ def _sentence(error: Any) -> str:
 def _contradictions(configuration: Configuration) -> Iterator[str]:
     yield from _text_problems(configuration)
     yield from _drive_problems(configuration)
+    yield from _friction_problems(configuration)
     yield from _depth_problems(configuration)
     yield from _range_problems(configuration)
     yield from _torque_problems(configuration)
@@ -248,6 +272,12 @@ def _drive_problems(configuration: Configuration) -> Iterator[str]:
         twin = places.setdefault((drive.bus, drive.node_id), joint)
         if twin != joint:
             yield f"drive.{joint}.node_id = {drive.node_id}: {twin} has the same on bus {drive.bus!r}"
+
+
+def _friction_problems(configuration: Configuration) -> Iterator[str]:
+    for joint in configuration.friction:
+        if joint not in JOINTS:
+            yield f"friction.{joint}: there is no such joint; the joints are {', '.join(JOINTS)}"
 
 
 def _torque_problems(configuration: Configuration) -> Iterator[str]:

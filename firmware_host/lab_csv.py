@@ -53,6 +53,7 @@ STATE_OF_PHASE = {
 }
 PUSHING = (Phase.STANCE, Phase.INSERTION, Phase.STANCE, Phase.INSERTION)  # when each of JOINTS works on mud
 
+CLIP_SHARE, CLIPPED_ROWS = 0.9995, 200  # rows at the largest current that make it a limit: half a second of them
 BACKWARDS_S = 1.0  # rows written out of order by less are kept as they are
 FROZEN_S, LEAP_M = 0.5, 0.02  # a pose that stands still so long and then leaps so far was lost, not measured
 
@@ -67,6 +68,7 @@ class LabLog(NamedTuple):
     body_x_m: Floats  # NaN without motion capture and where it had lost the body
     gait: dict[str, float]  # what the operator had set; `insertion_angle` is the commanded depth in m
     flippers: tuple[str, ...]  # those that ever moved
+    current_limit_a: float  # at which the drives clipped; infinite where they never did
 
 
 def read_lab_csv(path: Path) -> LabLog:
@@ -83,7 +85,7 @@ def read_lab_csv(path: Path) -> LabLog:
     _blank_absent(angle_rad, current_a, flippers)
     _orient(angle_rad, current_a, phase)
     body_x_m = _body_advance([column[name] for name in BODY_COLUMNS if name in column], stamp_s, phase)
-    return LabLog(stamp_s, phase, angle_rad, current_a, body_x_m, gait, flippers)
+    return LabLog(stamp_s, phase, angle_rad, current_a, body_x_m, gait, flippers, _find_limit_a(current_a))
 
 
 def _read_lines(path: Path) -> list[str]:
@@ -192,6 +194,14 @@ def _blank_absent(angle_rad: Floats, current_a: Floats, flippers: tuple[str, ...
         if name not in flippers:
             angle_rad[:, 2 * place : 2 * place + 2] = UNKNOWN
             current_a[:, 2 * place : 2 * place + 2] = UNKNOWN
+
+
+def _find_limit_a(current_a: Floats) -> float:
+    """The largest current, where one joint shows exactly that again and again: a clip, and no peak."""
+    size_a = np.nan_to_num(np.abs(current_a))
+    peak_a = float(size_a.max(initial=0.0))
+    at_peak = size_a >= CLIP_SHARE * peak_a
+    return peak_a if peak_a > 0.0 and int(at_peak.sum(axis=0).max()) >= CLIPPED_ROWS else math.inf
 
 
 def _orient(angle_rad: Floats, current_a: Floats, phase: Integers) -> None:

@@ -64,7 +64,12 @@ class Loop:
         self.pose = pose
         self.recorder = recorder
         self.timing = LoopTiming()
-        self.estimator = MudEstimator(configuration.geometry, configuration.arm, configuration.torque_constants_nm_a)
+        self.estimator = MudEstimator(
+            configuration.geometry,
+            configuration.flipper_drives,
+            configuration.estimation,
+            configuration.adaptation.body_drag_n,
+        )
         self.adaptation = DepthAdaptation(configuration.adaptation, configuration.geometry, configuration.gait)
         self.controller = Controller(
             configuration.gait,
@@ -115,16 +120,30 @@ class Loop:
         velocities_rad_s = (a.velocity_rad_s, b.velocity_rad_s, c.velocity_rad_s, d.velocity_rad_s)
         currents_a = (a.current_a, b.current_a, c.current_a, d.current_a)
         return self.estimator.update(
-            now_s, self.target_before.phase, angles_rad, velocities_rad_s, currents_a, self.body.x_m
+            now_s,
+            self.target_before.phase,
+            angles_rad,
+            velocities_rad_s,
+            currents_a,
+            self.body.x_m,
+            (now_s - a.angle_stamp_s, now_s - b.angle_stamp_s, now_s - c.angle_stamp_s, now_s - d.angle_stamp_s),
+            (
+                now_s - a.current_stamp_s,
+                now_s - b.current_stamp_s,
+                now_s - c.current_stamp_s,
+                now_s - d.current_stamp_s,
+            ),
         )
 
     def _adapt(self, now_s: float) -> None:
         """Once a stride, in swing: choose the depth of the next one."""
         if not self.reading.strides:
             return
+        if self.estimator.belief.boundary:
+            self.event(now_s, "another mud")
         depth_m = self.controller.order.depth_m
         if self.controller.order.adaptive:
-            choice = self.adaptation.step(self.reading.strides)
+            choice = self.adaptation.step(self.estimator.belief, self.reading.strides)
             depth_m = choice.depth_m
             if depth_m != self.controller.gait.next_depth_m:
                 self.event(now_s, f"depth {depth_m:.4f} m: {choice.reason}{', slips' if choice.slips else ''}")

@@ -14,7 +14,7 @@ from control.records import JOINTS, DriveState
 from drivers.odrive_codec import error_text
 from firmware_host.loop import Loop
 from firmware_host.recorder import Recording
-from firmware_host.reports import check_item, known, stride_report
+from firmware_host.reports import belief_report, check_item, known, map_report, stride_report
 from firmware_host.status_socket import Methods, RefusedError
 
 MOST_STRIDES = 100000  # that a walk may be ordered
@@ -51,6 +51,7 @@ class OperatorCalls:
             "hello": self.hello,
             "status": self.status,
             "strides": self.strides,
+            "map": self.map,
             "check": self.check,
             "arm": lambda params: self._request(Request.ARM),
             "walk": self.walk,
@@ -78,6 +79,7 @@ class OperatorCalls:
             "body_x_m": known(loop.body.x_m),
             "drives": [self._drive(place) for place in range(len(JOINTS))],
             "strides_closed": loop.strides_closed,
+            "mud": belief_report(loop.estimator.belief),
             "loop": loop.timing.summary(),
             "warnings": self._warnings,
             "bus": self._bus(),
@@ -123,6 +125,10 @@ class OperatorCalls:
             stride_report(closed.estimate) | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
             for closed in wanted[:STRIDES_PER_ANSWER]
         ]
+
+    def map(self, params: dict[str, Any]) -> list[dict[str, Any]]:
+        """The mud along the way, since the walk began."""
+        return map_report(self._loop.estimator.map.rows())
 
     def walk(self, params: dict[str, Any]) -> str:
         """`depth_m` for a fixed depth, else adaptive from the configured start; `strides`, 0 without end."""

@@ -5,7 +5,7 @@ authors' logs are its first real input.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
 
@@ -13,7 +13,9 @@ from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.modes import Mode
 from control.records import Phase, StrideEstimate
-from estimation.mud import MudEstimator
+from estimation.joint_load import FlipperDrive
+from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstimator
+from estimation.mud_map import MapRow
 from firmware_host.configuration import Configuration, ConfigurationError, parse_configuration
 from firmware_host.lab_csv import LabLog, read_lab_csv
 from firmware_host.log_reader import Log, LogError, read_log
@@ -22,8 +24,13 @@ PAPER_CONSTANT_NM_A = 0.083
 WEIGHTLESS = ArmMass(
     arm_mass_kg=0.0, center_of_mass_m=0.0, sweep_inertia_kg_m2=0.0, adduction_inertia_kg_m2=0.0
 )  # what the authors' method assumes; nothing else is known of their arm
+LAB_DRIVE = FlipperDrive(WEIGHTLESS, PAPER_CONSTANT_NM_A, PAPER_CONSTANT_NM_A)
 NO_VELOCITY = (nan, nan, nan, nan)
 PHASES = tuple(Phase)
+TICK_FIELDS = (
+    "stamp_s", "mode", "phase",
+    "angle_rad", "velocity_rad_s", "current_a", "body_x_m", "angle_age_s", "current_age_s",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -32,55 +39,68 @@ class Replay:
 
     strides: list[StrideEstimate]
     flippers: tuple[str, ...]
+    map: tuple[MapRow, ...] = ()  # of the mud along the way, where there was a pose
     complete: bool = True  # False where the writer of the log was cut off
 
 
-def replay_file(path: Path, configuration: Configuration | None = None) -> Replay:
-    """By the file's name: our MCAP log, or the authors' CSV. Raises LogError."""
+def replay_file(path: Path, configuration: Configuration | None = None, method: Method | None = None) -> Replay:
+    """By the file's name: our MCAP log, or the authors' CSV. Raises LogError.
+
+    `method` instead of the configured one.
+    """
     if path.name.endswith((".csv", ".csv.gz")):
-        return replay_lab(read_lab_csv(path), configuration)
+        return replay_lab(read_lab_csv(path), configuration, method)
     if path.suffix == ".mcap":
-        return replay_log(path, read_log(path), configuration)
+        return replay_log(path, read_log(path), configuration, method)
     raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
 
 
-def replay_log(path: Path, log: Log, configuration: Configuration | None = None) -> Replay:
+def replay_log(
+    path: Path, log: Log, configuration: Configuration | None = None, method: Method | None = None
+) -> Replay:
     """With the configuration that the log carries, unless another one is given."""
     try:
         configuration = configuration or parse_configuration(log.configuration_text)
     except ConfigurationError as problem:
         raise LogError(f"{path}: its configuration is not one of this version: {problem.problems[0]}") from problem
-    estimator = MudEstimator(configuration.geometry, configuration.arm, configuration.torque_constants_nm_a)
-    return Replay(list(_strides_of_log(estimator, log)), ("left", "right"), log.complete)
+    parameters = _by_method(configuration.estimation, method)
+    drag_n = configuration.adaptation.body_drag_n
+    estimator = MudEstimator(configuration.geometry, configuration.flipper_drives, parameters, drag_n)
+    strides = list(_strides_of_log(estimator, log))
+    return Replay(strides, ("left", "right"), estimator.map.rows(), log.complete)
+
+
+def _by_method(parameters: EstimationParameters, method: Method | None) -> EstimationParameters:
+    return replace(parameters, method=method) if method else parameters
 
 
 def _strides_of_log(estimator: MudEstimator, log: Log) -> Iterator[StrideEstimate]:
     """Row by row as the loop did it: first the sample, then the change of mode, which begins a walk afresh."""
     ticks = log.ticks
     walking, mode_before = int(Mode.WALKING), -1
-    for now_s, mode, phase, angles_rad, velocities_rad_s, currents_a, body_x_m in zip(
-        *(
-            ticks[name].tolist()
-            for name in ("stamp_s", "mode", "phase", "angle_rad", "velocity_rad_s", "current_a", "body_x_m")
-        ),
-        strict=True,
-    ):
-        reading = estimator.update(now_s, PHASES[phase], angles_rad, velocities_rad_s, currents_a, body_x_m)
+    for now_s, mode, phase, *sample in zip(*(ticks[name].tolist() for name in TICK_FIELDS), strict=True):
+        reading = estimator.update(now_s, PHASES[phase], *sample)
         yield from reading.strides
         if mode == walking and mode_before != walking:
             estimator.reset()
         mode_before = mode
 
 
-def replay_lab(lab: LabLog, configuration: Configuration | None = None) -> Replay:
-    """With the paper's torque constant and a weightless arm, unless a configuration is given."""
-    geometry = configuration.geometry if configuration else FlipperGeometry()
-    mass = configuration.arm if configuration else WEIGHTLESS
-    constant = PAPER_CONSTANT_NM_A
-    constants = configuration.torque_constants_nm_a if configuration else (constant, constant, constant, constant)
-    estimator = MudEstimator(geometry, mass, constants)
+def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: Method | None = None) -> Replay:
+    """With the paper's torque constant and a weightless arm, unless a configuration is given.
+
+    One flipper alone hung from a bench; two carried a body.
+    """
+    geometry, drives, parameters = FlipperGeometry(), (LAB_DRIVE, LAB_DRIVE), EstimationParameters()
+    if configuration:
+        geometry, drives, parameters = configuration.geometry, configuration.flipper_drives, configuration.estimation
+    left, right = (drive._replace(current_limit_a=min(lab.current_limit_a, drive.current_limit_a)) for drive in drives)
+    parameters = _by_method(parameters, method)
+    parameters = replace(parameters, fixed_base=parameters.fixed_base or len(lab.flippers) == 1)
+    drag_n = configuration.adaptation.body_drag_n if configuration else PAPER_DRAG_N
+    estimator = MudEstimator(geometry, (left, right), parameters, drag_n)
     strides = [stride for stride in _strides_of_lab(estimator, lab) if stride.flipper in lab.flippers]
-    return Replay(strides, lab.flippers)
+    return Replay(strides, lab.flippers, estimator.map.rows())
 
 
 def _strides_of_lab(estimator: MudEstimator, lab: LabLog) -> Iterator[StrideEstimate]:

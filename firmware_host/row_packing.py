@@ -53,10 +53,10 @@ def stride_row(now_s: float, stride: StrideEstimate, chosen_depth_m: float) -> b
     return STRIDE.encode(
         now_s, stride.t_start_s, stride.insertion_s, stride.stance_s, stride.extraction_s,
         k_p.value, k_p.std_error, k_s.value, k_s.std_error, k_e.value, k_e.std_error,
-        stride.surface_m, stride.depth_m,
+        stride.surface_m, stride.surface_std_error_m, stride.depth_m,
         stride.insertion_force_n, stride.stance_force_n, stride.extraction_force_n,
-        stride.step_m, chosen_depth_m,
+        stride.step_m, stride.place_m, stride.tare_n, stride.tare_drift_n, chosen_depth_m,
         stride.index, k_p.samples, k_s.samples, k_e.samples,
         0 if stride.flipper == "left" else 1,
-        k_p.valid, k_s.valid, k_e.valid, stride.released,
+        k_p.valid, k_s.valid, k_e.valid, k_p.at_least, k_s.at_least, k_e.at_least, stride.released,
     )  # fmt: skip

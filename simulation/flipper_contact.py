@@ -1,25 +1,23 @@
-"""One rigid flipper in clay: an anchored elastic-plastic contact in the plate's own three directions.
+"""One flipper in clay: its joints' motion as the plate's, and the plate's forces as torques and thrust.
 
-The plate hangs under the arm, normal n in the direction of the sweep, in-plane directions r (outwards along the arm)
-and s (up along the plate). Mud holds the plate like a spring on each of them until its yield force is reached, from
-where on the anchor drags behind. In the frame that tilts with adduction the resultant acts at (l sin α, l cos α, -e),
-e below the arm, which moves with
+The plate hangs under the arm, normal n in the direction of the sweep, in-plane directions r (outward along the arm)
+and s (up along the plate). In the frame that tilts with adduction, the point u outward and s up from the middle of
+the lower edge stands at ((l + u) sin α, (l + u) cos α, s - h) and moves with
 
-    v_n = l α' + X' cos α - e sin α β'      v_r = X' sin α + e cos α β'      v_s = l cos α β'
+    v_n = (l + u) α' + X' cos α - (h - s) sin α β'    v_r = X' sin α + (h - s) cos α β'    v_s = (l + u) cos α β'
 
-where X' is the body's speed. The same coefficients, transposed, turn the forces into joint torques and thrust.
+where X' is the body's speed. The same coefficients, transposed, turn the mud's forces into joint torques and thrust;
+its depth is ζ = z - u cos α sin β - s cos β.
 """
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import cos, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
-from simulation.clay import Clay, Plate, rate_factor
-
-LATERAL_STIFFNESS_N_M = 1500.0  # speeds of the walking model hardly change between 400 and 1500
-EDGE_STIFFNESS_N_M = 2000.0
+from simulation.clay import Clay
+from simulation.plate_contact import Attitude, PlateContact, PlateSize, Twist, Wrench, lowest_point_m
 
 
 class ContactForce(NamedTuple):
@@ -27,22 +25,68 @@ class ContactForce(NamedTuple):
     adduction_nm: float
     thrust_n: float  # forward, on the body
     normal_n: float  # along the plate's normal
+    outward_n: float  # along the arm
     upward_n: float  # along the plate, up: in insertion positive
 
 
-NO_CONTACT = ContactForce(0.0, 0.0, 0.0, 0.0, 0.0)
+NO_CONTACT = ContactForce(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def plate_size(geometry: FlipperGeometry) -> PlateSize:
+    return PlateSize(geometry.plate_width_m, geometry.plate_height_m, geometry.plate_thickness_m)
+
+
+def attitude_of(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, surface_m: float = 0.0) -> Attitude:
+    depth_m = geometry.depth_m(sweep_rad, adduction_rad) - surface_m
+    return Attitude(depth_m, -cos(sweep_rad) * sin(adduction_rad), cos(adduction_rad))
+
+
+def lowest_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> float:
+    """Depth of the plate's lower corner below the mud's nominal surface."""
+    return lowest_point_m(attitude_of(geometry, sweep_rad, adduction_rad), geometry.plate_width_m)
+
+
+def twist_of(
+    geometry: FlipperGeometry, sweep_rad: float, sweep_rad_s: float, adduction_rad_s: float, body_m_s: float
+) -> Twist:
+    """Of the plate's motion through the mud. (It is the same whatever the adduction angle.)"""
+    length_m, drop_m, sa, ca = geometry.flipper_length_m, geometry.drop_m, sin(sweep_rad), cos(sweep_rad)
+    return Twist(
+        length_m * sweep_rad_s + body_m_s * ca - drop_m * sa * adduction_rad_s,
+        body_m_s * sa + drop_m * ca * adduction_rad_s,
+        length_m * ca * adduction_rad_s,
+        sweep_rad_s,
+        sa * adduction_rad_s,
+        -ca * adduction_rad_s,
+        ca * adduction_rad_s,
+    )
+
+
+def contact_force(geometry: FlipperGeometry, sweep_rad: float, wrench: Wrench) -> ContactForce:
+    """The transpose of `twist_of`: torques and thrust do the same work on joints and body as the mud on the plate."""
+    length_m, drop_m, sa, ca = geometry.flipper_length_m, geometry.drop_m, sin(sweep_rad), cos(sweep_rad)
+    across_nm = drop_m * wrench.normal_n - wrench.normal_upward_nm
+    outward_nm = drop_m * wrench.outward_n - wrench.outward_upward_nm
+    lifting_nm = length_m * wrench.upward_n + wrench.upward_outward_nm
+    return ContactForce(
+        length_m * wrench.normal_n + wrench.normal_outward_nm,
+        ca * (outward_nm + lifting_nm) - sa * across_nm,
+        ca * wrench.normal_n + sa * wrench.outward_n,
+        wrench.normal_n,
+        wrench.outward_n,
+        wrench.upward_n,
+    )
 
 
 class FlipperContact:
-    """Owns the elastic displacement of the mud around one plate."""
+    """Owns the contact of one flipper's plate."""
 
-    def __init__(self, geometry: FlipperGeometry) -> None:
+    def __init__(self, geometry: FlipperGeometry, relaxation: float = 0.0) -> None:
         self.geometry = geometry
-        self.plate = Plate(geometry.plate_width_m, geometry.plate_thickness_m)
-        self.reset()
+        self.plate = PlateContact(plate_size(geometry), relaxation)
 
     def reset(self) -> None:
-        self._normal_m = self._outward_m = self._upward_m = 0.0
+        self.plate.reset()
 
     def step(
         self,
@@ -53,54 +97,11 @@ class FlipperContact:
         sweep_velocity_rad_s: float,
         adduction_velocity_rad_s: float,
         body_velocity_m_s: float,
+        surface_m: float = 0.0,
     ) -> ContactForce:
-        depth_m = self.geometry.depth_m(sweep_rad, adduction_rad)
-        if depth_m <= 0.0:
-            self.reset()
+        """`surface_m`: how far the mud's surface lies below its nominal height."""
+        attitude = attitude_of(self.geometry, sweep_rad, adduction_rad, surface_m)
+        if self.plate.leaves(attitude):  # as in swing: nothing else to compute
             return NO_CONTACT
-        sa, ca, length_m = sin(sweep_rad), cos(sweep_rad), self.geometry.flipper_length_m
-        center_m = depth_m - clay.lateral_center_m(depth_m, self.plate.width_m)
-        arm_m = self.geometry.drop_m - center_m / cos(adduction_rad)
-        normal_n, outward_n, upward_n = self._yield(
-            dt_s,
-            clay,
-            depth_m,
-            length_m * sweep_velocity_rad_s + body_velocity_m_s * ca - arm_m * sa * adduction_velocity_rad_s,
-            body_velocity_m_s * sa + arm_m * ca * adduction_velocity_rad_s,
-            length_m * ca * adduction_velocity_rad_s,
-        )
-        return ContactForce(
-            length_m * normal_n,
-            arm_m * (ca * outward_n - sa * normal_n) + length_m * ca * upward_n,
-            ca * normal_n + sa * outward_n,
-            normal_n,
-            upward_n,
-        )
-
-    def _yield(
-        self, dt_s: float, clay: Clay, depth_m: float, normal_m_s: float, outward_m_s: float, upward_m_s: float
-    ) -> tuple[float, float, float]:
-        """Forces along the plate's directions after it moved on for `dt_s`."""
-        rate = rate_factor(sqrt(normal_m_s**2 + outward_m_s**2 + upward_m_s**2))
-        lateral_n = rate * clay.lateral_n(depth_m, self.plate.width_m)
-        edgewise_n = rate * clay.edgewise_n(depth_m, self.plate)
-        insertion_n = rate * clay.insertion_n(depth_m, self.plate)
-        extraction_n = rate * clay.extraction_n(depth_m, self.plate)
-        self._normal_m, normal_n = _yielding(
-            self._normal_m + normal_m_s * dt_s, LATERAL_STIFFNESS_N_M, lateral_n, lateral_n
-        )
-        self._outward_m, outward_n = _yielding(
-            self._outward_m + outward_m_s * dt_s, EDGE_STIFFNESS_N_M, edgewise_n, edgewise_n
-        )
-        self._upward_m, upward_n = _yielding(
-            self._upward_m + upward_m_s * dt_s, EDGE_STIFFNESS_N_M, insertion_n, extraction_n
-        )
-        return normal_n, outward_n, upward_n
-
-
-def _yielding(
-    displacement_m: float, stiffness_n_m: float, largest_n: float, largest_pull_n: float
-) -> tuple[float, float]:
-    """(elastic displacement left, force) of a spring that slides at its yield forces in push and pull."""
-    force_n = min(max(-stiffness_n_m * displacement_m, -largest_pull_n), largest_n)
-    return -force_n / stiffness_n_m, force_n
+        twist = twist_of(self.geometry, sweep_rad, sweep_velocity_rad_s, adduction_velocity_rad_s, body_velocity_m_s)
+        return contact_force(self.geometry, sweep_rad, self.plate.step(dt_s, clay, attitude, twist))

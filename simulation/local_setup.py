@@ -46,6 +46,19 @@ bus = "right"
 node_id = 2
 sign = 1
 
+# As a calibration of these joints would show.
+[friction.left_sweep]
+viscous_nm_s = 0.002
+
+[friction.left_adduction]
+viscous_nm_s = 0.002
+
+[friction.right_sweep]
+viscous_nm_s = 0.002
+
+[friction.right_adduction]
+viscous_nm_s = 0.002
+
 [loop]
 silence_s = 0.5
 

@@ -18,6 +18,7 @@ from firmware_host.configuration import Configuration
 from firmware_host.loop import Loop
 from firmware_host.recorder import NullRecorder, Recording
 from firmware_host.ticker import PERIOD_S, Beat
+from simulation.disturbances import NONE, Disturbances, drive_changes
 from simulation.odrive import OdriveParameters
 from simulation.plant import PlantParameters
 from simulation.robot import SimulatedRobot
@@ -40,8 +41,15 @@ def drives_of(configuration: Configuration, **changes: float) -> dict[str, Odriv
     }
 
 
-def plant_of(configuration: Configuration) -> PlantParameters:
-    return PlantParameters(geometry=configuration.geometry, arm_mass=configuration.arm)
+def plant_of(
+    configuration: Configuration, disturbances: Disturbances = NONE, fixed_base: bool = False
+) -> PlantParameters:
+    return PlantParameters(
+        geometry=configuration.geometry,
+        arm_mass=configuration.arm,
+        disturbances=disturbances,
+        fixed_base=fixed_base,
+    )
 
 
 class SimulatedPose:
@@ -56,7 +64,7 @@ class SimulatedPose:
 
 
 class Lockstep:
-    """Owns the common time of robot and loop."""
+    """Owns the common time of robot and loop. Disturbances are of the mud and of the drives."""
 
     def __init__(
         self,
@@ -64,13 +72,14 @@ class Lockstep:
         track: Track,
         seed: int = 1,
         recorder: Recording | None = None,
-        plant: PlantParameters | None = None,
+        disturbances: Disturbances = NONE,
+        fixed_base: bool = False,
     ) -> None:
         buses = {name: MockBus() for name in configuration.bus}
         self.robot = SimulatedRobot(
-            plant or plant_of(configuration),
+            plant_of(configuration, disturbances, fixed_base),
             track,
-            drives_of(configuration),
+            drives_of(configuration, **drive_changes(disturbances)),
             {joint: configuration.drive[joint].bus for joint in JOINTS},
             {name: bus.open() for name, bus in buses.items()},
             seed,

@@ -1,7 +1,7 @@
 """A motor drive as the bus sees it: ODrive CANSimple 0.6, byte for byte.
 
 Axis state machine (idle, closed loop), error word with disarm reason, watchdog, torque mode with the velocity-limit
-clamp and the current limit, cyclic messages, requests by remote frame. The motor turns current into torque by its
+clamp and the current limits, cyclic messages, requests by remote frame. The motor turns current into torque by its
 own constant and reports the current with noise and the angle in steps of its encoder.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from math import isfinite, pi
+from math import inf, isfinite, pi
 from random import Random
 
 from drivers import odrive_codec as codec
@@ -37,6 +37,7 @@ class OdriveParameters:
     velocity_gain_nm_s_turn: float = 1.0 / 6.0  # ODrive's default vel_gain, used by the torque clamp
     temperature_c: float = 30.0
     bus_voltage_v: float = 24.0
+    motor_current_limit_a: float = inf  # the motor's own clip, whatever limit the bus sets
 
 
 class SimulatedOdrive:
@@ -127,7 +128,8 @@ class SimulatedOdrive:
             return 0.0
         gain, limit = parameters.velocity_gain_nm_s_turn, self._velocity_limit_turn_s
         torque_nm = min(max(self._setpoint_nm, (-limit - self._turns_s) * gain), (limit - self._turns_s) * gain)
-        largest_nm = self._current_limit_a * parameters.torque_constant_nm_a
+        largest_a = min(self._current_limit_a, parameters.motor_current_limit_a)
+        largest_nm = largest_a * parameters.torque_constant_nm_a
         torque_nm = min(max(torque_nm, -largest_nm), largest_nm)
         self._current_a = torque_nm / parameters.torque_constant_nm_a
         return parameters.sign * torque_nm
@@ -148,7 +150,7 @@ class SimulatedOdrive:
             if self._due_s[place] <= now_s:  # held up for longer than a period: the lost ones are not made up for
                 self._due_s[place] = now_s + period_s
             for message in messages:
-                yield self._frame(message)
+                yield self._frame(message)._replace(stamp_s=now_s)
 
     def _frame(self, message: Message) -> Frame:
         return Frame(arbitration_id(self.parameters.node_id, message), self._PAYLOADS[message](self))

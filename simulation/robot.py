@@ -30,7 +30,7 @@ class SimulatedRobot:
         start_s: float = 0.0,
     ) -> None:
         random = Random(seed)
-        self.plant = Plant(plant, track)
+        self.plant = Plant(plant, track, Random(f"mud {seed}"))  # the drives' draws are none of its
         self.drives = tuple(SimulatedOdrive(drives[joint], random) for joint in JOINTS)
         self._ports = dict(ports)
         self._port_of_drive = tuple(ports[bus_of_joint[joint]] for joint in JOINTS)

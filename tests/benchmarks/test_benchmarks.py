@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+from benchmarks.estimator_cost import fit_rows, measure_fits
+from benchmarks.fit_libraries import FITS
 from benchmarks.report import Progress, summary_us, verdict
 from benchmarks.tick_time import STAGES, VARIANTS
 
@@ -80,13 +82,46 @@ def test_memory_growth() -> None:
     assert report.keys() >= {"dropped_rows", "strides", "walked_m", "bar_kib"}
 
 
+def test_estimator_cost() -> None:
+    """600 ticks of a stride of 1.58 s; the law that was put in comes out, so every fit was at work."""
+    report = report_of("estimator_cost", "--strides", "2", "--memory-strides", "2")
+    phases = {"insertion", "stance", "extraction", "swing"}
+    for figures in report["methods"].values():
+        assert sum(figures["samples"].values()) == pytest.approx(1.58 * 380.0, abs=2.0)
+        assert set(figures["sample_us"]) == set(figures["close_us"]) == set(figures["samples"]) == phases
+        assert figures.keys() >= {"sample_mean_us", "close_total_us"}
+    assert report["methods"]["default"]["k_n_cm3"] == pytest.approx({"k_p": 1.0, "k_s": 0.6, "k_e": 0.7}, rel=0.1)
+    assert 0.0 < report["repeats"]["share"] < 1.0
+    assert report["memory"].keys() == {"strides", "held_bytes", "peak_bytes", "growth_bytes"}
+    assert report.keys() >= {"stroke_us", "bar_sample_us", "bar_close_us"}
+
+
+def test_every_library_finds_the_same_slope() -> None:
+    """All are least squares of the same samples; the robust one weighs one or two of them less."""
+    fits = report_of("estimator_cost", "--strides", "1", "--memory-strides", "1")["fits"]
+    assert set(fits) == set(FITS)
+    k_n_cm3 = fits["our LineFit"]["k_n_cm3"]
+    for figures in fits.values():
+        assert figures["sample_us"] > 0.0
+        assert figures["k_n_cm3"] == pytest.approx(k_n_cm3, rel=0.002)
+
+
+def test_a_library_that_is_not_installed_is_said_to_be_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "padasip", None)
+    monkeypatch.setitem(sys.modules, "padasip.filters", None)
+    fits = measure_fits(1, Progress(1.0), 0.0)["fits"]
+    assert fits["padasip FilterRLS"] is None
+    assert fits["numpy.linalg.lstsq"] is not None
+    assert ["padasip FilterRLS", "not installed", "", ""] in fit_rows(fits, 110)
+
+
 def test_a_person_gets_a_table_that_ends_in_the_verdict() -> None:
     lines = run_benchmark("lockstep_speed", "--rounds", "1", "--longest", "1").splitlines()
     assert lines[0].split()[0] == "round"
     assert lines[-1].startswith("at least 5 times faster than real time: ")
 
 
-@pytest.mark.parametrize("name", ["tick_time", "loop_jitter", "lockstep_speed", "memory_growth"])
+@pytest.mark.parametrize("name", ["tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "estimator_cost"])
 def test_help_says_what_is_measured(name: str) -> None:
     module = (ROOT / "benchmarks" / f"{name}.py").read_text(encoding="utf-8")
     assert module.split('"""')[1].splitlines()[0] in run_benchmark(name, "--help")

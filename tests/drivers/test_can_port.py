@@ -1,12 +1,14 @@
 """A port over python-can: what passes, what is counted, and that nothing waits or raises."""
 
 import errno
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import can
 import pytest
 
+from control.records import NEVER_S
 from drivers.can_port import MOST_FAILURES_PER_READ, MOST_FRAMES_PER_READ, PythonCanPort, open_port
 from drivers.frames import Frame
 
@@ -62,10 +64,23 @@ def as_message(frame: Frame) -> can.Message:
     )
 
 
+def unstamped(port: PythonCanPort) -> list[Frame]:
+    return [frame._replace(stamp_s=NEVER_S) for frame in port.receive()]
+
+
+def test_a_frame_says_when_it_was_on_the_bus(port: PythonCanPort, other: can.BusABC) -> None:
+    before_s = time.monotonic()
+    other.send(as_message(FRAMES[0]))
+    after_s = time.monotonic()
+    time.sleep(0.02)
+    (frame,) = port.receive()
+    assert before_s - 0.005 < frame.stamp_s < after_s + 0.005  # the clock on the wall is read a moment later
+
+
 @pytest.mark.parametrize("frame", FRAMES)
 def test_frames_come_in_unchanged(port: PythonCanPort, other: can.BusABC, frame: Frame) -> None:
     other.send(as_message(frame))
-    assert port.receive() == [frame]
+    assert unstamped(port) == [frame]
 
 
 @pytest.mark.parametrize("frame", FRAMES)
@@ -80,7 +95,7 @@ def test_frames_go_out_unchanged(port: PythonCanPort, other: can.BusABC, frame: 
 def test_error_frames_are_counted_and_not_passed_on(port: PythonCanPort, other: can.BusABC) -> None:
     for frame in (Frame(0x040, bytes(8), is_error=True), Frame(0x009, b"\x01")):
         other.send(as_message(frame))
-    assert port.receive() == [Frame(0x009, b"\x01")]
+    assert unstamped(port) == [Frame(0x009, b"\x01")]
     assert port.error_frames == 1
 
 
@@ -88,7 +103,7 @@ def test_frames_keep_their_order(port: PythonCanPort, other: can.BusABC) -> None
     sent = [Frame(number, bytes([number])) for number in range(100)]
     for frame in sent:
         other.send(as_message(frame))
-    assert port.receive() == sent
+    assert unstamped(port) == sent
 
 
 def test_nothing_is_waited_for() -> None:
@@ -144,7 +159,7 @@ def test_ports_talk_over_the_local_bus(tmp_path: Path) -> None:
     first, second = (open_port("mudskipper_local", str(tmp_path), {}) for _ in range(2))
     for frame in FRAMES:
         first.send(frame)
-    assert second.receive() == FRAMES
+    assert unstamped(second) == FRAMES
     first.close()
     second.close()
 
@@ -152,7 +167,7 @@ def test_ports_talk_over_the_local_bus(tmp_path: Path) -> None:
 def test_options_reach_the_interface() -> None:
     port = open_port("virtual", "own-messages", {"receive_own_messages": True})
     port.send(Frame(1))
-    assert port.receive() == [Frame(1)]
+    assert unstamped(port) == [Frame(1)]
     port.close()
 
 

@@ -54,9 +54,10 @@ class Bench:
         self.far: dict[str, MockPort] = {name: bus.open() for name, bus in buses.items()}
         self.drives = OdriveDrives(parameters, {name: bus.open() for name, bus in buses.items()})
 
-    def tell(self, joint: str, message: Message, *values: float) -> None:
+    def tell(self, joint: str, message: Message, *values: float, stamp_s: float = NEVER_S) -> None:
         drive = self.parameters[joint]
-        self.far[drive.bus].send(Frame(arbitration_id(drive.node_id, message), message.encode(*values)))
+        frame = Frame(arbitration_id(drive.node_id, message), message.encode(*values), stamp_s=stamp_s)
+        self.far[drive.bus].send(frame)
 
     def tell_everything(self, now_s: float, closed_loop: bool = True) -> DriveStates:
         for joint in JOINTS:
@@ -109,6 +110,17 @@ def test_every_signal_has_its_own_stamp(bench: Bench) -> None:
     state, untold = bench.drives.read(9.0)[:2]
     assert (state.angle_stamp_s, state.current_stamp_s, state.heartbeat_stamp_s) == (1.0, 2.0, 3.0)
     assert (untold.angle_stamp_s, untold.current_stamp_s, untold.heartbeat_stamp_s) == (NEVER_S, NEVER_S, NEVER_S)
+
+
+@pytest.mark.parametrize(
+    ("frame_s", "stamp_s"),
+    [(8.999, 8.999), (9.0, 9.0), (8.96, 8.96), (8.9, 9.0), (9.001, 9.0), (1.7e9, 9.0), (NEVER_S, 9.0)],
+)
+def test_a_signal_has_the_stamp_of_its_frame_unless_that_is_of_another_clock(
+    bench: Bench, frame_s: float, stamp_s: float
+) -> None:
+    bench.tell("left_sweep", GET_IQ, 0.0, 1.0, stamp_s=frame_s)
+    assert bench.drives.read(9.0)[0].current_stamp_s == stamp_s
 
 
 def test_the_newest_frame_wins(bench: Bench) -> None:

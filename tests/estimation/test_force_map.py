@@ -1,14 +1,14 @@
-"""The paper's force map against its matrix in numpy and against numbers worked by hand."""
+"""The force maps: the paper's against its matrix and hand numbers, the truthful one against a pseudo-inverse."""
 
 from math import pi, radians
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
-from estimation.force_map import mud_torque_nm, paper_force_n
+from estimation.force_map import paper_force_n, smallest_force_n
 
 angles = st.floats(-pi / 3, pi / 3)
 torques = st.floats(-2.0, 2.0)
@@ -56,8 +56,67 @@ def test_a_force_square_to_the_plate_has_exactly_the_forward_part_that_the_map_t
     assert paper_force_n(sweep, adduction, sweep_nm, adduction_nm, 0.12)[0] == pytest.approx(force[0], abs=1e-12)
 
 
-def test_the_mud_bears_what_motor_and_gravity_do_not_spend_on_motion() -> None:
-    assert mud_torque_nm(motor_nm=-0.4, gravity_nm=0.0, inertial_nm=0.0) == pytest.approx(0.4)
-    assert mud_torque_nm(motor_nm=0.3, gravity_nm=-0.3, inertial_nm=0.0) == 0.0
-    assert mud_torque_nm(motor_nm=0.5, gravity_nm=-0.3, inertial_nm=0.2) == pytest.approx(0.0)
-    assert mud_torque_nm(motor_nm=-0.5, gravity_nm=-0.1, inertial_nm=0.2) == pytest.approx(0.8)
+geometries = st.builds(
+    FlipperGeometry, flipper_length_m=st.floats(0.05, 1.0), drop_m=st.floats(0.0, 0.5), axis_height_m=st.just(0.06)
+)
+
+
+@given(geometries, angles, angles, torques, torques)
+def test_the_smallest_force_is_the_pseudo_inverse_of_the_jacobians_transpose(
+    geometry: FlipperGeometry, sweep: float, adduction: float, sweep_nm: float, adduction_nm: float
+) -> None:
+    """To rounding times the condition of JᵀJ, which is a hundred at most in these poses."""
+    jacobian = np.reshape(geometry.jacobian(sweep, adduction), (3, 2))
+    force = np.linalg.pinv(jacobian.T) @ [sweep_nm, adduction_nm]
+    found = smallest_force_n(geometry, sweep, adduction, sweep_nm, adduction_nm)
+    assert found == pytest.approx((force[0], force[2]), rel=1e-9, abs=1e-9)
+
+
+@given(angles, angles, torques, torques)
+def test_no_other_force_with_the_same_torques_is_smaller(
+    sweep: float, adduction: float, sweep_nm: float, adduction_nm: float
+) -> None:
+    """It has none of the direction across both columns of J, in which a force turns no joint, and has the torques."""
+    geometry = FlipperGeometry()
+    jacobian = np.reshape(geometry.jacobian(sweep, adduction), (3, 2))
+    unfelt = np.cross(jacobian[:, 0], jacobian[:, 1])
+    force_x_n, force_z_n = smallest_force_n(geometry, sweep, adduction, sweep_nm, adduction_nm)
+    assume(abs(unfelt[1]) > 1e-6)
+    force_y_n = -(force_x_n * unfelt[0] + force_z_n * unfelt[2]) / unfelt[1]
+    force = np.array([force_x_n, force_y_n, force_z_n])
+    assert jacobian.T @ force == pytest.approx([sweep_nm, adduction_nm], abs=1e-7)
+
+
+@given(st.floats(0.05, 0.5), angles, angles, torques)
+def test_without_drop_and_level_both_maps_agree(length_m: float, sweep: float, adduction: float, torque: float) -> None:
+    """In the sweep column everywhere, in the other where cos² α = 1: section 2.1 of the physics."""
+    geometry = FlipperGeometry(length_m, 0.0, 0.06)
+    truthful, paper = (
+        smallest_force_n(geometry, sweep, adduction, torque, 0.0),
+        paper_force_n(sweep, adduction, torque, 0.0, length_m),
+    )
+    assert truthful == pytest.approx(paper, abs=1e-12)
+    straight = smallest_force_n(geometry, 0.0, adduction, 0.0, torque)
+    assert straight == pytest.approx(paper_force_n(0.0, adduction, 0.0, torque, length_m), abs=1e-12)
+
+
+@pytest.mark.parametrize("sweep_deg", [-30.0, 0.0, 30.0])
+def test_the_papers_upward_force_is_low_by_the_square_of_the_sweeps_cosine(sweep_deg: float) -> None:
+    """Section 2.1: f_z from the adduction torque is 25 % low at ±30°."""
+    geometry = FlipperGeometry(0.115, 0.0, 0.03)
+    _, truthful_n = smallest_force_n(geometry, radians(sweep_deg), -0.5, 0.0, 0.3)
+    _, paper_n = paper_force_n(radians(sweep_deg), -0.5, 0.0, 0.3, 0.115)
+    assert paper_n / truthful_n == pytest.approx(np.cos(radians(sweep_deg)) ** 2)
+
+
+@given(angles, angles, torques, torques, st.floats(-5.0, 5.0))
+def test_both_maps_are_linear_in_the_torques(sweep: float, adduction: float, a: float, b: float, times: float) -> None:
+    geometry = FlipperGeometry()
+    for whole, part in (
+        (
+            smallest_force_n(geometry, sweep, adduction, times * a, times * b),
+            smallest_force_n(geometry, sweep, adduction, a, b),
+        ),
+        (paper_force_n(sweep, adduction, times * a, times * b, 0.12), paper_force_n(sweep, adduction, a, b, 0.12)),
+    ):
+        assert whole == pytest.approx(tuple(times * each for each in part), abs=1e-9)

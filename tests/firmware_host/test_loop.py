@@ -324,7 +324,7 @@ def test_garbage_on_the_bus_is_counted_and_changes_nothing(configuration: Config
         noisy.step()
     assert noisy.loop.drives.unknown_frames >= 1500 and noisy.loop.drives.garbled_frames >= 3000
     assert len(quiet.loop.strides) >= 2
-    assert [s.estimate for s in noisy.loop.strides] == [s.estimate for s in quiet.loop.strides]
+    assert repr(noisy.loop.strides) == repr(quiet.loop.strides)  # NaN is not equal to itself
 
 
 def test_a_missed_tick_costs_no_place_in_the_gait(robot: Lockstep) -> None:

@@ -1,70 +1,44 @@
-"""Yield forces of clay, against the stated pressure laws integrated numerically."""
+"""The clay's stresses, against the stated laws, and muds between the three that were fitted."""
 
 from itertools import pairwise
+from math import nan, sqrt
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulation.clay import MUDS, SUCTION_FADE_M, Clay, Plate, rate_factor
+from simulation.clay import MUDS, Clay, clay_of_water, rate_factor
 
-PLATE = Plate(0.025, 0.004)
 STRENGTHS = st.floats(200.0, 20000.0)
 DEPTHS = st.floats(0.001, 0.15)
 WIDTHS = st.floats(0.005, 0.1)
 RISING_DEPTHS_M = np.linspace(0.0005, 0.1, 60)
 
 
-def pressure_n_m(clay: Clay, width_m: float, depths_m: np.ndarray) -> np.ndarray:
-    """Matlock's law, per metre of depth, as the module states it."""
-    factor = np.minimum(3.0 + 17.5e3 * depths_m / clay.strength_pa + 0.5 * depths_m / width_m, 9.0)
-    return clay.strength_pa * width_m * factor
+@given(STRENGTHS, DEPTHS, WIDTHS)
+def test_the_sideways_force_is_the_sum_of_the_pressure(strength_pa: float, depth_m: float, width_m: float) -> None:
+    edges_m = np.linspace(0.0, depth_m, 4001)
+    middles_m = (edges_m[1:] + edges_m[:-1]) / 2.0
+    factor = np.minimum(3.0 + 17.5e3 * middles_m / strength_pa + 0.5 * middles_m / width_m, 9.0)
+    slices_n = strength_pa * width_m * factor * np.diff(edges_m)
+    assert Clay("any", strength_pa).lateral_n(depth_m, width_m) == pytest.approx(slices_n.sum(), rel=1e-5)
 
 
 @given(STRENGTHS, DEPTHS, WIDTHS)
-def test_the_sideways_force_and_its_depth_are_those_of_the_pressure(
-    strength_pa: float, depth_m: float, width_m: float
-) -> None:
-    clay = Clay("any", strength_pa)
-    edges_m = np.linspace(0.0, depth_m, 4001)
-    middles_m = (edges_m[1:] + edges_m[:-1]) / 2.0
-    slices_n = pressure_n_m(clay, width_m, middles_m) * np.diff(edges_m)
-    assert clay.lateral_n(depth_m, width_m) == pytest.approx(slices_n.sum(), rel=1e-5)
-    center_m = (slices_n * middles_m).sum() / slices_n.sum()
-    assert clay.lateral_center_m(depth_m, width_m) == pytest.approx(center_m, rel=1e-5)
+def test_the_rise_of_the_pressure_factor_is_that_of_the_law(strength_pa: float, depth_m: float, width_m: float) -> None:
+    factor = 3.0 + Clay("any", strength_pa).lateral_rise_per_m(width_m) * depth_m
+    assert factor == pytest.approx(3.0 + 17.5e3 * depth_m / strength_pa + 0.5 * depth_m / width_m)
 
 
-def test_the_forces_on_the_edge_have_these_values() -> None:
-    clay, edge_m2, faces_m = Clay("1 kPa", 1000.0), 0.025 * 0.004, 2.0 * 0.029
-    assert clay.insertion_n(0.0, PLATE) == pytest.approx(5.14 * 1000.0 * edge_m2)
-    adhesion_n = 0.25 * 1000.0 * faces_m * 0.050
-    assert clay.insertion_n(0.050, PLATE) == pytest.approx(5.14 * 1000.0 * edge_m2 + adhesion_n)
-    assert clay.extraction_n(0.050, PLATE) == pytest.approx(9.0 * 1000.0 * edge_m2 + adhesion_n)
-    assert clay.edgewise_n(0.050, PLATE) == pytest.approx(
-        9.0 * 1000.0 * 0.004 * 0.050 + 0.25 * 1000.0 * faces_m * 0.050
-    )
-
-
-def test_suction_fades_in_the_last_centimetre() -> None:
-    clay = MUDS["45.3"]
-    adhesion_n_m = 0.25 * clay.strength_pa * 2.0 * 0.029
-    depths_m = (0.0, 0.25 * SUCTION_FADE_M, SUCTION_FADE_M, 0.05)
-    suction_n = [clay.extraction_n(depth_m, PLATE) - adhesion_n_m * depth_m for depth_m in depths_m]
-    assert suction_n[0] == 0.0
-    assert suction_n[1] == pytest.approx(suction_n[2] / 4.0)
-    assert suction_n[2] == pytest.approx(suction_n[3])
-
-
-@pytest.mark.parametrize("law", [Clay.insertion_n, Clay.extraction_n, Clay.edgewise_n, Clay.lateral_n])
 @pytest.mark.parametrize("name", MUDS)
-def test_forces_rise_with_depth_and_with_strength(law: object, name: str) -> None:
-    assert callable(law)
-    size = 0.025 if law is Clay.lateral_n else PLATE
+def test_the_sideways_force_rises_with_depth_and_with_strength(name: str) -> None:
     stronger = Clay("stronger", 1.1 * MUDS[name].strength_pa)
-    forces_n = [law(MUDS[name], z, size) for z in RISING_DEPTHS_M]
+    forces_n = [MUDS[name].lateral_n(depth_m, 0.025) for depth_m in RISING_DEPTHS_M]
     assert all(before < after for before, after in pairwise(forces_n))
-    assert all(law(stronger, z, size) > force_n for z, force_n in zip(RISING_DEPTHS_M, forces_n, strict=True))
+    assert all(
+        stronger.lateral_n(depth_m, 0.025) > force_n for depth_m, force_n in zip(RISING_DEPTHS_M, forces_n, strict=True)
+    )
 
 
 def test_the_rate_factor_is_one_at_the_reference_speed_and_rises() -> None:
@@ -75,4 +49,41 @@ def test_the_rate_factor_is_one_at_the_reference_speed_and_rises() -> None:
 
 
 def test_wetter_mud_is_weaker() -> None:
-    assert MUDS["53.1"].strength_pa < MUDS["48.5"].strength_pa < MUDS["45.3"].strength_pa
+    strengths_pa = [clay_of_water(percent).strength_pa for percent in np.linspace(44.0, 56.0, 49)]
+    assert all(before > after for before, after in pairwise(strengths_pa))
+
+
+@pytest.mark.parametrize("name", MUDS)
+def test_the_fitted_muds_are_met(name: str) -> None:
+    clay = clay_of_water(float(name))
+    assert clay.name == name
+    assert clay.strength_pa == pytest.approx(MUDS[name].strength_pa)
+
+
+@pytest.mark.parametrize(("dry", "wet"), [("45.3", "48.5"), ("48.5", "53.1")])
+def test_half_way_between_two_muds_lies_their_geometric_mean(dry: str, wet: str) -> None:
+    between = clay_of_water((float(dry) + float(wet)) / 2.0)
+    assert between.strength_pa == pytest.approx(sqrt(MUDS[dry].strength_pa * MUDS[wet].strength_pa))
+
+
+@pytest.mark.parametrize(("end", "inner", "outer"), [("45.3", 46.5, 44.1), ("53.1", 51.0, 55.2)])
+def test_the_slope_goes_on_beyond_the_outer_muds(end: str, inner: float, outer: float) -> None:
+    """The ends lie half way between these."""
+    product = clay_of_water(inner).strength_pa * clay_of_water(outer).strength_pa
+    assert product == pytest.approx(MUDS[end].strength_pa ** 2)
+
+
+def test_a_mud_is_named_after_its_water() -> None:
+    assert clay_of_water(47.6).name == "47.6"
+    assert clay_of_water(50.0).name == "50"
+
+
+@pytest.mark.parametrize("percent", [43.99, 56.01, -1.0, nan])
+def test_water_contents_of_which_the_fit_says_nothing_are_refused(percent: float) -> None:
+    with pytest.raises(ValueError, match="44 to 56"):
+        clay_of_water(percent)
+
+
+@pytest.mark.parametrize("percent", [44.0, 56.0])
+def test_the_ends_of_the_range_are_in_it(percent: float) -> None:
+    assert clay_of_water(percent).strength_pa > 0.0

@@ -46,6 +46,16 @@ def test_another_seed_reads_other_currents(configuration: Configuration) -> None
     assert all(one != other for one, other in zip(*currents, strict=True))
 
 
+def test_on_a_fixed_base_the_flippers_walk_and_the_body_stays(configuration: Configuration) -> None:
+    lockstep = Lockstep(configuration, TRACK, fixed_base=True)
+    lockstep.arm()
+    lockstep.walk(WalkOrder(0.03))
+    lockstep.run_for(5.0)
+    assert len(lockstep.loop.strides) >= 4
+    assert lockstep.robot.plant.body_m == 0.0
+    assert abs(lockstep.loop.body.x_m) < 0.001  # what motion capture sees of it
+
+
 def test_nothing_is_transmitted_before_every_drive_was_heard(configuration: Configuration) -> None:
     lockstep = Lockstep(configuration, TRACK)
     obeyed: list[Frame] = []

@@ -150,6 +150,17 @@ def test_the_current_limit_bounds_torque_both_ways(sign: int) -> None:
     assert ask(drive, GET_IQ) == pytest.approx((sign * 5.0, sign * 5.0))
 
 
+@pytest.mark.parametrize(("bus_a", "motor_a", "given_a"), [(5.0, 3.0, 3.0), (2.0, 3.0, 2.0)])
+def test_the_smaller_one_of_the_motor_s_clip_and_the_bus_s_limit_holds(
+    bus_a: float, motor_a: float, given_a: float
+) -> None:
+    drive = make_armed_drive(current_limit_a=bus_a, motor_current_limit_a=motor_a, current_noise_a=0.0)
+    for sign in (1.0, -1.0):
+        tell(drive, SET_INPUT_TORQUE, sign * 3.0)
+        assert drive.torque_nm(0.0) == pytest.approx(sign * given_a * 0.083)
+        assert ask(drive, GET_IQ)[1] == pytest.approx(sign * given_a)
+
+
 def test_a_mirrored_motor_turns_angle_velocity_and_torque() -> None:
     drive = make_armed_drive(sign=-1, zero_turn=0.25)
     tell(drive, SET_INPUT_TORQUE, 0.2)

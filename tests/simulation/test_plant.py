@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 from math import exp, pi, radians, sin, sqrt
+from random import Random
 
 import pytest
 
 from control.joint_pd import ArmMass
 from control.records import NO_TORQUE
 from simulation.clay import MUDS, Clay, rate_factor
+from simulation.disturbances import LAB, Disturbances
 from simulation.flipper_contact import NO_CONTACT, ContactForce, FlipperContact
 from simulation.plant import DRAG_STIFFNESS_N_M, END_STOPS_RAD, STEP_S, Plant, PlantParameters
 from simulation.track import Track
@@ -31,6 +33,7 @@ class ConstantThrust(FlipperContact):
         sweep_velocity_rad_s: float,
         adduction_velocity_rad_s: float,
         body_velocity_m_s: float,
+        surface_m: float = 0.0,
     ) -> ContactForce:
         return NO_CONTACT._replace(thrust_n=self.thrust_n)
 
@@ -171,12 +174,93 @@ def test_a_quarter_of_the_step_gives_the_same_push() -> None:
     assert ends_m[1] == pytest.approx(ends_m[0], rel=0.03)
 
 
-def test_a_reset_brings_everything_back() -> None:
-    plant, fresh = Plant(PlantParameters(), TRACK), Plant(PlantParameters(), TRACK)
-    for _ in range(500):
-        plant.step(STEP_S, (-0.7, -0.3, -0.7, -0.3))
+def row(plant: Plant, strides: int = 2) -> list[float]:
+    """Strokes with prescribed torques: down, back, up and forward. The flippers' angles at the end of each."""
+    ends = []
+    for _ in range(strides):
+        for torques_nm in ((0.0, -0.2), (-0.6, -0.1), (0.0, 0.6), (0.1, 0.05)):
+            for _ in range(300):
+                plant.step(STEP_S, (*torques_nm, *torques_nm))
+            ends += [plant.body_m, *plant.angles_rad]
+    return ends
+
+
+@pytest.mark.parametrize("disturbances", [Disturbances(), LAB])
+def test_a_reset_brings_everything_back(disturbances: Disturbances) -> None:
+    plant = Plant(PlantParameters(disturbances=disturbances), TRACK, Random(3))
+    first = row(plant)
+    assert row(plant) != first
     plant.reset()
-    for _ in range(100):
+    assert row(plant) == first
+
+
+def test_the_body_of_a_fixed_base_never_moves() -> None:
+    plant, free = Plant(PlantParameters(fixed_base=True), TRACK), Plant(PlantParameters(), TRACK)
+    row(free)
+    assert free.body_m > 0.02
+    row(plant)
+    assert (plant.body_m, plant.body_m_s) == (0.0, 0.0)
+    assert max(abs(angle_rad) for angle_rad in plant.angles_rad) > 0.1
+
+
+def test_the_flippers_have_histories_of_their_own_and_a_seed_repeats_them() -> None:
+    plants = [Plant(PlantParameters(disturbances=LAB), TRACK, Random(seed)) for seed in (3, 3, 4)]
+    for plant in plants:
+        row(plant)
+    first, second, third = ([(a.surface_m, a.history.clinging_n) for a in plant.arms] for plant in plants)
+    assert first == second
+    assert len({first[0], first[1], third[0], third[1]}) == 4
+    assert all(clinging_n > 0.0 for _, clinging_n in first)
+
+
+def test_an_arm_starts_with_its_edge_on_the_mud_that_it_meets() -> None:
+    plant = Plant(PlantParameters(disturbances=Disturbances(surface_sd_m=0.003)), TRACK, Random(3))
+    for arm in plant.arms:
+        assert arm.surface_m != 0.0
+        depth_m = plant.parameters.geometry.depth_m(arm.sweep_rad, arm.adduction_rad)
+        assert depth_m == pytest.approx(arm.surface_m)
+
+
+def test_a_flipper_feels_the_mud_from_its_own_surface_on() -> None:
+    plant = Plant(PlantParameters(), TRACK)
+    for arm, surface_m in zip(plant.arms, (-0.001, 0.003), strict=True):  # the lower corner is at 1.5 mm
+        arm.adduction_rad = plant.parameters.geometry.adduction_rad(0.0, 0.0)
+        arm.adduction_velocity_rad_s = -0.1
+        arm.history.surface_m = surface_m
+    plant.step(STEP_S, NO_TORQUE)
+    left, right = plant.arms
+    assert left.force.upward_n > 0.0
+    assert right.force == NO_CONTACT
+
+
+def test_an_arm_tells_the_clay_under_its_flipper_as_firm_as_it_was_left() -> None:
+    plant = Plant(
+        PlantParameters(disturbances=Disturbances(remoulding=1.0), fixed_base=True), Track([(9.0, Clay("any", 1000.0))])
+    )
+    assert [arm.clay for arm in plant.arms] == [Clay("any", 1000.0)] * 2
+    torques_nm = (0.0, -0.3, 0.0, -0.3)
+    strengths_pa = []
+    for _ in range(3):
+        for direction in (1.0, -2.0):
+            for _ in range(300):
+                plant.step(STEP_S, (0.0, direction * torques_nm[1], 0.0, direction * torques_nm[3]))
+            if direction > 0.0:
+                strengths_pa.append(plant.arms[0].clay.strength_pa)
+    assert strengths_pa == pytest.approx([500.0 + 500.0 * exp(-0.4 * earlier) for earlier in range(3)])
+
+
+def test_the_clay_is_the_one_where_the_flipper_is_not_where_the_body_is() -> None:
+    plant = Plant(PlantParameters(), Track([(0.05, MUDS["48.5"]), (1.0, MUDS["53.1"])]))
+    plant.arms[0].sweep_rad, plant.arms[1].sweep_rad = radians(30.0), radians(-30.0)
+    plant.step(STEP_S, NO_TORQUE)
+    assert [arm.clay for arm in plant.arms] == [MUDS["53.1"], MUDS["48.5"]]
+
+
+def test_a_flipper_that_carries_mud_is_heavier() -> None:
+    falls = []
+    for weight_n in (0.0, 0.5):
+        plant = make_air_plant()
+        plant.arms[0].history.clinging_n = weight_n
         plant.step(STEP_S, NO_TORQUE)
-        fresh.step(STEP_S, NO_TORQUE)
-    assert (plant.body_m, plant.angles_rad) == (fresh.body_m, fresh.angles_rad)
+        falls.append(-plant.arms[0].adduction_velocity_rad_s * 0.0006 / STEP_S)
+    assert falls == pytest.approx([MOMENT_NM, MOMENT_NM + 0.5 * 0.12])  # level arms: the lever is their length

@@ -40,7 +40,7 @@ def test_five_centimetres_stick_in_the_stiff_mud(configuration: Configuration) -
 @pytest.mark.parametrize("water", MUDS)
 def test_it_moves_forward_in_every_mud(configuration: Configuration, water: str) -> None:
     step_cm, _ = walk(configuration, MUDS[water], 0.03)
-    assert 1.0 < step_cm < 16.0
+    assert 1.0 < step_cm < 20.0  # a sweep of 12 cm, and some coasting
 
 
 def test_three_centimetres_slip_in_the_soft_mud(configuration: Configuration) -> None:

@@ -1,4 +1,7 @@
-"""Strokes through made-up mud whose law is known, and whether the estimator finds that law again."""
+"""Strokes through made-up mud whose law is known, and whether the estimator finds that law again.
+
+Strides are compared by their text: what is unknown is NaN, which is not equal to itself.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
@@ -11,9 +14,10 @@ import pytest
 from control.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
-from control.records import NO_LOAD, Phase, StrideEstimate
-from estimation.mud import MudEstimator
-from estimation.stride import MOBILISED_M, RELEASED_M, STEADY_SHARE, SURFACE_FORCE_N, FlipperEstimator
+from control.records import NO_LOAD, FlipperLoad, Phase, StrideEstimate
+from estimation.joint_load import FlipperDrive, JointSample
+from estimation.mud import EstimationParameters, MudEstimator
+from estimation.paper import MOBILISED_M, RELEASED_M, STEADY_SHARE, SURFACE_FORCE_N, PaperEstimator
 
 TICK_S = 1.0 / 380.0
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
@@ -21,6 +25,7 @@ EDGE_M2, WIDTH_M, LENGTH_M = 0.025 * 0.004, 0.025, 0.12
 SWEEP_NM_A, ADDUCTION_NM_A = 0.083, 0.09
 WEIGHTLESS = ArmMass(0.0, 0.0, 0.0, 0.0)
 HEAVY = ArmMass(0.3, 0.07, 0.0004, 0.0006)
+DRIVE = FlipperDrive(WEIGHTLESS, SWEEP_NM_A, ADDUCTION_NM_A)
 EXACT = 1e-6
 
 
@@ -119,17 +124,25 @@ def triggered(samples: Sequence[Sample], mud: Mud, mass: ArmMass = WEIGHTLESS) -
     return loaded(samples, lambda sample: (0.0, 2.0 * SURFACE_FORCE_N) if sample is start else law(sample), mass)
 
 
-def estimator(mass: ArmMass = WEIGHTLESS) -> FlipperEstimator:
-    return FlipperEstimator("left", GEOMETRY, mass, SWEEP_NM_A, ADDUCTION_NM_A)
+def estimator(mass: ArmMass = WEIGHTLESS) -> PaperEstimator:
+    return PaperEstimator("left", GEOMETRY, FlipperDrive(mass, SWEEP_NM_A, ADDUCTION_NM_A))
 
 
-def closed(samples: Iterable[Sample], flipper: FlipperEstimator | None = None) -> list[StrideEstimate]:
+def feed(flipper: PaperEstimator, sample: Sample) -> tuple[FlipperLoad, StrideEstimate | None]:
+    """As messages that are as new as the tick."""
+    now_s, phase, sweep_rad, adduction_rad, sweep_rad_s, adduction_rad_s, sweep_a, adduction_a, body_x_m = sample
+    sweep = JointSample(sweep_rad, sweep_rad_s, sweep_a, now_s, now_s)
+    adduction = JointSample(adduction_rad, adduction_rad_s, adduction_a, now_s, now_s)
+    return flipper.update(now_s, phase, sweep, adduction, body_x_m)
+
+
+def closed(samples: Iterable[Sample], flipper: PaperEstimator | None = None) -> list[StrideEstimate]:
     flipper = flipper or estimator()
-    strides = [flipper.update(*sample)[1] for sample in samples]
+    strides = [feed(flipper, sample)[1] for sample in samples]
     return [stride for stride in strides if stride is not None]
 
 
-def one(samples: Iterable[Sample], flipper: FlipperEstimator | None = None) -> StrideEstimate:
+def one(samples: Iterable[Sample], flipper: PaperEstimator | None = None) -> StrideEstimate:
     (stride,) = closed(samples, flipper)
     return stride
 
@@ -171,7 +184,7 @@ def test_each_stride_of_a_walk_tells_the_same_law() -> None:
 def test_the_load_is_the_force_that_the_mud_exerts() -> None:
     law, flipper = law_of(MUD), estimator()
     for sample in loaded(motion(), law):
-        load, _ = flipper.update(*sample)
+        load, _ = feed(flipper, sample)
         assert (load.force_x_n, load.force_z_n) == pytest.approx(law(sample), abs=1e-12)
         assert load.depth_m == sample.depth_m
 
@@ -291,14 +304,14 @@ def test_a_sample_that_is_read_again_counts_once(times: int, mass: ArmMass) -> N
     repeated = [
         sample._replace(now_s=sample.now_s + again * TICK_S / times) for sample in samples for again in range(times)
     ]
-    assert one(repeated, estimator(mass)) == one(samples, estimator(mass))
+    assert repr(one(repeated, estimator(mass))) == repr(one(samples, estimator(mass)))
 
 
 def test_a_sample_that_is_read_again_shows_the_same_load() -> None:
     flipper = estimator()
     for sample in loaded(motion(), law_of(MUD)):
-        load, _ = flipper.update(*sample)
-        assert flipper.update(*sample) == (load, None)
+        load, _ = feed(flipper, sample)
+        assert feed(flipper, sample) == (load, None)
 
 
 @pytest.mark.parametrize("field", ["sweep_rad", "adduction_rad", "sweep_current_a", "adduction_current_a"])
@@ -306,12 +319,12 @@ def test_a_sample_that_is_read_again_shows_the_same_load() -> None:
 def test_samples_that_are_not_finite_are_skipped(field: str, bad: float) -> None:
     samples, change = triggered(motion(), MUD), cast(dict[str, Any], {field: bad})
     between = [each for sample in samples for each in (sample, sample._replace(**change))]
-    assert one(between) == one(samples)
+    assert repr(one(between)) == repr(one(samples))
 
 
 def test_a_sample_that_is_not_finite_has_no_load() -> None:
     lost = motion()[0]._replace(sweep_current_a=nan)
-    assert estimator().update(*lost) == (NO_LOAD, None)
+    assert feed(estimator(), lost) == (NO_LOAD, None)
 
 
 def test_the_law_is_found_from_every_other_sample() -> None:
@@ -357,7 +370,7 @@ def test_a_stroke_cut_short_does_not_close(last: Phase) -> None:
     stop = begun[-1]._replace(now_s=begun[-1].now_s + TICK_S, phase=Phase.REST)
     flipper = estimator()
     assert closed([*begun, stop], flipper) == []
-    assert one(samples, flipper) == one(samples)
+    assert repr(one(samples, flipper)) == repr(one(samples))
 
 
 def test_an_extraction_cut_short_does_not_close() -> None:
@@ -443,22 +456,21 @@ def test_a_reset_forgets_the_stride_under_way_and_the_count() -> None:
     flipper = estimator()
     closed(moving[: len(moving) * 2 // 3], flipper)
     flipper.reset()
-    assert closed(moving, flipper) == closed(moving)
+    assert repr(closed(moving, flipper)) == repr(closed(moving))
 
 
 def test_a_reset_forgets_the_velocities_before_it() -> None:
     moving = motion()[30]
     flipper = estimator(HEAVY)
-    flipper.update(*moving._replace(now_s=0.0, adduction_velocity_rad_s=-5.0))
+    feed(flipper, moving._replace(now_s=0.0, adduction_velocity_rad_s=-5.0))
     flipper.reset()
-    assert flipper.update(*moving) == estimator(HEAVY).update(*moving)
+    assert feed(flipper, moving) == feed(estimator(HEAVY), moving)
 
 
 def test_the_same_samples_give_the_same_bits() -> None:
     samples = [sample._replace(body_x_m=0.0) for sample in noisy(triggered(motion(strides=3), MUD), 3, 0.1)]
     first, again = closed(samples), closed(samples)
     assert len(first) == 3
-    assert first == again
     assert repr(first) == repr(again)
 
 
@@ -466,7 +478,7 @@ def test_the_same_samples_give_the_same_bits() -> None:
 
 
 def both(left: list[Sample], right: list[Sample]) -> list[StrideEstimate]:
-    mud = MudEstimator(GEOMETRY, WEIGHTLESS, (SWEEP_NM_A, ADDUCTION_NM_A, SWEEP_NM_A, ADDUCTION_NM_A))
+    mud = MudEstimator(GEOMETRY, (DRIVE, DRIVE), EstimationParameters(method="paper"))
     strides: list[StrideEstimate] = []
     for a, b in zip(left, right, strict=True):
         reading = mud.update(
@@ -492,13 +504,14 @@ def test_each_flipper_finds_its_own_mud() -> None:
 def test_a_flipper_that_is_not_heard_does_not_disturb_the_other_one() -> None:
     samples = triggered(motion(), MUD)
     lost = [sample._replace(sweep_rad=nan, adduction_current_a=nan) for sample in samples]
-    assert both(samples, lost)[0] == both(samples, samples)[0]
-    assert both(lost, samples)[1] == both(samples, samples)[1]
+    assert repr(both(samples, lost)[0]) == repr(both(samples, samples)[0])
+    assert repr(both(lost, samples)[1]) == repr(both(samples, samples)[1])
 
 
 def test_each_joint_has_its_own_torque_constant() -> None:
     constants = (0.05, 0.06, 0.07, 0.08)
-    mud = MudEstimator(GEOMETRY, WEIGHTLESS, constants)
+    drives = (FlipperDrive(WEIGHTLESS, *constants[:2]), FlipperDrive(WEIGHTLESS, *constants[2:]))
+    mud = MudEstimator(GEOMETRY, drives, EstimationParameters(method="paper"))
     reading = mud.update(0.0, Phase.REST, (0.0,) * 4, (0.0,) * 4, (1.0, 1.0, 1.0, 1.0), 0.0)
     torques = [getattr(load, name) for load in reading[:2] for name in ("sweep_torque_nm", "adduction_torque_nm")]
     assert torques == [-constant for constant in constants]

@@ -1,0 +1,115 @@
+"""`mudskipper experiment`: the paper's experiments, each ending in numbers beside the paper's and a picture."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from command_line import exit_codes
+from command_line.screen import Progress, complain, number, table
+from experiments.estimation import (
+    LAYERS,
+    SINGLE_WATERS,
+    WALKING_WATERS,
+    Plan,
+    judge,
+    report_of,
+    with_layers,
+)
+from simulation.clay import Clay, clay_of_water
+
+
+def estimation(options: argparse.Namespace) -> int:
+    if not options.simulated:
+        complain("the truth comes from a virtual load cell: this experiment runs with --simulated only")
+        return exit_codes.USAGE
+    try:
+        plan = plan_of(options)
+    except ValueError as problem:
+        complain(str(problem))
+        return exit_codes.USAGE
+    progress = Progress("trials")
+    report = report_of(plan, judge(plan, progress.show))
+    progress.clear()
+    if options.out is not None:
+        _write(options, report)
+    print(json.dumps(report) if options.json else text_of(report))
+    return exit_codes.OK
+
+
+def plan_of(options: argparse.Namespace) -> Plan:
+    """Raises ValueError for a mud or a layer that there is not."""
+    layers = LAYERS if options.layers is None else tuple(name for name in options.layers.split(",") if name)
+    plan = with_layers(Plan(seeds=options.seeds), () if layers == ("none",) else layers)
+    single = _muds(options, SINGLE_WATERS) if options.setup in ("single", "both") else ()
+    walking = _muds(options, WALKING_WATERS) if options.setup in ("walking", "both") else ()
+    return replace(plan, single=single, walking=walking)
+
+
+def _muds(options: argparse.Namespace, waters: Sequence[float]) -> tuple[Clay, ...]:
+    if options.strength:
+        return tuple(Clay(f"{strength_pa:g} Pa", strength_pa) for strength_pa in options.strength)
+    return tuple(clay_of_water(water) for water in options.mud or waters)
+
+
+def _write(options: argparse.Namespace, report: dict[str, Any]) -> None:
+    from experiments.plots import plot_errors  # matplotlib takes its time
+
+    options.out.mkdir(parents=True, exist_ok=True)
+    (options.out / "estimation.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    plot_errors(report, options.out / "estimation.png")
+    print(f"written  {options.out / 'estimation.json'}, {options.out / 'estimation.png'}", file=sys.stderr)
+
+
+def text_of(report: dict[str, Any]) -> str:
+    head = ["setup", "mud", "", "method", "median", "p95", "bias", "in 95 %", "strides", "bounds", "hold", "not valid"]
+    rows = [
+        [
+            row["setup"],
+            row["mud"],
+            row["coefficient"],
+            row["method"],
+            *(_percent(row[name]) for name in ("median", "p95", "bias", "coverage")),
+            str(row["strides"]),
+            str(row["bounds"]),
+            _percent(row["bounds_hold"]),
+            str(row["not_valid"]),
+        ]
+        for row in report["errors"]
+    ]
+    return "\n\n".join([table([head, *rows]), _plates_text(report["plates"]), _boundaries_text(report["boundaries"])])
+
+
+def _plates_text(plates: Sequence[dict[str, Any]]) -> str:
+    head = ["setup", "mud", "", "upright / leaning plate", "estimate / upright", "share of the lean"]
+    rows = [
+        [
+            row["setup"],
+            row["mud"],
+            row["coefficient"],
+            number(row["upright_over_leaning"]),
+            number(row["estimate_over_upright"]),
+            _percent(row["lean_share"]),
+        ]
+        for row in plates
+    ]
+    return "The paper's upright plate (section II-E)\n" + table([head, *rows])
+
+
+def _boundaries_text(boundaries: Sequence[dict[str, Any]]) -> str:
+    if not boundaries:
+        return "Boundaries: none walked over"
+    head = ["from", "to", "crossings", "followed within two strides", "most strides"]
+    rows = [
+        [row["from"], row["to"], str(row["crossings"]), _percent(row["within_two"]), str(row["most_strides"])]
+        for row in boundaries
+    ]
+    return "Mud boundaries\n" + table([head, *rows])
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{100.0 * value:.1f} %"

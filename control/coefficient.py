@@ -1,0 +1,67 @@
+"""What is believed of the mud between strides: each coefficient with its doubt, and with how it changes with depth.
+
+The coefficients of control/plate.py stand for forces that grow with the depth squared (k_s) or with the submerged
+volume (k_p, k_e). Mud's forces grow more slowly, so the same mud reads softer in a deeper stride: by the clay practice
+of Matlock (1970) k_s at 5 cm is a third lower than at 3 cm. Near the depth z₀ of the strides it came from, k ∝ z^m.
+The exponent is learned too, and what is not known of it counts the more, the farther a force is predicted:
+
+    ln k(z) = ln k + m ln(z/z₀)        (std_error/k)² at z  =  (std_error/k)² + ln²(z/z₀) · (exponent_std_error)²
+
+z₀ is the weighted mean of the strides' ln z: there the errors of ln k and m are independent, as the sum assumes.
+"""
+
+from __future__ import annotations
+
+from math import exp, hypot, log
+from typing import NamedTuple
+
+from control.records import UNKNOWN
+
+LARGEST_LOG_RATIO = 300.0  # nonsense stays a number: exp() and a few products of it do not overflow
+
+
+class Coefficient(NamedTuple):
+    value: float  # N/m³, at depth_m
+    std_error: float  # N/m³
+    depth_m: float  # below the mud's surface
+    exponent: float  # k ∝ z^exponent near depth_m
+    exponent_std_error: float
+    strides: int  # that support it
+    at_least: bool = False  # the mud never yielded: a lower bound
+
+    def at(self, depth_m: float) -> tuple[float, float]:
+        """Value and standard error at another depth; NaN where there is no mud."""
+        if not (depth_m > 0.0 and self.depth_m > 0.0):
+            return UNKNOWN, UNKNOWN
+        log_depths = log(depth_m) - log(self.depth_m)
+        log_ratio = self.exponent * log_depths
+        ratio = exp(min(max(log_ratio, -LARGEST_LOG_RATIO), LARGEST_LOG_RATIO))
+        value = ratio * self.value
+        return value, hypot(ratio * self.std_error, value * log_depths * self.exponent_std_error)
+
+
+class FlipperBelief(NamedTuple):
+    """What one flipper's strides say; None where they said nothing yet."""
+
+    k_p: Coefficient | None = None
+    k_s: Coefficient | None = None
+    k_e: Coefficient | None = None
+
+
+class MudBelief(NamedTuple):
+    """Each flipper apart, and both together where they agree. They go through two muds at times: then there is no
+    such thing as the mud's coefficient, and together it is None.
+    """
+
+    k_p: Coefficient | None = None
+    k_s: Coefficient | None = None
+    k_e: Coefficient | None = None
+    left: FlipperBelief = FlipperBelief()
+    right: FlipperBelief = FlipperBelief()
+    boundary: bool = False  # this stride did not fit what was remembered, which was dropped: another mud
+
+    def of(self, flipper: str) -> FlipperBelief:
+        return self.left if flipper == "left" else self.right
+
+
+NOTHING_KNOWN = MudBelief()

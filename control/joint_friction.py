@@ -1,0 +1,35 @@
+"""What a motor's bearings and magnets take of its torque, where a calibration has measured it.
+
+Direct-drive motors have little of it (the paper leaves it out), so everything is zero unless configured:
+
+    τ = c tanh(ω / ω₀) + d ω + A sin(n θ + φ)          Coulomb, viscous, cogging
+
+is what the motor spends on itself at the angle θ and the velocity ω. Bounds are those of motors of this size.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians, sin, tanh
+from typing import Annotated
+
+from control.bounds import Bounds
+
+SLOW_RAD_S = 0.05  # below it dry friction may point either way
+
+
+@dataclass(frozen=True)
+class JointFriction:
+    coulomb_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
+    viscous_nm_s: Annotated[float, Bounds(0.0, 0.1)] = 0.0
+    cogging_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
+    cogging_per_turn: Annotated[int, Bounds(0, 1000)] = 0
+    cogging_phase_deg: Annotated[float, Bounds(-360.0, 360.0)] = 0.0
+
+    def torque_nm(self, angle_rad: float, velocity_rad_s: float) -> float:
+        cogging_rad = self.cogging_per_turn * angle_rad + radians(self.cogging_phase_deg)
+        moving_nm = self.coulomb_nm * tanh(velocity_rad_s / SLOW_RAD_S) + self.viscous_nm_s * velocity_rad_s
+        return moving_nm + self.cogging_nm * sin(cogging_rad)
+
+
+NO_FRICTION = JointFriction()

@@ -1,0 +1,209 @@
+"""What one flipper learns from one stride, in torque space.
+
+Each stroke is kept as batches of equal travel (stroke.py). When the insertion ends, the surface is found (surface.py)
+and k_p fitted; when the stride closes, k_s or its bound (shear.py) and k_e (stroke_fit.py). The zero is taken anew in
+every swing (tare.py). Coefficients are linear in the joints' torques, so no force has to be known that two torques
+cannot tell; forces are mapped for display alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, hypot, isfinite, sin
+
+from control.geometry import FlipperGeometry
+from control.records import NO_LOAD, UNKNOWN, Estimate, FlipperLoad, Phase, StrideEstimate
+from estimation.force_map import smallest_force_n
+from estimation.joint_load import FlipperDrive, JointLoad, JointLoads, JointSample
+from estimation.shear import Base, Shear, find_shear
+from estimation.stride_clock import StrideClock
+from estimation.stroke import Batch, Stroke
+from estimation.stroke_fit import NOT_THERE, bound_extraction, fit_extraction, fit_insertion, judged, level_free
+from estimation.surface import NO_SURFACE, combined, find_surface
+from estimation.tare import Tare
+
+STEPS_M = {Phase.INSERTION: 0.0015, Phase.STANCE: 0.006, Phase.EXTRACTION: 0.002}
+RELEASED_M = 0.003  # depth up to which a flipper counts as out of the mud
+OWN_ERROR_M = 0.002  # by which a stroke's own force may seem to begin elsewhere than at the mud's surface
+FREE_SHARE = 0.4  # of the clearance that the edge must be above the mud to count as free air
+CLINGING_M = 0.015  # above the lower edge: the middle of what a stroke of 3 cm wets
+
+
+class FlipperEstimator:
+    """Owns what one flipper gathers in the stride under way."""
+
+    def __init__(
+        self,
+        flipper: str,
+        geometry: FlipperGeometry,
+        drive: FlipperDrive,
+        base: Base = Base.FREE,
+        body_drag_n: float = 0.0,
+        surface_error_m: float = 0.001,
+    ) -> None:
+        self.flipper = flipper
+        self.geometry = geometry
+        self.base = base
+        self.body_drag_n = body_drag_n
+        self.surface_error_m = surface_error_m
+        self._free_m = -FREE_SHARE * geometry.clearance_m
+        self._loads = JointLoads(geometry, drive)
+        self._clock = StrideClock()
+        self._tare = Tare()
+        self._strokes = {phase: Stroke(step_m) for phase, step_m in STEPS_M.items()}
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything, the count of strides included."""
+        self._loads.reset()
+        self._clock.reset()
+        self._tare.reset()
+        self._load = NO_LOAD
+        self._travel_m = UNKNOWN
+        self._body_at_close_m = UNKNOWN
+        self._begin_stride(0.0, UNKNOWN)
+
+    def _begin_stride(self, now_s: float, body_m: float) -> None:
+        self._clock.begin(now_s)
+        for stroke in self._strokes.values():
+            stroke.reset()
+        self._surface = combined(NO_SURFACE, self.surface_error_m, 0.0)
+        self._k_p = NOT_THERE
+        self._deepest_m = UNKNOWN
+        self._body_at_insertion_m = UNKNOWN
+        self._insertion_n = self._stance_n = self._extraction_n = UNKNOWN
+        if self._clock.index == 0 and not isfinite(self._body_at_close_m):
+            self._body_at_close_m = body_m
+
+    def update(
+        self, now_s: float, phase: Phase, sweep: JointSample, adduction: JointSample, body_x_m: float
+    ) -> tuple[FlipperLoad, StrideEstimate | None]:
+        """The load now and, on the first sample after a stride's extraction, what the stride said."""
+        closed = self._change_phase(now_s, phase, body_x_m) if phase is not self._clock.phase else None
+        if not isfinite(sweep.angle_rad + adduction.angle_rad + sweep.current_a + adduction.current_a):
+            return NO_LOAD, closed
+        load = self._loads.update(sweep, adduction)
+        if load is not None:
+            self._take_in(now_s, phase, load, body_x_m)
+        return self._load, closed
+
+    def _take_in(self, now_s: float, phase: Phase, load: JointLoad, body_m: float) -> None:
+        sweep_rad, adduction_rad, depth_m, rise_sweep_m, rise_adduction_m, sweep_nm, adduction_nm, saturated = load
+        rise_adduction_m -= CLINGING_M * sin(adduction_rad)
+        stroke = self._strokes.get(phase)
+        if stroke is None and depth_m < self._free_m:
+            self._tare.update(rise_sweep_m, rise_adduction_m, sweep_nm, adduction_nm)
+        weight_n, offset_nm, _ = self._tare.zero
+        sweep_nm += weight_n * rise_sweep_m - offset_nm
+        adduction_nm += weight_n * rise_adduction_m
+        force_x_n, force_z_n = smallest_force_n(self.geometry, sweep_rad, adduction_rad, sweep_nm, adduction_nm)
+        if phase is Phase.STANCE:
+            force_z_n = UNKNOWN
+        self._load = FlipperLoad(sweep_nm, adduction_nm, force_x_n, force_z_n, depth_m)
+        if stroke is not None:
+            self._travel_m = self.geometry.flipper_length_m * sweep_rad if phase is Phase.STANCE else depth_m
+            stroke.update(now_s, self._travel_m, sweep_rad, adduction_rad, sweep_nm, adduction_nm, body_m, saturated)
+            self._mark(phase, self._load, body_m)
+
+    def _mark(self, phase: Phase, load: FlipperLoad, body_m: float) -> None:
+        """Largest forces and depth of the stride."""
+        if phase is Phase.EXTRACTION:
+            self._extraction_n = -_larger(-load.force_z_n, -self._extraction_n)
+            return
+        self._deepest_m = _larger(load.depth_m, self._deepest_m)
+        if phase is Phase.STANCE:
+            self._stance_n = _larger(load.force_x_n, self._stance_n)
+        else:
+            self._insertion_n = _larger(load.force_z_n, self._insertion_n)
+            self._body_at_insertion_m = body_m
+
+    def _change_phase(self, now_s: float, phase: Phase, body_m: float) -> StrideEstimate | None:
+        change = self._clock.change(now_s, phase)
+        if change.ended in self._strokes:
+            self._strokes[change.ended].close(now_s, self._travel_m)
+        if change.ended is Phase.INSERTION:
+            self._learn_insertion(self._strokes[Phase.INSERTION].moving())
+        closed = self._close(now_s, body_m) if change.closes_stride else None
+        if change.begins_stride:
+            self._begin_stride(now_s, body_m)
+        if phase is Phase.INSERTION:
+            self._tare.take()
+        return closed
+
+    def _learn_insertion(self, batches: Sequence[Batch]) -> None:
+        """Surface, what is left of the zero above it, and k_p.
+
+        k_p is counted from where this stroke's own force began: a lag between angle and current shifts both alike.
+        """
+        length_m, arm_m = self.geometry.flipper_length_m, hypot(self.geometry.flipper_length_m, self.geometry.drop_m)
+        depths_m = [b.travel_m for b in batches]
+        forces_n = [b.adduction_nm / (arm_m * cos(b.sweep_rad)) for b in batches]
+        samples = sum([b.samples for b in batches])
+        sample_m = (depths_m[-1] - depths_m[0]) / samples if samples else 0.0
+        found = find_surface(depths_m, forces_n)
+        self._surface = combined(found, self.surface_error_m, sample_m)
+        level_n, level_error_n = (value * arm_m / length_m for value in self._surface[2:4])
+        corrected_n = self._tare.correct(-level_n, level_error_n)
+        below = level_free(batches, -corrected_n * length_m)
+        own = combined(found, max(self.surface_error_m, OWN_ERROR_M), 0.0)
+        self._k_p = fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n)
+
+    @property
+    def surface_m(self) -> float:
+        """What is known of the surface's depth below its nominal height."""
+        return self._surface.depth_m
+
+    def _close(self, now_s: float, body_m: float) -> StrideEstimate:
+        stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
+        shear = find_shear(self.geometry, stance.batches, self.surface_m, self.base, self.body_drag_n)
+        released = not self._load.depth_m > self.surface_m + RELEASED_M
+        duration_s = self._clock.duration_s
+        estimate = StrideEstimate(
+            flipper=self.flipper,
+            index=self._clock.index,
+            t_start_s=self._clock.start_s,
+            t_end_s=now_s,
+            insertion_s=duration_s[Phase.INSERTION],
+            stance_s=duration_s[Phase.STANCE],
+            extraction_s=duration_s[Phase.EXTRACTION],
+            k_p=self._k_p,
+            k_s=self._shear_estimate(shear),
+            k_e=self._learn_extraction(extraction, released),
+            surface_m=self.surface_m,
+            surface_std_error_m=self._surface.std_error_m,
+            depth_m=self._deepest_m - self.surface_m,
+            released=released,
+            insertion_force_n=self._insertion_n,
+            stance_force_n=self._stance_n,
+            extraction_force_n=self._extraction_n,
+            step_m=body_m - self._body_at_close_m,
+            place_m=self._body_at_insertion_m,
+            stance=shear.case,
+            tare_n=self._tare.zero.weight_n,
+            tare_drift_n=self._tare.drift_n,
+        )
+        self._clock.index += 1
+        self._body_at_close_m = body_m
+        return estimate
+
+    def _learn_extraction(self, stroke: Stroke, released: bool) -> Estimate:
+        told = fit_extraction(
+            self.geometry, stroke.moving(), self._surface, self._tare.zero.std_error_n, stroke.first_m
+        )
+        if released or told.valid:
+            return told
+        return bound_extraction(self.geometry, stroke.batches, self._surface)
+
+    def _shear_estimate(self, shear: Shear) -> Estimate:
+        """With the doubt about the surface: dk = 2 k dδ / z of a pressure that grows with depth."""
+        if shear.fit is None:
+            return NOT_THERE._replace(samples=shear.samples, reason=shear.reason or NOT_THERE.reason)
+        depth_m = self._deepest_m - self.surface_m
+        surface = 2.0 * shear.fit.slope * self._surface.std_error_m / depth_m if depth_m > 0.0 else 0.0
+        estimate = judged(shear.fit, surface, shear.samples)
+        return estimate._replace(at_least=shear.at_least, reason=estimate.reason or shear.reason)
+
+
+def _larger(value: float, largest: float) -> float:
+    """The larger one, also while there is none yet (NaN)."""
+    return largest if largest >= value else value

@@ -1,0 +1,114 @@
+"""The mud along the distance travelled: each coefficient over pieces of 5 cm, about half a step, where there is a pose.
+
+A piece's coefficient is the weighted mean of ln k over all strides of both flippers there, with the weights 1/r² of
+estimation/knowledge.py. Its doubt is that of the mean, times √(χ²/(n - 1)) where the strides differ by more than their
+own doubts allow (Birge's ratio: a boundary within the piece, a hole walked through again). The strides' depths differ
+too, so a mean depth stands beside it. A lower bound is not averaged; where nothing else was told the greatest stands.
+The pieces that were not walked on for longest are given up, so a long walk does not fill the memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import exp, floor, isfinite, sqrt
+from typing import NamedTuple
+
+from control.records import StrideEstimate
+from estimation.knowledge import Reading, reading_of
+
+PIECE_M = 0.05
+MOST_PIECES = 400  # 20 m
+
+
+class Mapped(NamedTuple):
+    """One coefficient of one piece."""
+
+    value: float  # N/m³
+    std_error: float  # N/m³
+    depth_m: float  # mean of the strides'
+    strides: int
+    at_least: bool
+
+
+class MapRow(NamedTuple):
+    place_m: float  # the piece's middle
+    k_p: Mapped | None
+    k_s: Mapped | None
+    k_e: Mapped | None
+
+
+class Sums(NamedTuple):
+    """Of the strides in one piece, weighted; squares about the mean."""
+
+    weight: float
+    log_k: float
+    log_depth: float
+    squares: float
+    strides: int
+    at_least: bool
+
+    def plus(self, reading: Reading) -> Sums:
+        if reading.at_least:
+            return _alone(reading) if self.at_least and reading.log_k > self.log_k else self
+        if self.at_least:
+            return _alone(reading)
+        weight = 1.0 / reading.variance
+        share = weight / (self.weight + weight)
+        stronger = reading.log_k - self.log_k
+        return Sums(
+            self.weight + weight,
+            self.log_k + share * stronger,
+            self.log_depth + share * (reading.log_depth - self.log_depth),
+            self.squares + self.weight * share * stronger * stronger,
+            self.strides + 1,
+            False,
+        )
+
+    def mapped(self) -> Mapped:
+        k, strides = exp(self.log_k), self.strides
+        scatter = max(1.0, self.squares / (strides - 1)) if strides > 1 else 1.0
+        return Mapped(k, k * sqrt(scatter / self.weight), exp(self.log_depth), strides, self.at_least)
+
+
+def _alone(reading: Reading) -> Sums:
+    return Sums(1.0 / reading.variance, reading.log_k, reading.log_depth, 0.0, 1, reading.at_least)
+
+
+Piece = tuple[Sums | None, Sums | None, Sums | None]  # of k_p, k_s, k_e
+
+
+class MudMap:
+    """Owns the pieces, in the order in which they were last walked on."""
+
+    def __init__(self) -> None:
+        self._pieces: dict[int, Piece] = {}
+
+    def reset(self) -> None:
+        self._pieces.clear()
+
+    def update(self, place_m: float, strides: Sequence[StrideEstimate]) -> None:
+        """The strides that closed with the body at `place_m`, NaN without a pose."""
+        if not isfinite(place_m / PIECE_M):
+            return
+        number = floor(place_m / PIECE_M)
+        for stride in strides:
+            k_p, k_s, k_e = (reading_of(each, stride.depth_m) for each in (stride.k_p, stride.k_s, stride.k_e))
+            if k_p is None and k_s is None and k_e is None:
+                continue
+            a, b, c = self._pieces.pop(number, (None, None, None))
+            self._pieces[number] = (_added(a, k_p), _added(b, k_s), _added(c, k_e))
+        while len(self._pieces) > MOST_PIECES:
+            del self._pieces[next(iter(self._pieces))]
+
+    def rows(self) -> tuple[MapRow, ...]:
+        """In the order of places."""
+        return tuple(
+            MapRow((number + 0.5) * PIECE_M, *(sums.mapped() if sums else None for sums in self._pieces[number]))
+            for number in sorted(self._pieces)
+        )
+
+
+def _added(sums: Sums | None, reading: Reading | None) -> Sums | None:
+    if reading is None:
+        return sums
+    return sums.plus(reading) if sums else _alone(reading)

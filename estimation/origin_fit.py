@@ -1,0 +1,104 @@
+"""Least squares of y = k x over one stroke, with a doubt that holds for samples that hang together.
+
+A stroke arrives as batches of equal travel, so every piece of the way counts alike, however long the flipper stayed
+there and however often a message was read. Single bad batches count less (Huber 1964, weight min(1, c s / |r|) with
+c = HUBER; the scale s is the median absolute residual of a robust first slope, and stays: a scale that followed the
+fit would let many bad batches pull it after them). The standard error is Newey and West's (1987), which counts
+residuals that run together by their autocovariances,
+
+    var k = [Γ₀ + 2 Σ (1 - j/(L+1)) Γ_j] / (Σ w x²)² · n/(n-2)       Γ_j = Σ g_i g_{i-j},  g = w x r
+
+with r what is left of the residuals beside a line through them: that line is how mud bends from the law, not how
+samples scatter. It is never less than that of independent residuals, and carries Student's factor. Two of them cover
+95 % where residuals are independent, and with twenty batches 87, 72 and 36 % where neighbours correlate by 0.3, 0.6
+and 0.9 (measured in the tests): the slower the noise, the more of it goes for a bend.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import accumulate
+from math import inf, isfinite, sqrt
+from operator import mul
+from typing import NamedTuple
+
+HUBER = 3.0  # with the usual 1.345 the ends of strokes in mud that bends from the law would count as bad
+NORMAL_MAD = 1.4826
+LAGS = 4
+ROUNDS = 20
+CONVERGED = 1e-7  # of the slope: far below its standard error
+MIN_BATCHES = 4
+STUDENT = (1.0, 6.48, 2.195, 1.624, 1.417, 1.312, 1.248, 1.207, 1.177, 1.154, 1.137, 1.123, 1.112, 1.102, 1.094)
+# t at 97.5 % over 1.96, by degrees of freedom, 1 + 1.3/ν beyond: two standard errors are 95 % however short the stroke
+
+
+class OriginFit(NamedTuple):
+    slope: float
+    std_error: float
+
+
+def fit_through_origin(x: Sequence[float], y: Sequence[float]) -> OriginFit | None:
+    """None where there are too few batches, none with a regressor, or numbers too large to square."""
+    square = sum([u * u for u in x])
+    if len(x) < MIN_BATCHES or not (0.0 < square < inf and max(x) > 0.0 and isfinite(sum(y))):
+        return None
+    slope, weights = _median_slope(x, y), [1.0] * len(x)
+    clip = HUBER * NORMAL_MAD * median([abs(v - slope * u) for u, v in zip(x, y, strict=True)])
+    for _ in range(ROUNDS):
+        sizes = [abs(v - slope * u) for u, v in zip(x, y, strict=True)]
+        weights = [1.0 if size <= clip else clip / size for size in sizes]
+        before, slope = slope, _weighted_slope(x, y, weights)
+        if abs(slope - before) <= CONVERGED * abs(slope):
+            break
+    return OriginFit(slope, _std_error(x, y, weights, slope)) if isfinite(slope) else None
+
+
+def median(values: Sequence[float]) -> float:
+    ordered, middle = sorted(values), len(values) // 2
+    return ordered[middle] if len(values) % 2 else (ordered[middle - 1] + ordered[middle]) / 2.0
+
+
+def _median_slope(x: Sequence[float], y: Sequence[float]) -> float:
+    """A start that single bad batches cannot move: of the batches with more than a third of the largest regressor."""
+    large = max(x) / 3.0
+    return median([b / a for a, b in zip(x, y, strict=True) if a > large])
+
+
+def _weighted_slope(x: Sequence[float], y: Sequence[float], weights: Sequence[float]) -> float:
+    weighted: list[float] = list(map(mul, weights, x))
+    square: float = sum(map(mul, weighted, x))
+    slope: float = sum(map(mul, weighted, y)) / square if square > 0.0 else inf
+    return slope
+
+
+def _std_error(x: Sequence[float], y: Sequence[float], weights: Sequence[float], slope: float) -> float:
+    """Newey and West's, whose weighted lags are the squared sums of all L + 1 batches in a row; but never less than
+    that of independent residuals: of few batches theirs is too small.
+    """
+    n, (offset, tilt) = len(x), _bend(x, y, weights, slope)
+    residuals = [v - offset - (slope + tilt) * u for u, v in zip(x, y, strict=True)]
+    weighted: list[float] = list(map(mul, weights, x))
+    scores: list[float] = list(map(mul, weighted, residuals))
+    square: float = sum(map(mul, weighted, x))
+    sums = list(accumulate([0.0] * (LAGS + 1) + scores + [0.0] * LAGS))
+    together = sum([(b - a) * (b - a) for a, b in zip(sums, sums[LAGS + 1 :], strict=False)]) / (LAGS + 1)
+    apart = square * sum([w * r * r for w, r in zip(weights, residuals, strict=True)])
+    student = STUDENT[n - 2] if n - 2 < len(STUDENT) else 1.0 + 1.3 / (n - 2)
+    return student * sqrt(max(n * together, apart) / (n - 2)) / square
+
+
+def _bend(x: Sequence[float], y: Sequence[float], weights: Sequence[float], slope: float) -> tuple[float, float]:
+    """The line a + c x through the residuals, which is how mud bends from the law and not how samples scatter."""
+    sw = sx = sy = sxx = sxy = 0.0
+    for u, v, w in zip(x, y, weights, strict=True):
+        r = v - slope * u
+        sw += w
+        sx += w * u
+        sy += w * r
+        sxx += w * u * u
+        sxy += w * u * r
+    spread = sw * sxx - sx * sx
+    if not spread > 1e-9 * sw * sxx:
+        return 0.0, 0.0
+    tilt = (sw * sxy - sx * sy) / spread
+    return (sy - tilt * sx) / sw, tilt

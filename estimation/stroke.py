@@ -1,0 +1,109 @@
+"""One stroke as batches of equal travel: the constant memory from which its coefficient is fitted.
+
+Samples are averaged until the flipper has travelled `step_m` further; a flipper that stands still adds to one batch
+however long it stands, and one that moves leaves the same batches at any rate of messages. Batch means are what
+residuals are computed from, so a standard error rests on pieces of way and not on rows.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from control.records import UNKNOWN
+
+LONGEST = 60  # batches: twice what the longest stroke leaves; what comes after is not kept
+MOVING = 0.6  # of the median speed, under which the flipper is starting or stopping
+MOSTLY = 0.3  # share of saturated samples from which a batch counts as saturated
+
+
+class Batch(NamedTuple):
+    """Means over one piece of the way."""
+
+    travel_m: float
+    sweep_rad: float
+    adduction_rad: float
+    sweep_nm: float
+    adduction_nm: float
+    body_m: float  # NaN without a pose
+    saturated: bool
+    samples: int
+    speed_m_s: float  # along the stroke
+
+
+class Stroke:
+    """Owns the batches of the stroke under way."""
+
+    __slots__ = (
+        "_body", "_clipped", "_lift", "_n", "_start_m", "_start_s", "_sweep", "_swept", "_travel",
+        "_turned",
+        "batches", "first_m", "step_m",
+    )  # fmt: skip
+
+    def __init__(self, step_m: float) -> None:
+        self.step_m = step_m
+        self.reset()
+
+    def reset(self) -> None:
+        self.batches: list[Batch] = []
+        self.first_m = UNKNOWN  # travel of the first sample
+        self._start_m = self._start_s = 0.0
+        self._empty()
+
+    def _empty(self) -> None:
+        self._n = self._clipped = 0
+        self._travel = self._sweep = self._lift = self._swept = self._turned = self._body = 0.0
+
+    def update(
+        self,
+        now_s: float,
+        travel_m: float,
+        sweep_rad: float,
+        adduction_rad: float,
+        sweep_nm: float,
+        adduction_nm: float,
+        body_m: float,
+        saturated: bool,
+    ) -> None:
+        """`travel_m`: the place along the stroke, in either direction."""
+        if self._n == 0:
+            self._start_m, self._start_s = travel_m, now_s
+            if not self.batches:
+                self.first_m = travel_m
+        elif not -self.step_m < travel_m - self._start_m < self.step_m:
+            self.close(now_s, travel_m)
+            self._start_m, self._start_s = travel_m, now_s
+        self._n += 1
+        self._clipped += saturated
+        self._travel += travel_m
+        self._sweep += sweep_rad
+        self._lift += adduction_rad
+        self._swept += sweep_nm
+        self._turned += adduction_nm
+        self._body += body_m
+
+    def close(self, now_s: float, travel_m: float) -> None:
+        """End the batch under way; also called when the stroke ends."""
+        n = self._n
+        if n and len(self.batches) < LONGEST:
+            elapsed_s = now_s - self._start_s
+            self.batches.append(
+                Batch(
+                    self._travel / n,
+                    self._sweep / n,
+                    self._lift / n,
+                    self._swept / n,
+                    self._turned / n,
+                    self._body / n,
+                    self._clipped > MOSTLY * n,
+                    n,
+                    abs(travel_m - self._start_m) / elapsed_s if elapsed_s > 0.0 else 0.0,
+                )
+            )
+        self._empty()
+
+    def moving(self) -> list[Batch]:
+        """Without the slow pieces at either end, where the flipper starts and stops: mud resists slow motion less."""
+        speeds_m_s = sorted([batch.speed_m_s for batch in self.batches])
+        least_m_s = MOVING * speeds_m_s[len(speeds_m_s) // 2] if speeds_m_s else 0.0
+        quick = [i for i, batch in enumerate(self.batches) if batch.speed_m_s >= least_m_s]
+        return self.batches[quick[0] : quick[-1] + 1] if quick else []

@@ -1,0 +1,68 @@
+"""How soon the robot knows that it is in another mud: walks across borders that it is not told of.
+
+A crossing begins with the first stride of a flipper whose insertion was in the next mud. It is followed once what
+that flipper believes of k_p is within FOLLOWED of the truth there; strides are counted with that one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+from control.records import FLIPPERS
+from experiments.load_cell_truth import LoadCellTruth
+from experiments.trial import Trial, beliefs_of
+from simulation.witness import StrideTruth
+
+FOLLOWED = 0.2  # of the truth: half of the smallest step between the muds
+
+
+class Crossing(NamedTuple):
+    before: str
+    after: str
+    flipper: str
+    strides: int | None  # until it was followed; None where it was not before the next border or the end
+
+
+def crossings_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]) -> list[Crossing]:
+    beliefs = beliefs_of(trial, trial.configuration.estimation)
+    return [crossing for flipper in FLIPPERS for crossing in _of_flipper(flipper, trial, truths, beliefs)]
+
+
+def _of_flipper(
+    flipper: str, trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth], beliefs: Mapping[int, Any]
+) -> list[Crossing]:
+    strides = [truth for truth in trial.truths if truth.flipper == flipper and truth.index in beliefs]
+    starts = [i for i in range(1, len(strides)) if strides[i].clay.name != strides[i - 1].clay.name]
+    crossings = []
+    for start, end in pairwise([*starts, len(strides)]):
+        close = [_is_close(stride, truths, beliefs) for stride in strides[start:end]]
+        if close:
+            followed = close.index(True) + 1 if True in close else None
+            crossings.append(Crossing(strides[start - 1].clay.name, strides[start].clay.name, flipper, followed))
+    return crossings
+
+
+def _is_close(stride: StrideTruth, truths: Mapping[tuple[str, int], LoadCellTruth], beliefs: Mapping[int, Any]) -> bool:
+    believed = beliefs[stride.index].of(stride.flipper).k_p
+    if believed is None:
+        return False
+    value, _ = believed.at(stride.insertion.deepest_m)
+    return bool(abs(value / truths[stride.flipper, stride.index].leaning.k_p - 1.0) <= FOLLOWED)
+
+
+def boundary_rows(crossings: Sequence[Crossing]) -> list[dict[str, Any]]:
+    groups: dict[tuple[str, str], list[Crossing]] = {}
+    for crossing in crossings:
+        groups.setdefault(crossing[:2], []).append(crossing)
+    return [
+        {
+            "from": before,
+            "to": after,
+            "crossings": len(group),
+            "within_two": round(sum(c.strides is not None and c.strides <= 2 for c in group) / len(group), 4),
+            "most_strides": "never" if any(c.strides is None for c in group) else max(c.strides or 0 for c in group),
+        }
+        for (before, after), group in groups.items()
+    ]

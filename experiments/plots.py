@@ -1,0 +1,56 @@
+"""The experiments as pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
+from matplotlib.axes import Axes  # noqa: E402
+
+COLOURS = {"default": "tab:blue", "paper": "tab:red", "paper compensated": "tab:orange"}
+COEFFICIENTS = ("k_p", "k_s", "k_e")
+HIGHEST_PERCENT = 150.0  # what lies above is drawn at the edge
+
+
+def plot_errors(report: dict[str, Any], path: Path) -> None:
+    """Median and 95th percentile of the error by setup, coefficient, mud and method."""
+    errors = report["errors"]
+    setups = list(dict.fromkeys(row["setup"] for row in errors))
+    size = (4.0 * len(COEFFICIENTS), 2.8 * len(setups))
+    figure, panels = plt.subplots(len(setups), len(COEFFICIENTS), figsize=size, squeeze=False, constrained_layout=True)
+    for row, setup in enumerate(setups):
+        for column, name in enumerate(COEFFICIENTS):
+            told = [each for each in errors if (each["setup"], each["coefficient"]) == (setup, name)]
+            _plot_panel(panels[row][column], told)
+            panels[row][column].set_title(f"{setup}: ${name}$", fontsize="medium")
+    panels[0][0].legend(fontsize="small")
+    for panel in panels[:, 0]:
+        panel.set_ylabel("error (%)")
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def _plot_panel(panel: Axes, rows: Sequence[dict[str, Any]]) -> None:
+    muds = list(dict.fromkeys(row["mud"] for row in rows))
+    for method, colour in COLOURS.items():
+        told = [row for row in rows if row["method"] == method and row["median"] is not None]
+        places = [muds.index(row["mud"]) for row in told]
+        medians = [min(100.0 * row["median"], HIGHEST_PERCENT) for row in told]
+        highest = [min(100.0 * row["p95"], HIGHEST_PERCENT) for row in told]
+        panel.vlines(places, medians, highest, color=colour, linewidth=2)
+        panel.plot(places, medians, "o", color=colour, label=method)
+    for place, mud in enumerate(muds):
+        if any(
+            row["mud"] == mud and row["method"] == "default" and row["bounds"] and not row["strides"] for row in rows
+        ):
+            panel.text(place, 2.0, "bounds", ha="center", color=COLOURS["default"], fontsize="small")
+    panel.axhline(10.0, color="grey", linewidth=0.8, linestyle=":")
+    panel.set_xticks(range(len(muds)), muds)
+    panel.set_ylim(0.0, HIGHEST_PERCENT)
+    panel.set_yscale("symlog", linthresh=20.0)
+    panel.set_xlabel("mud")

@@ -1,0 +1,90 @@
+"""The friction of a joint against numpy, and the laws that any friction must keep."""
+
+from math import pi, radians
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.joint_friction import NO_FRICTION, SLOW_RAD_S, JointFriction
+
+DRY = JointFriction(coulomb_nm=0.02)
+VISCOUS = JointFriction(viscous_nm_s=0.004)
+COGGING = JointFriction(cogging_nm=0.01, cogging_per_turn=84, cogging_phase_deg=30.0)
+
+angles = st.floats(-10.0, 10.0)
+velocities = st.floats(-50.0, 50.0)
+frictions = st.builds(
+    JointFriction,
+    coulomb_nm=st.floats(0.0, 0.5),
+    viscous_nm_s=st.floats(0.0, 0.1),
+    cogging_nm=st.floats(0.0, 0.5),
+    cogging_per_turn=st.integers(0, 1000),
+    cogging_phase_deg=st.floats(-360.0, 360.0),
+)
+
+
+@given(frictions, angles, velocities)
+def test_friction_is_the_docstrings_sum(friction: JointFriction, angle: float, velocity: float) -> None:
+    """To 1e-9 of the bounds: a thousand periods a turn multiply the rounding of the angle by as much."""
+    phase = np.deg2rad(friction.cogging_phase_deg)
+    expected = (
+        friction.coulomb_nm * np.tanh(velocity / SLOW_RAD_S)
+        + friction.viscous_nm_s * velocity
+        + friction.cogging_nm * np.sin(friction.cogging_per_turn * angle + phase)
+    )
+    assert friction.torque_nm(angle, velocity) == pytest.approx(float(expected), abs=1e-9)
+
+
+@given(angles, velocities)
+def test_an_unconfigured_joint_has_none(angle: float, velocity: float) -> None:
+    assert NO_FRICTION.torque_nm(angle, velocity) == 0.0
+
+
+def test_dry_friction_is_whole_at_walking_speeds_and_odd() -> None:
+    for velocity in (0.3, 1.0, 10.0):
+        assert DRY.torque_nm(1.0, velocity) == pytest.approx(0.02, rel=1e-4)  # 1 - tanh 6 = 1e-5
+        assert DRY.torque_nm(1.0, -velocity) == -DRY.torque_nm(1.0, velocity)
+
+
+def test_dry_friction_of_a_joint_at_rest_points_nowhere() -> None:
+    assert DRY.torque_nm(1.0, 0.0) == 0.0
+    assert abs(DRY.torque_nm(1.0, 0.01 * SLOW_RAD_S)) < 0.011 * 0.02  # no jump there
+
+
+def test_viscous_friction_is_in_proportion_to_the_velocity() -> None:
+    assert VISCOUS.torque_nm(0.0, 5.0) == pytest.approx(0.02)
+    assert VISCOUS.torque_nm(0.0, -10.0) == pytest.approx(-0.04)
+
+
+@given(velocities, angles)
+def test_what_moves_a_joint_is_spent_not_gained(velocity: float, angle: float) -> None:
+    friction = JointFriction(coulomb_nm=0.02, viscous_nm_s=0.004)
+    assert friction.torque_nm(angle, velocity) * velocity >= 0.0
+
+
+def test_cogging_repeats_as_often_a_turn_as_configured() -> None:
+    angles_rad = np.linspace(0.0, 2.0 * pi, 84 * 100, endpoint=False)
+    torques_nm = np.array([COGGING.torque_nm(float(angle), 0.0) for angle in angles_rad])
+    spectrum = np.abs(np.fft.rfft(torques_nm)) * 2.0 / len(torques_nm)
+    assert int(spectrum.argmax()) == 84
+    assert spectrum[84] == pytest.approx(0.01)
+    assert np.delete(spectrum, 84).max() < 1e-12  # one frequency only, to rounding
+
+
+def test_cogging_gives_back_over_a_turn_what_it_takes() -> None:
+    angles_rad = np.linspace(0.0, 2.0 * pi, 1000, endpoint=False)
+    assert sum(COGGING.torque_nm(float(angle), 3.0) for angle in angles_rad) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_phase_of_cogging_is_that_of_the_sine_at_angle_zero() -> None:
+    assert COGGING.torque_nm(0.0, 0.0) == pytest.approx(0.01 * np.sin(radians(30.0)))
+    turned = JointFriction(cogging_nm=0.01, cogging_per_turn=1, cogging_phase_deg=90.0)
+    assert turned.torque_nm(0.0, 0.0) == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("velocity", [3.4e38, -3.4e38])
+def test_dry_friction_keeps_its_bound_at_any_velocity(velocity: float) -> None:
+    """The largest that the bus can carry; what is not finite never gets here."""
+    assert abs(DRY.torque_nm(0.0, velocity)) <= 0.02

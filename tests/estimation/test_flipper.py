@@ -1,0 +1,691 @@
+"""Strokes through made-up mud that keeps the estimator's own laws, so that the truth is known to the last digit.
+
+The joints follow the gait exactly. The currents carry k_p Φ, k_s Ψ and k_e Φ of control/plate.py on the true surface,
+what the plate's face bears, gravity, inertia, friction and mud that clings. Without noise only two things are left in
+between: strokes are averaged over pieces of the way, and the surface has to be found first. The law bends a line of
+force against depth by 3 % at 2 cm, 8 % at 3 cm and 20 % at 4 cm (the plate leans more, the deeper it is), which reads
+as a surface that is too deep. Where a test wants the laws without that, it says beforehand where the surface is.
+"""
+
+from collections.abc import Iterable, Sequence
+from functools import cache
+from itertools import pairwise
+from math import cos, inf, isfinite, nan, radians, sin
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from control.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_duration_s
+from control.geometry import FlipperGeometry
+from control.joint_friction import JointFriction
+from control.joint_pd import ArmMass
+from control.plate import crossing, stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.records import NO_LOAD, Estimate, GaitTarget, Phase, StrideEstimate
+from estimation.flipper import CLINGING_M, RELEASED_M, FlipperEstimator
+from estimation.force_map import smallest_force_n
+from estimation.joint_load import FlipperDrive, JointSample
+from estimation.shear import Base
+from estimation.stroke_fit import MIN_VERTICAL_LEVER_M, NOT_OUT, UNOBSERVABLE
+
+RATE_HZ = 380.0
+INSTANT_S = 1e-5  # over which accelerations are taken: none of the gait's changes within it
+GEOMETRY, GAIT = FlipperGeometry(), GaitParameters(swing_duration_s=0.25)  # a short swing: nothing happens in it
+LENGTH_M, DROP_M = GEOMETRY.flipper_length_m, GEOMETRY.drop_m
+FRICTION = JointFriction(0.01, 0.002, 0.01, 14, 20.0)
+WEIGHTLESS = FlipperDrive(ArmMass(0.0, 0.0, 0.0, 0.0), 0.083, 0.09)
+HEAVY = FlipperDrive(ArmMass(0.3, 0.07, 0.0004, 0.0006), 0.083, 0.09, FRICTION, FRICTION)
+KNOWN_M = 1e-6  # doubt of a surface that is as good as known
+NOISE_A = 0.2  # the authors' logs show 0.1 to 0.3
+
+
+class Mud(NamedTuple):
+    k_p: float = 1.0e6  # N/m³
+    k_s: float = 0.6e6
+    k_e: float = 0.7e6
+    surface_m: float = 0.0
+    face_share: float = 0.0  # of the stance's load that the face also bears in insertion and extraction
+    weight_n: float = 0.0  # clings to the flipper
+    offset_nm: float = 0.0  # of the sweep motor
+
+    def times(self, factor: float) -> "Mud":
+        return self._replace(k_p=factor * self.k_p, k_s=factor * self.k_s, k_e=factor * self.k_e)
+
+
+MUD = Mud()
+
+
+class Moment(NamedTuple):
+    now_s: float
+    phase: Phase
+    sweep_rad: float
+    adduction_rad: float
+    sweep_rad_s: float = 0.0
+    adduction_rad_s: float = 0.0
+    sweep_rad_s2: float = 0.0
+    adduction_rad_s2: float = 0.0
+
+
+class Row(NamedTuple):
+    """The arguments of an estimator's `update`."""
+
+    now_s: float
+    phase: Phase
+    sweep: JointSample
+    adduction: JointSample
+    body_m: float = 0.0
+
+    @property
+    def depth_m(self) -> float:
+        return GEOMETRY.depth_m(self.sweep.angle_rad, self.adduction.angle_rad)
+
+    def lost(self) -> "Row":
+        return self._replace(adduction=self.adduction._replace(angle_rad=nan))
+
+    def pushed(self, sweep_a: float, adduction_a: float) -> "Row":
+        """With more current."""
+        sweep = self.sweep._replace(current_a=self.sweep.current_a + sweep_a)
+        return self._replace(
+            sweep=sweep, adduction=self.adduction._replace(current_a=self.adduction.current_a + adduction_a)
+        )
+
+
+def joints(target: GaitTarget) -> tuple[float, float, float, float]:
+    """Angles and velocities that follow the gait exactly."""
+    lift_rad = GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m)
+    lift_rad_s = GEOMETRY.adduction_velocity_rad_s(
+        target.sweep_rad, lift_rad, target.sweep_velocity_rad_s, target.depth_velocity_m_s
+    )
+    return target.sweep_rad, lift_rad, target.sweep_velocity_rad_s, lift_rad_s
+
+
+@cache
+def motion(
+    depth_m: float = 0.03, gait: GaitParameters = GAIT, strides: int = 1, rate_hz: float = RATE_HZ
+) -> tuple[Moment, ...]:
+    """Whole strides, from the swing before the first one to the sample that closes the last."""
+    walk, moments = Gait(gait, GEOMETRY), list[Moment]()
+    walk.reset(depth_m)
+    for tick in range(1, int((strides + 1) * stride_duration_s(gait, GEOMETRY, depth_m) * rate_hz)):
+        before, target = joints(walk.step(1.0 / rate_hz - 2.0 * INSTANT_S)), walk.step(INSTANT_S)
+        after = joints(walk.step(INSTANT_S))
+        accelerations = [(after[i] - before[i]) / (2.0 * INSTANT_S) for i in (2, 3)]
+        moments.append(Moment(tick / rate_hz, target.phase, *joints(target), *accelerations))
+    first, *_, last = (i for i, (a, b) in enumerate(pairwise(moments), 1) if a.phase is not b.phase is Phase.SWING)
+    return tuple(moments[first : last + 1])
+
+
+def mud_torques_nm(moment: Moment, mud: Mud) -> tuple[float, float]:
+    """By the laws, of the mud on (sweep, adduction)."""
+    plate = submerged_plate(GEOMETRY, moment.sweep_rad, moment.adduction_rad, mud.surface_m)
+    stance_nm = mud.k_s * stance_moment_m4(GEOMETRY, plate)
+    stroke_m4 = stroke_moment_m4(GEOMETRY, plate, moment.sweep_rad)
+    share, k = {
+        Phase.INSERTION: (mud.face_share, mud.k_p),
+        Phase.STANCE: (1.0, 0.5 * mud.k_p),  # whatever holds a flipper up in stance: it must not matter
+        Phase.EXTRACTION: (-mud.face_share, -mud.k_e),
+    }.get(moment.phase, (0.0, 0.0))
+    sweep_nm = share * stance_nm
+    return sweep_nm, k * stroke_m4 + crossing(GEOMETRY, plate, moment.sweep_rad) * sweep_nm
+
+
+def clinging_torques_nm(moment: Moment, mud: Mud) -> tuple[float, float]:
+    """-W ∂z/∂q of the point CLINGING_M above the edge, whose height is l cos α sin β - (h - CLINGING_M) cos β."""
+    sa, ca, sb, cb = (trig(angle) for angle in (moment.sweep_rad, moment.adduction_rad) for trig in (sin, cos))
+    sweep_nm = mud.weight_n * LENGTH_M * sa * sb + mud.offset_nm
+    return sweep_nm, -mud.weight_n * (LENGTH_M * ca * cb + (DROP_M - CLINGING_M) * sb)
+
+
+def rows_of(moments: Iterable[Moment], mud: Mud = MUD, drive: FlipperDrive = WEIGHTLESS) -> list[Row]:
+    """What the drives measure while they move the flipper so: k_t I = J ω' - gravity - load + friction."""
+    rows, mass = [], drive.mass
+    for moment in moments:
+        now_s, phase, sweep_rad, lift_rad, sweep_rad_s, lift_rad_s, sweep_rad_s2, lift_rad_s2 = moment
+        load_nm = [
+            sum(each) for each in zip(mud_torques_nm(moment, mud), clinging_torques_nm(moment, mud), strict=True)
+        ]
+        gravity_nm = mass.gravity_torques_nm(sweep_rad, lift_rad)
+        sweep_nm = mass.sweep_inertia_kg_m2 * sweep_rad_s2 - gravity_nm[0] - load_nm[0]
+        lift_nm = mass.adduction_inertia_kg_m2 * lift_rad_s2 - gravity_nm[1] - load_nm[1]
+        sweep_a = (sweep_nm + drive.sweep_friction.torque_nm(sweep_rad, sweep_rad_s)) / drive.sweep_constant_nm_a
+        lift_a = (lift_nm + drive.adduction_friction.torque_nm(lift_rad, lift_rad_s)) / drive.adduction_constant_nm_a
+        sweep = JointSample(sweep_rad, sweep_rad_s, sweep_a, now_s, now_s)
+        rows.append(Row(now_s, phase, sweep, JointSample(lift_rad, lift_rad_s, lift_a, now_s, now_s)))
+    return rows
+
+
+def noisy(rows: Sequence[Row], seed: int, noise_a: float = NOISE_A) -> list[Row]:
+    noise = np.random.default_rng(seed).normal(0.0, noise_a, (len(rows), 2)).tolist()
+    return [row.pushed(*each) for row, each in zip(rows, noise, strict=True)]
+
+
+def estimator(
+    drive: FlipperDrive = WEIGHTLESS, surface_error_m: float = 0.001, base: Base = Base.FIXED
+) -> FlipperEstimator:
+    return FlipperEstimator("left", GEOMETRY, drive, base, 2.5, surface_error_m)
+
+
+def closed(rows: Iterable[Row], flipper: FlipperEstimator | None = None) -> list[StrideEstimate]:
+    flipper = flipper or estimator()
+    strides = [flipper.update(*row)[1] for row in rows]
+    return [stride for stride in strides if stride is not None]
+
+
+def one(rows: Iterable[Row], flipper: FlipperEstimator | None = None) -> StrideEstimate:
+    (stride,) = closed(rows, flipper)
+    return stride
+
+
+def coefficients(stride: StrideEstimate) -> tuple[Estimate, Estimate, Estimate]:
+    return stride.k_p, stride.k_s, stride.k_e
+
+
+def ratios(stride: StrideEstimate, mud: Mud) -> list[float]:
+    return [each.value / truth for each, truth in zip(coefficients(stride), mud[:3], strict=True)]
+
+
+def doubts(stride: StrideEstimate) -> list[float]:
+    return [each.std_error / each.value for each in coefficients(stride)]
+
+
+# the laws are found
+
+
+@pytest.mark.parametrize("drive", [WEIGHTLESS, HEAVY])
+@pytest.mark.parametrize("gait", [GAIT, SINGLE_FLIPPER])
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.04])
+def test_where_the_surface_is_known_shear_and_extraction_are_found(
+    depth_m: float, gait: GaitParameters, drive: FlipperDrive
+) -> None:
+    """0.1 %: batches of 6 mm on a law that is not quite a line. 1 % for k_e: what bends in the insertion also leaves a
+    level of up to 10 mN for the zero, and a tick of the quick extraction is 3 % of its ramp's sine.
+    """
+    mud = MUD._replace(face_share=0.3)
+    stride = one(rows_of(motion(depth_m, gait), mud, drive), estimator(drive, KNOWN_M))
+    assert stride.k_s.valid and stride.k_e.valid
+    assert stride.k_s.value == pytest.approx(mud.k_s, rel=1e-3)
+    assert stride.k_e.value == pytest.approx(mud.k_e, rel=1e-2)
+
+
+@pytest.mark.parametrize("surface_m", [-0.003, 0.0, 0.003])
+@pytest.mark.parametrize("depth_m", [0.02, 0.025, 0.03])
+@pytest.mark.parametrize("factor", [0.25, 1.0, 3.0])
+def test_where_the_surface_has_to_be_found_truth_is_within_the_doubt_of_it(
+    factor: float, depth_m: float, surface_m: float
+) -> None:
+    """Nothing is known beforehand, nothing is noisy: the surface is told to 0.8 mm, and each coefficient to 6 %."""
+    mud = MUD.times(factor)._replace(surface_m=surface_m)
+    stride = one(rows_of(motion(depth_m), mud), estimator(surface_error_m=0.05))
+    assert all(each.valid for each in coefficients(stride))
+    assert abs(stride.surface_m - surface_m) < 0.8e-3
+    assert ratios(stride, mud) == pytest.approx([1.0, 1.0, 1.0], abs=0.06)
+    assert stride.depth_m == pytest.approx(depth_m - stride.surface_m, abs=1e-5)
+
+
+@pytest.mark.parametrize("surface_m", [-0.003, 0.0, 0.003])
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.04])
+def test_without_noise_all_error_is_that_of_the_surface(depth_m: float, surface_m: float) -> None:
+    """k_p and k_e go with V of a slope through it, 3/2 dδ/z; k_s with its square. Taken off to first order in dδ/z,
+    which is up to 4 %, so its square is left; and a quarter of the way up is not fitted, so k_e is more than 3/2.
+    """
+    mud = MUD._replace(surface_m=surface_m)
+    stride = one(rows_of(motion(depth_m), mud), estimator(surface_error_m=0.05))
+    late = (stride.surface_m - surface_m) / (depth_m - surface_m)
+    left = [ratio * (1.0 - late) ** n for ratio, n in zip(ratios(stride, mud), (1.5, 2.0, 1.5), strict=True)]
+    assert left[0] == pytest.approx(1.0, abs=0.01)
+    assert left[1] == pytest.approx(1.0, abs=0.003)
+    assert left[2] == pytest.approx(1.0, abs=0.03)
+
+
+def test_softer_and_firmer_mud_are_read_alike() -> None:
+    """0.5 %: the zero is allowed to have crept by the same 0.05 N in any mud."""
+    readings = [ratios(one(rows_of(motion(), MUD.times(factor))), MUD.times(factor)) for factor in (0.1, 1.0, 5.0)]
+    assert readings[0] == pytest.approx(readings[1], rel=5e-3)
+    assert readings[2] == pytest.approx(readings[1], rel=5e-3)
+
+
+@pytest.mark.parametrize("factor", [-1.0, 0.0])
+def test_mud_that_pushes_the_wrong_way_has_no_coefficient(factor: float) -> None:
+    for each in coefficients(one(noisy(rows_of(motion(), MUD.times(factor)), 1, 0.01))):
+        assert not each.valid
+        assert each.reason
+
+
+def test_gravity_inertia_and_friction_left_in_would_be_taken_for_mud() -> None:
+    """So the tests above would notice if one of them were not taken off."""
+    whole = HEAVY.mass
+    for lacking in (
+        HEAVY._replace(mass=ArmMass(0.0, 0.0, whole.sweep_inertia_kg_m2, whole.adduction_inertia_kg_m2)),
+        HEAVY._replace(mass=ArmMass(whole.arm_mass_kg, whole.center_of_mass_m, 0.0, 0.0)),
+        HEAVY._replace(adduction_friction=JointFriction()),
+    ):
+        stride = one(rows_of(motion(), MUD, HEAVY), estimator(lacking, KNOWN_M))
+        assert abs(stride.k_e.value / MUD.k_e - 1.0) > 0.03
+
+
+@pytest.mark.parametrize("face_share", [-0.3, 0.15, 0.3])
+def test_a_load_on_the_face_changes_nothing_but_the_surface_that_is_found(face_share: float) -> None:
+    """At -30 % to 30 % of the stance's load it would change k_p by up to 14 % and k_e by as much, were it not taken
+    off; where the force begins to rise it blurs by a few tenths of a millimetre, which the doubt covers.
+    """
+    plain, faced = (
+        one(rows_of(motion(), MUD._replace(face_share=share)), estimator(surface_error_m=0.05))
+        for share in (0.0, face_share)
+    )
+    assert faced.k_p.value == pytest.approx(MUD.k_p, abs=2.0 * faced.k_p.std_error)
+    late = [(each.surface_m / each.depth_m) for each in (plain, faced)]
+    corrected = [each.k_p.value * (1.0 - share) ** 1.5 for each, share in zip((plain, faced), late, strict=True)]
+    assert corrected[1] == pytest.approx(corrected[0], rel=0.01)  # the square of the surfaces' difference
+
+
+def test_a_load_on_the_face_adds_to_the_doubt() -> None:
+    """By a quarter of what is taken off: 2.8 % beside the 3.2 % of the torque constant."""
+    plain, faced = (
+        one(rows_of(motion(), MUD._replace(face_share=share)), estimator(surface_error_m=KNOWN_M))
+        for share in (0.0, 0.3)
+    )
+    assert doubts(plain)[2] < 0.035
+    assert doubts(faced)[2] > 0.04
+
+
+def test_at_five_centimetres_and_thirty_degrees_an_insertion_cannot_be_observed() -> None:
+    """The arm hangs so steeply that its adduction joint has 14 mm of lever left. k_e is from the last three quarters
+    of the way up, where it has more again.
+    """
+    front_rad = radians(30.0)
+    assert GEOMETRY.vertical_lever_m(front_rad, GEOMETRY.adduction_rad(front_rad, 0.05)) < MIN_VERTICAL_LEVER_M
+    stride = one(rows_of(motion(0.05)), estimator(surface_error_m=KNOWN_M))
+    assert (stride.k_p.valid, stride.k_p.reason) == (False, UNOBSERVABLE)
+    assert ratios(stride, MUD)[1:] == pytest.approx([1.0, 1.0], abs=0.01)  # as at smaller depths
+
+
+def test_at_five_centimetres_a_narrow_sweep_can_be_observed() -> None:
+    stride = one(rows_of(motion(0.05, GaitParameters(sweep_angle_deg=15.0))), estimator(surface_error_m=KNOWN_M))
+    assert all(each.valid for each in coefficients(stride))
+
+
+# the zero
+
+
+def test_mud_that_clings_and_its_drift_are_told() -> None:
+    """To 0.02 N: a hundredth of the force on the way down, whose bend leaves a level."""
+    single = motion(strides=1)
+    weights_n, period_s = (0.7, 1.1, 0.9), single[-1].now_s - single[0].now_s
+    rows = [
+        row
+        for turn, weight_n in enumerate(weights_n)
+        for row in rows_of(
+            (moment._replace(now_s=moment.now_s + turn * period_s) for moment in single[:-1]),
+            MUD._replace(weight_n=weight_n, offset_nm=0.02),
+        )
+    ]
+    strides = closed([*rows, rows[0]._replace(now_s=rows[-1].now_s + 1.0 / RATE_HZ)])
+    assert [stride.tare_n for stride in strides] == pytest.approx(weights_n, abs=0.02)
+    first, *later = [stride.tare_drift_n for stride in strides]
+    assert not isfinite(first)
+    assert later == pytest.approx([0.4, -0.2], abs=2e-3)  # the first sample of a swing is half of the stride before
+
+
+@pytest.mark.parametrize(("weight_n", "offset_nm"), [(0.7, 0.0), (0.0, 0.02), (1.5, -0.03)])
+def test_what_clings_changes_no_coefficient(weight_n: float, offset_nm: float) -> None:
+    clean, dirty = (one(rows_of(motion(), mud)) for mud in (MUD, MUD._replace(weight_n=weight_n, offset_nm=offset_nm)))
+    for a, b in zip(coefficients(clean), coefficients(dirty), strict=True):
+        assert b.value == pytest.approx(a.value, rel=1e-3)  # samples are 2.6 ms apart, levers in between a mean
+        assert b.std_error == pytest.approx(a.std_error, rel=1e-2)
+
+
+def test_without_air_before_it_the_insertion_itself_tells_the_zero() -> None:
+    """A walk that begins with an insertion: its way down to the mud shows 0.7 N of clinging mud to a tenth."""
+    rows = [row for row in rows_of(motion(), MUD._replace(weight_n=0.7)) if row.phase is not Phase.SWING]
+    last = rows_of(motion())[-1]
+    assert one([*rows, last]).tare_n == pytest.approx(0.7, abs=0.1)
+
+
+# messages: repeated, seldom, lost, wild
+
+
+@pytest.mark.parametrize("times", [2, 3, 10])
+def test_rows_that_repeat_change_neither_value_nor_doubt(times: int) -> None:
+    """But for the moment at which a batch ends, which only its speed shows."""
+    rows = noisy(rows_of(motion(), MUD, HEAVY), 3)
+    step_s = 1.0 / RATE_HZ / times
+    repeated = [row._replace(now_s=row.now_s + again * step_s) for row in rows for again in range(times)]
+    plain, again = (one(each, estimator(HEAVY)) for each in (rows, repeated[: 1 - times]))
+    for a, b in zip(coefficients(plain), coefficients(again), strict=True):
+        assert b == a
+
+
+@pytest.mark.parametrize("ticks", [2, 4, 10])
+def test_messages_that_last_several_ticks_change_value_and_doubt_little(ticks: int) -> None:
+    """190 to 38 messages a second. With a tenth of the messages there is √10 of the noise; of 0.02 A that is nothing
+    beside the torque constants' 3.2 %.
+    """
+    rows = noisy(rows_of(motion(gait=SINGLE_FLIPPER), MUD, HEAVY), 3, 0.02)
+    held = [rows[i - i % ticks]._replace(now_s=row.now_s, phase=row.phase) for i, row in enumerate(rows)]
+    plain, seldom = (one(each, estimator(HEAVY)) for each in (rows, held))
+    for a, b in zip(coefficients(plain), coefficients(seldom), strict=True):
+        assert abs(b.value - a.value) < a.std_error
+        assert b.std_error == pytest.approx(a.std_error, rel=0.5)
+
+
+@pytest.mark.parametrize("bad", [nan, inf, -inf])
+@pytest.mark.parametrize("joint", ["sweep", "adduction"])
+@pytest.mark.parametrize("field", ["angle_rad", "current_a"])
+def test_samples_that_are_not_finite_are_skipped(joint: str, field: str, bad: float) -> None:
+    rows = rows_of(motion(), MUD, HEAVY)
+    between = [each for row in rows for each in (row, _spoilt(row, joint, field, bad))]
+    assert repr(one(between, estimator(HEAVY))) == repr(one(rows, estimator(HEAVY)))
+    assert estimator().update(*_spoilt(rows[0], joint, field, bad)) == (NO_LOAD, None)
+
+
+def _spoilt(row: Row, joint: str, field: str, bad: float) -> Row:
+    spoilt = getattr(row, joint)._replace(**{field: bad})
+    return row._replace(sweep=spoilt) if joint == "sweep" else row._replace(adduction=spoilt)
+
+
+@pytest.mark.parametrize("lost", [5, 20])
+def test_a_gap_in_each_stroke_moves_no_coefficient_by_more_than_its_doubt(lost: int) -> None:
+    """Of 13 and 52 ms: longer than what two samples say together of one motion."""
+    rows = rows_of(motion(gait=SINGLE_FLIPPER), MUD, HEAVY)
+    whole = one(rows, estimator(HEAVY))
+    gaps = {i for phase in (1, 2, 3) for i in _middle(rows, Phase(phase), lost)}
+    pierced = one((row.lost() if i in gaps else row for i, row in enumerate(rows)), estimator(HEAVY))
+    for a, b in zip(coefficients(whole), coefficients(pierced), strict=True):
+        assert b.valid
+        assert abs(b.value - a.value) < a.std_error
+
+
+def _middle(rows: Sequence[Row], phase: Phase, count: int) -> range:
+    places = [i for i, row in enumerate(rows) if row.phase is phase]
+    middle = places[len(places) // 2]
+    return range(middle - count // 2, middle - count // 2 + count)
+
+
+def assert_wild_samples_are_borne(rows: Sequence[Row], phase: Phase, wild_a: float) -> None:
+    """One at a time, all along the stroke. 10 A is as much as the drives give and five times what they do here. It is
+    in two loads, each half-way between samples, and so in two batches where these meet.
+    """
+    calm = one(rows)
+    for place in [i for i, row in enumerate(rows) if row.phase is phase][3::17]:
+        wild = one([*rows[:place], rows[place].pushed(wild_a, wild_a), *rows[place + 1 :]])
+        for a, b in zip(coefficients(calm), coefficients(wild), strict=True):
+            assert abs(b.value - a.value) < 1.96 * b.std_error
+
+
+@pytest.mark.parametrize("wild_a", [-10.0, 10.0])
+@pytest.mark.parametrize("phase", [Phase.SWING, Phase.STANCE, Phase.EXTRACTION])
+def test_one_wild_sample_moves_no_coefficient_out_of_its_interval(phase: Phase, wild_a: float) -> None:
+    assert_wild_samples_are_borne(noisy(rows_of(motion(gait=SINGLE_FLIPPER)), 4), phase, wild_a)
+
+
+@pytest.mark.xfail(strict=True, reason="find_surface takes one batch that is 1 N off for the jump of firm mud")
+def test_one_wild_sample_in_the_insertion_moves_no_coefficient_out_of_its_interval() -> None:
+    """At 8 mm it moves the surface by 6 mm and all coefficients by a third to a half, which is 4 to 6 of their doubts.
+    What is fitted is robust, where the surface is looked for is not.
+    """
+    assert_wild_samples_are_borne(noisy(rows_of(motion()), 4), Phase.INSERTION, 10.0)
+
+
+# noise
+
+
+def drawn(seed: int) -> tuple[Mud, StrideEstimate]:
+    """A stride in which all that the doubt allows for varies as it allows for: 1 mm of surface, 3.2 % of each torque
+    constant, a quarter of what crosses over from a face that bears 20 %, current noise; and mud that clings.
+    """
+    random = np.random.default_rng(seed)
+    mud = Mud(surface_m=random.normal(0.0, 0.001), face_share=0.2, weight_n=random.uniform(0.3, 1.0))
+    constants = WEIGHTLESS[1:3] * (1.0 + random.normal(0.0, 0.032, 2))
+    known = WEIGHTLESS._replace(sweep_constant_nm_a=constants[0], adduction_constant_nm_a=constants[1])
+    return mud, one(noisy(rows_of(motion(), mud), seed), estimator(known))
+
+
+def test_the_interval_of_95_percent_covers_the_truth_about_as_often_as_it_says() -> None:
+    """Of 300 strides: k_p 98 %, k_s 94 %, k_e 93 %. A true 95 % would read 92.2 to 97.4 % in 49 of 50 such tests; 88
+    and 99.5 % are where intervals would be half as wide or twice as wide as they should be.
+    """
+    told = [drawn(seed) for seed in range(300)]
+    for place in range(3):
+        pairs = [(coefficients(stride)[place], mud[place]) for mud, stride in told]
+        assert sum(each.valid for each, _ in pairs) >= 297
+        hits = [abs(each.value - truth) <= 1.96 * each.std_error for each, truth in pairs if each.valid]
+        assert 0.88 <= np.mean(hits) <= 0.995
+
+
+def test_no_coefficient_is_biased_by_more_than_half_its_doubt() -> None:
+    """The bent law makes 3 to 5 %, a whole doubt; the surface's nominal height, which is weighed against it, and the
+    face, whose load rises with depth squared, take most of that back. Of 100 strides a mean errs by a tenth.
+    """
+    told = [drawn(seed) for seed in range(100)]
+    scores = [
+        [(each.value - truth) / each.std_error for each, truth in zip(coefficients(stride), mud[:3], strict=True)]
+        for mud, stride in told
+    ]
+    assert np.abs(np.mean(scores, axis=0)).max() < 0.5
+
+
+def test_more_noise_makes_more_doubt() -> None:
+    rows = rows_of(motion())
+    little, some, much = (doubts(one(noisy(rows, 1, noise_a))) for noise_a in (0.05, 0.3, 1.0))
+    assert all(a < b for a, b in zip(little, some, strict=True))
+    assert all(a < b for a, b in zip(some, much, strict=True))
+
+
+# motors at their limit, bodies that move
+
+
+def stuck(at_rad: float) -> list[Moment]:
+    """The sweep stops on its way and stays there, the rest of the stance long; up it comes in the same place."""
+    moments = []
+    for moment in motion():
+        if moment.sweep_rad < at_rad and moment.phase in (Phase.STANCE, Phase.EXTRACTION):
+            depth_m = GEOMETRY.depth_m(moment.sweep_rad, moment.adduction_rad)
+            moment = moment._replace(sweep_rad=at_rad, sweep_rad_s=0.0)
+            moment = moment._replace(adduction_rad=GEOMETRY.adduction_rad(at_rad, depth_m))
+        moments.append(moment)
+    return moments
+
+
+@pytest.mark.parametrize("base", [Base.FIXED, Base.FREE])
+def test_a_stance_that_sticks_with_its_motor_at_the_limit_bounds_the_shear_strength(base: Base) -> None:
+    """The mud could bear twice of what this motor gives, 1.7 N·m on 1.35 cm⁴ of Ψ."""
+    limit_a = 20.0
+    drive = WEIGHTLESS._replace(current_limit_a=limit_a)
+    rows = [
+        row._replace(sweep=row.sweep._replace(current_a=max(row.sweep.current_a, -limit_a)))
+        for row in noisy(rows_of(stuck(radians(10.0)), MUD._replace(k_s=2.0e6)), 1, 0.01)
+    ]
+    stride = one(rows, estimator(drive, base=base))
+    assert (stride.stance, stride.k_s.reason) == ("saturated", "a motor at its limit")
+    assert stride.k_s.at_least and stride.k_s.valid
+    assert stride.k_s.value == pytest.approx(limit_a * 0.083 / 1.35e-6, rel=0.1)  # Ψ at 3 cm, the arm straight
+    assert stride.k_s.value < 2.0e6
+
+
+def test_a_stance_that_stands_almost_at_once_tells_not_even_a_bound() -> None:
+    """However long the motor pushes: what stands is one batch, and a bound is what three in a row have borne."""
+    stride = one(noisy(rows_of(stuck(radians(25.0))), 1, 0.01), estimator(WEIGHTLESS._replace(current_limit_a=1.0)))
+    assert (stride.stance, stride.k_s.reason) == ("saturated", "a motor at its limit")
+    assert not stride.k_s.valid and not stride.k_s.at_least
+
+
+def test_a_stance_that_sticks_below_the_limit_is_not_called_saturated() -> None:
+    rows = rows_of(stuck(radians(10.0)))
+    assert one(rows, estimator(WEIGHTLESS._replace(current_limit_a=50.0))).stance == "body"
+
+
+def carried(rows: Sequence[Row], share: float) -> list[Row]:
+    """The body advances by a share of what the flipper goes back in stance: the rest is slip."""
+    front_m, lifted = LENGTH_M * sin(radians(30.0)), (Phase.SWING, Phase.INSERTION)
+    ways_m = [0.0 if row.phase in lifted else front_m - LENGTH_M * sin(row.sweep.angle_rad) for row in rows]
+    return [row._replace(body_m=share * way_m) for row, way_m in zip(rows, ways_m, strict=True)]
+
+
+@pytest.mark.parametrize(("share", "case"), [(0.0, "yield"), (0.5, "mixed"), (0.97, "body")])
+def test_the_place_of_the_body_tells_what_gave_way(share: float, case: str) -> None:
+    stride = one(carried(rows_of(motion()), share), estimator(surface_error_m=KNOWN_M, base=Base.FREE))
+    assert stride.stance == case
+    assert stride.k_s.at_least is (case == "body")
+    assert stride.k_s.value == pytest.approx(MUD.k_s, rel=2e-3)  # these rows carry the mud's whole strength anyway
+
+
+def test_without_a_pose_the_stance_is_unknown_and_the_shear_strength_a_bound() -> None:
+    lost = [row._replace(body_m=nan) for row in rows_of(motion(), MUD.times(3.0))]
+    stride = one(lost, estimator(base=Base.FREE))
+    assert stride.stance == "unknown" and stride.k_s.at_least
+    assert not isfinite(stride.step_m) and not isfinite(stride.place_m)
+
+
+def test_step_and_place_are_the_bodys() -> None:
+    """Advance from close to close; the place where the insertion ended."""
+    rows = [row._replace(body_m=7.0 + 0.05 * row.now_s) for row in rows_of(motion(strides=3))]
+    first, *later = strides = closed(rows)
+    assert len(strides) == 3
+    assert first.step_m == pytest.approx(0.05 * (first.t_end_s - rows[0].now_s))
+    for before, after in pairwise(strides):
+        assert after.step_m == pytest.approx(0.05 * (after.t_end_s - before.t_end_s))
+    ended_s = [a.now_s for a, b in pairwise(rows) if a.phase is Phase.INSERTION is not b.phase]
+    assert [stride.place_m for stride in strides] == pytest.approx([7.0 + 0.05 * now_s for now_s in ended_s])
+
+
+# loads
+
+
+def test_the_load_is_the_mud_without_what_clings_to_the_flipper() -> None:
+    """To 10 mN·m, which is 0.08 N of the zero; half a tick before the newest sample, since acceleration is told
+    between two.
+    """
+    mud, flipper = MUD._replace(weight_n=0.7, offset_nm=0.02), estimator()
+    moments = motion()
+    for i, row in enumerate(rows_of(moments, mud)[:-1]):
+        load, _ = flipper.update(*row)
+        if row.phase is Phase.STANCE is moments[i - 1].phase:
+            sweep_nm, adduction_nm = mud_torques_nm(moments[i], mud)
+            assert load.sweep_torque_nm == pytest.approx(sweep_nm, abs=0.01)
+            assert load.adduction_torque_nm == pytest.approx(adduction_nm, abs=0.01)
+            assert load.depth_m == pytest.approx(row.depth_m, abs=1e-4)
+
+
+def test_forces_are_the_smallest_ones_and_in_stance_none_upward_is_told() -> None:
+    """Of the pose half-way between two samples."""
+    flipper, rows = estimator(), rows_of(motion())[:-1]
+    loads = [flipper.update(*row)[0] for row in rows]
+    for before, row, load in zip(rows, rows[1:], loads[1:], strict=False):
+        sweep_rad = (before.sweep.angle_rad + row.sweep.angle_rad) / 2.0
+        lift_rad = (before.adduction.angle_rad + row.adduction.angle_rad) / 2.0
+        force_n = smallest_force_n(GEOMETRY, sweep_rad, lift_rad, load.sweep_torque_nm, load.adduction_torque_nm)
+        assert load.force_x_n == pytest.approx(force_n[0], abs=1e-9)
+        if row.phase is Phase.STANCE:
+            assert not isfinite(load.force_z_n)
+        else:
+            assert load.force_z_n == pytest.approx(force_n[1], abs=1e-9)
+
+
+def test_a_row_that_repeats_shows_the_same_load() -> None:
+    flipper = estimator()
+    for row in rows_of(motion())[:-1]:
+        load, _ = flipper.update(*row)
+        assert repr(flipper.update(*row)) == repr((load, None))
+
+
+def test_the_largest_forces_of_the_stride_are_told() -> None:
+    """To 3 %: the level that the insertion leaves for the zero, and the quick extraction's half a tick."""
+    stride, forces = one(rows_of(motion())), dict[Phase, list[tuple[float, float]]]()
+    for moment in motion():
+        torques_nm = mud_torques_nm(moment, MUD)
+        force_n = smallest_force_n(GEOMETRY, moment.sweep_rad, moment.adduction_rad, *torques_nm)
+        forces.setdefault(moment.phase, []).append(force_n)
+    assert stride.insertion_force_n == pytest.approx(max(z for _, z in forces[Phase.INSERTION]), rel=0.03)
+    assert stride.stance_force_n == pytest.approx(max(x for x, _ in forces[Phase.STANCE]), rel=0.03)
+    assert stride.extraction_force_n == pytest.approx(min(z for _, z in forces[Phase.EXTRACTION]), rel=0.03)
+
+
+# what closes a stride
+
+
+def stopped(rows: Sequence[Row], phase: Phase) -> list[Row]:
+    """Cut short in the middle of a stroke."""
+    places = [i for i, row in enumerate(rows) if row.phase is phase]
+    middle = places[len(places) // 2]
+    return [*rows[:middle], rows[middle]._replace(phase=Phase.REST)]
+
+
+@pytest.mark.parametrize("phase", [Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION])
+def test_a_stride_cut_short_does_not_close_and_is_not_counted(phase: Phase) -> None:
+    rows, flipper = rows_of(motion()), estimator()
+    assert closed(stopped(rows, phase), flipper) == []
+    later = [row._replace(now_s=row.now_s + 60.0) for row in rows]
+    stride = one(later, flipper)
+    assert stride.index == 0
+    assert ratios(stride, MUD) == pytest.approx(ratios(one(rows), MUD), rel=1e-3)  # the zero is that of both airs
+
+
+@pytest.mark.parametrize("lacking", [Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION])
+def test_a_stride_that_lacks_a_stroke_does_not_close(lacking: Phase) -> None:
+    assert closed(row for row in rows_of(motion()) if row.phase is not lacking) == []
+
+
+def test_durations_and_times_are_those_of_the_gait() -> None:
+    rows = rows_of(motion())
+    stride, tick_s = one(rows), 1.0 / RATE_HZ
+    assert stride.insertion_s == pytest.approx(0.0445 / 0.1, abs=1.5 * tick_s)
+    assert stride.stance_s == pytest.approx(2.0 * radians(30.0) * LENGTH_M / 0.5, abs=1.5 * tick_s)
+    assert stride.extraction_s == pytest.approx(0.0445 / 0.5, abs=1.5 * tick_s)
+    begun_s = next(row.now_s for row in rows if row.phase is Phase.INSERTION)
+    assert (stride.t_start_s, stride.t_end_s) == (begun_s, rows[-1].now_s)
+
+
+def test_a_flipper_that_meets_no_mud_says_why_it_knows_nothing() -> None:
+    stride = one(noisy(rows_of(motion(-0.001)), 1, 0.05))
+    assert not any(each.valid for each in coefficients(stride))
+    assert all(each.reason for each in coefficients(stride))
+    assert stride.surface_m == pytest.approx(0.0, abs=1e-3)
+    assert stride.released
+
+
+def lifted_to(highest_m: float) -> list[Moment]:
+    """The extraction ends below `highest_m`: mud that holds on."""
+    moments = []
+    for moment in motion():
+        depth_m = GEOMETRY.depth_m(moment.sweep_rad, moment.adduction_rad)
+        if moment.phase is Phase.EXTRACTION and depth_m < highest_m:
+            moment = moment._replace(adduction_rad=GEOMETRY.adduction_rad(moment.sweep_rad, highest_m))
+        moments.append(moment)
+    return moments
+
+
+@pytest.mark.parametrize(("below_m", "released"), [(-1e-4, True), (1e-4, False)])
+def test_a_flipper_is_released_from_three_millimetres_below_the_surface_on(below_m: float, released: bool) -> None:
+    moments = lifted_to(RELEASED_M + below_m)
+    assert one(noisy(rows_of(moments), 1, 1e-3), estimator(surface_error_m=KNOWN_M)).released is released
+
+
+def test_a_flipper_that_stays_down_tells_only_how_much_the_mud_has_borne() -> None:
+    """To 5 %: a batch of 33 samples, the first of which is half in stance."""
+    stride = one(noisy(rows_of(lifted_to(0.03)), 1, 0.01), estimator(surface_error_m=KNOWN_M))
+    assert not stride.released
+    assert (stride.k_e.at_least, stride.k_e.reason) == (True, NOT_OUT)
+    assert stride.k_e.value == pytest.approx(MUD.k_e, rel=0.05)
+    assert stride.k_p.valid and stride.k_s.valid
+
+
+# memory
+
+
+def test_each_stride_of_a_walk_tells_the_same() -> None:
+    strides = closed(rows_of(motion(strides=3)))
+    assert [stride.index for stride in strides] == [0, 1, 2]
+    for stride in strides[1:]:  # ticks fall differently into each: up to one of 26 in a batch's way
+        assert ratios(stride, MUD) == pytest.approx(ratios(strides[0], MUD), rel=0.02)
+
+
+def test_a_reset_forgets_stride_zero_and_count() -> None:
+    rows, flipper = rows_of(motion(strides=2), MUD, HEAVY), estimator(HEAVY)
+    closed((row.pushed(0.5, 0.5) for row in rows[: len(rows) * 2 // 3]), flipper)
+    flipper.reset()
+    assert repr(closed(rows, flipper)) == repr(closed(rows, estimator(HEAVY)))
+
+
+def test_the_same_rows_give_the_same_bits() -> None:
+    rows = noisy(rows_of(motion(strides=2), MUD, HEAVY), 3)
+    assert repr(closed(rows, estimator(HEAVY))) == repr(closed(rows, estimator(HEAVY)))

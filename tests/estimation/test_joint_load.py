@@ -1,0 +1,286 @@
+"""From currents to joint loads: the balance of torques on an arm that is simulated here, and what is no new sample."""
+
+from math import cos, inf, isfinite, nan, pi, sin
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.geometry import FlipperGeometry
+from control.joint_friction import JointFriction
+from control.joint_pd import ArmMass
+from estimation.joint_load import (
+    LONGEST_GAP_S,
+    SATURATION,
+    FlipperDrive,
+    JointLoad,
+    JointLoads,
+    JointSample,
+    motion_at,
+    motion_between,
+)
+
+GEOMETRY, MASS = FlipperGeometry(), ArmMass()
+SWEEP_NM_A, LIFT_NM_A = 0.083, 0.09
+WEIGHTLESS = ArmMass(0.0, 0.0, 0.0, 0.0)
+DRIVE = FlipperDrive(MASS, SWEEP_NM_A, LIFT_NM_A)
+TICK_S = 1.0 / 380.0
+
+angles = st.floats(-pi / 3, pi / 3)
+currents = st.floats(-20.0, 20.0)
+
+
+def sample(angle_rad: float, velocity_rad_s: float, current_a: float, now_s: float) -> JointSample:
+    return JointSample(angle_rad, velocity_rad_s, current_a, now_s, now_s)
+
+
+def one(drive: FlipperDrive, sweep: JointSample, adduction: JointSample) -> JointLoad:
+    load = JointLoads(GEOMETRY, drive).update(sweep, adduction)
+    assert load is not None
+    return load
+
+
+# one sample
+
+
+@given(angles, angles, currents, currents)
+def test_without_mass_the_load_is_the_papers(sweep: float, lift: float, sweep_a: float, lift_a: float) -> None:
+    drive = FlipperDrive(WEIGHTLESS, SWEEP_NM_A, LIFT_NM_A)
+    load = one(drive, sample(sweep, nan, sweep_a, 1.0), sample(lift, nan, lift_a, 1.0))
+    assert load.sweep_nm == pytest.approx(-SWEEP_NM_A * sweep_a, abs=1e-15)
+    assert load.adduction_nm == pytest.approx(-LIFT_NM_A * lift_a, abs=1e-15)
+
+
+@given(angles, angles)
+def test_what_carries_the_arm_in_the_air_is_no_load(sweep: float, lift: float) -> None:
+    gravity_nm = MASS.gravity_torques_nm(sweep, lift)
+    held = (sample(sweep, 0.0, -gravity_nm[0] / SWEEP_NM_A, 1.0), sample(lift, 0.0, -gravity_nm[1] / LIFT_NM_A, 1.0))
+    load = one(DRIVE, *held)
+    assert (load.sweep_nm, load.adduction_nm) == pytest.approx((0.0, 0.0), abs=1e-15)
+
+
+@given(angles, angles)
+def test_the_pose_comes_with_its_depth_and_levers(sweep: float, lift: float) -> None:
+    load = one(DRIVE, sample(sweep, 0.0, 0.0, 1.0), sample(lift, 0.0, 0.0, 1.0))
+    jacobian = GEOMETRY.jacobian(sweep, lift)
+    assert (load.sweep_rad, load.adduction_rad) == (sweep, lift)
+    assert load.depth_m == pytest.approx(GEOMETRY.depth_m(sweep, lift), abs=1e-15)
+    assert load.rise_sweep_m == pytest.approx(jacobian.z_sweep, abs=1e-15)
+    assert load.rise_adduction_m == pytest.approx(jacobian.z_adduction, abs=1e-15)
+
+
+def test_friction_is_what_the_motor_spends_on_itself() -> None:
+    friction = JointFriction(coulomb_nm=0.02, viscous_nm_s=0.004)
+    drive = FlipperDrive(WEIGHTLESS, SWEEP_NM_A, LIFT_NM_A, friction, friction)
+    spent_nm = friction.torque_nm(0.1, 2.0)
+    free = (sample(0.1, 2.0, spent_nm / SWEEP_NM_A, 1.0), sample(0.1, -2.0, -spent_nm / LIFT_NM_A, 1.0))
+    load = one(drive, *free)
+    assert (load.sweep_nm, load.adduction_nm) == pytest.approx((0.0, 0.0), abs=1e-15)
+
+
+def test_friction_of_an_unknown_velocity_leaves_cogging_alone() -> None:
+    friction = JointFriction(coulomb_nm=0.02, viscous_nm_s=0.004, cogging_nm=0.01, cogging_per_turn=1)
+    drive = FlipperDrive(WEIGHTLESS, SWEEP_NM_A, LIFT_NM_A, friction, friction)
+    load = one(drive, sample(0.5, nan, 0.0, 1.0), sample(-0.5, inf, 0.0, 1.0))
+    assert load.sweep_nm == pytest.approx(0.01 * sin(0.5))
+    assert load.adduction_nm == pytest.approx(-0.01 * sin(0.5))
+
+
+@pytest.mark.parametrize(
+    ("sweep_a", "lift_a", "saturated"),
+    [
+        (9.7, 0.0, False),
+        (9.81, 0.0, True),
+        (-9.81, 0.0, True),
+        (0.0, 9.81, True),
+        (0.0, -10.0, True),
+        (0.0, 0.0, False),
+    ],
+)
+def test_a_motor_at_its_limit_is_told(sweep_a: float, lift_a: float, saturated: bool) -> None:
+    """Clipped currents waver a little under the limit."""
+    assert SATURATION == 0.98
+    limited = DRIVE._replace(current_limit_a=10.0)
+    assert one(limited, sample(0.0, 0.0, sweep_a, 1.0), sample(0.0, 0.0, lift_a, 1.0)).saturated is saturated
+
+
+def test_a_drive_of_unknown_limit_never_saturates() -> None:
+    assert not one(DRIVE, sample(0.0, 0.0, 1e6, 1.0), sample(0.0, 0.0, 1e6, 1.0)).saturated
+
+
+# inertia
+
+
+def swinging(now_s: float, rate_rad_s: float, amplitude_rad: float) -> tuple[float, float, float]:
+    """Angle, velocity and acceleration."""
+    phase = rate_rad_s * now_s
+    return (
+        amplitude_rad * sin(phase),
+        amplitude_rad * rate_rad_s * cos(phase),
+        -amplitude_rad * rate_rad_s**2 * sin(phase),
+    )
+
+
+def loads_of_a_free_arm(angle_every_s: float, current_every_s: float, shift_s: float) -> list[JointLoad]:
+    """Both joints swing in the air as fast as an extraction; angle and current are messages of their own."""
+
+    def joint(now_s: float, constant_nm_a: float, inertia_kg_m2: float, place: int) -> JointSample:
+        angle_s = now_s - now_s % angle_every_s
+        current_s = now_s - (now_s - shift_s) % current_every_s
+        poses = [[swinging(at_s, 20.0, 0.3), swinging(at_s + 0.02, 25.0, 0.2)] for at_s in (angle_s, current_s)]
+        angle_rad, velocity_rad_s, _ = poses[0][place]
+        gravity_nm = MASS.gravity_torques_nm(poses[1][0][0], poses[1][1][0])[place]
+        current_a = (inertia_kg_m2 * poses[1][place][2] - gravity_nm) / constant_nm_a
+        return JointSample(angle_rad, velocity_rad_s, current_a, angle_s, current_s)
+
+    loads, seen = JointLoads(GEOMETRY, DRIVE), list[JointLoad]()
+    for tick in range(200):
+        now_s = 1.0 + tick * TICK_S
+        sweep = joint(now_s, SWEEP_NM_A, MASS.sweep_inertia_kg_m2, 0)
+        adduction = joint(now_s, LIFT_NM_A, MASS.adduction_inertia_kg_m2, 1)
+        load = loads.update(sweep, adduction)
+        if load is not None and tick > 5:
+            seen.append(load)
+    return seen
+
+
+def largest_nm(loads: list[JointLoad]) -> float:
+    return max(max(abs(load.sweep_nm), abs(load.adduction_nm)) for load in loads)
+
+
+INERTIA_NM = MASS.adduction_inertia_kg_m2 * 0.2 * 25.0**2
+
+
+def test_a_free_arm_in_quick_motion_bears_no_load() -> None:
+    """Of the 0.08 N·m that its inertia takes, (ω dt)²/8 is left by taking lines for curves: 0.1 %."""
+    assert largest_nm(loads_of_a_free_arm(TICK_S, TICK_S, 0.0)) < 0.002 * INERTIA_NM
+
+
+@pytest.mark.parametrize("shift_s", [0.0005, 0.001, 0.0015])
+def test_a_current_that_is_measured_at_another_moment_is_brought_to_that_of_the_acceleration(shift_s: float) -> None:
+    """Left where it is, a current half a tick aside would leave ω dt/2 = 3 %."""
+    loads = loads_of_a_free_arm(TICK_S, TICK_S, shift_s)
+    assert largest_nm(loads) < 0.01 * INERTIA_NM
+
+
+@pytest.mark.parametrize("ticks", [2, 4])
+def test_a_current_that_comes_without_a_new_angle_keeps_the_last_acceleration(ticks: int) -> None:
+    """Without it all inertia would be left, several times a message. (ω dt)²/8 grows with the angle's interval."""
+    loads = loads_of_a_free_arm(ticks * TICK_S, TICK_S, 0.0005)
+    assert len(loads) > 100
+    assert largest_nm(loads) < 0.02 * INERTIA_NM
+
+
+def test_a_joint_whose_message_is_late_does_not_lose_its_inertia() -> None:
+    """The other joint alone is new."""
+    loads = JointLoads(GEOMETRY, DRIVE)
+    loads.update(sample(0.1, 1.0, 0.0, 1.0), sample(0.0, 0.0, 0.0, 1.0))
+    plain = loads.update(sample(0.1, 1.0, 1.0, 1.01), sample(0.0, 2.0, 0.0, 1.01))
+    late = loads.update(sample(0.1, 1.0, 2.0, 1.02), sample(0.0, 2.0, 0.0, 1.01))
+    assert plain is not None
+    assert late is not None
+    assert late.adduction_nm == plain.adduction_nm != 0.0
+
+
+def test_the_pose_is_that_of_the_acceleration() -> None:
+    loads = JointLoads(GEOMETRY, DRIVE)
+    loads.update(sample(0.1, 1.0, 0.0, 1.0), sample(-0.2, 0.0, 0.0, 1.0))
+    load = loads.update(sample(0.2, 3.0, 0.0, 1.01), sample(-0.4, 0.0, 0.0, 1.01))
+    assert load is not None
+    assert (load.sweep_rad, load.adduction_rad) == pytest.approx((0.15, -0.3))
+    assert load.depth_m == pytest.approx(GEOMETRY.depth_m(0.15, -0.3))
+
+
+@given(angles, angles, st.floats(-20.0, 20.0), st.floats(-20.0, 20.0), currents, currents)
+def test_between_two_samples_everything_is_half_way(
+    angle: float, later: float, velocity: float, after: float, current: float, current_after: float
+) -> None:
+    motion = motion_between(sample(angle, velocity, current, 1.0), sample(later, after, current_after, 1.01))
+    middle = (
+        (angle + later) / 2.0,
+        (velocity + after) / 2.0,
+        (after - velocity) / 0.01,
+        (current + current_after) / 2.0,
+    )
+    assert motion == pytest.approx(middle, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("gap_s", [LONGEST_GAP_S, 1.0, 0.0, -0.01, nan, inf])
+def test_samples_that_do_not_tell_of_one_motion_are_taken_as_they_are(gap_s: float) -> None:
+    motion = motion_between(sample(0.1, 1.0, 2.0, 1.0), sample(0.3, 3.0, 4.0, 1.0 + gap_s))
+    assert motion == (0.3, 3.0, 0.0, 4.0)
+
+
+@pytest.mark.parametrize(("before", "after"), [(nan, 1.0), (1.0, nan), (inf, 1.0), (1.0, -inf)])
+def test_unknown_velocities_leave_inertia_out(before: float, after: float) -> None:
+    for motion in (motion_between, motion_at):
+        assert motion(sample(0.1, before, 2.0, 1.0), sample(0.3, after, 4.0, 1.01))[2] == 0.0
+
+
+def test_the_papers_motion_is_at_the_newest_sample() -> None:
+    motion = motion_at(sample(0.1, 1.0, 2.0, 1.0), sample(0.3, 3.0, 4.0, 1.01))
+    assert motion == pytest.approx((0.3, 3.0, 200.0, 4.0))
+
+
+def test_a_joint_that_is_unknown_does_not_spoil_the_other_one() -> None:
+    loads = JointLoads(GEOMETRY, DRIVE)
+    loads.update(sample(0.0, nan, 0.0, 1.0), sample(0.0, 0.0, 0.0, 1.0))
+    load = loads.update(sample(0.01, 1.0, 0.0, 1.01), sample(0.01, 1.0, 0.0, 1.01))
+    assert load is not None
+    assert isfinite(load.sweep_nm)
+    assert load.adduction_nm == pytest.approx(
+        MASS.adduction_inertia_kg_m2 * 100.0 - MASS.gravity_torques_nm(load.sweep_rad, load.adduction_rad)[1]
+    )
+
+
+# what is new
+
+
+def test_a_sample_that_repeats_the_one_before_is_none() -> None:
+    loads = JointLoads(GEOMETRY, DRIVE)
+    pair = (sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0))
+    assert loads.update(*pair) is not None
+    assert loads.update(*pair) is None
+    assert loads.update(*(each._replace(angle_stamp_s=1.1, current_stamp_s=1.1) for each in pair)) is None
+
+
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize("field", ["angle_rad", "current_a"])
+def test_a_change_of_any_angle_or_current_is_new(place: int, field: str) -> None:
+    loads = JointLoads(GEOMETRY, DRIVE)
+    pair = [sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0)]
+    loads.update(*pair)
+    pair[place] = pair[place]._replace(**{field: 0.5})
+    assert loads.update(*pair) is not None
+
+
+def test_repeats_between_two_samples_change_nothing() -> None:
+    first = (sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0))
+    second = (sample(0.12, 2.0, 3.0, 1.01), sample(0.21, 2.0, 3.0, 1.01))
+    plain, again = JointLoads(GEOMETRY, DRIVE), JointLoads(GEOMETRY, DRIVE)
+    plain.update(*first)
+    for _ in range(4):
+        again.update(*first)
+    assert again.update(*second) == plain.update(*second)
+
+
+def test_a_reset_forgets_the_sample_before() -> None:
+    loads = JointLoads(GEOMETRY, DRIVE)
+    pair = (sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0))
+    first = loads.update(*pair)
+    loads.reset()
+    assert loads.update(*pair) == first
+
+
+anything = st.floats()
+samples = st.builds(JointSample, anything, anything, anything, anything, anything)
+
+
+@given(st.lists(st.tuples(samples, samples), max_size=5))
+def test_nothing_but_an_angle_without_a_sine_makes_it_raise(pairs: list[tuple[JointSample, JointSample]]) -> None:
+    """The estimator skips samples whose angle or current is not finite."""
+    loads = JointLoads(GEOMETRY, DRIVE)
+    for sweep, adduction in pairs:
+        if np.isfinite([sweep.angle_rad, adduction.angle_rad, sweep.current_a, adduction.current_a]).all():
+            loads.update(sweep, adduction)
