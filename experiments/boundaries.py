@@ -48,7 +48,7 @@ def _is_close(stride: StrideTruth, truths: Mapping[tuple[str, int], LoadCellTrut
     believed = beliefs[stride.index].of(stride.flipper).k_p
     if believed is None:
         return False
-    value, _ = believed.at(stride.insertion.deepest_m)
+    value, _ = believed.at(max(stride.insertion.deepest_m, stride.stance.deepest_m))  # as a stride tells its depth
     return bool(abs(value / truths[stride.flipper, stride.index].leaning.k_p - 1.0) <= FOLLOWED)
 
 

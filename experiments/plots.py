@@ -38,6 +38,8 @@ def plot_errors(report: dict[str, Any], path: Path) -> None:
 def _plot_panel(panel: Axes, rows: Sequence[dict[str, Any]]) -> None:
     muds = list(dict.fromkeys(row["mud"] for row in rows))
     for method, colour in COLOURS.items():
+        if method == "paper compensated" and rows and rows[0]["coefficient"] != "k_s":
+            continue  # it compensates k_s alone
         told = [row for row in rows if row["method"] == method and row["median"] is not None]
         places = [muds.index(row["mud"]) for row in told]
         medians = [min(100.0 * row["median"], HIGHEST_PERCENT) for row in told]
@@ -51,6 +53,8 @@ def _plot_panel(panel: Axes, rows: Sequence[dict[str, Any]]) -> None:
             panel.text(place, 2.0, "bounds", ha="center", color=COLOURS["default"], fontsize="small")
     panel.axhline(10.0, color="grey", linewidth=0.8, linestyle=":")
     panel.set_xticks(range(len(muds)), muds)
+    panel.set_xlim(-0.5, len(muds) - 0.5)
     panel.set_ylim(0.0, HIGHEST_PERCENT)
     panel.set_yscale("symlog", linthresh=20.0)
+    panel.set_yticks([0, 5, 10, 20, 50, 100], ["0", "5", "10", "20", "50", "100"])
     panel.set_xlabel("mud")

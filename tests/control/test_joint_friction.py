@@ -1,6 +1,7 @@
 """The friction of a joint against numpy, and the laws that any friction must keep."""
 
 from math import pi, radians
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -88,3 +89,10 @@ def test_the_phase_of_cogging_is_that_of_the_sine_at_angle_zero() -> None:
 def test_dry_friction_keeps_its_bound_at_any_velocity(velocity: float) -> None:
     """The largest that the bus can carry; what is not finite never gets here."""
     assert abs(DRY.torque_nm(0.0, velocity)) <= 0.02
+
+
+@pytest.mark.parametrize("field", ["coulomb_nm", "viscous_nm_s", "cogging_nm", "cogging_per_turn"])
+def test_no_motor_can_be_configured_to_spend_less_than_nothing(field: str) -> None:
+    (bounds,) = get_type_hints(JointFriction, include_extras=True)[field].__metadata__
+    assert bounds.minimum == 0.0
+    assert getattr(NO_FRICTION, field) == 0.0

@@ -1,0 +1,171 @@
+"""The truth of a stride against the clay's own numbers, worked out for an upright plate by hand.
+
+At the depth z, with the edge's area A and the plate's girth G, the rate factor g and the strength s_u,
+
+    down  F = g s_u (5.14 A + 0.25 G z)        up  F = g s_u (9 A min(z/1 cm, 1) + 0.25 G z)
+
+and sideways N_p s_u on the face. k is the least-squares slope of F against V = A z, or F over ∫ζ dA.
+"""
+
+from dataclasses import replace
+from math import cos, isfinite, nan, radians, sin
+from typing import Any
+
+import numpy as np
+import pytest
+
+from control.geometry import FlipperGeometry
+from control.plate import submerged_part
+from experiments.load_cell_truth import (
+    PAPER_SPEED_M_S,
+    REVERSAL_SHARE,
+    LoadCellTruth,
+    TrueCoefficients,
+    load_cell_truth,
+)
+from simulation.clay import ADHESION, BEARING_FACTOR, DEEP_FACTOR, SUCTION_FADE_M, Clay, clay_of_water, rate_factor
+from simulation.load_cell import measure_insertion
+from simulation.witness import StrideTruth, StrokeTruth
+
+GEOMETRY = FlipperGeometry()
+EDGE_M2 = GEOMETRY.plate_width_m * GEOMETRY.plate_thickness_m
+GIRTH_M = 2.0 * (GEOMETRY.plate_width_m + GEOMETRY.plate_thickness_m)
+CLAY = clay_of_water(49.5)
+DEPTH_M, SPEED_M_S = 0.03, 0.2
+NEVER = StrokeTruth(nan, nan, nan, nan, nan, nan)
+
+
+def stroke(
+    sweep_rad: float = 0.0, adduction_rad: float = 0.0, deepest_m: float = DEPTH_M, speed_m_s: float = SPEED_M_S
+) -> StrokeTruth:
+    return StrokeTruth(sweep_rad, adduction_rad, deepest_m, speed_m_s, 0.05, 0.9 * deepest_m)
+
+
+def stride(clay: Clay = CLAY, **changes: Any) -> StrideTruth:
+    return replace(StrideTruth("left", 0, clay, 0.0, stroke(), stroke(), stroke()), **changes)
+
+
+def with_stroke(name: str, of: StrokeTruth) -> StrideTruth:
+    changes: dict[str, Any] = {name: of}
+    return stride(**changes)
+
+
+def truth(of: StrideTruth, relaxation: float = 0.0, hold_s: float = 0.0) -> LoadCellTruth:
+    return load_cell_truth(of, GEOMETRY, relaxation, hold_s)
+
+
+def slope(depths_m: np.ndarray, forces_n: np.ndarray) -> float:
+    volumes = EDGE_M2 * depths_m
+    return float(volumes @ forces_n / (volumes @ volumes))
+
+
+# the closed law
+
+
+@pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(51.2)])
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.05])
+def test_penetration_of_an_upright_plate_is_bearing_and_adhesion(depth_m: float, clay: Clay) -> None:
+    """To 1 %: along the plate mud yields after a millimetre, in which it bears less."""
+    z = np.linspace(0.0, depth_m, 2001)
+    forces_n = rate_factor(SPEED_M_S) * clay.strength_pa * (BEARING_FACTOR * EDGE_M2 + ADHESION * GIRTH_M * z)
+    told = truth(stride(clay, insertion=stroke(deepest_m=depth_m)))
+    assert told.upright.k_p == pytest.approx(slope(z, forces_n), rel=0.01)
+
+
+@pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(51.2)])
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.05])
+def test_extraction_of_an_upright_plate_is_suction_and_adhesion(depth_m: float, clay: Clay) -> None:
+    """To 0.2 %, steps of the carrier: over the last three quarters all mud has turned."""
+    z = np.linspace(0.0, (1.0 - REVERSAL_SHARE) * depth_m, 2001)
+    suction = DEEP_FACTOR * EDGE_M2 * np.minimum(z / SUCTION_FADE_M, 1.0)
+    forces_n = rate_factor(SPEED_M_S) * clay.strength_pa * (suction + ADHESION * GIRTH_M * z)
+    told = truth(stride(clay, extraction=stroke(deepest_m=depth_m)))
+    assert told.upright.k_e == pytest.approx(slope(z, forces_n), rel=2e-3)
+
+
+@pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(51.2)])
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.05])
+def test_shear_of_an_upright_plate_is_the_pressure_on_its_face(depth_m: float, clay: Clay) -> None:
+    """To rounding: once it has yielded the mud bears what the clay's sideways law says, at the stance's mean depth."""
+    mean_m = 0.9 * depth_m
+    force_n = rate_factor(SPEED_M_S) * clay.lateral_n(mean_m, GEOMETRY.plate_width_m)
+    told = truth(stride(clay, stance=stroke(deepest_m=depth_m)))
+    assert told.upright.k_s == pytest.approx(force_n / (GEOMETRY.plate_width_m * mean_m**2 / 2.0), rel=1e-6)
+
+
+def test_firmer_mud_is_so_in_proportion_along_the_plate() -> None:
+    """Sideways the weight of the mud bears too, whatever its strength."""
+    soft, firm = (truth(stride(Clay("", strength_pa))).leaning for strength_pa in (1000.0, 2000.0))
+    assert firm.k_p == pytest.approx(2.0 * soft.k_p)
+    assert firm.k_e == pytest.approx(2.0 * soft.k_e)
+    assert 1.5 * soft.k_s < firm.k_s < 2.0 * soft.k_s
+
+
+@pytest.mark.parametrize("name", ["insertion", "stance", "extraction"])
+def test_each_coefficient_is_of_its_own_strokes_speed(name: str) -> None:
+    slow, quick = (truth(with_stroke(name, stroke(speed_m_s=speed_m_s))).upright for speed_m_s in (0.05, 0.8))
+    grip = rate_factor(0.8) / rate_factor(0.05)
+    ratios = [b / a for a, b in zip(slow, quick, strict=True)]
+    place = ("insertion", "stance", "extraction").index(name)
+    assert ratios.pop(place) == pytest.approx(grip, rel=0.01)  # the carrier's steps
+    assert ratios == [1.0, 1.0]
+
+
+# leaning plates
+
+
+def leaning(depth_m: float = DEPTH_M) -> StrokeTruth:
+    sweep_rad = radians(30.0)
+    return stroke(sweep_rad, GEOMETRY.adduction_rad(sweep_rad, depth_m / 2.0))
+
+
+def test_a_plate_that_does_not_lean_is_the_upright_one() -> None:
+    told = truth(stride())
+    assert told.leaning == told.upright
+
+
+def test_a_leaning_plate_is_that_of_the_load_cell_in_the_same_attitude() -> None:
+    """F = k V over its own volume, by least squares on the cell's own curve; give or take its last step."""
+    attitude = leaning()
+    curve = measure_insertion(CLAY, GEOMETRY, attitude.sweep_rad, attitude.adduction_rad, DEPTH_M, SPEED_M_S).down
+    lean, q = cos(attitude.sweep_rad) * sin(attitude.adduction_rad), cos(attitude.adduction_rad)
+    rows = [(z, f) for z, f in zip(curve.depths_m, curve.forces_n, strict=True) if z > 0.0]
+    volumes = np.array([GEOMETRY.plate_thickness_m * submerged_part(GEOMETRY, z, -lean, q).area_m2 for z, _ in rows])
+    forces_n = np.array([f for _, f in rows])
+    expected = float(volumes @ forces_n / (volumes @ volumes))
+    assert truth(stride(insertion=attitude)).leaning.k_p == pytest.approx(expected, rel=2e-3)
+
+
+def test_a_leaning_plate_meets_more_on_its_way_down_than_an_upright_one() -> None:
+    """Its faces are pushed through the mud, not only along it."""
+    told = truth(stride(insertion=leaning()))
+    assert told.leaning.k_p > 1.05 * told.upright.k_p
+
+
+def test_in_stance_the_plate_is_square_to_its_way() -> None:
+    """The sweep angle turns through zero: only the lean of the adduction is the flipper's."""
+    turned = stroke(sweep_rad=0.3, adduction_rad=-0.3)
+    assert truth(stride(stance=turned)).leaning.k_s == truth(stride(stance=turned._replace(sweep_rad=0.0))).leaning.k_s
+    assert truth(stride(stance=turned)).leaning.k_s != truth(stride(stance=turned)).upright.k_s
+
+
+# strokes that did not happen
+
+
+@pytest.mark.parametrize(("name", "place"), [("insertion", 0), ("stance", 1), ("extraction", 2)])
+@pytest.mark.parametrize("gone", [NEVER, stroke(deepest_m=0.0), stroke(deepest_m=-0.01)])
+def test_a_stroke_that_did_not_happen_has_no_coefficient(name: str, place: int, gone: StrokeTruth) -> None:
+    for told in truth(with_stroke(name, gone)):
+        assert isinstance(told, TrueCoefficients)
+        assert [isfinite(k) for k in told] == [i != place for i in range(3)]
+
+
+def test_a_plate_that_never_slipped_is_dragged_at_the_papers_speed() -> None:
+    held = truth(stride(stance=stroke(speed_m_s=nan)))
+    assert held.leaning.k_s == truth(stride(stance=stroke(speed_m_s=PAPER_SPEED_M_S))).leaning.k_s
+
+
+def test_relaxation_in_a_hold_is_forgotten_on_the_way_up() -> None:
+    """It takes the load that holds the plate up at rest; mud that holds it down has to be sheared anew anyway."""
+    at_once, held = truth(stride(), 0.13, 0.0).leaning.k_e, truth(stride(), 0.13, 3.0).leaning.k_e
+    assert held == pytest.approx(at_once, rel=1e-3)  # 7 mm of the way up: seven times what makes it forget
