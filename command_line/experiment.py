@@ -32,13 +32,21 @@ def estimation(options: argparse.Namespace) -> int:
     except ValueError as problem:
         complain(str(problem))
         return exit_codes.USAGE
-    progress = Progress("trials")
-    report = report_of(plan, judge(plan, progress.show))
-    progress.clear()
+    if options.out is not None:
+        options.out.mkdir(parents=True, exist_ok=True)  # what cannot be is refused before the minutes of work
+    report = _run(plan)
     if options.out is not None:
         _write(options, report)
     print(json.dumps(report) if options.json else text_of(report))
     return exit_codes.OK
+
+
+def _run(plan: Plan) -> dict[str, Any]:
+    progress = Progress("trials")
+    try:
+        return report_of(plan, judge(plan, progress.show))
+    finally:
+        progress.clear()
 
 
 def plan_of(options: argparse.Namespace) -> Plan:
@@ -59,7 +67,6 @@ def _muds(options: argparse.Namespace, waters: Sequence[float]) -> tuple[Clay, .
 def _write(options: argparse.Namespace, report: dict[str, Any]) -> None:
     from experiments.plots import plot_errors  # matplotlib takes its time
 
-    options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "estimation.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     plot_errors(report, options.out / "estimation.png")
     print(f"written  {options.out / 'estimation.json'}, {options.out / 'estimation.png'}", file=sys.stderr)

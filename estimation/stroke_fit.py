@@ -50,9 +50,9 @@ def bound_extraction(geometry: FlipperGeometry, batches: Sequence[Batch], surfac
     """Of a flipper that did not come out: the largest k_e that the mud has borne."""
     borne = [_borne(geometry, batch, surface) for batch in batches]
     samples = sum(batch.samples for batch in batches)
-    if not borne or not 0.0 < max(borne) < inf:
+    bound = max(borne, default=0.0)
+    if not (bound > 0.0 and isfinite(2.0 * bound)):
         return NOT_THERE._replace(samples=samples)
-    bound = max(borne)
     return Estimate(bound, REPEATABILITY * bound, samples, True, NOT_OUT, at_least=True)
 
 

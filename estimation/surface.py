@@ -57,9 +57,9 @@ def combined(surface: Surface, expected_error_m: float, sample_m: float) -> Surf
 
 
 def find_surface(depths_m: Sequence[float], forces_n: Sequence[float]) -> Surface:
-    """From the batches of one insertion, deeper and deeper."""
+    """From the batches of one insertion, deeper and deeper; one that leads upward tells nothing."""
     n = len(depths_m)
-    if n < MIN_ABOVE + MIN_BELOW:
+    if n < MIN_ABOVE + MIN_BELOW or depths_m[0] >= depths_m[-1]:
         return NO_SURFACE
     mean_n = sum(forces_n) / n
     surface = _mud_begins(depths_m, [force_n - mean_n for force_n in forces_n])
@@ -143,13 +143,16 @@ def _kink(x: Sequence[float], y: Sequence[float], border: int, kink_m: float, re
 
 def _mean(jump: Surface, kink: Surface, share: float) -> Surface:
     """`share`: of the jump."""
-    rest, apart_m = 1.0 - share, jump.depth_m - kink.depth_m
-    own_m2 = share * jump.std_error_m * jump.std_error_m + rest * kink.std_error_m * kink.std_error_m
+    rest = 1.0 - share
+
+    def doubt(own: float, other: float, apart: float) -> float:
+        return sqrt(share * own * own + rest * other * other + share * rest * apart * apart)
+
     return Surface(
         share * jump.depth_m + rest * kink.depth_m,
-        sqrt(own_m2 + share * rest * apart_m * apart_m),
+        doubt(jump.std_error_m, kink.std_error_m, jump.depth_m - kink.depth_m),
         share * jump.level_n + rest * kink.level_n,
-        max(jump.level_std_error_n, kink.level_std_error_n),
+        doubt(jump.level_std_error_n, kink.level_std_error_n, jump.level_n - kink.level_n),
         True,
     )
 

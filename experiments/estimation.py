@@ -8,6 +8,7 @@ trial is simulated once; every method estimates from the same samples.
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
@@ -110,15 +111,23 @@ def judge(plan: Plan, show: Callable[[int, int], None], processes: int | None = 
     """All trials of a plan, side by side in as many processes as there are processors."""
     parts = plan.parts()
     outcomes: list[Outcome] = [Outcome([], [])] * len(parts)
-    with ProcessPoolExecutor(processes or os.cpu_count()) as pool:
+    pool = ProcessPoolExecutor(processes or os.cpu_count(), initializer=_ignore_interrupts)
+    try:
         places = {pool.submit(run_part, part, plan): i for i, part in enumerate(parts)}
         for done, future in enumerate(as_completed(places), 1):
             outcomes[places[future]] = future.result()
             show(done, len(parts))
+    finally:
+        pool.shutdown(cancel_futures=True)  # after Ctrl-C only the trials under way are waited for
     return Outcome(
         [each for outcome in outcomes for each in outcome.judged],
         [each for outcome in outcomes for each in outcome.crossings],
     )
+
+
+def _ignore_interrupts() -> None:
+    """Ctrl-C reaches every process of a terminal; a worker would take it for the trial's result and begin the next."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def run_part(part: Part, plan: Plan) -> Outcome:

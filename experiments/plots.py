@@ -53,7 +53,7 @@ def _plot_panel(panel: Axes, rows: Sequence[dict[str, Any]]) -> None:
             panel.text(place, 2.0, "bounds", ha="center", color=COLOURS["default"], fontsize="small")
     panel.axhline(10.0, color="grey", linewidth=0.8, linestyle=":")
     panel.set_xticks(range(len(muds)), muds)
-    panel.set_xlim(-0.5, len(muds) - 0.5)
+    panel.set_xlim(-0.5, max(len(muds), 1) - 0.5)
     panel.set_ylim(0.0, HIGHEST_PERCENT)
     panel.set_yscale("symlog", linthresh=20.0)
     panel.set_yticks([0, 5, 10, 20, 50, 100], ["0", "5", "10", "20", "50", "100"])

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import sympy
-from hypothesis import example, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -360,15 +360,18 @@ def test_a_mirrored_sweep_has_the_same_moments_and_the_opposite_crossing(
     assert ratios[0] == -ratios[1]
 
 
+def vanishes(value: float) -> bool:
+    """So small that its powers round."""
+    return 0.0 < abs(value) < 1e-6
+
+
 @given(poses, st.sampled_from([0.25, 2.0, 16.0]))
 def test_moments_scale_with_the_fourth_power_of_length(pose: Pose, times: float) -> None:
-    """By powers of two, which do not round but where numbers vanish."""
+    """By powers of two, which do not round."""
+    assume(not any(vanishes(value) for value in (*pose[1:], *astuple(pose.geometry))))
     larger = FlipperGeometry(*(times * length_m for length_m in astuple(pose.geometry)))
     small, large = pose.plate(), pose._replace(geometry=larger).plate()
-    nothing = 1e-200
-    stance_m4 = times**4 * stance_moment_m4(pose.geometry, small)
-    assert stance_moment_m4(larger, large) == pytest.approx(stance_m4, rel=0.0, abs=nothing)
-    stroke_m4 = times**4 * stroke_moment_m4(pose.geometry, small, pose.sweep_rad)
-    assert stroke_moment_m4(larger, large, pose.sweep_rad) == pytest.approx(stroke_m4, rel=0.0, abs=nothing)
-    ratio = crossing(pose.geometry, small, pose.sweep_rad)
-    assert crossing(larger, large, pose.sweep_rad) == pytest.approx(ratio, rel=0.0, abs=nothing)
+    assert stance_moment_m4(larger, large) == times**4 * stance_moment_m4(pose.geometry, small)
+    stroke_m4 = stroke_moment_m4(pose.geometry, small, pose.sweep_rad)
+    assert stroke_moment_m4(larger, large, pose.sweep_rad) == times**4 * stroke_m4
+    assert crossing(larger, large, pose.sweep_rad) == crossing(pose.geometry, small, pose.sweep_rad)

@@ -429,6 +429,7 @@ def test_one_wild_sample_in_the_insertion_moves_no_coefficient_out_of_its_interv
 # noise
 
 
+@cache
 def drawn(seed: int) -> tuple[Mud, StrideEstimate]:
     """A stride in which all that the doubt allows for varies as it allows for: 1 mm of surface, 3.2 % of each torque
     constant, a quarter of what crosses over from a face that bears 20 %, current noise; and mud that clings.

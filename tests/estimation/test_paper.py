@@ -1,4 +1,5 @@
-"""Strokes through made-up mud whose law is known, and whether the estimator finds that law again.
+"""The paper's method on strokes through made-up mud that keeps the paper's laws: whether it finds them again, and the
+bias that its trigger is known to have.
 
 Strides are compared by their text: what is unknown is NaN, which is not equal to itself.
 """
@@ -358,6 +359,35 @@ def test_unknown_velocities_leave_only_inertia_in() -> None:
         for sample in triggered(motion(), MUD, slow)
     ]
     assert_found(one(samples, estimator(HEAVY)), MUD)
+
+
+# the body's drag
+
+
+def advancing(samples: Sequence[Sample], speed_m_s: float) -> list[Sample]:
+    return [sample._replace(body_x_m=speed_m_s * sample.now_s) for sample in samples]
+
+
+def test_half_of_the_drag_is_added_while_the_body_advances() -> None:
+    """At 0.2 m/s it has advanced by 2 mm long before the steady part of stance."""
+    samples, drag_n = triggered(motion(), MUD), 2.5
+    plain = one(samples)
+    told = one(advancing(samples, 0.2), PaperEstimator("left", GEOMETRY, DRIVE, drag_n))
+    added_n_m3 = drag_n / 2.0 / (WIDTH_M * plain.depth_m**2 / 2.0)
+    assert told.k_s.value == pytest.approx(MUD.k_s + added_n_m3, rel=1e-3)  # the deepest sample is 1 µm below the rest
+    assert (told.k_p, told.k_e) == (plain.k_p, plain.k_e)
+
+
+@pytest.mark.parametrize("speed_m_s", [0.0, -0.2, nan])
+def test_no_drag_is_added_where_the_body_does_not_advance(speed_m_s: float) -> None:
+    samples = triggered(motion(), MUD)
+    told = one(advancing(samples, speed_m_s), PaperEstimator("left", GEOMETRY, DRIVE, 2.5))
+    assert told.k_s == one(samples).k_s
+
+
+def test_without_compensation_no_drag_is_added() -> None:
+    samples = triggered(motion(), MUD)
+    assert one(advancing(samples, 0.2)).k_s == one(samples).k_s
 
 
 # what closes a stride, and what it then says

@@ -15,9 +15,10 @@ Row = tuple[float, float]  # time and travel
 
 
 def row(
-    now_s: float, travel_m: float, saturated: bool = False, body_m: float = 0.0
+    now_s: float, travel_m: float, saturated: bool = False, body_m: float | None = None
 ) -> tuple[float, float, float, float, float, float, float, bool]:
     """All else in proportion to the travel, so that a batch's means can be told."""
+    body_m = 6.0 * travel_m if body_m is None else body_m
     return now_s, travel_m, 2.0 * travel_m, 3.0 * travel_m, 4.0 * travel_m, 5.0 * travel_m, body_m, saturated
 
 
@@ -42,7 +43,7 @@ def test_batches_are_means_of_all_samples_in_their_order(travels_m: list[float])
     for batch in batches:
         mean_m = float(np.mean(travels_m[begin : begin + batch.samples]))
         begin += batch.samples
-        assert batch[:5] == pytest.approx(tuple(factor * mean_m for factor in (1, 2, 3, 4, 5)), abs=1e-15)
+        assert batch[:6] == pytest.approx(tuple(factor * mean_m for factor in (1, 2, 3, 4, 5, 6)), abs=1e-15)
 
 
 @given(st.lists(st.floats(-0.02, 0.02), min_size=1, max_size=LONGEST))
@@ -127,8 +128,9 @@ def test_a_batch_is_saturated_from_a_third_of_its_samples_on(clipped: int, satur
 # speed, and which batches count as moving
 
 
-def test_the_speed_is_that_along_the_stroke() -> None:
-    for batch in stroke_of(even(380.0)).batches[:-1]:
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_the_speed_is_that_along_the_stroke(direction: float) -> None:
+    for batch in stroke_of((now_s, direction * travel_m) for now_s, travel_m in even(380.0)).batches[:-1]:
         assert batch.speed_m_s == pytest.approx(SPEED_M_S, rel=1e-9)
 
 
@@ -186,7 +188,7 @@ def test_ending_a_stroke_twice_or_without_samples_adds_nothing() -> None:
 
 def test_a_single_sample_is_a_batch_of_its_own() -> None:
     (batch,) = stroke_of([(1.0, 0.02)]).batches
-    assert batch == Batch(0.02, 0.04, 0.06, 0.08, 0.1, 0.0, False, 1, 0.0)
+    assert batch == Batch(0.02, 0.04, 0.06, 0.08, 0.1, 0.12, False, 1, 0.0)
 
 
 def test_a_reset_forgets_everything() -> None:

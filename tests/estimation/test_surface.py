@@ -103,14 +103,37 @@ def test_a_surface_without_noise_is_found_to_a_seventh_of_a_batch(shift_m: float
     assert surface.level_n == pytest.approx(1.5, abs=1e-3)
 
 
-@given(st.floats(-5.0, 5.0), st.floats(-0.1, 0.1))
-def test_offsets_of_force_and_depth_only_move_the_result(offset_n: float, offset_m: float) -> None:
-    z = depths(2)
-    force = 100.0 * np.maximum(0.0, z) + BATCH_NOISE_N * noise(2, len(z))
+@given(st.floats(-5.0, 5.0), st.floats(-0.1, 0.1), st.integers(0, 20), st.sampled_from([0.0, 0.2, 1.0]))
+def test_offsets_of_force_and_depth_only_move_the_result(
+    offset_n: float, offset_m: float, seed: int, jump_n: float
+) -> None:
+    """With shapes that the residuals decide on, and with ones that they do not."""
+    z = depths(seed)
+    force = np.where(z > 0.0, jump_n + 100.0 * z, 0.0) + BATCH_NOISE_N * noise(seed, len(z))
     plain, moved = found(z, force), found(z + offset_m, force + offset_n)
     assert moved.depth_m == pytest.approx(plain.depth_m + offset_m, abs=1e-9)
     assert moved.level_n == pytest.approx(plain.level_n + offset_n, abs=1e-9)
     assert moved.std_error_m == pytest.approx(plain.std_error_m, rel=1e-6)
+    assert moved.level_std_error_n == pytest.approx(plain.level_std_error_n, rel=1e-6)
+
+
+@pytest.mark.parametrize(("slope_n_m", "jump_n"), [(100.0, 0.0), (100.0, 1.0)])
+def test_the_level_errs_as_it_says(slope_n_m: float, jump_n: float) -> None:
+    """By the noise over the root of the batches above, nine or ten of them; a kink lends it a little more."""
+    errors_n, told_n = [], 0.0
+    for seed in range(400):
+        z = depths(seed)
+        surface = found(z, np.where(z > 0.0, jump_n + slope_n_m * z, 0.0) + BATCH_NOISE_N * noise(seed, len(z)))
+        errors_n.append(surface.level_n)
+        told_n += surface.level_std_error_n / 400.0
+    assert told_n == pytest.approx(BATCH_NOISE_N / sqrt(9.7), rel=0.15)
+    assert np.std(errors_n) == pytest.approx(told_n, rel=0.15)
+
+
+def test_shapes_that_disagree_add_to_the_doubt() -> None:
+    """Where a jump and a kink fit alike, two millimetres apart, there is more doubt than of either."""
+    told_mm = [scores(100.0, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200).told_mm for jump_n in (0.0, 0.2, 1.0)]
+    assert told_mm[1] > 1.3 * max(told_mm[0], told_mm[2])
 
 
 def test_more_noise_makes_more_doubt() -> None:
@@ -186,6 +209,11 @@ def test_falling_forces_are_no_mud() -> None:
     z = depths(4)
     assert found(z, -100.0 * np.maximum(0.0, z)) == NO_SURFACE
     assert found(z, np.where(z > 0.0, -1.0 - 50.0 * z, 0.0)) == NO_SURFACE
+
+
+def test_an_insertion_that_leads_upward_tells_nothing() -> None:
+    z = depths(4)[::-1]
+    assert found(z, 100.0 * np.maximum(0.0, z)) == NO_SURFACE
 
 
 def test_a_line_from_the_first_batch_on_has_its_surface_there_or_none() -> None:

@@ -71,15 +71,18 @@ def test_the_standard_error_is_that_of_the_weights_scatter() -> None:
     assert np.mean([zero.weight_n for zero in zeros]) == pytest.approx(WEIGHT_N, abs=4.0 * scatter_n / sqrt(300))
 
 
-def test_few_samples_leave_more_doubt_not_less() -> None:
-    few = np.mean([taken([(0.0, 0.1)] * 8, WEIGHT_N, NOISE_NM, seed).zero.std_error_n for seed in range(200)])
-    many = np.mean([taken([(0.0, 0.1)] * 40, WEIGHT_N, NOISE_NM, seed).zero.std_error_n for seed in range(200)])
-    assert few == pytest.approx(sqrt(40.0 / 8.0) * many, rel=0.15)
+def test_of_few_samples_the_squared_doubt_is_that_of_their_mean() -> None:
+    """σ²/n without bias: the variance is counted about the samples' own mean."""
+    per_nm = 1.0 / GEOMETRY.jacobian(0.0, 0.1).z_adduction
+    squares = [taken([(0.0, 0.1)] * 8, WEIGHT_N, NOISE_NM, seed).zero.std_error_n ** 2 for seed in range(1000)]
+    assert np.mean(squares) == pytest.approx((per_nm * NOISE_NM) ** 2 / 8.0, rel=0.07)  # four sampling errors
 
 
 def test_a_weight_that_is_there_from_the_start_is_no_scatter() -> None:
     """The first sample's way from nothing to the weight is none either."""
-    assert taken(swing(FEWEST), 5.0).zero.std_error_n == pytest.approx(0.0, abs=1e-9)
+    zero = taken(swing(FEWEST), 5.0).zero
+    assert zero.weight_n == pytest.approx(5.0)
+    assert zero.std_error_n == pytest.approx(0.0, abs=1e-9)
 
 
 def test_mud_that_drips_off_is_followed() -> None:
