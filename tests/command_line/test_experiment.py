@@ -195,16 +195,19 @@ def test_dashes_stand_where_nothing_was_told() -> None:
 # Ctrl-C
 
 
-def test_ctrl_c_ends_it_after_the_trials_under_way() -> None:
-    """Of 100 trials of a second or two each; in a terminal all processes get the signal."""
+@pytest.mark.parametrize("seeds", ["1", "100"])
+def test_ctrl_c_ends_it_after_the_trials_under_way(seeds: str) -> None:
+    """Of trials of a second or two each: one, while another worker waits, or a hundred, most of which have not begun.
+    In a terminal all processes get the signal.
+    """
     command = [sys.executable, "-m", "command_line.main", *COMMAND, "--setup", "walking", "--mud", "49.5"]
-    command += ["--seeds", "100", "--layers", "none"]
+    command += ["--seeds", seeds, "--layers", "none"]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     children = Path(f"/proc/{run.pid}/task/{run.pid}/children")
     deadline_s = time.monotonic() + 30.0
     while not children.read_text().split() and time.monotonic() < deadline_s:
         time.sleep(0.05)
-    time.sleep(0.5)  # a trial has begun
+    time.sleep(0.3)  # a trial has begun
     os.killpg(run.pid, signal.SIGINT)
     printed, complaints = run.communicate(timeout=40.0)
     assert run.returncode == exit_codes.INTERRUPTED

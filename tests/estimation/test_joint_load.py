@@ -79,6 +79,13 @@ def test_friction_is_what_the_motor_spends_on_itself() -> None:
     assert (load.sweep_nm, load.adduction_nm) == pytest.approx((0.0, 0.0), abs=1e-15)
 
 
+def test_friction_of_one_joint_alone_counts() -> None:
+    friction, free = JointFriction(viscous_nm_s=0.004), FlipperDrive(WEIGHTLESS, SWEEP_NM_A, LIFT_NM_A)
+    moving = sample(0.1, 2.0, 0.0, 1.0)
+    assert one(free._replace(sweep_friction=friction), moving, moving)[5:7] == pytest.approx((0.008, 0.0))
+    assert one(free._replace(adduction_friction=friction), moving, moving)[5:7] == pytest.approx((0.0, 0.008))
+
+
 def test_friction_of_an_unknown_velocity_leaves_cogging_alone() -> None:
     friction = JointFriction(coulomb_nm=0.02, viscous_nm_s=0.004, cogging_nm=0.01, cogging_per_turn=1)
     drive = FlipperDrive(WEIGHTLESS, SWEEP_NM_A, LIFT_NM_A, friction, friction)
@@ -210,6 +217,30 @@ def test_between_two_samples_everything_is_half_way(
 def test_samples_that_do_not_tell_of_one_motion_are_taken_as_they_are(gap_s: float) -> None:
     motion = motion_between(sample(0.1, 1.0, 2.0, 1.0), sample(0.3, 3.0, 4.0, 1.0 + gap_s))
     assert motion == (0.3, 3.0, 0.0, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("stamps_s", "current_a"),
+    [
+        ((1.000, 1.010), 3.0),  # with the angles: half-way
+        ((1.005, 1.015), 2.0),  # the earlier one is of the very moment
+        ((0.995, 1.005), 4.0),
+        ((0.990, 1.000), 5.0),  # a little old: along the line, half a gap further
+        ((0.970, 0.971), 6.0),  # long ago: no further than one gap beyond the last
+        ((1.020, 1.021), 0.0),  # long after: no further than one gap before the first
+        ((1.005, 1.005), 4.0),  # the same message: as it is
+        ((1.006, 1.004), 4.0),
+    ],
+)
+def test_the_current_is_that_of_the_moment_between_the_angles(stamps_s: tuple[float, float], current_a: float) -> None:
+    before = JointSample(0.0, 0.0, 2.0, 1.00, stamps_s[0])
+    now = JointSample(0.1, 1.0, 4.0, 1.01, stamps_s[1])
+    assert motion_between(before, now)[3] == pytest.approx(current_a)
+
+
+def test_two_samples_of_one_moment_tell_no_acceleration() -> None:
+    for motion in (motion_between, motion_at):
+        assert motion(sample(0.1, 1.0, 2.0, 1.0), sample(0.3, 3.0, 4.0, 1.0)) == (0.3, 3.0, 0.0, 4.0)
 
 
 @pytest.mark.parametrize(("before", "after"), [(nan, 1.0), (1.0, nan), (inf, 1.0), (1.0, -inf)])

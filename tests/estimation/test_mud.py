@@ -184,11 +184,13 @@ def test_without_a_pose_there_is_a_belief_and_no_map() -> None:
 def test_a_reset_forgets_strides_belief_and_map(method: Method) -> None:
     mud = estimator(method)
     first = strides_of(mud, walk(1), walk(2), speed_m_s=0.1)
-    assert mud.belief != NOTHING_KNOWN and mud.map.rows()
+    belief, rows = mud.belief, mud.map.rows()
+    assert belief != NOTHING_KNOWN and rows
     mud.reset()
     assert mud.belief == NOTHING_KNOWN
     assert mud.map.rows() == ()
     assert repr(strides_of(mud, walk(1), walk(2), speed_m_s=0.1)) == repr(first)
+    assert (mud.belief, mud.map.rows()) == (belief, rows)
 
 
 # ages: when a message was measured

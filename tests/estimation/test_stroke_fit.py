@@ -20,7 +20,6 @@ from estimation.stroke_fit import (
     NOT_OUT,
     NOT_THERE,
     REPEATABILITY,
-    REVERSAL_SHARE,
     UNOBSERVABLE,
     _slope_per_surface,
     bound_extraction,
@@ -126,10 +125,10 @@ def test_a_face_load_that_was_left_in_would_be_taken_for_mud() -> None:
 def test_only_batches_in_the_mud_count() -> None:
     """A force above the surface, and samples there, change nothing; nor do the first quarter of the way up."""
     batches, rising = down(), up()
-    start_m = (1.0 - REVERSAL_SHARE) * 0.03
+    start_m = 0.75 * 0.03
     odd_down = [b._replace(adduction_nm=1.0, samples=1) if b.travel_m < -STEP_M else b for b in batches]
     odd_up = [
-        b._replace(adduction_nm=1.0, samples=1) if b.travel_m > start_m + 0.002 or b.travel_m < -0.002 else b
+        b._replace(adduction_nm=1.0, samples=1) if b.travel_m > start_m + 0.001 or b.travel_m < -0.001 else b
         for b in rising
     ]
     assert insertion(odd_down) == insertion(batches)
@@ -175,7 +174,8 @@ def test_the_ways_between_two_depths_add_up_to_what_lies_between_them(
     """Batches meet half-way between their means, and reach as far beyond the first and the last one."""
     travels_m = list(np.cumsum(steps_m) - 0.012)
     first_m, last_m = travels_m[0] - steps_m[1] / 2.0, travels_m[-1] + steps_m[-1] / 2.0
-    batches = [batch_at(float(travel_m)) for travel_m in (reversed(travels_m) if upward else travels_m)]
+    ordered = reversed(travels_m) if upward else travels_m
+    batches = [batch_at(0.0)._replace(travel_m=float(travel_m)) for travel_m in ordered]
     deepest_m = shallowest_m + height_m
     inside_m = max(0.0, min(last_m, deepest_m) - max(first_m, shallowest_m))
     ways = ways_m(batches, shallowest_m, deepest_m)

@@ -26,9 +26,10 @@ from experiments.estimation import (
     run_part,
     with_layers,
 )
-from experiments.trial import SINGLE, WALKING
+from experiments.trial import SINGLE, WALKING, Setup
 from simulation.clay import clay_of_water
-from simulation.disturbances import LAB, NONE
+from simulation.disturbances import LAB, NONE, Disturbances
+from simulation.track import Track
 
 STRONG = clay_of_water(47.6)
 SHORT = Plan(single=(STRONG,), walking=(STRONG,), seeds=1, single_strides=1, walking_strides=2)
@@ -175,14 +176,28 @@ def test_a_trial_in_another_process_is_the_same_trial() -> None:
     assert repr(here) == repr([each for each in outcome().judged if each.setup.startswith("walking")])
 
 
-def test_what_is_not_disturbed_is_known_exactly() -> None:
-    """All else alike, a wrong torque constant changes every coefficient of the paper by a few times its error."""
-    quiet, loud = (
-        run_part(Part(WALKING, (STRONG,), 1, 1), with_layers(SHORT, layers)).judged for layers in ((), (TORQUE,))
-    )
-    ratios = [b.estimate.value / a.estimate.value for a, b in zip(quiet, loud, strict=True) if a.method == "paper"]
-    assert all(ratio != 1.0 for ratio in ratios)
-    assert max(abs(ratio - 1.0) for ratio in ratios) < 5.0 * TORQUE_ERROR
+def trial_of(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What a part of the plan is simulated with."""
+    asked: dict[str, Any] = {}
+
+    def run_trial(setup: Setup, track: Track, disturbances: Disturbances, strides: int, seed: int, error: float) -> Any:
+        asked.update(setup=setup, disturbances=disturbances, torque_error=error)
+        raise InterruptedError
+
+    monkeypatch.setattr(experiments.estimation, "run_trial", run_trial)
+    with pytest.raises(InterruptedError):
+        run_part(Part(WALKING, (STRONG,), 1, 1), plan)
+    return asked
+
+
+@pytest.mark.parametrize(("layers", "period_s", "error"), [((REPEATS,), 0.005, 0.0), ((TORQUE,), 0.0, 0.032)])
+def test_rows_and_torque_constants_are_disturbed_as_asked(
+    layers: tuple[str, ...], period_s: float, error: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = trial_of(with_layers(SHORT, layers), monkeypatch)
+    assert (asked["setup"].row_period_s, asked["torque_error"]) == (period_s, error)
+    assert asked["setup"].gait == WALKING.gait
+    assert asked["disturbances"] == NONE
 
 
 def test_a_walk_over_a_border_tells_how_soon_it_was_followed(monkeypatch: pytest.MonkeyPatch) -> None:
