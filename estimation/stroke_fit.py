@@ -22,6 +22,7 @@ from estimation.stroke import Batch
 from estimation.surface import Surface
 
 REVERSAL_SHARE = 0.25  # of the way up
+SHORTEST_M = 1e-9  # a piece of way that is less is rounding, or none
 MIN_VERTICAL_LEVER_M = 0.03  # under it the adduction joint hardly feels an upward force
 REPEATABILITY = 0.032  # of a torque, as the paper measured it
 CROSSING_DOUBT = 0.25  # of what is taken off: its centre of pressure is that of the law, not the mud's
@@ -103,7 +104,7 @@ def _pieces(
 ) -> _Pieces:
     moments, torques, crossed_nm, depths_m, samples, lever_m = [], [], [], [], 0, inf
     for batch, way_m in zip(batches, ways_m(batches, surface.depth_m, deepest_m), strict=True):
-        if way_m <= 0.0:
+        if way_m < SHORTEST_M:
             continue
         plate = submerged_plate(geometry, batch.sweep_rad, batch.adduction_rad, surface.depth_m)
         across_nm = crossing(geometry, plate, batch.sweep_rad) * batch.sweep_nm

@@ -80,7 +80,9 @@ def _mud_begins(x: Sequence[float], y: Sequence[float]) -> Surface:
     if not (slope_n_m > 0.0 and best > 0.0):
         return jump
     place = kinks.index(best)
-    kink = _kink(x, y, place + MIN_ABOVE, kinks_m[place], square - best)
+    border = place + MIN_ABOVE
+    border += kinks_m[place] >= x[border]  # a batch right at the kink counts as above, from whichever border it is met
+    kink = _kink(x, y, border, kinks_m[place], square - best)
     saved = (largest - best) / variance - FREEDOM if jump_n > 0.0 else -inf
     return _mean(jump, kink, 1.0 / (1.0 + exp(min(-saved / 2.0, LARGEST_EXPONENT))))
 

@@ -11,8 +11,10 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from math import isfinite
+from multiprocessing import active_children
 from typing import Any, NamedTuple
 
 from control.records import StrideEstimate
@@ -111,18 +113,29 @@ def judge(plan: Plan, show: Callable[[int, int], None], processes: int | None = 
     """All trials of a plan, side by side in as many processes as there are processors."""
     parts = plan.parts()
     outcomes: list[Outcome] = [Outcome([], [])] * len(parts)
-    pool = ProcessPoolExecutor(processes or os.cpu_count(), initializer=_ignore_interrupts)
-    try:
+    with _workers(processes or os.cpu_count()) as pool:
         places = {pool.submit(run_part, part, plan): i for i, part in enumerate(parts)}
         for done, future in enumerate(as_completed(places), 1):
             outcomes[places[future]] = future.result()
             show(done, len(parts))
-    finally:
-        pool.shutdown(cancel_futures=True)  # after Ctrl-C only the trials under way are waited for
     return Outcome(
         [each for outcome in outcomes for each in outcome.judged],
         [each for outcome in outcomes for each in outcome.crossings],
     )
+
+
+@contextmanager
+def _workers(count: int | None) -> Iterator[ProcessPoolExecutor]:
+    """They end with the work, also where that ends early: after Ctrl-C nobody waits for the trials under way."""
+    pool = ProcessPoolExecutor(count, initializer=_ignore_interrupts)
+    try:
+        yield pool
+    except BaseException:
+        for worker in active_children():
+            worker.terminate()
+        raise
+    finally:
+        pool.shutdown()
 
 
 def _ignore_interrupts() -> None:

@@ -5,7 +5,7 @@ from math import cos, hypot, inf, isfinite, nan, radians
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
@@ -352,6 +352,7 @@ def test_up_to_half_of_itself_a_doubt_is_borne() -> None:
     assert judged(OriginFit(K, 0.0), 0.99 * float(np.sqrt(LARGEST_DOUBT**2 - REPEATABILITY**2)) * K, 7).valid
 
 
+@example([0.0] * 28, -5e-324, 0.0)  # a piece of way whose half is nothing
 @given(st.lists(st.floats(), min_size=28, max_size=28), st.floats(-0.02, 0.02), st.floats(0.0, 1.0))
 def test_no_torque_makes_it_raise(torques_nm: list[float], surface_m: float, zero_error_n: float) -> None:
     batches = [b._replace(adduction_nm=t, sweep_nm=t / 2.0) for b, t in zip(down(), torques_nm, strict=True)]
