@@ -120,6 +120,7 @@ class StrideEstimate:
     stance: str = "unknown"  # yield, body, mixed, saturated or unknown: whether the mud sheared or the body moved
     tare_n: float = UNKNOWN  # weight of what clings to the flipper
     tare_drift_n: float = UNKNOWN  # since the stride before
+    extraction_torque_nm: float = UNKNOWN  # of the mud on the adduction joint, at the hardest moment of the extraction
 
 
 class BodyPose(NamedTuple):

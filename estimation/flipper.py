@@ -181,6 +181,7 @@ class FlipperEstimator:
             stance=shear.case,
             tare_n=self._tare.zero.weight_n,
             tare_drift_n=self._tare.drift_n,
+            extraction_torque_nm=max([-batch.adduction_nm for batch in extraction.batches], default=UNKNOWN),
         )
         self._clock.index += 1
         self._body_at_close_m = body_m

@@ -67,6 +67,7 @@ class PaperEstimator:
         self._body_at_stance_m = self._body_at_insertion_m = UNKNOWN
         self._extraction_start_m = UNKNOWN
         self._insertion_force_n = self._stance_force_n = self._extraction_force_n = UNKNOWN
+        self._extraction_nm = UNKNOWN
         if self._clock.index == 0 and not isfinite(self._body_at_close_m):
             self._body_at_close_m = body_x_m
 
@@ -118,6 +119,7 @@ class PaperEstimator:
 
     def _learn_extraction(self, load: FlipperLoad) -> None:
         self._extraction_force_n = -_larger(-load.force_z_n, -self._extraction_force_n)
+        self._extraction_nm = _larger(-load.adduction_torque_nm, self._extraction_nm)
         if not isfinite(self._extraction_start_m):
             self._extraction_start_m = load.depth_m
         submerged_m = load.depth_m - self.surface_m
@@ -160,6 +162,7 @@ class PaperEstimator:
             extraction_force_n=self._extraction_force_n,
             step_m=body_x_m - self._body_at_close_m,
             place_m=self._body_at_insertion_m,
+            extraction_torque_nm=self._extraction_nm,
         )
         self._clock.index += 1
         self._body_at_close_m = body_x_m

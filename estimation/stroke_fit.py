@@ -4,8 +4,9 @@
     extraction    τ₂ - crossing = -k_e Φ        over the last three quarters of the way up
 
 Φ is the leverage of the submerged volume in each pose (control/plate.py); the crossing is what the plate's face bears
-across its motion, which the sweep joint has felt. Every piece of way counts by its length within these limits. On the
-first quarter of the way up, mud that held the flipper up turns to hold it down.
+across its motion, which the sweep joint has felt. Every piece of way counts by its length within these limits, where
+the adduction joint feels an upward force at all. On the first quarter of the way up, mud that held the flipper up
+turns to hold it down.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ class _Pieces(NamedTuple):
     crossed_nm: list[float]  # taken off
     depths_m: list[float]
     samples: int
-    lever_m: float  # the shortest vertical one
+    lever_m: float  # the shortest vertical one of the whole stroke
 
 
 def _fit(
@@ -86,17 +87,15 @@ def _fit(
     pieces = _pieces(geometry, batches, surface, sign, deepest_m)
     fit = fit_through_origin(pieces.moments, pieces.torques)
     if fit is None:
-        return NOT_THERE._replace(samples=pieces.samples)
+        hidden = pieces.lever_m < MIN_VERTICAL_LEVER_M
+        return NOT_THERE._replace(samples=pieces.samples, reason=UNOBSERVABLE if hidden else TOO_SHORT)
     edge_m2 = geometry.plate_width_m * geometry.plate_thickness_m
     systematic = hypot(
         CROSSING_DOUBT * _slope(pieces.moments, pieces.crossed_nm),
         _slope_per_surface(fit, pieces.moments, pieces.torques, pieces.depths_m) * surface.std_error_m,
         1.5 * zero_error_n / (edge_m2 * max(pieces.depths_m)),
     )
-    estimate = judged(fit, systematic, pieces.samples)
-    if pieces.lever_m < MIN_VERTICAL_LEVER_M:
-        return estimate._replace(valid=False, reason=UNOBSERVABLE)
-    return estimate
+    return judged(fit, systematic, pieces.samples)
 
 
 def _pieces(
@@ -104,7 +103,9 @@ def _pieces(
 ) -> _Pieces:
     moments, torques, crossed_nm, depths_m, samples, lever_m = [], [], [], [], 0, inf
     for batch, way_m in zip(batches, ways_m(batches, surface.depth_m, deepest_m), strict=True):
-        if way_m < SHORTEST_M:
+        vertical_m = geometry.vertical_lever_m(batch.sweep_rad, batch.adduction_rad)
+        lever_m = min(lever_m, vertical_m)
+        if way_m < SHORTEST_M or vertical_m < MIN_VERTICAL_LEVER_M:
             continue
         plate = submerged_plate(geometry, batch.sweep_rad, batch.adduction_rad, surface.depth_m)
         across_nm = crossing(geometry, plate, batch.sweep_rad) * batch.sweep_nm
@@ -114,7 +115,6 @@ def _pieces(
         crossed_nm.append(root * across_nm)
         depths_m.append(max(batch.travel_m - surface.depth_m, way_m / 2.0))
         samples += batch.samples
-        lever_m = min(lever_m, geometry.vertical_lever_m(batch.sweep_rad, batch.adduction_rad))
     return _Pieces(moments, torques, crossed_nm, depths_m, samples, lever_m)
 
 

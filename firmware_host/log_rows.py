@@ -128,6 +128,7 @@ STRIDE = RowKind(
         Field("place_m", "float64", meaning="of the body when the insertion ended; NaN without a pose"),
         Field("tare_n", "float64", meaning="weight of what clings to the flipper"),
         Field("tare_drift_n", "float64", meaning="since the stride before"),
+        Field("extraction_torque_nm", "float64", meaning="of the mud on the adduction joint, at its hardest"),
         Field("chosen_depth_m", "float64", meaning="insertion depth of the next stride"),
         Field("index", "uint32"),
         Field("k_p_samples", "uint32"),

@@ -10,11 +10,12 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from control.adaptation import DepthAdaptation
+from control.adaptation import Adaptation, DepthAdaptation
 from control.controller import RESTING, Controller, WalkOrder
 from control.faults import Fault
 from control.limits import LimitedTorques, apply_limits
 from control.modes import ACCEPTED_IN, ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
+from control.paper_adaptation import PaperAdaptation
 from control.records import (
     NEVER_S,
     NO_TORQUE,
@@ -50,6 +51,11 @@ class ClosedStride(NamedTuple):
     chosen_depth_m: float
 
 
+def _adaptation_of(configuration: Configuration) -> Adaptation:
+    kind = PaperAdaptation if configuration.adaptation.method == "paper" else DepthAdaptation
+    return kind(configuration.adaptation, configuration.geometry, configuration.gait)
+
+
 class Loop:
     def __init__(
         self,
@@ -70,7 +76,7 @@ class Loop:
             configuration.estimation,
             configuration.adaptation.body_drag_n,
         )
-        self.adaptation = DepthAdaptation(configuration.adaptation, configuration.geometry, configuration.gait)
+        self.adaptation = _adaptation_of(configuration)
         self.controller = Controller(
             configuration.gait,
             configuration.geometry,

@@ -30,7 +30,7 @@ SURFACE_FACTOR = 3.0
 BEARING_FACTOR = 5.14
 ADHESION = 0.25
 SUCTION_FADE_M = 0.01
-RATE_COEFFICIENT = 1.99
+RATE_COEFFICIENT = 0.4
 RATE_EXPONENT = 0.4
 REFERENCE_SPEED_M_S = 0.1
 
@@ -60,7 +60,7 @@ def rate_factor(speed_m_s: float) -> float:
 _AT_REFERENCE = 1.0 + RATE_COEFFICIENT * REFERENCE_SPEED_M_S**RATE_EXPONENT
 
 # By water content in percent, as in Table I of the paper.
-MUDS = {"48.5": Clay("48.5", 2590.0), "53.1": Clay("53.1", 519.0), "45.3": Clay("45.3", 4520.0)}
+MUDS = {"48.5": Clay("48.5", 2800.0), "53.1": Clay("53.1", 680.0), "45.3": Clay("45.3", 3270.0)}
 DRIEST_PERCENT, WETTEST_PERCENT = 44.0, 56.0
 
 

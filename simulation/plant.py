@@ -32,8 +32,9 @@ class PlantParameters:
     geometry: FlipperGeometry = FlipperGeometry()
     arm_mass: ArmMass = ArmMass()
     joint_friction_nm_s: float = 0.002
-    body_mass_kg: float = 1.02  # of the walking model that was fitted to Table I
+    body_mass_kg: float = 1.0
     rail_drag_n: float = 2.5  # the paper's, without the pad
+    rail_damping_n_s_m: float = 6.0  # how drag grows with speed: fitted to Table I with the muds' strengths
     pad_width_m: float = 0.015
     pad_depth_m: float = 0.02
     disturbances: Disturbances = NONE
@@ -160,7 +161,8 @@ class Plant:
         if self.parameters.fixed_base:
             return
         thrust_n = left.force.thrust_n + right.force.thrust_n
-        self.body_m_s += dt_s * (thrust_n + self._drag_n(dt_s)) / self.parameters.body_mass_kg
+        drag_n = self._drag_n(dt_s) - self.parameters.rail_damping_n_s_m * self.body_m_s
+        self.body_m_s += dt_s * (thrust_n + drag_n) / self.parameters.body_mass_kg
         self.body_m += dt_s * self.body_m_s
 
     def _drag_n(self, dt_s: float) -> float:

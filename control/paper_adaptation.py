@@ -1,0 +1,66 @@
+"""The paper's own choice of depth (section III-D), kept under its name beside the default one.
+
+From the last stride's coefficients, by the laws of the plate's edge, b its width and t its thickness:
+
+    no slip       2 f_x(z) > f_r + f_a      f_x = k_s b z²/2     f_r = drag + k_s · pad     f_a = m v / t_acc / 2
+    extraction    f_e(z) < f_m              f_e = k_e b t z
+
+The paper names both conditions, not which depth between them it takes. Its adaptive speed in the firm mud (6.4 cm/s,
+that of a depth of 5 cm: 6.6) shows that it was the deepest that comes out, and so it is here. The estimates are taken
+as they are, without doubt; like the paper's robot, the right flipper decides while it knows anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from control.adaptation import AdaptationParameters, DepthChoice, depth_grid
+from control.coefficient import MudBelief
+from control.gait import GaitParameters
+from control.geometry import FlipperGeometry
+from control.records import Estimate, StrideEstimate
+
+NOT_TOLD = Estimate(0.0, 0.0, 0, False)
+
+
+class PaperAdaptation:
+    """Owns the last coefficients that were valid, and the depth of the next stride."""
+
+    def __init__(self, parameters: AdaptationParameters, geometry: FlipperGeometry, gait: GaitParameters) -> None:
+        self.parameters = parameters
+        self.geometry = geometry
+        self.gait = gait
+        self.grid_m = depth_grid(parameters, geometry, gait)
+        self.reset(parameters.initial_depth_m)
+
+    def reset(self, depth_m: float) -> None:
+        self.choice = DepthChoice(depth_m, False, "start")
+        self._k_s = self._k_e = NOT_TOLD
+
+    def step(self, belief: MudBelief, strides: Sequence[StrideEstimate]) -> DepthChoice:
+        for stride in sorted(strides, key=lambda stride: stride.flipper):  # the right one last
+            self._k_s = stride.k_s if stride.k_s.valid else self._k_s
+            self._k_e = stride.k_e if stride.k_e.valid else self._k_e
+        if self._k_e.valid:
+            out = [depth_m for depth_m in self.grid_m if self._extraction_n(depth_m) < self.parameters.motor_force_n]
+            depth_m = max(out, default=self.grid_m[0])
+            self.choice = DepthChoice(depth_m, self._slips(depth_m), "deepest that comes out" if out else "extraction")
+        else:
+            self.choice = self.choice._replace(reason="no k_e known, depth kept")
+        return self.choice
+
+    def _extraction_n(self, depth_m: float) -> float:
+        return self._k_e.value * self.geometry.plate_width_m * self.geometry.plate_thickness_m * depth_m
+
+    def _slips(self, depth_m: float) -> bool:
+        if not self._k_s.valid:
+            return False
+        thrust_n = self._k_s.value * self.geometry.plate_width_m * depth_m * depth_m / 2.0
+        return 2.0 * thrust_n <= self._resistance_n()
+
+    def _resistance_n(self) -> float:
+        """f_r + f_a, with f_a = m α l / (t_acc t_s) and the stance time t_s = 2 α l / v."""
+        parameters = self.parameters
+        pad_n = self._k_s.value * parameters.pad_width_m * parameters.pad_depth_m**2 / 2.0
+        inertial_n = parameters.body_mass_kg * self.gait.stance_speed_m_s / (2.0 * parameters.acceleration_s)
+        return parameters.body_drag_n + pad_n + inertial_n

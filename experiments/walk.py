@@ -1,0 +1,117 @@
+"""One simulated walk, stride by stride: how far, how long, in which mud, and what went wrong.
+
+The truth comes from the plant, not from the robot's own estimates: the body's way from the start of one insertion to
+the next, and the mud in which the plates went down. Two failures have names, after the paper's section III-D: a
+stride slips that advances by less than half an arm (the bound in the authors' optimiser); a flipper is held where the
+body is pushed back after the extraction, since the plates are still in the mud when they swing forward.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import inf, sin
+from typing import NamedTuple
+
+from control.controller import WalkOrder
+from control.modes import Mode
+from control.records import Phase
+from firmware_host.configuration import Configuration
+from simulation.disturbances import NONE, Disturbances
+from simulation.lockstep import Lockstep
+from simulation.track import Track
+
+SLIPPAGE, EXTRACTION = "slippage", "extraction"
+PUSHED_BACK_M = 0.01  # more than a flipper that comes out moves the body
+AFTER_STANCE = frozenset({Phase.EXTRACTION, Phase.SWING})
+
+
+class WalkedStride(NamedTuple):
+    """Between the starts of two insertions."""
+
+    mud: str  # that the plates went into
+    place_m: float  # of the plates along the track
+    depth_m: float  # commanded
+    step_m: float
+    duration_s: float
+    pushed_back_m: float  # the body's way back after the extraction
+
+    def failure(self, arm_m: float) -> str:
+        """Its name, or an empty string."""
+        if self.pushed_back_m > PUSHED_BACK_M:
+            return EXTRACTION
+        return SLIPPAGE if self.step_m < arm_m / 2.0 else ""
+
+
+@dataclass(frozen=True)
+class Walk:
+    strides: Sequence[WalkedStride]
+    fault: str  # that ended it, in a sentence; else empty
+
+    def in_mud(self, mud: str) -> list[WalkedStride]:
+        return [stride for stride in self.strides if stride.mud == mud]
+
+
+def speed_m_s(strides: Sequence[WalkedStride]) -> float:
+    """Of at least one stride."""
+    return sum(stride.step_m for stride in strides) / sum(stride.duration_s for stride in strides)
+
+
+class StrideRecord:
+    """Owns the strides of a walk so far, and what was seen of the one under way."""
+
+    def __init__(self, lockstep: Lockstep, track: Track) -> None:
+        self._lockstep = lockstep
+        self._track = track
+        self.reset()
+
+    def reset(self) -> None:
+        self.strides: list[WalkedStride] = []
+        self._number = -1
+        self._begin()
+
+    def _begin(self) -> None:
+        plant, loop = self._lockstep.robot.plant, self._lockstep.loop
+        self._start_m, self._start_s = plant.body_m, self._lockstep.now_s
+        self._furthest_m, self._pushed_back_m = -inf, 0.0
+        self._depth_m = loop.controller.gait.commanded_depth_m
+        self._place_m = plant.body_m + loop.configuration.geometry.flipper_length_m * sin(plant.arms[0].sweep_rad)
+
+    def look(self) -> None:
+        """Once a tick, while the robot walks."""
+        target, body_m = self._lockstep.loop.controller.target, self._lockstep.robot.plant.body_m
+        if target.stride != self._number:
+            self._close(body_m)
+            self._number = target.stride
+        if target.phase in AFTER_STANCE:
+            self._furthest_m = max(self._furthest_m, body_m)
+            self._pushed_back_m = max(self._pushed_back_m, self._furthest_m - body_m)
+
+    def _close(self, body_m: float) -> None:
+        if self._number >= 0:
+            mud, duration_s = self._track.clay_at(self._place_m).name, self._lockstep.now_s - self._start_s
+            step_m = body_m - self._start_m
+            self.strides.append(
+                WalkedStride(mud, self._place_m, self._depth_m, step_m, duration_s, self._pushed_back_m)
+            )
+        self._begin()
+
+
+def walk(
+    configuration: Configuration,
+    track: Track,
+    order: WalkOrder,
+    seed: int,
+    done: Callable[[Sequence[WalkedStride]], bool],
+    disturbances: Disturbances = NONE,
+) -> Walk:
+    """Until `done` with the strides so far, or a fault. Raises RuntimeError where the robot does not start."""
+    lockstep = Lockstep(configuration, track, seed, disturbances=disturbances)
+    lockstep.arm()
+    lockstep.walk(order)
+    record = StrideRecord(lockstep, track)
+    while lockstep.loop.mode is Mode.WALKING and not done(record.strides):
+        lockstep.step()
+        record.look()
+    fault = lockstep.loop.fault
+    return Walk(record.strides, fault.sentence if fault else "")
