@@ -19,7 +19,10 @@ UNKNOWN = float("nan")
 
 
 class Phase(IntEnum):
-    """Where in the stride a flipper is. REST is outside of any stride, PAUSE a still moment between two phases."""
+    """Where in the stride a flipper is. REST is outside of any stride, PAUSE a still moment between two phases.
+
+    RECOVERY comes before the swing where the mud holds a flipper on.
+    """
 
     REST = 0
     INSERTION = 1
@@ -27,6 +30,7 @@ class Phase(IntEnum):
     EXTRACTION = 3
     SWING = 4
     PAUSE = 5
+    RECOVERY = 6
 
 
 class DriveState(NamedTuple):
