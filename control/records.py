@@ -114,7 +114,7 @@ class StrideEstimate:
     k_e: Estimate
     surface_m: float  # depth of the mud's surface below its nominal height
     depth_m: float  # deepest point reached below that surface
-    released: bool  # the flipper was out of the mud when the extraction ended
+    released: bool  # out of the mud without a recovery, before swing began
     insertion_force_n: float  # largest upward force in insertion
     stance_force_n: float  # largest forward force in stance
     extraction_force_n: float  # most negative upward force in extraction

@@ -140,7 +140,7 @@ STRIDE = RowKind(
         Field("k_p_at_least", "bool", meaning="the value is a lower bound"),
         Field("k_s_at_least", "bool"),
         Field("k_e_at_least", "bool"),
-        Field("released", "bool", meaning="out of the mud when the extraction ended"),
+        Field("released", "bool", meaning="out of the mud without a recovery, before swing began"),
     ),
 )
 
