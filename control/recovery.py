@@ -38,7 +38,7 @@ class RecoveryParameters:
     attempts: Annotated[int, Bounds(0, 20)] = 3  # 0: the stride does not wait, as on the paper's robot
     grace_s: Annotated[float, Bounds(0.0, 5.0)] = 0.15  # for joints that follow late, at full torque
     pause_s: Annotated[float, Bounds(0.0, 30.0)] = 0.3  # without pull, before each attempt
-    attempt_s: Annotated[float, Bounds(0.1, 30.0)] = 2.0
+    attempt_s: Annotated[float, Bounds(0.1, 30.0)] = 3.0
     speed_rad_s: Annotated[float, Bounds(0.05, 5.0)] = 1.0  # of both joints in the first attempt; the n-th has 1/n
     sweep_deg: Annotated[float, Bounds(0.0, 60.0)] = 20.0  # away from the middle in the second; the n-th has n - 1
     lead_deg: Annotated[float, Bounds(0.5, 45.0)] = 6.0  # of targets: times the stiffness, the full torque
