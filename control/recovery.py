@@ -137,14 +137,14 @@ class Recovery:
         self._goals = goal_a, 0.0, goal_c, 0.0
         self.news = f"{_are_stuck(stuck)}, attempt {self.attempt} of {self.parameters.attempts}"
 
-    def _sweep_goals(self, stuck: Sequence[str], sweeps_rad: tuple[float, float]) -> tuple[float, float]:
+    def _sweep_goals(self, stuck: Sequence[str], here_rad: tuple[float, float]) -> tuple[float, float]:
         """Stuck flippers go the same way, so that the body is not turned; one that is out stays where it is."""
-        places_rad = [sweep_rad for name, sweep_rad in zip(FLIPPERS, sweeps_rad, strict=True) if name in stuck]
-        outward_rad = copysign(radians(self.parameters.sweep_deg), sum(places_rad)) * (self.attempt - 1)
-        left_rad, right_rad = (
-            sweep_rad if name not in stuck else self._rear_rad if self.attempt == 1 else sweep_rad + outward_rad
-            for name, sweep_rad in zip(FLIPPERS, sweeps_rad, strict=True)
-        )
+        places_rad = dict(zip(FLIPPERS, here_rad, strict=True))
+        away_rad = copysign(radians(self.parameters.sweep_deg), sum(places_rad[name] for name in stuck))
+        goals_rad = {name: places_rad[name] + (self.attempt - 1) * away_rad for name in stuck}
+        if self.attempt == 1:
+            goals_rad = dict.fromkeys(stuck, self._rear_rad)
+        left_rad, right_rad = ((places_rad | goals_rad)[name] for name in FLIPPERS)
         return left_rad, right_rad
 
     def _lift(self, dt_s: float, states: DriveStates) -> JointTargets:
@@ -181,14 +181,13 @@ class Recovery:
         """The gait's targets with what is left of the gaps."""
         if not self._gaps:
             return wanted
-        a, b, c, d = (
-            JointTarget(_within(target.angle_rad + rest.angle_rad, *span), target.velocity_rad_s + rest.velocity_rad_s)
-            for target, rest, span in zip(
-                wanted, [gap.after(self._time_s) for gap in self._gaps], self._ranges, strict=True
-            )
-        )
+        rests = [gap.after(self._time_s) for gap in self._gaps]
         if self._time_s >= max(self._fade_s):
             self._gaps = ()
+        a, b, c, d = (
+            JointTarget(_within(gait.angle_rad + rest.angle_rad, *span), gait.velocity_rad_s + rest.velocity_rad_s)
+            for gait, rest, span in zip(wanted, rests, self._ranges, strict=True)
+        )
         return a, b, c, d
 
 
