@@ -9,10 +9,13 @@ the plate to slide out along its own plane, without pushing mud aside, a point e
     l α' = e sin α β'
 
 so while β rises the sweep must move away from the middle, which also shortens the lever l cos α of what sticks to the
-plate. The first attempt goes to the rear, as the stance did: a plate that stopped short of it pushes the body forward
-and comes out on the way. The later ones go further away from the middle on the side where the flipper is, however far
-they push the body. Targets never lead their joints by more than full torque needs, so a plate that comes free does
-not fly. Swing begins where the recovery leaves off, and what separates the two fades out without a jump of speed.
+plate. (In simulated clay of 6 to 9 kPa, entered to 4 or 5 cm, a lift in place and one towards the middle freed nothing
+in 4 s; one away from the middle came out within 2.5 s, for 16 to 35 mm of the body's way.) The first attempt goes to
+the rear, as the stance did: a plate that stopped short of it pushes the body forward and comes out on the way. The
+later ones go away from the middle on the side where the flipper is.
+
+Targets lead their joints by no more than full torque needs, so a plate that comes free does not fly. Swing begins
+where the recovery leaves off, and what separates the two fades out without a jump of position or speed.
 """
 
 from __future__ import annotations
