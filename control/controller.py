@@ -1,7 +1,7 @@
 """From a mode to the torques that it wants: hold a pose, walk, or raise the flippers.
 
-Owns the gait and the paths into and out of it. Modes without torque want none; what leaves for the drives is decided
-by the limits, not here.
+Owns the gait, the recovery of stuck flippers, and the paths into and out of the gait. Modes without torque want none;
+what leaves for the drives is decided by the limits, not here.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from math import radians
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
+from control.faults import Fault, held_by_the_mud
 from control.gait import Gait, GaitParameters
 from control.geometry import FlipperGeometry
 from control.joint_path import JointPath, still
@@ -26,6 +27,7 @@ from control.records import (
     Phase,
     Torques,
 )
+from control.recovery import Recovery
 
 
 @dataclass(frozen=True)
@@ -61,16 +63,19 @@ class Controller:
         gains: JointGains,
         mass: ArmMass,
         motion: MotionParameters,
+        recovery: Recovery,
     ) -> None:
         self.gait = Gait(gait, geometry)
         self.geometry = geometry
         self.gains = gains
         self.mass = mass
         self.motion = motion
+        self.recovery = recovery
         self.order = WalkOrder(0.0)
         self.reset()
 
     def reset(self) -> None:
+        self.recovery.reset()
         self._mode = Mode.IDLE
         self._path: JointPath | None = None
         self._pose: JointTargets = still((0.0, 0.0, 0.0, 0.0))
@@ -89,6 +94,12 @@ class Controller:
         """The flippers are up at the end of a walk, or would be by now if the mud let them."""
         return self._mode is Mode.STOPPING and (self._up or self._waited_s > RAISING_S)
 
+    @property
+    def fault(self) -> Fault | None:
+        """The mud keeps a flipper, whatever was tried."""
+        held = self.recovery.given_up
+        return held_by_the_mud(held, self.recovery.parameters.attempts) if held else None
+
     def is_up(self, states: DriveStates) -> bool:
         return all(abs(states[joint].angle_rad) < UP_RAD for joint in (1, 3))
 
@@ -103,9 +114,10 @@ class Controller:
         if mode is Mode.STOPPING and self._path is not None and self._path.finished:
             self._up = self.is_up(states)
             self._waited_s += dt_s
-        return joint_torques_nm(self._targets(dt_s, mode), states, self.gains, self.mass, self._fade)
+        return joint_torques_nm(self._targets(dt_s, mode, states), states, self.gains, self.mass, self._fade)
 
     def _enter(self, mode: Mode, states: DriveStates) -> None:
+        self.recovery.reset()
         here = measured_angles(states)
         if mode is Mode.HOLD:
             self._pose = self._pose if self._mode is Mode.STOPPING else still(here)
@@ -128,14 +140,23 @@ class Controller:
         way_points = [self._raised(here), (front, 0.0, front, 0.0)]
         return JointPath(here, way_points, self.motion.path_speed_rad_s)
 
-    def _targets(self, dt_s: float, mode: Mode) -> JointTargets:
+    def _targets(self, dt_s: float, mode: Mode, states: DriveStates) -> JointTargets:
         if mode is Mode.HOLD or self._path is None:
             return self._pose
         if mode is Mode.STOPPING or not self._path.finished:
             self._pose = self._path.step(dt_s)
             return self._pose
-        self.target = self.gait.step(dt_s)
-        return self._follow(self.target)
+        return self._gait_targets(dt_s, states)
+
+    def _gait_targets(self, dt_s: float, states: DriveStates) -> JointTargets:
+        """The gait's own, or those that free the flippers for which it waits with the swing."""
+        stuck = self.recovery.stuck(states) if self.gait.swing_is_next else ()
+        self.target = self.gait.step(dt_s, may_swing=not stuck)
+        waits_for = stuck if self.gait.waits else ()
+        targets = self.recovery.step(dt_s, waits_for, states, self._follow(self.target))
+        if self.recovery.attempt:
+            self.target = self.target._replace(phase=Phase.RECOVERY)
+        return targets
 
     def _follow(self, target: GaitTarget) -> JointTargets:
         """The gait's target as joint targets: the same for both flippers."""

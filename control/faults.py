@@ -2,11 +2,12 @@
 
 `find_fault` is pure and runs every tick: a silent drive, a drive's own error, a drive that left closed loop, a joint
 out of its range, a hot motor. What the loop sees of itself (a stall, a bus that takes no commands, a torque that is
-no number, slow arming, wrong firmware) it reports by the same record.
+no number, slow arming, wrong firmware) it reports by the same record, and so does a walk that cannot go on.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import degrees, inf, isfinite
 from typing import NamedTuple
 
@@ -91,3 +92,14 @@ def _hot(joint: str, state: DriveState, limits: JointLimits) -> Fault | None:
     if state.temperature_c >= limits.temperature_hot_c:
         return Fault("motor_hot", f"The {joint} motor has {state.temperature_c:.0f} degrees C.")
     return None
+
+
+def held_by_the_mud(flippers: Sequence[str], attempts: int) -> Fault:
+    """Of flippers that a recovery has given up."""
+    one = len(flippers) == 1
+    held = f"The {flippers[0]} flipper is" if one else "Both flippers are"
+    return Fault(
+        "flipper_stuck",
+        f"{held} stuck in the mud after {attempts} attempt{'s' if attempts > 1 else ''}:"
+        f" free {'it' if one else 'them'} by hand, and walk less deep.",
+    )

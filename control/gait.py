@@ -51,18 +51,25 @@ def stride_table(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float
     front = radians(gait.sweep_angle_deg)
     raised_m = -geometry.clearance_m
     travel_m = depth_m - raised_m
-    arc_m = 2.0 * front * geometry.flipper_length_m
-    swing_s = gait.swing_duration_s or arc_m / gait.swing_speed_m_s
+    stance_s = _arc_m(gait, geometry) / gait.stance_speed_m_s
     rows = (
         PhaseRow(Phase.INSERTION, travel_m / gait.insertion_speed_m_s, front, front, raised_m, depth_m),
         PhaseRow(Phase.PAUSE, gait.pause_s, front, front, depth_m, depth_m),
-        PhaseRow(Phase.STANCE, arc_m / gait.stance_speed_m_s, front, -front, depth_m, depth_m),
+        PhaseRow(Phase.STANCE, stance_s, front, -front, depth_m, depth_m),
         PhaseRow(Phase.PAUSE, gait.pause_s, -front, -front, depth_m, depth_m),
         PhaseRow(Phase.EXTRACTION, travel_m / gait.extraction_speed_m_s, -front, -front, depth_m, raised_m),
         PhaseRow(Phase.PAUSE, gait.pause_s, -front, -front, raised_m, raised_m),
-        PhaseRow(Phase.SWING, swing_s, -front, front, raised_m, raised_m),
+        PhaseRow(Phase.SWING, swing_duration_s(gait, geometry), -front, front, raised_m, raised_m),
     )
     return tuple(row for row in rows if row.duration_s > 0.0)
+
+
+def swing_duration_s(gait: GaitParameters, geometry: FlipperGeometry) -> float:
+    return gait.swing_duration_s or _arc_m(gait, geometry) / gait.swing_speed_m_s
+
+
+def _arc_m(gait: GaitParameters, geometry: FlipperGeometry) -> float:
+    return 2.0 * radians(gait.sweep_angle_deg) * geometry.flipper_length_m
 
 
 def stride_duration_s(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -> float:
@@ -118,18 +125,36 @@ class Gait:
         """Of the stride under way."""
         return self._rows[0].depth_end_m
 
-    def step(self, dt_s: float) -> GaitTarget:
-        """Advance by `dt_s`. Time left over at the end of a phase counts for the next, so strides keep their rate."""
+    @property
+    def swing_is_next(self) -> bool:
+        """After the phase under way, in which the flippers are to come out of the mud."""
+        return self._row == len(self._rows) - 2
+
+    @property
+    def waits(self) -> bool:
+        """The phase before swing is over, and swing may not begin yet."""
+        return self.swing_is_next and self._time_s >= self._rows[self._row].duration_s
+
+    def step(self, dt_s: float, may_swing: bool = True) -> GaitTarget:
+        """Advance by `dt_s`, but not into a swing that may not begin.
+
+        Time left over at the end of a phase counts for the next, so strides keep their rate.
+        """
         self._time_s += dt_s
         while self._time_s >= self._rows[self._row].duration_s:
-            self._time_s -= self._rows[self._row].duration_s
-            self._row += 1
-            if self._row == len(self._rows):
-                left_over_s = self._time_s
-                self.stride += 1
-                self._begin_stride()
-                self._time_s = left_over_s
+            if self.swing_is_next and not may_swing:
+                self._time_s = self._rows[self._row].duration_s
+                break
+            self._end_row()
         return self._target()
+
+    def _end_row(self) -> None:
+        left_over_s = self._time_s - self._rows[self._row].duration_s
+        self._row += 1
+        if self._row == len(self._rows):
+            self.stride += 1
+            self._begin_stride()
+        self._time_s = left_over_s
 
     def _target(self) -> GaitTarget:
         phase, duration_s, sweep_start, sweep_end, depth_start, depth_end = self._rows[self._row]

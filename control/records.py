@@ -19,7 +19,10 @@ UNKNOWN = float("nan")
 
 
 class Phase(IntEnum):
-    """Where in the stride a flipper is. REST is outside of any stride, PAUSE a still moment between two phases."""
+    """Where in the stride a flipper is. REST is outside of any stride, PAUSE a still moment between two phases.
+
+    RECOVERY comes before the swing where the mud holds a flipper on.
+    """
 
     REST = 0
     INSERTION = 1
@@ -27,6 +30,7 @@ class Phase(IntEnum):
     EXTRACTION = 3
     SWING = 4
     PAUSE = 5
+    RECOVERY = 6
 
 
 class DriveState(NamedTuple):
@@ -110,7 +114,7 @@ class StrideEstimate:
     k_e: Estimate
     surface_m: float  # depth of the mud's surface below its nominal height
     depth_m: float  # deepest point reached below that surface
-    released: bool  # the flipper was out of the mud when the extraction ended
+    released: bool  # out of the mud without a recovery, before swing began
     insertion_force_n: float  # largest upward force in insertion
     stance_force_n: float  # largest forward force in stance
     extraction_force_n: float  # most negative upward force in extraction

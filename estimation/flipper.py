@@ -13,6 +13,7 @@ from math import cos, hypot, isfinite, sin
 
 from control.geometry import FlipperGeometry
 from control.records import NO_LOAD, UNKNOWN, Estimate, FlipperLoad, Phase, StrideEstimate
+from control.recovery import is_in_mud
 from estimation.force_map import smallest_force_n
 from estimation.joint_load import FlipperDrive, JointLoad, JointLoads, JointSample
 from estimation.shear import Base, Shear, find_shear
@@ -23,7 +24,6 @@ from estimation.surface import NO_SURFACE, combined, find_surface
 from estimation.tare import Tare
 
 STEPS_M = {Phase.INSERTION: 0.0015, Phase.STANCE: 0.006, Phase.EXTRACTION: 0.002}
-RELEASED_M = 0.003  # depth up to which a flipper counts as out of the mud
 OWN_ERROR_M = 0.002  # by which a stroke's own force may seem to begin elsewhere than at the mud's surface
 FREE_SHARE = 0.4  # of the clearance that the edge must be above the mud to count as free air
 CLINGING_M = 0.015  # above the lower edge: the middle of what a stroke of 3 cm wets
@@ -69,6 +69,7 @@ class FlipperEstimator:
             stroke.reset()
         self._surface = combined(NO_SURFACE, self.surface_error_m, 0.0)
         self._k_p = NOT_THERE
+        self._stuck = False
         self._deepest_m = UNKNOWN
         self._body_at_insertion_m = UNKNOWN
         self._insertion_n = self._stance_n = self._extraction_n = UNKNOWN
@@ -91,7 +92,7 @@ class FlipperEstimator:
         sweep_rad, adduction_rad, depth_m, rise_sweep_m, rise_adduction_m, sweep_nm, adduction_nm, saturated = load
         rise_adduction_m -= CLINGING_M * sin(adduction_rad)
         stroke = self._strokes.get(phase)
-        if stroke is None and depth_m < self._free_m:
+        if stroke is None and depth_m < self._free_m and phase is not Phase.RECOVERY:
             self._tare.update(rise_sweep_m, rise_adduction_m, sweep_nm, adduction_nm)
         weight_n, offset_nm, _ = self._tare.zero
         sweep_nm += weight_n * rise_sweep_m - offset_nm
@@ -123,6 +124,8 @@ class FlipperEstimator:
             self._strokes[change.ended].close(now_s, self._travel_m)
         if change.ended is Phase.INSERTION:
             self._learn_insertion(self._strokes[Phase.INSERTION].moving())
+        if phase is Phase.RECOVERY or change.closes_stride:
+            self._stuck = self._stuck or is_in_mud(self.geometry, *self._loads.angles_rad)
         closed = self._close(now_s, body_m) if change.closes_stride else None
         if change.begins_stride:
             self._begin_stride(now_s, body_m)
@@ -156,7 +159,6 @@ class FlipperEstimator:
     def _close(self, now_s: float, body_m: float) -> StrideEstimate:
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
         shear = find_shear(self.geometry, stance.batches, self.surface_m, self.base, self.body_drag_n)
-        released = not self._load.depth_m > self.surface_m + RELEASED_M
         duration_s = self._clock.duration_s
         estimate = StrideEstimate(
             flipper=self.flipper,
@@ -168,11 +170,11 @@ class FlipperEstimator:
             extraction_s=duration_s[Phase.EXTRACTION],
             k_p=self._k_p,
             k_s=self._shear_estimate(shear),
-            k_e=self._learn_extraction(extraction, released),
+            k_e=self._learn_extraction(extraction),
             surface_m=self.surface_m,
             surface_std_error_m=self._surface.std_error_m,
             depth_m=self._deepest_m - self.surface_m,
-            released=released,
+            released=not self._stuck,
             insertion_force_n=self._insertion_n,
             stance_force_n=self._stance_n,
             extraction_force_n=self._extraction_n,
@@ -187,11 +189,11 @@ class FlipperEstimator:
         self._body_at_close_m = body_m
         return estimate
 
-    def _learn_extraction(self, stroke: Stroke, released: bool) -> Estimate:
+    def _learn_extraction(self, stroke: Stroke) -> Estimate:
         told = fit_extraction(
             self.geometry, stroke.moving(), self._surface, self._tare.zero.std_error_n, stroke.first_m
         )
-        if released or told.valid:
+        if told.valid or not self._stuck:
             return told
         return bound_extraction(self.geometry, stroke.batches, self._surface)
 

@@ -106,6 +106,11 @@ class JointLoads:
     def reset(self) -> None:
         self._sweep = self._adduction = (JointSample(), JointSample())
 
+    @property
+    def angles_rad(self) -> tuple[float, float]:
+        """The newest of sweep and adduction; a load belongs to a moment a little earlier."""
+        return self._sweep[1].angle_rad, self._adduction[1].angle_rad
+
     def update(self, sweep: JointSample, adduction: JointSample) -> JointLoad | None:
         """None for samples that repeat the ones before. Velocities may be unknown (NaN)."""
         if _repeats(self._sweep[1], sweep) and _repeats(self._adduction[1], adduction):

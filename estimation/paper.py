@@ -17,6 +17,7 @@ from math import inf, isfinite
 
 from control.geometry import FlipperGeometry
 from control.records import NO_LOAD, UNKNOWN, FlipperLoad, Phase, StrideEstimate
+from control.recovery import is_in_mud
 from estimation.force_map import paper_force_n
 from estimation.joint_load import FlipperDrive, JointLoads, JointSample, motion_at
 from estimation.line_fit import LineFit
@@ -25,7 +26,6 @@ from estimation.stride_clock import StrideClock
 SURFACE_FORCE_N = 0.5  # the paper's trigger, chosen above its noise
 STEADY_SHARE = 0.6  # of the sweep's half range around the middle: the force has reached its plateau by then
 MOBILISED_M = 0.002  # rise after which the mud under an extracted flipper yields instead of springing back
-RELEASED_M = 0.003  # depth up to which a flipper counts as out of the mud
 ADVANCED_M = 0.002  # from which the body has moved
 
 
@@ -62,6 +62,7 @@ class PaperEstimator:
         for fit in (self._penetration, self._shear, self._extraction):
             fit.reset()
         self._surface_m = UNKNOWN
+        self._stuck = False
         self._deepest_m = -inf
         self._steady_rad = 0.0
         self._body_at_stance_m = self._body_at_insertion_m = UNKNOWN
@@ -133,6 +134,8 @@ class PaperEstimator:
 
     def _change_phase(self, now_s: float, phase: Phase, body_x_m: float) -> StrideEstimate | None:
         change = self._clock.change(now_s, phase)
+        if phase is Phase.RECOVERY or change.closes_stride:
+            self._stuck = self._stuck or is_in_mud(self.geometry, *self._loads.angles_rad)
         closed = self._close(now_s, body_x_m) if change.closes_stride else None
         if change.begins_stride:
             self._begin_stride(now_s, body_x_m)
@@ -156,7 +159,7 @@ class PaperEstimator:
             k_e=self._extraction.estimate(),
             surface_m=self.surface_m,
             depth_m=deepest_m - self.surface_m,
-            released=not self._load.depth_m > self.surface_m + RELEASED_M,
+            released=not self._stuck,
             insertion_force_n=self._insertion_force_n,
             stance_force_n=self._stance_force_n,
             extraction_force_n=self._extraction_force_n,

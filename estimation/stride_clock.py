@@ -1,7 +1,8 @@
 """The order of phases that makes a stride, told apart from what is learned in it.
 
 A stride begins with swing, insertion or rest, and is complete when insertion, stance and extraction have followed. It
-closes on the first sample of the phase after; one that rest cuts short does not close.
+closes on the first sample of the phase after; one that rest cuts short does not close. Pauses and a recovery lie
+between its phases: a flipper that was recovered has its stride closed by the swing that follows.
 """
 
 from __future__ import annotations

@@ -27,6 +27,7 @@ from control.joint_friction import NO_FRICTION, JointFriction
 from control.joint_pd import ArmMass, JointGains
 from control.limits import JointLimits, JointRange
 from control.records import JOINTS
+from control.recovery import RecoveryParameters
 from drivers.odrive_drives import DriveParameters
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
@@ -91,6 +92,7 @@ class Configuration:
     gait: GaitParameters = GaitParameters()
     gains: JointGains = JointGains()
     motion: MotionParameters = MotionParameters()
+    recovery: RecoveryParameters = RecoveryParameters()
     limits: JointLimits = JointLimits()
     estimation: EstimationParameters = EstimationParameters()
     friction: dict[str, JointFriction] = field(default_factory=dict)  # by joint, where it was measured

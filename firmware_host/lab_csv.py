@@ -50,6 +50,7 @@ STATE_OF_PHASE = {
     Phase.STANCE: 3,
     Phase.EXTRACTION: 4,
     Phase.PAUSE: 5,
+    Phase.RECOVERY: 5,  # they have no such state: it is between extraction and swing
 }
 PUSHING = (Phase.STANCE, Phase.INSERTION, Phase.STANCE, Phase.INSERTION)  # when each of JOINTS works on mud
 

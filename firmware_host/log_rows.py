@@ -97,7 +97,7 @@ TICK = RowKind(
         Field("missed_ticks", "uint32", meaning="since the start"),
         Field("stride", "int32", meaning="-1 outside of a walk"),
         Field("mode", "uint8", meaning="0 boot, 1 idle, 2 arming, 3 hold, 4 walking, 5 stopping, 6 fault"),
-        Field("phase", "uint8", meaning="0 rest, 1 insertion, 2 stance, 3 extraction, 4 swing, 5 pause"),
+        Field("phase", "uint8", meaning="0 rest, 1 insertion, 2 stance, 3 extraction, 4 swing, 5 pause, 6 recovery"),
         Field("limited", "bool", meaning="the limits cut a torque"),
     ),
 )
@@ -141,7 +141,7 @@ STRIDE = RowKind(
         Field("k_p_at_least", "bool", meaning="the value is a lower bound"),
         Field("k_s_at_least", "bool"),
         Field("k_e_at_least", "bool"),
-        Field("released", "bool", meaning="out of the mud when the extraction ended"),
+        Field("released", "bool", meaning="out of the mud without a recovery, before swing began"),
     ),
 )
 

@@ -26,6 +26,7 @@ from control.records import (
     StrideEstimate,
     Torques,
 )
+from control.recovery import Recovery
 from drivers.odrive_drives import OdriveDrives
 from drivers.pose_port import PoseSource
 from estimation.mud import MudEstimator, MudReading
@@ -83,6 +84,7 @@ class Loop:
             configuration.gains,
             configuration.arm,
             configuration.motion,
+            Recovery(configuration.recovery, configuration.geometry, configuration.gait, configuration.joint_ranges),
         )
         self._clock = clock
         self._ranges = configuration.joint_ranges
@@ -165,6 +167,7 @@ class Loop:
         fault = None
         if heard:
             fault = self._fault_watch.update(beat, self.mode, self._mode_since_s, self.states, self.sent)
+            fault = fault or self.controller.fault
         return Health(
             drives_heard=heard,
             closed_loop=self._all_in_closed_loop(),
@@ -276,6 +279,8 @@ class Loop:
             self.sent,
         )
         self.recorder.put(TICK_KIND, tick_row(moment))
+        if self.controller.recovery.news:
+            self.event(beat.now_s, self.controller.recovery.news)
         self.timing.update(beat.now_s, beat.late_s, beat.missed, tick_s)
 
     def _tell(self, now_s: float, notice: str) -> None:

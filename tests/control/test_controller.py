@@ -8,8 +8,10 @@ from control.controller import RESTING, Controller, MotionParameters, WalkOrder
 from control.gait import GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains
+from control.limits import JointRange
 from control.modes import MOVING, Mode
 from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, Phase, Torques
+from control.recovery import Recovery, RecoveryParameters
 
 TICK_S = 1.0 / 380.0
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
@@ -18,6 +20,7 @@ RAISED = (0.2, 0.0, 0.3, 0.0)
 FRONT = (radians(30.0), 0.0, radians(30.0), 0.0)
 SPRING = JointGains(1.0, 0.0, 1.0, 0.0)  # torque = wanted angle - measured angle
 DAMPER = JointGains(0.0, 1.0, 0.0, 1.0)  # torque = wanted velocity - measured velocity
+RANGES = 2 * (JointRange(radians(-60.0), radians(60.0)), JointRange(radians(-75.0), radians(45.0)))
 STILL_MODES = sorted(set(Mode) - MOVING)
 
 
@@ -26,9 +29,13 @@ def states_at(pose: JointAngles) -> DriveStates:
     return a, b, c, d
 
 
-def weightless(gains: JointGains = SPRING) -> Controller:
+def recovery(attempts: int = 0) -> Recovery:
+    return Recovery(RecoveryParameters(attempts), GEOMETRY, GAIT, RANGES)
+
+
+def weightless(gains: JointGains = SPRING, attempts: int = 0) -> Controller:
     """Without gravity term and without fade, so that every torque tells its target."""
-    return Controller(GAIT, GEOMETRY, gains, ArmMass(arm_mass_kg=0.0), MotionParameters(1.0, 0.0))
+    return Controller(GAIT, GEOMETRY, gains, ArmMass(arm_mass_kg=0.0), MotionParameters(1.0, 0.0), recovery(attempts))
 
 
 def wanted_pose(controller: Controller, mode: Mode, pose: JointAngles = POSE) -> JointAngles:
@@ -48,7 +55,7 @@ def path_to_the_gait(controller: Controller) -> list[JointAngles]:
 
 @pytest.mark.parametrize("mode", STILL_MODES)
 def test_modes_that_may_not_move_want_exactly_nothing(mode: Mode) -> None:
-    controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters())
+    controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(), recovery())
     for before in sorted(MOVING):
         for _ in range(10):
             controller.step(TICK_S, before, states_at(POSE))
@@ -70,7 +77,7 @@ def test_arming_again_holds_the_new_pose() -> None:
 
 
 def test_the_torque_after_arming_is_a_ramp_from_nothing() -> None:
-    controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(fade_in_s=0.5))
+    controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(fade_in_s=0.5), recovery())
     controller.step(TICK_S, Mode.ARMING, states_at(POSE))
     torques = [controller.step(TICK_S, Mode.HOLD, states_at(POSE)) for _ in range(300)]
     whole = torques[-1]
@@ -81,7 +88,7 @@ def test_the_torque_after_arming_is_a_ramp_from_nothing() -> None:
 
 
 def test_the_ramp_starts_again_after_every_arming() -> None:
-    controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(fade_in_s=0.5))
+    controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(fade_in_s=0.5), recovery())
     first = controller.step(TICK_S, Mode.HOLD, states_at(POSE))
     for _ in range(300):
         controller.step(TICK_S, Mode.HOLD, states_at(POSE))

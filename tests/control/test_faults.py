@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from control.faults import HEARTBEAT_SILENCE_S, Fault, find_fault
+from control.faults import HEARTBEAT_SILENCE_S, Fault, find_fault, held_by_the_mud
 from control.limits import JointLimits, JointRange
 from control.records import JOINTS, NEVER_S, DriveState, DriveStates
 
@@ -130,3 +130,10 @@ def test_of_one_joint_silence_is_named_before_anything_it_may_have_caused() -> N
 def test_drives_that_were_never_heard_are_silent() -> None:
     fault = find_fault((DriveState(),) * 4, RANGES, LIMITS, SILENCE_S, False, NOW_S)
     assert fault == Fault("drive_silent", "No position came from the left_sweep drive at all.")
+
+
+def test_stuck_flippers_are_named_with_the_attempts_and_what_to_do() -> None:
+    one, both = held_by_the_mud(["right"], 1), held_by_the_mud(["left", "right"], 3)
+    assert one.name == both.name == "flipper_stuck"
+    assert one.sentence.startswith("The right flipper is stuck in the mud after 1 attempt: free it by hand")
+    assert both.sentence.startswith("Both flippers are stuck in the mud after 3 attempts: free them by hand")

@@ -235,6 +235,37 @@ def test_a_new_depth_waits_for_the_next_stride() -> None:
     assert depths == {0: 0.03, 1: 0.045}
 
 
+@pytest.mark.parametrize("parameters", PROTOCOLS.values())
+def test_a_swing_that_may_not_begin_is_waited_for_at_the_rear_and_up(parameters: GaitParameters) -> None:
+    gait = Gait(parameters, GEOMETRY)
+    gait.reset(0.03)
+    before_swing_s = stride_duration_s(parameters, GEOMETRY, 0.03) - stride_table(parameters, GEOMETRY, 0.03)[-1][1]
+    for _ in range(round((before_swing_s + 2.0) / TICK_S)):
+        target = gait.step(TICK_S, may_swing=False)
+    assert gait.waits
+    assert target.phase in (Phase.EXTRACTION, Phase.PAUSE)
+    assert target[2:] == pytest.approx((radians(-30.0), 0.0, -GEOMETRY.clearance_m, 0.0))
+    assert gait.step(TICK_S).phase is Phase.SWING
+    assert not gait.waits
+
+
+def test_a_swing_that_may_not_begin_hinders_nothing_before_it() -> None:
+    free, held = Gait(WALKING, GEOMETRY), Gait(WALKING, GEOMETRY)
+    for gait in (free, held):
+        gait.reset(0.03)
+    while (target := free.step(TICK_S)).phase is not Phase.SWING:
+        assert held.step(TICK_S, may_swing=False) == target
+
+
+def test_a_swing_that_has_begun_is_not_held_up() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.03)
+    while gait.step(TICK_S).phase is not Phase.SWING:
+        pass
+    phases = [gait.step(TICK_S, may_swing=False).phase for _ in range(round(1.0 / TICK_S))]
+    assert phases[-1] is Phase.INSERTION
+
+
 def test_a_reset_starts_the_first_stride_again() -> None:
     gait = Gait(WALKING, GEOMETRY)
     gait.reset(0.03)

@@ -22,6 +22,7 @@ from control.joint_friction import JointFriction
 from control.joint_pd import ArmMass
 from control.plate import crossing, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import NO_LOAD, Estimate, GaitTarget, Phase, StrideEstimate
+from control.recovery import OUT_M, is_in_mud, lowest_m
 from estimation.flipper import CLINGING_M, FlipperEstimator
 from estimation.force_map import smallest_force_n
 from estimation.joint_load import FlipperDrive, JointSample
@@ -658,10 +659,68 @@ def lifted_to(highest_m: float) -> list[Moment]:
     return moments
 
 
+def edge_depth_m(lowest_depth_m: float) -> float:
+    """Of the edge's middle, at the rear, where the plate's lowest corner is so deep."""
+    rear_rad, edge_m = radians(-GAIT.sweep_angle_deg), lowest_depth_m
+    for _ in range(20):
+        edge_m += lowest_depth_m - lowest_m(GEOMETRY, rear_rad, GEOMETRY.adduction_rad(rear_rad, edge_m))
+    return edge_m
+
+
+@pytest.mark.parametrize("surface_m", [-0.003, 0.003])
 @pytest.mark.parametrize(("below_m", "released"), [(-1e-4, True), (1e-4, False)])
-def test_a_flipper_is_released_from_three_millimetres_below_the_surface_on(below_m: float, released: bool) -> None:
-    moments = lifted_to(0.003 + below_m)
-    assert one(noisy(rows_of(moments), 1, 1e-3), estimator(surface_error_m=KNOWN_M)).released is released
+def test_released_is_what_the_gait_sees_whatever_the_height_of_the_mud(
+    below_m: float, released: bool, surface_m: float
+) -> None:
+    moments = lifted_to(edge_depth_m(OUT_M + below_m))
+    *_, last = (moment for moment in moments if moment.phase is Phase.EXTRACTION)
+    assert is_in_mud(GEOMETRY, last.sweep_rad, last.adduction_rad) is not released
+    assert one(rows_of(moments, MUD._replace(surface_m=surface_m))).released is released
+
+
+def with_recovery(rows: Sequence[Row], weight_a: float) -> list[Row]:
+    """A second in which the flipper is pulled up by another current, before the swing."""
+    swing = max(i for i, row in enumerate(rows) if row.phase is Phase.SWING)
+    held, ticks = rows[swing - 1], round(RATE_HZ)
+    freed = [
+        later(held, tick / RATE_HZ, held.adduction.angle_rad * (1.0 - tick / ticks)).pushed(0.0, weight_a)
+        for tick in range(1, ticks + 1)
+    ]
+    return [*rows[:swing], *freed, *(later(row, 1.0, row.adduction.angle_rad) for row in rows[swing:])]
+
+
+def later(row: Row, seconds: float, adduction_rad: float) -> Row:
+    now_s = row.now_s + seconds
+    phase = row.phase if row.phase is Phase.SWING else Phase.RECOVERY
+    return row._replace(
+        now_s=now_s,
+        phase=phase,
+        sweep=row.sweep._replace(angle_stamp_s=now_s, current_stamp_s=now_s),
+        adduction=row.adduction._replace(angle_rad=adduction_rad, angle_stamp_s=now_s, current_stamp_s=now_s),
+    )
+
+
+def test_a_stride_with_a_recovery_closes_with_the_swing_and_was_not_released() -> None:
+    rows = rows_of(lifted_to(0.02))
+    stride, longer = one(rows), one(with_recovery(rows, 2.0))
+    assert not longer.released
+    assert longer.t_end_s == pytest.approx(stride.t_end_s + 1.0)
+    assert coefficients(longer) == coefficients(stride)
+    assert longer.extraction_s == pytest.approx(stride.extraction_s)
+
+
+def test_a_flipper_that_is_out_while_the_other_one_is_freed_was_released() -> None:
+    assert one(with_recovery(rows_of(motion()), 2.0)).released
+
+
+def test_a_recovery_does_not_shift_the_zero() -> None:
+    """It ends 14 mm above the mud with 2 A in excess: the next stride's zero is that of the swing alone."""
+    first = rows_of(motion(strides=2), MUD, HEAVY)
+    border = next(i for i, (a, b) in enumerate(pairwise(first), 1) if a.phase is Phase.EXTRACTION is not b.phase)
+    whole = with_recovery(first[: border + 1], 2.0)
+    rest = [later(row, 1.0, row.adduction.angle_rad)._replace(phase=row.phase) for row in first[border + 1 :]]
+    plain, second = closed(first, estimator(HEAVY))[1], closed([*whole, *rest], estimator(HEAVY))[1]
+    assert second.tare_n == pytest.approx(plain.tare_n, abs=1e-3)
 
 
 def test_a_flipper_that_stays_down_tells_only_how_much_the_mud_has_borne() -> None:

@@ -16,9 +16,10 @@ from control.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.records import NO_LOAD, FlipperLoad, Phase, StrideEstimate
+from control.recovery import OUT_M, lowest_m
 from estimation.joint_load import FlipperDrive, JointSample
 from estimation.mud import EstimationParameters, MudEstimator
-from estimation.paper import MOBILISED_M, RELEASED_M, STEADY_SHARE, SURFACE_FORCE_N, PaperEstimator
+from estimation.paper import MOBILISED_M, STEADY_SHARE, SURFACE_FORCE_N, PaperEstimator
 
 TICK_S = 1.0 / 380.0
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
@@ -440,18 +441,66 @@ def test_a_flipper_that_stays_down_is_not_released() -> None:
     assert not stride.k_e.valid
 
 
-@pytest.mark.parametrize(("above_m", "released"), [(-1e-6, False), (1e-6, True)])
-def test_a_flipper_is_released_from_three_millimetres_below_the_surface_on(above_m: float, released: bool) -> None:
-    samples = triggered(motion(), MUD)
-    surface_m = one(samples).surface_m
-    highest_m = surface_m + RELEASED_M - above_m
-    held = [
-        sample._replace(adduction_rad=GEOMETRY.adduction_rad(sample.sweep_rad, max(sample.depth_m, highest_m)))
-        if sample.phase is Phase.EXTRACTION
-        else sample
-        for sample in samples
-    ]
+@pytest.mark.parametrize(("below_m", "released"), [(1e-6, False), (-1e-6, True)])
+def test_a_flipper_is_released_from_where_its_lowest_corner_counts_as_out(below_m: float, released: bool) -> None:
+    held = held_at(triggered(motion(), MUD), OUT_M + below_m)
     assert one(held).released is released
+    assert one(held).surface_m > 0.002  # the height that the mud was found at does not count
+
+
+def test_a_flipper_that_comes_out_at_the_last_moment_is_released() -> None:
+    """The sample that tells it is the last one before swing."""
+    samples = held_at(triggered(motion(), MUD), 0.01)
+    assert not one(samples).released
+    *_, last = (i for i, sample in enumerate(samples) if sample.phase is Phase.EXTRACTION)
+    samples[last] = samples[last]._replace(adduction_rad=0.0)
+    assert one(samples).released
+
+
+def test_a_recovered_flipper_was_not_released_and_the_other_was() -> None:
+    samples = triggered(motion(), MUD)
+    for lowest_depth_m, released in ((0.02, False), (-0.01, True)):
+        (stride,) = closed(recovered(held_at(samples, lowest_depth_m)))
+        assert stride.released is released
+
+
+def test_a_recovery_teaches_nothing() -> None:
+    samples = held_at(triggered(motion(), MUD), 0.01)
+    stride, longer = one(samples), one(recovered(samples))
+    assert longer.k_e == stride.k_e
+    assert longer.extraction_s == pytest.approx(stride.extraction_s)
+    assert longer.extraction_force_n == stride.extraction_force_n
+
+
+def held_at(samples: Sequence[Sample], lowest_depth_m: float) -> list[Sample]:
+    """Mud that does not let the plate's lowest corner rise above that depth in extraction."""
+
+    def held(sample: Sample) -> Sample:
+        low_rad, high_rad = -1.0, 0.3
+        for _ in range(60):
+            middle_rad = (low_rad + high_rad) / 2.0
+            deeper = lowest_m(GEOMETRY, sample.sweep_rad, middle_rad) > lowest_depth_m
+            low_rad, high_rad = (middle_rad, high_rad) if deeper else (low_rad, middle_rad)
+        return sample._replace(adduction_rad=min(sample.adduction_rad, low_rad))
+
+    return [held(sample) if sample.phase is Phase.EXTRACTION else sample for sample in samples]
+
+
+def recovered(samples: Sequence[Sample]) -> list[Sample]:
+    """With a second of recovery at ten times the current before the swing, at whose end the flipper is up."""
+    swing = next(i for i, sample in enumerate(samples) if sample.phase is Phase.SWING)
+    held, ticks = samples[swing - 1], round(1.0 / TICK_S)
+    freed = [
+        held._replace(
+            now_s=held.now_s + tick * TICK_S,
+            phase=Phase.RECOVERY,
+            adduction_rad=held.adduction_rad * (1.0 - tick / ticks),
+            adduction_current_a=10.0 * held.adduction_current_a,
+        )
+        for tick in range(1, ticks + 1)
+    ]
+    after = [sample._replace(now_s=sample.now_s + 1.0) for sample in samples[swing:]]
+    return [*samples[:swing], *freed, *after]
 
 
 def test_the_step_is_the_bodys_advance_from_close_to_close() -> None:

@@ -45,6 +45,23 @@ def test_pauses_between_the_strokes_change_nothing() -> None:
     assert [change.begins_stride for change in seen] == [True] + [False] * 5 + [True]
 
 
+@pytest.mark.parametrize("before", [[EXTRACTION], [EXTRACTION, PAUSE]])
+def test_a_stride_with_a_recovery_closes_with_the_swing_after_it(before: list[Phase]) -> None:
+    seen = changes([INSERTION, STANCE, *before, Phase.RECOVERY, SWING, INSERTION])
+    assert [change.closes_stride for change in seen[-3:]] == [False, True, False]
+    assert seen[-3].begins_stride is False
+
+
+def test_a_recovery_that_ends_in_rest_closes_nothing() -> None:
+    assert closes([INSERTION, STANCE, EXTRACTION, Phase.RECOVERY, REST, SWING, INSERTION]) == 0
+
+
+def test_the_time_of_a_recovery_is_not_the_extractions() -> None:
+    clock = StrideClock()
+    changes([INSERTION, STANCE, EXTRACTION, *[Phase.RECOVERY] * 50], clock)
+    assert clock.duration_s[EXTRACTION] == 1.0
+
+
 def test_a_stride_that_rest_cuts_short_does_not_close() -> None:
     for done in ([INSERTION], [INSERTION, STANCE], [INSERTION, STANCE, EXTRACTION]):
         assert closes([*done, REST]) == 0

@@ -19,7 +19,7 @@ import pytest
 from numpy.typing import NDArray
 
 from control.records import JOINTS, Phase
-from firmware_host.lab_csv import LabLog, read_lab_csv, write_lab_csv
+from firmware_host.lab_csv import STATE_OF_PHASE, LabLog, read_lab_csv, write_lab_csv
 from firmware_host.log_reader import Log, LogError, tick_type
 
 SHARED = Path(os.environ.get("MUDSKIPPER_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -301,3 +301,7 @@ def test_an_archive_that_is_none_is_refused(tmp_path: Path) -> None:
 def test_a_file_that_is_not_there_is_told_in_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"none\.csv: No such file or directory"):
         read_lab_csv(tmp_path / "none.csv")
+
+
+def test_every_phase_has_a_state_to_be_written_as() -> None:
+    assert set(STATE_OF_PHASE) == set(Phase)

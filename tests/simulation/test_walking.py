@@ -4,12 +4,14 @@ Speeds are compared with one another only. The strengths were fitted to a simple
 every cell of Table I: see the module of the clay.
 """
 
+from dataclasses import replace
 from math import isfinite
 
 import pytest
 
 from control.controller import WalkOrder
 from control.modes import Mode
+from control.recovery import RecoveryParameters
 from firmware_host.configuration import Configuration
 from simulation.clay import MUDS, Clay
 from simulation.lockstep import Lockstep
@@ -19,7 +21,11 @@ STRIDES = 5
 
 
 def walk(configuration: Configuration, clay: Clay, depth_m: float) -> tuple[float, float]:
-    """Step length in cm and speed in cm/s over the strides after the first two, at a fixed depth."""
+    """Step length in cm and speed in cm/s over the strides after the first two, at a fixed depth.
+
+    As on the paper's robot, the gait does not wait for flippers that are stuck.
+    """
+    configuration = replace(configuration, recovery=RecoveryParameters(attempts=0))
     lockstep = Lockstep(configuration, Track([(1.0, clay)]))
     lockstep.arm()
     lockstep.walk(WalkOrder(depth_m, adaptive=False))

@@ -55,6 +55,17 @@ def test_pauses_between_the_strokes_do_not_close_a_stride() -> None:
     assert len(watch(witness, plant, Phase.SWING)) == 2
 
 
+def test_a_stride_with_a_recovery_closes_once_and_the_recovery_is_no_stroke() -> None:
+    strides = []
+    for phases in (STRIDE[:3], (*STRIDE[:3], Phase.RECOVERY)):
+        witness, plant = StrokeWitness(), make_plant()
+        assert watch(witness, plant, *phases) == []
+        strides.append(watch(witness, plant, Phase.SWING))
+        assert watch(witness, plant, Phase.SWING) == []
+    assert len(strides[0]) == len(strides[1]) == 2
+    assert repr(strides[0]) == repr(strides[1])
+
+
 def test_an_insertion_closes_a_stride_too() -> None:
     witness, plant = StrokeWitness(), make_plant()
     assert len(watch(witness, plant, *STRIDE[:3], Phase.INSERTION)) == 2
