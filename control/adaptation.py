@@ -44,9 +44,9 @@ class AdaptationParameters:
     pad_depth_m: Annotated[float, Bounds(0.0, 0.5)] = 0.02
     body_mass_kg: Annotated[float, Bounds(0.05, 100.0)] = 1.0
     acceleration_s: Annotated[float, Bounds(0.01, 10.0)] = 0.1  # of method "paper"
-    mobilisation_n_m: Annotated[float, Bounds(10.0, 1e5)] = 300.0  # of one flipper in mud, its servo's give included
+    mobilisation_n_m: Annotated[float, Bounds(10.0, 1e5)] = 250.0  # of one flipper in mud, its servo's give included
     motor_force_n: Annotated[float, Bounds(0.1, 100.0)] = 6.25  # 0.75 N·m at 0.12 m
-    lifting_share: Annotated[float, Bounds(0.1, 1.0)] = 0.8  # of its torque that an extraction may need
+    lifting_share: Annotated[float, Bounds(0.1, 1.0)] = 0.95  # of its torque that an extraction may need
 
 
 class DepthChoice(NamedTuple):
@@ -63,9 +63,7 @@ class Adaptation(Protocol):
     def step(self, belief: MudBelief, strides: Sequence[StrideEstimate]) -> DepthChoice: ...
 
 
-def depth_grid(
-    parameters: AdaptationParameters, geometry: FlipperGeometry, gait: GaitParameters
-) -> tuple[float, ...]:
+def depth_grid(parameters: AdaptationParameters, geometry: FlipperGeometry, gait: GaitParameters) -> tuple[float, ...]:
     """From the shallowest depth to the deepest that is within reach over the whole sweep."""
     low_m = parameters.min_depth_m
     high_m = min(parameters.max_depth_m, geometry.deepest_m(gait.sweep_angle_deg))

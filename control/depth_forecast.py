@@ -5,7 +5,7 @@ mud that yielded told its k_s. One that did not told only that it bears so much,
 both come from the one strength of the mud: k_s = ρ k_p. ρ is 0.69 in the authors' log whose insertion can be read
 (their 12.5N mud, 1.8 cm), and 0.43 to 0.63 by the clay practice of Matlock and Prandtl from 0.5 to 4.5 kPa and 1.8 to
 3 cm. So it starts between, is corrected wherever k_s and k_p are both known, and is never trusted to better than a
-quarter. The larger one of both tellings holds, since each is on the safe side.
+fifth. The larger one of both tellings holds, since each is on the safe side.
 
 The torque of an extraction is k_e(z) Φ in the pose at the rear end of the sweep, times the share of it that is felt
 at most at one moment: k_e is that of a whole stroke, and mud's force grows more slowly with depth than the law, so the
@@ -27,12 +27,12 @@ from control.plate import stroke_moment_m4, submerged_plate
 from control.records import StrideEstimate
 
 SHEAR_RATIO = 0.55  # k_s over k_p before any mud told both
-RATIO_DOUBT = 0.25
+RATIO_DOUBT = 0.2
 LEARNING = 0.25  # weight of a new stride in what is learned from many
 SHARES = (0.2, 1.5)  # bounds of what can be learned of each
 RATIOS = (0.2, 1.5)
 THRUST_DOUBT, SUCTION_DOUBT = 1.0, 2.0  # standard errors: a slip costs half a step, a stuck flipper the walk
-SAG_SHARE = 0.5  # of the deepest moment's, on average over the stance
+SAG_SHARE = 0.25  # of the deepest moment's, on average over the stance
 TOLD_APART_M = 0.0025  # depths closer together are the same
 
 
