@@ -39,7 +39,9 @@ RISE_S = 0.2  # to reach the height of the swing
 @dataclass(frozen=True)
 class RecoveryParameters:
     attempts: Annotated[int, Bounds(0, 20)] = 3  # 0: the stride does not wait, as on the paper's robot
-    grace_s: Annotated[float, Bounds(0.0, 5.0)] = 0.15  # for joints that follow late, at full torque
+    grace_s: Annotated[float, Bounds(0.0, 5.0)] = (
+        0.3  # at full torque, for joints that follow late: by up to 0.2 s in simulated clay
+    )
     pause_s: Annotated[float, Bounds(0.0, 30.0)] = 0.3  # without pull, before each attempt
     attempt_s: Annotated[float, Bounds(0.1, 30.0)] = 3.0
     speed_rad_s: Annotated[float, Bounds(0.05, 5.0)] = 1.0  # of both joints in the first attempt; the n-th has 1/n
