@@ -103,7 +103,7 @@ class StrokeHistory:
         self._entered_m = self._deepest_m = 0.0
 
     def step(self, lowest_m: float, place_m: float) -> None:
-        """`lowest_m`: depth of the plate's lowest point below the nominal surface; `place_m` along the track."""
+        """`lowest_m`: depth of the plate's lowest point below the track's own surface; `place_m` along the track."""
         submerged_m = lowest_m - self.surface_m
         if submerged_m > 0.0:
             if not self._in_mud:

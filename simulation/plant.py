@@ -16,7 +16,7 @@ from random import Random
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.records import JointAngles, Torques
-from simulation.clay import Clay, rate_factor
+from simulation.clay import rate_factor
 from simulation.disturbances import NONE, Disturbances, StrokeHistory, clinging_torques_nm
 from simulation.flipper_contact import NO_CONTACT, FlipperContact, lowest_m
 from simulation.track import Track
@@ -46,7 +46,7 @@ class Arm:
     def __init__(self, parameters: PlantParameters, track: Track, seed: int) -> None:
         self.parameters = parameters
         self.track = track
-        self.contact = FlipperContact(parameters.geometry, parameters.disturbances.relaxation)
+        self.contact = FlipperContact(parameters.geometry, parameters.disturbances.relaxation, track.stones)
         self.history = StrokeHistory(parameters.disturbances, seed)
         self._disturbed = parameters.disturbances != NONE
         self.reset()
@@ -54,6 +54,7 @@ class Arm:
     def reset(self) -> None:
         """At rest with the plate's edge on the mud, as a robot lies when its motors are off."""
         self.history.reset()
+        self.relief_m = self.track.surface_m(0.0)
         self.sweep_rad = 0.0
         self.adduction_rad = self.parameters.geometry.adduction_rad(0.0, self.surface_m)
         self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = 0.0
@@ -64,7 +65,7 @@ class Arm:
     @property
     def surface_m(self) -> float:
         """How far the mud that this flipper meets lies below its nominal height."""
-        return self.history.surface_m
+        return self.relief_m + self.history.surface_m
 
     def step(self, dt_s: float, body_m: float, body_m_s: float, sweep_nm: float, lift_nm: float) -> None:
         self._look_at_mud(body_m)
@@ -77,6 +78,7 @@ class Arm:
             self.adduction_velocity_rad_s,
             body_m_s,
             self.surface_m,
+            body_m,
         )
         load_sweep_nm, load_lift_nm = self._load_nm()
         self._move(dt_s, sweep_nm + load_sweep_nm, lift_nm + load_lift_nm)
@@ -85,10 +87,11 @@ class Arm:
         """Which clay is under the flipper, as firm as earlier strokes have left it, and how high."""
         geometry = self.parameters.geometry
         edge_m = body_m + geometry.flipper_length_m * sin(self.sweep_rad)
+        self.relief_m = self.track.surface_m(edge_m)
         if self._disturbed:
-            self.history.step(lowest_m(geometry, self.sweep_rad, self.adduction_rad), edge_m)
+            self.history.step(lowest_m(geometry, self.sweep_rad, self.adduction_rad) - self.relief_m, edge_m)
         clay, firmness = self.track.clay_at(edge_m), self.history.firmness
-        self.clay = clay if firmness == 1.0 else Clay(clay.name, firmness * clay.strength_pa)
+        self.clay = clay if firmness == 1.0 else clay.scaled(firmness)
 
     def _load_nm(self) -> tuple[float, float]:
         """Of mud, clinging mud, gravity and friction on (sweep, adduction)."""
