@@ -172,7 +172,7 @@ def _stone_problems(document: Mapping[str, Any]) -> Iterator[str]:
             yield f"stone {place}.start_m = {start_m:g}: must be more than {free_m:g}, where stone {place - 1} ends"
         if end_m <= start_m:
             yield f"stone {place}.end_m = {end_m:g}: must be more than start_m = {start_m:g}"
-        if top_m < amplitude_m:
+        if 0.0 <= top_m < amplitude_m:
             yield f"stone {place}.top_m = {top_m:g}: must be at least {amplitude_m:g}, ridges.amplitude_m"
         free_m = end_m
 
