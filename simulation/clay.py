@@ -81,9 +81,10 @@ class Clay(NamedTuple):
         """Between two depths."""
         share = 1.0
         for layer in self.layers:
-            inside_m = min(to_m, layer.bottom_m) - max(from_m, layer.top_m)
-            if inside_m > 0.0:
-                share += (layer.factor - 1.0) * inside_m / (to_m - from_m)
+            top_m = layer.top_m if layer.top_m > from_m else from_m
+            bottom_m = layer.bottom_m if layer.bottom_m < to_m else to_m
+            if bottom_m > top_m:
+                share += (layer.factor - 1.0) * (bottom_m - top_m) / (to_m - from_m)
         return share * self.strength_pa
 
 
