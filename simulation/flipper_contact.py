@@ -7,22 +7,17 @@ the lower edge stands at ((l + u) sin α, (l + u) cos α, s - h) and moves with
     v_n = (l + u) α' + X' cos α - (h - s) sin α β'    v_r = X' sin α + (h - s) cos α β'    v_s = (l + u) cos α β'
 
 where X' is the body's speed. The same coefficients, transposed, turn the mud's forces into joint torques and thrust;
-its depth is ζ = z - u cos α sin β - s cos β. A stone's push on the lower edge, F_x forward and F_z up, is along them
-
-    F_n = F_x cos α - F_z sin α sin β    F_r = F_x sin α + F_z cos α sin β    F_s = F_z cos β
+its depth is ζ = z - u cos α sin β - s cos β.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import copysign, cos, sin
-from operator import add
+from math import cos, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
 from simulation.clay import Clay
-from simulation.plate_contact import NO_WRENCH, Attitude, PlateContact, PlateSize, Twist, Wrench, lowest_point_m
-from simulation.stones import NO_PUSH, Push, Stone, StoneContact
+from simulation.plate_contact import Attitude, PlateContact, PlateSize, Twist, Wrench, lowest_point_m
 
 
 class ContactForce(NamedTuple):
@@ -83,32 +78,15 @@ def contact_force(geometry: FlipperGeometry, sweep_rad: float, wrench: Wrench) -
     )
 
 
-def push_wrench(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, push: Push) -> Wrench:
-    """Of a stone: forward on the middle of the lower edge, upward on its lower corner."""
-    sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
-    corner_m = copysign(geometry.plate_width_m / 2.0, -ca * sb)
-    upright_n, upward_n = -push.upward_n * sa * sb, push.upward_n * cb
-    return Wrench(
-        push.forward_n * ca + upright_n,
-        push.forward_n * sa + push.upward_n * ca * sb,
-        upward_n,
-        normal_outward_nm=upright_n * corner_m,
-        upward_outward_nm=upward_n * corner_m,
-    )
-
-
 class FlipperContact:
-    """Owns the contact of one flipper's plate with mud and with stones."""
+    """Owns the contact of one flipper's plate."""
 
-    def __init__(self, geometry: FlipperGeometry, relaxation: float = 0.0, stones: Sequence[Stone] = ()) -> None:
+    def __init__(self, geometry: FlipperGeometry, relaxation: float = 0.0) -> None:
         self.geometry = geometry
         self.plate = PlateContact(plate_size(geometry), relaxation)
-        self.stones = StoneContact(stones) if stones else None
 
     def reset(self) -> None:
         self.plate.reset()
-        if self.stones:
-            self.stones.reset()
 
     def step(
         self,
@@ -120,22 +98,10 @@ class FlipperContact:
         adduction_velocity_rad_s: float,
         body_velocity_m_s: float,
         surface_m: float = 0.0,
-        body_m: float = 0.0,
     ) -> ContactForce:
-        """`surface_m`: how far the mud's surface lies below its nominal height; `body_m`: place along the track."""
+        """`surface_m`: how far the mud's surface lies below its nominal height."""
         attitude = attitude_of(self.geometry, sweep_rad, adduction_rad, surface_m)
-        pushed = self._pushed(dt_s, sweep_rad, adduction_rad, body_m) if self.stones else NO_WRENCH
         if self.plate.leaves(attitude):  # as in swing: nothing else to compute
-            return contact_force(self.geometry, sweep_rad, pushed) if pushed is not NO_WRENCH else NO_CONTACT
+            return NO_CONTACT
         twist = twist_of(self.geometry, sweep_rad, sweep_velocity_rad_s, adduction_velocity_rad_s, body_velocity_m_s)
-        wrench = self.plate.step(dt_s, clay, attitude, twist)
-        if pushed is not NO_WRENCH:
-            wrench = Wrench(*map(add, wrench, pushed))
-        return contact_force(self.geometry, sweep_rad, wrench)
-
-    def _pushed(self, dt_s: float, sweep_rad: float, adduction_rad: float, body_m: float) -> Wrench:
-        """By a stone."""
-        assert self.stones is not None
-        place_m = body_m + self.geometry.flipper_length_m * sin(sweep_rad)
-        push = self.stones.step(dt_s, place_m, lowest_m(self.geometry, sweep_rad, adduction_rad))
-        return NO_WRENCH if push is NO_PUSH else push_wrench(self.geometry, sweep_rad, adduction_rad, push)
+        return contact_force(self.geometry, sweep_rad, self.plate.step(dt_s, clay, attitude, twist))

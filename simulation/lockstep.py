@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from random import Random
-from types import MappingProxyType
 from typing import Any
 
 from control.controller import WalkOrder
@@ -26,7 +25,6 @@ from simulation.plant import PlantParameters
 from simulation.robot import SimulatedRobot
 from simulation.track import Track
 
-UNCHANGED: Mapping[str, Any] = MappingProxyType({})
 POSE_NOISE_M = 1e-4  # of a motion-capture system at the scale of this track
 
 
@@ -70,8 +68,7 @@ class SimulatedPose:
 class Lockstep:
     """Owns the common time of robot and loop. Disturbances are of the mud and of the drives.
 
-    `robot` and `drives` change fields of PlantParameters and of OdriveParameters. They are a World's, as are track and
-    disturbances.
+    `plant` and `drives` are used as they are, in place of those that configuration, disturbances and base make.
     """
 
     def __init__(
@@ -82,27 +79,21 @@ class Lockstep:
         recorder: Recording | None = None,
         disturbances: Disturbances = NONE,
         fixed_base: bool = False,
-        robot: Mapping[str, Any] = UNCHANGED,
-        drives: Mapping[str, Any] = UNCHANGED,
+        plant: PlantParameters | None = None,
+        drives: Mapping[str, OdriveParameters] | None = None,
     ) -> None:
         buses = {name: MockBus() for name in configuration.bus}
         self.robot = SimulatedRobot(
-            plant_of(configuration, disturbances, fixed_base, **robot),
+            plant or plant_of(configuration, disturbances, fixed_base),
             track,
-            drives_of(configuration, **drive_changes(disturbances), **drives),
+            drives or drives_of(configuration, **drive_changes(disturbances)),
             {joint: configuration.drive[joint].bus for joint in JOINTS},
             {name: bus.open() for name, bus in buses.items()},
             seed,
         )
-        ends = {name: bus.open() for name, bus in buses.items()}
+        ports = OdriveDrives(configuration.drive, {name: bus.open() for name, bus in buses.items()})
         pose = SimulatedPose(self.robot, seed + 1)
-        self.loop = Loop(
-            configuration,
-            OdriveDrives(configuration.drive, ends),
-            pose,
-            recorder or NullRecorder(),
-            clock=lambda: self.now_s,
-        )
+        self.loop = Loop(configuration, ports, pose, recorder or NullRecorder(), clock=lambda: self.now_s)
         self.tick_number = 0
 
     @property

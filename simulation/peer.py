@@ -21,8 +21,7 @@ from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration import EXIT_CONFIGURATION, Configuration, ConfigurationError, load_configuration
 from firmware_host.ticker import Ticker
 from simulation.clay import MUDS
-from simulation.disturbances import drive_changes
-from simulation.lockstep import POSE_NOISE_M, drives_of, plant_of
+from simulation.lockstep import POSE_NOISE_M
 from simulation.robot import SimulatedRobot
 from simulation.track import COMPARTMENT_M, Track
 from simulation.world import World, load_world
@@ -53,9 +52,9 @@ class Peer:
         self.ticker = Ticker(STEP_S)
         self._ports = open_ports(configuration.bus)
         self.robot = SimulatedRobot(
-            plant_of(configuration, world.disturbances, **world.robot),
+            world.plant(configuration),
             world.track,
-            drives_of(configuration, **{"watchdog_s": WATCHDOG_S, **drive_changes(world.disturbances), **world.drives}),
+            world.drives(configuration, watchdog_s=WATCHDOG_S),
             {joint: configuration.drive[joint].bus for joint in JOINTS},
             self._ports,
             seed,

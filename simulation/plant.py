@@ -11,14 +11,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import radians, sin
+from operator import add
 from random import Random
 
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.records import JointAngles, Torques
-from simulation.clay import rate_factor
+from simulation.clay import Clay, rate_factor
 from simulation.disturbances import NONE, Disturbances, StrokeHistory, clinging_torques_nm
-from simulation.flipper_contact import NO_CONTACT, FlipperContact, lowest_m
+from simulation.flipper_contact import NO_CONTACT, ContactForce, FlipperContact, contact_force, lowest_m
+from simulation.stones import NO_PUSH, StoneContact, push_wrench
 from simulation.track import Track
 
 STEP_S = 0.001
@@ -46,8 +48,9 @@ class Arm:
     def __init__(self, parameters: PlantParameters, track: Track, seed: int) -> None:
         self.parameters = parameters
         self.track = track
-        self.contact = FlipperContact(parameters.geometry, parameters.disturbances.relaxation, track.stones)
+        self.contact = FlipperContact(parameters.geometry, parameters.disturbances.relaxation)
         self.history = StrokeHistory(parameters.disturbances, seed)
+        self.stones = StoneContact(track.stones) if track.stones else None
         self._disturbed = parameters.disturbances != NONE
         self.reset()
 
@@ -59,6 +62,8 @@ class Arm:
         self.adduction_rad = self.parameters.geometry.adduction_rad(0.0, self.surface_m)
         self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = 0.0
         self.contact.reset()
+        if self.stones:
+            self.stones.reset()
         self.force = NO_CONTACT
         self.clay = self.track.clay_at(0.0)
 
@@ -78,8 +83,9 @@ class Arm:
             self.adduction_velocity_rad_s,
             body_m_s,
             self.surface_m,
-            body_m,
         )
+        if self.stones:
+            self._meet_stones(self.stones, dt_s, body_m)
         load_sweep_nm, load_lift_nm = self._load_nm()
         self._move(dt_s, sweep_nm + load_sweep_nm, lift_nm + load_lift_nm)
 
@@ -91,7 +97,15 @@ class Arm:
         if self._disturbed:
             self.history.step(lowest_m(geometry, self.sweep_rad, self.adduction_rad) - self.relief_m, edge_m)
         clay, firmness = self.track.clay_at(edge_m), self.history.firmness
-        self.clay = clay if firmness == 1.0 else clay.scaled(firmness)
+        self.clay = clay if firmness == 1.0 else Clay(clay.name, firmness * clay.strength_pa, clay.layers)
+
+    def _meet_stones(self, stones: StoneContact, dt_s: float, body_m: float) -> None:
+        geometry, sweep_rad, adduction_rad = self.parameters.geometry, self.sweep_rad, self.adduction_rad
+        edge_m = body_m + geometry.flipper_length_m * sin(sweep_rad)
+        push = stones.step(dt_s, edge_m, lowest_m(geometry, sweep_rad, adduction_rad))
+        if push is not NO_PUSH:
+            pushed = contact_force(geometry, sweep_rad, push_wrench(geometry, sweep_rad, adduction_rad, push))
+            self.force = ContactForce(*map(add, self.force, pushed))
 
     def _load_nm(self) -> tuple[float, float]:
         """Of mud, clinging mud, gravity and friction on (sweep, adduction)."""

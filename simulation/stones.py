@@ -20,9 +20,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from math import copysign, cos, sin
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
+from control.geometry import FlipperGeometry
+from simulation.plate_contact import Wrench
 
 STIFFNESS_N_M = 20e3
 DAMPING_N_S_M = 15.0
@@ -61,6 +64,23 @@ class Push(NamedTuple):
 
 
 NO_PUSH = Push(0.0, 0.0)
+
+
+def push_wrench(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, push: Push) -> Wrench:
+    """Forward F_x on the middle of the lower edge and upward F_z on its lower corner, along the plate's directions:
+
+    F_n = F_x cos α - F_z sin α sin β    F_r = F_x sin α + F_z cos α sin β    F_s = F_z cos β
+    """
+    sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
+    corner_m = copysign(geometry.plate_width_m / 2.0, -ca * sb)
+    upright_n, upward_n = -push.upward_n * sa * sb, push.upward_n * cb
+    return Wrench(
+        push.forward_n * ca + upright_n,
+        push.forward_n * sa + push.upward_n * ca * sb,
+        upward_n,
+        normal_outward_nm=upright_n * corner_m,
+        upward_outward_nm=upward_n * corner_m,
+    )
 
 
 class StoneContact:

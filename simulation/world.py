@@ -14,9 +14,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from control.bounds import Bounds
+from firmware_host.configuration import Configuration
 from firmware_host.toml_records import ChangesOf, ConfigurationError, RecordReader, parse_document, read_text
 from simulation.clay import DRIEST_PERCENT, WETTEST_PERCENT, Clay, Layer, clay_of_water
-from simulation.disturbances import DRIVE_FIELDS, NONE, Disturbances
+from simulation.disturbances import DRIVE_FIELDS, NONE, Disturbances, drive_changes
+from simulation.lockstep import drives_of, plant_of
 from simulation.odrive import OdriveParameters
 from simulation.plant import PlantParameters
 from simulation.stones import Stone
@@ -31,10 +33,19 @@ FIXED_OF_DRIVE = frozenset({"node_id", "sign", "zero_turn", "torque_constant_nm_
 
 @dataclass(frozen=True)
 class World:
+    """`Lockstep(configuration, world.track, plant=world.plant(configuration), drives=world.drives(configuration))`."""
+
     track: Track
     disturbances: Disturbances = NONE
-    robot: Mapping[str, Any] = field(default_factory=dict)  # fields of PlantParameters
-    drives: Mapping[str, Any] = field(default_factory=dict)  # fields of OdriveParameters, the same for all four
+    robot_changes: Mapping[str, Any] = field(default_factory=dict)  # fields of PlantParameters
+    drive_changes: Mapping[str, Any] = field(default_factory=dict)  # fields of OdriveParameters, the same for all four
+
+    def plant(self, configuration: Configuration) -> PlantParameters:
+        return plant_of(configuration, self.disturbances, **self.robot_changes)
+
+    def drives(self, configuration: Configuration, **otherwise: Any) -> dict[str, OdriveParameters]:
+        """`otherwise`: what is not as usual where neither disturbances nor the file say anything."""
+        return drives_of(configuration, **(otherwise | drive_changes(self.disturbances) | dict(self.drive_changes)))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from math import cos, hypot, pi, sin
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
@@ -17,11 +17,9 @@ from simulation.flipper_contact import (
     contact_force,
     lowest_m,
     plate_size,
-    push_wrench,
     twist_of,
 )
 from simulation.plate_contact import Wrench
-from simulation.stones import Push, Stone
 
 GEOMETRY = FlipperGeometry()
 CLAY = MUDS["48.5"]
@@ -98,49 +96,6 @@ def test_the_twist_is_the_motion_of_every_point_of_the_plate(
             twist.upward_m_s + twist.upward_per_outward_s * u,
         )
         assert told_m_s == pytest.approx([float(velocity_m_s @ way) for way in directions], abs=1e-8)
-
-
-@given(SWEEPS, ADDUCTIONS, SPEEDS, SPEEDS, st.floats(-1.0, 1.0), st.floats(-10.0, 10.0), st.floats(0.0, 10.0))
-def test_a_stone_does_its_work_on_the_edge_s_middle_forward_and_on_its_lower_corner_upward(
-    sweep_rad: float,
-    adduction_rad: float,
-    sweep_rad_s: float,
-    adduction_rad_s: float,
-    body_m_s: float,
-    forward_n: float,
-    upward_n: float,
-) -> None:
-    assume(abs(adduction_rad) > 1e-3)  # where no corner is the lower one
-    push = push_wrench(GEOMETRY, sweep_rad, adduction_rad, Push(forward_n, upward_n))
-    force = contact_force(GEOMETRY, sweep_rad, push)
-    power_w = force.sweep_nm * sweep_rad_s + force.adduction_nm * adduction_rad_s + force.thrust_n * body_m_s
-    lower_m = min((-0.0125, 0.0125), key=lambda u: place_m(sweep_rad, adduction_rad, u, 0.0)[2])
-    moved_s = 1e-6
-
-    def moved_m(way: float, outward_m: float) -> np.ndarray:
-        ahead_rad = sweep_rad + way * moved_s * sweep_rad_s, adduction_rad + way * moved_s * adduction_rad_s
-        return place_m(*ahead_rad, outward_m, 0.0)
-
-    forward_m_s = (moved_m(1.0, 0.0) - moved_m(-1.0, 0.0))[0] / (2.0 * moved_s) + body_m_s
-    upward_m_s = (moved_m(1.0, lower_m) - moved_m(-1.0, lower_m))[2] / (2.0 * moved_s)
-    assert power_w == pytest.approx(forward_n * forward_m_s + upward_n * upward_m_s, abs=1e-6)
-
-
-def test_a_stone_holds_a_flipper_in_the_mud_and_above_it() -> None:
-    """Half a millimetre under its top: what the mud does, and the stone beside it."""
-    adduction_rad = GEOMETRY.adduction_rad(0.0, 0.03)
-    top_m = lowest_m(GEOMETRY, 0.0, adduction_rad) - 0.0005
-
-    def force(stones: list[Stone], surface_m: float, body_m: float) -> ContactForce:
-        contact = FlipperContact(GEOMETRY, stones=stones)
-        return contact.step(DT_S, CLAY, 0.0, adduction_rad, 0.0, -0.1, 0.0, surface_m, body_m)
-
-    stone = Stone(0.5, 0.6, top_m)
-    on_stone, beside, without = force([stone], 0.0, 0.55), force([stone], 0.0, 0.4), force([], 0.0, 0.55)
-    assert beside == without
-    in_air = force([stone], 0.1, 0.55)
-    assert in_air.adduction_nm > 0.5
-    assert on_stone == pytest.approx([a + b for a, b in zip(without, in_air, strict=True)])
 
 
 @given(SWEEPS, SPEEDS, SPEEDS, st.floats(-1.0, 1.0), st.tuples(*[st.floats(-10.0, 10.0)] * 7))

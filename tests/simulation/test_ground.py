@@ -10,7 +10,7 @@ from control.records import NO_TORQUE
 from firmware_host.configuration import Configuration
 from simulation.clay import MUDS, Clay, Layer
 from simulation.disturbances import Disturbances
-from simulation.flipper_contact import lowest_m
+from simulation.flipper_contact import ContactForce, lowest_m
 from simulation.lockstep import Lockstep
 from simulation.plant import STEP_S, Arm, Plant, PlantParameters
 from simulation.stones import Stone
@@ -71,6 +71,38 @@ def test_an_arm_that_falls_on_a_stone_comes_to_rest_and_never_rises_as_high_agai
     assert max(heights_rad[landed:]) < 0.15
     assert arm.adduction_velocity_rad_s == pytest.approx(0.0, abs=1e-6)
     assert depth_m(arm) == pytest.approx(0.005, abs=0.0001)  # its own weight is 0.4 N at the plate: 20 um
+
+
+def test_a_stone_acts_beside_the_mud_and_only_where_it_is() -> None:
+    """On an arm that stands half a millimetre under its top, in mud and in a trough so deep that there is none."""
+    geometry, sunk_rad = PlantParameters().geometry, -0.4
+    stone = Stone(0.5, 0.6, lowest_m(geometry, 0.0, sunk_rad) - 0.0005)
+
+    def force(stones: list[Stone], body_m: float, surface_m: float) -> ContactForce:
+        arm = Plant(PlantParameters(), Track([(9.0, MUDS["48.5"])], stones)).arms[0]
+        arm.adduction_rad, arm.adduction_velocity_rad_s, arm.history.surface_m = sunk_rad, -0.1, surface_m
+        arm.step(STEP_S, body_m, 0.0, 0.0, 0.0)
+        return arm.force
+
+    without, beside = force([], 0.55, 0.0), force([stone], 0.4, 0.0)
+    assert beside == without
+    of_stone = force([stone], 0.55, 0.1)
+    assert of_stone.adduction_nm > 0.5
+    assert force([stone], 0.55, 0.0) == pytest.approx([a + b for a, b in zip(without, of_stone, strict=True)])
+
+
+def test_a_reset_arm_has_met_no_stone() -> None:
+    """Else it would be pushed back through the flank that it had come to before."""
+    plant = Plant(PlantParameters(), Track([(9.0, MUDS["48.5"])], [Stone(-0.005, 9.0, 0.0)]))
+    arm = plant.arms[0]
+    arm.sweep_rad, arm.adduction_rad = -0.04, -0.4
+    plant.step(STEP_S, NO_TORQUE)
+    assert arm.force.thrust_n < -1.0
+    arm.reset()
+    arm.adduction_rad -= 0.002
+    arm.step(STEP_S, 0.0, 0.0, 0.0, 0.0)
+    assert arm.force.thrust_n == pytest.approx(0.0, abs=0.1)
+    assert arm.force.upward_n > 0.0
 
 
 def test_ridges_lift_the_mud_under_the_flipper_by_its_own_place() -> None:

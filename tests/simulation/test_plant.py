@@ -34,7 +34,6 @@ class ConstantThrust(FlipperContact):
         adduction_velocity_rad_s: float,
         body_velocity_m_s: float,
         surface_m: float = 0.0,
-        body_m: float = 0.0,
     ) -> ContactForce:
         return NO_CONTACT._replace(thrust_n=self.thrust_n)
 

@@ -1,14 +1,19 @@
 """A stone's push: away from the face that was met, hard enough, never pulling and never giving energy."""
 
+from dataclasses import replace
 from math import inf
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from simulation.stones import NO_PUSH, STIFFNESS_N_M, Stone, StoneContact
+from control.geometry import FlipperGeometry
+from simulation.flipper_contact import contact_force
+from simulation.stones import NO_PUSH, STIFFNESS_N_M, Push, Stone, StoneContact, push_wrench
 
 DT_S = 0.001
+GEOMETRY = FlipperGeometry()
+SPEEDS = st.floats(-3.0, 3.0)
 STONE = Stone(0.10, 0.16, 0.02)
 
 
@@ -102,3 +107,30 @@ def test_a_plate_that_is_pressed_on_a_stone_comes_to_rest_within_a_millimetre_of
     assert depth_m - STONE.top_m == pytest.approx(load_n / STIFFNESS_N_M)
     assert depth_m - STONE.top_m < 0.001
     assert velocity_m_s == pytest.approx(0.0, abs=1e-6)
+
+
+@given(st.floats(-0.6, 0.6), st.floats(-1.2, 0.3), SPEEDS, SPEEDS, SPEEDS, st.floats(-10.0, 10.0), st.floats(0.0, 10.0))
+def test_a_push_works_on_the_edge_s_middle_forward_and_on_its_lower_corner_upward(
+    sweep_rad: float,
+    adduction_rad: float,
+    sweep_rad_s: float,
+    adduction_rad_s: float,
+    body_m_s: float,
+    forward_n: float,
+    upward_n: float,
+) -> None:
+    """By virtual work: a point outward on the edge is the middle of the edge of a longer arm."""
+    assume(abs(adduction_rad) > 1e-3)  # where no corner is the lower one
+    wrench = push_wrench(GEOMETRY, sweep_rad, adduction_rad, Push(forward_n, upward_n))
+    force = contact_force(GEOMETRY, sweep_rad, wrench)
+    power_w = force.sweep_nm * sweep_rad_s + force.adduction_nm * adduction_rad_s + force.thrust_n * body_m_s
+
+    def height_m(arm: FlipperGeometry) -> float:
+        return arm.edge_position(sweep_rad, adduction_rad)[2]
+
+    corners = (replace(GEOMETRY, flipper_length_m=0.12 + way * GEOMETRY.plate_width_m / 2.0) for way in (1.0, -1.0))
+    lower = min(corners, key=height_m)
+    at_middle, at_corner = (arm.jacobian(sweep_rad, adduction_rad) for arm in (GEOMETRY, lower))
+    forward_m_s = at_middle.x_sweep * sweep_rad_s + at_middle.x_adduction * adduction_rad_s + body_m_s
+    upward_m_s = at_corner.z_sweep * sweep_rad_s + at_corner.z_adduction * adduction_rad_s
+    assert power_w == pytest.approx(forward_n * forward_m_s + upward_n * upward_m_s, abs=1e-9)

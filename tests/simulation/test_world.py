@@ -1,8 +1,9 @@
 """A world is taken as it is written or refused as a whole, with everything that is wrong."""
 
 from dataclasses import fields
+from math import isfinite
 from pathlib import Path
-from typing import get_args, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import pytest
 from hypothesis import given
@@ -62,8 +63,8 @@ def test_the_example_says_what_it_says() -> None:
     assert world.track.ridges == Ridges(0.002, 0.25)
     assert world.track.clay_at(0.3).strength_pa != clay_of_water(48.5).strength_pa
     assert world.disturbances == Disturbances(0.7, 1.0, 0.13, 0.0015)
-    assert world.robot == {"body_mass_kg": 1.02, "rail_drag_n": 2.5, "pad_width_m": 0.015, "pad_depth_m": 0.02}
-    assert world.drives == {"current_noise_a": 0.2, "encoder_counts": 16384}
+    assert world.robot_changes == {"body_mass_kg": 1.02, "rail_drag_n": 2.5, "pad_width_m": 0.015, "pad_depth_m": 0.02}
+    assert world.drive_changes == {"current_noise_a": 0.2, "encoder_counts": 16384}
 
 
 def test_the_example_shows_every_section() -> None:
@@ -78,7 +79,7 @@ def test_the_shortest_world_is_one_segment_and_nothing_else() -> None:
     assert [segment.clay for segment in world.track.segments] == [Clay("2000 Pa", 2000.0)]
     assert (world.track.stones, world.track.ridges) == ((), LEVEL)
     assert world.track.clay_at(0.3) == Clay("2000 Pa", 2000.0)
-    assert (world.disturbances, world.robot, world.drives) == (NONE, {}, {})
+    assert (world.disturbances, world.robot_changes, world.drive_changes) == (NONE, {}, {})
 
 
 def test_a_mud_by_its_water_is_the_paper_s() -> None:
@@ -215,17 +216,24 @@ def test_every_number_of_a_world_has_bounds(record: type) -> None:
 
 def test_robot_and_drives_may_be_given_whatever_their_records_hold() -> None:
     """So that a field which is added there can be set here."""
-    for section, record, fixed in (
-        ("robot", PlantParameters, FIXED_OF_ROBOT),
-        ("drives", OdriveParameters, FIXED_OF_DRIVE),
-    ):
-        names = {item.name for item in fields(record)}
-        assert fixed < names
-        for item in fields(record):
-            if item.name in fixed or type(item.default) not in (int, float) or item.default == float("inf"):
-                continue
-            world = parse_world(SHORTEST + f"[{section}]\n{item.name} = {item.default!r}\n")
-            assert getattr(world, section) == {item.name: item.default}
+    settable: dict[str, dict[str, Any]] = {
+        section: {item.name: item.default for item in fields(record) if item.name not in fixed}
+        for section, record, fixed in (
+            ("robot", PlantParameters, FIXED_OF_ROBOT),
+            ("drives", OdriveParameters, FIXED_OF_DRIVE),
+        )
+    }
+    for section, defaults in settable.items():
+        numbers = {name: value for name, value in defaults.items() if type(value) in (int, float) and isfinite(value)}
+        assert len(numbers) > 3
+        lines = "".join(f"{name} = {value!r}\n" for name, value in numbers.items())
+        world = parse_world(f"{SHORTEST}[{section}]\n{lines}")
+        assert {"robot": world.robot_changes, "drives": world.drive_changes}[section] == numbers
+
+
+def test_what_the_configuration_fixes_is_in_no_world() -> None:
+    assert {item.name for item in fields(PlantParameters)} > FIXED_OF_ROBOT
+    assert {item.name for item in fields(OdriveParameters)} > FIXED_OF_DRIVE
 
 
 def test_a_lockstep_lives_in_a_world(configuration: Configuration) -> None:
@@ -234,7 +242,7 @@ def test_a_lockstep_lives_in_a_world(configuration: Configuration) -> None:
         + "[robot]\nbody_mass_kg = 2.0\n[drives]\nencoder_counts = 4096\n[disturbances]\ncurrent_noise_a = 0.3\n"
     )
     lockstep = Lockstep(
-        configuration, world.track, disturbances=world.disturbances, robot=world.robot, drives=world.drives
+        configuration, world.track, plant=world.plant(configuration), drives=world.drives(configuration)
     )
     plant = lockstep.robot.plant
     assert (plant.track, plant.parameters.body_mass_kg) == (world.track, 2.0)
