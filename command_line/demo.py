@@ -23,13 +23,15 @@ from typing import Any
 import numpy as np
 
 from command_line import exit_codes
-from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
+from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, mud_text, stride_line
 from control.modes import Mode
 from firmware_host.log_reader import Log, LogError, read_log
 from firmware_host.status_client import CallRefusedError, NoDaemonError, StatusClient
+from firmware_host.toml_records import ConfigurationError
 from simulation.local_setup import write_local_setup
 from simulation.peer import end_with_parent
 from simulation.track import Track, paper_track
+from simulation.world import load_world
 
 LONGEST_WALK_S = 60.0
 STARTING_S = 20.0
@@ -52,13 +54,14 @@ class InterruptedDemoError(Exception):
 class Demo:
     """Owns the two processes, the client and what was learned so far."""
 
-    def __init__(self, folder: Path, logs: Path, seed: int) -> None:
+    def __init__(self, folder: Path, logs: Path, seed: int, world: Path | None = None) -> None:
         self.folder = folder
         self.seed = seed
-        self.track: Track = paper_track()
+        self.track: Track = load_world(world).track if world else paper_track()
         self.configuration_path = write_local_setup(folder, logs)
         self.output = (folder / "output.txt").open("w+", encoding="utf-8")
-        self.robot = self._start("simulation.peer", "--seed", str(seed))
+        ground = () if world is None else ("--world", str(world))
+        self.robot = self._start("simulation.peer", "--seed", str(seed), *ground)
         self.daemon = self._start("firmware_host.daemon")
         self.client: StatusClient | None = None
         self.strides: list[dict[str, Any]] = []
@@ -179,11 +182,11 @@ class Demo:
 
 
 @contextmanager
-def running_demo(logs: Path, seed: int) -> Iterator[Demo]:
+def running_demo(logs: Path, seed: int, world: Path | None = None) -> Iterator[Demo]:
     """A demo whose processes and folder are gone afterwards, whatever happens."""
     folder = Path(tempfile.mkdtemp(prefix="mudskipper-"))  # short, as the path of a Unix socket must be
     try:
-        demonstration = Demo(folder, logs, seed)
+        demonstration = Demo(folder, logs, seed, world)
         try:
             yield demonstration
         except KeyboardInterrupt:
@@ -199,6 +202,13 @@ def demo(options: argparse.Namespace) -> int:
     for number in ENDING_SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup wants it
             signal.signal(number, signal.default_int_handler)  # they all end the demo as Ctrl-C does
+    try:
+        if options.world:
+            load_world(options.world)
+    except ConfigurationError as problem:
+        for sentence in problem.problems:
+            complain(sentence)
+        return exit_codes.CONFIGURATION
     options.out.mkdir(parents=True, exist_ok=True)
     if options.json and not os.access(options.json if options.json.exists() else options.json.parent, os.W_OK):
         complain(f"{options.json} cannot be written")
@@ -220,13 +230,14 @@ def demo(options: argparse.Namespace) -> int:
 
 def _perform(options: argparse.Namespace) -> tuple[dict[str, Any], Demo]:
     print("Starting a simulated robot and the daemon ...", flush=True)
-    with running_demo(options.out, options.seed) as demonstration:
+    with running_demo(options.out, options.seed, options.world) as demonstration:
         os.nice(5)  # whoever watches gives way to those who work
         demonstration.connect()
         print("Arming ...", flush=True)
         demonstration.arm()
-        muds = ", ".join(f"{segment.clay.name} %" for segment in demonstration.track.segments)
-        print(f"Walking {demonstration.track.length_m:.2f} m over mud with {muds} water.\n")
+        muds = ", ".join(mud_text(segment.clay.name) for segment in demonstration.track.segments)
+        water = " water" if muds.endswith("%") else ""
+        print(f"Walking {demonstration.track.length_m:.2f} m over mud with {muds}{water}.\n")
         print(f"{STRIDE_HEAD}\n{STRIDE_UNITS}", flush=True)
 
         def show(stride: dict[str, Any]) -> None:
@@ -288,10 +299,13 @@ def speeds_cm_s(
         beyond = np.flatnonzero(places_m >= segment.end_m)
         first = int(inside[0]) if len(inside) else -1
         last = int(beyond[0]) if len(beyond) else len(places_m) - 1
-        speeds[segment.clay.name] = None
+        name = segment.clay.name
+        if name in speeds:  # the same mud once more
+            name = f"{name} at {start_m:.2f} m"
+        speeds[name] = None
         if 0 <= first < last:
             distance_m, duration_s = places_m[last] - places_m[first], stamps_s[last] - stamps_s[first]
-            speeds[segment.clay.name] = round(100.0 * float(distance_m / duration_s), 2)
+            speeds[name] = round(100.0 * float(distance_m / duration_s), 2)
         start_m = segment.end_m
     return speeds
 
@@ -299,7 +313,8 @@ def speeds_cm_s(
 def summary_text(summary: dict[str, Any]) -> str:
     late, tick = summary["wake_late_us"], summary["tick_us"]
     speeds = ", ".join(
-        f"{mud} %: {'-' if speed is None else f'{speed:.1f} cm/s'}" for mud, speed in summary["speed_cm_s"].items()
+        f"{mud_text(mud)}: {'-' if speed is None else f'{speed:.1f} cm/s'}"
+        for mud, speed in summary["speed_cm_s"].items()
     )
     lines = [
         f"strides  {len(summary['strides'])} of both flippers",

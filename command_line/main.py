@@ -101,10 +101,13 @@ def _add_simulation(commands: Commands) -> None:  # type: ignore[valid-type]
     demo.add_argument("--out", type=Path, default=Path("mudskipper-demo"), metavar="DIR", help="for log and plot")
     demo.add_argument("--seed", type=int, default=1)
     demo.add_argument("--depth", type=_depth_cm, metavar="CM", help="fixed instead of adaptive")
+    demo.add_argument("--world", type=Path, metavar="FILE", help="describes the ground, instead of three muds")
     simulate = _add(commands, "simulate", "simulate.simulate", "The simulated robot alone, on a bus, until Ctrl-C.")
     simulate.add_argument("--bus", default="robot", metavar="NAME", help="of the local bus (default: %(default)s)")
     simulate.add_argument("--config", type=Path, help="on the buses of this configuration instead")
-    simulate.add_argument("--mud", action="append", metavar="W", help="water content, repeatable: 48.5, 53.1, 45.3")
+    ground = simulate.add_mutually_exclusive_group()
+    ground.add_argument("--mud", action="append", metavar="W", help="water content, repeatable: 48.5, 53.1, 45.3")
+    ground.add_argument("--world", type=Path, metavar="FILE", help="describes the ground, and more")
     simulate.add_argument("--seed", type=int, default=1)
 
 

@@ -14,6 +14,7 @@ import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend wi
 import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 
+from command_line.screen import mud_text  # noqa: E402
 from control.modes import Mode  # noqa: E402
 from firmware_host.log_reader import Log  # noqa: E402
 from simulation.track import Track  # noqa: E402
@@ -98,6 +99,7 @@ def _shade_muds(panels: Any, time_s: Array, places_m: Array, track: Track) -> No
         end_s = float(time_s[beyond[0]]) if len(beyond) else (float(time_s[-1]) if len(time_s) else 0.0)
         for panel in panels:
             panel.axvspan(start_s, end_s, color=colour, alpha=0.6, linewidth=0)
-        name, above = f"w = {segment.clay.name} %", panels[0].get_xaxis_transform()
-        panels[0].text((start_s + end_s) / 2, 1.02, name, transform=above, ha="center")
+        name, above = mud_text(segment.clay.name), panels[0].get_xaxis_transform()
+        label = f"w = {name}" if name.endswith("%") else name
+        panels[0].text((start_s + end_s) / 2, 1.02, label, transform=above, ha="center")
         start_s = end_s

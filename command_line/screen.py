@@ -46,6 +46,12 @@ class Progress:
             print("\r\033[K", end="", file=sys.stderr, flush=True)
 
 
+def mud_text(name: str) -> str:
+    """A mud is named after its water in percent, or by its strength with the unit; some say where it lies."""
+    mud, _, place = name.partition(" at ")
+    return f"{mud} %{' at ' if place else ''}{place}" if mud[-1:].isdigit() else name
+
+
 def complain(sentence: str) -> None:
     """To a person, beside the data."""
     print(f"mudskipper: {sentence}", file=sys.stderr)

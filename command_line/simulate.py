@@ -8,25 +8,35 @@ from pathlib import Path
 
 from command_line import exit_codes
 from command_line.screen import complain
+from firmware_host.toml_records import ConfigurationError
 from simulation import peer
 from simulation.clay import MUDS
 from simulation.local_setup import named_folder, write_local_setup
+from simulation.world import load_world
 
 
 def simulate(options: argparse.Namespace) -> int:
-    waters = options.mud or list(MUDS)
+    waters = options.mud or []
     unknown = [water for water in waters if water not in MUDS]
     if unknown:
         complain(f"--mud {unknown[0]}: known water contents are {', '.join(MUDS)}")
         return exit_codes.USAGE
     try:
+        if options.world:
+            load_world(options.world)  # before anything is written or said; the peer reads it itself
         path = options.config or _local_configuration(options.bus)
+    except ConfigurationError as problem:
+        for sentence in problem.problems:
+            complain(sentence)
+        return exit_codes.CONFIGURATION
     except ValueError as problem:
         complain(f"--bus {problem}")
         return exit_codes.USAGE
     arguments = ["--config", str(path), "--seed", str(options.seed)]
     for water in waters:
         arguments += ["--mud", water]
+    if options.world:
+        arguments += ["--world", str(options.world)]
     return peer.main(arguments)
 
 

@@ -1,22 +1,19 @@
 """The robot's configuration: one TOML file, checked once, before anything is energised.
 
 Only what differs from machine to machine is configuration. Every section is a record of the part that uses it, with
-default, unit and bounds beside each field there; this module reads the file, refuses unknown keys and values out of
-bounds, all of them at once and by name, and checks what only the whole can show: that the gait is within reach of
-the geometry and of the joint limits.
+default, unit and bounds beside each field there, by which toml_records.py refuses unknown keys and values out of
+bounds, all of them at once and by name; this module checks what only the whole can show: that the gait is within
+reach of the geometry and of the joint limits.
 """
 
 from __future__ import annotations
 
 import re
-import tomllib
-from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
 from math import ceil, degrees, radians
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
-
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from typing import Annotated, Any
 
 from control.adaptation import AdaptationParameters
 from control.bounds import Bounds
@@ -31,17 +28,11 @@ from control.recovery import RecoveryParameters
 from drivers.odrive_drives import DriveParameters
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
+from firmware_host.toml_records import ConfigurationError as ConfigurationError  # for whoever loads one
+from firmware_host.toml_records import RecordReader, parse_document, read_text
 
 LONGEST_SOCKET_PATH = 107  # sun_path of unix(7) has 108 bytes with its final zero
 EXIT_CONFIGURATION = 78  # EX_CONFIG of sysexits.h; systemd is told not to restart on it
-
-
-class ConfigurationError(Exception):
-    """Everything that is wrong with a file, one sentence each, naming key, value and bound."""
-
-    def __init__(self, problems: list[str]) -> None:
-        super().__init__("\n".join(problems))
-        self.problems = problems
 
 
 @dataclass(frozen=True)
@@ -134,24 +125,18 @@ class Configuration:
         return sweep, adduction, sweep, adduction
 
 
+_READER = RecordReader(Configuration, without={"text"})
+
+
 def load_configuration(path: Path) -> Configuration:
     """Raises ConfigurationError, also where the file cannot be read."""
-    try:
-        return parse_configuration(path.read_text(encoding="utf-8-sig"))
-    except OSError as problem:
-        raise ConfigurationError([f"{path}: {problem.strerror}"]) from problem
-    except UnicodeDecodeError as problem:
-        raise ConfigurationError([f"{path}: not UTF-8 text at byte {problem.start}"]) from problem
+    return parse_configuration(read_text(path))
 
 
 def parse_configuration(text: str) -> Configuration:
-    try:
-        document = tomllib.loads(text)
-    except (ValueError, RecursionError) as problem:  # of which tomllib's own error is one
-        raise ConfigurationError([f"not a TOML file: {problem}"]) from problem
+    document = parse_document(text)
     _apply_protocol(document)
-    values = _validated(document)
-    configuration = Configuration(**values, text=text)
+    configuration = Configuration(**_READER.read(document), text=text)
     problems = list(_contradictions(configuration))
     if problems:
         raise ConfigurationError(problems)
@@ -167,71 +152,6 @@ def _apply_protocol(document: dict[str, Any]) -> None:
     if not isinstance(name, str) or name not in PROTOCOLS:
         raise ConfigurationError([f"gait.protocol = {name!r}: must be one of {', '.join(PROTOCOLS)}"])
     document["gait"] = asdict(PROTOCOLS[name]) | gait
-
-
-def _validated(document: Mapping[str, Any]) -> dict[str, Any]:
-    try:
-        checked = _DOCUMENT_MODEL.model_validate(document)
-    except ValidationError as problem:
-        raise ConfigurationError([_sentence(error) for error in problem.errors()]) from problem
-    return {name: _as_records(hint, getattr(checked, name)) for name, hint in _hints(Configuration).items()}
-
-
-def _hints(record: type) -> dict[str, Any]:
-    """Annotations of a record's fields; of the Configuration those that a file may hold."""
-    return {name: hint for name, hint in get_type_hints(record, include_extras=True).items() if name != "text"}
-
-
-def _model_of(record: type) -> type[BaseModel]:
-    """A pydantic model with a record's fields, defaults and bounds, which refuses anything else."""
-    hints = _hints(record)
-    definitions: dict[str, Any] = {}
-    for item in fields(record):
-        if item.name not in hints:
-            continue
-        default = item.default if item.default is not MISSING else ...
-        if item.default_factory is not MISSING:
-            default = Field(default_factory=item.default_factory)
-        definitions[item.name] = (_checked_hint(hints[item.name]), default)
-    settings = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
-    return create_model(record.__name__, __config__=settings, **definitions)
-
-
-def _checked_hint(hint: Any) -> Any:
-    if get_origin(hint) is Annotated:
-        kind, bounds = get_args(hint)
-        return Annotated[kind, Field(ge=bounds.minimum, le=bounds.maximum)]
-    if get_origin(hint) is dict and is_dataclass(get_args(hint)[1]):
-        return dict[str, _model_of(get_args(hint)[1])]  # type: ignore[misc]
-    return _model_of(hint) if is_dataclass(hint) and isinstance(hint, type) else hint
-
-
-def _as_records(hint: Any, value: Any) -> Any:
-    """Models back to the records that they were made from."""
-    if get_origin(hint) is dict:
-        record = get_args(hint)[1]
-        return {name: record(**dict(model)) for name, model in value.items()}
-    return hint(**dict(value)) if isinstance(value, BaseModel) else value
-
-
-_DOCUMENT_MODEL = _model_of(Configuration)
-
-
-def _sentence(error: Any) -> str:
-    """`limits.torque_nm = 9.0: must be at most 5.0`."""
-    key = ".".join(str(part) for part in error["loc"])
-    bounds = error.get("ctx", {})
-    match error["type"]:
-        case "extra_forbidden":
-            return f"{key}: there is no such key"
-        case "missing":
-            return f"{key} is missing"
-        case "greater_than_equal":
-            return f"{key} = {error['input']}: must be at least {bounds['ge']}"
-        case "less_than_equal":
-            return f"{key} = {error['input']}: must be at most {bounds['le']}"
-        case _:
-            return f"{key} = {error['input']!r}: {error['msg'].removeprefix('Input ').lower()}"
 
 
 def _contradictions(configuration: Configuration) -> Iterator[str]:

@@ -16,12 +16,19 @@ paper's Table I; the adaptive speeds were not used. In this plant, which has mor
 both failures, not each number: 10.2, 2.4 and 7.4 cm/s at 3 cm, 7.5, 7.6 and 0.2 at 5 cm (48.5, 53.1, 45.3 %), where
 the paper has 7.6, 2.1, 7.2 and 6.6, 5.5, 3.0. In firm mud the body leaves the stance at 0.9 m/s and coasts on.
 c is large for a plate that stops: its load falls to 56 % at once, where the authors' logs keep 85 to 90 % for seconds.
+
+A mud may have layers, crusts or weak ones, in which s_u is another at another depth: the laws then hold with the
+strength where the piece of the body is, and the weight of what lies above it stays the same.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import pairwise
 from math import exp, log
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
+
+from control.bounds import Bounds
 
 UNIT_WEIGHT_N_M3 = 17.5e3
 MATLOCK_J = 0.5
@@ -35,21 +42,64 @@ RATE_EXPONENT = 0.4
 REFERENCE_SPEED_M_S = 0.1
 
 
+@dataclass(frozen=True)
+class Layer:
+    """Between two depths below the surface the mud has `factor` times its strength. Layers do not overlap."""
+
+    top_m: Annotated[float, Bounds(0.0, 1.0)]
+    bottom_m: Annotated[float, Bounds(0.0, 1.0)]
+    factor: Annotated[float, Bounds(0.01, 20.0)]
+
+
 class Clay(NamedTuple):
     name: str
     strength_pa: float
+    layers: tuple[Layer, ...] = ()
 
     def lateral_n(self, depth_m: float, width_m: float) -> float:
         """Yield force sideways on an upright plate at the reference speed."""
-        rise_per_m = self.lateral_rise_per_m(width_m)
-        shallow_m = min(depth_m, (DEEP_FACTOR - SURFACE_FACTOR) / rise_per_m)
-        factor_m = SURFACE_FACTOR * shallow_m + rise_per_m * shallow_m * shallow_m / 2.0
-        factor_m += DEEP_FACTOR * (depth_m - shallow_m)
-        return self.strength_pa * width_m * factor_m
+        if not self.layers:
+            return _lateral_n(self.strength_pa, depth_m, width_m)
+        borders_m = {border_m for layer in self.layers for border_m in (layer.top_m, layer.bottom_m)}
+        force_n = 0.0
+        for top_m, bottom_m in pairwise(sorted({0.0, depth_m} | {m for m in borders_m if 0.0 < m < depth_m})):
+            strength_pa = self.mean_strength_pa(top_m, bottom_m)
+            force_n += _lateral_n(strength_pa, bottom_m, width_m) - _lateral_n(strength_pa, top_m, width_m)
+        return force_n
 
-    def lateral_rise_per_m(self, width_m: float) -> float:
-        """How fast pressure over strength rises with depth, from 3 at the surface up to 9."""
-        return UNIT_WEIGHT_N_M3 / self.strength_pa + MATLOCK_J / width_m
+    def scaled(self, factor: float) -> Clay:
+        """The same mud, stronger or weaker in all its layers."""
+        return Clay(self.name, factor * self.strength_pa, self.layers)
+
+    def strength_at_pa(self, depth_m: float) -> float:
+        for layer in self.layers:
+            if layer.top_m <= depth_m < layer.bottom_m:
+                return layer.factor * self.strength_pa
+        return self.strength_pa
+
+    def mean_strength_pa(self, from_m: float, to_m: float) -> float:
+        """Between two depths."""
+        share = 1.0
+        for layer in self.layers:
+            top_m = layer.top_m if layer.top_m > from_m else from_m
+            bottom_m = layer.bottom_m if layer.bottom_m < to_m else to_m
+            if bottom_m > top_m:
+                share += (layer.factor - 1.0) * (bottom_m - top_m) / (to_m - from_m)
+        return share * self.strength_pa
+
+
+def _lateral_n(strength_pa: float, depth_m: float, width_m: float) -> float:
+    """Of mud that is equally strong from the surface to `depth_m`: the integral of Matlock's law."""
+    rise_per_m = lateral_rise_per_m(strength_pa, width_m)
+    shallow_m = min(depth_m, (DEEP_FACTOR - SURFACE_FACTOR) / rise_per_m)
+    factor_m = SURFACE_FACTOR * shallow_m + rise_per_m * shallow_m * shallow_m / 2.0
+    factor_m += DEEP_FACTOR * (depth_m - shallow_m)
+    return strength_pa * width_m * factor_m
+
+
+def lateral_rise_per_m(strength_pa: float, width_m: float) -> float:
+    """How fast pressure over strength rises with depth, from 3 at the surface up to 9."""
+    return UNIT_WEIGHT_N_M3 / strength_pa + MATLOCK_J / width_m
 
 
 def rate_factor(speed_m_s: float) -> float:

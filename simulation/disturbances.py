@@ -24,7 +24,9 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from math import cos, exp, sin
 from random import Random
+from typing import Annotated
 
+from control.bounds import Bounds
 from control.geometry import FlipperGeometry
 
 STROKE_M = 0.005
@@ -37,13 +39,13 @@ REMOULDING_RATE = 0.4  # per stroke
 
 @dataclass(frozen=True)
 class Disturbances:
-    clinging_n: float = 0.0  # mean weight of the mud on one plate
-    remoulding: float = 0.0  # 1: as above
-    relaxation: float = 0.0  # share of the load
-    surface_sd_m: float = 0.0
-    current_noise_a: float = 0.0  # 0: the drive's own
-    sample_period_s: float = 0.0  # between messages of position, and of current; 0: the drive's own
-    current_limit_a: float = 0.0  # of the motor, whatever the bus allows; 0: none
+    clinging_n: Annotated[float, Bounds(0.0, 10.0)] = 0.0  # mean weight of the mud on one plate
+    remoulding: Annotated[float, Bounds(0.0, 1.0)] = 0.0  # 1: as above
+    relaxation: Annotated[float, Bounds(0.0, 0.9)] = 0.0  # share of the load
+    surface_sd_m: Annotated[float, Bounds(0.0, 0.01)] = 0.0
+    current_noise_a: Annotated[float, Bounds(0.0, 10.0)] = 0.0  # 0: the drive's own
+    sample_period_s: Annotated[float, Bounds(0.0, 1.0)] = 0.0  # of position, and of current; 0: the drive's own
+    current_limit_a: Annotated[float, Bounds(0.0, 200.0)] = 0.0  # of the motor, whatever the bus allows; 0: none
 
     def __post_init__(self) -> None:
         """Raises ValueError for what cannot be."""
@@ -65,14 +67,17 @@ LAB = Disturbances(
 )
 
 
+# Of the drives' parameters, those that a disturbance sets.
+DRIVE_FIELDS = {
+    "current_noise_a": ("current_noise_a",),
+    "sample_period_s": ("encoder_period_s", "current_period_s"),
+    "current_limit_a": ("motor_current_limit_a",),
+}
+
+
 def drive_changes(disturbances: Disturbances) -> dict[str, float]:
     """The drives' parameters that differ from their own."""
-    changes = {
-        "current_noise_a": disturbances.current_noise_a,
-        "encoder_period_s": disturbances.sample_period_s,
-        "current_period_s": disturbances.sample_period_s,
-        "motor_current_limit_a": disturbances.current_limit_a,
-    }
+    changes = {name: getattr(disturbances, source) for source, names in DRIVE_FIELDS.items() for name in names}
     return {name: value for name, value in changes.items() if value}
 
 
@@ -103,7 +108,7 @@ class StrokeHistory:
         self._entered_m = self._deepest_m = 0.0
 
     def step(self, lowest_m: float, place_m: float) -> None:
-        """`lowest_m`: depth of the plate's lowest point below the nominal surface; `place_m` along the track."""
+        """`lowest_m`: depth of the plate's lowest point below the track's own surface; `place_m` along the track."""
         submerged_m = lowest_m - self.surface_m
         if submerged_m > 0.0:
             if not self._in_mud:

@@ -6,8 +6,9 @@ encoded and decoded.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from random import Random
+from typing import Any
 
 from control.controller import WalkOrder
 from control.modes import Mode, Request
@@ -27,7 +28,7 @@ from simulation.track import Track
 POSE_NOISE_M = 1e-4  # of a motion-capture system at the scale of this track
 
 
-def drives_of(configuration: Configuration, **changes: float) -> dict[str, OdriveParameters]:
+def drives_of(configuration: Configuration, **changes: Any) -> dict[str, OdriveParameters]:
     """Simulated drives that fit a configuration's bus: ids, signs, zeros and torque constants."""
     return {
         joint: OdriveParameters(
@@ -35,20 +36,21 @@ def drives_of(configuration: Configuration, **changes: float) -> dict[str, Odriv
             sign=drive.sign,
             zero_turn=drive.zero_turn,
             torque_constant_nm_a=drive.torque_constant_nm_a,
-            **changes,  # type: ignore[arg-type]
+            **changes,
         )
         for joint, drive in configuration.drive.items()
     }
 
 
 def plant_of(
-    configuration: Configuration, disturbances: Disturbances = NONE, fixed_base: bool = False
+    configuration: Configuration, disturbances: Disturbances = NONE, fixed_base: bool = False, **changes: Any
 ) -> PlantParameters:
     return PlantParameters(
         geometry=configuration.geometry,
         arm_mass=configuration.arm,
         disturbances=disturbances,
         fixed_base=fixed_base,
+        **changes,
     )
 
 
@@ -64,7 +66,10 @@ class SimulatedPose:
 
 
 class Lockstep:
-    """Owns the common time of robot and loop. Disturbances are of the mud and of the drives."""
+    """Owns the common time of robot and loop. Disturbances are of the mud and of the drives.
+
+    `plant` and `drives` are used as they are, in place of those that configuration, disturbances and base make.
+    """
 
     def __init__(
         self,
@@ -74,19 +79,21 @@ class Lockstep:
         recorder: Recording | None = None,
         disturbances: Disturbances = NONE,
         fixed_base: bool = False,
+        plant: PlantParameters | None = None,
+        drives: Mapping[str, OdriveParameters] | None = None,
     ) -> None:
         buses = {name: MockBus() for name in configuration.bus}
         self.robot = SimulatedRobot(
-            plant_of(configuration, disturbances, fixed_base),
+            plant or plant_of(configuration, disturbances, fixed_base),
             track,
-            drives_of(configuration, **drive_changes(disturbances)),
+            drives or drives_of(configuration, **drive_changes(disturbances)),
             {joint: configuration.drive[joint].bus for joint in JOINTS},
             {name: bus.open() for name, bus in buses.items()},
             seed,
         )
-        drives = OdriveDrives(configuration.drive, {name: bus.open() for name, bus in buses.items()})
+        ports = OdriveDrives(configuration.drive, {name: bus.open() for name, bus in buses.items()})
         pose = SimulatedPose(self.robot, seed + 1)
-        self.loop = Loop(configuration, drives, pose, recorder or NullRecorder(), clock=lambda: self.now_s)
+        self.loop = Loop(configuration, ports, pose, recorder or NullRecorder(), clock=lambda: self.now_s)
         self.tick_number = 0
 
     @property

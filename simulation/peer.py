@@ -21,9 +21,10 @@ from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration import EXIT_CONFIGURATION, Configuration, ConfigurationError, load_configuration
 from firmware_host.ticker import Ticker
 from simulation.clay import MUDS
-from simulation.lockstep import POSE_NOISE_M, drives_of, plant_of
+from simulation.lockstep import POSE_NOISE_M
 from simulation.robot import SimulatedRobot
 from simulation.track import COMPARTMENT_M, Track
+from simulation.world import World, load_world
 
 STEP_S = 0.002  # the period of the drives' fastest messages
 POSE_PERIOD_S = 1.0 / 120.0  # the paper's motion capture
@@ -47,13 +48,13 @@ class PoseBroadcast:
 
 
 class Peer:
-    def __init__(self, configuration: Configuration, track: Track, seed: int) -> None:
+    def __init__(self, configuration: Configuration, world: World, seed: int) -> None:
         self.ticker = Ticker(STEP_S)
         self._ports = open_ports(configuration.bus)
         self.robot = SimulatedRobot(
-            plant_of(configuration),
-            track,
-            drives_of(configuration, watchdog_s=WATCHDOG_S),
+            world.plant(configuration),
+            world.track,
+            world.drives(configuration, watchdog_s=WATCHDOG_S),
             {joint: configuration.drive[joint].bus for joint in JOINTS},
             self._ports,
             seed,
@@ -90,12 +91,15 @@ def end_with_parent() -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="simulation.peer", description=__doc__)
     parser.add_argument("--config", type=Path, required=True)
-    parser.add_argument("--mud", action="append", choices=sorted(MUDS), help="water content in percent; repeatable")
+    ground = parser.add_mutually_exclusive_group()
+    ground.add_argument("--mud", action="append", choices=sorted(MUDS), help="water content in percent; repeatable")
+    ground.add_argument("--world", type=Path, help="file that describes the ground and more")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)
     try:
         configuration = load_configuration(options.config)
-        peer = Peer(configuration, track_of(options.mud or list(MUDS)), options.seed)
+        world = load_world(options.world) if options.world else World(track_of(options.mud or list(MUDS)))
+        peer = Peer(configuration, world, options.seed)
     except ConfigurationError as problem:
         print("\n".join(problem.problems), file=sys.stderr)
         return EXIT_CONFIGURATION

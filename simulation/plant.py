@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import radians, sin
+from operator import add
 from random import Random
 
 from control.geometry import FlipperGeometry
@@ -18,7 +19,8 @@ from control.joint_pd import ArmMass
 from control.records import JointAngles, Torques
 from simulation.clay import Clay, rate_factor
 from simulation.disturbances import NONE, Disturbances, StrokeHistory, clinging_torques_nm
-from simulation.flipper_contact import NO_CONTACT, FlipperContact, lowest_m
+from simulation.flipper_contact import NO_CONTACT, ContactForce, FlipperContact, contact_force, lowest_m
+from simulation.stones import NO_PUSH, StoneContact, push_wrench
 from simulation.track import Track
 
 STEP_S = 0.001
@@ -49,23 +51,27 @@ class Arm:
         self.track = track
         self.contact = FlipperContact(parameters.geometry, parameters.disturbances.relaxation)
         self.history = StrokeHistory(parameters.disturbances, seed)
+        self.stones = StoneContact(track.stones) if track.stones else None
         self._disturbed = parameters.disturbances != NONE
         self.reset()
 
     def reset(self) -> None:
         """At rest with the plate's edge on the mud, as a robot lies when its motors are off."""
         self.history.reset()
+        self.relief_m = self.track.surface_m(0.0)
         self.sweep_rad = 0.0
         self.adduction_rad = self.parameters.geometry.adduction_rad(0.0, self.surface_m)
         self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = 0.0
         self.contact.reset()
+        if self.stones:
+            self.stones.reset()
         self.force = NO_CONTACT
         self.clay = self.track.clay_at(0.0)
 
     @property
     def surface_m(self) -> float:
         """How far the mud that this flipper meets lies below its nominal height."""
-        return self.history.surface_m
+        return self.relief_m + self.history.surface_m
 
     def step(self, dt_s: float, body_m: float, body_m_s: float, sweep_nm: float, lift_nm: float) -> None:
         self._look_at_mud(body_m)
@@ -79,6 +85,8 @@ class Arm:
             body_m_s,
             self.surface_m,
         )
+        if self.stones:
+            self._meet_stones(self.stones, dt_s, body_m)
         load_sweep_nm, load_lift_nm = self._load_nm()
         self._move(dt_s, sweep_nm + load_sweep_nm, lift_nm + load_lift_nm)
 
@@ -86,10 +94,19 @@ class Arm:
         """Which clay is under the flipper, as firm as earlier strokes have left it, and how high."""
         geometry = self.parameters.geometry
         edge_m = body_m + geometry.flipper_length_m * sin(self.sweep_rad)
+        self.relief_m = self.track.surface_m(edge_m)
         if self._disturbed:
-            self.history.step(lowest_m(geometry, self.sweep_rad, self.adduction_rad), edge_m)
+            self.history.step(lowest_m(geometry, self.sweep_rad, self.adduction_rad) - self.relief_m, edge_m)
         clay, firmness = self.track.clay_at(edge_m), self.history.firmness
-        self.clay = clay if firmness == 1.0 else Clay(clay.name, firmness * clay.strength_pa)
+        self.clay = clay if firmness == 1.0 else Clay(clay.name, firmness * clay.strength_pa, clay.layers)
+
+    def _meet_stones(self, stones: StoneContact, dt_s: float, body_m: float) -> None:
+        geometry, sweep_rad, adduction_rad = self.parameters.geometry, self.sweep_rad, self.adduction_rad
+        edge_m = body_m + geometry.flipper_length_m * sin(sweep_rad)
+        push = stones.step(dt_s, edge_m, lowest_m(geometry, sweep_rad, adduction_rad))
+        if push is not NO_PUSH:
+            pushed = contact_force(geometry, sweep_rad, push_wrench(geometry, sweep_rad, adduction_rad, push))
+            self.force = ContactForce(*map(add, self.force, pushed))
 
     def _load_nm(self) -> tuple[float, float]:
         """Of mud, clinging mud, gravity and friction on (sweep, adduction)."""

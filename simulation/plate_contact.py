@@ -8,9 +8,9 @@ elastic-plastic contact)
     narrow sides  N_p(ζ) s_u for a body as wide as the plate is thick, half of it on each
     lower edge    down N_c s_u, up 9 s_u with suction fading near the surface
 
-at its own depth ζ, times the rate factor of the plate's speed. The laws and their constants are those of the clay.
-Adhesion does not depend on pressure (undrained), so across and along are independent. Whatever leans, crosses over or
-pulls sideways comes out of the sum.
+with the strength s_u at its own depth ζ (a strip's is the mean over its height), times the rate factor of the plate's
+speed. The laws and their constants are those of the clay. Adhesion does not depend on pressure (undrained), so across
+and along are independent. Whatever leans, crosses over or pulls sideways comes out of the sum.
 
 The spring's stiffness is that of slow mud, whatever the speed: only its yield follows the rate. A piece that goes
 deeper meets unstrained mud, so its force stays while its stiffness rises; one that comes up loses force with
@@ -29,7 +29,16 @@ from __future__ import annotations
 from math import exp, sqrt
 from typing import NamedTuple, TypeVar
 
-from simulation.clay import ADHESION, BEARING_FACTOR, DEEP_FACTOR, SUCTION_FADE_M, SURFACE_FACTOR, Clay, rate_factor
+from simulation.clay import (
+    ADHESION,
+    BEARING_FACTOR,
+    DEEP_FACTOR,
+    SUCTION_FADE_M,
+    SURFACE_FACTOR,
+    Clay,
+    lateral_rise_per_m,
+    rate_factor,
+)
 
 SIDEWAYS_YIELD_M = 0.015
 LENGTHWAYS_YIELD_M = 0.001
@@ -113,8 +122,9 @@ class Instant(NamedTuple):
 
 
 # The submerged part of one strip of a column, a bare tuple since there are twenty in each step:
-# the height of its middle above the lower edge, the depth of that, and how much of the strip is covered.
-Strip = tuple[float, float, float]
+# the height of its middle above the lower edge, the depth of that, how much of the strip is covered,
+# and the mud's strength there.
+Strip = tuple[float, float, float, float]
 
 Share = TypeVar("Share", float, complex)
 
@@ -127,9 +137,9 @@ def kept(share: Share, before_n: float, now_n: float) -> Share:
     return share if now_n <= before_n else share * (before_n / now_n)
 
 
-def submerged_strips(submerged_m: float, strip_m: float, per_upward: float) -> list[Strip]:
+def submerged_strips(submerged_m: float, strip_m: float, per_upward: float, clay: Clay) -> list[Strip]:
     """Of a column that is in the mud up to `submerged_m` above the lower edge."""
-    strips = []
+    strips, strength_pa, layers = [], clay.strength_pa, clay.layers
     for strip in range(STRIPS):
         low_m = strip * strip_m
         covered_m = submerged_m - low_m
@@ -138,7 +148,11 @@ def submerged_strips(submerged_m: float, strip_m: float, per_upward: float) -> l
         if covered_m > strip_m:
             covered_m = strip_m
         middle_m = low_m + covered_m / 2.0
-        strips.append((middle_m, (submerged_m - middle_m) * per_upward, covered_m))
+        depth_m = (submerged_m - middle_m) * per_upward
+        if layers:
+            half_m = covered_m * per_upward / 2.0
+            strength_pa = clay.mean_strength_pa(depth_m - half_m, depth_m + half_m)
+        strips.append((middle_m, depth_m, covered_m, strength_pa))
     return strips
 
 
@@ -162,13 +176,16 @@ class PressedColumn:
         self, instant: Instant, strips: list[Strip], breadth_m: float, speed_m_s: float, per_upward_s: float
     ) -> tuple[float, float]:
         """Force against a motion that grows by `per_upward_s` upward, and its moment."""
-        clay, grip = instant.clay, instant.grip
-        rise_per_m, pressed_n_m = clay.lateral_rise_per_m(self.profile_width_m), clay.strength_pa * breadth_m
-        per_yield = instant.dt_s / self.yield_m
+        clay, grip, layered = instant.clay, instant.grip, bool(instant.clay.layers)
+        rise_per_m = lateral_rise_per_m(clay.strength_pa, self.profile_width_m)
+        pressed_n_m, per_yield = clay.strength_pa * breadth_m, instant.dt_s / self.yield_m
         moved, per_m = per_yield * speed_m_s, per_yield * per_upward_s
         shares, limits_n = self._shares, self._limits_n
         force_n = moment_nm = 0.0
-        for place, (above_edge_m, depth_m, covered_m) in enumerate(strips):
+        for place, (above_edge_m, depth_m, covered_m, strength_pa) in enumerate(strips):
+            if layered:
+                rise_per_m = lateral_rise_per_m(strength_pa, self.profile_width_m)
+                pressed_n_m = strength_pa * breadth_m
             factor = SURFACE_FACTOR + rise_per_m * depth_m
             limit_n = (factor if factor < DEEP_FACTOR else DEEP_FACTOR) * pressed_n_m * covered_m
             share = kept(shares[place], limits_n[place], limit_n) - moved - per_m * above_edge_m
@@ -200,12 +217,14 @@ class RubbedColumn:
 
         `breadth_m`: of all surfaces that mud sticks to.
         """
-        grip, sticking_n_m = instant.grip, ADHESION * instant.clay.strength_pa * breadth_m
-        per_yield = instant.dt_s / LENGTHWAYS_YIELD_M
+        clay, grip, layered = instant.clay, instant.grip, bool(instant.clay.layers)
+        sticking_n_m, per_yield = ADHESION * clay.strength_pa * breadth_m, instant.dt_s / LENGTHWAYS_YIELD_M
         moved, per_m = per_yield * velocity_m_s, per_yield * per_upward_s
         shares, limits_n = self._shares, self._limits_n
         force_n, moment_nm = 0j, 0.0
-        for place, (above_edge_m, _, covered_m) in enumerate(strips):
+        for place, (above_edge_m, _, covered_m, strength_pa) in enumerate(strips):
+            if layered:
+                sticking_n_m = ADHESION * strength_pa * breadth_m
             limit_n = sticking_n_m * covered_m
             share = kept(shares[place], limits_n[place], limit_n) - moved - per_m * above_edge_m
             stretch = abs(share)
@@ -226,24 +245,26 @@ class LowerEdge:
 
     def reset(self) -> None:
         self._shares = [0.0, 0.0]
-        self._limit_n = 0.0
+        self._limits_n = [0.0, 0.0]
 
     def fade(self, left: float) -> None:
         self._shares = [share * left for share in self._shares]
 
     def step(self, instant: Instant, places_m: tuple[float, float], wet_m: float) -> tuple[float, float]:
         """Force upward, and its moment outward."""
-        attitude, twist, before_n = instant.attitude, instant.twist, self._limit_n
-        self._limit_n = BEARING_FACTOR * instant.clay.strength_pa * self.thickness_m * wet_m / 2.0
+        clay, attitude, twist = instant.clay, instant.attitude, instant.twist
         force_n = moment_nm = 0.0
         for half, outward_m in enumerate(places_m):
             depth_m = attitude.depth_m + attitude.per_outward * outward_m
             suction = DEEP_FACTOR / BEARING_FACTOR * min(depth_m / SUCTION_FADE_M, 1.0)
             moved_m = instant.dt_s * (twist.upward_m_s + twist.upward_per_outward_s * outward_m)
-            share = kept(self._shares[half], before_n, self._limit_n) - moved_m / LENGTHWAYS_YIELD_M
+            strength_pa = clay.strength_at_pa(depth_m) if clay.layers else clay.strength_pa
+            limit_n = BEARING_FACTOR * strength_pa * self.thickness_m * wet_m / 2.0
+            share = kept(self._shares[half], self._limits_n[half], limit_n) - moved_m / LENGTHWAYS_YIELD_M
             self._shares[half] = share = min(max(share, -suction * instant.grip), instant.grip)
-            force_n += share * self._limit_n
-            moment_nm += share * self._limit_n * outward_m
+            self._limits_n[half] = limit_n
+            force_n += share * limit_n
+            moment_nm += share * limit_n * outward_m
         return force_n, moment_nm
 
 
@@ -317,13 +338,14 @@ class PlateContact:
         for part in self._parts:
             part.fade(left)
 
-    def _strips(self, attitude: Attitude, outward_m: float) -> list[Strip]:
+    def _strips(self, instant: Instant, outward_m: float) -> list[Strip]:
+        attitude = instant.attitude
         submerged_m = (attitude.depth_m + attitude.per_outward * outward_m) / attitude.per_upward
-        return submerged_strips(submerged_m, self._strip_m, attitude.per_upward)
+        return submerged_strips(submerged_m, self._strip_m, attitude.per_upward, instant.clay)
 
     def _step_column(self, instant: Instant, column: Column, outward_m: float, breadth_m: float) -> Wrench:
         v_n, v_r, v_s, n_u, n_s, r_s, s_u = instant.twist
-        strips = self._strips(instant.attitude, outward_m)
+        strips = self._strips(instant, outward_m)
         normal_n, normal_nm = column.pressed.step(instant, strips, breadth_m, v_n + n_u * outward_m, n_s)
         sticky_m = 2.0 * breadth_m + self.size.thickness_m
         along_n, outward_nm = column.rubbed.step(instant, strips, sticky_m, complex(v_r, v_s + s_u * outward_m), r_s)
@@ -332,6 +354,6 @@ class PlateContact:
 
     def _step_side(self, instant: Instant, side: PressedColumn, outward_m: float) -> tuple[float, float]:
         """Force outward, and its moment upward."""
-        strips, twist = self._strips(instant.attitude, outward_m), instant.twist
+        strips, twist = self._strips(instant, outward_m), instant.twist
         breadth_m = self.size.thickness_m / 2.0
         return side.step(instant, strips, breadth_m, twist.outward_m_s, twist.outward_per_upward_s)

@@ -54,6 +54,27 @@ def test_the_demo_walks_three_muds_and_sums_up(tmp_path: Path) -> None:
     assert len(lines) == len(summary["strides"])
 
 
+def test_the_demo_walks_the_ground_that_a_file_describes(tmp_path: Path) -> None:
+    """The same mud twice, which is told apart by its place, and another by its strength."""
+    world = tmp_path / "world.toml"
+    borders_m, muds = (0.0, 0.1, 0.2, 0.3), ("water_percent = 48.5", "strength_pa = 1500", "water_percent = 48.5")
+    world.write_text(
+        "".join(
+            f"[[segment]]\nstart_m = {start_m}\nend_m = {end_m}\n{mud}\n"
+            for start_m, end_m, mud in zip(borders_m[:-1], borders_m[1:], muds, strict=True)
+        ),
+        encoding="utf-8",
+    )
+    with start_demo(tmp_path / "out", "--world", str(world), "--json", str(tmp_path / "demo.json")) as demo:
+        printed, complaints = demo.communicate(timeout=60)
+    assert (demo.returncode, complaints) == (exit_codes.OK, "")
+    assert "Walking 0.30 m over mud with 48.5 %, 1500 Pa, 48.5 % water." in printed
+    summary = json.loads((tmp_path / "demo.json").read_text(encoding="utf-8"))
+    assert set(summary["speed_cm_s"]) == {"48.5", "1500 Pa", "48.5 at 0.20 m"}
+    assert "48.5 % at 0.20 m: " in printed
+    assert {stride["mud"] for stride in summary["strides"]} <= {"48.5", "1500 Pa"}
+
+
 def test_ctrl_c_ends_the_demo_cleanly(tmp_path: Path) -> None:
     out = tmp_path / "out"
     with start_demo(out) as demo:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulation.clay import MUDS, Clay, clay_of_water, rate_factor
+from simulation.clay import MUDS, Clay, Layer, clay_of_water, lateral_rise_per_m, rate_factor
 
 STRENGTHS = st.floats(200.0, 20000.0)
 DEPTHS = st.floats(0.001, 0.15)
@@ -27,8 +27,43 @@ def test_the_sideways_force_is_the_sum_of_the_pressure(strength_pa: float, depth
 
 @given(STRENGTHS, DEPTHS, WIDTHS)
 def test_the_rise_of_the_pressure_factor_is_that_of_the_law(strength_pa: float, depth_m: float, width_m: float) -> None:
-    factor = 3.0 + Clay("any", strength_pa).lateral_rise_per_m(width_m) * depth_m
+    factor = 3.0 + lateral_rise_per_m(strength_pa, width_m) * depth_m
     assert factor == pytest.approx(3.0 + 17.5e3 * depth_m / strength_pa + 0.5 * depth_m / width_m)
+
+
+CRUSTED = Clay("crusted", 1500.0, (Layer(0.0, 0.008, 3.0), Layer(0.02, 0.035, 0.4)))
+
+
+@given(DEPTHS, WIDTHS)
+def test_the_sideways_force_in_layers_is_the_sum_of_the_pressure(depth_m: float, width_m: float) -> None:
+    edges_m = np.linspace(0.0, depth_m, 4001)
+    z = (edges_m[1:] + edges_m[:-1]) / 2.0
+    strengths_pa = 1500.0 * np.where(z < 0.008, 3.0, np.where((z > 0.02) & (z < 0.035), 0.4, 1.0))
+    pressures_pa = strengths_pa * np.minimum(3.0 + 17.5e3 * z / strengths_pa + 0.5 * z / width_m, 9.0)
+    slices_n = width_m * pressures_pa * np.diff(edges_m)
+    # Three borders, each within half a slice of the dense sum's.
+    doubt_n = 1.5 * width_m * 9.0 * 4500.0 * depth_m / 4000
+    assert CRUSTED.lateral_n(depth_m, width_m) == pytest.approx(slices_n.sum(), abs=doubt_n)
+
+
+@given(st.floats(0.0, 0.06), st.floats(1e-4, 0.06))
+def test_the_mean_strength_of_layers_is_the_mean_of_the_strengths_in_them(from_m: float, span_m: float) -> None:
+    z = from_m + span_m * (np.arange(4000) + 0.5) / 4000
+    strengths_pa = [CRUSTED.strength_at_pa(depth_m) for depth_m in z]
+    doubt_pa = 1.5 * (4500.0 - 600.0) / 4000  # three borders, each within half a piece of the dense sum's
+    assert CRUSTED.mean_strength_pa(from_m, from_m + span_m) == pytest.approx(np.mean(strengths_pa), abs=doubt_pa)
+
+
+def test_a_layer_begins_at_its_top_and_ends_at_its_bottom() -> None:
+    strengths_pa = [CRUSTED.strength_at_pa(depth_m) for depth_m in (0.0, 0.008, 0.02, 0.035)]
+    assert strengths_pa == [4500.0, 1500.0, 600.0, 1500.0]
+
+
+def test_a_mud_is_scaled_in_all_its_layers() -> None:
+    half = CRUSTED.scaled(0.5)
+    assert half.name == CRUSTED.name
+    for depth_m in (0.004, 0.015, 0.03):
+        assert half.strength_at_pa(depth_m) == 0.5 * CRUSTED.strength_at_pa(depth_m)
 
 
 @pytest.mark.parametrize("name", MUDS)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
-from simulation.clay import MUDS, Clay, rate_factor
+from simulation.clay import MUDS, Clay, Layer, rate_factor
 from simulation.flipper_contact import NO_CONTACT, FlipperContact, attitude_of
 from simulation.load_cell import LoadCell, measure_insertion, measure_shear
 
@@ -127,6 +127,21 @@ def test_twice_the_strength_is_a_bit_less_than_twice_the_shear() -> None:
         for strength_pa in (2000.0, 4000.0)
     )
     assert 1.5 < strong_n / weak_n < 1.99
+
+
+def test_a_load_cell_finds_a_crust_where_it_is() -> None:
+    """Down to its bottom the edge bears 3 times as much, below it what it bore without; the sides stay in the crust.
+
+    A strip that has just come into the mud is loaded within its first millimetre or two: up to 5 % are missing.
+    """
+    plain = measure_insertion(CLAY, GEOMETRY, 0.0, 0.0, 0.03, 0.1).down
+    crusted = measure_insertion(CLAY._replace(layers=(Layer(0.0, 0.01, 3.0),)), GEOMETRY, 0.0, 0.0, 0.03, 0.1).down
+    for depth_m, forces_n, plain_n in zip(crusted.depths_m, crusted.forces_n, plain.forces_n, strict=True):
+        added_n = 2.0 * CLAY.strength_pa * 0.25 * GIRTH_M * min(max(depth_m, 0.0), 0.01)
+        if 0.002 < depth_m < 0.0099:  # beyond the millimetre in which it yields
+            assert forces_n - plain_n == pytest.approx(2.0 * CLAY.strength_pa * 5.14 * EDGE_M2 + added_n, rel=0.01)
+        elif depth_m > 0.0102:
+            assert forces_n - plain_n == pytest.approx(added_n, rel=0.05)
 
 
 def test_a_reset_cell_is_a_new_one() -> None:

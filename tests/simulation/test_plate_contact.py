@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulation.clay import MUDS, Clay, rate_factor
+from simulation.clay import MUDS, Clay, Layer, rate_factor
 from simulation.plate_contact import (
     LENGTHWAYS_YIELD_M,
     NO_WRENCH,
@@ -57,7 +57,6 @@ def power_w(wrench: Wrench, twist: Twist) -> float:
 def yielded_n(attitude: Attitude, clay: Clay, velocity_m_s: tuple[float, float, float], pieces: int) -> Wrench:
     """From clay that yields everywhere to a straight motion: the laws as their module states them, summed up."""
     speed_m_s = sqrt(sum(part * part for part in velocity_m_s))
-    strength_pa = rate_factor(speed_m_s) * clay.strength_pa
     normal, outward, upward = velocity_m_s
     along = (-outward / hypot(outward, upward), -upward / hypot(outward, upward))
     places = (np.arange(pieces) + 0.5) / pieces
@@ -68,26 +67,36 @@ def yielded_n(attitude: Attitude, clay: Clay, velocity_m_s: tuple[float, float, 
     def depth_m(across: np.ndarray | float, up: np.ndarray | float) -> np.ndarray:
         return np.asarray(attitude.depth_m + attitude.per_outward * across - attitude.per_upward * up)
 
-    def factor(depths_m: np.ndarray, width_m: float) -> np.ndarray:
-        law = 3.0 + 17.5e3 * depths_m / clay.strength_pa + 0.5 * depths_m / width_m
-        return np.where(depths_m > 0.0, np.minimum(law, 9.0), 0.0)
+    def strength_pa(depths_m: np.ndarray) -> np.ndarray:
+        """Times the rate factor."""
+        share = np.ones_like(depths_m)
+        for layer in clay.layers:
+            share = np.where((depths_m >= layer.top_m) & (depths_m < layer.bottom_m), layer.factor, share)
+        return rate_factor(speed_m_s) * clay.strength_pa * np.where(depths_m > 0.0, share, 0.0)
+
+    def pressure_pa(depths_m: np.ndarray, width_m: float) -> np.ndarray:
+        """N_p s_u = min(3 s_u + γ ζ + J s_u ζ/b, 9 s_u), which is 0 above the mud."""
+        strengths_pa = strength_pa(depths_m)
+        weight_pa = rate_factor(speed_m_s) * 17.5e3 * depths_m
+        law_pa = 3.0 * strengths_pa + weight_pa + 0.5 * strengths_pa * depths_m / width_m
+        return np.where(depths_m > 0.0, np.minimum(law_pa, 9.0 * strengths_pa), 0.0)
 
     def moments(across: np.ndarray, stick_n: np.ndarray, pressed_n: np.ndarray) -> list[float]:
         """Of forces that act at `across` and `height`."""
         out_n = along[0] * stick_n + pressed_n
         return [out_n.sum(), along[1] * stick_n.sum(), (out_n * height).sum(), (along[1] * stick_n * across).sum()]
 
-    across_n = -np.sign(normal) * factor(depth_m(u, s), SIZE.width_m) * strength_pa * area_m2
-    faces = moments(u, 2.0 * 0.25 * strength_pa * area_m2 * (depth_m(u, s) > 0.0), np.zeros_like(u))
+    across_n = -np.sign(normal) * pressure_pa(depth_m(u, s), SIZE.width_m) * area_m2
+    faces = moments(u, 2.0 * 0.25 * strength_pa(depth_m(u, s)) * area_m2, np.zeros_like(u))
     sides = [0.0] * 4
     for side_m in (-SIZE.width_m / 2.0, SIZE.width_m / 2.0):
         slice_m2 = SIZE.thickness_m * SIZE.height_m / pieces
-        pressed_n = -np.sign(outward) * factor(depth_m(side_m, height), SIZE.thickness_m) * strength_pa * slice_m2 / 2.0
-        stick_n = 0.25 * strength_pa * slice_m2 * (depth_m(side_m, height) > 0.0)
+        pressed_n = -np.sign(outward) * pressure_pa(depth_m(side_m, height), SIZE.thickness_m) * slice_m2 / 2.0
+        stick_n = 0.25 * strength_pa(depth_m(side_m, height)) * slice_m2
         sides = [a + b for a, b in zip(sides, moments(np.full(pieces, side_m), stick_n, pressed_n), strict=True)]
     edge_m = depth_m(edge, 0.0)
-    bearing = np.where(edge_m > 0.0, 5.14 if upward < 0.0 else -9.0 * np.minimum(edge_m / 0.01, 1.0), 0.0)
-    bearing_n = bearing * strength_pa * SIZE.width_m * SIZE.thickness_m / pieces
+    bearing = 5.14 if upward < 0.0 else -9.0 * np.minimum(edge_m / 0.01, 1.0)
+    bearing_n = bearing * strength_pa(edge_m) * SIZE.width_m * SIZE.thickness_m / pieces
     return Wrench(
         across_n.sum(),
         faces[0] + sides[0],
@@ -99,6 +108,7 @@ def yielded_n(attitude: Attitude, clay: Clay, velocity_m_s: tuple[float, float, 
     )
 
 
+GROUNDS = [*MUDS.values(), Clay("crusted", 519.0, (Layer(0.0, 0.012, 8.0), Layer(0.02, 0.05, 0.2)))]
 DIRECTIONS = st.sampled_from([-1.0, 1.0])
 
 
@@ -115,6 +125,70 @@ def test_strips_give_what_a_dense_sum_gives(
     whole_n = sqrt(sum(force_n * force_n for force_n in dense[:3]))
     assert wrench[:3] == pytest.approx(dense[:3], abs=0.03 * whole_n + 2e-3)
     assert wrench[3:] == pytest.approx(dense[3:], abs=(0.03 * whole_n + 2e-3) * SIZE.height_m / 2.0)
+
+
+@st.composite
+def layered(draw: st.DrawFn) -> Clay:
+    """Two layers, crust or weak, anywhere in the upper 6 cm."""
+    a, b, c, d = sorted(draw(st.lists(st.floats(0.0, 0.06), min_size=4, max_size=4)))
+    factors = st.floats(0.2, 4.0)
+    return Clay("layered", 1500.0, (Layer(a, b, draw(factors)), Layer(c, d, draw(factors))))
+
+
+@given(st.floats(0.002, 0.08), layered(), st.tuples(DIRECTIONS, DIRECTIONS, DIRECTIONS))
+def test_every_strip_has_the_strength_of_the_mud_at_its_own_depth(
+    depth_m: float, clay: Clay, directions: tuple[float, float, float]
+) -> None:
+    """Upright, where strips and layers are parallel. A strip across a border takes the law at its mean strength, which
+    is concave in it: with factors of 0.2 and 4 and the 15 mm that the strongest layer fills at most in the strips of
+    its two borders, that is 5 % of the whole force. A piece of the dense sum is 0.2 mm high, which can lie on either
+    side of four borders of up to 9 times 6 kPa.
+    """
+    velocity_m_s = (0.08 * directions[0], 0.04 * directions[1], 0.06 * directions[2])
+    attitude = Attitude(depth_m, 0.0, 1.0)
+    wrench = move(PlateContact(SIZE), Twist(*velocity_m_s), 0.5, attitude, clay)
+    dense = yielded_n(attitude, clay, velocity_m_s, 400)
+    whole_n = sqrt(sum(force_n * force_n for force_n in dense[:3]))
+    slice_n = 9.0 * 6000.0 * SIZE.width_m * SIZE.height_m / 400
+    assert wrench[:3] == pytest.approx(dense[:3], abs=0.05 * whole_n + 4.0 * slice_n)
+
+
+def steady_n(depth_m: float, clay: Clay) -> float:
+    """Across, at the reference speed."""
+    return -move(PlateContact(SIZE), Twist(normal_m_s=0.1), 0.3, Attitude(depth_m, 0.0, 1.0), clay).normal_n
+
+
+def test_a_crust_is_felt_before_what_lies_under_it() -> None:
+    """Bearing under the edge: three times as much in the crust, as without it below."""
+    crusted = CLAY._replace(layers=(Layer(0.0, 0.01, 3.0),))
+    plate, plain = PlateContact(SIZE), PlateContact(SIZE)
+    bearing_n = {}
+    for step in range(1, 200):
+        attitude = Attitude(0.0001 * step, 0.0, 1.0)
+        down = Twist(upward_m_s=-0.1)
+        forces_n = [each.step(DT_S, clay, attitude, down).upward_n for each, clay in ((plate, crusted), (plain, CLAY))]
+        bearing_n[step] = forces_n[0] - forces_n[1]
+    stuck_n = 2.0 * adhesion_n(0.01)  # what the crust adds to the sides, which stay in it
+    assert bearing_n[90] == pytest.approx(2.0 * edge_n(5.14) + 0.9 * stuck_n)
+    assert bearing_n[190] == pytest.approx(stuck_n)
+
+
+def test_a_weak_layer_takes_its_share_of_the_force_and_no_more() -> None:
+    """The layer from 1 to 2 cm, with a tenth of the strength: 3 to 9 times that are left of what was there."""
+    weak = CLAY._replace(layers=(Layer(0.01, 0.02, 0.1),))
+    assert steady_n(0.01, weak) == steady_n(0.01, CLAY)
+    lost_n = steady_n(0.03, CLAY) - steady_n(0.03, weak)
+    third_n = CLAY.lateral_n(0.02, SIZE.width_m) - CLAY.lateral_n(0.01, SIZE.width_m)
+    left_n = 0.1 * CLAY.strength_pa * 0.01 * SIZE.width_m
+    assert third_n - 9.0 * left_n < lost_n < third_n - 3.0 * left_n
+    assert steady_n(0.03, weak) == pytest.approx(weak.lateral_n(0.03, SIZE.width_m), rel=0.01)  # as without the layer
+
+
+def test_layers_of_factor_one_are_no_layers() -> None:
+    same = CLAY._replace(layers=(Layer(0.0, 0.013, 1.0), Layer(0.02, 0.04, 1.0)))
+    twist, plain, layered_one = Twist(0.05, 0.02, -0.03, 1.0, 1.0, 1.0, 1.0), PlateContact(SIZE), PlateContact(SIZE)
+    for attitude in (attitude_of(0.01, 0.3, 0.4), attitude_of(0.05, -0.5, 0.7)):
+        assert move(layered_one, twist, 0.05, attitude, same) == pytest.approx(move(plain, twist, 0.05, attitude))
 
 
 def adhesion_n(depth_m: float) -> float:
@@ -221,7 +295,7 @@ def test_outward_and_inward_are_mirror_images(attitude: Attitude, twists: list[T
 
 
 @given(
-    st.lists(st.tuples(ATTITUDES, TWISTS, st.sampled_from(list(MUDS.values())), st.integers(1, 30)), max_size=12),
+    st.lists(st.tuples(ATTITUDES, TWISTS, st.sampled_from(GROUNDS), st.integers(1, 30)), max_size=12),
     st.sampled_from([0.0, 0.3]),
 )
 def test_mud_never_gives_more_work_than_it_was_given(

@@ -15,7 +15,7 @@ from simulation.disturbances import Disturbances
 from simulation.load_cell import measure_shear
 from simulation.lockstep import Lockstep
 from simulation.plant import Plant, PlantParameters
-from simulation.track import Track
+from simulation.track import Ridges, Track
 from simulation.witness import StrideTruth, StrokeTruth, StrokeWitness
 
 DT_S = 0.01
@@ -146,6 +146,18 @@ def test_clay_and_surface_are_those_that_the_flipper_met_first() -> None:
     assert (left.clay, left.surface_m) == (Clay("remoulded", 1234.0), 0.002)
     assert (right.clay, right.surface_m) == (MUDS["48.5"], 0.0)
     assert left.insertion.deepest_m == pytest.approx(0.028)
+
+
+def test_depths_and_surface_are_those_of_the_ridge_that_the_flipper_met() -> None:
+    """A crest of 4 mm lies under a flipper that stands straight out, with the body a quarter of a ridge ahead."""
+    witness, plant = StrokeWitness(), make_plant()
+    plant.track = Track([(1.0, MUDS["48.5"])], ridges=Ridges(0.004, 0.2))
+    for arm in plant.arms:
+        arm.track = plant.track
+        arm.step(1e-9, 0.05, 0.0, 0.0, 0.0)  # so short that nothing moves
+    left, _ = watch(witness, plant, *STRIDE)
+    assert left.surface_m == pytest.approx(-0.004)
+    assert left.insertion.deepest_m == pytest.approx(0.03 + 0.004)
 
 
 def test_a_reset_witness_counts_from_zero() -> None:

@@ -1,0 +1,171 @@
+"""Records filled from a TOML file, or everything that is wrong with the file, in sentences.
+
+A record is a frozen dataclass that states default, unit and bounds beside each field. The reader makes a pydantic
+model of it and of the records in it, which refuses unknown keys, other types, numbers that are none and values out of
+bounds; each problem becomes one sentence with key, value and bound. Tables of an array are counted from 1.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Collection, Mapping
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from control.bounds import Bounds
+
+
+class ConfigurationError(Exception):
+    """Everything that is wrong with a file, one sentence each, naming key, value and bound."""
+
+    def __init__(self, problems: list[str]) -> None:
+        super().__init__("\n".join(problems))
+        self.problems = problems
+
+
+@dataclass(frozen=True)
+class ChangesOf:
+    """Annotates a dict of those fields of a record that the file sets: `Annotated[dict[str, Any], ChangesOf(…)]`."""
+
+    record: type
+    without: frozenset[str] = frozenset()
+
+
+def read_text(path: Path) -> str:
+    """Raises ConfigurationError."""
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as problem:
+        raise ConfigurationError([f"{path}: {problem.strerror}"]) from problem
+    except UnicodeDecodeError as problem:
+        raise ConfigurationError([f"{path}: not UTF-8 text at byte {problem.start}"]) from problem
+
+
+def parse_document(text: str) -> dict[str, Any]:
+    """Raises ConfigurationError."""
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as problem:  # of which tomllib's own error is one
+        raise ConfigurationError([f"not a TOML file: {problem}"]) from problem
+
+
+class RecordReader:
+    """Reads the fields of one record, except those that no file may hold."""
+
+    def __init__(self, record: type, without: Collection[str] = ()) -> None:
+        self._hints = _hints(record, without)
+        self._model = _model_of(record, without)
+
+    def problems(self, document: Mapping[str, Any]) -> list[str]:
+        try:
+            self.read(document)
+        except ConfigurationError as problem:
+            return problem.problems
+        return []
+
+    def read(self, document: Mapping[str, Any]) -> dict[str, Any]:
+        """The record's fields. Raises ConfigurationError."""
+        try:
+            checked = self._model.model_validate(document)
+        except ValidationError as problem:
+            raise ConfigurationError([_sentence(error) for error in problem.errors()]) from problem
+        return _values(self._hints, checked)
+
+
+def _hints(record: type, without: Collection[str] = ()) -> dict[str, Any]:
+    """Annotations of the fields that a file may hold."""
+    return {name: hint for name, hint in get_type_hints(record, include_extras=True).items() if name not in without}
+
+
+def _model_of(record: type, without: Collection[str] = ()) -> type[BaseModel]:
+    """A pydantic model with a record's fields, defaults and bounds, which refuses anything else."""
+    hints = _hints(record, without)
+    definitions: dict[str, Any] = {}
+    for item in fields(record):
+        if item.name not in hints:
+            continue
+        default = item.default if item.default is not MISSING else ...
+        if item.default_factory is not MISSING:
+            default = Field(default_factory=item.default_factory)
+        definitions[item.name] = (_checked_hint(hints[item.name]), default)
+    settings = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+    return create_model(record.__name__, __config__=settings, **definitions)
+
+
+def _checked_hint(hint: Any) -> Any:
+    if changes := _changes(hint):
+        return _model_of(changes.record, changes.without)
+    if get_origin(hint) is Annotated:
+        kind, bounds = get_args(hint)
+        return Annotated[kind, Field(ge=bounds.minimum, le=bounds.maximum)] if isinstance(bounds, Bounds) else hint
+    record = _record_in(hint)
+    if get_origin(hint) is dict and record:
+        return dict[str, _model_of(record)]  # type: ignore[misc]
+    if get_origin(hint) is list and record:
+        return list[_model_of(record)]  # type: ignore[misc]
+    return _model_of(hint) if is_dataclass(hint) and isinstance(hint, type) else hint
+
+
+def _changes(hint: Any) -> ChangesOf | None:
+    extras = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
+    return next((extra for extra in extras if isinstance(extra, ChangesOf)), None)
+
+
+def _record_in(hint: Any) -> type | None:
+    """Of which a dict or a list is made."""
+    last = get_args(hint)[-1] if get_args(hint) else None
+    return last if is_dataclass(last) and isinstance(last, type) else None
+
+
+def _values(hints: Mapping[str, Any], model: BaseModel) -> dict[str, Any]:
+    return {name: _as_records(hint, getattr(model, name)) for name, hint in hints.items()}
+
+
+def _as_records(hint: Any, value: Any) -> Any:
+    """Models back to the records that they were made from."""
+    if changes := _changes(hint):
+        return _changed(changes, value)
+    record = _record_in(hint)
+    if get_origin(hint) is dict and record:
+        return {name: record(**_values(_hints(record), model)) for name, model in value.items()}
+    if get_origin(hint) is list and record:
+        return [record(**_values(_hints(record), model)) for model in value]
+    return hint(**_values(_hints(hint), value)) if isinstance(value, BaseModel) else value
+
+
+def _changed(changes: ChangesOf, value: Any) -> dict[str, Any]:
+    """Only what the file sets: the rest stays with whoever makes the record."""
+    if not isinstance(value, BaseModel):  # the section is not there
+        return {}
+    hints = _hints(changes.record, changes.without)
+    return {name: _as_records(hints[name], getattr(value, name)) for name in hints if name in value.model_fields_set}
+
+
+def _key(location: tuple[str | int, ...]) -> str:
+    """`limits.torque_nm`, `segment 2.layer 1.factor`."""
+    key = ""
+    for part in location:
+        key += f" {part + 1}" if isinstance(part, int) else f".{part}" if key else part
+    return key
+
+
+def _sentence(error: Any) -> str:
+    """`limits.torque_nm = 9.0: must be at most 5.0`."""
+    key = _key(error["loc"])
+    bounds = error.get("ctx", {})
+    match error["type"]:
+        case "extra_forbidden":
+            return f"{key}: there is no such key"
+        case "missing":
+            return f"{key} is missing"
+        case "greater_than_equal":
+            return f"{key} = {error['input']}: must be at least {bounds['ge']}"
+        case "less_than_equal":
+            return f"{key} = {error['input']}: must be at most {bounds['le']}"
+        case "list_type":
+            return f"{key} = {error['input']!r}: must be tables, each under [[{key}]]"
+        case _:
+            return f"{key} = {error['input']!r}: {error['msg'].removeprefix('Input ').lower()}"

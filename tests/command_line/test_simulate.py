@@ -1,0 +1,109 @@
+"""`mudskipper simulate`: which ground it is given, and what is refused before anything starts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.main import main
+from simulation import peer
+from simulation.local_setup import write_local_setup
+
+WORLD = "[[segment]]\nstart_m = 0\nend_m = 1\nstrength_pa = 2000\n"
+
+
+class StillPeer(peer.Peer):
+    """Ends as soon as it has begun."""
+
+    made: list[StillPeer] = []
+
+    def __init__(self, *arguments: object) -> None:
+        super().__init__(*arguments)  # type: ignore[arg-type]
+        self.ended = True
+        self.made.append(self)
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Path:
+    path = tmp_path / "world.toml"
+    path.write_text(WORLD, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def peers(monkeypatch: pytest.MonkeyPatch) -> list[StillPeer]:
+    monkeypatch.setattr(peer, "Peer", StillPeer)
+    monkeypatch.setattr("os.nice", lambda _: 0)
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+    monkeypatch.setattr(StillPeer, "made", [])
+    return StillPeer.made
+
+
+def test_a_world_is_simulated_as_it_is_written(short_folder: Path, world: Path, peers: list[StillPeer]) -> None:
+    extra = "[robot]\nbody_mass_kg = 3.0\n[drives]\nencoder_counts = 4096\n[disturbances]\nclinging_n = 0.5\n"
+    world.write_text(WORLD + extra, encoding="utf-8")
+    setup = write_local_setup(short_folder, short_folder)
+    assert main(["simulate", "--config", str(setup), "--world", str(world)]) == exit_codes.OK
+    (simulated,) = peers
+    plant, drives = simulated.robot.plant, simulated.robot.drives
+    assert [segment.clay.name for segment in plant.track.segments] == ["2000 Pa"]
+    assert (plant.parameters.body_mass_kg, plant.parameters.disturbances.clinging_n) == (3.0, 0.5)
+    assert {drive.parameters.encoder_counts for drive in drives} == {4096}
+    assert {drive.parameters.watchdog_s for drive in drives} == {peer.WATCHDOG_S}
+
+
+def test_a_world_may_set_the_watchdog(short_folder: Path, world: Path, peers: list[StillPeer]) -> None:
+    world.write_text(WORLD + "[drives]\nwatchdog_s = 0.5\n", encoding="utf-8")
+    setup = write_local_setup(short_folder, short_folder)
+    assert main(["simulate", "--config", str(setup), "--world", str(world)]) == exit_codes.OK
+    assert peers[0].robot.drives[0].parameters.watchdog_s == 0.5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"), [((), ["48.5", "53.1", "45.3"]), (("--mud", "53.1", "--mud", "48.5"), ["53.1", "48.5"])]
+)
+def test_without_a_world_there_are_the_paper_s_muds(
+    short_folder: Path, peers: list[StillPeer], arguments: tuple[str, ...], names: list[str]
+) -> None:
+    setup = write_local_setup(short_folder, short_folder)
+    assert main(["simulate", "--config", str(setup), *arguments]) == exit_codes.OK
+    assert [segment.clay.name for segment in peers[0].robot.plant.track.segments] == names
+
+
+@pytest.mark.parametrize("command", ["simulate", "demo"])
+def test_a_world_that_cannot_be_is_refused_before_anything_starts(
+    command: str, tmp_path: Path, world: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "run"))
+    world.write_text(WORLD.replace("2000", "-1").replace("start_m = 0", "start_m = 0.5"), encoding="utf-8")
+    assert main([command, "--world", str(world)]) == exit_codes.CONFIGURATION == 78
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.splitlines() == [
+        "mudskipper: segment 1.strength_pa = -1: must be at least 50.0",
+        "mudskipper: segment 1.start_m = 0.5: must be 0, where the track begins, without gap",
+    ]
+    assert list(tmp_path.iterdir()) == [world]
+
+
+@pytest.mark.parametrize("command", ["simulate", "demo"])
+def test_a_world_that_is_not_there_is_refused_by_its_name(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--world", "/nowhere/world.toml"]) == exit_codes.CONFIGURATION
+    assert capsys.readouterr() == ("", "mudskipper: /nowhere/world.toml: No such file or directory\n")
+
+
+def test_a_world_has_its_own_mud(world: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate", "--world", str(world), "--mud", "48.5"])
+    assert ended.value.code == exit_codes.USAGE
+    assert "not allowed with argument" in capsys.readouterr().err
+
+
+def test_the_peer_refuses_a_world_too(short_folder: Path, world: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    world.write_text("", encoding="utf-8")
+    setup = write_local_setup(short_folder, short_folder)
+    assert peer.main(["--config", str(setup), "--world", str(world)]) == exit_codes.CONFIGURATION
+    assert capsys.readouterr().err == "segment is missing\n"

@@ -1,0 +1,169 @@
+"""Uneven ground under the robot's flippers: what stones, ridges, layers and random strength do to arms and body."""
+
+from math import cos, pi, radians, sin
+from random import Random
+
+import pytest
+
+from control.controller import WalkOrder
+from control.records import NO_TORQUE
+from firmware_host.configuration import Configuration
+from simulation.clay import MUDS, Clay, Layer
+from simulation.disturbances import Disturbances
+from simulation.flipper_contact import ContactForce, lowest_m
+from simulation.lockstep import Lockstep
+from simulation.plant import STEP_S, Arm, Plant, PlantParameters
+from simulation.stones import Stone
+from simulation.track import LEVEL, RandomStrength, Ridges, Track
+
+
+def press(plant: Plant, lift_nm: float) -> Plant:
+    """With the same torque for a second."""
+    for _ in range(1000):
+        plant.step(STEP_S, (0.0, lift_nm, 0.0, lift_nm))
+    return plant
+
+
+def pressed_arm(track: Track, lift_nm: float) -> Arm:
+    """From the mud's surface on, where the track begins, on a body that stays."""
+    return press(Plant(PlantParameters(fixed_base=True), track), lift_nm).arms[0]
+
+
+def depth_m(arm: Arm) -> float:
+    return lowest_m(arm.parameters.geometry, arm.sweep_rad, arm.adduction_rad)
+
+
+@pytest.mark.parametrize("lift_nm", [-0.2, -0.75, -1.66])
+def test_a_flipper_that_comes_down_on_a_stone_stops_there(lift_nm: float) -> None:
+    """Up to the torque of 20 A, which sinks it far deeper beside the stone; a millimetre is 20 N on its spring."""
+    soft = [(9.0, MUDS["53.1"])]
+    beside, arm = (pressed_arm(Track(soft, [Stone(start_m, 9.0, 0.02)]), lift_nm) for start_m in (0.01, -0.01))
+    assert depth_m(beside) > 0.025
+    assert 0.0 < depth_m(arm) - 0.02 < 0.001
+    assert arm.adduction_velocity_rad_s == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("sweep_nm", [-0.2, -0.75])
+def test_a_flipper_that_sweeps_against_a_stone_is_held_and_pushes_the_robot(sweep_nm: float) -> None:
+    """In mud so soft that it alone gives way: 0.75 N·m are 6 N at the plate."""
+    stone = Stone(-0.2, -0.02, 0.01)
+    plant = Plant(PlantParameters(fixed_base=True), Track([(9.0, Clay("soup", 100.0))], [stone]))
+    arm, geometry = plant.arms[0], plant.parameters.geometry
+    arm.sweep_rad, arm.adduction_rad = 0.3, geometry.adduction_rad(0.3, 0.03)
+    for _ in range(2000):
+        hold_nm = 20.0 * (geometry.adduction_rad(arm.sweep_rad, 0.03) - arm.adduction_rad)
+        plant.step(STEP_S, (sweep_nm, hold_nm - 0.2 * arm.adduction_velocity_rad_s, 0.0, 0.0))
+    behind_m = stone.end_m - geometry.flipper_length_m * sin(arm.sweep_rad)
+    assert 0.0 < behind_m < 0.001
+    # F l cos α but for what the soup holds and for the arm's weight, which is 0.01 N·m on the sweep joint.
+    thrust_n = -sweep_nm / (geometry.flipper_length_m * cos(arm.sweep_rad))
+    assert arm.force.thrust_n == pytest.approx(thrust_n, abs=0.1)
+
+
+def test_an_arm_that_falls_on_a_stone_comes_to_rest_and_never_rises_as_high_again() -> None:
+    plant = Plant(PlantParameters(fixed_base=True), Track([(9.0, Clay("soup", 100.0))], [Stone(-1.0, 1.0, 0.005)]))
+    arm, heights_rad = plant.arms[0], []
+    arm.adduction_rad, arm.adduction_velocity_rad_s = 0.3, -3.0
+    for _ in range(3000):
+        plant.step(STEP_S, NO_TORQUE)
+        heights_rad.append(arm.adduction_rad)
+    landed = heights_rad.index(min(heights_rad))
+    assert max(heights_rad[landed:]) < 0.15
+    assert arm.adduction_velocity_rad_s == pytest.approx(0.0, abs=1e-6)
+    assert depth_m(arm) == pytest.approx(0.005, abs=0.0001)  # its own weight is 0.4 N at the plate: 20 um
+
+
+def test_a_stone_acts_beside_the_mud_and_only_where_it_is() -> None:
+    """On an arm that stands half a millimetre under its top, in mud and in a trough so deep that there is none."""
+    geometry, sunk_rad = PlantParameters().geometry, -0.4
+    stone = Stone(0.5, 0.6, lowest_m(geometry, 0.0, sunk_rad) - 0.0005)
+
+    def force(stones: list[Stone], body_m: float, surface_m: float) -> ContactForce:
+        arm = Plant(PlantParameters(), Track([(9.0, MUDS["48.5"])], stones)).arms[0]
+        arm.adduction_rad, arm.adduction_velocity_rad_s, arm.history.surface_m = sunk_rad, -0.1, surface_m
+        arm.step(STEP_S, body_m, 0.0, 0.0, 0.0)
+        return arm.force
+
+    without, beside = force([], 0.55, 0.0), force([stone], 0.4, 0.0)
+    assert beside == without
+    of_stone = force([stone], 0.55, 0.1)
+    assert of_stone.adduction_nm > 0.5
+    assert force([stone], 0.55, 0.0) == pytest.approx([a + b for a, b in zip(without, of_stone, strict=True)])
+
+
+def test_a_reset_arm_has_met_no_stone() -> None:
+    """Else it would be pushed back through the flank that it had come to before."""
+    plant = Plant(PlantParameters(), Track([(9.0, MUDS["48.5"])], [Stone(-0.005, 9.0, 0.0)]))
+    arm = plant.arms[0]
+    arm.sweep_rad, arm.adduction_rad = -0.04, -0.4
+    plant.step(STEP_S, NO_TORQUE)
+    assert arm.force.thrust_n < -1.0
+    arm.reset()
+    arm.adduction_rad -= 0.002
+    arm.step(STEP_S, 0.0, 0.0, 0.0, 0.0)
+    assert arm.force.thrust_n == pytest.approx(0.0, abs=0.1)
+    assert arm.force.upward_n > 0.0
+
+
+def test_ridges_lift_the_mud_under_the_flipper_by_its_own_place() -> None:
+    track = Track([(9.0, MUDS["48.5"])], ridges=Ridges(0.005, 0.48))  # flippers a quarter of a ridge before and behind
+    plant = Plant(PlantParameters(), track)
+    for arm, sweep_rad in zip(plant.arms, (pi / 2.0, -pi / 2.0), strict=True):
+        arm.sweep_rad = sweep_rad
+    plant.step(STEP_S, NO_TORQUE)
+    assert [arm.surface_m for arm in plant.arms] == pytest.approx([-0.005, 0.005])
+
+
+def test_ridges_come_on_top_of_the_unevenness_from_stride_to_stride() -> None:
+    disturbed = PlantParameters(disturbances=Disturbances(surface_sd_m=0.001))
+    level, ridged = (
+        Plant(disturbed, Track([(9.0, MUDS["48.5"])], ridges=ridges), Random(3))
+        for ridges in (LEVEL, Ridges(0.004, 0.2))
+    )
+    for plant in (level, ridged):
+        plant.body_m = 0.05
+        plant.step(STEP_S, NO_TORQUE)
+    for plain, lifted in zip(level.arms, ridged.arms, strict=True):
+        assert plain.surface_m != 0.0
+        assert lifted.surface_m == pytest.approx(plain.surface_m - 0.004)
+
+
+def test_a_flipper_comes_to_rest_as_far_below_a_crest_as_below_a_trough() -> None:
+    """Within 1 mm: the arm hangs 1 cm lower there, so the same torque presses a little less."""
+    depths_m = []
+    for crest_m in (0.005, -0.005):
+        plant = Plant(PlantParameters(fixed_base=True), Track([(9.0, MUDS["48.5"])], ridges=Ridges(0.005, 0.2)))
+        plant.body_m = 0.05 if crest_m > 0.0 else 0.15
+        depths_m.append(depth_m(press(plant, -0.2).arms[0]) + crest_m)
+    assert depths_m[0] > 0.003
+    assert depths_m[0] == pytest.approx(depths_m[1], abs=0.001)
+
+
+def test_random_strength_is_that_of_the_flipper_s_own_place() -> None:
+    track = Track([(9.0, MUDS["48.5"])], random_strength=RandomStrength(0.3, 0.05, 7))
+    plant = Plant(PlantParameters(), track)
+    plant.arms[0].sweep_rad = radians(30.0)
+    plant.step(STEP_S, NO_TORQUE)
+    assert plant.arms[0].clay == track.clay_at(0.12 * sin(radians(30.0))) != plant.arms[1].clay == track.clay_at(0.0)
+
+
+def test_a_crust_carries_an_arm_that_sinks_without_it() -> None:
+    """Its own weight at the plate, 0.4 N, against a tenth of a newton of bearing in this mud."""
+    soup = Clay("soup", 200.0)
+    sunk = pressed_arm(Track([(9.0, soup)]), 0.0)
+    crusted = pressed_arm(Track([(9.0, soup._replace(layers=(Layer(0.0, 0.005, 10.0),)))]), 0.0)
+    assert depth_m(crusted) < 0.005 < depth_m(sunk)
+
+
+def test_a_robot_walks_faster_where_buried_stones_hold_its_flippers(configuration: Configuration) -> None:
+    """In mud in which it slips: bars across the track every 5 cm, 1 cm under the surface."""
+    soft = [(9.0, Clay("soft", 500.0))]
+    bars = [Stone(0.05 * place, 0.05 * place + 0.01, 0.01) for place in range(1, 40)]
+    distances_m = []
+    for stones in ([], bars):
+        lockstep = Lockstep(configuration, Track(soft, stones))
+        lockstep.arm()
+        lockstep.walk(WalkOrder(0.025, adaptive=False))
+        lockstep.run_for(12.0)
+        distances_m.append(lockstep.robot.plant.body_m)
+    assert distances_m[1] > 2.0 * distances_m[0]
