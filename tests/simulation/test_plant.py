@@ -8,10 +8,12 @@ import pytest
 
 from control.joint_pd import ArmMass
 from control.records import NO_TORQUE
+from simulation.carriage import Carriage
 from simulation.clay import MUDS, Clay, rate_factor
 from simulation.disturbances import LAB, Disturbances
 from simulation.flipper_contact import NO_CONTACT, ContactForce, FlipperContact
-from simulation.plant import DRAG_STIFFNESS_N_M, END_STOPS_RAD, STEP_S, Plant, PlantParameters
+from simulation.plant import END_STOPS_RAD, STEP_S, Plant, PlantParameters
+from simulation.rail_body import DRAG_STIFFNESS_N_M
 from simulation.track import Track
 
 TRACK = Track([(1.0, MUDS["48.5"])])
@@ -34,6 +36,7 @@ class ConstantThrust(FlipperContact):
         adduction_velocity_rad_s: float,
         body_velocity_m_s: float,
         surface_m: float = 0.0,
+        carriage: Carriage | None = None,
     ) -> ContactForce:
         return NO_CONTACT._replace(thrust_n=self.thrust_n)
 
