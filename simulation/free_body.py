@@ -14,16 +14,18 @@ A point P of the body stands at x + forward·P and height + up·P, and since ∂
 with constant inertias: the box's gyroscopic terms and the joints' throwing it about are left out. It does not turn
 about the vertical nor drift sideways, as if the track led it.
 
-The belly presses on the mud at the four Gauss points of its rectangle, each for a quarter of its area A, as an
-anchored elastic-plastic contact like the plate's:
+The belly presses on the mud at the four corners of its rectangle, each for a quarter of its area A (so it tips over
+its edges, as it should, and resists small turns three times too stiffly), as an anchored elastic-plastic contact like
+the plate's:
 
     pressure up    g(v) N_c s_u + γ d at the depth d        Prandtl's strip, and the weight of the mud beside it
     drag           g(v) a s_u A of what is pressed on       adhesion, held elastically until it yields
 
 It yields YIELD_M deep and leaves a print that bears nothing until the belly is back in it or has been clear of the
 mud. The print goes along with the body: mud that it slides on to is as pressed as the mud that it comes from. There
-is no suction under the belly (air gets under it) and no mud ploughed up before it. The drag pad below it counts as
-deep as the belly is below the surface, and pulls at the belly.
+is no suction under the belly (air gets under it) and no mud ploughed up before it. The drag pad goes as much deeper
+as the belly does, and pulls at the belly. Nothing keeps the body from rearing or tipping over: flippers that push
+down with more than its weight lift it.
 """
 
 from __future__ import annotations
@@ -37,7 +39,6 @@ from control.joint_pd import GRAVITY_M_S2
 from simulation.carriage import Carriage, Vector, cross, dot, plate_directions
 from simulation.clay import ADHESION, BEARING_FACTOR, UNIT_WEIGHT_N_M3, Clay, rate_factor
 from simulation.flipper_contact import ContactForce
-from simulation.plate_contact import GAUSS
 from simulation.rail_body import BodyMotion, DragPad, DryDrag, Pusher
 from simulation.track import Track
 
@@ -49,12 +50,12 @@ SIDES = (1.0, -1.0)  # left, right
 class BodyShape:
     """Of a free body: a box, with the centre of mass at the height of the joints' axes."""
 
-    length_m: Annotated[float, Bounds(0.02, 2.0)] = 0.15
-    width_m: Annotated[float, Bounds(0.02, 2.0)] = 0.10  # the joints stand at its sides
+    length_m: Annotated[float, Bounds(0.02, 2.0)] = 0.20
+    width_m: Annotated[float, Bounds(0.02, 2.0)] = 0.06  # the joints stand at its sides
     axis_above_belly_m: Annotated[float, Bounds(0.0, 1.0)] = 0.0645
     axis_forward_m: Annotated[float, Bounds(-1.0, 1.0)] = 0.0  # of the centre of mass
-    roll_inertia_kg_m2: Annotated[float, Bounds(1e-4, 100.0)] = 0.0014  # of a box 8 cm high
-    pitch_inertia_kg_m2: Annotated[float, Bounds(1e-4, 100.0)] = 0.0025
+    roll_inertia_kg_m2: Annotated[float, Bounds(1e-4, 100.0)] = 0.0014
+    pitch_inertia_kg_m2: Annotated[float, Bounds(1e-4, 100.0)] = 0.0039  # of a box 8 cm high
 
 
 class Axes(NamedTuple):
@@ -155,7 +156,7 @@ class FreeBody:
         self.shape = shape
         self.pad = pad
         self.track = track
-        ahead_m, aside_m, area_m2 = GAUSS * shape.length_m, GAUSS * shape.width_m, shape.length_m * shape.width_m
+        ahead_m, aside_m, area_m2 = shape.length_m / 2.0, shape.width_m / 2.0, shape.length_m * shape.width_m
         below_m = -shape.axis_above_belly_m
         self._places = tuple((way * ahead_m, side * aside_m, below_m) for way in SIDES for side in SIDES)
         self._quarters = tuple(BellyQuarter(area_m2 / 4.0, mass_kg / 4.0) for _ in self._places)
