@@ -30,6 +30,7 @@ down with more than its weight lift it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import cos, hypot, sin, sqrt
 from typing import Annotated, NamedTuple
@@ -38,12 +39,12 @@ from control.bounds import Bounds
 from control.joint_pd import GRAVITY_M_S2
 from simulation.carriage import Carriage, Vector, cross, dot, plate_directions
 from simulation.clay import ADHESION, BEARING_FACTOR, UNIT_WEIGHT_N_M3, Clay, rate_factor
-from simulation.flipper_contact import ContactForce
+from simulation.flipper_contact import NO_CONTACT
 from simulation.rail_body import BodyMotion, DragPad, DryDrag, Pusher
 from simulation.track import Track
 
 YIELD_M = 0.003  # two or three hundredths of a belly's width, as footings on soft clay settle before they fail
-SIDES = (1.0, -1.0)  # left, right
+SIDES = (1.0, -1.0)  # fore, aft; left, right
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,14 @@ def axes_of(roll_rad: float, pitch_rad: float) -> Axes:
     return Axes((cp, sp * sr, sp * cr), (0.0, cr, -sr), (-sp, cp * sr, cp * cr))
 
 
+def mirrored(axes: Axes) -> Axes:
+    """In the axes of the right flipper, whose y points to the right."""
+    (fx, fy, fz), (_, ay, az), (ux, uy, uz) = axes
+    return Axes((fx, -fy, fz), (0.0, ay, -az), (ux, -uy, uz))
+
+
 def in_world(axes: Axes, place: Vector) -> Vector:
+    """(ahead, across, above) of the centre of mass."""
     return dot(axes.forward, place), dot(axes.across, place), dot(axes.up, place)
 
 
@@ -84,20 +92,20 @@ class BodyLoad(NamedTuple):
     pitch_nm: float
 
 
-def load_at(axes: Axes, place: Vector, forward_n: float, upward_n: float) -> BodyLoad:
-    """Of a force in the world at a place on the body."""
-    ahead_m, across_m, above_m = in_world(axes, place)
-    sp, cp = -axes.up[0], axes.forward[0]
-    roll_nm = (sp * forward_n + cp * upward_n) * across_m
+def load_at(axes: Axes, lever_m: Vector, forward_n: float, upward_n: float) -> BodyLoad:
+    """Of a force in the world, `lever_m` from the centre of mass in the world."""
+    ahead_m, across_m, above_m = lever_m
+    roll_nm = (axes.forward[0] * upward_n - axes.up[0] * forward_n) * across_m
     return BodyLoad(forward_n, upward_n, roll_nm, above_m * forward_n - ahead_m * upward_n)
 
 
-def load_of_flipper(axes: Axes, joint: Vector, force: ContactForce, sweep_rad: float, adduction_rad: float) -> BodyLoad:
-    """Of the mud through a flipper, in whose own mirrored axes everything stands.
+def load_of_flipper(axes: Axes, joint: Vector, flipper: Pusher, side: float) -> BodyLoad:
+    """Of the mud through a flipper, in whose own axes everything stands; `side`: 1 on the left, -1 on the right.
 
     Moments about the axes that tilt with adduction are turned upright, and moved from the joints to the middle.
     """
-    n, r, s = plate_directions(sweep_rad, adduction_rad)
+    force = flipper.force
+    n, r, s = plate_directions(flipper.sweep_rad, flipper.adduction_rad)
     f_n, f_r, f_s = force.normal_n, force.outward_n, force.upward_n
     push_n = (f_n * n[0] + f_r * r[0], f_n * n[1] + f_r * r[1] + f_s * s[1], f_n * n[2] + f_r * r[2] + f_s * s[2])
     sb, cb = -s[1], s[2]
@@ -107,7 +115,8 @@ def load_of_flipper(axes: Axes, joint: Vector, force: ContactForce, sweep_rad: f
         levered[1] + cb * force.tilting_nm + sb * force.sweep_nm,
         levered[2] + sb * force.tilting_nm - cb * force.sweep_nm,
     )
-    return BodyLoad(dot(axes.forward, push_n), dot(axes.up, push_n), moment_nm[0], dot(axes.across, moment_nm))
+    pitch_nm = dot(axes.across, moment_nm)
+    return BodyLoad(dot(axes.forward, push_n), dot(axes.up, push_n), side * moment_nm[0], pitch_nm)
 
 
 class BellyQuarter:
@@ -158,8 +167,9 @@ class FreeBody:
         self.track = track
         ahead_m, aside_m, area_m2 = shape.length_m / 2.0, shape.width_m / 2.0, shape.length_m * shape.width_m
         below_m = -shape.axis_above_belly_m
-        self._places = tuple((way * ahead_m, side * aside_m, below_m) for way in SIDES for side in SIDES)
-        self._quarters = tuple(BellyQuarter(area_m2 / 4.0, mass_kg / 4.0) for _ in self._places)
+        self._belly = (0.0, 0.0, below_m)
+        self._corners = tuple((way * ahead_m, side * aside_m, below_m) for way in SIDES for side in SIDES)
+        self._quarters = tuple(BellyQuarter(area_m2 / 4.0, mass_kg / 4.0) for _ in self._corners)
         self._joint = (shape.axis_forward_m, shape.width_m / 2.0, 0.0)  # of either flipper, in its own axes
         self._drag = DryDrag()
         self.reset()
@@ -182,13 +192,13 @@ class FreeBody:
 
     @property
     def carriages(self) -> tuple[Carriage, Carriage]:
-        return self._carriage(1.0), self._carriage(-1.0)
+        axes = axes_of(self.roll_rad, self.pitch_rad)
+        return self._carriage(axes, self.roll_rad_s), self._carriage(mirrored(axes), -self.roll_rad_s)
 
-    def _carriage(self, side: float) -> Carriage:
-        """In the flipper's own axes, which are mirrored on the right: there a roll is the other way round."""
-        axes = axes_of(side * self.roll_rad, self.pitch_rad)
+    def _carriage(self, axes: Axes, roll_rad_s: float) -> Carriage:
+        """In the flipper's own axes: on the right a roll is the other way round."""
         (fx, fy, fz), (_, ay, az), (ux, uy, uz) = axes
-        turning = (side * self.roll_rad_s, ay * self.pitch_rad_s, az * self.pitch_rad_s)
+        turning = (roll_rad_s, ay * self.pitch_rad_s, az * self.pitch_rad_s)
         levered = cross(turning, self._joint)
         ahead_m_s, up_m_s = self.forward_m_s, self.upward_m_s
         velocity_m_s = (
@@ -199,8 +209,13 @@ class FreeBody:
         return Carriage(self.height_m + dot(axes.up, self._joint), axes.up, velocity_m_s, turning)
 
     def step(self, dt_s: float, left: Pusher, right: Pusher) -> None:
-        loads = [self._flipper_load(1.0, left), self._flipper_load(-1.0, right), *self._belly_loads(dt_s)]
-        forward_n, upward_n, roll_nm, pitch_nm = (sum(parts) for parts in zip(*loads, strict=True))
+        axes = axes_of(self.roll_rad, self.pitch_rad)
+        forward_n = upward_n = roll_nm = pitch_nm = 0.0
+        for load in (*self.flipper_loads(axes, left, right), *self._belly_loads(dt_s, axes)):
+            forward_n += load.forward_n
+            upward_n += load.upward_n
+            roll_nm += load.roll_nm
+            pitch_nm += load.pitch_nm
         self.forward_m_s += dt_s * forward_n / self.mass_kg
         self.upward_m_s += dt_s * (upward_n / self.mass_kg - GRAVITY_M_S2)
         self.roll_rad_s += dt_s * roll_nm / self.shape.roll_inertia_kg_m2
@@ -210,34 +225,34 @@ class FreeBody:
         self.roll_rad += dt_s * self.roll_rad_s
         self.pitch_rad += dt_s * self.pitch_rad_s
 
-    def _flipper_load(self, side: float, flipper: Pusher) -> BodyLoad:
-        axes = axes_of(side * self.roll_rad, self.pitch_rad)
-        load = load_of_flipper(axes, self._joint, flipper.force, flipper.sweep_rad, flipper.adduction_rad)
-        return load._replace(roll_nm=side * load.roll_nm)
+    def flipper_loads(self, axes: Axes, left: Pusher, right: Pusher) -> Iterator[BodyLoad]:
+        """Of those flippers that the mud touches."""
+        for flipper, own_axes, side in ((left, axes, 1.0), (right, mirrored(axes), -1.0)):
+            if flipper.force is not NO_CONTACT:
+                yield load_of_flipper(own_axes, self._joint, flipper, side)
 
-    def _belly_loads(self, dt_s: float) -> list[BodyLoad]:
-        axes = axes_of(self.roll_rad, self.pitch_rad)
-        belly = (0.0, 0.0, -self.shape.axis_above_belly_m)
-        sliding_m_s = self._speeds_m_s(axes, belly)[0]
-        loads, sticking_n = [], 0.0
-        for quarter, place in zip(self._quarters, self._places, strict=True):
-            clay = self.track.clay_at(self.forward_m + place[0])
-            rising_m_s = self._speeds_m_s(axes, place)[1]
+    def _belly_loads(self, dt_s: float, axes: Axes) -> Iterator[BodyLoad]:
+        lever_m = in_world(axes, self._belly)
+        sliding_m_s, _ = self._speeds_m_s(axes, lever_m)
+        sticking_n = 0.0
+        for quarter, corner in zip(self._quarters, self._corners, strict=True):
+            corner_m = in_world(axes, corner)
+            clay = self.track.clay_at(self.forward_m + corner_m[0])
+            _, rising_m_s = self._speeds_m_s(axes, corner_m)
             grip = rate_factor(hypot(sliding_m_s, rising_m_s))
-            upward_n = quarter.step(clay, grip, -self.height_m - dot(axes.up, place), -rising_m_s)
-            loads.append(load_at(axes, place, 0.0, upward_n))
+            upward_n = quarter.step(clay, grip, -self.height_m - corner_m[2], -rising_m_s)
+            yield load_at(axes, corner_m, 0.0, upward_n)
             if quarter.pressed:
                 sticking_n += ADHESION * clay.strength_pa * quarter.area_m2
-        pad_n = self.pad.yield_n(self.track.clay_at(self.forward_m), -self.height_m - dot(axes.up, belly))
+        pad_n = self.pad.yield_n(self.track.clay_at(self.forward_m), -self.height_m - lever_m[2])
         largest_n = rate_factor(abs(sliding_m_s)) * (sticking_n + pad_n)
-        loads.append(load_at(axes, belly, self._drag.step(dt_s, sliding_m_s, largest_n), 0.0))
-        return loads
+        yield load_at(axes, lever_m, self._drag.step(dt_s, sliding_m_s, largest_n), 0.0)
 
-    def _speeds_m_s(self, axes: Axes, place: Vector) -> tuple[float, float]:
-        """Of a place on the body: (forward, up) in the world."""
-        ahead_m, across_m, above_m = in_world(axes, place)
-        sp, cp = -axes.up[0], axes.forward[0]
+    def _speeds_m_s(self, axes: Axes, lever_m: Vector) -> tuple[float, float]:
+        """(forward, up) in the world, of a place on the body that far from the centre of mass in the world."""
+        ahead_m, across_m, above_m = lever_m
+        rolling_m_s = across_m * self.roll_rad_s
         return (
-            self.forward_m_s + above_m * self.pitch_rad_s + sp * across_m * self.roll_rad_s,
-            self.upward_m_s - ahead_m * self.pitch_rad_s + cp * across_m * self.roll_rad_s,
+            self.forward_m_s + above_m * self.pitch_rad_s - axes.up[0] * rolling_m_s,
+            self.upward_m_s - ahead_m * self.pitch_rad_s + axes.forward[0] * rolling_m_s,
         )

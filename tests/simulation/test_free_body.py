@@ -23,6 +23,7 @@ from simulation.free_body import (
     BodyShape,
     FreeBody,
     axes_of,
+    in_world,
     load_at,
     load_of_flipper,
 )
@@ -134,9 +135,10 @@ def test_joints_and_body_get_the_work_that_the_mud_does_on_a_carried_plate(
 ) -> None:
     wrench, body = Wrench(*parts), body_in(state, rates)
     force = contact_force(GEOMETRY, state[4], wrench)
-    flipper = Still(force)
+    flipper, other = Still(force), Still()
     flipper.sweep_rad, flipper.adduction_rad = state[4:]
-    load = body._flipper_load(side, flipper)
+    pair = (flipper, other) if side > 0.0 else (other, flipper)
+    (load,) = body.flipper_loads(axes_of(state[2], state[3]), *pair)
     twist = carried_twist(GEOMETRY, body.carriages[side < 0.0], *state[4:], *rates[4:])
     power_w = float(np.dot(load, rates[:4])) + force.sweep_nm * rates[4] + force.adduction_nm * rates[5]
     assert power_w == pytest.approx(sum(a * b for a, b in zip(wrench, twist, strict=True)), abs=1e-9)
@@ -159,7 +161,8 @@ def test_a_level_body_carries_its_flippers_as_a_rail_does(
 def test_a_force_on_the_body_does_the_work_of_its_point(
     roll_rad: float, pitch_rad: float, place: tuple[float, float, float], roll_rad_s: float, pitch_rad_s: float
 ) -> None:
-    load, moved_s = load_at(axes_of(roll_rad, pitch_rad), place, 3.0, -2.0), 1e-6
+    axes, moved_s = axes_of(roll_rad, pitch_rad), 1e-6
+    load = load_at(axes, in_world(axes, place), 3.0, -2.0)
     ahead_m, behind_m = (
         turned(roll_rad + way * moved_s * roll_rad_s, pitch_rad + way * moved_s * pitch_rad_s) @ np.array(place)
         for way in (1.0, -1.0)
@@ -398,5 +401,7 @@ def test_moments_of_a_flipper_on_a_level_body_are_levers_times_forces() -> None:
     level = Axes((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     joint = (AHEAD_M, SHAPE.width_m / 2.0, 0.0)
     x_m, y_m, _ = GEOMETRY.edge_position(sweep_rad, adduction_rad)
-    load = load_of_flipper(level, joint, force, sweep_rad, adduction_rad)
+    flipper = Still(force)
+    flipper.sweep_rad, flipper.adduction_rad = sweep_rad, adduction_rad
+    load = load_of_flipper(level, joint, flipper, 1.0)
     assert load == pytest.approx((0.0, 5.0, 5.0 * (y_m + joint[1]), -5.0 * (x_m + joint[0])), abs=1e-12)
