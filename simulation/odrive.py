@@ -23,6 +23,7 @@ from random import Random
 from typing import Annotated
 
 from control.bounds import Bounds
+from control.records import NEVER_S
 from drivers import odrive_codec as codec
 from drivers.frames import Frame
 from drivers.odrive_codec import AxisState, GarbledMessageError, Message, arbitration_id
@@ -196,15 +197,16 @@ class SimulatedOdrive:
             if self._due_s[place] <= now_s:  # held up for longer than a period: the lost ones are not made up for
                 self._due_s[place] = now_s + period_s
             for message in messages:
-                frame = self._perhaps_old(message) if self.parameters.repeated_share else self._frame(message)
-                yield frame._replace(stamp_s=now_s)
+                repeating = self.parameters.repeated_share and message in REPEATED
+                yield self._perhaps_old(message, now_s) if repeating else self._frame(message, now_s)
 
-    def _perhaps_old(self, message: Message) -> Frame:
-        """The frame before this one once more, where the drive has nothing else to tell."""
+    def _perhaps_old(self, message: Message, now_s: float) -> Frame:
+        """What the frame before told once more, where the drive has nothing else to tell."""
         told = self._told.get(message)
-        if told is None or message not in REPEATED or self._random.random() >= self.parameters.repeated_share:
-            told = self._told[message] = self._frame(message)
-        return told
+        if told is not None and self._random.random() < self.parameters.repeated_share:
+            return told._replace(stamp_s=now_s)
+        self._told[message] = frame = self._frame(message, now_s)
+        return frame
 
     def _delayed(self, frames: Iterable[Frame], now_s: float) -> Iterator[Frame]:
         """None overtakes another. Stamps tell when they arrive, as a receiver's do."""
@@ -216,8 +218,8 @@ class SimulatedOdrive:
         while self._under_way and self._under_way[0][0] <= now_s:
             yield self._under_way.popleft()[1]._replace(stamp_s=now_s)
 
-    def _frame(self, message: Message) -> Frame:
-        return Frame(arbitration_id(self.parameters.node_id, message), self._PAYLOADS[message](self))
+    def _frame(self, message: Message, stamp_s: float = NEVER_S) -> Frame:
+        return Frame(arbitration_id(self.parameters.node_id, message), self._PAYLOADS[message](self), stamp_s=stamp_s)
 
     def _encoder(self) -> bytes:
         parameters = self.parameters
