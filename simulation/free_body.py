@@ -21,11 +21,11 @@ the plate's:
     pressure up    g(v) N_c s_u + γ d at the depth d        Prandtl's strip, and the weight of the mud beside it
     drag           g(v) a s_u A of what is pressed on       adhesion, held elastically until it yields
 
-It yields YIELD_M deep and leaves a print that bears nothing until the belly is back in it or has been clear of the
-mud. The print goes along with the body: mud that it slides on to is as pressed as the mud that it comes from. There
-is no suction under the belly (air gets under it) and no mud ploughed up before it. The drag pad goes as much deeper
-as the belly does, and pulls at the belly. Nothing keeps the body from rearing or tipping over: flippers that push
-down with more than its weight lift it.
+It yields YIELD_M deep, or deeper where the body is so light that it would ring too quickly for the steps. It leaves a
+print that bears nothing until the belly is back in it or has been clear of the mud. The print goes along with the
+body: mud that it slides on to is as pressed as the mud that it comes from. There is no suction under the belly (air
+gets under it) and no mud ploughed up before it. The drag pad goes as much deeper as the belly does, and pulls at the
+belly. Nothing keeps the body from rearing or tipping over: flippers that push down with more than its weight lift it.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ from simulation.rail_body import BodyMotion, DragPad, DryDrag, Pusher
 from simulation.track import Track
 
 YIELD_M = 0.003  # two or three hundredths of a belly's width, as footings on soft clay settle before they fail
+LARGEST_RAD_S = 600.0  # at which the body may ring on its belly: steps of 1 ms follow that
 SIDES = (1.0, -1.0)  # fore, aft; left, right
 
 
@@ -123,12 +124,13 @@ class BellyQuarter:
     """Owns the print of a quarter of the belly."""
 
     def __init__(self, area_m2: float, mass_kg: float) -> None:
+        """`mass_kg`: that a push on its corner moves."""
         self.area_m2 = area_m2
-        self.mass_kg = mass_kg  # that rests on it, for the damping
+        self.mass_kg = mass_kg
         self.reset()
 
     def reset(self) -> None:
-        self._print_m = self._strength_pa = 0.0
+        self._print_m = self._stiffness_n_m = 0.0
         self.pressed = False
 
     def step(self, clay: Clay, grip: float, depth_m: float, sinking_m_s: float) -> float:
@@ -136,24 +138,23 @@ class BellyQuarter:
         if depth_m <= 0.0:
             self.reset()
             return 0.0
-        strain_m = self._strain_m(clay, depth_m)
-        self.pressed = strain_m > 0.0
+        slow_n = BEARING_FACTOR * clay.strength_pa * self.area_m2
+        stiffness_n_m = min(slow_n / YIELD_M, self.mass_kg * LARGEST_RAD_S**2)
+        elastic_n = min(stiffness_n_m * self._strain_m(stiffness_n_m, depth_m), grip * slow_n)
         floating_n = UNIT_WEIGHT_N_M3 * self.area_m2 * depth_m
+        self.pressed = elastic_n > 0.0
         if not self.pressed:
             return floating_n
-        slow_n = BEARING_FACTOR * clay.strength_pa * self.area_m2
-        strain_m = min(strain_m, grip * YIELD_M)
-        self._print_m = depth_m - strain_m
-        stiffness_n_m = slow_n / YIELD_M
-        pressing_n = stiffness_n_m * strain_m + sqrt(stiffness_n_m * self.mass_kg) * sinking_m_s
-        return floating_n + min(max(pressing_n, 0.0), grip * slow_n)
+        self._print_m = depth_m - elastic_n / stiffness_n_m
+        damping_n = sqrt(stiffness_n_m * self.mass_kg) * sinking_m_s
+        return floating_n + min(max(elastic_n + damping_n, 0.0), grip * slow_n)
 
-    def _strain_m(self, clay: Clay, depth_m: float) -> float:
+    def _strain_m(self, stiffness_n_m: float, depth_m: float) -> float:
         """Of the mud above its print. Where the mud becomes stiffer the force stays, as it does along a plate."""
         strain_m = depth_m - self._print_m
-        if strain_m > 0.0 and self._strength_pa < clay.strength_pa:
-            strain_m *= self._strength_pa / clay.strength_pa if self._strength_pa else 1.0
-        self._strength_pa = clay.strength_pa
+        if strain_m > 0.0 and 0.0 < self._stiffness_n_m < stiffness_n_m:
+            strain_m *= self._stiffness_n_m / stiffness_n_m
+        self._stiffness_n_m = stiffness_n_m
         return strain_m
 
 
@@ -169,7 +170,10 @@ class FreeBody:
         below_m = -shape.axis_above_belly_m
         self._belly = (0.0, 0.0, below_m)
         self._corners = tuple((way * ahead_m, side * aside_m, below_m) for way in SIDES for side in SIDES)
-        self._quarters = tuple(BellyQuarter(area_m2 / 4.0, mass_kg / 4.0) for _ in self._corners)
+        pitched_kg = shape.pitch_inertia_kg_m2 / shape.length_m**2
+        rolled_kg = shape.roll_inertia_kg_m2 / shape.width_m**2
+        moved_kg = min(mass_kg / 4.0, pitched_kg, rolled_kg)  # of the four corners together, the lightest motion
+        self._quarters = tuple(BellyQuarter(area_m2 / 4.0, moved_kg) for _ in self._corners)
         self._joint = (shape.axis_forward_m, shape.width_m / 2.0, 0.0)  # of either flipper, in its own axes
         self._drag = DryDrag()
         self.reset()
