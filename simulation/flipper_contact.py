@@ -7,7 +7,7 @@ the lower edge stands at ((l + u) sin α, (l + u) cos α, s - h) and moves with
     v_n = (l + u) α' + X' cos α - (h - s) sin α β'    v_r = X' sin α + (h - s) cos α β'    v_s = (l + u) cos α β'
 
 where X' is the body's speed. The same coefficients, transposed, turn the mud's forces into joint torques and thrust;
-its depth is ζ = z - u cos α sin β - s cos β.
+its depth is ζ = z - u cos α sin β - s cos β. A body that also rises and turns adds to all of this: see carriage.py.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from math import cos, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
+from simulation.carriage import Carriage, carried_attitude, carried_twist
 from simulation.clay import Clay
 from simulation.plate_contact import Attitude, PlateContact, PlateSize, Twist, Wrench, lowest_point_m
 
@@ -27,6 +28,7 @@ class ContactForce(NamedTuple):
     normal_n: float  # along the plate's normal
     outward_n: float  # along the arm
     upward_n: float  # along the plate, up: in insertion positive
+    tilting_nm: float = 0.0  # on the body, about the outward axis that tilts with adduction, through the joints' axes
 
 
 NO_CONTACT = ContactForce(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -41,9 +43,14 @@ def attitude_of(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: floa
     return Attitude(depth_m, -cos(sweep_rad) * sin(adduction_rad), cos(adduction_rad))
 
 
-def lowest_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> float:
+def lowest_m(
+    geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, carriage: Carriage | None = None
+) -> float:
     """Depth of the plate's lower corner below the mud's nominal surface."""
-    return lowest_point_m(attitude_of(geometry, sweep_rad, adduction_rad), geometry.plate_width_m)
+    attitude = attitude_of(geometry, sweep_rad, adduction_rad)
+    if carriage is not None:
+        attitude = carried_attitude(geometry, carriage, sweep_rad, adduction_rad, 0.0)
+    return lowest_point_m(attitude, geometry.plate_width_m)
 
 
 def twist_of(
@@ -75,6 +82,7 @@ def contact_force(geometry: FlipperGeometry, sweep_rad: float, wrench: Wrench) -
         wrench.normal_n,
         wrench.outward_n,
         wrench.upward_n,
+        -sa * (outward_nm + lifting_nm) - ca * across_nm,
     )
 
 
@@ -98,10 +106,20 @@ class FlipperContact:
         adduction_velocity_rad_s: float,
         body_velocity_m_s: float,
         surface_m: float = 0.0,
+        carriage: Carriage | None = None,
     ) -> ContactForce:
-        """`surface_m`: how far the mud's surface lies below its nominal height."""
-        attitude = attitude_of(self.geometry, sweep_rad, adduction_rad, surface_m)
+        """`surface_m`: how far the mud's surface lies below its nominal height; `carriage`: of a body off its rail."""
+        geometry = self.geometry
+        if carriage is None:
+            attitude = attitude_of(geometry, sweep_rad, adduction_rad, surface_m)
+        else:
+            attitude = carried_attitude(geometry, carriage, sweep_rad, adduction_rad, surface_m)
         if self.plate.leaves(attitude):  # as in swing: nothing else to compute
             return NO_CONTACT
-        twist = twist_of(self.geometry, sweep_rad, sweep_velocity_rad_s, adduction_velocity_rad_s, body_velocity_m_s)
-        return contact_force(self.geometry, sweep_rad, self.plate.step(dt_s, clay, attitude, twist))
+        if carriage is None:
+            twist = twist_of(geometry, sweep_rad, sweep_velocity_rad_s, adduction_velocity_rad_s, body_velocity_m_s)
+        else:
+            twist = carried_twist(
+                geometry, carriage, sweep_rad, adduction_rad, sweep_velocity_rad_s, adduction_velocity_rad_s
+            )
+        return contact_force(geometry, sweep_rad, self.plate.step(dt_s, clay, attitude, twist))

@@ -7,12 +7,11 @@ encoded and decoded.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from random import Random
 from typing import Any
 
 from control.controller import WalkOrder
 from control.modes import Mode, Request
-from control.records import JOINTS, BodyPose
+from control.records import JOINTS
 from drivers.mock_bus import MockBus
 from drivers.odrive_drives import OdriveDrives
 from firmware_host.configuration import Configuration
@@ -20,12 +19,12 @@ from firmware_host.loop import Loop
 from firmware_host.recorder import NullRecorder, Recording
 from firmware_host.ticker import PERIOD_S, Beat
 from simulation.disturbances import NONE, Disturbances, drive_changes
+from simulation.free_body import BodyShape
+from simulation.motion_capture import AT_EVERY_TICK, MotionCaptureParameters, SimulatedPose
 from simulation.odrive import OdriveParameters
 from simulation.plant import PlantParameters
 from simulation.robot import SimulatedRobot
 from simulation.track import Track
-
-POSE_NOISE_M = 1e-4  # of a motion-capture system at the scale of this track
 
 
 def drives_of(configuration: Configuration, **changes: Any) -> dict[str, OdriveParameters]:
@@ -45,24 +44,15 @@ def drives_of(configuration: Configuration, **changes: Any) -> dict[str, OdriveP
 def plant_of(
     configuration: Configuration, disturbances: Disturbances = NONE, fixed_base: bool = False, **changes: Any
 ) -> PlantParameters:
-    return PlantParameters(
-        geometry=configuration.geometry,
-        arm_mass=configuration.arm,
-        disturbances=disturbances,
-        fixed_base=fixed_base,
-        **changes,
-    )
-
-
-class SimulatedPose:
-    """The robot's true place with a little noise, as motion capture would send it."""
-
-    def __init__(self, robot: SimulatedRobot, seed: int) -> None:
-        self._robot = robot
-        self._random = Random(seed)
-
-    def read(self, now_s: float) -> BodyPose:
-        return BodyPose(now_s, self._robot.plant.body_m + self._random.gauss(0.0, POSE_NOISE_M))
+    """Mechanics that fit a configuration, with changes by name: a free body's joints are as high as its flippers'."""
+    fitting: dict[str, Any] = {
+        "geometry": configuration.geometry,
+        "arm_mass": configuration.arm,
+        "disturbances": disturbances,
+        "fixed_base": fixed_base,
+        "body": BodyShape(axis_above_belly_m=configuration.geometry.axis_height_m),
+    }
+    return PlantParameters(**(fitting | changes))
 
 
 class Lockstep:
@@ -81,6 +71,7 @@ class Lockstep:
         fixed_base: bool = False,
         plant: PlantParameters | None = None,
         drives: Mapping[str, OdriveParameters] | None = None,
+        motion_capture: MotionCaptureParameters = AT_EVERY_TICK,
     ) -> None:
         buses = {name: MockBus() for name in configuration.bus}
         self.robot = SimulatedRobot(
@@ -92,7 +83,7 @@ class Lockstep:
             seed,
         )
         ports = OdriveDrives(configuration.drive, {name: bus.open() for name, bus in buses.items()})
-        pose = SimulatedPose(self.robot, seed + 1)
+        pose = SimulatedPose(self.robot.plant, motion_capture, seed + 1)
         self.loop = Loop(configuration, ports, pose, recorder or NullRecorder(), clock=lambda: self.now_s)
         self.tick_number = 0
 

@@ -1,43 +1,65 @@
 """A motor drive as the bus sees it: ODrive CANSimple 0.6, byte for byte.
 
 Axis state machine (idle, closed loop), error word with disarm reason, watchdog, torque mode with the velocity-limit
-clamp and the current limits, cyclic messages, requests by remote frame. The motor turns current into torque by its
-own constant and reports the current with noise and the angle in steps of its encoder.
+clamp and the current limits, cyclic messages, requests by remote frame. What no drive tells stands between it and the
+joint, each off at 0. The motor's true constant differs from the one that the drive reckons with; current follows its
+command with a first-order lag; magnets pull towards detents at any current. The encoder has steps, noise and an
+offset, the current noise. Messages arrive late by evenly drawn times, though in order, and some tell their old values
+again. (The velocity is the drive's own filtered one and has no noise here.)
+
+Cogging is the slope of an energy that repeats n times a turn, so it takes as much as it gives, and no pure sine:
+
+    τ = -A [sin(n θ + φ) + 0.25 sin(2 (n θ + φ))]         the second harmonic is made up, the first is what is stated
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from math import inf, isfinite, pi
+from math import exp, inf, isfinite, pi, radians, sin
 from random import Random
+from typing import Annotated
 
+from control.bounds import Bounds
+from control.records import NEVER_S
 from drivers import odrive_codec as codec
 from drivers.frames import Frame
 from drivers.odrive_codec import AxisState, GarbledMessageError, Message, arbitration_id
 
 TURN_RAD = 2.0 * pi
+SECOND_HARMONIC = 0.25
+REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
 VERSION_FIELDS = (2, 4, 4, 58, 0, 6, 11, 0)  # protocol 2, an ODrive Pro, firmware 0.6.11
 
 
 @dataclass(frozen=True)
 class OdriveParameters:
-    node_id: int
-    sign: int = 1
-    zero_turn: float = 0.0
-    torque_constant_nm_a: float = 0.083
-    current_noise_a: float = 0.1
-    encoder_counts: int = 16384
-    watchdog_s: float = 0.1  # 0: off, as ODrives are delivered
-    encoder_period_s: float = 0.002
-    current_period_s: float = 0.002
-    heartbeat_period_s: float = 0.1
-    slow_period_s: float = 0.1  # error, temperature, bus voltage
-    velocity_gain_nm_s_turn: float = 1.0 / 6.0  # ODrive's default vel_gain, used by the torque clamp
-    temperature_c: float = 30.0
-    bus_voltage_v: float = 24.0
-    motor_current_limit_a: float = inf  # the motor's own clip, whatever limit the bus sets
+    node_id: Annotated[int, Bounds(0, 62)]
+    sign: Annotated[int, Bounds(-1, 1)] = 1
+    zero_turn: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0
+    torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0)] = 0.083  # that the drive reckons with
+    torque_constant_error: Annotated[float, Bounds(-0.5, 0.5)] = 0.0  # share by which the true one is larger
+    cogging_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
+    cogging_per_turn: Annotated[int, Bounds(1, 1000)] = 84  # 12 slots and 14 magnets, as many small motors have
+    cogging_phase_deg: Annotated[float, Bounds(-360.0, 360.0)] = 0.0
+    current_lag_s: Annotated[float, Bounds(0.0, 0.1)] = 0.0  # time constant
+    current_noise_a: Annotated[float, Bounds(0.0, 10.0)] = 0.1
+    encoder_counts: Annotated[int, Bounds(16, 16777216)] = 16384
+    encoder_offset_rad: Annotated[float, Bounds(-pi, pi)] = 0.0  # what the joint is read to be beyond where it is
+    encoder_noise_rad: Annotated[float, Bounds(0.0, 0.1)] = 0.0
+    watchdog_s: Annotated[float, Bounds(0.0, 60.0)] = 0.1  # 0: off, as ODrives are delivered
+    encoder_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
+    current_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
+    heartbeat_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.1
+    slow_period_s: Annotated[float, Bounds(0.001, 10.0)] = 0.1  # error, temperature, bus voltage
+    message_delay_s: Annotated[float, Bounds(0.0, 0.05)] = 0.0  # longest
+    repeated_share: Annotated[float, Bounds(0.0, 0.99)] = 0.0  # of the messages of angle, and of current
+    velocity_gain_nm_s_turn: Annotated[float, Bounds(0.0, 100.0)] = 1.0 / 6.0  # ODrive's default vel_gain, in the clamp
+    temperature_c: Annotated[float, Bounds(-50.0, 200.0)] = 30.0
+    bus_voltage_v: Annotated[float, Bounds(0.0, 100.0)] = 24.0
+    motor_current_limit_a: Annotated[float, Bounds(0.0, inf)] = inf  # the motor's own clip, whatever limit the bus sets
 
 
 class SimulatedOdrive:
@@ -57,7 +79,10 @@ class SimulatedOdrive:
         self._velocity_limit_turn_s, self._current_limit_a = 2.0, 10.0  # ODrive's defaults
         self._fed_s = now_s
         self._current_a = 0.0
+        self._stepped_s = now_s
         self._turns = self._turns_s = 0.0
+        self._told: dict[Message, Frame] = {}
+        self._under_way: deque[tuple[float, Frame]] = deque()  # when it arrives, and what
         periods = self.parameters
         self._schedule: list[tuple[float, tuple[Message, ...]]] = [
             (periods.encoder_period_s, (codec.GET_ENCODER_ESTIMATES,)),
@@ -123,26 +148,48 @@ class SimulatedOdrive:
         parameters = self.parameters
         if self.axis_state is AxisState.CLOSED_LOOP and 0.0 < parameters.watchdog_s < now_s - self._fed_s:
             self._disarm(codec.ERROR_WATCHDOG)
-        if self.axis_state is not AxisState.CLOSED_LOOP or self._modes != (codec.TORQUE_CONTROL, codec.PASSTHROUGH):
+        torque_nm = 0.0
+        if self.axis_state is AxisState.CLOSED_LOOP and self._modes == (codec.TORQUE_CONTROL, codec.PASSTHROUGH):
+            torque_nm = self._reckoned_nm(now_s) * (1.0 + parameters.torque_constant_error)
+        else:
             self._current_a = 0.0
-            return 0.0
+        self._stepped_s = now_s
+        if parameters.cogging_nm:
+            torque_nm += self._cogging_nm()
+        return parameters.sign * torque_nm
+
+    def _reckoned_nm(self, now_s: float) -> float:
+        """What the drive believes to exert: clamped as it clamps, and as far as the current has come."""
+        parameters = self.parameters
         gain, limit = parameters.velocity_gain_nm_s_turn, self._velocity_limit_turn_s
         torque_nm = min(max(self._setpoint_nm, (-limit - self._turns_s) * gain), (limit - self._turns_s) * gain)
         largest_a = min(self._current_limit_a, parameters.motor_current_limit_a)
         largest_nm = largest_a * parameters.torque_constant_nm_a
         torque_nm = min(max(torque_nm, -largest_nm), largest_nm)
+        if parameters.current_lag_s:
+            before_nm = self._current_a * parameters.torque_constant_nm_a
+            torque_nm += (before_nm - torque_nm) * exp((self._stepped_s - now_s) / parameters.current_lag_s)
         self._current_a = torque_nm / parameters.torque_constant_nm_a
-        return parameters.sign * torque_nm
+        return torque_nm
+
+    def _cogging_nm(self) -> float:
+        """At the motor, by its true angle."""
+        parameters = self.parameters
+        angle = parameters.cogging_per_turn * TURN_RAD * self._turns + radians(parameters.cogging_phase_deg)
+        return -parameters.cogging_nm * (sin(angle) + SECOND_HARMONIC * sin(2.0 * angle))
 
     def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
         """Take in where the joint is."""
         parameters = self.parameters
-        turns = parameters.sign * angle_rad / TURN_RAD + parameters.zero_turn
-        self._turns = round(turns * parameters.encoder_counts) / parameters.encoder_counts
+        self._turns = parameters.sign * angle_rad / TURN_RAD + parameters.zero_turn
         self._turns_s = parameters.sign * velocity_rad_s / TURN_RAD
 
     def cyclic_frames(self, now_s: float) -> Iterator[Frame]:
-        """The messages that have come due."""
+        """The messages that have come due, or what arrives of them."""
+        frames = self._due_frames(now_s)
+        return self._delayed(frames, now_s) if self.parameters.message_delay_s else frames
+
+    def _due_frames(self, now_s: float) -> Iterator[Frame]:
         for place, (period_s, messages) in enumerate(self._schedule):
             if now_s < self._due_s[place]:
                 continue
@@ -150,13 +197,38 @@ class SimulatedOdrive:
             if self._due_s[place] <= now_s:  # held up for longer than a period: the lost ones are not made up for
                 self._due_s[place] = now_s + period_s
             for message in messages:
-                yield self._frame(message)._replace(stamp_s=now_s)
+                repeating = self.parameters.repeated_share and message in REPEATED
+                yield self._perhaps_old(message, now_s) if repeating else self._frame(message, now_s)
 
-    def _frame(self, message: Message) -> Frame:
-        return Frame(arbitration_id(self.parameters.node_id, message), self._PAYLOADS[message](self))
+    def _perhaps_old(self, message: Message, now_s: float) -> Frame:
+        """What the frame before told once more, where the drive has nothing else to tell."""
+        told = self._told.get(message)
+        if told is not None and self._random.random() < self.parameters.repeated_share:
+            return told._replace(stamp_s=now_s)
+        self._told[message] = frame = self._frame(message, now_s)
+        return frame
+
+    def _delayed(self, frames: Iterable[Frame], now_s: float) -> Iterator[Frame]:
+        """None overtakes another. Stamps tell when they arrive, as a receiver's do."""
+        for frame in frames:
+            arrival_s = now_s + self.parameters.message_delay_s * self._random.random()
+            if self._under_way:
+                arrival_s = max(arrival_s, self._under_way[-1][0])
+            self._under_way.append((arrival_s, frame))
+        while self._under_way and self._under_way[0][0] <= now_s:
+            yield self._under_way.popleft()[1]._replace(stamp_s=now_s)
+
+    def _frame(self, message: Message, stamp_s: float = NEVER_S) -> Frame:
+        return Frame(arbitration_id(self.parameters.node_id, message), self._PAYLOADS[message](self), stamp_s=stamp_s)
 
     def _encoder(self) -> bytes:
-        return codec.GET_ENCODER_ESTIMATES.encode(self._turns, self._turns_s)
+        parameters = self.parameters
+        wrong_rad = parameters.encoder_offset_rad
+        if parameters.encoder_noise_rad:
+            wrong_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
+        turns = self._turns + parameters.sign * wrong_rad / TURN_RAD
+        told_turns = round(turns * parameters.encoder_counts) / parameters.encoder_counts
+        return codec.GET_ENCODER_ESTIMATES.encode(told_turns, self._turns_s)
 
     def _iq(self) -> bytes:
         noise_a = self.parameters.current_noise_a

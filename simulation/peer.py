@@ -13,7 +13,6 @@ import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from random import Random
 
 from control.records import JOINTS
 from drivers.pose_port import PoseSender
@@ -21,30 +20,29 @@ from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration import EXIT_CONFIGURATION, Configuration, ConfigurationError, load_configuration
 from firmware_host.ticker import Ticker
 from simulation.clay import MUDS
-from simulation.lockstep import POSE_NOISE_M
+from simulation.motion_capture import OF_THE_PAPER, MotionCapture
+from simulation.plant import Plant
 from simulation.robot import SimulatedRobot
 from simulation.track import COMPARTMENT_M, Track
 from simulation.world import World, load_world
 
 STEP_S = 0.002  # the period of the drives' fastest messages
-POSE_PERIOD_S = 1.0 / 120.0  # the paper's motion capture
 WATCHDOG_S = 0.25  # of the simulated drives, on processors that everything shares
 LONGEST_CATCH_UP_S = 0.5  # a robot that was stopped for longer has lost that time
 PR_SET_PDEATHSIG = 1
 
 
 class PoseBroadcast:
-    """Sends the body's place when it is due."""
+    """Sends the body's place as motion capture sees it."""
 
     def __init__(self, path: str, seed: int) -> None:
         self._sender = PoseSender(Path(path)) if path else None
-        self._random = Random(seed)
-        self._due_s = 0.0
+        self._capture = MotionCapture(OF_THE_PAPER, seed)
 
-    def step(self, now_s: float, x_m: float) -> None:
-        if self._sender is not None and now_s >= self._due_s:
-            self._due_s = max(self._due_s + POSE_PERIOD_S, now_s)
-            self._sender.send(now_s, x_m + self._random.gauss(0.0, POSE_NOISE_M))
+    def step(self, now_s: float, plant: Plant) -> None:
+        if self._sender is not None:
+            for frame in self._capture.step(now_s, plant):
+                self._sender.send(*frame)
 
 
 class Peer:
@@ -73,7 +71,7 @@ class Peer:
             if now_s - self.robot.now_s > LONGEST_CATCH_UP_S:
                 self.robot.now_s = now_s
             self.robot.advance(now_s)
-            self._pose.step(now_s, self.robot.plant.body_m)
+            self._pose.step(now_s, self.robot.plant)
         for port in self._ports.values():
             port.close()
 

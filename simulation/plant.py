@@ -1,31 +1,36 @@
-"""The robot's mechanics: two arms with two joints each, and a body on a rail.
+"""The robot's mechanics: two arms with two joints each, and a body on a rail, on a fixed base or free.
 
-Arms have a constant inertia about each joint, gravity and a little viscous friction; their mass is small beside the
-body's, so they do not throw it about. The rail's drag and the drag pad in the mud hold the body elastically until
-they yield. What earlier strokes left behind is each arm's own history, off by default. Semi-implicit Euler at STEP_S:
-the stiffest spring, mud along a plate 5 cm deep in the stiffest of the paper's muds, makes the arm swing at about
+Arms have a constant inertia about each joint, the gravity of a level body and friction; their mass is small beside
+the body's, so they do not throw it about. Viscous friction grows with speed; Coulomb's, off at 0, takes a constant
+torque as long as a joint turns and holds it where less than that would turn it. It is solved for the velocity at the
+end of a step, which it brings to zero but never turns round, so a joint sticks and steps of any length are stable.
+What earlier strokes left behind is each arm's own history, off by default. Semi-implicit Euler at STEP_S: the
+stiffest spring, mud along a plate 5 cm deep in the stiffest of the paper's muds, makes the arm swing at about
 400 rad/s.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians, sin
+from math import copysign, radians, sin
 from operator import add
 from random import Random
+from typing import Annotated
 
+from control.bounds import Bounds
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.records import JointAngles, Torques
-from simulation.clay import Clay, rate_factor
+from simulation.carriage import Carriage
+from simulation.clay import Clay
 from simulation.disturbances import NONE, Disturbances, StrokeHistory, clinging_torques_nm
 from simulation.flipper_contact import NO_CONTACT, ContactForce, FlipperContact, contact_force, lowest_m
+from simulation.free_body import BodyShape, FreeBody
+from simulation.rail_body import Body, BodyMotion, DragPad, RailBody
 from simulation.stones import NO_PUSH, StoneContact, push_wrench
 from simulation.track import Track
 
 STEP_S = 0.001
-DRAG_STIFFNESS_N_M = 5000.0
-DRAG_DAMPING_N_S_M = 71.0  # half of critical with the body's mass: dry friction lets nothing ring
 END_STOPS_RAD = (radians(100.0), radians(85.0))  # sweep, adduction: the arm meets the body
 
 
@@ -33,14 +38,22 @@ END_STOPS_RAD = (radians(100.0), radians(85.0))  # sweep, adduction: the arm mee
 class PlantParameters:
     geometry: FlipperGeometry = FlipperGeometry()
     arm_mass: ArmMass = ArmMass()
-    joint_friction_nm_s: float = 0.002
-    body_mass_kg: float = 1.0
-    rail_drag_n: float = 2.5  # the paper's, without the pad
-    rail_damping_n_s_m: float = 6.0  # how drag grows with speed: fitted to Table I with the muds' strengths
-    pad_width_m: float = 0.015
-    pad_depth_m: float = 0.02
+    joint_friction_nm_s: Annotated[float, Bounds(0.0, 0.1)] = 0.002
+    joint_coulomb_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
+    body_mass_kg: Annotated[float, Bounds(0.05, 100.0)] = 1.0
+    rail_drag_n: Annotated[float, Bounds(0.0, 100.0)] = 2.5  # the paper's, without the pad
+    rail_damping_n_s_m: Annotated[float, Bounds(0.0, 1000.0)] = 6.0  # how that grows with speed: fitted to Table I
+    pad_width_m: Annotated[float, Bounds(0.0, 0.5)] = 0.015
+    pad_depth_m: Annotated[float, Bounds(0.0, 0.5)] = 0.02
     disturbances: Disturbances = NONE
     fixed_base: bool = False  # the body never moves, as in the paper's trials of a single flipper
+    free_body: bool = False  # without a rail, of this shape
+    body: BodyShape = BodyShape()
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for what cannot be."""
+        if self.fixed_base and self.free_body:
+            raise ValueError("a body on a fixed base cannot be free")
 
 
 class Arm:
@@ -65,6 +78,7 @@ class Arm:
         self.contact.reset()
         if self.stones:
             self.stones.reset()
+        self.carriage: Carriage | None = None
         self.force = NO_CONTACT
         self.clay = self.track.clay_at(0.0)
 
@@ -73,7 +87,17 @@ class Arm:
         """How far the mud that this flipper meets lies below its nominal height."""
         return self.relief_m + self.history.surface_m
 
-    def step(self, dt_s: float, body_m: float, body_m_s: float, sweep_nm: float, lift_nm: float) -> None:
+    def step(
+        self,
+        dt_s: float,
+        body_m: float,
+        body_m_s: float,
+        sweep_nm: float,
+        lift_nm: float,
+        carriage: Carriage | None = None,
+    ) -> None:
+        """`carriage`: how a free body carries this arm."""
+        self.carriage = carriage
         self._look_at_mud(body_m)
         self.force = self.contact.step(
             dt_s,
@@ -84,6 +108,7 @@ class Arm:
             self.adduction_velocity_rad_s,
             body_m_s,
             self.surface_m,
+            carriage,
         )
         if self.stones:
             self._meet_stones(self.stones, dt_s, body_m)
@@ -96,14 +121,15 @@ class Arm:
         edge_m = body_m + geometry.flipper_length_m * sin(self.sweep_rad)
         self.relief_m = self.track.surface_m(edge_m)
         if self._disturbed:
-            self.history.step(lowest_m(geometry, self.sweep_rad, self.adduction_rad) - self.relief_m, edge_m)
+            deepest_m = lowest_m(geometry, self.sweep_rad, self.adduction_rad, self.carriage)
+            self.history.step(deepest_m - self.relief_m, edge_m)
         clay, firmness = self.track.clay_at(edge_m), self.history.firmness
         self.clay = clay if firmness == 1.0 else Clay(clay.name, firmness * clay.strength_pa, clay.layers)
 
     def _meet_stones(self, stones: StoneContact, dt_s: float, body_m: float) -> None:
         geometry, sweep_rad, adduction_rad = self.parameters.geometry, self.sweep_rad, self.adduction_rad
         edge_m = body_m + geometry.flipper_length_m * sin(sweep_rad)
-        push = stones.step(dt_s, edge_m, lowest_m(geometry, sweep_rad, adduction_rad))
+        push = stones.step(dt_s, edge_m, lowest_m(geometry, sweep_rad, adduction_rad, self.carriage))
         if push is not NO_PUSH:
             pushed = contact_force(geometry, sweep_rad, push_wrench(geometry, sweep_rad, adduction_rad, push))
             self.force = ContactForce(*map(add, self.force, pushed))
@@ -121,9 +147,15 @@ class Arm:
         return sweep_nm, lift_nm
 
     def _move(self, dt_s: float, sweep_nm: float, lift_nm: float) -> None:
-        mass = self.parameters.arm_mass
+        mass, coulomb_nm = self.parameters.arm_mass, self.parameters.joint_coulomb_nm
         self.sweep_velocity_rad_s += dt_s * sweep_nm / mass.sweep_inertia_kg_m2
         self.adduction_velocity_rad_s += dt_s * lift_nm / mass.adduction_inertia_kg_m2
+        if coulomb_nm:
+            impulse_nm_s = dt_s * coulomb_nm
+            self.sweep_velocity_rad_s = _slowed(self.sweep_velocity_rad_s, impulse_nm_s / mass.sweep_inertia_kg_m2)
+            self.adduction_velocity_rad_s = _slowed(
+                self.adduction_velocity_rad_s, impulse_nm_s / mass.adduction_inertia_kg_m2
+            )
         self.sweep_rad, self.sweep_velocity_rad_s = _moved(
             self.sweep_rad, self.sweep_velocity_rad_s, dt_s, END_STOPS_RAD[0]
         )
@@ -132,11 +164,23 @@ class Arm:
         )
 
 
+def _slowed(velocity_rad_s: float, loss_rad_s: float) -> float:
+    """By dry friction, at most to a halt."""
+    return copysign(max(abs(velocity_rad_s) - loss_rad_s, 0.0), velocity_rad_s)
+
+
 def _moved(angle_rad: float, velocity_rad_s: float, dt_s: float, stop_rad: float) -> tuple[float, float]:
     angle_rad += velocity_rad_s * dt_s
     if -stop_rad < angle_rad < stop_rad:
         return angle_rad, velocity_rad_s
     return min(max(angle_rad, -stop_rad), stop_rad), 0.0
+
+
+def body_of(parameters: PlantParameters, track: Track) -> Body:
+    mass_kg, pad = parameters.body_mass_kg, DragPad(parameters.pad_width_m, parameters.pad_depth_m)
+    if parameters.free_body:
+        return FreeBody(mass_kg, parameters.body, pad, track)
+    return RailBody(mass_kg, parameters.rail_drag_n, parameters.rail_damping_n_s_m, pad, track)
 
 
 class Plant:
@@ -148,13 +192,26 @@ class Plant:
         random = random or Random(1)
         left, right = (Arm(parameters, track, random.getrandbits(32)) for _ in range(2))
         self.arms = (left, right)
+        self.body = body_of(parameters, track)
         self.reset()
 
     def reset(self) -> None:
         for arm in self.arms:
             arm.reset()
-        self.body_m = self.body_m_s = 0.0
-        self._drag_m = 0.0
+        self.body.reset()
+
+    @property
+    def body_m(self) -> float:
+        """The body's place along the track."""
+        return self.body.forward_m
+
+    @property
+    def body_m_s(self) -> float:
+        return self.body.forward_m_s
+
+    @property
+    def motion(self) -> BodyMotion:
+        return self.body.motion
 
     @property
     def angles_rad(self) -> JointAngles:
@@ -172,22 +229,9 @@ class Plant:
         )
 
     def step(self, dt_s: float, torques_nm: Torques) -> None:
-        left, right = self.arms
-        left.step(dt_s, self.body_m, self.body_m_s, torques_nm[0], torques_nm[1])
-        right.step(dt_s, self.body_m, self.body_m_s, torques_nm[2], torques_nm[3])
-        if self.parameters.fixed_base:
-            return
-        thrust_n = left.force.thrust_n + right.force.thrust_n
-        drag_n = self._drag_n(dt_s) - self.parameters.rail_damping_n_s_m * self.body_m_s
-        self.body_m_s += dt_s * (thrust_n + drag_n) / self.parameters.body_mass_kg
-        self.body_m += dt_s * self.body_m_s
-
-    def _drag_n(self, dt_s: float) -> float:
-        """Rail and pad together: elastic up to their yield force, then sliding."""
-        parameters, clay = self.parameters, self.track.clay_at(self.body_m)
-        pad_n = clay.lateral_n(parameters.pad_depth_m, parameters.pad_width_m) if parameters.pad_width_m else 0.0
-        largest_n = parameters.rail_drag_n + rate_factor(abs(self.body_m_s)) * pad_n
-        self._drag_m += dt_s * self.body_m_s
-        elastic_n = min(max(-DRAG_STIFFNESS_N_M * self._drag_m, -largest_n), largest_n)
-        self._drag_m = -elastic_n / DRAG_STIFFNESS_N_M
-        return min(max(elastic_n - DRAG_DAMPING_N_S_M * self.body_m_s, -largest_n), largest_n)
+        (left, right), body = self.arms, self.body
+        left_carriage, right_carriage = body.carriages
+        left.step(dt_s, body.forward_m, body.forward_m_s, torques_nm[0], torques_nm[1], left_carriage)
+        right.step(dt_s, body.forward_m, body.forward_m_s, torques_nm[2], torques_nm[3], right_carriage)
+        if not self.parameters.fixed_base:
+            body.step(dt_s, left, right)

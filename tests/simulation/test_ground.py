@@ -121,7 +121,7 @@ def test_ridges_come_on_top_of_the_unevenness_from_stride_to_stride() -> None:
         for ridges in (LEVEL, Ridges(0.004, 0.2))
     )
     for plant in (level, ridged):
-        plant.body_m = 0.05
+        plant.body.forward_m = 0.05
         plant.step(STEP_S, NO_TORQUE)
     for plain, lifted in zip(level.arms, ridged.arms, strict=True):
         assert plain.surface_m != 0.0
@@ -133,7 +133,7 @@ def test_a_flipper_comes_to_rest_as_far_below_a_crest_as_below_a_trough() -> Non
     depths_m = []
     for crest_m in (0.005, -0.005):
         plant = Plant(PlantParameters(fixed_base=True), Track([(9.0, MUDS["48.5"])], ridges=Ridges(0.005, 0.2)))
-        plant.body_m = 0.05 if crest_m > 0.0 else 0.15
+        plant.body.forward_m = 0.05 if crest_m > 0.0 else 0.15
         depths_m.append(depth_m(press(plant, -0.2).arms[0]) + crest_m)
     assert depths_m[0] > 0.003
     assert depths_m[0] == pytest.approx(depths_m[1], abs=0.001)

@@ -11,7 +11,9 @@ from drivers.frames import Frame
 from drivers.odrive_codec import ERROR_WATCHDOG, AxisState
 from firmware_host.configuration import Configuration
 from simulation.clay import MUDS
-from simulation.lockstep import Lockstep
+from simulation.disturbances import LAB
+from simulation.lockstep import Lockstep, drives_of, plant_of
+from simulation.motion_capture import MotionCaptureParameters
 from simulation.track import Track
 
 TRACK = Track([(1.0, MUDS["48.5"])])
@@ -54,6 +56,37 @@ def test_on_a_fixed_base_the_flippers_walk_and_the_body_stays(configuration: Con
     assert len(lockstep.loop.strides) >= 4
     assert lockstep.robot.plant.body_m == 0.0
     assert abs(lockstep.loop.body.x_m) < 0.001  # what motion capture sees of it
+
+
+def test_a_plant_and_drives_of_one_s_own_are_used_as_they_are(configuration: Configuration) -> None:
+    plant = plant_of(configuration, joint_coulomb_nm=0.01)
+    drives = drives_of(configuration, cogging_nm=0.005, torque_constant_error=0.03)
+    lockstep = Lockstep(configuration, TRACK, disturbances=LAB, plant=plant, drives=drives)
+    assert lockstep.robot.plant.parameters is plant
+    assert [drive.parameters for drive in lockstep.robot.drives] == [drives[joint] for joint in JOINTS]
+
+
+def test_it_walks_with_everything_that_can_be_wrong_with_its_joints_and_its_pose(configuration: Configuration) -> None:
+    drives = drives_of(
+        configuration,
+        torque_constant_error=-0.05,
+        cogging_nm=0.01,
+        current_lag_s=0.0005,
+        current_noise_a=0.3,
+        encoder_offset_rad=0.01,
+        encoder_noise_rad=0.0002,
+        message_delay_s=0.001,
+        repeated_share=0.2,
+    )
+    cameras = MotionCaptureParameters(rate_hz=120.0, latency_s=0.01, dropouts_per_s=0.3)
+    plant = plant_of(configuration, joint_coulomb_nm=0.01)
+    lockstep = Lockstep(configuration, TRACK, plant=plant, drives=drives, motion_capture=cameras)
+    lockstep.arm()
+    lockstep.walk(WalkOrder(0.03))
+    lockstep.run_for(5.0)
+    assert lockstep.loop.fault is None
+    assert len(lockstep.loop.strides) >= 4
+    assert lockstep.robot.plant.body_m > 0.2
 
 
 def test_nothing_is_transmitted_before_every_drive_was_heard(configuration: Configuration) -> None:

@@ -1,7 +1,8 @@
 """The simulated drive, held against what ODrive documents: states, watchdog, clamps, periods, answers."""
 
 from collections import Counter
-from math import isfinite, pi
+from itertools import pairwise
+from math import exp, isfinite, pi
 from random import Random
 
 import numpy as np
@@ -254,3 +255,116 @@ def test_a_torque_that_is_no_number_is_ignored() -> None:
     drive = make_armed_drive()
     tell(drive, SET_INPUT_TORQUE, float("nan"))
     assert isfinite(drive.torque_nm(0.0))
+
+
+def test_a_motor_with_another_constant_exerts_another_torque_and_reports_the_believed_current() -> None:
+    drive = make_armed_drive(torque_constant_error=-0.1, current_noise_a=0.0)
+    tell(drive, SET_INPUT_TORQUE, 0.3)
+    assert drive.torque_nm(0.0) == pytest.approx(0.27)
+    assert ask(drive, GET_IQ)[1] == pytest.approx(0.3 / 0.083)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_cogging_has_the_stated_amplitude_and_number_per_turn_and_gives_no_energy(sign: int) -> None:
+    drive = make_drive(cogging_nm=0.02, cogging_per_turn=14, sign=sign)  # idle: magnets know no power
+    angles_rad = np.arange(1400) * 2.0 * pi / 1400
+    torques_nm = []
+    for angle_rad in angles_rad:
+        drive.measure(angle_rad, 0.0)
+        torques_nm.append(drive.torque_nm(0.0))
+    spectrum = np.abs(np.fft.rfft(torques_nm)) * 2.0 / 1400
+    assert spectrum[14] == pytest.approx(0.02)
+    assert spectrum[28] == pytest.approx(0.005)
+    assert sum(spectrum) == pytest.approx(0.025)  # nothing else, and no mean: a turn takes what it gives
+    assert torques_nm[1] < 0.0 < torques_nm[-1]  # a detent holds the joint where it is
+
+
+def test_cogging_adds_to_what_the_motor_is_told_and_is_not_reported() -> None:
+    drive = make_armed_drive(cogging_nm=0.02, cogging_phase_deg=90.0, current_noise_a=0.0)
+    tell(drive, SET_INPUT_TORQUE, 0.3)
+    assert drive.torque_nm(0.0) == pytest.approx(0.28)
+    assert ask(drive, GET_IQ)[1] == pytest.approx(0.3 / 0.083)
+
+
+@pytest.mark.parametrize("step_s", [0.001, 0.0001])
+def test_current_follows_its_command_with_the_stated_time_constant_at_any_step(step_s: float) -> None:
+    drive = make_armed_drive(current_lag_s=0.01, watchdog_s=0.0)
+    tell(drive, SET_INPUT_TORQUE, 0.3)
+    for step in range(round(0.02 / step_s)):
+        torque_nm = drive.torque_nm((step + 1) * step_s)
+    assert torque_nm == pytest.approx(0.3 * (1.0 - exp(-2.0)))
+
+
+def test_a_lagging_current_is_the_one_that_is_reported_and_falls_at_once_when_the_power_is_cut() -> None:
+    drive = make_armed_drive(current_lag_s=0.01, current_noise_a=0.0)
+    tell(drive, SET_INPUT_TORQUE, 0.3)
+    torque_nm = drive.torque_nm(0.005)
+    assert 0.0 < torque_nm < 0.2
+    assert ask(drive, GET_IQ)[1] == pytest.approx(torque_nm / 0.083)
+    tell(drive, ESTOP)
+    assert drive.torque_nm(0.006) == 0.0
+    assert ask(drive, GET_IQ)[1] == 0.0
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_encoder_s_offset_is_read_as_an_angle_of_the_joint(sign: int) -> None:
+    drive = make_drive(encoder_offset_rad=0.1, sign=sign, zero_turn=0.25)
+    drive.measure(0.4, 0.0)
+    turns, _ = ask(drive, GET_ENCODER_ESTIMATES)
+    assert sign * (turns - 0.25) * 2.0 * pi == pytest.approx(0.5, abs=2.0 * pi / 16384)  # one step of the encoder
+
+
+def test_encoder_noise_is_as_stated_and_comes_in_whole_counts() -> None:
+    drive = make_drive(encoder_noise_rad=0.01)
+    turns = np.array([ask(drive, GET_ENCODER_ESTIMATES)[0] for _ in range(4000)])
+    assert np.std(turns) * 2.0 * pi == pytest.approx(0.01, rel=0.05)  # 4000 draws tell it to 1 %
+    assert turns * 16384 == pytest.approx(np.round(turns * 16384), abs=1e-2)
+
+
+def test_the_cogging_is_where_the_joint_is_not_where_the_encoder_reads_it() -> None:
+    told_nm = []
+    for offset_rad in (0.0, 0.01):
+        drive = make_drive(cogging_nm=0.02, encoder_offset_rad=offset_rad)
+        drive.measure(0.01, 0.0)
+        told_nm.append(drive.torque_nm(0.0))
+    assert told_nm[0] == told_nm[1] != 0.0
+
+
+def test_late_messages_keep_their_order_and_number_and_tell_of_an_earlier_moment() -> None:
+    drive, late_ms = make_drive(message_delay_s=0.01), []
+    for step in range(2000):
+        drive.measure(2.0 * pi * step / 4096.0, 0.0)
+        for frame in drive.cyclic_frames(step / 1000.0):
+            if frame.arbitration_id == arbitration_id(NODE, GET_ENCODER_ESTIMATES):
+                turns, _ = GET_ENCODER_ESTIMATES.decode(frame.data)
+                assert frame.stamp_s == step / 1000.0
+                late_ms.append(step - turns * 4096.0)
+    assert len(late_ms) == pytest.approx(1000, abs=6)  # one each 2 ms; the last 10 ms of them are still under way
+    assert 0.0 <= min(late_ms) < 3.0
+    assert 9.0 < max(late_ms) <= 11.0  # the bound, and the millisecond in which they are looked for
+
+
+def test_the_stated_share_of_messages_repeats_the_one_before_to_the_last_bit() -> None:
+    drive, payloads = make_drive(repeated_share=0.6), []
+    for step in range(10000):
+        drive.measure(step / 1000.0, 0.0)
+        payloads += [
+            frame.data
+            for frame in drive.cyclic_frames(step / 1000.0)
+            if frame.arbitration_id == arbitration_id(NODE, GET_IQ)
+        ]
+    repeated = np.mean([one == other for one, other in pairwise(payloads)])
+    assert repeated == pytest.approx(0.6, abs=0.03)  # 5000 messages tell it to 0.007
+
+
+def test_a_heartbeat_is_never_an_old_one() -> None:
+    drive = make_drive(repeated_share=0.99)
+    cyclic_frames(drive, 0.5)
+    tell(drive, ESTOP)
+    beats = [frame for frame in drive.cyclic_frames(10.0) if frame.arbitration_id == arbitration_id(NODE, HEARTBEAT)]
+    assert [HEARTBEAT.decode(beat.data)[0] for beat in beats] == [ERROR_ESTOP]
+
+
+def test_what_is_off_draws_nothing() -> None:
+    plain, dressed = make_drive(), make_drive(torque_constant_error=0.1, cogging_nm=0.1, current_lag_s=0.01)
+    assert cyclic_frames(plain, 0.5) == cyclic_frames(dressed, 0.5)

@@ -8,10 +8,12 @@ import pytest
 
 from control.joint_pd import ArmMass
 from control.records import NO_TORQUE
+from simulation.carriage import Carriage
 from simulation.clay import MUDS, Clay, rate_factor
 from simulation.disturbances import LAB, Disturbances
 from simulation.flipper_contact import NO_CONTACT, ContactForce, FlipperContact
-from simulation.plant import DRAG_STIFFNESS_N_M, END_STOPS_RAD, STEP_S, Plant, PlantParameters
+from simulation.plant import END_STOPS_RAD, STEP_S, Plant, PlantParameters
+from simulation.rail_body import DRAG_STIFFNESS_N_M
 from simulation.track import Track
 
 TRACK = Track([(1.0, MUDS["48.5"])])
@@ -34,6 +36,7 @@ class ConstantThrust(FlipperContact):
         adduction_velocity_rad_s: float,
         body_velocity_m_s: float,
         surface_m: float = 0.0,
+        carriage: Carriage | None = None,
     ) -> ContactForce:
         return NO_CONTACT._replace(thrust_n=self.thrust_n)
 
@@ -105,6 +108,39 @@ def test_friction_slows_an_arm_down() -> None:
     plant.arms[0].sweep_velocity_rad_s = 1.0
     run(plant, 0.2)
     assert plant.arms[0].sweep_velocity_rad_s == pytest.approx(exp(-1.0), rel=0.01)  # 0.0004 / 0.002 = 0.2 s
+
+
+DRY = PlantParameters(joint_friction_nm_s=0.0, joint_coulomb_nm=0.02, arm_mass=ArmMass(arm_mass_kg=0.0))
+
+
+def test_dry_friction_slows_an_arm_down_evenly_until_it_stands() -> None:
+    plant = make_air_plant(DRY)
+    arm = plant.arms[0]
+    arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s = 2.0, -2.0
+    run(plant, 0.02)
+    assert arm.sweep_velocity_rad_s == pytest.approx(2.0 - 0.02 * 0.02 / 0.0004)
+    assert arm.adduction_velocity_rad_s == pytest.approx(-2.0 + 0.02 * 0.02 / 0.0006)
+    run(plant, 0.1)
+    assert plant.velocities_rad_s == (0.0, 0.0, 0.0, 0.0)
+    assert arm.sweep_rad == pytest.approx(2.0**2 / 2.0 * 0.0004 / 0.02, rel=0.03)  # v²/2a, in steps of a fortieth
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_dry_friction_holds_a_joint_until_more_torque_turns_it_and_takes_its_share_then(sign: float) -> None:
+    plant = make_air_plant(DRY)
+    for _ in range(100):
+        plant.step(STEP_S, (sign * 0.0199, sign * 0.0199, 0.0, 0.0))
+    assert plant.angles_rad == (0.0, 0.0, 0.0, 0.0)
+    for _ in range(10):
+        plant.step(STEP_S, (sign * 0.03, sign * 0.03, 0.0, 0.0))
+    rates_rad_s = [sign * 0.01 * 0.01 / inertia_kg_m2 for inertia_kg_m2 in (0.0004, 0.0006)]
+    assert plant.velocities_rad_s == pytest.approx((*rates_rad_s, 0.0, 0.0))
+
+
+def test_a_load_that_dry_friction_can_hold_never_makes_a_joint_creep() -> None:
+    plant = make_air_plant(PlantParameters(joint_coulomb_nm=0.05))  # more than the level arm's weight
+    run(plant, 20.0)
+    assert plant.angles_rad == (0.0, 0.0, 0.0, 0.0)
 
 
 def test_unpowered_flippers_rest_on_the_mud_and_the_body_stays() -> None:

@@ -103,7 +103,7 @@ def test_means_are_those_of_the_part_in_the_mud_and_the_depth_is_the_greatest() 
 def test_the_speed_is_that_of_the_edge_through_the_mud_the_body_s_included() -> None:
     witness, plant = StrokeWitness(), make_plant()
     arm, geometry = plant.arms[1], plant.parameters.geometry
-    arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s, plant.body_m_s = 0.4, -0.8, 0.1
+    arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s, plant.body.forward_m_s = 0.4, -0.8, 0.1
     jacobian = geometry.jacobian(arm.sweep_rad, arm.adduction_rad)
     velocity_m_s = (
         0.4 * jacobian.x_sweep - 0.8 * jacobian.x_adduction + 0.1,
@@ -121,7 +121,7 @@ def test_in_stance_only_backward_slip_counts() -> None:
     length_m = plant.parameters.geometry.flipper_length_m
     for slip_m_s in (0.1, 0.3, 0.019, -0.5):
         plant.arms[0].sweep_velocity_rad_s = -(slip_m_s + 0.2) / length_m
-        plant.body_m_s = 0.2
+        plant.body.forward_m_s = 0.2
         watch(witness, plant, Phase.STANCE)
     left, right = watch(witness, plant, Phase.EXTRACTION, Phase.SWING)
     assert left.stance.speed_m_s == pytest.approx(0.2)
