@@ -19,6 +19,7 @@ import command_line.experiment
 from command_line import exit_codes
 from command_line.main import main
 from experiments.estimation import Plan
+from simulation.clay import Clay
 
 COMMAND = ("experiment", "estimation", "--simulated")
 SHORT = (*COMMAND, "--seeds", "1", "--setup", "single", "--mud", "49.5", "--layers", "none")
@@ -135,7 +136,7 @@ def test_muds_and_setup_can_be_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
     assert ([clay.name for clay in plan.single], plan.walking, plan.seeds) == (["48.5", "50"], (), 3)
     assert plan.single[0].strength_pa == pytest.approx(2590.0)  # Table I
     plan = planned(monkeypatch, "--setup", "walking", "--strength", "1500")
-    assert (plan.single, [tuple(clay) for clay in plan.walking]) == ((), [("1500 Pa", 1500.0)])
+    assert (plan.single, plan.walking) == ((), (Clay("1500 Pa", 1500.0),))
 
 
 @pytest.mark.parametrize("layers", ["none", ""])

@@ -59,7 +59,7 @@ def test_the_example_says_what_it_says() -> None:
     crusted = Clay("1500 Pa", 1500.0, (Layer(0.0, 0.004, 1.5), Layer(0.025, 0.035, 0.5)))
     assert [segment.clay for segment in world.track.segments] == [clay_of_water(48.5), crusted, clay_of_water(46.0)]
     assert [segment.end_m for segment in world.track.segments] == pytest.approx([0.6, 1.2, 1.8])
-    assert world.track.stones == (Stone(0.40, 0.46, 0.025),)
+    assert world.track.stones == (Stone(0.40, 0.46, 0.015),)
     assert world.track.ridges == Ridges(0.002, 0.25)
     assert world.track.clay_at(0.3).strength_pa != clay_of_water(48.5).strength_pa
     assert world.disturbances == Disturbances(0.7, 1.0, 0.13, 0.0015)
