@@ -138,7 +138,7 @@ class BellyQuarter:
         if depth_m <= 0.0:
             self.reset()
             return 0.0
-        slow_n = BEARING_FACTOR * clay.strength_pa * self.area_m2
+        slow_n = BEARING_FACTOR * clay.strength_at_pa(depth_m) * self.area_m2
         stiffness_n_m = min(slow_n / YIELD_M, self.mass_kg * LARGEST_RAD_S**2)
         elastic_n = min(stiffness_n_m * self._strain_m(stiffness_n_m, depth_m), grip * slow_n)
         floating_n = UNIT_WEIGHT_N_M3 * self.area_m2 * depth_m
