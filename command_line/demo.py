@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from command_line import exit_codes
+from command_line.recorded_walk import read_walk
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
 from control.modes import Mode
 from firmware_host.log_reader import Log, LogError, read_log
@@ -247,7 +248,7 @@ def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration
     print(f"\n{summary_text(summary)}\nDrawing ...", flush=True)
     from command_line.plots import plot_walk  # matplotlib takes its time; the walk must not wait for it
 
-    plot_walk(log, demonstration.track, plot_path)
+    plot_walk(read_walk(log_path), plot_path, demonstration.track)
     print(f"plot     {plot_path}")
     if options.json:
         options.json.write_text(json.dumps(summary, indent=1) + os.linesep, encoding="utf-8")

@@ -1,0 +1,82 @@
+"""Which strides of a walk are worth a picture, and which moments of them.
+
+A stride fails in one of the paper's two ways (section III-A): the mud gives way and the body stays behind, or the
+flipper does not come out of the mud.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from command_line.recorded_walk import RecordedWalk
+from control.records import Phase
+
+Stride = dict[str, Any]  # a row of log_rows.STRIDE
+
+FULL_SHARE = 0.5  # of the geometric step; below it a stride slips
+
+
+class Outcome(StrEnum):
+    SLIPPING = "slipping"
+    STUCK = "stuck"
+    GOOD = "good"
+    UNKNOWN = "unknown"  # without a pose nobody knows how far it went
+
+
+class Moment(NamedTuple):
+    caption: str
+    row: int
+
+
+def outcome_of(stride: Stride, geometric_step_m: float) -> Outcome:
+    if not stride["released"]:
+        return Outcome.STUCK
+    if np.isnan(stride["step_m"] - geometric_step_m):
+        return Outcome.UNKNOWN
+    return Outcome.SLIPPING if stride["step_m"] < FULL_SHARE * geometric_step_m else Outcome.GOOD
+
+
+def choose_strides(walk: RecordedWalk) -> list[Stride]:
+    """The clearest one of each outcome that there is: of the failures the shortest, of the good ones the longest."""
+    chosen = []
+    for outcome in Outcome:
+        strides = [stride for stride in walk.own_strides if outcome_of(stride, walk.geometric_step_m) is outcome]
+        if strides:
+            farthest = max if outcome is Outcome.GOOD else min
+            chosen.append(farthest(strides, key=lambda stride: np.nan_to_num(stride["step_m"])))
+    return chosen
+
+
+def rows_of(walk: RecordedWalk, stride: Stride) -> range:
+    """From the start of its insertion to the end of the swing after it."""
+    first, close = (int(np.searchsorted(walk.time_s, stride[name])) for name in ("t_start_s", "stamp_s"))
+    beyond = close + np.flatnonzero(np.isin(walk.phase[close:], (Phase.INSERTION, Phase.REST)))
+    return range(first, int(beyond[0]) if len(beyond) else len(walk.time_s))
+
+
+def duration_s(walk: RecordedWalk, stride: Stride) -> float:
+    rows = rows_of(walk, stride)
+    return float(walk.time_s[rows.stop - 1] - walk.time_s[rows.start])
+
+
+def moments_of(walk: RecordedWalk, stride: Stride) -> list[Moment]:
+    """Seven, or fewer where the log breaks off before the swing has ended."""
+    rows = rows_of(walk, stride)
+    phase = walk.phase[rows.start : rows.stop]
+
+    def moment(caption: str, wanted: Phase, share: float) -> list[Moment]:
+        inside = np.flatnonzero(phase == wanted)
+        return [Moment(caption, rows.start + int(inside[round(share * (len(inside) - 1))]))] if len(inside) else []
+
+    return [
+        *moment("insertion", Phase.INSERTION, 0.0),
+        *moment("insertion ends", Phase.INSERTION, 1.0),
+        *moment("stance", Phase.STANCE, 0.5),
+        *moment("stance ends", Phase.STANCE, 1.0),
+        *moment("extraction ends", Phase.EXTRACTION, 1.0),
+        *moment("swing", Phase.SWING, 0.4),
+        *moment("swing ends", Phase.SWING, 1.0),
+    ]
