@@ -40,14 +40,23 @@ def outcome_of(stride: Stride, geometric_step_m: float) -> Outcome:
 
 
 def choose_strides(walk: RecordedWalk) -> list[Stride]:
-    """The clearest one of each outcome that there is: of the failures the shortest, of the good ones the longest."""
+    """The clearest one of each outcome that there is."""
     chosen = []
     for outcome in Outcome:
         strides = [stride for stride in walk.own_strides if outcome_of(stride, walk.geometric_step_m) is outcome]
+        ranks = [_rank(walk, stride, outcome) for stride in strides]
         if strides:
-            farthest = max if outcome is Outcome.GOOD else min
-            chosen.append(farthest(strides, key=lambda stride: np.nan_to_num(stride["step_m"])))
+            chosen.append(strides[ranks.index(min(ranks))])
     return chosen
+
+
+def _rank(walk: RecordedWalk, stride: Stride, outcome: Outcome) -> tuple[bool, float]:
+    """Lowest for the longest of the good ones and the shortest failure; one that begins above the mud comes before one
+    that was stuck already.
+    """
+    step_m = float(np.nan_to_num(stride["step_m"]))
+    began_in_mud = bool(walk.depth_m[rows_of(walk, stride).start] > 0.0)
+    return began_in_mud, -step_m if outcome is Outcome.GOOD else step_m
 
 
 def rows_of(walk: RecordedWalk, stride: Stride) -> range:
@@ -77,6 +86,6 @@ def moments_of(walk: RecordedWalk, stride: Stride) -> list[Moment]:
         *moment("stance", Phase.STANCE, 0.5),
         *moment("stance ends", Phase.STANCE, 1.0),
         *moment("extraction ends", Phase.EXTRACTION, 1.0),
-        *moment("swing", Phase.SWING, 0.4),
+        *moment("swing", Phase.SWING, 0.5),
         *moment("swing ends", Phase.SWING, 1.0),
     ]

@@ -20,10 +20,10 @@ from command_line.recorded_walk import RecordedWalk  # noqa: E402
 from command_line.robot_sketch import body_place_m, draw_robot, draw_trail, prepare  # noqa: E402
 from command_line.stride_choice import Outcome, Stride, moments_of, outcome_of, rows_of  # noqa: E402
 
-DEEPEST_M, HIGHEST_M = 0.098, 0.148  # of what a row shows, below and above the surface
+DEEPEST_M, HIGHEST_M = 0.106, 0.146  # of what a row shows, below and above the surface
 APART_M = 0.235  # from one moment to the next
 MARGIN_M = 0.09
-LEAST_ARROW_M = 0.01
+LEAST_ARROW_M = 0.015
 WIDTH_IN, HEAD_IN, FOOT_IN, DOTS_PER_INCH = 12.0, 0.36, 0.34, 150
 ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": INK, "shrinkA": 0.0, "shrinkB": 0.0, "linewidth": 1.2}
 WITH_PLACE = "Arrow: how far the body has come since the insertion began.  Red line: the way of the plate's lower edge."
