@@ -167,7 +167,7 @@ def _only_walk(path: Path, lab: LabLog, number: int) -> RecordedWalk:
     return RecordedWalk(
         title=path.name,
         geometry=FlipperGeometry(),
-        sweep_rad=lab.gait.get("lateral_angle_range", nan),
+        sweep_rad=lab.gait.get("lateral_angle_range", radians(lab.gait.get("sweep_angle_deg", nan))),
         flipper=flipper,
         time_s=lab.stamp_s - start_s,
         phase=lab.phase,

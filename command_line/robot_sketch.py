@@ -24,8 +24,11 @@ def prepare(panel: Axes, left_m: float, right_m: float, deepest_m: float, highes
 
 
 def body_place_m(walk: RecordedWalk, row: int) -> float:
-    """Zero where nobody measured it."""
-    return float(np.nan_to_num(walk.body_x_m[row]))
+    """On the line between two known places where it was not measured, and zero where it never was."""
+    if np.isfinite(walk.body_x_m[row]):
+        return float(walk.body_x_m[row])
+    known = np.flatnonzero(np.isfinite(walk.body_x_m))
+    return float(np.interp(row, known, walk.body_x_m[known])) if len(known) else 0.0
 
 
 def view_of(walk: RecordedWalk, row: int, origin_m: float) -> SideView:

@@ -43,9 +43,9 @@ def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> Non
         _draw_row(panel, walk, stride)
     for column, caption in enumerate(captions):
         place = (MARGIN_M + column * APART_M) / width_m, 1.0 - 0.65 * HEAD_IN / height_in
-        figure.text(*place, caption, size=12, ha="center", va="center", color=INK)
+        figure.text(*place, caption, size=13, ha="center", va="center", color=INK)
     legend = WITH_PLACE if np.any(np.isfinite(walk.body_x_m)) else WITHOUT_PLACE
-    figure.text(0.012, 0.45 * FOOT_IN / height_in, legend, size=11, va="center", color=INK)
+    figure.text(0.012, 0.45 * FOOT_IN / height_in, legend, size=12, va="center", color=INK)
     figure.savefig(path, dpi=DOTS_PER_INCH)
     plt.close(figure)
 
@@ -64,7 +64,7 @@ def _draw_row(panel: Axes, walk: RecordedWalk, stride: Stride) -> None:
         origin_m = column * APART_M - start_m
         draw_robot(panel, walk, row, origin_m)
         draw_trail(panel, walk, range(first, row + 1), origin_m)
-        if np.isfinite(walk.body_x_m[row]):
+        if np.all(np.isfinite(walk.body_x_m[[first, row]])):
             _draw_advance(panel, column * APART_M, body_place_m(walk, row) - start_m)
 
 
@@ -72,9 +72,9 @@ def _draw_title(panel: Axes, walk: RecordedWalk, stride: Stride) -> None:
     outcome, place = outcome_of(stride, walk.geometric_step_m), (0.018 - MARGIN_M, HIGHEST_M - 0.03)
     name = "stride" if outcome is Outcome.UNKNOWN else f"{outcome} stride"
     told = f"number {stride['index']}, {100.0 * stride['depth_m']:.1f} cm deep, at {stride['t_start_s']:.1f} s"
-    title = panel.annotate(name, place, weight="bold", size=14, color=OUTCOMES[outcome])
+    title = panel.annotate(name, place, weight="bold", size=15, color=OUTCOMES[outcome])
     after: dict[str, Any] = {"xycoords": (title, "data"), "xytext": (10, 0), "textcoords": "offset points"}
-    panel.annotate(told, (1, place[1]), size=11, color=INK, **after)
+    panel.annotate(told, (1, place[1]), size=12, color=INK, **after)
 
 
 def _draw_advance(panel: Axes, start_m: float, advance_m: float) -> None:
@@ -84,4 +84,4 @@ def _draw_advance(panel: Axes, start_m: float, advance_m: float) -> None:
         panel.annotate("", (start_m + advance_m, z_m), (start_m, z_m), arrowprops=ARROW)
     text = f"{100.0 * advance_m:+.1f} cm"
     text = "0 cm" if text in ("+0.0 cm", "-0.0 cm") else text
-    panel.text(start_m - 0.003, z_m - 0.009, text, size=11, va="top", color=INK)
+    panel.text(start_m - 0.003, z_m - 0.009, text, size=12, va="top", color=INK)

@@ -165,6 +165,7 @@ def test_what_the_authors_form_does_not_hold_is_named(as_csv: Path, tmp_path: Pa
     assert walk.missing == ["the body's place, so no steps", "the commanded depth"]
     assert np.isnan(walk.geometric_step_m)
     assert read_walk(as_csv).missing == []
+    assert read_walk(as_csv).geometric_step_m == pytest.approx(0.12)
 
 
 def test_a_run_in_the_authors_form_is_one_walk(as_csv: Path) -> None:
