@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 
 from command_line import exit_codes
-from command_line.recorded_walk import read_walk
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
 from control.modes import Mode
 from firmware_host.log_reader import Log, LogError, read_log
@@ -247,6 +246,7 @@ def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration
     summary = summarise(report, demonstration, log, log_path, plot_path)
     print(f"\n{summary_text(summary)}\nDrawing ...", flush=True)
     from command_line.plots import plot_walk  # matplotlib takes its time; the walk must not wait for it
+    from command_line.recorded_walk import read_walk
 
     plot_walk(read_walk(log_path), plot_path, demonstration.track)
     print(f"plot     {plot_path}")
