@@ -7,6 +7,7 @@ log alone a mud begins with the stride after which the robot said so.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,33 +42,33 @@ STYLE: dict[Any, Any] = {
 MudRegion = tuple[float, float, str]  # from, to in s, and its name
 
 
+Draw = Callable[[Axes, RecordedWalk], None]
+
+
 def plot_walk(walk: RecordedWalk, path: Path, track: Track | None = None) -> None:
     """`track`: the muds that were really there."""
-    panels_wanted = _panels(walk)
+    wanted, regions = _panels(walk), mud_regions(walk, track)
+    size = (WIDTH_IN, PANEL_IN * len(wanted) + 0.4)
     with plt.rc_context(STYLE):
-        size = (WIDTH_IN, PANEL_IN * len(panels_wanted) + 0.4)
-        figure, panels = plt.subplots(
-            len(panels_wanted), 1, figsize=size, sharex=True, squeeze=False, layout="constrained"
-        )
-        for panel, (label, draw) in zip(panels[:, 0], panels_wanted, strict=True):
+        figure, axes = plt.subplots(len(wanted), 1, figsize=size, sharex=True, squeeze=False, layout="constrained")
+        panels = axes[:, 0]
+        for panel, (label, draw) in zip(panels, wanted, strict=True):
             draw(panel, walk)
             panel.set_ylabel(label)
-            _shade(panel, mud_regions(walk, track))
-            for noticed_s in walk.noticed_s:
-                panel.axvline(noticed_s, color=INK, linewidth=1.0, linestyle=NOTICED)
-        _name_muds(panels[0][0], mud_regions(walk, track))
-        panels[0][0].set_xlim(0.0, max(float(walk.time_s[-1]), SHORTEST_S))
-        panels[-1][0].set_xlabel("time (s)")
-        panels[-1][0].set_title(f"{walk.flipper} flipper, {walk.title}", y=-0.42, loc="right", size=8, color=FAINT)
+            _shade(panel, regions, walk.noticed_s)
+        _name_muds(panels[0], regions)
+        panels[0].set_xlim(0.0, max(float(walk.time_s[-1]), SHORTEST_S))
+        panels[-1].set_xlabel("time (s)")
+        panels[-1].set_title(f"{walk.flipper} flipper, {walk.title}", y=-0.42, loc="right", size=8, color=FAINT)
         figure.align_ylabels()
         figure.savefig(path, dpi=DOTS_PER_INCH)
         plt.close(figure)
 
 
-def _panels(walk: RecordedWalk) -> list[tuple[str, Callable[[Axes, RecordedWalk], None]]]:
+def _panels(walk: RecordedWalk) -> list[tuple[str, Draw]]:
     """Those of which the log holds anything."""
-    panels: list[tuple[str, Callable[[Axes, RecordedWalk], None]]] = [("force (N)", _plot_forces)]
-    panels += [(f"${name}$ (N/cm³)", _coefficient_panel(name)) for name in COEFFICIENTS]
+    panels: list[tuple[str, Draw]] = [("force (N)", _plot_forces)]
+    panels += [(f"${name}$ (N/cm³)", partial(_plot_coefficient, name=name)) for name in COEFFICIENTS]
     panels.append(("depth (cm)", _plot_depth))
     if np.any(np.isfinite(walk.body_x_m)):
         panels += [("body (m)", _plot_place), ("step (cm)", _plot_steps)]
@@ -97,9 +98,11 @@ def _arrival_s(walk: RecordedWalk, place_m: float) -> float:
     return float(walk.time_s[beyond[0] if len(beyond) else -1])
 
 
-def _shade(panel: Axes, regions: list[MudRegion]) -> None:
+def _shade(panel: Axes, regions: list[MudRegion], noticed_s: list[float]) -> None:
     for number, (start_s, end_s, _) in enumerate(regions):
         panel.axvspan(start_s, end_s, color=MUDS[number % len(MUDS)], linewidth=0, zorder=0)
+    for at_s in noticed_s:
+        panel.axvline(at_s, color=INK, linewidth=1.0, linestyle=NOTICED)
 
 
 def _name_muds(panel: Axes, regions: list[MudRegion]) -> None:
@@ -120,7 +123,7 @@ def _plot_forces(panel: Axes, walk: RecordedWalk) -> None:
 
 
 def _explain_coefficients(panel: Axes, walk: RecordedWalk) -> None:
-    """What the marks of all three panels mean, as far as they occur."""
+    """What the marks in all panels of coefficients mean, as far as they occur."""
     for flipper in dict.fromkeys(NAMES[stride["flipper"]] for stride in walk.strides):
         panel.plot([], [], "o", color=FLIPPERS[flipper], label=flipper)
     if any(stride[f"{name}_at_least"] for name in COEFFICIENTS for stride in walk.strides):
@@ -131,15 +134,6 @@ def _explain_coefficients(panel: Axes, walk: RecordedWalk) -> None:
         panel.plot([], [], color=INK, linewidth=1.0, linestyle=NOTICED, label="another mud noticed")
     if panel.get_legend_handles_labels()[0]:
         panel.legend(ncols=5, **LEGEND)
-
-
-def _coefficient_panel(name: str) -> Callable[[Axes, RecordedWalk], None]:
-    def plot(panel: Axes, walk: RecordedWalk) -> None:
-        _plot_coefficient(panel, walk, name)
-        if name == COEFFICIENTS[0]:
-            _explain_coefficients(panel, walk)
-
-    return plot
 
 
 def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
@@ -160,6 +154,8 @@ def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
         )
     largest = max((stride[name] / 1e6 for stride in told), default=0.0)
     panel.set_ylim(0.0, FULL_VIEW * largest if largest > 0.0 else 1.0)
+    if name == COEFFICIENTS[0]:
+        _explain_coefficients(panel, walk)
 
 
 def _plot_depth(panel: Axes, walk: RecordedWalk) -> None:
@@ -169,9 +165,13 @@ def _plot_depth(panel: Axes, walk: RecordedWalk) -> None:
     if chosen_m:
         chosen_cm = [100.0 * depth_m for depth_m in chosen_m.values()]
         panel.plot(list(chosen_m), chosen_cm, "v", color=INK, label="chosen for the next stride")
+    stuck_s = [stride["stamp_s"] for stride in walk.own_strides if not stride["released"]]
+    if stuck_s:
+        stuck_cm = 100.0 * np.interp(stuck_s, walk.time_s, walk.depth_m)
+        panel.plot(stuck_s, stuck_cm, "x", color=OUTCOMES[Outcome.STUCK], markeredgewidth=2.0, label="stuck")
     panel.axhline(0.0, color=SURFACE, linewidth=1.0)
     panel.invert_yaxis()
-    panel.legend(ncols=3, **LEGEND)
+    panel.legend(ncols=4, **LEGEND)
 
 
 def _plot_place(panel: Axes, walk: RecordedWalk) -> None:
@@ -180,21 +180,17 @@ def _plot_place(panel: Axes, walk: RecordedWalk) -> None:
 
 def _plot_steps(panel: Axes, walk: RecordedWalk) -> None:
     """A bar from the start of a stride to its close, in the colour of how it went."""
+    known = [stride for stride in walk.own_strides if np.isfinite(stride["step_m"])]
     for outcome in Outcome:
-        went = [
-            s
-            for s in walk.own_strides
-            if outcome_of(s, walk.geometric_step_m) is outcome and s["step_m"] == s["step_m"]
-        ]
+        went = [stride for stride in known if outcome_of(stride, walk.geometric_step_m) is outcome]
+        starts_s = [stride["t_start_s"] for stride in went]
+        lengths_s = [stride["stamp_s"] - stride["t_start_s"] for stride in went]
+        steps_cm = [100.0 * stride["step_m"] for stride in went]
         if went:
-            panel.bar(
-                [stride["t_start_s"] for stride in went],
-                [100.0 * stride["step_m"] for stride in went],
-                [stride["stamp_s"] - stride["t_start_s"] for stride in went],
-                align="edge",
-                color=OUTCOMES[outcome],
-                label=str(outcome),
-            )
+            panel.bar(starts_s, steps_cm, lengths_s, align="edge", color=OUTCOMES[outcome], label=str(outcome))
     panel.axhline(0.0, color=FAINT, linewidth=0.8)
-    panel.axhline(100.0 * walk.geometric_step_m, color=INK, linewidth=0.8, linestyle=":", label="$2l\\,\\sin\\alpha$")
-    panel.legend(ncols=4, **LEGEND)
+    if np.isfinite(walk.geometric_step_m):
+        step_cm = 100.0 * walk.geometric_step_m
+        panel.axhline(step_cm, color=INK, linewidth=0.8, linestyle=":", label="$2l\\,\\sin\\alpha$")
+    if panel.get_legend_handles_labels()[0]:
+        panel.legend(ncols=4, **LEGEND)

@@ -14,6 +14,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
 import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
 
 from command_line.colours import INK, OUTCOMES  # noqa: E402
 from command_line.recorded_walk import RecordedWalk  # noqa: E402
@@ -41,13 +42,17 @@ def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> Non
     for panel, stride in zip(panels[:, 0], strides, strict=True):
         prepare(panel, -MARGIN_M, width_m - MARGIN_M, DEEPEST_M, HIGHEST_M)
         _draw_row(panel, walk, stride)
-    for column, caption in enumerate(captions):
-        place = (MARGIN_M + column * APART_M) / width_m, 1.0 - 0.65 * HEAD_IN / height_in
-        figure.text(*place, caption, size=13, ha="center", va="center", color=INK)
+    _write_captions(figure, captions, width_m, height_in)
     legend = WITH_PLACE if np.any(np.isfinite(walk.body_x_m)) else WITHOUT_PLACE
     figure.text(0.012, 0.45 * FOOT_IN / height_in, legend, size=12, va="center", color=INK)
     figure.savefig(path, dpi=DOTS_PER_INCH)
     plt.close(figure)
+
+
+def _write_captions(figure: Figure, captions: Sequence[str], width_m: float, height_in: float) -> None:
+    for column, caption in enumerate(captions):
+        place = (MARGIN_M + column * APART_M) / width_m, 1.0 - 0.65 * HEAD_IN / height_in
+        figure.text(*place, caption, size=13, ha="center", va="center", color=INK)
 
 
 def _farthest_m(walk: RecordedWalk, stride: Stride) -> float:

@@ -13,16 +13,18 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from PIL import Image
 
 import command_line.logs
 import command_line.stride_film
 from command_line import exit_codes
+from command_line.colours import OUTCOMES
 from command_line.main import main
 from command_line.plots import mud_regions, plot_walk
 from command_line.recorded_walk import RecordedWalk, read_walk
-from command_line.stride_choice import duration_s, rows_of
+from command_line.stride_choice import Outcome, duration_s, rows_of
 from command_line.stride_film import FRAMES_PER_S, film_frames
 from firmware_host.lab_csv import write_lab_csv
 from firmware_host.log_reader import read_log
@@ -170,6 +172,31 @@ def test_bars_of_a_coefficient_are_two_standard_errors(two_walks: Path, figure: 
         ((_, low), (_, high)) = container.lines[2][0].get_segments()[0]
         assert (high + low) / 2.0 == pytest.approx(stride[name] / 1e6)
         assert (high - low) / 4.0 == pytest.approx(stride[f"{name}_std_error"] / 1e6)
+
+
+def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
+    """Stuck where the flipper hung in the mud as the stride closed; slipping and stuck in the colour of their bars."""
+    walk = read_walk(two_walks, 1)
+    slipping, stuck = walk.own_strides[0] | {"step_m": 0.01}, walk.own_strides[1] | {"released": False}
+    slipping["released"] = True
+    figure = drawn(walk._replace(strides=[slipping, stuck]), tmp_path / "walk.png")
+    (mark,) = [line for line in panel(figure, "depth").lines if line.get_label() == "stuck"]
+    row = int(np.searchsorted(walk.time_s, stuck["stamp_s"]))
+    assert np.asarray(mark.get_xdata()) == pytest.approx([stuck["stamp_s"]])
+    assert np.asarray(mark.get_ydata()) == pytest.approx([100.0 * walk.depth_m[row]])
+    handles, labels = panel(figure, "step").get_legend_handles_labels()
+    bars = dict(zip(labels, handles, strict=True))
+    for outcome, stride in ((Outcome.SLIPPING, slipping), (Outcome.STUCK, stuck)):
+        (bar,) = bars[outcome].get_children()
+        assert to_hex(bar.get_facecolor()) == OUTCOMES[outcome]
+        assert bar.get_x() == pytest.approx(stride["t_start_s"])
+
+
+def test_without_a_known_sweep_no_geometric_step_is_drawn(two_walks: Path, tmp_path: Path) -> None:
+    walk = read_walk(two_walks, 1)
+    strides = [stride | {"released": True} for stride in walk.strides]
+    figure = drawn(walk._replace(strides=strides, sweep_rad=float("nan")), tmp_path / "walk.png")
+    assert panel(figure, "step").get_legend_handles_labels()[1] == ["unknown"]
 
 
 def test_without_a_pose_there_are_no_panels_of_place(two_walks: Path, tmp_path: Path) -> None:
