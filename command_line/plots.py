@@ -84,12 +84,17 @@ def mud_regions(walk: RecordedWalk, track: Track | None) -> list[MudRegion]:
     else:
         borders_m = [segment.end_m for segment in track.segments[:-1]]
         starts_s = [0.0, *(_arrival_s(walk, border_m) for border_m in borders_m)]
-        names = [f"w = {segment.clay.name} %" for segment in track.segments]
+        names = [_mud_name(segment.clay.name) for segment in track.segments]
     return [
         (start_s, until_s, name)
         for start_s, until_s, name in zip(starts_s, [*starts_s[1:], end_s], names, strict=True)
         if start_s < until_s
     ]
+
+
+def _mud_name(name: str) -> str:
+    """Most muds are named after their water in percent; others carry a unit of their own."""
+    return f"w = {name} %" if name[-1:].isdigit() else name
 
 
 def _arrival_s(walk: RecordedWalk, place_m: float) -> float:

@@ -17,6 +17,15 @@ from control.records import Phase
 Stride = dict[str, Any]  # a row of log_rows.STRIDE
 
 FULL_SHARE = 0.5  # of the geometric step; below it a stride slips
+MOMENTS = (  # worth a picture: how they are called, the phase, and the share of it that has passed
+    ("insertion", Phase.INSERTION, 0.0),
+    ("insertion ends", Phase.INSERTION, 1.0),
+    ("stance", Phase.STANCE, 0.5),
+    ("stance ends", Phase.STANCE, 1.0),
+    ("extraction ends", Phase.EXTRACTION, 1.0),
+    ("swing", Phase.SWING, 0.5),
+    ("swing ends", Phase.SWING, 1.0),
+)
 
 
 class Outcome(StrEnum):
@@ -72,20 +81,11 @@ def duration_s(walk: RecordedWalk, stride: Stride) -> float:
 
 
 def moments_of(walk: RecordedWalk, stride: Stride) -> list[Moment]:
-    """Seven, or fewer where the log breaks off before the swing has ended."""
+    """Those of MOMENTS that the stride has: a log may break off before the swing has ended."""
     rows = rows_of(walk, stride)
-    phase = walk.phase[rows.start : rows.stop]
-
-    def moment(caption: str, wanted: Phase, share: float) -> list[Moment]:
+    phase, moments = walk.phase[rows.start : rows.stop], []
+    for caption, wanted, share in MOMENTS:
         inside = np.flatnonzero(phase == wanted)
-        return [Moment(caption, rows.start + int(inside[round(share * (len(inside) - 1))]))] if len(inside) else []
-
-    return [
-        *moment("insertion", Phase.INSERTION, 0.0),
-        *moment("insertion ends", Phase.INSERTION, 1.0),
-        *moment("stance", Phase.STANCE, 0.5),
-        *moment("stance ends", Phase.STANCE, 1.0),
-        *moment("extraction ends", Phase.EXTRACTION, 1.0),
-        *moment("swing", Phase.SWING, 0.5),
-        *moment("swing ends", Phase.SWING, 1.0),
-    ]
+        if len(inside):
+            moments.append(Moment(caption, rows.start + int(inside[round(share * (len(inside) - 1))])))
+    return moments

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure  # noqa: E402
 from command_line.colours import INK, OUTCOMES  # noqa: E402
 from command_line.recorded_walk import RecordedWalk  # noqa: E402
 from command_line.robot_sketch import body_place_m, draw_robot, draw_trail, prepare  # noqa: E402
-from command_line.stride_choice import Outcome, Stride, moments_of, outcome_of, rows_of  # noqa: E402
+from command_line.stride_choice import MOMENTS, Outcome, Stride, moments_of, outcome_of, rows_of  # noqa: E402
 
 DEEPEST_M, HIGHEST_M = 0.106, 0.146  # of what a row shows, below and above the surface
 APART_M = 0.235  # from one moment to the next
@@ -33,7 +33,8 @@ WITHOUT_PLACE = "Red line: the way of the plate's lower edge.  Where the body wa
 
 def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> None:
     """A row a stride, each a series of moments."""
-    captions = [moment.caption for moment in max((moments_of(walk, stride) for stride in strides), key=len)]
+    shown = {moment.caption for stride in strides for moment in moments_of(walk, stride)}
+    captions = [caption for caption, *_ in MOMENTS if caption in shown]
     farthest_m = max(_farthest_m(walk, stride) for stride in strides)
     width_m = 2.0 * MARGIN_M + APART_M * (len(captions) - 1) + farthest_m
     height_in = WIDTH_IN * (DEEPEST_M + HIGHEST_M) / width_m * len(strides) + HEAD_IN + FOOT_IN
@@ -41,7 +42,7 @@ def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> Non
     figure.subplots_adjust(0.0, FOOT_IN / height_in, 1.0, 1.0 - HEAD_IN / height_in, hspace=0.0)
     for panel, stride in zip(panels[:, 0], strides, strict=True):
         prepare(panel, -MARGIN_M, width_m - MARGIN_M, DEEPEST_M, HIGHEST_M)
-        _draw_row(panel, walk, stride)
+        _draw_row(panel, walk, stride, captions)
     _write_captions(figure, captions, width_m, height_in)
     legend = WITH_PLACE if np.any(np.isfinite(walk.body_x_m)) else WITHOUT_PLACE
     figure.text(0.012, 0.45 * FOOT_IN / height_in, legend, size=12, va="center", color=INK)
@@ -61,16 +62,17 @@ def _farthest_m(walk: RecordedWalk, stride: Stride) -> float:
     return max(body_place_m(walk, row) for row in rows) - body_place_m(walk, rows.start)
 
 
-def _draw_row(panel: Axes, walk: RecordedWalk, stride: Stride) -> None:
+def _draw_row(panel: Axes, walk: RecordedWalk, stride: Stride, captions: Sequence[str]) -> None:
+    """Each moment under its caption."""
     first = rows_of(walk, stride).start
     start_m = body_place_m(walk, first)
     _draw_title(panel, walk, stride)
-    for column, (_, row) in enumerate(moments_of(walk, stride)):
-        origin_m = column * APART_M - start_m
-        draw_robot(panel, walk, row, origin_m)
-        draw_trail(panel, walk, range(first, row + 1), origin_m)
+    for caption, row in moments_of(walk, stride):
+        begin_m = captions.index(caption) * APART_M
+        draw_robot(panel, walk, row, begin_m - start_m)
+        draw_trail(panel, walk, range(first, row + 1), begin_m - start_m)
         if np.all(np.isfinite(walk.body_x_m[[first, row]])):
-            _draw_advance(panel, column * APART_M, body_place_m(walk, row) - start_m)
+            _draw_advance(panel, begin_m, body_place_m(walk, row) - start_m)
 
 
 def _draw_title(panel: Axes, walk: RecordedWalk, stride: Stride) -> None:
@@ -83,7 +85,7 @@ def _draw_title(panel: Axes, walk: RecordedWalk, stride: Stride) -> None:
 
 
 def _draw_advance(panel: Axes, start_m: float, advance_m: float) -> None:
-    z_m = 0.03 - DEEPEST_M
+    z_m = 0.033 - DEEPEST_M
     panel.plot([start_m, start_m], [z_m - 0.006, z_m + 0.006], color=INK, linewidth=1.2)
     if abs(advance_m) > LEAST_ARROW_M:
         panel.annotate("", (start_m + advance_m, z_m), (start_m, z_m), arrowprops=ARROW)

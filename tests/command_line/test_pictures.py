@@ -28,7 +28,7 @@ from command_line.stride_choice import Outcome, duration_s, rows_of
 from command_line.stride_film import FRAMES_PER_S, film_frames
 from firmware_host.lab_csv import write_lab_csv
 from firmware_host.log_reader import read_log
-from simulation.clay import MUDS
+from simulation.clay import MUDS, Clay
 from simulation.track import Track
 
 
@@ -233,9 +233,9 @@ def test_muds_are_shaded_where_the_robot_said_so(two_walks: Path) -> None:
 def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(two_walks: Path) -> None:
     walk = read_walk(two_walks, 1)
     place_m = np.linspace(0.0, 0.5, len(walk.time_s))
-    track = Track([(0.1, MUDS["48.5"]), (0.3, MUDS["53.1"]), (0.3, MUDS["45.3"]), (0.3, MUDS["48.5"])])
+    track = Track([(0.1, MUDS["48.5"]), (0.3, MUDS["53.1"]), (0.3, Clay("900 Pa", 900.0)), (0.3, MUDS["48.5"])])
     regions = mud_regions(walk._replace(body_x_m=place_m), track)
-    assert [name for *_, name in regions] == ["w = 48.5 %", "w = 53.1 %", "w = 45.3 %"]  # the last was not reached
+    assert [name for *_, name in regions] == ["w = 48.5 %", "w = 53.1 %", "900 Pa"]  # the last was not reached
     borders_s = np.interp([0.0, 0.1, 0.4, 0.5], place_m, walk.time_s)
     np.testing.assert_allclose([start for start, *_ in regions], borders_s[:3], atol=0.003)  # one tick
     assert regions[-1][1] == walk.time_s[-1]
