@@ -257,8 +257,9 @@ def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration
     summary = summarise(report, demonstration, log, log_path, plot_path)
     print(f"\n{summary_text(summary)}\nDrawing ...", flush=True)
     from command_line.plots import plot_walk  # matplotlib takes its time; the walk must not wait for it
+    from command_line.recorded_walk import read_walk
 
-    plot_walk(log, demonstration.track, plot_path)
+    plot_walk(read_walk(log_path), plot_path, demonstration.track)
     print(f"plot     {plot_path}")
     if options.json:
         options.json.write_text(json.dumps(summary, indent=1) + os.linesep, encoding="utf-8")

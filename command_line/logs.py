@@ -1,14 +1,17 @@
-"""Commands that read logs: replay, info, export."""
+"""Commands that read logs: replay, plot, film, info, export."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from pathlib import Path
 
 from command_line import exit_codes
-from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
+from command_line.recorded_walk import RecordedWalk, read_walk
+from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line
+from command_line.stride_choice import Stride, choose_strides, duration_s, outcome_of
 from firmware_host.configuration import ConfigurationError, load_configuration
 from firmware_host.lab_csv import write_lab_csv
 from firmware_host.log_reader import LogError, log_summary, read_log
@@ -16,6 +19,9 @@ from firmware_host.replay import Replay, replay_file
 from firmware_host.reports import map_report, stride_report
 
 Options = argparse.Namespace
+
+LONGEST_FILM_S = 60.0
+CUT_OFF = "the log is not finished: its writer was cut off; everything up to there was read"
 
 
 def replay(options: Options) -> int:
@@ -46,7 +52,95 @@ def _show_replay(replayed: Replay, as_json: bool) -> None:
     if not strides:
         complain("no complete stride in this log")
     if not replayed.complete:
-        complain("the log is not finished: its writer was cut off; everything up to there was read")
+        complain(CUT_OFF)
+
+
+def plot(options: Options) -> int:
+    path = options.out or _beside(options.file, ".png")
+    try:
+        walk = _walk_for_picture(options, path)
+    except LogError as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
+    if not walk.strides:
+        complain("no complete stride in this log")
+    from command_line.plots import plot_walk  # matplotlib takes its time
+
+    plot_walk(walk, path)
+    print(f"written  {path}")
+    return exit_codes.OK
+
+
+def film(options: Options) -> int:
+    path = options.out or _beside(options.file, "-strides.png")
+    moving = path.suffix == ".gif"
+    try:
+        walk = _walk_for_picture(options, path)
+        strides = _chosen_strides(options, walk, moving)
+    except LogError as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
+    except ValueError as problem:
+        complain(str(problem))
+        return exit_codes.USAGE
+    if moving:
+        _draw_film(walk, strides, path)
+    else:
+        from command_line.stride_strip import draw_strip
+
+        draw_strip(walk, strides, path)
+    names = [f"{outcome_of(stride, walk.geometric_step_m)} {stride['index']}" for stride in strides]
+    print(f"strides  {', '.join(names)}\nwritten  {path}")
+    return exit_codes.OK
+
+
+def _beside(log: Path, ending: str) -> Path:
+    """The log's name with another ending."""
+    return log.with_name(log.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap") + ending)
+
+
+def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
+    """With what is to be said of it. Raises LogError, also for a picture that nobody could write."""
+    walk = read_walk(options.file, options.walk)
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise LogError(f"{path} cannot be written; choose another place with --out")
+    if walk.walks > 1 and not options.walk:
+        complain(f"the last of {walk.walks} walks in this log; --walk N takes another")
+    if walk.missing:
+        complain(f"not in this log: {', '.join(walk.missing)}")
+    if not walk.complete:
+        complain(CUT_OFF)
+    return walk
+
+
+def _chosen_strides(options: Options, walk: RecordedWalk, moving: bool) -> list[Stride]:
+    """Those asked for, or all for a film, or the clearest of each kind. Raises LogError, and ValueError for a wish that
+    cannot be fulfilled.
+    """
+    by_number = {stride["index"]: stride for stride in walk.own_strides}
+    if not by_number:
+        raise LogError(f"{options.file}: no complete stride in this log")
+    for number in options.stride or ():
+        if number not in by_number:
+            raise ValueError(f"--stride {number}: this walk has {min(by_number)} to {max(by_number)}")
+    if options.stride:
+        strides = [by_number[number] for number in options.stride]
+    else:
+        strides = walk.own_strides if moving else choose_strides(walk)
+    length_s = sum(duration_s(walk, stride) for stride in strides)
+    if moving and length_s > LONGEST_FILM_S:
+        raise ValueError(f"{length_s:.0f} s of film are more than {LONGEST_FILM_S:.0f} s; choose with --stride")
+    return strides
+
+
+def _draw_film(walk: RecordedWalk, strides: list[Stride], path: Path) -> None:
+    from command_line.stride_film import draw_film
+
+    progress = Progress("frames")
+    try:
+        draw_film(walk, strides, path, progress.show)
+    finally:
+        progress.clear()
 
 
 def info(options: Options) -> int:

@@ -17,6 +17,7 @@ from command_line.screen import complain
 
 DEFAULT_SOCKET = "/run/mudskipper/mudskipper.sock"
 METHODS = ("default", "paper")  # of estimation
+PICTURE_MODULES = ("matplotlib", "PIL")  # an extra of this package
 DEFAULT_CONFIG = "/etc/mudskipper/mudskipper.toml"
 
 
@@ -117,6 +118,16 @@ def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
     replay.add_argument("--json", action="store_true")
     replay.add_argument("--config", type=Path, help="instead of the one in the log")
     replay.add_argument("--method", choices=METHODS, help="of estimation, instead of the configured one")
+    plot = _add(commands, "plot", "logs.plot", "A walk against time: forces, coefficients, depth, place and steps.")
+    film = _add(commands, "film", "logs.film", "Strides seen from the side: as a strip of pictures, or moving.")
+    plot.add_argument("--out", type=_picture(".png", ".svg", ".pdf"), metavar="PNG", help="or .svg, .pdf")
+    film.add_argument("--out", type=_picture(".png", ".gif"), metavar="FILE", help=".png for a strip, .gif for a film")
+    film.add_argument("--stride", action="append", type=_count, metavar="N", help="as replay counts them, repeatable")
+    for parser in (plot, film):
+        parser.add_argument("file", type=Path, help="a log of ours, or the authors' CSV")
+        parser.add_argument(
+            "--walk", type=_count, default=0, metavar="N", help="of the log's walks (default: the last)"
+        )
     log = commands.add_parser("log", help="Look into a log.")  # type: ignore[attr-defined]
     actions = log.add_subparsers(dest="action", required=True, metavar="action")
     info = _add(actions, "info", "logs.info", "What a log holds.")
@@ -126,6 +137,15 @@ def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
     export.add_argument("file", type=Path)
     export.add_argument("--csv", action="store_true", required=True, help="the format; there is one so far")
     export.add_argument("--out", type=Path, help="file to write (default: standard output)")
+
+
+def _picture(*endings: str) -> Callable[[str], Path]:
+    def path(text: str) -> Path:
+        if not text.endswith(endings):
+            raise argparse.ArgumentTypeError(f"{text}: must end with {' or '.join(endings)}")
+        return Path(text)
+
+    return path
 
 
 def _add_experiments(commands: Commands) -> None:  # type: ignore[valid-type]
@@ -168,6 +188,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return run(options)
     except KeyboardInterrupt:
         return exit_codes.INTERRUPTED
+    except ModuleNotFoundError as problem:
+        if problem.name not in PICTURE_MODULES:
+            raise
+        complain("pictures need matplotlib: install mudskipper with its extra 'plots'")
+        return exit_codes.UNHEALTHY
     except BrokenPipeError:  # the reader of our output, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return exit_codes.OK

@@ -7,14 +7,17 @@ From the last stride's coefficients, by the laws of the plate's edge, b its widt
 
 The paper names both conditions, not which depth between them it takes. Its adaptive speed in the firm mud (6.4 cm/s,
 that of a depth of 5 cm: 6.6) shows that it was the deepest that comes out, and so it is here. The estimates are taken
-as they are, without doubt; like the paper's robot, the right flipper decides while it knows anything.
+as they are, without doubt; like the paper's robot, the right flipper decides while it knows anything. A flipper that
+did not come out proves f_e ≥ f_m at its depth, whatever its force said, until the mud changes: a motor at its limit
+feels no more than that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 
-from control.adaptation import AdaptationParameters, DepthChoice, depth_grid
+from control.adaptation import GRID_M, AdaptationParameters, DepthChoice, depth_grid
 from control.coefficient import MudBelief
 from control.gait import GaitParameters
 from control.geometry import FlipperGeometry
@@ -36,21 +39,28 @@ class PaperAdaptation:
     def reset(self, depth_m: float) -> None:
         self.choice = DepthChoice(depth_m, False, "start")
         self._k_s = self._k_e = NOT_TOLD
+        self._stuck_m = inf  # the shallowest depth that held a flipper in this mud
 
     def step(self, belief: MudBelief, strides: Sequence[StrideEstimate]) -> DepthChoice:
         for stride in sorted(strides, key=lambda stride: stride.flipper):  # the right one last
             self._k_s = stride.k_s if stride.k_s.valid else self._k_s
             self._k_e = stride.k_e if stride.k_e.valid else self._k_e
-        if self._k_e.valid:
-            out = [depth_m for depth_m in self.grid_m if self._extraction_n(depth_m) < self.parameters.motor_force_n]
+        if belief.boundary:
+            self._stuck_m = inf
+        if not all(stride.released for stride in strides):
+            self._stuck_m = min(self._stuck_m, self.choice.depth_m)
+        if self._k_e.valid or self._stuck_m < inf:
+            out = [depth_m for depth_m in self.grid_m if self._comes_out(depth_m)]
             depth_m = max(out, default=self.grid_m[0])
             self.choice = DepthChoice(depth_m, self._slips(depth_m), "deepest that comes out" if out else "extraction")
         else:
             self.choice = self.choice._replace(reason="no k_e known, depth kept")
         return self.choice
 
-    def _extraction_n(self, depth_m: float) -> float:
-        return self._k_e.value * self.geometry.plate_width_m * self.geometry.plate_thickness_m * depth_m
+    def _comes_out(self, depth_m: float) -> bool:
+        edge_m2 = self.geometry.plate_width_m * self.geometry.plate_thickness_m
+        extraction_n = self._k_e.value * edge_m2 * depth_m
+        return depth_m < self._stuck_m - GRID_M / 2.0 and extraction_n < self.parameters.motor_force_n
 
     def _slips(self, depth_m: float) -> bool:
         if not self._k_s.valid:

@@ -13,8 +13,14 @@ from typing import Any
 
 import pytest
 
+from control.controller import WalkOrder
+from control.modes import Mode
+from firmware_host.configuration import Configuration
+from firmware_host.recorder import Recorder
 from firmware_host.status_client import NoDaemonError, StatusClient
 from simulation.local_setup import write_local_setup
+from simulation.lockstep import Lockstep
+from simulation.track import paper_track
 
 
 class Bench:
@@ -72,3 +78,17 @@ def bench(short_folder: Path, tmp_path: Path) -> Iterator[Bench]:
         yield made
     finally:
         made.end()
+
+
+@pytest.fixture(scope="session")
+def two_walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
+    """A log in which the robot walked two strides, held, and walked one more."""
+    path = tmp_path_factory.mktemp("logs") / "two.mcap"
+    recorder = Recorder(path, configuration.text, {"robot": "test"})
+    robot = Lockstep(configuration, paper_track(), recorder=recorder)
+    robot.arm()
+    for strides in (2, 1):
+        robot.walk(WalkOrder(0.03, True, strides))
+        robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
+    assert recorder.close(20.0)
+    return path

@@ -1,0 +1,344 @@
+"""`mudskipper plot` and `mudskipper film`: what is drawn, what is written, what is refused."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from PIL import Image
+
+import command_line.logs
+import command_line.stride_film
+from command_line import exit_codes
+from command_line.colours import OUTCOMES
+from command_line.main import main
+from command_line.plots import mud_regions, plot_walk
+from command_line.recorded_walk import RecordedWalk, read_walk
+from command_line.stride_choice import Outcome, duration_s, rows_of
+from command_line.stride_film import FRAMES_PER_S, film_frames
+from firmware_host.lab_csv import write_lab_csv
+from firmware_host.log_reader import read_log
+from simulation.clay import MUDS, Clay
+from simulation.track import Track
+
+
+def png_size(path: Path) -> tuple[int, int]:
+    """Of a picture that can be decoded to its end."""
+    with Image.open(path) as picture:
+        assert picture.format == "PNG"
+        picture.load()
+        return picture.size
+
+
+def refusal(capsys: pytest.CaptureFixture[str], status: int, *arguments: str) -> str:
+    """The sentence with which a command line is refused."""
+    try:
+        ended: object = main(arguments)
+    except SystemExit as problem:  # as argparse does it
+        ended = problem.code
+    printed = capsys.readouterr()
+    assert (ended, printed.out) == (status, "")
+    assert "Traceback" not in printed.err
+    return printed.err.splitlines()[-1]
+
+
+@pytest.fixture
+def log(two_walks: Path, tmp_path: Path) -> Path:
+    """In a folder of its own."""
+    return Path(shutil.copy(two_walks, tmp_path / "two.mcap"))
+
+
+# what is written
+
+
+def test_a_plot_stands_beside_its_log(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plot", str(log)]) == exit_codes.OK
+    assert png_size(log.with_name("two.png"))[0] == 1200
+    printed = capsys.readouterr()
+    assert str(log.with_name("two.png")) in printed.out
+    assert "last of 2 walks" in printed.err
+
+
+@pytest.mark.parametrize("ending", ["svg", "pdf"])
+def test_a_plot_can_have_other_names_and_formats(log: Path, tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"figure.{ending}"
+    assert main(["plot", str(log), "--walk", "1", "--out", str(path)]) == exit_codes.OK
+    begins = {"svg": b"<?xml", "pdf": b"%PDF"}
+    assert path.read_bytes().startswith(begins[ending])
+
+
+def test_a_strip_stands_beside_its_log(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["film", str(log), "--walk", "1"]) == exit_codes.OK
+    assert png_size(log.with_name("two-strides.png"))[0] == 1800
+    assert "two-strides.png" in capsys.readouterr().out
+
+
+def test_a_strip_has_a_row_for_each_stride_asked_for(log: Path, tmp_path: Path) -> None:
+    heights = []
+    for strides in (["0"], ["0", "1"], ["1", "0", "1"]):
+        options = [word for stride in strides for word in ("--stride", stride)]
+        assert main(["film", str(log), "--walk", "1", *options, "--out", str(tmp_path / "strip.png")]) == exit_codes.OK
+        heights.append(png_size(tmp_path / "strip.png")[1])
+    rows = np.diff(heights)
+    assert rows[0] > 100 and abs(rows[1] - rows[0]) < 0.1 * rows[0]  # rounding, and each row as wide as the widest
+
+
+def test_a_film_runs_in_real_time_for_ever(log: Path, tmp_path: Path) -> None:
+    path = tmp_path / "walk.gif"
+    assert main(["film", str(log), "--walk", "1", "--stride", "1", "--out", str(path)]) == exit_codes.OK
+    walk = read_walk(log, 1)
+    with Image.open(path) as film:
+        assert (film.format, film.info["loop"]) == ("GIF", 0)
+        shown_ms = 0
+        for number in range(getattr(film, "n_frames", 1)):
+            film.seek(number)
+            film.load()
+            shown_ms += film.info["duration"]
+    frames = len(film_frames(walk, [walk.own_strides[1]]))
+    assert shown_ms == 1000 * frames // FRAMES_PER_S  # frames that look alike are joined, their times added
+    assert abs(shown_ms / 1000.0 - duration_s(walk, walk.own_strides[1])) <= 1.0 / FRAMES_PER_S
+
+
+def test_the_authors_form_is_drawn_too(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "walk.csv"
+    with path.open("w", encoding="utf-8") as out:
+        write_lab_csv(read_log(log), out)
+    assert main(["plot", str(path)]) == exit_codes.OK
+    assert main(["film", str(path)]) == exit_codes.OK
+    png_size(tmp_path / "walk.png")
+    png_size(tmp_path / "walk-strides.png")
+    assert capsys.readouterr().err == ""
+
+
+def test_a_cut_log_is_drawn_as_far_as_it_goes(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log.write_bytes(log.read_bytes()[: int(0.6 * log.stat().st_size)])
+    assert main(["plot", str(log)]) == exit_codes.OK
+    assert "cut off" in capsys.readouterr().err
+    png_size(log.with_name("two.png"))
+
+
+# what is drawn
+
+
+def drawn(walk: RecordedWalk, path: Path) -> Figure:
+    """The figure that a plot was saved from."""
+    figures: list[Figure] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plt, "close", figures.append)
+        plot_walk(walk, path)
+    return figures[0]
+
+
+@pytest.fixture(scope="module")
+def figure(two_walks: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Figure]:
+    """Of the first walk."""
+    yield drawn(read_walk(two_walks, 1), tmp_path_factory.mktemp("figure") / "walk.png")
+    plt.close("all")
+
+
+def panel(figure: Figure, label: str) -> Axes:
+    (found,) = [axes for axes in figure.axes if label in axes.get_ylabel()]
+    return found
+
+
+def test_the_plot_shows_the_logs_own_numbers(two_walks: Path, figure: Figure) -> None:
+    walk = read_walk(two_walks, 1)
+    lines = {str(line.get_label()): np.asarray(line.get_ydata()) for axes in figure.axes for line in axes.lines}
+    np.testing.assert_array_equal(lines["$f_z$ up"], walk.force_z_n)
+    np.testing.assert_array_equal(lines["commanded"], 100.0 * walk.depth_command_m)
+    chosen_cm = [100.0 * stride["chosen_depth_m"] for stride in walk.own_strides]
+    np.testing.assert_array_equal(lines["chosen for the next stride"], chosen_cm)
+    bars = [bar.get_height() for axes in [panel(figure, "step")] for bar in axes.patches if bar.get_width() < 2.0]  # type: ignore[attr-defined]
+    assert bars == pytest.approx([100.0 * stride["step_m"] for stride in walk.own_strides])
+
+
+@pytest.mark.parametrize("name", ["k_p", "k_s", "k_e"])
+def test_bars_of_a_coefficient_are_two_standard_errors(two_walks: Path, figure: Figure, name: str) -> None:
+    walk = read_walk(two_walks, 1)
+    told = [stride for stride in walk.strides if np.isfinite(stride[name])]
+    containers: Sequence[Any] = panel(figure, f"${name}$").containers
+    assert len(told) == len(containers) > 1
+    for stride, container in zip(told, containers, strict=True):
+        ((_, low), (_, high)) = container.lines[2][0].get_segments()[0]
+        assert (high + low) / 2.0 == pytest.approx(stride[name] / 1e6)
+        assert (high - low) / 4.0 == pytest.approx(stride[f"{name}_std_error"] / 1e6)
+
+
+def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
+    """Stuck where the flipper hung in the mud as the stride closed; slipping and stuck in the colour of their bars."""
+    walk = read_walk(two_walks, 1)
+    slipping, stuck = walk.own_strides[0] | {"step_m": 0.01}, walk.own_strides[1] | {"released": False}
+    slipping["released"] = True
+    figure = drawn(walk._replace(strides=[slipping, stuck]), tmp_path / "walk.png")
+    (mark,) = [line for line in panel(figure, "depth").lines if line.get_label() == "stuck"]
+    row = int(np.searchsorted(walk.time_s, stuck["stamp_s"]))
+    assert np.asarray(mark.get_xdata()) == pytest.approx([stuck["stamp_s"]])
+    assert np.asarray(mark.get_ydata()) == pytest.approx([100.0 * walk.depth_m[row]])
+    handles, labels = panel(figure, "step").get_legend_handles_labels()
+    bars = dict(zip(labels, handles, strict=True))
+    for outcome, stride in ((Outcome.SLIPPING, slipping), (Outcome.STUCK, stuck)):
+        (bar,) = bars[outcome].get_children()
+        assert to_hex(bar.get_facecolor()) == OUTCOMES[outcome]
+        assert bar.get_x() == pytest.approx(stride["t_start_s"])
+
+
+def test_without_a_known_sweep_no_geometric_step_is_drawn(two_walks: Path, tmp_path: Path) -> None:
+    walk = read_walk(two_walks, 1)
+    strides = [stride | {"released": True} for stride in walk.strides]
+    figure = drawn(walk._replace(strides=strides, sweep_rad=float("nan")), tmp_path / "walk.png")
+    assert panel(figure, "step").get_legend_handles_labels()[1] == ["unknown"]
+
+
+def test_without_a_pose_there_are_no_panels_of_place(two_walks: Path, tmp_path: Path) -> None:
+    walk = read_walk(two_walks, 1)
+    figure = drawn(walk._replace(body_x_m=np.full(len(walk.time_s), np.nan)), tmp_path / "walk.png")
+    assert [axes.get_ylabel().split()[0] for axes in figure.axes] == ["force", "$k_p$", "$k_s$", "$k_e$", "depth"]
+
+
+@pytest.mark.filterwarnings("error")
+def test_strides_that_say_nothing_are_no_trouble(two_walks: Path, tmp_path: Path) -> None:
+    """Not a number, infinite, negative, and none at all in a walk of one tick."""
+    walk = read_walk(two_walks, 1)
+    values = ((np.nan, np.nan), (np.inf, 1.0), (1e6, np.inf), (-1e6, 1.0))
+    wild = [
+        stride | {"k_p": value, "k_p_std_error": std_error}
+        for stride, (value, std_error) in zip(walk.strides, values, strict=True)
+    ]
+    plot_walk(walk._replace(strides=wild), tmp_path / "wild.png")
+    plot_walk(walk._replace(strides=[], time_s=np.zeros(len(walk.time_s))), tmp_path / "bare.png")
+    assert png_size(tmp_path / "wild.png") == png_size(tmp_path / "bare.png")
+
+
+def test_muds_are_shaded_where_the_robot_said_so(two_walks: Path) -> None:
+    walk = read_walk(two_walks, 1)
+    assert mud_regions(walk, None) == [(0.0, walk.time_s[-1], "mud 1")]
+    second = walk.own_strides[1]
+    noticed = walk._replace(noticed_s=[second["stamp_s"]])
+    assert mud_regions(noticed, None) == [
+        (0.0, second["t_start_s"], "mud 1"),
+        (second["t_start_s"], walk.time_s[-1], "mud 2"),
+    ]
+
+
+def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(two_walks: Path) -> None:
+    walk = read_walk(two_walks, 1)
+    place_m = np.linspace(0.0, 0.5, len(walk.time_s))
+    track = Track([(0.1, MUDS["48.5"]), (0.3, MUDS["53.1"]), (0.3, Clay("900 Pa", 900.0)), (0.3, MUDS["48.5"])])
+    regions = mud_regions(walk._replace(body_x_m=place_m), track)
+    assert [name for *_, name in regions] == ["w = 48.5 %", "w = 53.1 %", "900 Pa"]  # the last was not reached
+    borders_s = np.interp([0.0, 0.1, 0.4, 0.5], place_m, walk.time_s)
+    np.testing.assert_allclose([start for start, *_ in regions], borders_s[:3], atol=0.003)  # one tick
+    assert regions[-1][1] == walk.time_s[-1]
+
+
+def test_frames_are_a_twentieth_of_a_second_apart(two_walks: Path) -> None:
+    walk = read_walk(two_walks, 1)
+    frames = film_frames(walk, walk.own_strides)
+    for stride in walk.own_strides:
+        rows = [row for shown, row in frames if shown is stride]
+        assert rows[0] == rows_of(walk, stride).start
+        assert set(rows) <= set(rows_of(walk, stride))
+        np.testing.assert_allclose(np.diff(walk.time_s[rows]), 1.0 / FRAMES_PER_S, atol=0.003)  # one tick
+
+
+# what is refused
+
+
+@pytest.mark.parametrize("command", ["plot", "film"])
+def test_what_is_no_log_is_refused_in_a_sentence(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "broken.mcap").write_bytes(b"not a log")
+    assert "broken.mcap: damaged" in refusal(capsys, exit_codes.UNHEALTHY, command, str(tmp_path / "broken.mcap"))
+    assert "No such file" in refusal(capsys, exit_codes.UNHEALTHY, command, str(tmp_path / "none.mcap"))
+    assert "not a log" in refusal(capsys, exit_codes.UNHEALTHY, command, str(tmp_path / "walk.txt"))
+    assert not list(tmp_path.glob("*.png"))
+
+
+@pytest.mark.parametrize("command", ["plot", "film"])
+def test_a_walk_that_there_is_not_is_refused(command: str, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "no walk 3, only 2" in refusal(capsys, exit_codes.UNHEALTHY, command, str(log), "--walk", "3")
+
+
+def test_a_stride_that_there_is_not_is_refused_with_those_there_are(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sentence = refusal(capsys, exit_codes.USAGE, "film", str(log), "--walk", "1", "--stride", "0", "--stride", "2")
+    assert "--stride 2: this walk has 0 to 1" in sentence
+
+
+@pytest.mark.parametrize(("command", "name"), [("plot", "x.gif"), ("film", "x.mp4"), ("film", "x"), ("plot", "")])
+def test_other_formats_are_refused(command: str, name: str, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "must end with .png" in refusal(capsys, exit_codes.USAGE, command, str(log), "--out", name)
+
+
+@pytest.mark.parametrize("command", ["plot", "film"])
+def test_a_place_that_cannot_be_written_is_named(command: str, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = log.parent / "nowhere" / "x.png"
+    assert f"{out} cannot be written" in refusal(capsys, exit_codes.UNHEALTHY, command, str(log), "--out", str(out))
+
+
+@pytest.fixture
+def no_strides(monkeypatch: pytest.MonkeyPatch) -> None:
+    def read(path: Path, number: int) -> RecordedWalk:
+        return read_walk(path, number)._replace(strides=[])
+
+    monkeypatch.setattr(command_line.logs, "read_walk", read)
+
+
+def test_without_strides_there_is_nothing_to_film(
+    log: Path, no_strides: None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "no complete stride" in refusal(capsys, exit_codes.UNHEALTHY, "film", str(log), "--walk", "1")
+
+
+def test_without_strides_a_plot_shows_the_rest(log: Path, no_strides: None, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plot", str(log), "--walk", "1"]) == exit_codes.OK
+    assert "no complete stride" in capsys.readouterr().err
+    png_size(log.with_name("two.png"))
+
+
+def test_a_film_without_end_is_refused(
+    log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(command_line.logs, "LONGEST_FILM_S", 2.0)
+    monkeypatch.setattr(command_line.stride_film, "FRAMES_PER_S", 2)
+    out = str(log.with_suffix(".gif"))
+    assert "choose with --stride" in refusal(capsys, exit_codes.USAGE, "film", str(log), "--walk", "1", "--out", out)
+    assert main(["film", str(log), "--walk", "1", "--out", out, "--stride", "1"]) == exit_codes.OK
+
+
+@pytest.mark.parametrize("command", [("plot",), ("film",), ("film", "--out", "x.gif")])
+def test_without_matplotlib_a_sentence_says_what_to_install(command: tuple[str, ...], log: Path) -> None:
+    program = "import sys; sys.modules['matplotlib'] = None; from command_line.main import main; sys.exit(main())"
+    ended = subprocess.run(
+        [sys.executable, "-c", program, command[0], str(log), *command[1:]],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        cwd=log.parent,
+    )
+    assert (ended.returncode, ended.stdout) == (exit_codes.UNHEALTHY, "")
+    assert (
+        ended.stderr.splitlines()[-1]
+        == "mudskipper: pictures need matplotlib: install mudskipper with its extra 'plots'"
+    )
+    assert "Traceback" not in ended.stderr
+
+
+def test_another_missing_module_is_no_matter_of_pictures(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "command_line.plots", raising=False)
+    monkeypatch.setitem(sys.modules, "simulation.track", None)
+    with pytest.raises(ModuleNotFoundError):
+        main(["plot", str(log)])
