@@ -7,9 +7,10 @@ From the last stride's coefficients, by the laws of the plate's edge, b its widt
 
 The paper names both conditions, not which depth between them it takes. Its adaptive speed in the firm mud (6.4 cm/s,
 that of a depth of 5 cm: 6.6) shows that it was the deepest that comes out, and so it is here. The estimates are taken
-as they are, without doubt; like the paper's robot, the right flipper decides while it knows anything. A flipper that
-did not come out proves f_e ≥ f_m at its depth, whatever its force said, until the mud changes: a motor at its limit
-feels no more than that.
+as they are, without doubt; like the paper's robot, the right flipper decides while it knows anything. A motor at its
+limit feels no more than f_m, so its force cannot tell that f_e is greater. The body can: a flipper that was late in
+coming out and pulled the body back (or no pose says that it did not) proves f_e ≥ f_m at its depth, until the mud
+changes.
 """
 
 from __future__ import annotations
@@ -39,16 +40,14 @@ class PaperAdaptation:
     def reset(self, depth_m: float) -> None:
         self.choice = DepthChoice(depth_m, False, "start")
         self._k_s = self._k_e = NOT_TOLD
-        self._stuck_m = inf  # the shallowest depth that held a flipper in this mud
+        self._late_m = inf  # depth of the last stride, if a flipper was still in the mud after its extraction
+        self._stuck_m = inf  # the shallowest one in this mud whose swing pulled the body back
 
     def step(self, belief: MudBelief, strides: Sequence[StrideEstimate]) -> DepthChoice:
         for stride in sorted(strides, key=lambda stride: stride.flipper):  # the right one last
             self._k_s = stride.k_s if stride.k_s.valid else self._k_s
             self._k_e = stride.k_e if stride.k_e.valid else self._k_e
-        if belief.boundary:
-            self._stuck_m = inf
-        if not all(stride.released for stride in strides):
-            self._stuck_m = min(self._stuck_m, self.choice.depth_m)
+        self._remember(belief, strides)
         if self._k_e.valid or self._stuck_m < inf:
             out = [depth_m for depth_m in self.grid_m if self._comes_out(depth_m)]
             depth_m = max(out, default=self.grid_m[0])
@@ -56,6 +55,14 @@ class PaperAdaptation:
         else:
             self.choice = self.choice._replace(reason="no k_e known, depth kept")
         return self.choice
+
+    def _remember(self, belief: MudBelief, strides: Sequence[StrideEstimate]) -> None:
+        """The step that has just been measured holds the swing of the stride before."""
+        if belief.boundary:
+            self._stuck_m = inf
+        if not all(stride.step_m >= self.geometry.flipper_length_m / 2.0 for stride in strides):
+            self._stuck_m = min(self._stuck_m, self._late_m)
+        self._late_m = inf if all(stride.released for stride in strides) else self.choice.depth_m
 
     def _comes_out(self, depth_m: float) -> bool:
         edge_m2 = self.geometry.plate_width_m * self.geometry.plate_thickness_m
