@@ -43,7 +43,7 @@ from simulation.flipper_contact import NO_CONTACT
 from simulation.rail_body import BodyMotion, DragPad, DryDrag, Pusher
 from simulation.track import Track
 
-YIELD_M = 0.003  # two or three hundredths of a belly's width, as footings on soft clay settle before they fail
+YIELD_M = 0.003  # a twentieth of a belly's width, after which footings on soft clay have failed
 LARGEST_RAD_S = 600.0  # at which the body may ring on its belly: steps of 1 ms follow that
 SIDES = (1.0, -1.0)  # fore, aft; left, right
 

@@ -112,6 +112,14 @@ def test_a_carried_plate_is_as_deep_as_rotation_matrices_say(state: np.ndarray, 
         assert told_m == pytest.approx(-point_in_world(state, side, u, s)[2] - 0.004)
 
 
+def test_a_plate_on_a_tipped_body_never_lies_flat() -> None:
+    body = make_body()
+    body.roll_rad = 1.5
+    left, right = (carried_attitude(GEOMETRY, carriage, 0.0, 0.5, 0.0) for carriage in body.carriages)
+    assert left.per_upward == LEAST_UPRIGHT
+    assert right.per_upward == pytest.approx(cos(1.0))
+
+
 @given(STATES, SPEEDS, SIDES)
 def test_a_carried_plate_moves_as_differences_of_its_places_say(
     state: np.ndarray, rates: np.ndarray, side: float

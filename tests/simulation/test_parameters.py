@@ -1,0 +1,31 @@
+"""Every number that describes the simulated robot states its bounds, and its default lies within them."""
+
+from dataclasses import MISSING, fields
+from typing import Annotated, get_args, get_origin, get_type_hints
+
+import pytest
+
+from control.bounds import Bounds
+from simulation.free_body import BodyShape
+from simulation.imu import ImuParameters
+from simulation.motion_capture import MotionCaptureParameters
+from simulation.odrive import OdriveParameters
+from simulation.plant import PlantParameters
+
+RECORDS = [BodyShape, ImuParameters, MotionCaptureParameters, OdriveParameters, PlantParameters]
+
+
+@pytest.mark.parametrize("record", RECORDS)
+def test_every_number_has_bounds_around_its_default(record: type) -> None:
+    hints = get_type_hints(record, include_extras=True)
+    bounded = 0
+    for field in fields(record):
+        hint = hints[field.name]
+        assert hint not in (int, float), field.name
+        if get_origin(hint) is Annotated:
+            _, bounds = get_args(hint)
+            assert isinstance(bounds, Bounds)
+            assert bounds.minimum < bounds.maximum
+            assert field.default is MISSING or bounds.minimum <= field.default <= bounds.maximum, field.name
+            bounded += 1
+    assert bounded >= 5
