@@ -17,7 +17,7 @@ from typing import Protocol
 from control.records import BodyPose
 
 POSE = Struct("<dd")
-STALE_S = 0.5
+STALE_S = 0.05  # six frames of 120 Hz: a body that seems to stand makes a bound on k_s a value
 SOCKET_MODE = 0o660  # a bridge run by an operator may send
 MOST_MESSAGES_PER_READ = 64  # a sender gone wild must not hold the loop
 
