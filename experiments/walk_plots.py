@@ -43,7 +43,9 @@ def plot_trackway(report: dict[str, Any], path: Path) -> None:
         for rule, colour in colours.items():
             _plot_walk(panel, report["walks"][rule][0], name, colour)
         panel.set_ylabel(title)
-    axes["steps"].set_ylim(bottom=min(0.0, axes["steps"].get_ylim()[0]))
+    low, high = axes["steps"].get_ylim()
+    axes["steps"].set_ylim(min(0.0, low), high + 0.1 * (high - low))  # room for the muds' names
+    _name_muds(axes["steps"], report)
     axes["steps"].set_title("One walk of each gait over the trackway", fontsize="medium")
     axes["steps"].legend(handles=_legend(colours, report), fontsize="small", loc="lower left", ncols=2, framealpha=0.9)
     axes["steps"].tick_params(labelbottom=False)
@@ -61,13 +63,17 @@ def _colours(rules: Sequence[str]) -> dict[str, str]:
 
 def _shade_muds(panel: Axes, report: dict[str, Any]) -> None:
     length_cm = 100.0 * report["settings"]["compartment_m"]
-    muds = list(report["settings"]["strength_pa"])
-    for i, mud in enumerate(muds):
+    muds = len(report["settings"]["strength_pa"])
+    for i in range(muds):
         panel.axvspan(i * length_cm, (i + 1) * length_cm, color=MUD_SHADES[i % len(MUD_SHADES)], zorder=0)
-        panel.text((i + 0.5) * length_cm, 1.0, f"w = {mud} %", transform=panel.get_xaxis_transform(),
-                   ha="center", va="top", fontsize="small", color=TEXT)  # fmt: skip
-    panel.set_xlim(0.0, len(muds) * length_cm)
-    panel.margins(y=0.12)
+    panel.set_xlim(0.0, muds * length_cm)
+
+
+def _name_muds(panel: Axes, report: dict[str, Any]) -> None:
+    length_cm, high = 100.0 * report["settings"]["compartment_m"], panel.get_xaxis_transform()
+    for i, mud in enumerate(report["settings"]["strength_pa"]):
+        place_cm = (i + 0.5) * length_cm
+        panel.text(place_cm, 0.97, f"w = {mud} %", transform=high, ha="center", va="top", color=TEXT)
 
 
 def _plot_walk(panel: Axes, strides: Sequence[Mapping[str, Any]], figure: str, colour: str) -> None:
@@ -168,8 +174,9 @@ def _plot_choice(panel: Axes, rows: Sequence[Mapping[str, Any]], strengths_kpa: 
     told = [(strength, settled) for strength, settled in told if settled["depth_cm"] is not None]
     depths = np.array([settled["depth_cm"] for _, settled in told])
     ranges = np.array([settled["depth_range_cm"] for _, settled in told]).reshape(-1, 2)
-    panel.errorbar([strength for strength, _ in told], depths, yerr=abs(ranges.T - depths), fmt="o", color=colour,
-                   markeredgecolor="black", markersize=7, capsize=3, linewidth=1.2, label=f"chosen by {method}")  # fmt: skip
+    look: dict[str, Any] = {"fmt": "o", "markeredgecolor": "black", "markersize": 7, "capsize": 3, "linewidth": 1.2}
+    places = [strength for strength, _ in told]
+    panel.errorbar(places, depths, yerr=abs(ranges.T - depths), color=colour, label=f"chosen by {method}", **look)
 
 
 def _plot_share(panel: Axes, rows: Sequence[Mapping[str, Any]], strengths_kpa: Any, method: str, colour: str) -> None:
@@ -179,8 +186,8 @@ def _plot_share(panel: Axes, rows: Sequence[Mapping[str, Any]], strengths_kpa: A
     for strength, share, each in zip(strengths_kpa, shares, settled, strict=True):
         failed = sum(each["failures"].values())
         if failed:
-            panel.annotate(f"{failed}/{each['strides']}", (strength, share), textcoords="offset points", xytext=(0, -12),
-                           ha="center", fontsize="x-small", color=colour)  # fmt: skip
+            look: dict[str, Any] = {"textcoords": "offset points", "xytext": (0, -12), "ha": "center"}
+            panel.annotate(f"{failed}/{each['strides']}", (strength, share), color=colour, fontsize="x-small", **look)
 
 
 def _name_sweep_axes(over: Axes, below: Axes, strengths_kpa: Any) -> None:
