@@ -1,16 +1,15 @@
-"""`mudskipper experiment`: the paper's experiments, each ending in numbers beside the paper's and a picture."""
+"""`mudskipper experiment estimation`: its plan from the command line, and its tables."""
 
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from command_line import exit_codes
-from command_line.screen import Progress, complain, number, table
+from command_line.conduct import conduct, refuse
+from command_line.screen import number, table
 from experiments.estimation import (
     LAYERS,
     SINGLE_WATERS,
@@ -25,28 +24,18 @@ from simulation.clay import Clay, clay_of_water
 
 def estimation(options: argparse.Namespace) -> int:
     if not options.simulated:
-        complain("the truth comes from a virtual load cell: this experiment runs with --simulated only")
-        return exit_codes.USAGE
+        return refuse("the truth comes from a virtual load cell: this experiment runs with --simulated only")
     try:
         plan = plan_of(options)
     except ValueError as problem:
-        complain(str(problem))
-        return exit_codes.USAGE
-    if options.out is not None:
-        options.out.mkdir(parents=True, exist_ok=True)  # what cannot be is refused before the minutes of work
-    report = _run(plan)
-    if options.out is not None:
-        _write(options, report)
-    print(json.dumps(report) if options.json else text_of(report))
-    return exit_codes.OK
+        return refuse(str(problem))
+    return conduct(options, "trials", lambda show: report_of(plan, judge(plan, show)), text_of, _plot)
 
 
-def _run(plan: Plan) -> dict[str, Any]:
-    progress = Progress("trials")
-    try:
-        return report_of(plan, judge(plan, progress.show))
-    finally:
-        progress.clear()
+def _plot(report: dict[str, Any], path: Path) -> None:
+    from experiments.plots import plot_errors  # matplotlib takes its time
+
+    plot_errors(report, path)
 
 
 def plan_of(options: argparse.Namespace) -> Plan:
@@ -62,14 +51,6 @@ def _muds(options: argparse.Namespace, waters: Sequence[float]) -> tuple[Clay, .
     if options.strength:
         return tuple(Clay(f"{strength_pa:g} Pa", strength_pa) for strength_pa in options.strength)
     return tuple(clay_of_water(water) for water in options.mud or waters)
-
-
-def _write(options: argparse.Namespace, report: dict[str, Any]) -> None:
-    from experiments.plots import plot_errors  # matplotlib takes its time
-
-    (options.out / "estimation.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    plot_errors(report, options.out / "estimation.png")
-    print(f"written  {options.out / 'estimation.json'}, {options.out / 'estimation.png'}", file=sys.stderr)
 
 
 def text_of(report: dict[str, Any]) -> str:

@@ -152,15 +152,51 @@ def _add_experiments(commands: Commands) -> None:  # type: ignore[valid-type]
     experiment = commands.add_parser("experiment", help="The paper's experiments.")  # type: ignore[attr-defined]
     names = experiment.add_subparsers(dest="name", required=True, metavar="name")
     estimation = _add(names, "estimation", "experiment.estimation", "Estimated coefficients against a load cell.")
-    estimation.add_argument("--simulated", action="store_true", help="the load cell is a virtual one")
-    estimation.add_argument("--json", action="store_true", help="for machines")
-    estimation.add_argument("--out", type=Path, metavar="DIR", help="write JSON and picture there")
+    _add_report(estimation, "the load cell is a virtual one", "write JSON and picture there")
     estimation.add_argument("--setup", choices=("single", "walking", "both"), default="both")
     estimation.add_argument("--seeds", type=_seeds, default=10, metavar="N", help="trials of each mud (default: 10)")
     muds = estimation.add_mutually_exclusive_group()
     muds.add_argument("--mud", action="append", type=float, metavar="W", help="water content in percent, repeatable")
     muds.add_argument("--strength", action="append", type=_strength_pa, metavar="PA", help="instead, repeatable")
     estimation.add_argument("--layers", metavar="A,B", help="disturbances, separated by commas, or none (default: all)")
+    _add_trackway(names)
+    _add_sweep(names)
+    fit = _add(names, "mud-fit", "walking.run_mud_fit", "The simulator's muds, fitted to the paper's fixed depths.")
+    _add_report(fit, "the muds are the simulator's", "write JSON there")
+    fit.add_argument("--seeds", type=_seeds, default=2, metavar="N", help="walks of each point (default: 2)")
+
+
+def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -> None:
+    experiment.add_argument("--simulated", action="store_true", help=simulated)
+    experiment.add_argument("--json", action="store_true", help="for machines")
+    experiment.add_argument("--out", type=Path, metavar="DIR", help=out)
+
+
+def _add_trackway(names: Commands) -> None:  # type: ignore[valid-type]
+    trackway = _add(names, "trackway", "walking.run_trackway", "Three muds in a row, at fixed and at chosen depths.")
+    _add_report(trackway, "robot and muds are simulated", "write JSON and picture there")
+    trackway.add_argument("--seeds", type=_seeds, default=5, metavar="N", help="trials of each gait (default: 5)")
+    trackway.add_argument(
+        "--method", action="append", metavar="NAME", help="of adaptation, repeatable to compare (default: default)"
+    )
+    trackway.add_argument(
+        "--compartment", type=_compartment_m, default=0.61, metavar="M", help="length of each mud (default: 0.61)"
+    )
+
+
+def _add_sweep(names: Commands) -> None:  # type: ignore[valid-type]
+    sweep = _add(names, "sweep", "walking.run_sweep", "Speed against depth in muds of any strength.")
+    _add_report(sweep, "robot and muds are simulated", "write JSON and picture there")
+    sweep.add_argument("--strength", action="append", type=_strength_pa, metavar="PA", help="repeatable (default: 12)")
+    sweep.add_argument("--method", action="append", metavar="NAME", help="of adaptation, repeatable (default: all)")
+    sweep.add_argument("--seeds", type=_seeds, default=2, metavar="N", help="walks of each point (default: 2)")
+
+
+def _compartment_m(text: str) -> float:
+    value = float(text)
+    if not 0.2 <= value <= 100.0:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 0.2 to 100")
+    return value
 
 
 def _seeds(text: str) -> int:

@@ -7,14 +7,10 @@ trial is simulated once; every method estimates from the same samples.
 
 from __future__ import annotations
 
-import os
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from math import isfinite
-from multiprocessing import active_children
 from typing import Any, NamedTuple
 
 from control.records import StrideEstimate
@@ -22,6 +18,7 @@ from estimation.mud import EstimationParameters
 from experiments.boundaries import Crossing, boundary_rows, crossings_of
 from experiments.error_table import COEFFICIENTS, Judged, error_rows, plate_rows
 from experiments.load_cell_truth import LoadCellTruth, load_cell_truth
+from experiments.side_by_side import Show, side_by_side
 from experiments.trial import SINGLE, WALKING, Setup, Trial, run_trial, strides_of
 from simulation.clay import Clay, clay_of_water
 from simulation.disturbances import LAB, NONE, Disturbances
@@ -109,38 +106,13 @@ def methods_of(setup: Setup) -> tuple[Method, ...]:
     return *both, compensated, Method("default", f"{setup.name} without pose", False, default)
 
 
-def judge(plan: Plan, show: Callable[[int, int], None], processes: int | None = None) -> Outcome:
-    """All trials of a plan, side by side in as many processes as there are processors."""
-    parts = plan.parts()
-    outcomes: list[Outcome] = [Outcome([], [])] * len(parts)
-    with _workers(processes or os.cpu_count()) as pool:
-        places = {pool.submit(run_part, part, plan): i for i, part in enumerate(parts)}
-        for done, future in enumerate(as_completed(places), 1):
-            outcomes[places[future]] = future.result()
-            show(done, len(parts))
+def judge(plan: Plan, show: Show, processes: int | None = None) -> Outcome:
+    """All trials of a plan, side by side."""
+    outcomes = side_by_side([partial(run_part, part, plan) for part in plan.parts()], show, processes)
     return Outcome(
         [each for outcome in outcomes for each in outcome.judged],
         [each for outcome in outcomes for each in outcome.crossings],
     )
-
-
-@contextmanager
-def _workers(count: int | None) -> Iterator[ProcessPoolExecutor]:
-    """They end with the work, also where that ends early: after Ctrl-C nobody waits for the trials under way."""
-    pool = ProcessPoolExecutor(count, initializer=_ignore_interrupts)
-    try:
-        yield pool
-    except BaseException:
-        for worker in active_children():
-            worker.terminate()
-        raise
-    finally:
-        pool.shutdown()
-
-
-def _ignore_interrupts() -> None:
-    """Ctrl-C reaches every process of a terminal; a worker would take it for the trial's result and begin the next."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def run_part(part: Part, plan: Plan) -> Outcome:

@@ -108,6 +108,11 @@ def walk(
     """Until `done` with the strides so far, or a fault. Raises RuntimeError where the robot does not start."""
     lockstep = Lockstep(configuration, track, seed, disturbances=disturbances)
     lockstep.arm()
+    return walk_in(lockstep, track, order, done)
+
+
+def walk_in(lockstep: Lockstep, track: Track, order: WalkOrder, done: Callable[[Sequence[WalkedStride]], bool]) -> Walk:
+    """As `walk`, of a robot that is armed."""
     lockstep.walk(order)
     record = StrideRecord(lockstep, track)
     while lockstep.loop.mode is Mode.WALKING and not done(record.strides):

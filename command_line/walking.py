@@ -1,0 +1,204 @@
+"""`mudskipper experiment trackway`, `sweep` and `mud-fit`: their plans from the command line, and their tables."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from command_line.conduct import conduct, refuse
+from command_line.screen import number, table
+from experiments import depth_sweep, mud_fit, trackway
+from experiments.mud_fit import cells_beside_paper
+
+SIMULATED_ONLY = "the muds are those of the simulator: this experiment runs with --simulated only"
+
+
+def run_trackway(options: argparse.Namespace) -> int:
+    if not options.simulated:
+        return refuse(SIMULATED_ONLY)
+    try:
+        rules = trackway.rules_of(_unique(options.method) or ["default"])
+    except ValueError as problem:
+        return refuse(str(problem))
+    plan = trackway.Plan(rules=rules, seeds=options.seeds, compartment_m=options.compartment)
+    return conduct(options, "walks", lambda show: trackway.run(plan, show), trackway_text, _plot_trackway)
+
+
+def run_sweep(options: argparse.Namespace) -> int:
+    if not options.simulated:
+        return refuse(SIMULATED_ONLY)
+    plan = depth_sweep.Plan(seeds=options.seeds)
+    if options.strength:
+        plan = replace(plan, strengths_pa=tuple(sorted(set(options.strength))))
+    if options.method:
+        plan = replace(plan, methods=tuple(_unique(options.method)))
+    try:
+        plan.method_walks()
+    except ValueError as problem:
+        return refuse(str(problem))
+    return conduct(options, "walks", lambda show: depth_sweep.run(plan, show), sweep_text, _plot_sweep)
+
+
+def run_mud_fit(options: argparse.Namespace) -> int:
+    if not options.simulated:
+        return refuse(SIMULATED_ONLY)
+    plan = mud_fit.Plan(seeds=options.seeds)
+    return conduct(options, "walks", lambda show: mud_fit.run(plan, show), fit_text)
+
+
+def _unique(names: list[str] | None) -> list[str]:
+    return list(dict.fromkeys(names or []))
+
+
+def _plot_trackway(report: dict[str, Any], path: Path) -> None:
+    from experiments.walk_plots import plot_trackway  # matplotlib takes its time
+
+    plot_trackway(report, path)
+
+
+def _plot_sweep(report: dict[str, Any], path: Path) -> None:
+    from experiments.walk_plots import plot_sweep  # matplotlib takes its time
+
+    plot_sweep(report, path)
+
+
+# the trackway
+
+
+def trackway_text(report: dict[str, Any]) -> str:
+    parts = [_speeds_text(report), _failures_text(report), _best_text(report)]
+    short = sum(cell["short_trials"] for row in report["table"].values() for cell in row.values())
+    if short:
+        parts.append(f"Fewer than three strides in a mud, all of them counted: {short} times.")
+    return "\n\n".join(parts)
+
+
+def _speeds_text(report: dict[str, Any]) -> str:
+    muds = list(report["settings"]["strength_pa"])
+    head = ["cm/s", *(f"w = {mud} %" for mud in muds), "all muds"]
+    rows = [head]
+    for rule, row in report["table"].items():
+        over = report["mean_over_muds"][rule]
+        rows.append([rule, *(_plus_minus(row[mud], "") for mud in muds), number(over["mean"], 2)])
+        rows.append(["  all strides", *(_plus_minus(row[mud], "_all") for mud in muds), number(over["mean_all"], 2)])
+        if rule in report["paper"]:
+            rows.append(["  paper", *(_paper_text(report, rule, mud) for mud in muds), ""])
+    return f"Table I: speed after the second stride in each mud, mean ± sd of {_trials(report)}\n{table(rows)}"
+
+
+def _trials(report: dict[str, Any]) -> str:
+    seeds = report["settings"]["seeds"]
+    return "1 trial" if seeds == 1 else f"{seeds} trials"
+
+
+def _plus_minus(cell: Mapping[str, Any], which: str) -> str:
+    mean, sd = cell["mean" + which], cell["sd" + which]
+    return number(mean, 2) if sd is None else f"{number(mean, 2)} ± {sd:.2f}"
+
+
+def _paper_text(report: dict[str, Any], rule: str, mud: str) -> str:
+    told = report["paper"][rule].get(mud)
+    if told is None:
+        return "-"
+    inside = report["within_one_sd"].get(rule, {}).get(mud)
+    verdict = "" if inside is None else (", within" if inside else ", outside")
+    return f"{told['mean']:.1f} ± {told['sd']:.1f}{verdict}"
+
+
+def _failures_text(report: dict[str, Any]) -> str:
+    muds = list(report["settings"]["strength_pa"])
+    rows = [["", *(f"w = {mud} %" for mud in muds), "ends"]]
+    for rule, row in report["table"].items():
+        ends = ", ".join(f"{count} {end}" for end, count in report["ends"][rule].items())
+        rows.append([rule, *(_failed(row[mud]) for mud in muds), ends])
+    return "Failed strides, in brackets those after the second\n" + table(rows)
+
+
+def _failed(cell: Mapping[str, Any]) -> str:
+    later = cell["failures_after_second"]
+    named = [f"{count} ({later.get(name, 0)}) {name}" for name, count in cell["failures"].items()]
+    return f"{', '.join(named) or 'none'} of {cell['strides']}"
+
+
+def _best_text(report: dict[str, Any]) -> str:
+    best = report["best_constant_depth"]
+    rows = [["", *(f"w = {mud} %" for mud in best), "all muds"]]
+    rows.append(["depth", *(f"{each['depth_cm']:g} cm" for each in best.values()), ""])
+    means = [f"{each['mean']:.2f} cm/s" for each in best.values()]
+    rows.append(["speed", *means, f"{report['best_constant_mean_over_muds']:.2f} cm/s"])
+    for rule in report["settings"]["methods"]:
+        rows.append([f"{rule} over it", *(number(ratio) for ratio in report["over_best"][rule].values()), ""])
+    return "Best constant depth in each mud alone\n" + table(rows)
+
+
+# the sweep
+
+
+def sweep_text(report: dict[str, Any]) -> str:
+    methods = report["settings"]["methods"]
+    rows = [["strength", "best depth", "cm/s", *(_sweep_head(method) for method in methods)]]
+    for row in report["strengths"]:
+        cells = [_sweep_cell(row["methods"][method]) for method in methods]
+        rows.append(
+            [f"{row['strength_pa']:g} Pa", f"{row['best']['depth_cm']:g} cm", f"{row['best']['mean']:.2f}", *cells]
+        )
+    title = "Speed at the best constant depth, and where each method settles (after its second stride)"
+    return f"{title}\n{table(rows)}"
+
+
+def _sweep_head(method: str) -> str:
+    return f"{method}: depth, cm/s, share of best, failed"
+
+
+def _sweep_cell(settled: Mapping[str, Any]) -> str:
+    failed = sum(settled["failures"].values())
+    fault = ", fault" if settled["faults"] else ""
+    share = settled["share_of_best"]
+    return (
+        f"{number(settled['depth_cm'], 2)} cm  {settled['mean']:5.2f}  "
+        f"{'-' if share is None else f'{100.0 * share:3.0f} %'}  {failed}/{settled['strides']}{fault}"
+    )
+
+
+# the fit
+
+
+def fit_text(report: dict[str, Any]) -> str:
+    return "\n\n".join([_values_text(report), _cells_text(report), _damping_text(report)])
+
+
+def _values_text(report: dict[str, Any]) -> str:
+    fitted, present = report["fitted"], report["present"]
+    rows = [["", "fitted", "chi² within 1 of it", "present"]]
+    for mud, strength_pa in fitted["strength_pa"].items():
+        low, high = fitted["strength_range_pa"][mud]
+        rows.append(
+            [
+                f"w = {mud} %",
+                f"{strength_pa:.0f} Pa",
+                f"{low:.0f} to {high:.0f} Pa",
+                f"{present['strength_pa'][mud]:.0f} Pa",
+            ]
+        )
+    damping, today = fitted["rail_damping_n_s_m"], present["rail_damping_n_s_m"]
+    rows.append(["rail damping", f"{damping:g} N·s/m", "", f"{today:g} N·s/m"])
+    rows.append(["chi²", f"{fitted['chi2']:.2f}", "", f"{present['chi2']:.2f}"])
+    return "Fitted to the six fixed-depth cells of Table I\n" + table(rows)
+
+
+def _cells_text(report: dict[str, Any]) -> str:
+    rows = [["cm/s", "mud", "paper", "fitted", "present"]]
+    for (rule, mud, speed, paper), (_, _, today, _) in zip(
+        cells_beside_paper(report["fitted"]), cells_beside_paper(report["present"]), strict=True
+    ):
+        rows.append([rule, f"w = {mud} %", f"{paper.mean:.1f} ± {paper.sd:.1f}", f"{speed:.2f}", f"{today:.2f}"])
+    return table(rows)
+
+
+def _damping_text(report: dict[str, Any]) -> str:
+    rows = [["rail damping, N·s/m", "least chi²"]]
+    rows += [[damping, f"{chi2:.2f}"] for damping, chi2 in report["chi2_of_damping"].items()]
+    return table(rows)

@@ -1,0 +1,163 @@
+"""Three muds in a row, walked with two fixed depths and with chosen ones: Table I and figure 8F of the paper.
+
+After section III-D: the trackway of 1.83 m holds mud of 48.5, 53.1 and 45.3 % of water, here in the clay of the
+simulator with the disturbances of the authors' logs. A walk ends when the plates would go down past the end, after 90 s
+in one mud, or by a fault. Beside the table stands what a constant depth could have done at best: every depth in each
+mud alone, on a long track.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
+
+from experiments.depth_rule import DepthRule, chosen_by, configuration_for, constant_depth, walk_by
+from experiments.one_mud import (
+    CONSTANT_STRIDES,
+    MudWalk,
+    best_depth,
+    constant_walks,
+    depths_m,
+    mean_speeds_cm_s,
+    run_mud_walk,
+)
+from experiments.paper_table import ADAPTIVE, FIXED_DEPTHS_M, PAPER_TABLE
+from experiments.side_by_side import Show, side_by_side
+from experiments.speed_table import cell, mean_over_muds, within_one_sd
+from experiments.walk import Walk, WalkedStride
+from simulation.clay import MUDS, Clay
+from simulation.disturbances import LAB
+from simulation.track import COMPARTMENT_M, Track
+
+STUCK_S = 90.0  # of walking in one mud
+FIXED = tuple(constant_depth(depth_m) for depth_m in FIXED_DEPTHS_M.values())
+
+
+@dataclass(frozen=True)
+class Plan:
+    rules: tuple[DepthRule, ...] = (*FIXED, chosen_by("default", ADAPTIVE))
+    muds: tuple[Clay, ...] = tuple(MUDS.values())
+    compartment_m: float = COMPARTMENT_M
+    seeds: int = 5
+    constant_depths_m: tuple[float, ...] = depths_m(0.0025)
+    constant_seeds: int = 2
+
+    @property
+    def seed_range(self) -> range:
+        return range(1, self.seeds + 1)
+
+    def constant_walks(self) -> list[MudWalk]:
+        return constant_walks(self.muds, self.constant_depths_m, self.constant_seeds)
+
+
+def rules_of(methods: Sequence[str]) -> tuple[DepthRule, ...]:
+    """The fixed depths, the first method as "adaptive", the others by name. Raises ValueError for an unknown one."""
+    first, *others = methods
+    return (*FIXED, chosen_by(first, ADAPTIVE), *(chosen_by(each, f"{ADAPTIVE}, {each}") for each in others))
+
+
+def walk_trackway(rule: DepthRule, muds: Sequence[Clay], compartment_m: float, seed: int) -> Walk:
+    track = Track([(compartment_m, clay) for clay in muds])
+    return walk_by(rule, track, seed, partial(is_over, track.length_m))
+
+
+def is_over(length_m: float, strides: Sequence[WalkedStride]) -> bool:
+    return bool(strides) and (is_past(length_m, strides[-1]) or is_stuck(strides))
+
+
+def is_past(length_m: float, last: WalkedStride) -> bool:
+    """Whether the plates go down behind the track next."""
+    return last.place_m + last.step_m >= length_m
+
+
+def is_stuck(strides: Sequence[WalkedStride]) -> bool:
+    mud = strides[-1].mud
+    return sum(stride.duration_s for stride in strides if stride.mud == mud) >= STUCK_S
+
+
+def run(plan: Plan, show: Show, processes: int | None = None) -> dict[str, Any]:
+    """The report. The longest walks begin first, so that the last ones end together."""
+    long = [
+        partial(walk_trackway, rule, plan.muds, plan.compartment_m, seed)
+        for rule in plan.rules
+        for seed in plan.seed_range
+    ]
+    constant = plan.constant_walks()
+    walks = side_by_side([*long, *(partial(run_mud_walk, order) for order in constant)], show, processes)
+    by_rule = {rule.name: walks[i * plan.seeds : (i + 1) * plan.seeds] for i, rule in enumerate(plan.rules)}
+    return report_of(plan, by_rule, mean_speeds_cm_s(constant, walks[len(long) :]))
+
+
+def report_of(plan: Plan, walks: dict[str, list[Walk]], constant_cm_s: dict[str, dict[float, float]]) -> dict[str, Any]:
+    """`walks` by rule, `constant_cm_s` by mud and depth in metres."""
+    arm_m = configuration_for(plan.rules[0]).geometry.flipper_length_m
+    names = [clay.name for clay in plan.muds]
+    cells = {rule: {mud: cell(trials, mud, arm_m) for mud in names} for rule, trials in walks.items()}
+    best = {mud: best_depth(speeds) for mud, speeds in constant_cm_s.items()}
+    return {
+        "experiment": "trackway",
+        "table": cells,
+        "mean_over_muds": {
+            rule: {figure: mean_over_muds(row, figure) for figure in ("mean", "mean_all")}
+            for rule, row in cells.items()
+        },
+        "best_constant_depth": best,
+        "best_constant_mean_over_muds": round(sum(each["mean"] for each in best.values()) / len(best), 3),
+        "over_best": {
+            rule: {mud: _ratio(row[mud]["mean"], best[mud]["mean"]) for mud in names} for rule, row in cells.items()
+        },
+        "paper": {rule: {mud: told._asdict() for mud, told in row.items()} for rule, row in PAPER_TABLE.items()},
+        "within_one_sd": {
+            rule: {mud: within_one_sd(cells[rule][mud]["mean"], told) for mud, told in PAPER_TABLE[rule].items()}
+            for rule in FIXED_DEPTHS_M
+            if rule in cells and set(names) == set(PAPER_TABLE[rule])
+        },
+        "constant_depth_cm_s": {
+            mud: {f"{100.0 * depth_m:g}": round(speed, 3) for depth_m, speed in speeds.items()}
+            for mud, speeds in constant_cm_s.items()
+        },
+        "ends": {rule: dict(Counter(end_of(plan, trial) for trial in trials)) for rule, trials in walks.items()},
+        "walks": {rule: [_strides_of(trial, arm_m) for trial in trials] for rule, trials in walks.items()},
+        "settings": _settings(plan),
+    }
+
+
+def end_of(plan: Plan, walk: Walk) -> str:
+    """How a walk ended."""
+    if walk.fault:
+        return walk.fault
+    last = walk.strides[-1]
+    return "past the end" if is_past(plan.compartment_m * len(plan.muds), last) else f"stuck in {last.mud}"
+
+
+def _ratio(mean: float | None, best: float) -> float | None:
+    return None if mean is None or best <= 0.0 else round(mean / best, 3)
+
+
+def _strides_of(walk: Walk, arm_m: float) -> list[dict[str, Any]]:
+    return [
+        {
+            "mud": stride.mud,
+            "place_cm": round(100.0 * stride.place_m, 2),
+            "depth_cm": round(100.0 * stride.depth_m, 3),
+            "step_cm": round(100.0 * stride.step_m, 2),
+            "duration_s": round(stride.duration_s, 3),
+            "failure": stride.failure(arm_m),
+        }
+        for stride in walk.strides
+    ]
+
+
+def _settings(plan: Plan) -> dict[str, Any]:
+    return {
+        "seeds": plan.seeds,
+        "compartment_m": plan.compartment_m,
+        "methods": {rule.name: rule.method for rule in plan.rules if rule.method},
+        "strength_pa": {clay.name: clay.strength_pa for clay in plan.muds},
+        "constant_strides": CONSTANT_STRIDES,
+        "constant_seeds": plan.constant_seeds,
+        "disturbances": asdict(LAB),
+    }

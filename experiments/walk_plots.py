@@ -1,0 +1,205 @@
+"""The walks as pictures: along the trackway as in the paper's figure 8, and speed over depth and strength."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
+import numpy as np  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
+from matplotlib.lines import Line2D  # noqa: E402
+
+from experiments.paper_table import ADAPTIVE  # noqa: E402
+from experiments.walk import EXTRACTION, SLIPPAGE  # noqa: E402
+
+COLOURS = {"3 cm": "tab:green", "5 cm": "tab:orange", ADAPTIVE: "tab:blue"}  # as in the paper
+OTHERS = ("tab:red", "tab:purple", "tab:brown")
+MUD_SHADES = ("#e9dfd0", "#f6f1e8", "#d8c7ad")
+MARKS = {SLIPPAGE: "v", EXTRACTION: "X"}
+METHOD_COLOURS = ("white", "tab:red", "tab:cyan", "tab:pink")
+TEXT = "#333333"
+
+
+def plot_trackway(report: dict[str, Any], path: Path) -> None:
+    """Step length and depth along the track, and the table beside the paper's."""
+    figure, axes = plt.subplot_mosaic(
+        [["steps", "speeds"], ["depths", "speeds"]],
+        figsize=(12.0, 5.6),
+        width_ratios=(1.5, 1.0),
+        height_ratios=(1.6, 1.0),
+        constrained_layout=True,
+    )
+    colours = _colours(list(report["table"]))
+    for name, panel, title in (
+        ("step_cm", axes["steps"], "step length (cm)"),
+        ("depth_cm", axes["depths"], "depth (cm)"),
+    ):
+        _shade_muds(panel, report)
+        for rule, colour in colours.items():
+            _plot_walk(panel, report["walks"][rule][0], name, colour)
+        panel.set_ylabel(title)
+    low, high = axes["steps"].get_ylim()
+    axes["steps"].set_ylim(min(0.0, low), high + 0.1 * (high - low))  # room for the muds' names
+    _name_muds(axes["steps"], report)
+    axes["steps"].set_title("One walk of each gait over the trackway", fontsize="medium")
+    axes["steps"].legend(handles=_legend(colours, report), fontsize="small", loc="lower left", ncols=2, framealpha=0.9)
+    axes["steps"].tick_params(labelbottom=False)
+    axes["depths"].invert_yaxis()
+    axes["depths"].set_xlabel("place along the track (cm)")
+    _plot_speeds(axes["speeds"], report, colours)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def _colours(rules: Sequence[str]) -> dict[str, str]:
+    others = iter(OTHERS * len(rules))
+    return {rule: COLOURS[rule] if rule in COLOURS else next(others) for rule in rules}
+
+
+def _shade_muds(panel: Axes, report: dict[str, Any]) -> None:
+    length_cm = 100.0 * report["settings"]["compartment_m"]
+    muds = len(report["settings"]["strength_pa"])
+    for i in range(muds):
+        panel.axvspan(i * length_cm, (i + 1) * length_cm, color=MUD_SHADES[i % len(MUD_SHADES)], zorder=0)
+    panel.set_xlim(0.0, muds * length_cm)
+
+
+def _name_muds(panel: Axes, report: dict[str, Any]) -> None:
+    length_cm, high = 100.0 * report["settings"]["compartment_m"], panel.get_xaxis_transform()
+    for i, mud in enumerate(report["settings"]["strength_pa"]):
+        place_cm = (i + 0.5) * length_cm
+        panel.text(place_cm, 0.97, f"w = {mud} %", transform=high, ha="center", va="top", color=TEXT)
+
+
+def _plot_walk(panel: Axes, strides: Sequence[Mapping[str, Any]], figure: str, colour: str) -> None:
+    places = [stride["place_cm"] for stride in strides]
+    panel.plot(places, [stride[figure] for stride in strides], "-o", color=colour, markersize=3.5, linewidth=1.4)
+    for failure, mark in MARKS.items():
+        failed = [stride for stride in strides if stride["failure"] == failure]
+        xs, ys = [stride["place_cm"] for stride in failed], [stride[figure] for stride in failed]
+        panel.plot(xs, ys, mark, color=colour, markeredgecolor="black", markeredgewidth=0.6, markersize=7)
+
+
+def _legend(colours: Mapping[str, str], report: dict[str, Any]) -> list[Line2D]:
+    handles = [Line2D([], [], color=colour, marker="o", markersize=3.5, label=rule) for rule, colour in colours.items()]
+    names = {stride["failure"] for trials in report["walks"].values() for stride in trials[0]}
+    look: dict[str, Any] = {"color": "lightgrey", "markeredgecolor": "black", "linestyle": ""}
+    return handles + [Line2D([], [], marker=mark, label=name, **look) for name, mark in MARKS.items() if name in names]
+
+
+def _plot_speeds(panel: Axes, report: dict[str, Any], colours: Mapping[str, str]) -> None:
+    """Bars are the paper's, dots ours; whiskers one standard deviation of each."""
+    muds, width = list(report["settings"]["strength_pa"]), 0.8 / len(colours)
+    for i, (rule, colour) in enumerate(colours.items()):
+        places = [mud + (i - (len(colours) - 1) / 2.0) * width for mud in range(len(muds))]
+        paper = report["paper"].get(rule)
+        if paper is not None:
+            told = [paper[mud] for mud in muds]
+            panel.bar(places, [each["mean"] for each in told], 0.92 * width, yerr=[each["sd"] for each in told],
+                      color=colour, alpha=0.3, ecolor="grey", capsize=3)  # fmt: skip
+        cells = [report["table"][rule][mud] for mud in muds]
+        reached = [(place, cell) for place, cell in zip(places, cells, strict=True) if cell["mean"] is not None]
+        panel.errorbar([place for place, _ in reached], [cell["mean"] for _, cell in reached],
+                       yerr=[cell["sd"] or 0.0 for _, cell in reached], fmt="o", color=colour,
+                       markeredgecolor="black", markeredgewidth=0.6, markersize=7, capsize=3)  # fmt: skip
+    for mud, best in enumerate(report["best_constant_depth"].values()):
+        panel.hlines(best["mean"], mud - 0.42, mud + 0.42, color=TEXT, linewidth=1.0, linestyle=":")
+    panel.set_xticks(range(len(muds)), [f"w = {mud} %" for mud in muds])
+    panel.set_ylim(0.0, max(panel.get_ylim()[1], 9.0))
+    panel.set_ylabel("speed (cm/s)")
+    panel.set_title("Table I: the paper's (bars), simulated (dots)", fontsize="medium")
+    dots = Line2D([], [], color=TEXT, linestyle=":", label="best constant depth, simulated")
+    panel.legend(handles=[dots], fontsize="small", loc="upper right")
+
+
+def plot_sweep(report: dict[str, Any], path: Path) -> None:
+    """Above speed over strength and depth with every method's choice, below what share of the best it is."""
+    figure, (over, below) = plt.subplots(
+        2, 1, figsize=(9.0, 7.2), height_ratios=(2.2, 1.0), sharex=True, constrained_layout=True
+    )
+    rows = report["strengths"]
+    strengths_kpa = np.array([row["strength_pa"] / 1000.0 for row in rows])
+    colours = dict(zip(report["settings"]["methods"], METHOD_COLOURS * len(rows), strict=False))
+    _plot_map(figure, over, rows, strengths_kpa)
+    best = [row["best"]["depth_cm"] for row in rows]
+    over.plot(strengths_kpa, best, color="black", linewidth=1.2, linestyle="--", label="best constant depth")
+    for method, colour in colours.items():
+        _plot_choice(over, rows, strengths_kpa, method, colour)
+        _plot_share(below, rows, strengths_kpa, method, "tab:blue" if colour == "white" else colour)
+    _name_sweep_axes(over, below, strengths_kpa)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def _plot_map(figure: Any, panel: Axes, rows: Sequence[Mapping[str, Any]], strengths_kpa: Any) -> None:
+    depths = [each["depth_cm"] for each in rows[0]["constant"]]
+    speeds = np.array([[each["mean"] for each in row["constant"]] for row in rows]).T
+    mesh = panel.pcolormesh(
+        _edges(strengths_kpa, logarithmic=True), _edges(np.array(depths)), speeds, cmap="viridis", vmin=0.0
+    )
+    figure.colorbar(mesh, ax=panel, label="speed (cm/s)", pad=0.01)
+    for name, mark in MARKS.items():
+        failed = [
+            (row["strength_pa"] / 1000.0, each["depth_cm"])
+            for row in rows
+            for each in row["constant"]
+            if _share(each["failures"].get(name, 0), each["strides"]) > 0.1
+        ]
+        panel.plot([x for x, _ in failed], [y for _, y in failed], mark, color="#ffffff90", markeredgecolor="none",
+                   markersize=5, label=f"{name} in more than a tenth of the strides")  # fmt: skip
+
+
+def _edges(centres: Any, logarithmic: bool = False) -> Any:
+    """Of cells around the centres."""
+    told = np.log(centres) if logarithmic else centres
+    if len(told) == 1:
+        edges = np.array([told[0] - 0.1, told[0] + 0.1])
+    else:
+        between = (told[1:] + told[:-1]) / 2.0
+        edges = np.concatenate([[told[0] - (between[0] - told[0])], between, [told[-1] + (told[-1] - between[-1])]])
+    return np.exp(edges) if logarithmic else edges
+
+
+def _share(count: int, of: int) -> float:
+    return count / of if of else 0.0
+
+
+def _plot_choice(panel: Axes, rows: Sequence[Mapping[str, Any]], strengths_kpa: Any, method: str, colour: str) -> None:
+    told = [(strength, row["methods"][method]) for strength, row in zip(strengths_kpa, rows, strict=True)]
+    told = [(strength, settled) for strength, settled in told if settled["depth_cm"] is not None]
+    depths = np.array([settled["depth_cm"] for _, settled in told])
+    ranges = np.array([settled["depth_range_cm"] for _, settled in told]).reshape(-1, 2)
+    look: dict[str, Any] = {"fmt": "o", "markeredgecolor": "black", "markersize": 7, "capsize": 3, "linewidth": 1.2}
+    places = [strength for strength, _ in told]
+    panel.errorbar(places, depths, yerr=abs(ranges.T - depths), color=colour, label=f"chosen by {method}", **look)
+
+
+def _plot_share(panel: Axes, rows: Sequence[Mapping[str, Any]], strengths_kpa: Any, method: str, colour: str) -> None:
+    settled = [row["methods"][method] for row in rows]
+    shares = [100.0 * (each["share_of_best"] or 0.0) for each in settled]
+    panel.plot(strengths_kpa, shares, "-o", color=colour, markersize=5, label=method)
+    for strength, share, each in zip(strengths_kpa, shares, settled, strict=True):
+        failed = sum(each["failures"].values())
+        if failed:
+            look: dict[str, Any] = {"textcoords": "offset points", "xytext": (0, -12), "ha": "center"}
+            panel.annotate(f"{failed}/{each['strides']}", (strength, share), color=colour, fontsize="x-small", **look)
+
+
+def _name_sweep_axes(over: Axes, below: Axes, strengths_kpa: Any) -> None:
+    over.set_ylabel("insertion depth (cm)")
+    over.invert_yaxis()
+    over.set_title("Speed of constant depths, and where the adaptation settles", fontsize="medium")
+    over.legend(fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.02), ncols=3, facecolor="#8fa3ad")
+    below.axhline(100.0, color="grey", linewidth=0.8, linestyle=":")
+    below.set_ylim(0.0, 115.0)
+    below.set_ylabel("% of the best constant depth")
+    below.set_xlabel("undrained strength of the mud (kPa); numbers at the dots: failed strides after the second")
+    below.set_xscale("log")
+    below.set_xticks(strengths_kpa, [f"{strength:g}" for strength in strengths_kpa])
+    below.minorticks_off()
+    below.legend(fontsize="small", loc="lower left")
