@@ -12,6 +12,7 @@ from typing import NamedTuple, cast, get_args
 
 from control.adaptation import Method
 from control.controller import WalkOrder
+from control.recovery import RecoveryParameters
 from experiments.trial import WALKING, configuration_of
 from experiments.walk import Walk, WalkedStride, walk
 from firmware_host.configuration import Configuration
@@ -54,7 +55,11 @@ def configuration_for(rule: DepthRule) -> Configuration:
 
 def _papers_robot(configuration: Configuration) -> Configuration:
     """Its estimator; its gait does not wait for a flipper that the mud holds."""
-    return replace(configuration, estimation=replace(configuration.estimation, method="paper"))
+    return replace(
+        configuration,
+        estimation=replace(configuration.estimation, method="paper"),
+        recovery=RecoveryParameters(attempts=0),
+    )
 
 
 def walk_by(rule: DepthRule, track: Track, seed: int, done: Callable[[Sequence[WalkedStride]], bool]) -> Walk:
