@@ -10,6 +10,11 @@ with thrust and suction on the safe side of what is known (depth_forecast.py). A
 the first condition needs no bound of its own. It is said where S is less than half an arm, the bound of the authors'
 optimiser. Where no depth comes out the shallowest is taken; where none promises a step, the deepest that comes out.
 
+A boundary is met at the depth of the mud before it. What holds a flipper would have been felt on the way in: to pull it
+out takes 1.3 times what the insertion took (k_e over k_p is 1.3 to 1.8 by clay practice, and an extraction has its
+hardest moment when it has come up half-way). So an insertion ends early where it takes a torque from which on the
+flipper would not come out again.
+
 The drag pad's resistance k_s w d²/2 is counted with the body's: w and d are its width and depth.
 """
 
@@ -47,6 +52,7 @@ class AdaptationParameters:
     mobilisation_n_m: Annotated[float, Bounds(10.0, 1e5)] = 250.0  # of one flipper in mud, its servo's give included
     motor_force_n: Annotated[float, Bounds(0.1, 100.0)] = 6.25  # 0.75 N·m at 0.12 m
     lifting_share: Annotated[float, Bounds(0.1, 1.0)] = 0.95  # of its torque that an extraction may need
+    insertion_share: Annotated[float, Bounds(0.1, 10.0)] = 0.73  # of it at which an insertion ends; over 1: none does
 
 
 class DepthChoice(NamedTuple):
@@ -57,6 +63,10 @@ class DepthChoice(NamedTuple):
 
 class Adaptation(Protocol):
     """Owns the depth of the next stride."""
+
+    @property
+    def largest_insertion_nm(self) -> float:
+        """Mud's torque on the adduction joint at which an insertion ends where it is."""
 
     def reset(self, depth_m: float) -> None: ...
 
@@ -99,6 +109,10 @@ class DepthAdaptation:
         else:
             self.choice = self.choice._replace(reason="nothing known of the thrust, depth kept")
         return self.choice
+
+    @property
+    def largest_insertion_nm(self) -> float:
+        return self.parameters.insertion_share * self.forecast.lifting_torque_nm
 
     def _that_come_out(self) -> list[float]:
         limit_nm = self.parameters.lifting_share * self.forecast.lifting_torque_nm

@@ -10,9 +10,11 @@ fifth. The larger one of both tellings holds, since each is on the safe side.
 The torque of an extraction is k_e(z) Φ in the pose at the rear end of the sweep, times the share of it that is felt
 at most at one moment: k_e is that of a whole stroke, and mud's force grows more slowly with depth than the law, so the
 hardest moment falls short of k_e Φ at the deepest point. The share is learned from the hardest moment of every
-extraction, and from 1, which is safe. A flipper that came out without telling k_e proves τ_e < τ_m where it was. One
-that stuck proves τ_e ≥ τ_m there, whatever was believed, and elsewhere in proportion to depth (Φ k_e is near that);
-this is remembered until it comes out of there, or the mud changes.
+extraction, and from 1, which is safe. Where k_e is not known, k_p Φ stands for that torque: k_e is 1.3 to 1.8 times
+k_p by clay practice (0.8 in the log above) and the share about a half. A flipper that came out proves what it took, in
+every shallower place too, and no more than in proportion to Φ in a deeper one, since k_e falls with depth. One that
+stuck proves τ_e ≥ τ_m there, whatever was believed, and elsewhere in proportion to depth (Φ k_e is near that); this is
+remembered until it comes out of there, or the mud changes.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from control.records import StrideEstimate
 
 SHEAR_RATIO = 0.55  # k_s over k_p before any mud told both
 RATIO_DOUBT = 0.2
+SUCTION_RATIO = 1.0  # of the hardest moment's torque over k_p Φ, where k_e is not known
 LEARNING = 0.25  # weight of a new stride in what is learned from many
 SHARES = (0.2, 1.5)  # bounds of what can be learned of each
 RATIOS = (0.2, 1.5)
@@ -138,18 +141,28 @@ class DepthForecast:
         submerged_m = depth_m - surface_m
         if submerged_m <= 0.0:
             return 0.0
-        k_e = self._belief.k_e or self._belief.of(stride.flipper).k_e
-        if (k_e is None or k_e.at_least) and submerged_m > _known(stride.depth_m) + TOLD_APART_M:
-            return self.lifting_torque_nm
-        told_nm = 0.0
-        if k_e is not None:
-            value, std_error = k_e.at(submerged_m)
-            told_nm = (max(0.0, value) + SUCTION_DOUBT * std_error) * self._lift_moment_m4(depth_m, surface_m)
-            told_nm *= self.felt_share
-        if stride.released and submerged_m <= stride.depth_m and stride.extraction_torque_nm > 0.0:
-            told_nm = min(told_nm, stride.extraction_torque_nm)
+        told_nm = self._told_nm(stride, depth_m, surface_m)
+        if stride.released and stride.extraction_torque_nm > 0.0 and stride.depth_m > 0.0:
+            told_nm = min(told_nm, self._proven_nm(stride, depth_m, surface_m))
         held_nm = self.lifting_torque_nm * submerged_m / self._stuck_m.get(stride.flipper, inf)
         return max(told_nm, held_nm)
+
+    def _proven_nm(self, stride: StrideEstimate, depth_m: float, surface_m: float) -> float:
+        """What it took, or would take deeper if k_e did not fall with depth, as it does."""
+        moment_m4 = self._lift_moment_m4(depth_m, surface_m)
+        return stride.extraction_torque_nm * max(
+            1.0, moment_m4 / self._lift_moment_m4(stride.depth_m + surface_m, surface_m)
+        )
+
+    def _told_nm(self, stride: StrideEstimate, depth_m: float, surface_m: float) -> float:
+        """By k_e, or by k_p where that is not known; by neither, all that there is below where the flipper has been."""
+        flipper, submerged_m = self._belief.of(stride.flipper), depth_m - surface_m
+        k_e, k_p = self._belief.k_e or flipper.k_e, self._belief.k_p or flipper.k_p
+        if k_e is not None and not k_e.at_least:
+            return self.felt_share * _more(k_e, submerged_m) * self._lift_moment_m4(depth_m, surface_m)
+        if k_p is not None:
+            return SUCTION_RATIO * _more(k_p, submerged_m) * self._lift_moment_m4(depth_m, surface_m)
+        return self.lifting_torque_nm if submerged_m > _known(stride.depth_m) + TOLD_APART_M else 0.0
 
     def _lift_moment_m4(self, depth_m: float, surface_m: float) -> float:
         """Φ in the pose in which the flipper is pulled out."""
@@ -170,6 +183,11 @@ class DepthForecast:
 def _less(k: Coefficient, depth_m: float) -> float:
     value, std_error = k.at(depth_m)
     return max(0.0, value - THRUST_DOUBT * std_error)
+
+
+def _more(k: Coefficient, depth_m: float) -> float:
+    value, std_error = k.at(depth_m)
+    return max(0.0, value) + SUCTION_DOUBT * std_error
 
 
 def _within(value: float, bounds: tuple[float, float]) -> float:

@@ -148,6 +148,12 @@ class Gait:
             self._end_row()
         return self._target()
 
+    def end_insertion(self) -> None:
+        """The stride goes on at the depth that is commanded now."""
+        if self._rows[self._row].phase is Phase.INSERTION:
+            self._rows = stride_table(self.parameters, self.geometry, self._target().depth_m)
+            self._row, self._time_s = 1, 0.0
+
     def _end_row(self) -> None:
         left_over_s = self._time_s - self._rows[self._row].duration_s
         self._row += 1

@@ -56,6 +56,11 @@ class PaperAdaptation:
             self.choice = self.choice._replace(reason="no k_e known, depth kept")
         return self.choice
 
+    @property
+    def largest_insertion_nm(self) -> float:
+        """The paper's robot goes to the depth that it chose."""
+        return inf
+
     def _remember(self, belief: MudBelief, strides: Sequence[StrideEstimate]) -> None:
         """The step that has just been measured holds the swing of the stride before."""
         if belief.boundary:

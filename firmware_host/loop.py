@@ -23,6 +23,7 @@ from control.records import (
     DriveState,
     DriveStates,
     GaitTarget,
+    Phase,
     StrideEstimate,
     Torques,
 )
@@ -113,6 +114,7 @@ class Loop:
         self.body = self.pose.read(beat.now_s)
         self.reading = self._estimate(beat.now_s)
         self._adapt(beat.now_s)
+        self._heed_insertion(beat.now_s)
         self.health = self._examine(beat)
         self._change_mode(next_mode(self.mode, self._request_now(beat.now_s), self.health), beat.now_s)
         step_s = min(1 + beat.missed, LONGEST_STEP_TICKS) * PERIOD_S
@@ -161,6 +163,15 @@ class Loop:
             self.strides_closed += 1
             self.recorder.put(STRIDE_KIND, stride_row(now_s, estimate, depth_m))
         del self.strides[:-KEPT_STRIDES]
+
+    def _heed_insertion(self, now_s: float) -> None:
+        """Mud from which a flipper would not come out again is entered no deeper."""
+        controller, reading, limit_nm = self.controller, self.reading, self.adaptation.largest_insertion_nm
+        if not controller.order.adaptive or controller.target.phase is not Phase.INSERTION:
+            return
+        if reading.left.adduction_torque_nm > limit_nm or reading.right.adduction_torque_nm > limit_nm:
+            controller.gait.end_insertion()
+            self.event(now_s, f"insertion ended at {controller.gait.commanded_depth_m:.4f} m: firm mud")
 
     def _examine(self, beat: Beat) -> Health:
         heard = self.mode is not Mode.BOOT or self.drives.heard
