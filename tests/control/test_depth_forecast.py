@@ -17,8 +17,8 @@ from tests.control.made_up_muds import (
     GEOMETRY,
     LIFTING_NM,
     MOTOR_FORCE_N,
-    believed,
     apart,
+    believed,
     both,
     bound,
     lift_m4,
@@ -373,7 +373,9 @@ class TestPad:
 
 
 numbers = st.floats(allow_infinity=False) | st.floats(-0.5, 0.5) | st.sampled_from([0.0, 0.03, 1e6])
-estimates = st.builds(measured, numbers) | st.builds(Estimate, numbers, numbers, st.just(9), st.booleans(), st.just(""), st.booleans())
+estimates = st.builds(measured, numbers) | st.builds(
+    Estimate, numbers, numbers, st.just(9), st.booleans(), st.just(""), st.booleans()
+)
 coefficients = st.none() | st.builds(Coefficient, *[numbers] * 5, st.just(3), st.booleans())
 flipper_beliefs = st.builds(FlipperBelief, *[coefficients] * 3)
 beliefs = st.builds(MudBelief, *[coefficients] * 3, flipper_beliefs, flipper_beliefs, st.booleans())
@@ -382,7 +384,10 @@ strides = st.builds(stride, flippers, numbers, st.booleans(), numbers, estimates
 
 
 @settings(max_examples=400)
-@given(st.lists(st.tuples(beliefs, st.lists(strides, min_size=1, max_size=2)), min_size=1, max_size=2), st.floats(0.005, 0.2))
+@given(
+    st.lists(st.tuples(beliefs, st.lists(strides, min_size=1, max_size=2)), min_size=1, max_size=2),
+    st.floats(0.005, 0.2),
+)
 def test_nothing_that_is_believed_or_measured_raises(
     walk: list[tuple[MudBelief, list[StrideEstimate]]], depth_m: float
 ) -> None:

@@ -6,7 +6,7 @@ passes what the mud bears. Where it would, the plates shear through.
 
 from functools import cache
 from itertools import product
-from math import pi, radians, sin
+from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def arm_speed_m_s(gait: GaitParameters, time_s: float) -> float:
     to_an_end_s = min(time_s, stance_duration_s(gait) - time_s)
     if to_an_end_s <= 0.0:
         return 0.0
-    return top_speed_m_s(gait) * (1.0 - np.cos(pi * min(to_an_end_s / RAMP_S, 1.0))) / 2.0
+    return top_speed_m_s(gait) * (1.0 - cos(pi * min(to_an_end_s / RAMP_S, 1.0))) / 2.0
 
 
 @cache
