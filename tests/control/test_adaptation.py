@@ -97,8 +97,18 @@ class TestTheFastestDepth:
             next(speed for z, speed in out.items() if abs(z - choice.depth_m) < 1e-9)
         )
 
+    def test_it_slips_where_less_than_half_an_arm_is_promised(self) -> None:
+        """6 cm. At 5 cm, in muds that grow firmer in steps of 1 %, which is at most 3 mm of step."""
+        slipping, walking = list[float](), list[float]()
+        for k_s in 0.06e6 * 1.01 ** np.arange(60):
+            belief = believed(told(k_s), LOOSE)
+            choice, promised = chosen(belief), steps_m(forecast(belief, both()))[DEPTHS_M[-1]]
+            assert choice.depth_m == same_depth(0.05)
+            (slipping if choice.slips else walking).append(promised)
+        assert 0.057 < max(slipping) < 0.06 <= min(walking) < 0.063
+
     @given(shears, suctions, made_up_strides)
-    def test_it_slips_where_less_than_half_an_arm_is_promised(
+    def test_it_slips_by_what_is_promised_of_the_chosen_depth(
         self, k_s: float, k_e: float, strides: list[StrideEstimate]
     ) -> None:
         belief = believed(told(k_s), told(k_e))

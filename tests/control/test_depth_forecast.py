@@ -229,6 +229,17 @@ class TestExtraction:
         proven = forecast(believed(None, told(0.2e6)), both(0.05, extraction_nm=0.5))
         assert proven.extraction_nm(0.02) == pytest.approx(0.2e6 * lift_m4(0.02), rel=PIECES)
 
+    def test_a_flipper_that_stuck_proves_nothing_by_its_torque(self) -> None:
+        """At half the depth it is held by half of all the torque, and by what is believed where that is more."""
+        stuck = both(0.04, released=False, extraction_nm=0.1)
+        for k_e, expected_nm in ((2e6, 2e6 * lift_m4(0.02)), (0.5e6, LIFTING_NM / 2.0)):
+            found = forecast(believed(None, told(k_e)), stuck).extraction_nm(0.02)
+            assert found == pytest.approx(expected_nm, rel=PIECES)
+
+    def test_a_k_e_below_zero_is_none_but_keeps_its_doubt(self) -> None:
+        found = forecast(believed(None, told(-0.4e6, 0.2e6)), both(nan)).extraction_nm(0.03)
+        assert found == pytest.approx(0.4e6 * lift_m4(0.03), rel=PIECES)
+
     @pytest.mark.parametrize("k_e", [None, bound(0.1e6)])
     def test_without_a_value_it_comes_out_of_where_it_was_and_a_step_of_the_grid_deeper(
         self, k_e: Coefficient | None
