@@ -91,7 +91,8 @@ class DepthForecast:
         k_s, k_p = belief.k_s, belief.k_p
         if k_s is None or k_p is None or k_s.at_least or k_p.at_least:
             return
-        ratio = k_s.value / k_p.at(k_s.depth_m)[0]
+        pressed = k_p.at(k_s.depth_m)[0]
+        ratio = k_s.value / pressed if pressed > 0.0 else 0.0
         if ratio > 0.0 and isfinite(ratio):
             self.shear_ratio = _within(exp(log(self.shear_ratio) + LEARNING * log(ratio / self.shear_ratio)), RATIOS)
 
@@ -165,8 +166,10 @@ class DepthForecast:
         return self.lifting_torque_nm if submerged_m > _known(stride.depth_m) + TOLD_APART_M else 0.0
 
     def _lift_moment_m4(self, depth_m: float, surface_m: float) -> float:
-        """Φ in the pose in which the flipper is pulled out."""
+        """Φ in the pose in which the flipper is pulled out; 0 where a fitted surface puts that out of reach."""
         reached_m = min(depth_m, self.geometry.deepest_m(self.gait.sweep_angle_deg))
+        if not self.geometry.is_reachable(self.rear_rad, reached_m):
+            return 0.0
         adduction_rad = self.geometry.adduction_rad(self.rear_rad, reached_m)
         plate = submerged_plate(self.geometry, self.rear_rad, adduction_rad, surface_m)
         return stroke_moment_m4(self.geometry, plate, self.rear_rad)

@@ -17,12 +17,13 @@ the authors' logs the sweep's force reaches its plateau with 300 to 700 N/m, the
 
 from __future__ import annotations
 
-from math import log, radians, sin
+from math import log1p, radians, sin
 from typing import NamedTuple
 
 from control.gait import GaitParameters, smooth_progress
 
 STEP_S = 0.01  # a tenth of the swinging time of 1 kg on 600 N/m is 0.026 s
+NEGLIGIBLE = 1e-6
 
 
 class BodyDrag(NamedTuple):
@@ -67,11 +68,11 @@ def _next_speed_m_s(body_m_s: float, force_n: float, drag: BodyDrag) -> float:
 
 
 def coast_m(drag: BodyDrag, speed_m_s: float) -> float:
-    """How far the body slides by itself."""
-    if drag.damping_n_s_m <= 0.0:
+    """How far the body slides by itself. Where drag hardly grows with speed, the logarithm would round it away."""
+    viscous_n = drag.damping_n_s_m * speed_m_s
+    if viscous_n < NEGLIGIBLE * drag.dry_n:
         return drag.mass_kg * speed_m_s * speed_m_s / (2.0 * drag.dry_n)
     lag_s = drag.mass_kg / drag.damping_n_s_m
     if drag.dry_n <= 0.0:
         return lag_s * speed_m_s
-    dry_m_s = drag.dry_n / drag.damping_n_s_m
-    return lag_s * (speed_m_s - dry_m_s * log(1.0 + speed_m_s / dry_m_s))
+    return lag_s * (speed_m_s - drag.dry_n / drag.damping_n_s_m * log1p(viscous_n / drag.dry_n))

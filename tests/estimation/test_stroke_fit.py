@@ -293,19 +293,31 @@ def test_scatter_of_the_batches_adds_to_the_doubt() -> None:
 # what is no coefficient
 
 
-def test_in_poses_without_a_vertical_lever_nothing_can_be_observed() -> None:
-    """At 5 cm and 30 degrees there are 14 mm of it."""
-    batches = [loaded(batch_at(travel_m), K) for travel_m in depths(end_m=0.05)]
-    assert GEOMETRY.vertical_lever_m(FRONT_RAD, batches[-1].adduction_rad) < MIN_VERTICAL_LEVER_M
-    told = insertion(batches)
-    assert (told.valid, told.reason) == (False, UNOBSERVABLE)
-    assert told.value == pytest.approx(K, rel=EXACT)  # in theory: a millimetre of geometry would be 7 %
+def lever_m(batch: Batch) -> float:
+    return GEOMETRY.vertical_lever_m(batch.sweep_rad, batch.adduction_rad)
 
 
-def test_of_an_extraction_only_the_last_three_quarters_need_a_lever() -> None:
-    batches = [loaded(batch_at(travel_m, -FRONT_RAD), -K) for travel_m in reversed(depths(end_m=0.05))]
-    assert extraction(batches, start_m=0.05).valid
-    assert extraction(batches, start_m=0.07).reason == UNOBSERVABLE  # then three quarters reach down to the end
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_pieces_in_poses_without_a_vertical_lever_are_not_asked(sign: float) -> None:
+    """At 5 cm and 30 degrees there are 14 mm of it, and 30 mm at 4.68 cm."""
+    batches = [loaded(batch_at(travel_m, sign * FRONT_RAD), sign * K) for travel_m in depths(end_m=0.05)[:: int(sign)]]
+    blind = [batch for batch in batches if lever_m(batch) < MIN_VERTICAL_LEVER_M]
+    wrong = [batch._replace(adduction_nm=9.0) if batch in blind else batch for batch in batches]
+    told, seen = ((insertion(each) if sign > 0.0 else extraction(each, start_m=0.07)) for each in (wrong, batches))
+    assert 0.0468 < min(batch.travel_m for batch in blind) < 0.0468 + STEP_M
+    assert told == seen
+    assert told.valid
+    assert told.value == pytest.approx(K, rel=EXACT)
+    assert told.samples == SAMPLES * sum(batch.travel_m > 0.0 and batch not in blind for batch in batches)
+
+
+def test_a_stroke_wholly_in_poses_without_a_vertical_lever_cannot_be_observed() -> None:
+    """In mud that begins 4.7 cm deep. One that ends above is as short of pieces, but not for their poses."""
+    batches = [loaded(batch_at(travel_m), K, 0.047) for travel_m in depths(end_m=0.05, step_m=0.0005)]
+    told = insertion(batches, surface_at(0.047))
+    assert (told.valid, told.reason, told.samples) == (False, UNOBSERVABLE, 0)
+    above = [batch for batch in batches if lever_m(batch) >= MIN_VERTICAL_LEVER_M]
+    assert insertion(above, surface_at(0.047)) == NOT_THERE
 
 
 @pytest.mark.parametrize("count", range(MIN_BATCHES))

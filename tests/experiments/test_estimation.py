@@ -201,8 +201,10 @@ def test_rows_and_torque_constants_are_disturbed_as_asked(
 
 
 def test_a_walk_over_a_border_tells_how_soon_it_was_followed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From soft to strong mud after 6 cm. In three strides at most, each flipper's crossing is told."""
-    monkeypatch.setattr(experiments.estimation, "COMPARTMENT_M", 0.06)
+    """From soft to strong mud after 10 cm: the first stride goes in at l sin 30° = 6 cm, and each carries the body no
+    farther than the arms' 12 cm. In three strides at most, each flipper's crossing is told.
+    """
+    monkeypatch.setattr(experiments.estimation, "COMPARTMENT_M", 0.1)
     soft = clay_of_water(51.2)
     outcome = run_part(Part(WALKING, (soft, STRONG), 5, 1), with_layers(SHORT, ()))
     assert outcome.judged == []

@@ -1,0 +1,109 @@
+"""Muds, strides and beliefs that are made up for the tests of the choice of depth, and the plate in numpy.
+
+What the plate meets is summed over small pieces of it here, not by the formulas of control/plate.py.
+"""
+
+from math import nan
+
+import numpy as np
+
+from control.adaptation import AdaptationParameters
+from control.coefficient import Coefficient, FlipperBelief, MudBelief
+from control.gait import GaitParameters
+from control.geometry import FlipperGeometry
+from control.records import FLIPPERS, Estimate, StrideEstimate
+
+GEOMETRY, GAIT, PARAMETERS = FlipperGeometry(), GaitParameters(), AdaptationParameters()
+MOTOR_FORCE_N, LIFTING_NM = 6.25, 0.75
+NOT_TOLD = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
+
+
+def told(
+    value: float, doubt: float = 0.0, depth_m: float = 0.03, exponent: float = 0.0, exponent_doubt: float = 0.0
+) -> Coefficient:
+    """By the paper's own law (one k at every depth), unless an exponent is given."""
+    return Coefficient(value, doubt, depth_m, exponent, exponent_doubt, 8)
+
+
+def bound(value: float, depth_m: float = 0.03) -> Coefficient:
+    return told(value, depth_m=depth_m)._replace(at_least=True)
+
+
+def measured(value: float, at_least: bool = False) -> Estimate:
+    return Estimate(value, 0.01 * value, 20, True, at_least=at_least)
+
+
+def believed(k_s: Coefficient | None, k_e: Coefficient | None = None, k_p: Coefficient | None = None) -> MudBelief:
+    """By both flippers alike."""
+    flipper = FlipperBelief(k_p, k_s, k_e)
+    return MudBelief(k_p, k_s, k_e, flipper, flipper)
+
+
+def apart(left: FlipperBelief, right: FlipperBelief) -> MudBelief:
+    """Flippers in two muds."""
+    return MudBelief(left=left, right=right)
+
+
+def stride(
+    flipper: str = "left",
+    depth_m: float = 0.03,
+    released: bool = True,
+    surface_m: float = 0.0,
+    k_s: Estimate = NOT_TOLD,
+    k_e: Estimate = NOT_TOLD,
+    extraction_nm: float = nan,
+) -> StrideEstimate:
+    return StrideEstimate(
+        flipper=flipper,
+        index=0,
+        t_start_s=0.0,
+        t_end_s=1.0,
+        insertion_s=0.4,
+        stance_s=0.25,
+        extraction_s=0.1,
+        k_p=NOT_TOLD,
+        k_s=k_s,
+        k_e=k_e,
+        surface_m=surface_m,
+        depth_m=depth_m,
+        released=released,
+        insertion_force_n=3.0,
+        stance_force_n=6.0,
+        extraction_force_n=-2.0,
+        step_m=nan,
+        extraction_torque_nm=extraction_nm,
+    )
+
+
+def both(
+    depth_m: float = 0.03, released: bool = True, surface_m: float = 0.0, extraction_nm: float = nan
+) -> list[StrideEstimate]:
+    return [stride(flipper, depth_m, released, surface_m, extraction_nm=extraction_nm) for flipper in FLIPPERS]
+
+
+def plate_pieces(
+    sweep_rad: float, depth_m: float, surface_m: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Depth ζ, and u outward and s up from the lower edge's middle, of small pieces under the surface; one's area."""
+    adduction_rad = GEOMETRY.adduction_rad(sweep_rad, depth_m)
+    width_m, height_m = GEOMETRY.plate_width_m, GEOMETRY.plate_height_m
+    u, s = np.meshgrid((np.arange(100) + 0.5) / 100 * width_m - width_m / 2, (np.arange(1400) + 0.5) / 1400 * height_m)
+    outward = np.cos(sweep_rad) * np.sin(adduction_rad)
+    depths = depth_m - surface_m - u * outward - s * np.cos(adduction_rad)
+    wet = depths > 0.0
+    return depths[wet], u[wet], s[wet], width_m * height_m / u.size
+
+
+def thrust_m3(depth_m: float, surface_m: float = 0.0) -> float:
+    """∫ζ dA with the flipper straight out."""
+    depths, _, _, piece_m2 = plate_pieces(0.0, depth_m, surface_m)
+    return float(np.sum(depths)) * piece_m2
+
+
+def lift_m4(depth_m: float, surface_m: float = 0.0) -> float:
+    """Submerged volume times the way of its centre per radian, at the rear of the sweep."""
+    rear_rad = -np.radians(GAIT.sweep_angle_deg)
+    _, u, s, piece_m2 = plate_pieces(rear_rad, depth_m, surface_m)
+    volume_m3 = GEOMETRY.plate_thickness_m * u.size * piece_m2
+    way_m = np.hypot(GEOMETRY.flipper_length_m + np.mean(u), GEOMETRY.drop_m - np.mean(s)) * np.cos(rear_rad)
+    return volume_m3 * float(way_m)
