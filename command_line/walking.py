@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 from command_line.conduct import conduct, refuse
@@ -85,7 +86,8 @@ def _speeds_text(report: dict[str, Any]) -> str:
         rows.append([rule, *(_plus_minus(row[mud], "") for mud in muds), number(over["mean"], 2)])
         rows.append(["  all strides", *(_plus_minus(row[mud], "_all") for mud in muds), number(over["mean_all"], 2)])
         if rule in report["paper"]:
-            rows.append(["  paper", *(_paper_text(report, rule, mud) for mud in muds), ""])
+            told = fmean(each["mean"] for each in report["paper"][rule].values())
+            rows.append(["  paper", *(_paper_text(report, rule, mud) for mud in muds), number(told, 2)])
     return f"Table I: speed after the second stride in each mud, mean ± sd of {_trials(report)}\n{table(rows)}"
 
 
@@ -104,7 +106,7 @@ def _paper_text(report: dict[str, Any], rule: str, mud: str) -> str:
     if told is None:
         return "-"
     inside = report["within_one_sd"].get(rule, {}).get(mud)
-    verdict = "" if inside is None else (", within" if inside else ", outside")
+    verdict = "" if inside is None else (", ours within" if inside else ", ours outside")
     return f"{told['mean']:.1f} ± {told['sd']:.1f}{verdict}"
 
 

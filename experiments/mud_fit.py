@@ -8,9 +8,10 @@ Four numbers are fitted, each mud's strength (simulation/clay.py) and how the ra
 is least. The adaptive speeds are never used: they are what the adaptation is measured by. With six cells for four
 numbers the fit shows that the plant can be like the paper's trackway, not that it is.
 
-Not fitted: the rate coefficient 0.4, for which a plate that stops keeps 86 % of its load (the authors' logs: 85 to
-90 %; clay practice has about 10 % for a tenfold speed); the body's 1 kg, assumed; bearing, adhesion and suction, from
-the literature; disturbances, from the logs.
+Not fitted: the rate coefficient 0.4, with which a plate that stops keeps 86 % of its load (the authors' logs: 85 to
+90 %; clay practice has about 10 % for a tenfold speed); the body's mass, assumed to be 1 kg (two simpler models came to
+1.0 and 1.7 kg when it was fitted too); bearing, adhesion, suction and the mud's give sideways, from the literature and
+the logs; disturbances, from the logs.
 
 The search is a grid, which no cliff misleads: in firm mud the speed at 5 cm falls by half within a few per cent of
 strength. Every walk of it is one that all three muds may choose; then a finer grid lies around the best.

@@ -22,6 +22,7 @@ OTHERS = ("tab:red", "tab:purple", "tab:brown")
 MUD_SHADES = ("#e9dfd0", "#f6f1e8", "#d8c7ad")
 MARKS = {SLIPPAGE: "v", EXTRACTION: "X"}
 METHOD_COLOURS = ("white", "tab:red", "tab:cyan", "tab:pink")
+BESIDE = 1.03  # of the methods' dots in strength, so that none hides another
 TEXT = "#333333"
 
 
@@ -128,9 +129,10 @@ def plot_sweep(report: dict[str, Any], path: Path) -> None:
     _plot_map(figure, over, rows, strengths_kpa)
     best = [row["best"]["depth_cm"] for row in rows]
     over.plot(strengths_kpa, best, color="black", linewidth=1.2, linestyle="--", label="best constant depth")
-    for method, colour in colours.items():
-        _plot_choice(over, rows, strengths_kpa, method, colour)
-        _plot_share(below, rows, strengths_kpa, method, "tab:blue" if colour == "white" else colour)
+    for i, (method, colour) in enumerate(colours.items()):
+        beside = strengths_kpa * BESIDE ** (i - (len(colours) - 1) / 2.0)
+        _plot_choice(over, rows, beside, method, colour)
+        _plot_share(below, rows, beside, method, colour, 7 if i == 0 else -12 * i)
     _name_sweep_axes(over, below, strengths_kpa)
     figure.savefig(path, dpi=110)
     plt.close(figure)
@@ -176,18 +178,22 @@ def _plot_choice(panel: Axes, rows: Sequence[Mapping[str, Any]], strengths_kpa: 
     ranges = np.array([settled["depth_range_cm"] for _, settled in told]).reshape(-1, 2)
     look: dict[str, Any] = {"fmt": "o", "markeredgecolor": "black", "markersize": 7, "capsize": 3, "linewidth": 1.2}
     places = [strength for strength, _ in told]
-    panel.errorbar(places, depths, yerr=abs(ranges.T - depths), color=colour, label=f"chosen by {method}", **look)
+    panel.errorbar(places, depths, yerr=abs(ranges.T - depths), color=colour, label=f"method {method}", **look)
 
 
-def _plot_share(panel: Axes, rows: Sequence[Mapping[str, Any]], strengths_kpa: Any, method: str, colour: str) -> None:
+def _plot_share(
+    panel: Axes, rows: Sequence[Mapping[str, Any]], strengths_kpa: Any, method: str, colour: str, points: int
+) -> None:
+    """Failures are written that many points above the dots."""
     settled = [row["methods"][method] for row in rows]
     shares = [100.0 * (each["share_of_best"] or 0.0) for each in settled]
-    panel.plot(strengths_kpa, shares, "-o", color=colour, markersize=5, label=method)
+    line = TEXT if colour == "white" else colour
+    panel.plot(strengths_kpa, shares, "-o", color=line, markerfacecolor=colour, markersize=6, label=method)
     for strength, share, each in zip(strengths_kpa, shares, settled, strict=True):
         failed = sum(each["failures"].values())
         if failed:
-            look: dict[str, Any] = {"textcoords": "offset points", "xytext": (0, -12), "ha": "center"}
-            panel.annotate(f"{failed}/{each['strides']}", (strength, share), color=colour, fontsize="x-small", **look)
+            look: dict[str, Any] = {"textcoords": "offset points", "xytext": (0, points), "ha": "center"}
+            panel.annotate(f"{failed}/{each['strides']}", (strength, share), color=line, fontsize="x-small", **look)
 
 
 def _name_sweep_axes(over: Axes, below: Axes, strengths_kpa: Any) -> None:
@@ -196,7 +202,7 @@ def _name_sweep_axes(over: Axes, below: Axes, strengths_kpa: Any) -> None:
     over.set_title("Speed of constant depths, and where the adaptation settles", fontsize="medium")
     over.legend(fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.02), ncols=3, facecolor="#8fa3ad")
     below.axhline(100.0, color="grey", linewidth=0.8, linestyle=":")
-    below.set_ylim(0.0, 115.0)
+    below.set_ylim(0.0, 130.0)
     below.set_ylabel("% of the best constant depth")
     below.set_xlabel("undrained strength of the mud (kPa); numbers at the dots: failed strides after the second")
     below.set_xscale("log")

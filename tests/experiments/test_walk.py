@@ -9,9 +9,8 @@ from typing import Any
 
 import pytest
 
-from control.controller import WalkOrder
 from control.records import Phase
-from experiments.trial import WALKING, configuration_of
+from experiments.depth_rule import configuration_for, constant_depth
 from experiments.walk import EXTRACTION, SLIPPAGE, StrideRecord, Walk, WalkedStride, speed_m_s, walk
 from simulation.clay import Clay
 from simulation.track import Track
@@ -131,8 +130,8 @@ def test_a_record_that_was_reset_has_no_strides() -> None:
 @cache
 def walked(depth_m: float, strength_pa: float, strides: int = 3) -> Walk:
     track = Track([(100.0, Clay("mud", strength_pa))])
-    order = WalkOrder(depth_m, adaptive=False)
-    return walk(configuration_of(WALKING), track, order, 1, lambda told: len(told) >= strides)
+    rule = constant_depth(depth_m)
+    return walk(configuration_for(rule), track, rule.order, 1, lambda told: len(told) >= strides)
 
 
 def test_a_walk_is_as_long_as_it_was_asked_to_be_and_deterministic() -> None:
