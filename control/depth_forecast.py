@@ -150,20 +150,22 @@ class DepthForecast:
 
     def _proven_nm(self, stride: StrideEstimate, depth_m: float, surface_m: float) -> float:
         """What it took, or would take deeper if k_e did not fall with depth, as it does."""
-        moment_m4 = self._lift_moment_m4(depth_m, surface_m)
-        return stride.extraction_torque_nm * max(
-            1.0, moment_m4 / self._lift_moment_m4(stride.depth_m + surface_m, surface_m)
-        )
+        was_m4 = self._lift_moment_m4(stride.depth_m + surface_m, surface_m)
+        if not was_m4 > 0.0:
+            return inf
+        return stride.extraction_torque_nm * max(1.0, self._lift_moment_m4(depth_m, surface_m) / was_m4)
 
     def _told_nm(self, stride: StrideEstimate, depth_m: float, surface_m: float) -> float:
         """By k_e, or by k_p where that is not known; by neither, all that there is below where the flipper has been."""
         flipper, submerged_m = self._belief.of(stride.flipper), depth_m - surface_m
         k_e, k_p = self._belief.k_e or flipper.k_e, self._belief.k_p or flipper.k_p
+        moment_m4 = self._lift_moment_m4(depth_m, surface_m)
+        told_nm = self.felt_share * _more(k_e, submerged_m) * moment_m4 if k_e is not None else 0.0
         if k_e is not None and not k_e.at_least:
-            return self.felt_share * _more(k_e, submerged_m) * self._lift_moment_m4(depth_m, surface_m)
+            return told_nm
         if k_p is not None:
-            return SUCTION_RATIO * _more(k_p, submerged_m) * self._lift_moment_m4(depth_m, surface_m)
-        return self.lifting_torque_nm if submerged_m > _known(stride.depth_m) + TOLD_APART_M else 0.0
+            return max(told_nm, SUCTION_RATIO * _more(k_p, submerged_m) * moment_m4)
+        return self.lifting_torque_nm if submerged_m > _known(stride.depth_m) + TOLD_APART_M else told_nm
 
     def _lift_moment_m4(self, depth_m: float, surface_m: float) -> float:
         """Φ in the pose in which the flipper is pulled out; 0 where a fitted surface puts that out of reach."""

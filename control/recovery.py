@@ -3,18 +3,19 @@
 A stride goes on to swing when the lower edges of both plates are out, by the measured joint angles. One that is late
 gets a short grace under full torque; then it is recovered, or swing would push the body back with the plate in the
 mud (the paper's extraction failure). Each attempt first lets go, so that the mud relaxes, and then lifts from where
-the flipper is, the n-th at 1/n of the speed: mud resists slow motion less. The sweep decides whether that helps. For
-the plate to slide out along its own plane, without pushing mud aside, a point e below the arm needs
+the flipper is while the sweep rocks: at full torque, most of each round one way and the rest of it back.
 
-    l α' = e sin α β'
+A steady pull at full torque comes to rest where mud, body and joints balance, and in simulated clay of 6 kPa entered to
+5 cm it never frees the plate. Rocking frees it because nothing comes to rest: the body, thrown to and fro, pulls with
+its momentum too, and mud that sticks to the plate resists one slip, so while the plate slips outward and back little
+of that is left against the lift. Round after round the way of the sweep wins. The first attempt goes to the rear, as
+the stance did, so that the body moves forward. The later ones go away from the middle on the side where the flipper
+is: there the lever l cos α of what sticks to the plate is shorter. (In simulated clay of up to 9 kPa, entered to
+between 3 and 5 cm, every flipper came out within 12 s, after which the body stood 8 to 10 cm further forward, and never
+more than 3 mm further back. Rocking that is five times slower, or as long back as forth, frees less.)
 
-so while β rises the sweep must move away from the middle, which also shortens the lever l cos α of what sticks to the
-plate. (In simulated clay of 6 to 9 kPa, entered to 4 or 5 cm, a lift in place and one towards the middle freed nothing
-in 4 s; one away from the middle came out within 2.5 s, for 16 to 35 mm of the body's way.) The first attempt goes to
-the rear, as the stance did: a plate that stopped short of it pushes the body forward and comes out on the way. The
-later ones go away from the middle on the side where the flipper is.
-
-Targets lead their joints by no more than full torque needs, so a plate that comes free does not fly. Swing begins
+A rocked joint's target leads it by what full torque needs, and stands still, so a plate that comes free is braked. The
+lift's target leads by no more than that. Swing begins
 where the recovery leaves off, and what separates the two fades out without a jump of position or speed.
 """
 
@@ -30,10 +31,11 @@ from control.gait import RAMP_S, GaitParameters, swing_duration_s
 from control.geometry import FlipperGeometry
 from control.joint_path import still
 from control.limits import JointRange
-from control.records import FLIPPERS, DriveStates, JointAngles, JointTarget, JointTargets
+from control.records import FLIPPERS, DriveStates, JointTarget, JointTargets
 
 OUT_M = 0.003  # depth of the plate's lowest point up to which a flipper counts as out of the mud
 RISE_S = 0.2  # to reach the height of the swing
+AWAY_SHARE = 0.8  # of each rocking; the rest is back
 
 
 @dataclass(frozen=True)
@@ -43,10 +45,10 @@ class RecoveryParameters:
         0.3  # at full torque, for joints that follow late: by up to 0.2 s in simulated clay
     )
     pause_s: Annotated[float, Bounds(0.0, 30.0)] = 0.3  # without pull, before each attempt
-    attempt_s: Annotated[float, Bounds(0.1, 30.0)] = 3.0
-    speed_rad_s: Annotated[float, Bounds(0.05, 5.0)] = 1.0  # of both joints in the first attempt; the n-th has 1/n
-    sweep_deg: Annotated[float, Bounds(0.0, 60.0)] = 20.0  # away from the middle in the second; the n-th has n - 1
-    lead_deg: Annotated[float, Bounds(0.5, 45.0)] = 6.0  # of targets: times the stiffness, the full torque
+    attempt_s: Annotated[float, Bounds(0.1, 30.0)] = 4.0
+    lift_rad_s: Annotated[float, Bounds(0.05, 5.0)] = 1.0
+    rock_s: Annotated[float, Bounds(0.02, 2.0)] = 0.1  # to and fro with the sweep
+    lead_deg: Annotated[float, Bounds(0.5, 45.0)] = 8.0  # of targets: times the stiffness, the full torque
 
 
 def lowest_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> float:
@@ -89,7 +91,6 @@ class Recovery:
         self.parameters = parameters
         self.geometry = geometry
         self._ranges = ranges
-        self._rear_rad = -radians(gait.sweep_angle_deg)
         swing_s = swing_duration_s(gait, geometry)
         self._fade_s = (swing_s, min(RISE_S, swing_s), swing_s, min(RISE_S, swing_s))
         self.reset()
@@ -101,7 +102,7 @@ class Recovery:
         self._waits = False
         self._time_s = 0.0  # since the wait, the attempt or the swing after it began
         self._targets: JointTargets = still((0.0, 0.0, 0.0, 0.0))
-        self._goals: JointAngles = (0.0, 0.0, 0.0, 0.0)
+        self._way = -1.0  # the way of the sweep: 1 forward, -1 to the rear
         self._gaps: tuple[Gap, ...] = ()
 
     def stuck(self, states: DriveStates) -> tuple[str, ...]:
@@ -123,7 +124,7 @@ class Recovery:
             return self._faded(wanted)
         if self._time_s > self._allowed_s:
             self._begin(stuck, states)
-        return self._lift(dt_s, states) if self.attempt else wanted
+        return self._pull(dt_s, stuck, states) if self.attempt else wanted
 
     @property
     def _allowed_s(self) -> float:
@@ -138,40 +139,38 @@ class Recovery:
         self._time_s = 0.0
         a, b, c, d = (state.angle_rad for state in states)
         self._targets = still((a, b, c, d))
-        goal_a, goal_c = self._sweep_goals(stuck, (a, c))
-        self._goals = goal_a, 0.0, goal_c, 0.0
+        places_rad = dict(zip(FLIPPERS, (a, c), strict=True))
+        self._way = -1.0 if self.attempt == 1 else copysign(1.0, sum(places_rad[name] for name in stuck))
         self.news = f"{_are_stuck(stuck)}, attempt {self.attempt} of {self.parameters.attempts}"
 
-    def _sweep_goals(self, stuck: Sequence[str], here_rad: tuple[float, float]) -> tuple[float, float]:
-        """Stuck flippers go the same way, so that the body is not turned; one that is out stays where it is."""
-        places_rad = dict(zip(FLIPPERS, here_rad, strict=True))
-        away_rad = copysign(radians(self.parameters.sweep_deg), sum(places_rad[name] for name in stuck))
-        goals_rad = {name: places_rad[name] + (self.attempt - 1) * away_rad for name in stuck}
-        if self.attempt == 1:
-            goals_rad = dict.fromkeys(stuck, self._rear_rad)
-        left_rad, right_rad = ((places_rad | goals_rad)[name] for name in FLIPPERS)
-        return left_rad, right_rad
-
-    def _lift(self, dt_s: float, states: DriveStates) -> JointTargets:
-        ramp = min(max(self._time_s - self.parameters.pause_s, 0.0) / RAMP_S, 1.0)
-        speed_rad_s = ramp * self.parameters.speed_rad_s / self.attempt
-        a, b, c, d = (
-            self._led(dt_s, target, goal_rad, speed_rad_s, state.angle_rad, span)
-            for target, goal_rad, state, span in zip(self._targets, self._goals, states, self._ranges, strict=True)
+    def _pull(self, dt_s: float, stuck: Sequence[str], states: DriveStates) -> JointTargets:
+        """Lift all flippers and rock the stuck ones, the same way, so that the body is not turned."""
+        pulled_s = self._time_s - self.parameters.pause_s
+        if pulled_s < 0.0:
+            return self._targets
+        way = self._way if pulled_s / self.parameters.rock_s % 1.0 < AWAY_SHARE else -self._way
+        speed_rad_s = min(pulled_s / RAMP_S, 1.0) * self.parameters.lift_rad_s
+        pairs = zip(FLIPPERS, self._targets[::2], self._targets[1::2], states[::2], states[1::2], strict=True)
+        (a, b), (c, d) = (
+            (
+                self._before(way, sweep.angle_rad) if name in stuck else sweep_target,
+                self._raised(dt_s * speed_rad_s, dt_s, lift_target, lift.angle_rad),
+            )
+            for name, sweep_target, lift_target, sweep, lift in pairs
         )
         self._targets = a, b, c, d
         return self._targets
 
-    def _led(
-        self, dt_s: float, target: JointTarget, goal_rad: float, speed_rad_s: float, here_rad: float, span: JointRange
-    ) -> JointTarget:
-        """One step on the way to the goal, close to where the joint is and within its limits."""
-        lead_rad, step_rad = radians(self.parameters.lead_deg), speed_rad_s * dt_s
-        angle_rad = _within(goal_rad, target.angle_rad - step_rad, target.angle_rad + step_rad)
-        angle_rad = _within(angle_rad, here_rad - lead_rad, here_rad + lead_rad)
-        angle_rad = _within(angle_rad, span.min_rad, span.max_rad)
-        velocity_rad_s = _within((angle_rad - target.angle_rad) / dt_s, -speed_rad_s, speed_rad_s)
-        return JointTarget(angle_rad, velocity_rad_s)
+    def _before(self, way: float, here_rad: float) -> JointTarget:
+        """Full torque, up to the joint's limit."""
+        return JointTarget(_within(here_rad + way * radians(self.parameters.lead_deg), *self._ranges[0]), 0.0)
+
+    def _raised(self, step_rad: float, dt_s: float, target: JointTarget, here_rad: float) -> JointTarget:
+        """One step on the way to a level arm, close to where the joint is and within its limits."""
+        lead_rad = radians(self.parameters.lead_deg)
+        angle_rad = _within(0.0, target.angle_rad - step_rad, target.angle_rad + step_rad)
+        angle_rad = _within(_within(angle_rad, here_rad - lead_rad, here_rad + lead_rad), *self._ranges[1])
+        return JointTarget(angle_rad, _within((angle_rad - target.angle_rad) / dt_s, -step_rad / dt_s, step_rad / dt_s))
 
     def _leave(self, wanted: JointTargets) -> None:
         """All flippers are out."""

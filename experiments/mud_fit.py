@@ -20,7 +20,7 @@ strength. Every walk of it is one that all three muds may choose; then a finer g
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from statistics import fmean
 from typing import Any, NamedTuple
@@ -32,7 +32,7 @@ from experiments.side_by_side import Show, side_by_side
 from experiments.walk import walk_in
 from simulation.clay import MUDS, Clay
 from simulation.disturbances import LAB
-from simulation.lockstep import Lockstep
+from simulation.lockstep import Lockstep, plant_of
 from simulation.plant import PlantParameters
 from simulation.track import Track
 
@@ -121,9 +121,9 @@ def walk_on(
 def fixed_speed_cm_s(ground: Ground, depth_m: float, seed: int, strides: int) -> float:
     """In one endless mud."""
     rule, track = constant_depth(depth_m), Track([(ENDLESS_M, Clay("mud", ground.strength_pa))])
-    lockstep = Lockstep(configuration_for(rule), track, seed, disturbances=LAB)
-    plant = lockstep.robot.plant
-    plant.parameters = replace(plant.parameters, rail_damping_n_s_m=ground.damping_n_s_m)
+    configuration = configuration_for(rule)
+    plant = plant_of(configuration, LAB, rail_damping_n_s_m=ground.damping_n_s_m)
+    lockstep = Lockstep(configuration, track, seed, disturbances=LAB, plant=plant)
     lockstep.arm()
     return speed_cm_s(walk_in(lockstep, track, rule.order, partial(has, strides)))
 

@@ -161,6 +161,7 @@ def _contradictions(configuration: Configuration) -> Iterator[str]:
     yield from _depth_problems(configuration)
     yield from _range_problems(configuration)
     yield from _torque_problems(configuration)
+    yield from _lead_problems(configuration)
 
 
 def _text_problems(configuration: Configuration) -> Iterator[str]:
@@ -211,6 +212,18 @@ def _torque_problems(configuration: Configuration) -> Iterator[str]:
             yield (
                 f"drive.{joint}.current_limit_a = {drive.current_limit_a}: must be at least"
                 f" {needed_a:.2f} for limits.torque_nm = {torque_nm}"
+            )
+
+
+def _lead_problems(configuration: Configuration) -> Iterator[str]:
+    """A recovery's targets must lead far enough for the full torque, or the last attempt is a weak one."""
+    gains, lead_deg, torque_nm = configuration.gains, configuration.recovery.lead_deg, configuration.limits.torque_nm
+    needed_nm_rad = torque_nm / radians(lead_deg)
+    for key in ("sweep_stiffness_nm_rad", "adduction_stiffness_nm_rad"):
+        if configuration.recovery.attempts and getattr(gains, key) < needed_nm_rad:
+            yield (
+                f"gains.{key} = {getattr(gains, key)}: must be at least {ceil(100.0 * needed_nm_rad) / 100.0:.2f},"
+                f" or a recovery.lead_deg = {lead_deg:g} does not reach limits.torque_nm = {torque_nm}"
             )
 
 

@@ -113,7 +113,7 @@ def rate_factor(speed_m_s: float) -> float:
 _AT_REFERENCE = 1.0 + RATE_COEFFICIENT * REFERENCE_SPEED_M_S**RATE_EXPONENT
 
 # By water content in percent, as in Table I of the paper.
-MUDS = {"48.5": Clay("48.5", 2800.0), "53.1": Clay("53.1", 680.0), "45.3": Clay("45.3", 3270.0)}
+MUDS = {"48.5": Clay("48.5", 2800.0), "53.1": Clay("53.1", 684.0), "45.3": Clay("45.3", 3445.0)}
 DRIEST_PERCENT, WETTEST_PERCENT = 44.0, 56.0
 
 

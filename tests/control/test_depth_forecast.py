@@ -223,7 +223,18 @@ class TestExtraction:
     def test_a_flipper_that_came_out_proves_every_shallower_depth(self) -> None:
         proven = forecast(believed(None, told(2e6)), both(0.035, extraction_nm=0.3))
         assert proven.extraction_nm(0.03) == proven.extraction_nm(0.035) == 0.3
-        assert proven.extraction_nm(0.0375) == pytest.approx(2e6 * lift_m4(0.0375), rel=PIECES)
+
+    def test_deeper_it_proves_a_torque_in_proportion_to_the_lift_moment(self) -> None:
+        """For k_e falls with depth; a belief of less than that holds."""
+        for k_e, expected_nm in ((2e6, 0.3 * lift_m4(0.045) / lift_m4(0.035)), (0.1e6, 0.1e6 * lift_m4(0.045))):
+            proven = forecast(believed(None, told(k_e)), both(0.035, extraction_nm=0.3))
+            assert proven.extraction_nm(0.045) == pytest.approx(expected_nm, rel=2.0 * PIECES)
+
+    def test_where_k_e_is_not_known_k_p_stands_for_it(self) -> None:
+        for k_e in (None, bound(0.1e6)):
+            belief = believed(None, k_e)._replace(k_p=told(0.5e6, 0.1e6))
+            found = forecast(belief, both(0.02)).extraction_nm(0.04)
+            assert found == pytest.approx(0.7e6 * lift_m4(0.04), rel=PIECES)
 
     def test_a_proof_never_makes_an_extraction_harder_than_the_mud(self) -> None:
         proven = forecast(believed(None, told(0.2e6)), both(0.05, extraction_nm=0.5))

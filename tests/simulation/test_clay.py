@@ -78,7 +78,7 @@ def test_the_sideways_force_rises_with_depth_and_with_strength(name: str) -> Non
 
 def test_the_rate_factor_is_one_at_the_reference_speed_and_rises() -> None:
     assert rate_factor(0.1) == pytest.approx(1.0)
-    assert rate_factor(0.0) == pytest.approx(1.0 / (1.0 + 1.99 * 0.1**0.4))
+    assert rate_factor(0.0) == pytest.approx(1.0 / (1.0 + 0.4 * 0.1**0.4))
     factors = [rate_factor(speed_m_s) for speed_m_s in np.linspace(0.0, 2.0, 50)]
     assert all(before < after for before, after in pairwise(factors))
 

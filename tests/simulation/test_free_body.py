@@ -211,10 +211,9 @@ def test_on_mud_that_cannot_bear_it_it_sinks_until_it_floats() -> None:
     bearing_n = rate_factor(0.0) * 5.14 * weak.strength_pa * AREA_M2
     least_m = (WEIGHT_N - bearing_n) / (17.5e3 * AREA_M2)
     assert least_m > 0.01  # far beyond its elastic depth
-    # The slower it sinks, the less the mud bears: it creeps the last millimetres, at 1 mm/s and less.
     assert abs(body.upward_m_s) < 0.001
-    creeping_m = (rate_factor(0.001) / rate_factor(0.0) - 1.0) * bearing_n / (17.5e3 * AREA_M2)
-    assert least_m - creeping_m < SHAPE.axis_above_belly_m - body.height_m < least_m
+    # Let go on the surface it overshoots, at most as a weight that is let go on an undamped spring: to twice that.
+    assert least_m < SHAPE.axis_above_belly_m - body.height_m < 2.0 * least_m
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -319,9 +318,11 @@ def test_both_flippers_pushed_down_beside_the_body_lift_it() -> None:
     plant = Plant(FREE, Track([(9.0, Clay("stiff", 8000.0))]))
     body = plant.body
     assert isinstance(body, FreeBody)
-    for _ in range(100):
+    for _ in range(400):
         plant.step(STEP_S, (0.0, -1.0, 0.0, -1.0))
-    assert body.height_m > body.shape.axis_above_belly_m + 0.002
+    assert body.height_m > body.shape.axis_above_belly_m  # clear of the mud
+    carried_n = sum(load.upward_n for load in body.flipper_loads(axes_of(0.0, 0.0), *plant.arms))
+    assert carried_n == pytest.approx(body.mass_kg * 9.81, rel=0.05)  # it still rocks by that much on the plates
     assert abs(body.pitch_rad) < 0.01
 
 

@@ -179,7 +179,7 @@ def test_the_body_stays_under_a_thrust_below_its_drag() -> None:
 
 
 def test_the_body_slides_under_a_thrust_above_its_drag_at_the_speed_that_balances() -> None:
-    thrust_n = 2.5 + rate_factor(0.3) * MUDS["48.5"].lateral_n(0.02, 0.015)
+    thrust_n = 2.5 + 6.0 * 0.3 + rate_factor(0.3) * MUDS["48.5"].lateral_n(0.02, 0.015)
     plant = make_pushed_plant(thrust_n, 10.0)
     assert plant.body_m_s == pytest.approx(0.3, rel=0.01)
     assert plant.body_m > 1.0
@@ -232,8 +232,8 @@ def test_a_reset_brings_everything_back(disturbances: Disturbances) -> None:
 
 def test_the_body_of_a_fixed_base_never_moves() -> None:
     plant, free = Plant(PlantParameters(fixed_base=True), TRACK), Plant(PlantParameters(), TRACK)
-    row(free)
-    assert free.body_m > 0.02
+    # Further than the drag that holds it elastically gives way, twice over for a sudden push: it has slid.
+    assert max(row(free)[::5]) > 2.0 * static_drag_n() / DRAG_STIFFNESS_N_M
     row(plant)
     assert (plant.body_m, plant.body_m_s) == (0.0, 0.0)
     assert max(abs(angle_rad) for angle_rad in plant.angles_rad) > 0.1

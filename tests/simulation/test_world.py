@@ -134,7 +134,7 @@ def test_a_mud_by_its_water_is_the_paper_s() -> None:
         (LAYER.replace("0.02", "0.005"), "segment 1.layer 1.bottom_m = 0.005: must be more than top_m = 0.01"),
         (LAYER.replace("3.0", "0"), "segment 1.layer 1.factor = 0: must be at least 0.01"),
         (LAYER + LAYER, "segment 1.layer 2.top_m = 0.01: must be at least 0.02, where layer 1 ends"),
-        (SECOND + LAYER.replace("3.0", "20"), "segment 2.layer 1.factor = 20: must be at most 19.3 in mud of 2590 Pa"),
+        (SECOND + LAYER.replace("3.0", "20"), "segment 2.layer 1.factor = 20: must be at most 17.9 in mud of 2800 Pa"),
     ],
 )
 def test_what_cannot_be_is_refused_with_key_value_and_bound(added: str, told: str) -> None:
