@@ -20,7 +20,7 @@ from control.controller import WalkOrder
 from simulation.lockstep import Lockstep
 from simulation.track import paper_track
 
-BAR_TIMES = 5.0
+BAR_TIMES = 8.0
 
 
 def walk_once(longest_s: float) -> dict[str, Any]:

@@ -5,18 +5,21 @@ gets a short grace under full torque; then it is recovered, or swing would push 
 mud (the paper's extraction failure). Each attempt first lets go, so that the mud relaxes, and then lifts from where
 the flipper is while the sweep rocks: at full torque, most of each round one way and the rest of it back.
 
-A steady pull at full torque comes to rest where mud, body and joints balance, and in simulated clay of 6 kPa entered to
-5 cm it never frees the plate. Rocking frees it because nothing comes to rest: the body, thrown to and fro, pulls with
-its momentum too, and mud that sticks to the plate resists one slip, so while the plate slips outward and back little
-of that is left against the lift. Round after round the way of the sweep wins. The first attempt goes to the rear, as
-the stance did, so that the body moves forward. The later ones go away from the middle on the side where the flipper
-is: there the lever l cos α of what sticks to the plate is shorter. (In simulated clay of up to 9 kPa, entered to
-between 3 and 5 cm, every flipper came out within 12 s, after which the body stood 8 to 10 cm further forward, and never
-more than 3 mm further back. Rocking that is five times slower, or as long back as forth, frees less.)
+A steady pull at full torque comes to rest where mud, joints and body balance. A torque that is suddenly reversed throws
+the plate against the mud's spring by half beyond that balance, and off the middle (by the sine of the sweep angle) what
+presses on its face lifts as well. Each such peak lifts the plate a little; for it to sink as much again, the mud would
+have to yield the other way. The first attempt goes to the rear, as the stance did, and takes the body along. The later
+ones go away from the middle on the side where the flipper is; there the lever l cos α of what sticks to the plate is
+shorter, too.
 
-A rocked joint's target leads it by what full torque needs, and stands still, so a plate that comes free is braked. The
-lift's target leads by no more than that. Swing begins
-where the recovery leaves off, and what separates the two fades out without a jump of position or speed.
+In simulated clay of up to 9 kPa, commanded to between 3 and 5 cm, all came out within 12 s; the body went 8 to 11 cm
+forward meanwhile, and never more than 4 mm back. A steady pull freed nothing from 6 kPa and 5 cm on; rocking at half
+the rate, or as long back as forth, did not free 9 kPa, and with bodies of half or three times the mass some of 7.5 kPa
+and more stayed in. Real mud may differ: nobody has tried it there.
+
+A rocked joint's target stands still before it, so that a plate that comes free is braked. The lift's target leads by no
+more, so that it does not fly. Swing begins where the recovery leaves off, and what separates the two fades out without
+a jump of position or speed.
 """
 
 from __future__ import annotations

@@ -275,6 +275,7 @@ def test_a_flipper_that_is_out_stays_where_it_is() -> None:
 def test_both_flippers_go_the_same_way_also_from_both_sides_of_the_middle() -> None:
     recovery = Recovery(PARAMETERS, GEOMETRY, GAIT, RANGES)
     down, left, right = DriveState(angle_rad=-0.6), DriveState(angle_rad=0.2), DriveState(angle_rad=-0.1)
+    targets = still((0.0, 0.0, 0.0, 0.0))
     while recovery.attempt < 2 or targets[0].angle_rad == pytest.approx(left.angle_rad):
         targets = recovery.step(TICK_S, BOTH, (left, down, right, down), still((0.0, 0.0, 0.0, 0.0)))
     lead_rad = radians(PARAMETERS.lead_deg)

@@ -154,6 +154,19 @@ def test_texts_that_cannot_be_used_are_refused(example_text: str, old: str, new:
     assert told in problems_of(example_text.replace(old, new))[0]
 
 
+@pytest.mark.parametrize("key", ["sweep_stiffness_nm_rad", "adduction_stiffness_nm_rad"])
+def test_a_recovery_s_lead_that_does_not_reach_the_full_torque_is_refused(example_text: str, key: str) -> None:
+    """0.75 N·m over 8 degrees are 5.37 N·m/rad."""
+    (told,) = problems_of(f"{example_text}\n[gains]\n{key} = 5.3\n")
+    assert told == (
+        f"gains.{key} = 5.3: must be at least 5.38, or a recovery.lead_deg = 8 does not reach limits.torque_nm = 0.75"
+    )
+    parse_configuration(f"{example_text}\n[gains]\n{key} = 5.38\n")
+    longer = changed(example_text, "attempts", "3\nlead_deg = 8.2")
+    parse_configuration(f"{longer}\n[gains]\n{key} = 5.3\n")
+    parse_configuration(f"{changed(example_text, 'attempts', '0')}\n[gains]\n{key} = 0.0\n")
+
+
 def test_a_current_limit_below_the_torque_limit_is_refused(example_text: str) -> None:
     text = example_text.replace("node_id = 0", "node_id = 0\ncurrent_limit_a = 5.0")
     assert problems_of(text) == [

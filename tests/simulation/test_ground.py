@@ -129,17 +129,18 @@ def test_ridges_come_on_top_of_the_unevenness_from_stride_to_stride() -> None:
 
 
 def test_a_flipper_comes_to_rest_as_far_below_a_crest_as_below_a_trough() -> None:
-    """On firm mud 1 cm below both, of which half an edge bears 3 N where the flipper presses with 2.
+    """On firm mud 1 cm below both, of which half an edge bears 3 N where the flipper presses with 2.5.
 
-    Within 1 mm, in which mud under an edge yields. The lower corner, by which depth is told, is up to 3 mm deeper than
-    the point at which its half is carried.
+    Within 1 mm, in which mud under an edge yields; the joints are so stiff that the arm comes down slowly. The lower
+    corner, by which depth is told, is up to 2 mm deeper than the point at which its half of the edge is carried.
     """
-    firm_below, depths_m = Clay("firm below", 700.0, (Layer(0.01, 0.1, 20.0),)), []
+    firm_below = Track([(9.0, Clay("firm below", 700.0, (Layer(0.01, 0.1, 20.0),)))], ridges=Ridges(0.005, 0.2))
+    depths_m = []
     for crest_m in (0.005, -0.005):
-        plant = Plant(PlantParameters(fixed_base=True), Track([(9.0, firm_below)], ridges=Ridges(0.005, 0.2)))
+        plant = Plant(PlantParameters(fixed_base=True, joint_friction_nm_s=0.3), firm_below)
         plant.body.forward_m = 0.05 if crest_m > 0.0 else 0.15
         depths_m.append(depth_m(press(plant, -0.2).arms[0]) + crest_m)
-    assert 0.01 < depths_m[0] < 0.014
+    assert 0.01 < depths_m[0] < 0.013
     assert depths_m[0] == pytest.approx(depths_m[1], abs=0.001)
 
 

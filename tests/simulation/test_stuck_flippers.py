@@ -111,13 +111,13 @@ def test_without_attempts_swing_begins_with_the_flippers_in_the_mud(configuratio
 
 @pytest.mark.parametrize("kilopascal", [6.0, 7.5, 9.0])
 def test_in_stiff_mud_it_frees_itself_and_walks_on(configuration: Configuration, kilopascal: float) -> None:
-    """Pushing the body back by no more than 3 cm, a quarter of a stride's sweep."""
+    """And the body has lost no more way than its swaying takes, but won most of a stride's 12 cm."""
     robot, recorder = walking(configuration, mud(kilopascal), 0.05)
     assert until_phase(robot, Phase.RECOVERY)
     stuck_s, stuck_m = robot.now_s, robot.robot.plant.body_m
     assert until_swing(robot)
     assert robot.now_s - stuck_s < longest_s(PARAMETERS)
-    assert robot.robot.plant.body_m > stuck_m - 0.03
+    assert robot.robot.plant.body_m > stuck_m + 0.06
     assert recorder.texts[-1].startswith("the flippers came out after")
     assert [stride.estimate.released for stride in robot.loop.strides] == [False, False]
     assert until_phase(robot, Phase.INSERTION)
