@@ -87,7 +87,6 @@ class Recovery:
         self.parameters = parameters
         self.geometry = geometry
         self._ranges = ranges
-        self._rear_rad = -radians(gait.sweep_angle_deg)
         swing_s = swing_duration_s(gait, geometry)
         self._fade_s = (swing_s, min(RISE_S, swing_s), swing_s, min(RISE_S, swing_s))
         self.reset()
@@ -120,14 +119,14 @@ class Recovery:
         if not stuck:
             return self._faded(wanted)
         if self._time_s > self._allowed_s:
-            self._begin(stuck, states)
+            self._begin(stuck, states, wanted)
         return self._lift(dt_s, states) if self.attempt else wanted
 
     @property
     def _allowed_s(self) -> float:
         return self.parameters.pause_s + self.parameters.attempt_s if self.attempt else self.parameters.grace_s
 
-    def _begin(self, stuck: Sequence[str], states: DriveStates) -> None:
+    def _begin(self, stuck: Sequence[str], states: DriveStates, wanted: JointTargets) -> None:
         """The next attempt, from where the flippers are; after the last one, nothing."""
         if self.attempt == self.parameters.attempts:
             self.given_up = stuck
@@ -136,17 +135,19 @@ class Recovery:
         self._time_s = 0.0
         a, b, c, d = (state.angle_rad for state in states)
         self._targets = still((a, b, c, d))
-        goal_a, goal_c = self._sweep_goals(stuck, (a, c))
+        goal_a, goal_c = self._sweep_goals(stuck, (a, c), wanted)
         self._goals = goal_a, 0.0, goal_c, 0.0
         self.news = f"{_are_stuck(stuck)}, attempt {self.attempt} of {self.parameters.attempts}"
 
-    def _sweep_goals(self, stuck: Sequence[str], here_rad: tuple[float, float]) -> tuple[float, float]:
+    def _sweep_goals(
+        self, stuck: Sequence[str], here_rad: tuple[float, float], wanted: JointTargets
+    ) -> tuple[float, float]:
         """Stuck flippers go the same way, so that the body is not turned; one that is out stays where it is."""
         places_rad = dict(zip(FLIPPERS, here_rad, strict=True))
         away_rad = copysign(radians(self.parameters.sweep_deg), sum(places_rad[name] for name in stuck))
         goals_rad = {name: places_rad[name] + (self.attempt - 1) * away_rad for name in stuck}
         if self.attempt == 1:
-            goals_rad = dict.fromkeys(stuck, self._rear_rad)
+            goals_rad = dict.fromkeys(stuck, wanted[0].angle_rad)  # the rear, where the gait waits
         left_rad, right_rad = ((places_rad | goals_rad)[name] for name in FLIPPERS)
         return left_rad, right_rad
 
