@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from control.adaptation import AdaptationParameters, DepthChoice, body_drag
 from control.coefficient import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
 from control.depth_forecast import DepthForecast
-from control.gait import GaitParameters, stride_duration_s
+from control.gait import Gait, GaitParameters, stride_duration_s
 from control.gait_adaptation import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptation, quickest
 from control.geometry import FlipperGeometry
 from control.joint_path import still
-from control.limits import JointRange
+from control.limits import JointLimits, JointRange
 from control.records import DriveState, Estimate, StrideEstimate
 from control.recovery import Recovery, RecoveryParameters
 from control.step_model import Grip, step_m
@@ -229,6 +229,19 @@ def test_every_choice_is_within_bounds_and_reach(k_s: float, k_e: float, seed: i
         choice = adaptation.step(believed(k_s, k_e), strides(released=bool(seed >> i & 1)))
         assert 0.015 <= choice.depth_m <= min(0.05, GEOMETRY.deepest_m(sweep_deg(choice)))
         assert 30.0 <= sweep_deg(choice) <= 50.0
+
+
+def test_no_stride_that_may_be_chosen_asks_a_joint_for_more_than_its_velocity_limit() -> None:
+    limit_rad_s = JointLimits().velocity_rad_s
+    for stride in adapted().candidates:
+        gait = Gait(stride.gait, GEOMETRY)
+        gait.reset(stride.depth_m)
+        while (target := gait.step(0.002)).stride == 0:
+            adduction_rad = GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m)
+            adduction_rad_s = GEOMETRY.adduction_velocity_rad_s(
+                target.sweep_rad, adduction_rad, target.sweep_velocity_rad_s, target.depth_velocity_m_s
+            )
+            assert max(abs(adduction_rad_s), abs(target.sweep_velocity_rad_s)) < limit_rad_s
 
 
 def test_only_this_method_has_a_shorter_swing() -> None:
