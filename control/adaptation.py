@@ -34,7 +34,7 @@ from control.step_model import BodyDrag, Grip, step_m
 
 GRID_M = 0.0025  # depths that are told apart; the joints do not follow more finely in mud
 
-Method = Literal["default", "paper"]
+Method = Literal["default", "paper", "gait"]
 
 
 @dataclass(frozen=True)
@@ -53,16 +53,20 @@ class AdaptationParameters:
     motor_force_n: Annotated[float, Bounds(0.1, 100.0)] = 6.25  # 0.75 N·m at 0.12 m
     lifting_share: Annotated[float, Bounds(0.1, 1.0)] = 0.95  # of its torque that an extraction may need
     insertion_share: Annotated[float, Bounds(0.1, 10.0)] = 0.73  # of it at which an insertion ends; over 1: none does
+    min_sweep_deg: Annotated[float, Bounds(1.0, 60.0)] = 30.0  # these three of method "gait"
+    max_sweep_deg: Annotated[float, Bounds(1.0, 60.0)] = 50.0
+    swing_duration_s: Annotated[float, Bounds(0.2, 10.0)] = 0.3
 
 
 class DepthChoice(NamedTuple):
     depth_m: float
     slips: bool  # less than half an arm of step is promised
     reason: str
+    gait: GaitParameters | None = None  # of the next stride; None: as configured
 
 
 class Adaptation(Protocol):
-    """Owns the depth of the next stride."""
+    """Owns the depth of the next stride, and its gait where the method chooses that as well."""
 
     @property
     def largest_insertion_nm(self) -> float:
@@ -79,6 +83,13 @@ def depth_grid(parameters: AdaptationParameters, geometry: FlipperGeometry, gait
     high_m = min(parameters.max_depth_m, geometry.deepest_m(gait.sweep_angle_deg))
     count = max(0, int((high_m - low_m) / GRID_M + 1e-9)) + 1
     return tuple(low_m + i * GRID_M for i in range(count))
+
+
+def body_drag(parameters: AdaptationParameters, forecast: DepthForecast) -> BodyDrag:
+    """With the pad's in the mud that is forecast."""
+    depth_m = parameters.pad_depth_m
+    pad_n = forecast.shear_at(depth_m) * parameters.pad_width_m * depth_m * depth_m / 2.0
+    return BodyDrag(parameters.body_drag_n + pad_n, parameters.body_damping_n_s_m, parameters.body_mass_kg)
 
 
 class DepthAdaptation:
@@ -120,7 +131,7 @@ class DepthAdaptation:
 
     def _speeds_m_s(self) -> dict[float, float]:
         """Promised at every depth of the grid; empty where nothing is known of the thrust."""
-        drag, stiffness_n_m = self._drag(), 2.0 * self.parameters.mobilisation_n_m
+        drag, stiffness_n_m = body_drag(self.parameters, self.forecast), 2.0 * self.parameters.mobilisation_n_m
         length_m, speeds = self.geometry.flipper_length_m, dict[float, float]()
         for depth_m in self.grid_m:
             thrust_n = self.forecast.thrust_n(depth_m)
@@ -142,9 +153,3 @@ class DepthAdaptation:
     def _choice(self, depth_m: float, speeds: dict[float, float], reason: str) -> DepthChoice:
         promised_m = speeds[depth_m] * self._durations_s[depth_m]
         return DepthChoice(depth_m, promised_m < self.geometry.flipper_length_m / 2.0, reason)
-
-    def _drag(self) -> BodyDrag:
-        parameters = self.parameters
-        depth_m = parameters.pad_depth_m
-        pad_n = self.forecast.shear_at(depth_m) * parameters.pad_width_m * depth_m * depth_m / 2.0
-        return BodyDrag(parameters.body_drag_n + pad_n, parameters.body_damping_n_s_m, parameters.body_mass_kg)

@@ -40,7 +40,10 @@ TOLD_APART_M = 0.0025  # depths closer together are the same
 
 
 class DepthForecast:
-    """Owns what outlives a belief: ratio, share, and how deep each flipper was in this mud when it stuck."""
+    """Owns what outlives a belief: ratio, share, and how deep each flipper was in this mud when it stuck.
+
+    `gait` is that of the strides that are told of and asked about. A method that varies it sets it before either.
+    """
 
     def __init__(self, geometry: FlipperGeometry, gait: GaitParameters, motor_force_n: float) -> None:
         self.geometry = geometry

@@ -46,6 +46,18 @@ class PhaseRow(NamedTuple):
     depth_end_m: float
 
 
+class Turn(NamedTuple):
+    """A change of the angle at which a swing ends: a path of its own on top, over what is left of the swing."""
+
+    start_s: float
+    span_rad: float
+
+    def after(self, time_s: float, duration_s: float) -> tuple[float, float]:
+        """Angle and velocity that it adds to a swing of `duration_s`."""
+        fraction, rate = smooth_progress(time_s - self.start_s, duration_s - self.start_s)
+        return self.span_rad * fraction, self.span_rad * rate
+
+
 def stride_table(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -> tuple[PhaseRow, ...]:
     """One stride at `depth_m` below the nominal surface, row by row in time."""
     front = radians(gait.sweep_angle_deg)
@@ -102,7 +114,11 @@ def _first_half(time_s: float, ramp_s: float, rate: float) -> tuple[float, float
 
 
 class Gait:
-    """Owns the place in the stride. The depth of the next stride may be set until its insertion begins."""
+    """Owns the place in the stride.
+
+    The depth of the next stride may be set until its insertion begins. Its gait may be set until half of the swing
+    before it is over, since that swing ends where the next stride's sweep begins; later it counts for the one after.
+    """
 
     def __init__(self, parameters: GaitParameters, geometry: FlipperGeometry) -> None:
         self.parameters = parameters
@@ -110,15 +126,17 @@ class Gait:
         self.reset(0.0)
 
     def reset(self, depth_m: float) -> None:
-        """Back to the start of stride 0, at `depth_m`."""
+        """Back to the start of stride 0, at `depth_m` and by the gait's own parameters."""
         self.next_depth_m = depth_m
+        self.next_parameters = self._aim = self.parameters
         self.stride = 0
         self._begin_stride()
 
     def _begin_stride(self) -> None:
-        self._rows = stride_table(self.parameters, self.geometry, self.next_depth_m)
+        self._rows = stride_table(self._aim, self.geometry, self.next_depth_m)
         self._row = 0
         self._time_s = 0.0
+        self._turns: tuple[Turn, ...] = ()
 
     @property
     def commanded_depth_m(self) -> float:
@@ -140,6 +158,8 @@ class Gait:
 
         Time left over at the end of a phase counts for the next, so strides keep their rate.
         """
+        if self.next_parameters is not self._aim and self._rows[self._row].phase is Phase.SWING:
+            self._turn()
         self._time_s += dt_s
         while self._time_s >= self._rows[self._row].duration_s:
             if self.swing_is_next and not may_swing:
@@ -151,8 +171,16 @@ class Gait:
     def end_insertion(self) -> None:
         """The stride goes on at the depth that is commanded now."""
         if self._rows[self._row].phase is Phase.INSERTION:
-            self._rows = stride_table(self.parameters, self.geometry, self._target().depth_m)
+            self._rows = stride_table(self._aim, self.geometry, self._target().depth_m)
             self._row, self._time_s = 1, 0.0
+
+    def _turn(self) -> None:
+        if self._time_s > self._rows[self._row].duration_s / 2.0:
+            return
+        span_rad = radians(self.next_parameters.sweep_angle_deg) - radians(self._aim.sweep_angle_deg)
+        self._aim = self.next_parameters
+        if span_rad:
+            self._turns += (Turn(self._time_s, span_rad),)
 
     def _end_row(self) -> None:
         left_over_s = self._time_s - self._rows[self._row].duration_s
@@ -166,11 +194,16 @@ class Gait:
         phase, duration_s, sweep_start, sweep_end, depth_start, depth_end = self._rows[self._row]
         fraction, rate = smooth_progress(self._time_s, duration_s)
         sweep_span, depth_span = sweep_end - sweep_start, depth_end - depth_start
+        sweep_rad, sweep_rad_s = sweep_start + sweep_span * fraction, sweep_span * rate
+        if self._turns:
+            added = [turn.after(self._time_s, duration_s) for turn in self._turns]
+            sweep_rad += sum(angle_rad for angle_rad, _ in added)
+            sweep_rad_s += sum(velocity_rad_s for _, velocity_rad_s in added)
         return GaitTarget(
             phase,
             self.stride,
-            sweep_start + sweep_span * fraction,
-            sweep_span * rate,
+            sweep_rad,
+            sweep_rad_s,
             depth_start + depth_span * fraction,
             depth_span * rate,
         )

@@ -17,6 +17,7 @@ the authors' logs the sweep's force reaches its plateau with 300 to 700 N/m, the
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import log1p, radians, sin
 from typing import NamedTuple
 
@@ -41,30 +42,44 @@ class Grip(NamedTuple):
     stiffness_n_m: float  # until then
 
 
+Motion = tuple[tuple[float, float], ...]  # a step of time each: how far the plates swept, the share of thrust left
+
+
 def step_m(gait: GaitParameters, flipper_length_m: float, drag: BodyDrag, grip: Grip, depth_m: float) -> float:
     """With the flippers at `depth_m`, from which they are pulled out at the gait's speed of extraction."""
+    return carried_m(motion_of(gait, flipper_length_m, depth_m), drag, grip)
+
+
+@lru_cache(maxsize=256)
+def motion_of(gait: GaitParameters, flipper_length_m: float, depth_m: float) -> Motion:
+    """Of the plates, from the start of the stance until they are out."""
     front_rad = radians(gait.sweep_angle_deg)
     stance_s = 2.0 * front_rad * flipper_length_m / gait.stance_speed_m_s
     leaving_s = depth_m / gait.extraction_speed_m_s
-    thrust_n, stiffness_n_m = grip
-    body_m = body_m_s = slip_m = time_s = 0.0
+    motion, time_s = list[tuple[float, float]](), 0.0
     while time_s < stance_s + leaving_s:
         time_s += STEP_S
-        if time_s > stance_s:
-            thrust_n = grip.thrust_n * max(0.0, 1.0 - (time_s - stance_s) / leaving_s)
         swept_m = 2.0 * flipper_length_m * sin(front_rad) * smooth_progress(time_s, stance_s)[0]
+        motion.append((swept_m, min(1.0, max(0.0, 1.0 - (time_s - stance_s) / leaving_s))))
+    return tuple(motion)
+
+
+def carried_m(motion: Motion, drag: BodyDrag, grip: Grip) -> float:
+    """The body goes forward only: it slides back less than dry friction lets it."""
+    dry_n, damping_n_s_m, mass_kg = drag
+    stiffness_n_m = grip.stiffness_n_m
+    if grip.thrust_n <= dry_n:
+        return 0.0
+    body_m = body_m_s = slip_m = 0.0
+    for swept_m, share in motion:
+        thrust_n = share * grip.thrust_n
         wanted_n = stiffness_n_m * (swept_m - body_m - slip_m)
-        force_n = min(max(wanted_n, -thrust_n), thrust_n)
+        force_n = thrust_n if wanted_n > thrust_n else max(wanted_n, -thrust_n)
         slip_m += (wanted_n - force_n) / stiffness_n_m
-        body_m_s = _next_speed_m_s(body_m_s, force_n, drag)
+        body_m_s += STEP_S * (force_n - damping_n_s_m * body_m_s - dry_n) / mass_kg
+        body_m_s = body_m_s if body_m_s > 0.0 else 0.0
         body_m += STEP_S * body_m_s
     return body_m + coast_m(drag, body_m_s)
-
-
-def _next_speed_m_s(body_m_s: float, force_n: float, drag: BodyDrag) -> float:
-    """Forward only: the body slides back less than dry friction lets it."""
-    net_n = force_n - drag.damping_n_s_m * body_m_s - drag.dry_n
-    return max(0.0, body_m_s + STEP_S * net_n / drag.mass_kg)
 
 
 def coast_m(drag: BodyDrag, speed_m_s: float) -> float:

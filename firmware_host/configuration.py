@@ -19,6 +19,7 @@ from control.adaptation import AdaptationParameters
 from control.bounds import Bounds
 from control.controller import MotionParameters
 from control.gait import PROTOCOLS, GaitParameters
+from control.gait_adaptation import candidates
 from control.geometry import FlipperGeometry
 from control.joint_friction import NO_FRICTION, JointFriction
 from control.joint_pd import ArmMass, JointGains
@@ -160,6 +161,8 @@ def _contradictions(configuration: Configuration) -> Iterator[str]:
     yield from _friction_problems(configuration)
     yield from _depth_problems(configuration)
     yield from _range_problems(configuration)
+    if configuration.adaptation.method == "gait":
+        yield from _sweep_problems(configuration)
     yield from _torque_problems(configuration)
     yield from _lead_problems(configuration)
 
@@ -273,4 +276,29 @@ def _range_problems(configuration: Configuration) -> Iterator[str]:
         yield (
             f"limits.adduction_min_deg = {limits.adduction_min_deg}: must be at most {lowest_deg:.1f}"
             f" to reach adaptation.max_depth_m = {depth_m}"
+        )
+
+
+def _sweep_problems(configuration: Configuration) -> Iterator[str]:
+    """Of the sweeps among which the method "gait" chooses; wide ones go less deep, as far as they reach."""
+    geometry, limits, adaptation = configuration.geometry, configuration.limits, configuration.adaptation
+    widest_deg, widest = adaptation.max_sweep_deg, f"adaptation.max_sweep_deg = {adaptation.max_sweep_deg}"
+    within_deg = min(-limits.sweep_min_deg, limits.sweep_max_deg)
+    reached_m = geometry.deepest_m(widest_deg)
+    if adaptation.min_sweep_deg > widest_deg:
+        yield f"adaptation.min_sweep_deg = {adaptation.min_sweep_deg}: must be at most {widest}"
+    if widest_deg > within_deg:
+        yield f"{widest}: must be at most {within_deg:g} for limits.sweep_min_deg and sweep_max_deg"
+    if adaptation.min_depth_m > reached_m:
+        yield f"{widest}: reaches {reached_m:.4f} m, less than adaptation.min_depth_m = {adaptation.min_depth_m}"
+        return
+    poses = [
+        geometry.adduction_rad(radians(each.gait.sweep_angle_deg), each.depth_m)
+        for each in candidates(adaptation, geometry, configuration.gait)
+    ]
+    lowest_deg = degrees(min(poses))
+    if limits.adduction_min_deg > lowest_deg:
+        yield (
+            f"limits.adduction_min_deg = {limits.adduction_min_deg}: must be at most {lowest_deg:.1f}"
+            " for adaptation.min_sweep_deg to max_sweep_deg"
         )

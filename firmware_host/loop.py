@@ -10,9 +10,12 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from control.adaptation import Adaptation, DepthAdaptation
+from control.adaptation import Adaptation, AdaptationParameters, DepthAdaptation, DepthChoice, Method
 from control.controller import RESTING, Controller, WalkOrder
 from control.faults import Fault
+from control.gait import GaitParameters
+from control.gait_adaptation import GaitAdaptation, quickest
+from control.geometry import FlipperGeometry
 from control.limits import LimitedTorques, apply_limits
 from control.modes import ACCEPTED_IN, ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
 from control.paper_adaptation import PaperAdaptation
@@ -53,9 +56,21 @@ class ClosedStride(NamedTuple):
     chosen_depth_m: float
 
 
+METHODS: dict[Method, Callable[[AdaptationParameters, FlipperGeometry, GaitParameters], Adaptation]] = {
+    "default": DepthAdaptation,
+    "paper": PaperAdaptation,
+    "gait": GaitAdaptation,
+}
+
+
 def _adaptation_of(configuration: Configuration) -> Adaptation:
-    kind = PaperAdaptation if configuration.adaptation.method == "paper" else DepthAdaptation
+    kind = METHODS[configuration.adaptation.method]
     return kind(configuration.adaptation, configuration.geometry, configuration.gait)
+
+
+def _told(choice: DepthChoice) -> str:
+    sweep = f", sweep {choice.gait.sweep_angle_deg:g} degrees" if choice.gait else ""
+    return f"depth {choice.depth_m:.4f} m{sweep}: {choice.reason}{', slips' if choice.slips else ''}"
 
 
 class Loop:
@@ -85,7 +100,12 @@ class Loop:
             configuration.gains,
             configuration.arm,
             configuration.motion,
-            Recovery(configuration.recovery, configuration.geometry, configuration.gait, configuration.joint_ranges),
+            Recovery(
+                configuration.recovery,
+                configuration.geometry,
+                quickest(configuration.adaptation, configuration.gait),
+                configuration.joint_ranges,
+            ),
         )
         self._clock = clock
         self._ranges = configuration.joint_ranges
@@ -151,13 +171,14 @@ class Loop:
             return
         if self.estimator.belief.boundary:
             self.event(now_s, "another mud")
-        depth_m = self.controller.order.depth_m
+        gait, depth_m = self.controller.gait, self.controller.order.depth_m
         if self.controller.order.adaptive:
             choice = self.adaptation.step(self.estimator.belief, self.reading.strides)
-            depth_m = choice.depth_m
-            if depth_m != self.controller.gait.next_depth_m:
-                self.event(now_s, f"depth {depth_m:.4f} m: {choice.reason}{', slips' if choice.slips else ''}")
-        self.controller.gait.next_depth_m = depth_m
+            depth_m, parameters = choice.depth_m, choice.gait or gait.parameters
+            if (depth_m, parameters) != (gait.next_depth_m, gait.next_parameters):
+                self.event(now_s, _told(choice))
+            gait.next_parameters = parameters
+        gait.next_depth_m = depth_m
         for estimate in self.reading.strides:
             self.strides.append(ClosedStride(self.strides_closed, estimate, depth_m))
             self.strides_closed += 1

@@ -1,6 +1,7 @@
 """The stride's timing against the paper's numbers, and its motion against numeric derivatives."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import groupby, islice, pairwise
 from math import degrees, floor, pi, radians, sin
 
@@ -280,3 +281,79 @@ def test_no_joint_is_asked_for_more_than_its_velocity_limit(depth_m: float) -> N
     limit = JointLimits().velocity_rad_s
     for target in islice(targets(TICK_S, depth_m), 1000):
         assert max(abs(target.sweep_velocity_rad_s), abs(adduction_velocity_rad_s(target))) < limit
+
+
+WIDE = replace(WALKING, sweep_angle_deg=45.0, swing_duration_s=0.3)
+NARROW = replace(WALKING, sweep_angle_deg=20.0)
+
+
+def swept(changes: dict[float, GaitParameters], duration_s: float, dt_s: float = 0.0005) -> list[GaitTarget]:
+    """Targets of a walk whose next gait is set at the first tick in swing at or after each share of the swing."""
+    gait, seen, waiting = Gait(WALKING, GEOMETRY), list[GaitTarget](), dict(changes)
+    gait.reset(0.03)
+    swing_ticks = 0
+    for _ in range(round(duration_s / dt_s)):
+        if seen and seen[-1].phase is Phase.SWING and seen[-1].stride == 0:
+            swing_ticks += 1
+            for share in [share for share in waiting if swing_ticks * dt_s >= share * WALKING.swing_duration_s]:
+                gait.next_parameters = waiting.pop(share)
+        seen.append(gait.step(dt_s))
+    return seen
+
+
+STRIDE_S = stride_duration_s(WALKING, GEOMETRY, 0.03)
+
+
+@pytest.mark.parametrize("change", [{0.0: WIDE}, {0.0: NARROW}, {0.3: WIDE}, {0.1: WIDE, 0.4: NARROW}])
+def test_another_sweep_told_in_swing_moves_the_target_without_a_jump(change: dict[float, GaitParameters]) -> None:
+    seen = swept(change, STRIDE_S + 0.8)
+    for before, after in pairwise(seen):
+        mean_rad_s = (before.sweep_velocity_rad_s + after.sweep_velocity_rad_s) / 2.0
+        moved_rad = after.sweep_rad - before.sweep_rad
+        # The trapezium's error over a step of 0.5 ms is dt² Δa/8 at a bend; accelerations stay below 1000 rad/s².
+        assert moved_rad == pytest.approx(mean_rad_s * 0.0005, abs=3e-5)
+        assert abs(after.sweep_velocity_rad_s - before.sweep_velocity_rad_s) < 1000.0 * 0.0005
+
+
+@pytest.mark.parametrize("last", [WIDE, NARROW])
+def test_the_stride_after_a_change_sweeps_from_its_own_front_to_its_own_rear(last: GaitParameters) -> None:
+    seen = [target for target in swept({0.0: last}, STRIDE_S + 1.2) if target.stride == 1]
+    insertion = [target.sweep_rad for target in seen if target.phase is Phase.INSERTION]
+    extraction = [target.sweep_rad for target in seen if target.phase is Phase.EXTRACTION]
+    assert insertion == pytest.approx([radians(last.sweep_angle_deg)] * len(insertion))
+    assert extraction == pytest.approx([-radians(last.sweep_angle_deg)] * len(extraction))
+    assert insertion
+    assert extraction
+
+
+def test_the_swing_of_a_stride_lasts_as_long_as_its_own_gait_says() -> None:
+    seen = swept({0.0: WIDE}, 2.0 * STRIDE_S + 0.2)
+    assert [
+        sum(target.phase is Phase.SWING and target.stride == stride for target in seen) * 0.0005 for stride in (0, 1)
+    ] == pytest.approx([0.8, 0.3], abs=0.001)
+
+
+def test_a_gait_told_late_in_the_swing_is_that_of_the_stride_after_the_next() -> None:
+    seen = swept({0.6: WIDE}, 2.0 * STRIDE_S + 0.5)
+    fronts = [next(t.sweep_rad for t in seen if t.stride == i and t.phase is Phase.INSERTION) for i in (1, 2)]
+    assert fronts == pytest.approx([radians(30.0), radians(45.0)])
+
+
+def test_a_gait_whose_next_stride_is_never_set_walks_bit_for_bit_the_same() -> None:
+    free, told = Gait(WALKING, GEOMETRY), Gait(WALKING, GEOMETRY)
+    free.reset(0.03)
+    told.reset(0.03)
+    for _ in range(3000):
+        told.next_parameters = replace(WALKING)  # equal, and another object
+        assert told.step(TICK_S) == free.step(TICK_S)
+
+
+def test_a_reset_forgets_the_gait_of_the_next_stride() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.03)
+    first = [gait.step(TICK_S) for _ in range(1500)]
+    gait.next_parameters = WIDE
+    for _ in range(1500):
+        gait.step(TICK_S)
+    gait.reset(0.03)
+    assert [gait.step(TICK_S) for _ in range(1500)] == first

@@ -1,0 +1,248 @@
+"""The choice of depth and sweep together, from beliefs made up of muds, against a search that looks at every pair."""
+
+from dataclasses import replace
+from math import nan
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from control.adaptation import AdaptationParameters, DepthChoice, body_drag
+from control.coefficient import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
+from control.depth_forecast import DepthForecast
+from control.gait import Gait, GaitParameters, stride_duration_s
+from control.gait_adaptation import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptation, quickest
+from control.geometry import FlipperGeometry
+from control.limits import JointLimits
+from control.records import Estimate, StrideEstimate
+from control.step_model import Grip, step_m
+
+GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
+PARAMETERS = AdaptationParameters(method="gait")
+LIFTING_NM = PARAMETERS.motor_force_n * GEOMETRY.flipper_length_m
+NOT_TOLD = Estimate(nan, nan, 0, False, "not told")
+
+
+def told(value: float, at_least: bool = False) -> Coefficient:
+    return Coefficient(value, 0.05 * value, 0.03, 0.0, 0.1, 8, at_least)
+
+
+def believed(k_s: float, k_e: float, boundary: bool = False) -> MudBelief:
+    """By both flippers alike; a mud that never yielded has a k_s of this or more."""
+    flipper = FlipperBelief(None, told(k_s), told(k_e))
+    return MudBelief(None, told(k_s), told(k_e), flipper, flipper, boundary)
+
+
+FIRM, SOFT, STICKY = believed(2.0e6, 0.5e6), believed(0.2e6, 0.1e6), believed(2.0e6, 2.5e6)
+
+
+def strides(
+    released: bool = True, torque_nm: float = 0.2, depth_m: float = 0.03, surface_m: float = 0.0
+) -> list[StrideEstimate]:
+    return [
+        StrideEstimate(
+            flipper=flipper,
+            index=0,
+            t_start_s=0.0,
+            t_end_s=1.0,
+            insertion_s=0.4,
+            stance_s=0.25,
+            extraction_s=0.1,
+            k_p=NOT_TOLD,
+            k_s=NOT_TOLD,
+            k_e=NOT_TOLD,
+            surface_m=surface_m,
+            depth_m=depth_m,
+            released=released,
+            insertion_force_n=3.0,
+            stance_force_n=6.0,
+            extraction_force_n=-2.0,
+            step_m=nan,
+            extraction_torque_nm=torque_nm,
+        )
+        for flipper in ("left", "right")
+    ]
+
+
+def adapted(parameters: AdaptationParameters = PARAMETERS) -> GaitAdaptation:
+    return GaitAdaptation(parameters, GEOMETRY, GAIT)
+
+
+def sweep_deg(choice: DepthChoice) -> float:
+    assert choice.gait is not None
+    return choice.gait.sweep_angle_deg
+
+
+def settled(belief: MudBelief, count: int = 5) -> DepthChoice:
+    adaptation = adapted()
+    for _ in range(count):
+        choice = adaptation.step(belief, strides())
+    return choice
+
+
+def brute_force(belief: MudBelief, closed: list[StrideEstimate], widest_deg: float) -> list[tuple[float, float, float]]:
+    """(speed, depth, sweep) of every pair that comes out, by a forecast of its own for each sweep."""
+    found = []
+    for i in range(round((PARAMETERS.max_sweep_deg - PARAMETERS.min_sweep_deg) / SWEEP_STEP_DEG) + 1):
+        deg = PARAMETERS.min_sweep_deg + i * SWEEP_STEP_DEG
+        gait = replace(GAIT, sweep_angle_deg=deg, swing_duration_s=PARAMETERS.swing_duration_s)
+        forecast = DepthForecast(GEOMETRY, gait, PARAMETERS.motor_force_n)
+        forecast.update(belief, closed, 0.03)
+        drag = body_drag(PARAMETERS, forecast)
+        for j in range(15):
+            depth_m = 0.015 + 0.0025 * j
+            if depth_m > GEOMETRY.deepest_m(deg) or deg > widest_deg:
+                continue
+            if forecast.extraction_nm(depth_m) >= PARAMETERS.lifting_share * LIFTING_NM:
+                continue
+            grip = Grip(forecast.thrust_n(depth_m) or 0.0, 2.0 * PARAMETERS.mobilisation_n_m)
+            carried_m = step_m(gait, GEOMETRY.flipper_length_m, drag, grip, depth_m)
+            found.append((carried_m / stride_duration_s(gait, GEOMETRY, depth_m), depth_m, deg))
+    return sorted(found, reverse=True)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    k_s=st.floats(0.15e6, 3e6),
+    k_e=st.floats(0.05e6, 2e6),
+    torque_nm=st.floats(0.0, 0.7),
+    surface_m=st.floats(-0.002, 0.002),
+)
+def test_it_takes_the_fastest_of_all_pairs_that_come_out(
+    k_s: float, k_e: float, torque_nm: float, surface_m: float
+) -> None:
+    belief, closed = believed(k_s, k_e), strides(torque_nm=torque_nm, surface_m=surface_m)
+    choice = adapted().step(belief, closed)
+    easily = torque_nm < 0.7 * LIFTING_NM
+    pairs = brute_force(belief, closed, 30.0 + (WIDENING_DEG if easily else 0.0))
+    if not pairs or pairs[0][0] == 0.0:
+        assert choice.reason in ("extraction", "thrust")
+        return
+    speeds = {(round(depth_m, 6), deg): speed for speed, depth_m, deg in pairs}
+    assert speeds[round(choice.depth_m, 6), sweep_deg(choice)] == pytest.approx(pairs[0][0], rel=1e-9)
+
+
+def test_firm_mud_is_walked_wide_and_shallow_and_soft_mud_narrow_and_deep() -> None:
+    firm, soft = settled(FIRM), settled(SOFT)
+    assert sweep_deg(firm) > sweep_deg(soft)
+    assert firm.depth_m < soft.depth_m
+
+
+def test_every_stride_has_the_short_swing_of_the_method() -> None:
+    choice = settled(FIRM)
+    assert choice.gait is not None
+    assert choice.gait == replace(GAIT, sweep_angle_deg=sweep_deg(choice), swing_duration_s=0.3)
+
+
+def test_the_first_stride_is_walked_as_configured() -> None:
+    adaptation = adapted()
+    adaptation.reset(0.02)
+    assert adaptation.choice[:2] == (0.02, False)
+    assert adaptation.choice.gait == GAIT
+
+
+def test_the_sweep_grows_by_no_more_than_one_widening_from_stride_to_stride() -> None:
+    adaptation, before_deg, widest_deg = adapted(), 30.0, 0.0
+    for _ in range(6):
+        now_deg = sweep_deg(adaptation.step(FIRM, strides()))
+        assert now_deg <= before_deg + WIDENING_DEG
+        before_deg, widest_deg = now_deg, max(widest_deg, now_deg)
+    assert widest_deg == 50.0
+
+
+@pytest.mark.parametrize("torque_nm", [0.7 * LIFTING_NM, nan])
+def test_no_stride_is_wider_after_an_extraction_that_was_hard_or_was_not_seen(torque_nm: float) -> None:
+    assert sweep_deg(adapted().step(FIRM, strides(torque_nm=torque_nm))) == 30.0
+    assert sweep_deg(adapted().step(FIRM, strides(torque_nm=0.69 * LIFTING_NM))) > 30.0
+
+
+def test_one_flipper_that_was_hard_to_lift_is_enough() -> None:
+    left, right = strides()[0], strides(torque_nm=0.6)[1]
+    assert sweep_deg(adapted().step(FIRM, [left, right])) == 30.0
+
+
+def test_a_sweep_narrower_than_the_methods_becomes_its_narrowest_at_once() -> None:
+    adaptation = GaitAdaptation(PARAMETERS, GEOMETRY, replace(GAIT, sweep_angle_deg=15.0))
+    assert sweep_deg(adaptation.step(FIRM, strides(torque_nm=0.7))) == 30.0
+
+
+class TestStuck:
+    def walked(self) -> tuple[GaitAdaptation, DepthChoice]:
+        adaptation = adapted()
+        for _ in range(4):
+            choice = adaptation.step(FIRM, strides())
+        return adaptation, choice
+
+    def test_nothing_as_deep_and_as_wide_is_tried_again_in_the_same_mud(self) -> None:
+        adaptation, stuck = self.walked()
+        for torque_nm in (0.2, 0.3, 0.2, 0.2):
+            choice = adaptation.step(FIRM, strides(torque_nm == 0.3, torque_nm, stuck.depth_m))
+            assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
+
+    def test_it_says_so(self) -> None:
+        adaptation, _ = self.walked()
+        assert adaptation.step(FIRM, strides(released=False)).reason == "a flipper was stuck"
+
+    @pytest.mark.parametrize("forgotten", ["another mud", "another walk"])
+    def test_it_is_forgotten_in_another_mud_and_in_another_walk(self, forgotten: str) -> None:
+        adaptation, stuck = self.walked()
+        adaptation.step(FIRM, strides(released=False, depth_m=stuck.depth_m))
+        if forgotten == "another walk":
+            adaptation.reset(0.03)
+        adaptation.step(FIRM._replace(boundary=True), strides())
+        for _ in range(4):
+            choice = adaptation.step(FIRM, strides())
+        assert (choice.depth_m, choice.gait) == (stuck.depth_m, stuck.gait)
+
+    def test_with_no_thrust_known_it_goes_on_with_something_else(self) -> None:
+        adaptation, stuck = self.walked()
+        choice = adaptation.step(NOTHING_KNOWN, strides(released=False, depth_m=stuck.depth_m))
+        assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
+
+
+def test_where_nothing_is_known_of_the_thrust_depth_and_gait_stay() -> None:
+    adaptation = adapted()
+    before = adaptation.step(FIRM, strides())
+    after = adaptation.step(NOTHING_KNOWN, strides())
+    assert (after.depth_m, after.gait) == (before.depth_m, before.gait)
+    assert "nothing known" in after.reason
+
+
+def test_where_no_pair_comes_out_the_shallowest_and_narrowest_is_taken() -> None:
+    choice = adapted().step(believed(2.0e6, 50e6), strides(torque_nm=0.75, depth_m=0.01))
+    assert (choice.depth_m, sweep_deg(choice), choice.reason) == (0.015, 30.0, "extraction")
+
+
+def test_where_none_promises_a_step_the_deepest_is_taken() -> None:
+    choice = adapted().step(believed(0.005e6, 0.001e6), strides())
+    assert (choice.reason, choice.slips) == ("thrust", True)
+    assert choice.depth_m == pytest.approx(0.05)
+
+
+@settings(max_examples=30, deadline=None)
+@given(k_s=st.floats(1e4, 1e7), k_e=st.floats(1e4, 1e7), seed=st.integers(0, 7))
+def test_every_choice_is_within_bounds_and_reach(k_s: float, k_e: float, seed: int) -> None:
+    adaptation = adapted()
+    for i in range(4):
+        choice = adaptation.step(believed(k_s, k_e), strides(released=bool(seed >> i & 1)))
+        assert 0.015 <= choice.depth_m <= min(0.05, GEOMETRY.deepest_m(sweep_deg(choice)))
+        assert 30.0 <= sweep_deg(choice) <= 50.0
+
+
+def test_no_stride_that_may_be_chosen_asks_a_joint_for_more_than_its_velocity_limit() -> None:
+    limit_rad_s = JointLimits().velocity_rad_s
+    for stride in adapted().candidates:
+        gait = Gait(stride.gait, GEOMETRY)
+        gait.reset(stride.depth_m)
+        while (target := gait.step(0.002)).stride == 0:
+            adduction_rad = GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m)
+            adduction_rad_s = GEOMETRY.adduction_velocity_rad_s(
+                target.sweep_rad, adduction_rad, target.sweep_velocity_rad_s, target.depth_velocity_m_s
+            )
+            assert max(abs(adduction_rad_s), abs(target.sweep_velocity_rad_s)) < limit_rad_s
+
+
+def test_only_this_method_has_a_shorter_swing() -> None:
+    assert quickest(PARAMETERS, GAIT).swing_duration_s == 0.3
+    for method in ("default", "paper"):
+        assert quickest(replace(PARAMETERS, method=method), GAIT) is GAIT
