@@ -17,6 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,12 @@ POLL_S = 0.05
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 FINISH_M = 0.02  # before the end of the track
 LEAD_M = 0.06  # the flippers are in the mud about this far ahead of the body's middle when a stride begins
+
+
+def _begin(signals_waiting: set[int | signal.Signals]) -> None:
+    """In a process that was just forked."""
+    signal.pthread_sigmask(signal.SIG_SETMASK, signals_waiting)
+    end_with_parent()
 
 
 class DemoError(Exception):
@@ -69,15 +76,22 @@ class Demo:
         self.armed = False
 
     def _start(self, module: str, *arguments: str) -> subprocess.Popen[bytes]:
-        """In a session of its own, so that Ctrl-C reaches only us and we end things in order."""
-        return subprocess.Popen(
-            [sys.executable, "-P", "-m", module, "--config", str(self.configuration_path), *arguments],
-            stdin=subprocess.DEVNULL,
-            stdout=self.output,
-            stderr=self.output,
-            start_new_session=True,
-            preexec_fn=end_with_parent,  # noqa: PLW1509 - no threads here
-        )
+        """In a session of its own, so that Ctrl-C reaches only us and we end things in order.
+
+        A signal waits until the fork is over: Python drops an exception that it raises in there.
+        """
+        waiting = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+        try:
+            return subprocess.Popen(
+                [sys.executable, "-P", "-m", module, "--config", str(self.configuration_path), *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=self.output,
+                stderr=self.output,
+                start_new_session=True,
+                preexec_fn=partial(_begin, waiting),  # noqa: PLW1509 - no threads here
+            )
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, waiting)
 
     def connect(self) -> StatusClient:
         deadline_s = time.monotonic() + STARTING_S
