@@ -111,7 +111,7 @@ def test_without_attempts_swing_begins_with_the_flippers_in_the_mud(configuratio
 
 @pytest.mark.parametrize("kilopascal", [6.0, 7.5, 9.0])
 def test_in_stiff_mud_it_frees_itself_and_walks_on(configuration: Configuration, kilopascal: float) -> None:
-    """And the body has lost no more way than its swaying takes, but won most of a stride's 12 cm."""
+    """And the body goes forward meanwhile, by at least half of a stride's 12 cm."""
     robot, recorder = walking(configuration, mud(kilopascal), 0.05)
     assert until_phase(robot, Phase.RECOVERY)
     stuck_s, stuck_m = robot.now_s, robot.robot.plant.body_m
