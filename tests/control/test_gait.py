@@ -357,3 +357,31 @@ def test_a_reset_forgets_the_gait_of_the_next_stride() -> None:
         gait.step(TICK_S)
     gait.reset(0.03)
     assert [gait.step(TICK_S) for _ in range(1500)] == first
+
+
+def test_an_insertion_that_ends_early_leaves_the_rest_of_the_stride_at_its_depth() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.05)
+    before = gait.step(0.4)
+    gait.end_insertion()
+    after = gait.step(0.0)
+    assert (before.phase, after.phase) == (Phase.INSERTION, Phase.STANCE)
+    assert after.depth_m == gait.commanded_depth_m == before.depth_m < 0.03
+    assert after.sweep_rad == before.sweep_rad
+    stance = [target for target in (gait.step(0.01) for _ in range(20)) if target.phase is Phase.STANCE]
+    assert {target.depth_m for target in stance} == {before.depth_m}
+
+
+def test_only_an_insertion_can_end_early_and_only_that_of_its_own_stride() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.03)
+    gait.step(0.5)
+    gait.end_insertion()
+    assert gait.step(0.0).phase is Phase.STANCE
+    assert gait.commanded_depth_m == 0.03
+    gait.reset(0.03)
+    gait.step(0.3)
+    gait.end_insertion()
+    while gait.stride == 0:
+        gait.step(0.01)
+    assert gait.commanded_depth_m == 0.03
