@@ -145,16 +145,14 @@ class GaitAdaptation:
     def _best(self, steps_m: Sequence[float], widest_deg: float) -> tuple[int, str]:
         """Which candidate is the fastest one that comes out, and why. Fast ones are asked first: asking costs time.
 
-        Where none promises a step, the deepest one counts as the fastest.
+        Where none promises a step, it is the deepest one.
         """
         pairs = zip(steps_m, self.candidates, strict=True)
-        speeds, reason = [step_m / each.duration_s for step_m, each in pairs], "fastest"
-        if not any(speeds):
-            speeds, reason = [each.depth_m for each in self.candidates], "thrust"
-        for index in sorted(range(len(speeds)), key=speeds.__getitem__, reverse=True):
+        merits = [(step_m / each.duration_s, each.depth_m) for step_m, each in pairs]
+        for index in sorted(range(len(merits)), key=merits.__getitem__, reverse=True):
             best = self.candidates[index]
             if best.gait.sweep_angle_deg <= widest_deg and self._comes_out(best):
-                return index, reason
+                return index, "fastest" if merits[index][0] > 0.0 else "thrust"
         return 0, "extraction"
 
     def _comes_out(self, stride: Candidate) -> bool:
