@@ -9,7 +9,8 @@ What a wide sweep does to an extraction the law does not know. Where the mud hol
 flippers push, the sweep lags, and the adduction angle that is meant for the rear presses the flipper deeper than
 commanded: in simulated clay of 5 kPa, 2 cm and ±40°, it began the extraction 27° in front of its joint and stayed in.
 So the sweep grows by at most WIDENING_DEG from stride to stride, and only while the extractions take well less than
-the joints can give; and in the same mud no stride is tried that is as deep and as wide as one that stuck.
+the joints can give. After a stride that stuck it is the narrowest, and in the same mud none is tried again that is as
+deep and as wide.
 
 The authors' swing takes 0.8 s, half of the time of a stride at 3 cm; the simulated sweep joints follow one of 0.2 s to
 within 1.1°, and the coefficients read the same.
@@ -121,9 +122,11 @@ class GaitAdaptation:
             self._stuck = [each for each in self._stuck if not self._walked.holds(each)]
 
     def _widest_deg(self, strides: Sequence[StrideEstimate]) -> float:
-        """Wider than the last stride only where that left the mud easily."""
+        """Wider than the last stride only where that left the mud easily; the narrowest where it did not leave it."""
+        if any(not stride.released for stride in strides):
+            return self.parameters.min_sweep_deg
         limit_nm = EASY_SHARE * self.forecast.lifting_torque_nm
-        easily = all(stride.released and stride.extraction_torque_nm < limit_nm for stride in strides)
+        easily = all(stride.extraction_torque_nm < limit_nm for stride in strides)
         widest_deg = self._walked.gait.sweep_angle_deg + (WIDENING_DEG if easily else 0.0)
         return max(widest_deg, self.parameters.min_sweep_deg)
 

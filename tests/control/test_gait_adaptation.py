@@ -208,6 +208,11 @@ class TestStuck:
             choice = adaptation.step(FIRM, strides(torque_nm == 0.3, torque_nm, stuck.depth_m))
             assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
 
+    def test_the_next_stride_has_the_narrowest_sweep(self) -> None:
+        adaptation, stuck = self.walked()
+        assert sweep_deg(stuck) == 50.0
+        assert sweep_deg(adaptation.step(FIRM, strides(released=False, depth_m=stuck.depth_m))) == 30.0
+
     def test_not_even_where_the_flipper_was_pressed_much_deeper_than_commanded(self) -> None:
         """By the depth that it reached alone, the commanded one would be safe."""
         adaptation, stuck = self.walked()
