@@ -9,7 +9,8 @@ What a wide sweep does to an extraction the law does not know. Where the mud hol
 flippers push, the sweep lags, and the adduction angle that is meant for the rear presses the flipper deeper than
 commanded: in simulated clay of 5 kPa, 2 cm and ±40°, it began the extraction 27° in front of its joint and stayed in.
 So the sweep grows by at most WIDENING_DEG from stride to stride, and only while the extractions take well less than
-the joints can give; and in the same mud no stride is tried that is as deep and as wide as one that stuck.
+the joints can give. After a stride that stuck it is the narrowest, and in the same mud none is tried again that is as
+deep and as wide.
 
 The authors' swing takes 0.8 s, half of the time of a stride at 3 cm; the simulated sweep joints follow one of 0.2 s to
 within 1.1°, and the coefficients read the same.
@@ -125,9 +126,11 @@ class GaitAdaptation:
             self._stuck = [each for each in self._stuck if not self._walked.holds(each)]
 
     def _widest_deg(self, strides: Sequence[StrideEstimate]) -> float:
-        """Wider than the last stride only where that left the mud easily."""
+        """Wider than the last stride only where that left the mud easily; the narrowest where it did not leave it."""
+        if any(not stride.released for stride in strides):
+            return self.parameters.min_sweep_deg
         limit_nm = EASY_SHARE * self.forecast.lifting_torque_nm
-        easily = all(stride.released and stride.extraction_torque_nm < limit_nm for stride in strides)
+        easily = all(stride.extraction_torque_nm < limit_nm for stride in strides)
         widest_deg = self._walked.gait.sweep_angle_deg + (WIDENING_DEG if easily else 0.0)
         return max(widest_deg, self.parameters.min_sweep_deg)
 
@@ -149,16 +152,14 @@ class GaitAdaptation:
     def _best(self, steps_m: Sequence[float], widest_deg: float) -> tuple[int, str]:
         """Which candidate is the fastest one that comes out, and why. Fast ones are asked first: asking costs time.
 
-        Where none promises a step, the deepest one counts as the fastest.
+        Where none promises a step, it is the deepest one.
         """
         pairs = zip(steps_m, self.candidates, strict=True)
-        speeds, reason = [step_m / each.duration_s for step_m, each in pairs], "fastest"
-        if not any(speeds):
-            speeds, reason = [each.depth_m for each in self.candidates], "thrust"
-        for index in sorted(range(len(speeds)), key=speeds.__getitem__, reverse=True):
+        merits = [(step_m / each.duration_s, each.depth_m) for step_m, each in pairs]
+        for index in sorted(range(len(merits)), key=merits.__getitem__, reverse=True):
             best = self.candidates[index]
             if best.gait.sweep_angle_deg <= widest_deg and self._comes_out(best):
-                return index, reason
+                return index, "fastest" if merits[index][0] > 0.0 else "thrust"
         return 0, "extraction"
 
     def _comes_out(self, stride: Candidate) -> bool:

@@ -1,7 +1,7 @@
 """The choice of depth and sweep together, from beliefs made up of muds, against a search that looks at every pair."""
 
 from dataclasses import replace
-from math import nan
+from math import nan, radians
 
 import pytest
 from hypothesis import given, settings
@@ -14,6 +14,7 @@ from control.gait import Gait, GaitParameters, stride_duration_s
 from control.gait_adaptation import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptation, quickest
 from control.geometry import FlipperGeometry
 from control.limits import JointLimits
+from control.plate import stroke_moment_m4, submerged_plate
 from control.records import Estimate, StrideEstimate
 from control.step_model import Grip, step_m
 
@@ -80,14 +81,17 @@ def settled(belief: MudBelief, count: int = 5) -> DepthChoice:
     return choice
 
 
-def brute_force(belief: MudBelief, closed: list[StrideEstimate], widest_deg: float) -> list[tuple[float, float, float]]:
-    """(speed, depth, sweep) of every pair that comes out, by a forecast of its own for each sweep."""
+def brute_force(
+    belief: MudBelief, closed: list[StrideEstimate], walked: GaitParameters, widest_deg: float
+) -> list[tuple[float, float, float]]:
+    """(speed, depth, sweep) of every pair that comes out, the fastest first."""
     found = []
     for i in range(round((PARAMETERS.max_sweep_deg - PARAMETERS.min_sweep_deg) / SWEEP_STEP_DEG) + 1):
         deg = PARAMETERS.min_sweep_deg + i * SWEEP_STEP_DEG
         gait = replace(GAIT, sweep_angle_deg=deg, swing_duration_s=PARAMETERS.swing_duration_s)
-        forecast = DepthForecast(GEOMETRY, gait, PARAMETERS.motor_force_n)
-        forecast.update(belief, closed, 0.03)
+        forecast = DepthForecast(GEOMETRY, walked, PARAMETERS.motor_force_n)
+        forecast.update(belief, closed, PARAMETERS.initial_depth_m)
+        forecast.gait = gait
         drag = body_drag(PARAMETERS, forecast)
         for j in range(15):
             depth_m = 0.015 + 0.0025 * j
@@ -101,25 +105,47 @@ def brute_force(belief: MudBelief, closed: list[StrideEstimate], widest_deg: flo
     return sorted(found, reverse=True)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
+    walked_deg=st.sampled_from([30.0, 40.0, 50.0]),
     k_s=st.floats(0.15e6, 3e6),
-    k_e=st.floats(0.05e6, 2e6),
+    k_e=st.floats(0.2e6, 5e6),
     torque_nm=st.floats(0.0, 0.7),
     surface_m=st.floats(-0.002, 0.002),
 )
 def test_it_takes_the_fastest_of_all_pairs_that_come_out(
-    k_s: float, k_e: float, torque_nm: float, surface_m: float
+    walked_deg: float, k_s: float, k_e: float, torque_nm: float, surface_m: float
 ) -> None:
-    belief, closed = believed(k_s, k_e), strides(torque_nm=torque_nm, surface_m=surface_m)
-    choice = adapted().step(belief, closed)
+    """A stride of 1.5 cm came out and told its k_e, which the last one felt with some share of it."""
+    felt = Estimate(k_e, 0.05 * k_e, 50, True)
+    closed = [replace(each, k_e=felt) for each in strides(torque_nm=torque_nm, depth_m=0.015, surface_m=surface_m)]
+    walked, belief = replace(GAIT, sweep_angle_deg=walked_deg), believed(k_s, k_e)
+    choice = GaitAdaptation(PARAMETERS, GEOMETRY, walked).step(belief, closed)
     easily = torque_nm < 0.7 * LIFTING_NM
-    pairs = brute_force(belief, closed, 30.0 + (WIDENING_DEG if easily else 0.0))
+    pairs = brute_force(belief, closed, walked, walked_deg + (WIDENING_DEG if easily else 0.0))
     if not pairs or pairs[0][0] == 0.0:
-        assert choice.reason in ("extraction", "thrust")
+        assert choice.reason == ("thrust" if pairs else "extraction")
+        assert choice.depth_m == pytest.approx(max((depth_m for _, depth_m, _ in pairs), default=0.015))
         return
     speeds = {(round(depth_m, 6), deg): speed for speed, depth_m, deg in pairs}
     assert speeds[round(choice.depth_m, 6), sweep_deg(choice)] == pytest.approx(pairs[0][0], rel=1e-9)
+
+
+@pytest.mark.parametrize("deg", [30.0, 40.0, 50.0])
+def test_the_torque_of_an_extraction_is_that_of_the_pose_at_its_own_rear(deg: float) -> None:
+    """Over the wider sweep Φ of 2 cm is smaller: what just sticks at ±30° comes out at ±50°."""
+    parameters = replace(PARAMETERS, min_depth_m=0.02, max_depth_m=0.02, initial_depth_m=0.02)
+    rear_rad = -radians(deg)
+    plate = submerged_plate(GEOMETRY, rear_rad, GEOMETRY.adduction_rad(rear_rad, 0.02))
+    limit_nm = parameters.lifting_share * LIFTING_NM
+    just = limit_nm / stroke_moment_m4(GEOMETRY, plate, rear_rad) / 1.1  # two standard errors of 5 %
+    for share, comes_out in ((0.999, True), (1.001, False)):
+        narrowed = replace(parameters, min_sweep_deg=deg, max_sweep_deg=deg)
+        adaptation = GaitAdaptation(narrowed, GEOMETRY, replace(GAIT, sweep_angle_deg=40.0))
+        k_e = Coefficient(share * just, 0.05 * share * just, 0.02, 0.0, 0.0, 8)
+        flipper = FlipperBelief(None, told(2e6), k_e)
+        choice = adaptation.step(MudBelief(None, told(2e6), k_e, flipper, flipper), strides(depth_m=nan))
+        assert (choice.reason == "fastest") is comes_out
 
 
 def test_firm_mud_is_walked_wide_and_shallow_and_soft_mud_narrow_and_deep() -> None:
@@ -163,7 +189,8 @@ def test_one_flipper_that_was_hard_to_lift_is_enough() -> None:
 
 def test_a_sweep_narrower_than_the_methods_becomes_its_narrowest_at_once() -> None:
     adaptation = GaitAdaptation(PARAMETERS, GEOMETRY, replace(GAIT, sweep_angle_deg=15.0))
-    assert sweep_deg(adaptation.step(FIRM, strides(torque_nm=0.7))) == 30.0
+    choice = adaptation.step(FIRM, strides(torque_nm=0.7))
+    assert (sweep_deg(choice), choice.reason) == (30.0, "fastest")
 
 
 class TestStuck:
@@ -178,6 +205,26 @@ class TestStuck:
         for torque_nm in (0.2, 0.3, 0.2, 0.2):
             choice = adaptation.step(FIRM, strides(torque_nm == 0.3, torque_nm, stuck.depth_m))
             assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
+
+    def test_the_next_stride_has_the_narrowest_sweep(self) -> None:
+        adaptation, stuck = self.walked()
+        assert sweep_deg(stuck) == 50.0
+        assert sweep_deg(adaptation.step(FIRM, strides(released=False, depth_m=stuck.depth_m))) == 30.0
+
+    def test_not_even_where_the_flipper_was_pressed_much_deeper_than_commanded(self) -> None:
+        """By the depth that it reached alone, the commanded one would be safe."""
+        adaptation, stuck = self.walked()
+        choice = adaptation.step(FIRM, strides(released=False, depth_m=0.05))
+        assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
+
+    def test_at_the_shallowest_and_narrowest_it_stays_until_it_comes_out_of_there(self) -> None:
+        parameters = replace(PARAMETERS, initial_depth_m=0.015)
+        adaptation = GaitAdaptation(parameters, GEOMETRY, GAIT)
+        for _ in range(2):
+            choice = adaptation.step(FIRM, strides(released=False, depth_m=0.03))
+            assert (choice.depth_m, sweep_deg(choice), choice.reason) == (0.015, 30.0, "a flipper was stuck")
+        choice = adaptation.step(FIRM, strides(depth_m=0.03))
+        assert (choice.depth_m, sweep_deg(choice)) > (0.015, 30.0)
 
     def test_it_says_so(self) -> None:
         adaptation, _ = self.walked()
