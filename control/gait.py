@@ -133,7 +133,9 @@ class Gait:
         self._begin_stride()
 
     def _begin_stride(self) -> None:
-        self._rows = stride_table(self._aim, self.geometry, self.next_depth_m)
+        """No deeper than this stride's sweep allows: a gait told late leaves its depth with the one before."""
+        depth_m = min(self.next_depth_m, self.geometry.deepest_m(self._aim.sweep_angle_deg))
+        self._rows = stride_table(self._aim, self.geometry, depth_m)
         self._row = 0
         self._time_s = 0.0
         self._turns: tuple[Turn, ...] = ()

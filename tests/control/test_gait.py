@@ -385,3 +385,16 @@ def test_only_an_insertion_can_end_early_and_only_that_of_its_own_stride() -> No
     while gait.stride == 0:
         gait.step(0.01)
     assert gait.commanded_depth_m == 0.03
+
+
+def test_a_depth_meant_for_a_narrower_sweep_that_was_told_late_stays_within_reach() -> None:
+    gait = Gait(replace(WALKING, sweep_angle_deg=50.0), GEOMETRY)
+    gait.reset(0.02)
+    while (target := gait.step(TICK_S)).stride == 0:
+        late = target.phase is Phase.SWING and target.sweep_rad > 0.5
+        if late:
+            gait.next_depth_m, gait.next_parameters = 0.05, WALKING
+    assert gait.commanded_depth_m == GEOMETRY.deepest_m(50.0)
+    while gait.step(TICK_S).stride == 1:
+        pass
+    assert gait.commanded_depth_m == 0.05

@@ -17,6 +17,7 @@ from control.limits import JointLimits
 from control.plate import stroke_moment_m4, submerged_plate
 from control.records import Estimate, StrideEstimate
 from control.step_model import Grip, step_m
+from tests.control.made_up_muds import both
 
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 PARAMETERS = AdaptationParameters(method="gait")
@@ -40,29 +41,7 @@ FIRM, SOFT, STICKY = believed(2.0e6, 0.5e6), believed(0.2e6, 0.1e6), believed(2.
 def strides(
     released: bool = True, torque_nm: float = 0.2, depth_m: float = 0.03, surface_m: float = 0.0
 ) -> list[StrideEstimate]:
-    return [
-        StrideEstimate(
-            flipper=flipper,
-            index=0,
-            t_start_s=0.0,
-            t_end_s=1.0,
-            insertion_s=0.4,
-            stance_s=0.25,
-            extraction_s=0.1,
-            k_p=NOT_TOLD,
-            k_s=NOT_TOLD,
-            k_e=NOT_TOLD,
-            surface_m=surface_m,
-            depth_m=depth_m,
-            released=released,
-            insertion_force_n=3.0,
-            stance_force_n=6.0,
-            extraction_force_n=-2.0,
-            step_m=nan,
-            extraction_torque_nm=torque_nm,
-        )
-        for flipper in ("left", "right")
-    ]
+    return both(depth_m, released, surface_m, torque_nm)
 
 
 def adapted(parameters: AdaptationParameters = PARAMETERS) -> GaitAdaptation:
