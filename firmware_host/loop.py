@@ -10,15 +10,11 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from control.adaptation import Adaptation, AdaptationParameters, DepthAdaptation, DepthChoice, Method
 from control.controller import RESTING, Controller, WalkOrder
 from control.faults import Fault
-from control.gait import GaitParameters
-from control.gait_adaptation import GaitAdaptation, quickest
-from control.geometry import FlipperGeometry
+from control.gait_adaptation import quickest
 from control.limits import LimitedTorques, apply_limits
 from control.modes import ACCEPTED_IN, ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
-from control.paper_adaptation import PaperAdaptation
 from control.records import (
     NEVER_S,
     NO_TORQUE,
@@ -34,6 +30,7 @@ from control.recovery import Recovery
 from drivers.odrive_drives import OdriveDrives
 from drivers.pose_port import PoseSource
 from estimation.mud import MudEstimator, MudReading
+from firmware_host.adaptation_methods import adaptation_of, choice_text
 from firmware_host.configuration import Configuration
 from firmware_host.fault_watch import FaultWatch
 from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK
@@ -56,23 +53,6 @@ class ClosedStride(NamedTuple):
     chosen_depth_m: float
 
 
-METHODS: dict[Method, Callable[[AdaptationParameters, FlipperGeometry, GaitParameters], Adaptation]] = {
-    "default": DepthAdaptation,
-    "paper": PaperAdaptation,
-    "gait": GaitAdaptation,
-}
-
-
-def _adaptation_of(configuration: Configuration) -> Adaptation:
-    kind = METHODS[configuration.adaptation.method]
-    return kind(configuration.adaptation, configuration.geometry, configuration.gait)
-
-
-def _told(choice: DepthChoice) -> str:
-    sweep = f", sweep {choice.gait.sweep_angle_deg:g} degrees" if choice.gait else ""
-    return f"depth {choice.depth_m:.4f} m{sweep}: {choice.reason}{', slips' if choice.slips else ''}"
-
-
 class Loop:
     def __init__(
         self,
@@ -93,7 +73,7 @@ class Loop:
             configuration.estimation,
             configuration.adaptation.body_drag_n,
         )
-        self.adaptation = _adaptation_of(configuration)
+        self.adaptation = adaptation_of(configuration)
         self.controller = Controller(
             configuration.gait,
             configuration.geometry,
@@ -176,7 +156,7 @@ class Loop:
             choice = self.adaptation.step(self.estimator.belief, self.reading.strides)
             depth_m, parameters = choice.depth_m, choice.gait or gait.parameters
             if (depth_m, parameters) != (gait.next_depth_m, gait.next_parameters):
-                self.event(now_s, _told(choice))
+                self.event(now_s, choice_text(choice))
             gait.next_parameters = parameters
         gait.next_depth_m = depth_m
         for estimate in self.reading.strides:
