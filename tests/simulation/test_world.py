@@ -63,8 +63,21 @@ def test_the_example_says_what_it_says() -> None:
     assert world.track.ridges == Ridges(0.002, 0.25)
     assert world.track.clay_at(0.3).strength_pa != clay_of_water(48.5).strength_pa
     assert world.disturbances == Disturbances(0.7, 1.0, 0.13, 0.0015)
-    assert world.robot_changes == {"body_mass_kg": 1.02, "rail_drag_n": 2.5, "pad_width_m": 0.015, "pad_depth_m": 0.02}
-    assert world.drive_changes == {"current_noise_a": 0.2, "encoder_counts": 16384}
+    assert world.robot_changes == {
+        "body_mass_kg": 1.0,
+        "rail_drag_n": 2.5,
+        "rail_damping_n_s_m": 6.0,
+        "pad_width_m": 0.015,
+        "pad_depth_m": 0.02,
+    }
+    assert world.drive_changes == {
+        "current_noise_a": 0.2,
+        "encoder_counts": 16384,
+        "torque_constant_error": 0.02,
+        "cogging_nm": 0.005,
+        "current_lag_s": 0.0005,
+        "message_delay_s": 0.001,
+    }
 
 
 def test_the_example_shows_every_section() -> None:
