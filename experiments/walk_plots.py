@@ -202,7 +202,7 @@ def _name_sweep_axes(over: Axes, below: Axes, strengths_kpa: Any) -> None:
     over.set_title("Speed of constant depths, and where the adaptation settles", fontsize="medium")
     over.legend(fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.02), ncols=3, facecolor="#8fa3ad")
     below.axhline(100.0, color="grey", linewidth=0.8, linestyle=":")
-    below.set_ylim(0.0, 130.0)
+    below.set_ylim(0.0, max(130.0, below.get_ylim()[1]))
     below.set_ylabel("% of the best constant depth")
     below.set_xlabel("undrained strength of the mud (kPa); numbers at the dots: failed strides after the second")
     below.set_xscale("log")
