@@ -3,7 +3,8 @@
 Both flippers follow the same target. The edge goes down at the front of the sweep, holds its depth through the
 stance while the flipper sweeps back, comes up at the back and swings forward above the mud. A phase's duration is
 its path length over its speed, as in the authors' controller, so stride times equal theirs; within a phase the
-speed rises and falls as half a cosine, so joint velocities are continuous and zero where phases meet.
+speed rises and falls as half a cosine, so joint velocities are continuous and zero where phases meet (but for an
+insertion that is ended early, which stops within a tick).
 """
 
 from __future__ import annotations
@@ -170,11 +171,14 @@ class Gait:
             self._end_row()
         return self._target()
 
-    def end_insertion(self) -> None:
-        """The stride goes on at the depth that is commanded now."""
-        if self._rows[self._row].phase is Phase.INSERTION:
-            self._rows = stride_table(self._aim, self.geometry, self._target().depth_m)
-            self._row, self._time_s = 1, 0.0
+    def end_insertion(self) -> bool:
+        """The stride goes on at the depth that is commanded now, if that is in the mud. Whether it does."""
+        depth_m = self._target().depth_m
+        if self._rows[self._row].phase is not Phase.INSERTION or depth_m <= 0.0:
+            return False
+        self._rows = stride_table(self._aim, self.geometry, depth_m)
+        self._row, self._time_s = 1, 0.0
+        return True
 
     def _turn(self) -> None:
         if self._time_s > self._rows[self._row].duration_s / 2.0:

@@ -20,13 +20,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from math import floor, inf
 from typing import NamedTuple
 
 from control.adaptation import AdaptationParameters, DepthChoice, body_drag, depth_grid
 from control.coefficient import MudBelief
 from control.depth_forecast import DepthForecast
-from control.gait import GaitParameters, stride_duration_s
+from control.gait import GaitParameters, stride_duration_s, swing_duration_s
 from control.geometry import FlipperGeometry
 from control.records import StrideEstimate
 from control.step_model import Grip, Motion, carried_m, motion_of
@@ -49,11 +50,15 @@ class Candidate(NamedTuple):
         return self.depth_m >= other.depth_m and self.gait.sweep_angle_deg >= other.gait.sweep_angle_deg
 
 
-def quickest(parameters: AdaptationParameters, gait: GaitParameters) -> GaitParameters:
+def quickest(parameters: AdaptationParameters, geometry: FlipperGeometry, gait: GaitParameters) -> GaitParameters:
     """The gait with the shortest swing that the method may ask for."""
     if parameters.method != "gait":
         return gait
-    return replace(gait, swing_duration_s=parameters.swing_duration_s)
+    return min(
+        gait,
+        replace(gait, swing_duration_s=parameters.swing_duration_s),
+        key=partial(swing_duration_s, geometry=geometry),
+    )
 
 
 def sweep_grid(parameters: AdaptationParameters) -> tuple[float, ...]:
@@ -97,10 +102,14 @@ class GaitAdaptation:
         self._stuck: list[Candidate] = []
         self.forecast.reset()
 
-    def step(self, belief: MudBelief, strides: Sequence[StrideEstimate]) -> DepthChoice:
-        """From the strides that just closed and the belief after them. Where nothing is known all stays."""
+    def step(self, belief: MudBelief, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
+        """From the strides that just closed, the depth that they were told, and the belief after them.
+
+        Where nothing is known all stays.
+        """
+        self._walked = self._walked._replace(depth_m=walked_m)
         self.forecast.gait = self._walked.gait
-        self.forecast.update(belief, strides, self._walked.depth_m)
+        self.forecast.update(belief, strides, walked_m)
         stuck = any(not stride.released for stride in strides)
         self._remember(stuck, belief.boundary)
         steps_m = self._steps_m()

@@ -43,11 +43,11 @@ class PaperAdaptation:
         self._late_m = inf  # depth of the last stride, if a flipper was still in the mud after its extraction
         self._stuck_m = inf  # the shallowest one in this mud whose swing pulled the body back
 
-    def step(self, belief: MudBelief, strides: Sequence[StrideEstimate]) -> DepthChoice:
+    def step(self, belief: MudBelief, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
         for stride in sorted(strides, key=lambda stride: stride.flipper):  # the right one last
             self._k_s = stride.k_s if stride.k_s.valid else self._k_s
             self._k_e = stride.k_e if stride.k_e.valid else self._k_e
-        self._remember(belief, strides)
+        self._remember(belief, strides, walked_m)
         if self._k_e.valid or self._stuck_m < inf:
             out = [depth_m for depth_m in self.grid_m if self._comes_out(depth_m)]
             depth_m = max(out, default=self.grid_m[0])
@@ -61,13 +61,13 @@ class PaperAdaptation:
         """The paper's robot goes to the depth that it chose."""
         return inf
 
-    def _remember(self, belief: MudBelief, strides: Sequence[StrideEstimate]) -> None:
+    def _remember(self, belief: MudBelief, strides: Sequence[StrideEstimate], walked_m: float) -> None:
         """The step that has just been measured holds the swing of the stride before."""
         if belief.boundary:
             self._stuck_m = inf
         if not all(stride.step_m >= self.geometry.flipper_length_m / 2.0 for stride in strides):
             self._stuck_m = min(self._stuck_m, self._late_m)
-        self._late_m = inf if all(stride.released for stride in strides) else self.choice.depth_m
+        self._late_m = inf if all(stride.released for stride in strides) else walked_m
 
     def _comes_out(self, depth_m: float) -> bool:
         edge_m2 = self.geometry.plate_width_m * self.geometry.plate_thickness_m

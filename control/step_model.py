@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 from control.gait import GaitParameters, smooth_progress
 
+LONGEST_S = 1.0  # of a stance or an extraction: in a slower one inertia says nothing more
 STEP_S = 0.01  # a tenth of the swinging time of 1 kg on 600 N/m is 0.026 s
 NEGLIGIBLE = 1e-6
 
@@ -54,8 +55,8 @@ def step_m(gait: GaitParameters, flipper_length_m: float, drag: BodyDrag, grip: 
 def motion_of(gait: GaitParameters, flipper_length_m: float, depth_m: float) -> Motion:
     """Of the plates, from the start of the stance until they are out."""
     front_rad = radians(gait.sweep_angle_deg)
-    stance_s = 2.0 * front_rad * flipper_length_m / gait.stance_speed_m_s
-    leaving_s = depth_m / gait.extraction_speed_m_s
+    stance_s = min(2.0 * front_rad * flipper_length_m / gait.stance_speed_m_s, LONGEST_S)
+    leaving_s = min(max(depth_m, 0.0) / gait.extraction_speed_m_s, LONGEST_S)
     motion, time_s = list[tuple[float, float]](), 0.0
     while time_s < stance_s + leaving_s:
         time_s += STEP_S
@@ -67,7 +68,7 @@ def motion_of(gait: GaitParameters, flipper_length_m: float, depth_m: float) -> 
 def carried_m(motion: Motion, drag: BodyDrag, grip: Grip) -> float:
     """The body goes forward only: it slides back less than dry friction lets it."""
     dry_n, damping_n_s_m, mass_kg = drag
-    stiffness_n_m = grip.stiffness_n_m
+    stiffness_n_m, damped = grip.stiffness_n_m, 1.0 + STEP_S * damping_n_s_m / mass_kg
     if grip.thrust_n <= dry_n:
         return 0.0
     body_m = body_m_s = slip_m = 0.0
@@ -76,7 +77,7 @@ def carried_m(motion: Motion, drag: BodyDrag, grip: Grip) -> float:
         wanted_n = stiffness_n_m * (swept_m - body_m - slip_m)
         force_n = thrust_n if wanted_n > thrust_n else max(wanted_n, -thrust_n)
         slip_m += (wanted_n - force_n) / stiffness_n_m
-        body_m_s += STEP_S * (force_n - damping_n_s_m * body_m_s - dry_n) / mass_kg
+        body_m_s = (body_m_s + STEP_S * (force_n - dry_n) / mass_kg) / damped
         body_m_s = body_m_s if body_m_s > 0.0 else 0.0
         body_m += STEP_S * body_m_s
     return body_m + coast_m(drag, body_m_s)

@@ -24,6 +24,7 @@ from control.records import UNKNOWN
 
 SATURATION = 0.98  # of the limit: clipped currents stay a little under it
 LONGEST_GAP_S = 0.03  # between two samples that still tell of one motion
+SHORTEST_GAP_S = 0.0005  # two frames that an adapter delivered together do not tell when they were made
 
 
 class FlipperDrive(NamedTuple):
@@ -76,7 +77,7 @@ def motion_between(before: JointSample, now: JointSample) -> JointMotion:
     angle_before_rad, before_rad_s, current_before_a, angle_before_s, current_before_s = before
     angle_rad, now_rad_s, current_a, angle_s, current_s = now
     dt_s, change_rad_s = angle_s - angle_before_s, now_rad_s - before_rad_s
-    if not (0.0 < dt_s < LONGEST_GAP_S and isfinite(change_rad_s)):
+    if not (SHORTEST_GAP_S < dt_s < LONGEST_GAP_S and isfinite(change_rad_s)):
         return angle_rad, now_rad_s, 0.0, current_a
     between_s = current_s - current_before_s
     if between_s > 0.0:

@@ -21,7 +21,7 @@ from simulation.disturbances import NONE, Disturbances
 from simulation.lockstep import Lockstep
 from simulation.track import Track
 
-SLIPPAGE, EXTRACTION = "slippage", "extraction"
+SLIPPAGE, EXTRACTION, RECOVERED = "slippage", "extraction", "recovered"
 PUSHED_BACK_M = 0.01  # more than a flipper that comes out moves the body
 AFTER_STANCE = frozenset({Phase.EXTRACTION, Phase.SWING})
 
@@ -35,11 +35,14 @@ class WalkedStride(NamedTuple):
     step_m: float
     duration_s: float
     pushed_back_m: float  # the body's way back after the extraction
+    recovered: bool = False  # a flipper was stuck and had to be freed
 
     def failure(self, arm_m: float) -> str:
         """Its name, or an empty string."""
         if self.pushed_back_m > PUSHED_BACK_M:
             return EXTRACTION
+        if self.recovered:
+            return RECOVERED
         return SLIPPAGE if self.step_m < arm_m / 2.0 else ""
 
 
@@ -73,7 +76,7 @@ class StrideRecord:
     def _begin(self) -> None:
         plant, loop = self._lockstep.robot.plant, self._lockstep.loop
         self._start_m, self._start_s = plant.body_m, self._lockstep.now_s
-        self._furthest_m, self._pushed_back_m = -inf, 0.0
+        self._furthest_m, self._pushed_back_m, self._recovered = -inf, 0.0, False
         self._depth_m = loop.controller.gait.commanded_depth_m
         self._place_m = plant.body_m + loop.configuration.geometry.flipper_length_m * sin(plant.arms[0].sweep_rad)
 
@@ -83,6 +86,8 @@ class StrideRecord:
         if target.stride != self._number:
             self._close(body_m)
             self._number = target.stride
+        self._depth_m = self._lockstep.loop.controller.gait.commanded_depth_m  # an insertion may end early
+        self._recovered = self._recovered or target.phase is Phase.RECOVERY
         if target.phase in AFTER_STANCE:
             self._furthest_m = max(self._furthest_m, body_m)
             self._pushed_back_m = max(self._pushed_back_m, self._furthest_m - body_m)
@@ -92,7 +97,9 @@ class StrideRecord:
             mud, duration_s = self._track.clay_at(self._place_m).name, self._lockstep.now_s - self._start_s
             step_m = body_m - self._start_m
             self.strides.append(
-                WalkedStride(mud, self._place_m, self._depth_m, step_m, duration_s, self._pushed_back_m)
+                WalkedStride(
+                    mud, self._place_m, self._depth_m, step_m, duration_s, self._pushed_back_m, self._recovered
+                )
             )
         self._begin()
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
-from math import ceil, degrees, radians
+from math import ceil, degrees, floor, radians
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,6 +33,7 @@ from firmware_host.toml_records import ConfigurationError as ConfigurationError 
 from firmware_host.toml_records import RecordReader, parse_document, read_text
 
 LONGEST_SOCKET_PATH = 107  # sun_path of unix(7) has 108 bytes with its final zero
+ROUNDING = 1e-6  # of numbers that a file gives with few digits
 EXIT_CONFIGURATION = 78  # EX_CONFIG of sysexits.h; systemd is told not to restart on it
 
 
@@ -159,6 +160,7 @@ def _contradictions(configuration: Configuration) -> Iterator[str]:
     yield from _text_problems(configuration)
     yield from _drive_problems(configuration)
     yield from _friction_problems(configuration)
+    yield from _motor_force_problems(configuration)
     yield from _depth_problems(configuration)
     yield from _range_problems(configuration)
     if configuration.adaptation.method == "gait":
@@ -228,6 +230,18 @@ def _lead_problems(configuration: Configuration) -> Iterator[str]:
                 f"gains.{key} = {getattr(gains, key)}: must be at least {ceil(100.0 * needed_nm_rad) / 100.0:.2f},"
                 f" or a recovery.lead_deg = {lead_deg:g} does not reach limits.torque_nm = {torque_nm}"
             )
+
+
+def _motor_force_problems(configuration: Configuration) -> Iterator[str]:
+    """What is predicted of an extraction must be within what the limits let the motors do."""
+    length_m, force_n = configuration.geometry.flipper_length_m, configuration.adaptation.motor_force_n
+    largest_n = configuration.limits.torque_nm / length_m
+    if force_n > largest_n * (1.0 + ROUNDING):
+        yield (
+            f"adaptation.motor_force_n = {force_n}: must be at most {floor(100.0 * largest_n) / 100.0:.2f}"
+            f" for limits.torque_nm = {configuration.limits.torque_nm}"
+            f" and geometry.flipper_length_m = {length_m}"
+        )
 
 
 def _depth_problems(configuration: Configuration) -> Iterator[str]:

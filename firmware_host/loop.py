@@ -39,6 +39,7 @@ from firmware_host.row_packing import Moment, stride_row, tick_row
 from firmware_host.ticker import PERIOD_S, Beat
 from firmware_host.timing import LoopTiming
 
+FIRM_TICKS = 3  # of a load that ends an insertion
 CLEARING_S = 0.5  # for the drives to report that their errors are gone
 LONGEST_STEP_TICKS = 3  # what the controller may advance at once: after a longer gap the gait goes on where it was
 KEPT_STRIDES = 200  # for clients that ask what happened
@@ -83,7 +84,7 @@ class Loop:
             Recovery(
                 configuration.recovery,
                 configuration.geometry,
-                quickest(configuration.adaptation, configuration.gait),
+                quickest(configuration.adaptation, configuration.geometry, configuration.gait),
                 configuration.joint_ranges,
             ),
         )
@@ -104,6 +105,7 @@ class Loop:
         self.target_before: GaitTarget = RESTING  # commanded while the states of this tick came about
         self._request, self._clear_until_s = Request.NONE, NEVER_S
         self._mode_since_s = 0.0
+        self._firm_ticks = 0
         self._fault_watch = FaultWatch(configuration, drives)
 
     def tick(self, beat: Beat) -> None:
@@ -153,7 +155,7 @@ class Loop:
             self.event(now_s, "another mud")
         gait, depth_m = self.controller.gait, self.controller.order.depth_m
         if self.controller.order.adaptive:
-            choice = self.adaptation.step(self.estimator.belief, self.reading.strides)
+            choice = self.adaptation.step(self.estimator.belief, self.reading.strides, gait.commanded_depth_m)
             depth_m, parameters = choice.depth_m, choice.gait or gait.parameters
             if (depth_m, parameters) != (gait.next_depth_m, gait.next_parameters):
                 self.event(now_s, choice_text(choice))
@@ -166,13 +168,14 @@ class Loop:
         del self.strides[:-KEPT_STRIDES]
 
     def _heed_insertion(self, now_s: float) -> None:
-        """Mud from which a flipper would not come out again is entered no deeper."""
-        controller, reading, limit_nm = self.controller, self.reading, self.adaptation.largest_insertion_nm
-        if not controller.order.adaptive or controller.target.phase is not Phase.INSERTION:
-            return
-        if reading.left.adduction_torque_nm > limit_nm or reading.right.adduction_torque_nm > limit_nm:
-            controller.gait.end_insertion()
-            self.event(now_s, f"insertion ended at {controller.gait.commanded_depth_m:.4f} m: firm mud")
+        """Where a depth is chosen: mud that might hold a flipper is entered no deeper. One odd sample says nothing."""
+        order, gait, reading = self.controller.order, self.controller.gait, self.reading
+        limit_nm = self.adaptation.largest_insertion_nm
+        firm = reading.left.adduction_torque_nm > limit_nm or reading.right.adduction_torque_nm > limit_nm
+        inserting = order.adaptive and self.controller.target.phase is Phase.INSERTION
+        self._firm_ticks = self._firm_ticks + 1 if firm and inserting else 0
+        if self._firm_ticks >= FIRM_TICKS and gait.end_insertion():
+            self.event(now_s, f"insertion ended at {gait.commanded_depth_m:.4f} m: firm mud")
 
     def _examine(self, beat: Beat) -> Health:
         heard = self.mode is not Mode.BOOT or self.drives.heard
@@ -206,7 +209,6 @@ class Loop:
             self._clear_until_s = now_s + CLEARING_S
         if order is not None:
             self.controller.order = order
-            self.adaptation.reset(order.depth_m)
         if request is not Request.CLEAR and self._request is not Request.DISARM:  # which nothing may undo
             self._request = request
         return None
@@ -221,7 +223,7 @@ class Loop:
         return refusal(self.mode, request, self.health)
 
     def _reaches(self, depth_m: float) -> bool:
-        return depth_m <= self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
+        return 0.0 < depth_m <= self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
 
     def _request_now(self, now_s: float) -> Request:
         """The request to act on in this tick. A clear lasts until the drives had time to report no errors."""
@@ -243,6 +245,7 @@ class Loop:
             self.notice = ""
         if mode is Mode.WALKING:
             self.estimator.reset()
+            self.adaptation.reset(self.controller.order.depth_m)
         if self.mode is Mode.STOPPING and mode is Mode.HOLD and not self.controller.is_up(self.states):
             self._tell(now_s, "the flippers did not come out of the mud")
         because = f": {self.fault.sentence}" if self.fault else ""

@@ -398,3 +398,11 @@ def test_a_depth_meant_for_a_narrower_sweep_that_was_told_late_stays_within_reac
     while gait.step(TICK_S).stride == 1:
         pass
     assert gait.commanded_depth_m == 0.05
+
+
+def test_an_insertion_does_not_end_above_the_mud() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.03)
+    gait.step(0.05)
+    assert not gait.end_insertion()
+    assert (gait.step(0.0).phase, gait.commanded_depth_m) == (Phase.INSERTION, 0.03)

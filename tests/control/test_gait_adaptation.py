@@ -56,7 +56,7 @@ def sweep_deg(choice: DepthChoice) -> float:
 def settled(belief: MudBelief, count: int = 5) -> DepthChoice:
     adaptation = adapted()
     for _ in range(count):
-        choice = adaptation.step(belief, strides())
+        choice = adaptation.step(belief, strides(), adaptation.choice.depth_m)
     return choice
 
 
@@ -99,7 +99,7 @@ def test_it_takes_the_fastest_of_all_pairs_that_come_out(
     felt = Estimate(k_e, 0.05 * k_e, 50, True)
     closed = [replace(each, k_e=felt) for each in strides(torque_nm=torque_nm, depth_m=0.015, surface_m=surface_m)]
     walked, belief = replace(GAIT, sweep_angle_deg=walked_deg), believed(k_s, k_e)
-    choice = GaitAdaptation(PARAMETERS, GEOMETRY, walked).step(belief, closed)
+    choice = GaitAdaptation(PARAMETERS, GEOMETRY, walked).step(belief, closed, 0.03)
     easily = torque_nm < 0.7 * LIFTING_NM
     pairs = brute_force(belief, closed, walked, walked_deg + (WIDENING_DEG if easily else 0.0))
     if not pairs or pairs[0][0] == 0.0:
@@ -123,7 +123,9 @@ def test_the_torque_of_an_extraction_is_that_of_the_pose_at_its_own_rear(deg: fl
         adaptation = GaitAdaptation(narrowed, GEOMETRY, replace(GAIT, sweep_angle_deg=40.0))
         k_e = Coefficient(share * just, 0.05 * share * just, 0.02, 0.0, 0.0, 8)
         flipper = FlipperBelief(None, told(2e6), k_e)
-        choice = adaptation.step(MudBelief(None, told(2e6), k_e, flipper, flipper), strides(depth_m=nan))
+        choice = adaptation.step(
+            MudBelief(None, told(2e6), k_e, flipper, flipper), strides(depth_m=nan), adaptation.choice.depth_m
+        )
         assert (choice.reason == "fastest") is comes_out
 
 
@@ -149,7 +151,7 @@ def test_the_first_stride_is_walked_as_configured() -> None:
 def test_the_sweep_grows_by_no_more_than_one_widening_from_stride_to_stride() -> None:
     adaptation, before_deg, widest_deg = adapted(), 30.0, 0.0
     for _ in range(6):
-        now_deg = sweep_deg(adaptation.step(FIRM, strides()))
+        now_deg = sweep_deg(adaptation.step(FIRM, strides(), 0.03))
         assert now_deg <= before_deg + WIDENING_DEG
         before_deg, widest_deg = now_deg, max(widest_deg, now_deg)
     assert widest_deg == 50.0
@@ -157,18 +159,18 @@ def test_the_sweep_grows_by_no_more_than_one_widening_from_stride_to_stride() ->
 
 @pytest.mark.parametrize("torque_nm", [0.7 * LIFTING_NM, nan])
 def test_no_stride_is_wider_after_an_extraction_that_was_hard_or_was_not_seen(torque_nm: float) -> None:
-    assert sweep_deg(adapted().step(FIRM, strides(torque_nm=torque_nm))) == 30.0
-    assert sweep_deg(adapted().step(FIRM, strides(torque_nm=0.69 * LIFTING_NM))) > 30.0
+    assert sweep_deg(adapted().step(FIRM, strides(torque_nm=torque_nm), 0.03)) == 30.0
+    assert sweep_deg(adapted().step(FIRM, strides(torque_nm=0.69 * LIFTING_NM), 0.03)) > 30.0
 
 
 def test_one_flipper_that_was_hard_to_lift_is_enough() -> None:
     left, right = strides()[0], strides(torque_nm=0.6)[1]
-    assert sweep_deg(adapted().step(FIRM, [left, right])) == 30.0
+    assert sweep_deg(adapted().step(FIRM, [left, right], 0.03)) == 30.0
 
 
 def test_a_sweep_narrower_than_the_methods_becomes_its_narrowest_at_once() -> None:
     adaptation = GaitAdaptation(PARAMETERS, GEOMETRY, replace(GAIT, sweep_angle_deg=15.0))
-    choice = adaptation.step(FIRM, strides(torque_nm=0.7))
+    choice = adaptation.step(FIRM, strides(torque_nm=0.7), adaptation.choice.depth_m)
     assert (sweep_deg(choice), choice.reason) == (30.0, "fastest")
 
 
@@ -176,71 +178,75 @@ class TestStuck:
     def walked(self) -> tuple[GaitAdaptation, DepthChoice]:
         adaptation = adapted()
         for _ in range(4):
-            choice = adaptation.step(FIRM, strides())
+            choice = adaptation.step(FIRM, strides(), adaptation.choice.depth_m)
         return adaptation, choice
 
     def test_nothing_as_deep_and_as_wide_is_tried_again_in_the_same_mud(self) -> None:
         adaptation, stuck = self.walked()
         for torque_nm in (0.2, 0.3, 0.2, 0.2):
-            choice = adaptation.step(FIRM, strides(torque_nm == 0.3, torque_nm, stuck.depth_m))
+            choice = adaptation.step(
+                FIRM, strides(torque_nm == 0.3, torque_nm, stuck.depth_m), adaptation.choice.depth_m
+            )
             assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
 
     def test_the_next_stride_has_the_narrowest_sweep(self) -> None:
         adaptation, stuck = self.walked()
         assert sweep_deg(stuck) == 50.0
-        assert sweep_deg(adaptation.step(FIRM, strides(released=False, depth_m=stuck.depth_m))) == 30.0
+        assert sweep_deg(adaptation.step(FIRM, strides(released=False, depth_m=stuck.depth_m), 0.03)) == 30.0
 
     def test_not_even_where_the_flipper_was_pressed_much_deeper_than_commanded(self) -> None:
         """By the depth that it reached alone, the commanded one would be safe."""
         adaptation, stuck = self.walked()
-        choice = adaptation.step(FIRM, strides(released=False, depth_m=0.05))
+        choice = adaptation.step(FIRM, strides(released=False, depth_m=0.05), adaptation.choice.depth_m)
         assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
 
     def test_at_the_shallowest_and_narrowest_it_stays_until_it_comes_out_of_there(self) -> None:
         parameters = replace(PARAMETERS, initial_depth_m=0.015)
         adaptation = GaitAdaptation(parameters, GEOMETRY, GAIT)
         for _ in range(2):
-            choice = adaptation.step(FIRM, strides(released=False, depth_m=0.03))
+            choice = adaptation.step(FIRM, strides(released=False, depth_m=0.03), adaptation.choice.depth_m)
             assert (choice.depth_m, sweep_deg(choice), choice.reason) == (0.015, 30.0, "a flipper was stuck")
-        choice = adaptation.step(FIRM, strides(depth_m=0.03))
+        choice = adaptation.step(FIRM, strides(depth_m=0.03), adaptation.choice.depth_m)
         assert (choice.depth_m, sweep_deg(choice)) > (0.015, 30.0)
 
     def test_it_says_so(self) -> None:
         adaptation, _ = self.walked()
-        assert adaptation.step(FIRM, strides(released=False)).reason == "a flipper was stuck"
+        assert adaptation.step(FIRM, strides(released=False), adaptation.choice.depth_m).reason == "a flipper was stuck"
 
     @pytest.mark.parametrize("forgotten", ["another mud", "another walk"])
     def test_it_is_forgotten_in_another_mud_and_in_another_walk(self, forgotten: str) -> None:
         adaptation, stuck = self.walked()
-        adaptation.step(FIRM, strides(released=False, depth_m=stuck.depth_m))
+        adaptation.step(FIRM, strides(released=False, depth_m=stuck.depth_m), adaptation.choice.depth_m)
         if forgotten == "another walk":
             adaptation.reset(0.03)
-        adaptation.step(FIRM._replace(boundary=True), strides())
+        adaptation.step(FIRM._replace(boundary=True), strides(), adaptation.choice.depth_m)
         for _ in range(4):
-            choice = adaptation.step(FIRM, strides())
+            choice = adaptation.step(FIRM, strides(), adaptation.choice.depth_m)
         assert (choice.depth_m, choice.gait) == (stuck.depth_m, stuck.gait)
 
     def test_with_no_thrust_known_it_goes_on_with_something_else(self) -> None:
         adaptation, stuck = self.walked()
-        choice = adaptation.step(NOTHING_KNOWN, strides(released=False, depth_m=stuck.depth_m))
+        choice = adaptation.step(
+            NOTHING_KNOWN, strides(released=False, depth_m=stuck.depth_m), adaptation.choice.depth_m
+        )
         assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
 
 
 def test_where_nothing_is_known_of_the_thrust_depth_and_gait_stay() -> None:
     adaptation = adapted()
-    before = adaptation.step(FIRM, strides())
-    after = adaptation.step(NOTHING_KNOWN, strides())
+    before = adaptation.step(FIRM, strides(), adaptation.choice.depth_m)
+    after = adaptation.step(NOTHING_KNOWN, strides(), adaptation.choice.depth_m)
     assert (after.depth_m, after.gait) == (before.depth_m, before.gait)
     assert "nothing known" in after.reason
 
 
 def test_where_no_pair_comes_out_the_shallowest_and_narrowest_is_taken() -> None:
-    choice = adapted().step(believed(2.0e6, 50e6), strides(torque_nm=0.75, depth_m=0.01))
+    choice = adapted().step(believed(2.0e6, 50e6), strides(torque_nm=0.75, depth_m=0.01), 0.03)
     assert (choice.depth_m, sweep_deg(choice), choice.reason) == (0.015, 30.0, "extraction")
 
 
 def test_where_none_promises_a_step_the_deepest_is_taken() -> None:
-    choice = adapted().step(believed(0.005e6, 0.001e6), strides())
+    choice = adapted().step(believed(0.005e6, 0.001e6), strides(), 0.03)
     assert (choice.reason, choice.slips) == ("thrust", True)
     assert choice.depth_m == pytest.approx(0.05)
 
@@ -250,7 +256,7 @@ def test_where_none_promises_a_step_the_deepest_is_taken() -> None:
 def test_every_choice_is_within_bounds_and_reach(k_s: float, k_e: float, seed: int) -> None:
     adaptation = adapted()
     for i in range(4):
-        choice = adaptation.step(believed(k_s, k_e), strides(released=bool(seed >> i & 1)))
+        choice = adaptation.step(believed(k_s, k_e), strides(released=bool(seed >> i & 1)), adaptation.choice.depth_m)
         assert 0.015 <= choice.depth_m <= min(0.05, GEOMETRY.deepest_m(sweep_deg(choice)))
         assert 30.0 <= sweep_deg(choice) <= 50.0
 
@@ -269,6 +275,13 @@ def test_no_stride_that_may_be_chosen_asks_a_joint_for_more_than_its_velocity_li
 
 
 def test_only_this_method_has_a_shorter_swing() -> None:
-    assert quickest(PARAMETERS, GAIT).swing_duration_s == 0.3
+    assert quickest(PARAMETERS, GEOMETRY, GAIT).swing_duration_s == 0.3
     for method in ("default", "paper"):
-        assert quickest(replace(PARAMETERS, method=method), GAIT) is GAIT
+        assert quickest(replace(PARAMETERS, method=method), GEOMETRY, GAIT) is GAIT
+
+
+def test_what_stuck_is_not_forgotten_by_a_stride_that_ended_its_insertion_above_it() -> None:
+    adaptation = adapted()
+    held = adaptation.step(STICKY, strides(released=False, depth_m=0.04), 0.04)
+    adaptation.step(STICKY, strides(depth_m=0.02), 0.02)
+    assert any(each.depth_m == 0.04 for each in adaptation._stuck), held

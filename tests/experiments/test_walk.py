@@ -11,7 +11,7 @@ import pytest
 
 from control.records import Phase
 from experiments.depth_rule import configuration_for, constant_depth
-from experiments.walk import EXTRACTION, SLIPPAGE, StrideRecord, Walk, WalkedStride, speed_m_s, walk
+from experiments.walk import EXTRACTION, RECOVERED, SLIPPAGE, StrideRecord, Walk, WalkedStride, speed_m_s, walk
 from simulation.clay import Clay
 from simulation.track import Track
 
@@ -39,6 +39,11 @@ def test_a_stride_slips_below_half_an_arm_and_is_held_when_pushed_back(
     step_m: float, pushed_back_m: float, name: str
 ) -> None:
     assert GOOD._replace(step_m=step_m, pushed_back_m=pushed_back_m).failure(ARM_M) == name
+
+
+def test_a_stride_that_needed_a_recovery_has_failed_however_far_it_came() -> None:
+    assert GOOD._replace(recovered=True).failure(ARM_M) == RECOVERED
+    assert GOOD._replace(recovered=True, pushed_back_m=0.08).failure(ARM_M) == EXTRACTION
 
 
 def test_speed_is_the_way_over_the_time_not_the_mean_of_speeds() -> None:

@@ -167,6 +167,15 @@ def test_a_recovery_s_lead_that_does_not_reach_the_full_torque_is_refused(exampl
     parse_configuration(f"{changed(example_text, 'attempts', '0')}\n[gains]\n{key} = 0.0\n")
 
 
+def test_a_motor_force_beyond_the_torque_limit_is_refused(example_text: str) -> None:
+    """0.75 N·m at 0.12 m are 6.25 N."""
+    parse_configuration(changed(example_text, "motor_force_n", "6.25"))
+    assert problems_of(changed(example_text, "motor_force_n", "6.26")) == [
+        "adaptation.motor_force_n = 6.26: must be at most 6.25 for limits.torque_nm = 0.75"
+        " and geometry.flipper_length_m = 0.12"
+    ]
+
+
 def test_a_current_limit_below_the_torque_limit_is_refused(example_text: str) -> None:
     text = example_text.replace("node_id = 0", "node_id = 0\ncurrent_limit_a = 5.0")
     assert problems_of(text) == [
