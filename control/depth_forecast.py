@@ -58,6 +58,7 @@ class DepthForecast:
         self._strides: Sequence[StrideEstimate] = ()
         self._stuck_m: dict[str, float] = {}
         self._sag_m = 0.0
+        self._walked_m4: dict[str, float] = {}  # Φ of each flipper's last stride
 
     def update(self, belief: MudBelief, strides: Sequence[StrideEstimate], commanded_m: float) -> None:
         """The strides that just closed, one of each flipper, their depth, and the belief after them."""
@@ -67,6 +68,8 @@ class DepthForecast:
         if belief.boundary:
             self._stuck_m.clear()
         for stride in strides:
+            surface_m = _known(stride.surface_m)
+            self._walked_m4[stride.flipper] = self._lift_moment_m4(_known(stride.depth_m) + surface_m, surface_m)
             self._remember(stride)
             self._learn_share(stride)
         self._learn_ratio(belief)
@@ -81,9 +84,10 @@ class DepthForecast:
 
     def _learn_share(self, stride: StrideEstimate) -> None:
         """From an extraction that told k_e and was not held: there the motor's limit, not the mud, sets the torque."""
-        if not (stride.released and stride.k_e.valid and not stride.k_e.at_least and stride.depth_m > 0.0):
+        told = stride.k_e.valid and not stride.k_e.at_least and isfinite(stride.surface_m)
+        if not (stride.released and told and stride.depth_m > 0.0):
             return
-        whole_nm = stride.k_e.value * self._lift_moment_m4(stride.depth_m + stride.surface_m, stride.surface_m)
+        whole_nm = stride.k_e.value * self._walked_m4[stride.flipper]
         if whole_nm > 0.0 and stride.extraction_torque_nm > 0.0:
             self._shares_told += 1
             weight = max(LEARNING, 1.0 / self._shares_told)
@@ -145,24 +149,22 @@ class DepthForecast:
         submerged_m = depth_m - surface_m
         if submerged_m <= 0.0:
             return 0.0
-        told_nm = self._told_nm(stride, depth_m, surface_m)
+        moment_m4 = self._lift_moment_m4(depth_m, surface_m)
+        told_nm = self._told_nm(stride, submerged_m, moment_m4)
         if stride.released and stride.extraction_torque_nm > 0.0 and stride.depth_m > 0.0:
-            told_nm = min(told_nm, self._proven_nm(stride, depth_m, surface_m))
+            told_nm = min(told_nm, self._proven_nm(stride, moment_m4))
         held_nm = self.lifting_torque_nm * submerged_m / self._stuck_m.get(stride.flipper, inf)
         return max(told_nm, held_nm)
 
-    def _proven_nm(self, stride: StrideEstimate, depth_m: float, surface_m: float) -> float:
+    def _proven_nm(self, stride: StrideEstimate, moment_m4: float) -> float:
         """What it took, or would take deeper if k_e did not fall with depth, as it does."""
-        was_m4 = self._lift_moment_m4(stride.depth_m + surface_m, surface_m)
-        if not was_m4 > 0.0:
-            return inf
-        return stride.extraction_torque_nm * max(1.0, self._lift_moment_m4(depth_m, surface_m) / was_m4)
+        walked_m4 = self._walked_m4[stride.flipper]
+        return stride.extraction_torque_nm * max(1.0, moment_m4 / walked_m4) if walked_m4 > 0.0 else inf
 
-    def _told_nm(self, stride: StrideEstimate, depth_m: float, surface_m: float) -> float:
+    def _told_nm(self, stride: StrideEstimate, submerged_m: float, moment_m4: float) -> float:
         """By k_e, or by k_p where that is not known; by neither, all that there is below where the flipper has been."""
-        flipper, submerged_m = self._belief.of(stride.flipper), depth_m - surface_m
+        flipper = self._belief.of(stride.flipper)
         k_e, k_p = self._belief.k_e or flipper.k_e, self._belief.k_p or flipper.k_p
-        moment_m4 = self._lift_moment_m4(depth_m, surface_m)
         told_nm = self.felt_share * _more(k_e, submerged_m) * moment_m4 if k_e is not None else 0.0
         if k_e is not None and not k_e.at_least:
             return told_nm
