@@ -49,7 +49,7 @@ class AdaptationParameters:
     pad_depth_m: Annotated[float, Bounds(0.0, 0.5)] = 0.02
     body_mass_kg: Annotated[float, Bounds(0.05, 100.0)] = 1.0
     acceleration_s: Annotated[float, Bounds(0.01, 10.0)] = 0.1  # of method "paper"
-    mobilisation_n_m: Annotated[float, Bounds(10.0, 1e5)] = 250.0  # of a flipper with its servo; in the authors' logs 300 to 700
+    mobilisation_n_m: Annotated[float, Bounds(10.0, 1e5)] = 250.0  # of a flipper with its servo; logs: 300 to 700
     motor_force_n: Annotated[float, Bounds(0.1, 100.0)] = 6.25  # 0.75 N·m at 0.12 m
     lifting_share: Annotated[float, Bounds(0.1, 1.0)] = 0.95  # of that torque, which the mud may take of an extraction
     insertion_share: Annotated[float, Bounds(0.1, 10.0)] = 0.73  # of that torque, at which an insertion ends early
