@@ -26,13 +26,11 @@ from typing import Annotated, Literal, NamedTuple, Protocol
 
 from control.bounds import Bounds
 from control.coefficient import MudBelief
-from control.depth_forecast import DepthForecast
+from control.depth_forecast import GRID_M, DepthForecast
 from control.gait import GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.records import StrideEstimate
 from control.step_model import BodyDrag, Grip, step_m
-
-GRID_M = 0.0025  # depths that are told apart; the joints do not follow more finely in mud
 
 Method = Literal["default", "paper", "gait"]
 

@@ -36,7 +36,7 @@ SHARES = (0.2, 1.5)  # bounds of what can be learned of each
 RATIOS = (0.2, 1.5)
 THRUST_DOUBT, SUCTION_DOUBT = 1.0, 2.0  # standard errors: a slip costs half a step, a stuck flipper the walk
 SAG_SHARE = 0.25  # of the deepest moment's, on average over the stance
-TOLD_APART_M = 0.0025  # depths closer together are the same
+GRID_M = 0.0025  # depths that are told apart; the joints do not follow more finely in mud
 
 
 class DepthForecast:
@@ -60,10 +60,10 @@ class DepthForecast:
         self._sag_m = 0.0
         self._walked_m4: dict[str, float] = {}  # Φ of each flipper's last stride
 
-    def update(self, belief: MudBelief, strides: Sequence[StrideEstimate], commanded_m: float) -> None:
-        """The strides that just closed, one of each flipper, their depth, and the belief after them."""
+    def update(self, belief: MudBelief, strides: Sequence[StrideEstimate], walked_m: float) -> None:
+        """The strides that just closed, one of each flipper, the depth they were told, and the belief after them."""
         self._belief, self._strides = belief, strides
-        sags_m = [stride.depth_m + stride.surface_m - commanded_m for stride in strides]
+        sags_m = [stride.depth_m + stride.surface_m - walked_m for stride in strides]
         self._sag_m = SAG_SHARE * max(0.0, min([sag_m for sag_m in sags_m if isfinite(sag_m)], default=0.0))
         if belief.boundary:
             self._stuck_m.clear()
@@ -75,11 +75,11 @@ class DepthForecast:
         self._learn_ratio(belief)
 
     def _remember(self, stride: StrideEstimate) -> None:
-        reached_m = max(_known(stride.depth_m), TOLD_APART_M)
+        reached_m = max(_known(stride.depth_m), GRID_M)
         stuck_m = self._stuck_m.get(stride.flipper, inf)
         if not stride.released:
             self._stuck_m[stride.flipper] = min(reached_m, stuck_m)
-        elif reached_m > stuck_m - TOLD_APART_M / 2.0:
+        elif reached_m > stuck_m - GRID_M / 2.0:
             del self._stuck_m[stride.flipper]
 
     def _learn_share(self, stride: StrideEstimate) -> None:
@@ -170,7 +170,7 @@ class DepthForecast:
             return told_nm
         if k_p is not None:
             return max(told_nm, SUCTION_RATIO * _more(k_p, submerged_m) * moment_m4)
-        return self.lifting_torque_nm if submerged_m > _known(stride.depth_m) + TOLD_APART_M else told_nm
+        return self.lifting_torque_nm if submerged_m > _known(stride.depth_m) + GRID_M else told_nm
 
     def _lift_moment_m4(self, depth_m: float, surface_m: float) -> float:
         """Φ in the pose in which the flipper is pulled out; 0 where a fitted surface puts that out of reach."""

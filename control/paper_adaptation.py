@@ -18,8 +18,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 
-from control.adaptation import GRID_M, AdaptationParameters, DepthChoice, depth_grid
+from control.adaptation import AdaptationParameters, DepthChoice, depth_grid
 from control.coefficient import MudBelief
+from control.depth_forecast import GRID_M
 from control.gait import GaitParameters
 from control.geometry import FlipperGeometry
 from control.records import Estimate, StrideEstimate

@@ -52,6 +52,7 @@ def stride(
     k_s: Estimate = NOT_TOLD,
     k_e: Estimate = NOT_TOLD,
     extraction_nm: float = nan,
+    k_p: Estimate = NOT_TOLD,
 ) -> StrideEstimate:
     return StrideEstimate(
         flipper=flipper,
@@ -61,7 +62,7 @@ def stride(
         insertion_s=0.4,
         stance_s=0.25,
         extraction_s=0.1,
-        k_p=NOT_TOLD,
+        k_p=k_p,
         k_s=k_s,
         k_e=k_e,
         surface_m=surface_m,

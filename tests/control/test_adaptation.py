@@ -8,9 +8,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from control.adaptation import GRID_M, AdaptationParameters, DepthAdaptation, DepthChoice
+from control.adaptation import AdaptationParameters, DepthAdaptation, DepthChoice
 from control.coefficient import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
-from control.depth_forecast import DepthForecast
+from control.depth_forecast import GRID_M, DepthForecast
 from control.gait import GaitParameters
 from control.records import StrideEstimate
 from control.step_model import BodyDrag, Grip, step_m

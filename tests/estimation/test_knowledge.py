@@ -30,6 +30,7 @@ from estimation.knowledge import (
     Reading,
     reading_of,
 )
+from tests.control import made_up_muds
 
 K_P, K_S, K_E = 1.0e6, 0.6e6, 1.1e6
 TOLD = 0.03  # relative standard error of a stride in these tests, where there is any
@@ -51,25 +52,7 @@ def stride(
     depth_m: float = 0.03,
     flipper: str = "left",
 ) -> StrideEstimate:
-    return StrideEstimate(
-        flipper=flipper,
-        index=0,
-        t_start_s=0.0,
-        t_end_s=1.0,
-        insertion_s=0.4,
-        stance_s=0.25,
-        extraction_s=0.1,
-        k_p=k_p,
-        k_s=k_s,
-        k_e=k_e,
-        surface_m=0.0,
-        depth_m=depth_m,
-        released=True,
-        insertion_force_n=3.0,
-        stance_force_n=6.0,
-        extraction_force_n=-2.0,
-        step_m=nan,
-    )
+    return made_up_muds.stride(flipper, depth_m, k_p=k_p, k_s=k_s, k_e=k_e)
 
 
 def after(*strides: StrideEstimate) -> MudBelief:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from control.records import Estimate, StrideEstimate
 from estimation.knowledge import REPEATABILITY
 from estimation.mud_map import MOST_PIECES, PIECE_M, Mapped, MudMap
+from tests.control import made_up_muds
 
 NOT_TOLD = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
 
@@ -21,25 +22,7 @@ def told(value: float, relative: float = 0.0, at_least: bool = False) -> Estimat
 def stride(
     k_p: Estimate = NOT_TOLD, k_s: Estimate = NOT_TOLD, k_e: Estimate = NOT_TOLD, depth_m: float = 0.03
 ) -> StrideEstimate:
-    return StrideEstimate(
-        flipper="left",
-        index=0,
-        t_start_s=0.0,
-        t_end_s=1.0,
-        insertion_s=0.4,
-        stance_s=0.25,
-        extraction_s=0.1,
-        k_p=k_p,
-        k_s=k_s,
-        k_e=k_e,
-        surface_m=0.0,
-        depth_m=depth_m,
-        released=True,
-        insertion_force_n=3.0,
-        stance_force_n=6.0,
-        extraction_force_n=-2.0,
-        step_m=nan,
-    )
+    return made_up_muds.stride("left", depth_m, k_p=k_p, k_s=k_s, k_e=k_e)
 
 
 def mapped(*strides: StrideEstimate, place_m: float = 0.01) -> MudMap:
