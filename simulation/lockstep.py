@@ -84,12 +84,15 @@ class Lockstep:
         )
         ports = OdriveDrives(configuration.drive, {name: bus.open() for name, bus in buses.items()})
         pose = SimulatedPose(self.robot.plant, motion_capture, seed + 1)
-        self.loop = Loop(configuration, ports, pose, recorder or NullRecorder(), clock=lambda: self.now_s)
+        self.loop = Loop(configuration, ports, pose, recorder or NullRecorder(), self._now_s, self._now_s)
         self.tick_number = 0
 
     @property
     def now_s(self) -> float:
         return self.tick_number * PERIOD_S
+
+    def _now_s(self) -> float:
+        return self.now_s
 
     def step(self) -> None:
         self.tick_number += 1
@@ -110,7 +113,7 @@ class Lockstep:
 
     def arm(self) -> None:
         """From power-on to holding the pose. Raises RuntimeError with the reason where that fails."""
-        self.run_until(lambda: self.loop.health.fault is None and self.loop.mode is Mode.IDLE, 3.0)
+        self.run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking(), 3.0)
         refused = self.loop.request(Request.ARM, self.now_s)
         if refused or not self.run_until(lambda: self.loop.mode is Mode.HOLD, 3.0):
             raise RuntimeError(refused or f"not armed: {self.loop.fault}")
