@@ -12,7 +12,7 @@ from typing import Any
 
 from control.faults import Blocks, Fault
 from control.records import JOINTS, DriveState
-from drivers.odrive_drives import OdriveAxis
+from drivers.odrive_axis import OdriveAxis
 from firmware_host.loop import Loop
 from firmware_host.reports import check_item
 

@@ -28,7 +28,7 @@ from control.limits import JointLimits, JointRange
 from control.records import JOINTS
 from control.recovery import RecoveryParameters
 from control.winding import WindingParameters
-from drivers.odrive_drives import DriveParameters
+from drivers.odrive_axis import DriveParameters, WatchdogEndpoints
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
 from firmware_host.toml_records import ConfigurationError as ConfigurationError  # for whoever loads one
@@ -97,6 +97,7 @@ class Configuration:
     log: LogParameters = LogParameters()
     status: StatusParameters = StatusParameters()
     pose: PoseParameters = PoseParameters()
+    watchdog_endpoints: list[WatchdogEndpoints] = field(default_factory=list)  # of further builds of ODrive's firmware
     text: str = ""  # the file itself, which goes into every log
 
     @property

@@ -113,7 +113,8 @@ def run(configuration: Configuration, shutdown: Shutdown) -> int:
     with ExitStack() as stack:
         status = StatusSocket(Path(configuration.status.socket), {})  # first: it refuses to be the second daemon
         stack.callback(status.close)
-        drives = OdriveDrives(configuration.drive, open_ports(configuration.bus))
+        ports = open_ports(configuration.bus)
+        drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         stack.callback(drives.close)
         pose = PosePort(Path(configuration.pose.socket) if configuration.pose.socket else None)
         stack.callback(pose.close)

@@ -5,6 +5,7 @@ Each is data. What comes of them is decided by the latch, which knows how long t
 
 from __future__ import annotations
 
+from math import isnan
 from typing import NamedTuple
 
 from control.controller import ALL_TRUSTED
@@ -14,8 +15,10 @@ from control.joint_watch import JointFacts, JointWatch
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
 from control.records import JOINTS, BodyPose, DriveStates
+from drivers.can_port import BusState
+from drivers.odrive_axis import OdriveAxis
 from drivers.odrive_codec import error_text
-from drivers.odrive_drives import OdriveAxis, OdriveDrives
+from drivers.odrive_drives import OdriveDrives
 from firmware_host.configuration import Configuration
 from firmware_host.loop_watch import LoopWatch
 from firmware_host.ticker import PERIOD_S, Beat
@@ -26,6 +29,13 @@ FIRMWARE = (0, 6)  # major and minor version whose messages the codec knows
 POSE_FORGOTTEN_S = 10.0  # a motion capture that was switched off on purpose
 UNTRUSTED = frozenset({"encoder_jump", "position_stale", "position_silent", "drive_quiet", "drive_silent"})
 EXPLAINED = frozenset({"drive_error", "drive_disarmed"})  # by the drive's own words
+
+
+BUS_FAULTS = {
+    BusState.WARNING: ("bus_warning", "meets many errors"),
+    BusState.PASSIVE: ("bus_passive", "meets so many errors that its controller is passive"),
+    BusState.OFF: ("bus_off", "was left by its controller"),
+}
 
 
 class Situation(NamedTuple):
@@ -57,6 +67,7 @@ class FaultWatch:
             for joint, span in zip(JOINTS, configuration.joint_ranges, strict=True)
         )
         self._loop = LoopWatch(configuration.faults)
+        self._longest_watchdog_s = configuration.faults.longest_watchdog_s
         self._warm_c = configuration.limits.temperature_warm_c
         self.reset()
 
@@ -66,6 +77,8 @@ class FaultWatch:
         self._loop.reset()
         self._failed_sends = {name: port.failed_sends for name, port in self._drives.ports.items()}
         self._refused_ticks = dict.fromkeys(self._drives.ports, 0)
+        self._restarts = {axis.joint: axis.restarts for axis in self._drives.axes}
+        self._refused_commands = self._drives.gate.refused
         self._pose_stamp_s: float | None = None
         self.trusted: tuple[bool, ...] = ALL_TRUSTED  # of the joints' encoders
 
@@ -83,7 +96,7 @@ class FaultWatch:
         """Everything that is wrong in this tick."""
         found = self._loop.update(beat, situation.wall_minus_monotonic_s)
         self._watch_buses(found)
-        if situation.mode is Mode.BOOT:
+        if situation.mode is Mode.BOOT and not self._drives.heard:
             return found
         self._watch_joints(found, beat, situation)
         blind = {fault.subject for fault in found if fault.name in UNTRUSTED}
@@ -92,12 +105,17 @@ class FaultWatch:
             found.append(make_fault("torque_not_finite", "", "A torque was not a finite number."))
         if situation.mode is Mode.ARMING and beat.now_s - situation.mode_since_s > ARMING_S:
             self._watch_arming(found, situation.states)
-        self._watch_firmware(found)
+        self._watch_gate(found)
+        for axis in self._drives.axes:
+            self._watch_axis(found, axis)
         self._watch_pose(found, beat.now_s, situation.body)
         return found
 
     def _watch_buses(self, found: list[Fault]) -> None:
         for name, port in self._drives.ports.items():
+            if port.state is not BusState.ACTIVE:
+                kind, text = BUS_FAULTS[port.state]
+                found.append(make_fault(kind, name, f"The {name} bus {text}: {port.last_error or 'no word why'}."))
             lost = port.failed_sends > self._failed_sends[name]
             self._refused_ticks[name] = self._refused_ticks[name] + 1 if lost else 0
             self._failed_sends[name] = port.failed_sends
@@ -123,16 +141,43 @@ class FaultWatch:
                 text = f"The {joint} drive did not go into closed loop within {ARMING_S:g} s."
                 found.append(make_fault("arming_failed", joint, text))
 
-    def _watch_firmware(self, found: list[Fault]) -> None:
-        """Asked for once every drive was heard; messages mean other things in other firmware."""
-        for axis in self._drives.axes:
-            if axis.version is None:
-                text = f"The {axis.joint} drive did not tell its firmware version yet."
-                found.append(make_fault("drive_version", axis.joint, text))
-            elif (axis.version.major, axis.version.minor) != FIRMWARE:
-                version = ".".join(map(str, axis.version))
-                text = f"The {axis.joint} drive runs firmware {version}; 0.6 is supported."
-                found.append(make_fault("drive_version", axis.joint, text))
+    def _watch_gate(self, found: list[Fault]) -> None:
+        gate = self._drives.gate
+        if gate.refused > self._refused_commands:
+            self._refused_commands = gate.refused
+            found.append(make_fault("command_refused", "", gate.last_refusal))
+
+    def _watch_axis(self, found: list[Fault], axis: OdriveAxis) -> None:
+        """What a drive tells of itself beside its signals."""
+        joint = axis.joint
+        if axis.restarts != self._restarts[joint]:
+            self._restarts[joint] = axis.restarts
+            found.append(make_fault("drive_restarted", joint, f"The {joint} drive started anew."))
+        if axis.twins:
+            found.append(make_fault("drive_twins", joint, f"Two drives send as the {joint} drive."))
+        if axis.version is None:
+            text = f"The {joint} drive did not tell its firmware version yet."
+            found.append(make_fault("drive_version", joint, text))
+        elif (axis.version.major, axis.version.minor) != FIRMWARE:
+            version = ".".join(map(str, axis.version))
+            text = f"The {joint} drive runs firmware {version}; 0.6 is supported."
+            found.append(make_fault("drive_version", joint, text))
+        self._watch_watchdog(found, joint, axis.watchdog_s)
+
+    def _watch_watchdog(self, found: list[Fault], joint: str, watchdog_s: float) -> None:
+        """It alone acts when this program dies."""
+        if 0.0 < watchdog_s <= self._longest_watchdog_s:
+            return
+        if isnan(watchdog_s):
+            text = f"The {joint} drive's watchdog was not read back."
+            found.append(make_fault("watchdog_unknown", joint, text))
+        elif watchdog_s == 0.0:
+            found.append(make_fault("watchdog_off", joint, f"The {joint} drive's watchdog is off."))
+        else:
+            text = (
+                f"The {joint} drive's watchdog waits for {watchdog_s:g} s; {self._longest_watchdog_s:g} s is the most."
+            )
+            found.append(make_fault("watchdog_off", joint, text))
 
     def _watch_pose(self, found: list[Fault], now_s: float, body: BodyPose) -> None:
         if body.stamp_s > float("-inf"):

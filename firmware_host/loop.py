@@ -230,6 +230,7 @@ class Loop:
             return
         if self.mode is Mode.IDLE:
             self.drives.request_versions(now_s)
+            self.drives.request_watchdogs(now_s)
         self.drives.send(self.sent.torques_nm)
 
     def _record(self, beat: Beat) -> None:

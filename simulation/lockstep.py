@@ -82,7 +82,8 @@ class Lockstep:
             {name: bus.open() for name, bus in buses.items()},
             seed,
         )
-        ports = OdriveDrives(configuration.drive, {name: bus.open() for name, bus in buses.items()})
+        wires = {name: bus.open() for name, bus in buses.items()}
+        ports = OdriveDrives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
         pose = SimulatedPose(self.robot.plant, motion_capture, seed + 1)
         self.loop = Loop(configuration, ports, pose, recorder or NullRecorder(), self._now_s, self._now_s)
         self.tick_number = 0
