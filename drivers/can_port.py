@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from enum import IntEnum
 from typing import Protocol
 
 import can
@@ -19,9 +20,19 @@ MOST_FAILURES_PER_READ = 32
 MOST_FRAMES_PER_READ = 4096  # half a second of a full bus; a babbling node must not hold the loop for ever
 
 
+class BusState(IntEnum):
+    """Of a CAN controller by its error counters (ISO 11898-1), worst last."""
+
+    ACTIVE = 0
+    WARNING = 1
+    PASSIVE = 2
+    OFF = 3
+
+
 class CanPort(Protocol):
     """What the drives need of a bus. `failed_sends` and `error_frames` only grow."""
 
+    state: BusState
     failed_sends: int
     error_frames: int
     last_send_error: str
@@ -42,6 +53,7 @@ class PythonCanPort:
 
     def __init__(self, bus: can.BusABC) -> None:
         self._bus = bus
+        self.state = BusState.ACTIVE
         self.failed_sends = 0
         self.error_frames = 0
         self.last_error = ""  # of receiving

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 
+from drivers.can_port import BusState
 from drivers.frames import Frame
 
 LONGEST_QUEUE = 4096  # a port that nobody reads loses its oldest frames, like a controller's receive buffer
@@ -19,6 +20,7 @@ class MockPort:
     def __init__(self, bus: MockBus) -> None:
         self._bus = bus
         self.queue: deque[Frame] = deque(maxlen=LONGEST_QUEUE)
+        self.state = BusState.ACTIVE
         self.failed_sends = 0
         self.error_frames = 0
         self.last_send_error = ""

@@ -26,6 +26,7 @@ from control.joint_pd import ArmMass, JointGains
 from control.limits import JointLimits, JointRange
 from control.records import JOINTS
 from control.recovery import RecoveryParameters
+from drivers.failures import FailureParameters
 from drivers.odrive_drives import DriveParameters
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
@@ -94,6 +95,7 @@ class Configuration:
     log: LogParameters = LogParameters()
     status: StatusParameters = StatusParameters()
     pose: PoseParameters = PoseParameters()
+    failures: FailureParameters = FailureParameters()
     text: str = ""  # the file itself, which goes into every log
 
     @property

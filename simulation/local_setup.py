@@ -70,6 +70,9 @@ socket = {status}
 
 [pose]
 socket = {pose}
+
+[failures]
+allowed = true
 """
 
 

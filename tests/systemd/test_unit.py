@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from control.records import JOINTS
+from drivers.can_port import BusState
 from drivers.frames import Frame
 from drivers.odrive_drives import OdriveDrives
 from firmware_host import daemon
@@ -151,6 +152,7 @@ def test_the_network_files_configure_the_same_buses(configuration: Configuration
 
 
 class CountingPort:
+    state = BusState.ACTIVE
     failed_sends = error_frames = 0
     last_send_error = ""
 
