@@ -93,6 +93,7 @@ class Lockstep:
         pose = failing_pose(SimulatedPose(self.robot.plant, motion_capture, seed + 1), failures)
         rows = failing_recorder(recorder or NullRecorder(), failures)
         self.loop = Loop(configuration, OdriveDrives(configuration.drive, ports), pose, rows, lambda: self.now_s)
+        self._sound = failures is None
         self.failures = failures or Failures(configuration.bus)
         self._stalls = Stalls(self.failures)
         self.tick_number = 0
@@ -111,7 +112,7 @@ class Lockstep:
 
     def fail(self, component: str, kind: str, for_s: float = USUAL_S) -> None:
         """From the next tick on. Raises RuntimeError where it is refused."""
-        refused = self.failures.refusal(component, kind, for_s)
+        refused = "no failures were given" if self._sound else self.failures.refusal(component, kind, for_s)
         if refused:
             raise RuntimeError(refused)
         self.loop.event(self.now_s, begin_text(component, kind, for_s, "lockstep"))
