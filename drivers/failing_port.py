@@ -75,11 +75,10 @@ class FailingPort:
         }
 
     def _count(self) -> None:
-        self.failed_sends = self._port.failed_sends + self._refused_sends
-        self.error_frames = self._port.error_frames + self._forged_error_frames
-        failure = self._failures.of(self._bus)
-        forged = STATES.get(failure.kind, BusState.ACTIVE) if failure else BusState.ACTIVE
-        self.state = max(self._port.state, forged)
+        port, failure = self._port, self._failures.of(self._bus)
+        self.failed_sends = port.failed_sends + self._refused_sends
+        self.error_frames = port.error_frames + self._forged_error_frames
+        self.state = port.state if failure is None else max(port.state, STATES.get(failure.kind, BusState.ACTIVE))
 
     @property
     def _untouched(self) -> bool:
@@ -190,7 +189,6 @@ class FailingPort:
         else:
             self._deliver()
             self._send_failing(frame)
-        self._count()
 
     def _send_failing(self, frame: Frame) -> None:
         components = self._listeners.get(_node_id(frame), (self._bus,))
@@ -207,6 +205,7 @@ class FailingPort:
     def _refuse(self, why: str) -> None:
         self._refused_sends += 1
         self.last_send_error = why
+        self._count()
 
     def _deliver(self) -> None:
         for frame in self._outgoing.take(self._due_s):
@@ -217,6 +216,7 @@ class FailingPort:
         self._port.send(frame)
         if self._port.failed_sends != failed_before:
             self.last_send_error = self._port.last_send_error
+            self._count()
 
     def close(self) -> None:
         self._port.close()
