@@ -28,6 +28,7 @@ from control.limits import JointLimits, JointRange
 from control.records import JOINTS
 from control.recovery import RecoveryParameters
 from control.winding import WindingParameters
+from drivers.failures import FailureParameters
 from drivers.odrive_axis import DriveParameters, WatchdogEndpoints
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
@@ -97,6 +98,7 @@ class Configuration:
     log: LogParameters = LogParameters()
     status: StatusParameters = StatusParameters()
     pose: PoseParameters = PoseParameters()
+    failures: FailureParameters = FailureParameters()
     watchdog_endpoints: list[WatchdogEndpoints] = field(default_factory=list)  # of further builds of ODrive's firmware
     text: str = ""  # the file itself, which goes into every log
 
