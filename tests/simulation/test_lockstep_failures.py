@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from control.controller import WalkOrder
-from control.modes import ENERGISED
+from control.modes import ENERGISED, Mode
 from control.records import NO_TORQUE
 from drivers.failures import Failures
 from firmware_host.configuration import Configuration
