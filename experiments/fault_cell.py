@@ -1,0 +1,281 @@
+"""One cell: a fault in one phase, and all that was seen after it, judged.
+
+Ticks are those that the loop made after the cause. The reaction is there when the mode is at least as hard as the
+fault's kind demands; where it was that before, and where a fault only stands against arming, when the fault is told.
+Torque is what the simulated motors exert. After the cause is gone the robot is watched for a while: nothing may arm it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from random import Random
+from typing import Any
+
+from control.controller import DAMPING_NM, DAMPING_S, SOFT_STOP_S
+from control.faults import Blocks, FaultKind, Reaction
+from control.modes import ENERGISED, Mode, Request
+from control.records import JOINTS
+from drivers.odrive_codec import AxisState
+from experiments.fault_bench import FaultBench
+from experiments.fault_injection import BY_NAME, TOLD_S, Way
+from experiments.fault_phases import bench_for, bring
+from firmware_host.ticker import PERIOD_S
+
+HARDNESS = {  # in arming there is no torque yet
+    Mode.BOOT: 4, Mode.IDLE: 4, Mode.FAULT: 4, Mode.DAMPING: 3, Mode.STOPPING: 2, Mode.HOLD: 1, Mode.ARMING: 1,
+    Mode.WALKING: 0,
+}  # fmt: skip
+WATCHDOG_TICKS = 40  # 0.1 s, and one tick on the way to the drive and back
+BUG_BOUND_TICKS = 2
+ON_THE_WAY_TICKS = 2  # from the loop's torque to the motor's
+SLEWING_TICKS = 3  # from full torque one way to the most of damping the other way, at the torques' rate
+LONGEST_STOP_S = max(SOFT_STOP_S, DAMPING_S) + 0.2
+AFTER_S = 1.0  # to see whether anything comes back
+WALKED_ON_S = 0.3  # with a fault that ends nothing
+
+
+@dataclass
+class Cell:
+    """What was seen, as it goes into the report."""
+
+    fault: str
+    way: str
+    phase: str
+    seed: int
+    joint: str
+    reaction: str
+    bound_ticks: int | None
+    reaction_ticks: int | None = None
+    told_ticks: int | None = None
+    told: list[str] = field(default_factory=list)
+    mode: str = ""  # in the end
+    peak_torque_nm: float = 0.0  # of any motor, from the cause on
+    damping_torque_nm: float = 0.0  # once damping has begun
+    zero_torque_ticks: int | None = None  # from the cause to the last torque, where there is none in the end
+    travel_rad: float | None = None  # of the joint that moved most, where the walk ends
+    stop_s: float | None = None  # from a soft stop or damping to idle drives
+    rows_lost: int = 0
+    disarmed: bool = True  # stayed so, once torque was off
+    exception: str = ""
+    ok: bool = False
+    why: list[str] = field(default_factory=list)
+
+
+def run_cell(name: str, phase: str, seed: int) -> dict[str, Any]:
+    """Everything of it follows from its three arguments."""
+    way, random = BY_NAME[name], Random(f"{name} {phase} {seed}")
+    bench = bench_for(phase, random, hopeless=way.fault == "flipper_stuck")
+    joint = random.choice(JOINTS)
+    bring(bench, phase, random)
+    cell = Cell(way.fault, name, phase, seed, joint, _reaction_text(way), _bound_ticks(way))
+    with way.cause(bench, joint):
+        watch = Watch(bench, way, cell)
+        watch.run(way.lasts_s, until_told=way.lasts_s == TOLD_S)
+    watch.run_on()
+    cell.why = list(problems(cell, way))
+    cell.ok = not cell.why
+    return asdict(cell)
+
+
+def _reaction_text(way: Way) -> str:
+    if way.kind:
+        return way.kind.reaction.name.lower()
+    return "none" if way.fault == "none" else "drives_idle"
+
+
+def _bound_ticks(way: Way) -> int | None:
+    if way.kind:
+        return way.kind.bound_ticks
+    return {"none": None, "bug_in_the_tick": BUG_BOUND_TICKS}.get(way.fault, WATCHDOG_TICKS)
+
+
+class Watch:
+    """Owns what is counted after the cause, up to the moment."""
+
+    def __init__(self, bench: FaultBench, way: Way, cell: Cell) -> None:
+        self._bench = bench
+        self._way = way
+        self._cell = cell
+        self._steps = 0
+        self._first_tick = bench.ticks_made
+        self._first_text = len(bench.rows.texts)
+        self._mode_before = bench.loop.mode
+        self._angles_rad = bench.robot.plant.angles_rad
+        self._last_torque_steps = 0
+        self._damping_steps = 0
+        self._stopping_since: int | None = None
+        self._disarmed_steps = 0
+        self._missing_rows = bench.ticks_made - bench.rows.ticks
+        self._travel_rad = 0.0
+
+    def run(self, duration_s: float, until_told: bool = False) -> None:
+        told_by = self._way.kind.bound_ticks * 2 + 10 if until_told and self._way.kind else 0
+        for _ in range(told_by or round(duration_s / PERIOD_S)):
+            self._step()
+            if until_told and self._cell.told_ticks is not None:
+                return
+
+    def run_on(self) -> None:
+        """Until the robot is at rest, and a while longer."""
+        kind, bench = self._way.kind, self._bench
+        if kind is None or kind.reaction < Reaction.SOFT_STOP:
+            self.run(AFTER_S if kind is None and not self._walks_on else WALKED_ON_S)
+        else:
+            for _ in range(round((LONGEST_STOP_S + 1.0) / PERIOD_S)):
+                if bench.loop.mode not in ENERGISED:
+                    break
+                self._step()
+            self.run(AFTER_S)
+        self._end()
+
+    @property
+    def _walks_on(self) -> bool:
+        return self._way.fault == "none" or (
+            self._way.kind is not None and self._way.kind.reaction < Reaction.HOLD and self._cell.phase != "idle"
+        )
+
+    def _step(self) -> None:
+        self._bench.step()
+        self._steps += 1
+        self._look_at_loop()
+        self._look_at_robot()
+
+    # the loop
+
+    @property
+    def _ticks(self) -> int:
+        return self._bench.ticks_made - self._first_tick
+
+    def _look_at_loop(self) -> None:
+        cell, bench, kind = self._cell, self._bench, self._way.kind
+        mode = bench.loop.mode
+        if kind is None:
+            self._look_at_drives_end()
+        else:
+            self._look_for_told(kind)
+            hard = HARDNESS[mode] >= _needed(kind)
+            if cell.reaction_ticks is None and cell.told_ticks is not None and self._only_told(kind):
+                cell.reaction_ticks = cell.told_ticks
+            elif cell.reaction_ticks is None and hard and not self._only_told(kind):
+                cell.reaction_ticks = self._ticks
+        if mode in (Mode.STOPPING, Mode.DAMPING) and self._stopping_since is None:
+            self._stopping_since = self._steps
+        if mode not in ENERGISED and self._stopping_since is not None and cell.stop_s is None:
+            cell.stop_s = (self._steps - self._stopping_since) * PERIOD_S
+
+    def _only_told(self, kind: FaultKind) -> bool:
+        """The mode has nothing to say: it was as hard before, or the fault asks for nothing."""
+        return kind.reaction < Reaction.HOLD or HARDNESS[self._mode_before] >= _needed(kind)
+
+    def _look_for_told(self, kind: FaultKind) -> None:
+        if self._cell.told_ticks is not None:
+            return
+        loop = self._bench.loop
+        if any(fault.name == kind.name for fault in loop.faults.standing):
+            self._cell.told_ticks = self._ticks
+            if self._cell.phase == "idle" and _stands_against_arming(kind):
+                refused = loop.request(Request.ARM, self._bench.now_s)
+                if refused is None:
+                    self._cell.why.append("arming was not refused")
+
+    def _look_at_drives_end(self) -> None:
+        """A daemon that ended says nothing: the drives' torque does."""
+
+    # the robot
+
+    def _look_at_robot(self) -> None:
+        cell, bench = self._cell, self._bench
+        torque_nm = max(map(abs, bench.torques_nm()))
+        cell.peak_torque_nm = max(cell.peak_torque_nm, torque_nm)
+        if torque_nm:
+            self._last_torque_steps = self._steps
+        self._look_at_damping(torque_nm)
+        moved = (abs(now - before) for now, before in zip(bench.robot.plant.angles_rad, self._angles_rad, strict=True))
+        self._travel_rad = max(self._travel_rad, *moved)
+        off = bench.dead or bench.loop.mode not in ENERGISED
+        self._disarmed_steps = self._disarmed_steps + 1 if off else 0
+        if self._disarmed_steps > self._longest_off_ticks and self._armed(torque_nm):
+            cell.disarmed = False
+
+    def _armed(self, torque_nm: float) -> bool:
+        if self._way.fault == "drive_energised":  # that is the cause itself
+            return torque_nm > 0.0
+        return torque_nm > 0.0 or any(each.axis_state is AxisState.CLOSED_LOOP for each in self._bench.robot.drives)
+
+    @property
+    def _longest_off_ticks(self) -> int:
+        return WATCHDOG_TICKS if self._way.deaf or self._bench.dead and not self._bench.bug else ON_THE_WAY_TICKS
+
+    def _look_at_damping(self, torque_nm: float) -> None:
+        damping = self._bench.loop.mode is Mode.DAMPING
+        self._damping_steps = self._damping_steps + 1 if damping else 0
+        deaf = self._way.deaf and self._steps <= WATCHDOG_TICKS
+        if self._damping_steps > SLEWING_TICKS + ON_THE_WAY_TICKS and not deaf:
+            self._cell.damping_torque_nm = max(self._cell.damping_torque_nm, torque_nm)
+
+    def _end(self) -> None:
+        cell, bench = self._cell, self._bench
+        cell.mode = bench.loop.mode.name.lower()
+        texts = bench.rows.texts[self._first_text :]
+        cell.told = list(dict.fromkeys(text.split()[1] for text in texts if text.startswith("fault ")))
+        cell.exception = bench.bug
+        cell.rows_lost = bench.ticks_made - bench.rows.ticks - self._missing_rows
+        if self._steps - self._last_torque_steps > ON_THE_WAY_TICKS:
+            cell.zero_torque_ticks = self._last_torque_steps
+        if not self._walks_on:
+            cell.travel_rad = self._travel_rad
+        if self._way.kind is None and self._way.fault != "none":
+            cell.reaction_ticks = cell.zero_torque_ticks
+
+
+def _needed(kind: FaultKind) -> int:
+    return max(0, kind.reaction - Reaction.WARN)
+
+
+def _stands_against_arming(kind: FaultKind) -> bool:
+    return kind.blocks is not Blocks.NO or kind.reaction >= Reaction.HOLD
+
+
+# the judgement
+
+
+def problems(cell: Cell, way: Way) -> Iterator[str]:
+    """In words, what should not be."""
+    yield from cell.why
+    if cell.exception and not way.ends_daemon:
+        yield f"an exception escaped: {cell.exception}"
+    if not cell.disarmed:
+        yield "torque or closed loop came back by itself"
+    if cell.rows_lost > (1 if way.ends_daemon else 0):
+        yield f"{cell.rows_lost} rows are missing in the log"
+    if cell.damping_torque_nm > DAMPING_NM + 1e-6:
+        yield f"{cell.damping_torque_nm:.3f} N·m while damping"
+    if way.fault == "none":
+        if cell.told:
+            yield f"without a cause it told of {', '.join(cell.told)}"
+        return
+    yield from _late(cell)
+    if way.kind is None or way.kind.reaction >= Reaction.SOFT_STOP:
+        yield from _not_stopped(cell)
+    if way.kind and cell.fault not in cell.told:
+        yield "the log holds no word of it"
+
+
+def _late(cell: Cell) -> Iterator[str]:
+    bound = cell.bound_ticks or 0
+    if cell.reaction_ticks is None:
+        yield "no reaction"
+    elif cell.reaction_ticks > bound:
+        yield f"the reaction came after {cell.reaction_ticks} ticks, {bound} are the most"
+    if cell.told_ticks is not None and cell.told_ticks > bound:
+        yield f"told after {cell.told_ticks} ticks, {bound} are the most"
+
+
+def _not_stopped(cell: Cell) -> Iterator[str]:
+    if cell.zero_torque_ticks is None:
+        yield "torque in the end"
+    if cell.mode not in ("idle", "fault", "boot") and cell.fault not in ("daemon_killed", "bug_in_the_tick"):
+        yield f"in the end it is in mode {cell.mode}"
+    if cell.stop_s is not None and cell.stop_s > LONGEST_STOP_S:
+        yield f"{cell.stop_s:.1f} s from the stop to idle drives"
