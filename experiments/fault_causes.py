@@ -64,6 +64,14 @@ def overcurrent(bench: FaultBench, joint: str) -> Iterator[None]:
 
 
 @contextmanager
+def watchdog_ran_out(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Commands do not reach the drive; the cause is that it has given up waiting."""
+    with failing("JOINT.command", "off")(bench, joint):
+        bench.run_until(lambda: bool(bench.drive(joint).errors), 0.5)
+        yield
+
+
+@contextmanager
 def left_closed_loop(bench: FaultBench, joint: str) -> Iterator[None]:
     bench.drive(joint).axis_state = AxisState.IDLE
     yield

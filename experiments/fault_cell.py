@@ -28,6 +28,7 @@ HARDNESS = {  # in arming there is no torque yet
 }  # fmt: skip
 WATCHDOG_TICKS = 40  # 0.1 s, and one tick on the way to the drive and back
 BUG_BOUND_TICKS = 2
+FORBIDDEN_TICKS = 80  # two heartbeats: a drive tells that it is in closed loop, and is told again to go idle
 ON_THE_WAY_TICKS = 2  # from the loop's torque to the motor's
 SLEWING_TICKS = 3  # from full torque one way to the most of damping the other way, at the torques' rate
 LONGEST_STOP_S = max(SOFT_STOP_S, DAMPING_S) + 0.2
@@ -195,13 +196,15 @@ class Watch:
         self._travel_rad = max(self._travel_rad, *moved)
         off = bench.dead or bench.loop.mode not in ENERGISED
         self._disarmed_steps = self._disarmed_steps + 1 if off else 0
-        if self._disarmed_steps > self._longest_off_ticks and self._armed(torque_nm):
+        if torque_nm and self._disarmed_steps > self._longest_off_ticks or self._rearmed:
             cell.disarmed = False
 
-    def _armed(self, torque_nm: float) -> bool:
-        if self._way.fault == "drive_energised":  # that is the cause itself
-            return torque_nm > 0.0
-        return torque_nm > 0.0 or any(each.axis_state is AxisState.CLOSED_LOOP for each in self._bench.robot.drives)
+    @property
+    def _rearmed(self) -> bool:
+        """Closed loop, for longer than it takes to hear of it and to forbid it."""
+        if self._disarmed_steps <= FORBIDDEN_TICKS or self._way.fault == "drive_energised":  # that is the cause itself
+            return False
+        return any(drive.axis_state is AxisState.CLOSED_LOOP for drive in self._bench.robot.drives)
 
     @property
     def _longest_off_ticks(self) -> int:

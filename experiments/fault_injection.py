@@ -33,6 +33,7 @@ from experiments.fault_causes import (
     said,
     stands,
     twin,
+    watchdog_ran_out,
     watchdog_told_off,
     whirled,
     wild_stride,
@@ -79,8 +80,8 @@ DYING = ("hold", *GAIT, "recovery")
 WAYS: tuple[Way, ...] = (
     Way("none", nothing, 1.0, PHASES),
     # signals of a drive
-    Way("drive_late", failing("JOINT", "off"), TOLD_S),
-    Way("drive_quiet", failing("JOINT", "off"), TOLD_S, PHASES),
+    Way("drive_late", failing("JOINT", "off"), TOLD_S, deaf=True),
+    Way("drive_quiet", failing("JOINT", "off"), TOLD_S, PHASES, deaf=True),
     Way("drive_silent", failing("JOINT", "off"), 1.0, PHASES, deaf=True),
     Way("position_stale", failing("JOINT.position", "off"), TOLD_S),
     Way("position_silent", failing("JOINT.position", "off"), 1.0),
@@ -89,7 +90,7 @@ WAYS: tuple[Way, ...] = (
     Way("heartbeat_silent", failing("JOINT.heartbeat", "off"), 1.0),
     Way("temperature_silent", failing("JOINT.temperature", "off"), 1.5),
     Way("drive_error", overcurrent, phases=PHASES),
-    Way("drive_error", failing("JOINT.command", "off"), 0.5, MOVING, "by its watchdog", deaf=True),
+    Way("drive_error", watchdog_ran_out, 0.5, MOVING, "by its watchdog", deaf=True),
     Way("drive_error", said(codec.ESTOP), 0.5, MOVING, "by a stranger's emergency stop"),
     Way("drive_disarmed", left_closed_loop, phases=MOVING),
     Way("drive_energised", other_master, 1.0, ("idle",)),

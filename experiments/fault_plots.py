@@ -22,9 +22,10 @@ def plot_faults(report: dict[str, Any], path: Path) -> None:
     """Numbers are ticks, of the slowest seed; the colour is their share of the bound; a red cross is not ok."""
     rows = report["faults"]
     phases = [phase for phase in report["settings"]["phases"] if any(c["phase"] == phase for c in report["cells"])]
-    per_panel = -(-len(rows) // COLUMNS)
+    columns = min(COLUMNS, len(rows))
+    per_panel = -(-len(rows) // columns)
     figure, panels = plt.subplots(
-        1, COLUMNS, figsize=(12.0, 1.6 + 0.22 * per_panel), squeeze=False, constrained_layout=True
+        1, columns, figsize=(12.0, 1.6 + 0.22 * per_panel), squeeze=False, constrained_layout=True
     )
     for i, panel in enumerate(panels[0]):
         mesh = _plot_panel(panel, report, rows[i * per_panel : (i + 1) * per_panel], phases)
@@ -43,8 +44,8 @@ def _plot_panel(panel: Axes, report: dict[str, Any], rows: Sequence[dict[str, An
             cells = [c for c in report["cells"] if (c["way"], c["phase"]) == (row["way"], phase)]
             if cells:
                 percent[y, x] = _write_cell(panel, x, y, cells)
-    mesh = panel.imshow(percent, cmap="YlGnBu", vmin=0.0, vmax=HIGHEST_PERCENT, aspect="auto")
-    mesh.cmap.set_bad("#f4f4f4")
+    colours = plt.get_cmap("YlGnBu").with_extremes(bad="#f4f4f4")
+    mesh = panel.imshow(percent, cmap=colours, vmin=0.0, vmax=HIGHEST_PERCENT, aspect="auto")
     panel.set_xticks(range(len(phases)), list(phases), rotation=35, ha="left", fontsize="small")
     panel.xaxis.tick_top()
     panel.set_yticks(range(len(rows)), [_label(row) for row in rows], fontsize="x-small")
