@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import msgpack
 from firmware_host.rpc import NOT_PERMITTED, REQUEST
 
 ANSWER_S = 5.0
+TIMEVAL = struct.Struct("ll")  # seconds and microseconds
 
 
 class NoDaemonError(Exception):
@@ -31,13 +33,15 @@ class StatusClient:
         self._number = 0
         self._unpacker = msgpack.Unpacker(raw=False)
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._socket.settimeout(timeout_s)
+        patience = TIMEVAL.pack(*divmod(int(1e6 * timeout_s), 10**6))
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, patience)
         try:
-            self._socket.connect(str(path))
+            self._socket.connect(str(path))  # blocking: with Python's own timeout a full queue is an error at once
         except PermissionError as problem:
             raise NotPermittedError(f"no permission to use {path}. Join the group that owns it.") from problem
         except OSError as problem:
             raise NoDaemonError(f"no daemon answers on {path}") from problem
+        self._socket.settimeout(timeout_s)
 
     def call(self, method: str, **params: Any) -> Any:
         """The result.

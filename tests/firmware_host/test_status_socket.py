@@ -4,91 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import socket
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
 
 import msgpack
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from firmware_host.connection import BURST, LONGEST_SENDING_S, REQUESTS_PER_S, Caller
-from firmware_host.rights import Group, Peer, Rights
-from firmware_host.rpc import LONGEST_REQUEST, MOST_PARAMS, NOT_PERMITTED
-from firmware_host.status_socket import MOST_CLIENTS, RefusedError, StatusSocket
-from firmware_host.ticker import PERIOD_S
-
-
-def refuse(params: dict[str, Any], caller: Caller) -> Any:
-    raise RefusedError("not now")
-
-
-METHODS: dict[str, Callable[[dict[str, Any], Caller], Any]] = {
-    "echo": lambda params, caller: params,
-    "refuse": refuse,
-    "long": lambda params, caller: "x" * 300_000,
-}
-
-
-RIGHTS = Rights(readers=Group("viewers", 70), operators=Group("pilots", 71), own_uid=1)
-OPERATOR, READER, STRANGER = (
-    Peer(500, 1000, frozenset({1000, 71})),
-    Peer(501, 1001, frozenset({1001, 70})),
-    Peer(502, 1002, frozenset({1002})),
-)
-
-
-class Served(StatusSocket):
-    """With a clock of its own, and clients that the kernel takes for whom the test wants."""
-
-    def __init__(self, path: Path) -> None:
-        self.coming: list[Peer] = []
-        super().__init__(path, METHODS, RIGHTS, lambda connection: self.coming.pop(0))
-        self.now_s = 1000.0
-
-    def tick(self, ticks: int = 1) -> None:
-        for _ in range(ticks):
-            self.now_s += PERIOD_S
-            self.serve(self.now_s)
-
-
-@pytest.fixture
-def served(short_folder: Path) -> Iterator[Served]:
-    status = Served(short_folder / "s")
-    yield status
-    status.close()
-
-
-def connect(served: Served, peer: Peer = OPERATOR) -> socket.socket:
-    served.coming.append(peer)
-    client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    client.settimeout(2.0)
-    client.connect(str(served.path))
-    return client
-
-
-def serve(served: Served, ticks: int = 6) -> None:
-    served.tick(ticks)
-
-
-def ask(served: Served, client: socket.socket, data: bytes) -> list[Any]:
-    """Everything that comes back within a few ticks."""
-    client.sendall(data)
-    serve(served)
-    client.setblocking(False)
-    unpacker = msgpack.Unpacker(raw=False)
-    while True:
-        try:
-            answer = client.recv(1 << 20)
-        except BlockingIOError:
-            break
-        if not answer:
-            break
-        unpacker.feed(answer)
-        serve(served)
-    client.settimeout(2.0)
-    return list(unpacker)
+from firmware_host.rpc import LONGEST_REQUEST
+from firmware_host.status_socket import MOST_CLIENTS
+from tests.firmware_host.served_socket import METHODS, Served, ask, connect, serve, unpacked
 
 
 def test_a_request_is_answered_by_its_number(served: Served) -> None:
@@ -117,16 +41,10 @@ def test_requests_sent_together_are_answered_one_a_tick_in_order(served: Served)
         served.tick()
         client.setblocking(False)
         try:
-            answered.append(len(list(_unpacked(client.recv(65536)))))
+            answered.append(len(list(unpacked(client.recv(65536)))))
         except BlockingIOError:
             answered.append(0)
     assert sum(answered) == 5 and max(answered) == 1
-
-
-def _unpacked(data: bytes) -> Iterator[Any]:
-    unpacker = msgpack.Unpacker(raw=False)
-    unpacker.feed(data)
-    yield from unpacker
 
 
 @pytest.mark.parametrize(
@@ -195,7 +113,7 @@ def test_a_busy_client_does_not_delay_the_others(served: Served) -> None:
     other.sendall(msgpack.packb([0, 1, "echo", {}]))
     serve(served, 3)
     other.setblocking(False)
-    assert list(_unpacked(other.recv(4096))) == [[1, 1, None, {}]]
+    assert list(unpacked(other.recv(4096))) == [[1, 1, None, {}]]
 
 
 def test_a_wish_counts_although_its_client_has_hung_up(served: Served) -> None:
@@ -222,7 +140,7 @@ def test_a_client_that_has_no_more_to_ask_still_gets_a_long_answer_whole(served:
         served.tick()
         with contextlib.suppress(BlockingIOError):
             received += client.recv(65536)
-    ((_, _, _, result),) = _unpacked(bytes(received))
+    ((_, _, _, result),) = unpacked(bytes(received))
     assert len(result) == 300_000
     assert served._clients == {}
 
@@ -236,7 +154,7 @@ def test_many_short_requests_at_once_are_all_answered(served: Served) -> None:
         served.tick()
         with contextlib.suppress(BlockingIOError):
             received += client.recv(65536)
-    assert [number for _, number, _, _ in _unpacked(bytes(received))] == list(range(600))
+    assert [number for _, number, _, _ in unpacked(bytes(received))] == list(range(600))
 
 
 def test_a_method_with_a_bug_answers_so_and_is_reported(served: Served) -> None:
