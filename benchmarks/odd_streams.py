@@ -18,7 +18,14 @@ VALUES: tuple[Any, ...] = (
     *("", "x" * 900, "\ud800".encode("utf-8", "surrogatepass"), b"\x00\xff", [], [[]], {}, {"a": {"b": []}}),
     *(msgpack.ExtType(7, b"abc"), msgpack.Timestamp(1, 2)),
 )
-HEADERS = (b"\xdc\x20\x00", b"\xdd\x00\x00\x20\x00", b"\xde\x20\x00", b"\xdf\xff\xff\xff\xff", b"\x81\xa1a", b"\x94")
+HEADERS: tuple[bytes, ...] = (
+    b"\xdc\x20\x00",
+    b"\xdd\x00\x00\x20\x00",
+    b"\xde\x20\x00",
+    b"\xdf\xff\xff\xff\xff",
+    b"\x81\xa1a",
+    b"\x94",
+)
 HEADERS += (b"\xdb\x00\x00\x10\x00", b"\xc9\x00\x00\x10\x00\x05", b"\xc6\xff\xff\xff\xff", b"\x94\x00\x01", b"\xc1")
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from firmware_host import rights
 from firmware_host.configuration import ConfigurationError, StatusParameters
 from firmware_host.rights import Level, Peer, load_rights, read_peer
 
@@ -53,13 +52,13 @@ def test_a_peer_is_who_the_kernel_says_it_is(listener: socket.socket) -> None:
         client.connect(listener.getsockname())
         connection, _ = listener.accept()
         with connection:
-            assert read_peer(connection) == (os.getpid(), os.geteuid(), {os.getegid(), *os.getgroups()})
+            assert read_peer(connection) == Peer(os.getpid(), os.geteuid(), frozenset((os.getegid(), *os.getgroups())))
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can start a process of another user")
 def test_supplementary_groups_of_another_user_s_process_count(listener: socket.socket) -> None:
     child, peer = peer_in_groups(listener, [4321, 4322])
-    assert peer == (child, NOBODY, {NOBODY, 4321, 4322})
+    assert peer == Peer(child, NOBODY, frozenset({NOBODY, 4321, 4322}))
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a process as many groups")
@@ -111,7 +110,7 @@ def test_no_name_is_looked_up_once_a_daemon_runs(monkeypatch: pytest.MonkeyPatch
         raise AssertionError("a name service may take seconds")
 
     for name in ("getgrnam", "getgrgid", "getgrall"):
-        monkeypatch.setattr(rights.grp, name, slow)
+        monkeypatch.setattr(grp, name, slow)
     monkeypatch.setattr(os, "getgrouplist", slow)
     one, other = socket.socketpair()
     with one, other:

@@ -181,3 +181,33 @@ def test_no_bytes_make_it_raise(served: Served, garbage: bytes) -> None:
     serve(served, 4)
     client.close()
     serve(served, 3)
+
+
+VALID = [msgpack.packb([0, number, "echo", {"a": number}]) for number in range(4)]
+ODD = st.one_of(
+    st.binary(max_size=60),
+    st.builds(lambda data, place: data[: place % len(data)], st.sampled_from(VALID), st.integers(0, 99)),
+    st.builds(
+        lambda data, place, byte: data[: place % len(data)] + bytes([byte]) + data[place % len(data) + 1 :],
+        st.sampled_from(VALID),
+        st.integers(0, 99),
+        st.integers(0, 255),
+    ),
+)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(ODD, max_size=4), st.integers(0, 4), st.integers(0, 200))
+def test_valid_requests_are_answered_whatever_comes_after(
+    served: Served, odd: list[bytes], valid: int, cut: int
+) -> None:
+    client, witness = connect(served), connect(served)
+    data = b"".join(VALID[:valid] + odd)
+    answers = ask(served, client, data[:cut]) if cut else []
+    with contextlib.suppress(BrokenPipeError):
+        answers += ask(served, client, data[cut:])
+    assert [[1, n, None, {"a": n}] for n in range(valid)] == answers[:valid]
+    assert ask(served, witness, VALID[1]) == [[1, 1, None, {"a": 1}]]
+    client.close()
+    witness.close()
+    serve(served, 6)
