@@ -121,7 +121,7 @@ class DaemonLoop:
         """As in firmware_host.daemon."""
         beat = ticker.wait()
         self.loop.tick(beat)
-        self._status.serve()
+        self._status.serve(beat.now_s)
         self._watchdog.update(beat, self.loop.mode)
         self._shutdown.step(self.loop, beat.now_s)
         return beat

@@ -73,6 +73,7 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
     depth.add_argument("--depth", type=_depth_cm, metavar="CM", help="the same in every stride")
     depth.add_argument("--adaptive", action="store_true", help="chosen from the mud, once a stride (default)")
     parsers["walk"].add_argument("--strides", type=_count, default=0, metavar="N", help="then stop (default: go on)")
+    parsers["walk"].add_argument("--attended", action="store_true", help="stay; the robot stops when this ends")
     parsers["check"].add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
 
 

@@ -70,6 +70,9 @@ class LogParameters:
 @dataclass(frozen=True)
 class StatusParameters:
     socket: str = "/run/mudskipper/mudskipper.sock"
+    anyone_may_stop: bool = True  # whoever has an account here; else nobody outside the socket's group may connect
+    read_group: str = ""  # who may see how the robot is; empty: the daemon's own group
+    drive_group: str = ""  # who may operate it, and see; empty: the daemon's own group
 
 
 @dataclass(frozen=True)
@@ -187,6 +190,9 @@ def _text_problems(configuration: Configuration) -> Iterator[str]:
         yield "status.socket = '': must name a socket"
     if pose and pose == status:
         yield f"pose.socket = {pose!r}: must not be status.socket"
+    for key in ("read_group", "drive_group"):
+        if "\0" in getattr(configuration.status, key):
+            yield f"status.{key}: must be without a zero byte"
     if "\0" in configuration.log.directory:
         yield f"log.directory = {configuration.log.directory!r}: must be without a zero byte"
 

@@ -35,10 +35,12 @@ from firmware_host.configuration import (
 from firmware_host.failing_recorder import failing_recorder
 from firmware_host.failing_time import failing_clock, failing_ticker
 from firmware_host.failure_calls import failures_of, with_failures
+from firmware_host.lease import Lease
 from firmware_host.loop import Loop
 from firmware_host.operator_calls import OperatorCalls, software_version
 from firmware_host.realtime import prepare_loop
 from firmware_host.recorder import NullRecorder, Recorder
+from firmware_host.rights import Rights, load_rights
 from firmware_host.sd_notify import SystemdNotifier
 from firmware_host.status_socket import AlreadyServedError, StatusSocket
 from firmware_host.ticker import RATE_HZ, Beat, Ticker
@@ -114,10 +116,11 @@ def open_recorder(configuration: Configuration, path: Path | None) -> Recorder |
     return Recorder(path, configuration.text, metadata)
 
 
-def run(configuration: Configuration, shutdown: Shutdown) -> int:
+def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int:
     """Until `shutdown` is wanted and done. Raises BusError, AlreadyServedError or OSError before it has begun."""
     with ExitStack() as stack:
-        status = StatusSocket(Path(configuration.status.socket), {})  # first: it refuses to be the second daemon
+        # First: it refuses to be the second daemon.
+        status = StatusSocket(Path(configuration.status.socket), {}, rights)
         stack.callback(status.close)
         failures = failures_of(configuration)
         ports = failing_ports(open_ports(configuration.bus), configuration.drive, failures)
@@ -131,8 +134,10 @@ def run(configuration: Configuration, shutdown: Shutdown) -> int:
         wall_clock = failing_clock(time.time, failures)
         loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock)
         warnings: list[str] = []
-        calls = OperatorCalls(loop, recorder, str(log_path) if log_path else None, warnings, time.monotonic)
+        lease = Lease()
+        calls = OperatorCalls(loop, recorder, str(log_path) if log_path else None, warnings, time.monotonic, lease)
         status.methods = with_failures(calls.methods, failures, loop.event, time.monotonic)
+        status.on_hang_up = lease.hang_up
         status.report_bug = lambda sentence: loop.event(time.monotonic(), sentence)
         notifier = SystemdNotifier()
         stack.callback(notifier.close)
@@ -154,7 +159,7 @@ def _run_loop(
             beat = ticker.wait()
             now_s = beat.now_s
             loop.tick(beat)
-            status.serve()
+            status.serve(now_s)
             watchdog.update(beat, loop.mode)
         notifier.send("STOPPING=1")
         return 0
@@ -184,6 +189,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         configuration = load_configuration(options.config)
+        rights = load_rights(configuration.status)
     except ConfigurationError as problem:
         return _refuse([f"mudskipperd: {sentence}" for sentence in problem.problems], EXIT_CONFIGURATION)
     if options.check_config:
@@ -191,7 +197,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     shutdown = Shutdown()
     _on_signals(shutdown.ask)
     try:
-        return run(configuration, shutdown)
+        return run(configuration, rights, shutdown)
     except (BusError, AlreadyServedError) as problem:
         return _refuse([f"mudskipperd: {problem}"], EXIT_FAILED)
     except OSError as problem:
