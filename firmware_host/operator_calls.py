@@ -34,13 +34,11 @@ class OperatorCalls:
         self,
         loop: Loop,
         recorder: Recording,
-        log_path: str | None,
         warnings: list[str],
         clock: Callable[[], float],
     ) -> None:
         self._loop = loop
         self._recorder = recorder
-        self._log_path = log_path
         self._warnings = warnings
         self._clock = clock
         self._version = software_version()
@@ -84,7 +82,7 @@ class OperatorCalls:
             "warnings": self._warnings,
             "bus": self._bus(),
             "log": {
-                "path": self._log_path,
+                "path": str(self._recorder.path) if self._recorder.path else None,
                 "dropped": self._recorder.dropped,
                 "writer_alive": self._recorder.writer_alive,
             },
