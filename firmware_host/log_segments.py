@@ -132,7 +132,8 @@ class LogSegments:
         reason = error.strerror or str(error)
         self.problem = f"The log {self.path} cannot be written: {reason}."
         if reason != self._reason:
-            print(self.problem, file=sys.stderr, flush=True)
+            with suppress(OSError):  # standard error may be a file on the same disk
+                print(self.problem, file=sys.stderr, flush=True)
         self._reason = reason
         self._full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         self._retry_s = time.monotonic() + RETRY_S

@@ -52,9 +52,9 @@ class Reporter:
         self._due_s, self._said = now_s + REPORT_INTERVAL_S, log.problem
         self._slowest_s.append(log.slowest_s)
         log.slowest_s = 0.0
-        self._send(log)
+        self.send(log)
 
-    def _send(self, log: LogSegments) -> None:
+    def send(self, log: LogSegments) -> None:
         space = FreeSpace(0.0, 0)
         with suppress(OSError):  # a disk that does not even answer this has no room
             space = free_space(log.path.parent)
@@ -64,7 +64,7 @@ class Reporter:
             "problem": log.problem[:LONGEST_SENTENCE],
             "free_share": space.free_share,
             "free_bytes": space.free_bytes,
-            "slowest_write_s": max(self._slowest_s),
+            "slowest_write_s": max(self._slowest_s, default=0.0),
         }
         with suppress(OSError):  # nobody reads, or nobody is there any more
             os.write(self._pipe, json.dumps(report).encode() + b"\n")
@@ -84,7 +84,9 @@ def write_log(pipe: int, reports: int, path: Path) -> bool:
     for rows in batches:
         log.write(_sound(rows))
         reporter.update(log)
-    return log.close()
+    whole = log.close()
+    reporter.send(log)
+    return whole
 
 
 def _sound(rows: Rows) -> Rows:

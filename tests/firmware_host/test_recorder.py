@@ -276,16 +276,17 @@ def test_a_disk_that_refuses_costs_rows_that_the_log_counts(tmp_path: Path, capf
     """The kernel lets no file grow beyond a size; then it does again."""
     recorder = Recorder(tmp_path / "run.mcap", "", {})
     wait_until(recorder.path.exists)
-    resource.prlimit(recorder.writer_pid, resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
+    resource.prlimit(recorder.writer_pid, resource.RLIMIT_FSIZE, (2000, resource.RLIM_INFINITY))
     put = 0
-    while not look(recorder).problem:
+    deadline_s = time.monotonic() + TIMEOUT_S
+    while not look(recorder).problem and time.monotonic() < deadline_s:
         put += recorder.put(TICK_KIND, make_tick(float(put)))
         time.sleep(0.003)
     assert look(recorder).problem == f"The log {tmp_path / 'run.mcap'} cannot be written: File too large."
     assert recorder.writer_alive
     unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
     resource.prlimit(recorder.writer_pid, resource.RLIMIT_FSIZE, unlimited)
-    while look(recorder).problem:
+    while look(recorder).problem and time.monotonic() < deadline_s:
         put += recorder.put(TICK_KIND, make_tick(float(put)))
         time.sleep(0.003)
     assert recorder.close(TIMEOUT_S)
