@@ -32,6 +32,7 @@ from drivers.failures import FailureParameters
 from drivers.odrive_axis import DriveParameters, WatchdogEndpoints
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
+from firmware_host.log_parameters import LogParameters
 from firmware_host.toml_records import ConfigurationError as ConfigurationError  # for whoever loads one
 from firmware_host.toml_records import RecordReader, parse_document, read_text
 
@@ -59,12 +60,6 @@ class LoopParameters:
     priority: Annotated[int, Bounds(0, 99)] = 45  # SCHED_FIFO, under the interrupt threads' 50; 0: none
     cpu: Annotated[int, Bounds(-1, 1023)] = -1  # to run on; -1: any
     lock_memory: bool = True
-
-
-@dataclass(frozen=True)
-class LogParameters:
-    directory: str = "logs"
-    enabled: bool = True
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
-from datetime import UTC, datetime
 from pathlib import Path
 
 from control.modes import ENERGISED, Mode, Request
@@ -36,6 +35,7 @@ from firmware_host.failing_recorder import failing_recorder
 from firmware_host.failing_time import failing_clock, failing_ticker
 from firmware_host.failure_calls import failures_of, with_failures
 from firmware_host.lease import Lease
+from firmware_host.log_folder import first_path, new_run_id
 from firmware_host.loop import Loop
 from firmware_host.operator_calls import OperatorCalls, software_version
 from firmware_host.realtime import prepare_loop
@@ -99,21 +99,17 @@ class Shutdown:
         return False
 
 
-def new_log_path(configuration: Configuration) -> Path | None:
+def open_recorder(configuration: Configuration) -> Recorder | NullRecorder:
+    """Of a new run. Raises OSError where no log can be written at all."""
     if not configuration.log.enabled:
-        return None
-    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
-    return Path(configuration.log.directory) / f"{configuration.robot.name}-{stamp}.mcap"
-
-
-def open_recorder(configuration: Configuration, path: Path | None) -> Recorder | NullRecorder:
-    if path is None:
         return NullRecorder()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if not os.access(path.parent, os.W_OK):
-        raise PermissionError(errno.EACCES, "is not writable", str(path.parent))
-    metadata = {"robot": configuration.robot.name, "version": software_version()}
-    return Recorder(path, configuration.text, metadata)
+    folder, robot = Path(configuration.log.directory), configuration.robot.name
+    folder.mkdir(parents=True, exist_ok=True)
+    if not os.access(folder, os.W_OK):
+        raise PermissionError(errno.EACCES, "is not writable", str(folder))
+    run_id = new_run_id(robot)
+    metadata = {"robot": robot, "run_id": run_id, "version": software_version()}
+    return Recorder(first_path(folder, run_id), configuration.text, metadata, configuration.log)
 
 
 def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int:
@@ -128,14 +124,13 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         stack.callback(drives.close)
         pose = PosePort(Path(configuration.pose.socket) if configuration.pose.socket else None)
         stack.callback(pose.close)
-        log_path = new_log_path(configuration)
-        recorder = failing_recorder(open_recorder(configuration, log_path), failures)
+        recorder = failing_recorder(open_recorder(configuration), failures)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
         wall_clock = failing_clock(time.time, failures)
         loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock)
         warnings: list[str] = []
         lease = Lease()
-        calls = OperatorCalls(loop, recorder, str(log_path) if log_path else None, warnings, time.monotonic, lease)
+        calls = OperatorCalls(loop, recorder, warnings, time.monotonic, lease)
         status.methods = with_failures(calls.methods, failures, loop.event, time.monotonic)
         status.on_hang_up = lease.hang_up
         status.report_bug = lambda sentence: loop.event(time.monotonic(), sentence)

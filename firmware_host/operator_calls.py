@@ -41,7 +41,6 @@ class OperatorCalls:
         self,
         loop: Loop,
         recorder: Recording,
-        log_path: str | None,
         warnings: list[str],
         clock: Callable[[], float],
         lease: Lease | None = None,
@@ -49,7 +48,6 @@ class OperatorCalls:
         self._loop = loop
         self._lease = lease or Lease()
         self._recorder = recorder
-        self._log_path = log_path
         self._warnings = warnings
         self._clock = clock
         self._version = software_version()
@@ -97,7 +95,7 @@ class OperatorCalls:
             "warnings": self._warnings,
             "bus": self._bus(),
             "log": {
-                "path": self._log_path,
+                "path": str(self._recorder.path) if self._recorder.path else None,
                 "dropped": self._recorder.dropped,
                 "writer_alive": self._recorder.writer_alive,
             },
@@ -207,7 +205,7 @@ class OperatorCalls:
 
     def check(self, params: dict[str, Any]) -> list[dict[str, Any]]:
         """What stands between this robot and torque, item by item."""
-        return arming_checks(self._loop, self._log_path or "off", self._warnings)
+        return arming_checks(self._loop, str(self._recorder.path or "off"), self._warnings)
 
 
 def _fault(loop: Loop) -> dict[str, Any] | None:
