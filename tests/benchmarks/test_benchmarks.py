@@ -82,6 +82,15 @@ def test_memory_growth() -> None:
     assert report.keys() >= {"dropped_rows", "strides", "walked_m", "bar_kib"}
 
 
+def test_socket_fuzz() -> None:
+    report = report_of("socket_fuzz", "--streams", "600")
+    assert sum(report["kinds"].values()) == report["streams"] == 600
+    assert (report["unanswered"], report["bugs"], report["most_calls_a_tick"]) == (0, [], 1)
+    assert report["longest_wait_ticks"] <= 17
+    assert report["valid_requests"] > 100 and report["counters"]["garbled_requests"] > 100
+    assert report.keys() >= {"serve_us", "readings", "growth_kib", "ticks", "seconds", "seed"}
+
+
 def test_estimator_cost() -> None:
     """600 ticks of a stride of 1.58 s; the law that was put in comes out, so every fit was at work."""
     report = report_of("estimator_cost", "--strides", "2", "--memory-strides", "2")
@@ -121,7 +130,9 @@ def test_a_person_gets_a_table_that_ends_in_the_verdict() -> None:
     assert lines[-1].startswith("at least 8 times faster than real time: ")
 
 
-@pytest.mark.parametrize("name", ["tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "estimator_cost"])
+@pytest.mark.parametrize(
+    "name", ["tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "socket_fuzz", "estimator_cost"]
+)
 def test_help_says_what_is_measured(name: str) -> None:
     module = (ROOT / "benchmarks" / f"{name}.py").read_text(encoding="utf-8")
     assert module.split('"""')[1].splitlines()[0] in run_benchmark(name, "--help")
