@@ -81,3 +81,13 @@ def unpacked(data: bytes) -> Iterator[Any]:
     unpacker = msgpack.Unpacker(raw=False)
     unpacker.feed(data)
     yield from unpacker
+
+
+def is_open(client: socket.socket) -> bool:
+    client.setblocking(False)
+    try:
+        return bool(client.recv(65536))
+    except BlockingIOError:
+        return True
+    except ConnectionResetError:
+        return False
