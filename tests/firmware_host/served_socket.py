@@ -67,7 +67,7 @@ def ask(served: Served, client: socket.socket, data: bytes) -> list[Any]:
     while True:
         try:
             answer = client.recv(1 << 20)
-        except BlockingIOError:
+        except (BlockingIOError, ConnectionResetError):
             break
         if not answer:
             break

@@ -9,7 +9,7 @@ from typing import Any
 import msgpack
 import pytest
 
-from firmware_host.rpc import MOST_PARAMS
+from firmware_host.rpc import LONGEST_REQUEST, MOST_PARAMS
 from tests.firmware_host.served_socket import Served, ask, connect, is_open, serve
 
 NESTED: Any = []
@@ -93,3 +93,28 @@ def test_a_few_bytes_that_announce_much_take_no_memory(served: Served, header: b
     finally:
         tracemalloc.stop()
     assert peak < 1_000_000
+
+
+def tree(depth: int) -> Any:
+    """Of params within params, each short."""
+    return {str(place): tree(depth - 1) for place in range(MOST_PARAMS)} if depth else "x" * 20
+
+
+@pytest.mark.parametrize("depth", [2, 3])
+def test_a_request_of_many_short_parts_is_too_long_as_well(served: Served, depth: int) -> None:
+    data = msgpack.packb([0, 1, "echo", tree(depth)])
+    assert len(data) > LONGEST_REQUEST
+    client = connect(served)
+    ((_, number, error, _),) = ask(served, client, data)
+    assert number is None and error == f"a request has at most {LONGEST_REQUEST} bytes"
+    assert not is_open(client)
+
+
+def test_the_longest_request_is_answered_and_one_byte_more_is_not(served: Served) -> None:
+    spare = LONGEST_REQUEST - len(msgpack.packb([0, 1, "echo", {"a": "x" * 1000}])) + 1000
+    client = connect(served)
+    for _ in range(3):
+        assert len(ask(served, client, msgpack.packb([0, 1, "echo", {"a": "x" * spare}]))) == 1
+        assert is_open(client)
+    ((_, _, error, _),) = ask(served, client, msgpack.packb([0, 1, "echo", {"a": "x" * (spare + 1)}]))
+    assert "at most" in error and not is_open(client)
