@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import msgpack
 
 from firmware_host.rights import Level, Peer
-from firmware_host.rpc import LONGEST_REQUEST, make_unpacker
+from firmware_host.rpc import LONGEST_REQUEST, SHAPE, TOO_LONG, GarbledError, make_unpacker
 
 READ_BYTES = LONGEST_REQUEST
 WRITE_BYTES = 64 * 1024  # at once
@@ -62,18 +62,27 @@ class Client:
         self._begun_s = inf  # when the rest of a request began to be waited for
 
     def receive(self) -> None:
-        """Raises OSError, or msgpack.BufferFull for a request that is too long."""
+        """Raises OSError, or GarbledError for a request that is too long."""
         data = self.connection.recv(READ_BYTES)
         self.ended = not data
         self._received += len(data)
-        self._unpacker.feed(data)
+        try:
+            self._unpacker.feed(data)
+        except msgpack.BufferFull:
+            raise GarbledError(TOO_LONG) from None
 
     def next_message(self, now_s: float) -> Any:
-        """Or NOTHING. Raises ValueError, msgpack.UnpackException or RecursionError for what is no MessagePack."""
-        message = next(self._unpacker, NOTHING)
+        """Or NOTHING. Raises GarbledError for what is too long or no MessagePack."""
+        try:
+            message = next(self._unpacker, NOTHING)
+        except (ValueError, msgpack.UnpackException, RecursionError):
+            raise GarbledError(SHAPE) from None
+        end = self._received if message is NOTHING else self._unpacker.tell()
+        if end - self._read > LONGEST_REQUEST:  # of many short parts: the unpacker bounds but the parts
+            raise GarbledError(TOO_LONG)
         if message is not NOTHING:
-            self._read, self._begun_s = self._unpacker.tell(), inf
-        elif self._received > self._read:
+            self._read, self._begun_s = end, inf
+        elif end > self._read:
             self._begun_s = min(self._begun_s, now_s)
         return message
 

@@ -22,6 +22,8 @@ PARTS = 4  # of a request
 NOT_PERMITTED = "not permitted: "  # how a refusal for want of rights begins
 SHAPE = f"a request is [0, id, method, params] in MessagePack, with at most {MOST_PARAMS} params"
 
+TOO_LONG = f"a request has at most {LONGEST_REQUEST} bytes"
+
 
 class RefusedError(Exception):
     """A request that was understood and will not be done; the text says why."""

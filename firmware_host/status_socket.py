@@ -16,12 +16,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import msgpack
-
 from firmware_host.configuration import StatusParameters
 from firmware_host.connection import LONGEST_BACKLOG, NOTHING, Caller, Client
 from firmware_host.rights import Peer, Rights, load_rights, read_peer
-from firmware_host.rpc import LONGEST_REQUEST, RESPONSE, SHAPE, GarbledError, read_params, read_shape
+from firmware_host.rpc import RESPONSE, GarbledError, read_params, read_shape
 from firmware_host.rpc import RefusedError as RefusedError  # for whoever writes a method
 from firmware_host.socket_file import AlreadyServedError as AlreadyServedError  # for whoever opens one
 from firmware_host.socket_file import SocketFile
@@ -117,8 +115,8 @@ class StatusSocket:
             try:
                 client.receive()
                 self._waiting[descriptor] = None
-            except msgpack.BufferFull:
-                self._reject(client, f"a request must be shorter than {LONGEST_REQUEST} bytes")
+            except GarbledError as problem:
+                self._reject(client, str(problem))
             except OSError:
                 return self._drop(descriptor)
         return self._settle(descriptor)
@@ -136,8 +134,8 @@ class StatusSocket:
         try:
             message = client.next_message(now_s)
             request = None if message is NOTHING else read_shape(message)
-        except (GarbledError, ValueError, msgpack.UnpackException, RecursionError):
-            self._reject(client, SHAPE)
+        except GarbledError as problem:
+            self._reject(client, str(problem))
         else:
             if request is not None:
                 client.budget.spend()

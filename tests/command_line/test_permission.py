@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from argparse import Namespace
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,9 @@ from typing import Any
 import pytest
 
 from command_line import exit_codes, operation
-from firmware_host.status_client import NotPermittedError
+from firmware_host.status_client import NotPermittedError, StatusClient
 
+NOBODY = 65534
 REFUSAL = "status is for members of the group mudskipper"
 
 
@@ -52,3 +54,33 @@ def test_anything_else_is_not_permitted(
     options.attended = attended
     assert command(options) == exit_codes.NOT_PERMITTED
     assert capsys.readouterr().err == f"mudskipper: {REFUSAL}\n"
+
+
+def permitted(path: Path, method: str) -> bool:
+    """Of a process of another user, in no group of the daemon's."""
+    child = os.fork()
+    if child == 0:
+        status = 2
+        try:
+            os.setgroups([])
+            os.setresgid(NOBODY, NOBODY, NOBODY)
+            os.setresuid(NOBODY, NOBODY, NOBODY)
+            StatusClient(path).call(method)
+            status = 0
+        except NotPermittedError:
+            status = 1
+        finally:
+            os._exit(status)
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    assert status in (0, 1)
+    return status == 0
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
+def test_a_real_stranger_may_stop_a_real_daemon_s_robot_and_no_more(bench: Any) -> None:
+    bench.folder.chmod(0o755)
+    assert bench.run("arm").stdout == "hold\n"
+    allowed = {method for method in ("hello", "status", "arm", "walk", "lease", "clear", "stop", "disarm")
+               if permitted(bench.socket, method)}  # fmt: skip
+    assert allowed == {"hello", "stop", "disarm"}
+    assert bench.wait_for(lambda report: report["mode"] == "idle")["fault"] is None

@@ -67,7 +67,7 @@ def ask(served: Served, client: socket.socket, data: bytes) -> list[Any]:
     while True:
         try:
             answer = client.recv(1 << 20)
-        except BlockingIOError:
+        except (BlockingIOError, ConnectionResetError):
             break
         if not answer:
             break
@@ -81,3 +81,13 @@ def unpacked(data: bytes) -> Iterator[Any]:
     unpacker = msgpack.Unpacker(raw=False)
     unpacker.feed(data)
     yield from unpacker
+
+
+def is_open(client: socket.socket) -> bool:
+    client.setblocking(False)
+    try:
+        return bool(client.recv(65536))
+    except BlockingIOError:
+        return True
+    except ConnectionResetError:
+        return False

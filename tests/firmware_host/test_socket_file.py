@@ -31,6 +31,12 @@ def test_the_file_has_its_permissions_whatever_the_umask(short_folder: Path, mod
     assert not made.path.exists()
 
 
+def test_its_folder_is_made_and_nobody_is_waited_for(short_folder: Path) -> None:
+    made = SocketFile(short_folder / "one" / "two" / "s", 0o660, 4)
+    assert not made.listener.getblocking()
+    made.close()
+
+
 def test_a_second_daemon_is_refused(short_folder: Path) -> None:
     first = SocketFile(short_folder / "s", 0o660, 4)
     with pytest.raises(AlreadyServedError, match="already running"):
