@@ -82,6 +82,22 @@ def test_memory_growth() -> None:
     assert report.keys() >= {"dropped_rows", "strides", "walked_m", "bar_kib"}
 
 
+def test_corrupted_logs() -> None:
+    report = report_of("corrupted_logs", "--logs", "40")
+    assert sum(report["outcomes"].values()) == report["logs"] == 40
+    assert report.keys() >= {"slowest_s", "peak_in_log_sizes", "seed"}
+    assert report["wrong"] == []
+
+
+def test_log_kills() -> None:
+    """Each victim once, and the daemon once more."""
+    report = report_of("log_kills", "--kills", "5")
+    assert [kill["victim"] for kill in report["rounds"]] == ["daemon", "writer", "both", "all", "daemon"]
+    sums = report["sums"]
+    assert (sums["missing_inside"], sums["doubled"], sums["unsound"]) == (0, 0, 0)
+    assert sums["segments"] >= 5
+
+
 def test_estimator_cost() -> None:
     """600 ticks of a stride of 1.58 s; the law that was put in comes out, so every fit was at work."""
     report = report_of("estimator_cost", "--strides", "2", "--memory-strides", "2")
@@ -121,7 +137,10 @@ def test_a_person_gets_a_table_that_ends_in_the_verdict() -> None:
     assert lines[-1].startswith("at least 8 times faster than real time: ")
 
 
-@pytest.mark.parametrize("name", ["tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "estimator_cost"])
+@pytest.mark.parametrize(
+    "name",
+    ["tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "estimator_cost", "corrupted_logs", "log_kills"],
+)
 def test_help_says_what_is_measured(name: str) -> None:
     module = (ROOT / "benchmarks" / f"{name}.py").read_text(encoding="utf-8")
     assert module.split('"""')[1].splitlines()[0] in run_benchmark(name, "--help")
