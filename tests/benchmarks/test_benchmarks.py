@@ -21,6 +21,9 @@ from benchmarks.tick_time import STAGES, VARIANTS
 ROOT = Path(__file__).parent.parent.parent
 TIMEOUT_S = 60.0
 ALWAYS = {"benchmark", "reached", "verdict"}
+BENCHMARKS = (
+    "tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "estimator_cost", "corrupted_logs", "log_kills",
+)  # fmt: skip
 SUMMARY = {"median", "p99", "max"}
 
 
@@ -137,10 +140,7 @@ def test_a_person_gets_a_table_that_ends_in_the_verdict() -> None:
     assert lines[-1].startswith("at least 8 times faster than real time: ")
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "estimator_cost", "corrupted_logs", "log_kills"],
-)
+@pytest.mark.parametrize("name", BENCHMARKS)
 def test_help_says_what_is_measured(name: str) -> None:
     module = (ROOT / "benchmarks" / f"{name}.py").read_text(encoding="utf-8")
     assert module.split('"""')[1].splitlines()[0] in run_benchmark(name, "--help")
