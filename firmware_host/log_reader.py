@@ -82,7 +82,7 @@ def read_logs(paths: Sequence[Path]) -> Log:
         raise LogError(f"{paths[0]}: segments {numbers[0]} to {numbers[-1]} of its run are not all here, each once")
     ordered = [logs[place] for _, place in by_number]
     return ordered[0]._replace(
-        ticks=_in_order(np.concatenate([log.ticks for log in ordered])),
+        ticks=_in_order(np.frombuffer(b"".join(log.ticks.tobytes() for log in ordered), dtype=tick_type())),
         strides=[stride for log in ordered for stride in log.strides],
         events=[event for log in ordered for event in log.events],
         complete=all(log.complete for log in ordered),
@@ -93,7 +93,8 @@ def _in_order(ticks: NDArray[np.void]) -> NDArray[np.void]:
     """Ticks that were held back at rest stand after later ones in the file: see rest_thinning.py."""
     if np.all(ticks["tick"][1:] >= ticks["tick"][:-1]):
         return ticks
-    return ticks[np.argsort(ticks["tick"], kind="stable")]
+    whole_rows = ticks.view(np.dtype((np.void, ticks.dtype.itemsize)))  # with the bytes that no field names
+    return whole_rows[np.argsort(ticks["tick"], kind="stable")].view(ticks.dtype)
 
 
 def _is_cut(error: Exception, at_the_end: bool) -> bool:

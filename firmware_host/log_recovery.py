@@ -24,7 +24,7 @@ from mcap.records import Attachment, Channel, Chunk, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
-from firmware_host.log_chunks import Row, open_chunk, records_of
+from firmware_host.log_chunks import RECORD_HEAD, Row, open_chunk, records_of
 from firmware_host.log_file import LogFile, lock_file
 from firmware_host.log_folder import BROKEN, PART, finished_path, synchronise_folder, unfinished_files
 from firmware_host.log_reader import DAMAGE, LogError, read_log
@@ -186,7 +186,8 @@ def _sound_chunks(contents: bytes) -> Iterator[list[Row | Schema | Channel]]:
         opcode, length, first_ns, last_ns, size, checksum = CHUNK_HEAD.unpack_from(contents, start)
         (compressed,) = LENGTH.unpack_from(contents, data - LENGTH.size)
         end = data + compressed
-        if opcode != CHUNK_OPCODE or end > len(contents) or size > LARGEST_CHUNK or length != end - start - 9:
+        sane = opcode == CHUNK_OPCODE and checksum != 0 and size <= LARGEST_CHUNK
+        if not sane or end > len(contents) or length != end - start - RECORD_HEAD.size:
             continue
         with suppress(*DAMAGE):
             chunk = Chunk("lz4", contents[data:end], last_ns, first_ns, checksum, size)

@@ -59,8 +59,8 @@ class LogSegments:
         wanted = [*thinned.rows, self._event(thinned.notice)] if thinned.notice else thinned.rows
         if self._file is None and time.monotonic() >= self._retry_s:
             self._open()
-        self._write(wanted)
         self._rotate(wanted)
+        self._write(wanted)
         self._free_room()
 
     def _write(self, rows: Rows) -> None:
@@ -142,7 +142,7 @@ class LogSegments:
         self.slowest_s, file.slowest_s = max(self.slowest_s, file.slowest_s), 0.0
 
     def _rotate(self, rows: Rows) -> None:
-        """By the rows' own time, and by size."""
+        """Before these rows, by their own time and by the size so far."""
         if self._file is None or not rows:
             return
         if self._first_stamp_s is None:

@@ -79,10 +79,7 @@ class RestThinning:
             written.append(row)
             return f"end of the rest: the {len(held)} ticks held back before this one are written after all"
         (number,) = struct.unpack_from("<I", row[1], NUMBER)
-        if self._resting and number % self._every:
-            self._held.append(row)
-            return ""
-        written.append(row)
+        (self._held if self._resting and number % self._every else written).append(row)
         begins = self._resting and not was_resting
         return f"at rest: of the ticks, one in {self._every} is written from here on" if begins else ""
 

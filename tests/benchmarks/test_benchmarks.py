@@ -21,6 +21,9 @@ from benchmarks.tick_time import STAGES, VARIANTS
 ROOT = Path(__file__).parent.parent.parent
 TIMEOUT_S = 60.0
 ALWAYS = {"benchmark", "reached", "verdict"}
+BENCHMARKS = (
+    "tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "socket_fuzz", "estimator_cost", "corrupted_logs", "log_kills",
+)  # fmt: skip
 SUMMARY = {"median", "p99", "max"}
 
 
@@ -75,7 +78,7 @@ def test_lockstep_speed() -> None:
 
 
 def test_memory_growth() -> None:
-    report = report_of("memory_growth", "--seconds", "3", "--every", "1")
+    report = report_of("memory_growth", "socket_fuzz", "--seconds", "3", "--every", "1")
     assert [reading["walked_s"] for reading in report["readings"]] == [1.0, 2.0, 3.0]
     assert all(reading["resident_kib"] > 0.0 for reading in report["readings"])
     assert report["growth_kib"] == report["readings"][-1]["resident_kib"] - report["readings"][0]["resident_kib"]
@@ -89,6 +92,22 @@ def test_socket_fuzz() -> None:
     assert report["longest_wait_ticks"] <= 17
     assert report["valid_requests"] > 100 and report["counters"]["garbled_requests"] > 100
     assert report.keys() >= {"serve_us", "readings", "growth_kib", "ticks", "seconds", "seed"}
+
+
+def test_corrupted_logs() -> None:
+    report = report_of("corrupted_logs", "--logs", "40")
+    assert sum(report["outcomes"].values()) == report["logs"] == 40
+    assert report.keys() >= {"slowest_s", "peak_in_log_sizes", "seed"}
+    assert report["wrong"] == []
+
+
+def test_log_kills() -> None:
+    """Each victim once, and the daemon once more."""
+    report = report_of("log_kills", "--kills", "5")
+    assert [kill["victim"] for kill in report["rounds"]] == ["daemon", "writer", "both", "all", "daemon"]
+    sums = report["sums"]
+    assert (sums["missing_inside"], sums["doubled"], sums["unsound"]) == (0, 0, 0)
+    assert sums["segments"] >= 5
 
 
 def test_estimator_cost() -> None:
@@ -130,9 +149,7 @@ def test_a_person_gets_a_table_that_ends_in_the_verdict() -> None:
     assert lines[-1].startswith("at least 8 times faster than real time: ")
 
 
-@pytest.mark.parametrize(
-    "name", ["tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "socket_fuzz", "estimator_cost"]
-)
+@pytest.mark.parametrize("name", BENCHMARKS)
 def test_help_says_what_is_measured(name: str) -> None:
     module = (ROOT / "benchmarks" / f"{name}.py").read_text(encoding="utf-8")
     assert module.split('"""')[1].splitlines()[0] in run_benchmark(name, "--help")
