@@ -17,9 +17,10 @@ from copy import deepcopy
 from pathlib import Path
 from types import ModuleType
 
-import can
 import hypothesis
 import pytest
+
+from drivers import mock_bus, odrive_axis
 
 ROOT = Path(__file__).parent.parent.parent
 MODULE = "drivers.transmit_gate"
@@ -178,7 +179,7 @@ def _run_tests(tree: ast.Module) -> int:
 
 def main() -> int:
     os.chdir(ROOT)
-    assert can is not None and hypothesis is not None  # loaded once, for all forks
+    assert hypothesis and mock_bus and odrive_axis  # loaded once, for all forks
     killed, survivors = 0, []
     for text, tree in mutants():
         if is_killed(tree):

@@ -258,6 +258,19 @@ def test_the_step_is_as_long_as_the_time_that_has_passed(armed: Bench) -> None:
     assert armed.torque(0.601) == 0.0
 
 
+def test_the_bounds_themselves_belong_to_what_may_pass() -> None:
+    gate = TransmitGate(JointLimits(torque_nm=0.75, torque_rate_nm_s=128.0))
+    gate.open()
+    gate.allow_step(1.0 / 512.0)
+    step_nm = 0.25 + 1e-6
+    for sign in (1.0, -1.0):
+        assert gate.torque_problem(sign * (0.5 + step_nm), sign * 0.5) == ""
+        assert gate.torque_problem(sign * (0.5 + 1.001 * step_nm), sign * 0.5) != ""
+        assert gate.torque_problem(sign * (0.75 + 1e-6), sign * 0.75) == ""
+        assert gate.torque_problem(sign * (0.75 + 1.1e-6), sign * 0.75) != ""
+        assert gate.torque_problem(sign * 0.0, sign * 0.75) == ""
+
+
 def test_no_torque_passes_before_a_step_was_allowed() -> None:
     gate, bus = TransmitGate(LIMITS), MockBus()
     far, port = bus.open(), gate.outlet(bus.open(), [DriveParameters("left", 2)])
@@ -276,6 +289,8 @@ def test_every_drive_has_its_own_torque_before(armed: Bench) -> None:
 def test_the_first_torque_after_arming_counts_from_zero_on_every_bus(armed: Bench) -> None:
     bus = MockBus()
     far, second = bus.open(), armed.gate.outlet(bus.open(), [DriveParameters("right", 2)])
+    second.send(Frame(MOTOR, pack("<f", 0.4)))
+    assert far.receive() == [Frame(MOTOR, ZERO)]
     for torque_nm in (0.2, 0.4):
         armed.torque(torque_nm)
         second.send(Frame(MOTOR, pack("<f", torque_nm)))
