@@ -15,6 +15,8 @@ from typing import Any
 import can
 import pytest
 from can.interfaces.socketcan import socketcan
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from drivers.can_port import BusState, PythonCanPort, open_port
 from drivers.frames import Frame, encode_frame
@@ -171,6 +173,19 @@ def test_no_broadcast_manager_is_asked_for(kernel: socket.socket, monkeypatch: p
     tell(kernel, ENCODER)
     assert ids(opened) == [0x009]
     opened.close()
+
+
+@settings(max_examples=500, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.lists(st.binary(min_size=16, max_size=16), max_size=8))
+def test_whatever_sixteen_bytes_the_kernel_gives_nothing_is_raised_and_every_frame_counts(
+    port: PythonCanPort, kernel: socket.socket, data: list[bytes]
+) -> None:
+    errors_before = port.error_frames
+    for frame in data:
+        kernel.send(frame)
+    frames = port.receive()
+    assert len(frames) + port.error_frames - errors_before == len(data)
+    assert not any(frame.is_error for frame in frames)
 
 
 def test_a_mock_port_fails_as_it_is_told() -> None:
