@@ -142,7 +142,7 @@ class DaemonLoop:
         """From whatever was before: nobody drained the buses while the bare loop ran."""
         self._run_until(lambda: self.loop.mode in (Mode.IDLE, Mode.FAULT))
         self.loop.request(Request.CLEAR, time.monotonic())
-        self._run_until(lambda: self.loop.mode is Mode.IDLE and self.loop.health.fault is None)
+        self._run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking())
         self.loop.request(Request.ARM, time.monotonic())
         self._run_until(lambda: self.loop.mode is Mode.HOLD)
         order = WalkOrder(self.loop.configuration.adaptation.initial_depth_m)
@@ -154,7 +154,7 @@ class DaemonLoop:
         ticker, deadline_s = Ticker(), time.monotonic() + LONGEST_STEP_S
         while not done():
             if self.beat(ticker).now_s > deadline_s:
-                raise RuntimeError(f"the simulated robot is {self.loop.mode.name.lower()}: {self.loop.health.fault}")
+                raise RuntimeError(f"the simulated robot is {self.loop.mode.name.lower()}: {self.loop.fault}")
 
 
 @contextmanager

@@ -244,10 +244,10 @@ class TimedWalk:
         walk = self.walk
         walk.tick_number += 1
         walk.robot.advance(walk.now_s)
-        beat, closed_before = Beat(walk.now_s, 0.0, walk.tick_number, 0), walk.loop.strides_closed
+        beat, closed_before = Beat(walk.now_s, 0.0, walk.tick_number, 0), walk.loop.learning.strides_closed
         start_s = perf_counter()
         walk.loop.tick(beat)
-        return perf_counter() - start_s, walk.loop.strides_closed > closed_before
+        return perf_counter() - start_s, walk.loop.learning.strides_closed > closed_before
 
     def _marked_tick(self) -> tuple[dict[str, float], bool]:
         moments_s = self.marks.moments_s

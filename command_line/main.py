@@ -58,6 +58,7 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
         "check": "What stands between this robot and a walk.",
     }
     parsers = {name: _add(commands, name, f"operation.{name}", text) for name, text in described.items()}
+    parsers["fail"] = _add_fail(commands)
     for parser in parsers.values():
         parser.add_argument(
             "--socket",
@@ -65,7 +66,7 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
             default=Path(os.environ.get("MUDSKIPPER_SOCKET", DEFAULT_SOCKET)),
             help="of the daemon (default: $MUDSKIPPER_SOCKET or %(default)s)",
         )
-    for name in ("status", "check"):
+    for name in ("status", "check", "fail"):
         parsers[name].add_argument("--json", action="store_true", help="for machines")
     parsers["watch"].add_argument("--period", type=_seconds, default=0.5, metavar="S", help="between two looks")
     depth = parsers["walk"].add_mutually_exclusive_group()
@@ -73,6 +74,15 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
     depth.add_argument("--adaptive", action="store_true", help="chosen from the mud, once a stride (default)")
     parsers["walk"].add_argument("--strides", type=_count, default=0, metavar="N", help="then stop (default: go on)")
     parsers["check"].add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
+
+
+def _add_fail(commands: Commands) -> argparse.ArgumentParser:  # type: ignore[valid-type]
+    fail = _add(commands, "fail", "failing.fail", "Make a part of the robot fail on purpose, where that is allowed.")
+    fail.add_argument("component", nargs="?", help="what fails, such as left_sweep, bus.left, pose; or all")
+    fail.add_argument("kind", nargs="?", help="off, stuck, garbage, slow, intermittent ..., or ok to end it")
+    fail.add_argument("--for", type=float, default=2.0, metavar="S", dest="seconds", help="then it ends by itself")
+    fail.add_argument("--list", action="store_true", help="what can fail, how, and what fails already")
+    return fail
 
 
 def _seconds(text: str) -> float:

@@ -23,9 +23,12 @@ from control.gait_adaptation import candidates
 from control.geometry import FlipperGeometry
 from control.joint_friction import NO_FRICTION, JointFriction
 from control.joint_pd import ArmMass, JointGains
+from control.joint_watch import FaultBounds
 from control.limits import JointLimits, JointRange
 from control.records import JOINTS
 from control.recovery import RecoveryParameters
+from control.winding import WindingParameters
+from drivers.failures import FailureParameters
 from drivers.odrive_axis import DriveParameters, WatchdogEndpoints
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
@@ -53,7 +56,6 @@ class BusParameters:
 
 @dataclass(frozen=True)
 class LoopParameters:
-    silence_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0263  # 10 ticks without position or current: a fault
     priority: Annotated[int, Bounds(0, 99)] = 45  # SCHED_FIFO, under the interrupt threads' 50; 0: none
     cpu: Annotated[int, Bounds(-1, 1023)] = -1  # to run on; -1: any
     lock_memory: bool = True
@@ -87,6 +89,8 @@ class Configuration:
     motion: MotionParameters = MotionParameters()
     recovery: RecoveryParameters = RecoveryParameters()
     limits: JointLimits = JointLimits()
+    winding: WindingParameters = WindingParameters()
+    faults: FaultBounds = FaultBounds()
     estimation: EstimationParameters = EstimationParameters()
     friction: dict[str, JointFriction] = field(default_factory=dict)  # by joint, where it was measured
     adaptation: AdaptationParameters = AdaptationParameters()
@@ -94,6 +98,7 @@ class Configuration:
     log: LogParameters = LogParameters()
     status: StatusParameters = StatusParameters()
     pose: PoseParameters = PoseParameters()
+    failures: FailureParameters = FailureParameters()
     watchdog_endpoints: list[WatchdogEndpoints] = field(default_factory=list)  # of further builds of ODrive's firmware
     text: str = ""  # the file itself, which goes into every log
 
@@ -168,6 +173,7 @@ def _contradictions(configuration: Configuration) -> Iterator[str]:
         yield from _sweep_problems(configuration)
     yield from _torque_problems(configuration)
     yield from _lead_problems(configuration)
+    yield from _fault_problems(configuration)
 
 
 def _text_problems(configuration: Configuration) -> Iterator[str]:
@@ -231,6 +237,20 @@ def _lead_problems(configuration: Configuration) -> Iterator[str]:
                 f"gains.{key} = {getattr(gains, key)}: must be at least {ceil(100.0 * needed_nm_rad) / 100.0:.2f},"
                 f" or a recovery.lead_deg = {lead_deg:g} does not reach limits.torque_nm = {torque_nm}"
             )
+
+
+def _fault_problems(configuration: Configuration) -> Iterator[str]:
+    """Milder reactions come first."""
+    bounds = configuration.faults
+    for milder, harder in (("late_s", "quiet_s"), ("quiet_s", "silence_s"), ("lag_s", "silence_s")):
+        low, high = getattr(bounds, milder), getattr(bounds, harder)
+        if low > high:
+            yield f"faults.{milder} = {low}: must be at most faults.{harder} = {high}"
+    if bounds.voltage_min_v > bounds.voltage_low_v:
+        yield (
+            f"faults.voltage_min_v = {bounds.voltage_min_v}: must be at most"
+            f" faults.voltage_low_v = {bounds.voltage_low_v}"
+        )
 
 
 def _motor_force_problems(configuration: Configuration) -> Iterator[str]:

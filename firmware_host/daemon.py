@@ -20,6 +20,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from control.modes import ENERGISED, Mode, Request
+from drivers.failing_port import failing_ports
+from drivers.failing_pose import failing_pose
+from drivers.failures import Failures
 from drivers.odrive_drives import OdriveDrives
 from drivers.pose_port import PosePort
 from firmware_host.buses import BusError, open_ports
@@ -29,6 +32,9 @@ from firmware_host.configuration import (
     ConfigurationError,
     load_configuration,
 )
+from firmware_host.failing_recorder import failing_recorder
+from firmware_host.failing_time import failing_clock, failing_ticker
+from firmware_host.failure_calls import failures_of, with_failures
 from firmware_host.loop import Loop
 from firmware_host.operator_calls import OperatorCalls, software_version
 from firmware_host.realtime import prepare_loop
@@ -113,18 +119,20 @@ def run(configuration: Configuration, shutdown: Shutdown) -> int:
     with ExitStack() as stack:
         status = StatusSocket(Path(configuration.status.socket), {})  # first: it refuses to be the second daemon
         stack.callback(status.close)
-        ports = open_ports(configuration.bus)
+        failures = failures_of(configuration)
+        ports = failing_ports(open_ports(configuration.bus), configuration.drive, failures)
         drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         stack.callback(drives.close)
         pose = PosePort(Path(configuration.pose.socket) if configuration.pose.socket else None)
         stack.callback(pose.close)
         log_path = new_log_path(configuration)
-        recorder = open_recorder(configuration, log_path)
+        recorder = failing_recorder(open_recorder(configuration, log_path), failures)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
-        loop = Loop(configuration, drives, pose, recorder)
+        wall_clock = failing_clock(time.time, failures)
+        loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock)
         warnings: list[str] = []
         calls = OperatorCalls(loop, recorder, str(log_path) if log_path else None, warnings, time.monotonic)
-        status.methods = calls.methods
+        status.methods = with_failures(calls.methods, failures, loop.event, time.monotonic)
         status.report_bug = lambda sentence: loop.event(time.monotonic(), sentence)
         notifier = SystemdNotifier()
         stack.callback(notifier.close)
@@ -132,11 +140,13 @@ def run(configuration: Configuration, shutdown: Shutdown) -> int:
         warnings += prepare_loop(options.priority, options.cpu, options.lock_memory)
         for warning in warnings:
             print(f"warning: {warning}", file=sys.stderr)
-        return _run_loop(loop, status, notifier, shutdown)
+        return _run_loop(loop, failures, status, notifier, shutdown)
 
 
-def _run_loop(loop: Loop, status: StatusSocket, notifier: SystemdNotifier, shutdown: Shutdown) -> int:
-    ticker, watchdog = Ticker(), WatchdogFeed(notifier)
+def _run_loop(
+    loop: Loop, failures: Failures | None, status: StatusSocket, notifier: SystemdNotifier, shutdown: Shutdown
+) -> int:
+    ticker, watchdog = failing_ticker(Ticker(), failures, loop.event), WatchdogFeed(notifier)
     notifier.send("READY=1", "STATUS=running")
     now_s = time.monotonic()
     try:
@@ -150,6 +160,8 @@ def _run_loop(loop: Loop, status: StatusSocket, notifier: SystemdNotifier, shutd
         return 0
     except Exception as problem:  # noqa: BLE001 - the one place where surprises end
         notifier.send("STOPPING=1")
+        if failures is not None:  # or what fails on purpose would keep the drives from hearing the end
+            failures.end_all()
         return _end_safely(loop, problem)
 
 

@@ -8,13 +8,14 @@ from math import isfinite
 from typing import Any
 
 from control.controller import WalkOrder
-from control.faults import silent_signals
-from control.modes import Mode, Request
-from control.records import JOINTS, DriveState
+from control.faults import Blocks, Fault
+from control.modes import Request
+from control.records import JOINTS
 from drivers.odrive_codec import error_text
+from firmware_host.arming_checks import arming_checks
 from firmware_host.loop import Loop
 from firmware_host.recorder import Recording
-from firmware_host.reports import belief_report, check_item, known, map_report, stride_report
+from firmware_host.reports import belief_report, known, map_report, stride_report
 from firmware_host.status_socket import Methods, RefusedError
 
 MOST_STRIDES = 100000  # that a walk may be ordered
@@ -53,7 +54,7 @@ class OperatorCalls:
             "strides": self.strides,
             "map": self.map,
             "check": self.check,
-            "arm": lambda params: self._request(Request.ARM),
+            "arm": self.arm,
             "walk": self.walk,
             "stop": lambda params: self._request(Request.STOP),
             "disarm": lambda params: self._request(Request.DISARM),
@@ -72,14 +73,16 @@ class OperatorCalls:
             "version": self._version,
             "mode": loop.mode.name.lower(),
             "fault": _fault(loop),
+            "faults": [_fault_report(fault) for fault in loop.faults.standing],
+            "forced": loop.forced,
             "notice": loop.notice if self._recorder.writer_alive else "the log's writer has died: nothing is recorded",
             "phase": loop.target_before.phase.name.lower(),
             "stride": loop.target_before.stride,
             "depth_m": loop.controller.gait.commanded_depth_m,
             "body_x_m": known(loop.body.x_m),
             "drives": [self._drive(place) for place in range(len(JOINTS))],
-            "strides_closed": loop.strides_closed,
-            "mud": belief_report(loop.estimator.belief),
+            "strides_closed": loop.learning.strides_closed,
+            "mud": belief_report(loop.learning.estimator.belief),
             "loop": loop.timing.summary(),
             "warnings": self._warnings,
             "bus": self._bus(),
@@ -120,7 +123,7 @@ class OperatorCalls:
     def strides(self, params: dict[str, Any]) -> list[dict[str, Any]]:
         """The first STRIDES_PER_ANSWER closed from number `since` on, as far back as they are kept."""
         since = _integer(params, "since", 0, LARGEST_NUMBER)
-        wanted = [closed for closed in self._loop.strides if closed.number >= since]
+        wanted = [closed for closed in self._loop.learning.strides if closed.number >= since]
         return [
             stride_report(closed.estimate) | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
             for closed in wanted[:STRIDES_PER_ANSWER]
@@ -128,7 +131,14 @@ class OperatorCalls:
 
     def map(self, params: dict[str, Any]) -> list[dict[str, Any]]:
         """The mud along the way, since the walk began."""
-        return map_report(self._loop.estimator.map.rows())
+        return map_report(self._loop.learning.estimator.map.rows())
+
+    def arm(self, params: dict[str, Any]) -> str:
+        """`force` overrules what is not mandatory."""
+        force = params.get("force", False)
+        if not isinstance(force, bool):
+            raise RefusedError(f"force = {force!r}: must be true or false")
+        return self._request(Request.ARM, forced=force)
 
     def walk(self, params: dict[str, Any]) -> str:
         """`depth_m` for a fixed depth, else adaptive from the configured start; `strides`, 0 without end."""
@@ -144,8 +154,8 @@ class OperatorCalls:
             raise RefusedError(f"depth_m = {depth_m}: must be more than 0 and at most {deepest_m}")
         return self._request(Request.WALK, WalkOrder(float(depth_m), False, strides))
 
-    def _request(self, request: Request, order: WalkOrder | None = None) -> str:
-        refused = self._loop.request(request, self._clock(), order)
+    def _request(self, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:
+        refused = self._loop.request(request, self._clock(), order, forced)
         if refused:
             raise RefusedError(refused)
         return "accepted"
@@ -156,50 +166,26 @@ class OperatorCalls:
         return "accepted"
 
     def check(self, params: dict[str, Any]) -> list[dict[str, Any]]:
-        """What stands between this robot and a walk, item by item."""
-        items = [check_item("configuration", True, f"accepted for {self._loop.configuration.robot.name}", "")]
-        items += [self._check_drive(joint, state) for joint, state in zip(JOINTS, self._loop.states, strict=True)]
-        items.append(self._check_bus())
-        items.append(self._check_arming())
-        alive = self._recorder.writer_alive
-        items.append(check_item("log", alive, "rows are written" if alive else "its writer has died", "restart"))
-        for warning in self._warnings:
-            items.append(check_item("realtime", True, f"warning: {warning}", ""))
-        return items
-
-    def _check_drive(self, joint: str, state: DriveState) -> dict[str, Any]:
-        silence_s = self._loop.configuration.loop.silence_s
-        missing = [signal for signal, _ in silent_signals(state, silence_s, self._clock())]
-        if missing:
-            fix = "check its power, wiring, node id and cyclic message periods (README, 'Setting up the drives')"
-            return check_item(f"drive.{joint}", False, f"no {', '.join(missing)}", fix)
-        if state.error_flags:
-            fix = "mend the cause, then 'mudskipper clear'"
-            return check_item(f"drive.{joint}", False, error_text(state.error_flags), fix)
-        unwatched = "" if isfinite(state.temperature_stamp_s) else ", but never its temperature: no limit guards it"
-        return check_item(f"drive.{joint}", True, f"heard{unwatched}", "")
-
-    def _check_bus(self) -> dict[str, Any]:
-        counts = self._bus()
-        trouble = counts["error_frames"] + counts["failed_sends"]
-        text = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counts.items())
-        fix = "check wiring, termination and bit rate; 'ip -s -d link show' tells more"
-        return check_item("bus", trouble == 0, text, fix)
-
-    def _check_arming(self) -> dict[str, Any]:
-        loop = self._loop
-        if loop.mode is Mode.BOOT:
-            return check_item("arming", False, "not every drive was heard yet", "see the drives above")
-        fault = loop.fault or loop.health.fault
-        if fault is not None:
-            return check_item("arming", False, fault.sentence, "mend the cause, then 'mudskipper clear'")
-        return check_item("arming", True, f"nothing against it; the mode is {loop.mode.name.lower()}", "")
+        """What stands between this robot and torque, item by item."""
+        return arming_checks(self._loop, self._log_path or "off", self._warnings)
 
 
-def _fault(loop: Loop) -> dict[str, str] | None:
-    """The latched one, or what stands against arming now."""
-    fault = loop.fault or (loop.health.fault if loop.mode is not Mode.BOOT else None)
-    return {"name": fault.name, "sentence": fault.sentence} if fault else None
+def _fault(loop: Loop) -> dict[str, Any] | None:
+    """The worst that stands, or what stands against arming."""
+    fault = loop.fault or next(iter(loop.faults.blocking()), None)
+    return _fault_report(fault) if fault else None
+
+
+def _fault_report(fault: Fault) -> dict[str, Any]:
+    kind = fault.kind
+    return {
+        "name": fault.name,
+        "subject": fault.subject,
+        "sentence": fault.sentence,
+        "what_to_do": kind.what_to_do,
+        "reaction": kind.reaction.name.lower(),
+        "blocks_arming": kind.blocks is not Blocks.NO,
+    }
 
 
 def _integer(params: dict[str, Any], name: str, low: int, high: int) -> int:

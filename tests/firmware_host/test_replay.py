@@ -39,7 +39,7 @@ def test_a_replayed_walk_gives_the_same_strides_to_the_last_digit(tmp_path: Path
     robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
     assert recorder.dropped == 0
     assert recorder.close(20.0)
-    live = [stride.estimate for stride in robot.loop.strides]
+    live = [stride.estimate for stride in robot.loop.learning.strides]
     replayed = replay_file(path).strides
     assert len(live) == len(replayed) == 12
     assert all(same(one, other) for one, other in zip(live, replayed, strict=True))

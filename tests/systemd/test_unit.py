@@ -152,9 +152,9 @@ def test_the_network_files_configure_the_same_buses(configuration: Configuration
 
 
 class CountingPort:
+    state = BusState.ACTIVE
     failed_sends = error_frames = 0
     last_error = last_send_error = ""
-    state = BusState.ACTIVE
 
     def __init__(self) -> None:
         self.sent = 0
