@@ -13,10 +13,12 @@ from typing import Any
 
 import pytest
 
+from benchmarks.can_fuzz import is_forbidden
 from benchmarks.estimator_cost import fit_rows, measure_fits
 from benchmarks.fit_libraries import FITS
 from benchmarks.report import Progress, summary_us, verdict
 from benchmarks.tick_time import STAGES, VARIANTS
+from drivers.frames import Frame
 
 ROOT = Path(__file__).parent.parent.parent
 TIMEOUT_S = 60.0
@@ -75,6 +77,38 @@ def test_lockstep_speed() -> None:
     assert walk["simulated_s"] == pytest.approx(2.0, abs=0.01)
     assert walk["times"] == report["median_times"] > 0.0
     assert walk["arrived"] is False
+
+
+def test_can_fuzz() -> None:
+    """What it finds is asserted: it depends on no clock. Memory is not, in so few frames."""
+    report = report_of("can_fuzz", "--frames", "8000")
+    assert {name: part["frames"] for name, part in report["parts"].items()} == {
+        "drives": 4000,
+        "boot": 2000,
+        "idle": 2000,
+    }
+    for part in report["parts"].values():
+        assert (part["exceptions"], part["forbidden"], part["ticks_in_another_mode"]) == (0, [], 0)
+    assert report["parts"]["drives"]["frames_sent"] > 100
+
+
+@pytest.mark.parametrize(
+    ("frame", "forbidden"),
+    [
+        (Frame(0x00E, bytes(4)), False),
+        (Frame(0x00E, b"\1\0\0\0"), True),
+        (Frame(0x007, b"\1\0\0\0"), False),
+        (Frame(0x007, b"\x08\0\0\0"), True),
+        (Frame(0x000, is_remote=True), False),
+        (Frame(0x00E, is_remote=True), True),
+        (Frame(0x004, bytes(4)), False),
+        (Frame(0x004, b"\1\2\0\0"), True),
+        (Frame(0x00C, bytes(8)), True),
+        (Frame(0x00E, bytes(4), is_extended=True), True),
+    ],
+)
+def test_the_fuzz_knows_what_a_disarmed_robot_must_not_send(frame: Frame, forbidden: bool) -> None:
+    assert is_forbidden(frame) == forbidden
 
 
 def test_memory_growth() -> None:
