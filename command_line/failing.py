@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import getpass
 import json
 from typing import Any
 
@@ -24,16 +23,9 @@ def fail(options: argparse.Namespace) -> int:
 
 def _fail(client: StatusClient, options: argparse.Namespace) -> int:
     wish: dict[str, Any] = {"component": options.component, "kind": options.kind, "for_s": options.seconds}
-    failing = client.call("fail", **wish, who=_who())
+    failing = client.call("fail", **wish)
     print(json.dumps(failing) if options.json else failing_table(failing))
     return exit_codes.OK
-
-
-def _who() -> str:
-    try:
-        return getpass.getuser()
-    except OSError:  # a user without a name
-        return "someone"
 
 
 def _show(client: StatusClient, as_json: bool) -> int:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from drivers.failures import FailureKind, Failures
 from firmware_host.log_rows import EVENT
-from firmware_host.recorder import EVENT_KIND, STAMP, Recording
+from firmware_host.recorder import EVENT_KIND, STAMP, LogReport, Recording
 
 
 class FailingRecorder:
@@ -31,6 +33,18 @@ class FailingRecorder:
             taken = self._recorder.put(kind_index, payload)
         self._count()
         return taken
+
+    @property
+    def path(self) -> Path | None:
+        return self._recorder.path
+
+    def report(self) -> LogReport:
+        report, failure = self._recorder.report(), self._failures.of("log")
+        self._count()
+        if failure is None:
+            return report._replace(dropped=self.dropped)
+        problem = f"the log is failing on purpose: {failure.kind}"
+        return report._replace(alive=self.writer_alive, dropped=self.dropped, problem=problem)
 
     def _refuses(self) -> bool:
         failure = self._failures.of("log")

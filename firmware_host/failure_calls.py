@@ -12,6 +12,7 @@ from typing import Any
 
 from drivers.failures import EFFECTS, USUAL_S, Failure, Failures, begin_text, end_text
 from firmware_host.configuration import Configuration
+from firmware_host.connection import Caller
 from firmware_host.status_socket import Methods, RefusedError
 
 LONGEST_NAME = 64
@@ -19,7 +20,7 @@ FORBIDDEN = "nothing may fail on purpose here: set failures.allowed = true in th
 OK, ALL = "ok", "all"
 
 Tell = Callable[[float, str], None]
-Method = Callable[[dict[str, Any]], Any]
+Method = Callable[[dict[str, Any], Caller], Any]
 
 
 def failures_of(configuration: Configuration) -> Failures | None:
@@ -30,17 +31,21 @@ def failures_of(configuration: Configuration) -> Failures | None:
 def with_failures(methods: Methods, failures: Failures | None, tell: Tell, clock: Callable[[], float]) -> Methods:
     """The methods of a daemon, and those that make it fail; the others as they are where nothing may."""
     if failures is None:
-        return {**methods, "fail": _refuse, "failures": lambda params: {"allowed": False, "failing": [], "table": []}}
+        return {
+            **methods,
+            "fail": _refuse,
+            "failures": lambda params, caller: {"allowed": False, "failing": [], "table": []},
+        }
     calls = FailureCalls(failures, tell, clock)
-    added: Methods = {"fail": calls.fail, "failures": calls.failures}
+    added: Methods = {"fail": calls.fail, "failures": lambda params, caller: calls.failures()}
     changed: Methods = {
-        "status": lambda params: calls.in_status(methods["status"](params)),
+        "status": lambda params, caller: calls.in_status(methods["status"](params, caller)),
         "disarm": calls.ending_all_before(methods["disarm"]),
     }
     return {**methods, **added, **changed}
 
 
-def _refuse(params: dict[str, Any]) -> Any:
+def _refuse(params: dict[str, Any], caller: Caller) -> Any:
     raise RefusedError(FORBIDDEN)
 
 
@@ -50,13 +55,13 @@ class FailureCalls:
         self._tell = tell
         self._clock = clock
 
-    def fail(self, params: dict[str, Any]) -> list[dict[str, Any]]:
+    def fail(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
         """Make `component` fail as `kind` says for `for_s`; kind "ok" ends it, also for "all". What fails then."""
-        component, kind, who = (_text(params, name) for name in ("component", "kind", "who"))
+        component, kind = _text(params, "component"), _text(params, "kind")
         if kind == OK:
             self._end(component)
         else:
-            self._begin(component, kind, _seconds(params), who or "someone")
+            self._begin(component, kind, _seconds(params), str(caller))
         return self._failing()
 
     def _begin(self, component: str, kind: str, for_s: float, who: str) -> None:
@@ -74,7 +79,7 @@ class FailureCalls:
         for each in self._failures.end_all() if component == ALL else [failure] if failure else []:
             self._tell(self._clock(), end_text(each))
 
-    def failures(self, params: dict[str, Any]) -> dict[str, Any]:
+    def failures(self) -> dict[str, Any]:
         """What fails, and all that could."""
         table = [{"component": name, "kind": kind, "does": does} for name, kind, does in self._failures.table()]
         return {"allowed": True, "failing": self._failing(), "table": table}
@@ -97,9 +102,9 @@ class FailureCalls:
         return report | {"failing": failing, "warnings": report["warnings"] + warnings}
 
     def ending_all_before(self, method: Method) -> Method:
-        def ended_first(params: dict[str, Any]) -> Any:
+        def ended_first(params: dict[str, Any], caller: Caller) -> Any:
             self._end(ALL)
-            return method(params)
+            return method(params, caller)
 
         return ended_first
 

@@ -63,6 +63,21 @@ def test_a_writer_that_died_by_itself_stays_dead() -> None:
     assert not FailingRecorder(kept, Failures(())).writer_alive
 
 
+@pytest.mark.parametrize(("kind", "alive"), [("off", False), ("stuck", True), ("intermittent", True)])
+def test_the_log_s_report_tells_what_fails_and_what_it_lost(kind: str, alive: bool) -> None:
+    kept, failures = KeepingRecorder(), Failures(())
+    recorder = FailingRecorder(kept, failures)
+    assert recorder.report() == kept.report()._replace(dropped=2)
+    failures.begin("log", kind, 0.0)
+    refused = put_numbers(recorder, range(20)).count(False)
+    report = recorder.report()
+    assert (report.alive, report.dropped, report.free_share) == (alive, 2 + refused, kept.report().free_share)
+    assert refused and "on purpose" in report.problem and kind in report.problem
+    failures.end_all()
+    assert recorder.report() == kept.report()._replace(dropped=2 + refused)
+    assert recorder.path is kept.path
+
+
 def test_closing_reaches_the_log() -> None:
     kept = KeepingRecorder()
     assert FailingRecorder(kept, Failures(())).close(3.0) and kept.closed_in_s == 3.0
