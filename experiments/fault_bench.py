@@ -20,7 +20,7 @@ from firmware_host.configuration import Configuration
 from firmware_host.daemon import _end_safely as end_safely
 from firmware_host.log_rows import EVENT
 from firmware_host.loop import TICK_KIND
-from firmware_host.recorder import EVENT_KIND, NullRecorder
+from firmware_host.recorder import EVENT_KIND, HEALTHY, LogReport, NullRecorder
 from firmware_host.ticker import PERIOD_S, Beat
 from simulation.lockstep import Lockstep
 from simulation.odrive import SimulatedOdrive
@@ -31,11 +31,15 @@ Act = Callable[[], None]
 
 
 class CountingRecorder(NullRecorder):
-    """A Recording. Owns the count of the ticks' rows and the sentences of the events."""
+    """A Recording. Owns the count of the ticks' rows, the sentences of the events, and what its writer would tell."""
 
     def __init__(self) -> None:
         self.ticks = 0
         self.texts: list[str] = []
+        self.told = HEALTHY
+
+    def report(self) -> LogReport:
+        return self.told
 
     def put(self, kind_index: int, payload: bytes) -> bool:
         if kind_index == TICK_KIND:

@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
-from math import copysign, nan
+from math import copysign
 from typing import Any
 
-from control.records import Estimate, StrideEstimate
+from control.records import JOINTS
 from drivers import odrive_codec as codec
 from drivers.odrive_codec import AxisState
-from estimation.mud import MudReading
 from experiments.fault_bench import FaultBench
 from simulation.odrive import ENABLE_WATCHDOG_ENDPOINT
 
@@ -206,95 +205,14 @@ def given_up(bench: FaultBench, joint: str) -> Iterator[None]:
     yield
 
 
-# in the loop
+@contextmanager
+def wrong_way(bench: FaultBench, joint: str) -> Iterator[None]:
+    """The current that a drive tells is against the torque that it was told."""
+    place, sign = JOINTS.index(joint), bench.drive(joint).parameters.sign
 
+    def tell() -> None:
+        current_a = -copysign(4.0, bench.loop.sent.torques_nm[place]) * sign
+        bench.say(joint, codec.GET_IQ, current_a, current_a)
 
-def heated(temperature_c: float) -> Cause:
-    @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        winding = bench.winding(joint)
-        winding.temperature_c = temperature_c
+    with bench.acting(tell):
         yield
-        winding.reset()
-
-    return cause
-
-
-@contextmanager
-def gains_of_nan(bench: FaultBench, joint: str) -> Iterator[None]:
-    controller = bench.loop.controller
-    before = controller.gains
-    controller.gains = replace(before, sweep_stiffness_nm_rad=nan, adduction_damping_nm_s_rad=nan)
-    yield
-    controller.gains = before
-
-
-@contextmanager
-def five_newton_metres(bench: FaultBench, joint: str) -> Iterator[None]:
-    """A bug that goes past every limit, to the wire."""
-    next(axis for axis in bench.loop.drives.axes if axis.joint == joint).send_torque(5.0)
-    yield
-
-
-def stands(ticks: int) -> Cause:
-    @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        bench.stands_still = ticks
-        yield
-
-    return cause
-
-
-@contextmanager
-def wild_stride(bench: FaultBench, joint: str) -> Iterator[None]:
-    """The next sample closes a stride with a coefficient of 10²⁰ N/m³."""
-    estimator = bench.loop.learning.estimator
-    true_update = estimator.update
-    wild = Estimate(1e20, 1.0, 100, True)
-    stride = StrideEstimate(
-        "left", 0, 0.0, 1.0, 0.4, 0.3, 0.1, wild, wild, wild, 0.0, 0.03, True, 1.0, 1.0, -1.0, 0.1
-    )  # fmt: skip
-
-    def update(*arguments: Any) -> MudReading:
-        del estimator.__dict__["update"]  # once
-        return true_update(*arguments)._replace(strides=(stride,))
-
-    estimator.__dict__["update"] = update
-    yield
-
-
-# the daemon
-
-
-@contextmanager
-def killed(bench: FaultBench, joint: str) -> Iterator[None]:
-    bench.dead = True
-    yield
-
-
-@contextmanager
-def nothing(bench: FaultBench, joint: str) -> Iterator[None]:
-    yield
-
-
-class DeliberateBugError(Exception):
-    pass
-
-
-def bug_in(path: str) -> Cause:
-    """The next call of what `path` names in the loop raises."""
-
-    @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        *owners, method = path.split(".")
-        part: Any = bench.loop
-        for owner in owners:
-            part = getattr(part, owner)
-
-        def broken(*arguments: Any, **options: Any) -> Any:
-            raise DeliberateBugError(path)
-
-        setattr(part, method, broken)
-        yield
-
-    return cause

@@ -15,7 +15,6 @@ from typing import Any
 from control.controller import DAMPING_NM, DAMPING_S, SOFT_STOP_S
 from control.faults import Blocks, FaultKind, Reaction
 from control.modes import ENERGISED, Mode, Request
-from control.records import JOINTS
 from drivers.odrive_codec import AxisState
 from experiments.fault_bench import FaultBench
 from experiments.fault_injection import BY_NAME, TOLD_S, Way
@@ -26,6 +25,7 @@ HARDNESS = {  # in arming there is no torque yet
     Mode.BOOT: 4, Mode.IDLE: 4, Mode.FAULT: 4, Mode.DAMPING: 3, Mode.STOPPING: 2, Mode.HOLD: 1, Mode.ARMING: 1,
     Mode.WALKING: 0,
 }  # fmt: skip
+GOING_ON = ("arming", "hold", "walking", "stopping")
 WATCHDOG_TICKS = 40  # 0.1 s, and one tick on the way to the drive and back
 BUG_BOUND_TICKS = 2
 FORBIDDEN_TICKS = 80  # two heartbeats: a drive tells that it is in closed loop, and is told again to go idle
@@ -67,7 +67,7 @@ def run_cell(name: str, phase: str, seed: int) -> dict[str, Any]:
     """Everything of it follows from its three arguments."""
     way, random = BY_NAME[name], Random(f"{name} {phase} {seed}")
     bench = bench_for(phase, random, hopeless=way.fault == "flipper_stuck")
-    joint = random.choice(JOINTS)
+    joint = random.choice(way.joints(phase))
     bring(bench, phase, random)
     cell = Cell(way.fault, name, phase, seed, joint, _reaction_text(way), _bound_ticks(way))
     with way.cause(bench, joint):
@@ -119,22 +119,21 @@ class Watch:
 
     def run_on(self) -> None:
         """Until the robot is at rest, and a while longer."""
-        kind, bench = self._way.kind, self._bench
-        if kind is None or kind.reaction < Reaction.SOFT_STOP:
-            self.run(AFTER_S if kind is None and not self._walks_on else WALKED_ON_S)
-        else:
-            for _ in range(round((LONGEST_STOP_S + 1.0) / PERIOD_S)):
-                if bench.loop.mode not in ENERGISED:
-                    break
-                self._step()
-            self.run(AFTER_S)
+        kind, loop = self._way.kind, self._bench.loop
+        longest = round((LONGEST_STOP_S + 1.0) / PERIOD_S) if kind and kind.reaction >= Reaction.SOFT_STOP else 0
+        for _ in range(longest):
+            if loop.mode not in ENERGISED:
+                break
+            self._step()
+        self.run(WALKED_ON_S if self._walks_on else AFTER_S)
         self._end()
 
     @property
     def _walks_on(self) -> bool:
-        return self._way.fault == "none" or (
-            self._way.kind is not None and self._way.kind.reaction < Reaction.HOLD and self._cell.phase != "idle"
-        )
+        kind = self._way.kind
+        if kind is None:
+            return self._way.fault == "none"
+        return kind.reaction < Reaction.HOLD and self._cell.phase != "idle"
 
     def _step(self) -> None:
         self._bench.step()
@@ -149,24 +148,24 @@ class Watch:
         return self._bench.ticks_made - self._first_tick
 
     def _look_at_loop(self) -> None:
-        cell, bench, kind = self._cell, self._bench, self._way.kind
-        mode = bench.loop.mode
-        if kind is None:
-            self._look_at_drives_end()
-        else:
+        cell, mode, kind = self._cell, self._bench.loop.mode, self._way.kind
+        if kind is not None:
             self._look_for_told(kind)
-            hard = HARDNESS[mode] >= _needed(kind)
-            if cell.reaction_ticks is None and cell.told_ticks is not None and self._only_told(kind):
-                cell.reaction_ticks = cell.told_ticks
-            elif cell.reaction_ticks is None and hard and not self._only_told(kind):
+            if cell.reaction_ticks is None and self._has_reacted(kind, mode):
                 cell.reaction_ticks = self._ticks
         if mode in (Mode.STOPPING, Mode.DAMPING) and self._stopping_since is None:
             self._stopping_since = self._steps
         if mode not in ENERGISED and self._stopping_since is not None and cell.stop_s is None:
             cell.stop_s = (self._steps - self._stopping_since) * PERIOD_S
 
+    def _has_reacted(self, kind: FaultKind, mode: Mode) -> bool:
+        """Where the mode has nothing to say it counts that the fault is told."""
+        if self._only_told(kind):
+            return self._cell.told_ticks is not None
+        return HARDNESS[mode] >= _needed(kind)
+
     def _only_told(self, kind: FaultKind) -> bool:
-        """The mode has nothing to say: it was as hard before, or the fault asks for nothing."""
+        """The mode was as hard before, or the fault asks for nothing."""
         return kind.reaction < Reaction.HOLD or HARDNESS[self._mode_before] >= _needed(kind)
 
     def _look_for_told(self, kind: FaultKind) -> None:
@@ -179,9 +178,6 @@ class Watch:
                 refused = loop.request(Request.ARM, self._bench.now_s)
                 if refused is None:
                     self._cell.why.append("arming was not refused")
-
-    def _look_at_drives_end(self) -> None:
-        """A daemon that ended says nothing: the drives' torque does."""
 
     # the robot
 
@@ -246,6 +242,8 @@ def _stands_against_arming(kind: FaultKind) -> bool:
 def problems(cell: Cell, way: Way) -> Iterator[str]:
     """In words, what should not be."""
     yield from cell.why
+    if way.ends_daemon and not cell.exception:
+        yield "the bug never came"
     if cell.exception and not way.ends_daemon:
         yield f"an exception escaped: {cell.exception}"
     if not cell.disarmed:
@@ -261,6 +259,8 @@ def problems(cell: Cell, way: Way) -> Iterator[str]:
     yield from _late(cell)
     if way.kind is None or way.kind.reaction >= Reaction.SOFT_STOP:
         yield from _not_stopped(cell)
+    elif way.kind.reaction <= Reaction.WARN and cell.phase != "idle" and cell.mode not in GOING_ON:
+        yield f"a warning ended in mode {cell.mode}"
     if way.kind and cell.fault not in cell.told:
         yield "the log holds no word of it"
 

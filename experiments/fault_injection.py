@@ -10,37 +10,45 @@ from dataclasses import dataclass
 
 from control.fault_kinds import KINDS
 from control.faults import FaultKind
+from control.records import JOINTS
 from drivers import odrive_codec as codec
 from experiments.fault_causes import (
     Cause,
     always_said,
     blocked,
-    bug_in,
     drive_with,
     failing,
-    five_newton_metres,
-    gains_of_nan,
     given_up,
-    heated,
-    killed,
     left_closed_loop,
     never_in_closed_loop,
-    nothing,
     other_master,
     out_of_range,
     overcurrent,
     restart,
     said,
-    stands,
     twin,
     watchdog_ran_out,
     watchdog_told_off,
     whirled,
-    wild_stride,
+    wrong_way,
 )
 from experiments.fault_phases import EVERYWHERE, GAIT, PHASES
+from experiments.loop_causes import (
+    bug_in,
+    five_newton_metres,
+    gains_of_nan,
+    heated,
+    hung_up,
+    killed,
+    nothing,
+    stands,
+    wild_stride,
+    writer_lost_rows,
+    writer_tells,
+)
 
 TOLD_S = 0.0  # a cause that lasts until its fault is told
+TURNING = {"insertion": "adduction", "stance": "sweep", "extraction": "adduction", "swing": "sweep"}
 MOVING = ("hold", *GAIT, "stopping")
 
 
@@ -55,10 +63,16 @@ class Way:
     how: str = ""  # where there is more than one way to a fault
     deaf: bool = False  # commands do not reach a drive meanwhile: only its watchdog takes its torque
     ends_daemon: bool = False
+    turns: bool = False  # it shows at a joint that turns only
 
     @property
     def name(self) -> str:
         return f"{self.fault}, {self.how}" if self.how else self.fault
+
+    def joints(self, phase: str) -> tuple[str, ...]:
+        """Of which one is drawn."""
+        turning = TURNING.get(phase, "") if self.turns else ""
+        return tuple(joint for joint in JOINTS if joint.endswith(turning))
 
     @property
     def kind(self) -> FaultKind | None:
@@ -111,6 +125,8 @@ WAYS: tuple[Way, ...] = (
     Way("joint_current", always_said(codec.GET_IQ, 40.0, 40.0)),
     Way("joint_not_following", blocked, 3.0, ("hold", *GAIT)),
     Way("encoder_jump", drive_with(encoder_offset_rad=0.6), phases=PHASES),
+    Way("encoder_stuck", failing("JOINT.position", "stuck"), 1.0, GAIT, turns=True),
+    Way("torque_missing", wrong_way, phases=MOVING),
     Way("motor_overheating", drive_with(temperature_c=82.0), phases=PHASES),
     Way("motor_hot", drive_with(temperature_c=95.0)),
     Way("winding_overheating", heated(83.0)),
@@ -129,6 +145,13 @@ WAYS: tuple[Way, ...] = (
     Way("clock_step", failing("clock", "garbage")),
     Way("estimate_wild", wild_stride, phases=GAIT),
     Way("pose_lost", failing("pose", "off")),
+    Way("lease_lost", hung_up, phases=PHASES),
+    # the log
+    Way("disk_low", writer_tells(free_share=0.02)),
+    Way("log_unwritable", writer_tells(problem="Nothing can be written to the log: No space left on device.")),
+    Way("disk_slow", writer_tells(slowest_write_s=5.0)),
+    Way("recorder_dead", writer_tells(alive=False)),
+    Way("rows_lost", writer_lost_rows),
     # the daemon
     Way("daemon_killed", killed, 1.0, PHASES),
     Way("daemon_hung", stands(760), 2.2, PHASES),

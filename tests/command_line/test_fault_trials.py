@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
-from command_line import exit_codes, fault_trials
+from command_line import exit_codes
 from command_line.main import main
+from experiments import faults
 from experiments.faults import Plan, report_of
 
 CELL: dict[str, Any] = {
@@ -30,7 +31,7 @@ def plans(monkeypatch: pytest.MonkeyPatch) -> list[Plan]:
         cells = [cell for cell in (CELL, LATE, CONTROL) if cell["phase"] in plan.phases]
         return report_of(plan, cells)
 
-    monkeypatch.setattr(fault_trials.faults, "run", run)
+    monkeypatch.setattr(faults, "run", run)
     return seen
 
 

@@ -6,21 +6,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
+from random import Random
 from typing import Any
 
 import pytest
 
 from control.fault_kinds import KINDS
-from experiments import fault_cell
 from experiments.fault_bench import FaultBench
-from experiments.fault_causes import bug_in, nothing
 from experiments.fault_cell import Cell, problems, run_cell
 from experiments.fault_injection import BY_NAME, WAYS, Way
 from experiments.fault_phases import PHASES, bench_for
 from experiments.faults import FAULTS, Place, Plan, report_of
+from experiments.loop_causes import bug_in, nothing
 from experiments.side_by_side import side_by_side
-
-FEW = 3  # cells that are run with something broken
 
 
 def one_place_of_each_fault() -> list[Place]:
@@ -75,7 +73,7 @@ def test_what_there_is_not_is_refused(faults: tuple[str, ...], phases: tuple[str
 
 
 def with_way(monkeypatch: pytest.MonkeyPatch, way: Way) -> dict[str, Any]:
-    monkeypatch.setitem(fault_cell.BY_NAME, way.name, way)
+    monkeypatch.setitem(BY_NAME, way.name, way)
     return run_cell(way.name, "hold", 1)
 
 
@@ -134,8 +132,6 @@ def test_the_slowest_cell_stands_for_its_fault(cells: Sequence[dict[str, Any]]) 
 
 
 def make_bench() -> FaultBench:
-    from random import Random
-
     return bench_for("hold", Random(1))
 
 
