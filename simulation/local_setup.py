@@ -64,6 +64,7 @@ silence_s = 0.5
 
 [log]
 directory = {logs}
+min_free_share = 0.0  # a full disk of a desk is no reason to free anybody's logs
 
 [status]
 socket = {status}
