@@ -175,8 +175,9 @@ class JointWatch:
         angle_rad, velocity_rad_s = state.angle_rad, abs(state.velocity_rad_s)
         if not self._low_rad <= angle_rad <= self._high_rad:
             found.append(self._out_of_range(angle_rad))
-        self._fast_s = self._fast_s + facts.dt_s if velocity_rad_s > self._fast_rad_s else 0.0
-        if self._fast_s >= self._bounds.fast_s - facts.dt_s / 2.0:
+        fast = velocity_rad_s > self._fast_rad_s
+        self._fast_s = self._fast_s + facts.dt_s if fast else 0.0
+        if fast and self._fast_s >= self._bounds.fast_s - facts.dt_s / 2.0:
             text = f"The {self.joint} joint turns at {velocity_rad_s:.0f} rad/s."
             found.append(self._fault("joint_velocity", text))
         if velocity_rad_s > MOVING_RAD_S and not facts.energised:

@@ -63,7 +63,8 @@ class FaultBench(Lockstep):
         self._missed = 0
 
     def step(self) -> None:
-        self.stands_still += int(self._stalls.next_s() / PERIOD_S)
+        if not self._missed:
+            self.stands_still += int(self._stalls.next_s() / PERIOD_S)
         self.tick_number += 1
         self.robot.advance(self.now_s)
         for act in tuple(self._acts):

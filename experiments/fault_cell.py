@@ -17,7 +17,7 @@ from control.faults import Blocks, FaultKind, Reaction
 from control.modes import ENERGISED, Mode, Request
 from drivers.odrive_codec import AxisState
 from experiments.fault_bench import FaultBench
-from experiments.fault_injection import BY_NAME, TOLD_S, Way
+from experiments.fault_injection import BRINGS, BY_NAME, FALLING, TOLD_S, Way
 from experiments.fault_phases import bench_for, bring
 from firmware_host.ticker import PERIOD_S
 
@@ -66,17 +66,25 @@ class Cell:
 def run_cell(name: str, phase: str, seed: int) -> dict[str, Any]:
     """Everything of it follows from its three arguments."""
     way, random = BY_NAME[name], Random(f"{name} {phase} {seed}")
-    bench = bench_for(phase, random, hopeless=way.fault == "flipper_stuck")
     joint = random.choice(way.joints(phase))
-    bring(bench, phase, random)
     cell = Cell(way.fault, name, phase, seed, joint, _reaction_text(way), _bound_ticks(way))
-    with way.cause(bench, joint):
+    try:
+        _live_through(way, cell, random)
+    except Exception as problem:  # noqa: BLE001 - the one thing that must never happen is a cell as any other
+        cell.exception = f"{type(problem).__name__}: {problem}"
+        cell.why.append(f"an exception escaped: {cell.exception}")
+    cell.why = list(dict.fromkeys(problems(cell, way)))
+    cell.ok = not cell.why
+    return asdict(cell)
+
+
+def _live_through(way: Way, cell: Cell, random: Random) -> None:
+    bench = bench_for(cell.phase, random, hopeless=way.fault == "flipper_stuck")
+    bring(bench, cell.phase, random)
+    with way.cause(bench, cell.joint):
         watch = Watch(bench, way, cell)
         watch.run(way.lasts_s, until_told=way.lasts_s == TOLD_S)
     watch.run_on()
-    cell.why = list(problems(cell, way))
-    cell.ok = not cell.why
-    return asdict(cell)
 
 
 def _reaction_text(way: Way) -> str:
@@ -257,6 +265,9 @@ def problems(cell: Cell, way: Way) -> Iterator[str]:
             yield f"without a cause it told of {', '.join(cell.told)}"
         return
     yield from _late(cell)
+    others = set(cell.told) - {cell.fault, FALLING, *BRINGS.get(cell.fault, ())}
+    if others:
+        yield f"it also told of {', '.join(sorted(others))}"
     if way.kind is None or way.kind.reaction >= Reaction.SOFT_STOP:
         yield from _not_stopped(cell)
     elif way.kind.reaction <= Reaction.WARN and cell.phase != "idle" and cell.mode not in GOING_ON:

@@ -161,3 +161,34 @@ WAYS: tuple[Way, ...] = (
     ),
 )
 BY_NAME = {way.name: way for way in WAYS}
+
+FALLING = "joint_moving"  # the flippers, once their drives are idle
+AWAY = (
+    "drive_late", "drive_quiet", "drive_silent", "heartbeat_silent", "temperature_silent", "drive_energised",
+    "drive_error", "drive_restarted", "drive_version", "watchdog_unknown",
+)  # fmt: skip
+DEAF = ("drive_error", "drive_disarmed")
+THROWN = ("joint_velocity", "joint_position")  # by the last torque, until the drive's watchdog acts
+BRINGS: dict[str, tuple[str, ...]] = {
+    "drive_quiet": ("drive_late", "position_stale", "current_stale"),
+    "drive_silent": AWAY,
+    "position_stale": ("drive_late",),
+    "position_silent": ("drive_late", "position_stale"),
+    "current_stale": ("drive_late",),
+    "current_silent": ("drive_late", "current_stale", "torque_missing"),
+    "heartbeat_silent": ("drive_energised",),
+    "drive_error": ("drive_disarmed", *THROWN),
+    "drive_restarted": AWAY,
+    "drive_twins": ("encoder_jump", "drive_disarmed", "joint_position"),
+    "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version"),
+    "bus_off": (*AWAY, *DEAF, *THROWN, "bus_refuses"),
+    "bus_refuses": (*DEAF, *THROWN),
+    "joint_position": ("encoder_jump",),
+    "joint_velocity": ("joint_position",),
+    "encoder_stuck": ("encoder_jump",),  # when it goes on
+    "motor_overheating": ("winding_overheating",),
+    "motor_hot": ("winding_hot",),
+    "loop_lagging": ("loop_overrun",),
+    "loop_stalled": ("loop_lagging",),
+    "daemon_hung": (*DEAF, *THROWN, "loop_stalled", "loop_lagging", "arming_failed", "torque_missing"),
+}  # what else may be told, since it is true as well
