@@ -95,7 +95,7 @@ def _reaction_text(way: Way) -> str:
 
 def _bound_ticks(way: Way) -> int | None:
     if way.kind:
-        return way.kind.bound_ticks
+        return way.bound_ticks or way.kind.bound_ticks
     return {"none": None, "bug_in_the_tick": BUG_BOUND_TICKS}.get(way.fault, WATCHDOG_TICKS)
 
 

@@ -63,6 +63,7 @@ class Way:
     how: str = ""  # where there is more than one way to a fault
     deaf: bool = False  # commands do not reach a drive meanwhile: only its watchdog takes its torque
     ends_daemon: bool = False
+    bound_ticks: int | None = None  # where this way shows sooner than the kind's bound says
     turns: bool = False  # it shows at a joint that turns only
 
     @property
@@ -139,7 +140,7 @@ WAYS: tuple[Way, ...] = (
     Way("torque_not_finite", gains_of_nan, phases=MOVING),
     Way("command_refused", five_newton_metres, phases=PHASES),
     Way("loop_overrun", stands(1)),
-    Way("loop_lagging", stands(7)),
+    Way("loop_lagging", stands(7), bound_ticks=2),
     Way("loop_lagging", failing("loop", "slow"), 1.0, ("hold", "stance"), "every tick too long"),
     Way("loop_stalled", failing("loop", "stuck"), phases=PHASES),
     Way("clock_step", failing("clock", "garbage")),
@@ -177,7 +178,7 @@ BRINGS: dict[str, tuple[str, ...]] = {
     "current_stale": ("drive_late",),
     "current_silent": ("drive_late", "current_stale", "torque_missing"),
     "heartbeat_silent": ("drive_energised",),
-    "drive_error": ("drive_disarmed", *THROWN),
+    "drive_error": ("drive_disarmed", "torque_missing", *THROWN),
     "drive_restarted": AWAY,
     "drive_twins": ("encoder_jump", "drive_disarmed", "joint_position"),
     "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version"),
@@ -188,7 +189,7 @@ BRINGS: dict[str, tuple[str, ...]] = {
     "encoder_stuck": ("encoder_jump",),  # when it goes on
     "motor_overheating": ("winding_overheating",),
     "motor_hot": ("winding_hot",),
-    "loop_lagging": ("loop_overrun",),
+    "loop_lagging": ("loop_overrun", "joint_velocity"),  # at half its rate the control rings
     "loop_stalled": ("loop_lagging",),
     "daemon_hung": (*DEAF, *THROWN, "loop_stalled", "loop_lagging", "arming_failed", "torque_missing"),
 }  # what else may be told, since it is true as well

@@ -40,12 +40,12 @@ def writer_lost_rows(bench: FaultBench, joint: str) -> Iterator[None]:
 
 
 def heated(temperature_c: float) -> Cause:
+    """It cools as slowly as it is reckoned to."""
+
     @contextmanager
     def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        winding = bench.winding(joint)
-        winding.temperature_c = temperature_c
+        bench.winding(joint).temperature_c = temperature_c
         yield
-        winding.reset()
 
     return cause
 
