@@ -28,8 +28,9 @@ STILL_RAD_S = 0.1
 SATURATED_SHARE = 0.95  # of the torque limit
 STALLED_S = 2.0  # longer than an insertion, a stance or an extraction of the paper's gait takes
 JUMP_SHARE = 2.0  # of the velocity limit
-FROZEN_RAD = 0.03  # that a joint has gone, by its own speed, while its angle stayed the same to the last bit
-FROZEN_S = 0.1  # at full torque without a change of the last bit of angle or speed
+GONE_RAD = 0.03  # by a joint's own speed, while its angle stayed the same to the last bit
+GONE_S = 0.02  # drives tell an old value once more, now and then
+FROZEN_S = 0.5  # at full torque, by which not even the last bit of angle and speed changes
 MISSING_SHARE = 0.3  # of the torque limit, by which the current differs from the torque that was sent
 MISSING_S = 0.1
 TWO_MESSAGES_S = 0.15  # of those that come every 0.1 s: a single odd one proves nothing
@@ -95,7 +96,7 @@ class JointWatch:
         """But not the winding: it stays as warm as it is."""
         self._current_ticks = 0
         self._fast_s = self._stalled_s = self._energised_s = self._missing_s = 0.0
-        self._low_s = self._under_s = self._hot_s = self._frozen_s = self._gone_rad = 0.0
+        self._low_s = self._under_s = self._hot_s = self._frozen_s = self._gone_s = self._gone_rad = 0.0
         self._angle_rad, self._velocity_rad_s, self._angle_stamp_s = UNKNOWN, UNKNOWN, NEVER_S
 
     def update(self, facts: JointFacts, state: DriveState) -> list[Fault]:
@@ -191,18 +192,19 @@ class JointWatch:
             self._watch_frozen(found, facts, state)
         else:
             self._watch_jump(found, facts, state)
-            self._frozen_s = self._gone_rad = 0.0
+            self._frozen_s = self._gone_s = self._gone_rad = 0.0
         self._angle_rad, self._velocity_rad_s = state.angle_rad, state.velocity_rad_s
         self._angle_stamp_s = state.angle_stamp_s
 
     def _watch_frozen(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
         """An angle that stays the same while the joint moves by its own speed, or at full torque with that speed."""
         gap_s = state.angle_stamp_s - self._angle_stamp_s
+        self._gone_s += gap_s
         self._gone_rad += abs(state.velocity_rad_s) * gap_s
         pushed = facts.energised and abs(facts.torque_nm) >= self._saturated_nm
         frozen = pushed and state.velocity_rad_s == self._velocity_rad_s
         self._frozen_s = self._frozen_s + gap_s if frozen else 0.0
-        if self._gone_rad > FROZEN_RAD or self._frozen_s > FROZEN_S:
+        if (self._gone_rad > GONE_RAD and self._gone_s > GONE_S) or self._frozen_s > FROZEN_S:
             found.append(self._fault("encoder_stuck", f"The {self.joint} encoder stands still while the joint moves."))
 
     def _out_of_range(self, angle_rad: float) -> Fault:
