@@ -203,9 +203,9 @@ class JointWatch:
         winding_c = self.winding.update(facts.dt_s, state.current_a, measured_c)
         if winding_c < self._nearly_hot_c:
             return
-        by_sensor = measured_c >= self._nearly_hot_c
+        hot = winding_c >= self._limits.temperature_hot_c
+        by_sensor = measured_c >= (self._limits.temperature_hot_c if hot else self._nearly_hot_c)
         what, how = ("motor", "") if by_sensor else ("winding", ", by its currents")
         temperature_c = measured_c if by_sensor else winding_c
-        hot = temperature_c >= self._limits.temperature_hot_c
         text = f"The {self.joint} motor has {temperature_c:.0f} degrees C{how}."
         found.append(self._fault(f"{what}_hot" if hot else f"{what}_overheating", text))
