@@ -34,7 +34,7 @@ _ROWS: tuple[FaultKind, ...] = (
     FaultKind("drive_error", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 41, "The drive reports an error.", MEND),
     FaultKind("drive_disarmed", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 41, "It left closed loop by itself.", MEND),
     FaultKind(
-        "drive_energised", "drive", WARN, ALWAYS, WHEN_GONE, 80,
+        "drive_energised", "drive", WARN, ALWAYS, WHEN_GONE, 117,
         "It is in closed loop though nobody armed it.", "end what else commands it, or 'mudskipper disarm'",
     ),
     FaultKind(
