@@ -177,7 +177,7 @@ class JointWatch:
     def _watch_jump(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
         """Between two messages; what a stamp is late by may be a tick."""
         step_rad = abs(state.angle_rad - self._angle_rad)
-        gap_s = state.angle_stamp_s - self._angle_stamp_s + facts.dt_s
+        gap_s = max(state.angle_stamp_s - self._angle_stamp_s, 0.0) + facts.dt_s
         self._angle_rad, self._angle_stamp_s = state.angle_rad, state.angle_stamp_s
         if step_rad > JUMP_RAD + self._jump_rad_s * gap_s:  # never true of the first one
             text = f"The {self.joint} encoder jumped by {degrees(step_rad):.0f} degrees in {gap_s * 1e3:.1f} ms."

@@ -340,6 +340,11 @@ def test_the_same_message_seen_twice_is_no_jump_and_no_step() -> None:
         assert not seen(watch, HEALTHY._replace(angle_rad=0.0), START_S + tick * 0.002)
 
 
+def test_a_stamp_before_the_one_before_makes_no_jump() -> None:
+    """A frame that came without a time is stamped when it is read, which may be after the next one's own time."""
+    assert samples(make_watch(), [(0.05, 0.1), (0.01, 0.1), (0.012, 0.11)]) == [set(), set(), set()]
+
+
 def test_a_joint_at_the_velocity_limit_never_jumps() -> None:
     steps = [(tick * TICK_S, -0.9 + LIMITS.velocity_rad_s * tick * TICK_S) for tick in range(30)]
     assert samples(make_watch(), steps) == [set()] * 30
