@@ -27,13 +27,9 @@ def names_in(package: str) -> set[str]:
     for path in (ROOT / package).rglob("*.py"):
         if path.name != "fault_kinds.py":
             tree = ast.parse(path.read_text(encoding="utf-8"))
-            found |= {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and _is_text(node.value)}
+            found |= {str(node.value) for node in ast.walk(tree) if isinstance(node, ast.Constant)}
             found |= {name for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for name in _filled(node)}
     return found
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
 
 
 def _filled(text: ast.JoinedStr) -> set[str]:

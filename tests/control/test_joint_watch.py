@@ -76,7 +76,9 @@ def names(state: DriveState, **changes: Any) -> set[str]:
 
 def fresh(now_s: float, **changes: Any) -> DriveState:
     """A drive that has just sent everything."""
-    stamps = dict.fromkeys(("angle_stamp_s", "current_stamp_s", "heartbeat_stamp_s", "temperature_stamp_s"), now_s)
+    stamps: dict[str, Any] = dict.fromkeys(
+        ("angle_stamp_s", "current_stamp_s", "heartbeat_stamp_s", "temperature_stamp_s"), now_s
+    )
     return HEALTHY._replace(**(stamps | changes))
 
 
@@ -122,8 +124,12 @@ def test_a_healthy_drive_shows_no_fault() -> None:
 def test_a_signal_counts_as_gone_from_its_bound_on(
     stamps: tuple[str, ...], bound_s: float, before: str | None, after: str
 ) -> None:
-    assert names(HEALTHY._replace(**dict.fromkeys(stamps, START_S - bound_s + BEYOND))) == ({before} - {None})
-    assert names(HEALTHY._replace(**dict.fromkeys(stamps, START_S - bound_s - BEYOND))) == {after}
+    def told(age_s: float) -> set[str]:
+        stamped: dict[str, Any] = dict.fromkeys(stamps, START_S - age_s)
+        return names(HEALTHY._replace(**stamped))
+
+    assert told(bound_s - BEYOND) == ({before} - {None})
+    assert told(bound_s + BEYOND) == {after}
 
 
 @given(

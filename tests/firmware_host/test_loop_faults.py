@@ -13,7 +13,7 @@ import pytest
 
 from control.controller import SOFT_STOP_S, WalkOrder
 from control.fault_kinds import KINDS
-from control.faults import Reaction
+from control.faults import Clears, Reaction
 from control.modes import ENERGISED, HELD, Mode, Request
 from control.records import JOINTS, NO_TORQUE, Phase
 from drivers import odrive_codec as codec
@@ -28,6 +28,7 @@ from firmware_host.ticker import PERIOD_S
 from simulation.clay import MUDS, Clay
 from simulation.disturbances import LAB
 from simulation.lockstep import Lockstep
+from simulation.motion_capture import SimulatedPose
 from simulation.track import Track
 
 WALK = WalkOrder(0.03, adaptive=False)
@@ -54,6 +55,10 @@ def texts_of(robot: Lockstep) -> list[str]:
     recorder = robot.loop.recorder
     assert isinstance(recorder, EventRecorder)
     return recorder.texts
+
+
+def mode_of(robot: Lockstep) -> Mode:
+    return robot.loop.mode
 
 
 def make_robot(configuration: Configuration, clay: Clay = MUDS["48.5"]) -> Lockstep:
@@ -87,7 +92,7 @@ def moments(configuration: Configuration) -> dict[str, Lockstep]:
     until_phase(robot, Phase.STANCE, 0.1)
     robot.loop.request(Request.STOP, robot.now_s)
     robot.run_for(0.1)
-    assert robot.loop.mode is Mode.STOPPING
+    assert mode_of(robot) is Mode.STOPPING
     return found | {"stopping": robot}
 
 
@@ -109,7 +114,7 @@ def mute(robot: Lockstep, place: int, *messages: Message) -> None:
 
 
 def unmute(robot: Lockstep, place: int) -> None:
-    del robot.robot.drives[place].cyclic_frames  # type: ignore[method-assign]
+    del robot.robot.drives[place].cyclic_frames
 
 
 def muted(*messages: Message) -> Cause:
@@ -188,9 +193,44 @@ def test_every_cause_is_met_by_its_reaction_within_its_ticks(at: Copied, name: s
         robot, kind = at(moment), KINDS[name]
         CAUSES[name](robot)
         ticks_until(robot, name, kind.bound_ticks)
-        assert robot.loop.mode in AFTER[kind.reaction], moment
+        assert mode_of(robot) in AFTER[kind.reaction], moment
         if kind.reaction is Reaction.DRIVES_IDLE:
             assert robot.loop.sent.torques_nm == NO_TORQUE
+
+
+def test_a_drive_that_starts_anew_is_told_within_its_ticks_and_needs_a_clear(at: Copied) -> None:
+    robot = at("stance")
+    robot.robot.drives[1].restart(robot.now_s)
+    ticks_until(robot, "drive_restarted", KINDS["drive_restarted"].bound_ticks)
+    robot.run_for(2.0)
+    assert mode_of(robot) is Mode.FAULT
+    assert [fault.name for fault in robot.loop.faults.standing if fault.kind.clears is Clears.BY_HAND] == [
+        "drive_silent"
+    ]
+    assert robot.loop.request(Request.CLEAR, robot.now_s) is None
+    assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.6)
+    robot.run_for(1.5)  # in which version and watchdog are read anew
+    assert robot.loop.request(Request.ARM, robot.now_s) is None
+
+
+def test_a_drive_that_somebody_else_arms_is_told_within_its_ticks(at: Copied) -> None:
+    robot = at("idle")
+    drive = robot.robot.drives[1]
+    drive.receive = lambda frame, now_s: []  # type: ignore[method-assign]
+    altered(watchdog_s=0.0)(robot)
+    drive.axis_state = AxisState.CLOSED_LOOP
+    ticks_until(robot, "drive_energised", KINDS["drive_energised"].bound_ticks)
+    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
+
+
+def test_a_place_that_is_lost_is_told_within_its_ticks_and_the_walk_goes_on(at: Copied) -> None:
+    robot = at("stance")
+    pose = robot.loop.pose
+    assert isinstance(pose, SimulatedPose)
+    pose._capture.step = lambda now_s, plant: iter(())  # type: ignore[method-assign]
+    ticks_until(robot, "pose_lost", KINDS["pose_lost"].bound_ticks)
+    robot.run_for(0.5)
+    assert mode_of(robot) is Mode.WALKING
 
 
 @pytest.mark.parametrize("moment", MOMENTS)
@@ -200,10 +240,10 @@ def test_a_drive_that_falls_silent_leads_to_damping_and_then_to_idle_drives(
 ) -> None:
     robot = at(moment)
     mute(robot, joint)
-    ticks = {}
+    ticks: dict[Mode, int] = {}
     for tick in range(1, 20):
         robot.step()
-        ticks.setdefault(robot.loop.mode, tick)
+        ticks.setdefault(mode_of(robot), tick)
     assert ticks[Mode.DAMPING] <= KINDS["drive_quiet"].bound_ticks
     assert ticks[Mode.DAMPING] < ticks[Mode.FAULT] <= KINDS["drive_silent"].bound_ticks
     assert robot.loop.sent.torques_nm == NO_TORQUE
@@ -215,12 +255,12 @@ def test_a_drive_that_falls_silent_while_arming_ends_it_without_torque(at: Copie
     robot = at("idle")
     assert robot.loop.request(Request.ARM, robot.now_s) is None
     robot.step()
-    assert robot.loop.mode is Mode.ARMING
+    assert mode_of(robot) is Mode.ARMING
     mute(robot, 2)
     for _ in range(KINDS["drive_silent"].bound_ticks):
         robot.step()
         assert robot.loop.sent.torques_nm == NO_TORQUE
-    assert robot.loop.mode is Mode.FAULT
+    assert mode_of(robot) is Mode.FAULT
 
 
 @pytest.mark.parametrize("moment", MOMENTS)
@@ -229,12 +269,12 @@ def test_damping_never_speeds_a_joint_up(at: Copied, moment: str) -> None:
     robot = at(moment)
     mute(robot, 1, codec.GET_ENCODER_ESTIMATES)
     ticks = 0
-    while robot.loop.mode is not Mode.FAULT:
+    while mode_of(robot) is not Mode.FAULT:
         robot.step()
-        ticks += robot.loop.mode is Mode.DAMPING
-        if robot.loop.mode is Mode.DAMPING and ticks == 3:
+        ticks += mode_of(robot) is Mode.DAMPING
+        if mode_of(robot) is Mode.DAMPING and ticks == 3:
             unmute(robot, 1)  # as a plug that slips in again
-        if robot.loop.mode is Mode.DAMPING and ticks > 3:
+        if mode_of(robot) is Mode.DAMPING and ticks > 3:
             for torque_nm, state in zip(robot.loop.sent.torques_nm, robot.loop.states, strict=True):
                 assert torque_nm * state.velocity_rad_s <= 0.0
                 assert abs(torque_nm) <= 0.4
@@ -247,10 +287,10 @@ def test_a_joint_whose_encoder_jumped_gets_no_torque_until_the_drives_are_idle(a
     robot = at("stance")
     altered(0, encoder_offset_rad=-0.4)(robot)
     ticks_until(robot, "encoder_jump", KINDS["encoder_jump"].bound_ticks)
-    assert robot.loop.mode is Mode.DAMPING
+    assert mode_of(robot) is Mode.DAMPING
     robot.run_for(3 * PERIOD_S)
     torques = []
-    while robot.loop.mode is Mode.DAMPING:
+    while mode_of(robot) is Mode.DAMPING:
         torques.append(robot.loop.sent.torques_nm)
         robot.step()
     assert len(torques) > 50
@@ -263,7 +303,7 @@ def test_after_a_soft_stop_the_flippers_are_up_and_the_drives_idle(at: Copied, m
     robot = at(moment)
     altered(bus_voltage_v=17.0)(robot)
     ticks_until(robot, "voltage_under", KINDS["voltage_under"].bound_ticks)
-    assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, SOFT_STOP_S + 0.2)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, SOFT_STOP_S + 0.2)
     assert all(abs(robot.robot.plant.angles_rad[joint]) < UP_RAD for joint in (1, 3))
     robot.step()
     assert all(drive.axis_state is AxisState.IDLE for drive in robot.robot.drives)
@@ -275,7 +315,7 @@ def test_a_soft_stop_in_mud_that_keeps_the_flippers_ends_in_time_as_well(at: Cop
         arm.track = Track([(5.0, Clay("40 kPa", 40e3))])
     altered(bus_voltage_v=17.0)(robot)
     ticks_until(robot, "voltage_under", KINDS["voltage_under"].bound_ticks)
-    assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, SOFT_STOP_S + 0.2)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, SOFT_STOP_S + 0.2)
     assert robot.robot.plant.angles_rad[1] < -UP_RAD
 
 
@@ -283,23 +323,23 @@ def test_a_worse_fault_in_a_soft_stop_is_heeded_at_once(at: Copied) -> None:
     robot = at("stance")
     altered(bus_voltage_v=17.0)(robot)
     robot.run_for(0.2)
-    assert robot.loop.mode is Mode.STOPPING
+    assert mode_of(robot) is Mode.STOPPING
     mute(robot, 0)
     robot.run_for(KINDS["drive_silent"].bound_ticks * PERIOD_S)
-    assert robot.loop.mode is Mode.FAULT
+    assert mode_of(robot) is Mode.FAULT
 
 
 def test_a_fault_that_ends_with_its_cause_ends_by_itself_but_nobody_arms(at: Copied) -> None:
     robot = at("holding")
     altered(bus_voltage_v=17.0)(robot)
-    assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 4.0)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, 4.0)
     robot.run_for(0.5)
-    assert robot.loop.mode is Mode.FAULT  # the cause lasts
+    assert mode_of(robot) is Mode.FAULT  # the cause lasts
     altered(bus_voltage_v=24.0)(robot)
-    assert robot.run_until(lambda: robot.loop.mode is Mode.IDLE, 0.5)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.5)
     for _ in range(500):
         robot.step()
-        assert robot.loop.mode is Mode.IDLE
+        assert mode_of(robot) is Mode.IDLE
         assert not any(drive.axis_state is AxisState.CLOSED_LOOP for drive in robot.robot.drives)
     assert robot.loop.fault is None
     assert "stopped by voltage_under" in robot.loop.notice  # still told
@@ -311,16 +351,16 @@ def test_what_a_person_must_clear_stands_until_then_and_against_force(at: Copied
     robot = at("stance")
     usual = robot.robot.drives[1].parameters
     CAUSES[name](robot)
-    assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 4.0)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, 4.0)
     robot.robot.drives[1].parameters = usual
     robot.robot.drives[1].__dict__.pop("cyclic_frames", None)
     robot.run_for(1.0)
-    assert robot.loop.mode is Mode.FAULT
+    assert mode_of(robot) is Mode.FAULT
     assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
-    assert robot.run_until(lambda: robot.loop.mode is Mode.IDLE, 0.6)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.6)
     robot.run_for(0.5)
-    assert robot.loop.mode is Mode.IDLE and not robot.loop.faults.standing
+    assert mode_of(robot) is Mode.IDLE and not robot.loop.faults.standing
     assert sum(text.startswith(f"fault {name} ") for text in texts_of(robot)) == 1
 
 
@@ -330,13 +370,13 @@ def test_a_clear_does_not_reach_into_the_time_after_it(at: Copied) -> None:
     robot.step()
     cleared_s = robot.now_s
     assert robot.loop.request(Request.ARM, robot.now_s) is None
-    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 0.3)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 0.3)
     CAUSES["encoder_jump"](robot)
     ticks_until(robot, "encoder_jump", 5)
     assert robot.now_s - cleared_s < 0.4
-    assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 4.0)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, 4.0)
     robot.run_for(1.0)
-    assert robot.loop.mode is Mode.FAULT
+    assert mode_of(robot) is Mode.FAULT
 
 
 def test_a_bug_stands_until_a_restart(at: Copied) -> None:
@@ -345,11 +385,11 @@ def test_a_bug_stands_until_a_restart(at: Copied) -> None:
     robot.loop.controller.gains = replace(gains, sweep_stiffness_nm_rad=float("nan"))
     robot.run_for(0.02)
     robot.loop.controller.gains = gains
-    assert robot.loop.mode is Mode.FAULT
+    assert mode_of(robot) is Mode.FAULT
     for _ in range(3):
         robot.loop.request(Request.CLEAR, robot.now_s)
         robot.run_for(0.6)
-    assert robot.loop.mode is Mode.FAULT
+    assert mode_of(robot) is Mode.FAULT
     assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
 
 
@@ -360,7 +400,7 @@ def test_a_bug_stands_until_a_restart(at: Copied) -> None:
 def unread(configuration: Configuration) -> Lockstep:
     """A robot with a drive whose watchdog nobody could read."""
     robot = make_robot(configuration)
-    robot.robot.drives[2]._read_parameter = lambda data: []  # type: ignore[method-assign, assignment]
+    robot.robot.drives[2]._read_parameter = lambda data: []  # type: ignore[method-assign]
     robot.run_for(1.5)
     assert {fault.name for fault in robot.loop.faults.blocking()} == {"watchdog_unknown"}
     return robot
@@ -370,7 +410,7 @@ def test_force_is_logged_with_all_that_it_overrules(unread: Lockstep) -> None:
     refused = unread.loop.request(Request.ARM, unread.now_s)
     assert refused is not None and "right_sweep" in refused
     assert unread.loop.request(Request.ARM, unread.now_s, forced=True) is None
-    assert unread.run_until(lambda: unread.loop.mode is Mode.HOLD, 1.0)
+    assert unread.run_until(lambda: mode_of(unread) is Mode.HOLD, 1.0)
     assert unread.loop.forced
     overruled = [text for text in texts_of(unread) if text.startswith("armed by force despite ")]
     assert len(overruled) == 1 and "watchdog_unknown" in overruled[0] and "right_sweep" in overruled[0]
@@ -379,7 +419,7 @@ def test_force_is_logged_with_all_that_it_overrules(unread: Lockstep) -> None:
 
 def test_force_ends_with_the_torque(unread: Lockstep) -> None:
     assert unread.loop.request(Request.ARM, unread.now_s, forced=True) is None
-    assert unread.run_until(lambda: unread.loop.mode is Mode.HOLD, 1.0)
+    assert unread.run_until(lambda: mode_of(unread) is Mode.HOLD, 1.0)
     unread.loop.request(Request.DISARM, unread.now_s)
     unread.step()
     assert not unread.loop.forced
@@ -390,16 +430,16 @@ def test_force_that_came_to_nothing_leaves_nothing_behind(unread: Lockstep) -> N
     assert unread.loop.request(Request.ARM, unread.now_s, forced=True) is None
     unread.loop.request(Request.DISARM, unread.now_s)
     unread.step()
-    assert unread.loop.mode is Mode.IDLE
+    assert mode_of(unread) is Mode.IDLE
     assert unread.loop.request(Request.ARM, unread.now_s) is not None
     unread.run_for(0.1)
-    assert unread.loop.mode is Mode.IDLE
+    assert mode_of(unread) is Mode.IDLE
 
 
 def test_force_where_nothing_is_to_be_overruled_is_none(at: Copied) -> None:
     robot = at("idle")
     assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is None
-    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 1.0)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
     assert not robot.loop.forced
     assert not any("despite" in text for text in texts_of(robot))
 
@@ -411,7 +451,7 @@ def test_what_is_mandatory_is_never_overruled(at: Copied, name: str) -> None:
     ticks_until(robot, name, KINDS[name].bound_ticks)
     assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
     robot.run_for(0.1)
-    assert robot.loop.mode is Mode.IDLE
+    assert mode_of(robot) is Mode.IDLE
     assert not any("despite" in text for text in texts_of(robot))
 
 
@@ -428,13 +468,13 @@ def hold_by_a_fault(robot: Lockstep) -> None:
 def test_a_stop_during_a_fault_that_holds_lifts_the_flippers(at: Copied) -> None:
     robot = at("stance")
     hold_by_a_fault(robot)
-    assert robot.loop.mode is Mode.HOLD
+    assert mode_of(robot) is Mode.HOLD
     assert robot.loop.faults.reaction is Reaction.HOLD
     assert robot.robot.plant.angles_rad[1] < -UP_RAD
     assert robot.loop.request(Request.STOP, robot.now_s) is None
     robot.step()
-    assert robot.loop.mode is Mode.STOPPING
-    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, SOFT_STOP_S)
+    assert mode_of(robot) is Mode.STOPPING
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, SOFT_STOP_S)
     assert all(abs(robot.robot.plant.angles_rad[joint]) < UP_RAD for joint in (1, 3))
 
 
@@ -443,10 +483,10 @@ def test_a_fault_that_holds_is_over_by_itself_and_then_the_robot_walks_again_whe
     hold_by_a_fault(robot)
     assert robot.loop.request(Request.WALK, robot.now_s, WALK) is not None
     robot.run_for(0.2)
-    assert (robot.loop.mode, robot.loop.faults.standing) == (Mode.HOLD, [])
+    assert (mode_of(robot), robot.loop.faults.standing) == (Mode.HOLD, [])
     assert robot.loop.request(Request.WALK, robot.now_s, WALK) is None
     robot.step()
-    assert robot.loop.mode is Mode.WALKING
+    assert mode_of(robot) is Mode.WALKING
 
 
 def test_warnings_change_no_torque(at: Copied) -> None:
@@ -459,7 +499,7 @@ def test_warnings_change_no_torque(at: Copied) -> None:
         well.step()
         warned.step()
         assert warned.loop.sent == well.loop.sent
-    assert warned.loop.mode is Mode.WALKING
+    assert mode_of(warned) is Mode.WALKING
     assert {"voltage_low", "bus_warning", "clock_step"} <= {fault.name for fault in warned.loop.faults.standing}
 
 
@@ -468,9 +508,9 @@ def test_a_robot_that_nobody_needs_lets_go_by_itself(configuration: Configuratio
     robot = make_robot(replace(configuration, motion=motion))
     robot.arm()
     robot.run_for(0.9)
-    assert robot.loop.mode is Mode.HOLD
+    assert mode_of(robot) is Mode.HOLD
     robot.run_for(0.2)
-    assert robot.loop.mode is Mode.IDLE
+    assert mode_of(robot) is Mode.IDLE
     assert not any(drive.axis_state is AxisState.CLOSED_LOOP for drive in robot.robot.drives)
 
 
@@ -488,7 +528,7 @@ def test_a_walk_is_no_fault(configuration: Configuration, mud: str) -> None:
     robot = make_robot(configuration, MUDS[mud])
     robot.arm()
     robot.walk(WalkOrder(0.05, False, 1))
-    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 12.0)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 12.0)
     assert faults_told(robot) == []
 
 
@@ -496,7 +536,7 @@ def test_a_recovery_in_the_stiffest_clay_is_no_fault(configuration: Configuratio
     robot = make_robot(configuration, Clay("9 kPa", 9000.0))
     robot.arm()
     robot.walk(WalkOrder(0.03, False, 1))
-    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 20.0)
     assert any("attempt" in text for text in texts_of(robot))
     assert faults_told(robot) == []
 
@@ -505,7 +545,7 @@ def test_a_walk_with_a_labs_disturbances_is_no_fault(configuration: Configuratio
     robot = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=EventRecorder(), disturbances=LAB)
     robot.arm()
     robot.walk(WalkOrder(0.03, True, 2))
-    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 15.0)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 15.0)
     assert faults_told(robot) == []
 
 
@@ -514,8 +554,8 @@ def test_disarm_is_obeyed_in_every_moment_of_a_fault(at: Copied) -> None:
         robot = at("stance")
         CAUSES[name](robot)
         ticks_until(robot, name, KINDS[name].bound_ticks)
-        assert robot.loop.mode in ENERGISED
+        assert mode_of(robot) in ENERGISED
         assert robot.loop.request(Request.DISARM, robot.now_s) is None
         robot.step()
-        assert robot.loop.mode in (Mode.IDLE, Mode.FAULT)
+        assert mode_of(robot) in (Mode.IDLE, Mode.FAULT)
         assert robot.loop.sent.torques_nm == NO_TORQUE

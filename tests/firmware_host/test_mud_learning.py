@@ -176,11 +176,14 @@ def test_what_is_within_bounds_or_not_valid_is_no_nonsense(learning: MudLearning
 def test_nonsense_never_leads_out_of_the_depths_that_may_be_chosen(
     learning: MudLearning, configuration: Configuration
 ) -> None:
-    """It may not even come near the estimator's belief; a depth is chosen all the same."""
+    """What is known of the mud does not believe it; a depth is chosen all the same."""
     controller = MadeUpController(WalkOrder(0.03))
-    wild = Estimate(nan, nan, 100, True)
-    for index in range(5):
-        learning.reading = MudReading(strides=(stride("left", index, k_p=wild, k_s=wild, k_e=wild, depth_m=nan),))
+    estimator = learning.estimator
+    for index, value in enumerate((nan, inf, -inf, 1e300, -1e300, 0.0)):
+        wild = Estimate(value, abs(value), 100, True)
+        strides = (stride("left", index, k_p=wild, k_s=wild, k_e=wild),)
+        estimator.belief = estimator._knowledge.update(strides)
+        learning.reading = MudReading(strides=strides)
         step(learning, controller)
         bounds = configuration.adaptation
         assert bounds.min_depth_m <= controller.gait.next_depth_m <= bounds.max_depth_m
