@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-.PHONY: help setup demo test lint clean
+.PHONY: help setup demo test mutants lint clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -16,6 +16,9 @@ demo: .venv/setup  ## a simulated robot walks over three muds, in real time
 
 test: .venv/test  ## every test, without network
 	$(BIN)/python -m pytest -q $(ARGS)
+
+mutants: .venv/test  ## change the transmit gate in 204 places; its tests must notice each
+	$(BIN)/python -m tests.drivers.gate_mutants
 
 lint: .venv/test  ## ruff and mypy --strict
 	$(BIN)/ruff check .

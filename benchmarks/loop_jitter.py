@@ -111,7 +111,7 @@ class DaemonLoop:
         self.recorder = Recorder(folder / "jitter.mcap", configuration.text, {})
         stack.callback(self.recorder.close, timeout_s=10.0)
         self.loop = Loop(configuration, drives, pose, self.recorder)
-        calls = OperatorCalls(self.loop, self.recorder, None, [], time.monotonic)
+        calls = OperatorCalls(self.loop, self.recorder, [], time.monotonic)
         self._status = StatusSocket(Path(configuration.status.socket), calls.methods)
         stack.callback(self._status.close)
         self._watchdog, self._shutdown = WatchdogFeed(SystemdNotifier("")), Shutdown()
@@ -121,7 +121,7 @@ class DaemonLoop:
         """As in firmware_host.daemon."""
         beat = ticker.wait()
         self.loop.tick(beat)
-        self._status.serve()
+        self._status.serve(beat.now_s)
         self._watchdog.update(beat, self.loop.mode)
         self._shutdown.step(self.loop, beat.now_s)
         return beat

@@ -132,7 +132,7 @@ class StageMarks:
         self._entries: tuple[tuple[Any, str], ...] = (
             (loop.drives, "read"),
             (loop.pose, "read"),
-            (loop, "_estimate"),
+            (loop.learning, "update"),
             (loop, "_adapt"),
             (loop, "_examine"),
             (loop.controller, "step"),

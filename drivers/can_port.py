@@ -31,11 +31,11 @@ MOST_FRAMES_PER_READ = 4096  # half a second of a full bus; a babbling node must
 class CanPort(Protocol):
     """What the drives need of a bus. `failed_sends` and `error_frames` only grow."""
 
+    state: BusState
     failed_sends: int
     error_frames: int  # and reads that failed
     last_error: str  # of receiving
     last_send_error: str
-    state: BusState
 
     def receive(self) -> Sequence[Frame]:
         """All data frames that have arrived, oldest first; never waits."""
@@ -53,6 +53,7 @@ class PythonCanPort:
 
     def __init__(self, bus: can.BusABC) -> None:
         self._bus = bus
+        self.state = BusState.ACTIVE
         self.failed_sends = 0
         self.error_frames = 0
         self.last_error = ""

@@ -49,6 +49,10 @@ class MockPort:
         self.last_error = error.text
         self.state = next_state(self.state, class_bits, error.state)
 
+    def open_beside(self) -> MockPort:
+        """Another node on the same bus."""
+        return self._bus.open()
+
     def close(self) -> None:
         if self in self._bus.ports:
             self._bus.ports.remove(self)

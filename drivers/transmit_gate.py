@@ -116,20 +116,20 @@ class GatedPort:
             self._sent_nm[identifier] = 0.0
 
     def send(self, frame: Frame) -> None:
-        if frame.is_extended or frame.is_error or frame.is_remote:
+        identifier, data, is_remote, is_error, is_extended, _ = frame
+        if is_extended or is_error or is_remote:
             passes = self._is_request(frame)
-        elif frame.arbitration_id in self._sent_nm:
-            self._send_torque(frame)
+        elif identifier in self._sent_nm:
+            self._send_torque(frame, identifier, data)
             return
         else:
-            passes = self._is_command(frame.arbitration_id, frame.data)
+            passes = self._is_command(identifier, data)
         if passes:
             self._port.send(frame)
         else:
             self._gate.refuse(f"A frame that is not on the list was not sent: {_text_of(frame)}.")
 
-    def _send_torque(self, frame: Frame) -> None:
-        identifier, data = frame.arbitration_id, frame.data
+    def _send_torque(self, frame: Frame, identifier: int, data: bytes) -> None:
         torque_nm: float = TORQUE.unpack(data)[0] if len(data) == TORQUE.size else nan
         problem = self._gate.torque_problem(torque_nm, self._sent_nm[identifier])
         if problem:

@@ -28,9 +28,11 @@ from control.limits import JointLimits, JointRange
 from control.records import JOINTS
 from control.recovery import RecoveryParameters
 from control.winding import WindingParameters
+from drivers.failures import FailureParameters
 from drivers.odrive_axis import DriveParameters, WatchdogEndpoints
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
+from firmware_host.log_parameters import LogParameters
 from firmware_host.toml_records import ConfigurationError as ConfigurationError  # for whoever loads one
 from firmware_host.toml_records import RecordReader, parse_document, read_text
 
@@ -61,14 +63,11 @@ class LoopParameters:
 
 
 @dataclass(frozen=True)
-class LogParameters:
-    directory: str = "logs"
-    enabled: bool = True
-
-
-@dataclass(frozen=True)
 class StatusParameters:
     socket: str = "/run/mudskipper/mudskipper.sock"
+    anyone_may_stop: bool = True  # whoever has an account here; else nobody outside the socket's group may connect
+    read_group: str = ""  # who may see how the robot is; empty: the daemon's own group
+    drive_group: str = ""  # who may operate it, and see; empty: the daemon's own group
 
 
 @dataclass(frozen=True)
@@ -97,6 +96,7 @@ class Configuration:
     log: LogParameters = LogParameters()
     status: StatusParameters = StatusParameters()
     pose: PoseParameters = PoseParameters()
+    failures: FailureParameters = FailureParameters()
     watchdog_endpoints: list[WatchdogEndpoints] = field(default_factory=list)  # of further builds of ODrive's firmware
     text: str = ""  # the file itself, which goes into every log
 
@@ -185,6 +185,9 @@ def _text_problems(configuration: Configuration) -> Iterator[str]:
         yield "status.socket = '': must name a socket"
     if pose and pose == status:
         yield f"pose.socket = {pose!r}: must not be status.socket"
+    for key in ("read_group", "drive_group"):
+        if "\0" in getattr(configuration.status, key):
+            yield f"status.{key}: must be without a zero byte"
     if "\0" in configuration.log.directory:
         yield f"log.directory = {configuration.log.directory!r}: must be without a zero byte"
 

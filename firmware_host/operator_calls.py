@@ -1,4 +1,8 @@
-"""What a person can ask of the running daemon: the methods of the status socket."""
+"""What a person can ask of the running daemon: the methods of the status socket.
+
+Who asks for something to be done is named in the log. A lease is given while torque is on: before, there is nothing
+that its loss could stop.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +13,12 @@ from typing import Any
 
 from control.controller import WalkOrder
 from control.faults import Blocks, Fault
-from control.modes import Request
+from control.modes import ENERGISED, Request
 from control.records import JOINTS
 from drivers.odrive_codec import error_text
 from firmware_host.arming_checks import arming_checks
+from firmware_host.connection import Caller
+from firmware_host.lease import LONGEST_S, SHORTEST_S, Lease
 from firmware_host.loop import Loop
 from firmware_host.recorder import Recording
 from firmware_host.reports import belief_report, known, map_report, stride_report
@@ -35,13 +41,13 @@ class OperatorCalls:
         self,
         loop: Loop,
         recorder: Recording,
-        log_path: str | None,
         warnings: list[str],
         clock: Callable[[], float],
+        lease: Lease | None = None,
     ) -> None:
         self._loop = loop
+        self._lease = lease or Lease()
         self._recorder = recorder
-        self._log_path = log_path
         self._warnings = warnings
         self._clock = clock
         self._version = software_version()
@@ -49,17 +55,19 @@ class OperatorCalls:
     @property
     def methods(self) -> Methods:
         return {
-            "hello": self.hello,
-            "status": self.status,
-            "strides": self.strides,
-            "map": self.map,
-            "check": self.check,
+            "hello": lambda params, caller: self.hello(params),
+            "status": lambda params, caller: self.status(params),
+            "strides": lambda params, caller: self.strides(params),
+            "map": lambda params, caller: self.map(params),
+            "check": lambda params, caller: self.check(params),
             "arm": self.arm,
             "walk": self.walk,
-            "stop": lambda params: self._request(Request.STOP),
-            "disarm": lambda params: self._request(Request.DISARM),
-            "clear": lambda params: self._request(Request.CLEAR),
-            "reset_timing": self.reset_timing,
+            "stop": lambda params, caller: self._request(caller, Request.STOP),
+            "disarm": lambda params, caller: self._request(caller, Request.DISARM),
+            "clear": self.clear,
+            "lease": self.lease,
+            "release": self.release,
+            "reset_timing": lambda params, caller: self.reset_timing(params),
         }
 
     def hello(self, params: dict[str, Any]) -> dict[str, Any]:
@@ -87,7 +95,7 @@ class OperatorCalls:
             "warnings": self._warnings,
             "bus": self._bus(),
             "log": {
-                "path": self._log_path,
+                "path": str(self._recorder.path) if self._recorder.path else None,
                 "dropped": self._recorder.dropped,
                 "writer_alive": self._recorder.writer_alive,
             },
@@ -133,32 +141,62 @@ class OperatorCalls:
         """The mud along the way, since the walk began."""
         return map_report(self._loop.learning.estimator.map.rows())
 
-    def arm(self, params: dict[str, Any]) -> str:
+    def arm(self, params: dict[str, Any], caller: Caller) -> str:
         """`force` overrules what is not mandatory."""
         force = params.get("force", False)
         if not isinstance(force, bool):
             raise RefusedError(f"force = {force!r}: must be true or false")
-        return self._request(Request.ARM, forced=force)
+        return self._request(caller, Request.ARM, forced=force)
 
-    def walk(self, params: dict[str, Any]) -> str:
+    def walk(self, params: dict[str, Any], caller: Caller) -> str:
         """`depth_m` for a fixed depth, else adaptive from the configured start; `strides`, 0 without end."""
         configuration = self._loop.configuration
         strides = _integer(params, "strides", 0, MOST_STRIDES)
         depth_m = params.get("depth_m")
         if depth_m is None:
-            return self._request(Request.WALK, WalkOrder(configuration.adaptation.initial_depth_m, True, strides))
+            order = WalkOrder(configuration.adaptation.initial_depth_m, True, strides)
+            return self._request(caller, Request.WALK, order)
         if isinstance(depth_m, bool) or not isinstance(depth_m, int | float) or not isfinite(depth_m):
             raise RefusedError(f"depth_m = {depth_m!r}: must be a number")
         deepest_m = configuration.adaptation.max_depth_m
         if not 0.0 < depth_m <= deepest_m:
             raise RefusedError(f"depth_m = {depth_m}: must be more than 0 and at most {deepest_m}")
-        return self._request(Request.WALK, WalkOrder(float(depth_m), False, strides))
+        return self._request(caller, Request.WALK, WalkOrder(float(depth_m), False, strides))
 
-    def _request(self, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:
-        refused = self._loop.request(request, self._clock(), order, forced)
+    def clear(self, params: dict[str, Any], caller: Caller) -> str:
+        """A lost lease is cleared with the rest."""
+        accepted = self._request(caller, Request.CLEAR)
+        if self._lease.lost(self._clock()):
+            self._lease.reset()
+        return accepted
+
+    def lease(self, params: dict[str, Any], caller: Caller) -> str:
+        """Promise to renew it within `for_s`, or to be stopped."""
+        for_s = params.get("for_s")
+        if isinstance(for_s, bool) or not isinstance(for_s, int | float) or not SHORTEST_S <= for_s <= LONGEST_S:
+            raise RefusedError(f"for_s = {for_s!r}: must be a number from {SHORTEST_S:g} to {LONGEST_S:g}")
+        if self._loop.mode not in ENERGISED:
+            raise RefusedError("the torque is off, there is nothing to stop: arm first")
+        begins = self._lease.holder != caller
+        self._accept(self._lease.renew(caller, self._clock(), for_s))
+        if begins:
+            self._loop.event(self._clock(), f"lease taken by {caller}")
+        return "accepted"
+
+    def release(self, params: dict[str, Any], caller: Caller) -> str:
+        """End one's own lease, or whoever's was lost."""
+        self._accept(self._lease.release(caller))
+        self._loop.event(self._clock(), f"lease released by {caller}")
+        return "accepted"
+
+    def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:
+        self._accept(self._loop.request(request, self._clock(), order, forced))
+        self._loop.event(self._clock(), f"request {request.name.lower()} by {caller}")
+        return "accepted"
+
+    def _accept(self, refused: str | None) -> None:
         if refused:
             raise RefusedError(refused)
-        return "accepted"
 
     def reset_timing(self, params: dict[str, Any]) -> str:
         """Start the loop's statistics anew."""
@@ -167,7 +205,7 @@ class OperatorCalls:
 
     def check(self, params: dict[str, Any]) -> list[dict[str, Any]]:
         """What stands between this robot and torque, item by item."""
-        return arming_checks(self._loop, self._log_path or "off", self._warnings)
+        return arming_checks(self._loop, str(self._recorder.path or "off"), self._warnings)
 
 
 def _fault(loop: Loop) -> dict[str, Any] | None:

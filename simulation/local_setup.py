@@ -74,6 +74,9 @@ socket = {status}
 
 [pose]
 socket = {pose}
+
+[failures]
+allowed = true
 """
 
 

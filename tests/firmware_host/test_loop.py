@@ -364,7 +364,7 @@ def test_a_log_that_is_lost_is_told(robot: Lockstep) -> None:
     robot.run_for(0.1)
     recorder = recorder_of(robot)
     recorder.writer_alive = False
-    calls = OperatorCalls(robot.loop, recorder, None, [], lambda: robot.now_s)
+    calls = OperatorCalls(robot.loop, recorder, [], lambda: robot.now_s)
     assert calls.status({})["notice"] == "the log's writer has died: nothing is recorded"
 
 

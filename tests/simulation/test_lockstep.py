@@ -83,7 +83,7 @@ def test_it_walks_with_everything_that_can_be_wrong_with_its_joints_and_its_pose
     lockstep = Lockstep(configuration, TRACK, plant=plant, drives=drives, motion_capture=cameras)
     lockstep.arm()
     lockstep.walk(WalkOrder(0.03))
-    lockstep.run_for(5.0)
+    lockstep.run_for(6.0)
     assert lockstep.loop.fault is None
     assert len(lockstep.loop.learning.strides) >= 4
     assert lockstep.robot.plant.body_m > 0.2
