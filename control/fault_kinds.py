@@ -84,16 +84,25 @@ _ROWS: tuple[FaultKind, ...] = (
         "encoder_jump", "joint", DAMPING, ALWAYS, BY_HAND, 3,
         "A position jumped farther than a joint can move.", "check encoder, magnet and cable, then clear",
     ),
-    FaultKind("motor_overheating", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 42, "A motor is nearly too hot.", COOL),
-    FaultKind("motor_hot", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 42, "A motor is too hot.", COOL),
+    FaultKind(
+        "encoder_stuck", "joint", DAMPING, ALWAYS, BY_HAND, 120,
+        "A position stands still while the joint moves.", "check encoder, magnet and cable, then clear",
+    ),
+    FaultKind(
+        "torque_missing", "joint", SOFT_STOP, ALWAYS, BY_HAND, 45,
+        "A motor's current is not that of its torque for 0.1 s.",
+        "check the drive's limits, its torque constant and cables, then clear",
+    ),
+    FaultKind("motor_overheating", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 100, "A motor is nearly too hot.", COOL),
+    FaultKind("motor_hot", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 100, "A motor is too hot.", COOL),
     FaultKind(
         "winding_overheating", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 3,
         "By its currents a winding is nearly too hot.", COOL,
     ),
     FaultKind("winding_hot", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 3, "By its currents a winding is too hot.", COOL),
-    FaultKind("voltage_low", "joint", WARN, NO, WHEN_GONE, 42, "The supply is low.", "charge or change the battery"),
+    FaultKind("voltage_low", "joint", WARN, NO, WHEN_GONE, 100, "The supply is low.", "charge or change the battery"),
     FaultKind(
-        "voltage_under", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 42,
+        "voltage_under", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 100,
         "The supply is too low.", "charge or change the battery",
     ),
     FaultKind(

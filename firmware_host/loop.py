@@ -21,6 +21,7 @@ from drivers.odrive_drives import OdriveDrives
 from drivers.pose_port import PoseSource
 from firmware_host.configuration import Configuration
 from firmware_host.fault_watch import FaultWatch, Situation
+from firmware_host.lease import Lease
 from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK
 from firmware_host.mud_learning import MudLearning
 from firmware_host.recorder import Recording
@@ -42,11 +43,13 @@ class Loop:
         recorder: Recording,
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
+        lease: Lease | None = None,
     ) -> None:
         self.configuration = configuration
         self.drives = drives
         self.pose = pose
         self.recorder = recorder
+        self.lease = lease or Lease()
         self.timing = LoopTiming()
         self.learning = MudLearning(configuration)
         self.controller = controller_of(configuration)
@@ -89,6 +92,11 @@ class Loop:
         """The worst that stands and is more than a warning."""
         return self.faults.worst if self.faults.reaction >= Reaction.HOLD else None
 
+    @property
+    def temperatures_c(self) -> tuple[float, ...]:
+        """Of the motors, measured or reckoned."""
+        return tuple(joint.winding.temperature_c for joint in self._fault_watch.joints)
+
     def _adapt(self, now_s: float) -> None:
         """Once a stride, in swing, the gait changes; and where an insertion meets firm mud."""
         closed, sentences = self.learning.step(self.controller)
@@ -99,7 +107,7 @@ class Loop:
 
     def _examine(self, beat: Beat) -> Health:
         """Faults as data, and what else the mode depends on."""
-        present = self._fault_watch.update(beat, self._situation()) + self.learning.faults
+        present = self._fault_watch.update(beat, self._situation(beat.now_s)) + self.learning.faults
         if self.controller.fault:
             present.append(self.controller.fault)
         clearing = beat.now_s <= self._clear_until_s
@@ -116,7 +124,10 @@ class Loop:
             blocking=tuple(self.faults.blocking(self.forced)),
         )
 
-    def _situation(self) -> Situation:
+    def _situation(self, now_s: float) -> Situation:
+        lost = self.lease.lost(now_s)
+        if lost and self.mode not in ENERGISED:  # nothing is left to attend to
+            self.lease.reset()
         return Situation(
             self.mode,
             self._mode_since_s,
@@ -125,6 +136,8 @@ class Loop:
             self.sent,
             self.controller.recovery.attempt > 0,
             self._wall_clock() - self._clock(),
+            self.recorder.report(),
+            str(self.lease.holder) if lost else "",
         )
 
     def _tell_faults(self, now_s: float) -> None:

@@ -63,6 +63,8 @@ viscous_nm_s = 0.002
 late_s = 0.5
 quiet_s = 0.5
 silence_s = 0.5
+jump_rad = 2.0
+fast_s = 0.2
 lag_s = 0.5
 lag_share = 1.0
 

@@ -24,7 +24,8 @@ ROOT = Path(__file__).parent.parent.parent
 TIMEOUT_S = 60.0
 ALWAYS = {"benchmark", "reached", "verdict"}
 BENCHMARKS = (
-    "tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "socket_fuzz", "estimator_cost", "corrupted_logs", "log_kills",
+    "tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "socket_fuzz", "estimator_cost",
+    "corrupted_logs", "log_kills",
 )  # fmt: skip
 SUMMARY = {"median", "p99", "max"}
 

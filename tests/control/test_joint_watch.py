@@ -12,9 +12,9 @@ from control.fault_kinds import KINDS
 from control.faults import Reaction
 from control.joint_watch import (
     CURRENT_TICKS,
-    FAST_TICKS,
     HEARTBEAT_SILENCE_S,
     TEMPERATURE_SILENCE_S,
+    TWO_MESSAGES_S,
     FaultBounds,
     JointFacts,
     JointWatch,
@@ -30,6 +30,8 @@ START_S = 1000.0
 LIMITS, BOUNDS = JointLimits(), FaultBounds()
 SPAN = JointRange(radians(-60.0), radians(60.0))
 CURRENT_LIMIT_A = 12.0
+FAST_TICKS = round(FaultBounds().fast_s * 380.0)
+TWO_MESSAGES = round(TWO_MESSAGES_S * 380.0)
 HEALTHY = DriveState(
     angle_rad=0.1,
     velocity_rad_s=0.0,
@@ -55,7 +57,7 @@ SEVERITY = [
 
 
 def make_watch() -> JointWatch:
-    return JointWatch(JOINT, LIMITS, SPAN, BOUNDS, WindingParameters(), CURRENT_LIMIT_A)
+    return JointWatch(JOINT, LIMITS, SPAN, BOUNDS, WindingParameters(), CURRENT_LIMIT_A, 0.083)
 
 
 def facts(now_s: float = START_S, **changes: Any) -> JointFacts:
@@ -72,6 +74,14 @@ def seen(watch: JointWatch, state: DriveState, now_s: float = START_S, **changes
 def names(state: DriveState, **changes: Any) -> set[str]:
     """What a fresh watch says of one sample."""
     return set(seen(make_watch(), state, **changes))
+
+
+def lasting(state: DriveState, watch: JointWatch | None = None) -> set[str]:
+    """What is said of one that stays so for two slow messages; before that nothing is."""
+    watch = watch or make_watch()
+    before = [seen(watch, state) for _ in range(TWO_MESSAGES)]
+    assert not any(before[:-1])
+    return set(seen(watch, state)) | set(seen(watch, state))
 
 
 def fresh(now_s: float, **changes: Any) -> DriveState:
@@ -259,8 +269,8 @@ def test_the_time_to_obey_begins_anew_with_every_obedience() -> None:
     ("voltage_v", "expected"),
     [(24.0, None), (20.0, None), (19.99, "voltage_low"), (18.0, "voltage_low"), (17.99, "voltage_under"), (nan, None)],
 )
-def test_a_supply_is_low_and_then_too_low(voltage_v: float, expected: str | None) -> None:
-    assert names(HEALTHY._replace(bus_voltage_v=voltage_v)) == ({expected} - {None})
+def test_a_supply_is_low_and_then_too_low_once_two_messages_say_so(voltage_v: float, expected: str | None) -> None:
+    assert lasting(HEALTHY._replace(bus_voltage_v=voltage_v)) == ({expected} - {None})
 
 
 # motion
@@ -393,13 +403,22 @@ def test_one_tick_of_motion_begins_the_wait_anew() -> None:
     watch = make_watch()
     for tick in range(2000):
         state = HEALTHY._replace(velocity_rad_s=0.2 if tick % 700 == 0 else 0.0)
-        assert not seen(watch, state, torque_nm=LIMITS.torque_nm)
+        assert "joint_not_following" not in seen(watch, state, torque_nm=LIMITS.torque_nm)
 
 
 def test_missed_ticks_count_for_as_long_as_they_lasted() -> None:
     watch = make_watch()
-    found = [tick for tick in range(1, 200) if seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=10.0 * TICK_S)]
+    found = [
+        tick
+        for tick in range(1, 200)
+        if "joint_not_following" in seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=10.0 * TICK_S)
+    ]
     assert found[0] == pytest.approx(76, abs=1)
+
+
+@pytest.mark.parametrize("missed", [1, 5, 9, 200])
+def test_a_joint_at_rest_is_not_too_fast_after_missed_ticks(missed: int) -> None:
+    assert names(HEALTHY, dt_s=(1 + missed) * TICK_S) == set()
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -434,7 +453,7 @@ def test_a_motor_takes_too_much_from_a_quarter_over_its_limit_on(sign: float) ->
 def test_a_sensor_is_nearly_too_hot_half_way_to_its_bound_and_then_too_hot(
     temperature_c: float, expected: str | None
 ) -> None:
-    assert names(HEALTHY._replace(temperature_c=temperature_c)) == ({expected} - {None})
+    assert lasting(HEALTHY._replace(temperature_c=temperature_c)) == ({expected} - {None})
 
 
 def warm_watch(winding_c: float) -> JointWatch:
@@ -460,14 +479,18 @@ def test_a_winding_that_is_too_hot_is_not_hidden_by_a_sensor_that_is_nearly_so()
 
 
 def test_where_both_are_as_hot_the_sensor_is_believed() -> None:
-    told = seen(warm_watch(95.0), HEALTHY._replace(temperature_c=96.0))
+    watch = warm_watch(95.0)
+    for _ in range(TWO_MESSAGES + 2):
+        told = seen(watch, HEALTHY._replace(temperature_c=96.0))
     assert told == {"motor_hot": "The left_sweep motor has 96 degrees C."}
 
 
 def test_one_absurd_temperature_is_over_in_minutes() -> None:
     for absurd in (inf, 1e38):
         watch = make_watch()
-        seen(watch, HEALTHY._replace(temperature_c=absurd))
+        for _ in range(TWO_MESSAGES + 2):
+            told = seen(watch, HEALTHY._replace(temperature_c=absurd))
+        assert set(told) == {"motor_hot"}
         ticks = 0
         while seen(watch, HEALTHY, dt_s=1.0):
             ticks += 1

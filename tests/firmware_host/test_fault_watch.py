@@ -19,6 +19,7 @@ from drivers.odrive_axis import OdriveAxis, Version
 from drivers.odrive_drives import OdriveDrives
 from firmware_host.configuration import Configuration
 from firmware_host.fault_watch import ARMING_S, POSE_FORGOTTEN_S, REFUSED_TICKS, FaultWatch, Situation
+from firmware_host.recorder import HEALTHY
 from firmware_host.ticker import PERIOD_S, Beat
 
 START_S = 100.0
@@ -51,7 +52,7 @@ class Bench:
         states = states or self.states()
         self.tick_number += 1
         sent = LimitedTorques(NO_TORQUE, False, True)
-        situation = Situation(mode, START_S, states, BodyPose(), sent, False, 0.0)
+        situation = Situation(mode, START_S, states, BodyPose(), sent, False, 0.0, HEALTHY, "")
         return self.watch.update(Beat(self.now_s, 0.0, self.tick_number, 0), situation._replace(**changes))
 
 
@@ -238,6 +239,14 @@ def test_a_place_that_is_lost_is_told_until_it_is_back_or_forgotten(bench: Bench
     assert not lost[-1]
 
 
+def test_who_lost_the_lease_is_named(bench: Bench) -> None:
+    (fault,) = bench.tick(lease_holder="the operator's tablet")
+    assert (fault.name, fault.sentence) == (
+        "lease_lost",
+        "the operator's tablet promised to attend the robot and is gone.",
+    )
+
+
 # trust in encoders
 
 
@@ -286,7 +295,14 @@ def test_the_limits_see_the_windings_heat_once_it_matters(bench: Bench) -> None:
 
 def test_a_joint_in_a_recovery_is_not_asked_to_follow_and_one_that_walks_is(bench: Bench) -> None:
     full = LimitedTorques((0.75, 0.0, 0.0, 0.0), False, True)
-    assert not any(bench.tick(sent=full, freeing=True) for _ in range(800))
-    assert not any(bench.tick(Mode.DAMPING, sent=full) for _ in range(800))
-    found = [bench.tick(Mode.WALKING, sent=full) for _ in range(800)]
-    assert told(found[-1]) == [("joint_not_following", "left_sweep")]
+
+    def ticks(mode: Mode, freeing: bool) -> list[Fault]:
+        found: list[Fault] = []
+        for tick in range(800):
+            states = bench.states(0, current_a=0.75 / 0.083, velocity_rad_s=1e-4 * (tick % 2))
+            found += bench.tick(mode, states, sent=full, freeing=freeing)
+        return found
+
+    assert ticks(Mode.WALKING, True) == []
+    assert ticks(Mode.DAMPING, False) == []
+    assert set(told(ticks(Mode.WALKING, False))) == {("joint_not_following", "left_sweep")}

@@ -44,7 +44,7 @@ class Robot:
         self.events = Events()
         self.steps = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=self.events)
         self.lease = Lease()
-        calls = OperatorCalls(self.steps.loop, self.events, [], lambda: self.steps.now_s, self.lease)
+        calls = OperatorCalls(self.steps.loop, self.events, [], lambda: self.steps.now_s)
         self._methods = calls.methods
         self.names = set(self._methods)
 

@@ -63,7 +63,7 @@ def test_a_log_that_was_thinned_and_cut_into_segments_gives_the_same_strides(
     paths = log_files(tmp_path, DONE)
     assert len(paths) > 3
     assert len(read_logs(paths).ticks) < robot.tick_number - 3000
-    live = [stride.estimate for stride in robot.loop.strides]
+    live = [stride.estimate for stride in robot.loop.learning.strides]
     replayed = replay_files(paths).strides
     assert len(live) == len(replayed) == 10
     assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
