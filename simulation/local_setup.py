@@ -70,6 +70,7 @@ lag_share = 1.0
 
 [log]
 directory = {logs}
+min_free_share = 0.0  # a full disk of a desk is no reason to free anybody's logs
 
 [status]
 socket = {status}
