@@ -34,7 +34,6 @@ FROZEN_S = 0.5  # at full torque, by which not even the last bit of angle and sp
 MISSING_SHARE = 0.3  # of the torque limit, by which the current differs from the torque that was sent
 MISSING_S = 0.1
 TWO_MESSAGES_S = 0.15  # of those that come every 0.1 s: a single odd one proves nothing
-HOTTEST_C = 200.0  # a winding has burnt by then: what tells more is no sensor
 
 
 @dataclass(frozen=True)
@@ -177,7 +176,7 @@ class JointWatch:
         if not self._low_rad <= angle_rad <= self._high_rad:
             found.append(self._out_of_range(angle_rad))
         self._fast_s = self._fast_s + facts.dt_s if velocity_rad_s > self._fast_rad_s else 0.0
-        if self._fast_s >= self._bounds.fast_s - facts.dt_s / 2.0:
+        if self._fast_s > max(self._bounds.fast_s - facts.dt_s / 2.0, 0.0):
             text = f"The {self.joint} joint turns at {velocity_rad_s:.0f} rad/s."
             found.append(self._fault("joint_velocity", text))
         if velocity_rad_s > MOVING_RAD_S and not facts.energised:
@@ -215,7 +214,7 @@ class JointWatch:
     def _watch_jump(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
         """Between two messages; what a stamp is late by may be a tick."""
         step_rad = abs(state.angle_rad - self._angle_rad)
-        gap_s = state.angle_stamp_s - self._angle_stamp_s + facts.dt_s
+        gap_s = max(state.angle_stamp_s - self._angle_stamp_s, 0.0) + facts.dt_s
         if step_rad > self._bounds.jump_rad + self._jump_rad_s * gap_s:  # never true of the first one
             text = f"The {self.joint} encoder jumped by {degrees(step_rad):.0f} degrees in {gap_s * 1e3:.1f} ms."
             found.append(self._fault("encoder_jump", text))
@@ -251,12 +250,12 @@ class JointWatch:
         if not measured_c < self._nearly_hot_c and not self._hot_s > TWO_MESSAGES_S:
             measured_c = UNKNOWN
         current_a = state.current_a if abs(state.current_a) < 2.0 * self._most_a else UNKNOWN  # no motor takes more
-        winding_c = self.winding.update(facts.dt_s, current_a, min(measured_c, HOTTEST_C))
+        winding_c = self.winding.update(facts.dt_s, current_a, measured_c)
         if winding_c < self._nearly_hot_c:
             return
-        by_sensor = measured_c >= self._nearly_hot_c
+        hot = winding_c >= self._limits.temperature_hot_c
+        by_sensor = measured_c >= (self._limits.temperature_hot_c if hot else self._nearly_hot_c)
         what, how = ("motor", "") if by_sensor else ("winding", ", by its currents")
         temperature_c = measured_c if by_sensor else winding_c
-        hot = temperature_c >= self._limits.temperature_hot_c
         text = f"The {self.joint} motor has {temperature_c:.0f} degrees C{how}."
         found.append(self._fault(f"{what}_hot" if hot else f"{what}_overheating", text))

@@ -111,7 +111,7 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition(_from(Mode.ARMING), _is("closed loop", lambda health: health.closed_loop), Mode.HOLD),
     Transition(_from(Mode.HOLD), WALK_ACCEPTED, Mode.WALKING),
     Transition(_from(Mode.HOLD), _is("nobody needs it", lambda health: health.rested), Mode.IDLE),
-    Transition(_from(Mode.WALKING), _asked(Request.STOP), Mode.STOPPING),
+    Transition(_from(Mode.HOLD, Mode.WALKING), _asked(Request.STOP), Mode.STOPPING),
     Transition(_from(Mode.WALKING), _is("strides done", lambda health: health.walk_finished), Mode.STOPPING),
     Transition(_from(Mode.WALKING), _at_least(Reaction.HOLD), Mode.HOLD),
     Transition(_from(Mode.STOPPING), SOFT_STOP_DONE, Mode.FAULT),

@@ -124,6 +124,13 @@ def test_a_walk_ends_by_raising_the_flippers() -> None:
     assert next_mode(Mode.WALKING, Request.NONE, WELL) is Mode.WALKING
 
 
+def test_a_stop_raises_flippers_that_a_fault_left_in_the_mud() -> None:
+    """The pose that is held then is that of the walk."""
+    for health in (WELL, faulty(Reaction.WARN), faulty(Reaction.HOLD)):
+        assert next_mode(Mode.HOLD, Request.STOP, health) is Mode.STOPPING
+        assert next_mode(Mode.HOLD, Request.NONE, health) is Mode.HOLD
+
+
 def test_a_stop_for_a_person_ends_in_hold_and_one_for_a_fault_without_torque() -> None:
     for request in set(Request) - {Request.DISARM}:
         assert next_mode(Mode.STOPPING, request, WELL) is Mode.STOPPING
