@@ -119,6 +119,7 @@ class Loop:
             walk_finished=self.controller.walk_finished,
             raised=self.controller.raised,
             settled=self.controller.settled,
+            cut_short=self.controller.cut_short,
             rested=self.controller.rested,
             worst=self.faults.worst,
             blocking=tuple(self.faults.blocking(self.forced)),

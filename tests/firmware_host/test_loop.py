@@ -365,7 +365,7 @@ def test_a_fixed_depth_stays_fixed(robot: Lockstep) -> None:
 
 
 def test_a_log_that_is_lost_is_told(robot: Lockstep) -> None:
-    robot.run_for(0.1)
+    robot.arm()
     recorder = recorder_of(robot)
     recorder.health = HEALTHY._replace(alive=False)
     robot.step()

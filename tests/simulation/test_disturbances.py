@@ -308,8 +308,8 @@ def test_the_drives_take_over_their_part() -> None:
 
 
 def patient(configuration: Configuration) -> Configuration:
-    """For messages that come so seldom that a robot would take them for lost."""
-    return replace(configuration, faults=FaultBounds(late_s=0.02, quiet_s=0.02))
+    """For messages that come so seldom that a robot would take them for lost, and joints that swing."""
+    return replace(configuration, faults=FaultBounds(late_s=0.02, quiet_s=0.02, jump_rad=1.0, fast_s=1.0))
 
 
 def test_the_joints_stay_calm_in_the_lab(configuration: Configuration) -> None:
