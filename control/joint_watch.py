@@ -29,12 +29,12 @@ STILL_RAD_S = 0.1
 SATURATED_SHARE = 0.95  # of the torque limit
 STALLED_S = 2.0  # longer than an insertion, a stance or an extraction of the paper's gait takes
 JUMP_SHARE = 2.0  # of the velocity limit
-FROZEN_RAD = 0.03  # that a joint has gone, by its own speed, while its angle stayed the same to the last bit
-FROZEN_S = 0.1  # at full torque without a change of the last bit of angle or speed
+GONE_RAD = 0.03  # by a joint's own speed, while its angle stayed the same to the last bit
+GONE_S = 0.02  # drives tell an old value once more, now and then
+FROZEN_S = 0.5  # at full torque, by which not even the last bit of angle and speed changes
 MISSING_SHARE = 0.3  # of the torque limit, by which the current differs from the torque that was sent
 MISSING_S = 0.1
 TWO_MESSAGES_S = 0.15  # of those that come every 0.1 s: a single odd one proves nothing
-HOTTEST_C = 200.0  # a winding has burnt by then: what tells more is no sensor
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class JointWatch:
         """But not the winding: it stays as warm as it is."""
         self._current_ticks = 0
         self._fast_s = self._stalled_s = self._energised_s = self._missing_s = 0.0
-        self._low_s = self._under_s = self._hot_s = self._frozen_s = self._gone_rad = 0.0
+        self._low_s = self._under_s = self._hot_s = self._frozen_s = self._gone_s = self._gone_rad = 0.0
         self._angle_rad, self._velocity_rad_s, self._angle_stamp_s = UNKNOWN, UNKNOWN, NEVER_S
 
     def update(self, facts: JointFacts, state: DriveState) -> list[Fault]:
@@ -178,9 +178,8 @@ class JointWatch:
         angle_rad, velocity_rad_s = state.angle_rad, abs(state.velocity_rad_s)
         if not self._low_rad <= angle_rad <= self._high_rad:
             found.append(self._out_of_range(angle_rad))
-        fast = velocity_rad_s > self._fast_rad_s
-        self._fast_s = self._fast_s + facts.dt_s if fast else 0.0
-        if fast and self._fast_s >= self._bounds.fast_s - facts.dt_s / 2.0:
+        self._fast_s = self._fast_s + facts.dt_s if velocity_rad_s > self._fast_rad_s else 0.0
+        if self._fast_s > max(self._bounds.fast_s - facts.dt_s / 2.0, 0.0):
             text = f"The {self.joint} joint turns at {velocity_rad_s:.0f} rad/s."
             found.append(self._fault("joint_velocity", text))
         if velocity_rad_s > MOVING_RAD_S and not facts.energised:
@@ -195,18 +194,19 @@ class JointWatch:
             self._watch_frozen(found, facts, state)
         else:
             self._watch_jump(found, facts, state)
-            self._frozen_s = self._gone_rad = 0.0
+            self._frozen_s = self._gone_s = self._gone_rad = 0.0
         self._angle_rad, self._velocity_rad_s = state.angle_rad, state.velocity_rad_s
         self._angle_stamp_s = state.angle_stamp_s
 
     def _watch_frozen(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
         """An angle that stays the same while the joint moves by its own speed, or at full torque with that speed."""
         gap_s = state.angle_stamp_s - self._angle_stamp_s
+        self._gone_s += gap_s
         self._gone_rad += abs(state.velocity_rad_s) * gap_s
         pushed = facts.energised and abs(facts.torque_nm) >= self._saturated_nm
         frozen = pushed and state.velocity_rad_s == self._velocity_rad_s
         self._frozen_s = self._frozen_s + gap_s if frozen else 0.0
-        if self._gone_rad > FROZEN_RAD or self._frozen_s > FROZEN_S:
+        if (self._gone_rad > GONE_RAD and self._gone_s > GONE_S) or self._frozen_s > FROZEN_S:
             found.append(self._fault("encoder_stuck", f"The {self.joint} encoder stands still while the joint moves."))
 
     def _out_of_range(self, angle_rad: float) -> Fault:
@@ -217,7 +217,7 @@ class JointWatch:
     def _watch_jump(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
         """Between two messages; what a stamp is late by may be a tick."""
         step_rad = abs(state.angle_rad - self._angle_rad)
-        gap_s = state.angle_stamp_s - self._angle_stamp_s + facts.dt_s
+        gap_s = max(state.angle_stamp_s - self._angle_stamp_s, 0.0) + facts.dt_s
         if step_rad > self._bounds.jump_rad + self._jump_rad_s * gap_s:  # never true of the first one
             text = f"The {self.joint} encoder jumped by {degrees(step_rad):.0f} degrees in {gap_s * 1e3:.1f} ms."
             found.append(self._fault("encoder_jump", text))
@@ -253,12 +253,12 @@ class JointWatch:
         if not measured_c < self._nearly_hot_c and not self._hot_s > TWO_MESSAGES_S:
             measured_c = UNKNOWN
         current_a = state.current_a if abs(state.current_a) < 2.0 * self._most_a else UNKNOWN  # no motor takes more
-        winding_c = self.winding.update(facts.dt_s, current_a, min(measured_c, HOTTEST_C))
+        winding_c = self.winding.update(facts.dt_s, current_a, measured_c)
         if winding_c < self._nearly_hot_c:
             return
-        by_sensor = measured_c >= self._nearly_hot_c
+        hot = winding_c >= self._limits.temperature_hot_c
+        by_sensor = measured_c >= (self._limits.temperature_hot_c if hot else self._nearly_hot_c)
         what, how = ("motor", "") if by_sensor else ("winding", ", by its currents")
         temperature_c = measured_c if by_sensor else winding_c
-        hot = temperature_c >= self._limits.temperature_hot_c
         text = f"The {self.joint} motor has {temperature_c:.0f} degrees C{how}."
         found.append(self._fault(f"{what}_hot" if hot else f"{what}_overheating", text))

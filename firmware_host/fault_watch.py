@@ -29,9 +29,8 @@ ARMING_S = 2.0  # a drive that takes longer to go into closed loop does not mean
 REFUSED_TICKS = 3  # in a row, in each of which one bus lost a command
 FIRMWARE = (0, 6)  # major and minor version whose messages the codec knows
 POSE_FORGOTTEN_S = 10.0  # a motion capture that was switched off on purpose
-UNTRUSTED = frozenset(
-    {"encoder_jump", "encoder_stuck", "position_stale", "position_silent", "drive_quiet", "drive_silent"}
-)
+BROKEN = frozenset({"encoder_jump", "encoder_stuck"})  # told in some ticks, true in all of them
+BLIND = frozenset({"position_stale", "position_silent", "drive_quiet", "drive_silent"})
 EXPLAINED = frozenset({"drive_error", "drive_disarmed"})  # by the drive's own words
 
 
@@ -89,6 +88,7 @@ class FaultWatch:
         self._restarts = {axis.joint: axis.restarts for axis in self._drives.axes}
         self._refused_commands = self._drives.gate.refused
         self._pose_stamp_s: float | None = None
+        self._broken: set[str] = set()  # encoders, until torque is off
         self.trusted: tuple[bool, ...] = ALL_TRUSTED  # of the joints' encoders
 
     def with_winding_heat(self, states: DriveStates) -> DriveStates:
@@ -112,8 +112,7 @@ class FaultWatch:
         if situation.mode is Mode.BOOT and not self._drives.heard:
             return found
         self._watch_joints(found, beat, situation)
-        blind = {fault.subject for fault in found if fault.name in UNTRUSTED}
-        self.trusted = tuple(joint not in blind for joint in JOINTS) if blind else ALL_TRUSTED
+        self._watch_trust(found, situation.mode)
         if not situation.sent.finite:
             found.append(make_fault("torque_not_finite", "", "A torque was not a finite number."))
         if situation.mode is Mode.ARMING and beat.now_s - situation.mode_since_s > ARMING_S:
@@ -147,6 +146,14 @@ class FaultWatch:
                 beat.now_s, dt_s, mode in ENERGISED, mode in MOVING, torque_nm, situation.freeing or mode not in HELD
             )
             found += [_explained(fault, axis) for fault in joint.update(facts, state)]
+
+    def _watch_trust(self, found: list[Fault], mode: Mode) -> None:
+        """What breaks an encoder shows in some ticks only, silence in all of its own."""
+        if mode not in ENERGISED:
+            self._broken.clear()
+        self._broken.update(fault.subject for fault in found if fault.name in BROKEN)
+        blind = self._broken.union(fault.subject for fault in found if fault.name in BLIND)
+        self.trusted = tuple(joint not in blind for joint in JOINTS) if blind else ALL_TRUSTED
 
     def _watch_arming(self, found: list[Fault], states: DriveStates) -> None:
         for joint, state in zip(JOINTS, states, strict=True):

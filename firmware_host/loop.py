@@ -80,6 +80,7 @@ class Loop:
         self._adapt(beat.now_s)
         self.health = self._examine(beat)
         self._change_mode(next_mode(self.mode, self._request_now(), self.health), beat.now_s)
+        self.forced = self.forced and self.mode in ENERGISED
         step_s = min(1 + beat.missed, LONGEST_STEP_TICKS) * PERIOD_S
         wanted = self.controller.step(step_s, self.mode, self.states, self._trusted())
         self.sent = self._limit(wanted)
@@ -118,6 +119,7 @@ class Loop:
             walk_finished=self.controller.walk_finished,
             raised=self.controller.raised,
             settled=self.controller.settled,
+            cut_short=self.controller.cut_short,
             rested=self.controller.rested,
             worst=self.faults.worst,
             blocking=tuple(self.faults.blocking(self.forced)),
@@ -182,7 +184,7 @@ class Loop:
             return "the daemon is ending"
         if order is not None and not self._reaches(order.depth_m):
             return f"depth {order.depth_m:g} m: out of the flippers' reach over the sweep"
-        health = self.health._replace(blocking=tuple(self.faults.blocking(forced or self.forced)))
+        health = self.health._replace(blocking=tuple(self.faults.blocking(forced)))
         return refusal(self.mode, request, health)
 
     def _reaches(self, depth_m: float) -> bool:
@@ -200,9 +202,8 @@ class Loop:
         self._tell_change(mode, now_s)
         if mode is Mode.WALKING:
             self.learning.reset(self.controller.order.depth_m)
-        if mode is Mode.IDLE:
-            self.forced = False
         if mode is Mode.ARMING:
+            self._clear_until_s = NEVER_S  # what begins from here on was not meant
             self.drives.arm(now_s, at_once=True)
         elif self.mode in ENERGISED and mode not in ENERGISED:
             self.drives.disarm(now_s, at_once=True)
