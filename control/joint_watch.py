@@ -17,7 +17,7 @@ from control.limits import JointLimits, JointRange
 from control.records import NEVER_S, UNKNOWN, DriveState
 from control.winding import Winding, WindingParameters
 
-MOST_SEEN_S = 0.008  # that one tick adds to any duration: three periods
+MOST_SEEN_S = 0.03  # that one tick adds to any duration: a loop that stood still for longer did not look
 HEARTBEAT_SILENCE_S = 0.5  # drives send one every 100 ms: five in a row are missing
 TEMPERATURE_SILENCE_S = 1.0  # of a drive that has told its temperature before
 ENERGISED_S = 0.2  # two heartbeats, in which a drive that was told to go idle may say that it has not yet

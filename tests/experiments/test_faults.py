@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from control.fault_kinds import KINDS
+from control.modes import Mode
 from experiments.fault_bench import FaultBench
 from experiments.fault_cell import Cell, problems, run_cell
 from experiments.fault_injection import BY_NAME, WAYS, Way
@@ -144,3 +145,14 @@ def test_a_loop_that_stands_still_misses_those_ticks_and_the_robot_lives_on() ->
         bench.step()
     assert (bench.ticks_made, bench.loop.missed_ticks) == (made + 1, missed + 5)
     assert bench.robot.now_s == pytest.approx(bench.now_s, abs=0.001)
+
+
+def test_a_lease_that_is_lost_without_torque_still_names_its_holder() -> None:
+    bench = make_bench()
+    bench.run_until(lambda: bench.loop.mode is Mode.IDLE, 2.0)
+    bench.loop.lease.renew("alice", bench.now_s, 1.0)
+    bench.loop.lease.hang_up("alice")
+    bench.step()
+    assert [fault.sentence for fault in bench.loop.faults.standing if fault.name == "lease_lost"] == [
+        "alice promised to attend the robot and is gone."
+    ]
