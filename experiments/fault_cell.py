@@ -7,17 +7,18 @@ Torque is what the simulated motors exert. After the cause is gone the robot is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
+from math import radians
 from random import Random
 from typing import Any
 
-from control.controller import DAMPING_NM, DAMPING_S, SOFT_STOP_S
 from control.faults import Blocks, FaultKind, Reaction
+from control.joint_watch import MOVING_RAD_S
 from control.modes import ENERGISED, Mode, Request
 from drivers.odrive_codec import AxisState
 from experiments.fault_bench import FaultBench
-from experiments.fault_injection import BRINGS, BY_NAME, FALLING, TOLD_S, Way
+from experiments.fault_injection import BY_NAME, TOLD_S, Way
+from experiments.fault_judgement import LONGEST_STOP_S, Cell, problems
 from experiments.fault_phases import bench_for, bring
 from firmware_host.ticker import PERIOD_S
 
@@ -25,42 +26,13 @@ HARDNESS = {  # in arming there is no torque yet
     Mode.BOOT: 4, Mode.IDLE: 4, Mode.FAULT: 4, Mode.DAMPING: 3, Mode.STOPPING: 2, Mode.HOLD: 1, Mode.ARMING: 1,
     Mode.WALKING: 0,
 }  # fmt: skip
-GOING_ON = ("arming", "hold", "walking", "stopping")
 WATCHDOG_TICKS = 40  # 0.1 s, and one tick on the way to the drive and back
 BUG_BOUND_TICKS = 2
 FORBIDDEN_TICKS = 80  # two heartbeats: a drive tells that it is in closed loop, and is told again to go idle
 ON_THE_WAY_TICKS = 2  # from the loop's torque to the motor's
 SLEWING_TICKS = 3  # from full torque one way to the most of damping the other way, at the torques' rate
-LONGEST_STOP_S = max(SOFT_STOP_S, DAMPING_S) + 0.2
 AFTER_S = 1.0  # to see whether anything comes back
 WALKED_ON_S = 0.3  # with a fault that ends nothing
-
-
-@dataclass
-class Cell:
-    """What was seen, as it goes into the report."""
-
-    fault: str
-    way: str
-    phase: str
-    seed: int
-    joint: str
-    reaction: str
-    bound_ticks: int | None
-    reaction_ticks: int | None = None
-    told_ticks: int | None = None
-    told: list[str] = field(default_factory=list)
-    mode: str = ""  # in the end
-    peak_torque_nm: float = 0.0  # of any motor, from the cause on
-    damping_torque_nm: float = 0.0  # once damping has begun
-    zero_torque_ticks: int | None = None  # from the cause to the last torque, where there is none in the end
-    travel_rad: float | None = None  # of the joint that moved most, where the walk ends
-    stop_s: float | None = None  # from a soft stop or damping to idle drives
-    rows_lost: int = 0
-    disarmed: bool = True  # stayed so, once torque was off
-    exception: str = ""
-    ok: bool = False
-    why: list[str] = field(default_factory=list)
 
 
 def run_cell(name: str, phase: str, seed: int) -> dict[str, Any]:
@@ -198,10 +170,23 @@ class Watch:
         self._look_at_damping(torque_nm)
         moved = (abs(now - before) for now, before in zip(bench.robot.plant.angles_rad, self._angles_rad, strict=True))
         self._travel_rad = max(self._travel_rad, *moved)
+        self._look_at_joints()
         off = bench.dead or bench.loop.mode not in ENERGISED
         self._disarmed_steps = self._disarmed_steps + 1 if off else 0
         if torque_nm and self._disarmed_steps > self._longest_off_ticks or self._rearmed:
             cell.disarmed = False
+
+    def _look_at_joints(self) -> None:
+        """What may be told of them, since the plant knows it too."""
+        plant, configuration = self._bench.robot.plant, self._bench.loop.configuration
+        margin_rad = radians(configuration.limits.position_margin_deg)
+        true = {"joint_moving"} if max(map(abs, plant.velocities_rad_s)) > MOVING_RAD_S else set()
+        if max(map(abs, plant.velocities_rad_s)) > configuration.limits.velocity_rad_s:
+            true.add("joint_velocity")
+        for angle_rad, span in zip(plant.angles_rad, configuration.joint_ranges, strict=True):
+            if not span.min_rad - margin_rad <= angle_rad <= span.max_rad + margin_rad:
+                true.add("joint_position")
+        self._cell.true_too = sorted(true.union(self._cell.true_too))
 
     @property
     def _rearmed(self) -> bool:
@@ -242,54 +227,3 @@ def _needed(kind: FaultKind) -> int:
 
 def _stands_against_arming(kind: FaultKind) -> bool:
     return kind.blocks is not Blocks.NO or kind.reaction >= Reaction.HOLD
-
-
-# the judgement
-
-
-def problems(cell: Cell, way: Way) -> Iterator[str]:
-    """In words, what should not be."""
-    yield from cell.why
-    if way.ends_daemon and not cell.exception:
-        yield "the bug never came"
-    if cell.exception and not way.ends_daemon:
-        yield f"an exception escaped: {cell.exception}"
-    if not cell.disarmed:
-        yield "torque or closed loop came back by itself"
-    if cell.rows_lost > (1 if way.ends_daemon else 0):
-        yield f"{cell.rows_lost} rows are missing in the log"
-    if cell.damping_torque_nm > DAMPING_NM + 1e-6:
-        yield f"{cell.damping_torque_nm:.3f} N·m while damping"
-    if way.fault == "none":
-        if cell.told:
-            yield f"without a cause it told of {', '.join(cell.told)}"
-        return
-    yield from _late(cell)
-    others = set(cell.told) - {cell.fault, FALLING, *BRINGS.get(cell.fault, ())}
-    if others:
-        yield f"it also told of {', '.join(sorted(others))}"
-    if way.kind is None or way.kind.reaction >= Reaction.SOFT_STOP:
-        yield from _not_stopped(cell)
-    elif way.kind.reaction <= Reaction.WARN and cell.phase != "idle" and cell.mode not in GOING_ON:
-        yield f"a warning ended in mode {cell.mode}"
-    if way.kind and cell.fault not in cell.told:
-        yield "the log holds no word of it"
-
-
-def _late(cell: Cell) -> Iterator[str]:
-    bound = cell.bound_ticks or 0
-    if cell.reaction_ticks is None:
-        yield "no reaction"
-    elif cell.reaction_ticks > bound:
-        yield f"the reaction came after {cell.reaction_ticks} ticks, {bound} are the most"
-    if cell.told_ticks is not None and cell.told_ticks > bound:
-        yield f"told after {cell.told_ticks} ticks, {bound} are the most"
-
-
-def _not_stopped(cell: Cell) -> Iterator[str]:
-    if cell.zero_torque_ticks is None:
-        yield "torque in the end"
-    if cell.mode not in ("idle", "fault", "boot") and cell.fault not in ("daemon_killed", "bug_in_the_tick"):
-        yield f"in the end it is in mode {cell.mode}"
-    if cell.stop_s is not None and cell.stop_s > LONGEST_STOP_S:
-        yield f"{cell.stop_s:.1f} s from the stop to idle drives"

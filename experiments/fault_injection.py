@@ -106,7 +106,7 @@ WAYS: tuple[Way, ...] = (
     Way("temperature_silent", failing("JOINT.temperature", "off"), 1.5),
     Way("drive_error", overcurrent, phases=PHASES),
     Way("drive_error", watchdog_ran_out, 0.5, MOVING, "by its watchdog", deaf=True),
-    Way("drive_error", said(codec.ESTOP), 0.5, MOVING, "by a stranger's emergency stop"),
+    Way("drive_error", said(codec.ESTOP), 0.5, MOVING, "by a stranger's stop"),
     Way("drive_disarmed", left_closed_loop, phases=MOVING),
     Way("drive_energised", other_master, 1.0, ("idle",)),
     Way("drive_restarted", restart, 2.0),
@@ -163,13 +163,11 @@ WAYS: tuple[Way, ...] = (
 )
 BY_NAME = {way.name: way for way in WAYS}
 
-FALLING = "joint_moving"  # the flippers, once their drives are idle
 AWAY = (
     "drive_late", "drive_quiet", "drive_silent", "heartbeat_silent", "temperature_silent", "drive_energised",
     "drive_error", "drive_restarted", "drive_version", "watchdog_unknown",
 )  # fmt: skip
 DEAF = ("drive_error", "drive_disarmed")
-THROWN = ("joint_velocity", "joint_position")  # by the last torque, until the drive's watchdog acts
 BRINGS: dict[str, tuple[str, ...]] = {
     "drive_quiet": ("drive_late", "position_stale", "current_stale"),
     "drive_silent": AWAY,
@@ -178,18 +176,17 @@ BRINGS: dict[str, tuple[str, ...]] = {
     "current_stale": ("drive_late",),
     "current_silent": ("drive_late", "current_stale", "torque_missing"),
     "heartbeat_silent": ("drive_energised",),
-    "drive_error": ("drive_disarmed", "torque_missing", *THROWN),
+    "drive_error": ("drive_disarmed", "torque_missing"),
     "drive_restarted": AWAY,
-    "drive_twins": ("encoder_jump", "drive_disarmed", "joint_position"),
+    "drive_twins": ("encoder_jump", "drive_disarmed", "joint_position"),  # the other one's encoder is elsewhere
     "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version"),
-    "bus_off": (*AWAY, *DEAF, *THROWN, "bus_refuses"),
-    "bus_refuses": (*DEAF, *THROWN),
+    "bus_off": (*AWAY, *DEAF, "bus_refuses"),
+    "bus_refuses": DEAF,
     "joint_position": ("encoder_jump",),
-    "joint_velocity": ("joint_position",),
     "encoder_stuck": ("encoder_jump",),  # when it goes on
     "motor_overheating": ("winding_overheating",),
     "motor_hot": ("winding_hot",),
-    "loop_lagging": ("loop_overrun", "joint_velocity"),  # at half its rate the control rings
+    "loop_lagging": ("loop_overrun",),
     "loop_stalled": ("loop_lagging",),
-    "daemon_hung": (*DEAF, *THROWN, "loop_stalled", "loop_lagging", "arming_failed", "torque_missing"),
+    "daemon_hung": (*DEAF, "loop_stalled", "loop_lagging", "arming_failed", "torque_missing"),
 }  # what else may be told, since it is true as well

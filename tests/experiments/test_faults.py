@@ -14,8 +14,9 @@ import pytest
 from control.fault_kinds import KINDS
 from control.modes import Mode
 from experiments.fault_bench import FaultBench
-from experiments.fault_cell import Cell, problems, run_cell
+from experiments.fault_cell import run_cell
 from experiments.fault_injection import BY_NAME, WAYS, Way
+from experiments.fault_judgement import Cell, problems
 from experiments.fault_phases import PHASES, bench_for
 from experiments.faults import FAULTS, Place, Plan, report_of
 from experiments.loop_causes import bug_in, nothing
