@@ -121,6 +121,7 @@ class OperatorCalls:
             "temperature_c": known(state.temperature_c),
             "bus_voltage_v": known(state.bus_voltage_v),
             "firmware": ".".join(map(str, axis.version)) if axis.version else None,
+            "hardware": axis.hardware or None,
             "watchdog_s": known(axis.watchdog_s),
             "winding_c": round(self._loop.temperatures_c[place], 1),
             "angle_age_s": known(now_s - state.angle_stamp_s),
