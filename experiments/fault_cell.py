@@ -154,10 +154,9 @@ class Watch:
         loop = self._bench.loop
         if any(fault.name == kind.name for fault in loop.faults.standing):
             self._cell.told_ticks = self._ticks
-            if self._cell.phase == "idle" and _stands_against_arming(kind):
-                refused = loop.request(Request.ARM, self._bench.now_s)
-                if refused is None:
-                    self._cell.why.append("arming was not refused")
+            refusing = self._cell.phase == "idle" and _stands_against_arming(kind)
+            if refusing and loop.request(Request.ARM, self._bench.now_s) is None:
+                self._cell.why.append("arming was not refused")
 
     # the robot
 
@@ -171,10 +170,15 @@ class Watch:
         moved = (abs(now - before) for now, before in zip(bench.robot.plant.angles_rad, self._angles_rad, strict=True))
         self._travel_rad = max(self._travel_rad, *moved)
         self._look_at_joints()
-        off = bench.dead or bench.loop.mode not in ENERGISED
+        self._look_whether_off(torque_nm)
+
+    def _look_whether_off(self, torque_nm: float) -> None:
+        """Once it is off, neither mode nor drives may come back. A request to arm takes a tick to be heeded."""
+        off = self._ticks > 0 and self._bench.loop.mode not in ENERGISED or self._bench.dead
+        came_back = self._disarmed_steps > 0 and not off
         self._disarmed_steps = self._disarmed_steps + 1 if off else 0
-        if torque_nm and self._disarmed_steps > self._longest_off_ticks or self._rearmed:
-            cell.disarmed = False
+        if came_back or torque_nm and self._disarmed_steps > self._longest_off_ticks or self._rearmed:
+            self._cell.disarmed = False
 
     def _look_at_joints(self) -> None:
         """What may be told of them, since the plant knows it too."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
@@ -12,7 +13,7 @@ from typing import Any
 import pytest
 
 from control.fault_kinds import KINDS
-from control.modes import Mode
+from control.modes import Mode, Request
 from experiments.fault_bench import FaultBench
 from experiments.fault_cell import run_cell
 from experiments.fault_injection import BY_NAME, WAYS, Way
@@ -74,9 +75,9 @@ def test_what_there_is_not_is_refused(faults: tuple[str, ...], phases: tuple[str
 # the judgement
 
 
-def with_way(monkeypatch: pytest.MonkeyPatch, way: Way) -> dict[str, Any]:
+def with_way(monkeypatch: pytest.MonkeyPatch, way: Way, phase: str = "hold") -> dict[str, Any]:
     monkeypatch.setitem(BY_NAME, way.name, way)
-    return run_cell(way.name, "hold", 1)
+    return run_cell(way.name, phase, 1)
 
 
 def test_a_fault_that_nobody_made_is_missed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -92,6 +93,27 @@ def test_an_exception_that_nobody_meant_is_a_failure(monkeypatch: pytest.MonkeyP
 def test_a_fault_in_the_control_group_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     cell = with_way(monkeypatch, replace(BY_NAME["none"], cause=BY_NAME["voltage_low"].cause))
     assert cell["why"] == ["without a cause it told of voltage_low"]
+
+
+LOW_SUPPLY = BY_NAME["voltage_under"]
+
+
+@contextmanager
+def eager(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Somebody asks for torque again and again, also when the fault is gone."""
+
+    def ask() -> None:
+        bench.loop.request(Request.ARM, bench.now_s)
+
+    bench._acts.append(ask)
+    with LOW_SUPPLY.cause(bench, joint):
+        yield
+
+
+@pytest.mark.parametrize("phase", ["idle", "hold"])
+def test_a_robot_that_arms_again_is_a_failure(phase: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = with_way(monkeypatch, replace(LOW_SUPPLY, cause=eager), phase)
+    assert "torque or closed loop came back by itself" in cell["why"]
 
 
 GOOD = Cell("drive_quiet", "drive_quiet", "hold", 1, "left_sweep", "damping", 5, 4, 4, ["drive_quiet"], "fault", 0.3,
