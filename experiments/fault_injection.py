@@ -164,10 +164,10 @@ WAYS: tuple[Way, ...] = (
 BY_NAME = {way.name: way for way in WAYS}
 
 AWAY = (
-    "drive_late", "drive_quiet", "drive_silent", "heartbeat_silent", "temperature_silent", "drive_energised",
+    "drive_late", "current_stale", "position_stale", "drive_quiet", "drive_silent", "heartbeat_silent", "temperature_silent", "drive_energised",
     "drive_error", "drive_restarted", "drive_version", "watchdog_unknown",
 )  # fmt: skip
-DEAF = ("drive_error", "drive_disarmed")
+DEAF = ("drive_error", "drive_disarmed", "torque_missing")
 BRINGS: dict[str, tuple[str, ...]] = {
     "drive_quiet": ("drive_late", "position_stale", "current_stale"),
     "drive_silent": AWAY,
@@ -188,5 +188,5 @@ BRINGS: dict[str, tuple[str, ...]] = {
     "motor_hot": ("winding_hot",),
     "loop_lagging": ("loop_overrun",),
     "loop_stalled": ("loop_lagging",),
-    "daemon_hung": (*DEAF, "loop_stalled", "loop_lagging", "arming_failed", "torque_missing"),
+    "daemon_hung": (*DEAF, "loop_stalled", "loop_lagging", "arming_failed"),
 }  # what else may be told, since it is true as well

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from control.controller import DAMPING_NM, DAMPING_S, SOFT_STOP_S
-from control.faults import Reaction
+from control.faults import Blocks, FaultKind, Reaction
 from experiments.fault_injection import BRINGS, Way
 
 LONGEST_STOP_S = max(SOFT_STOP_S, DAMPING_S) + 0.2
@@ -64,7 +64,7 @@ def problems(cell: Cell, way: Way) -> Iterator[str]:
         yield f"it also told of {', '.join(sorted(others))}"
     if way.kind is None or way.kind.reaction >= Reaction.SOFT_STOP:
         yield from _not_stopped(cell)
-    elif way.kind.reaction <= Reaction.WARN and cell.phase != "idle" and cell.mode not in GOING_ON:
+    elif way.kind.reaction <= Reaction.WARN and cell.phase != "idle" and not _goes_on(cell, way.kind):
         yield f"a warning ended in mode {cell.mode}"
     if way.kind and cell.fault not in cell.told:
         yield "the log holds no word of it"
@@ -87,3 +87,9 @@ def _not_stopped(cell: Cell) -> Iterator[str]:
         yield f"in the end it is in mode {cell.mode}"
     if cell.stop_s is not None and cell.stop_s > LONGEST_STOP_S:
         yield f"{cell.stop_s:.1f} s from the stop to idle drives"
+
+
+def _goes_on(cell: Cell, kind: FaultKind) -> bool:
+    """Or was not armed to begin with: what stands against arming may come in the tick of the request."""
+    refused = cell.phase == "arming" and cell.mode == "idle" and kind.blocks is not Blocks.NO
+    return cell.mode in GOING_ON or refused
