@@ -18,6 +18,7 @@ from control.limits import JointLimits, JointRange
 from control.records import UNKNOWN, DriveState
 from control.winding import Winding, WindingParameters
 
+MOST_SEEN_S = 0.03  # that one tick adds to any duration: a loop that stood still for longer did not look
 HEARTBEAT_SILENCE_S = 0.5  # drives send one every 100 ms: five in a row are missing
 TEMPERATURE_SILENCE_S = 1.0  # of a drive that has told its temperature before
 ENERGISED_S = 0.2  # two heartbeats, in which a drive that was told to go idle may say that it has not yet
@@ -98,10 +99,12 @@ class JointWatch:
 
     def update(self, facts: JointFacts, state: DriveState) -> list[Fault]:
         found: list[Fault] = []
+        # One sample after a gap says nothing of what was in the gap.
+        seen = facts if facts.dt_s <= MOST_SEEN_S else facts._replace(dt_s=MOST_SEEN_S)
         self._watch_signals(found, facts, state)
-        self._watch_drive(found, facts, state)
-        self._watch_motion(found, facts, state)
-        self._watch_load(found, facts, state)
+        self._watch_drive(found, seen, state)
+        self._watch_motion(found, seen, state)
+        self._watch_load(found, seen, state)
         self._watch_heat(found, facts, state)
         return found
 

@@ -172,8 +172,9 @@ def _end_safely(loop: Loop, problem: Exception) -> int:
             axis.disarm()
     place = traceback.extract_tb(problem.__traceback__)[-1]
     sentence = f"{type(problem).__name__}: {problem} ({Path(place.filename).name}, line {place.lineno})"
-    loop.event(time.monotonic(), f"stopped by a bug: {sentence}")
     print(f"mudskipperd: stopped by a bug, the drives are idle: {sentence}", file=sys.stderr)
+    with suppress(Exception):  # or the log
+        loop.event(time.monotonic(), f"stopped by a bug: {sentence}")
     return EXIT_FAILED
 
 

@@ -126,8 +126,8 @@ class Loop:
         )
 
     def _situation(self, now_s: float) -> Situation:
-        lost = self.lease.lost(now_s)
-        if lost and self.mode not in ENERGISED:  # nothing is left to attend to
+        lost_by = str(self.lease.holder) if self.lease.lost(now_s) else ""
+        if lost_by and self.mode not in ENERGISED:  # nothing is left to attend to
             self.lease.reset()
         return Situation(
             self.mode,
@@ -138,7 +138,7 @@ class Loop:
             self.controller.recovery.attempt > 0,
             self._wall_clock() - self._clock(),
             self.recorder.report(),
-            str(self.lease.holder) if lost else "",
+            lost_by,
         )
 
     def _tell_faults(self, now_s: float) -> None:

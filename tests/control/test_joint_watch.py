@@ -418,6 +418,13 @@ def test_missed_ticks_count_for_as_long_as_they_lasted() -> None:
     assert found[0] == pytest.approx(76, abs=1)
 
 
+def test_one_sample_after_a_long_stall_is_no_proof_of_what_lasted() -> None:
+    """A daemon that hung for seconds looks once."""
+    watch = make_watch()
+    stalled = seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=3.0)
+    assert set(stalled).isdisjoint({"joint_not_following", "torque_missing", "joint_velocity"})
+
+
 @pytest.mark.parametrize("missed", [1, 5, 9, 200])
 def test_a_joint_at_rest_is_not_too_fast_after_missed_ticks(missed: int) -> None:
     assert names(HEALTHY, dt_s=(1 + missed) * TICK_S) == set()
