@@ -13,7 +13,7 @@ from random import Random
 from typing import Any
 
 from control.faults import Blocks, FaultKind, Reaction
-from control.joint_watch import MOVING_RAD_S
+from control.joint_watch import REST_S, STILL_RAD
 from control.modes import ENERGISED, Mode, Request
 from drivers.odrive_codec import AxisState
 from experiments.fault_bench import FaultBench
@@ -184,7 +184,7 @@ class Watch:
         """What may be told of them, since the plant knows it too."""
         plant, configuration = self._bench.robot.plant, self._bench.loop.configuration
         margin_rad = radians(configuration.limits.position_margin_deg)
-        true = {"joint_moving"} if max(map(abs, plant.velocities_rad_s)) > MOVING_RAD_S else set()
+        true = {"joint_moving"} if max(map(abs, plant.velocities_rad_s)) > STILL_RAD / REST_S else set()
         if max(map(abs, plant.velocities_rad_s)) > configuration.limits.velocity_rad_s:
             true.add("joint_velocity")
         for angle_rad, span in zip(plant.angles_rad, configuration.joint_ranges, strict=True):

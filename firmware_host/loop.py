@@ -82,7 +82,8 @@ class Loop:
         self._change_mode(next_mode(self.mode, self._request_now(), self.health), beat.now_s)
         self.forced = self.forced and self.mode in ENERGISED
         step_s = min(1 + beat.missed, LONGEST_STEP_TICKS) * PERIOD_S
-        wanted = self.controller.step(step_s, self.mode, self.states, self._trusted())
+        elapsed_s = (1 + beat.missed) * PERIOD_S
+        wanted = self.controller.step(step_s, self.mode, self.states, self._trusted(), elapsed_s)
         self.sent = self._limit(wanted)
         self._command(beat.now_s)
         self._record(beat)
