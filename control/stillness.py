@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf, isfinite, isnan
+
 from control.records import UNKNOWN
 
 
@@ -14,12 +16,15 @@ class Stillness:
 
     def reset(self) -> None:
         self._place_rad = UNKNOWN
-        self.still_s = 0.0  # within the band about the place
+        self.still_s = inf  # within the band about the place; infinite: never seen to leave one
 
     def update(self, angle_rad: float, dt_s: float) -> bool:
-        """Whether the joint is still where it was."""
+        """Whether the joint is still where it was, or was seen for the first time."""
         if abs(angle_rad - self._place_rad) <= self._band_rad:
             self.still_s += dt_s
             return True
-        self._place_rad, self.still_s = angle_rad, 0.0
-        return False
+        first = isnan(self._place_rad) and isfinite(angle_rad)
+        self._place_rad = angle_rad
+        if not first:
+            self.still_s = 0.0
+        return first

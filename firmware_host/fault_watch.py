@@ -86,7 +86,7 @@ class FaultWatch:
         self._loop.reset()
         self._log.reset()
         self._failed_sends = {name: port.failed_sends for name, port in self._drives.ports.items()}
-        self._error_frames = {name: port.error_frames for name, port in self._drives.ports.items()}
+        self._bus_news = {name: (0, BusState.ACTIVE) for name in self._drives.ports}
         self._error_s = dict.fromkeys(self._drives.ports, NEVER_S)
         self._refused_ticks = dict.fromkeys(self._drives.ports, 0)
         self._restarts = {axis.joint: axis.restarts for axis in self._drives.axes}
@@ -135,8 +135,8 @@ class FaultWatch:
     def _watch_buses(self, found: list[Fault], now_s: float) -> None:
         """A warning ends with the error frames: not every CAN driver tells that its controller has recovered."""
         for name, port in self._drives.ports.items():
-            if port.error_frames > self._error_frames[name]:
-                self._error_frames[name], self._error_s[name] = port.error_frames, now_s
+            if (port.error_frames, port.state) != self._bus_news[name]:
+                self._bus_news[name], self._error_s[name] = (port.error_frames, port.state), now_s
             if port.state is BusState.OFF or (port.state and now_s - self._error_s[name] < BUS_TROUBLE_S):
                 kind, text = BUS_FAULTS[port.state]
                 found.append(make_fault(kind, name, f"The {name} bus {text}: {port.last_error or 'no word why'}."))

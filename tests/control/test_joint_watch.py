@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from math import inf, isfinite, nan, radians
+from random import Random
 from typing import Any
 
 import pytest
@@ -152,7 +153,7 @@ def test_of_two_silences_the_hardest_is_told_and_more_silence_is_never_milder(
 ) -> None:
     def told(position_age_s: float, current_age_s: float) -> int:
         found = names(HEALTHY._replace(angle_stamp_s=START_S - position_age_s, current_stamp_s=START_S - current_age_s))
-        assert len(found) <= 1
+        assert len(found - {"current_silent"}) <= 1
         return max((SEVERITY.index(name) for name in found), default=-1)
 
     def reaction(place: int) -> Reaction:
@@ -254,7 +255,7 @@ def test_a_drive_out_of_closed_loop_is_a_fault_only_where_it_is_expected_there()
 
 def test_a_drive_in_closed_loop_unasked_is_told_once_it_had_time_to_obey() -> None:
     watch = make_watch()
-    unasked = [tick for tick in range(200) if seen(watch, HEALTHY, energised=False, moving=False)]
+    unasked = [tick for tick in range(200) if "drive_energised" in seen(watch, HEALTHY, energised=False, moving=False)]
     assert unasked[0] == pytest.approx(0.2 / TICK_S, abs=1)
     assert unasked[0] + 38 + 2 <= KINDS["drive_energised"].bound_ticks  # a heartbeat tells of it
 
@@ -313,12 +314,25 @@ def test_two_fast_samples_again_and_again_are_no_fault() -> None:
         assert not seen(watch, HEALTHY._replace(velocity_rad_s=100.0 if tick % 3 else 0.0))
 
 
+def moving_ticks(speed_rad_s: float, noise_rad_s: float = 0.0, energised: bool = False) -> int:
+    """Of 200, in which a joint with this speed is told to move."""
+    watch, random, count = make_watch(), Random(1), 0
+    for tick in range(200):
+        now_s = START_S + tick * TICK_S
+        told_rad_s = speed_rad_s + random.gauss(0.0, noise_rad_s)
+        state = fresh(now_s, angle_rad=speed_rad_s * tick * TICK_S, velocity_rad_s=told_rad_s, closed_loop=False)
+        count += "joint_moving" in seen(watch, state, now_s, energised=energised, moving=False)
+    return count
+
+
 def test_a_joint_that_moves_without_torque_stands_against_arming_and_only_then() -> None:
-    moving = HEALTHY._replace(velocity_rad_s=0.51, closed_loop=False)
-    assert names(moving, energised=False, moving=False) == {"joint_moving"}
-    assert names(moving._replace(velocity_rad_s=-0.51), energised=False, moving=False) == {"joint_moving"}
-    assert names(moving._replace(velocity_rad_s=0.5), energised=False, moving=False) == set()
-    assert names(moving, energised=True, moving=False) == set()
+    assert moving_ticks(0.5) > 150
+    assert moving_ticks(-0.5) > 150
+    assert moving_ticks(0.5, energised=True) == 0
+
+
+def test_a_joint_at_rest_whose_speed_is_noise_may_be_armed() -> None:
+    assert moving_ticks(0.0, noise_rad_s=0.5) == 0
 
 
 def samples(watch: JointWatch, steps: Iterable[tuple[float, float]]) -> list[set[str]]:
@@ -326,9 +340,8 @@ def samples(watch: JointWatch, steps: Iterable[tuple[float, float]]) -> list[set
     return [set(seen(watch, fresh(START_S + time_s, angle_rad=angle), START_S + time_s)) for time_s, angle in steps]
 
 
-def test_an_encoder_jumps_beyond_what_a_joint_can_do_between_two_messages() -> None:
-    farthest = 0.05 + 2.0 * LIMITS.velocity_rad_s * (0.002 + TICK_S)
-    for step_rad, expected in ((farthest - BEYOND, set()), (farthest + BEYOND, {"encoder_jump"})):
+def test_an_encoder_jumps_beyond_what_its_speed_explains() -> None:
+    for step_rad, expected in ((0.05 - BEYOND, set()), (0.05 + BEYOND, {"encoder_jump"})):
         for sign in (1.0, -1.0):
             assert samples(make_watch(), [(0.0, 0.0), (0.002, sign * step_rad)]) == [set(), expected]
 
@@ -345,11 +358,6 @@ def test_the_first_sample_is_never_a_jump() -> None:
     assert samples(watch, [(0.0, -1.0)]) == [set()]
 
 
-def test_a_gap_explains_a_far_step() -> None:
-    assert samples(make_watch(), [(0.0, -0.9), (0.05, 0.9)]) == [set(), set()]
-    assert samples(make_watch(), [(0.0, -0.9), (0.02, 0.9)]) == [set(), {"encoder_jump"}]
-
-
 def test_the_same_message_seen_twice_is_no_jump_and_no_step() -> None:
     watch = make_watch()
     samples(watch, [(0.0, 0.0)])
@@ -363,8 +371,11 @@ def test_a_stamp_before_the_one_before_makes_no_jump() -> None:
 
 
 def test_a_joint_at_the_velocity_limit_never_jumps() -> None:
-    steps = [(tick * TICK_S, -0.9 + LIMITS.velocity_rad_s * tick * TICK_S) for tick in range(30)]
-    assert samples(make_watch(), steps) == [set()] * 30
+    watch, speed_rad_s = make_watch(), LIMITS.velocity_rad_s
+    for tick in range(30):
+        now_s = START_S + tick * TICK_S
+        angle_rad = -0.9 + speed_rad_s * tick * TICK_S
+        assert not seen(watch, fresh(now_s, angle_rad=angle_rad, velocity_rad_s=speed_rad_s), now_s)
 
 
 # load
@@ -372,8 +383,8 @@ def test_a_joint_at_the_velocity_limit_never_jumps() -> None:
 
 def stalled_ticks(torque_nm: float, velocity_rad_s: float, excused: bool = False, ticks: int = 900) -> int | None:
     watch = make_watch()
-    state = HEALTHY._replace(velocity_rad_s=velocity_rad_s)
     for tick in range(1, ticks):
+        state = HEALTHY._replace(velocity_rad_s=velocity_rad_s, angle_rad=0.1 + velocity_rad_s * tick * TICK_S)
         if "joint_not_following" in seen(watch, state, torque_nm=torque_nm, may_stand_still=excused):
             return tick
     return None
@@ -400,11 +411,23 @@ def test_everything_else_follows_or_is_excused(torque_nm: float, velocity_rad_s:
     assert stalled_ticks(torque_nm, velocity_rad_s, excused, 2000) is None
 
 
-def test_one_tick_of_motion_begins_the_wait_anew() -> None:
-    watch = make_watch()
+def test_a_move_begins_the_wait_anew_and_the_noise_of_a_speed_does_not() -> None:
+    watch, random = make_watch(), Random(1)
     for tick in range(2000):
-        state = HEALTHY._replace(velocity_rad_s=0.2 if tick % 700 == 0 else 0.0)
+        state = HEALTHY._replace(angle_rad=0.05 * (tick // 700))
         assert "joint_not_following" not in seen(watch, state, torque_nm=LIMITS.torque_nm)
+    watch = make_watch()
+    noisy = [HEALTHY._replace(velocity_rad_s=random.gauss(0.0, 0.3)) for _ in range(800)]
+    assert any("joint_not_following" in seen(watch, state, torque_nm=LIMITS.torque_nm) for state in noisy)
+
+
+def test_a_joint_that_is_blocked_while_its_target_goes_to_and_fro_does_not_follow() -> None:
+    watch = make_watch()
+    found = (
+        "joint_not_following" in seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm * (1.0 if tick // 200 % 2 else -1.0))
+        for tick in range(1000)
+    )
+    assert any(found)
 
 
 def test_missed_ticks_count_for_as_long_as_they_lasted() -> None:

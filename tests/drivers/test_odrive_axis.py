@@ -96,9 +96,9 @@ def test_a_stall_of_ours_is_no_silence_of_the_drive(bench: Bench) -> None:
 
 def test_frames_with_stamps_of_another_clock_make_no_restart_and_no_twin(bench: Bench) -> None:
     for number in range(2000):
-        bench.tell(GET_IQ, 0.0, 0.0, stamp_s=1e9 * (number % 3))
+        bench.tell(GET_IQ, 0.0, 0.0, stamp_s=1e9 * (1 + number % 3))
         if number % 50 == 0:
-            bench.tell(HEARTBEAT, 0, 1, 0, 0, stamp_s=-1e9 * (number % 7))
+            bench.tell(HEARTBEAT, 0, 1, 0, 0, stamp_s=-1e9 * (1 + number % 7))
         bench.read(0.002 * number)
     assert (bench.axis.restarts, bench.axis.twins) == (0, False)
 

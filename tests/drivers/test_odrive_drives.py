@@ -117,7 +117,7 @@ def test_every_signal_has_its_own_stamp(bench: Bench) -> None:
 
 @pytest.mark.parametrize(
     ("frame_s", "stamp_s"),
-    [(8.999, 8.999), (9.0, 9.0), (8.96, 8.96), (8.9, 9.0), (9.001, 9.0), (1.7e9, 9.0), (NEVER_S, 9.0)],
+    [(8.999, 8.999), (9.0, 9.0), (8.96, 8.96), (7.01, 7.01), (6.9, 9.0), (9.001, 9.0), (1.7e9, 9.0), (NEVER_S, 9.0)],
 )
 def test_a_signal_has_the_stamp_of_its_frame_unless_that_is_of_another_clock(
     bench: Bench, frame_s: float, stamp_s: float
@@ -259,21 +259,43 @@ def test_torques_leave_in_the_order_of_the_joints_with_these_bytes() -> None:
     }
 
 
-def test_arming_sends_mode_limits_zero_torque_and_closed_loop_in_that_order(bench: Bench) -> None:
+def test_arming_sends_mode_limits_gain_zero_torque_and_closed_loop_in_that_order(bench: Bench) -> None:
     bench.tell_everything(1.0, closed_loop=False)
     bench.drives.arm(1.0)
-    assert bench.sent()["right"][4:] == [
+    right = [frame for frame in bench.sent()["right"] if frame.arbitration_id >> 5 == 2]
+    assert right == [
         Frame(0x04B, bytes.fromhex("01000000 01000000")),
         Frame(0x04F, bytes.fromhex("00000041 0000c040")),  # 8 turns/s, 6 A
+        Frame(0x05B, bytes.fromhex("0000003f 00000000")),  # 0.5 N·m per turn/s
         Frame(0x04E, bytes.fromhex("00000000")),
         Frame(0x047, bytes.fromhex("08000000")),
     ]
 
 
+def test_at_once_drives_are_prepared_and_not_yet_asked(bench: Bench) -> None:
+    bench.tell_everything(1.0, closed_loop=False)
+    bench.drives.arm(1.0, at_once=True)
+    assert all(frame.arbitration_id & 0x1F != 0x07 for frames in bench.sent().values() for frame in frames)
+    bench.drives.arm(1.0)
+    assert sum(frame.arbitration_id & 0x1F == 0x07 for frames in bench.sent().values() for frame in frames) == 4
+
+
+def test_no_drive_is_asked_for_closed_loop_while_what_prepares_it_is_lost(bench: Bench) -> None:
+    bench.tell_everything(1.0, closed_loop=False)
+    port = bench.drives.ports["left"]
+    assert isinstance(port, MockPort)
+    port.full = True
+    bench.drives.arm(1.0)
+    port.full = False
+    assert not any(frame.arbitration_id & 0x1F == 0x07 for frame in bench.sent()["right"])
+    bench.drives.arm(1.01 + REPEAT_S)
+    assert sum(frame.arbitration_id & 0x1F == 0x07 for frames in bench.sent().values() for frame in frames) == 4
+
+
 def test_arming_is_repeated_after_a_while_and_only_for_drives_not_in_closed_loop(bench: Bench) -> None:
     bench.tell_everything(1.0, closed_loop=False)
     bench.drives.arm(1.0)
-    assert {name: len(frames) for name, frames in bench.sent().items()} == {"left": 8, "right": 8}
+    assert {name: len(frames) for name, frames in bench.sent().items()} == {"left": 10, "right": 10}
     for joint in JOINTS[:3]:
         bench.tell(joint, HEARTBEAT, 0, 8, 0, 0)
     bench.drives.read(1.05)
@@ -282,7 +304,7 @@ def test_arming_is_repeated_after_a_while_and_only_for_drives_not_in_closed_loop
     bench.drives.arm(1.01 + REPEAT_S)
     sent = bench.sent()
     assert sent["left"] == []
-    assert [frame.arbitration_id >> 5 for frame in sent["right"]] == [2] * 4
+    assert [frame.arbitration_id >> 5 for frame in sent["right"]] == [2] * 5
 
 
 def test_disarming_at_once_goes_to_all_with_zero_torque_and_idle(bench: Bench) -> None:
