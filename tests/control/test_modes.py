@@ -125,6 +125,11 @@ def test_a_walk_ends_by_raising_the_flippers() -> None:
     assert next_mode(Mode.WALKING, Request.NONE, WELL) is Mode.WALKING
 
 
+def test_a_stop_while_drives_are_armed_lets_them_go_idle() -> None:
+    for health in (WELL, WELL._replace(closed_loop=False)):
+        assert next_mode(Mode.ARMING, Request.STOP, health) is Mode.IDLE
+
+
 def test_a_stop_raises_flippers_that_a_fault_left_in_the_mud() -> None:
     """And moves nothing of a robot that holds a pose for another reason."""
     for health in (WELL, faulty(Reaction.WARN), faulty(Reaction.HOLD)):

@@ -15,7 +15,7 @@ from drivers.frames import Frame
 from drivers.mock_bus import MockBus
 from drivers.odrive_axis import OdriveAxis, WatchdogEndpoints
 from drivers.odrive_codec import GET_ENCODER_ESTIMATES, GET_IQ, GET_VERSION, HEARTBEAT, TX_SDO, Message, arbitration_id
-from drivers.odrive_drives import VERSION_REPEAT_S, DriveParameters, OdriveDrives
+from drivers.odrive_drives import REFRESH_S, VERSION_REPEAT_S, DriveParameters, OdriveDrives
 
 TICK_S = 1.0 / 380.0
 BUILD = WatchdogEndpoints("0.6.11", "4.4.58", enable=219, timeout=218)
@@ -332,3 +332,30 @@ def test_a_torque_that_no_bytes_hold_raises_nothing_and_becomes_zero(bench: Benc
     bench.drives.send((torque_nm, 0.0, 0.0, 0.0))
     assert {frame.data for frame in bench.far.receive()} <= {bytes(4), bytes.fromhex("00000080")}
     assert bench.drives.gate.refused == 1
+
+
+def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench) -> None:
+    bench.tell(GET_VERSION, *PRO)
+    bench.tell_setting(BUILD.enable, "01")
+    bench.tell_setting(BUILD.timeout, "cdcccc3d")
+    bench.read(0.0)
+    assert bench.axis.watchdog_s == pytest.approx(0.1)
+    for axis in bench.drives.axes[1:]:  # all are known: no question is left over
+        axis.version, axis.hardware = bench.axis.version, bench.axis.hardware
+        axis._watchdog_enabled, axis._watchdog_timeout_s = True, 0.1
+    asked = []
+    for tick in range(round(3.0 * REFRESH_S / TICK_S)):
+        bench.drives.request_versions(tick * TICK_S)
+        bench.drives.request_watchdogs(tick * TICK_S)
+        asked.append(len(bench.far.receive()))
+    assert [count for count in asked if count] == [4 + 8] * 3
+    bench.tell_setting(BUILD.enable, "00")
+    bench.read(6.0)
+    assert bench.axis.watchdog_s == 0.0
+
+
+def test_a_current_that_is_no_number_is_none_in_a_drive_that_lets_none_flow(bench: Bench) -> None:
+    bench.live(0.5)
+    bench.tell(GET_IQ, 0.0, float("nan"))
+    bench.read(0.6)
+    assert bench.axis.state.current_a == 0.0

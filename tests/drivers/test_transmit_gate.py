@@ -381,7 +381,9 @@ def test_nothing_but_the_gate_sends_on_a_port() -> None:
     assert {name: calls for name, calls in senders.items() if calls} == allowed
     for path in modules_of("control", "estimation", "firmware_host", "command_line"):
         for receiver in calls_of(path, "send"):
-            assert "port" not in receiver.split(".")[-1].replace("reporter", "") and "bus" not in receiver, f"{path.name}: {receiver}.send("
+            assert "port" not in receiver.split(".")[-1].replace("reporter", "") and "bus" not in receiver, (
+                f"{path.name}: {receiver}.send("
+            )
 
 
 def test_an_axis_gets_a_gated_outlet_and_no_port() -> None:

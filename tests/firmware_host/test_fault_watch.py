@@ -18,7 +18,7 @@ from drivers.mock_bus import MockBus, MockPort
 from drivers.odrive_axis import OdriveAxis, Version
 from drivers.odrive_drives import OdriveDrives
 from firmware_host.configuration import Configuration
-from firmware_host.fault_watch import ARMING_S, POSE_FORGOTTEN_S, REFUSED_TICKS, FaultWatch, Situation
+from firmware_host.fault_watch import ARMING_S, BUS_TROUBLE_S, POSE_FORGOTTEN_S, REFUSED_TICKS, FaultWatch, Situation
 from firmware_host.recorder import HEALTHY
 from firmware_host.ticker import PERIOD_S, Beat
 
@@ -306,3 +306,24 @@ def test_a_joint_in_a_recovery_is_not_asked_to_follow_and_one_that_walks_is(benc
     assert ticks(Mode.WALKING, True) == []
     assert ticks(Mode.DAMPING, False) == []
     assert set(told(ticks(Mode.WALKING, False))) == {("joint_not_following", "left_sweep")}
+
+
+@pytest.mark.parametrize("state", [BusState.WARNING, BusState.PASSIVE])
+def test_trouble_of_a_bus_is_over_without_further_error_frames_and_one_that_is_off_stays_so(
+    bench: Bench, state: BusState
+) -> None:
+    bench.ports["left"].state = state
+    for _ in range(int(BUS_TROUBLE_S / PERIOD_S) - 1):
+        assert bench.tick()
+    bench.tick()
+    assert bench.tick() == []
+    bench.ports["left"].error_frames += 1
+    assert bench.tick()
+    bench.ports["right"].state = BusState.OFF
+    assert all("bus_off" in [fault.name for fault in bench.tick()] for _ in range(1000))
+
+
+def test_a_drive_that_calibrates_stands_against_arming_and_is_no_fault_in_a_walk(bench: Bench) -> None:
+    bench.drives.axes[2].busy_state = 4
+    assert ("drive_energised", JOINTS[2]) in told(bench.tick(Mode.IDLE))
+    assert bench.tick(Mode.WALKING) == []

@@ -232,10 +232,10 @@ def test_flippers_that_stay_in_the_mud_are_told(configuration: Configuration) ->
     robot.arm()
     robot.walk(WalkOrder(0.05, False))
     robot.run_until(lambda: robot.loop.target_before.phase is Phase.STANCE, 5.0)
-    for share in range(1, 21):  # deeper than the torque could have pushed them, without a jump
+    for share in range(1, 101):  # deeper than the torque could have pushed them, without a jump
         for arm in robot.robot.plant.arms:
             deep_rad = configuration.geometry.adduction_rad(arm.sweep_rad, 0.05)
-            arm.adduction_rad += (deep_rad - arm.adduction_rad) * share / 20.0
+            arm.adduction_rad += (deep_rad - arm.adduction_rad) * share / 100.0
         robot.step()
     robot.loop.request(Request.STOP, robot.now_s)
     assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 5.0)

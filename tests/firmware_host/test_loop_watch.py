@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from control.fault_kinds import KINDS
 from control.faults import Fault
 from control.joint_watch import FaultBounds
-from firmware_host.loop_watch import MEAN_TICKS, LoopWatch
+from firmware_host.loop_watch import CRAWL_TICKS, MEAN_TICKS, LoopWatch
 from firmware_host.ticker import PERIOD_S, Beat, Ticker
 
 START_S = 5000.0
@@ -160,3 +161,29 @@ def test_whatever_the_beat_a_missed_tick_is_always_told(busy_s: list[float]) -> 
         beat = ticker.wait()
         told = names(watch.update(beat, DISTANCE_S))
         assert told or not beat.missed
+
+
+def crawled(period_ticks: float, beats: int = 40) -> list[str]:
+    """All names told of a loop whose beats come every so many ticks."""
+    watch, found = LoopWatch(FaultBounds()), []
+    for number in range(beats):
+        now_s = START_S + number * period_ticks * PERIOD_S
+        found += names(watch.update(Beat(now_s, 0.0, number, 0), DISTANCE_S))
+    return found
+
+
+def test_a_loop_that_commands_too_seldom_to_brake_a_joint_is_told_and_one_at_a_third_of_its_rate_is_not() -> None:
+    assert "loop_crawling" in crawled(4.05)
+    assert "loop_crawling" not in crawled(3.0)
+
+
+def test_a_crawl_is_told_within_its_ticks() -> None:
+    for period_ticks in (4.05, 7.0, 12.0):
+        watch = LoopWatch(FaultBounds())
+        passed = next(
+            number * period_ticks
+            for number in range(100)
+            if "loop_crawling"
+            in names(watch.update(Beat(START_S + number * period_ticks * PERIOD_S, 0.0, number, 0), DISTANCE_S))
+        )
+        assert passed <= max(KINDS["loop_crawling"].bound_ticks, CRAWL_TICKS * period_ticks)
