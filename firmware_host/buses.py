@@ -41,7 +41,7 @@ def open_ports(buses: Mapping[str, BusParameters]) -> dict[str, PythonCanPort]:
 
 
 def reopening_ports(buses: Mapping[str, BusParameters], wait: bool) -> dict[str, ReopeningPort]:
-    """The same, but of those that are opened again where they vanish; with `wait` one that does not open comes later."""
+    """The same, but of those that are opened again where they vanish. With `wait` they may be missing at first."""
     return _all_or_none(buses, lambda name, bus: ReopeningPort(partial(open_bus, name, bus), wait))
 
 
