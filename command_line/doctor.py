@@ -116,6 +116,9 @@ def _writer() -> Account:
 
 def _groups(configuration: Configuration, socket: Path) -> Iterator[Finding]:
     """Who may use the socket."""
+    with suppress(OSError):
+        status = socket.stat()
+        yield ok("socket", f"{socket}, mode {status.st_mode & 0o777:o}, group {_group_name(status.st_gid)}")
     try:
         load_rights(configuration.status)
     except ConfigurationError as problem:
@@ -129,9 +132,6 @@ def _groups(configuration: Configuration, socket: Path) -> Iterator[Finding]:
         return
     text = f"operators are the members of {name}: {', '.join(members) or 'nobody but root'}"
     yield ok("groups", text) if members else warn("groups", text, f"'adduser YOU {name}', then log in again")
-    with suppress(OSError):
-        status = socket.stat()
-        yield ok("socket", f"{socket}, mode {status.st_mode & 0o777:o}, group {_group_name(status.st_gid)}")
 
 
 def _group_name(gid: int) -> str:

@@ -6,7 +6,7 @@ import argparse
 import os
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from command_line import exit_codes
@@ -14,7 +14,7 @@ from command_line.screen import complain
 from command_line.service_plan import Plan, System, plan_installation, plan_removal
 from command_line.service_steps import Command, Run, StepError, perform, run_command
 
-HIDDEN = ("/home", "/root", "/run/user")  # from the service, by ProtectHome= in its unit
+HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # from the service: ProtectHome= and PrivateTmp=
 Find = Callable[[str], str | None]  # where a program is
 NEXT = """\
 Next: edit {root}etc/mudskipper/mudskipper.toml (your geometry, your drives), then
@@ -25,7 +25,7 @@ Next: edit {root}etc/mudskipper/mudskipper.toml (your geometry, your drives), th
 
 def install(options: argparse.Namespace, run: Run = run_command, find: Find = shutil.which) -> int:
     system = _system(options, run)
-    refusal = _problem_with_place(system)
+    refusal = problem_with_place((system.prefix, Path(__file__).resolve().parent)) if system.live else ""
     if refusal:
         complain(refusal)
         return exit_codes.REFUSED
@@ -45,22 +45,21 @@ def _system(options: argparse.Namespace, run: Run) -> System:
     root, prefix = options.root.resolve(), Path(sys.prefix)
     if prefix.is_relative_to(root):
         prefix = Path("/") / prefix.relative_to(root)
-    return System(root, prefix, run)
+    return System(root, prefix, run, live=root == Path("/"))
 
 
-def _problem_with_place(system: System) -> str:
-    """Why the service could not be started from where this is; empty where it could."""
-    code = Path(__file__).resolve().parent
-    for place in (system.prefix, code):
+def problem_with_place(places: Sequence[Path]) -> str:
+    """Why the service could not be started out of these; empty where it could."""
+    for place in places:
         if any(place.is_relative_to(hidden) for hidden in HIDDEN):
             return f"{place} is hidden from the service; install into an environment below /opt: README, 'On the robot'"
-    if not (Path(sys.prefix) / "bin" / "mudskipperd").exists():
-        return f"there is no mudskipperd in {sys.prefix}/bin: install the package there with pip first"
+    if not (places[0] / "bin" / "mudskipperd").exists():
+        return f"there is no mudskipperd in {places[0]}/bin: install the package there with pip first"
     return ""
 
 
 def _carry_out(options: argparse.Namespace, system: System, plan: Plan, find: Find) -> int:
-    if system.is_this_one and os.geteuid() != 0 and not options.dry_run:
+    if system.live and os.geteuid() != 0 and not options.dry_run:
         complain("this changes the system: run it with sudo, or look at it with --dry-run")
         return exit_codes.NOT_PERMITTED
     for note in plan.notes:

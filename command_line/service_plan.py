@@ -50,20 +50,17 @@ class System(NamedTuple):
     root: Path
     prefix: Path  # of the environment, as that system sees it
     run: Run
-
-    @property
-    def is_this_one(self) -> bool:
-        return self.root == Path("/")
+    live: bool  # the one that runs here
 
     def command(self, program: str, *words: str) -> Command:
-        where = () if self.is_this_one else (f"--root={self.root}",)
+        where = () if self.live else (f"--root={self.root}",)
         return Command((program, *where, *words))
 
     def is_enabled(self, unit: str) -> bool:
         return self.run(self.command("systemctl", "is-enabled", unit).words).text.strip() == "enabled"
 
     def is_active(self, unit: str) -> bool:
-        return self.is_this_one and self.run(("systemctl", "is-active", unit)).text.strip() == "active"
+        return self.live and self.run(("systemctl", "is-active", unit)).text.strip() == "active"
 
 
 def source_folder() -> Path:
@@ -126,21 +123,21 @@ def _plan_link(plan: Plan, system: System) -> None:
 
 
 def _commands(system: System, changed: set[str]) -> Iterator[Step]:
-    here = system.is_this_one
+    live = system.live
     if SYSUSERS in changed:
         yield system.command("systemd-sysusers")
-    if UNIT in changed and here:
+    if UNIT in changed and live:
         yield Command(("systemctl", "daemon-reload"))
-    if LINK_FILE in changed and here:
+    if LINK_FILE in changed and live:
         yield Command(("udevadm", "control", "--reload"))
-        places = [Path("/sys/class/net") / name for name in INTERFACES]
+        places = [system.root / "sys/class/net" / name for name in INTERFACES]
         present = [str(place) for place in places if place.exists()]
         if present:
             yield Command(("udevadm", "trigger", "--action=add", *present))
     if not system.is_enabled(NETWORKD):
-        yield system.command("systemctl", "enable", *(("--now",) if here else ()), NETWORKD)
+        yield system.command("systemctl", "enable", *(("--now",) if live else ()), NETWORKD)
         yield system.command("systemctl", "disable", WAIT_ONLINE)  # a CAN bus is never online; the boot would hang
-    if NETWORK in changed and here:
+    if NETWORK in changed and live:
         yield Command(("networkctl", "reload"))
     if not system.is_enabled(SERVICE):
         yield system.command("systemctl", "enable", SERVICE)
@@ -151,7 +148,7 @@ def plan_removal(system: System, purge: bool) -> Plan:
     root, plan, before = system.root, Plan([], []), _load_manifest(system.root)
     sources = load_sources(system.prefix)
     if system.is_enabled(SERVICE) or system.is_active(SERVICE):
-        now = ("--now",) if system.is_this_one else ()
+        now = ("--now",) if system.live else ()
         plan.steps.append(system.command("systemctl", "disable", *now, SERVICE))
     for place, text in sources.items():
         _plan_removal_of(plan, root / place, {_digest(text), before.get(place)}, purge)
@@ -161,7 +158,7 @@ def plan_removal(system: System, purge: bool) -> Plan:
     _plan_reloading(plan, system)
     if purge:
         plan.steps.extend(Remove(root / place) for place in OWNED if (root / place).exists())
-        if system.is_this_one and SERVICE in _users(root):
+        if system.live and SERVICE in _users(root):
             plan.steps.append(Command(("userdel", SERVICE)))
     else:
         _plan_manifest(plan, root, before)
@@ -182,9 +179,9 @@ def _plan_removal_of(plan: Plan, path: Path, ours: set[str | None], purge: bool)
 
 def _plan_reloading(plan: Plan, system: System) -> None:
     removed = {step.path for step in plan.steps if isinstance(step, Remove)}
-    if system.is_this_one and system.root / UNIT in removed:
+    if system.live and system.root / UNIT in removed:
         plan.steps.append(Command(("systemctl", "daemon-reload")))
-    if system.is_this_one and system.root / NETWORK in removed:
+    if system.live and system.root / NETWORK in removed:
         plan.steps.append(Command(("networkctl", "reload")))
 
 

@@ -48,17 +48,19 @@ def parse_links(text: str) -> dict[str, CanLink]:
         links = json.loads(text)
     except ValueError:
         return {}
+    if not isinstance(links, list):
+        return {}
     wanted = [link for link in links if isinstance(link, dict) and link.get("link_type") == "can"]
     return {link.name: link for link in map(_parse_link, wanted)}
 
 
 def _parse_link(link: dict[str, Any]) -> CanLink:
-    told = _record(link, "linkinfo")
+    told, flags = _record(link, "linkinfo"), link.get("flags")
     details = _record(told, "info_data")
     timing = _record(details, "bittiming")
     return CanLink(
         name=str(link.get("ifname", "")),
-        up="UP" in (link.get("flags") or ()),
+        up=isinstance(flags, list) and "UP" in flags,
         kind=str(told.get("info_kind", "")),
         state=str(details.get("state", "")),
         bit_rate_bit_s=int(_number(timing.get("bitrate"), 0.0)),
