@@ -48,7 +48,7 @@ def doctor(options: argparse.Namespace) -> int:
 
 
 def examine_all(configuration: Configuration, socket: Path, links: dict[str, CanLink]) -> Iterator[Finding]:
-    pid, daemon = _ask_daemon(socket)
+    pid, daemon = _ask_daemon(socket, configuration.faults.longest_watchdog_s)
     limits = process_limits(ROOT, pid) if pid else unit_limits(ROOT) or process_limits(ROOT, None)
     priority = thread_priority(ROOT, pid) if pid else None
     yield from examine_host(ROOT, configuration.loop, limits, priority)
@@ -66,14 +66,14 @@ def _clock() -> Finding:
     return examine_clock(datetime.now(UTC), clock_is_synchronised(), has_clock_chip(ROOT))
 
 
-def _ask_daemon(socket: Path) -> tuple[int | None, list[Finding]]:
+def _ask_daemon(socket: Path, longest_watchdog_s: float) -> tuple[int | None, list[Finding]]:
     """Its process id, and what it tells of itself and of its drives."""
     pid = None
     try:
         client = StatusClient(socket)
         try:
             pid = client.daemon_pid
-            return pid, list(examine_daemon(client.call("status"), software_version()))
+            return pid, list(examine_daemon(client.call("status"), software_version(), longest_watchdog_s))
         finally:
             client.close()
     except NotPermittedError as problem:
@@ -84,7 +84,7 @@ def _ask_daemon(socket: Path) -> tuple[int | None, list[Finding]]:
         return pid, [fail("daemon", str(problem), START)]
 
 
-def examine_daemon(status: dict[str, Any], version: str) -> Iterator[Finding]:
+def examine_daemon(status: dict[str, Any], version: str, longest_watchdog_s: float) -> Iterator[Finding]:
     """Of a status."""
     text = f"runs, version {status['version']}, {status['mode']}"
     if status["version"] == version:
@@ -93,15 +93,17 @@ def examine_daemon(status: dict[str, Any], version: str) -> Iterator[Finding]:
         fix = "'systemctl restart mudskipper', with the robot disarmed"
         yield warn("daemon", f"{text}; this command is version {version}", fix)
     for drive in status["drives"]:
-        yield _examine_watchdog(f"watchdog.{drive['joint']}", drive["watchdog_s"])
+        yield _examine_watchdog(f"watchdog.{drive['joint']}", drive["watchdog_s"], longest_watchdog_s)
 
 
-def _examine_watchdog(identity: str, watchdog_s: float | None) -> Finding:
+def _examine_watchdog(identity: str, watchdog_s: float | None, longest_s: float) -> Finding:
     setting = "README, 'Setting up the drives'"
     if watchdog_s is None:
         return warn(identity, "not read back: the drive is silent, or its firmware's numbers are not known", setting)
     if watchdog_s == 0.0:
         return fail(identity, "off: nothing stops this motor when the computer dies", setting)
+    if watchdog_s > longest_s:
+        return fail(identity, f"{watchdog_s:g} s is slower than faults.longest_watchdog_s = {longest_s:g}", setting)
     return ok(identity, f"{watchdog_s:g} s")
 
 

@@ -63,7 +63,11 @@ def examine_host(root: Path, loop: LoopParameters, limits: Limits | None, priori
 def examine_kernel(realtime: bool, release: str) -> Finding:
     if realtime:
         return ok("kernel", f"{release}, real-time")
-    return warn("kernel", f"{release} is no real-time kernel: ticks may be late", "apt install linux-image-rt-amd64")
+    return warn(
+        "kernel",
+        f"{release} is no real-time kernel: ticks may be late",
+        "a kernel with PREEMPT_RT, such as Debian's linux-image-rt-amd64 or -arm64",
+    )
 
 
 def examine_limits(loop: LoopParameters, limits: Limits | None) -> Iterator[Finding]:

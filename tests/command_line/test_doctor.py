@@ -59,15 +59,17 @@ def test_interfaces_that_are_missing_fail(configuration: Configuration, tmp_path
     assert found["bus.right"].text == "there is no interface can1"
 
 
-@pytest.mark.parametrize(("watchdog_s", "level"), [(0.1, Level.OK), (None, Level.WARN), (0.0, Level.FAIL)])
-def test_a_drive_without_its_watchdog_fails(watchdog_s: float | None, level: Level) -> None:
+@pytest.mark.parametrize(
+    ("watchdog_s", "level"), [(0.3, Level.OK), (None, Level.WARN), (0.0, Level.FAIL), (0.5, Level.FAIL)]
+)
+def test_a_drive_without_a_watchdog_that_is_quick_enough_fails(watchdog_s: float | None, level: Level) -> None:
     drives = [{"joint": "left_sweep", "watchdog_s": watchdog_s}]
-    found = {finding.id: finding.level for finding in examine_daemon(made_up_status(drives=drives), "1.0")}
+    found = {finding.id: finding.level for finding in examine_daemon(made_up_status(drives=drives), "1.0", 0.3)}
     assert found == {"daemon": Level.OK, "watchdog.left_sweep": level}
 
 
 def test_a_daemon_of_another_version_is_warned_of() -> None:
-    found = next(iter(examine_daemon(made_up_status(), "1.1")))
+    found = next(iter(examine_daemon(made_up_status(), "1.1", 0.3)))
     assert found.level is Level.WARN
     assert "1.0" in found.text and "1.1" in found.text
 
