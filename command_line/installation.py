@@ -11,8 +11,8 @@ from pathlib import Path
 
 from command_line import exit_codes
 from command_line.screen import complain
-from command_line.service_plan import Plan, System, plan_installation, plan_removal
-from command_line.service_steps import Command, Run, StepError, perform, run_command
+from command_line.service_plan import CONFIGURATION, Plan, System, plan_installation, plan_removal
+from command_line.service_steps import Command, Run, StepError, WriteFile, perform, run_command
 
 HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # from the service: ProtectHome= and PrivateTmp=
 Find = Callable[[str], str | None]  # where a program is
@@ -31,7 +31,8 @@ def install(options: argparse.Namespace, run: Run = run_command, find: Find = sh
         return exit_codes.REFUSED
     plan = plan_installation(system)
     status = _carry_out(options, system, plan, find)
-    if plan.steps and status == exit_codes.OK and not options.dry_run:
+    is_new = any(isinstance(step, WriteFile) and step.path == system.root / CONFIGURATION for step in plan.steps)
+    if is_new and status == exit_codes.OK and not options.dry_run:
         print(NEXT.format(root=str(system.root).rstrip("/") + "/"))
     return status
 

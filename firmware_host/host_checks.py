@@ -38,6 +38,7 @@ EARLIEST_YEAR = 2024  # a clock before that was never set
 VOLATILE = frozenset({"tmpfs", "ramfs", "overlay"})  # gone at power-off, or likely
 UNSYNCED = frozenset({"vfat", "exfat", "msdos", "nfs", "nfs4", "cifs", "fuse"})
 OURS = "mudskipper"
+STATE_FOLDER = ("var", "lib", OURS)  # StateDirectory= of the unit
 PACKAGES = ("control", "drivers", "estimation", "simulation")
 
 
@@ -181,10 +182,16 @@ def examine_folder(folder: Path, writer: Account) -> Finding:
         writable = may_write(nearest.stat(), writer)
     except PermissionError:
         return warn("log", f"{folder} cannot be looked into", "run this with sudo")
+    if writer.name == OURS and not writable and nearest == folder_of_systemd(folder):
+        return ok("log", f"{folder}: made when the service starts")
     text = f"{folder}: {'' if writable else 'not '}writable for {writer.name}"
-    return (
-        ok("log", text) if writable else fail("log", text, f"'chown {writer.name}: {nearest}', or change log.directory")
-    )
+    fix = f"'install -d -o {writer.uid} {folder}', or change log.directory"
+    return ok("log", text) if writable else fail("log", text, fix)
+
+
+def folder_of_systemd(folder: Path) -> Path | None:
+    """Where systemd will make the service's StateDirectory, if the folder is to be in that."""
+    return next((place.parent for place in (folder, *folder.parents) if place.parts[-3:] == STATE_FOLDER), None)
 
 
 def may_write(status: os.stat_result, writer: Account) -> bool:

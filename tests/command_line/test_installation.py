@@ -169,10 +169,14 @@ def test_what_is_done_is_what_was_shown(machine: Machine, capsys: pytest.Capture
     assert machine.ran == [line.removesuffix(f" --root={machine.root}") for line in runs]
 
 
-def test_an_upgrade_replaces_what_nobody_edited(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_upgrade_replaces_what_nobody_edited(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     machine.install()
+    assert "Next: edit" in capsys.readouterr().out
     release(monkeypatch, NETWORK)
     assert machine.install() == exit_codes.OK
+    assert "Next" not in capsys.readouterr().out
     assert machine.text(NETWORK).endswith("# new\n")
     assert not (machine.root / f"{NETWORK}.new").exists()
 

@@ -255,7 +255,18 @@ def test_a_folder_that_the_daemon_s_user_cannot_write_fails_with_who_should_own_
     stranger = Account("mudskipper", os.geteuid() + 4242, frozenset())
     found = examine_folder(tmp_path / "logs" / "deeper", stranger)
     assert found.level is Level.FAIL
-    assert found.fix.startswith(f"'chown mudskipper: {tmp_path}'")
+    assert found.fix.startswith(f"'install -d -o {stranger.uid} {tmp_path / 'logs' / 'deeper'}'")
+
+
+def test_the_service_s_own_folder_is_made_at_its_start_and_no_other(tmp_path: Path) -> None:
+    (tmp_path / "var/lib").mkdir(parents=True)
+    service, you = (Account(name, os.geteuid() + 4242, frozenset()) for name in ("mudskipper", "you"))
+    logs = tmp_path / "var/lib/mudskipper/logs"
+    assert examine_folder(logs, service).level is Level.OK
+    assert examine_folder(logs, you).level is Level.FAIL
+    assert examine_folder(tmp_path / "var/lib/elsewhere", service).level is Level.FAIL
+    logs.mkdir(parents=True)
+    assert examine_folder(logs, service).level is Level.FAIL
 
 
 def test_a_clock_that_was_never_set_fails_and_one_that_nobody_corrects_warns() -> None:
