@@ -35,6 +35,8 @@ TICKS_A_SECOND = 380
     ("problem", "words"),
     [
         (OSError(errno.ENODEV, "No such device"), "there is no such interface"),
+        (OSError(errno.ENOENT, "could not open port /dev/ttyACM0"), "there is no such device"),
+        (PermissionError(errno.EACCES, "could not open port"), "this user may not use it"),
         (OSError(errno.EAFNOSUPPORT, "Address family not supported"), "this kernel has no CAN"),
         (can.CanOperationError("Error receiving: Network is down", errno.ENETDOWN), "the interface is down"),
         (ValueError("bitrate is needed"), "bitrate is needed"),
