@@ -32,9 +32,18 @@ def open_bus(name: str, bus: BusParameters) -> PythonCanPort:
     try:
         return open_port(bus.interface, bus.channel, bus.options)
     except (can.CanError, OSError, ValueError, TypeError, ImportError) as problem:
-        number = problem.errno if isinstance(problem, OSError) else getattr(problem, "error_code", None)
-        why = WORDS.get(number or 0, str(problem))
+        why = WORDS.get(_error_number(problem), str(problem))
         raise BusError(f"bus.{name} ({bus.interface} {bus.channel}) does not open: {why}") from problem
+
+
+def _error_number(problem: BaseException | None) -> int:
+    """Of the operating system, where it is at the root of it."""
+    while problem is not None:
+        number = problem.errno if isinstance(problem, OSError) else getattr(problem, "error_code", None)
+        if number:
+            return int(number)
+        problem = problem.__cause__ or problem.__context__
+    return 0
 
 
 def open_ports(buses: Mapping[str, BusParameters]) -> dict[str, PythonCanPort]:

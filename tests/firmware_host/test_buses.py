@@ -55,6 +55,18 @@ def test_a_bus_that_does_not_open_is_one_clear_sentence(
     assert "\n" not in str(caught.value)
 
 
+def test_the_operating_system_s_word_is_found_behind_a_library_s(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object) -> None:
+        try:
+            raise FileNotFoundError(errno.ENOENT, "No such file or directory")
+        except FileNotFoundError as problem:
+            raise can.CanInitializationError("could not create serial device") from problem
+
+    monkeypatch.setattr(buses, "open_port", refuse)
+    with pytest.raises(BusError, match="there is no such device"):
+        open_bus("left", CAN0)
+
+
 class Opened:
     def __init__(self) -> None:
         self.closed = False
