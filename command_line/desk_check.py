@@ -6,14 +6,16 @@ Listens only; nothing is transmitted.
 from __future__ import annotations
 
 import os
-import resource
 import time
 from pathlib import Path
 from typing import Any
 
 from drivers.odrive_drives import OdriveDrives
 from firmware_host.buses import BusError, open_ports
+from firmware_host.can_links import examine_bus, read_links
 from firmware_host.configuration import Configuration, ConfigurationError, load_configuration
+from firmware_host.host_checks import Account, examine_folder, examine_limits
+from firmware_host.host_facts import process_limits
 from firmware_host.reports import check_item
 
 LISTENING_S = 0.6  # six heartbeats
@@ -50,21 +52,13 @@ def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
 
 
 def _host_items(configuration: Configuration) -> list[dict[str, Any]]:
-    items = []
+    findings = []
     if configuration.log.enabled:
-        folder = Path(configuration.log.directory)
-        nearest = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
-        writable = os.access(nearest, os.W_OK)
-        text = f"{folder}: {'writable' if writable else 'not writable'}"
-        items.append(check_item("log", writable, text, f"own {nearest}"))
-    priority = configuration.loop.priority
-    if priority:
-        permitted = _may_schedule(priority)
-        text = f"real-time priority {priority} is {'permitted' if permitted else 'not permitted: the loop may be late'}"
-        items.append(check_item("realtime", permitted, text, "raise the rtprio limit (LimitRTPRIO= in the unit)"))
-    return items
-
-
-def _may_schedule(priority: int) -> bool:
-    limit, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
-    return os.geteuid() == 0 or limit == resource.RLIM_INFINITY or limit >= priority
+        you = Account("you", os.geteuid(), frozenset({os.getegid(), *os.getgroups()}))
+        findings.append(examine_folder(Path(configuration.log.directory), you))
+    findings += examine_limits(configuration.loop, process_limits(Path("/"), None))
+    links = read_links()
+    for name, bus in configuration.bus.items():
+        drives = sum(drive.bus == name for drive in configuration.drive.values())
+        findings += examine_bus(name, bus, drives, links)[1:]  # whether it opens was said
+    return [finding.as_check_item for finding in findings]

@@ -76,6 +76,21 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
     parsers["walk"].add_argument("--strides", type=_count, default=0, metavar="N", help="then stop (default: go on)")
     parsers["walk"].add_argument("--attended", action="store_true", help="stay; the robot stops when this ends")
     parsers["check"].add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
+    _add_installation(commands)
+
+
+def _add_installation(commands: Commands) -> None:  # type: ignore[valid-type]
+    doctor = _add(commands, "doctor", "doctor.doctor", "The computer and its buses, line by line, with what to do.")
+    doctor.add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
+    doctor.add_argument("--json", action="store_true", help="for machines")
+    socket = os.environ.get("MUDSKIPPER_SOCKET")
+    doctor.add_argument("--socket", type=Path, default=Path(socket) if socket else None, help="of the daemon")
+    install = _add(commands, "install", "installation.install", "Set up this computer's service, network and users.")
+    uninstall = _add(commands, "uninstall", "installation.uninstall", "Take that back; configuration and logs stay.")
+    uninstall.add_argument("--purge", action="store_true", help="remove configuration, logs and user too")
+    for parser in (install, uninstall):
+        parser.add_argument("--dry-run", action="store_true", help="only show what would be done")
+        parser.add_argument("--root", type=Path, default=Path("/"), metavar="DIR", help="of another system's files")
 
 
 def _add_fail(commands: Commands) -> argparse.ArgumentParser:  # type: ignore[valid-type]

@@ -53,6 +53,7 @@ class BusParameters:
     interface: str
     channel: str
     options: dict[str, str | int | float | bool] = field(default_factory=dict)
+    bit_rate_kbit_s: Annotated[int, Bounds(10, 1000)] = 1000  # of its drives, by which `doctor` judges the interface
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ class LoopParameters:
     priority: Annotated[int, Bounds(0, 99)] = 45  # SCHED_FIFO, under the interrupt threads' 50; 0: none
     cpu: Annotated[int, Bounds(-1, 1023)] = -1  # to run on; -1: any
     lock_memory: bool = True
+    wait_for_bus: bool = False  # start without a bus that does not open, and try again every second; else end
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
@@ -24,7 +24,8 @@ from drivers.failing_pose import failing_pose
 from drivers.failures import Failures
 from drivers.odrive_drives import OdriveDrives
 from drivers.pose_port import PosePort
-from firmware_host.buses import BusError, open_ports
+from drivers.reopening_port import ReopeningPort
+from firmware_host.buses import BusError, reopening_ports
 from firmware_host.configuration import (
     EXIT_CONFIGURATION,
     Configuration,
@@ -120,7 +121,8 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         status = StatusSocket(Path(configuration.status.socket), {}, rights)
         stack.callback(status.close)
         failures = failures_of(configuration)
-        ports = failing_ports(open_ports(configuration.bus), configuration.drive, failures)
+        buses = reopening_ports(configuration.bus, configuration.loop.wait_for_bus)
+        ports = failing_ports(buses, configuration.drive, failures)
         drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         stack.callback(drives.close)
         pose = PosePort(Path(configuration.pose.socket) if configuration.pose.socket else None)
@@ -141,11 +143,16 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         warnings += prepare_loop(options.priority, options.cpu, options.lock_memory)
         for warning in warnings:
             print(f"warning: {warning}", file=sys.stderr)
-        return _run_loop(loop, failures, status, notifier, shutdown)
+        return _run_loop(loop, buses, failures, status, notifier, shutdown)
 
 
 def _run_loop(
-    loop: Loop, failures: Failures | None, status: StatusSocket, notifier: SystemdNotifier, shutdown: Shutdown
+    loop: Loop,
+    buses: Mapping[str, ReopeningPort],
+    failures: Failures | None,
+    status: StatusSocket,
+    notifier: SystemdNotifier,
+    shutdown: Shutdown,
 ) -> int:
     ticker, watchdog = failing_ticker(Ticker(), failures, loop.event), WatchdogFeed(notifier)
     notifier.send("READY=1", "STATUS=running")
@@ -157,6 +164,7 @@ def _run_loop(
             loop.tick(beat)
             status.serve(now_s)
             watchdog.update(beat, loop.mode)
+            reopen_buses(loop, buses, now_s)
         notifier.send("STOPPING=1")
         return 0
     except Exception as problem:  # noqa: BLE001 - the one place where surprises end
@@ -164,6 +172,15 @@ def _run_loop(
         if failures is not None:  # or what fails on purpose would keep the drives from hearing the end
             failures.end_all()
         return _end_safely(loop, problem)
+
+
+def reopen_buses(loop: Loop, buses: Mapping[str, ReopeningPort], now_s: float) -> None:
+    """Those that are off, while torque is: opening one may take longer than a tick."""
+    if loop.mode in ENERGISED:
+        return
+    for name, port in buses.items():
+        if port.reopen(now_s):
+            loop.event(now_s, f"bus {name} opened again")
 
 
 def _end_safely(loop: Loop, problem: Exception) -> int:

@@ -38,7 +38,7 @@ EXPLAINED = frozenset({"drive_error", "drive_disarmed"})  # by the drive's own w
 BUS_FAULTS = {
     BusState.WARNING: ("bus_warning", "meets many errors"),
     BusState.PASSIVE: ("bus_passive", "meets so many errors that its controller is passive"),
-    BusState.OFF: ("bus_off", "was left by its controller"),
+    BusState.OFF: ("bus_off", "is off"),
 }
 
 

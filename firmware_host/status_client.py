@@ -12,6 +12,7 @@ import msgpack
 from firmware_host.rpc import NOT_PERMITTED, REQUEST
 
 ANSWER_S = 5.0
+CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid
 TIMEVAL = struct.Struct("ll")  # seconds and microseconds
 
 
@@ -42,6 +43,12 @@ class StatusClient:
         except OSError as problem:
             raise NoDaemonError(f"no daemon answers on {path}") from problem
         self._socket.settimeout(timeout_s)
+
+    @property
+    def daemon_pid(self) -> int:
+        """By the kernel's word on who made the socket."""
+        size = CREDENTIALS.size
+        return int(CREDENTIALS.unpack(self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, size))[0])
 
     def call(self, method: str, **params: Any) -> Any:
         """The result.

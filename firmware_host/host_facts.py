@@ -1,0 +1,143 @@
+"""What the kernel tells of the computer: read from /proc and /sys below a root that a test may make up.
+
+Nothing here judges, and what cannot be read is empty: host_checks.py says what it means. Layouts: proc(5),
+proc_pid_stat(5); threaded interrupts are kernel threads named irq/NUMBER-DEVICE.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import re
+from contextlib import suppress
+from math import inf
+from pathlib import Path
+from typing import NamedTuple
+
+TIME_ERROR = 5  # adjtimex(2): the clock is not synchronised
+REFUSED = -1
+TIMEX_BYTES = 256  # struct timex has 208
+CAN_INTERRUPT = re.compile(r"irq/\d+-.*(can|mcp25|spi|xhci|dwc|ehci)", re.IGNORECASE)  # SPI and USB carry adapters
+RT_PRIORITY = 40 - 3  # field of /proc/PID/stat, counted behind the name in its brackets
+NAMES = {"Max realtime priority": "rtprio", "Max locked memory": "memlock"}
+UNIT = "etc/systemd/system/mudskipper.service"
+
+
+class Limits(NamedTuple):
+    """inf: unlimited."""
+
+    rtprio: float
+    memlock_bytes: float
+    whose: str
+
+
+class Thread(NamedTuple):
+    name: str
+    priority: int  # SCHED_FIFO or SCHED_RR; 0: neither
+
+
+class Mount(NamedTuple):
+    place: str
+    kind: str
+    read_only: bool
+
+
+def read_text(path: Path) -> str:
+    """Empty where there is nothing to read."""
+    with suppress(OSError):
+        return path.read_text(encoding="utf-8", errors="replace").strip()
+    return ""
+
+
+def is_realtime(root: Path) -> bool:
+    told = read_text(root / "sys/kernel/realtime") == "1"
+    return told or "PREEMPT_RT" in read_text(root / "proc/sys/kernel/version").replace("PREEMPT RT", "PREEMPT_RT")
+
+
+def kernel_text(root: Path) -> str:
+    return read_text(root / "proc/sys/kernel/osrelease") or "unknown"
+
+
+def process_limits(root: Path, pid: int | None) -> Limits | None:
+    """Of a process, or of this one, which root may exceed."""
+    if pid is None and os.geteuid() == 0:
+        return Limits(inf, inf, "for root")
+    text = read_text(root / "proc" / str(pid or "self") / "limits")
+    found = {}
+    for line in text.splitlines():
+        for name, short in NAMES.items():
+            if line.startswith(name):
+                found[short] = _limit(line.removeprefix(name).split()[0])
+    if len(found) < len(NAMES):
+        return None
+    return Limits(found["rtprio"], found["memlock"], "of the daemon" if pid else "of this shell")
+
+
+def unit_limits(root: Path) -> Limits | None:
+    """That the installed service gives its daemon."""
+    settings = dict(re.findall(r"^(Limit\w+)=(\S+)$", read_text(root / UNIT), re.MULTILINE))
+    if not settings:
+        return None
+    rtprio, memlock = (_limit(settings.get(f"Limit{name}", "0")) for name in ("RTPRIO", "MEMLOCK"))
+    return Limits(rtprio, memlock, "in the unit")
+
+
+def _limit(word: str) -> float:
+    if word in ("unlimited", "infinity"):
+        return inf
+    return float(word) if word.isdigit() else 0.0
+
+
+def governors(root: Path) -> set[str]:
+    folder = root / "sys/devices/system/cpu"
+    return {read_text(path) for path in folder.glob("cpu[0-9]*/cpufreq/scaling_governor")} - {""}
+
+
+def isolated_processors(root: Path) -> set[int]:
+    """Of a list such as 2-3,5."""
+    found: set[int] = set()
+    for first, last in re.findall(r"(\d+)(?:-(\d+))?", read_text(root / "sys/devices/system/cpu/isolated")):
+        found.update(range(int(first), int(last or first) + 1))
+    return found
+
+
+def processors(root: Path) -> int:
+    return len(list((root / "sys/devices/system/cpu").glob("cpu[0-9]*")))
+
+
+def can_interrupts(root: Path) -> list[Thread]:
+    """Threads that carry frames in: those of CAN controllers, and of what these hang on."""
+    found = []
+    for folder in (root / "proc").glob("[0-9]*"):
+        name = read_text(folder / "comm")
+        if CAN_INTERRUPT.match(name):
+            found.append(Thread(name, thread_priority(root, int(folder.name))))
+    return sorted(found)
+
+
+def thread_priority(root: Path, pid: int) -> int:
+    fields = read_text(root / "proc" / str(pid) / "stat").rpartition(")")[2].split()
+    return int(fields[RT_PRIORITY]) if len(fields) > RT_PRIORITY else 0
+
+
+def mount_of(root: Path, folder: Path) -> Mount | None:
+    """The file system that a folder is on, or will be."""
+    best: Mount | None = None
+    for line in read_text(root / "proc/self/mounts").splitlines():
+        fields = line.split()
+        if len(fields) < 4:
+            continue
+        place = fields[1].replace("\\040", " ")
+        if folder.absolute().is_relative_to(place) and (best is None or len(place) >= len(best.place)):
+            best = Mount(place, fields[2], "ro" in fields[3].split(","))
+    return best
+
+
+def has_clock_chip(root: Path) -> bool:
+    return any((root / "sys/class/rtc").glob("rtc*"))
+
+
+def clock_is_synchronised() -> bool:
+    """As the kernel was told by whoever disciplines it; only asks."""
+    state: int = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(TIMEX_BYTES))
+    return state not in (TIME_ERROR, REFUSED)

@@ -1,0 +1,232 @@
+"""Buses that do not open, vanish, or come later: what the daemon says, and that it stays disarmed."""
+
+from __future__ import annotations
+
+import errno
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import can
+import pytest
+
+from control.modes import Mode, Request
+from drivers.can_port import BusState
+from drivers.frames import Frame
+from drivers.mock_bus import MockPort
+from drivers.reopening_port import RETRY_S, NotOpenError, ReopeningPort
+from firmware_host import buses
+from firmware_host.buses import BusError, open_bus, open_ports, reopening_ports
+from firmware_host.configuration import BusParameters, Configuration
+from firmware_host.daemon import reopen_buses
+from firmware_host.status_client import NoDaemonError, StatusClient
+from simulation.clay import MUDS
+from simulation.local_setup import write_local_setup
+from simulation.lockstep import Lockstep
+from simulation.track import Track
+
+CAN0 = BusParameters("socketcan", "can0")
+TICKS_A_SECOND = 380
+
+
+@pytest.mark.parametrize(
+    ("problem", "words"),
+    [
+        (OSError(errno.ENODEV, "No such device"), "there is no such interface"),
+        (OSError(errno.ENOENT, "could not open port /dev/ttyACM0"), "there is no such device"),
+        (PermissionError(errno.EACCES, "could not open port"), "this user may not use it"),
+        (OSError(errno.EAFNOSUPPORT, "Address family not supported"), "this kernel has no CAN"),
+        (can.CanOperationError("Error receiving: Network is down", errno.ENETDOWN), "the interface is down"),
+        (ValueError("bitrate is needed"), "bitrate is needed"),
+    ],
+)
+def test_a_bus_that_does_not_open_is_one_clear_sentence(
+    problem: Exception, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*arguments: object) -> None:
+        raise problem
+
+    monkeypatch.setattr(buses, "open_port", refuse)
+    with pytest.raises(BusError) as caught:
+        open_bus("left", CAN0)
+    assert str(caught.value).startswith(f"bus.left (socketcan can0) does not open: {words}")
+    assert "\n" not in str(caught.value)
+
+
+def test_the_operating_system_s_word_is_found_behind_a_library_s(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object) -> None:
+        try:
+            raise FileNotFoundError(errno.ENOENT, "No such file or directory")
+        except FileNotFoundError as problem:
+            raise can.CanInitializationError("could not create serial device") from problem
+
+    monkeypatch.setattr(buses, "open_port", refuse)
+    with pytest.raises(BusError, match="there is no such device"):
+        open_bus("left", CAN0)
+
+
+class Opened:
+    def __init__(self) -> None:
+        self.closed = False
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def test_where_one_bus_does_not_open_the_others_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = Opened()
+
+    def open_left_alone(interface: str, channel: str, options: object) -> Opened:
+        if channel == "can1":
+            raise OSError(errno.ENODEV, "No such device")
+        return first
+
+    monkeypatch.setattr(buses, "open_port", open_left_alone)
+    with pytest.raises(BusError, match="bus.right"):
+        open_ports({"left": CAN0, "right": BusParameters("socketcan", "can1")})
+    assert first.closed
+
+
+def test_with_waiting_every_bus_is_there_and_says_what_it_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object) -> None:
+        raise OSError(errno.ENODEV, "No such device")
+
+    monkeypatch.setattr(buses, "open_port", refuse)
+    ports = reopening_ports({"left": CAN0}, wait=True)
+    assert ports["left"].state is BusState.OFF
+    assert "no such interface" in ports["left"].last_error
+    with pytest.raises(BusError):
+        reopening_ports({"left": CAN0}, wait=False)
+
+
+class Plug:
+    """Of the left adapter of a robot in lockstep."""
+
+    def __init__(self, robot: Lockstep) -> None:
+        drives = robot.loop.drives
+        wire = drives.ports["left"]
+        assert isinstance(wire, MockPort)
+        self.inside = True
+        self.port = ReopeningPort(lambda: self._open(wire), wait=True)
+        self.wire = wire
+        drives.ports["left"] = self.port
+        for place, (port, receivers) in enumerate(drives._receivers):
+            if port is wire:
+                drives._receivers[place] = (self.port, receivers)
+        for outlet in drives.gate._outlets:
+            if outlet._port is wire:
+                outlet._port = self.port
+
+    def _open(self, wire: MockPort) -> MockPort:
+        if not self.inside:
+            raise NotOpenError("bus.left (socketcan can0) does not open: there is no such interface")
+        wire.state = BusState.ACTIVE
+        wire.queue.clear()
+        return wire
+
+    def pull(self) -> None:
+        self.inside = False
+        self.wire.state, self.wire.last_error = BusState.OFF, "No such device"
+        self.wire.close = lambda: None  # type: ignore[method-assign]
+        self.wire.receive = list  # type: ignore[method-assign]
+
+    def plug_in(self) -> None:
+        self.inside = True
+        del self.wire.receive
+
+    def run(self, robot: Lockstep, for_s: float) -> None:
+        for _ in range(int(for_s * TICKS_A_SECOND)):
+            robot.step()
+            reopen_buses(robot.loop, {"left": self.port}, robot.now_s)
+
+
+def mode_of(robot: Lockstep) -> Mode:
+    return robot.loop.mode
+
+
+@pytest.fixture
+def robot(configuration: Configuration) -> Lockstep:
+    return Lockstep(configuration, Track([(5.0, MUDS["48.5"])]))
+
+
+def test_a_bus_that_vanishes_in_operation_is_a_fault_and_when_it_is_back_the_robot_is_disarmed(
+    robot: Lockstep,
+) -> None:
+    plug = Plug(robot)
+    robot.arm()
+    plug.pull()
+    plug.run(robot, 6.0)
+    assert mode_of(robot) is Mode.FAULT
+    names = {fault.name: fault.sentence for fault in robot.loop.faults.standing}
+    assert "there is no such interface" in names["bus_off"]
+    plug.plug_in()
+    plug.run(robot, 2.0 * RETRY_S)
+    assert plug.port.state is BusState.ACTIVE
+    assert mode_of(robot) is Mode.FAULT  # until a person clears it
+    assert robot.loop.request(Request.CLEAR, robot.now_s) is None
+    plug.run(robot, 2.0)
+    assert mode_of(robot) is Mode.IDLE
+    assert not any(state.closed_loop for state in robot.loop.states)
+
+
+def test_no_bus_is_opened_while_torque_is_on(robot: Lockstep) -> None:
+    plug = Plug(robot)
+    robot.arm()
+    tried: list[float] = []
+
+    def try_it(now_s: float) -> bool:
+        tried.append(now_s)
+        return False
+
+    plug.port.reopen = try_it  # type: ignore[method-assign]
+    plug.run(robot, 0.5)
+    assert robot.loop.mode is Mode.HOLD
+    assert tried == []
+
+
+def test_a_frame_that_was_never_sent_is_counted(robot: Lockstep) -> None:
+    plug = Plug(robot)
+    plug.pull()
+    plug.run(robot, 2.0)
+    before = plug.port.failed_sends
+    plug.port.send(Frame(1, b""))
+    assert plug.port.failed_sends == before + 1
+
+
+@pytest.mark.parametrize("wait", [True, False])
+def test_a_daemon_without_its_bus_waits_where_it_is_told_to_and_else_ends_with_status_1(
+    short_folder: Path, tmp_path: Path, wait: bool
+) -> None:
+    path = write_local_setup(short_folder, tmp_path / "logs")
+    text = path.read_text(encoding="utf-8").replace('interface = "mudskipper_local"', 'interface = "socketcan"')
+    path.write_text(text + f"\n[loop]\nwait_for_bus = {str(wait).lower()}\n", encoding="utf-8")
+    command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(path)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as daemon:
+        if wait:
+            report = wait_for_status(short_folder / "mudskipper.sock", daemon)
+            daemon.send_signal(signal.SIGTERM)
+        _, said = daemon.communicate(timeout=20)
+    assert "Traceback" not in said
+    if wait:
+        assert report["mode"] == "boot"
+        assert report["fault"]["name"] == "bus_off"
+        assert "does not open" in report["fault"]["sentence"]
+        assert daemon.returncode == 0
+    else:
+        assert daemon.returncode == 1
+        assert said.startswith("mudskipperd: bus.left (socketcan ")
+
+
+def wait_for_status(path: Path, daemon: subprocess.Popen[str]) -> dict[str, Any]:
+    while daemon.poll() is None:
+        try:
+            client = StatusClient(path)
+        except NoDaemonError:
+            continue
+        report: dict[str, Any] = client.call("status")
+        client.close()
+        if report["fault"]:
+            return report
+    raise AssertionError("the daemon ended")
