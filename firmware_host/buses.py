@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import can
 
-from drivers.can_port import PythonCanPort, open_port
+from drivers.can_port import CanPort, open_port
 from firmware_host.configuration import BusParameters
 
 
@@ -14,9 +14,9 @@ class BusError(Exception):
     """A bus does not open; the text names it and says why."""
 
 
-def open_ports(buses: Mapping[str, BusParameters]) -> dict[str, PythonCanPort]:
+def open_ports(buses: Mapping[str, BusParameters]) -> dict[str, CanPort]:
     """All of them, by name, or BusError and none."""
-    ports: dict[str, PythonCanPort] = {}
+    ports: dict[str, CanPort] = {}
     for name, bus in buses.items():
         try:
             ports[name] = open_port(bus.interface, bus.channel, bus.options)
