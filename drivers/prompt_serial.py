@@ -26,7 +26,8 @@ class PromptSerial:
         self._arrived = b""
         self._place = 0  # of the next byte among them
         self._unsent = b""
-        self.refusals = 0
+        self._has_written = False
+        self.refusals = 0  # since the first line; before, python-can has closed what was not open, and opened it twice
         self.write_timeout: float | None = None  # python-can sets it
 
     @property
@@ -41,7 +42,8 @@ class PromptSerial:
         waiting = self._port.in_waiting  # asked for first: as pyserial sets the line up, an empty read is no end of it
         if waiting:
             self._arrived = os.read(self._file, waiting).translate(ASCII)
-            self.refusals += self._arrived.count(REFUSAL)
+            if self._has_written:
+                self.refusals += self._arrived.count(REFUSAL)
 
     def read(self, size: int = 1) -> bytes:
         """Of what `in_waiting` has found; less, or nothing, where there is no more."""
@@ -51,6 +53,7 @@ class PromptSerial:
 
     def write(self, line: bytes) -> None:
         """Raises BlockingIOError, and writes nothing of this line, while the kernel takes no more."""
+        self._has_written = True
         if self._unsent:
             self._unsent = self._unsent[os.write(self._file, self._unsent) :]
         if self._unsent:
