@@ -2,8 +2,9 @@
 
 The simulated robot walks the paper's track adaptively, in step with the daemon's own loop, with four drives on two
 buses. The robot computes between the ticks and outside of every figure; no tick waits for a deadline, so processor
-and caches are warmer than on a robot (benchmarks.loop_jitter shows ticks that begin asleep). Three buses carry the
-frames: python-can's in-process `virtual` interface, our mock bus without python-can, and the local bus's sockets.
+and caches are warmer than on a robot (benchmarks.loop_jitter shows ticks that begin asleep). Five kinds of buses carry
+the frames: python-can's in-process `virtual` interface, our mock bus without python-can, the local bus's sockets, and
+SocketCAN on pairs of sockets by both of its paths, which benchmarks/can_paths.py also puts beside each other alone.
 
 Blocks of 1 s alternate between whole ticks, ticks marked at the beginning of every stage, and marked ticks without
 a recorder. What marking costs is measured and taken off each stage; whole ticks carry one reading of the clock.
@@ -21,15 +22,17 @@ from statistics import median
 from time import perf_counter
 from typing import Any, NamedTuple
 
+from benchmarks.can_paths import BAR_RATIO, Kind, compare_paths, open_bus, open_pair
 from benchmarks.example_robot import load_example
 from benchmarks.report import Progress, new_parser, print_report, summary_us, verdict
 from command_line.screen import table
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import JOINTS
-from drivers.can_port import CanPort, open_port
+from drivers.can_port import CanPort, PythonCanPort, open_port
 from drivers.mock_bus import MockBus
 from drivers.odrive_drives import OdriveDrives
+from drivers.socketcan_port import SocketcanPort
 from firmware_host.configuration import Configuration
 from firmware_host.loop import Loop
 from firmware_host.realtime import freeze_garbage
@@ -87,10 +90,21 @@ def local_wiring(buses: Iterable[str], folder: Path) -> Wiring:
     return python_can_wiring("mudskipper_local", buses, folder)
 
 
+def socketcan_wiring(kind: Kind, buses: Iterable[str]) -> Wiring:
+    robot: dict[str, CanPort] = {}
+    loop: dict[str, CanPort] = {}
+    for name in buses:
+        far, near = open_pair()
+        robot[name], loop[name] = SocketcanPort(open_bus(far)), kind(open_bus(near))
+    return Wiring(robot, loop)
+
+
 VARIANTS: dict[str, Callable[[Iterable[str], Path], Wiring]] = {
     "virtual": virtual_wiring,
     "mock": mock_wiring,
     "local": local_wiring,
+    "socketcan": lambda buses, folder: socketcan_wiring(SocketcanPort, buses),
+    "socketcan by python-can": lambda buses, folder: socketcan_wiring(PythonCanPort, buses),
 }
 
 
@@ -303,6 +317,13 @@ def text_of(report: dict[str, Any]) -> str:
         frames = f"{figures['frames_received']:.1f} frames in and {figures['frames_sent']:.1f} out per tick"
         marking = f"marking a stage costs {figures['marking_us']:.2f} us, taken off"
         lines += [f"{variant} bus: {frames}; {marking}", table(_rows(figures)), ""]
+    paths = report["socketcan"]
+    own, python_can = (
+        f"{paths['own_us']:.1f} us by the socket's own frames",
+        f"{paths['python_can_us']:.1f} by python-can",
+    )
+    lines.append(f"SocketCAN, reads and sends of a tick: {own}, {python_can}, {paths['ratio']:.2f} times as much")
+    lines.append(verdict(f"python-can takes at least {BAR_RATIO:g} times as long", paths["reached"]))
     return "\n".join([*lines, report["verdict"]])
 
 
@@ -331,8 +352,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         variant: measure(variant, options.seconds, progress, place * options.seconds)
         for place, variant in enumerate(variants)
     }
+    progress.show(len(variants) * options.seconds, "both paths to SocketCAN")
+    paths = compare_paths()
     progress.clear()
-    report: dict[str, Any] = {"benchmark": "tick_time", "seconds": options.seconds, "variants": measured}
+    report: dict[str, Any] = {
+        "benchmark": "tick_time",
+        "seconds": options.seconds,
+        "variants": measured,
+        "socketcan": paths,
+    }
     judged = "virtual" if "virtual" in measured else variants[0]
     reached = measured[judged]["whole_us"]["median"] <= BAR_US
     bar = f"median whole tick over the {judged} bus at most {BAR_US:.0f} us"

@@ -209,6 +209,7 @@ def _loop_text(report: dict[str, Any]) -> str:
             f"tick   {tick['p50']:.0f} us median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst",
             f"bus    {bus['unknown_frames']} unknown, {bus['garbled_frames']} garbled,"
             f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends"
+            + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")
             + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),
             f"log    {log['path'] or 'off'}, {log['dropped']} rows dropped",
         )

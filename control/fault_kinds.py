@@ -64,6 +64,7 @@ _ROWS: tuple[FaultKind, ...] = (
     FaultKind("bus_passive", "bus", WARN, ALWAYS, WHEN_GONE, 2, "The controller is error-passive.", WIRES),
     FaultKind("bus_off", "bus", DAMPING, ALWAYS, BY_HAND, 2, "The controller has left the bus.", WIRES),
     FaultKind("bus_refuses", "bus", DAMPING, ALWAYS, WHEN_GONE, 5, "Commands were lost in 3 ticks in a row.", WIRES),
+    FaultKind("frames_lost", "bus", WARN, NO, WHEN_GONE, 2, "Frames came faster than they were read.", BUSY),
     # joints and motors
     FaultKind(
         "joint_position", "joint", DAMPING, ALWAYS, BY_HAND, 3,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from math import inf
 from random import Random
@@ -78,12 +78,16 @@ class FailingPort:
         port, failure = self._port, self._failures.of(self._bus)
         self.failed_sends = port.failed_sends + self._refused_sends
         self.error_frames = port.error_frames + self._forged_error_frames
+        self.lost_frames = port.lost_frames
         self.last_error = port.last_error if failure is None else f"failing on purpose, {failure.kind}"
         self.state = port.state if failure is None else max(port.state, STATES.get(failure.kind, BusState.ACTIVE))
 
     @property
     def _untouched(self) -> bool:
         return not (self._failures.failing or self._incoming.waiting or self._outgoing.waiting)
+
+    def listen_to(self, ids: Iterable[int]) -> None:
+        self._port.listen_to(ids)
 
     def receive(self) -> Sequence[Frame]:
         frames = self._port.receive()  # drained whatever fails: what comes meanwhile is lost, not kept

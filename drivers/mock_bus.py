@@ -8,25 +8,25 @@ it is to send (`full`), or inject an error frame, which only it sees, as its own
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 
-from drivers.error_frames import BusState, decode_error_frame, next_state
 from drivers.frames import Frame
+from drivers.port_health import PortHealth
 
 LONGEST_QUEUE = 4096  # a port that nobody reads loses its oldest frames, like a controller's receive buffer
 
 
-class MockPort:
+class MockPort(PortHealth):
     """A CanPort."""
 
     def __init__(self, bus: MockBus) -> None:
+        super().__init__()
         self._bus = bus
         self.queue: deque[Frame] = deque(maxlen=LONGEST_QUEUE)
-        self.failed_sends = 0
-        self.error_frames = 0
-        self.last_error = ""
-        self.last_send_error = ""
-        self.state = BusState.ACTIVE
         self.full = False
+
+    def listen_to(self, ids: Iterable[int]) -> None:
+        """A test hears everything."""
 
     def receive(self) -> list[Frame]:
         frames = list(self.queue)
@@ -44,10 +44,7 @@ class MockPort:
 
     def inject_error(self, class_bits: int, data: bytes = bytes(8)) -> None:
         """One of SocketCAN's error frames."""
-        self.error_frames += 1
-        error = decode_error_frame(class_bits, data)
-        self.last_error = error.text
-        self.state = next_state(self.state, class_bits, error.state)
+        self.heed_error_frame(class_bits, data)
 
     def open_beside(self) -> MockPort:
         """Another node on the same bus."""

@@ -46,13 +46,15 @@ class OdriveDrives:
             OdriveAxis(joint, parameters[joint], outlets[parameters[joint].bus], endpoints) for joint in JOINTS
         )
         self._receivers = [(port, self._receivers_on(name)) for name, port in self.ports.items()]
+        for port, receivers in self._receivers:
+            port.listen_to(receivers)
         self.reset()
 
     def reset(self) -> None:
         for axis in self.axes:
             axis.reset()
         self.gate.close()
-        self.unknown_frames = 0  # of other ids, remote or extended
+        self.unknown_frames = 0  # of other ids, remote or extended, where the port does not keep them away
         self.garbled_frames = 0  # of a drive of ours, with a payload that makes no sense
         self._armed_s = self._disarmed_s = self._version_asked_s = self._watchdog_asked_s = NEVER_S
 

@@ -8,7 +8,7 @@ arrived on it: its controller may still be out of the bus.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 
 from drivers.can_port import PORT_ERRORS, BusState, CanPort
@@ -30,9 +30,10 @@ class ReopeningPort:
         self._port: CanPort | None = None
         self._awaits_frame = False
         self._due_s: float | None = None  # the next try
-        self._failed_before = self._errors_before = 0  # of the ports before
+        self._failed_before = self._errors_before = self._lost_before = 0  # of the ports before
+        self._ids: Iterable[int] | None = None  # all that is listened to
         self.state = BusState.OFF
-        self.failed_sends = self.error_frames = 0
+        self.failed_sends = self.error_frames = self.lost_frames = 0
         self.last_error = self.last_send_error = ""
         try:
             self._port = open_port()
@@ -41,6 +42,11 @@ class ReopeningPort:
                 raise
             self.last_error = str(problem)
         self._look()
+
+    def listen_to(self, ids: Iterable[int]) -> None:
+        self._ids = frozenset(ids)
+        if self._port is not None:
+            self._port.listen_to(self._ids)
 
     def receive(self) -> Sequence[Frame]:
         if self._port is None:
@@ -70,6 +76,7 @@ class ReopeningPort:
         self.state = BusState.OFF if self._awaits_frame and port.state is BusState.ACTIVE else port.state
         self.failed_sends = self._failed_before + port.failed_sends
         self.error_frames = self._errors_before + port.error_frames
+        self.lost_frames = self._lost_before + port.lost_frames
         self.last_error = port.last_error or self.last_error
         self.last_send_error = port.last_send_error or self.last_send_error
 
@@ -91,6 +98,8 @@ class ReopeningPort:
         except NotOpenError as problem:
             self.last_error = str(problem)
             return False
+        if self._ids is not None:
+            self._port.listen_to(self._ids)
         self._awaits_frame = True
         self._look()
         return True
@@ -100,5 +109,6 @@ class ReopeningPort:
         port, self._port = self._port, None
         if port is not None:
             self._failed_before, self._errors_before = self.failed_sends, self.error_frames
+            self._lost_before = self.lost_frames
             with suppress(*PORT_ERRORS):
                 port.close()

@@ -27,7 +27,8 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
         lines[f"drive.{joint}"] = _drive_text(axis, state)
         lines[f"joint.{joint}"] = _joint_text(state)
     for name, port in loop.drives.ports.items():
-        lines[f"bus.{name}"] = f"{port.error_frames} error frames, {port.failed_sends} failed sends"
+        lost = f", {port.lost_frames} frames lost" if port.lost_frames else ""
+        lines[f"bus.{name}"] = f"{port.error_frames} error frames, {port.failed_sends} failed sends{lost}"
     lines["loop"] = f"{loop.timing.rate_hz:.1f} Hz, {loop.missed_ticks} ticks missed since the start"
     lines["log"] = log_text
     faults = loop.faults.standing

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import can
 
-from drivers.can_port import CanPort, PythonCanPort, open_port
+from drivers.can_port import CanPort, open_port
 from drivers.reopening_port import NotOpenError, ReopeningPort
 from firmware_host.configuration import BusParameters
 
@@ -27,7 +27,7 @@ class BusError(NotOpenError):
     """A bus does not open; the text names it and says why."""
 
 
-def open_bus(name: str, bus: BusParameters) -> PythonCanPort:
+def open_bus(name: str, bus: BusParameters) -> CanPort:
     """Raises BusError."""
     try:
         return open_port(bus.interface, bus.channel, bus.options)
@@ -46,7 +46,7 @@ def _error_number(problem: BaseException | None) -> int:
     return 0
 
 
-def open_ports(buses: Mapping[str, BusParameters]) -> dict[str, PythonCanPort]:
+def open_ports(buses: Mapping[str, BusParameters]) -> dict[str, CanPort]:
     """All of them, by name, or BusError and none."""
     return _all_or_none(buses, open_bus)
 

@@ -88,6 +88,7 @@ class FaultWatch:
         self._failed_sends = {name: port.failed_sends for name, port in self._drives.ports.items()}
         self._bus_news = {name: (0, BusState.ACTIVE) for name in self._drives.ports}
         self._error_s = dict.fromkeys(self._drives.ports, NEVER_S)
+        self._lost_frames = {name: port.lost_frames for name, port in self._drives.ports.items()}
         self._refused_ticks = dict.fromkeys(self._drives.ports, 0)
         self._restarts = {axis.joint: axis.restarts for axis in self._drives.axes}
         self._refused_commands = self._drives.gate.refused
@@ -140,6 +141,11 @@ class FaultWatch:
             if port.state is BusState.OFF or (port.state and now_s - self._error_s[name] < BUS_TROUBLE_S):
                 kind, text = BUS_FAULTS[port.state]
                 found.append(make_fault(kind, name, f"The {name} bus {text}: {port.last_error or 'no word why'}."))
+            lost_frames = port.lost_frames - self._lost_frames[name]
+            if lost_frames:
+                self._lost_frames[name] = port.lost_frames
+                text = f"{lost_frames} frames of the {name} bus were lost: they came faster than they were read."
+                found.append(make_fault("frames_lost", name, text))
             lost = port.failed_sends > self._failed_sends[name]
             self._refused_ticks[name] = self._refused_ticks[name] + 1 if lost else 0
             self._failed_sends[name] = port.failed_sends

@@ -139,6 +139,7 @@ class OperatorCalls:
             "last_error": {name: port.last_error for name, port in drives.ports.items() if port.last_error},
             "error_frames": sum(port.error_frames for port in drives.ports.values()),
             "failed_sends": sum(port.failed_sends for port in drives.ports.values()),
+            "lost_frames": sum(port.lost_frames for port in drives.ports.values()),
         }
 
     def strides(self, params: dict[str, Any]) -> list[dict[str, Any]]:

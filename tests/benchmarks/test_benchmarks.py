@@ -51,6 +51,8 @@ def test_tick_time() -> None:
     report = report_of("tick_time", "--seconds", "1")
     assert report["bar_us"] == 200.0
     assert set(report["variants"]) == set(VARIANTS)
+    assert set(report["socketcan"]) == {"python_can_us", "own_us", "ratio", "bar_ratio", "reached"}
+    assert report["socketcan"]["bar_ratio"] == 2.0
     for figures in report["variants"].values():
         assert set(figures["stages_us"]) == set(STAGES)
         assert all(set(stage) == SUMMARY for stage in figures["stages_us"].values())

@@ -1,4 +1,4 @@
-"""The state of a port: over python-can's own socketcan bus on a pair of sockets, and over mock ports.
+"""The state of a port: over python-can's socketcan bus on a pair of sockets, by both paths, and over mock ports.
 
 This machine need not have CAN: the socket that python-can would open is replaced by one end of a datagram pair, and
 the kernel's frames are written into the other end as the 16 bytes of `struct can_frame`.
@@ -18,7 +18,7 @@ from can.interfaces.socketcan import socketcan
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivers.can_port import BusState, PythonCanPort, open_port
+from drivers.can_port import BusState, CanPort, PythonCanPort, open_port
 from drivers.frames import Frame, encode_frame
 from drivers.mock_bus import MockBus
 
@@ -39,9 +39,13 @@ def kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
     near.close()
 
 
-@pytest.fixture
-def port(kernel: socket.socket) -> Iterator[PythonCanPort]:
-    opened = open_port("socketcan", "can0", {})
+@pytest.fixture(params=["its own frames", "python-can's messages"])
+def port(kernel: socket.socket, request: pytest.FixtureRequest) -> Iterator[CanPort]:
+    opened: CanPort
+    if request.param == "its own frames":
+        opened = open_port("socketcan", "can0", {})
+    else:
+        opened = PythonCanPort(can.Bus(interface="socketcan", channel="can0"))
     yield opened
     opened.close()
 
@@ -51,11 +55,11 @@ def tell(kernel: socket.socket, *frames: Frame) -> None:
         kernel.send(encode_frame(frame))
 
 
-def ids(port: PythonCanPort) -> list[int]:
+def ids(port: CanPort) -> list[int]:
     return [frame.arbitration_id for frame in port.receive()]
 
 
-def test_error_frames_make_the_state_and_are_not_passed_on(port: PythonCanPort, kernel: socket.socket) -> None:
+def test_error_frames_make_the_state_and_are_not_passed_on(port: CanPort, kernel: socket.socket) -> None:
     assert port.state is BusState.ACTIVE
     tell(kernel, ENCODER, WARNING, ENCODER)
     assert ids(port) == [0x009, 0x009]
@@ -68,7 +72,7 @@ def test_error_frames_make_the_state_and_are_not_passed_on(port: PythonCanPort, 
     assert (port.state, port.error_frames) == (BusState.ACTIVE, 3)
 
 
-def test_a_peer_s_frame_ends_bus_off_but_no_warning(port: PythonCanPort, kernel: socket.socket) -> None:
+def test_a_peer_s_frame_ends_bus_off_but_no_warning(port: CanPort, kernel: socket.socket) -> None:
     states = []
     for frames in ((WARNING, ENCODER), (ENCODER, OFF), (ENCODER,)):
         tell(kernel, *frames)
@@ -144,7 +148,7 @@ def test_a_frame_without_a_stamp_is_counted_as_garbage() -> None:
 
 
 def test_sending_makes_the_kernel_s_bytes_and_no_entry_in_any_log(
-    port: PythonCanPort, kernel: socket.socket, caplog: pytest.LogCaptureFixture
+    port: CanPort, kernel: socket.socket, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.DEBUG):
         port.send(Frame(0x04E, bytes.fromhex("0000803e")))
@@ -153,7 +157,7 @@ def test_sending_makes_the_kernel_s_bytes_and_no_entry_in_any_log(
     assert [record for record in caplog.records if record.name.startswith("can")] == []
 
 
-def test_sending_into_a_full_queue_does_not_wait(port: PythonCanPort) -> None:
+def test_sending_into_a_full_queue_does_not_wait(port: CanPort) -> None:
     for _ in range(2000):  # nobody reads: the socket takes a few hundred
         port.send(ENCODER)
     assert port.failed_sends > 0
@@ -178,7 +182,7 @@ def test_no_broadcast_manager_is_asked_for(kernel: socket.socket, monkeypatch: p
 @settings(max_examples=500, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.lists(st.binary(min_size=16, max_size=16), max_size=8))
 def test_whatever_sixteen_bytes_the_kernel_gives_nothing_is_raised_and_every_frame_counts(
-    port: PythonCanPort, kernel: socket.socket, data: list[bytes]
+    port: CanPort, kernel: socket.socket, data: list[bytes]
 ) -> None:
     errors_before = port.error_frames
     for frame in data:

@@ -9,7 +9,7 @@ import can
 import pytest
 
 from control.records import NEVER_S
-from drivers.can_port import MOST_FAILURES_PER_READ, MOST_FRAMES_PER_READ, PythonCanPort, open_port
+from drivers.can_port import MOST_FAILURES_PER_READ, MOST_FRAMES_PER_READ, CanPort, PythonCanPort, open_port
 from drivers.frames import Frame
 
 FRAMES = [
@@ -27,7 +27,7 @@ def other() -> Iterator[can.BusABC]:
 
 
 @pytest.fixture
-def port(other: can.BusABC) -> Iterator[PythonCanPort]:
+def port(other: can.BusABC) -> Iterator[CanPort]:
     opened = open_port("virtual", "port-test", {})
     yield opened
     opened.close()
@@ -64,11 +64,11 @@ def as_message(frame: Frame) -> can.Message:
     )
 
 
-def unstamped(port: PythonCanPort) -> list[Frame]:
+def unstamped(port: CanPort) -> list[Frame]:
     return [frame._replace(stamp_s=NEVER_S) for frame in port.receive()]
 
 
-def test_a_frame_says_when_it_was_on_the_bus(port: PythonCanPort, other: can.BusABC) -> None:
+def test_a_frame_says_when_it_was_on_the_bus(port: CanPort, other: can.BusABC) -> None:
     before_s = time.monotonic()
     other.send(as_message(FRAMES[0]))
     after_s = time.monotonic()
@@ -78,13 +78,13 @@ def test_a_frame_says_when_it_was_on_the_bus(port: PythonCanPort, other: can.Bus
 
 
 @pytest.mark.parametrize("frame", FRAMES)
-def test_frames_come_in_unchanged(port: PythonCanPort, other: can.BusABC, frame: Frame) -> None:
+def test_frames_come_in_unchanged(port: CanPort, other: can.BusABC, frame: Frame) -> None:
     other.send(as_message(frame))
     assert unstamped(port) == [frame]
 
 
 @pytest.mark.parametrize("frame", FRAMES)
-def test_frames_go_out_unchanged(port: PythonCanPort, other: can.BusABC, frame: Frame) -> None:
+def test_frames_go_out_unchanged(port: CanPort, other: can.BusABC, frame: Frame) -> None:
     port.send(frame)
     message = other.recv(0.0)
     assert message is not None
@@ -92,14 +92,14 @@ def test_frames_go_out_unchanged(port: PythonCanPort, other: can.BusABC, frame: 
     assert other.recv(0.0) is None
 
 
-def test_error_frames_are_counted_and_not_passed_on(port: PythonCanPort, other: can.BusABC) -> None:
+def test_error_frames_are_counted_and_not_passed_on(port: CanPort, other: can.BusABC) -> None:
     for frame in (Frame(0x040, bytes(8), is_error=True), Frame(0x009, b"\x01")):
         other.send(as_message(frame))
     assert unstamped(port) == [Frame(0x009, b"\x01")]
     assert port.error_frames == 1
 
 
-def test_frames_keep_their_order(port: PythonCanPort, other: can.BusABC) -> None:
+def test_frames_keep_their_order(port: CanPort, other: can.BusABC) -> None:
     sent = [Frame(number, bytes([number])) for number in range(100)]
     for frame in sent:
         other.send(as_message(frame))
@@ -117,7 +117,7 @@ def test_a_babbling_node_does_not_hold_the_loop() -> None:
     assert len(PythonCanPort(FakeBus()).receive()) == MOST_FRAMES_PER_READ
 
 
-def test_what_one_read_leaves_the_next_one_takes(port: PythonCanPort, other: can.BusABC) -> None:
+def test_what_one_read_leaves_the_next_one_takes(port: CanPort, other: can.BusABC) -> None:
     for number in range(MOST_FRAMES_PER_READ + 5):
         other.send(as_message(Frame(number % 1000)))
     assert len(port.receive()) == MOST_FRAMES_PER_READ

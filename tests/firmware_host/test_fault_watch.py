@@ -114,6 +114,14 @@ def test_every_state_of_a_bus_but_active_is_a_fault(bench: Bench) -> None:
         assert bool(bench.tick()) == (state is not BusState.ACTIVE)
 
 
+def test_frames_that_were_lost_on_their_way_in_are_told_once(bench: Bench) -> None:
+    bench.ports["right"].lost_frames += 7
+    (fault,) = bench.tick()
+    assert (fault.name, fault.subject) == ("frames_lost", "right")
+    assert fault.sentence.startswith("7 frames of the right bus were lost")
+    assert bench.tick() == []
+
+
 def test_a_bus_that_loses_commands_in_three_ticks_in_a_row_is_a_fault(bench: Bench) -> None:
     found = []
     for _ in range(5):

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -156,11 +157,14 @@ def test_the_network_files_configure_the_same_buses(configuration: Configuration
 
 class CountingPort:
     state = BusState.ACTIVE
-    failed_sends = error_frames = 0
+    failed_sends = error_frames = lost_frames = 0
     last_error = last_send_error = ""
 
     def __init__(self) -> None:
         self.sent = 0
+
+    def listen_to(self, ids: Iterable[int]) -> None:
+        return
 
     def receive(self) -> list[Frame]:
         return []

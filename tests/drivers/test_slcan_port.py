@@ -1,0 +1,243 @@
+"""A serial CAN adapter: python-can's slcan and pyserial over a pseudo-terminal, an adapter at its other end."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from control.records import NEVER_S
+from drivers.can_port import CanPort, SlcanPort, open_port
+from drivers.error_frames import BusState
+from drivers.frames import Frame
+from drivers.mock_bus import MockBus
+from drivers.prompt_serial import PromptSerial
+from simulation.slcan_adapter import SlcanAdapter, decode_line, encode_line
+
+FRAMES = [
+    Frame(0x009, bytes(range(8))),
+    Frame(0x7FF),
+    Frame(0x060, is_remote=True),
+    Frame(0x18FEF100, b"\xff", is_extended=True),
+    Frame(0x18FEF100, is_remote=True, is_extended=True),
+]
+LINES = [b"t00980001020304050607\r", b"t7FF0\r", b"r0600\r", b"T18FEF1001FF\r", b"R18FEF1000\r"]
+OPENING_LINES = 5  # of python-can: C, S8, an empty one, O, O
+OPTIONS: dict[str, str | int | float | bool] = {"bitrate": 1000000, "sleep_after_open": 0.0}
+
+
+class Bench:
+    """The daemon's port, the adapter, and a node on the bus behind it."""
+
+    def __init__(self) -> None:
+        bus = MockBus()
+        self.node = bus.open()
+        self.adapter = SlcanAdapter(bus.open())
+        self.port: CanPort = open_port("slcan", self.adapter.device, OPTIONS)
+        self.read_bytes = 0
+        wait_until(lambda: stepped(self.adapter).heard_lines == OPENING_LINES)
+        self.settle()
+
+    def tell(self, *frames: Frame) -> None:
+        for frame in frames:
+            self.node.send(frame)
+        self.adapter.step()
+        self.settle()
+
+    def write(self, line: bytes) -> None:
+        self.adapter.write(line)
+        self.settle()
+
+    def send(self, frame: Frame) -> None:
+        """And wait until the adapter has obeyed or refused, and its answer is there."""
+        heard = self.adapter.heard_lines
+        self.port.send(frame)
+        wait_until(lambda: stepped(self.adapter).heard_lines > heard)
+        self.settle()
+
+    def receive(self) -> list[Frame]:
+        frames = [frame._replace(stamp_s=NEVER_S) for frame in self.port.receive()]
+        self.read_bytes = self.adapter.written_bytes
+        return frames
+
+    def settle(self) -> None:
+        """A pseudo-terminal delivers a moment later."""
+        wait_until(lambda: self.adapter.unread_bytes == self.adapter.written_bytes - self.read_bytes)
+
+
+def stepped(adapter: SlcanAdapter) -> SlcanAdapter:
+    adapter.step()
+    return adapter
+
+
+def wait_until(done: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + 5.0
+    while not done():
+        assert time.monotonic() < deadline_s
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    made = Bench()
+    yield made
+    made.port.close()
+    made.adapter.unplug()
+
+
+@pytest.mark.parametrize(("frame", "line"), list(zip(FRAMES, LINES, strict=True)))
+def test_a_frame_is_a_line(frame: Frame, line: bytes) -> None:
+    assert encode_line(frame) == line
+    assert decode_line(line[:-1]) == frame
+
+
+@pytest.mark.parametrize(
+    "line", [b"", b"t", b"t0098", b"t009800", b"t0099000000000000000000", b"t8000", b"T200000000", b"r0601FF", b"q0090"]
+)
+def test_another_line_is_no_frame(line: bytes) -> None:
+    assert decode_line(line) is None
+
+
+def answer(adapter: SlcanAdapter, file: int, command: bytes) -> bytes:
+    written = adapter.written_bytes
+    os.write(file, command + b"\r")
+    wait_until(lambda: stepped(adapter).written_bytes > written)
+    wait_until(lambda: adapter.unread_bytes == adapter.written_bytes - written)
+    return os.read(file, 100)
+
+
+def test_the_adapter_answers_as_the_protocol_says() -> None:
+    adapter = SlcanAdapter(MockBus().open())
+    file = os.open(adapter.device, os.O_RDWR | os.O_NOCTTY)
+    said = [answer(adapter, file, command) for command in b"C O S9 S8 t0090 O O S6 t0090 T000000090 V N F".split()]
+    ok, no = b"\r", b"\a"
+    assert said == [no, no, no, ok, no, ok, no, no, b"z\r", b"Z\r", b"V1013\r", b"NA123\r", b"F00\r"]
+    assert [answer(adapter, file, command) for command in (b"C", b"L", b"t0090", b"nonsense")] == [ok, ok, no, no]
+    os.close(file)
+    adapter.unplug()
+
+
+def test_python_can_opens_the_adapter_at_its_bit_rate(bench: Bench) -> None:
+    assert isinstance(bench.port, SlcanPort)
+    assert (bench.adapter.is_open, bench.adapter.bit_rate) == (True, "S8")
+    bench.port.close()
+    wait_until(lambda: not stepped(bench.adapter).is_open)
+
+
+def test_frames_pass_in_both_directions(bench: Bench) -> None:
+    bench.tell(*FRAMES)
+    assert bench.receive() == FRAMES
+    for frame in FRAMES:
+        bench.send(frame)
+    assert bench.node.receive() == FRAMES
+    assert bench.port.error_frames == 0
+
+
+def test_answers_between_frames_do_not_keep_any_of_them_back(bench: Bench) -> None:
+    for _ in range(20):
+        bench.send(FRAMES[0])
+        bench.tell(FRAMES[1])
+    assert bench.receive() == [FRAMES[1]] * 20
+
+
+def test_a_line_that_arrives_in_pieces_is_one_frame(bench: Bench) -> None:
+    bench.write(LINES[0][:7])
+    assert bench.receive() == []
+    bench.write(LINES[0][7:])
+    assert bench.receive() == [FRAMES[0]]
+
+
+def test_an_empty_read_does_not_wait(bench: Bench) -> None:
+    bench.receive()
+    durations_s = []
+    for _ in range(50):
+        start_s = time.perf_counter()
+        bench.port.receive()
+        durations_s.append(time.perf_counter() - start_s)
+    assert min(durations_s) < 0.0005  # pyserial alone waits for 1 ms whatever the machine
+
+
+def test_a_frame_that_the_adapter_refuses_is_a_failed_send(bench: Bench) -> None:
+    bench.receive()
+    assert bench.port.failed_sends == 0  # though python-can closes the channel first, which is not open
+    bench.adapter.is_open = False
+    bench.send(FRAMES[0])
+    assert bench.receive() == []
+    assert bench.port.failed_sends == 1
+    assert bench.port.last_send_error == "the adapter refused a frame"
+
+
+def test_garbled_lines_are_counted_and_hide_nothing(bench: Bench) -> None:
+    bench.write(b"tG0980001020304050607\rt00\rt0093GG\r\xff\xfe\r" + LINES[1])
+    assert bench.receive() == [FRAMES[1]]
+    assert bench.port.error_frames == 3  # python-can takes the one without a letter for an answer
+    assert bench.port.state is BusState.ACTIVE
+
+
+@settings(max_examples=60)
+@given(noise=st.binary(max_size=200))
+def test_no_noise_on_the_line_raises(noise: bytes) -> None:
+    bench = Bench()
+    bench.write(noise + b"\r")
+    for _ in range(4):  # each ends after MOST_FAILURES_PER_READ
+        bench.receive()
+    bench.tell(FRAMES[0])
+    assert bench.receive() == [FRAMES[0]]
+    bench.port.close()
+    bench.adapter.unplug()
+
+
+def test_an_adapter_that_takes_no_more_does_not_hold_the_sender_and_gets_whole_lines(bench: Bench) -> None:
+    sent = [Frame(number % 0x700, number.to_bytes(8, "big")) for number in range(3000)]
+    for frame in sent:
+        bench.port.send(frame)
+    assert bench.port.failed_sends > 0
+    assert bench.port.last_send_error == "Transmit buffer full"
+    kept: list[Frame] = []
+
+    def last_arrived() -> bool:
+        bench.port.send(FRAMES[1])  # takes the rest of a line along
+        bench.adapter.step()
+        bench.port.receive()
+        kept.extend(bench.node.receive())
+        return FRAMES[1] in kept
+
+    wait_until(last_arrived)
+    whole = kept[: kept.index(FRAMES[1])]
+    assert len(whole) > 10
+    assert whole == sent[: len(whole)]
+
+
+def test_an_unplugged_adapter_is_told_and_raises_nothing(bench: Bench) -> None:
+    other = Bench()
+    other.adapter.unplug()
+    other.port.receive()
+    assert other.port.state is BusState.OFF
+    assert other.port.error_frames == 1
+    other.port.send(FRAMES[0])
+    assert other.port.failed_sends == 1
+    assert "Input/output error" in other.port.last_error and "Input/output error" in other.port.last_send_error
+    other.port.close()
+
+
+def test_what_was_read_is_given_out_byte_by_byte(bench: Bench) -> None:
+    master, slave = os.openpty()
+
+    class Port:
+        in_waiting = 3
+
+        def fileno(self) -> int:
+            return slave
+
+        def close(self) -> None:
+            os.close(slave)
+
+    serial = PromptSerial(Port())
+    os.write(master, b"abc\n")
+    wait_until(lambda: serial.in_waiting == 3)
+    assert [serial.read(1) for _ in range(4)] == [b"a", b"b", b"c", b""]
+    serial.close()
+    os.close(master)

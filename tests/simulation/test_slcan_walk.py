@@ -1,0 +1,134 @@
+"""The simulated robot walks on two serial adapters: through LAWICEL's lines, two pseudo-terminals, pyserial and
+python-can, with the daemon's own loop at the other end, in step.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from control.controller import WalkOrder
+from control.modes import Mode
+from drivers.can_port import CanPort, open_port
+from drivers.frames import Frame
+from drivers.mock_bus import MockPort
+from drivers.odrive_drives import OdriveDrives
+from firmware_host.configuration import Configuration
+from firmware_host.loop import Loop
+from firmware_host.recorder import NullRecorder
+from firmware_host.ticker import Beat
+from simulation.clay import MUDS
+from simulation.lockstep import Lockstep
+from simulation.slcan_adapter import SlcanAdapter
+from simulation.track import Track
+
+OPENING_LINES = 5  # of python-can: C, S8, an empty one, O, O
+
+
+class Line:
+    """One bus over a serial line, and how far both ends are: a pseudo-terminal delivers a moment later."""
+
+    def __init__(self, end: CanPort) -> None:
+        assert isinstance(end, MockPort)
+        self.adapter = SlcanAdapter(end)
+        self.port = open_port("slcan", self.adapter.device, {"bitrate": 1000000, "sleep_after_open": 0.0})
+        self.plugged = True
+        self._lines, self._read_bytes = OPENING_LINES, 0
+        self._send = self.port.send
+        vars(self.port)["send"] = self._counted_send
+
+    def _counted_send(self, frame: Frame) -> None:
+        failed = self.port.failed_sends
+        self._send(frame)
+        self._lines += self.port.failed_sends == failed
+
+    def obey(self) -> None:
+        """What the loop has sent."""
+        while self.plugged:
+            self.adapter.step()
+            if self.adapter.heard_lines >= self._lines:
+                break
+            time.sleep(0.0)
+
+    def deliver(self) -> None:
+        """What the robot has sent since."""
+        if self.plugged:
+            self.adapter.step()
+            wait_until(lambda: self.adapter.unread_bytes == self.adapter.written_bytes - self._read_bytes)
+            self._read_bytes = self.adapter.written_bytes
+
+    def unplug(self) -> None:
+        self.adapter.unplug()
+        self.plugged = False
+
+
+def wait_until(done: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + 5.0
+    while not done():
+        assert time.monotonic() < deadline_s
+
+
+class SerialWalk(Lockstep):
+    """In place of the mock bus's own port, the loop has one over the line."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        super().__init__(configuration, Track([(1.0, MUDS["48.5"])]))
+        self.lines = {name: Line(port) for name, port in self.loop.drives.ports.items()}
+        ports = {name: line.port for name, line in self.lines.items()}
+        drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
+        self.loop = Loop(configuration, drives, self.loop.pose, NullRecorder(), self._now_s)
+
+    def step(self) -> None:
+        self.tick_number += 1
+        for line in self.lines.values():
+            line.obey()
+        self.robot.advance(self.now_s)
+        for line in self.lines.values():
+            line.deliver()
+        self.loop.tick(Beat(self.now_s, 0.0, self.tick_number, 0))
+
+    def close(self) -> None:
+        self.loop.drives.close()
+        for line in self.lines.values():
+            if line.plugged:
+                line.unplug()
+
+
+@pytest.fixture
+def walk(configuration: Configuration) -> Iterator[SerialWalk]:
+    walk = SerialWalk(configuration)
+    walk.arm()
+    walk.walk(WalkOrder(0.03))
+    yield walk
+    walk.close()
+
+
+def mode_of(walk: SerialWalk) -> Mode:
+    return walk.loop.mode
+
+
+def test_the_robot_walks_on_serial_adapters(walk: SerialWalk) -> None:
+    walk.run_for(3.0)
+    assert mode_of(walk) is Mode.WALKING
+    assert len(walk.loop.learning.strides) >= 2
+    assert walk.robot.plant.body_m > 0.01
+    assert not walk.loop.faults.standing
+    for name, port in walk.loop.drives.ports.items():
+        assert port.error_frames == 0, name
+        assert port.failed_sends == 0, name
+        assert walk.lines[name].adapter.lost_lines == 0
+
+
+def test_an_adapter_that_is_unplugged_ends_the_walk_in_a_fault_and_in_no_traceback(walk: SerialWalk) -> None:
+    walk.run_for(0.5)
+    walk.lines["left"].unplug()
+    walk.run_for(2 / 380)
+    told = {fault.name for fault in walk.loop.faults.standing}
+    assert "bus_off" in told
+    assert mode_of(walk) is Mode.DAMPING
+    walk.run_for(4.0)
+    assert mode_of(walk) is Mode.FAULT
+    assert walk.loop.drives.ports["left"].failed_sends > 0
+    walk.loop.drives.close()
