@@ -65,7 +65,7 @@ class LoopParameters:
 @dataclass(frozen=True)
 class StatusParameters:
     socket: str = "/run/mudskipper/mudskipper.sock"
-    anyone_may_stop: bool = True  # whoever has an account here; else nobody outside the socket's group may connect
+    anyone_may_stop: bool = True  # whoever has an account here; else nobody outside these two groups
     read_group: str = ""  # who may see how the robot is; empty: the daemon's own group
     drive_group: str = ""  # who may operate it, and see; empty: the daemon's own group
 

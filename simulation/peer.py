@@ -1,7 +1,8 @@
 """The simulated robot as a process of its own, in real time, on the buses that a configuration names.
 
 It reads of the configuration what a real robot's wiring would fix: buses, node ids, signs, geometry. The body's place
-goes to the pose socket at motion-capture rate.
+goes to the pose socket at motion-capture rate. SIGUSR1 stands for the person who moves the flippers back by hand, where
+they came to lie at their mechanical stops, beyond the limits: no torque leads back from there.
 """
 
 from __future__ import annotations
@@ -60,16 +61,25 @@ class Peer:
         )
         self._pose = PoseBroadcast(configuration.pose.socket, seed + 1)
         self.ended = False
+        self._hand_wanted = False
 
     def end(self, number: int, frame: object) -> None:
         """A signal handler."""
         self.ended = True
+
+    def lend_hand(self, number: int, frame: object) -> None:
+        """A signal handler."""
+        self._hand_wanted = True
 
     def run(self) -> None:
         while not self.ended:
             now_s = self.ticker.wait().now_s
             if now_s - self.robot.now_s > LONGEST_CATCH_UP_S:
                 self.robot.now_s = now_s
+            if self._hand_wanted:
+                self._hand_wanted = False
+                for arm in self.robot.plant.arms:
+                    arm.put_back()
             self.robot.advance(now_s)
             self._pose.step(now_s, self.robot.plant)
         for port in self._ports.values():
@@ -106,6 +116,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
+    signal.signal(signal.SIGUSR1, peer.lend_hand)
     os.nice(5)  # the controller comes first
     peer.run()
     return 0

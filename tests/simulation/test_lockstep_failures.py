@@ -9,23 +9,13 @@ from control.modes import ENERGISED, Mode
 from control.records import NO_TORQUE
 from drivers.failures import Failures
 from firmware_host.configuration import Configuration
-from firmware_host.log_rows import EVENT
-from firmware_host.recorder import EVENT_KIND, NullRecorder
+from firmware_host.recorder import NullRecorder
 from simulation.clay import MUDS
 from simulation.lockstep import Lockstep
 from simulation.track import Track
+from tests.kept_events import EventRecorder
 
 TRACK = Track([(2.0, MUDS["48.5"])])
-
-
-class EventRecorder(NullRecorder):
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-
-    def put(self, kind_index: int, payload: bytes) -> bool:
-        if kind_index == EVENT_KIND:
-            self.texts.append(EVENT.decode(payload)["text"])
-        return True
 
 
 def make_walking(configuration: Configuration, recorder: NullRecorder | None = None) -> Lockstep:
