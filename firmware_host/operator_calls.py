@@ -1,7 +1,7 @@
 """What a person can ask of the running daemon: the methods of the status socket.
 
-Who asks for something to be done is named in the log, where it changes anything. A lease is given while torque is on: before, there is nothing
-that its loss could stop.
+Who asks for something to be done is named in the log, where it changes anything. A lease is given while torque is on:
+before, there is nothing that its loss could stop.
 """
 
 from __future__ import annotations

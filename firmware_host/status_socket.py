@@ -3,8 +3,8 @@
 The loop calls `serve` once a tick: it never waits, answers at most one request, clients in turn, and gives every client
 bounded buffers, a bounded rate and a bounded time to send a request. Whoever asks faster waits: the kernel keeps the
 rest. Whoever sends something else is told so and disconnected. When there is no room, the user with the most
-connections makes some, so nobody can keep another one out; but never the one who has promised to attend. A method that fails answers so and is reported: no report
-stops a robot.
+connections makes some, so nobody can keep another one out; but never the one who has promised to attend. A method that
+fails answers so and is reported: no report stops a robot.
 """
 
 from __future__ import annotations
