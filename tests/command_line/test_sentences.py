@@ -11,7 +11,7 @@ import pytest
 from command_line import exit_codes, operation
 from command_line.screen import number
 from control.records import JOINTS
-from firmware_host.status_client import DroppedError, NoDaemonError
+from firmware_host.status_client import DroppedError
 
 NO_SOCKET = Namespace(socket=Path("/none"), json=False, config=Path("/none.toml"))
 
@@ -50,12 +50,10 @@ def test_a_daemon_that_is_not_there_is_to_be_started(capsys: pytest.CaptureFixtu
 def test_a_check_without_a_daemon_looks_for_itself(capsys: pytest.CaptureFixture[str]) -> None:
     assert operation.check(NO_SOCKET) == exit_codes.UNHEALTHY
     assert "FAIL daemon" in capsys.readouterr().out
-    with pytest.raises(NoDaemonError):
-        operation.StatusClient(NO_SOCKET.socket)
 
 
 def test_a_status_before_all_drives_are_heard_names_those_that_are_not() -> None:
-    heard = {"angle_age_s": 0.0, "current_age_s": 0.0, "heartbeat_age_s": 0.1}
+    heard: dict[str, Any] = {"angle_age_s": 0.0, "current_age_s": 0.0, "heartbeat_age_s": 0.1}
     drives = [heard | {"joint": joint} for joint in JOINTS]
     drives[1] = drives[1] | {"heartbeat_age_s": None}
     drives[3] = drives[3] | {"angle_age_s": None}
