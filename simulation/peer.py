@@ -61,25 +61,16 @@ class Peer:
         )
         self._pose = PoseBroadcast(configuration.pose.socket, seed + 1)
         self.ended = False
-        self._hand_wanted = False
 
     def end(self, number: int, frame: object) -> None:
         """A signal handler."""
         self.ended = True
-
-    def lend_hand(self, number: int, frame: object) -> None:
-        """A signal handler."""
-        self._hand_wanted = True
 
     def run(self) -> None:
         while not self.ended:
             now_s = self.ticker.wait().now_s
             if now_s - self.robot.now_s > LONGEST_CATCH_UP_S:
                 self.robot.now_s = now_s
-            if self._hand_wanted:
-                self._hand_wanted = False
-                for arm in self.robot.plant.arms:
-                    arm.put_back()
             self.robot.advance(now_s)
             self._pose.step(now_s, self.robot.plant)
         for port in self._ports.values():
@@ -116,7 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
-    signal.signal(signal.SIGUSR1, peer.lend_hand)
+    signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.lend_hand())
     os.nice(5)  # the controller comes first
     peer.run()
     return 0
