@@ -105,9 +105,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BusError as problem:
         print(problem, file=sys.stderr)
         return 1
+    signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.lend_hand())
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
-    signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.lend_hand())
     os.nice(5)  # the controller comes first
     peer.run()
     return 0
