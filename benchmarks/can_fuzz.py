@@ -284,7 +284,7 @@ def main() -> int:
     said = verdict(f"no exception, no torque, no closed loop, memory within {BAR_KIB:g} KiB", clean and flat)
     report = {"benchmark": "can_fuzz", "parts": parts, "reached": clean and flat, "verdict": said}
     print_report(report, f"{text_of(parts)}\n\n{said}", options.json)
-    return 0
+    return 0 if clean and flat else 1
 
 
 if __name__ == "__main__":

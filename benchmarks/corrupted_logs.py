@@ -223,7 +223,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     reached = not report["wrong"] and report["slowest_s"] < BAR_S and report["peak_in_log_sizes"] < BAR_MEMORY
     report |= {"reached": reached, "verdict": verdict("no crash, no hang, bounded memory, no row lost", reached)}
     print_report(report, text_of(report), options.json)
-    return 0
+    return 0 if reached else 1
 
 
 if __name__ == "__main__":

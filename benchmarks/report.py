@@ -1,6 +1,7 @@
 """What every benchmark prints: one JSON object for a program, or a table and a verdict for a person.
 
-A benchmark does not judge: it ends with status 0 whatever it measured, and its verdict says which bar was reached.
+A benchmark of figures does not judge: it ends with status 0 whatever it measured, and its verdict says which bar was
+reached. One that looks for defects ends with status 1 where its own is missed.
 While it runs, one line on a terminal says how far it is.
 """
 

@@ -264,7 +264,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     stands = reached(measured)
     report = {"benchmark": "socket_fuzz"} | measured | {"reached": stands, "verdict": verdict(bar, stands)}
     print_report(report, text_of(report), options.json)
-    return 0
+    return 0 if stands else 1
 
 
 if __name__ == "__main__":

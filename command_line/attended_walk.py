@@ -16,7 +16,7 @@ from firmware_host.status_client import CallRefusedError, StatusClient
 
 PROMISE_S = 1.0
 RENEWAL_S = 0.2
-UNDER_WAY = ("walking", "stopping")
+UNDER_WAY = ("walking", "stopping", "damping")
 
 
 def attend(client: StatusClient, params: dict[str, Any]) -> int:
@@ -55,13 +55,13 @@ def _stay(client: StatusClient) -> dict[str, Any]:
 
 
 def _conclude(report: dict[str, Any], status: int) -> int:
+    """It has ended well where the robot holds its pose, and nothing is to be told."""
     print(report["mode"])
-    if report["mode"] == "fault":
-        complain(report["fault"]["sentence"])
-        return exit_codes.REFUSED
-    if report["notice"]:
-        complain(report["notice"])
-    return status
+    if report["mode"] == "hold" and not report["notice"]:
+        return status
+    fault = report["fault"]["sentence"] if report["fault"] else "the torque was switched off"
+    complain(report["notice"] or fault)
+    return exit_codes.REFUSED
 
 
 class LiveLine:

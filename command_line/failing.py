@@ -13,6 +13,9 @@ from firmware_host.status_client import StatusClient
 
 
 def fail(options: argparse.Namespace) -> int:
+    if options.list and options.component is not None:
+        complain("fail --list takes neither COMPONENT nor KIND")
+        return exit_codes.USAGE
     if options.list:
         return with_daemon(options, lambda client: _show(client, options.json))
     if options.component is None or options.kind is None:
@@ -33,12 +36,25 @@ def _show(client: StatusClient, as_json: bool) -> int:
     if as_json:
         print(json.dumps(report))
     elif report["allowed"]:
-        rows = [(each["component"], each["kind"], each["does"]) for each in report["table"]]
-        print(table([("component", "kind", "what it does"), *rows]))
-        print(f"\n{failing_table(report['failing'])}")
+        print(f"{families_table(report['table'])}\n\n{failing_table(report['failing'])}")
     else:
         print("nothing may fail on purpose: failures.allowed is false in the configuration")
     return exit_codes.OK
+
+
+def families_table(rows: list[dict[str, Any]]) -> str:
+    """A row for all that can fail alike, such as the joints; --json has each, with what it does."""
+    kinds: dict[str, dict[str, None]] = {}
+    members: dict[str, dict[str, None]] = {}
+    for row in rows:
+        kinds.setdefault(row["family"], {})[row["kind"]] = None
+        for place in ("JOINT", "NAME"):
+            head, found, tail = row["family"].partition(place)
+            if found:
+                name = row["component"].removeprefix(head).removesuffix(tail)
+                members.setdefault(place, {})[name] = None
+    text = table([("component", "kinds"), *((family, ", ".join(each)) for family, each in kinds.items())])
+    return "\n".join([text, "", *(f"{place}: {', '.join(names)}" for place, names in members.items())])
 
 
 def failing_table(failing: list[dict[str, Any]]) -> str:

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from io import TextIOWrapper
+from math import isfinite
 from pathlib import Path
 
 from command_line import exit_codes
@@ -97,9 +98,18 @@ def _add_fail(commands: Commands) -> argparse.ArgumentParser:  # type: ignore[va
     fail = _add(commands, "fail", "failing.fail", "Make a part of the robot fail on purpose, where that is allowed.")
     fail.add_argument("component", nargs="?", help="what fails, such as left_sweep, bus.left, pose; or all")
     fail.add_argument("kind", nargs="?", help="off, stuck, garbage, slow, intermittent ..., or ok to end it")
-    fail.add_argument("--for", type=float, default=2.0, metavar="S", dest="seconds", help="then it ends by itself")
-    fail.add_argument("--list", action="store_true", help="what can fail, how, and what fails already")
+    fail.add_argument("--for", type=_finite, default=2.0, metavar="S", dest="seconds", help="then it ends by itself")
+    fail.add_argument(
+        "--list", action="store_true", help="what can fail, how, and what fails already; with --json also what it does"
+    )
     return fail
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text}: must be a number")
+    return value
 
 
 def _seconds(text: str) -> float:

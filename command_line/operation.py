@@ -12,7 +12,14 @@ from typing import Any
 from command_line import exit_codes
 from command_line.attended_walk import attend
 from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain, number, table
-from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
+from firmware_host.rpc import FOR_MEMBERS
+from firmware_host.status_client import (
+    CallRefusedError,
+    DroppedError,
+    NoDaemonError,
+    NotPermittedError,
+    StatusClient,
+)
 
 Options = argparse.Namespace
 ARMING_S = 5.0
@@ -28,6 +35,9 @@ def with_daemon(options: Options, act: Callable[[StatusClient], int]) -> int:
             return act(client)
         finally:
             client.close()
+    except DroppedError as problem:
+        complain(str(problem))
+        return exit_codes.NO_DAEMON
     except NoDaemonError as problem:
         complain(f"{problem}. Start it with 'systemctl start mudskipper', or name its socket with --socket.")
         return exit_codes.NO_DAEMON
@@ -107,8 +117,8 @@ def _request(client: StatusClient, method: str, modes: tuple[str, ...], longest_
     try:
         return _await(client, modes, longest_s)
     except NotPermittedError as problem:
-        print(accepted)
-        complain(str(problem))
+        group = str(problem).partition(FOR_MEMBERS)[2].partition(". ")[0]
+        print(f"{accepted}; whether the robot has stopped is shown to members of {group}")
         return exit_codes.OK
 
 
@@ -130,20 +140,19 @@ def _await(client: StatusClient, modes: tuple[str, ...], longest_s: float) -> in
 
 
 def check(options: Options) -> int:
-    """Ask the daemon; where none answers, try what it would need."""
+    """Ask the daemon; where none runs, try what it would need."""
     try:
-        client = StatusClient(options.socket)
-        try:
-            items = client.call("check")
-        finally:
-            client.close()
-    except (NoDaemonError, NotPermittedError) as problem:
+        StatusClient(options.socket).close()
+    except NoDaemonError as problem:
         from command_line.desk_check import desk_check  # brings python-can and pydantic, which `status` must not load
 
-        items = desk_check(options.config, str(problem))
-    except CallRefusedError as problem:
-        complain(str(problem))
-        return exit_codes.REFUSED
+        return _show_items(options, desk_check(options.config, str(problem)))
+    except NotPermittedError:
+        pass  # as with_daemon tells it
+    return with_daemon(options, lambda client: _show_items(options, client.call("check")))
+
+
+def _show_items(options: Options, items: list[dict[str, Any]]) -> int:
     if options.json:
         print(json.dumps(items))
     else:
@@ -163,6 +172,8 @@ def status_text(report: dict[str, Any]) -> str:
     mode = coloured(report["mode"], MODE_COLOURS.get(report["mode"], BOLD))
     lines = [f"{report['robot']}: {mode}, stride {report['stride']}, {report['phase']}"]
     lines[0] += f", depth {100 * report['depth_m']:.1f} cm, body {number(report['body_x_m'])} m"
+    if report["mode"] == "boot":
+        lines.append(_boot_line(report["drives"]))
     lines += [_fault_line(fault) for fault in report["faults"]]
     notices = [report["notice"]] if report["notice"] else []
     if report["forced"]:
@@ -170,6 +181,12 @@ def status_text(report: dict[str, Any]) -> str:
     lines += [coloured(f"warning: {warning}", YELLOW) for warning in notices + report["warnings"]]
     lines += ["", _drives_table(report["drives"]), "", _loop_text(report)]
     return "\n".join(lines)
+
+
+def _boot_line(drives: list[dict[str, Any]]) -> str:
+    signals = ("angle_age_s", "current_age_s", "heartbeat_age_s")
+    unheard = [drive["joint"] for drive in drives if any(drive[signal] is None for signal in signals)]
+    return coloured(f"not heard yet: {', '.join(unheard) or 'none'}; 'mudskipper check' says what to do", YELLOW)
 
 
 def _fault_line(fault: dict[str, Any]) -> str:

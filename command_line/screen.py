@@ -27,7 +27,7 @@ def table(rows: Sequence[Sequence[str]]) -> str:
 
 def number(value: float | None, digits: int = 3) -> str:
     """A dash where nothing is known."""
-    return "-" if value is None or not isfinite(value) else f"{value:.{digits}f}"
+    return "-" if value is None or not isfinite(value) else f"{value:z.{digits}f}"
 
 
 class Progress:

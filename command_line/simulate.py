@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
@@ -45,5 +46,6 @@ def _local_configuration(bus: str) -> Path:
     path = write_local_setup(folder, Path("logs"))
     programs = Path(sys.executable).parent
     print(f"Simulating, until Ctrl-C. In other terminals:\n  {programs}/mudskipperd --config {path}")
-    print(f"  export MUDSKIPPER_SOCKET={folder}/mudskipper.sock; {programs}/mudskipper status", flush=True)
+    print(f"  export MUDSKIPPER_SOCKET={folder}/mudskipper.sock; {programs}/mudskipper status")
+    print(f"Where the joints lie beyond their limits, 'kill -USR1 {os.getpid()}' moves them back by hand.", flush=True)
     return path

@@ -20,6 +20,7 @@ REPORT = "this is a bug: keep the log, report it, and restart the daemon"
 WIRES = "check wiring, termination and bit rate; 'ip -s -d link show' tells more"
 BUSY = "end what else runs on this computer; see 'mudskipper check' for real-time warnings"
 FREE = "free space on the log's disk, or lower log.quota_bytes"
+WRITE = "mend what the sentence names: the log's folder, its permissions, or the disk under it"
 
 _ROWS: tuple[FaultKind, ...] = (
     # signals of a drive
@@ -145,7 +146,7 @@ _ROWS: tuple[FaultKind, ...] = (
     ),
     # the log
     FaultKind("disk_low", "log", WARN, UNLESS_FORCED, WHEN_GONE, 400, "The log's disk is nearly full.", FREE),
-    FaultKind("log_unwritable", "log", WARN, UNLESS_FORCED, WHEN_GONE, 400, "The log cannot be written.", FREE),
+    FaultKind("log_unwritable", "log", WARN, UNLESS_FORCED, WHEN_GONE, 400, "The log cannot be written.", WRITE),
     FaultKind("disk_slow", "log", WARN, NO, WHEN_GONE, 400, "The log's disk is slow.", "use another card or disk"),
     FaultKind(
         "recorder_dead", "log", WARN, UNLESS_FORCED, WHEN_GONE, 2,

@@ -160,6 +160,8 @@ WHAT_TO_DO: dict[Mode, str] = {
 
 def refusal(mode: Mode, request: Request, health: Health) -> str | None:
     """Why a request would change nothing now, as a sentence; None where it is accepted."""
+    if request is Request.CLEAR and mode is Mode.HOLD:
+        return "nothing to clear: the robot holds its pose"
     if mode not in ACCEPTED_IN.get(request, Mode):
         return WHAT_TO_DO[mode]
     if request is Request.ARM and not _well(health):

@@ -84,8 +84,8 @@ class PythonCanPort(PortHealth):
                 self.heed_error_frame(message.arbitration_id, bytes(message.data))
             else:
                 frames.append(_as_frame(message, clock_s))
-                if self.state is BusState.OFF and message.is_rx:  # not what a process beside us has sent
-                    self.state = BusState.ACTIVE
+                if self.state is BusState.OFF:
+                    self.heed_frame(message.is_rx)
         return frames
 
     def _drained(self) -> bool:

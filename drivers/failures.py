@@ -51,7 +51,7 @@ def _signal(name: str) -> Effects:
         Kind.STUCK: f"its {name} stands still while messages keep coming",
         Kind.GARBAGE: f"its {name} is random, no number, huge, or of a wrong length",
         Kind.SLOW: f"its {name} comes 5 to 20 ms late",
-        Kind.INTERMITTENT: f"every other message of its {name} is lost, at random",
+        Kind.INTERMITTENT: f"half of the messages of its {name} are lost, at random",
     }
 
 
@@ -61,7 +61,7 @@ EFFECTS: Mapping[str, Effects] = {  # JOINT and NAME stand for each joint and ea
         Kind.STUCK: "all that it tells stands still; commands reach it",
         Kind.GARBAGE: "all that it tells is random, no number, huge, or of a wrong length; commands reach it",
         Kind.SLOW: "all messages from and to it are 5 to 20 ms late",
-        Kind.INTERMITTENT: "every other message from and to it is lost, at random",
+        Kind.INTERMITTENT: "half of the messages from and to it are lost, at random",
     },
     "JOINT.position": _signal("position"),
     "JOINT.current": _signal("current"),
@@ -77,14 +77,14 @@ EFFECTS: Mapping[str, Effects] = {  # JOINT and NAME stand for each joint and ea
     "JOINT.command": {
         Kind.OFF: "nothing that is sent reaches it",
         Kind.SLOW: "what is sent reaches it 5 to 20 ms late",
-        Kind.INTERMITTENT: "every other frame that is sent to it is lost, at random",
+        Kind.INTERMITTENT: "half of the frames that are sent to it are lost, at random",
     },
     "bus.NAME": {
         Kind.OFF: "the interface is gone: nothing comes, sending fails",
         Kind.STUCK: "the transmit queue is full: sending fails",
         Kind.GARBAGE: "half of what comes is garbled, with random frames between",
         Kind.SLOW: "all frames are 5 to 20 ms late",
-        Kind.INTERMITTENT: "every other frame is lost, at random",
+        Kind.INTERMITTENT: "half of the frames are lost, at random",
         Kind.WARNING: "error frames come, and the controller warns",
         Kind.PASSIVE: "error frames come, and the controller is error-passive",
         Kind.BUS_OFF: "the controller took itself off the bus: error frames, nothing else comes, sending fails",
@@ -99,7 +99,7 @@ EFFECTS: Mapping[str, Effects] = {  # JOINT and NAME stand for each joint and ea
     "log": {
         Kind.OFF: "the log's writer looks dead and takes no row",
         Kind.STUCK: "the log takes no row",
-        Kind.INTERMITTENT: "every other row is refused, at random",
+        Kind.INTERMITTENT: "half of the rows are refused, at random",
     },
     "loop": {
         Kind.STUCK: "the loop stands still for 30 ms, once",

@@ -1,7 +1,8 @@
 """What every kind of CAN port knows of its own health: the bus's state, and what went wrong.
 
-A bus that was off, or an interface that was gone, is active again once a frame of a peer arrives: a controller that is
-off receives none. Whoever receives frames has to look at that; the rest is here.
+A bus that was off is active again once a frame of a peer arrives: a controller that is off receives none. An interface
+that was gone is back with any frame, also one of a process beside us, which is all that a virtual one carries. Whoever
+receives frames has to call `heed_frame`; the rest is here.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ class PortHealth:
 
     def __init__(self) -> None:
         self.state = BusState.ACTIVE
+        self._gone = False  # why it is off
         self.failed_sends = 0
         self.error_frames = 0
         self.lost_frames = 0
@@ -31,6 +33,11 @@ class PortHealth:
         error = decode_error_frame(class_bits, data)
         self.last_error = error.text
         self.state = next_state(self.state, class_bits, error.state)
+
+    def heed_frame(self, from_peer: bool) -> None:
+        """Of a port that is off."""
+        if from_peer or self._gone:
+            self.state, self._gone = BusState.ACTIVE, False
 
     def heed_failed_read(self, problem: Exception) -> bool:
         """Whether the interface is gone."""
@@ -46,7 +53,7 @@ class PortHealth:
     def _heed_gone(self, problem: Exception) -> bool:
         gone = _error_number(problem) in GONE
         if gone:
-            self.state = BusState.OFF
+            self.state, self._gone = BusState.OFF, True
         return gone
 
 

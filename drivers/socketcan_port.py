@@ -74,8 +74,8 @@ class SocketcanPort(PortHealth):
             frame = self._heed_frame(encoded, ancillary, clock_s)
             if frame is not None:
                 frames.append(frame)
-                if self.state is BusState.OFF and not marks & socket.MSG_DONTROUTE:
-                    self.state = BusState.ACTIVE
+                if self.state is BusState.OFF:
+                    self.heed_frame(not marks & socket.MSG_DONTROUTE)  # which marks what a process beside us has sent
         return frames
 
     def _heed_frame(self, encoded: bytes, ancillary: list[tuple[int, int, bytes]], clock_s: float) -> Frame | None:

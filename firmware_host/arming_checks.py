@@ -11,7 +11,7 @@ from math import degrees, isfinite
 from typing import Any
 
 from control.faults import Blocks, Fault
-from control.records import JOINTS, DriveState
+from control.records import DriveState
 from drivers.odrive_axis import OdriveAxis
 from firmware_host.loop import Loop
 from firmware_host.reports import check_item
@@ -23,9 +23,8 @@ SIGNALS = ("position", "current", "heartbeat")
 def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[dict[str, Any]]:
     """All lines, the good ones too."""
     lines = {"configuration": f"accepted for {loop.configuration.robot.name}"}
-    for joint, axis, state in zip(JOINTS, loop.drives.axes, loop.states, strict=True):
-        lines[f"drive.{joint}"] = _drive_text(axis, state)
-        lines[f"joint.{joint}"] = _joint_text(state)
+    for axis, state in zip(loop.drives.axes, loop.states, strict=True):
+        lines |= _axis_lines(axis, state)
     for name, port in loop.drives.ports.items():
         lost = f", {port.lost_frames} frames lost" if port.lost_frames else ""
         lines[f"bus.{name}"] = f"{port.error_frames} error frames, {port.failed_sends} failed sends{lost}"
@@ -34,12 +33,18 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
     faults = loop.faults.standing
     for fault in faults:
         lines.setdefault(fault.check, "")
-    items = [_line(identity, text, [f for f in faults if f.check == identity]) for identity, text in lines.items()]
-    items += [_unheard(axis) for axis in loop.drives.axes if not axis.heard]
+    unheard = {f"drive.{axis.joint}" for axis in loop.drives.axes if not axis.heard}
+    items = [
+        _line(identity, text, [fault for fault in faults if fault.check == identity], identity in unheard)
+        for identity, text in lines.items()
+    ]
     return items + [check_item("realtime", True, f"warning: {warning}", "") for warning in warnings]
 
 
-def _line(identity: str, text: str, faults: Sequence[Fault]) -> dict[str, Any]:
+def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> dict[str, Any]:
+    if unheard:
+        told_as_well = (fault.sentence for fault in faults)
+        return check_item(identity, False, "; ".join([text, *told_as_well]), HEARING) | {"mandatory": True}
     blocking = [fault for fault in faults if fault.kind.blocks is not Blocks.NO]
     told = blocking or list(faults)
     sentences = " ".join(fault.sentence for fault in told)
@@ -47,6 +52,17 @@ def _line(identity: str, text: str, faults: Sequence[Fault]) -> dict[str, Any]:
     text = sentences if blocking else f"warning: {sentences}" if told else text
     item = check_item(identity, not blocking, text, fixes)
     return item | {"mandatory": any(fault.kind.blocks is Blocks.ALWAYS for fault in blocking)}
+
+
+def _axis_lines(axis: OdriveAxis, state: DriveState) -> dict[str, str]:
+    """What is known of a drive, its joint and its watchdog."""
+    if not axis.heard:
+        return {f"drive.{axis.joint}": _unheard_text(axis)}
+    lines = {f"drive.{axis.joint}": _drive_text(axis, state), f"joint.{axis.joint}": _joint_text(state)}
+    if isfinite(axis.watchdog_s):
+        text = f"trips after {axis.watchdog_s:g} s" if axis.watchdog_s else "off"
+        lines[f"watchdog.{axis.joint}"] = text
+    return lines
 
 
 def _drive_text(axis: OdriveAxis, state: DriveState) -> str:
@@ -62,8 +78,7 @@ def _joint_text(state: DriveState) -> str:
     return f"at {degrees(state.angle_rad):.1f} degrees{heat}"
 
 
-def _unheard(axis: OdriveAxis) -> dict[str, Any]:
+def _unheard_text(axis: OdriveAxis) -> str:
     stamps_s = (axis.state.angle_stamp_s, axis.state.current_stamp_s, axis.state.heartbeat_stamp_s)
     missing = [signal for signal, stamp_s in zip(SIGNALS, stamps_s, strict=True) if not isfinite(stamp_s)]
-    item = check_item(f"hearing.{axis.joint}", False, f"no {', '.join(missing)} yet", HEARING)
-    return item | {"mandatory": True}
+    return f"not heard: no {', '.join(missing)} yet"

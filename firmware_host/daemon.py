@@ -136,6 +136,7 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         calls = OperatorCalls(loop, recorder, warnings, time.monotonic)
         status.methods = with_failures(calls.methods, failures, loop.event, time.monotonic)
         status.on_hang_up = lease.hang_up
+        status.spares = lambda caller: caller == lease.holder
         status.report_bug = lambda sentence: loop.event(time.monotonic(), sentence)
         notifier = SystemdNotifier()
         stack.callback(notifier.close)

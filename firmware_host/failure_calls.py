@@ -81,7 +81,11 @@ class FailureCalls:
 
     def failures(self) -> dict[str, Any]:
         """What fails, and all that could."""
-        table = [{"component": name, "kind": kind, "does": does} for name, kind, does in self._failures.table()]
+        families = self._failures.families
+        table = [
+            {"component": name, "family": families[name], "kind": kind, "does": does}
+            for name, kind, does in self._failures.table()
+        ]
         return {"allowed": True, "failing": self._failing(), "table": table}
 
     def _failing(self) -> list[dict[str, Any]]:

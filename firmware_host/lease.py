@@ -1,7 +1,8 @@
 """A dead man's lease: a program that moves the robot promises to be there, and to say so again and again.
 
 A lease is for a moment. Who holds it renews it; whose connection ends, or who does not renew in time, has lost it, and
-that stays so until a person with the right to drive ends it. One program holds it at a time.
+that stays so until the robot has stopped and its torque is off, where the loop resets the lease: a person arms again.
+One program holds it at a time.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class Lease:
     def renew(self, holder: Hashable, now_s: float, for_s: float) -> str | None:
         """Why it is refused, or None."""
         if self.lost(now_s):
-            return f"{self._holder} has lost the lease: 'mudskipper clear' or 'mudskipper disarm' ends that"
+            return f"{self._holder} has lost the lease: the robot stops; then arm again"
         if self.held and holder != self._holder:
             return f"{self._holder} holds the lease"
         self._holder, self._until_s = holder, now_s + for_s

@@ -32,7 +32,7 @@ class LogWatch:
             found.append(make_fault("disk_low", "", text))
         if report.slowest_write_s > self._bounds.disk_slow_s:
             found.append(make_fault("disk_slow", "", f"The log's disk took {report.slowest_write_s:.1f} s to write."))
-        if report.dropped > self._dropped:
+        if report.alive and report.dropped > self._dropped:
             found.append(make_fault("rows_lost", "", f"{report.dropped} rows of the log were lost so far."))
         self._dropped = report.dropped
         return found

@@ -25,6 +25,7 @@ from firmware_host.lease import Lease
 from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK
 from firmware_host.mud_learning import MudLearning
 from firmware_host.recorder import Recording
+from firmware_host.requests_told import RequestsTold
 from firmware_host.row_packing import Moment, stride_row, tick_row
 from firmware_host.ticker import PERIOD_S, Beat
 from firmware_host.timing import LoopTiming
@@ -67,6 +68,7 @@ class Loop:
         self.ending = False  # the daemon is about to end: nothing is armed any more
         self.forced = False  # armed against what may be overruled
         self.target_before: GaitTarget = RESTING  # commanded while the states of this tick came about
+        self.requests_told = RequestsTold()
         self._request, self._clear_until_s = Request.NONE, NEVER_S
         self._mode_since_s = 0.0
 
@@ -154,13 +156,13 @@ class Loop:
         return all(state.closed_loop and state.heartbeat_stamp_s > oldest_s for state in self.states)
 
     def request(
-        self, request: Request, now_s: float, order: WalkOrder | None = None, forced: bool = False
+        self, request: Request, now_s: float, order: WalkOrder | None = None, forced: bool = False, by: str = ""
     ) -> str | None:
         """A person's wish, for the next tick. Returns why it is refused, or None."""
         refused = self._refusal(request, order, forced)
         if refused:
             return refused
-        self.event(now_s, f"request {request.name.lower()}{' by force' if forced else ''}")
+        self._tell_request(request, now_s, forced, by)
         if request is Request.DISARM and self.mode not in ENERGISED:
             self.drives.disarm(now_s, at_once=True)  # also while not all drives are heard
         elif request is Request.CLEAR:
@@ -173,6 +175,17 @@ class Loop:
         if self._request is not Request.DISARM:  # which nothing may undo
             self._request = request
         return None
+
+    def _tell_request(self, request: Request, now_s: float, forced: bool, by: str) -> None:
+        """Once, with who asked; but not a stop or disarm that changes nothing: whoever is let in may ask for those."""
+        changes = request not in (Request.STOP, Request.DISARM) or self._next(request) is not self._next(Request.NONE)
+        text = f"request {request.name.lower()}{' by force' if forced else ''}{f' by {by}' if by else ''}"
+        told = self.requests_told.update(text, changes, now_s)
+        if told:
+            self.event(now_s, told)
+
+    def _next(self, request: Request) -> Mode:
+        return next_mode(self.mode, request, self.health)
 
     def _force(self, now_s: float, forced: bool) -> None:
         overruled = self.faults.blocking() if forced else []
@@ -217,7 +230,8 @@ class Loop:
         if mode in (Mode.ARMING, Mode.WALKING):
             self.notice = ""
         if fault and self.mode in ENERGISED:
-            self.notice = f"stopped by {fault.name}: {fault.sentence} {fault.kind.what_to_do}."
+            to_do = fault.kind.what_to_do
+            self.notice = f"stopped by {fault.name}: {fault.sentence} {to_do[:1].upper()}{to_do[1:]}."
         if self.mode is Mode.STOPPING and mode is Mode.HOLD and not self.controller.is_up(self.states):
             self.notice = "the flippers did not come out of the mud"
             self.event(now_s, self.notice)

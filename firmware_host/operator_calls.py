@@ -1,7 +1,7 @@
 """What a person can ask of the running daemon: the methods of the status socket.
 
-Who asks for something to be done is named in the log. A lease is given while torque is on: before, there is nothing
-that its loss could stop.
+Who asks for something to be done is named in the log, where it changes anything. A lease is given while torque is on:
+before, there is nothing that its loss could stop.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class OperatorCalls:
             "walk": self.walk,
             "stop": lambda params, caller: self._request(caller, Request.STOP),
             "disarm": lambda params, caller: self._request(caller, Request.DISARM),
-            "clear": self.clear,
+            "clear": lambda params, caller: self._request(caller, Request.CLEAR),
             "lease": self.lease,
             "release": self.release,
             "reset_timing": lambda params, caller: self.reset_timing(params),
@@ -83,6 +83,7 @@ class OperatorCalls:
             "faults": [_fault_report(fault) for fault in loop.faults.standing],
             "forced": loop.forced,
             "notice": loop.notice,
+            "untold_requests": loop.requests_told.untold,
             "lease": str(loop.lease.holder) if loop.lease.held else None,
             "phase": loop.target_before.phase.name.lower(),
             "stride": loop.target_before.stride,
@@ -177,13 +178,6 @@ class OperatorCalls:
             raise RefusedError(f"depth_m = {depth_m}: must be more than 0 and at most {deepest_m}")
         return self._request(caller, Request.WALK, WalkOrder(float(depth_m), False, strides))
 
-    def clear(self, params: dict[str, Any], caller: Caller) -> str:
-        """A lost lease is cleared with the rest."""
-        accepted = self._request(caller, Request.CLEAR)
-        if self._lease.lost(self._clock()):
-            self._lease.reset()
-        return accepted
-
     def lease(self, params: dict[str, Any], caller: Caller) -> str:
         """Promise to renew it within `for_s`, or to be stopped."""
         for_s = params.get("for_s")
@@ -199,13 +193,14 @@ class OperatorCalls:
 
     def release(self, params: dict[str, Any], caller: Caller) -> str:
         """End one's own lease, or whoever's was lost."""
+        begun = self._lease.holder is not None
         self._accept(self._lease.release(caller))
-        self._loop.event(self._clock(), f"lease released by {caller}")
+        if begun:
+            self._loop.event(self._clock(), f"lease released by {caller}")
         return "accepted"
 
     def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:
-        self._accept(self._loop.request(request, self._clock(), order, forced))
-        self._loop.event(self._clock(), f"request {request.name.lower()} by {caller}")
+        self._accept(self._loop.request(request, self._clock(), order, forced, str(caller)))
         return "accepted"
 
     def _accept(self, refused: str | None) -> None:

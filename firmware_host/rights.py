@@ -1,9 +1,10 @@
 """Who may ask the daemon for what, by what the kernel says of a connection.
 
 SO_PEERCRED and SO_PEERGROUPS (unix(7), Linux 4.13) tell user, process and groups of the other end as they were when it
-connected; nobody can make them up. Three levels: whoever may connect may stop the robot, readers see how it is,
-operators move it. Operators also read; root and the daemon's own user may do everything. Names of groups are looked up
-once, at the start: a name service may take its time, and a tick has none.
+connected; nobody can make them up. Three levels: whoever is let in may stop the robot, readers see how it is, operators
+move it. Operators also read; root and the daemon's own user may do everything. The socket's file is open to everybody,
+since one group cannot own it for readers and operators: strangers who may not even stop are turned away here. Names of
+groups are looked up once, at the start: a name service may take its time, and a tick has none.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from firmware_host.configuration import ConfigurationError, StatusParameters
-from firmware_host.rpc import NOT_PERMITTED
+from firmware_host.rpc import FOR_MEMBERS, NOT_PERMITTED
 
 CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid
 SO_PEERGROUPS = 59  # asm-generic/socket.h; Python has no name for it
@@ -61,11 +62,6 @@ class Rights(NamedTuple):
     own_uid: int
     anyone_may_stop: bool = True
 
-    @property
-    def socket_mode(self) -> int:
-        """Connecting to a socket needs the right to write to its file."""
-        return 0o666 if self.anyone_may_stop else 0o660
-
     def level(self, peer: Peer) -> Level:
         if peer.uid in (0, self.own_uid) or self.operators.gid in peer.groups:
             return Level.DRIVE
@@ -75,11 +71,19 @@ class Rights(NamedTuple):
         needed = NEEDED.get(method, Level.DRIVE)
         if level >= needed:
             return None
-        group = self.operators.name if needed is Level.DRIVE else self.readers.name
-        return (
-            f"{NOT_PERMITTED}{method} is for members of the group {group}."
-            f" Have root run 'adduser YOU {group}', then log in again"
-        )
+        return _for_members(method, self.operators if needed is Level.DRIVE else self.readers)
+
+    def refusal_to_connect(self, level: Level) -> str | None:
+        if self.anyone_may_stop or level > Level.ANYONE:
+            return None
+        return _for_members("this robot", self.readers)
+
+
+def _for_members(what: str, group: Group) -> str:
+    return (
+        f"{NOT_PERMITTED}{what} is {FOR_MEMBERS}{group.name}."
+        f" Have root run 'adduser YOU {group.name}', then log in again"
+    )
 
 
 def load_rights(parameters: StatusParameters) -> Rights:

@@ -20,6 +20,7 @@ MOST_PARAMS = 16
 PARTS = 4  # of a request
 
 NOT_PERMITTED = "not permitted: "  # how a refusal for want of rights begins
+FOR_MEMBERS = "for members of the group "  # and what it says before the group's name
 SHAPE = f"a request is [0, id, method, params] in MessagePack, with at most {MOST_PARAMS} params"
 
 TOO_LONG = f"a request has at most {LONGEST_REQUEST} bytes"

@@ -1,4 +1,8 @@
-"""The file of a listening Unix socket: made with its permissions, replaced where a dead daemon left it behind.
+"""The file of a listening Unix socket: open to everybody, replaced where a dead daemon left it behind.
+
+Connecting needs the right to write to the file and to enter its folder. Who may ask for what, the kernel's word on who
+connects decides (rights.py), not the file: so a folder that is there keeps its permissions, and one that is made here
+lets everybody in.
 
 Nothing is followed and nothing but a dead socket is removed: not a file, not a symbolic link, not the socket of a
 daemon that lives or merely hangs. A folder that everybody may write to is refused, since there everybody could put
@@ -11,9 +15,12 @@ import errno
 import os
 import socket
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 PROBE_S = 1.0  # for a daemon to let a connection in
+OPEN_FILE, OPEN_FOLDER = 0o666, 0o755
 
 
 class AlreadyServedError(Exception):
@@ -23,15 +30,16 @@ class AlreadyServedError(Exception):
 class SocketFile:
     """Owns the listening socket and its place in the file system."""
 
-    def __init__(self, path: Path, mode: int, backlog: int) -> None:
+    def __init__(self, path: Path, backlog: int) -> None:
         """Raises AlreadyServedError, or OSError where the path cannot be bound."""
-        path.parent.mkdir(parents=True, exist_ok=True)
+        with _umask(0o777 & ~OPEN_FOLDER):
+            path.parent.mkdir(parents=True, exist_ok=True)
         _refuse_open_folder(path.parent)
         _remove_stale(path)
         self.path = path
         self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self.listener.setblocking(False)
-        _bind(self.listener, path, mode)
+        _bind(self.listener, path)
         self._identity = _identity(path)
         self.listener.listen(backlog)
 
@@ -42,14 +50,21 @@ class SocketFile:
             self.path.unlink(missing_ok=True)
 
 
-def _bind(listener: socket.socket, path: Path, mode: int) -> None:
-    """By the umask, so that there is no moment at which the file has other permissions."""
-    before = os.umask(0o777 & ~mode)
+def _bind(listener: socket.socket, path: Path) -> None:
     try:
-        listener.bind(str(path))
+        with _umask(0o777 & ~OPEN_FILE):
+            listener.bind(str(path))
     except OSError as problem:
         listener.close()
         raise OSError(problem.errno, problem.strerror, str(path)) from None
+
+
+@contextmanager
+def _umask(mask: int) -> Iterator[None]:
+    """So that there is no moment at which what is made has other permissions."""
+    before = os.umask(mask)
+    try:
+        yield
     finally:
         os.umask(before)
 

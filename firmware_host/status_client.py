@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import struct
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,17 @@ from firmware_host.rpc import NOT_PERMITTED, REQUEST
 
 ANSWER_S = 5.0
 CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid
+CLOSED = "it is ending, or made room for somebody else; try again"
+SILENT = "'systemctl status mudskipper' tells more"
 TIMEVAL = struct.Struct("ll")  # seconds and microseconds
 
 
 class NoDaemonError(Exception):
     """Nobody answers on the socket."""
+
+
+class DroppedError(NoDaemonError):
+    """A daemon is there, but gives no answer; the text says how that looks."""
 
 
 class NotPermittedError(Exception):
@@ -39,7 +46,7 @@ class StatusClient:
         try:
             self._socket.connect(str(path))  # blocking: with Python's own timeout a full queue is an error at once
         except PermissionError as problem:
-            raise NotPermittedError(f"no permission to use {path}. Join the group that owns it.") from problem
+            raise NotPermittedError(f"no permission to use {path}: its folder lets only its owner in") from problem
         except OSError as problem:
             raise NoDaemonError(f"no daemon answers on {path}") from problem
         self._socket.settimeout(timeout_s)
@@ -53,14 +60,17 @@ class StatusClient:
     def call(self, method: str, **params: Any) -> Any:
         """The result.
 
-        Raises CallRefusedError or NotPermittedError with the daemon's sentence, or NoDaemonError where it is gone.
+        Raises CallRefusedError or NotPermittedError with the daemon's sentence, or NoDaemonError where none comes.
         """
         self._number += 1
         try:
-            self._socket.sendall(msgpack.packb([REQUEST, self._number, method, params]))
+            with suppress(ConnectionError):  # what it said before it closed the connection can still be read
+                self._socket.sendall(msgpack.packb([REQUEST, self._number, method, params]))
             problem, result = self._receive()
+        except ConnectionError as problem_reading:
+            raise DroppedError(f"the daemon on {self._path} closed the connection: {CLOSED}") from problem_reading
         except OSError as problem_reading:
-            raise NoDaemonError(f"the daemon on {self._path} does not answer") from problem_reading
+            raise DroppedError(f"the daemon on {self._path} does not answer: {SILENT}") from problem_reading
         except (ValueError, TypeError, KeyError, msgpack.UnpackException) as problem_reading:
             raise NoDaemonError(f"what answers on {self._path} is no mudskipper daemon") from problem_reading
         if problem is not None and str(problem).startswith(NOT_PERMITTED):

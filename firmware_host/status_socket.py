@@ -3,8 +3,8 @@
 The loop calls `serve` once a tick: it never waits, answers at most one request, clients in turn, and gives every client
 bounded buffers, a bounded rate and a bounded time to send a request. Whoever asks faster waits: the kernel keeps the
 rest. Whoever sends something else is told so and disconnected. When there is no room, the user with the most
-connections makes some, so nobody can keep another one out. A method that fails answers so and is reported: no report
-stops a robot.
+connections makes some, so nobody can keep another one out; but never the one who has promised to attend. A method that
+fails answers so and is reported: no report stops a robot.
 """
 
 from __future__ import annotations
@@ -13,8 +13,11 @@ import select
 import socket
 from collections import Counter
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
+
+import msgpack
 
 from firmware_host.configuration import StatusParameters
 from firmware_host.connection import LONGEST_BACKLOG, NOTHING, Caller, Client
@@ -44,9 +47,10 @@ class StatusSocket:
         self.methods = methods
         self.report_bug: Callable[[str], None] = lambda sentence: None
         self.on_hang_up: Callable[[Caller], None] = lambda caller: None  # may come twice
+        self.spares: Callable[[Caller], bool] = lambda caller: False  # whose end would stop the robot
         self._rights = rights or load_rights(StatusParameters())
         self._peer_of = peer_of
-        self._file = SocketFile(path, self._rights.socket_mode, MOST_CLIENTS)
+        self._file = SocketFile(path, MOST_CLIENTS)
         self._listener = self._file.listener
         self._poll = select.epoll()
         self._poll.register(self._listener.fileno(), select.EPOLLIN)
@@ -84,14 +88,24 @@ class StatusSocket:
             peer = self._peer_of(connection)
         except OSError:
             return connection.close()
+        level = self._rights.level(peer)
+        refused = self._rights.refusal_to_connect(level)
+        if refused:
+            return self._turn_away(connection, refused)
         self._accepted += 1
         if len(self._clients) >= MOST_CLIENTS:
             self._make_room(peer)
         connection.setblocking(False)
-        caller = Caller(self._accepted, peer, self._rights.level(peer))
+        caller = Caller(self._accepted, peer, level)
         client = self._clients[connection.fileno()] = Client(connection, caller)
         client.watched = select.EPOLLIN
         return self._poll.register(connection.fileno(), client.watched)
+
+    def _turn_away(self, connection: socket.socket, sentence: str) -> None:
+        self._not_permitted += 1
+        connection.setblocking(False)
+        with connection, suppress(OSError):  # it may be gone already
+            connection.send(msgpack.packb([RESPONSE, None, sentence, None]))
 
     def _make_room(self, newcomer: Peer) -> None:
         """The user with the most connections loses the one that is still for longest; among equals the less trusted."""
@@ -102,8 +116,9 @@ class StatusSocket:
             caller = self._clients[descriptor].caller
             return connections[caller.peer.uid], -caller.level, descriptor not in self._waiting
 
+        candidates = [each for each, client in self._clients.items() if not self.spares(client.caller)]
         self._made_room += 1
-        self._drop(max(self._clients, key=claim))  # the first of equals
+        self._drop(max(candidates or self._clients, key=claim))  # the first of equals
 
     def _attend(self, descriptor: int, events: int) -> None:
         """Read, unless something of this client still waits for its turn: the kernel keeps the rest."""

@@ -1,7 +1,8 @@
 """The simulated robot as a process of its own, in real time, on the buses that a configuration names.
 
 It reads of the configuration what a real robot's wiring would fix: buses, node ids, signs, geometry. The body's place
-goes to the pose socket at motion-capture rate.
+goes to the pose socket at motion-capture rate. SIGUSR1 stands for the person who moves the flippers back by hand, where
+they came to lie at their mechanical stops, beyond the limits: no torque leads back from there.
 """
 
 from __future__ import annotations
@@ -104,6 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BusError as problem:
         print(problem, file=sys.stderr)
         return 1
+    signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.lend_hand())
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
     os.nice(5)  # the controller comes first

@@ -72,15 +72,18 @@ class Arm:
         """At rest with the plate's edge on the mud, as a robot lies when its motors are off."""
         self.history.reset()
         self.relief_m = self.track.surface_m(0.0)
-        self.sweep_rad = 0.0
-        self.adduction_rad = self.parameters.geometry.adduction_rad(0.0, self.surface_m)
-        self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = 0.0
-        self.contact.reset()
-        if self.stones:
-            self.stones.reset()
+        self.put_back()
         self.carriage: Carriage | None = None
         self.force = NO_CONTACT
         self.clay = self.track.clay_at(0.0)
+
+    def put_back(self) -> None:
+        """As a person does it by hand: straight out, the plate's edge on the mud. The mud remembers its strokes."""
+        self.sweep_rad = self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = 0.0
+        self.adduction_rad = self.parameters.geometry.adduction_rad(0.0, self.surface_m)
+        self.contact.reset()
+        if self.stones:
+            self.stones.reset()
 
     @property
     def surface_m(self) -> float:

@@ -35,6 +35,7 @@ class SimulatedRobot:
         self._ports = dict(ports)
         self._port_of_drive = tuple(ports[bus_of_joint[joint]] for joint in JOINTS)
         self.now_s = start_s
+        self._hand_wanted = False
         for drive in self.drives:
             drive.reset(start_s)
         self._measure()
@@ -42,6 +43,10 @@ class SimulatedRobot:
     def advance(self, until_s: float) -> None:
         """Obey the frames that have arrived, then live on until `until_s`, sending what comes due."""
         self._obey()
+        if self._hand_wanted:
+            self._hand_wanted = False
+            for arm in self.plant.arms:
+                arm.put_back()
         while self.now_s + STEP_S <= until_s:
             self.now_s += STEP_S
             a, b, c, d = self.drives
@@ -51,6 +56,10 @@ class SimulatedRobot:
             self.plant.step(STEP_S, torques)
             self._measure()
             self._report()
+
+    def lend_hand(self) -> None:
+        """A person moves the flippers back, at the next moment between two steps: a signal handler may call this."""
+        self._hand_wanted = True
 
     def restart_drive(self, place: int) -> None:
         """The drive of the joint at this place in JOINTS loses its supply for a moment."""

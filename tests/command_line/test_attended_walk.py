@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from command_line import exit_codes
+from command_line import attended_walk, exit_codes
 from firmware_host.status_client import StatusClient
 
 
@@ -28,6 +28,48 @@ def attended(bench: Any, *arguments: str) -> Iterator[subprocess.Popen[str]]:
             yield attendant
         finally:
             attendant.kill()
+
+
+class EndingWalk(StatusClient):
+    """To a robot whose walk ends as `reports` tell, one look after the other."""
+
+    def __init__(self, *reports: dict[str, Any]) -> None:
+        self.reports = list(reports)
+
+    def call(self, method: str, **params: Any) -> Any:
+        return self.reports.pop(0) if method == "status" else "accepted"
+
+
+def report(mode: str, sentence: str = "", notice: str = "") -> dict[str, Any]:
+    fault = {"sentence": sentence} if sentence else None
+    return {"mode": mode, "fault": fault, "notice": notice, "stride": 0, "phase": "swing", "depth_m": 0, "body_x_m": 0}
+
+
+STOPPED = "stopped by drive_silent: The left_sweep drive is silent. Check it."
+
+
+@pytest.mark.parametrize(
+    ("reports", "status", "complaint"),
+    [
+        ([report("walking"), report("hold")], exit_codes.OK, ""),
+        ([report("hold", "No current.", STOPPED)], exit_codes.REFUSED, STOPPED),
+        ([report("walking"), report("damping", "It is silent."), report("fault", "It is silent.", STOPPED)],
+         exit_codes.REFUSED, STOPPED),
+        ([report("stopping"), report("idle", notice=STOPPED)], exit_codes.REFUSED, STOPPED),
+        ([report("fault", "It is silent.")], exit_codes.REFUSED, "It is silent."),
+        ([report("idle")], exit_codes.REFUSED, "the torque was switched off"),
+    ],
+    ids=["done", "held by a fault", "damped, then a fault", "a fault that is over", "fault without notice", "disarmed"],
+)  # fmt: skip
+def test_a_walk_that_a_fault_has_ended_is_no_success_and_its_cause_is_told(
+    reports: list[dict[str, Any]], status: int, complaint: str, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.setattr(attended_walk, "RENEWAL_S", 0.0)
+    assert attended_walk.attend(EndingWalk(*reports), {}) == status
+    said = capsys.readouterr()
+    assert said.out.splitlines()[-1] == reports[-1]["mode"]
+    assert said.err == (f"mudskipper: {complaint}\n" if complaint else "")
 
 
 def test_it_arms_nothing(bench: Any) -> None:

@@ -15,7 +15,10 @@ def test_a_failing_drive_is_shown_stops_the_robot_and_stands_in_the_log(bench: A
     listed = json.loads(bench.run("fail", "--list", "--json").stdout)
     table = [(row["component"], row["kind"], row["does"]) for row in listed["table"]]
     assert table == list(Failures(("left", "right")).table()) and listed["failing"] == []
-    assert "left_sweep.position" in bench.run("fail", "--list").stdout
+    shown = bench.run("fail", "--list").stdout.splitlines()
+    assert len([line for line in shown if line.startswith(("JOINT", "bus.NAME", "pose", "log", "loop", "clock"))]) == 14
+    assert len(shown) < 20 and any(line.split()[:2] == ["JOINT.command", "off,"] for line in shown)
+    assert "JOINT: left_sweep, left_adduction, right_sweep, right_adduction" in shown and "NAME: left, right" in shown
     bench.run("arm")
     done = bench.run("fail", "left_sweep", "off", "--for", "5")
     assert done.returncode == exit_codes.OK and "left_sweep  off" in done.stdout
@@ -37,6 +40,11 @@ def test_what_cannot_fail_is_refused_and_half_a_wish_is_misuse(bench: Any) -> No
     refused = bench.run("fail", "left_sweep.command", "garbage")
     assert refused.returncode == exit_codes.REFUSED and "it can be off, slow, intermittent" in refused.stderr
     assert bench.run("fail", "left_sweep", "off", "--for", "61").returncode == exit_codes.REFUSED
+    for odd in (
+        ("left_sweep", "off", "--list"),
+        *(("left_sweep", "off", "--for", text) for text in ("nan", "inf", "x")),
+    ):
+        assert bench.run("fail", *odd).returncode == exit_codes.USAGE, odd
     half = bench.run("fail", "left_sweep")
     assert half.returncode == exit_codes.USAGE and "--list" in half.stderr
 

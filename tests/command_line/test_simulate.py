@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from command_line import exit_codes
 from command_line.main import main
 from simulation import peer
 from simulation.local_setup import write_local_setup
+from simulation.plant import END_STOPS_RAD
 
 WORLD = "[[segment]]\nstart_m = 0\nend_m = 1\nstrength_pa = 2000\n"
 
@@ -70,6 +72,30 @@ def test_without_a_world_there_are_the_paper_s_muds(
     setup = write_local_setup(short_folder, short_folder)
     assert main(["simulate", "--config", str(setup), *arguments]) == exit_codes.OK
     assert [segment.clay.name for segment in peers[0].robot.plant.track.segments] == names
+
+
+def test_a_signal_moves_the_flippers_back_by_hand(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class HandedPeer(peer.Peer):
+        """With its joints at their stops, for one step."""
+
+        def run(self) -> None:
+            for arm in self.robot.plant.arms:
+                arm.sweep_rad, arm.adduction_rad = END_STOPS_RAD
+            signal.raise_signal(signal.SIGUSR1)
+            self._pose.step = lambda now_s, plant: self.end(0, None)  # type: ignore[method-assign]
+            super().run()
+            lying.extend((arm.sweep_rad, arm.adduction_rad) for arm in self.robot.plant.arms)
+
+    lying: list[tuple[float, float]] = []
+    monkeypatch.setattr("os.nice", lambda _: 0)
+    monkeypatch.setattr(peer, "Peer", HandedPeer)
+    before = {number: signal.getsignal(number) for number in (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT)}
+    try:
+        assert main(["simulate", "--config", str(write_local_setup(short_folder, short_folder))]) == exit_codes.OK
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert len(lying) == 2 and all(abs(sweep) < 0.05 and abs(adduction) < 0.5 for sweep, adduction in lying)
 
 
 @pytest.mark.parametrize("command", ["simulate", "demo"])

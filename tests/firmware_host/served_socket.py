@@ -35,9 +35,9 @@ OPERATOR, READER, STRANGER = (
 
 
 class Served(StatusSocket):
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, rights: Rights = RIGHTS) -> None:
         self.coming: list[Peer] = []
-        super().__init__(path, METHODS, RIGHTS, lambda connection: self.coming.pop(0))
+        super().__init__(path, METHODS, rights, lambda connection: self.coming.pop(0))
         self.now_s = 1000.0
 
     def tick(self, ticks: int = 1) -> None:

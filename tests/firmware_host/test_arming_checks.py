@@ -45,10 +45,11 @@ def test_of_a_robot_that_is_ready_every_line_is_good(ready: Lockstep) -> None:
     lines = lines_of(ready)
     assert all(item["ok"] and not item["fix"] for item in lines.values())
     expected = {"configuration", "loop", "log", "bus.left", "bus.right"}
-    assert set(lines) == expected | {f"{part}.{joint}" for part in ("drive", "joint") for joint in JOINTS}
+    assert set(lines) == expected | {f"{part}.{joint}" for part in ("drive", "joint", "watchdog") for joint in JOINTS}
     assert lines["log"]["text"] == "logs/a.mcap"
     assert "firmware 0.6.11" in lines["drive.left_sweep"]["text"]
     assert "30 degrees C" in lines["joint.left_sweep"]["text"]
+    assert lines["watchdog.left_sweep"]["text"] == "trips after 0.1 s"
     assert "380" in lines["loop"]["text"]
 
 
@@ -106,9 +107,11 @@ def test_a_drive_that_was_not_heard_is_a_mandatory_line_with_what_is_missing(con
     robot.run_for(0.5)
     items = {item["id"]: item for item in arming_checks(robot.loop, "off", [])}
     unheard = {identity for identity, item in items.items() if not item["ok"]}
-    assert unheard == {"hearing.right_sweep"}
-    assert items["hearing.right_sweep"]["text"] == "no position, current, heartbeat yet"
-    assert items["hearing.right_sweep"]["mandatory"] and "wiring" in items["hearing.right_sweep"]["fix"]
+    assert unheard == {"drive.right_sweep"}
+    assert items["drive.right_sweep"]["text"] == "not heard: no position, current, heartbeat yet"
+    assert items["drive.right_sweep"]["mandatory"] and "wiring" in items["drive.right_sweep"]["fix"]
+    assert not items.keys() & {"joint.right_sweep", "watchdog.right_sweep"}
+    assert "joint.left_sweep" in items and not any("nan" in item["text"] for item in items.values())
     assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
 
 

@@ -43,6 +43,15 @@ def test_rows_are_told_lost_when_they_are_lost_and_not_for_ever() -> None:
     assert len(watch.update(HEALTHY._replace(dropped=8))) == 1
 
 
+def test_rows_that_a_dead_writer_does_not_take_are_no_second_fault() -> None:
+    assert names(HEALTHY._replace(alive=False, dropped=9)) == ["recorder_dead"]
+
+
+def test_a_log_that_may_not_be_written_is_not_answered_with_an_advice_about_space() -> None:
+    (fault,) = LogWatch(BOUNDS).update(HEALTHY._replace(problem="logs: Permission denied."))
+    assert "permissions" in fault.kind.what_to_do and "quota" not in fault.kind.what_to_do
+
+
 def test_no_trouble_of_the_log_stops_a_robot_and_what_cannot_be_written_stands_against_arming() -> None:
     ill = LogReport(True, 3, "No space left on device.", 0.0, 0, 9.0)
     faults = LogWatch(BOUNDS).update(ill) + LogWatch(BOUNDS).update(HEALTHY._replace(alive=False))

@@ -21,15 +21,13 @@ from drivers.can_port import BusState
 from drivers.mock_bus import MockPort
 from drivers.odrive_codec import AxisState, Message
 from firmware_host.configuration import Configuration
-from firmware_host.log_rows import EVENT
-from firmware_host.loop import EVENT_KIND
-from firmware_host.recorder import NullRecorder
 from firmware_host.ticker import PERIOD_S
 from simulation.clay import MUDS, Clay
 from simulation.disturbances import LAB
 from simulation.lockstep import Lockstep
 from simulation.motion_capture import SimulatedPose
 from simulation.track import Track
+from tests.kept_events import EventRecorder
 
 WALK = WalkOrder(0.03, adaptive=False)
 MOMENTS = ("holding", "raising", "insertion", "stance", "extraction", "swing", "stopping")
@@ -37,18 +35,6 @@ SHARED = {id(each): each for each in vars(codec).values() if isinstance(each, Me
 UP_RAD = 0.12
 Cause = Callable[[Lockstep], None]
 Copied = Callable[[str], Lockstep]
-
-
-class EventRecorder(NullRecorder):
-    """Keeps the sentences."""
-
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-
-    def put(self, kind_index: int, payload: bytes) -> bool:
-        if kind_index == EVENT_KIND:
-            self.texts.append(EVENT.decode(payload)["text"])
-        return True
 
 
 def texts_of(robot: Lockstep) -> list[str]:

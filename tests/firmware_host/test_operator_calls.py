@@ -7,40 +7,27 @@ from typing import Any
 
 import pytest
 
+from control.fault_kinds import make_fault
 from control.modes import Mode
 from firmware_host.configuration import Configuration
 from firmware_host.connection import Caller
-from firmware_host.log_rows import EVENT
-from firmware_host.loop import EVENT_KIND
 from firmware_host.operator_calls import OperatorCalls
-from firmware_host.recorder import NullRecorder
 from firmware_host.rights import NEEDED, Level, Peer
 from firmware_host.rpc import RefusedError
 from simulation.clay import MUDS
 from simulation.lockstep import Lockstep
 from simulation.track import Track
+from tests.kept_events import EventRecorder
 
 ANNA = Caller(1, Peer(77, 1000, frozenset({71})), Level.DRIVE)
 BEN = Caller(2, Peer(78, 1001, frozenset({71})), Level.DRIVE)
-
-
-class Events(NullRecorder):
-    """Keeps the sentences."""
-
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-
-    def put(self, kind_index: int, payload: bytes) -> bool:
-        if kind_index == EVENT_KIND:
-            self.texts.append(EVENT.decode(payload)["text"])
-        return True
 
 
 class Robot:
     """A simulated one, with its calls."""
 
     def __init__(self, configuration: Configuration) -> None:
-        self.events = Events()
+        self.events = EventRecorder()
         self.steps = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=self.events)
         self.lease = self.steps.loop.lease
         calls = OperatorCalls(self.steps.loop, self.events, [], lambda: self.steps.now_s)
@@ -67,10 +54,43 @@ def test_whoever_asks_for_something_is_named_in_the_log(armed: Robot) -> None:
     armed.steps.run_for(0.1)
     armed.ask("stop", BEN)
     armed.ask("disarm", BEN)
-    assert [text for text in armed.events.texts if " by " in text] == [
+    assert [text for text in armed.events.texts if text.startswith("request")] == [
+        "request arm",  # by the test
         "request walk by uid 1000 (process 77)",
         "request stop by uid 1001 (process 78)",
         "request disarm by uid 1001 (process 78)",
+    ]
+
+
+def test_a_stop_that_changes_nothing_does_not_fill_the_log_but_is_counted(armed: Robot) -> None:
+    armed.ask("disarm")
+    armed.steps.step()
+    told = len(armed.events.texts)
+    for _ in range(50):
+        assert armed.ask("stop", BEN) == armed.ask("disarm", BEN) == "accepted"
+        armed.steps.step()
+    assert not armed.events.about("request")[2:] and len(armed.events.texts) - told <= 2  # the mode, a lease
+    assert armed.ask("status")["untold_requests"] == 100
+    armed.ask("arm")
+    assert armed.events.texts[-1].startswith("request arm by uid 1000 (process 77); 100 before it")
+
+
+def test_an_arm_by_force_is_told_with_who_asked(robot: Robot) -> None:
+    robot.steps.run_for(2.0)
+    fault = make_fault("log_unwritable", "", "It cannot be written.")
+    robot.steps.loop.faults.update([fault], False)
+    robot.ask("arm", force=True)
+    assert robot.events.about("request") == ["request arm by force by uid 1000 (process 77)"]
+
+
+def test_the_same_request_again_and_again_is_told_once_a_second(robot: Robot) -> None:
+    robot.steps.run_for(1.0)
+    for _ in range(400):
+        robot.ask("clear")
+        robot.steps.step()
+    assert robot.events.about("request") == [
+        "request clear by uid 1000 (process 77)",
+        "request clear by uid 1000 (process 77); 379 before it changed nothing or came again",
     ]
 
 
@@ -130,11 +150,26 @@ def test_a_lost_lease_is_lost_until_an_operator_releases_it(armed: Robot) -> Non
     armed.ask("lease", BEN, for_s=0.5)
 
 
-def test_a_clear_that_is_accepted_ends_a_lost_lease(armed: Robot) -> None:
+def test_a_lost_lease_ends_with_the_torque_and_a_person_arms_again(armed: Robot) -> None:
     armed.ask("lease", for_s=0.5)
     armed.lease.hang_up(ANNA)
-    armed.ask("disarm")
-    armed.steps.run_for(0.1)
-    assert armed.steps.loop.mode is Mode.IDLE
-    armed.ask("clear", BEN)
-    assert not armed.lease.lost(armed.steps.now_s)
+    with pytest.raises(RefusedError, match="has lost the lease: the robot stops; then arm again"):
+        armed.ask("lease", BEN, for_s=0.5)
+    assert armed.steps.run_until(lambda: armed.steps.loop.mode is Mode.IDLE, 5.0)
+    armed.steps.arm()
+    assert armed.ask("lease", BEN, for_s=0.5) == "accepted"
+
+
+def test_a_clear_while_the_robot_holds_has_nothing_to_clear(armed: Robot) -> None:
+    with pytest.raises(RefusedError, match="^nothing to clear"):
+        armed.ask("clear")
+
+
+def test_the_notice_of_a_stop_is_made_of_whole_sentences(armed: Robot) -> None:
+    armed.ask("lease", for_s=0.5)
+    armed.lease.hang_up(ANNA)
+    armed.steps.run_for(4.0)
+    notice = armed.ask("status")["notice"]
+    assert notice.startswith("stopped by lease_lost: ") and notice.endswith(
+        "is gone. Look after the robot, then arm again."
+    )

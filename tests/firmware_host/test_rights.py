@@ -118,6 +118,9 @@ def test_no_name_is_looked_up_once_a_daemon_runs(monkeypatch: pytest.MonkeyPatch
     assert own.refusal("arm", Level.READ) is not None
 
 
-def test_whoever_may_not_stop_may_not_connect() -> None:
-    assert load_rights(StatusParameters()).socket_mode == 0o666
-    assert load_rights(StatusParameters(anyone_may_stop=False)).socket_mode == 0o660
+def test_only_strangers_who_may_not_stop_are_turned_away() -> None:
+    wide, strict = load_rights(StatusParameters()), load_rights(StatusParameters(anyone_may_stop=False))
+    assert [wide.refusal_to_connect(level) for level in Level] == [None, None, None]
+    refused, *others = (strict.refusal_to_connect(level) for level in Level)
+    assert refused is not None and f"for members of the group {strict.readers.name}. Have root run" in refused
+    assert others == [None, None]

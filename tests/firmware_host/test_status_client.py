@@ -12,7 +12,7 @@ import msgpack
 import pytest
 
 from firmware_host import rpc
-from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
+from firmware_host.status_client import CallRefusedError, DroppedError, NoDaemonError, NotPermittedError, StatusClient
 
 Ends = tuple[StatusClient, socket.socket]
 
@@ -63,9 +63,27 @@ def test_what_is_no_answer_comes_from_no_daemon_of_ours(ends: Ends, message: Any
         answer(ends, message)
 
 
-def test_silence_is_an_absent_daemon(ends: Ends) -> None:
-    with pytest.raises(NoDaemonError, match="does not answer"):
+def test_silence_is_no_absent_daemon(ends: Ends) -> None:
+    with pytest.raises(DroppedError, match="does not answer: 'systemctl status"):
         answer(ends)
+
+
+@pytest.mark.parametrize("before", [0, 1])
+def test_a_connection_that_the_daemon_has_closed_is_said_to_be_closed(ends: Ends, before: int) -> None:
+    client, connection = ends
+    for _ in range(before):
+        answer(ends, [rpc.RESPONSE, 1, None, "new"])
+    connection.close()
+    with pytest.raises(DroppedError, match="closed the connection: it is ending, or made room"):
+        client.call("status")
+
+
+def test_a_sentence_before_the_door_closes_is_read(ends: Ends) -> None:
+    client, connection = ends
+    connection.sendall(msgpack.packb([rpc.RESPONSE, None, f"{rpc.NOT_PERMITTED}join", None]))
+    connection.close()
+    with pytest.raises(NotPermittedError, match="^join$"):
+        client.call("status")
 
 
 def test_a_full_queue_is_waited_for(short_folder: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import socket
+from pathlib import Path
 
 import msgpack
 import pytest
@@ -16,6 +17,7 @@ from tests.firmware_host.served_socket import (
     METHODS,
     OPERATOR,
     READER,
+    RIGHTS,
     STRANGER,
     Served,
     ask,
@@ -201,6 +203,27 @@ def test_where_every_client_is_another_user_the_least_trusted_goes(served: Serve
     serve(served, 2)
     assert is_open(operator) and not is_open(others[0]) and is_open(others[1])
     assert served.counters["dropped_for_others"] == 1
+
+
+def test_a_stranger_who_may_not_even_stop_is_turned_away_with_a_sentence(short_folder: Path) -> None:
+    strict = Served(short_folder / "strict", RIGHTS._replace(anyone_may_stop=False))
+    stranger, reader, operator = (connect(strict, peer) for peer in (STRANGER, READER, OPERATOR))
+    serve(strict)
+    ((_, number, refused, result),) = unpacked(stranger.recv(65536))
+    assert (number, result) == (None, None) and not is_open(stranger)
+    assert refused.startswith(f"{NOT_PERMITTED}this robot is for members of the group viewers. Have root run")
+    assert is_open(reader) and is_open(operator)
+    assert (strict.counters["clients"], strict.counters["not_permitted"]) == (2, 1)
+    strict.close()
+
+
+def test_the_one_who_has_promised_to_attend_makes_no_room(served: Served) -> None:
+    served.spares = lambda caller: caller.connection == 1
+    clients = [connect(served, OPERATOR) for _ in range(MOST_CLIENTS)]  # the first one is still for longest
+    serve(served, MOST_CLIENTS)
+    connect(served, OPERATOR)
+    serve(served, 2)
+    assert [is_open(client) for client in clients[:3]] == [True, False, True]
 
 
 def test_a_hang_up_is_told_with_its_caller(served: Served) -> None:

@@ -15,7 +15,7 @@ from simulation.clay import Clay
 from simulation.disturbances import LAB
 from simulation.lockstep import Lockstep
 from simulation.track import Track
-from tests.simulation.test_stuck_flippers import EventRecorder
+from tests.kept_events import EventRecorder
 
 SOFT_M = 0.35
 

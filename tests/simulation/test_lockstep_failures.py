@@ -5,27 +5,18 @@ from __future__ import annotations
 import pytest
 
 from control.controller import WalkOrder
-from control.modes import ENERGISED, Mode
-from control.records import NO_TORQUE
+from control.modes import ENERGISED, Mode, Request
+from control.records import NO_TORQUE, Phase
 from drivers.failures import Failures
 from firmware_host.configuration import Configuration
-from firmware_host.log_rows import EVENT
-from firmware_host.recorder import EVENT_KIND, NullRecorder
+from firmware_host.recorder import NullRecorder
 from simulation.clay import MUDS
 from simulation.lockstep import Lockstep
+from simulation.plant import END_STOPS_RAD
 from simulation.track import Track
+from tests.kept_events import EventRecorder
 
 TRACK = Track([(2.0, MUDS["48.5"])])
-
-
-class EventRecorder(NullRecorder):
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-
-    def put(self, kind_index: int, payload: bytes) -> bool:
-        if kind_index == EVENT_KIND:
-            self.texts.append(EVENT.decode(payload)["text"])
-        return True
 
 
 def make_walking(configuration: Configuration, recorder: NullRecorder | None = None) -> Lockstep:
@@ -112,6 +103,27 @@ def test_a_loop_that_stands_still_misses_ticks_while_the_robot_lives_on(configur
     lockstep.fail("loop", "stuck")
     lockstep.step()
     assert lockstep.loop.missed_ticks == lockstep.tick_number - ticks - 1 == 11
+
+
+def test_joints_at_their_stops_are_moved_back_by_hand_and_the_robot_arms_again(configuration: Configuration) -> None:
+    """The bus goes in an extraction: until its watchdog trips a drive keeps the last torque."""
+    lockstep = make_walking(configuration)
+    lockstep.run_until(lambda: lockstep.loop.target_before.phase is Phase.EXTRACTION, 5.0)
+    lockstep.run_for(0.02)
+    lockstep.fail("bus.left", "bus-off", 0.5)
+    lockstep.run_for(3.0)
+    arms = lockstep.robot.plant.arms
+    assert (abs(arms[0].sweep_rad), abs(arms[0].adduction_rad)) == END_STOPS_RAD
+    for by_hand in (False, True):
+        if by_hand:
+            lockstep.robot.lend_hand()
+            lockstep.run_for(0.5)
+        lockstep.loop.request(Request.CLEAR, lockstep.now_s)
+        lockstep.run_for(1.0)
+        beyond = [fault.subject for fault in lockstep.loop.faults.standing if fault.name == "joint_position"]
+        assert beyond == ([] if by_hand else ["left_sweep", "left_adduction"])
+    lockstep.arm()
+    assert lockstep.loop.mode is Mode.HOLD
 
 
 def test_what_cannot_fail_is_refused(configuration: Configuration) -> None:

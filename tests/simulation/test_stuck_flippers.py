@@ -16,14 +16,13 @@ from control.recovery import RecoveryParameters
 from drivers.frames import Frame
 from drivers.odrive_codec import AxisState
 from firmware_host.configuration import Configuration
-from firmware_host.log_rows import EVENT
-from firmware_host.loop import EVENT_KIND
-from firmware_host.recorder import NullRecorder, Recorder
+from firmware_host.recorder import Recorder
 from firmware_host.replay import replay_file
 from firmware_host.ticker import PERIOD_S
 from simulation.clay import Clay
 from simulation.lockstep import Lockstep
 from simulation.track import Track
+from tests.kept_events import EventRecorder
 
 PARAMETERS = RecoveryParameters()
 HASTY = RecoveryParameters(attempts=2, pause_s=0.1, attempt_s=0.6)
@@ -31,19 +30,6 @@ HASTY = RecoveryParameters(attempts=2, pause_s=0.1, attempt_s=0.6)
 
 def longest_s(parameters: RecoveryParameters) -> float:
     return parameters.attempts * (parameters.pause_s + parameters.attempt_s)
-
-
-class EventRecorder(NullRecorder):
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-
-    def put(self, kind_index: int, payload: bytes) -> bool:
-        if kind_index == EVENT_KIND:
-            self.texts.append(EVENT.decode(payload)["text"])
-        return True
-
-    def about(self, word: str) -> list[str]:
-        return [text for text in self.texts if word in text]
 
 
 def mud(kilopascal: float) -> Track:

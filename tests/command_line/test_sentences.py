@@ -1,0 +1,66 @@
+"""What a person reads where something is not as it should be, without a robot."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import exit_codes, operation
+from command_line.screen import number
+from control.records import JOINTS
+from firmware_host.status_client import DroppedError
+
+NO_SOCKET = Namespace(socket=Path("/none"), json=False, config=Path("/none.toml"))
+
+
+class Client:
+    """To a daemon that answers every call with `problem`."""
+
+    problem: Exception
+
+    def __init__(self, path: Path) -> None:
+        return
+
+    def call(self, method: str, **params: Any) -> Any:
+        raise self.problem
+
+    def close(self) -> None:
+        return
+
+
+@pytest.mark.parametrize("command", [operation.status, operation.check, operation.clear])
+def test_a_client_whose_connection_ends_is_not_told_to_start_the_daemon(
+    command: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(operation, "StatusClient", Client)
+    Client.problem = DroppedError("the daemon closed the connection")
+    assert command(NO_SOCKET) == exit_codes.NO_DAEMON
+    said = capsys.readouterr()
+    assert (said.out, said.err) == ("", "mudskipper: the daemon closed the connection\n")
+
+
+def test_a_daemon_that_is_not_there_is_to_be_started(capsys: pytest.CaptureFixture[str]) -> None:
+    assert operation.status(NO_SOCKET) == exit_codes.NO_DAEMON
+    assert "systemctl start mudskipper" in capsys.readouterr().err
+
+
+def test_a_check_without_a_daemon_looks_for_itself(capsys: pytest.CaptureFixture[str]) -> None:
+    assert operation.check(NO_SOCKET) == exit_codes.UNHEALTHY
+    assert "FAIL daemon" in capsys.readouterr().out
+
+
+def test_a_status_before_all_drives_are_heard_names_those_that_are_not() -> None:
+    heard: dict[str, Any] = {"angle_age_s": 0.0, "current_age_s": 0.0, "heartbeat_age_s": 0.1}
+    drives = [heard | {"joint": joint} for joint in JOINTS]
+    drives[1] = drives[1] | {"heartbeat_age_s": None}
+    drives[3] = drives[3] | {"angle_age_s": None}
+    line = operation._boot_line(drives)
+    assert line == "not heard yet: left_adduction, right_adduction; 'mudskipper check' says what to do"
+
+
+@pytest.mark.parametrize(("value", "text"), [(-0.0001, "0.000"), (-0.0, "0.000"), (-0.001, "-0.001"), (None, "-")])
+def test_a_zero_has_no_sign(value: float | None, text: str) -> None:
+    assert number(value) == text

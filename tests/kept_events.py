@@ -1,0 +1,20 @@
+"""A recorder that keeps the sentences of a log, for tests that look at what was told."""
+
+from __future__ import annotations
+
+from firmware_host.log_rows import EVENT
+from firmware_host.loop import EVENT_KIND
+from firmware_host.recorder import NullRecorder
+
+
+class EventRecorder(NullRecorder):
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def put(self, kind_index: int, payload: bytes) -> bool:
+        if kind_index == EVENT_KIND:
+            self.texts.append(EVENT.decode(payload)["text"])
+        return True
+
+    def about(self, word: str) -> list[str]:
+        return [text for text in self.texts if word in text]
