@@ -8,7 +8,7 @@ ticks become one numpy array laid over the stored bytes.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
@@ -48,7 +48,14 @@ class Log(NamedTuple):
     complete: bool  # False where the writer was cut off; everything before that is here
 
 
-def read_log(path: Path) -> Log:
+Watch = Callable[[str, int, int], None]  # hears what is done, how far, of how much
+
+
+def unwatched(what: str, done: int, total: int) -> None:
+    """Nobody waits for it."""
+
+
+def read_log(path: Path, watch: Watch = unwatched) -> Log:
     """Raises LogError."""
     contents = _read_contents(path)
     stream, found = BytesIO(contents), _Findings()
@@ -56,6 +63,7 @@ def read_log(path: Path) -> Log:
     try:
         for record in reader.records:
             found.add(record)
+            watch("kB read", stream.tell() // 1000, len(contents) // 1000)
         complete = True
     except LayoutError as error:
         raise LayoutError(f"{path}: {error}; {OTHER_VERSION}") from None
@@ -78,9 +86,9 @@ def read_log(path: Path) -> Log:
     )
 
 
-def read_logs(paths: Sequence[Path]) -> Log:
+def read_logs(paths: Sequence[Path], watch: Watch = unwatched) -> Log:
     """One log, or several segments of one run as one. Raises LogError, also where a segment between them is missing."""
-    logs = [read_log(path) for path in paths]
+    logs = [read_log(path, watch) for path in paths]
     if len(logs) == 1:
         return logs[0]
     if len({log.metadata.get("run_id") for log in logs}) > 1 or "run_id" not in logs[0].metadata:
@@ -248,6 +256,12 @@ def log_summary(log: Log) -> dict[str, str | int | float | bool]:
         "complete": log.complete,
         "recovered": log.metadata.get("recovered") == "true",
     }
+
+
+def segment_of(log: Log) -> int:
+    """Its number in the run, or its first one's; 0 where none is given."""
+    number = log.metadata.get("segment", "")
+    return int(number) if number.isdecimal() else 0
 
 
 def _start_time(log: Log) -> str:

@@ -23,10 +23,12 @@ from mcap.writer import MCAP0_MAGIC
 
 from firmware_host.log_file import LogFile, lock_file
 from firmware_host.log_folder import BROKEN, PART, finished_path, make_folder, synchronise_folder, unfinished_files
-from firmware_host.log_reader import LogError, read_log
+from firmware_host.log_reader import LogError, Watch, read_log, unwatched
 from firmware_host.log_rows import EVENT
 from firmware_host.log_salvage import Salvage, readable_rows, salvage_rows
 from firmware_host.recorder import EVENT_KIND, STAMP
+
+WATCHED_ROWS = 1000  # between two words on how far it is
 
 
 class Recovered(NamedTuple):
@@ -53,7 +55,7 @@ def recover_all(folder: Path, say: Callable[[str], None]) -> list[Recovered]:
     return recovered
 
 
-def recover_log(path: Path) -> Recovered:
+def recover_log(path: Path, watch: Watch = unwatched) -> Recovered:
     """Raises LogError, and OSError; BlockingIOError where its writer lives."""
     with path.open("rb") as file:
         lock_file(file.fileno(), path)
@@ -70,11 +72,11 @@ def recover_log(path: Path) -> Recovered:
                 raise LogError(f"{path}: left as it is: {target} has its name and fewer rows; rename one of them")
             path.unlink()
             return Recovered(target, 0, 0, "was recovered before")
-        if contents.endswith(MCAP0_MAGIC) and _is_whole(path):
+        if contents.endswith(MCAP0_MAGIC) and _is_whole(path, watch):
             return _finish_move(path, target)
-        salvage = salvage_rows(path, contents)
+        salvage = salvage_rows(path, contents, watch)
         _require_gain(path, salvage, contents)
-        return _rewrite(path, target, salvage)
+        return _rewrite(path, target, salvage, watch)
 
 
 def _require_gain(path: Path, salvage: Salvage, contents: bytes) -> None:
@@ -85,9 +87,9 @@ def _require_gain(path: Path, salvage: Salvage, contents: bytes) -> None:
         raise LogError(f"{path}: left as it is: {reason}; another program has changed it")
 
 
-def _is_whole(path: Path) -> bool:
+def _is_whole(path: Path, watch: Watch = unwatched) -> bool:
     with suppress(LogError):
-        return read_log(path).complete
+        return read_log(path, watch).complete
     return False
 
 
@@ -101,7 +103,7 @@ def _finish_move(path: Path, target: Path) -> Recovered:
     return Recovered(target, 0, 0, "is whole")
 
 
-def _rewrite(path: Path, target: Path, salvage: Salvage) -> Recovered:
+def _rewrite(path: Path, target: Path, salvage: Salvage, watch: Watch) -> Recovered:
     broken = path if path.name.endswith(BROKEN) else path.with_name(path.name + BROKEN)
     path.rename(broken)
     part = broken.with_name(target.name + PART)
@@ -114,7 +116,10 @@ def _rewrite(path: Path, target: Path, salvage: Salvage) -> Recovered:
     }
     log = LogFile(part, opening)
     try:
-        log.write([*salvage.rows, (EVENT_KIND, EVENT.encode(_last_stamp_s(salvage), note))])
+        for place in range(0, len(salvage.rows), WATCHED_ROWS):
+            watch("rows written", place, len(salvage.rows))
+            log.write(salvage.rows[place : place + WATCHED_ROWS])
+        log.write([(EVENT_KIND, EVENT.encode(_last_stamp_s(salvage), note))])
         log.finish()
     except OSError:
         log.abandon()

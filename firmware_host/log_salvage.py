@@ -18,7 +18,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
 from firmware_host.log_chunks import RECORD_HEAD, Row, open_chunk, records_of
-from firmware_host.log_reader import DAMAGE, OTHER_VERSION, LayoutError, LogError, require_layout
+from firmware_host.log_reader import DAMAGE, OTHER_VERSION, LayoutError, LogError, Watch, require_layout, unwatched
 from firmware_host.log_rows import ROW_KINDS
 from firmware_host.recorder import STAMP
 
@@ -60,14 +60,14 @@ def readable_rows(contents: bytes) -> int:
     return len(rows)
 
 
-def salvage_rows(path: Path, contents: bytes) -> Salvage:
+def salvage_rows(path: Path, contents: bytes, watch: Watch = unwatched) -> Salvage:
     """Raises LogError for what never was a log of ours, or is one of another version."""
     if FOREIGN_SIGNATURE in contents:
         raise LogError(f"{path}: left as it is: another program has compressed it anew, which cannot be recovered here")
     metadata, configuration_text = _read_head(contents)
     sorter = _RowSorter()
     try:
-        for chunk in _sound_chunks(contents):
+        for chunk in _sound_chunks(contents, watch):
             sorter.add(chunk)
     except LayoutError as error:
         raise LayoutError(f"{path}: left as it is: {error}; {OTHER_VERSION}") from None
@@ -99,10 +99,11 @@ def _read_head(contents: bytes) -> tuple[dict[str, str], str]:
     return metadata, text
 
 
-def _sound_chunks(contents: bytes) -> Iterator[list[Row | Schema | Channel]]:
+def _sound_chunks(contents: bytes, watch: Watch) -> Iterator[list[Row | Schema | Channel]]:
     """Wherever they stand, in their order."""
     place = 0
     while (signature := contents.find(SIGNATURE, place)) >= 0:
+        watch("kB searched", place // 1000, len(contents) // 1000)
         place = signature + 1
         start, data = signature - CHUNK_HEAD.size, signature + len(SIGNATURE) + LENGTH.size
         if start < 0 or data > len(contents):

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from benchmarks import log_kills
 from benchmarks.can_fuzz import is_forbidden
 from benchmarks.estimator_cost import fit_rows, measure_fits
 from benchmarks.fit_libraries import FITS
@@ -34,7 +35,8 @@ def run_benchmark(name: str, *arguments: str) -> str:
     """In a process of its own, since a benchmark switches garbage collection off."""
     command = [sys.executable, "-m", f"benchmarks.{name}", *arguments]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=TIMEOUT_S)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stderr == ""
+    assert done.returncode in ((0, 1) if name == "log_kills" else (0,))  # 1: its bar was missed, on a busy machine
     return done.stdout
 
 
@@ -143,6 +145,17 @@ def test_log_kills() -> None:
     sums = report["sums"]
     assert (sums["missing_inside"], sums["doubled"], sums["unsound"]) == (0, 0, 0)
     assert sums["segments"] >= 5
+
+
+@pytest.mark.parametrize(("missing_s", "status"), [(0.5, 0), (1.5, 1)])
+def test_log_kills_ends_with_a_status_for_its_bar(
+    missing_s: float, status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    figures = dict.fromkeys(("ticks", "missing_inside", "doubled", "recovered", "segments"), 0)
+    kill: dict[str, Any] = figures | {"victim": "writer", "missing_at_end_s": missing_s, "problems": []}
+    monkeypatch.setattr(log_kills, "kill_many", lambda *_: [kill])
+    assert log_kills.main(["--json"]) == status
+    assert json.loads(capsys.readouterr().out)["reached"] is (status == 0)
 
 
 def test_estimator_cost() -> None:
