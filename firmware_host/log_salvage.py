@@ -13,7 +13,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
 
-from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
@@ -51,6 +51,8 @@ def readable_rows(contents: bytes) -> int:
     reader = StreamReader(BytesIO(contents), emit_chunks=True, record_size_limit=len(contents))
     with suppress(*DAMAGE):
         for outer in reader.records:
+            if isinstance(outer, DataEnd):
+                break  # what follows tells of rows and holds none
             for record in records_of(open_chunk(outer)) if isinstance(outer, Chunk) else (outer,):
                 if isinstance(record, Channel):
                     topics[record.id] = record.topic
