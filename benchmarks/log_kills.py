@@ -207,7 +207,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     report = {"benchmark": "log_kills", "kills": len(rounds), "seed": options.seed, "sums": sums, "rounds": rounds}
     report |= {"reached": reached, "verdict": verdict(bar, reached)}
     print_report(report, text_of(report), options.json)
-    return 0
+    return 0 if reached else 1
 
 
 if __name__ == "__main__":

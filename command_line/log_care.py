@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import time
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +11,30 @@ from mcap.exceptions import McapError
 from mcap.reader import make_reader
 
 from command_line import exit_codes
-from command_line.screen import Progress, complain, number, table
+from command_line.screen import PATIENCE_S, Progress, complain, number, size_text, table
 from firmware_host.configuration import ConfigurationError, load_configuration
-from firmware_host.log_folder import ACTIVE, DONE, KEPT, disk_bytes, free_space, log_files, preserve, unfinished_files
+from firmware_host.log_folder import (
+    BROKEN,
+    DONE,
+    ENDING,
+    KEPT,
+    PART,
+    disk_bytes,
+    free_space,
+    log_files,
+    preserve,
+    stored_files,
+    unfinished_files,
+)
 from firmware_host.log_reader import DAMAGE, LogError
 from firmware_host.log_recovery import Recovered, recover_log
 
 Options = argparse.Namespace
 
-PATIENCE_S = 2.0  # before progress is shown
+LEGEND = (
+    "unfinished: still being written, or cut off; broken: damaged, or left by a recovery that did not end.\n"
+    "'mudskipper log recover' puts in order what it can; remove what resists it, and what is no log"
+)
 
 
 def list_logs(options: Options) -> int:
@@ -30,7 +44,7 @@ def list_logs(options: Options) -> int:
     if not folder.is_dir():
         complain(f"{folder}: there is no such folder")
         return exit_codes.UNHEALTHY
-    logs = [describe(path) for path in log_files(folder, ACTIVE, DONE, KEPT)]
+    logs = [describe(path) for path in [*stored_files(folder), *log_files(folder, KEPT)]]
     space = free_space(folder)
     report = {
         "folder": str(folder),
@@ -58,11 +72,20 @@ def describe(path: Path) -> dict[str, Any]:
     return {
         "name": path.name,
         "place": path.parent.name,
+        "state": _state_of(path, duration_s is not None),
         "bytes": path.stat().st_size if path.exists() else 0,
         "duration_s": duration_s,
         "preserved": path.parent.name == KEPT,
         "recovered": metadata.get("recovered") == "true",
     }
+
+
+def _state_of(path: Path, has_summary: bool) -> str:
+    if has_summary:
+        return "whole"
+    if path.name.endswith(BROKEN) or path.parent.name in (DONE, KEPT):
+        return "broken"
+    return "unfinished" if path.name.endswith((ENDING, PART)) else "no log"
 
 
 def _summary_of(path: Path) -> tuple[dict[str, str], float | None]:
@@ -80,46 +103,50 @@ def _summary_of(path: Path) -> tuple[dict[str, str], float | None]:
 
 
 def _listing(report: dict[str, Any]) -> str:
-    rows = [["log", "place", "MB", "s", ""]]
+    rows, odd = [["log", "place", "MB", "s", ""]], False
     for log in report["logs"]:
-        marks = "recovered" if log["recovered"] else ""
+        odd = odd or log["state"] != "whole"
+        marks = "recovered" if log["recovered"] else log["state"].removeprefix("whole")
         size = f"{log['bytes'] / 1e6:.1f}"
         rows.append([log["name"], log["place"], size, number(log["duration_s"], 1), marks])
-    total = f"{report['logs_bytes'] / 1e6:.1f} MB of logs, {report['free_bytes'] / 1e9:.1f} GB free"
-    return f"{table(rows)}\n{total} of {report['disk_bytes'] / 1e9:.1f}"
+    sizes = [size_text(report[name]) for name in ("logs_bytes", "free_bytes", "disk_bytes")]
+    total = f"{sizes[0]} of logs, {sizes[1]} free of {sizes[2]}"
+    return "\n".join([table(rows), *[LEGEND] * odd, total])
 
 
 def recover(options: Options) -> int:
     places = options.places or [_configured_folder(options.config)]
     if None in places:
         return exit_codes.CONFIGURATION
-    paths = [path for place in places for path in (unfinished_files(place) if place.is_dir() else [place])]
-    recovered, resisted = _recover_each(paths)
+    named = {place for place in places if not place.is_dir()}
+    paths = [path for place in places for path in ([place] if place in named else unfinished_files(place))]
+    recovered, resisted = _recover_each(paths, named)
     if options.json:
         logs = [{"path": str(log.path), "rows": log.rows, "lost": log.lost, "note": log.note} for log in recovered]
         print(json.dumps({"recovered": logs, "problems": resisted}))
     else:
         for log in recovered:
             print(f"{log.path}: {log.note}")
-        if not paths:
+        if not recovered and not resisted:
             print("nothing to recover")
     for sentence in resisted:
         complain(sentence)
     return exit_codes.UNHEALTHY if resisted else exit_codes.OK
 
 
-def _recover_each(paths: list[Path]) -> tuple[list[Recovered], list[str]]:
+def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Recovered], list[str]]:
+    """Of files that nobody named, those of living writers are passed over."""
     recovered, resisted = [], []
-    progress, started_s = Progress("logs"), time.monotonic()
+    progress = Progress("", PATIENCE_S)
     for done, path in enumerate(paths):
-        if time.monotonic() - started_s > PATIENCE_S:
-            progress.show(done, len(paths))
+        progress.follow("logs", done, len(paths))
         try:
-            recovered.append(recover_log(path))
+            recovered.append(recover_log(path, progress.follow))
         except LogError as problem:
             resisted.append(str(problem))
         except BlockingIOError:
-            resisted.append(f"{path}: is being written; its writer will finish it")
+            if path in named:
+                resisted.append(f"{path}: is being written; its writer will finish it")
         except OSError as problem:
             resisted.append(f"{path}: {problem.strerror or problem}")
     progress.clear()
@@ -127,9 +154,15 @@ def _recover_each(paths: list[Path]) -> tuple[list[Recovered], list[str]]:
 
 
 def preserve_log(options: Options) -> int:
-    try:
-        print(preserve(options.file, options.undo))
-    except ValueError as problem:
-        complain(str(problem))
-        return exit_codes.REFUSED
-    return exit_codes.OK
+    """Each that can be, whatever becomes of the others."""
+    status = exit_codes.OK
+    for path in options.files:
+        try:
+            print(preserve(path, options.undo))
+        except ValueError as problem:
+            complain(str(problem))
+            status = exit_codes.REFUSED
+        except OSError as problem:
+            complain(f"{path}: {problem.strerror or problem}")
+            status = exit_codes.UNHEALTHY
+    return status

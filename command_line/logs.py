@@ -6,28 +6,32 @@ import argparse
 import json
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from command_line import exit_codes
 from command_line.recorded_walk import RecordedWalk, read_walk
-from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line
+from command_line.screen import PATIENCE_S, STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line
 from command_line.stride_choice import Stride, choose_strides, duration_s, outcome_of
 from firmware_host.configuration import ConfigurationError, load_configuration
 from firmware_host.lab_csv import write_lab_csv
-from firmware_host.log_reader import LogError, log_summary, read_log
+from firmware_host.log_folder import ACTIVE, DONE
+from firmware_host.log_reader import LogError, Watch, log_summary, read_log, read_logs
 from firmware_host.replay import Replay, replay_files
 from firmware_host.reports import map_report, stride_report
 
 Options = argparse.Namespace
 
 LONGEST_FILM_S = 60.0
-CUT_OFF = "the log is not finished: its writer was cut off; everything up to there was read"
+CUT_OFF = "the log is not finished: it is still being written, or was cut off; everything up to there was read"
 
 
 def replay(options: Options) -> int:
     try:
         configuration = load_configuration(options.config) if options.config else None
-        replayed = replay_files(options.files, configuration, options.method)
+        with _watched() as watch:
+            replayed = replay_files(options.files, configuration, options.method, watch)
     except ConfigurationError as problem:
         for sentence in problem.problems:
             complain(sentence)
@@ -51,12 +55,27 @@ def _show_replay(replayed: Replay, as_json: bool) -> None:
         print(f"{stride_line(report)}  {forces}")
     if not strides:
         complain("no complete stride in this log")
+    if replayed.segment:
+        complain(
+            f"the run's segments before {replayed.segment} are not given: "
+            "the first strides can differ from those computed live"
+        )
     if not replayed.complete:
         complain(CUT_OFF)
 
 
+@contextmanager
+def _watched() -> Iterator[Watch]:
+    """Something that a person may have to wait for."""
+    progress = Progress("", PATIENCE_S)
+    try:
+        yield progress.follow
+    finally:
+        progress.clear()
+
+
 def plot(options: Options) -> int:
-    path = options.out or _beside(options.file, ".png")
+    path = options.out or _beside(options.files[0], ".png")
     try:
         walk = _walk_for_picture(options, path)
     except LogError as problem:
@@ -72,7 +91,7 @@ def plot(options: Options) -> int:
 
 
 def film(options: Options) -> int:
-    path = options.out or _beside(options.file, "-strides.png")
+    path = options.out or _beside(options.files[0], "-strides.png")
     moving = path.suffix == ".gif"
     try:
         walk = _walk_for_picture(options, path)
@@ -95,19 +114,26 @@ def film(options: Options) -> int:
 
 
 def _beside(log: Path, ending: str) -> Path:
-    """The log's name with another ending."""
-    return log.with_name(log.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap") + ending)
+    """The log's name with another ending. A log that is being written leaves its folder, a picture would not."""
+    name = log.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap") + ending
+    if log.absolute().parent.name != ACTIVE:
+        return log.with_name(name)
+    done = log.absolute().parent.parent / DONE
+    return done / name if os.access(done, os.W_OK) else Path(name)
 
 
 def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
     """With what is to be said of it. Raises LogError, also for a picture that nobody could write."""
-    walk = read_walk(options.file, options.walk)
+    with _watched() as watch:
+        walk = read_walk(options.files[0], options.walk, options.files[1:], watch)
     if not os.access(path if path.exists() else path.parent, os.W_OK):
         raise LogError(f"{path} cannot be written; choose another place with --out")
     if walk.walks > 1 and not options.walk:
         complain(f"the last of {walk.walks} walks in this log; --walk N takes another")
     if walk.missing:
         complain(f"not in this log: {', '.join(walk.missing)}")
+    if walk.cut:
+        complain(f"the walk may have {walk.cut}; give those files too")
     if not walk.complete:
         complain(CUT_OFF)
     return walk
@@ -119,7 +145,7 @@ def _chosen_strides(options: Options, walk: RecordedWalk, moving: bool) -> list[
     """
     by_number = {stride["index"]: stride for stride in walk.own_strides}
     if not by_number:
-        raise LogError(f"{options.file}: no complete stride in this log")
+        raise LogError(f"{options.files[0]}: no complete stride in this log")
     for number in options.stride or ():
         if number not in by_number:
             raise ValueError(f"--stride {number}: this walk has {min(by_number)} to {max(by_number)}")
@@ -145,7 +171,8 @@ def _draw_film(walk: RecordedWalk, strides: list[Stride], path: Path) -> None:
 
 def info(options: Options) -> int:
     try:
-        summary = log_summary(read_log(options.file))
+        with _watched() as watch:
+            summary = log_summary(read_logs(options.files, watch))
     except LogError as problem:
         complain(str(problem))
         return exit_codes.UNHEALTHY
@@ -159,7 +186,8 @@ def info(options: Options) -> int:
 
 def export(options: Options) -> int:
     try:
-        log = read_log(options.file)
+        with _watched() as watch:
+            log = read_log(options.file, watch)
     except LogError as problem:
         complain(str(problem))
         return exit_codes.UNHEALTHY
@@ -169,6 +197,6 @@ def export(options: Options) -> int:
     if options.out.exists() and options.out.samefile(options.file):
         complain(f"{options.out} is the log itself; name another file")
         return exit_codes.USAGE
-    with Path(options.out).open("w", encoding="utf-8") as out:
-        write_lab_csv(log, out)
+    with Path(options.out).open("w", encoding="utf-8") as out, _watched() as watch:
+        write_lab_csv(log, out, watch)
     return exit_codes.OK

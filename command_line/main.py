@@ -161,7 +161,13 @@ def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
     film.add_argument("--out", type=_picture(".png", ".gif"), metavar="FILE", help=".png for a strip, .gif for a film")
     film.add_argument("--stride", action="append", type=_count, metavar="N", help="as replay counts them, repeatable")
     for parser in (plot, film):
-        parser.add_argument("file", type=Path, help="a log of ours, or the authors' CSV")
+        parser.add_argument(
+            "files",
+            type=Path,
+            nargs="+",
+            metavar="FILE",
+            help="our log, segments of one run, or the authors' CSV",
+        )
         parser.add_argument(
             "--walk", type=_count, default=0, metavar="N", help="of the log's walks (default: the last)"
         )
@@ -169,7 +175,7 @@ def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
     actions = log.add_subparsers(dest="action", required=True, metavar="action")
     _add_log_folder(actions)
     info = _add(actions, "info", "logs.info", "What a log holds.")
-    info.add_argument("file", type=Path)
+    info.add_argument("files", type=Path, nargs="+", metavar="FILE", help="several are segments of one run")
     info.add_argument("--json", action="store_true")
     export = _add(actions, "export", "logs.export", "A log in the columns of the authors' plotter.")
     export.add_argument("file", type=Path)
@@ -186,7 +192,7 @@ def _add_log_folder(actions: Commands) -> None:  # type: ignore[valid-type]
         parser.add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG), help="names the folder")
         parser.add_argument("--json", action="store_true", help="for machines")
     preserve = _add(actions, "preserve", "log_care.preserve_log", "Keep a log when older ones are freed.")
-    preserve.add_argument("file", type=Path)
+    preserve.add_argument("files", type=Path, nargs="+", metavar="FILE")
     preserve.add_argument("--undo", action="store_true", help="let it be freed again")
 
 

@@ -7,6 +7,7 @@ a log does not hold is NaN here, and named in `missing`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import nan, radians, sin
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +21,16 @@ from control.records import FLIPPERS, FlipperLoad, StrideEstimate
 from estimation.mud import EstimationParameters, MudEstimator
 from firmware_host.configuration import Configuration, ConfigurationError, parse_configuration
 from firmware_host.lab_csv import LabLog, read_lab_csv
-from firmware_host.log_reader import Log, LogError, log_summary, read_log
+from firmware_host.log_reader import (
+    Log,
+    LogError,
+    Watch,
+    log_summary,
+    read_log,
+    read_logs,
+    segment_of,
+    unwatched,
+)
 from firmware_host.log_rows import STRIDE
 from firmware_host.replay import LAB_DRIVE, NO_VELOCITY, PHASES
 from firmware_host.row_packing import stride_row
@@ -51,7 +61,8 @@ class RecordedWalk(NamedTuple):
     strides: list[dict[str, Any]]  # rows of log_rows.STRIDE, of both flippers
     noticed_s: list[float]  # when the robot said that it was in another mud
     walks: int = 1  # that the log holds
-    complete: bool = True  # False where the writer of the log was cut off
+    complete: bool = True  # False where the writer of the log was cut off, or still writes
+    cut: str = ""  # how the walk may reach beyond this log, in words
 
     @property
     def geometric_step_m(self) -> float:
@@ -75,12 +86,14 @@ class RecordedWalk(NamedTuple):
         return [words for name, words in WORDS.items() if not np.any(np.isfinite(getattr(self, name)))]
 
 
-def read_walk(path: Path, number: int = 0) -> RecordedWalk:
-    """Walk `number` of a log, counted from 1; the last one for 0. Raises LogError."""
+def read_walk(path: Path, number: int = 0, more: Sequence[Path] = (), watch: Watch = unwatched) -> RecordedWalk:
+    """Walk `number` of a log, counted from 1; the last one for 0. With `more` segments of its run. Raises LogError."""
+    if more:
+        return _numbered_walk(path, read_logs([path, *more], watch), number)
     if path.name.endswith((".csv", ".csv.gz")):
         return _only_walk(path, read_lab_csv(path), number)
     if path.suffix == ".mcap":
-        return _numbered_walk(path, read_log(path), number)
+        return _numbered_walk(path, read_log(path, watch), number)
     raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
 
 
@@ -95,7 +108,16 @@ def _numbered_walk(path: Path, log: Log, number: int) -> RecordedWalk:
     chosen = number - 1 if number else len(starts) - 1
     until_s = log.ticks["stamp_s"][starts[chosen + 1]] if chosen + 1 < len(starts) else np.inf
     walk = _walk_of_log(log, configuration, slice(starts[chosen], ends[chosen]), float(until_s))
-    return walk._replace(walks=len(starts), complete=log.complete)
+    cut = _cut_of(log, bool(starts[chosen] == 0), bool(ends[chosen] == len(log.ticks)))
+    return walk._replace(walks=len(starts), complete=log.complete, cut=cut)
+
+
+def _cut_of(log: Log, from_the_first: bool, to_the_last: bool) -> str:
+    """A run is cut into segments wherever the robot is."""
+    number = segment_of(log)
+    before = [f"begun before segment {number}"] * (from_the_first and number > 0)
+    after = ["gone on in the next segment"] * (to_the_last and log.complete and "segment" in log.metadata)
+    return " and ".join(before + after)
 
 
 def _refuse_number(path: Path, number: int, walks: int) -> None:

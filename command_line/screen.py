@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
 RED, GREEN, YELLOW, BOLD, PLAIN = "\033[31m", "\033[32m", "\033[33m", "\033[1m", "\033[0m"
+PATIENCE_S = 2.0  # of a person who sees nothing
+SOON_S = 0.1
 
 
 def coloured(text: str, colour: str) -> str:
@@ -30,15 +33,29 @@ def number(value: float | None, digits: int = 3) -> str:
     return "-" if value is None or not isfinite(value) else f"{value:z.{digits}f}"
 
 
+def size_text(size: float) -> str:
+    """Of bytes."""
+    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
+
+
 class Progress:
     """One line on a terminal's standard error while something takes its time; silent anywhere else."""
 
-    def __init__(self, what: str) -> None:
+    def __init__(self, what: str, patience_s: float = 0.0) -> None:
+        """Silent too for as long as the patience lasts."""
         self._what = what
         self._shown = sys.stderr.isatty()
+        self._interval_s = SOON_S if patience_s else 0.0  # what is watched row by row is shown now and then
+        self._due_s = time.monotonic() + patience_s
+
+    def follow(self, what: str, done: int, total: int) -> None:
+        """Of something that comes in several stretches."""
+        self._what = what
+        self.show(done, total)
 
     def show(self, done: int, total: int) -> None:
-        if self._shown:
+        if self._shown and time.monotonic() >= self._due_s:
+            self._due_s = time.monotonic() + self._interval_s
             print(f"\r\033[K{done} of {total} {self._what}", end="", file=sys.stderr, flush=True)
 
     def clear(self) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.records import FLIPPERS, UNKNOWN, Phase
-from firmware_host.log_reader import Log, LogError
+from firmware_host.log_reader import Log, LogError, Watch, unwatched
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -33,6 +33,7 @@ BODY_COLUMNS = ("OptitrackPosition_x", "OptitrackPosition_y", "OptitrackPosition
 JOINT_SIGNALS = [joint + signal for signal in ("_pos", "_curr") for joint in JOINT_COLUMNS]
 NEEDED_COLUMNS = ("time", "turtle_state", *JOINT_SIGNALS)
 FIRST_ROW_LINE = 3
+WATCHED_ROWS = 5000  # between two words on how far it is
 
 PHASE_OF_STATE = {
     -1: Phase.REST,
@@ -252,14 +253,17 @@ def _is_lost(position_m: Floats, stamp_s: Floats) -> Truths:
     return lost
 
 
-def write_lab_csv(log: Log, out: TextIO) -> None:
+def write_lab_csv(log: Log, out: TextIO, watch: Watch = unwatched) -> None:
     """In the authors' columns and units. The settings are those configured and the first stride's depth."""
     settings = _settings(log)
     out.write(f"{GAIT_HEADER} {','.join(settings)} | {','.join(settings.values())}\n")
     table = _columns(log)
     out.write(",".join(table) + "\n")
     formats = ["%d" if name == "turtle_state" else "%.9g" for name in table]
-    np.savetxt(out, np.column_stack(list(table.values())), fmt=formats, delimiter=",")
+    rows = np.column_stack(list(table.values()))
+    for place in range(0, len(rows), WATCHED_ROWS):
+        watch("rows written", place, len(rows))
+        np.savetxt(out, rows[place : place + WATCHED_ROWS], fmt=formats, delimiter=",")
 
 
 def _settings(log: Log) -> dict[str, str]:

@@ -22,7 +22,7 @@ from typing import Any
 
 from mcap.writer import CompressionType, Writer
 
-from firmware_host.log_folder import finished_path, synchronise_folder
+from firmware_host.log_folder import finished_path, make_folder, synchronise_folder, take_owner
 from firmware_host.log_rows import ROW_KINDS
 from firmware_host.recorder import STAMP
 
@@ -57,9 +57,8 @@ class _Buffer:
 class LogFile:
     """Made new and locked. Every method may raise OSError; only `abandon` is of use then."""
 
-    def __init__(self, path: Path, opening: Mapping[str, Any], ros_texts: Mapping[str, str] | None = None) -> None:
-        if not path.parent.exists():
-            path.parent.mkdir(parents=True)
+    def __init__(self, path: Path, opening: Mapping[str, Any]) -> None:
+        make_folder(path.parent)
         self.path = path
         self.rows = self.safe_rows = 0
         self.slowest_s = 0.0  # write or synchronisation since somebody set this to zero
@@ -73,8 +72,9 @@ class LogFile:
         self._chunk_bytes = self._safe_bytes = 0
         try:
             lock_file(self._file.fileno(), path)
+            take_owner(path)
             self._write_opening(opening["configuration_text"], opening["metadata"])
-            self._channels = self._register_channels(ros_texts or {})
+            self._channels = self._register_channels()
             self._write_out()
             self._synchronise()
         except OSError:
@@ -88,11 +88,10 @@ class LogFile:
         now_ns = time.time_ns()
         self._writer.add_attachment(now_ns, now_ns, ATTACHMENT, "application/toml", configuration_text.encode())
 
-    def _register_channels(self, ros_texts: Mapping[str, str]) -> list[int]:
+    def _register_channels(self) -> list[int]:
         channels = []
         for kind in ROW_KINDS:
-            text = ros_texts.get(kind.topic, kind.ros_text)
-            schema = self._writer.register_schema(kind.schema_name, "ros2msg", text.encode())
+            schema = self._writer.register_schema(kind.schema_name, "ros2msg", kind.ros_text.encode())
             channels.append(self._writer.register_channel(kind.topic, "cdr", schema))
         return channels
 
@@ -151,9 +150,18 @@ class LogFile:
     def _synchronise(self) -> None:
         started_s = time.monotonic()
         os.fsync(self._file.fileno())
+        self._require_place()
         self._unsynchronised = False
         self._synchronised_s = time.monotonic()
         self.slowest_s = max(self.slowest_s, self._synchronised_s - started_s)
+
+    def _require_place(self) -> None:
+        """A file that was removed takes every row without a complaint."""
+        if _is_at(self.path, self._file.fileno()):
+            return
+        if os.fstat(self._file.fileno()).st_nlink == 0:
+            self.safe_rows = 0
+        raise FileNotFoundError(errno.ENOENT, "it was removed or moved away")
 
     def finish(self) -> Path:
         """The index, and everything down to the disk, the file's name included; a file in active/ goes to done/."""
@@ -162,7 +170,7 @@ class LogFile:
         self._synchronise()
         path = finished_path(self.path)
         if path != self.path:
-            path.parent.mkdir(exist_ok=True)
+            make_folder(path.parent)
             self.path.rename(path)
             synchronise_folder(path.parent)
         synchronise_folder(self.path.parent)
@@ -175,7 +183,8 @@ class LogFile:
             os.ftruncate(self._file.fileno(), self._safe_bytes)
         if self.safe_rows == 0:
             with suppress(OSError):
-                self.path.unlink()
+                if _is_at(self.path, self._file.fileno()):
+                    self.path.unlink()
         with suppress(OSError):
             self._file.close()
 
@@ -183,5 +192,12 @@ class LogFile:
 def lock_file(descriptor: int, path: Path) -> None:
     """Raises OSError where another process holds it, or has moved it away meanwhile."""
     flock(descriptor, LOCK_EX | LOCK_NB)
-    if not path.exists() or not os.path.samestat(os.fstat(descriptor), path.stat()):
+    if not _is_at(path, descriptor):
         raise FileNotFoundError(errno.ENOENT, "was moved away", str(path))
+
+
+def _is_at(path: Path, descriptor: int) -> bool:
+    try:
+        return os.path.samestat(os.fstat(descriptor), path.stat())
+    except (FileNotFoundError, NotADirectoryError):
+        return False

@@ -2,7 +2,8 @@
 
 A file goes from active/ to done/ in one rename once it is down on the disk, so whatever lies in done/ is whole.
 Preserving a log moves it to kept/: unlike an extended attribute or a list of names that survives every copy to another
-disk, it is seen with `ls`, and freeing cannot reach it, since it only ever looks into done/.
+disk, it is seen with `ls`, and freeing cannot reach it, since it never looks there. A log that lies in the folder
+itself, as older versions left them, counts as one of done/.
 """
 
 from __future__ import annotations
@@ -17,10 +18,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 ACTIVE, DONE, KEPT = "active", "done", "kept"
+TOP = "."  # the folder itself
 ENDING = ".mcap"
 BROKEN = ".broken"  # after the name of a log that is being rewritten
 PART = ".part"  # after the name of one that is not whole yet
 FIRST = "-0000"
+LAST_BYTES = b"\x89MCAP0\r\n"  # of every whole MCAP file
 
 
 class FreeSpace(NamedTuple):
@@ -70,7 +73,26 @@ def log_files(folder: Path, *places: str) -> list[Path]:
 
 def unfinished_files(folder: Path) -> list[Path]:
     """What recovery has to look at, the files of living writers included."""
-    return sorted(path for ending in (ENDING, BROKEN, PART) for path in (folder / ACTIVE).glob(f"*{ending}"))
+    found = [path for ending in (ENDING, BROKEN, PART) for path in (folder / ACTIVE).glob(f"*{ending}")]
+    found += [path for ending in (BROKEN, PART) for path in folder.glob(f"*{ENDING}{ending}")]
+    return sorted([*found, *(path for path in folder.glob(f"*{ENDING}") if not _has_an_end(path))])
+
+
+def _has_an_end(path: Path) -> bool:
+    """Also of one that went away or cannot be opened: there is nothing to recover."""
+    try:
+        with path.open("rb") as file:
+            file.seek(-min(len(LAST_BYTES), path.stat().st_size), os.SEEK_END)
+            return file.read() == LAST_BYTES
+    except OSError:
+        return True
+
+
+def stored_files(folder: Path) -> list[Path]:
+    """All that takes up the logs' room, whatever lies in active/ included; what a person has preserved does not."""
+    junk = {path for path in (folder / ACTIVE).glob("*") if path.is_file()}
+    found = junk.union(unfinished_files(folder), log_files(folder, TOP, DONE))
+    return sorted(found, key=lambda path: path.name)
 
 
 def free_space(folder: Path) -> FreeSpace:
@@ -82,15 +104,21 @@ def free_space(folder: Path) -> FreeSpace:
 
 
 def free_logs(folder: Path, quota_bytes: int, min_free_share: float, most: int = 4) -> Iterator[FreedLog]:
-    """Remove the oldest of done/, one by one, while the logs or the disk hold too much. Raises OSError."""
-    used = sum(_size(path) for path in log_files(folder, ACTIVE, DONE, KEPT))
-    for oldest in log_files(folder, DONE)[:most]:
+    """Remove the oldest finished logs, one by one, while the logs or the disk hold too much. Raises OSError."""
+    used = sum(_size(path) for path in stored_files(folder))
+    for oldest in removable_logs(folder)[:most]:
         too_much = 0 < quota_bytes < used
         if not too_much and free_space(folder).free_share >= min_free_share:
             return
         freed = remove_log(oldest)
         used -= freed.size
         yield freed
+
+
+def removable_logs(folder: Path) -> list[Path]:
+    """The oldest first. The newest finished log is never freed: it tells of what happened last."""
+    unfinished = unfinished_files(folder)
+    return [path for path in log_files(folder, TOP, DONE) if path not in unfinished][:-1]
 
 
 def remove_log(path: Path) -> FreedLog:
@@ -112,18 +140,35 @@ def preserve(path: Path, undo: bool = False) -> Path:
     path = path.absolute()
     if path.parent.name == target:
         return path
-    if path.parent.name != source:
+    at_the_top = not undo and path.suffix == ENDING and (path.parent / DONE).is_dir()
+    if path.parent.name != source and not at_the_top:
         raise ValueError(f"{path}: only a log in {source}/ can be moved to {target}/")
-    moved = path.parent.parent / target / path.name
+    moved = (path.parent if at_the_top else path.parent.parent) / target / path.name
     if not path.exists():
         raise FileNotFoundError(2, "No such file or directory", str(path))
     if moved.exists():
         raise ValueError(f"{moved} exists already")
-    moved.parent.mkdir(exist_ok=True)
+    make_folder(moved.parent)
     path.rename(moved)
     synchronise_folder(moved.parent)
     synchronise_folder(path.parent)
     return moved
+
+
+def make_folder(folder: Path) -> None:
+    """With all above it that are not there, each with the owner of the folder that it lies in. Raises OSError."""
+    if not folder.exists():
+        make_folder(folder.parent)
+        folder.mkdir(exist_ok=True)
+        take_owner(folder)
+
+
+def take_owner(path: Path) -> None:
+    """Of its folder: what a command makes as root must not lock the daemon out."""
+    owner = path.parent.stat()
+    for user, group in ((-1, owner.st_gid), (owner.st_uid, -1)):
+        with suppress(OSError):  # only root may give things away, and not on every disk
+            os.chown(path, user, group)
 
 
 def synchronise_folder(folder: Path) -> None:

@@ -8,7 +8,7 @@ ticks become one numpy array laid over the stored bytes.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
@@ -28,10 +28,15 @@ DAMAGE = (McapError, ValueError, RuntimeError, OverflowError, MemoryError, struc
 
 
 ADVICE = "'mudskipper log recover' keeps what is sound"
+OTHER_VERSION = "the version that wrote it reads it"
 
 
 class LogError(ValueError):
     """A log that cannot be read: one sentence with the file, the place and the reason."""
+
+
+class LayoutError(LogError):
+    """A sound log of another version of this program."""
 
 
 class Log(NamedTuple):
@@ -43,7 +48,14 @@ class Log(NamedTuple):
     complete: bool  # False where the writer was cut off; everything before that is here
 
 
-def read_log(path: Path) -> Log:
+Watch = Callable[[str, int, int], None]  # hears what is done, how far, of how much
+
+
+def unwatched(what: str, done: int, total: int) -> None:
+    """Nobody waits for it."""
+
+
+def read_log(path: Path, watch: Watch = unwatched) -> Log:
     """Raises LogError."""
     contents = _read_contents(path)
     stream, found = BytesIO(contents), _Findings()
@@ -51,7 +63,10 @@ def read_log(path: Path) -> Log:
     try:
         for record in reader.records:
             found.add(record)
+            watch("kB read", stream.tell() // 1000, len(contents) // 1000)
         complete = True
+    except LayoutError as error:
+        raise LayoutError(f"{path}: {error}; {OTHER_VERSION}") from None
     except DAMAGE as error:
         finished = len(contents) > len(MCAP0_MAGIC) and contents.endswith(MCAP0_MAGIC)
         if finished or not _is_cut(error, stream.tell() == len(contents)):
@@ -71,9 +86,9 @@ def read_log(path: Path) -> Log:
     )
 
 
-def read_logs(paths: Sequence[Path]) -> Log:
+def read_logs(paths: Sequence[Path], watch: Watch = unwatched) -> Log:
     """One log, or several segments of one run as one. Raises LogError, also where a segment between them is missing."""
-    logs = [read_log(path) for path in paths]
+    logs = [read_log(path, watch) for path in paths]
     if len(logs) == 1:
         return logs[0]
     if len({log.metadata.get("run_id") for log in logs}) > 1 or "run_id" not in logs[0].metadata:
@@ -84,7 +99,7 @@ def read_logs(paths: Sequence[Path]) -> Log:
         raise LogError(f"{paths[0]}: the segments of its run are not numbered; read each alone") from None
     numbers = [number for number, _ in by_number]
     if numbers != list(range(numbers[0], numbers[0] + len(numbers))):
-        raise LogError(f"{paths[0]}: segments {numbers[0]} to {numbers[-1]} of its run are not all here, each once")
+        raise LogError(f"{paths[0]}: {_why_not_joined(numbers)}")
     ordered = [logs[place] for _, place in by_number]
     return ordered[0]._replace(
         ticks=_in_order(np.frombuffer(b"".join(log.ticks.tobytes() for log in ordered), dtype=tick_type())),
@@ -92,6 +107,14 @@ def read_logs(paths: Sequence[Path]) -> Log:
         events=[event for log in ordered for event in log.events],
         complete=all(log.complete for log in ordered),
     )
+
+
+def _why_not_joined(numbers: list[int]) -> str:
+    missing = sorted(set(range(numbers[0], numbers[-1])) - set(numbers))
+    twice = sorted({number for number in numbers if numbers.count(number) > 1})
+    wrong = [f"{', '.join(map(str, missing[:20]))} missing"] * bool(missing)
+    wrong += [f"{', '.join(map(str, twice[:20]))} given twice"] * bool(twice)
+    return f"segments {numbers[0]} to {numbers[-1]} of its run are not all here, each once: {'; '.join(wrong)}"
 
 
 def _in_order(ticks: NDArray[np.void]) -> NDArray[np.void]:
@@ -134,6 +157,7 @@ class _Findings:
                 self._add_row(record)
             case Chunk():
                 for inner in records_of(open_chunk(record)):
+                    self._require_layout(inner, record)
                     self.add(inner)
             case Schema():
                 self._schemas[record.id] = record
@@ -146,6 +170,11 @@ class _Findings:
             case Statistics():
                 self.messages_promised = record.message_count
 
+    def _require_layout(self, record: Row | Schema | Channel, chunk: Chunk) -> None:
+        """Where a checksum vouches for it, another layout is another version's and no damage."""
+        if chunk.uncompressed_crc and isinstance(record, Channel):
+            require_layout(record, self._schemas.get(record.schema_id))
+
     def _add_row(self, row: Row | Message) -> None:
         if row.channel_id not in self._rows_of_channel:
             raise ValueError(f"a row of channel {row.channel_id}, which was not described")
@@ -156,11 +185,21 @@ class _Findings:
         """Where this channel's rows belong; those of a channel that is not ours are not kept."""
         for kind in ROW_KINDS:
             if kind.topic == channel.topic:
-                schema = self._schemas.get(channel.schema_id)
-                if schema is None or _layout(schema.data.decode()) != _layout(kind.ros_text):
-                    raise ValueError(f"rows of {kind.topic} have another layout than this version's")
+                try:
+                    require_layout(channel, self._schemas.get(channel.schema_id))
+                except LayoutError as error:
+                    raise ValueError(str(error)) from None
                 return self.rows[kind]
         return []
+
+
+def require_layout(channel: Channel, schema: Schema | None) -> None:
+    """Of a topic of ours. Raises LayoutError."""
+    for kind in ROW_KINDS:
+        if kind.topic == channel.topic and (
+            schema is None or _layout(schema.data.decode(errors="replace")) != _layout(kind.ros_text)
+        ):
+            raise LayoutError(f"rows of {kind.topic} have another layout than this version's")
 
 
 def _layout(ros_text: str) -> list[str]:
@@ -217,6 +256,12 @@ def log_summary(log: Log) -> dict[str, str | int | float | bool]:
         "complete": log.complete,
         "recovered": log.metadata.get("recovered") == "true",
     }
+
+
+def segment_of(log: Log) -> int:
+    """Its number in the run, or its first one's; 0 where none is given."""
+    number = log.metadata.get("segment", "")
+    return int(number) if number.isdecimal() else 0
 
 
 def _start_time(log: Log) -> str:

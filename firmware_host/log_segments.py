@@ -22,10 +22,11 @@ from typing import Any
 from firmware_host.log_file import LogFile, Rows
 from firmware_host.log_folder import (
     ACTIVE,
-    DONE,
+    FreedLog,
     finished_path,
     free_logs,
-    log_files,
+    free_space,
+    removable_logs,
     remove_log,
     segment_path,
     unfinished_files,
@@ -54,10 +55,13 @@ class LogSegments:
         self._segment = 0
         self._missing = 0  # rows that the next file has to report
         self._full = False  # the disk was, when it refused
+        self._freeing_helps = True
+        self._freed: list[str] = []  # what the next file has to tell of
         self._latest_stamp_s = 0.0
         self._first_stamp_s: float | None = None  # of the ticks in this file
         self._retry_s = self._freeing_s = 0.0
         self._recovery: subprocess.Popen[bytes] | None = None
+        self._tried: set[Path] = set()  # to recover, once a run: what resists would be tried at every file
         self._open()
 
     def write(self, rows: Rows) -> None:
@@ -100,21 +104,25 @@ class LogSegments:
             self._file = LogFile(self.path, self._opening_of(self._segment))
             self._segment += 1
             self._first_stamp_s = None
-            self._report_missing(self._file)
+            self._report_gap(self._file)
         except OSError as error:
             self._segment += isinstance(error, FileExistsError)
             self._give_up(error)
             return
         self.problem = self._reason = ""
+        self._freeing_helps = True
         self._start_recovery()
 
-    def _report_missing(self, file: LogFile) -> None:
+    def _report_gap(self, file: LogFile) -> None:
+        """What is missing before this file, and what was freed for it."""
+        texts = list(self._freed)
         if self._missing:
-            file.write(
-                [self._event(f"rows missing here: {self._missing}, the log could not be written: {self._reason}")]
-            )
+            texts.append(f"rows missing here: {self._missing}, the log could not be written: {self._reason}")
+        if texts:
+            file.write([self._event(text) for text in texts])
             file.flush()
             self._missing = 0
+            self._freed.clear()
 
     def _opening_of(self, segment: int) -> dict[str, Any]:
         text = self._opening["configuration_text"]
@@ -184,10 +192,14 @@ class LogSegments:
         return not self.problem
 
     def _make_room(self) -> None:
-        """On a disk that was full: the oldest log gives way at once."""
-        if self._full and self._folder is not None:
-            for oldest in log_files(self._folder, DONE)[:1]:
-                remove_log(oldest)
+        """On a disk that was full: the oldest log gives way at once, where logs may be freed, as long as that helps."""
+        may_free = self._parameters.quota_bytes > 0 or self._parameters.min_free_share > 0.0
+        if self._full and self._folder is not None and may_free and self._freeing_helps:
+            for oldest in removable_logs(self._folder)[:1]:
+                before = free_space(self._folder).free_bytes
+                freed = remove_log(oldest)
+                self._freed.append(_told_of(freed))
+                self._freeing_helps = free_space(self._folder).free_bytes > before
         self._full = False
 
     def _free_room(self) -> None:
@@ -197,14 +209,20 @@ class LogSegments:
         quota_bytes, share = self._parameters.quota_bytes, self._parameters.min_free_share
         with suppress(OSError):  # what cannot be freed shows as a disk without room
             for freed in free_logs(self._folder, quota_bytes, share):
-                self._write([self._event(f"room for logs: {freed.name} was freed, {freed.size} bytes")])
+                self._write([self._event(_told_of(freed))])
 
     def _start_recovery(self) -> None:
         """Of what others, or this run before its disk failed, have left: in a process of its own."""
         if self._folder is None or (self._recovery is not None and self._recovery.poll() is None):
             return
-        if all(path == self.path for path in unfinished_files(self._folder)):
+        found = set(unfinished_files(self._folder)) - {self.path}
+        if found <= self._tried:
             return
+        self._tried |= found
         command = [sys.executable, "-P", "-m", "firmware_host.log_recovery", str(self._folder)]
         with suppress(OSError):  # the next start finds them too
             self._recovery = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+
+
+def _told_of(freed: FreedLog) -> str:
+    return f"room for logs: {freed.name} was freed, {freed.size} bytes"

@@ -103,6 +103,7 @@ class Recorder:
         self._pipe, self._reports = self._writer.stdin.fileno(), self._writer.stdout.fileno()
         self._report, self._dropped_by_writer = HEALTHY, 0
         self._calls, self._heard_s = 0, time.monotonic()
+        self.odd_reports = 0  # which were not understood
         os.set_blocking(self._reports, False)
         with suppress(PermissionError):  # beyond the user's limit: the pipe keeps its 64 KiB
             fcntl(self._pipe, F_SETPIPE_SZ, PIPE_BYTES)
@@ -167,8 +168,7 @@ class Recorder:
         if not said:
             self.writer_alive = False
         lines = said.split(b"\n")[:-1]
-        if lines and lines[-1]:
-            self._take(json.loads(lines[-1]))
+        if lines and lines[-1] and self._take(lines[-1]):
             self._heard_s = now_s
         silent_s = now_s - self._heard_s if self.writer_alive else 0.0
         slowest_s = self._report.slowest_write_s
@@ -178,12 +178,18 @@ class Recorder:
             slowest_write_s=max(slowest_s, silent_s) if silent_s > REPORT_OVERDUE_S else slowest_s,
         )
 
-    def _take(self, said: dict[str, Any]) -> None:
-        self.path = Path(said.pop("path"))
-        dropped = said.pop("dropped")
-        self.dropped += dropped - self._dropped_by_writer
-        self._dropped_by_writer = dropped
-        self._report = LogReport(self.writer_alive, self.dropped, **said)
+    def _take(self, line: bytes) -> bool:
+        """Whether it was a report: whatever the writer's program prints must not end the loop."""
+        try:
+            path, report = _decode_report(json.loads(line))
+        except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
+            self.odd_reports += 1
+            return False
+        self.path = path
+        self.dropped += report.dropped - self._dropped_by_writer
+        self._dropped_by_writer = report.dropped
+        self._report = report._replace(alive=self.writer_alive, dropped=self.dropped)
+        return True
 
     def close(self, timeout_s: float) -> bool:
         """End the log; True once it is whole on the disk. A writer that needs longer finishes alone."""
@@ -201,8 +207,23 @@ class Recorder:
         if not self._writer.stdout.closed:
             self._hear()
             self._writer.stdout.close()
+        if self.odd_reports:
+            print(f"The log's writer said {self.odd_reports} things that no report says.", file=sys.stderr, flush=True)
         self.path = present_path(self.path)
         return status == 0
+
+
+def _decode_report(said: dict[str, Any]) -> tuple[Path, LogReport]:
+    """Where the log is, and how; `dropped` is the writer's share of it."""
+    report = LogReport(
+        alive=True,
+        dropped=int(said["dropped"]),
+        problem=str(said["problem"]),
+        free_share=float(said["free_share"]),
+        free_bytes=int(said["free_bytes"]),
+        slowest_write_s=float(said["slowest_write_s"]),
+    )
+    return Path(said["path"]), report
 
 
 def _start_writer(path: Path) -> subprocess.Popen[bytes]:

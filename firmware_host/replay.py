@@ -18,7 +18,7 @@ from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstima
 from estimation.mud_map import MapRow
 from firmware_host.configuration import Configuration, ConfigurationError, parse_configuration
 from firmware_host.lab_csv import LabLog, read_lab_csv
-from firmware_host.log_reader import Log, LogError, read_log, read_logs
+from firmware_host.log_reader import Log, LogError, Watch, read_log, read_logs, segment_of, unwatched
 
 PAPER_CONSTANT_NM_A = 0.083
 WEIGHTLESS = ArmMass(
@@ -27,6 +27,7 @@ WEIGHTLESS = ArmMass(
 LAB_DRIVE = FlipperDrive(WEIGHTLESS, PAPER_CONSTANT_NM_A, PAPER_CONSTANT_NM_A)
 NO_VELOCITY = (nan, nan, nan, nan)
 PHASES = tuple(Phase)
+WATCHED_TICKS = 1000  # between two words on how far it is
 TICK_FIELDS = (
     "stamp_s", "mode", "phase",
     "angle_rad", "velocity_rad_s", "current_a", "body_x_m", "angle_age_s", "current_age_s",
@@ -40,19 +41,25 @@ class Replay:
     strides: list[StrideEstimate]
     flippers: tuple[str, ...]
     map: tuple[MapRow, ...] = ()  # of the mud along the way, where there was a pose
-    complete: bool = True  # False where the writer of the log was cut off
+    complete: bool = True  # False where the writer of the log was cut off, or still writes
+    segment: int = 0  # of the run, where the log begins with a later one
 
 
 def replay_files(
-    paths: Sequence[Path], configuration: Configuration | None = None, method: Method | None = None
+    paths: Sequence[Path],
+    configuration: Configuration | None = None,
+    method: Method | None = None,
+    watch: Watch = unwatched,
 ) -> Replay:
     """One file, or several segments of one run. Raises LogError."""
     if len(paths) == 1:
-        return replay_file(paths[0], configuration, method)
-    return replay_log(paths[0], read_logs(paths), configuration, method)
+        return replay_file(paths[0], configuration, method, watch)
+    return replay_log(paths[0], read_logs(paths, watch), configuration, method, watch)
 
 
-def replay_file(path: Path, configuration: Configuration | None = None, method: Method | None = None) -> Replay:
+def replay_file(
+    path: Path, configuration: Configuration | None = None, method: Method | None = None, watch: Watch = unwatched
+) -> Replay:
     """By the file's name: our MCAP log, or the authors' CSV. Raises LogError.
 
     `method` instead of the configured one.
@@ -60,12 +67,16 @@ def replay_file(path: Path, configuration: Configuration | None = None, method: 
     if path.name.endswith((".csv", ".csv.gz")):
         return replay_lab(read_lab_csv(path), configuration, method)
     if path.suffix == ".mcap":
-        return replay_log(path, read_log(path), configuration, method)
+        return replay_log(path, read_log(path, watch), configuration, method, watch)
     raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
 
 
 def replay_log(
-    path: Path, log: Log, configuration: Configuration | None = None, method: Method | None = None
+    path: Path,
+    log: Log,
+    configuration: Configuration | None = None,
+    method: Method | None = None,
+    watch: Watch = unwatched,
 ) -> Replay:
     """With the configuration that the log carries, unless another one is given."""
     try:
@@ -75,19 +86,22 @@ def replay_log(
     parameters = _by_method(configuration.estimation, method)
     drag_n = configuration.adaptation.body_drag_n
     estimator = MudEstimator(configuration.geometry, configuration.flipper_drives, parameters, drag_n)
-    strides = list(_strides_of_log(estimator, log))
-    return Replay(strides, ("left", "right"), estimator.map.rows(), log.complete)
+    strides = list(_strides_of_log(estimator, log, watch))
+    return Replay(strides, ("left", "right"), estimator.map.rows(), log.complete, segment_of(log))
 
 
 def _by_method(parameters: EstimationParameters, method: Method | None) -> EstimationParameters:
     return replace(parameters, method=method) if method else parameters
 
 
-def _strides_of_log(estimator: MudEstimator, log: Log) -> Iterator[StrideEstimate]:
+def _strides_of_log(estimator: MudEstimator, log: Log, watch: Watch) -> Iterator[StrideEstimate]:
     """Row by row as the loop did it: first the sample, then the change of mode, which begins a walk afresh."""
     ticks = log.ticks
     walking, mode_before = int(Mode.WALKING), -1
-    for now_s, mode, phase, *sample in zip(*(ticks[name].tolist() for name in TICK_FIELDS), strict=True):
+    rows = zip(*(ticks[name].tolist() for name in TICK_FIELDS), strict=True)
+    for number, (now_s, mode, phase, *sample) in enumerate(rows):
+        if number % WATCHED_TICKS == 0:
+            watch("ticks replayed", number, len(ticks))
         reading = estimator.update(now_s, PHASES[phase], *sample)
         yield from reading.strides
         if mode == walking and mode_before != walking:

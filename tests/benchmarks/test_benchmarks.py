@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks import can_fuzz, socket_fuzz
+from benchmarks import can_fuzz, log_kills, socket_fuzz
 from benchmarks.can_fuzz import is_forbidden
 from benchmarks.estimator_cost import fit_rows, measure_fits
 from benchmarks.fit_libraries import FITS
@@ -28,7 +28,7 @@ BENCHMARKS = (
     "tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "socket_fuzz", "estimator_cost",
     "corrupted_logs", "log_kills",
 )  # fmt: skip
-JUDGING = ("socket_fuzz", "can_fuzz", "corrupted_logs")  # end with status 1 where their bar is missed
+JUDGING = ("socket_fuzz", "can_fuzz", "corrupted_logs", "log_kills")  # end with status 1 where their bar is missed
 SUMMARY = {"median", "p99", "max"}
 
 
@@ -160,6 +160,17 @@ def test_log_kills() -> None:
     sums = report["sums"]
     assert (sums["missing_inside"], sums["doubled"], sums["unsound"]) == (0, 0, 0)
     assert sums["segments"] >= 5
+
+
+@pytest.mark.parametrize(("missing_s", "status"), [(0.5, 0), (1.5, 1)])
+def test_log_kills_ends_with_a_status_for_its_bar(
+    missing_s: float, status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    figures = dict.fromkeys(("ticks", "missing_inside", "doubled", "recovered", "segments"), 0)
+    kill: dict[str, Any] = figures | {"victim": "writer", "missing_at_end_s": missing_s, "problems": []}
+    monkeypatch.setattr(log_kills, "kill_many", lambda *_: [kill])
+    assert log_kills.main(["--json"]) == status
+    assert json.loads(capsys.readouterr().out)["reached"] is (status == 0)
 
 
 def test_estimator_cost() -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
 
-from command_line import exit_codes, main
+from command_line import exit_codes, log_care, main
+from command_line.screen import size_text
 from firmware_host.log_file import LogFile
 from firmware_host.log_folder import ACTIVE, DONE, KEPT
 from firmware_host.log_reader import read_log
@@ -40,6 +42,63 @@ def test_the_list_shows_what_is_known(folder: Path, capsys: pytest.CaptureFixtur
     assert 0 < report["free_bytes"] < report["disk_bytes"]
     assert main.main(["log", "list", str(folder)]) == exit_codes.OK
     assert "GB free" in capsys.readouterr().out
+
+
+def test_what_is_not_whole_is_listed_and_counted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    contents = (folder / DONE / "1.mcap").read_bytes()
+    (folder / DONE / "0.mcap").write_bytes(contents[:-100])
+    (folder / "00.mcap").write_bytes(contents)
+    for name in ("3.mcap.broken", "4.mcap.part", "notes.txt"):
+        (folder / ACTIVE / name).write_bytes(bytes(100))
+    assert main.main(["log", "list", str(folder), "--json"]) == exit_codes.OK
+    report = json.loads(capsys.readouterr().out)
+    assert {log["name"]: log["state"] for log in report["logs"]} == {
+        "00.mcap": "whole",
+        "0.mcap": "broken",
+        "1.mcap": "whole",
+        "2.mcap": "unfinished",
+        "3.mcap.broken": "broken",
+        "4.mcap.part": "unfinished",
+        "notes.txt": "no log",
+    }
+    sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
+    assert report["logs_bytes"] == sum(sizes)
+    assert main.main(["log", "list", str(folder)]) == exit_codes.OK
+    assert "remove what resists it" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("size", "text"), [(0, "0.0 MB"), (3_145_728, "3.1 MB"), (2e9, "2.0 GB")])
+def test_sizes_of_small_disks_say_something(size: float, text: str) -> None:
+    assert size_text(size) == text
+
+
+def test_recovery_of_a_folder_passes_over_what_is_being_written(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    living = make_log(folder, "3.mcap")
+    assert main.main(["log", "recover", str(folder)]) == exit_codes.OK
+    printed = capsys.readouterr()
+    assert "2.mcap: recovered" in printed.out and "3.mcap" not in printed.out + printed.err
+    assert main.main(["log", "recover", str(folder)]) == exit_codes.OK
+    assert capsys.readouterr().out == "nothing to recover\n"
+    living.finish()
+
+
+def test_several_logs_are_preserved_whatever_becomes_of_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    make_log(folder, "3.mcap").finish()
+    names = [str(folder / place / name) for place, name in ((ACTIVE, "2.mcap"), (DONE, "1.mcap"), (DONE, "3.mcap"))]
+    assert main.main(["log", "preserve", *names]) == exit_codes.REFUSED
+    assert "only a log in done/" in capsys.readouterr().err
+    assert sorted(path.name for path in (folder / KEPT).iterdir()) == ["1.mcap", "3.mcap"]
+
+
+def test_recovery_that_takes_its_time_says_how_far_it_is(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(log_care, "PATIENCE_S", 1e-9)
+    assert main.main(["log", "recover", str(folder)]) == exit_codes.OK
+    assert "of 1 logs" in capsys.readouterr().err
 
 
 def test_recovery_of_a_folder_says_what_became_of_each(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

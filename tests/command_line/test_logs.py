@@ -7,14 +7,24 @@ import os
 import shlex
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from mcap.reader import make_reader
 
-from command_line import exit_codes
+from command_line import exit_codes, logs, screen
+from command_line.main import main
+from command_line.recorded_walk import read_walk
 from control.controller import WalkOrder
 from control.modes import Mode
 from firmware_host.configuration import Configuration
+from firmware_host.log_folder import ACTIVE, DONE, first_path, log_files
+from firmware_host.log_parameters import ONE_FILE
+from firmware_host.log_reader import read_log
+from firmware_host.log_rows import ROW_KINDS
+from firmware_host.log_segments import LogSegments
 from firmware_host.recorder import Recorder
 from simulation.lockstep import Lockstep
 from simulation.track import paper_track
@@ -80,6 +90,81 @@ def test_a_broken_log_is_a_sentence(tmp_path: Path, contents: bytes) -> None:
         assert ended.returncode == exit_codes.UNHEALTHY
         assert ended.stderr.startswith("mudskipper: ") and "broken.mcap" in ended.stderr
         assert "Traceback" not in ended.stderr
+
+
+def make_segments(walk: Path, folder: Path) -> list[Path]:
+    """The same walk, cut into files of two seconds."""
+    rows = rows_of(walk)
+    parameters = replace(ONE_FILE, segment_s=2.0)
+    opening = {"configuration_text": read_log(walk).configuration_text, "metadata": {"robot": "test", "run_id": "run"}}
+    log = LogSegments(first_path(folder, "run"), opening, parameters)
+    for place in range(0, len(rows), 50):
+        log.write(rows[place : place + 50])
+    assert log.close()
+    return log_files(folder, DONE)
+
+
+def rows_of(path: Path) -> list[tuple[int, bytes]]:
+    topics = [kind.topic for kind in ROW_KINDS]
+    with path.open("rb") as file:
+        messages = make_reader(file).iter_messages(log_time_order=False)
+        return [(topics.index(channel.topic), message.data) for _, channel, message in messages]
+
+
+def test_segments_of_a_run_are_drawn_and_counted_as_one_log(walk: Path, tmp_path: Path) -> None:
+    paths = [str(path) for path in make_segments(walk, tmp_path)]
+    assert len(paths) > 2
+    whole, joined = read_walk(walk), read_walk(Path(paths[0]), 0, [Path(path) for path in paths[1:]])
+    assert np.array_equal(whole.sweep_angle_rad, joined.sweep_angle_rad)
+    assert (repr(joined.strides), joined.cut) == (repr(whole.strides), "")
+    assert run("plot", *paths, "--out", str(tmp_path / "walk.png")).stderr == ""
+    told = json.loads(run("log", "info", *paths, "--json").stdout)
+    assert told["strides"] == 4
+
+
+def test_a_walk_over_a_border_is_told(walk: Path, tmp_path: Path) -> None:
+    paths = make_segments(walk, tmp_path)
+    drawn = run("plot", str(paths[1]), "--out", str(tmp_path / "walk.png")).stderr
+    assert "the walk may have begun before segment 1 and gone on in the next segment; give those files too" in drawn
+    assert "the run's segments before 1 are not given" in run("replay", str(paths[1])).stderr
+    assert "not given" not in run("replay", str(paths[0])).stderr
+
+
+def test_a_picture_of_a_log_that_is_being_written_does_not_stay_beside_it(
+    walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for place in (ACTIVE, "here"):
+        (tmp_path / place).mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    path = tmp_path / ACTIVE / "walk.mcap"
+    path.write_bytes(walk.read_bytes()[:-1000])
+    assert main(["plot", str(path)]) == exit_codes.OK
+    assert (tmp_path / "here" / "walk.png").exists()
+    assert "still being written, or was cut off" in capsys.readouterr().err
+    (tmp_path / DONE).mkdir()
+    assert main(["plot", str(path)]) == exit_codes.OK
+    assert (tmp_path / DONE / "walk.png").exists()
+    assert list((tmp_path / ACTIVE).iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("command", "word"),
+    [
+        (("replay",), "ticks replayed"),
+        (("log", "info"), "kB read"),
+        (("log", "export", "--csv", "--out", "/dev/null"), "rows written"),
+    ],
+)
+def test_a_command_that_takes_its_time_says_how_far_it_is(
+    walk: Path, command: tuple[str, ...], word: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(screen, "SOON_S", 0.0)
+    assert main([*command, str(walk)]) == exit_codes.OK
+    assert word not in capsys.readouterr().err  # it took no time
+    monkeypatch.setattr(logs, "PATIENCE_S", 1e-9)
+    assert main([*command, str(walk)]) == exit_codes.OK
+    assert word in capsys.readouterr().err
 
 
 def test_a_log_that_is_not_there_is_a_sentence(tmp_path: Path) -> None:

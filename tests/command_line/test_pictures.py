@@ -290,7 +290,7 @@ def test_a_place_that_cannot_be_written_is_named(command: str, log: Path, capsys
 
 @pytest.fixture
 def no_strides(monkeypatch: pytest.MonkeyPatch) -> None:
-    def read(path: Path, number: int) -> RecordedWalk:
+    def read(path: Path, number: int, *_: object) -> RecordedWalk:
         return read_walk(path, number)._replace(strides=[])
 
     monkeypatch.setattr(command_line.logs, "read_walk", read)

@@ -9,14 +9,17 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from benchmarks.corrupted_logs import corrupt, make_sound_log, try_log
+from firmware_host import log_salvage
 from firmware_host.log_file import LogFile
 from firmware_host.log_folder import ACTIVE, DONE, unfinished_files
-from firmware_host.log_reader import LogError, read_log
+from firmware_host.log_reader import LayoutError, LogError, read_log
 from firmware_host.log_recovery import recover_all, recover_log
+from firmware_host.log_rows import TICK
 from tests.firmware_host.made_up_rows import OPENING, make_event, make_ticks
 
 CHUNK = 100  # ticks
@@ -132,7 +135,7 @@ def test_what_never_was_a_log_is_told_and_stays(tmp_path: Path) -> None:
     (tmp_path / ACTIVE).mkdir()
     path = tmp_path / ACTIVE / "x.mcap"
     path.write_bytes(b"no log at all" * 1000)
-    with pytest.raises(LogError, match="nothing of a log"):
+    with pytest.raises(LogError, match="nothing of a log can be found in it; remove it"):
         recover_log(path)
     assert path.exists()
 
@@ -172,6 +175,94 @@ def test_rows_written_late_are_read_in_order(tmp_path: Path) -> None:
     log = LogFile(tmp_path / "x.mcap", OPENING)
     log.write([*make_ticks(10, 20), make_event("between"), *make_ticks(0, 10)])
     assert read_log(log.finish()).ticks["tick"].tolist() == list(range(20))
+
+
+def test_a_log_of_the_older_layout_is_recovered_where_it_lies(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    path = path.rename(tmp_path / path.name)
+    recover_all(tmp_path, print)
+    assert read_log(path).complete and unfinished_files(tmp_path) == []
+
+
+def recompress(path: Path, cut_bytes: int = 0, ros_text: str = "", topics: tuple[str, ...] = ("/tick",)) -> Path:
+    """As another program writes it, or with another layout of its rows."""
+    ticks = [payload for _, payload in make_ticks(0, 300)]
+    with path.open("wb") as file:
+        compression = CompressionType.LZ4 if ros_text or len(topics) > 1 else CompressionType.ZSTD
+        writer = Writer(file, compression=compression, chunk_size=10_000)
+        writer.start(profile="ros2", library="another")
+        writer.add_metadata("mudskipper", {"run_id": "run"})
+        schema = writer.register_schema(TICK.schema_name, "ros2msg", (ros_text or TICK.ros_text).encode())
+        channels = [writer.register_channel(topic, "cdr", schema) for topic in topics]
+        for number, payload in enumerate(ticks):
+            for channel in channels:
+                writer.add_message(channel, 0, payload, 0, number)
+        writer.finish()  # type: ignore[no-untyped-call]
+    path.write_bytes(path.read_bytes()[: path.stat().st_size - cut_bytes])
+    return path
+
+
+def test_a_cut_log_that_another_program_compressed_is_left_as_it_is(tmp_path: Path) -> None:
+    path = recompress(tmp_path / "run.mcap", cut_bytes=2000)
+    before, rows = path.read_bytes(), len(read_log(path).ticks)
+    with pytest.raises(LogError, match="left as it is: another program has compressed it"):
+        recover_log(path)
+    assert rows > 100 and path.read_bytes() == before
+
+
+def test_a_log_is_never_replaced_by_one_with_fewer_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = recompress(tmp_path / "run.mcap", cut_bytes=2000)
+    before = path.read_bytes()
+    monkeypatch.setattr(log_salvage, "FOREIGN_SIGNATURE", b"none such")
+    with pytest.raises(LogError, match=r"left as it is: only 0 of the \d+ rows"):
+        recover_log(path)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("cut_bytes", [0, 2000])
+def test_a_log_of_another_version_is_left_as_it_is(tmp_path: Path, cut_bytes: int) -> None:
+    path = recompress(tmp_path / "run.mcap", cut_bytes, ros_text="float64 stamp_s\n")
+    before = path.read_bytes()
+    with pytest.raises(LayoutError, match="left as it is: rows of /tick have another layout"):
+        recover_log(path)
+    assert path.read_bytes() == before
+
+
+def test_rows_of_other_programs_are_counted_as_lost(tmp_path: Path) -> None:
+    path = recompress(tmp_path / "run.mcap", 2000, topics=("/camera", "/tick"))
+    recovered = recover_log(path)
+    assert recovered.rows > 100 and 0 <= recovered.lost - recovered.rows <= 1
+    assert f"{recovered.lost} of other programs left out" in recovered.note
+    log = read_log(path)
+    assert len(log.ticks) == recovered.rows and log.metadata["rows_lost"] == str(recovered.lost)
+
+
+def test_a_finished_log_of_the_same_name_with_fewer_rows_takes_nothing_away(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    other = make_file(tmp_path / "other.mcap", chunks=1).finish()
+    (tmp_path / DONE).mkdir()
+    other = other.rename(tmp_path / DONE / path.name)
+    with pytest.raises(LogError, match="has its name and fewer rows"):
+        recover_log(path)
+    assert path.exists() and len(read_log(other).ticks) == CHUNK
+
+
+def test_a_summary_that_looks_like_a_row_is_none(tmp_path: Path) -> None:
+    path = make_file(tmp_path / "run.mcap").finish()
+    contents = bytearray(path.read_bytes())
+    contents[contents.rfind(b"/tick") - 17] += 1  # a channel's opcode, in the summary: it makes a message of it
+    path.write_bytes(contents)
+    with pytest.raises(LogError, match="damaged"):
+        read_log(path)
+    assert recover_log(path).rows == 5 * CHUNK
+
+
+def test_nothing_is_said_to_be_missing_at_an_end_that_is_there(tmp_path: Path) -> None:
+    path = make_file(tmp_path / "run.mcap").finish()
+    contents = bytearray(path.read_bytes())
+    contents[contents.find(b"\x03\x00\x00\x00lz4") + 200] ^= 0x10
+    path.write_bytes(contents)
+    assert recover_log(path).note == f"recovered: {4 * CHUNK} rows kept, {CHUNK} lost in damaged places"
 
 
 @pytest.mark.parametrize("finished", [True, False])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
+import subprocess
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -11,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from control.modes import Mode
-from firmware_host import log_folder, log_segments
+from firmware_host import log_file, log_folder, log_segments
 from firmware_host.log_folder import ACTIVE, DONE, first_path, log_files, unfinished_files
 from firmware_host.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log_reader import LogError, read_log, read_logs
@@ -68,20 +70,115 @@ def test_segments_of_a_run_are_joined_only_if_they_are_all_there(tmp_path: Path)
     assert log.close()
     first, second, third, fourth = log_files(tmp_path, DONE)
     assert len(read_logs([third, second]).ticks) == len(read_log(second).ticks) + len(read_log(third).ticks)
-    with pytest.raises(LogError, match="not all here"):
-        read_logs([first, third])
-    with pytest.raises(LogError, match="not all here"):
+    with pytest.raises(LogError, match="segments 0 to 3 of its run are not all here, each once: 1, 2 missing"):
+        read_logs([first, fourth])
+    with pytest.raises(LogError, match="3 given twice"):
         read_logs([fourth, fourth])
+
+
+def make_old_logs(folder: Path, count: int = 2) -> list[Path]:
+    paths = [folder / DONE / f"{number}.mcap" for number in range(1, count + 1)]
+    paths[0].parent.mkdir()
+    for path in paths:
+        path.write_bytes(bytes(5000))
+    return paths
+
+
+def fill_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(descriptor: int, piece: bytes) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
+    monkeypatch.setattr(os, "write", full)
+
+
+def test_a_full_disk_frees_nothing_where_nothing_may_be_freed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    old = make_old_logs(tmp_path)
+    log = make_segments(tmp_path, ONE_FILE)
+    with monkeypatch.context() as patch:
+        fill_disk(patch)
+        for number in range(5):
+            log.write(make_ticks(100 * number, 100 * number + 190))
+    assert log.problem and all(path.exists() for path in old)
+
+
+def test_freeing_that_does_not_help_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Somebody else takes what becomes free, or another name keeps the file."""
+    old = make_old_logs(tmp_path, 5)
+    log = make_segments(tmp_path, replace(ONE_FILE, quota_bytes=10**9))
+    monkeypatch.setattr(log_segments, "free_space", lambda folder: log_folder.FreeSpace(0.0, 0))
+    with monkeypatch.context() as patch:
+        fill_disk(patch)
+        for number in range(5):
+            log.write(make_ticks(100 * number, 100 * number + 190))
+    assert [path.exists() for path in old] == [False, True, True, True, True]
+
+
+@pytest.mark.parametrize("removed", [ACTIVE, "."])
+def test_a_log_removed_under_the_writer_is_noticed(
+    tmp_path: Path, removed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
+    monkeypatch.setattr(log_file, "SYNC_INTERVAL_S", 0.0)
+    monkeypatch.setattr(log_file, "FLUSH_INTERVAL_S", 0.0)
+    folder = tmp_path / "logs"
+    log = make_segments(folder, ONE_FILE)
+    log.write(make_ticks(0, 100))
+    shutil.rmtree(folder / removed)
+    log.write(make_ticks(100, 200))
+    assert log.problem.endswith("run-0000.mcap cannot be written: it was removed or moved away.")
+    assert log.dropped == 200
+    log.write(make_ticks(200, 300))
+    assert log.close()
+    (path,) = log_files(folder, DONE)
+    read = read_log(path)
+    assert read.ticks["tick"].tolist() == list(range(200, 300))
+    assert read.events[0]["text"].startswith("rows missing here: 200, ")
+
+
+def test_a_log_moved_away_keeps_its_rows_and_its_place_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
+    log = make_segments(tmp_path, ONE_FILE)
+    monkeypatch.setattr(log_file, "SYNC_INTERVAL_S", 0.0)
+    monkeypatch.setattr(log_file, "FLUSH_INTERVAL_S", 0.0)
+    log.write(make_ticks(0, 100))
+    (tmp_path / ACTIVE / "run-0000.mcap").rename(tmp_path / "elsewhere")
+    (tmp_path / ACTIVE / "run-0000.mcap").write_text("somebody's")
+    log.write(make_ticks(100, 200))
+    assert log.problem and log.dropped == 0
+    log.write(make_ticks(200, 300))
+    assert (tmp_path / ACTIVE / "run-0000.mcap").read_text() == "somebody's"
+    assert len(read_log(tmp_path / "elsewhere").ticks) == 200
+    log.close()
+
+
+def test_what_resists_recovery_is_tried_once_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / ACTIVE).mkdir()
+    (tmp_path / ACTIVE / "junk.mcap").write_text("junk")
+    started: list[list[str]] = []
+
+    class Ended:
+        def __init__(self, command: list[str], **_: object) -> None:
+            started.append(command)
+
+        def poll(self) -> int:
+            return 0
+
+    monkeypatch.setattr(subprocess, "Popen", Ended)
+    log = make_segments(tmp_path)
+    write_ticks(log, 0, 1500)
+    assert log.close()
+    assert len(log_files(tmp_path, DONE)) == 4 and len(started) == 1
 
 
 def test_a_full_disk_frees_the_oldest_log_and_counts_what_it_cost(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    old = tmp_path / DONE / "old.mcap"
-    old.parent.mkdir()
-    old.write_bytes(b"x")
+    old, newest = make_old_logs(tmp_path)
     monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
-    log = make_segments(tmp_path, ONE_FILE)
+    log = make_segments(tmp_path, replace(ONE_FILE, quota_bytes=10**9))
     log.write(make_ticks(0, 10))
     assert log._file is not None
     log._file.flush()
@@ -97,12 +194,15 @@ def test_a_full_disk_frees_the_oldest_log_and_counts_what_it_cost(
     assert log.dropped == 190
     monkeypatch.setattr(os, "write", write)
     log.write(make_ticks(200, 210))
-    assert (log.problem, old.exists()) == ("", False)
+    assert (log.problem, old.exists(), newest.exists()) == ("", False, True)
     assert log.close()
     capsys.readouterr()
     ours = read_log(tmp_path / DONE / "run-0001.mcap")
     assert ours.ticks["tick"].tolist() == list(range(200, 210))
-    assert ours.events[0]["text"] == ("rows missing here: 190, the log could not be written: No space left on device")
+    assert [event["text"] for event in ours.events] == [
+        "room for logs: 1.mcap was freed, 5000 bytes",
+        "rows missing here: 190, the log could not be written: No space left on device",
+    ]
     left = read_log(log_folder.present_path(tmp_path / ACTIVE / "run-0000.mcap"))
     assert left.ticks["tick"].tolist() == list(range(10))  # to the row, not to the chunk
 

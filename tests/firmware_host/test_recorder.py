@@ -343,6 +343,21 @@ def test_a_writer_that_waits_for_its_disk_shows_as_a_slow_write(recorder: Record
     recorder.close(TIMEOUT_S)
 
 
+@pytest.mark.parametrize(
+    "line", [b"a stray line", b"[]", b"{}", b"7", b"\xff", b'{"path": 3, "dropped": "x"}', b"[" * 5000], ids=repr
+)
+def test_what_is_no_report_neither_ends_the_loop_nor_changes_what_is_known(
+    tmp_path: Path, line: bytes, capfd: pytest.CaptureFixture[str]
+) -> None:
+    recorder = Recorder(tmp_path / "run.mcap", "", {})
+    wait_until(lambda: look(recorder).free_bytes < HEALTHY.free_bytes)
+    report = recorder._report
+    assert not recorder._take(line)
+    assert (recorder._report, recorder.odd_reports, recorder.path) == (report, 1, tmp_path / "run.mcap")
+    assert recorder.close(TIMEOUT_S)
+    assert "1 things that no report says" in capfd.readouterr().err
+
+
 @pytest.mark.parametrize("sent", [b"", HEADER.pack(0, 100) + b"{"], ids=["nothing", "half an opening"])
 def test_a_writer_that_hears_nothing_makes_no_file(tmp_path: Path, sent: bytes) -> None:
     path = tmp_path / "run.mcap"
