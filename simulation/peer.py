@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from control.records import JOINTS
@@ -28,7 +29,8 @@ from simulation.world import World, load_world
 
 STEP_S = 0.002  # the period of the drives' fastest messages
 WATCHDOG_S = 0.25  # of the simulated drives, on processors that everything shares
-LONGEST_CATCH_UP_S = 0.5  # a robot that was stopped for longer has lost that time
+LONGEST_CATCH_UP_S = 0.02  # a robot that was held up for longer has lost that time: commands waited meanwhile
+NICENESS = -10  # where it is permitted: a real robot does not wait for its computer
 PR_SET_PDEATHSIG = 1
 
 
@@ -106,7 +108,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
-    os.nice(5)  # the controller comes first
+    with suppress(PermissionError):
+        os.nice(NICENESS)
     peer.run()
     return 0
 

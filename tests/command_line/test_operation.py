@@ -76,6 +76,7 @@ def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log(bench: Any) -> No
     assert "watchdog expired" in report["fault"]["sentence"]
     assert bench.run("arm").returncode == exit_codes.REFUSED
     assert bench.run("clear").returncode == exit_codes.OK
+    bench.wait_until_ready()  # the new daemon has read the watchdogs back
     assert bench.run("arm").stdout == "hold\n"
     first = min(bench.logs.glob("*/*.mcap"), key=lambda path: path.name)
     assert len(read_log(first).ticks) > 0
