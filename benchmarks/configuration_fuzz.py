@@ -162,17 +162,23 @@ def walk(robot: Lockstep) -> str:
         return "not armed"
     if not robot.run_until(lambda: loop.mode is Mode.HOLD, 1.0):
         return "fault in arming"
-    robot.run_for(HOLD_S)
-    if loop.mode is not Mode.HOLD:
+    if not _stays(robot, Mode.HOLD, HOLD_S):
         return "fault in hold"
     if loop.request(Request.WALK, robot.now_s, WalkOrder(loop.configuration.adaptation.initial_depth_m, True)):
         return "held"
-    robot.run_for(WALK_S)
-    return "walked" if loop.mode is Mode.WALKING else "fault in walking"
+    robot.step()
+    return "walked" if _stays(robot, Mode.WALKING, WALK_S) else "fault in walking"
+
+
+def _stays(robot: Lockstep, mode: Mode, duration_s: float) -> bool:
+    robot.run_for(duration_s)
+    return robot.loop.mode is mode
 
 
 def text_of(report: dict[str, Any]) -> str:
-    lines = [f"{kind:15} {count:6} files, {report['accepted'][kind]:6} accepted" for kind, count in report["kinds"].items()]
+    lines = [
+        f"{kind:15} {count:6} files, {report['accepted'][kind]:6} accepted" for kind, count in report["kinds"].items()
+    ]
     lines += [f"{what:18} {count}" for what, count in report["tried"].items()]
     lines.append(f"longest {report['longest_ms']:.0f} ms ({report['longest_kind']}), most {report['most_kib']:.0f} KiB")
     return "\n".join([*lines, *report["first_bugs"], report["verdict"]])

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 from control.bounds import Bounds
-from control.records import JOINTS
 from firmware_host.configuration import Configuration
 from firmware_host.toml_records import ChangesOf
 from simulation import world
@@ -36,7 +35,7 @@ coulomb_nm = 0.01
 cogging_per_turn = 84
 """
 HOSTILE = ("", "\0", "x" * 100_000, "ü" * 200, "../..", "/dev/full", "\x1b[2J", "\n" * 50, "'; --", "root", "nobody")
-OTHER_TYPES = (True, 1, 1.5, "1.0", [], [1, [2]], {}, {"a": {"b": 1}}, "", 10**30)
+OTHER_TYPES: tuple[Any, ...] = (True, 1, 1.5, "1.0", [], [1, [2]], {}, {"a": {"b": 1}}, "", 10**30)
 UNREADABLE = ("9" * 5000, '"' + "9" * 2_000_000 + '"')  # of which no key is known
 HUGE_NUMBERS = ("0x" + "f" * 6000, "9" * 400, "1e999", "-" + "9" * 400, "0o" + "7" * 9000, '"' + "9" * 900_000 + '"')
 
@@ -178,7 +177,9 @@ class OddConfigurations:
 
     # wrong by one value
 
-    def _wrong(self, is_world: bool, wanted: Callable[[Place], bool], make: Callable[[Place], tuple[Any, str]]) -> OddFile:
+    def _wrong(
+        self, is_world: bool, wanted: Callable[[Place], bool], make: Callable[[Place], tuple[Any, str]]
+    ) -> OddFile:
         document, places = self._start(is_world)
         place = self._chance.choice([place for place in places if wanted(place)])
         value, bound = make(place)

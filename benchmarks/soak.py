@@ -1,10 +1,10 @@
 """Whether anything grows in a long operation: an hour in accelerated lockstep, and minutes of the daemon in real time.
 
 A robot is operated by chance, fails by chance, and clients come and go; see soaked_loop.py and soaked_daemon.py. After
-the warm-up (the loop keeps its last 200 strides, Python its free lists, up to bounds of their own) resident memory must
-not grow by more than the bar, no descriptor and no thread may be left behind, the logs stay within quota and the
-file that is being written, and of the files that the quota has left no tick is missing. Nothing traces allocations; what
-cyclic garbage has come together is told by a collection at the end.
+the warm-up (the loop keeps its last 200 strides, Python its free lists, up to bounds of their own) resident memory
+must not grow by more than the bar, no descriptor and no thread may be left behind, the logs stay within quota and the
+file that is being written, and of the files that the quota has left no tick is missing. Nothing traces allocations;
+what cyclic garbage has come together is told by a collection at the end.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from control.bounds import Bounds
 
 LONGEST_SENTENCE = 400  # characters
-LARGEST_FILE_BYTES = 1_000_000  # a thousand times that of a robot
+LARGEST_FILE_BYTES = 1_000_000  # hundreds of times those of a robot or a world
 
 
 class ConfigurationError(Exception):
@@ -74,7 +74,9 @@ def parse_document(text: str) -> dict[str, Any]:
     except RecursionError as problem:
         raise ConfigurationError(["not a TOML file that can be read: it is nested too deep"]) from problem
     except ValueError as problem:
-        raise ConfigurationError(["not a TOML file that can be read: a number or a date is beyond all size"]) from problem
+        raise ConfigurationError(
+            ["not a TOML file that can be read: a number or a date is beyond all size"]
+        ) from problem
 
 
 class RecordReader:
