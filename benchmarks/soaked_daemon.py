@@ -7,7 +7,6 @@ purpose. Memory, descriptors and threads are the kernel's word on the daemon and
 from __future__ import annotations
 
 import signal
-import subprocess
 import time
 from collections import Counter
 from contextlib import suppress
@@ -27,6 +26,7 @@ ASK_S = 0.1  # between two clients
 WISHES = 10  # clients to one that attends
 FAILURE_SHARE = 1.0 / 150.0  # of the clients, so every 15 s
 LONGEST_START_S = 30.0
+PATIENCE_LOOKS = 5  # at a joint out of its range, before somebody moves it by hand
 READINGS = 40
 BUSES = ("left", "right")
 
@@ -50,6 +50,7 @@ class Client:
         self.refused = self.unanswered = 0
         self.report: dict[str, Any] = {}
         self._standing: set[str] = set()
+        self.helpless = 0  # looks in a row at a joint out of its range
 
     def ask(self, call: Call) -> Any:
         self.asked[call.method] += 1
@@ -73,6 +74,7 @@ class Client:
 
     def attend(self) -> None:
         self.look()
+        self.helpless = self.helpless + 1 if "joint_position" in self._standing else 0
         blocked = any(fault["blocks_arming"] for fault in self.report["faults"])
         self.ask(self.attendant.wish(self.report["mode"], blocked))
 
@@ -98,21 +100,44 @@ def wait_until_idle(path: Path) -> None:
     raise RuntimeError("the daemon did not start")
 
 
+class Session:
+    """Owns the processes of robot and daemon."""
+
+    def __init__(self, folder: Path) -> None:
+        self._configuration = write_setup(folder)
+        self._robot = start("simulation.peer", self._configuration)
+        self.daemon = start("firmware_host.daemon", self._configuration)
+        self.robots = 1
+
+    def move_by_hand(self) -> None:
+        """Another robot in place of this one: its joints are where they should be, its drives start anew."""
+        self._robot.kill()
+        self._robot.wait()
+        self._robot = start("simulation.peer", self._configuration)
+        self.robots += 1
+
+    def end(self) -> None:
+        for process in (self.daemon, self._robot):
+            if process.poll() is None:
+                process.kill()
+            process.wait()
+
+
 def soak_daemon(seconds: float, seed: int, folder: Path, progress: Progress) -> dict[str, Any]:
-    configuration = write_setup(folder)
-    processes = [start(module, configuration) for module in ("simulation.peer", "firmware_host.daemon")]
+    session = Session(folder)
     client = Client(folder / "mudskipper.sock", seed)
     try:
         wait_until_idle(folder / "mudskipper.sock")
-        readings = _readings(client, processes[1].pid, seconds, folder / "logs", progress)
+        readings = _readings(client, session, seconds, folder / "logs", progress)
         client.look()
-        processes[1].send_signal(signal.SIGTERM)
-        status = processes[1].wait(LONGEST_START_S)
+        session.daemon.send_signal(signal.SIGTERM)
+        status = session.daemon.wait(LONGEST_START_S)
     finally:
-        _end(processes)
+        session.end()
     rows = rows_of(folder / "logs")
     return {
         "seconds": seconds,
+        "robots": session.robots,
         "strides": client.report["strides_closed"],
         "loop": client.report["loop"],
         "asked": dict(client.asked),
@@ -126,19 +151,18 @@ def soak_daemon(seconds: float, seed: int, folder: Path, progress: Progress) -> 
     } | rows
 
 
-def _end(processes: list[subprocess.Popen[bytes]]) -> None:
-    for process in processes:
-        if process.poll() is None:
-            process.kill()
-        process.wait()
-
-
-def _readings(client: Client, daemon: int, seconds: float, logs: Path, progress: Progress) -> list[dict[str, float]]:
+def _readings(
+    client: Client, session: Session, seconds: float, logs: Path, progress: Progress
+) -> list[dict[str, float]]:
     readings: list[dict[str, float]] = []
+    daemon = session.daemon.pid
     begin_s, number = time.monotonic(), 0
     while (at_s := time.monotonic() - begin_s) < seconds:
         client.step(number)
         number += 1
+        if client.helpless >= PATIENCE_LOOKS:
+            session.move_by_hand()
+            client.helpless = 0
         if at_s >= seconds * len(readings) / READINGS:
             time.sleep(ASK_S)  # for the last client to be let go
             progress.show(at_s, "in real time")

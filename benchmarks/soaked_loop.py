@@ -44,6 +44,7 @@ from simulation.track import RandomStrength, Track
 
 LOG = LogParameters(segment_bytes=8_000_000, quota_bytes=40_000_000, min_free_share=0.0, rest_hz=0.0)
 WISH_TICKS = 190  # between two wishes of the attendant
+BY_HAND_TICKS = 1900  # between two looks for joints out of their range
 FAILURE_S = 15.0  # between two failures, on average
 SEGMENTS, SEGMENT_M = 100, 3.0
 PATIENCE_TICKS = 200  # of a client that waits for an answer
@@ -122,14 +123,22 @@ class SoakedLoop:
         self.asked: Counter[str] = Counter()
         self.faults: Counter[str] = Counter()
         self.mode_ticks: Counter[str] = Counter()
-        self.ticks = self.visits = self.refused = 0
+        self.ticks = self.visits = self.refused = self.moved_by_hand = 0
 
     def _now_s(self) -> float:
         return self.robot.now_s
 
     def _track(self) -> Track:
         waters = [self.chance.uniform(DRIEST_PERCENT + 1.0, WETTEST_PERCENT - 1.0) for _ in range(SEGMENTS)]
-        return Track([(SEGMENT_M, clay_of_water(water)) for water in waters], random_strength=RandomStrength(0.2))
+        track = Track([(SEGMENT_M, clay_of_water(water)) for water in waters], random_strength=RandomStrength(0.2))
+        track.clay_at(SEGMENTS * SEGMENT_M)  # drawn as far as this, so that it does not grow on the way
+        return track
+
+    def _move_by_hand(self) -> None:
+        """Joints that a fault has thrown out of their range."""
+        for arm in self.robot.robot.plant.arms:
+            arm.reset()
+        self.moved_by_hand += 1
 
     def run_for(self, seconds: float) -> None:
         for _ in range(round(seconds * RATE_HZ)):
@@ -144,6 +153,8 @@ class SoakedLoop:
         for fault in loop.faults.begun:
             self.faults[fault.name] += 1
         self.visitors = [visitor for visitor in self.visitors if not self._is_gone(visitor)]
+        if self.ticks % BY_HAND_TICKS == 0 and any(fault.name == "joint_position" for fault in loop.faults.standing):
+            self._move_by_hand()
         if self.ticks % WISH_TICKS == 0:
             self._visit(self.attendant.wish(loop.mode.name.lower(), bool(loop.faults.blocking())))
         if self.chance.random() < 1.0 / (FAILURE_S * RATE_HZ):
@@ -189,6 +200,7 @@ def soak_loop(seconds: float, seed: int, folder: Path, progress: Progress) -> di
         "walking_s": walked_s,
         "strides": soaked.robot.loop.learning.strides_closed,
         "walked_m": round(soaked.robot.robot.plant.body_m, 2),
+        "moved_by_hand": soaked.moved_by_hand,
         "visits": soaked.visits,
         "asked": dict(soaked.asked),
         "refused": soaked.refused,
