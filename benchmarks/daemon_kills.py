@@ -36,7 +36,7 @@ TOLERANCE_S = 0.01  # between the kill and the robot's reading of what was sent 
 WINDOW_S = 4.0 * WATCHDOG_S  # of listening
 PHASES = ("insertion", "stance", "extraction", "swing", "hold")
 SIGNALS = (signal.SIGKILL, signal.SIGSTOP)
-LONGEST_WAIT_S = 30.0
+LONGEST_WAIT_S = 60.0
 ATTEMPTS = 5  # at a walk, which a busy machine may spoil
 
 

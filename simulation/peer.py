@@ -69,11 +69,16 @@ class Peer:
 
     def run(self) -> None:
         while not self.ended:
-            now_s = self.ticker.wait().now_s
-            if now_s - self.robot.now_s > LONGEST_CATCH_UP_S:
-                self.robot.now_s = now_s
-            self.robot.advance(now_s)
-            self._pose.step(now_s, self.robot.plant)
+            self.step(self.ticker.wait().now_s)
+        self.close()
+
+    def step(self, now_s: float) -> None:
+        if now_s - self.robot.now_s > LONGEST_CATCH_UP_S:
+            self.robot.now_s = now_s
+        self.robot.advance(now_s)
+        self._pose.step(now_s, self.robot.plant)
+
+    def close(self) -> None:
         for port in self._ports.values():
             port.close()
 

@@ -21,7 +21,7 @@ from benchmarks.tick_time import STAGES, VARIANTS
 from drivers.frames import Frame
 
 ROOT = Path(__file__).parent.parent.parent
-TIMEOUT_S = 60.0
+TIMEOUT_S = 240.0  # on a machine that others keep busy
 ALWAYS = {"benchmark", "reached", "verdict"}
 BENCHMARKS = (
     "tick_time", "loop_jitter", "lockstep_speed", "soak", "daemon_kills", "configuration_fuzz", "socket_fuzz",
