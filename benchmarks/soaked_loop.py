@@ -48,7 +48,7 @@ BY_HAND_TICKS = 1900  # between two looks for joints out of their range
 FAILURE_S = 15.0  # between two failures, on average
 SEGMENTS, SEGMENT_M = 100, 3.0
 PATIENCE_TICKS = 200  # of a client that waits for an answer
-READINGS = 60
+READINGS = 30
 ROOM_MS = 20_000  # that the writer may take to empty its pipe
 
 

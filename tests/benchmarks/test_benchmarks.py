@@ -135,11 +135,11 @@ def test_daemon_kills() -> None:
 
 
 def test_configuration_fuzz() -> None:
-    report = report_of("configuration_fuzz", "--configurations", "250")
+    report = report_of("configuration_fuzz", "--configurations", "150")
     assert report["first_bugs"] == []
-    assert sum(report["kinds"].values()) == report["configurations"] == 250
+    assert sum(report["kinds"].values()) == report["configurations"] == 150
     assert 0.2 < report["accepted_share"] < 0.6
-    assert report["tried"]["walked"] > 3
+    assert report["tried"]["walked"] > 1
 
 
 def test_socket_fuzz() -> None:

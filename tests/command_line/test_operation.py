@@ -72,9 +72,19 @@ def kill_daemon(bench: Any) -> None:
     bench.daemon = bench.start("firmware_host.daemon")
 
 
+def start_walking(bench: Any) -> None:
+    """A machine that others keep busy may spoil a start, of which nothing is claimed here."""
+    for _ in range(3):
+        bench.run("clear")
+        bench.wait_until_ready()
+        bench.run("arm")
+        if bench.run("walk").stdout == "walking\n":
+            return
+    raise AssertionError("it does not walk")
+
+
 def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log(bench: Any) -> None:
-    bench.run("arm")
-    bench.run("walk")
+    start_walking(bench)
     kill_daemon(bench)
     report = bench.wait_for(lambda report: report["mode"] == "idle")
     assert not any(drive["closed_loop"] for drive in report["drives"])
