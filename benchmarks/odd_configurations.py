@@ -10,16 +10,14 @@ from __future__ import annotations
 import json
 import random
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from copy import deepcopy
-from dataclasses import MISSING, fields, is_dataclass
 from math import exp, inf, log, nan
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple
 
-from control.bounds import Bounds
+from benchmarks.record_places import Place, fields_of
 from firmware_host.configuration import Configuration
-from firmware_host.toml_records import ChangesOf
 from simulation import world
 from simulation.local_setup import configuration_text
 
@@ -46,53 +44,6 @@ class OddFile(NamedTuple):
     data: bytes
     wrong_key: str = ""  # that a refusal must name; empty: none, or nobody knows
     bound: str = ""  # that it must name as well
-
-
-class Place(NamedTuple):
-    """One value that a file may hold."""
-
-    path: tuple[str | int, ...]
-    kind: type
-    bounds: Bounds | None
-    default: Any
-
-    @property
-    def key(self) -> str:
-        """As a refusal tells it."""
-        return "".join(f" {part + 1}" if isinstance(part, int) else f".{part}" for part in self.path)[1:]
-
-
-def places_of(hint: Any, document: Any, default: Any, path: tuple[str | int, ...]) -> Iterator[Place]:
-    """All values under an annotation; of tables with free names, and of arrays, those that the document has."""
-    extras = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
-    changes = next((extra for extra in extras if isinstance(extra, ChangesOf)), None)
-    if changes:
-        yield from _fields_of(changes.record, document, None, path, changes.without)
-    elif extras and isinstance(extras[0], Bounds):
-        kinds = [kind for kind in (get_args(get_args(hint)[0]) or get_args(hint)) if kind in (int, float)]
-        yield Place(path, kinds[0], extras[0], default)
-    elif is_dataclass(hint) and isinstance(hint, type):
-        yield from _fields_of(hint, document, default, path)
-    elif get_origin(hint) is Literal or hint in (str, bool):
-        yield Place(path, hint if hint is bool else str, None, default)
-    elif get_origin(hint) is dict and is_dataclass(get_args(hint)[1]):
-        for name in document or {}:
-            yield from places_of(get_args(hint)[1], document[name], None, (*path, name))
-    elif get_origin(hint) is list:
-        for number in range(len(document or [])):
-            yield from places_of(get_args(hint)[0], document[number], None, (*path, number))
-
-
-def _fields_of(
-    record: Any, document: Any, default: Any, path: tuple[str | int, ...], without: Any = ("text",)
-) -> Iterator[Place]:
-    hints = get_type_hints(record, include_extras=True)
-    for item in fields(record):
-        if item.name not in without:
-            inner = (document or {}).get(item.name)
-            usual = None if item.default is MISSING else item.default
-            usual = getattr(default, item.name, usual) if inner is None else inner
-            yield from places_of(hints[item.name], inner, usual, (*path, item.name))
 
 
 class OddConfigurations:
@@ -136,7 +87,7 @@ class OddConfigurations:
         if "protocol" in gait:
             gait["protocol"] = self._chance.choice(("walking", "single_flipper"))
         record: Any = world.WorldText if is_world else Configuration
-        return deepcopy(document), list(_fields_of(record, document, None, ()))
+        return deepcopy(document), list(fields_of(record, document, None, ()))
 
     # valid field by field
 
