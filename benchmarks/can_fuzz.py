@@ -18,8 +18,8 @@ from time import perf_counter
 from typing import Any
 
 from benchmarks.example_robot import load_example
-from benchmarks.memory_growth import resident_kib
 from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.resources import resident_kib
 from command_line.screen import table
 from control.modes import Mode
 from control.records import JOINTS

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.resources import children_of
 from firmware_host.log_folder import ACTIVE, DONE, log_files, unfinished_files
 from firmware_host.log_reader import Log, read_log
 from firmware_host.log_recovery import recover_all
@@ -57,11 +58,6 @@ def wait_for_log(folder: Path, known: set[str]) -> None:
                 return
         time.sleep(0.02)
     raise RuntimeError("the daemon did not start")
-
-
-def children_of(parent: int) -> list[int]:
-    text = Path(f"/proc/{parent}/task/{parent}/children").read_text(encoding="ascii")
-    return [int(number) for number in text.split()]
 
 
 def kill(victim: str, daemon: subprocess.Popen[bytes]) -> float:

@@ -24,9 +24,9 @@ from typing import Any
 import msgpack
 
 from benchmarks.example_robot import load_example
-from benchmarks.memory_growth import resident_kib
 from benchmarks.odd_streams import OddStreams, Stream
 from benchmarks.report import Progress, new_parser, print_report, summary_us, verdict
+from benchmarks.resources import resident_kib
 from firmware_host.lease import Lease
 from firmware_host.operator_calls import OperatorCalls
 from firmware_host.realtime import freeze_garbage

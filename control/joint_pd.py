@@ -31,8 +31,8 @@ class ArmMass:
 
     arm_mass_kg: Annotated[float, Bounds(0.0, 20.0)] = 0.08
     center_of_mass_m: Annotated[float, Bounds(0.0, 1.0)] = 0.06  # from the axes, along the arm
-    sweep_inertia_kg_m2: Annotated[float, Bounds(0.0, 1.0)] = 0.0004  # arm and plate of PLA, rotor of a 60 mm motor
-    adduction_inertia_kg_m2: Annotated[float, Bounds(0.0, 1.0)] = 0.0006  # the same, and the sweep motor at the axis
+    sweep_inertia_kg_m2: Annotated[float, Bounds(1e-5, 1.0)] = 0.0004  # arm and plate of PLA, rotor of a 60 mm motor
+    adduction_inertia_kg_m2: Annotated[float, Bounds(1e-5, 1.0)] = 0.0006  # the same, and the sweep motor at the axis
 
     def gravity_torques_nm(self, sweep_rad: float, adduction_rad: float) -> tuple[float, float]:
         """What gravity does to (sweep, adduction): -∂/∂q of m g r cos α sin β."""

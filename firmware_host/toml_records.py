@@ -17,13 +17,30 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from control.bounds import Bounds
 
+LONGEST_SENTENCE = 400  # characters
+LARGEST_FILE_BYTES = 1_000_000  # hundreds of times those of a robot or a world
+
 
 class ConfigurationError(Exception):
-    """Everything that is wrong with a file, one sentence each, naming key, value and bound."""
+    """Everything that is wrong with a file, one sentence each, naming key, value and bound.
+
+    Keys and values may be of any length and of any characters: what a terminal would obey is escaped, and of a long
+    sentence the middle is left out, since its key stands at the beginning and its bound at the end.
+    """
 
     def __init__(self, problems: list[str]) -> None:
-        super().__init__("\n".join(problems))
-        self.problems = problems
+        self.problems = [_readable(problem) for problem in problems]
+        super().__init__("\n".join(self.problems))
+
+
+def _readable(sentence: str) -> str:
+    if len(sentence) > LONGEST_SENTENCE:
+        sentence = f"{sentence[: LONGEST_SENTENCE // 2]} [...] {sentence[-LONGEST_SENTENCE // 2 :]}"
+    return sentence if sentence.isprintable() else "".join(map(_printable, sentence))
+
+
+def _printable(character: str) -> str:
+    return character if character.isprintable() else repr(character)[1:-1]
 
 
 @dataclass(frozen=True)
@@ -37,7 +54,11 @@ class ChangesOf:
 def read_text(path: Path) -> str:
     """Raises ConfigurationError."""
     try:
-        return path.read_text(encoding="utf-8-sig")
+        with path.open("rb") as file:
+            data = file.read(LARGEST_FILE_BYTES + 1)
+        if len(data) > LARGEST_FILE_BYTES:
+            raise ConfigurationError([f"{path}: must have at most {LARGEST_FILE_BYTES} bytes"])
+        return data.decode("utf-8-sig")
     except OSError as problem:
         raise ConfigurationError([f"{path}: {problem.strerror}"]) from problem
     except UnicodeDecodeError as problem:
@@ -48,8 +69,14 @@ def parse_document(text: str) -> dict[str, Any]:
     """Raises ConfigurationError."""
     try:
         return tomllib.loads(text)
-    except (ValueError, RecursionError) as problem:  # of which tomllib's own error is one
+    except tomllib.TOMLDecodeError as problem:
         raise ConfigurationError([f"not a TOML file: {problem}"]) from problem
+    except RecursionError as problem:
+        raise ConfigurationError(["not a TOML file that can be read: it is nested too deep"]) from problem
+    except ValueError as problem:
+        raise ConfigurationError(
+            ["not a TOML file that can be read: a number or a date is beyond all size"]
+        ) from problem
 
 
 class RecordReader:
@@ -152,9 +179,17 @@ def _key(location: tuple[str | int, ...]) -> str:
     return key
 
 
+def shown(value: Any) -> str:
+    """A value of the file, whatever it is."""
+    try:
+        return repr(value)
+    except (ValueError, RecursionError):  # a whole number of thousands of digits, tables within tables
+        return "beyond all size"
+
+
 def _sentence(error: Any) -> str:
     """`limits.torque_nm = 9.0: must be at most 5.0`."""
-    key = _key(error["loc"])
+    key, value = _key(error["loc"]), shown(error["input"])
     bounds = error.get("ctx", {})
     match error["type"]:
         case "extra_forbidden":
@@ -162,10 +197,10 @@ def _sentence(error: Any) -> str:
         case "missing":
             return f"{key} is missing"
         case "greater_than_equal":
-            return f"{key} = {error['input']}: must be at least {bounds['ge']}"
+            return f"{key} = {value}: must be at least {bounds['ge']}"
         case "less_than_equal":
-            return f"{key} = {error['input']}: must be at most {bounds['le']}"
+            return f"{key} = {value}: must be at most {bounds['le']}"
         case "list_type":
-            return f"{key} = {error['input']!r}: must be tables, each under [[{key}]]"
+            return f"{key} = {value}: must be tables, each under [[{key}]]"
         case _:
-            return f"{key} = {error['input']!r}: {error['msg'].removeprefix('Input ').lower()}"
+            return f"{key} = {value}: {error['msg'].removeprefix('Input ').lower()}"

@@ -13,6 +13,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from control.records import JOINTS
@@ -29,7 +30,8 @@ from simulation.world import World, load_world
 
 STEP_S = 0.002  # the period of the drives' fastest messages
 WATCHDOG_S = 0.25  # of the simulated drives, on processors that everything shares
-LONGEST_CATCH_UP_S = 0.5  # a robot that was stopped for longer has lost that time
+LONGEST_CATCH_UP_S = 0.02  # a robot that was held up for longer has lost that time: commands waited meanwhile
+NICENESS = -10  # where it is permitted: a real robot does not wait for its computer
 PR_SET_PDEATHSIG = 1
 
 
@@ -68,11 +70,16 @@ class Peer:
 
     def run(self) -> None:
         while not self.ended:
-            now_s = self.ticker.wait().now_s
-            if now_s - self.robot.now_s > LONGEST_CATCH_UP_S:
-                self.robot.now_s = now_s
-            self.robot.advance(now_s)
-            self._pose.step(now_s, self.robot.plant)
+            self.step(self.ticker.wait().now_s)
+        self.close()
+
+    def step(self, now_s: float) -> None:
+        if now_s - self.robot.now_s > LONGEST_CATCH_UP_S:
+            self.robot.now_s = now_s
+        self.robot.advance(now_s)
+        self._pose.step(now_s, self.robot.plant)
+
+    def close(self) -> None:
         for port in self._ports.values():
             port.close()
 
@@ -108,7 +115,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.lend_hand())
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
-    os.nice(5)  # the controller comes first
+    with suppress(PermissionError):
+        os.nice(NICENESS)
     peer.run()
     return 0
 

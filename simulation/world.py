@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 from control.bounds import Bounds
 from firmware_host.configuration import Configuration
-from firmware_host.toml_records import ChangesOf, ConfigurationError, RecordReader, parse_document, read_text
+from firmware_host.toml_records import ChangesOf, ConfigurationError, RecordReader, parse_document, read_text, shown
 from simulation.clay import DRIEST_PERCENT, WETTEST_PERCENT, Clay, Layer, clay_of_water
 from simulation.disturbances import DRIVE_FIELDS, NONE, Disturbances, drive_changes
 from simulation.lockstep import drives_of, plant_of
@@ -125,7 +125,10 @@ def _tables(table: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
 def _number(table: Mapping[str, Any], key: str) -> float:
     """NaN, with which no comparison is true, where there is none."""
     value = table.get(key)
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else nan
+    try:
+        return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else nan
+    except OverflowError:  # a whole number beyond all floats
+        return nan
 
 
 def _border_problems(segments: list[dict[str, Any]]) -> Iterator[str]:
@@ -143,8 +146,8 @@ def _border_problems(segments: list[dict[str, Any]]) -> Iterator[str]:
 def _mud_problems(key: str, segment: dict[str, Any]) -> Iterator[str]:
     if "water_percent" in segment and "strength_pa" in segment:
         yield (
-            f"{key}.water_percent = {segment['water_percent']}: must not stand beside"
-            f" strength_pa = {segment['strength_pa']}; one of them is enough"
+            f"{key}.water_percent = {shown(segment['water_percent'])}: must not stand beside"
+            f" strength_pa = {shown(segment['strength_pa'])}; one of them is enough"
         )
     if "water_percent" not in segment and "strength_pa" not in segment:
         yield f"{key}: water_percent or strength_pa is missing"
@@ -197,4 +200,4 @@ def _drive_problems(document: Mapping[str, Any]) -> Iterator[str]:
         if _number(disturbances, source) > 0.0:
             for name in drives.keys() & set(names):
                 told = f"disturbances.{source} = {disturbances[source]}"
-                yield f"drives.{name} = {drives[name]}: must not stand beside {told}"
+                yield f"drives.{name} = {shown(drives[name])}: must not stand beside {told}"

@@ -42,7 +42,7 @@ class Bench:
         command = [sys.executable, "-m", "command_line.main", *arguments]
         return subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment, check=False)
 
-    def wait_for(self, done: Callable[[dict[str, Any]], bool], longest_s: float = 15.0) -> dict[str, Any]:
+    def wait_for(self, done: Callable[[dict[str, Any]], bool], longest_s: float = 60.0) -> dict[str, Any]:
         deadline_s = time.monotonic() + longest_s
         report: dict[str, Any] = {}
         while time.monotonic() < deadline_s:

@@ -15,6 +15,7 @@ import msgpack
 import pytest
 
 from command_line import exit_codes, main
+from control.modes import Mode
 from firmware_host.configuration import EXIT_CONFIGURATION, StatusParameters
 from firmware_host.log_reader import read_log
 from firmware_host.replay import replay_file
@@ -62,23 +63,47 @@ def test_sigterm_in_a_walk_finishes_safely(bench: Any) -> None:
     assert not bench.socket.exists()
 
 
-def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log(bench: Any) -> None:
-    bench.run("arm")
-    bench.run("walk")
-    bench.wait_for(lambda report: report["phase"] == "insertion")  # the mud holds what still pushes for a moment
+def kill_daemon(bench: Any) -> None:
+    """And start another one, once only the drives can have acted."""
     bench.daemon.kill()
     bench.daemon.wait(5)
     bench.daemon.stderr.close()
-    time.sleep(2.0 * WATCHDOG_S)  # only the drives can act now
+    time.sleep(2.0 * WATCHDOG_S)
     bench.daemon = bench.start("firmware_host.daemon")
+
+
+def start_walking(bench: Any) -> None:
+    """A machine that others keep busy may spoil a start, of which nothing is claimed here."""
+    for _ in range(3):
+        bench.run("clear")
+        bench.wait_until_ready()
+        bench.run("arm")
+        if bench.run("walk").stdout == "walking\n":
+            return
+    raise AssertionError("it does not walk")
+
+
+def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log(bench: Any) -> None:
+    start_walking(bench)
+    kill_daemon(bench)
     report = bench.wait_for(lambda report: report["mode"] == "idle")
     assert not any(drive["closed_loop"] for drive in report["drives"])
+    assert {drive["errors"] for drive in report["drives"]} == {"watchdog expired"}
     assert "watchdog expired" in report["fault"]["sentence"]
     assert bench.run("arm").returncode == exit_codes.REFUSED
-    assert bench.run("clear").returncode == exit_codes.OK
-    assert bench.run("arm").stdout == "hold\n"
     first = min(bench.logs.glob("*/*.mcap"), key=lambda path: path.name)
-    assert len(read_log(first).ticks) > 0
+    log = read_log(first)
+    assert Mode.WALKING in log.ticks["mode"]
+
+
+def test_after_a_kill_a_person_clears_and_arms_again(bench: Any) -> None:
+    """In hold: amid a stride the last torque may push a joint out of its range, from where it is moved by hand."""
+    bench.run("arm")
+    kill_daemon(bench)
+    bench.wait_for(lambda report: report["mode"] == "idle")
+    assert bench.run("clear").returncode == exit_codes.OK
+    bench.wait_until_ready()  # the new daemon has read the drives' settings
+    assert bench.run("arm").stdout == "hold\n"
 
 
 def test_a_robot_that_vanishes_is_a_fault_with_a_sentence(bench: Any) -> None:

@@ -176,6 +176,11 @@ def test_a_motor_force_beyond_the_torque_limit_is_refused(example_text: str) -> 
     ]
 
 
+def test_a_joint_without_inertia_is_refused(example_text: str) -> None:
+    text = example_text.replace("[arm]", "[arm]\nsweep_inertia_kg_m2 = 0.0")
+    assert problems_of(text) == ["arm.sweep_inertia_kg_m2 = 0.0: must be at least 1e-05"]
+
+
 def test_a_current_limit_below_the_torque_limit_is_refused(example_text: str) -> None:
     text = example_text.replace("node_id = 0", "node_id = 0\ncurrent_limit_a = 5.0")
     assert problems_of(text) == [

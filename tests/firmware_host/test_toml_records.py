@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Any
 
 import pytest
 
 from control.bounds import Bounds
-from firmware_host.toml_records import ChangesOf, ConfigurationError, RecordReader, parse_document
+from firmware_host.toml_records import (
+    LARGEST_FILE_BYTES,
+    ChangesOf,
+    ConfigurationError,
+    RecordReader,
+    parse_document,
+    read_text,
+)
 
 
 @dataclass(frozen=True)
@@ -90,3 +98,44 @@ def test_each_problem_is_told_with_key_value_and_bound(text: str, told: str) -> 
 
 def test_a_right_document_has_no_problems() -> None:
     assert READER.problems(parse_document("[[rail]]\nheight_m = 1.0\n")) == []
+
+
+def test_a_number_of_thousands_of_digits_is_refused_by_its_key() -> None:
+    """Python reads it in hexadecimal, but does not print it."""
+    document = parse_document(f"rail = []\n[beam.left]\nlength_m = 1.0\nnails = 0x{'f' * 6000}\n")
+    (told,) = READER.problems(document)
+    assert told.startswith("beam.left.nails = beyond all size: ")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (f"note = {'9' * 5000}", "not a TOML file that can be read: a number or a date is beyond all size"),
+        (f"note = {'[' * 20_000}", "not a TOML file that can be read: it is nested too deep"),
+        ("note = ", "not a TOML file: Invalid value (at end of document)"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_refused_in_a_sentence(text: str, told: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        parse_document(text)
+    assert caught.value.problems == [told]
+
+
+def test_of_a_long_sentence_the_key_and_the_bound_are_kept() -> None:
+    (told,) = READER.problems(parse_document(f"rail = '{'x' * 100_000}'"))
+    assert len(told) < 500
+    assert told.startswith("rail = 'xxx") and told.endswith("must be tables, each under [[rail]]")
+
+
+def test_a_terminal_obeys_nothing_of_a_sentence() -> None:
+    (told,) = READER.problems(parse_document('rail = []\n"\\u001b[2J\\n" = 1'))
+    assert told == "\\x1b[2J\\n: there is no such key"
+
+
+def test_a_file_beyond_all_size_is_refused_unread(tmp_path: Path) -> None:
+    path = tmp_path / "large.toml"
+    path.write_bytes(b"#" * LARGEST_FILE_BYTES)
+    assert len(read_text(path)) == LARGEST_FILE_BYTES
+    path.write_bytes(b"#" * (LARGEST_FILE_BYTES + 1))
+    with pytest.raises(ConfigurationError, match="must have at most 1000000 bytes"):
+        read_text(path)

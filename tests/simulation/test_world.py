@@ -272,3 +272,8 @@ def test_a_lockstep_lives_in_a_world(configuration: Configuration) -> None:
 def test_a_world_of_a_track_alone_changes_nothing() -> None:
     track = parse_world(SHORTEST).track
     assert World(track) == World(track, NONE, {}, {})
+
+
+def test_a_whole_number_beyond_all_floats_is_refused_by_its_key() -> None:
+    told = problems_of(SHORTEST + SECOND.replace("1.0", "1" + "0" * 400))
+    assert [problem.split(" = ")[0] for problem in told] == ["segment 2.end_m"]
