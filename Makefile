@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-.PHONY: help setup demo test lint clean
+.PHONY: help setup demo test test-vm lint clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -17,13 +17,17 @@ demo: .venv/setup  ## a simulated robot walks over three muds, in real time
 test: .venv/test  ## every test, without network
 	$(BIN)/python -m pytest -q $(ARGS)
 
+test-vm: .venv/test  ## the daemon under systemd on a real kernel, in a virtual machine
+	@$(BIN)/python -m virtual_machine.installed_robot
+	$(BIN)/python -m pytest -v virtual_machine $(ARGS)
+
 lint: .venv/test  ## ruff and mypy --strict
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
 
 clean:  ## remove the environment and what was built
-	rm -rf .venv build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .virtual_machine build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 .venv/setup: pyproject.toml
 	@echo "Installing into .venv (a minute or two) ..."
