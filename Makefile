@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-.PHONY: help setup demo test test-vm lint clean
+.PHONY: help setup demo test test-vm mutants lint clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -20,6 +20,9 @@ test: .venv/test  ## every test, without network
 test-vm: .venv/test  ## the daemon under systemd on a real kernel, in a virtual machine
 	@$(BIN)/python -m virtual_machine.installed_robot
 	$(BIN)/python -m pytest -v virtual_machine $(ARGS)
+
+mutants: .venv/test  ## change the transmit gate in 204 places; its tests must notice each
+	$(BIN)/python -m tests.drivers.gate_mutants
 
 lint: .venv/test  ## ruff and mypy --strict
 	$(BIN)/ruff check .

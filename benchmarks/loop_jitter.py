@@ -104,14 +104,14 @@ class DaemonLoop:
     """The daemon's parts and its loop's body; what it opens is closed with `stack`."""
 
     def __init__(self, configuration: Configuration, folder: Path, stack: ExitStack) -> None:
-        drives = OdriveDrives(configuration.drive, open_ports(configuration.bus))
+        drives = OdriveDrives(configuration.drive, open_ports(configuration.bus), configuration.limits)
         stack.callback(drives.close)
         pose = PosePort(Path(configuration.pose.socket))
         stack.callback(pose.close)
         self.recorder = Recorder(folder / "jitter.mcap", configuration.text, {})
         stack.callback(self.recorder.close, timeout_s=10.0)
         self.loop = Loop(configuration, drives, pose, self.recorder)
-        calls = OperatorCalls(self.loop, self.recorder, None, [], time.monotonic)
+        calls = OperatorCalls(self.loop, self.recorder, [], time.monotonic)
         self._status = StatusSocket(Path(configuration.status.socket), calls.methods)
         stack.callback(self._status.close)
         self._watchdog, self._shutdown = WatchdogFeed(SystemdNotifier("")), Shutdown()
@@ -121,7 +121,7 @@ class DaemonLoop:
         """As in firmware_host.daemon."""
         beat = ticker.wait()
         self.loop.tick(beat)
-        self._status.serve()
+        self._status.serve(beat.now_s)
         self._watchdog.update(beat, self.loop.mode)
         self._shutdown.step(self.loop, beat.now_s)
         return beat
@@ -142,7 +142,7 @@ class DaemonLoop:
         """From whatever was before: nobody drained the buses while the bare loop ran."""
         self._run_until(lambda: self.loop.mode in (Mode.IDLE, Mode.FAULT))
         self.loop.request(Request.CLEAR, time.monotonic())
-        self._run_until(lambda: self.loop.mode is Mode.IDLE and self.loop.health.fault is None)
+        self._run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking())
         self.loop.request(Request.ARM, time.monotonic())
         self._run_until(lambda: self.loop.mode is Mode.HOLD)
         order = WalkOrder(self.loop.configuration.adaptation.initial_depth_m)
@@ -154,7 +154,7 @@ class DaemonLoop:
         ticker, deadline_s = Ticker(), time.monotonic() + LONGEST_STEP_S
         while not done():
             if self.beat(ticker).now_s > deadline_s:
-                raise RuntimeError(f"the simulated robot is {self.loop.mode.name.lower()}: {self.loop.health.fault}")
+                raise RuntimeError(f"the simulated robot is {self.loop.mode.name.lower()}: {self.loop.fault}")
 
 
 @contextmanager

@@ -59,7 +59,7 @@ def walk_long(seconds: float, every_s: float, folder: Path, progress: Progress) 
     return {
         "readings": readings,
         "walked_m": round(walk.robot.plant.body_m, 2),
-        "strides": walk.loop.strides_closed,
+        "strides": walk.loop.learning.strides_closed,
         "dropped_rows": recorder.dropped,
     }
 

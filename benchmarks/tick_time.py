@@ -132,7 +132,7 @@ class StageMarks:
         self._entries: tuple[tuple[Any, str], ...] = (
             (loop.drives, "read"),
             (loop.pose, "read"),
-            (loop, "_estimate"),
+            (loop.learning, "update"),
             (loop, "_adapt"),
             (loop, "_examine"),
             (loop.controller, "step"),
@@ -203,7 +203,7 @@ class TimedWalk:
             {joint: configuration.drive[joint].bus for joint in JOINTS},
             wiring.robot,
         )
-        drives = OdriveDrives(configuration.drive, wiring.loop)
+        drives = OdriveDrives(configuration.drive, wiring.loop, configuration.limits)
         pose, clock = self.walk.loop.pose, lambda: self.walk.now_s
         self.walk.loop = Loop(configuration, drives, pose, recorder, clock)
         self.recorder = recorder
@@ -244,10 +244,10 @@ class TimedWalk:
         walk = self.walk
         walk.tick_number += 1
         walk.robot.advance(walk.now_s)
-        beat, closed_before = Beat(walk.now_s, 0.0, walk.tick_number, 0), walk.loop.strides_closed
+        beat, closed_before = Beat(walk.now_s, 0.0, walk.tick_number, 0), walk.loop.learning.strides_closed
         start_s = perf_counter()
         walk.loop.tick(beat)
-        return perf_counter() - start_s, walk.loop.strides_closed > closed_before
+        return perf_counter() - start_s, walk.loop.learning.strides_closed > closed_before
 
     def _marked_tick(self) -> tuple[dict[str, float], bool]:
         moments_s = self.marks.moments_s

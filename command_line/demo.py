@@ -26,6 +26,7 @@ import numpy as np
 from command_line import exit_codes
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, mud_text, stride_line
 from control.modes import Mode
+from firmware_host.log_folder import DONE, log_files, present_path
 from firmware_host.log_reader import Log, LogError, read_log
 from firmware_host.status_client import CallRefusedError, NoDaemonError, StatusClient
 from firmware_host.toml_records import ConfigurationError
@@ -227,7 +228,7 @@ def demo(options: argparse.Namespace) -> int:
     if options.json and not os.access(options.json if options.json.exists() else options.json.parent, os.W_OK):
         complain(f"{options.json} cannot be written")
         return exit_codes.UNHEALTHY
-    before = set(options.out.glob("*.mcap"))
+    before = set(log_files(options.out, DONE))
     try:
         report, demonstration = _perform(options)
         _conclude(options, report, demonstration)
@@ -235,7 +236,7 @@ def demo(options: argparse.Namespace) -> int:
         complain(str(problem))
         return exit_codes.UNHEALTHY
     except (InterruptedDemoError, KeyboardInterrupt) as problem:
-        for path in set(options.out.glob("*.mcap")) - before:
+        for path in sorted(set(log_files(options.out, DONE)) - before):
             print(f"\nlog      {path}")
         complain(str(problem) or "stopped")
         return exit_codes.INTERRUPTED
@@ -265,9 +266,9 @@ def _perform(options: argparse.Namespace) -> tuple[dict[str, Any], Demo]:
 
 def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration: Demo) -> None:
     """Summary, plot, and the JSON if wanted."""
-    log_path = Path(report["log"]["path"])
+    log_path = present_path(Path(report["log"]["path"]))
     log = read_log(log_path)
-    plot_path = log_path.with_suffix(".png")
+    plot_path = options.out / log_path.with_suffix(".png").name
     summary = summarise(report, demonstration, log, log_path, plot_path)
     print(f"\n{summary_text(summary)}\nDrawing ...", flush=True)
     from command_line.plots import plot_walk  # matplotlib takes its time; the walk must not wait for it

@@ -15,7 +15,7 @@ from command_line.stride_choice import Stride, choose_strides, duration_s, outco
 from firmware_host.configuration import ConfigurationError, load_configuration
 from firmware_host.lab_csv import write_lab_csv
 from firmware_host.log_reader import LogError, log_summary, read_log
-from firmware_host.replay import Replay, replay_file
+from firmware_host.replay import Replay, replay_files
 from firmware_host.reports import map_report, stride_report
 
 Options = argparse.Namespace
@@ -27,7 +27,7 @@ CUT_OFF = "the log is not finished: its writer was cut off; everything up to the
 def replay(options: Options) -> int:
     try:
         configuration = load_configuration(options.config) if options.config else None
-        replayed = replay_file(options.file, configuration, options.method)
+        replayed = replay_files(options.files, configuration, options.method)
     except ConfigurationError as problem:
         for sentence in problem.problems:
             complain(sentence)

@@ -58,6 +58,7 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
         "check": "What stands between this robot and a walk.",
     }
     parsers = {name: _add(commands, name, f"operation.{name}", text) for name, text in described.items()}
+    parsers["fail"] = _add_fail(commands)
     for parser in parsers.values():
         parser.add_argument(
             "--socket",
@@ -65,14 +66,24 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
             default=Path(os.environ.get("MUDSKIPPER_SOCKET", DEFAULT_SOCKET)),
             help="of the daemon (default: $MUDSKIPPER_SOCKET or %(default)s)",
         )
-    for name in ("status", "check"):
+    for name in ("status", "check", "fail"):
         parsers[name].add_argument("--json", action="store_true", help="for machines")
     parsers["watch"].add_argument("--period", type=_seconds, default=0.5, metavar="S", help="between two looks")
     depth = parsers["walk"].add_mutually_exclusive_group()
     depth.add_argument("--depth", type=_depth_cm, metavar="CM", help="the same in every stride")
     depth.add_argument("--adaptive", action="store_true", help="chosen from the mud, once a stride (default)")
     parsers["walk"].add_argument("--strides", type=_count, default=0, metavar="N", help="then stop (default: go on)")
+    parsers["walk"].add_argument("--attended", action="store_true", help="stay; the robot stops when this ends")
     parsers["check"].add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
+
+
+def _add_fail(commands: Commands) -> argparse.ArgumentParser:  # type: ignore[valid-type]
+    fail = _add(commands, "fail", "failing.fail", "Make a part of the robot fail on purpose, where that is allowed.")
+    fail.add_argument("component", nargs="?", help="what fails, such as left_sweep, bus.left, pose; or all")
+    fail.add_argument("kind", nargs="?", help="off, stuck, garbage, slow, intermittent ..., or ok to end it")
+    fail.add_argument("--for", type=float, default=2.0, metavar="S", dest="seconds", help="then it ends by itself")
+    fail.add_argument("--list", action="store_true", help="what can fail, how, and what fails already")
+    return fail
 
 
 def _seconds(text: str) -> float:
@@ -114,7 +125,7 @@ def _add_simulation(commands: Commands) -> None:  # type: ignore[valid-type]
 
 def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
     replay = _add(commands, "replay", "logs.replay", "The estimator over a recorded log: ours, or the authors' CSV.")
-    replay.add_argument("file", type=Path)
+    replay.add_argument("files", type=Path, nargs="+", metavar="FILE", help="several are segments of one run")
     replay.add_argument("--json", action="store_true")
     replay.add_argument("--config", type=Path, help="instead of the one in the log")
     replay.add_argument("--method", choices=METHODS, help="of estimation, instead of the configured one")
@@ -128,8 +139,9 @@ def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
         parser.add_argument(
             "--walk", type=_count, default=0, metavar="N", help="of the log's walks (default: the last)"
         )
-    log = commands.add_parser("log", help="Look into a log.")  # type: ignore[attr-defined]
+    log = commands.add_parser("log", help="Look into logs, and look after them.")  # type: ignore[attr-defined]
     actions = log.add_subparsers(dest="action", required=True, metavar="action")
+    _add_log_folder(actions)
     info = _add(actions, "info", "logs.info", "What a log holds.")
     info.add_argument("file", type=Path)
     info.add_argument("--json", action="store_true")
@@ -137,6 +149,19 @@ def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
     export.add_argument("file", type=Path)
     export.add_argument("--csv", action="store_true", required=True, help="the format; there is one so far")
     export.add_argument("--out", type=Path, help="file to write (default: standard output)")
+
+
+def _add_log_folder(actions: Commands) -> None:  # type: ignore[valid-type]
+    listing = _add(actions, "list", "log_care.list_logs", "The logs, and what room is left.")
+    listing.add_argument("folder", type=Path, nargs="?", help="of the logs (default: the configured one)")
+    recover = _add(actions, "recover", "log_care.recover", "Logs whose writer was cut off, put in order.")
+    recover.add_argument("places", type=Path, nargs="*", metavar="FILE|DIR", help="(default: the configured folder)")
+    for parser in (listing, recover):
+        parser.add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG), help="names the folder")
+        parser.add_argument("--json", action="store_true", help="for machines")
+    preserve = _add(actions, "preserve", "log_care.preserve_log", "Keep a log when older ones are freed.")
+    preserve.add_argument("file", type=Path)
+    preserve.add_argument("--undo", action="store_true", help="let it be freed again")
 
 
 def _picture(*endings: str) -> Callable[[str], Path]:

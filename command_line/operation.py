@@ -10,6 +10,7 @@ from math import degrees
 from typing import Any
 
 from command_line import exit_codes
+from command_line.attended_walk import attend
 from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain, number, table
 from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
@@ -31,7 +32,7 @@ def _with_daemon(options: Options, act: Callable[[StatusClient], int]) -> int:
         complain(f"{problem}. Start it with 'systemctl start mudskipper', or name its socket with --socket.")
         return exit_codes.NO_DAEMON
     except NotPermittedError as problem:
-        complain(f"{problem}. Join the group that owns it.")
+        complain(str(problem))
         return exit_codes.NOT_PERMITTED
     except CallRefusedError as problem:
         complain(str(problem))
@@ -64,6 +65,8 @@ def walk(options: Options) -> int:
     params: dict[str, Any] = {"strides": options.strides}
     if options.depth is not None:
         params["depth_m"] = options.depth / 100.0
+    if options.attended:
+        return _with_daemon(options, lambda client: attend(client, params))
     return _with_daemon(options, lambda client: _request(client, "walk", ("walking",), ARMING_S, **params))
 
 
@@ -93,8 +96,17 @@ def clear(options: Options) -> int:
 
 
 def _request(client: StatusClient, method: str, modes: tuple[str, ...], longest_s: float, **params: Any) -> int:
-    """Ask, then wait until the robot is in one of `modes`."""
-    client.call(method, **params)
+    """Ask, then wait until the robot is in one of `modes`. Whoever may stop it need not be allowed to see that."""
+    accepted = client.call(method, **params)
+    try:
+        return _await(client, modes, longest_s)
+    except NotPermittedError as problem:
+        print(accepted)
+        complain(str(problem))
+        return exit_codes.OK
+
+
+def _await(client: StatusClient, modes: tuple[str, ...], longest_s: float) -> int:
     deadline_s = time.monotonic() + longest_s
     while time.monotonic() < deadline_s:
         report = client.call("status")

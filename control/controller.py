@@ -1,4 +1,4 @@
-"""From a mode to the torques that it wants: hold a pose, walk, or raise the flippers.
+"""From a mode to the torques that it wants: hold a pose, walk, raise the flippers, or only brake the joints.
 
 Owns the gait, the recovery of stuck flippers, and the paths into and out of the gait. Modes without torque want none;
 what leaves for the drives is decided by the limits, not here.
@@ -6,16 +6,18 @@ what leaves for the drives is decided by the limits, not here.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
-from control.faults import Fault, held_by_the_mud
+from control.fault_kinds import make_fault
+from control.faults import Fault
 from control.gait import Gait, GaitParameters
 from control.geometry import FlipperGeometry
 from control.joint_path import JointPath, still
-from control.joint_pd import ArmMass, JointGains, joint_torques_nm
+from control.joint_pd import ArmMass, JointGains, damping_torques_nm, joint_torques_nm
 from control.modes import MOVING, Mode
 from control.records import (
     NO_TORQUE,
@@ -36,10 +38,17 @@ class MotionParameters:
 
     path_speed_rad_s: Annotated[float, Bounds(0.05, 10.0)] = 1.0
     fade_in_s: Annotated[float, Bounds(0.0, 10.0)] = 0.5  # stiffness after arming
+    longest_hold_s: Annotated[float, Bounds(0.0, 86400.0)] = 600.0  # then torque goes off by itself; 0: never
 
 
 UP_RAD = 0.12  # from level: the edge of a 12 cm arm is then 1.4 cm lower, still out of the mud
 RAISING_S = 1.0  # to wait for flippers that the mud holds
+SOFT_STOP_S = 3.0  # for raising them altogether
+DAMPING_S = 3.0  # longest, for joints that do not come to rest
+SETTLED_S = 0.3  # that all joints have to rest
+SETTLED_RAD_S = 0.1
+DAMPING_NM = 0.4  # at most, of each joint: half of what the motors may do
+ALL_TRUSTED = (True, True, True, True)
 
 
 class WalkOrder(NamedTuple):
@@ -82,6 +91,7 @@ class Controller:
         self._fade = 0.0
         self._up = False
         self._waited_s = 0.0  # since the path that ends a walk arrived
+        self._since_s = self._resting_s = 0.0  # the mode began, all joints rest
         self.target = RESTING
 
     @property
@@ -92,32 +102,58 @@ class Controller:
     @property
     def raised(self) -> bool:
         """The flippers are up at the end of a walk, or would be by now if the mud let them."""
-        return self._mode is Mode.STOPPING and (self._up or self._waited_s > RAISING_S)
+        waited = self._waited_s > RAISING_S or self._since_s > SOFT_STOP_S
+        return self._mode is Mode.STOPPING and (self._up or waited)
+
+    @property
+    def settled(self) -> bool:
+        """Damped joints have come to rest, or do not mean to."""
+        return self._mode is Mode.DAMPING and (self._resting_s > SETTLED_S or self._since_s > DAMPING_S)
+
+    @property
+    def rested(self) -> bool:
+        """The pose was held for so long that nobody seems to need it."""
+        return self._mode is Mode.HOLD and 0.0 < self.motion.longest_hold_s < self._since_s
 
     @property
     def fault(self) -> Fault | None:
         """The mud keeps a flipper, whatever was tried."""
         held = self.recovery.given_up
-        return held_by_the_mud(held, self.recovery.parameters.attempts) if held else None
+        return _held_by_the_mud(held, self.recovery.parameters.attempts) if held else None
 
     def is_up(self, states: DriveStates) -> bool:
         return all(abs(states[joint].angle_rad) < UP_RAD for joint in (1, 3))
 
-    def step(self, dt_s: float, mode: Mode, states: DriveStates) -> Torques:
-        """Torques wanted of the four joints; `target` then says where in the stride they belong to."""
+    def step(self, dt_s: float, mode: Mode, states: DriveStates, trusted: tuple[bool, ...] = ALL_TRUSTED) -> Torques:
+        """Torques wanted of the four joints; `target` then says where in the stride they belong to.
+
+        Joints whose encoder is not `trusted` are not damped: their speed may be made up.
+        """
         if mode is not self._mode:
             self._enter(mode, states)
         self.target = RESTING
+        self._since_s += dt_s
         if mode not in MOVING:
             return NO_TORQUE
+        if mode is Mode.DAMPING:
+            return self._damp(dt_s, states, trusted)
         self._fade = min(1.0, self._fade + dt_s / max(self.motion.fade_in_s, dt_s))
         if mode is Mode.STOPPING and self._path is not None and self._path.finished:
             self._up = self.is_up(states)
             self._waited_s += dt_s
         return joint_torques_nm(self._targets(dt_s, mode, states), states, self.gains, self.mass, self._fade)
 
+    def _damp(self, dt_s: float, states: DriveStates, trusted: tuple[bool, ...]) -> Torques:
+        moving = any(
+            trust and not abs(state.velocity_rad_s) < SETTLED_RAD_S
+            for state, trust in zip(states, trusted, strict=True)
+        )
+        self._resting_s = 0.0 if moving else self._resting_s + dt_s
+        return damping_torques_nm(states, self.gains, trusted, DAMPING_NM)
+
     def _enter(self, mode: Mode, states: DriveStates) -> None:
         self.recovery.reset()
+        self._since_s = self._resting_s = 0.0
         here = measured_angles(states)
         if mode is Mode.HOLD:
             self._pose = self._pose if self._mode is Mode.STOPPING else still(here)
@@ -167,3 +203,11 @@ class Controller:
         )
         adduction = JointTarget(angle_rad, velocity_rad_s)
         return sweep, adduction, sweep, adduction
+
+
+def _held_by_the_mud(flippers: Sequence[str], attempts: int) -> Fault:
+    """Of flippers that a recovery has given up."""
+    one = len(flippers) == 1
+    held = f"The {flippers[0]} flipper is" if one else "Both flippers are"
+    sentence = f"{held} stuck in the mud after {attempts} attempt{'s' if attempts > 1 else ''}."
+    return make_fault("flipper_stuck", flippers[0] if one else "", sentence)

@@ -56,6 +56,16 @@ def joint_torques_nm(
     return fade * left[0], fade * left[1], fade * right[0], fade * right[1]
 
 
+def damping_torques_nm(states: DriveStates, gains: JointGains, trusted: tuple[bool, ...], largest_nm: float) -> Torques:
+    """Of four joints that are braked and not held: τ = -d ω, at most `largest_nm`, and none by an untrusted encoder."""
+    dampings = (gains.sweep_damping_nm_s_rad, gains.adduction_damping_nm_s_rad) * 2
+    a, b, c, d = (
+        min(max(-damping * state.velocity_rad_s, -largest_nm), largest_nm) if trust else 0.0
+        for damping, state, trust in zip(dampings, states, trusted, strict=True)
+    )
+    return a, b, c, d
+
+
 def _flipper_torques_nm(
     sweep_target: JointTarget,
     adduction_target: JointTarget,

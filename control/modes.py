@@ -1,17 +1,17 @@
-"""Modes of the robot and the pure function that moves between them.
+"""Modes of the robot, and the table of transitions between them.
 
-    BOOT ──heard──▶ IDLE ──arm──▶ ARMING ──closed loop──▶ HOLD ──walk──▶ WALKING ──stop──▶ STOPPING ──raised──▶ HOLD
-
-A fault while torque is on leads to FAULT, which only `clear` leaves, to IDLE. `disarm` leads to IDLE wherever torque
-is on, and idles the drives in every mode. Nothing arms by itself.
+`next_mode` is a pure function: of the rows that begin in the present mode, the first one whose cause holds counts. A
+fault acts by its reaction alone (faults.py), so a new fault needs no new row. docs/modes.md is drawn from this table.
+Nothing arms by itself: the only way to torque leads over `arm`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple
 
-from control.faults import Fault
+from control.faults import Fault, Reaction
 
 
 class Mode(IntEnum):
@@ -21,7 +21,8 @@ class Mode(IntEnum):
     HOLD = 3  # the measured pose is held
     WALKING = 4
     STOPPING = 5  # flippers are raised out of the mud
-    FAULT = 6  # drives without torque until somebody clears the fault
+    FAULT = 6  # drives without torque until the fault is over
+    DAMPING = 7  # joints are braked but not held, after a fault
 
 
 class Request(IntEnum):
@@ -33,8 +34,9 @@ class Request(IntEnum):
     CLEAR = 5
 
 
-ENERGISED = frozenset({Mode.ARMING, Mode.HOLD, Mode.WALKING, Mode.STOPPING})
-MOVING = frozenset({Mode.HOLD, Mode.WALKING, Mode.STOPPING})  # the modes that may command torque
+ENERGISED = frozenset({Mode.ARMING, Mode.HOLD, Mode.WALKING, Mode.STOPPING, Mode.DAMPING})
+MOVING = ENERGISED - {Mode.ARMING}  # the modes that may command torque
+HELD = MOVING - {Mode.DAMPING}  # those with stiffness
 
 
 class Health(NamedTuple):
@@ -44,35 +46,91 @@ class Health(NamedTuple):
     closed_loop: bool = False  # all four drives
     walk_finished: bool = False  # the strides asked for are done
     raised: bool = False  # the flippers are up, or the wait for them is over
-    fault: Fault | None = None
+    settled: bool = False  # damped joints are at rest, or the wait for that is over
+    rested: bool = False  # the pose was held for so long that nobody seems to need it
+    worst: Fault | None = None
+    blocking: tuple[Fault, ...] = ()  # against arming
+
+    @property
+    def reaction(self) -> Reaction:
+        return self.worst.kind.reaction if self.worst else Reaction.NONE
+
+
+class Cause(NamedTuple):
+    """Why a mode is left, in words for the diagram."""
+
+    text: str
+    holds: Callable[[Request, Health], bool]
+
+
+class Transition(NamedTuple):
+    sources: frozenset[Mode]
+    cause: Cause
+    target: Mode
+
+
+def _at_least(reaction: Reaction) -> Cause:
+    name = reaction.name.lower().replace("_", " ")
+    return Cause(f"fault: {name}", lambda request, health: health.reaction >= reaction)
+
+
+def _asked(asked: Request) -> Cause:
+    return Cause(asked.name.lower(), lambda request, health: request is asked)
+
+
+def _is(text: str, holds: Callable[[Health], bool]) -> Cause:
+    return Cause(text, lambda request, health: holds(health))
+
+
+def _from(*modes: Mode) -> frozenset[Mode]:
+    return frozenset(modes)
+
+
+SOFT_STOP_DONE = Cause("raised, after a fault", lambda request, health: health.raised and _stopped(health))
+ARM_ACCEPTED = Cause("arm, and nothing against it", lambda request, health: request is Request.ARM and _well(health))
+WALK_ACCEPTED = Cause("walk", lambda request, health: request is Request.WALK and health.reaction < Reaction.HOLD)
+
+
+def _stopped(health: Health) -> bool:
+    return health.reaction >= Reaction.SOFT_STOP
+
+
+def _well(health: Health) -> bool:
+    return health.drives_heard and not health.blocking and health.reaction < Reaction.HOLD
+
+
+# In each mode the first row whose cause holds counts. A disarm comes before everything that goes on with torque.
+TRANSITIONS: tuple[Transition, ...] = (
+    Transition(ENERGISED, _at_least(Reaction.DRIVES_IDLE), Mode.FAULT),
+    Transition(ENERGISED, _asked(Request.DISARM), Mode.IDLE),
+    Transition(_from(Mode.ARMING), _at_least(Reaction.SOFT_STOP), Mode.FAULT),
+    Transition(HELD, _at_least(Reaction.DAMPING), Mode.DAMPING),
+    Transition(_from(Mode.HOLD, Mode.WALKING), _at_least(Reaction.SOFT_STOP), Mode.STOPPING),
+    Transition(_from(Mode.BOOT), _is("all drives heard", lambda health: health.drives_heard), Mode.IDLE),
+    Transition(_from(Mode.IDLE), ARM_ACCEPTED, Mode.ARMING),
+    Transition(_from(Mode.ARMING), _is("closed loop", lambda health: health.closed_loop), Mode.HOLD),
+    Transition(_from(Mode.HOLD), WALK_ACCEPTED, Mode.WALKING),
+    Transition(_from(Mode.HOLD), _is("nobody needs it", lambda health: health.rested), Mode.IDLE),
+    Transition(_from(Mode.WALKING), _asked(Request.STOP), Mode.STOPPING),
+    Transition(_from(Mode.WALKING), _is("strides done", lambda health: health.walk_finished), Mode.STOPPING),
+    Transition(_from(Mode.WALKING), _at_least(Reaction.HOLD), Mode.HOLD),
+    Transition(_from(Mode.STOPPING), SOFT_STOP_DONE, Mode.FAULT),
+    Transition(_from(Mode.STOPPING), _is("raised", lambda health: health.raised), Mode.HOLD),
+    Transition(_from(Mode.DAMPING), _is("at rest", lambda health: health.settled), Mode.FAULT),
+    Transition(_from(Mode.FAULT), _is("fault is over", lambda health: not _stopped(health)), Mode.IDLE),
+)
+
+_ROWS_OF: dict[Mode, tuple[tuple[Callable[[Request, Health], bool], Mode], ...]] = {
+    mode: tuple((row.cause.holds, row.target) for row in TRANSITIONS if mode in row.sources) for mode in Mode
+}
 
 
 def next_mode(mode: Mode, request: Request, health: Health) -> Mode:
     """The mode of the next tick. A request that does not fit the mode changes nothing: see `refusal`."""
-    if mode in ENERGISED and health.fault is not None:
-        return Mode.FAULT
-    if request is Request.DISARM and mode in ENERGISED:
-        return Mode.IDLE
-    match mode:
-        case Mode.BOOT:
-            return Mode.IDLE if health.drives_heard else Mode.BOOT
-        case Mode.IDLE:
-            return _after_idle(request, health)
-        case Mode.ARMING:
-            return Mode.HOLD if health.closed_loop else Mode.ARMING
-        case Mode.HOLD:
-            return Mode.WALKING if request is Request.WALK else Mode.HOLD
-        case Mode.WALKING:
-            return Mode.STOPPING if request is Request.STOP or health.walk_finished else Mode.WALKING
-        case Mode.STOPPING:
-            return Mode.HOLD if health.raised else Mode.STOPPING
-        case Mode.FAULT:
-            return Mode.IDLE if request is Request.CLEAR and health.fault is None else Mode.FAULT
-
-
-def _after_idle(request: Request, health: Health) -> Mode:
-    well = health.drives_heard and health.fault is None
-    return Mode.ARMING if request is Request.ARM and well else Mode.IDLE
+    for holds, target in _ROWS_OF[mode]:
+        if holds(request, health):
+            return target
+    return mode
 
 
 ACCEPTED_IN: dict[Request, frozenset[Mode]] = {
@@ -89,14 +147,22 @@ WHAT_TO_DO: dict[Mode, str] = {
     Mode.HOLD: "the robot already holds its pose",
     Mode.WALKING: "the robot walks; 'mudskipper stop' first",
     Mode.STOPPING: "the robot is stopping; try again in a moment",
-    Mode.FAULT: "a fault is latched; read 'mudskipper status', then 'mudskipper clear'",
+    Mode.FAULT: "a fault stands; read 'mudskipper status', then 'mudskipper clear'",
+    Mode.DAMPING: "a fault lets the joints sink; wait until they rest",
 }
 
 
 def refusal(mode: Mode, request: Request, health: Health) -> str | None:
     """Why a request would change nothing now, as a sentence; None where it is accepted."""
-    if request is Request.ARM and mode is Mode.IDLE and health.fault is not None:
-        return health.fault.sentence
-    if request is Request.CLEAR and health.fault is not None:
-        return f"the cause persists: {health.fault.sentence}"
-    return None if mode in ACCEPTED_IN.get(request, Mode) else WHAT_TO_DO[mode]
+    if mode not in ACCEPTED_IN.get(request, Mode):
+        return WHAT_TO_DO[mode]
+    if request is Request.ARM and not _well(health):
+        return _against(health)
+    if request is Request.WALK and health.reaction >= Reaction.HOLD:
+        return _against(health)
+    return None
+
+
+def _against(health: Health) -> str:
+    faults = health.blocking or ((health.worst,) if health.worst else ())
+    return " ".join(fault.sentence for fault in faults) or WHAT_TO_DO[Mode.BOOT]

@@ -1,13 +1,15 @@
 """A CAN bus within one process, without python-can: what one port sends, all others receive, in order.
 
 For tests and for walking in lockstep faster than real time. Frames pass as they are; their payloads were encoded by
-the sender and are decoded by the receiver as on any bus.
+the sender and are decoded by the receiver as on any bus. A test may fail a port: set its `state`, let it refuse what
+it is to send (`full`), or inject an error frame, which only it sees, as its own controller would report it.
 """
 
 from __future__ import annotations
 
 from collections import deque
 
+from drivers.error_frames import BusState, decode_error_frame, next_state
 from drivers.frames import Frame
 
 LONGEST_QUEUE = 4096  # a port that nobody reads loses its oldest frames, like a controller's receive buffer
@@ -21,7 +23,10 @@ class MockPort:
         self.queue: deque[Frame] = deque(maxlen=LONGEST_QUEUE)
         self.failed_sends = 0
         self.error_frames = 0
+        self.last_error = ""
         self.last_send_error = ""
+        self.state = BusState.ACTIVE
+        self.full = False
 
     def receive(self) -> list[Frame]:
         frames = list(self.queue)
@@ -29,9 +34,24 @@ class MockPort:
         return frames
 
     def send(self, frame: Frame) -> None:
+        if self.full:
+            self.failed_sends += 1
+            self.last_send_error = "No buffer space available"
+            return
         for port in self._bus.ports:
             if port is not self:
                 port.queue.append(frame)
+
+    def inject_error(self, class_bits: int, data: bytes = bytes(8)) -> None:
+        """One of SocketCAN's error frames."""
+        self.error_frames += 1
+        error = decode_error_frame(class_bits, data)
+        self.last_error = error.text
+        self.state = next_state(self.state, class_bits, error.state)
+
+    def open_beside(self) -> MockPort:
+        """Another node on the same bus."""
+        return self._bus.open()
 
     def close(self) -> None:
         if self in self._bus.ports:

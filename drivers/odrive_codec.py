@@ -39,6 +39,8 @@ GET_VERSION = Message(0x00, "<8B")  # protocol, product line, hw version, hw var
 HEARTBEAT = Message(0x01, "<IBBB1x")  # axis error, axis state, procedure result, bit 0 trajectory done
 ESTOP = Message(0x02, "<")
 GET_ERROR = Message(0x03, "<II")  # active errors, disarm reason
+RX_SDO = Message(0x04, "<BHB")  # opcode, endpoint, reserved; a value follows where one is written
+TX_SDO = Message(0x05, "<BHB")  # the same, and the value in as many bytes as its type has: see `decode_sdo`
 SET_AXIS_STATE = Message(0x07, "<I")
 GET_ENCODER_ESTIMATES = Message(0x09, "<ff")  # turns, turns/s
 SET_CONTROLLER_MODE = Message(0x0B, "<II")  # control mode, input mode
@@ -51,19 +53,24 @@ CLEAR_ERRORS = Message(0x18, "<B")  # identify flag
 
 
 class AxisState(IntEnum):
+    UNDEFINED = 0
     IDLE = 1
     CLOSED_LOOP = 8
 
 
 TORQUE_CONTROL = 1  # control mode
 PASSTHROUGH = 1  # input mode
+SDO_READ = 0  # opcode; 1 would write
+SDO_FLOAT = Struct("<f")
+SDO_HEAD_BYTES = 4
 
 # Flags of active errors and disarm reasons (odrive.enums.ODriveError).
+ERROR_INITIALIZING = 0x1
 ERROR_WATCHDOG = 0x1000000
 ERROR_ESTOP = 0x2000000
 
 ERROR_NAMES = {
-    0x1: "initializing",
+    ERROR_INITIALIZING: "initializing",
     0x2: "system level",
     0x4: "timing error",
     0x8: "missing estimate",
@@ -98,3 +105,24 @@ def error_text(flags: int) -> str:
 
 def arbitration_id(node_id: int, message: Message) -> int:
     return node_id << 5 | message.command
+
+
+def decode_sdo(data: bytes) -> tuple[int, bytes]:
+    """The endpoint that a drive was asked for and its value's bytes. A frame may be padded to eight."""
+    if not SDO_HEAD_BYTES < len(data) <= 2 * SDO_HEAD_BYTES:
+        raise GarbledMessageError(f"command 0x{TX_SDO.command:02x} with {len(data)} bytes")
+    _, endpoint, _ = TX_SDO.decode(data[:SDO_HEAD_BYTES])
+    return endpoint, data[SDO_HEAD_BYTES:]
+
+
+def decode_sdo_flag(value: bytes) -> bool:
+    if value[0] > 1:
+        raise GarbledMessageError(f"a flag of {value[0]}")
+    return value[0] == 1
+
+
+def decode_sdo_float(value: bytes) -> float:
+    if len(value) < SDO_FLOAT.size:
+        raise GarbledMessageError(f"a number of {len(value)} bytes")
+    (number,) = SDO_FLOAT.unpack_from(value)
+    return float(number)

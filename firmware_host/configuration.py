@@ -23,12 +23,16 @@ from control.gait_adaptation import candidates
 from control.geometry import FlipperGeometry
 from control.joint_friction import NO_FRICTION, JointFriction
 from control.joint_pd import ArmMass, JointGains
+from control.joint_watch import FaultBounds
 from control.limits import JointLimits, JointRange
 from control.records import JOINTS
 from control.recovery import RecoveryParameters
-from drivers.odrive_drives import DriveParameters
+from control.winding import WindingParameters
+from drivers.failures import FailureParameters
+from drivers.odrive_axis import DriveParameters, WatchdogEndpoints
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
+from firmware_host.log_parameters import LogParameters
 from firmware_host.toml_records import ConfigurationError as ConfigurationError  # for whoever loads one
 from firmware_host.toml_records import RecordReader, parse_document, read_text
 
@@ -53,21 +57,17 @@ class BusParameters:
 
 @dataclass(frozen=True)
 class LoopParameters:
-    silence_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0263  # 10 ticks without position or current: a fault
     priority: Annotated[int, Bounds(0, 99)] = 45  # SCHED_FIFO, under the interrupt threads' 50; 0: none
     cpu: Annotated[int, Bounds(-1, 1023)] = -1  # to run on; -1: any
     lock_memory: bool = True
 
 
 @dataclass(frozen=True)
-class LogParameters:
-    directory: str = "logs"
-    enabled: bool = True
-
-
-@dataclass(frozen=True)
 class StatusParameters:
     socket: str = "/run/mudskipper/mudskipper.sock"
+    anyone_may_stop: bool = True  # whoever has an account here; else nobody outside the socket's group may connect
+    read_group: str = ""  # who may see how the robot is; empty: the daemon's own group
+    drive_group: str = ""  # who may operate it, and see; empty: the daemon's own group
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,8 @@ class Configuration:
     motion: MotionParameters = MotionParameters()
     recovery: RecoveryParameters = RecoveryParameters()
     limits: JointLimits = JointLimits()
+    winding: WindingParameters = WindingParameters()
+    faults: FaultBounds = FaultBounds()
     estimation: EstimationParameters = EstimationParameters()
     friction: dict[str, JointFriction] = field(default_factory=dict)  # by joint, where it was measured
     adaptation: AdaptationParameters = AdaptationParameters()
@@ -94,6 +96,8 @@ class Configuration:
     log: LogParameters = LogParameters()
     status: StatusParameters = StatusParameters()
     pose: PoseParameters = PoseParameters()
+    failures: FailureParameters = FailureParameters()
+    watchdog_endpoints: list[WatchdogEndpoints] = field(default_factory=list)  # of further builds of ODrive's firmware
     text: str = ""  # the file itself, which goes into every log
 
     @property
@@ -167,6 +171,7 @@ def _contradictions(configuration: Configuration) -> Iterator[str]:
         yield from _sweep_problems(configuration)
     yield from _torque_problems(configuration)
     yield from _lead_problems(configuration)
+    yield from _fault_problems(configuration)
 
 
 def _text_problems(configuration: Configuration) -> Iterator[str]:
@@ -180,6 +185,9 @@ def _text_problems(configuration: Configuration) -> Iterator[str]:
         yield "status.socket = '': must name a socket"
     if pose and pose == status:
         yield f"pose.socket = {pose!r}: must not be status.socket"
+    for key in ("read_group", "drive_group"):
+        if "\0" in getattr(configuration.status, key):
+            yield f"status.{key}: must be without a zero byte"
     if "\0" in configuration.log.directory:
         yield f"log.directory = {configuration.log.directory!r}: must be without a zero byte"
 
@@ -230,6 +238,20 @@ def _lead_problems(configuration: Configuration) -> Iterator[str]:
                 f"gains.{key} = {getattr(gains, key)}: must be at least {ceil(100.0 * needed_nm_rad) / 100.0:.2f},"
                 f" or a recovery.lead_deg = {lead_deg:g} does not reach limits.torque_nm = {torque_nm}"
             )
+
+
+def _fault_problems(configuration: Configuration) -> Iterator[str]:
+    """Milder reactions come first."""
+    bounds = configuration.faults
+    for milder, harder in (("late_s", "quiet_s"), ("quiet_s", "silence_s"), ("lag_s", "silence_s")):
+        low, high = getattr(bounds, milder), getattr(bounds, harder)
+        if low > high:
+            yield f"faults.{milder} = {low}: must be at most faults.{harder} = {high}"
+    if bounds.voltage_min_v > bounds.voltage_low_v:
+        yield (
+            f"faults.voltage_min_v = {bounds.voltage_min_v}: must be at most"
+            f" faults.voltage_low_v = {bounds.voltage_low_v}"
+        )
 
 
 def _motor_force_problems(configuration: Configuration) -> Iterator[str]:

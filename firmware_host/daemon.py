@@ -16,10 +16,12 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
-from datetime import UTC, datetime
 from pathlib import Path
 
 from control.modes import ENERGISED, Mode, Request
+from drivers.failing_port import failing_ports
+from drivers.failing_pose import failing_pose
+from drivers.failures import Failures
 from drivers.odrive_drives import OdriveDrives
 from drivers.pose_port import PosePort
 from firmware_host.buses import BusError, open_ports
@@ -29,10 +31,16 @@ from firmware_host.configuration import (
     ConfigurationError,
     load_configuration,
 )
+from firmware_host.failing_recorder import failing_recorder
+from firmware_host.failing_time import failing_clock, failing_ticker
+from firmware_host.failure_calls import failures_of, with_failures
+from firmware_host.lease import Lease
+from firmware_host.log_folder import first_path, new_run_id
 from firmware_host.loop import Loop
 from firmware_host.operator_calls import OperatorCalls, software_version
 from firmware_host.realtime import prepare_loop
 from firmware_host.recorder import NullRecorder, Recorder
+from firmware_host.rights import Rights, load_rights
 from firmware_host.sd_notify import SystemdNotifier
 from firmware_host.status_socket import AlreadyServedError, StatusSocket
 from firmware_host.ticker import RATE_HZ, Beat, Ticker
@@ -91,39 +99,40 @@ class Shutdown:
         return False
 
 
-def new_log_path(configuration: Configuration) -> Path | None:
+def open_recorder(configuration: Configuration) -> Recorder | NullRecorder:
+    """Of a new run. Raises OSError where no log can be written at all."""
     if not configuration.log.enabled:
-        return None
-    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
-    return Path(configuration.log.directory) / f"{configuration.robot.name}-{stamp}.mcap"
-
-
-def open_recorder(configuration: Configuration, path: Path | None) -> Recorder | NullRecorder:
-    if path is None:
         return NullRecorder()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if not os.access(path.parent, os.W_OK):
-        raise PermissionError(errno.EACCES, "is not writable", str(path.parent))
-    metadata = {"robot": configuration.robot.name, "version": software_version()}
-    return Recorder(path, configuration.text, metadata)
+    folder, robot = Path(configuration.log.directory), configuration.robot.name
+    folder.mkdir(parents=True, exist_ok=True)
+    if not os.access(folder, os.W_OK):
+        raise PermissionError(errno.EACCES, "is not writable", str(folder))
+    run_id = new_run_id(robot)
+    metadata = {"robot": robot, "run_id": run_id, "version": software_version()}
+    return Recorder(first_path(folder, run_id), configuration.text, metadata, configuration.log)
 
 
-def run(configuration: Configuration, shutdown: Shutdown) -> int:
+def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int:
     """Until `shutdown` is wanted and done. Raises BusError, AlreadyServedError or OSError before it has begun."""
     with ExitStack() as stack:
-        status = StatusSocket(Path(configuration.status.socket), {})  # first: it refuses to be the second daemon
+        # First: it refuses to be the second daemon.
+        status = StatusSocket(Path(configuration.status.socket), {}, rights)
         stack.callback(status.close)
-        drives = OdriveDrives(configuration.drive, open_ports(configuration.bus))
+        failures = failures_of(configuration)
+        ports = failing_ports(open_ports(configuration.bus), configuration.drive, failures)
+        drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         stack.callback(drives.close)
         pose = PosePort(Path(configuration.pose.socket) if configuration.pose.socket else None)
         stack.callback(pose.close)
-        log_path = new_log_path(configuration)
-        recorder = open_recorder(configuration, log_path)
+        recorder = failing_recorder(open_recorder(configuration), failures)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
-        loop = Loop(configuration, drives, pose, recorder)
+        wall_clock = failing_clock(time.time, failures)
+        loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock)
         warnings: list[str] = []
-        calls = OperatorCalls(loop, recorder, str(log_path) if log_path else None, warnings, time.monotonic)
-        status.methods = calls.methods
+        lease = Lease()
+        calls = OperatorCalls(loop, recorder, warnings, time.monotonic, lease)
+        status.methods = with_failures(calls.methods, failures, loop.event, time.monotonic)
+        status.on_hang_up = lease.hang_up
         status.report_bug = lambda sentence: loop.event(time.monotonic(), sentence)
         notifier = SystemdNotifier()
         stack.callback(notifier.close)
@@ -131,11 +140,13 @@ def run(configuration: Configuration, shutdown: Shutdown) -> int:
         warnings += prepare_loop(options.priority, options.cpu, options.lock_memory)
         for warning in warnings:
             print(f"warning: {warning}", file=sys.stderr)
-        return _run_loop(loop, status, notifier, shutdown)
+        return _run_loop(loop, failures, status, notifier, shutdown)
 
 
-def _run_loop(loop: Loop, status: StatusSocket, notifier: SystemdNotifier, shutdown: Shutdown) -> int:
-    ticker, watchdog = Ticker(), WatchdogFeed(notifier)
+def _run_loop(
+    loop: Loop, failures: Failures | None, status: StatusSocket, notifier: SystemdNotifier, shutdown: Shutdown
+) -> int:
+    ticker, watchdog = failing_ticker(Ticker(), failures, loop.event), WatchdogFeed(notifier)
     notifier.send("READY=1", "STATUS=running")
     now_s = time.monotonic()
     try:
@@ -143,12 +154,14 @@ def _run_loop(loop: Loop, status: StatusSocket, notifier: SystemdNotifier, shutd
             beat = ticker.wait()
             now_s = beat.now_s
             loop.tick(beat)
-            status.serve()
+            status.serve(now_s)
             watchdog.update(beat, loop.mode)
         notifier.send("STOPPING=1")
         return 0
     except Exception as problem:  # noqa: BLE001 - the one place where surprises end
         notifier.send("STOPPING=1")
+        if failures is not None:  # or what fails on purpose would keep the drives from hearing the end
+            failures.end_all()
         return _end_safely(loop, problem)
 
 
@@ -171,6 +184,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         configuration = load_configuration(options.config)
+        rights = load_rights(configuration.status)
     except ConfigurationError as problem:
         return _refuse([f"mudskipperd: {sentence}" for sentence in problem.problems], EXIT_CONFIGURATION)
     if options.check_config:
@@ -178,7 +192,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     shutdown = Shutdown()
     _on_signals(shutdown.ask)
     try:
-        return run(configuration, shutdown)
+        return run(configuration, rights, shutdown)
     except (BusError, AlreadyServedError) as problem:
         return _refuse([f"mudskipperd: {problem}"], EXIT_FAILED)
     except OSError as problem:

@@ -1,90 +1,196 @@
-"""All faults that a tick can show: those of the drives, and those that the loop sees of itself and of its buses.
+"""All faults that a tick can show: those of the joints and their drives, of the buses, of the loop, of what it writes.
 
-Each is data, the first one found counts; the modes decide what comes of it.
+Each is data. What comes of them is decided by the latch, which knows how long they stand, and by the modes.
 """
 
 from __future__ import annotations
 
-from control.faults import Fault, find_fault
+from math import isnan
+from typing import NamedTuple
+
+from control.controller import ALL_TRUSTED
+from control.fault_kinds import make_fault
+from control.faults import Fault
+from control.joint_watch import JointFacts, JointWatch
 from control.limits import LimitedTorques
-from control.modes import MOVING, Mode
-from control.records import JOINTS, DriveStates
+from control.modes import ENERGISED, HELD, MOVING, Mode
+from control.records import JOINTS, BodyPose, DriveStates
+from drivers.can_port import BusState
+from drivers.odrive_axis import OdriveAxis
 from drivers.odrive_codec import error_text
 from drivers.odrive_drives import OdriveDrives
 from firmware_host.configuration import Configuration
+from firmware_host.loop_watch import LoopWatch
 from firmware_host.ticker import PERIOD_S, Beat
 
 ARMING_S = 2.0  # a drive that takes longer to go into closed loop does not mean to
-REFUSED_TICKS = 5  # in a row, in each of which one bus lost a command
+REFUSED_TICKS = 3  # in a row, in each of which one bus lost a command
 FIRMWARE = (0, 6)  # major and minor version whose messages the codec knows
+POSE_FORGOTTEN_S = 10.0  # a motion capture that was switched off on purpose
+UNTRUSTED = frozenset({"encoder_jump", "position_stale", "position_silent", "drive_quiet", "drive_silent"})
+EXPLAINED = frozenset({"drive_error", "drive_disarmed"})  # by the drive's own words
+
+
+BUS_FAULTS = {
+    BusState.WARNING: ("bus_warning", "meets many errors"),
+    BusState.PASSIVE: ("bus_passive", "meets so many errors that its controller is passive"),
+    BusState.OFF: ("bus_off", "was left by its controller"),
+}
+
+
+class Situation(NamedTuple):
+    """What the loop knows of the moment, before the mode changes."""
+
+    mode: Mode
+    mode_since_s: float
+    states: DriveStates
+    body: BodyPose
+    sent: LimitedTorques  # in the tick before
+    freeing: bool  # a recovery pulls at full torque
+    wall_minus_monotonic_s: float
 
 
 class FaultWatch:
-    """Owns the counts of ticks in a row in which a bus lost commands."""
+    """Owns the watches of the joints and of the loop, and what is counted over ticks."""
 
     def __init__(self, configuration: Configuration, drives: OdriveDrives) -> None:
-        self._configuration = configuration
-        self._ranges = configuration.joint_ranges
         self._drives = drives
-        self._failed_sends = dict.fromkeys(drives.ports, 0)
-        self._refused_ticks = dict.fromkeys(drives.ports, 0)
-
-    def update(
-        self, beat: Beat, mode: Mode, mode_since_s: float, states: DriveStates, sent: LimitedTorques
-    ) -> Fault | None:
-        """Once a tick, before the mode changes; `sent` is what the last tick commanded."""
-        self._count_refused()
-        return (
-            self._of_the_loop(beat, sent)
-            or self._of_arming(beat.now_s, mode, mode_since_s, states)
-            or self._of_the_drives(beat.now_s, mode, states)
-            or self._of_the_firmware()
+        self.joints = tuple(
+            JointWatch(
+                joint,
+                configuration.limits,
+                span,
+                configuration.faults,
+                configuration.winding,
+                configuration.drive[joint].current_limit_a,
+            )
+            for joint, span in zip(JOINTS, configuration.joint_ranges, strict=True)
         )
+        self._loop = LoopWatch(configuration.faults)
+        self._longest_watchdog_s = configuration.faults.longest_watchdog_s
+        self._warm_c = configuration.limits.temperature_warm_c
+        self.reset()
 
-    def _count_refused(self) -> None:
+    def reset(self) -> None:
+        for joint in self.joints:
+            joint.reset()
+        self._loop.reset()
+        self._failed_sends = {name: port.failed_sends for name, port in self._drives.ports.items()}
+        self._refused_ticks = dict.fromkeys(self._drives.ports, 0)
+        self._restarts = {axis.joint: axis.restarts for axis in self._drives.axes}
+        self._refused_commands = self._drives.gate.refused
+        self._pose_stamp_s: float | None = None
+        self.trusted: tuple[bool, ...] = ALL_TRUSTED  # of the joints' encoders
+
+    def with_winding_heat(self, states: DriveStates) -> DriveStates:
+        """The states with the windings' temperatures where these are warm enough for the limits to heed them."""
+        if all(joint.winding.temperature_c <= self._warm_c for joint in self.joints):
+            return states
+        a, b, c, d = (
+            state._replace(temperature_c=joint.winding.temperature_c)
+            for joint, state in zip(self.joints, states, strict=True)
+        )
+        return a, b, c, d
+
+    def update(self, beat: Beat, situation: Situation) -> list[Fault]:
+        """Everything that is wrong in this tick."""
+        found = self._loop.update(beat, situation.wall_minus_monotonic_s)
+        self._watch_buses(found)
+        if situation.mode is Mode.BOOT and not self._drives.heard:
+            return found
+        self._watch_joints(found, beat, situation)
+        blind = {fault.subject for fault in found if fault.name in UNTRUSTED}
+        self.trusted = tuple(joint not in blind for joint in JOINTS) if blind else ALL_TRUSTED
+        if not situation.sent.finite:
+            found.append(make_fault("torque_not_finite", "", "A torque was not a finite number."))
+        if situation.mode is Mode.ARMING and beat.now_s - situation.mode_since_s > ARMING_S:
+            self._watch_arming(found, situation.states)
+        self._watch_gate(found)
+        for axis in self._drives.axes:
+            self._watch_axis(found, axis)
+        self._watch_pose(found, beat.now_s, situation.body)
+        return found
+
+    def _watch_buses(self, found: list[Fault]) -> None:
         for name, port in self._drives.ports.items():
+            if port.state is not BusState.ACTIVE:
+                kind, text = BUS_FAULTS[port.state]
+                found.append(make_fault(kind, name, f"The {name} bus {text}: {port.last_error or 'no word why'}."))
             lost = port.failed_sends > self._failed_sends[name]
             self._refused_ticks[name] = self._refused_ticks[name] + 1 if lost else 0
             self._failed_sends[name] = port.failed_sends
+            if self._refused_ticks[name] >= REFUSED_TICKS:
+                ticks, why = self._refused_ticks[name], port.last_send_error
+                text = f"The {name} bus lost commands in {ticks} ticks in a row: {why}."
+                found.append(make_fault("bus_refuses", name, text))
 
-    def _of_the_loop(self, beat: Beat, sent: LimitedTorques) -> Fault | None:
-        if not sent.finite:
-            return Fault("not_finite", "A torque was not a finite number: this is a bug, please report it.")
-        if beat.missed * PERIOD_S > self._configuration.loop.silence_s:
-            return Fault("loop_stalled", f"The loop stood still for {1e3 * beat.late_s:.0f} ms.")
-        for name, refused_ticks in self._refused_ticks.items():
-            if refused_ticks >= REFUSED_TICKS:
-                why = self._drives.ports[name].last_send_error
-                return Fault("bus_refuses", f"The {name} bus lost commands in {refused_ticks} ticks in a row: {why}.")
-        return None
+    def _watch_joints(self, found: list[Fault], beat: Beat, situation: Situation) -> None:
+        mode, sent_nm = situation.mode, situation.sent.torques_nm
+        dt_s = (1 + beat.missed) * PERIOD_S
+        for joint, axis, state, torque_nm in zip(
+            self.joints, self._drives.axes, situation.states, sent_nm, strict=True
+        ):
+            facts = JointFacts(
+                beat.now_s, dt_s, mode in ENERGISED, mode in MOVING, torque_nm, situation.freeing or mode not in HELD
+            )
+            found += [_explained(fault, axis) for fault in joint.update(facts, state)]
 
-    def _of_arming(self, now_s: float, mode: Mode, mode_since_s: float, states: DriveStates) -> Fault | None:
-        if mode is not Mode.ARMING or now_s - mode_since_s <= ARMING_S:
-            return None
-        slow = [joint for joint, state in zip(JOINTS, states, strict=True) if not state.closed_loop]
-        return Fault("arming", f"Not every drive went into closed loop: {', '.join(slow)}.")
+    def _watch_arming(self, found: list[Fault], states: DriveStates) -> None:
+        for joint, state in zip(JOINTS, states, strict=True):
+            if not state.closed_loop:
+                text = f"The {joint} drive did not go into closed loop within {ARMING_S:g} s."
+                found.append(make_fault("arming_failed", joint, text))
 
-    def _of_the_drives(self, now_s: float, mode: Mode, states: DriveStates) -> Fault | None:
-        limits, silence_s = self._configuration.limits, self._configuration.loop.silence_s
-        fault = find_fault(states, self._ranges, limits, silence_s, mode in MOVING, now_s)
-        if fault and fault.name in ("drive_error", "drive_disarmed"):
-            return fault._replace(sentence=f"{fault.sentence} {self._drives_say()}".rstrip())
+    def _watch_gate(self, found: list[Fault]) -> None:
+        gate = self._drives.gate
+        if gate.refused > self._refused_commands:
+            self._refused_commands = gate.refused
+            found.append(make_fault("command_refused", "", gate.last_refusal))
+
+    def _watch_axis(self, found: list[Fault], axis: OdriveAxis) -> None:
+        """What a drive tells of itself beside its signals."""
+        joint = axis.joint
+        if axis.restarts != self._restarts[joint]:
+            self._restarts[joint] = axis.restarts
+            found.append(make_fault("drive_restarted", joint, f"The {joint} drive started anew."))
+        if axis.twins:
+            found.append(make_fault("drive_twins", joint, f"Two drives send as the {joint} drive."))
+        if axis.version is None:
+            text = f"The {joint} drive did not tell its firmware version yet."
+            found.append(make_fault("drive_version", joint, text))
+        elif (axis.version.major, axis.version.minor) != FIRMWARE:
+            version = ".".join(map(str, axis.version))
+            text = f"The {joint} drive runs firmware {version}; 0.6 is supported."
+            found.append(make_fault("drive_version", joint, text))
+        self._watch_watchdog(found, joint, axis.watchdog_s)
+
+    def _watch_watchdog(self, found: list[Fault], joint: str, watchdog_s: float) -> None:
+        """It alone acts when this program dies."""
+        if 0.0 < watchdog_s <= self._longest_watchdog_s:
+            return
+        if isnan(watchdog_s):
+            text = f"The {joint} drive's watchdog was not read back."
+            found.append(make_fault("watchdog_unknown", joint, text))
+        elif watchdog_s == 0.0:
+            found.append(make_fault("watchdog_off", joint, f"The {joint} drive's watchdog is off."))
+        else:
+            text = (
+                f"The {joint} drive's watchdog waits for {watchdog_s:g} s; {self._longest_watchdog_s:g} s is the most."
+            )
+            found.append(make_fault("watchdog_off", joint, text))
+
+    def _watch_pose(self, found: list[Fault], now_s: float, body: BodyPose) -> None:
+        if body.stamp_s > float("-inf"):
+            self._pose_stamp_s = now_s
+        elif self._pose_stamp_s is not None:
+            found.append(make_fault("pose_lost", "", "The body's place is not told any more."))
+            if now_s - self._pose_stamp_s > POSE_FORGOTTEN_S:
+                self._pose_stamp_s = None
+
+
+def _explained(fault: Fault, axis: OdriveAxis) -> Fault:
+    """With the drive's own words for its errors."""
+    flags = axis.state.error_flags | axis.disarm_reason
+    if fault.name not in EXPLAINED or not flags:
         return fault
-
-    def _drives_say(self) -> str:
-        said = [
-            f"{axis.joint}: {error_text(axis.state.error_flags | axis.disarm_reason)}"
-            for axis in self._drives.axes
-            if axis.state.error_flags | axis.disarm_reason
-        ]
-        return f"({'; '.join(said)})" if said else ""
-
-    def _of_the_firmware(self) -> Fault | None:
-        """Asked for once every drive was heard; messages mean other things in other firmware."""
-        for axis in self._drives.axes:
-            if axis.version is None:
-                return Fault("drive_version", f"The {axis.joint} drive did not tell its firmware version yet.")
-            if (axis.version.major, axis.version.minor) != FIRMWARE:
-                version = ".".join(map(str, axis.version))
-                return Fault("drive_version", f"The {axis.joint} drive runs firmware {version}; 0.6 is supported.")
-        return None
+    return fault._replace(sentence=f"{fault.sentence} ({error_text(flags)})")

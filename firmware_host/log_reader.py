@@ -8,6 +8,7 @@ ticks become one numpy array laid over the stored bytes.
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
@@ -15,12 +16,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from mcap.exceptions import EndOfFile, McapError, RecordLengthLimitExceeded
-from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema, Statistics
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema, Statistics
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
+from firmware_host.log_chunks import Row, open_chunk, records_of
 from firmware_host.log_rows import CDR_HEADER, EVENT, FORMAT_OF, ROW_KINDS, STRIDE, TICK, RowKind
+
+DAMAGE = (McapError, ValueError, RuntimeError, OverflowError, MemoryError, struct.error)  # what reading it may raise
 
 
 class LogError(ValueError):
@@ -37,13 +41,15 @@ class Log(NamedTuple):
 
 
 def read_log(path: Path) -> Log:
+    """Raises LogError."""
     contents = _read_contents(path)
     stream, found = BytesIO(contents), _Findings()
+    reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=len(contents))
     try:
-        for record in StreamReader(stream, validate_crcs=True, record_size_limit=len(contents)).records:
+        for record in reader.records:
             found.add(record)
         complete = True
-    except (McapError, ValueError, RuntimeError, MemoryError, struct.error) as error:
+    except DAMAGE as error:
         finished = len(contents) > len(MCAP0_MAGIC) and contents.endswith(MCAP0_MAGIC)
         if finished or not _is_cut(error, stream.tell() == len(contents)):
             raise LogError(f"{path}: damaged before byte {stream.tell()}: {error}") from None
@@ -53,11 +59,42 @@ def read_log(path: Path) -> Log:
     return Log(
         found.metadata,
         found.configuration_text,
-        _tick_array(path, found.rows[TICK]),
+        _in_order(_tick_array(path, found.rows[TICK])),
         _decode_rows(path, STRIDE, found.rows[STRIDE]),
         _decode_rows(path, EVENT, found.rows[EVENT]),
         complete,
     )
+
+
+def read_logs(paths: Sequence[Path]) -> Log:
+    """One log, or several segments of one run as one. Raises LogError, also where a segment between them is missing."""
+    logs = [read_log(path) for path in paths]
+    if len(logs) == 1:
+        return logs[0]
+    if len({log.metadata.get("run_id") for log in logs}) > 1 or "run_id" not in logs[0].metadata:
+        raise LogError(f"{paths[0]}: not of one run with the others; read each alone")
+    try:
+        by_number = sorted((int(log.metadata["segment"]), place) for place, log in enumerate(logs))
+    except (KeyError, ValueError):
+        raise LogError(f"{paths[0]}: the segments of its run are not numbered; read each alone") from None
+    numbers = [number for number, _ in by_number]
+    if numbers != list(range(numbers[0], numbers[0] + len(numbers))):
+        raise LogError(f"{paths[0]}: segments {numbers[0]} to {numbers[-1]} of its run are not all here, each once")
+    ordered = [logs[place] for _, place in by_number]
+    return ordered[0]._replace(
+        ticks=_in_order(np.frombuffer(b"".join(log.ticks.tobytes() for log in ordered), dtype=tick_type())),
+        strides=[stride for log in ordered for stride in log.strides],
+        events=[event for log in ordered for event in log.events],
+        complete=all(log.complete for log in ordered),
+    )
+
+
+def _in_order(ticks: NDArray[np.void]) -> NDArray[np.void]:
+    """Ticks that were held back at rest stand after later ones in the file: see rest_thinning.py."""
+    if np.all(ticks["tick"][1:] >= ticks["tick"][:-1]):
+        return ticks
+    whole_rows = ticks.view(np.dtype((np.void, ticks.dtype.itemsize)))  # with the bytes that no field names
+    return whole_rows[np.argsort(ticks["tick"], kind="stable")].view(ticks.dtype)
 
 
 def _is_cut(error: Exception, at_the_end: bool) -> bool:
@@ -86,10 +123,13 @@ class _Findings:
         self._schemas: dict[int, Schema] = {}
         self._rows_of_channel: dict[int, list[bytes]] = {}
 
-    def add(self, record: McapRecord) -> None:
+    def add(self, record: McapRecord | Row) -> None:
         match record:
-            case Message():
+            case Row() | Message():
                 self._add_row(record)
+            case Chunk():
+                for inner in records_of(open_chunk(record)):
+                    self.add(inner)
             case Schema():
                 self._schemas[record.id] = record
             case Channel():
@@ -101,10 +141,10 @@ class _Findings:
             case Statistics():
                 self.messages_promised = record.message_count
 
-    def _add_row(self, message: Message) -> None:
-        if message.channel_id not in self._rows_of_channel:
-            raise ValueError(f"a row of channel {message.channel_id}, which was not described")
-        self._rows_of_channel[message.channel_id].append(message.data)
+    def _add_row(self, row: Row | Message) -> None:
+        if row.channel_id not in self._rows_of_channel:
+            raise ValueError(f"a row of channel {row.channel_id}, which was not described")
+        self._rows_of_channel[row.channel_id].append(row.payload if isinstance(row, Row) else row.data)
         self.messages += 1
 
     def _rows_for(self, channel: Channel) -> list[bytes]:
@@ -176,5 +216,8 @@ def _start_time(log: Log) -> str:
     stamps_s = [*log.ticks["stamp_s"][:1], *(row["stamp_s"] for row in (*log.strides[:1], *log.events[:1]))]
     if not stamps_s or "wall_minus_monotonic_ns" not in log.metadata:
         return ""
-    wall_s = min(stamps_s) + int(log.metadata["wall_minus_monotonic_ns"]) / 1e9
-    return datetime.fromtimestamp(wall_s, UTC).isoformat(timespec="seconds")
+    try:
+        wall_s = min(stamps_s) + int(log.metadata["wall_minus_monotonic_ns"]) / 1e9
+        return datetime.fromtimestamp(wall_s, UTC).isoformat(timespec="seconds")
+    except (ValueError, OverflowError, OSError):  # no time of this world
+        return ""

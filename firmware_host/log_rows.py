@@ -96,7 +96,7 @@ TICK = RowKind(
         Field("tick", "uint32", meaning="ticks since the start, missed ones included"),
         Field("missed_ticks", "uint32", meaning="since the start"),
         Field("stride", "int32", meaning="-1 outside of a walk"),
-        Field("mode", "uint8", meaning="0 boot, 1 idle, 2 arming, 3 hold, 4 walking, 5 stopping, 6 fault"),
+        Field("mode", "uint8", meaning="0 boot, 1 idle, 2 arming, 3 hold, 4 walking, 5 stopping, 6 fault, 7 damping"),
         Field("phase", "uint8", meaning="0 rest, 1 insertion, 2 stance, 3 extraction, 4 swing, 5 pause, 6 recovery"),
         Field("limited", "bool", meaning="the limits cut a torque"),
     ),

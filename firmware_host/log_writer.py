@@ -1,123 +1,113 @@
-"""The writer of a log: rows from standard input into an MCAP file, in a process of its own.
+"""The writer of a log: rows from standard input into MCAP files, in a process of its own.
 
 The loop must never wait for a disk, so it hands rows over in a pipe and this program compresses and writes
-them. It ends when its input ends, and only then: signals meant for the loop pass it by, so the log is
-finished after the last row, whatever ended the loop. Chunks are small and the file is synchronised every
-second, so a power cut costs the last second or two and leaves the rest readable (`firmware_host.log_reader`).
+them. It ends when its input ends, and only then: signals meant for the loop pass it by, and a disk that refuses
+is waited for while rows are counted. Once a second it reports how the disk is on standard output, where it never
+waits either. Chunks end by time and the file is synchronised every second, so a crash of this program costs half a
+second, a power cut one or two, and what was written is put in order at the next start (`firmware_host.log_recovery`).
 """
 
 from __future__ import annotations
 
 import json
-import math
 import os
+import select
 import signal
 import sys
 import time
+from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
-from mcap.writer import CompressionType, Writer
-
+from firmware_host.log_folder import FreeSpace, free_space
+from firmware_host.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log_rows import ROW_KINDS
+from firmware_host.log_segments import LogSegments
 from firmware_host.recorder import HEADER, PIPE_BYTES, STAMP
 
-CHUNK_BYTES = 64 * 1024  # half a second of ticks: what a crash may cost
-SYNC_INTERVAL_S = 1.0
 GATHER_S = 0.05  # asleep between batches, the writer is not woken by every row, which the loop would pay for
+IDLE_MS = 200  # without rows: what is in memory still has to be flushed
+REPORT_INTERVAL_S = 1.0
+LATELY = 10  # reports for which a slow write is remembered
+LONGEST_SENTENCE = 1000  # of a report, which has to go into the pipe in one piece
 
 Rows = list[tuple[int, bytes]]  # index in ROW_KINDS, payload
 
 
-class LogFile:
-    """An MCAP file under construction: one channel per kind of row."""
+class Reporter:
+    """Owns the pipe back to the loop."""
 
-    def __init__(self, path: Path, opening: dict[str, Any]) -> None:
-        if not path.parent.exists():
-            path.parent.mkdir(parents=True)
-        self._path = path
-        self._file = path.open("xb")  # a log is never written over
-        self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.LZ4)
-        self._wall_offset_ns = int(opening["wall_minus_monotonic_ns"])
-        self._latest_ns = self._wall_offset_ns
-        self._sequences = [0] * len(ROW_KINDS)
-        self._write_opening(opening["configuration_text"], opening["metadata"])
-        self._channels = self._register_channels()
-        self._synchronise()
+    def __init__(self, pipe: int) -> None:
+        self._pipe = pipe
+        self._slowest_s: deque[float] = deque(maxlen=LATELY)
+        self._due_s = 0.0
+        self._said = ""
+        os.set_blocking(pipe, False)
 
-    def _write_opening(self, configuration_text: str, metadata: dict[str, str]) -> None:
-        self._writer.start(profile="ros2", library="mudskipper")
-        offset = {"wall_minus_monotonic_ns": str(self._wall_offset_ns)}
-        self._writer.add_metadata("mudskipper", metadata | offset)
-        now_ns = time.time_ns()
-        self._writer.add_attachment(
-            now_ns, now_ns, "configuration.toml", "application/toml", configuration_text.encode()
-        )
+    def update(self, log: LogSegments) -> None:
+        now_s = time.monotonic()
+        if now_s < self._due_s and log.problem == self._said:
+            return
+        self._due_s, self._said = now_s + REPORT_INTERVAL_S, log.problem
+        self._slowest_s.append(log.slowest_s)
+        log.slowest_s = 0.0
+        self.send(log)
 
-    def _register_channels(self) -> list[int]:
-        channels = []
-        for kind in ROW_KINDS:
-            schema = self._writer.register_schema(kind.schema_name, "ros2msg", kind.ros_text.encode())
-            channels.append(self._writer.register_channel(kind.topic, "cdr", schema))
-        return channels
-
-    def write(self, rows: Rows) -> None:
-        for kind_index, payload in rows:
-            log_time_ns = self._wall_time_ns(payload)
-            sequence = self._sequences[kind_index]
-            self._sequences[kind_index] += 1
-            channel = self._channels[kind_index]
-            self._writer.add_message(channel, log_time_ns, payload, log_time_ns, sequence)
-        if time.monotonic() - self._synchronised_s > SYNC_INTERVAL_S:
-            self._synchronise()
-
-    def _wall_time_ns(self, payload: bytes) -> int:
-        """Of the row's stamp; a row without a usable one is placed with the row before it."""
-        (stamp_s,) = STAMP.unpack_from(payload)
-        if math.isfinite(stamp_s):
-            self._latest_ns = max(0, self._wall_offset_ns + round(stamp_s * 1e9))
-        return self._latest_ns
-
-    def _synchronise(self) -> None:
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        self._synchronised_s = time.monotonic()
-
-    def finish(self) -> None:
-        """The index, and everything down to the disk, the file's name included."""
-        self._writer.finish()  # type: ignore[no-untyped-call]
-        self._synchronise()
-        self._file.close()
-        folder = os.open(self._path.parent, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
+    def send(self, log: LogSegments) -> None:
+        space = FreeSpace(0.0, 0)
+        with suppress(OSError):  # a disk that does not even answer this has no room
+            space = free_space(log.path.parent)
+        report = {
+            "path": str(log.path),
+            "dropped": log.dropped,
+            "problem": log.problem[:LONGEST_SENTENCE],
+            "free_share": space.free_share,
+            "free_bytes": space.free_bytes,
+            "slowest_write_s": max(self._slowest_s, default=0.0),
+        }
+        with suppress(OSError):  # nobody reads, or nobody is there any more
+            os.write(self._pipe, json.dumps(report).encode() + b"\n")
 
 
-def write_log(pipe: int, path: Path) -> None:
+def write_log(pipe: int, reports: int, path: Path) -> bool:
     """Everything that comes through the pipe. Without an opening there is nothing to log, and no file."""
     batches = _read_batches(pipe)
-    (_, opening), *rows = next(batches, [(0, b"")])
-    if not opening:
-        return
-    log = LogFile(path, json.loads(opening))
-    log.write(rows)
+    rows = next((batch for batch in batches if batch), [])
+    if not rows or not rows[0][1]:
+        return True
+    opening = json.loads(rows.pop(0)[1])
+    log = LogSegments(path, opening, LogParameters(**opening["parameters"]) if "parameters" in opening else ONE_FILE)
+    reporter = Reporter(reports)
+    reporter.update(log)
+    log.write(_sound(rows))
     for rows in batches:
-        log.write(rows)
-    log.finish()
+        log.write(_sound(rows))
+        reporter.update(log)
+    whole = log.close()
+    reporter.send(log)
+    return whole
+
+
+def _sound(rows: Rows) -> Rows:
+    """Rows that have a kind and a stamp, as every row of the recorder has."""
+    return [row for row in rows if row[0] < len(ROW_KINDS) and len(row[1]) >= STAMP.size]
 
 
 def _read_batches(pipe: int) -> Iterator[Rows]:
-    """Whole rows as they come, until the input ends."""
+    """Whole rows as they come, or none after a while without any, until the input ends."""
+    poll = select.poll()
+    poll.register(pipe, select.POLLIN | select.POLLHUP)
     unread = b""
-    while piece := os.read(pipe, PIPE_BYTES):
-        unread += piece
-        rows, unread = _split(unread)
-        if rows:
-            yield rows
+    while True:
+        if not poll.poll(IDLE_MS):
+            yield []
+            continue
+        piece = os.read(pipe, PIPE_BYTES)
+        if not piece:
+            return
+        rows, unread = _split(unread + piece)
+        yield rows
         time.sleep(GATHER_S)
 
 
@@ -145,11 +135,8 @@ def _keep_out_of_the_way() -> None:
 
 def main() -> None:
     _keep_out_of_the_way()
-    path = Path(sys.argv[1])
-    try:
-        write_log(sys.stdin.fileno(), path)
-    except OSError as error:
-        sys.exit(f"The log {path} cannot be written: {error.strerror or error}.")
+    if not write_log(sys.stdin.fileno(), sys.stdout.fileno(), Path(sys.argv[1])):
+        sys.exit(1)
 
 
 if __name__ == "__main__":

@@ -1,57 +1,36 @@
 """One tick of the robot, from the bus to the bus.
 
 `Loop.tick` is the whole control path and reads in the order in which it happens; the same object runs in the daemon,
-in simulation and in tests, on whatever ports it is given. It owns the mode, the latched fault and the last command.
+in simulation and in tests, on whatever ports it is given. It owns the mode, the faults that stand and the last command.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import NamedTuple
 
-from control.controller import RESTING, Controller, WalkOrder
-from control.faults import Fault
+from control.controller import ALL_TRUSTED, RESTING, Controller, WalkOrder
+from control.fault_latch import FaultLatch
+from control.faults import Fault, Reaction
 from control.gait_adaptation import quickest
 from control.limits import LimitedTorques, apply_limits
-from control.modes import ACCEPTED_IN, ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
-from control.records import (
-    NEVER_S,
-    NO_TORQUE,
-    BodyPose,
-    DriveState,
-    DriveStates,
-    GaitTarget,
-    Phase,
-    StrideEstimate,
-    Torques,
-)
+from control.modes import ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
+from control.records import NEVER_S, NO_TORQUE, BodyPose, DriveState, DriveStates, GaitTarget, Torques
 from control.recovery import Recovery
 from drivers.odrive_drives import OdriveDrives
 from drivers.pose_port import PoseSource
-from estimation.mud import MudEstimator, MudReading
-from firmware_host.adaptation_methods import adaptation_of, choice_text
 from firmware_host.configuration import Configuration
-from firmware_host.fault_watch import FaultWatch
+from firmware_host.fault_watch import FaultWatch, Situation
 from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK
+from firmware_host.mud_learning import MudLearning
 from firmware_host.recorder import Recording
 from firmware_host.row_packing import Moment, stride_row, tick_row
 from firmware_host.ticker import PERIOD_S, Beat
 from firmware_host.timing import LoopTiming
 
-FIRM_TICKS = 3  # of a load that ends an insertion
 CLEARING_S = 0.5  # for the drives to report that their errors are gone
 LONGEST_STEP_TICKS = 3  # what the controller may advance at once: after a longer gap the gait goes on where it was
-KEPT_STRIDES = 200  # for clients that ask what happened
 TICK_KIND, STRIDE_KIND, EVENT_KIND = ROW_KINDS.index(TICK), ROW_KINDS.index(STRIDE), ROW_KINDS.index(EVENT)
-
-
-class ClosedStride(NamedTuple):
-    """A stride of one flipper with the depth that was chosen from it."""
-
-    number: int  # counts all of both flippers since the start
-    estimate: StrideEstimate
-    chosen_depth_m: float
 
 
 class Loop:
@@ -62,51 +41,31 @@ class Loop:
         pose: PoseSource,
         recorder: Recording,
         clock: Callable[[], float] = time.monotonic,
+        wall_clock: Callable[[], float] = time.time,
     ) -> None:
         self.configuration = configuration
         self.drives = drives
         self.pose = pose
         self.recorder = recorder
         self.timing = LoopTiming()
-        self.estimator = MudEstimator(
-            configuration.geometry,
-            configuration.flipper_drives,
-            configuration.estimation,
-            configuration.adaptation.body_drag_n,
-        )
-        self.adaptation = adaptation_of(configuration)
-        self.controller = Controller(
-            configuration.gait,
-            configuration.geometry,
-            configuration.gains,
-            configuration.arm,
-            configuration.motion,
-            Recovery(
-                configuration.recovery,
-                configuration.geometry,
-                quickest(configuration.adaptation, configuration.geometry, configuration.gait),
-                configuration.joint_ranges,
-            ),
-        )
-        self._clock = clock
+        self.learning = MudLearning(configuration)
+        self.controller = controller_of(configuration)
+        self.faults = FaultLatch()
+        self._fault_watch = FaultWatch(configuration, drives)
+        self._clock, self._wall_clock = clock, wall_clock
         self._ranges = configuration.joint_ranges
         self.mode = Mode.BOOT
-        self.fault: Fault | None = None
         self.states: DriveStates = (DriveState(), DriveState(), DriveState(), DriveState())
-        self.reading = MudReading()
         self.body = BodyPose()
         self.sent = LimitedTorques(NO_TORQUE, False, True)
-        self.strides: list[ClosedStride] = []
-        self.strides_closed = 0
         self.health = Health()
         self.missed_ticks = 0  # since the start
-        self.notice = ""  # the last thing that a person should know and that is no fault
+        self.notice = ""  # the last thing that a person should know
         self.ending = False  # the daemon is about to end: nothing is armed any more
+        self.forced = False  # armed against what may be overruled
         self.target_before: GaitTarget = RESTING  # commanded while the states of this tick came about
         self._request, self._clear_until_s = Request.NONE, NEVER_S
         self._mode_since_s = 0.0
-        self._firm_ticks = 0
-        self._fault_watch = FaultWatch(configuration, drives)
 
     def tick(self, beat: Beat) -> None:
         """Everything that happens once in PERIOD_S."""
@@ -114,155 +73,149 @@ class Loop:
         self.target_before = self.controller.target
         self.states = self.drives.read(beat.now_s)
         self.body = self.pose.read(beat.now_s)
-        self.reading = self._estimate(beat.now_s)
+        self.learning.update(beat.now_s, self.target_before.phase, self.states, self.body)
         self._adapt(beat.now_s)
-        self._heed_insertion(beat.now_s)
         self.health = self._examine(beat)
-        self._change_mode(next_mode(self.mode, self._request_now(beat.now_s), self.health), beat.now_s)
+        self._change_mode(next_mode(self.mode, self._request_now(), self.health), beat.now_s)
         step_s = min(1 + beat.missed, LONGEST_STEP_TICKS) * PERIOD_S
-        wanted = self.controller.step(step_s, self.mode, self.states)
+        wanted = self.controller.step(step_s, self.mode, self.states, self._trusted())
         self.sent = self._limit(wanted)
         self._command(beat.now_s)
         self._record(beat)
 
-    def _estimate(self, now_s: float) -> MudReading:
-        """Feed the estimator with the phase that the measured motion was commanded in, as the log records it."""
-        a, b, c, d = self.states
-        angles_rad = (a.angle_rad, b.angle_rad, c.angle_rad, d.angle_rad)
-        velocities_rad_s = (a.velocity_rad_s, b.velocity_rad_s, c.velocity_rad_s, d.velocity_rad_s)
-        currents_a = (a.current_a, b.current_a, c.current_a, d.current_a)
-        return self.estimator.update(
-            now_s,
-            self.target_before.phase,
-            angles_rad,
-            velocities_rad_s,
-            currents_a,
-            self.body.x_m,
-            (now_s - a.angle_stamp_s, now_s - b.angle_stamp_s, now_s - c.angle_stamp_s, now_s - d.angle_stamp_s),
-            (
-                now_s - a.current_stamp_s,
-                now_s - b.current_stamp_s,
-                now_s - c.current_stamp_s,
-                now_s - d.current_stamp_s,
-            ),
-        )
+    @property
+    def fault(self) -> Fault | None:
+        """The worst that stands and is more than a warning."""
+        return self.faults.worst if self.faults.reaction >= Reaction.HOLD else None
 
     def _adapt(self, now_s: float) -> None:
-        """Once a stride, in swing: choose the depth of the next one."""
-        if not self.reading.strides:
-            return
-        if self.estimator.belief.boundary:
-            self.event(now_s, "another mud")
-        gait, depth_m = self.controller.gait, self.controller.order.depth_m
-        if self.controller.order.adaptive:
-            choice = self.adaptation.step(self.estimator.belief, self.reading.strides, gait.commanded_depth_m)
-            depth_m, parameters = choice.depth_m, choice.gait or gait.parameters
-            if (depth_m, parameters) != (gait.next_depth_m, gait.next_parameters):
-                self.event(now_s, choice_text(choice))
-            gait.next_parameters = parameters
-        gait.next_depth_m = depth_m
-        for estimate in self.reading.strides:
-            self.strides.append(ClosedStride(self.strides_closed, estimate, depth_m))
-            self.strides_closed += 1
-            self.recorder.put(STRIDE_KIND, stride_row(now_s, estimate, depth_m))
-        del self.strides[:-KEPT_STRIDES]
-
-    def _heed_insertion(self, now_s: float) -> None:
-        """Where a depth is chosen: mud that might hold a flipper is entered no deeper. One odd sample says nothing."""
-        order, gait, reading = self.controller.order, self.controller.gait, self.reading
-        limit_nm = self.adaptation.largest_insertion_nm
-        firm = reading.left.adduction_torque_nm > limit_nm or reading.right.adduction_torque_nm > limit_nm
-        inserting = order.adaptive and self.controller.target.phase is Phase.INSERTION
-        self._firm_ticks = self._firm_ticks + 1 if firm and inserting else 0
-        if self._firm_ticks >= FIRM_TICKS and gait.end_insertion():
-            self.event(now_s, f"insertion ended at {gait.commanded_depth_m:.4f} m: firm mud")
+        """Once a stride, in swing, the gait changes; and where an insertion meets firm mud."""
+        closed, sentences = self.learning.step(self.controller)
+        for sentence in sentences:
+            self.event(now_s, sentence)
+        for stride in closed:
+            self.recorder.put(STRIDE_KIND, stride_row(now_s, stride.estimate, stride.chosen_depth_m))
 
     def _examine(self, beat: Beat) -> Health:
-        heard = self.mode is not Mode.BOOT or self.drives.heard
-        fault = None
-        if heard:
-            fault = self._fault_watch.update(beat, self.mode, self._mode_since_s, self.states, self.sent)
-            fault = fault or self.controller.fault
+        """Faults as data, and what else the mode depends on."""
+        present = self._fault_watch.update(beat, self._situation()) + self.learning.faults
+        if self.controller.fault:
+            present.append(self.controller.fault)
+        clearing = beat.now_s <= self._clear_until_s
+        self.faults.update(present, self.mode in ENERGISED, clearing, 1 + beat.missed)
+        self._tell_faults(beat.now_s)
         return Health(
-            drives_heard=heard,
+            drives_heard=self.mode is not Mode.BOOT or self.drives.heard,
             closed_loop=self._all_in_closed_loop(),
             walk_finished=self.controller.walk_finished,
             raised=self.controller.raised,
-            fault=fault,
+            settled=self.controller.settled,
+            rested=self.controller.rested,
+            worst=self.faults.worst,
+            blocking=tuple(self.faults.blocking(self.forced)),
         )
+
+    def _situation(self) -> Situation:
+        return Situation(
+            self.mode,
+            self._mode_since_s,
+            self.states,
+            self.body,
+            self.sent,
+            self.controller.recovery.attempt > 0,
+            self._wall_clock() - self._clock(),
+        )
+
+    def _tell_faults(self, now_s: float) -> None:
+        for fault in self.faults.begun:
+            self.event(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault.sentence}")
+        for fault in self.faults.over:
+            self.event(now_s, f"over: {fault.name} {fault.subject}".rstrip())
 
     def _all_in_closed_loop(self) -> bool:
         """By heartbeats that are younger than the wish, while arming: an older one tells of before."""
         oldest_s = self._mode_since_s if self.mode is Mode.ARMING else NEVER_S
         return all(state.closed_loop and state.heartbeat_stamp_s > oldest_s for state in self.states)
 
-    def request(self, request: Request, now_s: float, order: WalkOrder | None = None) -> str | None:
+    def request(
+        self, request: Request, now_s: float, order: WalkOrder | None = None, forced: bool = False
+    ) -> str | None:
         """A person's wish, for the next tick. Returns why it is refused, or None."""
-        refused = self._refusal(request, order)
+        refused = self._refusal(request, order, forced)
         if refused:
             return refused
-        self.event(now_s, f"request {request.name.lower()}")
+        self.event(now_s, f"request {request.name.lower()}{' by force' if forced else ''}")
         if request is Request.DISARM and self.mode not in ENERGISED:
             self.drives.disarm(now_s, at_once=True)  # also while not all drives are heard
         elif request is Request.CLEAR:
             self.drives.clear_errors()
             self._clear_until_s = now_s + CLEARING_S
+        elif request is Request.ARM:
+            self._force(now_s, forced)
         if order is not None:
             self.controller.order = order
-        if request is not Request.CLEAR and self._request is not Request.DISARM:  # which nothing may undo
+        if self._request is not Request.DISARM:  # which nothing may undo
             self._request = request
         return None
 
-    def _refusal(self, request: Request, order: WalkOrder | None) -> str | None:
+    def _force(self, now_s: float, forced: bool) -> None:
+        overruled = self.faults.blocking() if forced else []
+        for fault in overruled:
+            self.event(now_s, f"armed by force despite {fault.name}: {fault.sentence}")
+        self.forced = bool(overruled)
+
+    def _refusal(self, request: Request, order: WalkOrder | None, forced: bool) -> str | None:
         if self.ending and request in (Request.ARM, Request.WALK):
             return "the daemon is ending"
         if order is not None and not self._reaches(order.depth_m):
             return f"depth {order.depth_m:g} m: out of the flippers' reach over the sweep"
-        if request is Request.CLEAR and self.mode in ACCEPTED_IN[request]:
-            return None  # whether the cause persists is known once the drives have answered
-        return refusal(self.mode, request, self.health)
+        health = self.health._replace(blocking=tuple(self.faults.blocking(forced or self.forced)))
+        return refusal(self.mode, request, health)
 
     def _reaches(self, depth_m: float) -> bool:
         return 0.0 < depth_m <= self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
 
-    def _request_now(self, now_s: float) -> Request:
-        """The request to act on in this tick. A clear lasts until the drives had time to report no errors."""
+    def _request_now(self) -> Request:
+        """The request to act on in this tick."""
         request, self._request = self._request, Request.NONE
-        if self.ending and request in (Request.ARM, Request.WALK):
-            request = Request.NONE
-        if request is Request.NONE and now_s <= self._clear_until_s:
-            return Request.CLEAR
-        return request
+        refused = self.ending and request in (Request.ARM, Request.WALK)
+        return Request.NONE if refused else request
 
     def _change_mode(self, mode: Mode, now_s: float) -> None:
         if mode is self.mode:
             return
-        if mode is Mode.FAULT:
-            self.fault = self.health.fault
-        elif mode is Mode.IDLE:
-            self.fault = None
-        if mode in (Mode.ARMING, Mode.WALKING):
-            self.notice = ""
+        self._tell_change(mode, now_s)
         if mode is Mode.WALKING:
-            self.estimator.reset()
-            self.adaptation.reset(self.controller.order.depth_m)
-        if self.mode is Mode.STOPPING and mode is Mode.HOLD and not self.controller.is_up(self.states):
-            self._tell(now_s, "the flippers did not come out of the mud")
-        because = f": {self.fault.sentence}" if self.fault else ""
-        self.event(now_s, f"mode {self.mode.name.lower()} to {mode.name.lower()}{because}")
+            self.learning.reset(self.controller.order.depth_m)
+        if mode is Mode.IDLE:
+            self.forced = False
         if mode is Mode.ARMING:
             self.drives.arm(now_s, at_once=True)
         elif self.mode in ENERGISED and mode not in ENERGISED:
             self.drives.disarm(now_s, at_once=True)
         self.mode, self._mode_since_s = mode, now_s
 
+    def _tell_change(self, mode: Mode, now_s: float) -> None:
+        fault = self.fault
+        because = f": {fault.sentence}" if fault else ""
+        self.event(now_s, f"mode {self.mode.name.lower()} to {mode.name.lower()}{because}")
+        if mode in (Mode.ARMING, Mode.WALKING):
+            self.notice = ""
+        if fault and self.mode in ENERGISED:
+            self.notice = f"stopped by {fault.name}: {fault.sentence} {fault.kind.what_to_do}."
+        if self.mode is Mode.STOPPING and mode is Mode.HOLD and not self.controller.is_up(self.states):
+            self.notice = "the flippers did not come out of the mud"
+            self.event(now_s, self.notice)
+
+    def _trusted(self) -> tuple[bool, ...]:
+        return self._fault_watch.trusted if self.mode is Mode.DAMPING else ALL_TRUSTED
+
     def _limit(self, wanted: Torques) -> LimitedTorques:
         """One tick's slew, however long the last gap was."""
         if self.mode not in MOVING:
             return LimitedTorques(NO_TORQUE, False, True)
-        return apply_limits(
-            wanted, self.sent.torques_nm, self.states, self.configuration.limits, self._ranges, PERIOD_S
-        )
+        states = self._fault_watch.with_winding_heat(self.states)
+        return apply_limits(wanted, self.sent.torques_nm, states, self.configuration.limits, self._ranges, PERIOD_S)
 
     def _command(self, now_s: float) -> None:
         """Before all drives are heard, those in closed loop are told to go idle, and nothing else is sent.
@@ -277,6 +230,7 @@ class Loop:
             return
         if self.mode is Mode.IDLE:
             self.drives.request_versions(now_s)
+            self.drives.request_watchdogs(now_s)
         self.drives.send(self.sent.torques_nm)
 
     def _record(self, beat: Beat) -> None:
@@ -289,7 +243,7 @@ class Loop:
             self.target_before,
             self.controller.gait.commanded_depth_m,
             self.states,
-            self.reading,
+            self.learning.reading,
             self.body,
             self.sent,
         )
@@ -298,10 +252,23 @@ class Loop:
             self.event(beat.now_s, self.controller.recovery.news)
         self.timing.update(beat.now_s, beat.late_s, beat.missed, tick_s)
 
-    def _tell(self, now_s: float, notice: str) -> None:
-        self.notice = notice
-        self.event(now_s, notice)
-
     def event(self, now_s: float, text: str) -> None:
         """A sentence into the log."""
         self.recorder.put(EVENT_KIND, EVENT.encode(now_s, text))
+
+
+def controller_of(configuration: Configuration) -> Controller:
+    recovery = Recovery(
+        configuration.recovery,
+        configuration.geometry,
+        quickest(configuration.adaptation, configuration.geometry, configuration.gait),
+        configuration.joint_ranges,
+    )
+    return Controller(
+        configuration.gait,
+        configuration.geometry,
+        configuration.gains,
+        configuration.arm,
+        configuration.motion,
+        recovery,
+    )

@@ -1,4 +1,8 @@
-"""What a person can ask of the running daemon: the methods of the status socket."""
+"""What a person can ask of the running daemon: the methods of the status socket.
+
+Who asks for something to be done is named in the log. A lease is given while torque is on: before, there is nothing
+that its loss could stop.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +12,16 @@ from math import isfinite
 from typing import Any
 
 from control.controller import WalkOrder
-from control.faults import silent_signals
-from control.modes import Mode, Request
-from control.records import JOINTS, DriveState
+from control.faults import Blocks, Fault
+from control.modes import ENERGISED, Request
+from control.records import JOINTS
 from drivers.odrive_codec import error_text
+from firmware_host.arming_checks import arming_checks
+from firmware_host.connection import Caller
+from firmware_host.lease import LONGEST_S, SHORTEST_S, Lease
 from firmware_host.loop import Loop
 from firmware_host.recorder import Recording
-from firmware_host.reports import belief_report, check_item, known, map_report, stride_report
+from firmware_host.reports import belief_report, known, map_report, stride_report
 from firmware_host.status_socket import Methods, RefusedError
 
 MOST_STRIDES = 100000  # that a walk may be ordered
@@ -34,13 +41,13 @@ class OperatorCalls:
         self,
         loop: Loop,
         recorder: Recording,
-        log_path: str | None,
         warnings: list[str],
         clock: Callable[[], float],
+        lease: Lease | None = None,
     ) -> None:
         self._loop = loop
+        self._lease = lease or Lease()
         self._recorder = recorder
-        self._log_path = log_path
         self._warnings = warnings
         self._clock = clock
         self._version = software_version()
@@ -48,17 +55,19 @@ class OperatorCalls:
     @property
     def methods(self) -> Methods:
         return {
-            "hello": self.hello,
-            "status": self.status,
-            "strides": self.strides,
-            "map": self.map,
-            "check": self.check,
-            "arm": lambda params: self._request(Request.ARM),
+            "hello": lambda params, caller: self.hello(params),
+            "status": lambda params, caller: self.status(params),
+            "strides": lambda params, caller: self.strides(params),
+            "map": lambda params, caller: self.map(params),
+            "check": lambda params, caller: self.check(params),
+            "arm": self.arm,
             "walk": self.walk,
-            "stop": lambda params: self._request(Request.STOP),
-            "disarm": lambda params: self._request(Request.DISARM),
-            "clear": lambda params: self._request(Request.CLEAR),
-            "reset_timing": self.reset_timing,
+            "stop": lambda params, caller: self._request(caller, Request.STOP),
+            "disarm": lambda params, caller: self._request(caller, Request.DISARM),
+            "clear": self.clear,
+            "lease": self.lease,
+            "release": self.release,
+            "reset_timing": lambda params, caller: self.reset_timing(params),
         }
 
     def hello(self, params: dict[str, Any]) -> dict[str, Any]:
@@ -72,19 +81,21 @@ class OperatorCalls:
             "version": self._version,
             "mode": loop.mode.name.lower(),
             "fault": _fault(loop),
+            "faults": [_fault_report(fault) for fault in loop.faults.standing],
+            "forced": loop.forced,
             "notice": loop.notice if self._recorder.writer_alive else "the log's writer has died: nothing is recorded",
             "phase": loop.target_before.phase.name.lower(),
             "stride": loop.target_before.stride,
             "depth_m": loop.controller.gait.commanded_depth_m,
             "body_x_m": known(loop.body.x_m),
             "drives": [self._drive(place) for place in range(len(JOINTS))],
-            "strides_closed": loop.strides_closed,
-            "mud": belief_report(loop.estimator.belief),
+            "strides_closed": loop.learning.strides_closed,
+            "mud": belief_report(loop.learning.estimator.belief),
             "loop": loop.timing.summary(),
             "warnings": self._warnings,
             "bus": self._bus(),
             "log": {
-                "path": self._log_path,
+                "path": str(self._recorder.path) if self._recorder.path else None,
                 "dropped": self._recorder.dropped,
                 "writer_alive": self._recorder.writer_alive,
             },
@@ -120,7 +131,7 @@ class OperatorCalls:
     def strides(self, params: dict[str, Any]) -> list[dict[str, Any]]:
         """The first STRIDES_PER_ANSWER closed from number `since` on, as far back as they are kept."""
         since = _integer(params, "since", 0, LARGEST_NUMBER)
-        wanted = [closed for closed in self._loop.strides if closed.number >= since]
+        wanted = [closed for closed in self._loop.learning.strides if closed.number >= since]
         return [
             stride_report(closed.estimate) | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
             for closed in wanted[:STRIDES_PER_ANSWER]
@@ -128,27 +139,64 @@ class OperatorCalls:
 
     def map(self, params: dict[str, Any]) -> list[dict[str, Any]]:
         """The mud along the way, since the walk began."""
-        return map_report(self._loop.estimator.map.rows())
+        return map_report(self._loop.learning.estimator.map.rows())
 
-    def walk(self, params: dict[str, Any]) -> str:
+    def arm(self, params: dict[str, Any], caller: Caller) -> str:
+        """`force` overrules what is not mandatory."""
+        force = params.get("force", False)
+        if not isinstance(force, bool):
+            raise RefusedError(f"force = {force!r}: must be true or false")
+        return self._request(caller, Request.ARM, forced=force)
+
+    def walk(self, params: dict[str, Any], caller: Caller) -> str:
         """`depth_m` for a fixed depth, else adaptive from the configured start; `strides`, 0 without end."""
         configuration = self._loop.configuration
         strides = _integer(params, "strides", 0, MOST_STRIDES)
         depth_m = params.get("depth_m")
         if depth_m is None:
-            return self._request(Request.WALK, WalkOrder(configuration.adaptation.initial_depth_m, True, strides))
+            order = WalkOrder(configuration.adaptation.initial_depth_m, True, strides)
+            return self._request(caller, Request.WALK, order)
         if isinstance(depth_m, bool) or not isinstance(depth_m, int | float) or not isfinite(depth_m):
             raise RefusedError(f"depth_m = {depth_m!r}: must be a number")
         deepest_m = configuration.adaptation.max_depth_m
         if not 0.0 < depth_m <= deepest_m:
             raise RefusedError(f"depth_m = {depth_m}: must be more than 0 and at most {deepest_m}")
-        return self._request(Request.WALK, WalkOrder(float(depth_m), False, strides))
+        return self._request(caller, Request.WALK, WalkOrder(float(depth_m), False, strides))
 
-    def _request(self, request: Request, order: WalkOrder | None = None) -> str:
-        refused = self._loop.request(request, self._clock(), order)
+    def clear(self, params: dict[str, Any], caller: Caller) -> str:
+        """A lost lease is cleared with the rest."""
+        accepted = self._request(caller, Request.CLEAR)
+        if self._lease.lost(self._clock()):
+            self._lease.reset()
+        return accepted
+
+    def lease(self, params: dict[str, Any], caller: Caller) -> str:
+        """Promise to renew it within `for_s`, or to be stopped."""
+        for_s = params.get("for_s")
+        if isinstance(for_s, bool) or not isinstance(for_s, int | float) or not SHORTEST_S <= for_s <= LONGEST_S:
+            raise RefusedError(f"for_s = {for_s!r}: must be a number from {SHORTEST_S:g} to {LONGEST_S:g}")
+        if self._loop.mode not in ENERGISED:
+            raise RefusedError("the torque is off, there is nothing to stop: arm first")
+        begins = self._lease.holder != caller
+        self._accept(self._lease.renew(caller, self._clock(), for_s))
+        if begins:
+            self._loop.event(self._clock(), f"lease taken by {caller}")
+        return "accepted"
+
+    def release(self, params: dict[str, Any], caller: Caller) -> str:
+        """End one's own lease, or whoever's was lost."""
+        self._accept(self._lease.release(caller))
+        self._loop.event(self._clock(), f"lease released by {caller}")
+        return "accepted"
+
+    def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:
+        self._accept(self._loop.request(request, self._clock(), order, forced))
+        self._loop.event(self._clock(), f"request {request.name.lower()} by {caller}")
+        return "accepted"
+
+    def _accept(self, refused: str | None) -> None:
         if refused:
             raise RefusedError(refused)
-        return "accepted"
 
     def reset_timing(self, params: dict[str, Any]) -> str:
         """Start the loop's statistics anew."""
@@ -156,50 +204,26 @@ class OperatorCalls:
         return "accepted"
 
     def check(self, params: dict[str, Any]) -> list[dict[str, Any]]:
-        """What stands between this robot and a walk, item by item."""
-        items = [check_item("configuration", True, f"accepted for {self._loop.configuration.robot.name}", "")]
-        items += [self._check_drive(joint, state) for joint, state in zip(JOINTS, self._loop.states, strict=True)]
-        items.append(self._check_bus())
-        items.append(self._check_arming())
-        alive = self._recorder.writer_alive
-        items.append(check_item("log", alive, "rows are written" if alive else "its writer has died", "restart"))
-        for warning in self._warnings:
-            items.append(check_item("realtime", True, f"warning: {warning}", ""))
-        return items
-
-    def _check_drive(self, joint: str, state: DriveState) -> dict[str, Any]:
-        silence_s = self._loop.configuration.loop.silence_s
-        missing = [signal for signal, _ in silent_signals(state, silence_s, self._clock())]
-        if missing:
-            fix = "check its power, wiring, node id and cyclic message periods (README, 'Setting up the drives')"
-            return check_item(f"drive.{joint}", False, f"no {', '.join(missing)}", fix)
-        if state.error_flags:
-            fix = "mend the cause, then 'mudskipper clear'"
-            return check_item(f"drive.{joint}", False, error_text(state.error_flags), fix)
-        unwatched = "" if isfinite(state.temperature_stamp_s) else ", but never its temperature: no limit guards it"
-        return check_item(f"drive.{joint}", True, f"heard{unwatched}", "")
-
-    def _check_bus(self) -> dict[str, Any]:
-        counts = self._bus()
-        trouble = counts["error_frames"] + counts["failed_sends"]
-        text = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counts.items())
-        fix = "check wiring, termination and bit rate; 'ip -s -d link show' tells more"
-        return check_item("bus", trouble == 0, text, fix)
-
-    def _check_arming(self) -> dict[str, Any]:
-        loop = self._loop
-        if loop.mode is Mode.BOOT:
-            return check_item("arming", False, "not every drive was heard yet", "see the drives above")
-        fault = loop.fault or loop.health.fault
-        if fault is not None:
-            return check_item("arming", False, fault.sentence, "mend the cause, then 'mudskipper clear'")
-        return check_item("arming", True, f"nothing against it; the mode is {loop.mode.name.lower()}", "")
+        """What stands between this robot and torque, item by item."""
+        return arming_checks(self._loop, str(self._recorder.path or "off"), self._warnings)
 
 
-def _fault(loop: Loop) -> dict[str, str] | None:
-    """The latched one, or what stands against arming now."""
-    fault = loop.fault or (loop.health.fault if loop.mode is not Mode.BOOT else None)
-    return {"name": fault.name, "sentence": fault.sentence} if fault else None
+def _fault(loop: Loop) -> dict[str, Any] | None:
+    """The worst that stands, or what stands against arming."""
+    fault = loop.fault or next(iter(loop.faults.blocking()), None)
+    return _fault_report(fault) if fault else None
+
+
+def _fault_report(fault: Fault) -> dict[str, Any]:
+    kind = fault.kind
+    return {
+        "name": fault.name,
+        "subject": fault.subject,
+        "sentence": fault.sentence,
+        "what_to_do": kind.what_to_do,
+        "reaction": kind.reaction.name.lower(),
+        "blocks_arming": kind.blocks is not Blocks.NO,
+    }
 
 
 def _integer(params: dict[str, Any], name: str, low: int, high: int) -> int:

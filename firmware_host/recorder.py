@@ -4,6 +4,8 @@ Compressing and writing a log takes milliseconds, a memory card now and then a s
 does that (`firmware_host.log_writer`), and `put` is one non-blocking write into a pipe that holds several
 seconds of rows. A row is smaller than PIPE_BUF, so it goes in whole or not at all. When the pipe is full the
 row is dropped and counted, and an event in the log says so before the next row that gets through.
+
+A second pipe leads back: once a second the writer says how the disk is. `report` reads what is there and never waits.
 """
 
 from __future__ import annotations
@@ -17,10 +19,13 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from dataclasses import asdict
 from fcntl import F_SETPIPE_SZ, fcntl
 from pathlib import Path
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
+from firmware_host.log_folder import present_path
+from firmware_host.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log_rows import EVENT, ROW_KINDS
 
 PIPE_BYTES = 1 << 20  # 2,560 ticks, ten to a page: almost seven seconds at 380 Hz
@@ -30,6 +35,22 @@ REPORT_BYTES = 256  # kept free for the report of a loss, which goes in together
 LARGEST_ROW = select.PIPE_BUF - HEADER.size - REPORT_BYTES
 LONGEST_TEXT = LARGEST_ROW - len(EVENT.encode(0.0, ""))  # bytes
 EVENT_KIND = ROW_KINDS.index(EVENT)
+REPORT_CALLS = 95  # between two looks into the pipe of reports, which brings one a second: four a second at 380 Hz
+REPORT_OVERDUE_S = 3.0  # without a report: the writer waits for its disk
+
+
+class LogReport(NamedTuple):
+    """How the log is."""
+
+    alive: bool  # the writer
+    dropped: int  # rows, by the full pipe and by the writer
+    problem: str  # a sentence, or empty
+    free_share: float  # of the disk
+    free_bytes: int
+    slowest_write_s: float  # of the last ten seconds, as far as it has come
+
+
+HEALTHY = LogReport(True, 0, "", 1.0, 1 << 62, 0.0)  # until the writer has said more
 
 
 class Recording(Protocol):
@@ -38,7 +59,12 @@ class Recording(Protocol):
     dropped: int
     writer_alive: bool
 
+    @property
+    def path(self) -> Path | None: ...
+
     def put(self, kind_index: int, payload: bytes) -> bool: ...
+
+    def report(self) -> LogReport: ...
 
     def close(self, timeout_s: float) -> bool: ...
 
@@ -46,11 +72,15 @@ class Recording(Protocol):
 class NullRecorder:
     """Takes every row and keeps none."""
 
+    path: Path | None = None
     dropped = 0
     writer_alive = True
 
     def put(self, kind_index: int, payload: bytes) -> bool:
         return True
+
+    def report(self) -> LogReport:
+        return HEALTHY
 
     def close(self, timeout_s: float) -> bool:
         return True
@@ -59,30 +89,30 @@ class NullRecorder:
 class Recorder:
     """Owns the writer and the pipe to it. Start it before the loop takes real-time priority."""
 
-    def __init__(self, path: Path, configuration_text: str, metadata: dict[str, str]) -> None:
-        self.path = path
+    def __init__(
+        self, path: Path, configuration_text: str, metadata: dict[str, str], parameters: LogParameters = ONE_FILE
+    ) -> None:
+        self.path = path  # of the file that is being written, or was written last
         self.dropped = 0
         self.writer_alive = True
         self._unreported = 0
         self._loss_stamp_s = 0.0
         self._writer = _start_writer(path)
         self.writer_pid = self._writer.pid
-        assert self._writer.stdin is not None
-        self._pipe = self._writer.stdin.fileno()
+        assert self._writer.stdin is not None and self._writer.stdout is not None
+        self._pipe, self._reports = self._writer.stdin.fileno(), self._writer.stdout.fileno()
+        self._report, self._dropped_by_writer = HEALTHY, 0
+        self._calls, self._heard_s = 0, time.monotonic()
+        os.set_blocking(self._reports, False)
         with suppress(PermissionError):  # beyond the user's limit: the pipe keeps its 64 KiB
             fcntl(self._pipe, F_SETPIPE_SZ, PIPE_BYTES)
-        self._send_opening(configuration_text, metadata)
+        self._send_opening(configuration_text, metadata, parameters)
         os.set_blocking(self._pipe, False)
 
-    def _send_opening(self, configuration_text: str, metadata: dict[str, str]) -> None:
-        opening = json.dumps(
-            {
-                "configuration_text": configuration_text,
-                "metadata": metadata,
-                "wall_minus_monotonic_ns": time.time_ns() - time.monotonic_ns(),
-            }
-        ).encode()
-        unsent = memoryview(HEADER.pack(0, len(opening)) + opening)
+    def _send_opening(self, configuration_text: str, metadata: dict[str, str], parameters: LogParameters) -> None:
+        opening = {"configuration_text": configuration_text, "metadata": metadata, "parameters": asdict(parameters)}
+        payload = json.dumps(opening).encode()
+        unsent = memoryview(HEADER.pack(0, len(payload)) + payload)
         try:
             while unsent:
                 unsent = unsent[os.write(self._pipe, unsent) :]
@@ -120,9 +150,44 @@ class Recorder:
         payload = EVENT.encode(self._loss_stamp_s, text)
         return HEADER.pack(EVENT_KIND, len(payload)) + payload
 
+    def report(self) -> LogReport:
+        """How the log is, cheap enough for every tick: the pipe is looked into now and then."""
+        self._calls -= 1
+        if self._calls < 0:
+            self._calls = REPORT_CALLS
+            self._hear()
+        return self._report
+
+    def _hear(self) -> None:
+        now_s = time.monotonic()
+        try:
+            said = os.read(self._reports, PIPE_BYTES)
+        except BlockingIOError:
+            said = b"\n"
+        if not said:
+            self.writer_alive = False
+        lines = said.split(b"\n")[:-1]
+        if lines and lines[-1]:
+            self._take(json.loads(lines[-1]))
+            self._heard_s = now_s
+        silent_s = now_s - self._heard_s if self.writer_alive else 0.0
+        slowest_s = self._report.slowest_write_s
+        self._report = self._report._replace(
+            alive=self.writer_alive,
+            dropped=self.dropped,
+            slowest_write_s=max(slowest_s, silent_s) if silent_s > REPORT_OVERDUE_S else slowest_s,
+        )
+
+    def _take(self, said: dict[str, Any]) -> None:
+        self.path = Path(said.pop("path"))
+        dropped = said.pop("dropped")
+        self.dropped += dropped - self._dropped_by_writer
+        self._dropped_by_writer = dropped
+        self._report = LogReport(self.writer_alive, self.dropped, **said)
+
     def close(self, timeout_s: float) -> bool:
         """End the log; True once it is whole on the disk. A writer that needs longer finishes alone."""
-        assert self._writer.stdin is not None
+        assert self._writer.stdin is not None and self._writer.stdout is not None
         deadline_s = time.monotonic() + timeout_s
         if self._unreported and self.writer_alive:
             _wait_for_room(self._pipe, timeout_s)
@@ -130,9 +195,14 @@ class Recorder:
         self.writer_alive = False
         self._writer.stdin.close()
         try:
-            return self._writer.wait(max(0.0, deadline_s - time.monotonic())) == 0
+            status = self._writer.wait(max(0.0, deadline_s - time.monotonic()))
         except subprocess.TimeoutExpired:
             return False
+        if not self._writer.stdout.closed:
+            self._hear()
+            self._writer.stdout.close()
+        self.path = present_path(self.path)
+        return status == 0
 
 
 def _start_writer(path: Path) -> subprocess.Popen[bytes]:
@@ -140,7 +210,7 @@ def _start_writer(path: Path) -> subprocess.Popen[bytes]:
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGABRT})
     try:
         command = [sys.executable, "-P", "-m", "firmware_host.log_writer", str(path)]
-        return subprocess.Popen(command, stdin=subprocess.PIPE, bufsize=0)
+        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 

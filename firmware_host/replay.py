@@ -4,7 +4,7 @@ authors' logs are its first real input.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
@@ -18,7 +18,7 @@ from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstima
 from estimation.mud_map import MapRow
 from firmware_host.configuration import Configuration, ConfigurationError, parse_configuration
 from firmware_host.lab_csv import LabLog, read_lab_csv
-from firmware_host.log_reader import Log, LogError, read_log
+from firmware_host.log_reader import Log, LogError, read_log, read_logs
 
 PAPER_CONSTANT_NM_A = 0.083
 WEIGHTLESS = ArmMass(
@@ -41,6 +41,15 @@ class Replay:
     flippers: tuple[str, ...]
     map: tuple[MapRow, ...] = ()  # of the mud along the way, where there was a pose
     complete: bool = True  # False where the writer of the log was cut off
+
+
+def replay_files(
+    paths: Sequence[Path], configuration: Configuration | None = None, method: Method | None = None
+) -> Replay:
+    """One file, or several segments of one run. Raises LogError."""
+    if len(paths) == 1:
+        return replay_file(paths[0], configuration, method)
+    return replay_log(paths[0], read_logs(paths), configuration, method)
 
 
 def replay_file(path: Path, configuration: Configuration | None = None, method: Method | None = None) -> Replay:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import socket
+import struct
 from pathlib import Path
 from typing import Any
 
 import msgpack
 
-REQUEST = 0
+from firmware_host.rpc import NOT_PERMITTED, REQUEST
+
 ANSWER_S = 5.0
+TIMEVAL = struct.Struct("ll")  # seconds and microseconds
 
 
 class NoDaemonError(Exception):
@@ -17,7 +20,7 @@ class NoDaemonError(Exception):
 
 
 class NotPermittedError(Exception):
-    """The socket is there and may not be used."""
+    """The socket may not be used, or not for this; the text says what to do."""
 
 
 class CallRefusedError(Exception):
@@ -30,34 +33,42 @@ class StatusClient:
         self._number = 0
         self._unpacker = msgpack.Unpacker(raw=False)
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._socket.settimeout(timeout_s)
+        patience = TIMEVAL.pack(*divmod(int(1e6 * timeout_s), 10**6))
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, patience)
         try:
-            self._socket.connect(str(path))
+            self._socket.connect(str(path))  # blocking: with Python's own timeout a full queue is an error at once
         except PermissionError as problem:
-            raise NotPermittedError(f"no permission to use {path}") from problem
+            raise NotPermittedError(f"no permission to use {path}. Join the group that owns it.") from problem
         except OSError as problem:
             raise NoDaemonError(f"no daemon answers on {path}") from problem
+        self._socket.settimeout(timeout_s)
 
     def call(self, method: str, **params: Any) -> Any:
-        """The result; raises CallRefusedError with the daemon's sentence, or NoDaemonError where it is gone."""
+        """The result.
+
+        Raises CallRefusedError or NotPermittedError with the daemon's sentence, or NoDaemonError where it is gone.
+        """
         self._number += 1
         try:
             self._socket.sendall(msgpack.packb([REQUEST, self._number, method, params]))
-            _, _, problem, result = self._receive()
+            problem, result = self._receive()
         except OSError as problem_reading:
             raise NoDaemonError(f"the daemon on {self._path} does not answer") from problem_reading
         except (ValueError, TypeError, KeyError, msgpack.UnpackException) as problem_reading:
             raise NoDaemonError(f"what answers on {self._path} is no mudskipper daemon") from problem_reading
+        if problem is not None and str(problem).startswith(NOT_PERMITTED):
+            raise NotPermittedError(str(problem).removeprefix(NOT_PERMITTED))
         if problem is not None:
             raise CallRefusedError(problem)
         return result
 
-    def _receive(self) -> list[Any]:
+    def _receive(self) -> tuple[Any, Any]:
+        """Problem and result. An answer that a Ctrl-C kept from being read belongs to an earlier request."""
         while True:
             for message in self._unpacker:
-                if not isinstance(message, list):
-                    raise TypeError(message)
-                return message
+                _, number, problem, result = message
+                if number in (self._number, None):
+                    return problem, result
             data = self._socket.recv(65536)
             if not data:
                 raise ConnectionResetError

@@ -59,8 +59,12 @@ viscous_nm_s = 0.002
 [friction.right_adduction]
 viscous_nm_s = 0.002
 
-[loop]
+[faults]
+late_s = 0.5
+quiet_s = 0.5
 silence_s = 0.5
+lag_s = 0.5
+lag_share = 1.0
 
 [log]
 directory = {logs}
@@ -70,6 +74,9 @@ socket = {status}
 
 [pose]
 socket = {pose}
+
+[failures]
+allowed = true
 """
 
 

@@ -12,9 +12,14 @@ from typing import Any
 from control.controller import WalkOrder
 from control.modes import Mode, Request
 from control.records import JOINTS
+from drivers.failing_port import failing_ports
+from drivers.failing_pose import failing_pose
+from drivers.failures import USUAL_S, Failures, begin_text, end_text
 from drivers.mock_bus import MockBus
 from drivers.odrive_drives import OdriveDrives
 from firmware_host.configuration import Configuration
+from firmware_host.failing_recorder import failing_recorder
+from firmware_host.failing_time import Stalls, failing_clock
 from firmware_host.loop import Loop
 from firmware_host.recorder import NullRecorder, Recording
 from firmware_host.ticker import PERIOD_S, Beat
@@ -59,6 +64,7 @@ class Lockstep:
     """Owns the common time of robot and loop. Disturbances are of the mud and of the drives.
 
     `plant` and `drives` are used as they are, in place of those that configuration, disturbances and base make.
+    `failures` make parts of the loop's side fail: begin them by `fail`.
     """
 
     def __init__(
@@ -72,6 +78,7 @@ class Lockstep:
         plant: PlantParameters | None = None,
         drives: Mapping[str, OdriveParameters] | None = None,
         motion_capture: MotionCaptureParameters = AT_EVERY_TICK,
+        failures: Failures | None = None,
     ) -> None:
         buses = {name: MockBus() for name in configuration.bus}
         self.robot = SimulatedRobot(
@@ -82,19 +89,39 @@ class Lockstep:
             {name: bus.open() for name, bus in buses.items()},
             seed,
         )
-        ports = OdriveDrives(configuration.drive, {name: bus.open() for name, bus in buses.items()})
-        pose = SimulatedPose(self.robot.plant, motion_capture, seed + 1)
-        self.loop = Loop(configuration, ports, pose, recorder or NullRecorder(), clock=lambda: self.now_s)
+        wires = failing_ports({name: bus.open() for name, bus in buses.items()}, configuration.drive, failures)
+        ports = OdriveDrives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
+        pose = failing_pose(SimulatedPose(self.robot.plant, motion_capture, seed + 1), failures)
+        rows = failing_recorder(recorder or NullRecorder(), failures)
+        wall_clock = failing_clock(self._now_s, failures)
+        self.loop = Loop(configuration, ports, pose, rows, self._now_s, wall_clock)
+        self._sound = failures is None
+        self.failures = failures or Failures(configuration.bus)
+        self._stalls = Stalls(self.failures)
         self.tick_number = 0
 
     @property
     def now_s(self) -> float:
         return self.tick_number * PERIOD_S
 
+    def _now_s(self) -> float:
+        return self.now_s
+
     def step(self) -> None:
-        self.tick_number += 1
+        missed = int(self._stalls.next_s() / PERIOD_S)
+        self.tick_number += 1 + missed
         self.robot.advance(self.now_s)
-        self.loop.tick(Beat(self.now_s, 0.0, self.tick_number, 0))
+        for failure in self.failures.update(self.now_s):
+            self.loop.event(self.now_s, end_text(failure))
+        self.loop.tick(Beat(self.now_s, missed * PERIOD_S, self.tick_number, missed))
+
+    def fail(self, component: str, kind: str, for_s: float = USUAL_S) -> None:
+        """From the next tick on. Raises RuntimeError where it is refused."""
+        refused = "no failures were given" if self._sound else self.failures.refusal(component, kind, for_s)
+        if refused:
+            raise RuntimeError(refused)
+        self.loop.event(self.now_s, begin_text(component, kind, for_s, "lockstep"))
+        self.failures.begin(component, kind, self.now_s, for_s)
 
     def run_for(self, duration_s: float) -> None:
         for _ in range(round(duration_s / PERIOD_S)):
@@ -110,7 +137,7 @@ class Lockstep:
 
     def arm(self) -> None:
         """From power-on to holding the pose. Raises RuntimeError with the reason where that fails."""
-        self.run_until(lambda: self.loop.health.fault is None and self.loop.mode is Mode.IDLE, 3.0)
+        self.run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking(), 3.0)
         refused = self.loop.request(Request.ARM, self.now_s)
         if refused or not self.run_until(lambda: self.loop.mode is Mode.HOLD, 3.0):
             raise RuntimeError(refused or f"not armed: {self.loop.fault}")

@@ -31,7 +31,9 @@ from drivers.odrive_codec import AxisState, GarbledMessageError, Message, arbitr
 TURN_RAD = 2.0 * pi
 SECOND_HARMONIC = 0.25
 REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
-VERSION_FIELDS = (2, 4, 4, 58, 0, 6, 11, 0)  # protocol 2, an ODrive Pro, firmware 0.6.11
+VERSION_FIELDS = (2, 0, 0, 0, 0, 6, 11, 0)  # protocol 2, no real board, firmware 0.6.11
+WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = 1, 2  # this drive's own numbers: every real build has others
+BOOT_S = 1.0  # silence of a drive that restarts
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,8 @@ class SimulatedOdrive:
         self._current_a = 0.0
         self._stepped_s = now_s
         self._turns = self._turns_s = 0.0
+        self._boots_until_s = NEVER_S
+        self._initializing = False
         self._told: dict[Message, Frame] = {}
         self._under_way: deque[tuple[float, Frame]] = deque()  # when it arrives, and what
         periods = self.parameters
@@ -93,13 +97,24 @@ class SimulatedOdrive:
         # Boards are switched on at different moments: their messages do not come all at once.
         self._due_s = [now_s + period_s * self._random.random() for period_s, _ in self._schedule]
 
+    def restart(self, now_s: float) -> None:
+        """As by a dip in its supply: it is deaf and silent for BOOT_S, then tells once that it initialises."""
+        turns, turns_s = self._turns, self._turns_s
+        self.reset(now_s + BOOT_S)
+        self._turns, self._turns_s = turns, turns_s
+        self._stepped_s = now_s
+        self._boots_until_s = now_s + BOOT_S
+        self._initializing = True
+
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
         """Obey one frame of the bus; the answers it calls for."""
         node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & 0x1F
-        if frame.is_extended or node_id != self.parameters.node_id:
+        if frame.is_extended or node_id != self.parameters.node_id or now_s < self._boots_until_s:
             return []
         if frame.is_remote:
             return [self._frame(message) for message in self._PAYLOADS if message.command == command]
+        if command == codec.RX_SDO.command:
+            return self._read_parameter(frame.data)
         with suppress(GarbledMessageError):  # a drive ignores what it cannot read
             self._obey(command, frame.data, now_s)
         return []
@@ -118,6 +133,21 @@ class SimulatedOdrive:
             self.errors = 0
         elif command == codec.ESTOP.command:
             self._disarm(codec.ERROR_ESTOP)
+
+    def _read_parameter(self, data: bytes) -> list[Frame]:
+        """The watchdog's settings are the only parameters here, and none can be written."""
+        try:
+            opcode, endpoint, _ = codec.RX_SDO.decode(data)
+        except GarbledMessageError:
+            return []
+        values = {
+            ENABLE_WATCHDOG_ENDPOINT: bytes([self.parameters.watchdog_s > 0.0]),
+            WATCHDOG_TIMEOUT_ENDPOINT: codec.SDO_FLOAT.pack(self.parameters.watchdog_s),
+        }
+        if opcode != codec.SDO_READ or endpoint not in values:
+            return []
+        answer = codec.TX_SDO.encode(0, endpoint, 0) + values[endpoint]
+        return [Frame(arbitration_id(self.parameters.node_id, codec.TX_SDO), answer)]
 
     def _set_torque(self, torque_nm: float, now_s: float) -> None:
         if not isfinite(torque_nm):
@@ -190,6 +220,8 @@ class SimulatedOdrive:
         return self._delayed(frames, now_s) if self.parameters.message_delay_s else frames
 
     def _due_frames(self, now_s: float) -> Iterator[Frame]:
+        if now_s < self._boots_until_s:
+            return
         for place, (period_s, messages) in enumerate(self._schedule):
             if now_s < self._due_s[place]:
                 continue
@@ -236,7 +268,9 @@ class SimulatedOdrive:
         return codec.GET_IQ.encode(self._current_a, measured_a)
 
     def _heartbeat(self) -> bytes:
-        return codec.HEARTBEAT.encode(self.errors, self.axis_state, 0, 0)
+        errors = self.errors | codec.ERROR_INITIALIZING if self._initializing else self.errors
+        self._initializing = False
+        return codec.HEARTBEAT.encode(errors, self.axis_state, 0, 0)
 
     def _error(self) -> bytes:
         return codec.GET_ERROR.encode(self.errors, self.disarm_reason)

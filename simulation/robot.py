@@ -52,6 +52,10 @@ class SimulatedRobot:
             self._measure()
             self._report()
 
+    def restart_drive(self, place: int) -> None:
+        """The drive of the joint at this place in JOINTS loses its supply for a moment."""
+        self.drives[place].restart(self.now_s)
+
     def _obey(self) -> None:
         for port in self._ports.values():
             for frame in port.receive():

@@ -13,14 +13,20 @@ from typing import Any
 
 import pytest
 
+from benchmarks.can_fuzz import is_forbidden
 from benchmarks.estimator_cost import fit_rows, measure_fits
 from benchmarks.fit_libraries import FITS
 from benchmarks.report import Progress, summary_us, verdict
 from benchmarks.tick_time import STAGES, VARIANTS
+from drivers.frames import Frame
 
 ROOT = Path(__file__).parent.parent.parent
 TIMEOUT_S = 60.0
 ALWAYS = {"benchmark", "reached", "verdict"}
+BENCHMARKS = (
+    "tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "socket_fuzz", "estimator_cost",
+    "corrupted_logs", "log_kills",
+)  # fmt: skip
 SUMMARY = {"median", "p99", "max"}
 
 
@@ -74,12 +80,69 @@ def test_lockstep_speed() -> None:
     assert walk["arrived"] is False
 
 
+def test_can_fuzz() -> None:
+    """What it finds is asserted: it depends on no clock. Memory is not, in so few frames."""
+    report = report_of("can_fuzz", "--frames", "8000")
+    assert {name: part["frames"] for name, part in report["parts"].items()} == {
+        "drives": 4000,
+        "boot": 2000,
+        "idle": 2000,
+    }
+    for part in report["parts"].values():
+        assert (part["exceptions"], part["forbidden"], part["ticks_in_another_mode"]) == (0, [], 0)
+    assert report["parts"]["drives"]["frames_sent"] > 100
+
+
+@pytest.mark.parametrize(
+    ("frame", "forbidden"),
+    [
+        (Frame(0x00E, bytes(4)), False),
+        (Frame(0x00E, b"\1\0\0\0"), True),
+        (Frame(0x007, b"\1\0\0\0"), False),
+        (Frame(0x007, b"\x08\0\0\0"), True),
+        (Frame(0x000, is_remote=True), False),
+        (Frame(0x00E, is_remote=True), True),
+        (Frame(0x004, bytes(4)), False),
+        (Frame(0x004, b"\1\2\0\0"), True),
+        (Frame(0x00C, bytes(8)), True),
+        (Frame(0x00E, bytes(4), is_extended=True), True),
+    ],
+)
+def test_the_fuzz_knows_what_a_disarmed_robot_must_not_send(frame: Frame, forbidden: bool) -> None:
+    assert is_forbidden(frame) == forbidden
+
+
 def test_memory_growth() -> None:
-    report = report_of("memory_growth", "--seconds", "3", "--every", "1")
+    report = report_of("memory_growth", "socket_fuzz", "--seconds", "3", "--every", "1")
     assert [reading["walked_s"] for reading in report["readings"]] == [1.0, 2.0, 3.0]
     assert all(reading["resident_kib"] > 0.0 for reading in report["readings"])
     assert report["growth_kib"] == report["readings"][-1]["resident_kib"] - report["readings"][0]["resident_kib"]
     assert report.keys() >= {"dropped_rows", "strides", "walked_m", "bar_kib"}
+
+
+def test_socket_fuzz() -> None:
+    report = report_of("socket_fuzz", "--streams", "600")
+    assert sum(report["kinds"].values()) == report["streams"] == 600
+    assert (report["unanswered"], report["bugs"], report["most_calls_a_tick"]) == (0, [], 1)
+    assert report["longest_wait_ticks"] <= 17
+    assert report["valid_requests"] > 100 and report["counters"]["garbled_requests"] > 100
+    assert report.keys() >= {"serve_us", "readings", "growth_kib", "ticks", "seconds", "seed"}
+
+
+def test_corrupted_logs() -> None:
+    report = report_of("corrupted_logs", "--logs", "40")
+    assert sum(report["outcomes"].values()) == report["logs"] == 40
+    assert report.keys() >= {"slowest_s", "peak_in_log_sizes", "seed"}
+    assert report["wrong"] == []
+
+
+def test_log_kills() -> None:
+    """Each victim once, and the daemon once more."""
+    report = report_of("log_kills", "--kills", "5")
+    assert [kill["victim"] for kill in report["rounds"]] == ["daemon", "writer", "both", "all", "daemon"]
+    sums = report["sums"]
+    assert (sums["missing_inside"], sums["doubled"], sums["unsound"]) == (0, 0, 0)
+    assert sums["segments"] >= 5
 
 
 def test_estimator_cost() -> None:
@@ -121,7 +184,7 @@ def test_a_person_gets_a_table_that_ends_in_the_verdict() -> None:
     assert lines[-1].startswith("at least 8 times faster than real time: ")
 
 
-@pytest.mark.parametrize("name", ["tick_time", "loop_jitter", "lockstep_speed", "memory_growth", "estimator_cost"])
+@pytest.mark.parametrize("name", BENCHMARKS)
 def test_help_says_what_is_measured(name: str) -> None:
     module = (ROOT / "benchmarks" / f"{name}.py").read_text(encoding="utf-8")
     assert module.split('"""')[1].splitlines()[0] in run_benchmark(name, "--help")

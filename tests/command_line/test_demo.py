@@ -86,7 +86,7 @@ def test_ctrl_c_ends_the_demo_cleanly(tmp_path: Path) -> None:
         printed, complaints = demo.communicate(timeout=60)
     assert demo.returncode == exit_codes.INTERRUPTED
     assert "torque is off" in complaints and "Traceback" not in complaints
-    (path,) = out.glob("*.mcap")
+    (path,) = (out / "done").glob("*.mcap")
     assert str(path) in printed
     log = read_log(path)
     assert log.complete and log.events[-1]["text"] == "mode hold to idle"

@@ -38,7 +38,7 @@ def test_a_whole_session(bench: Any) -> None:
     assert bench.run("disarm").stdout == "idle\n"
     bench.daemon.send_signal(signal.SIGTERM)
     assert bench.daemon.wait(20) == 0
-    (path,) = bench.logs.glob("*.mcap")
+    (path,) = (bench.logs / "done").glob("*.mcap")
     assert read_log(path).complete
     assert len(replay_file(path).strides) >= 2
 
@@ -49,7 +49,7 @@ def test_sigterm_in_a_walk_finishes_safely(bench: Any) -> None:
     bench.wait_for(lambda report: report["phase"] == "stance")
     bench.daemon.send_signal(signal.SIGTERM)
     assert bench.daemon.wait(20) == 0
-    (path,) = bench.logs.glob("*.mcap")
+    (path,) = (bench.logs / "done").glob("*.mcap")
     log = read_log(path)
     texts = [event["text"] for event in log.events]
     assert log.complete
@@ -77,7 +77,7 @@ def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log(bench: Any) -> No
     assert bench.run("arm").returncode == exit_codes.REFUSED
     assert bench.run("clear").returncode == exit_codes.OK
     assert bench.run("arm").stdout == "hold\n"
-    first = min(bench.logs.glob("*.mcap"))
+    first = min(bench.logs.glob("*/*.mcap"), key=lambda path: path.name)
     assert len(read_log(first).ticks) > 0
 
 

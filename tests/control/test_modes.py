@@ -1,46 +1,87 @@
-"""Every mode with every request and every state of health, against the rules that people rely on."""
+"""Every mode with every request, every reaction and every state of health, against the rules that people rely on."""
 
 from itertools import product
 
 import pytest
 
-from control.faults import Fault
-from control.modes import ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
+from control.fault_kinds import KINDS
+from control.faults import Fault, Reaction
+from control.modes import (
+    ENERGISED,
+    HELD,
+    MOVING,
+    TRANSITIONS,
+    Health,
+    Mode,
+    Request,
+    next_mode,
+    refusal,
+)
 
-BROKEN = Fault("drive_error", "The left_sweep drive reports error 0x1.")
 FLAGS = (False, True)
-HEALTHS = [Health(a, b, c, d, fault) for a, b, c, d, fault in product(FLAGS, FLAGS, FLAGS, FLAGS, (None, BROKEN))]
+OF_REACTION = {kind.reaction: Fault(kind, "left_sweep", f"{kind.meaning}") for kind in KINDS.values()}
+WORST: list[Fault | None] = [None, *OF_REACTION.values()]
+HEALTHS = [
+    Health(heard, closed, finished, raised, settled, rested, fault, blocking)
+    for heard, closed, finished, raised, settled, rested in product(FLAGS, FLAGS, FLAGS, FLAGS, FLAGS, FLAGS)
+    for fault, blocking in product(WORST, ((), (OF_REACTION[Reaction.NONE],)))
+]
 EVERYTHING = list(product(Mode, Request, HEALTHS))
 REQUESTS = [request for request in Request if request is not Request.NONE]
-ALWAYS_ACCEPTED = {(request, mode) for request in (Request.STOP, Request.DISARM) for mode in Mode} | {
-    (Request.CLEAR, Mode.IDLE)
-}
 WELL = Health(drives_heard=True, closed_loop=True)
+HARDNESS = {Mode.WALKING: 0, Mode.HOLD: 1, Mode.STOPPING: 2, Mode.DAMPING: 3, Mode.FAULT: 4, Mode.IDLE: 4}
+MILDEST = {
+    Reaction.NONE: 0,
+    Reaction.WARN: 0,
+    Reaction.HOLD: 1,
+    Reaction.SOFT_STOP: 2,
+    Reaction.DAMPING: 3,
+    Reaction.DRIVES_IDLE: 4,
+}
 
 
-def arrows(mode: Mode, request: Request) -> set[Mode]:
-    """All modes that may follow, whatever the health."""
-    return {next_mode(mode, request, health) for health in HEALTHS}
+def faulty(reaction: Reaction, health: Health = WELL) -> Health:
+    return health._replace(worst=OF_REACTION[reaction])
 
 
-@pytest.mark.parametrize("mode", sorted(ENERGISED))
-def test_a_fault_takes_the_torque_off_whatever_is_requested(mode: Mode) -> None:
+def test_there_is_a_fault_of_every_reaction() -> None:
+    assert set(OF_REACTION) == set(Reaction)
+
+
+def test_every_reaction_is_at_least_as_hard_as_it_says_in_every_mode_with_torque() -> None:
+    for mode, request, health in product(MOVING, Request, HEALTHS):
+        assert HARDNESS[next_mode(mode, request, health)] >= MILDEST[health.reaction], (mode, request, health)
+
+
+def test_arming_ends_at_any_fault_that_would_stop_a_walk() -> None:
     for request, health in product(Request, HEALTHS):
-        if health.fault is not None:
-            assert next_mode(mode, request, health) is Mode.FAULT
+        if health.reaction >= Reaction.SOFT_STOP:
+            assert next_mode(Mode.ARMING, request, health) in (Mode.FAULT, Mode.IDLE)
 
 
-def test_without_a_fault_nothing_leads_to_fault() -> None:
+def test_a_fault_never_makes_the_reaction_milder() -> None:
+    """Of two healths that differ in the fault alone, the one with the worse fault leads to the harder mode."""
+    for mode, request, health in product(MOVING, Request, HEALTHS):
+        if health.worst is None or request is Request.WALK:
+            continue
+        worse = [faulty(reaction, health) for reaction in Reaction if reaction > health.reaction]
+        hardness = [HARDNESS[next_mode(mode, request, each)] for each in (health, *worse)]
+        if not (health.raised or health.rested or health.settled or health.walk_finished or request is Request.STOP):
+            assert hardness == sorted(hardness), (mode, request, health)
+
+
+def test_without_a_fault_that_stops_nothing_leads_to_fault_or_damping() -> None:
     for mode, request, health in EVERYTHING:
-        if health.fault is None and mode is not Mode.FAULT:
-            assert next_mode(mode, request, health) is not Mode.FAULT
+        after = next_mode(mode, request, health)
+        if health.reaction < Reaction.SOFT_STOP and after is not mode and mode is not Mode.DAMPING:
+            assert after not in (Mode.FAULT, Mode.DAMPING)
 
 
 @pytest.mark.parametrize("mode", sorted(ENERGISED))
 def test_disarm_takes_the_torque_off_at_once(mode: Mode) -> None:
     for health in HEALTHS:
-        expected = Mode.IDLE if health.fault is None else Mode.FAULT
-        assert next_mode(mode, Request.DISARM, health) is expected
+        hard = health.reaction is Reaction.DRIVES_IDLE
+        assert next_mode(mode, Request.DISARM, health) is (Mode.FAULT if hard else Mode.IDLE)
 
 
 def test_only_arm_in_idle_ever_puts_torque_on() -> None:
@@ -48,8 +89,7 @@ def test_only_arm_in_idle_ever_puts_torque_on() -> None:
         if mode not in ENERGISED and next_mode(mode, request, health) in ENERGISED:
             assert (mode, request) == (Mode.IDLE, Request.ARM)
             assert next_mode(mode, request, health) is Mode.ARMING
-            assert health.drives_heard
-            assert health.fault is None
+            assert health.drives_heard and not health.blocking and health.reaction < Reaction.HOLD
     assert next_mode(Mode.IDLE, Request.ARM, WELL) is Mode.ARMING
 
 
@@ -60,29 +100,58 @@ def test_a_joint_may_only_move_once_all_drives_are_in_closed_loop() -> None:
             assert health.closed_loop
 
 
-def test_fault_is_left_only_by_clear_once_the_cause_is_gone() -> None:
+def test_stiffness_never_comes_back_after_damping() -> None:
     for request, health in product(Request, HEALTHS):
-        cleared = request is Request.CLEAR and health.fault is None
-        assert next_mode(Mode.FAULT, request, health) is (Mode.IDLE if cleared else Mode.FAULT)
+        assert next_mode(Mode.DAMPING, request, health) not in HELD
 
 
-def test_walking_starts_only_from_hold_and_only_when_told() -> None:
+def test_fault_lasts_until_no_fault_stands_that_stops() -> None:
+    for request, health in product(Request, HEALTHS):
+        stands = health.reaction >= Reaction.SOFT_STOP
+        assert next_mode(Mode.FAULT, request, health) is (Mode.FAULT if stands else Mode.IDLE)
+
+
+def test_walking_starts_only_from_hold_when_told_and_with_no_fault_that_holds() -> None:
     for mode, request, health in EVERYTHING:
         if mode is not Mode.WALKING and next_mode(mode, request, health) is Mode.WALKING:
             assert (mode, request) == (Mode.HOLD, Request.WALK)
+            assert health.reaction < Reaction.HOLD
 
 
 def test_a_walk_ends_by_raising_the_flippers() -> None:
     assert next_mode(Mode.WALKING, Request.STOP, WELL) is Mode.STOPPING
     assert next_mode(Mode.WALKING, Request.NONE, WELL._replace(walk_finished=True)) is Mode.STOPPING
     assert next_mode(Mode.WALKING, Request.NONE, WELL) is Mode.WALKING
-    assert arrows(Mode.WALKING, Request.NONE) == {Mode.WALKING, Mode.STOPPING, Mode.FAULT}
 
 
-def test_stopping_lasts_until_the_flippers_are_raised() -> None:
+def test_a_stop_for_a_person_ends_in_hold_and_one_for_a_fault_without_torque() -> None:
     for request in set(Request) - {Request.DISARM}:
         assert next_mode(Mode.STOPPING, request, WELL) is Mode.STOPPING
-        assert next_mode(Mode.STOPPING, request, WELL._replace(raised=True)) is Mode.HOLD
+        raised = WELL._replace(raised=True)
+        assert next_mode(Mode.STOPPING, request, raised) is Mode.HOLD
+        assert next_mode(Mode.STOPPING, request, faulty(Reaction.SOFT_STOP)) is Mode.STOPPING
+        assert next_mode(Mode.STOPPING, request, faulty(Reaction.SOFT_STOP, raised)) is Mode.FAULT
+
+
+def test_a_fault_that_holds_ends_a_walk_where_it_is_and_lets_a_stop_go_on() -> None:
+    assert next_mode(Mode.WALKING, Request.NONE, faulty(Reaction.HOLD)) is Mode.HOLD
+    assert next_mode(Mode.STOPPING, Request.NONE, faulty(Reaction.HOLD)) is Mode.STOPPING
+    assert next_mode(Mode.HOLD, Request.WALK, faulty(Reaction.HOLD)) is Mode.HOLD
+
+
+def test_a_stop_is_heeded_also_in_the_tick_of_a_fault_that_holds() -> None:
+    """Or the flippers would stay in the mud, against a person's wish."""
+    assert next_mode(Mode.WALKING, Request.STOP, faulty(Reaction.HOLD)) is Mode.STOPPING
+
+
+def test_a_warning_changes_no_mode() -> None:
+    for mode, request, health in EVERYTHING:
+        if health.worst is None:
+            assert next_mode(mode, request, health) is next_mode(mode, request, faulty(Reaction.WARN, health))
+
+
+def test_a_pose_that_nobody_needs_is_not_held_for_ever() -> None:
+    assert next_mode(Mode.HOLD, Request.NONE, WELL._replace(rested=True)) is Mode.IDLE
 
 
 def test_boot_ends_when_every_drive_was_heard_and_at_nothing_else() -> None:
@@ -90,44 +159,34 @@ def test_boot_ends_when_every_drive_was_heard_and_at_nothing_else() -> None:
         assert next_mode(Mode.BOOT, request, health) is (Mode.IDLE if health.drives_heard else Mode.BOOT)
 
 
-def test_modes_without_request_follow_the_picture() -> None:
-    health = Health()
-    assert next_mode(Mode.BOOT, Request.NONE, health) is Mode.BOOT
-    health = health._replace(drives_heard=True)
-    assert next_mode(Mode.BOOT, Request.NONE, health) is Mode.IDLE
-    assert next_mode(Mode.IDLE, Request.ARM, health) is Mode.ARMING
-    assert next_mode(Mode.ARMING, Request.NONE, health) is Mode.ARMING
-    health = health._replace(closed_loop=True)
-    assert next_mode(Mode.ARMING, Request.NONE, health) is Mode.HOLD
-    assert next_mode(Mode.HOLD, Request.WALK, health) is Mode.WALKING
-
-
-def reachable(mode: Mode, health: Health) -> bool:
-    """Whether the loop can be found so between two ticks: a fault has already ended every energised mode."""
-    if mode in ENERGISED and health.fault is not None:
-        return False
-    return mode is Mode.BOOT or health.drives_heard
+def test_every_row_of_the_table_is_the_first_that_holds_somewhere() -> None:
+    """A row that is hidden by those above it in each of its modes would be a lie in the diagram."""
+    for place, row in enumerate(TRANSITIONS):
+        above = TRANSITIONS[:place]
+        for source in row.sources:
+            hidden = [other for other in above if source in other.sources]
+            assert any(
+                row.cause.holds(request, health) and not any(other.cause.holds(request, health) for other in hidden)
+                for request, health in product(Request, HEALTHS)
+            ), (row, source)
 
 
 def test_a_request_is_refused_exactly_where_it_could_change_nothing() -> None:
-    for mode, request, health in product(Mode, REQUESTS, HEALTHS):
-        if not reachable(mode, health):
-            continue
+    for mode, request, health in product(Mode, (Request.ARM, Request.WALK), HEALTHS):
+        if mode in ENERGISED and health.reaction >= Reaction.SOFT_STOP or health.rested:
+            continue  # a fault has already ended the mode, or is about to
         effective = next_mode(mode, request, health) is not next_mode(mode, Request.NONE, health)
-        accepted = effective or (request, mode) in ALWAYS_ACCEPTED
-        if request is Request.CLEAR and health.fault is not None:
-            accepted = False
-        if mode is Mode.WALKING and request is Request.STOP:
-            accepted = True  # also in the tick in which the walk ends by itself
-        if mode is Mode.HOLD and request is Request.WALK:
-            assert effective
-        assert (refusal(mode, request, health) is None) == accepted, (mode, request, health)
+        if mode is Mode.IDLE and not health.drives_heard:
+            continue  # never so: BOOT lasts until they are
+        assert (refusal(mode, request, health) is None) == effective, (mode, request, health)
 
 
 def test_a_refusal_tells_the_cause_where_there_is_one() -> None:
-    faulty = WELL._replace(fault=BROKEN)
-    assert refusal(Mode.IDLE, Request.ARM, faulty) == BROKEN.sentence
-    assert refusal(Mode.FAULT, Request.CLEAR, faulty) == f"the cause persists: {BROKEN.sentence}"
+    blocked = WELL._replace(blocking=(OF_REACTION[Reaction.NONE], OF_REACTION[Reaction.WARN]))
+    sentence = refusal(Mode.IDLE, Request.ARM, blocked)
+    assert sentence == f"{OF_REACTION[Reaction.NONE].sentence} {OF_REACTION[Reaction.WARN].sentence}"
+    held = faulty(Reaction.HOLD)
+    assert refusal(Mode.HOLD, Request.WALK, held) == OF_REACTION[Reaction.HOLD].sentence
 
 
 @pytest.mark.parametrize("mode", Mode)

@@ -134,10 +134,10 @@ def test_failed_sends_are_counted_and_do_not_raise() -> None:
 
 
 def test_a_failed_receive_is_counted_and_does_not_raise() -> None:
-    port = PythonCanPort(FakeBus(can.CanOperationError("Network is down", errno.ENETDOWN)))
+    port = PythonCanPort(FakeBus(can.CanOperationError("garbage")))
     assert port.receive() == []
     assert port.error_frames == MOST_FAILURES_PER_READ
-    assert "Network is down" in port.last_error
+    assert "garbage" in port.last_error
 
 
 def test_garbage_does_not_hide_the_good_frames_behind_it() -> None:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from control.limits import JointLimits
 from control.records import JOINTS, NEVER_S, DriveStates
 from drivers.frames import Frame
 from drivers.mock_bus import MockBus, MockPort
@@ -41,6 +42,7 @@ SLOW_SIGNALS: list[tuple[Message, tuple[float, ...]]] = [
     (GET_VERSION, (2, 4, 4, 58, 0, 6, 11, 0)),
 ]
 RECEIVED = [message for message, _ in SIGNALS + SLOW_SIGNALS]
+BOUNDLESS = JointLimits(torque_nm=1e9, torque_rate_nm_s=1e12)
 ANY_SIGN = st.sampled_from([-1, 1])
 FINITE = st.floats(-1000.0, 1000.0, width=32)
 
@@ -48,11 +50,11 @@ FINITE = st.floats(-1000.0, 1000.0, width=32)
 class Bench:
     """The drives, and the far ends of their two buses."""
 
-    def __init__(self, parameters: dict[str, DriveParameters] = PARAMETERS) -> None:
+    def __init__(self, parameters: dict[str, DriveParameters] = PARAMETERS, limits: JointLimits | None = None) -> None:
         buses = {"left": MockBus(), "right": MockBus()}
         self.parameters = parameters
         self.far: dict[str, MockPort] = {name: bus.open() for name, bus in buses.items()}
-        self.drives = OdriveDrives(parameters, {name: bus.open() for name, bus in buses.items()})
+        self.drives = OdriveDrives(parameters, {name: bus.open() for name, bus in buses.items()}, limits)
 
     def tell(self, joint: str, message: Message, *values: float, stamp_s: float = NEVER_S) -> None:
         drive = self.parameters[joint]
@@ -82,7 +84,8 @@ def bench() -> Bench:
 def test_a_sign_turns_angle_velocity_current_and_torque_alike(
     sign: int, turns: float, turns_s: float, current_a: float, torque_nm: float
 ) -> None:
-    bench = Bench(PARAMETERS | {"left_sweep": DriveParameters("left", 0, sign=sign)})
+    bench = Bench(PARAMETERS | {"left_sweep": DriveParameters("left", 0, sign=sign)}, BOUNDLESS)
+    bench.drives.gate.open()
     bench.tell("left_sweep", GET_ENCODER_ESTIMATES, turns, turns_s)
     bench.tell("left_sweep", GET_IQ, 0.0, current_a)
     state = bench.drives.read(1.0)[0]
@@ -246,7 +249,9 @@ def test_reading_transmits_nothing(bench: Bench) -> None:
     assert bench.silent()
 
 
-def test_torques_leave_in_the_order_of_the_joints_with_these_bytes(bench: Bench) -> None:
+def test_torques_leave_in_the_order_of_the_joints_with_these_bytes() -> None:
+    bench = Bench(limits=BOUNDLESS)
+    bench.drives.gate.open()
     bench.drives.send((0.5, 0.25, -1.0, 2.0))
     assert bench.sent() == {
         "left": [Frame(0x00E, bytes.fromhex("0000003f")), Frame(0x02E, bytes.fromhex("000080be"))],

@@ -245,3 +245,24 @@ def test_the_daemon_refuses_with_status_78_and_no_traceback(tmp_path: Path, exam
     ended = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
     assert ended.returncode == EXIT_CONFIGURATION == 78
     assert ended.stderr == "mudskipperd: limits.torque_nm = 99: must be at most 5.0\n"
+
+
+@pytest.mark.parametrize("option", [[], ["--check-config"]])
+def test_a_group_that_does_not_exist_is_refused_before_anything_is_made(
+    short_folder: Path, example_text: str, option: list[str]
+) -> None:
+    socket = short_folder / "folder" / "s"
+    text = example_text.replace("/run/mudskipper/mudskipper.sock", str(socket))
+    text = text.replace("[status]", '[status]\nread_group = "no such"\n')
+    (short_folder / "mudskipper.toml").write_text(text, encoding="utf-8")
+    command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(short_folder / "mudskipper.toml"), *option]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert ended.returncode == EXIT_CONFIGURATION
+    assert ended.stderr.startswith("mudskipperd: status.read_group = 'no such': there is no such group")
+    assert ended.stderr.count("\n") == 1 and not socket.parent.exists()
+
+
+@pytest.mark.parametrize("key", ["read_group", "drive_group"])
+def test_a_group_s_name_holds_no_zero_byte(example_text: str, key: str) -> None:
+    with pytest.raises(ConfigurationError, match=f"status.{key}: must be without a zero byte"):
+        parse_configuration(example_text.replace("[status]", f'[status]\n{key} = "a\\u0000b"'))

@@ -100,12 +100,12 @@ def test_firm_mud_is_walked_faster_than_by_choosing_depth_alone(configuration: C
     """Measured 12.9 cm/s against 7.5 (3 kPa); both times include the start."""
     swift, steady = walked(configuration, 3000.0, "gait"), walked(configuration, 3000.0, "default")
     assert speed_m_s(swift) > 1.25 * speed_m_s(steady)
-    assert all(stride.estimate.released for stride in swift.loop.strides)
+    assert all(stride.estimate.released for stride in swift.loop.learning.strides)
 
 
 def test_strides_of_changing_sweep_still_tell_every_coefficient(configuration: Configuration) -> None:
     lockstep = walked(configuration, 2000.0, "gait")
-    estimates = [stride.estimate for stride in lockstep.loop.strides]
+    estimates = [stride.estimate for stride in lockstep.loop.learning.strides]
     assert all(each.k_p.valid and each.k_e.valid and each.k_s.valid for each in estimates)
     told = [each.k_p.value for each in estimates]
     assert max(told) < 1.5 * min(told)  # a fifth by depth (the k-law is not the clay's), and noise

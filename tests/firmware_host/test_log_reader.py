@@ -13,9 +13,9 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
+from firmware_host.log_file import LogFile
 from firmware_host.log_reader import Log, LogError, log_summary, read_log
 from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK, RowKind
-from firmware_host.log_writer import LogFile
 
 WALL_NS = 1_700_000_000_000_000_000  # 2023-11-14 22:13:20 UTC
 OPENING: dict[str, Any] = {

@@ -25,7 +25,16 @@ from rosbags.highlevel import AnyReader
 
 from firmware_host.log_reader import read_log
 from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK, RowKind
-from firmware_host.recorder import EVENT_KIND, HEADER, LONGEST_TEXT, NullRecorder, Recorder, Recording
+from firmware_host.recorder import (
+    EVENT_KIND,
+    HEADER,
+    HEALTHY,
+    LONGEST_TEXT,
+    LogReport,
+    NullRecorder,
+    Recorder,
+    Recording,
+)
 
 TICK_KIND = ROW_KINDS.index(TICK)
 TIMEOUT_S = 10.0
@@ -257,20 +266,60 @@ def test_a_path_that_cannot_be_made_is_told_in_a_sentence(tmp_path: Path, capfd:
 def test_a_log_is_never_written_over(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "run.mcap"
     path.write_text("precious")
-    assert not Recorder(path, "", {}).close(TIMEOUT_S)
-    assert path.read_text() == "precious"
+    recorder = Recorder(path, "", {})
+    assert recorder.close(TIMEOUT_S)
+    assert (path.read_text(), recorder.path.name) == ("precious", "run-0001.mcap")
     assert capfd.readouterr().err == f"The log {path} cannot be written: File exists.\n"
 
 
-def test_a_full_disk_is_told_in_a_sentence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_disk_that_refuses_costs_rows_that_the_log_counts(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """The kernel lets no file grow beyond a size; then it does again."""
     recorder = Recorder(tmp_path / "run.mcap", "", {})
-    resource.prlimit(recorder.writer_pid, resource.RLIMIT_FSIZE, (200_000, 200_000))
-    for number in range(2000):
-        recorder.put(TICK_KIND, make_tick(float(number)))
-    wait_until(lambda: not recorder.put(TICK_KIND, make_tick(0.0)) and not recorder.writer_alive)
-    assert not recorder.close(TIMEOUT_S)
-    assert capfd.readouterr().err == f"The log {recorder.path} cannot be written: File too large.\n"
-    assert len(read_log(recorder.path).ticks) > 300
+    wait_until(recorder.path.exists)
+    resource.prlimit(recorder.writer_pid, resource.RLIMIT_FSIZE, (2000, resource.RLIM_INFINITY))
+    put = 0
+    deadline_s = time.monotonic() + TIMEOUT_S
+    while not look(recorder).problem and time.monotonic() < deadline_s:
+        put += recorder.put(TICK_KIND, make_tick(float(put)))
+        time.sleep(0.003)
+    assert look(recorder).problem == f"The log {tmp_path / 'run.mcap'} cannot be written: File too large."
+    assert recorder.writer_alive
+    unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+    resource.prlimit(recorder.writer_pid, resource.RLIMIT_FSIZE, unlimited)
+    while look(recorder).problem and time.monotonic() < deadline_s:
+        put += recorder.put(TICK_KIND, make_tick(float(put)))
+        time.sleep(0.003)
+    assert recorder.close(TIMEOUT_S)
+    log = read_log(recorder.path)
+    lost = int(log.events[0]["text"].split()[3].rstrip(","))
+    assert recorder.dropped == lost > 0
+    assert log.ticks["stamp_s"].tolist() == [float(number) for number in range(lost, put)]
+    assert log.events[0]["text"].endswith("the log could not be written: File too large")
+    assert capfd.readouterr().err.count("\n") == 1
+
+
+def look(recorder: Recorder) -> LogReport:
+    """Into the pipe of reports, now."""
+    recorder._calls = 0
+    return recorder.report()
+
+
+def test_the_writer_reports_the_disk(recorder: Recorder) -> None:
+    wait_until(lambda: look(recorder).free_bytes < HEALTHY.free_bytes)
+    report, disk = look(recorder), os.statvfs(recorder.path)
+    assert report.free_share == pytest.approx(disk.f_bavail / disk.f_blocks, abs=0.05)
+    assert (report.alive, report.dropped, report.problem) == (True, 0, "")
+    assert 0.0 <= report.slowest_write_s < TIMEOUT_S
+    os.kill(recorder.writer_pid, signal.SIGKILL)
+    wait_until(lambda: not look(recorder).alive)
+    recorder.close(TIMEOUT_S)
+
+
+def test_a_writer_that_waits_for_its_disk_shows_as_a_slow_write(recorder: Recorder) -> None:
+    wait_until(lambda: look(recorder).free_bytes < HEALTHY.free_bytes)
+    recorder._heard_s -= 60.0
+    assert look(recorder).slowest_write_s >= 60.0
+    recorder.close(TIMEOUT_S)
 
 
 @pytest.mark.parametrize("sent", [b"", HEADER.pack(0, 100) + b"{"], ids=["nothing", "half an opening"])
@@ -295,4 +344,4 @@ def test_the_null_recorder_takes_everything() -> None:
     recording: Recording = NullRecorder()
     assert recording.put(TICK_KIND, make_tick(1.0))
     assert recording.close(0.0)
-    assert (recording.dropped, recording.writer_alive) == (0, True)
+    assert (recording.dropped, recording.writer_alive, recording.report()) == (0, True, HEALTHY)

@@ -13,9 +13,11 @@ from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import StrideEstimate
 from firmware_host.configuration import Configuration
-from firmware_host.log_reader import LogError
+from firmware_host.log_folder import DONE, first_path, log_files
+from firmware_host.log_parameters import LogParameters
+from firmware_host.log_reader import LogError, read_logs
 from firmware_host.recorder import Recorder
-from firmware_host.replay import replay_file
+from firmware_host.replay import replay_file, replay_files
 from simulation.lockstep import Lockstep
 from simulation.track import paper_track
 
@@ -39,9 +41,31 @@ def test_a_replayed_walk_gives_the_same_strides_to_the_last_digit(tmp_path: Path
     robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
     assert recorder.dropped == 0
     assert recorder.close(20.0)
-    live = [stride.estimate for stride in robot.loop.strides]
+    live = [stride.estimate for stride in robot.loop.learning.strides]
     replayed = replay_file(path).strides
     assert len(live) == len(replayed) == 12
+    assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
+
+
+def test_a_log_that_was_thinned_and_cut_into_segments_gives_the_same_strides(
+    tmp_path: Path, configuration: Configuration
+) -> None:
+    """A long rest first, of which few ticks are written, and a border every three seconds of the walk."""
+    parameters = LogParameters(directory=str(tmp_path), segment_s=3.0)
+    first = first_path(tmp_path, "run")
+    recorder = Recorder(first, configuration.text, {"robot": "test", "run_id": "run"}, parameters)
+    robot = Lockstep(configuration, paper_track(), recorder=recorder)
+    robot.run_for(20.0)
+    robot.arm()
+    robot.walk(WalkOrder(0.03, True, 5))
+    robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
+    assert recorder.close(20.0) and recorder.dropped == 0
+    paths = log_files(tmp_path, DONE)
+    assert len(paths) > 3
+    assert len(read_logs(paths).ticks) < robot.tick_number - 3000
+    live = [stride.estimate for stride in robot.loop.learning.strides]
+    replayed = replay_files(paths).strides
+    assert len(live) == len(replayed) == 10
     assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
 
 

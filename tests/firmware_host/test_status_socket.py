@@ -3,112 +3,48 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import socket
-import stat
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
 
 import msgpack
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from firmware_host.status_socket import (
-    LONGEST_REQUEST,
-    MOST_CLIENTS,
-    AlreadyServedError,
-    RefusedError,
-    StatusSocket,
-)
+from firmware_host.rpc import LONGEST_REQUEST
+from firmware_host.status_socket import MOST_CLIENTS
+from tests.firmware_host.served_socket import METHODS, Served, ask, connect, serve, unpacked
 
 
-def refuse(params: dict[str, Any]) -> Any:
-    raise RefusedError("not now")
-
-
-METHODS: dict[str, Callable[[dict[str, Any]], Any]] = {
-    "echo": lambda params: params,
-    "refuse": refuse,
-    "long": lambda params: "x" * 300_000,
-}
-
-
-@pytest.fixture
-def served(short_folder: Path) -> Iterator[StatusSocket]:
-    status = StatusSocket(short_folder / "s", METHODS)
-    yield status
-    status.close()
-
-
-def connect(served: StatusSocket) -> socket.socket:
-    client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    client.settimeout(2.0)
-    client.connect(str(served.path))
-    return client
-
-
-def serve(served: StatusSocket, ticks: int = 6) -> None:
-    for _ in range(ticks):
-        served.serve()
-
-
-def ask(served: StatusSocket, client: socket.socket, data: bytes) -> list[Any]:
-    """Everything that comes back within a few ticks."""
-    client.sendall(data)
-    serve(served)
-    client.setblocking(False)
-    unpacker = msgpack.Unpacker(raw=False)
-    while True:
-        try:
-            answer = client.recv(1 << 20)
-        except BlockingIOError:
-            break
-        if not answer:
-            break
-        unpacker.feed(answer)
-        serve(served)
-    client.settimeout(2.0)
-    return list(unpacker)
-
-
-def test_a_request_is_answered_by_its_number(served: StatusSocket) -> None:
+def test_a_request_is_answered_by_its_number(served: Served) -> None:
     client = connect(served)
     assert ask(served, client, msgpack.packb([0, 7, "echo", {"a": 1}])) == [[1, 7, None, {"a": 1}]]
 
 
-def test_params_may_stand_in_the_list_of_the_specification(served: StatusSocket) -> None:
+def test_params_may_stand_in_the_list_of_the_specification(served: Served) -> None:
     client = connect(served)
     assert ask(served, client, msgpack.packb([0, 7, "echo", [{"a": 1}]])) == [[1, 7, None, {"a": 1}]]
     assert ask(served, client, msgpack.packb([0, 8, "echo", []])) == [[1, 8, None, {}]]
 
 
-def test_a_refusal_and_an_unknown_method_are_answers(served: StatusSocket) -> None:
+def test_a_refusal_and_an_unknown_method_are_answers(served: Served) -> None:
     client = connect(served)
     assert ask(served, client, msgpack.packb([0, 1, "refuse", {}])) == [[1, 1, "not now", None]]
     ((_, _, error, _),) = ask(served, client, msgpack.packb([0, 2, "dance", {}]))
     assert "no method 'dance'" in error and "echo" in error
 
 
-def test_requests_sent_together_are_answered_one_a_tick_in_order(served: StatusSocket) -> None:
+def test_requests_sent_together_are_answered_one_a_tick_in_order(served: Served) -> None:
     client = connect(served)
     client.sendall(b"".join(msgpack.packb([0, n, "echo", {}]) for n in range(5)))
     answered = []
     for _ in range(8):
-        served.serve()
+        served.tick()
         client.setblocking(False)
         try:
-            answered.append(len(list(_unpacked(client.recv(65536)))))
+            answered.append(len(list(unpacked(client.recv(65536)))))
         except BlockingIOError:
             answered.append(0)
     assert sum(answered) == 5 and max(answered) == 1
-
-
-def _unpacked(data: bytes) -> Iterator[Any]:
-    unpacker = msgpack.Unpacker(raw=False)
-    unpacker.feed(data)
-    yield from unpacker
 
 
 @pytest.mark.parametrize(
@@ -116,16 +52,16 @@ def _unpacked(data: bytes) -> Iterator[Any]:
     [b"\xc1", b"GET / HTTP/1.1\r\n\r\n", msgpack.packb({"a": 1}), msgpack.packb([1, 2, 3]), msgpack.packb([2, "m", []]),
      msgpack.packb([0, "x", "echo", {}]), msgpack.packb([0, 1, 5, {}]), msgpack.packb([0, 1, "echo", 5])],
 )  # fmt: skip
-def test_a_garbled_request_gets_an_error_and_the_door(served: StatusSocket, message: bytes) -> None:
+def test_a_garbled_request_gets_an_error_and_the_door(served: Served, message: bytes) -> None:
     client = connect(served)
     answers = ask(served, client, message)
     assert answers and answers[0][2]
     serve(served)
     assert client.recv(10) == b""
-    assert served.garbled_requests == 1
+    assert served.counters["garbled_requests"] == 1
 
 
-def test_an_endless_request_gets_an_error_and_the_door(served: StatusSocket) -> None:
+def test_an_endless_request_gets_an_error_and_the_door(served: Served) -> None:
     client = connect(served)
     client.setblocking(False)
     header = b"\xdb" + (2 * LONGEST_REQUEST).to_bytes(4, "big")
@@ -135,28 +71,28 @@ def test_an_endless_request_gets_an_error_and_the_door(served: StatusSocket) -> 
             client.send(b"x" * 8192)
         except (BlockingIOError, BrokenPipeError, ConnectionResetError):
             break
-        served.serve()
+        served.tick()
     serve(served)
-    assert served.garbled_requests == 1
+    assert served.counters["garbled_requests"] == 1
 
 
-def test_a_client_that_does_not_fetch_its_answers_is_dropped(served: StatusSocket) -> None:
+def test_a_client_that_does_not_fetch_its_answers_is_dropped(served: Served) -> None:
     client = connect(served)
     client.sendall(b"".join(msgpack.packb([0, n, "long", {}]) for n in range(20)))
     serve(served, 60)
     with pytest.raises((BrokenPipeError, ConnectionResetError)):
         for _ in range(100):
             client.sendall(b"\xc0")
-            served.serve()
+            served.tick()
 
 
-def test_a_slow_client_still_gets_a_long_answer_whole(served: StatusSocket) -> None:
+def test_a_slow_client_still_gets_a_long_answer_whole(served: Served) -> None:
     client = connect(served)
     ((_, _, _, result),) = ask(served, client, msgpack.packb([0, 1, "long", {}]))
     assert len(result) == 300_000
 
 
-def test_a_newcomer_takes_the_place_of_the_client_that_was_still_for_longest(served: StatusSocket) -> None:
+def test_a_newcomer_takes_the_place_of_the_client_that_was_still_for_longest(served: Served) -> None:
     clients = [connect(served) for _ in range(MOST_CLIENTS)]
     serve(served, MOST_CLIENTS + 2)
     assert ask(served, clients[0], msgpack.packb([0, 1, "echo", {}]))
@@ -166,7 +102,7 @@ def test_a_newcomer_takes_the_place_of_the_client_that_was_still_for_longest(ser
     assert ask(served, clients[0], msgpack.packb([0, 3, "echo", {}]))
 
 
-def test_a_busy_client_does_not_delay_the_others(served: StatusSocket) -> None:
+def test_a_busy_client_does_not_delay_the_others(served: Served) -> None:
     busy, other = connect(served), connect(served)
     serve(served)
     for number in range(200):
@@ -177,12 +113,12 @@ def test_a_busy_client_does_not_delay_the_others(served: StatusSocket) -> None:
     other.sendall(msgpack.packb([0, 1, "echo", {}]))
     serve(served, 3)
     other.setblocking(False)
-    assert list(_unpacked(other.recv(4096))) == [[1, 1, None, {}]]
+    assert list(unpacked(other.recv(4096))) == [[1, 1, None, {}]]
 
 
-def test_a_wish_counts_although_its_client_has_hung_up(served: StatusSocket) -> None:
+def test_a_wish_counts_although_its_client_has_hung_up(served: Served) -> None:
     done: list[str] = []
-    served.methods = METHODS | {"disarm": lambda params: done.append("disarm")}
+    served.methods = METHODS | {"disarm": lambda params, caller: done.append("disarm")}
     busy, gone = connect(served), connect(served)
     serve(served, 3)
     busy.sendall(b"".join(msgpack.packb([0, number, "echo", {}]) for number in range(5)))
@@ -193,7 +129,7 @@ def test_a_wish_counts_although_its_client_has_hung_up(served: StatusSocket) -> 
     assert len(served._clients) == 1
 
 
-def test_a_client_that_has_no_more_to_ask_still_gets_a_long_answer_whole(served: StatusSocket) -> None:
+def test_a_client_that_has_no_more_to_ask_still_gets_a_long_answer_whole(served: Served) -> None:
     client = connect(served)
     client.sendall(msgpack.packb([0, 1, "long", {}]))
     client.shutdown(socket.SHUT_WR)
@@ -201,43 +137,35 @@ def test_a_client_that_has_no_more_to_ask_still_gets_a_long_answer_whole(served:
     client.setblocking(False)
     received = bytearray()
     for _ in range(50):
-        served.serve()
+        served.tick()
         with contextlib.suppress(BlockingIOError):
             received += client.recv(65536)
-    ((_, _, _, result),) = _unpacked(bytes(received))
+    ((_, _, _, result),) = unpacked(bytes(received))
     assert len(result) == 300_000
     assert served._clients == {}
 
 
-def test_many_short_requests_at_once_are_all_answered(served: StatusSocket) -> None:
+def test_many_short_requests_at_once_are_all_answered(served: Served) -> None:
     client = connect(served)
     client.sendall(b"".join(msgpack.packb([0, number, "echo", {}]) for number in range(600)))
     client.setblocking(False)
     received = bytearray()
-    for _ in range(1300):
-        served.serve()
+    for _ in range(2000):
+        served.tick()
         with contextlib.suppress(BlockingIOError):
             received += client.recv(65536)
-    assert [number for _, number, _, _ in _unpacked(bytes(received))] == list(range(600))
+    assert [number for _, number, _, _ in unpacked(bytes(received))] == list(range(600))
 
 
-def test_a_method_with_a_bug_answers_so_and_is_reported(served: StatusSocket) -> None:
+def test_a_method_with_a_bug_answers_so_and_is_reported(served: Served) -> None:
     said: list[str] = []
     served.report_bug = said.append
-    served.methods = {"broken": lambda params: params["missing"]}
+    served.methods = {"broken": lambda params, caller: params["missing"]}
     ((_, _, error, _),) = ask(served, connect(served), msgpack.packb([0, 1, "broken", {}]))
     assert "bug" in error and said == ["broken failed: KeyError: 'missing'"]
 
 
-def test_a_file_that_is_no_socket_is_left_alone(short_folder: Path) -> None:
-    path = short_folder / "notes"
-    path.write_text("mine", encoding="utf-8")
-    with pytest.raises(FileExistsError):
-        StatusSocket(path, METHODS)
-    assert path.read_text(encoding="utf-8") == "mine"
-
-
-def test_a_client_that_vanishes_with_a_request_under_way_does_no_harm(served: StatusSocket) -> None:
+def test_a_client_that_vanishes_with_a_request_under_way_does_no_harm(served: Served) -> None:
     client = connect(served)
     client.sendall(msgpack.packb([0, 1, "long", {}]))
     client.close()
@@ -245,29 +173,41 @@ def test_a_client_that_vanishes_with_a_request_under_way_does_no_harm(served: St
     assert ask(served, connect(served), msgpack.packb([0, 2, "echo", {}]))
 
 
-def test_the_socket_is_for_owner_and_group(served: StatusSocket) -> None:
-    assert stat.S_IMODE(os.stat(served.path).st_mode) == 0o660
-
-
-def test_a_second_daemon_is_refused_and_a_dead_ones_socket_replaced(short_folder: Path) -> None:
-    path = short_folder / "s"
-    first = StatusSocket(path, METHODS)
-    with pytest.raises(AlreadyServedError, match="already running"):
-        StatusSocket(path, METHODS)
-    first.close()
-    left_behind = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    left_behind.bind(str(path))
-    left_behind.close()
-    second = StatusSocket(path, METHODS)
-    second.close()
-    assert not path.exists()
-
-
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.binary(max_size=200))
-def test_no_bytes_make_it_raise(served: StatusSocket, garbage: bytes) -> None:
+def test_no_bytes_make_it_raise(served: Served, garbage: bytes) -> None:
     client = connect(served)
     client.sendall(garbage)
     serve(served, 4)
     client.close()
     serve(served, 3)
+
+
+VALID = [msgpack.packb([0, number, "echo", {"a": number}]) for number in range(4)]
+ODD = st.one_of(
+    st.binary(max_size=60),
+    st.builds(lambda data, place: data[: place % len(data)], st.sampled_from(VALID), st.integers(0, 99)),
+    st.builds(
+        lambda data, place, byte: data[: place % len(data)] + bytes([byte]) + data[place % len(data) + 1 :],
+        st.sampled_from(VALID),
+        st.integers(0, 99),
+        st.integers(0, 255),
+    ),
+)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(ODD, max_size=4), st.integers(0, 4), st.integers(0, 200))
+def test_valid_requests_are_answered_whatever_comes_after(
+    served: Served, odd: list[bytes], valid: int, cut: int
+) -> None:
+    client, witness = connect(served), connect(served)
+    data = b"".join(VALID[:valid] + odd)
+    answers = ask(served, client, data[:cut]) if cut else []
+    with contextlib.suppress(BrokenPipeError):
+        answers += ask(served, client, data[cut:])
+    assert [[1, n, None, {"a": n}] for n in range(valid)] == answers[:valid]
+    assert ask(served, witness, VALID[1]) == [[1, 1, None, {"a": 1}]]
+    client.close()
+    witness.close()
+    serve(served, 6)

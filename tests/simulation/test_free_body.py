@@ -381,7 +381,7 @@ def walking(configuration: Configuration) -> Lockstep:
 
 def test_a_free_body_walks_forward_on_firm_mud(walking: Lockstep) -> None:
     assert walking.loop.fault is None
-    assert len(walking.loop.strides) >= 6
+    assert len(walking.loop.learning.strides) >= 6
     assert walking.robot.plant.body_m > 0.08
 
 

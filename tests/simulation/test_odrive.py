@@ -14,6 +14,7 @@ from drivers.frames import Frame
 from drivers.odrive_codec import (
     CLEAR_ERRORS,
     ERROR_ESTOP,
+    ERROR_INITIALIZING,
     ERROR_WATCHDOG,
     ESTOP,
     GET_BUS_VOLTAGE_CURRENT,
@@ -23,15 +24,17 @@ from drivers.odrive_codec import (
     GET_TEMPERATURE,
     GET_VERSION,
     HEARTBEAT,
+    RX_SDO,
     SET_AXIS_STATE,
     SET_CONTROLLER_MODE,
     SET_INPUT_TORQUE,
     SET_LIMITS,
+    TX_SDO,
     AxisState,
     Message,
     arbitration_id,
 )
-from simulation.odrive import OdriveParameters, SimulatedOdrive
+from simulation.odrive import BOOT_S, OdriveParameters, SimulatedOdrive
 
 NODE = 3
 ANSWERED = [
@@ -368,3 +371,55 @@ def test_a_heartbeat_is_never_an_old_one() -> None:
 def test_what_is_off_draws_nothing() -> None:
     plain, dressed = make_drive(), make_drive(torque_constant_error=0.1, cogging_nm=0.1, current_lag_s=0.01)
     assert cyclic_frames(plain, 0.5) == cyclic_frames(dressed, 0.5)
+
+
+def told_setting(drive: SimulatedOdrive, endpoint: int) -> bytes:
+    question = Frame(arbitration_id(NODE, RX_SDO), RX_SDO.encode(0, endpoint, 0))
+    (answer,) = drive.receive(question, 0.0)
+    assert answer.arbitration_id == arbitration_id(NODE, TX_SDO)
+    assert answer.data[:4] == bytes([0, endpoint, 0, 0])
+    return answer.data[4:]
+
+
+@pytest.mark.parametrize(("watchdog_s", "enabled", "timeout"), [(0.1, "01", "cdcccc3d"), (0.0, "00", "00000000")])
+def test_the_watchdog_s_settings_are_told_byte_for_byte(watchdog_s: float, enabled: str, timeout: str) -> None:
+    drive = make_drive(watchdog_s=watchdog_s)
+    assert told_setting(drive, 2) == bytes.fromhex(enabled)
+    assert told_setting(drive, 1) == bytes.fromhex(timeout)
+
+
+@pytest.mark.parametrize("data", ["01 02 00 00", "00 03 00 00", "00 02 00", "00 02 00 00 00", ""])
+def test_no_other_parameter_is_told_and_none_is_written(data: str) -> None:
+    assert make_drive().receive(Frame(arbitration_id(NODE, RX_SDO), bytes.fromhex(data)), 0.0) == []
+
+
+def test_a_drive_that_restarts_is_silent_and_deaf_then_tells_once_that_it_initialises() -> None:
+    drive = make_armed_drive()
+    drive.measure(1.0, 0.0)
+    tell(drive, SET_INPUT_TORQUE, 0.25, now_s=5.0)
+    drive.restart(5.0)
+    assert drive.torque_nm(5.001) == 0.0
+    assert not any(list(drive.cyclic_frames(5.0 + step / 1000.0)) for step in range(round(1000 * BOOT_S)))
+    assert drive.receive(Frame(arbitration_id(NODE, GET_VERSION), is_remote=True), 5.5) == []
+    tell(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP, now_s=5.9)
+    frames = [frame for step in range(400) for frame in drive.cyclic_frames(5.0 + BOOT_S + step / 1000.0)]
+    heartbeats = [HEARTBEAT.decode(frame.data)[:2] for frame in frames if frame.arbitration_id & 0x1F == 0x01]
+    assert heartbeats == [(ERROR_INITIALIZING, AxisState.IDLE)] + [(0, AxisState.IDLE)] * (len(heartbeats) - 1)
+    assert len(heartbeats) >= 3
+    assert ask_at(drive, GET_ERROR, 7.0) == (0, 0)
+    assert ask_at(drive, GET_ENCODER_ESTIMATES, 7.0)[0] == pytest.approx(1.0 / (2.0 * pi), abs=1e-4)
+
+
+def test_a_drive_that_was_restarted_has_forgotten_its_mode() -> None:
+    drive = make_armed_drive()
+    drive.restart(0.0)
+    tell(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP, now_s=2.0)
+    tell(drive, SET_INPUT_TORQUE, 0.25, now_s=2.0)
+    assert drive.torque_nm(2.0) == 0.0
+    tell(drive, SET_CONTROLLER_MODE, 1, 1, now_s=2.0)
+    assert drive.torque_nm(2.0) == 0.25
+
+
+def ask_at(drive: SimulatedOdrive, message: Message, now_s: float) -> tuple[float, ...]:
+    (answer,) = drive.receive(Frame(arbitration_id(NODE, message), is_remote=True), now_s)
+    return message.decode(answer.data)

@@ -77,7 +77,7 @@ def crossing(configuration: Configuration) -> Lockstep:
 def chosen_depths_m(crossing: Lockstep, compartment: int) -> list[float]:
     """Of the last strides in a compartment: the first ones there still learn."""
     start_m, chosen, place_m = compartment * COMPARTMENT_M, [], 0.0
-    for stride in crossing.loop.strides:
+    for stride in crossing.loop.learning.strides:
         if stride.estimate.flipper != "left":
             continue
         place_m += stride.estimate.step_m if isfinite(stride.estimate.step_m) else 0.0

@@ -182,7 +182,7 @@ def test_a_walk_has_the_strides_that_the_loop_closes(configuration: Configuratio
     lockstep = Lockstep(configuration, Track([(1.0, MUDS["53.1"])]))
     truths = witnessed(lockstep, 0.03, 6.0)
     assert len(truths) >= 6
-    closed = [(stride.estimate.flipper, stride.estimate.index) for stride in lockstep.loop.strides]
+    closed = [(stride.estimate.flipper, stride.estimate.index) for stride in lockstep.loop.learning.strides]
     assert [(truth.flipper, truth.index) for truth in truths] == closed
     assert all(truth.insertion.deepest_m == pytest.approx(0.03, abs=0.002) for truth in truths)
 

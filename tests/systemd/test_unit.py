@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from control.records import JOINTS
+from drivers.can_port import BusState
 from drivers.frames import Frame
 from drivers.odrive_drives import OdriveDrives
 from firmware_host import daemon
@@ -80,17 +81,20 @@ def test_a_person_who_starts_the_daemon_without_options_gets_the_same_configurat
     assert asked == [Path(unit["ExecStart"][-1])]
 
 
-def test_the_socket_is_in_the_unit_s_runtime_directory_which_the_group_may_enter(
+def test_the_socket_is_in_the_unit_s_runtime_directory_which_everybody_may_enter_who_may_stop(
     unit: Settings, configuration: Configuration
 ) -> None:
     assert Path(configuration.status.socket).parent == Path("/run") / only(unit, "RuntimeDirectory")
     assert configuration.status.socket == StatusParameters().socket
-    assert only(unit, "RuntimeDirectoryMode") == "0750"
+    assert configuration.status.anyone_may_stop
+    assert only(unit, "RuntimeDirectoryMode") == "0755"
+    assert "PrivateUsers" not in unit  # it would make everybody "nobody" to the daemon
 
 
 def test_logs_go_into_the_unit_s_state_directory(unit: Settings, configuration: Configuration) -> None:
     state = Path("/var/lib") / only(unit, "StateDirectory")
     assert Path(configuration.log.directory).is_relative_to(state)
+    assert only(unit, "StateDirectoryMode") == "0750"
     assert only(unit, "ProtectSystem") == "strict"  # so nothing else could be written
 
 
@@ -151,8 +155,9 @@ def test_the_network_files_configure_the_same_buses(configuration: Configuration
 
 
 class CountingPort:
+    state = BusState.ACTIVE
     failed_sends = error_frames = 0
-    last_send_error = ""
+    last_error = last_send_error = ""
 
     def __init__(self) -> None:
         self.sent = 0
@@ -180,6 +185,7 @@ def test_the_transmit_queue_holds_the_tick_that_arms_where_linux_s_own_would_not
 def test_the_filter_lets_through_what_the_loop_and_the_writer_call(unit: Settings) -> None:
     allowed = expand(unit["SystemCallFilter"][0]) - expand(unit["SystemCallFilter"][1].removeprefix("~"))
     needed = {"sched_setscheduler", "sched_setaffinity", "setpriority", "mlockall", "vfork", "execve", "chmod"}
+    needed |= {"umask", "getsockopt"}  # the socket file's permissions, and who connects
     assert len(unit["SystemCallFilter"]) == 2
     assert needed <= allowed
     assert not {"setuid", "chown", "reboot", "ptrace"} & allowed

@@ -1,0 +1,48 @@
+"""`mudskipper fail`: parts of a robot made to fail on purpose, where its configuration allows that."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+from command_line import exit_codes
+from command_line.operation import _with_daemon
+from command_line.screen import complain, table
+from firmware_host.status_client import StatusClient
+
+
+def fail(options: argparse.Namespace) -> int:
+    if options.list:
+        return _with_daemon(options, lambda client: _show(client, options.json))
+    if options.component is None or options.kind is None:
+        complain("fail needs a COMPONENT and a KIND, or --list")
+        return exit_codes.USAGE
+    return _with_daemon(options, lambda client: _fail(client, options))
+
+
+def _fail(client: StatusClient, options: argparse.Namespace) -> int:
+    wish: dict[str, Any] = {"component": options.component, "kind": options.kind, "for_s": options.seconds}
+    failing = client.call("fail", **wish)
+    print(json.dumps(failing) if options.json else failing_table(failing))
+    return exit_codes.OK
+
+
+def _show(client: StatusClient, as_json: bool) -> int:
+    report = client.call("failures")
+    if as_json:
+        print(json.dumps(report))
+    elif report["allowed"]:
+        rows = [(each["component"], each["kind"], each["does"]) for each in report["table"]]
+        print(table([("component", "kind", "what it does"), *rows]))
+        print(f"\n{failing_table(report['failing'])}")
+    else:
+        print("nothing may fail on purpose: failures.allowed is false in the configuration")
+    return exit_codes.OK
+
+
+def failing_table(failing: list[dict[str, Any]]) -> str:
+    if not failing:
+        return "nothing fails on purpose"
+    rows = [(each["component"], each["kind"], f"{each['remaining_s']:.1f} s more", each["does"]) for each in failing]
+    return table([("failing", "kind", "for", "what it does"), *rows])

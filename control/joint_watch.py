@@ -1,0 +1,211 @@
+"""What one joint's signals say against having torque on it: silence, errors, positions, speeds, currents and heat.
+
+`JointWatch.update` runs every tick for each joint and gives all faults that it sees. It owns the few counts that a
+single sample cannot tell. Bounds that depend on the machine are in FaultBounds, the others stand here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import degrees, isfinite, radians
+from typing import Annotated, NamedTuple
+
+from control.bounds import Bounds
+from control.fault_kinds import make_fault
+from control.faults import Fault
+from control.limits import JointLimits, JointRange
+from control.records import NEVER_S, UNKNOWN, DriveState
+from control.winding import Winding, WindingParameters
+
+HEARTBEAT_SILENCE_S = 0.5  # drives send one every 100 ms: five in a row are missing
+TEMPERATURE_SILENCE_S = 1.0  # of a drive that has told its temperature before
+ENERGISED_S = 0.2  # two heartbeats, in which a drive that was told to go idle may say that it has not yet
+FAST_SHARE = 1.25  # of the velocity limit, above which no torque of ours drives a joint
+FAST_TICKS = 3
+CURRENT_SHARE = 1.25  # of the drive's current limit
+CURRENT_TICKS = 3
+MOVING_RAD_S = 0.5
+STILL_RAD_S = 0.1
+SATURATED_SHARE = 0.95  # of the torque limit
+STALLED_S = 2.0  # longer than an insertion, a stance or an extraction of the paper's gait takes
+JUMP_RAD = 0.05  # beyond what the fastest joint can do: encoder noise and stamps that are late
+JUMP_SHARE = 2.0  # of the velocity limit
+
+
+@dataclass(frozen=True)
+class FaultBounds:
+    """Where a fault begins that depends on the machine. T is the loop's period of 2.63 ms."""
+
+    late_s: Annotated[float, Bounds(0.003, 2.0)] = 0.0053  # 2 T without position or current: told
+    quiet_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0079  # 3 T: damping
+    silence_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0263  # 10 T: drives idle; of the loop itself: damping
+    lag_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0131  # 5 T missed in a row: soft stop
+    lag_share: Annotated[float, Bounds(0.01, 10.0)] = 0.1  # by which 100 ticks take longer than they should
+    longest_watchdog_s: Annotated[float, Bounds(0.01, 10.0)] = 0.3  # that a drive may have
+    voltage_low_v: Annotated[float, Bounds(0.0, 100.0)] = 20.0  # told; 0: never
+    voltage_min_v: Annotated[float, Bounds(0.0, 100.0)] = 18.0  # soft stop
+    disk_free_share: Annotated[float, Bounds(0.0, 0.9)] = 0.05  # of the log's disk, below which nothing is armed
+    disk_slow_s: Annotated[float, Bounds(0.05, 60.0)] = 2.0  # for one write
+
+
+class JointFacts(NamedTuple):
+    """What the loop knows of the moment."""
+
+    now_s: float
+    dt_s: float
+    energised: bool  # torque is or may be on
+    moving: bool  # closed loop is expected of the drive
+    torque_nm: float  # sent in the tick before
+    freeing: bool  # a recovery pulls at full torque on purpose
+
+
+class JointWatch:
+    def __init__(
+        self,
+        joint: str,
+        limits: JointLimits,
+        span: JointRange,
+        bounds: FaultBounds,
+        winding: WindingParameters,
+        current_limit_a: float,
+    ) -> None:
+        self.joint = joint
+        self.winding = Winding(winding)
+        self._limits = limits
+        self._bounds = bounds
+        self._low_rad = span.min_rad - radians(limits.position_margin_deg)
+        self._high_rad = span.max_rad + radians(limits.position_margin_deg)
+        self._fast_rad_s = FAST_SHARE * limits.velocity_rad_s
+        self._jump_rad_s = JUMP_SHARE * limits.velocity_rad_s
+        self._most_a = CURRENT_SHARE * current_limit_a
+        self._saturated_nm = SATURATED_SHARE * limits.torque_nm
+        self._nearly_hot_c = (limits.temperature_warm_c + limits.temperature_hot_c) / 2.0  # half of the torque is left
+        self.reset()
+
+    def reset(self) -> None:
+        """But not the winding: it stays as warm as it is."""
+        self._fast_ticks = self._current_ticks = 0
+        self._stalled_s = self._energised_s = 0.0
+        self._angle_rad, self._angle_stamp_s = UNKNOWN, NEVER_S
+
+    def update(self, facts: JointFacts, state: DriveState) -> list[Fault]:
+        found: list[Fault] = []
+        self._watch_signals(found, facts, state)
+        self._watch_drive(found, facts, state)
+        self._watch_motion(found, facts, state)
+        self._watch_load(found, facts, state)
+        self._watch_heat(found, facts, state)
+        return found
+
+    def _fault(self, name: str, sentence: str) -> Fault:
+        return make_fault(name, self.joint, sentence)
+
+    # signals
+
+    def _watch_signals(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        bounds, now_s = self._bounds, facts.now_s
+        position_s, current_s = now_s - state.angle_stamp_s, now_s - state.current_stamp_s
+        if position_s > bounds.late_s or current_s > bounds.late_s:
+            found.append(self._late(position_s, current_s))
+        if now_s - state.heartbeat_stamp_s > HEARTBEAT_SILENCE_S:
+            found.append(self._silence("heartbeat_silent", "heartbeat", now_s - state.heartbeat_stamp_s))
+        if isfinite(state.temperature_stamp_s) and now_s - state.temperature_stamp_s > TEMPERATURE_SILENCE_S:
+            found.append(self._silence("temperature_silent", "temperature", now_s - state.temperature_stamp_s))
+
+    def _late(self, position_s: float, current_s: float) -> Fault:
+        """The hardest of what two ages say: both signals gone, one of them, or a frame that is late."""
+        bounds = self._bounds
+        both_s = min(position_s, current_s)
+        if both_s > bounds.silence_s:
+            return self._silence("drive_silent", "message", both_s)
+        if position_s > bounds.silence_s:
+            return self._silence("position_silent", "position", position_s)
+        if both_s > bounds.quiet_s:
+            return self._silence("drive_quiet", "message", both_s)
+        if position_s > bounds.quiet_s:
+            return self._silence("position_stale", "position", position_s)
+        if current_s > bounds.silence_s:
+            return self._silence("current_silent", "current", current_s)
+        if current_s > bounds.quiet_s:
+            return self._silence("current_stale", "current", current_s)
+        return self._silence(
+            "drive_late", "position" if position_s > current_s else "current", max(position_s, current_s)
+        )
+
+    def _silence(self, name: str, signal: str, age_s: float) -> Fault:
+        ago = f"for {age_s * 1e3:.0f} ms" if isfinite(age_s) else "at all"
+        return self._fault(name, f"No {signal} came from the {self.joint} drive {ago}.")
+
+    # the drive's own state
+
+    def _watch_drive(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        if state.error_flags:
+            found.append(self._fault("drive_error", f"The {self.joint} drive reports error 0x{state.error_flags:x}."))
+        if facts.moving and not state.closed_loop:
+            found.append(self._fault("drive_disarmed", f"The {self.joint} drive left closed loop by itself."))
+        self._energised_s = self._energised_s + facts.dt_s if state.closed_loop and not facts.energised else 0.0
+        if self._energised_s > ENERGISED_S:
+            found.append(self._fault("drive_energised", f"The {self.joint} drive is in closed loop, unasked."))
+        voltage_v, bounds = state.bus_voltage_v, self._bounds
+        if voltage_v < bounds.voltage_min_v:
+            text = f"The {self.joint} drive has {voltage_v:.1f} V; {bounds.voltage_min_v:g} V are the least."
+            found.append(self._fault("voltage_under", text))
+        elif voltage_v < bounds.voltage_low_v:
+            found.append(self._fault("voltage_low", f"The {self.joint} drive has only {voltage_v:.1f} V."))
+
+    # motion
+
+    def _watch_motion(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        angle_rad, velocity_rad_s = state.angle_rad, abs(state.velocity_rad_s)
+        if not self._low_rad <= angle_rad <= self._high_rad:
+            found.append(self._out_of_range(angle_rad))
+        self._fast_ticks = self._fast_ticks + 1 if velocity_rad_s > self._fast_rad_s else 0
+        if self._fast_ticks >= FAST_TICKS:
+            text = f"The {self.joint} joint turns at {velocity_rad_s:.0f} rad/s."
+            found.append(self._fault("joint_velocity", text))
+        if velocity_rad_s > MOVING_RAD_S and not facts.energised:
+            text = f"The {self.joint} joint moves at {velocity_rad_s:.1f} rad/s."
+            found.append(self._fault("joint_moving", text))
+        if state.angle_stamp_s != self._angle_stamp_s:
+            self._watch_jump(found, facts, state)
+
+    def _out_of_range(self, angle_rad: float) -> Fault:
+        low, high = degrees(self._low_rad), degrees(self._high_rad)
+        text = f"The {self.joint} joint is at {degrees(angle_rad):.1f} degrees, outside of {low:.0f} to {high:.0f}."
+        return self._fault("joint_position", text)
+
+    def _watch_jump(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        """Between two messages; what a stamp is late by may be a tick."""
+        step_rad = abs(state.angle_rad - self._angle_rad)
+        gap_s = state.angle_stamp_s - self._angle_stamp_s + facts.dt_s
+        self._angle_rad, self._angle_stamp_s = state.angle_rad, state.angle_stamp_s
+        if step_rad > JUMP_RAD + self._jump_rad_s * gap_s:  # never true of the first one
+            text = f"The {self.joint} encoder jumped by {degrees(step_rad):.0f} degrees in {gap_s * 1e3:.1f} ms."
+            found.append(self._fault("encoder_jump", text))
+
+    # load
+
+    def _watch_load(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        self._current_ticks = self._current_ticks + 1 if abs(state.current_a) > self._most_a else 0
+        if self._current_ticks >= CURRENT_TICKS:
+            text = f"The {self.joint} motor takes {abs(state.current_a):.1f} A."
+            found.append(self._fault("joint_current", text))
+        stalled = abs(facts.torque_nm) >= self._saturated_nm and abs(state.velocity_rad_s) < STILL_RAD_S
+        self._stalled_s = self._stalled_s + facts.dt_s if stalled and not facts.freeing else 0.0
+        if self._stalled_s > STALLED_S:
+            text = f"The {self.joint} joint stands still at full torque for {self._stalled_s:.1f} s."
+            found.append(self._fault("joint_not_following", text))
+
+    # heat
+
+    def _watch_heat(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        measured_c = state.temperature_c
+        winding_c = self.winding.update(facts.dt_s, state.current_a, measured_c)
+        if winding_c < self._nearly_hot_c:
+            return
+        by_sensor = measured_c >= self._nearly_hot_c
+        what, how = ("motor", "") if by_sensor else ("winding", ", by its currents")
+        temperature_c = measured_c if by_sensor else winding_c
+        hot = temperature_c >= self._limits.temperature_hot_c
+        text = f"The {self.joint} motor has {temperature_c:.0f} degrees C{how}."
+        found.append(self._fault(f"{what}_hot" if hot else f"{what}_overheating", text))

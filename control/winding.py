@@ -1,0 +1,53 @@
+"""The temperature of a motor's winding, reckoned from its current where no sensor tells it quickly enough.
+
+One heat capacity that the copper loss warms and the room cools:
+
+    τ dT/dt = R_th P + T_room - T        P = 3/2 R (1 + 0.0039 (T - 25 °C)) i_q²
+
+with i_q the peak of the phase current, as ODrive and moteus tell it; 0.0039 per kelvin is copper's. The resistance is
+the R60's; its thermal resistance is a placeholder in the only public source, and the time constant is an estimate on
+the quick side: measure yours. A sensor that reads higher corrects the model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Annotated
+
+from control.bounds import Bounds
+
+COPPER_PER_K = 0.0039
+REFERENCE_C = 25.0
+
+
+@dataclass(frozen=True)
+class WindingParameters:
+    resistance_ohm: Annotated[float, Bounds(0.001, 50.0)] = 0.5
+    thermal_resistance_k_w: Annotated[float, Bounds(0.01, 100.0)] = 1.25
+    time_constant_s: Annotated[float, Bounds(1.0, 10000.0)] = 60.0
+    room_c: Annotated[float, Bounds(-40.0, 60.0)] = 30.0
+
+
+class Winding:
+    """Owns one winding's temperature."""
+
+    def __init__(self, parameters: WindingParameters) -> None:
+        self.parameters = parameters
+        self.reset()
+
+    def reset(self) -> None:
+        self.temperature_c = self.parameters.room_c
+
+    def update(self, dt_s: float, current_a: float, measured_c: float) -> float:
+        """Without a finite current the last one's heat is left out; the hotter of model and sensor counts."""
+        parameters, temperature_c = self.parameters, self.temperature_c
+        rise_k = 0.0
+        if isfinite(current_a):
+            resistance_ohm = parameters.resistance_ohm * (1.0 + COPPER_PER_K * (temperature_c - REFERENCE_C))
+            rise_k = parameters.thermal_resistance_k_w * 1.5 * resistance_ohm * current_a * current_a
+        temperature_c += (parameters.room_c + rise_k - temperature_c) * dt_s / (parameters.time_constant_s + dt_s)
+        if measured_c > temperature_c:  # never true of NaN
+            temperature_c = measured_c
+        self.temperature_c = temperature_c
+        return temperature_c

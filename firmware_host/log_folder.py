@@ -1,0 +1,138 @@
+"""The folder of the logs: active/ holds what is being written, done/ what is whole, kept/ what nobody may free.
+
+A file goes from active/ to done/ in one rename once it is down on the disk, so whatever lies in done/ is whole.
+Preserving a log moves it to kept/: unlike an extended attribute or a list of names that survives every copy to another
+disk, it is seen with `ls`, and freeing cannot reach it, since it only ever looks into done/.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NamedTuple
+
+ACTIVE, DONE, KEPT = "active", "done", "kept"
+ENDING = ".mcap"
+BROKEN = ".broken"  # after the name of a log that is being rewritten
+PART = ".part"  # after the name of one that is not whole yet
+FIRST = "-0000"
+
+
+class FreeSpace(NamedTuple):
+    free_share: float
+    free_bytes: int
+
+
+class FreedLog(NamedTuple):
+    name: str
+    size: int  # bytes
+
+
+def new_run_id(robot: str) -> str:
+    """Sorts by time, and is a file name whatever the robot is called."""
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
+    return f"{stamp}-{re.sub(r'[^A-Za-z0-9_.]+', '_', robot)[:60]}"
+
+
+def first_path(folder: Path, run_id: str) -> Path:
+    return folder / ACTIVE / f"{run_id}{FIRST}{ENDING}"
+
+
+def segment_path(first: Path, segment: int) -> Path:
+    if segment == 0:
+        return first
+    return first.with_name(f"{first.stem.removesuffix(FIRST)}-{segment:04d}{ENDING}")
+
+
+def finished_path(path: Path) -> Path:
+    """Where a log goes once it is whole; one outside of active/ stays where it is."""
+    moves = path.parent.name == ACTIVE and path.suffix == ENDING
+    return path.parent.parent / DONE / path.name if moves else path
+
+
+def present_path(path: Path) -> Path:
+    """Of a log that was last seen in active/ and may have gone on since."""
+    folder = path.parent.parent
+    places = (path, folder / DONE / path.name, folder / KEPT / path.name)
+    return next((place for place in places if place.exists()), path)
+
+
+def log_files(folder: Path, *places: str) -> list[Path]:
+    """The oldest first. A place that is not there holds none."""
+    found = [path for place in places for path in (folder / place).glob(f"*{ENDING}")]
+    return sorted(found, key=lambda path: path.name)
+
+
+def unfinished_files(folder: Path) -> list[Path]:
+    """What recovery has to look at, the files of living writers included."""
+    return sorted(path for ending in (ENDING, BROKEN, PART) for path in (folder / ACTIVE).glob(f"*{ending}"))
+
+
+def free_space(folder: Path) -> FreeSpace:
+    """Of the disk, for whoever has no special rights. Raises OSError."""
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    disk = os.statvfs(folder)
+    return FreeSpace(disk.f_bavail / max(1, disk.f_blocks), disk.f_bavail * disk.f_frsize)
+
+
+def free_logs(folder: Path, quota_bytes: int, min_free_share: float, most: int = 4) -> Iterator[FreedLog]:
+    """Remove the oldest of done/, one by one, while the logs or the disk hold too much. Raises OSError."""
+    used = sum(_size(path) for path in log_files(folder, ACTIVE, DONE, KEPT))
+    for oldest in log_files(folder, DONE)[:most]:
+        too_much = 0 < quota_bytes < used
+        if not too_much and free_space(folder).free_share >= min_free_share:
+            return
+        freed = remove_log(oldest)
+        used -= freed.size
+        yield freed
+
+
+def remove_log(path: Path) -> FreedLog:
+    freed = FreedLog(path.name, _size(path))
+    path.unlink()
+    return freed
+
+
+def _size(path: Path) -> int:
+    """Zero for one that went away meanwhile."""
+    with suppress(OSError):
+        return path.stat().st_size
+    return 0
+
+
+def preserve(path: Path, undo: bool = False) -> Path:
+    """To kept/, or back to done/; its new place. Raises OSError, and ValueError for a log that is elsewhere."""
+    source, target = (KEPT, DONE) if undo else (DONE, KEPT)
+    path = path.absolute()
+    if path.parent.name == target:
+        return path
+    if path.parent.name != source:
+        raise ValueError(f"{path}: only a log in {source}/ can be moved to {target}/")
+    moved = path.parent.parent / target / path.name
+    if not path.exists():
+        raise FileNotFoundError(2, "No such file or directory", str(path))
+    if moved.exists():
+        raise ValueError(f"{moved} exists already")
+    moved.parent.mkdir(exist_ok=True)
+    path.rename(moved)
+    synchronise_folder(moved.parent)
+    synchronise_folder(path.parent)
+    return moved
+
+
+def synchronise_folder(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def disk_bytes(folder: Path) -> int:
+    return shutil.disk_usage(folder).total

@@ -1,0 +1,122 @@
+"""What the loop learns of the mud as it walks, and what the gait makes of it.
+
+Samples go to the estimator with the phase that the measured motion was commanded in, as the log records it. Once a
+stride, in swing, the depth of the next one is chosen; mud that might hold a flipper is entered no deeper.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from control.controller import Controller
+from control.fault_kinds import make_fault
+from control.faults import Fault
+from control.records import BodyPose, DriveStates, Estimate, Phase, StrideEstimate
+from estimation.mud import MudEstimator, MudReading
+from firmware_host.adaptation_methods import adaptation_of, choice_text
+from firmware_host.configuration import Configuration
+
+FIRM_TICKS = 3  # of a load that ends an insertion: one odd sample says nothing
+KEPT_STRIDES = 200  # for clients that ask what happened
+LARGEST_N_M3 = 1e10  # 10 kN/cm³: a thousand times any mud
+
+
+class ClosedStride(NamedTuple):
+    """A stride of one flipper with the depth that was chosen from it."""
+
+    number: int  # counts all of both flippers since the start
+    estimate: StrideEstimate
+    chosen_depth_m: float
+
+
+class MudLearning:
+    """Owns the estimator, the choice of depth and the strides of late."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        self.estimator = MudEstimator(
+            configuration.geometry,
+            configuration.flipper_drives,
+            configuration.estimation,
+            configuration.adaptation.body_drag_n,
+        )
+        self.adaptation = adaptation_of(configuration)
+        self.reading = MudReading()
+        self.strides: list[ClosedStride] = []
+        self.strides_closed = 0  # since the start
+        self._firm_ticks = 0
+
+    def reset(self, depth_m: float) -> None:
+        """A walk begins; the strides before it are kept."""
+        self.estimator.reset()
+        self.adaptation.reset(depth_m)
+        self._firm_ticks = 0
+
+    def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> None:
+        a, b, c, d = states
+        self.reading = self.estimator.update(
+            now_s,
+            phase,
+            (a.angle_rad, b.angle_rad, c.angle_rad, d.angle_rad),
+            (a.velocity_rad_s, b.velocity_rad_s, c.velocity_rad_s, d.velocity_rad_s),
+            (a.current_a, b.current_a, c.current_a, d.current_a),
+            body.x_m,
+            (now_s - a.angle_stamp_s, now_s - b.angle_stamp_s, now_s - c.angle_stamp_s, now_s - d.angle_stamp_s),
+            (
+                now_s - a.current_stamp_s,
+                now_s - b.current_stamp_s,
+                now_s - c.current_stamp_s,
+                now_s - d.current_stamp_s,
+            ),
+        )
+
+    def step(self, controller: Controller) -> tuple[list[ClosedStride], list[str]]:
+        """What this tick changes in the gait: the strides that closed, and sentences for the log."""
+        closed, sentences = self._close(controller) if self.reading.strides else ([], [])
+        if self._is_firm(controller) and controller.gait.end_insertion():
+            sentences.append(f"insertion ended at {controller.gait.commanded_depth_m:.4f} m: firm mud")
+        return closed, sentences
+
+    def _close(self, controller: Controller) -> tuple[list[ClosedStride], list[str]]:
+        sentences = ["another mud"] if self.estimator.belief.boundary else []
+        sentences += self._choose(controller)
+        depth_m = controller.gait.next_depth_m
+        first = self.strides_closed
+        closed = [ClosedStride(first + i, estimate, depth_m) for i, estimate in enumerate(self.reading.strides)]
+        self.strides_closed += len(closed)
+        self.strides = (self.strides + closed)[-KEPT_STRIDES:]
+        return closed, sentences
+
+    def _choose(self, controller: Controller) -> list[str]:
+        """The depth of the next stride, and its gait where the method chooses that as well."""
+        gait, order = controller.gait, controller.order
+        if not order.adaptive:
+            gait.next_depth_m = order.depth_m
+            return []
+        choice = self.adaptation.step(self.estimator.belief, self.reading.strides, gait.commanded_depth_m)
+        parameters = choice.gait or gait.parameters
+        changes = (choice.depth_m, parameters) != (gait.next_depth_m, gait.next_parameters)
+        gait.next_depth_m, gait.next_parameters = choice.depth_m, parameters
+        return [choice_text(choice)] if changes else []
+
+    def _is_firm(self, controller: Controller) -> bool:
+        """Where a depth is chosen."""
+        limit_nm, reading = self.adaptation.largest_insertion_nm, self.reading
+        firm = reading.left.adduction_torque_nm > limit_nm or reading.right.adduction_torque_nm > limit_nm
+        inserting = controller.order.adaptive and controller.target.phase is Phase.INSERTION
+        self._firm_ticks = self._firm_ticks + 1 if firm and inserting else 0
+        return self._firm_ticks >= FIRM_TICKS
+
+    @property
+    def faults(self) -> list[Fault]:
+        """Coefficients of this tick's strides that no mud has."""
+        wild = [stride for stride in self.reading.strides if any(map(_is_wild, (stride.k_p, stride.k_s, stride.k_e)))]
+        return [
+            make_fault(
+                "estimate_wild", each.flipper, f"The {each.flipper} flipper's stride {each.index} tells nonsense."
+            )
+            for each in wild
+        ]
+
+
+def _is_wild(estimate: Estimate) -> bool:
+    return estimate.valid and not (abs(estimate.value) < LARGEST_N_M3 and estimate.std_error < LARGEST_N_M3)

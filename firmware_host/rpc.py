@@ -1,0 +1,72 @@
+"""MessagePack-RPC as the status socket understands it: what is a request, and what is refused.
+
+A request is [0, id, method, params], its answer [1, id, error, result] (the MessagePack-RPC specification). Params are
+a flat map from names to plain values, since that is all the methods take: what is nested, no number, or of an extension
+type is refused here and reaches none of them. The lengths are bounded before anything is allocated: a header of three
+bytes may announce 65535 elements, for which the unpacker makes room at once, and headers can be nested.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import msgpack
+
+REQUEST, RESPONSE = 0, 1
+LONGEST_REQUEST = 4 * 1024  # bytes
+LONGEST_METHOD = 64
+MOST_PARAMS = 16
+PARTS = 4  # of a request
+
+NOT_PERMITTED = "not permitted: "  # how a refusal for want of rights begins
+SHAPE = f"a request is [0, id, method, params] in MessagePack, with at most {MOST_PARAMS} params"
+
+TOO_LONG = f"a request has at most {LONGEST_REQUEST} bytes"
+
+
+class RefusedError(Exception):
+    """A request that was understood and will not be done; the text says why."""
+
+
+class GarbledError(Exception):
+    """No request; the text says what one is."""
+
+
+def make_unpacker(read_bytes: int) -> msgpack.Unpacker:
+    """For what comes in pieces of at most `read_bytes`."""
+    return msgpack.Unpacker(
+        max_buffer_size=LONGEST_REQUEST + read_bytes,
+        max_array_len=PARTS,
+        max_map_len=MOST_PARAMS,
+        max_str_len=LONGEST_REQUEST,
+        max_bin_len=LONGEST_REQUEST,
+        max_ext_len=LONGEST_REQUEST,
+        raw=False,
+    )
+
+
+def read_shape(message: Any) -> tuple[int, str, Any]:
+    """Number, method and params. Raises GarbledError."""
+    if not isinstance(message, list) or len(message) != PARTS:
+        raise GarbledError(SHAPE)
+    kind, number, method, params = message
+    if type(kind) is not int or kind != REQUEST or type(number) is not int or number < 0:
+        raise GarbledError(SHAPE)
+    if not isinstance(method, str) or len(method) > LONGEST_METHOD or not isinstance(params, list | dict):
+        raise GarbledError(SHAPE)
+    return number, method, params
+
+
+def read_params(params: Any) -> dict[str, Any]:
+    """They come as a map, or as the specification's list holding one. Raises RefusedError."""
+    if isinstance(params, list):
+        params = params[0] if params else {}
+    if not isinstance(params, dict) or not all(isinstance(key, str) for key in params):
+        raise RefusedError("params must be a map from names to values")
+    for key, value in params.items():
+        if value is not None and not isinstance(value, bool | int | float | str):
+            raise RefusedError(f"{key[:LONGEST_METHOD]}: must be a number, a text, true, false or nothing")
+        if isinstance(value, float) and not isfinite(value):
+            raise RefusedError(f"{key[:LONGEST_METHOD]} = {value}: must be a finite number")
+    return params

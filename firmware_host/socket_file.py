@@ -1,0 +1,96 @@
+"""The file of a listening Unix socket: made with its permissions, replaced where a dead daemon left it behind.
+
+Nothing is followed and nothing but a dead socket is removed: not a file, not a symbolic link, not the socket of a
+daemon that lives or merely hangs. A folder that everybody may write to is refused, since there everybody could put
+another socket in this one's place.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+import stat
+from pathlib import Path
+
+PROBE_S = 1.0  # for a daemon to let a connection in
+
+
+class AlreadyServedError(Exception):
+    """Another daemon answers on this socket."""
+
+
+class SocketFile:
+    """Owns the listening socket and its place in the file system."""
+
+    def __init__(self, path: Path, mode: int, backlog: int) -> None:
+        """Raises AlreadyServedError, or OSError where the path cannot be bound."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _refuse_open_folder(path.parent)
+        _remove_stale(path)
+        self.path = path
+        self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.listener.setblocking(False)
+        _bind(self.listener, path, mode)
+        self._identity = _identity(path)
+        self.listener.listen(backlog)
+
+    def close(self) -> None:
+        """The file goes with it, unless it is another daemon's by now."""
+        self.listener.close()
+        if _identity(self.path) == self._identity:
+            self.path.unlink(missing_ok=True)
+
+
+def _bind(listener: socket.socket, path: Path, mode: int) -> None:
+    """By the umask, so that there is no moment at which the file has other permissions."""
+    before = os.umask(0o777 & ~mode)
+    try:
+        listener.bind(str(path))
+    except OSError as problem:
+        listener.close()
+        raise OSError(problem.errno, problem.strerror, str(path)) from None
+    finally:
+        os.umask(before)
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    try:
+        found = path.lstat()
+    except FileNotFoundError:
+        return None
+    return found.st_dev, found.st_ino
+
+
+def _refuse_open_folder(folder: Path) -> None:
+    mode = folder.stat().st_mode
+    if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+        raise PermissionError(errno.EPERM, "everybody may write to it: run 'chmod o-w' on it", str(folder))
+
+
+def _remove_stale(path: Path) -> None:
+    """A socket that nobody answers was left behind by a daemon that died."""
+    try:
+        kind = path.lstat().st_mode
+    except FileNotFoundError:
+        return
+    if not stat.S_ISSOCK(kind):
+        raise FileExistsError(errno.EEXIST, "is there already and is no socket: remove it", str(path))
+    if _answers(path):
+        raise AlreadyServedError(f"another daemon is already running on {path}")
+    path.unlink(missing_ok=True)
+
+
+def _answers(path: Path) -> bool:
+    """Also where nobody is let in for a while: a daemon that hangs is no dead one."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        probe.settimeout(PROBE_S)
+        try:
+            probe.connect(str(path))
+        except (ConnectionRefusedError, FileNotFoundError):
+            return False
+        except (TimeoutError, BlockingIOError):
+            return True
+        except OSError as problem:
+            raise OSError(problem.errno, problem.strerror, str(path)) from None
+    return True

@@ -1,0 +1,26 @@
+"""The page about faults says what the robot does."""
+
+from pathlib import Path
+
+from control.fault_kinds import KINDS
+from control.fault_page import fault_page
+from control.modes import TRANSITIONS, Mode
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "faults.md"
+
+
+def test_the_page_is_written_from_the_tables() -> None:
+    """Where it is not: python -m control.fault_page > docs/faults.md"""
+    assert PAGE.read_text(encoding="utf-8") == fault_page()
+
+
+def test_the_page_shows_every_fault_every_mode_and_every_transition() -> None:
+    page = fault_page()
+    assert all(f"`{name}`" in page for name in KINDS)
+    for row in TRANSITIONS:
+        for source in row.sources - {row.target}:
+            arrow = next(
+                line for line in page.splitlines() if line.startswith(f"    {source.name} --> {row.target.name} ")
+            )
+            assert row.cause.text in arrow
+    assert all(mode.name in page for mode in Mode)

@@ -1,0 +1,209 @@
+"""The state of a port: over python-can's own socketcan bus on a pair of sockets, and over mock ports.
+
+This machine need not have CAN: the socket that python-can would open is replaced by one end of a datagram pair, and
+the kernel's frames are written into the other end as the 16 bytes of `struct can_frame`.
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+import socket
+from collections.abc import Iterator
+from typing import Any
+
+import can
+import pytest
+from can.interfaces.socketcan import socketcan
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from drivers.can_port import BusState, PythonCanPort, open_port
+from drivers.frames import Frame, encode_frame
+from drivers.mock_bus import MockBus
+
+ENCODER = Frame(0x009, bytes(8))
+WARNING = Frame(0x004, bytes.fromhex("00 08 00 00 00 00 00 00"), is_error=True)
+OFF = Frame(0x040, bytes(8), is_error=True)
+RESTARTED = Frame(0x100, bytes(8), is_error=True)
+
+
+@pytest.fixture
+def kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
+    """The far end of the socket behind the next bus that python-can opens."""
+    far, near = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    monkeypatch.setattr(socketcan, "create_socket", lambda: near)
+    monkeypatch.setattr(socketcan, "bind_socket", lambda *arguments: None)
+    yield far
+    far.close()
+    near.close()
+
+
+@pytest.fixture
+def port(kernel: socket.socket) -> Iterator[PythonCanPort]:
+    opened = open_port("socketcan", "can0", {})
+    yield opened
+    opened.close()
+
+
+def tell(kernel: socket.socket, *frames: Frame) -> None:
+    for frame in frames:
+        kernel.send(encode_frame(frame))
+
+
+def ids(port: PythonCanPort) -> list[int]:
+    return [frame.arbitration_id for frame in port.receive()]
+
+
+def test_error_frames_make_the_state_and_are_not_passed_on(port: PythonCanPort, kernel: socket.socket) -> None:
+    assert port.state is BusState.ACTIVE
+    tell(kernel, ENCODER, WARNING, ENCODER)
+    assert ids(port) == [0x009, 0x009]
+    assert (port.state, port.error_frames, port.last_error) == (BusState.WARNING, 1, "transmit warning")
+    tell(kernel, OFF)
+    assert ids(port) == []
+    assert (port.state, port.error_frames, port.last_error) == (BusState.OFF, 2, "bus-off")
+    tell(kernel, RESTARTED)
+    port.receive()
+    assert (port.state, port.error_frames) == (BusState.ACTIVE, 3)
+
+
+def test_a_peer_s_frame_ends_bus_off_but_no_warning(port: PythonCanPort, kernel: socket.socket) -> None:
+    states = []
+    for frames in ((WARNING, ENCODER), (ENCODER, OFF), (ENCODER,)):
+        tell(kernel, *frames)
+        port.receive()
+        states.append(port.state)
+    assert states == [BusState.WARNING, BusState.OFF, BusState.ACTIVE]
+
+
+def test_a_frame_of_a_process_beside_us_does_not_end_bus_off() -> None:
+    class Local(can.BusABC):
+        told = [
+            can.Message(arbitration_id=0x040, is_error_frame=True, is_extended_id=False, data=bytes(8)),
+            can.Message(arbitration_id=0x009, is_rx=False, is_extended_id=False),
+        ]
+
+        def __init__(self) -> None:
+            super().__init__(channel="local")
+
+        def recv(self, timeout: float | None = None) -> can.Message | None:
+            return self.told.pop(0) if self.told else None
+
+        def send(self, msg: can.Message, timeout: float | None = None) -> None: ...
+
+    port = PythonCanPort(Local())
+    assert len(port.receive()) == 1
+    assert port.state is BusState.OFF
+
+
+class Gone(can.BusABC):
+    """An interface that went away, and is asked how often."""
+
+    def __init__(self, problem: Exception) -> None:
+        super().__init__(channel="gone")
+        self.problem, self.asked = problem, 0
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        self.asked += 1
+        raise self.problem
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        raise self.problem
+
+
+@pytest.mark.parametrize("number", [errno.ENETDOWN, errno.ENODEV, errno.ENXIO])
+@pytest.mark.parametrize("kind", [OSError, can.CanOperationError])
+def test_an_interface_that_is_gone_is_told_and_asked_once_a_read(number: int, kind: type[Exception]) -> None:
+    problem = OSError(number, "gone") if kind is OSError else can.CanOperationError("gone", number)
+    bus = Gone(problem)
+    port = PythonCanPort(bus)
+    assert port.receive() == []
+    assert (bus.asked, port.error_frames, port.state) == (1, 1, BusState.OFF)
+    assert "gone" in port.last_error
+
+
+def test_a_send_into_an_interface_that_is_gone_tells_the_state_and_a_full_queue_does_not() -> None:
+    full = PythonCanPort(Gone(can.CanOperationError("No buffer space available", errno.ENOBUFS)))
+    full.send(ENCODER)
+    assert (full.failed_sends, full.state) == (1, BusState.ACTIVE)
+    gone = PythonCanPort(Gone(can.CanOperationError("Network is down", errno.ENETDOWN)))
+    gone.send(ENCODER)
+    assert (gone.failed_sends, gone.state, gone.last_send_error) == (
+        1,
+        BusState.OFF,
+        "Network is down [Error Code 100]",
+    )
+
+
+def test_a_frame_without_a_stamp_is_counted_as_garbage() -> None:
+    port = PythonCanPort(Gone(AssertionError("only requested a single extra field")))
+    assert port.receive() == []
+    assert port.state is BusState.ACTIVE
+    assert port.error_frames > 1
+
+
+def test_sending_makes_the_kernel_s_bytes_and_no_entry_in_any_log(
+    port: PythonCanPort, kernel: socket.socket, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.DEBUG):
+        port.send(Frame(0x04E, bytes.fromhex("0000803e")))
+    sent = kernel.recv(64)
+    assert (sent[:5], sent[8:]) == (bytes.fromhex("4e000000 04"), bytes.fromhex("0000803e 00000000"))
+    assert [record for record in caplog.records if record.name.startswith("can")] == []
+
+
+def test_sending_into_a_full_queue_does_not_wait(port: PythonCanPort) -> None:
+    for _ in range(2000):  # nobody reads: the socket takes a few hundred
+        port.send(ENCODER)
+    assert port.failed_sends > 0
+    assert port.last_send_error == "Transmit buffer full"
+
+
+def test_no_broadcast_manager_is_asked_for(kernel: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
+    """python-can opens CAN_BCM for periodic messages only: opening, sending and reading never do."""
+
+    def refuse(*arguments: Any, **options: Any) -> None:
+        raise AssertionError("a BCM socket")
+
+    monkeypatch.setattr(socketcan, "create_bcm_socket", refuse)
+    monkeypatch.setattr(socketcan.SocketcanBus, "_send_periodic_internal", refuse)
+    opened = open_port("socketcan", "can0", {})
+    opened.send(ENCODER)
+    tell(kernel, ENCODER)
+    assert ids(opened) == [0x009]
+    opened.close()
+
+
+@settings(max_examples=500, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.lists(st.binary(min_size=16, max_size=16), max_size=8))
+def test_whatever_sixteen_bytes_the_kernel_gives_nothing_is_raised_and_every_frame_counts(
+    port: PythonCanPort, kernel: socket.socket, data: list[bytes]
+) -> None:
+    errors_before = port.error_frames
+    for frame in data:
+        kernel.send(frame)
+    frames = port.receive()
+    assert len(frames) + port.error_frames - errors_before == len(data)
+    assert not any(frame.is_error for frame in frames)
+
+
+def test_a_mock_port_fails_as_it_is_told() -> None:
+    bus = MockBus()
+    port, other = bus.open(), bus.open()
+    port.inject_error(0x204, bytes.fromhex("00 10 00 00 00 00 00 80"))
+    assert (port.state, port.error_frames) == (BusState.PASSIVE, 1)
+    assert port.last_error == "receive passive, 0 transmit and 128 receive errors"
+    assert (other.state, other.error_frames) == (BusState.ACTIVE, 0)
+    port.inject_error(0x040)
+    port.inject_error(0x204, bytes.fromhex("00 40 00 00 00 00 00 00"))
+    assert port.state is BusState.OFF
+    port.full = True
+    port.send(ENCODER)
+    assert (port.failed_sends, other.receive()) == (1, [])
+    port.full = False
+    port.send(ENCODER)
+    assert (port.failed_sends, other.receive()) == (1, [ENCODER])
+    third = port.open_beside()
+    third.send(ENCODER)
+    assert other.receive() == port.receive() == [ENCODER]

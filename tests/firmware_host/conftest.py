@@ -1,0 +1,17 @@
+"""Fixtures of the daemon's tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.firmware_host.served_socket import Served
+
+
+@pytest.fixture
+def served(short_folder: Path) -> Iterator[Served]:
+    status = Served(short_folder / "s")
+    yield status
+    status.close()

@@ -1,0 +1,34 @@
+"""Rows of a log with the given fields; the others hold zeros."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from firmware_host.log_rows import EVENT, ROW_KINDS, TICK, RowKind
+
+TICK_KIND, EVENT_KIND = ROW_KINDS.index(TICK), ROW_KINDS.index(EVENT)
+OPENING: dict[str, Any] = {
+    "configuration_text": "[robot]\n",
+    "metadata": {"robot": "mudskipper-1", "run_id": "run"},
+    "wall_minus_monotonic_ns": 1_700_000_000_000_000_000,
+}
+
+
+def encode_row(kind: RowKind, **known: Any) -> bytes:
+    values: list[Any] = []
+    for field in kind.fields:
+        value = known.get(field.name, "" if field.kind == "string" else [0] * field.count)
+        values.extend([value] if isinstance(value, str) or not hasattr(value, "__len__") else value)
+    return kind.encode(*values)
+
+
+def make_tick(number: int, mode: int = 0) -> tuple[int, bytes]:
+    return TICK_KIND, encode_row(TICK, stamp_s=number / 380, tick=number, mode=mode)
+
+
+def make_ticks(first: int, end: int, mode: int = 0) -> list[tuple[int, bytes]]:
+    return [make_tick(number, mode) for number in range(first, end)]
+
+
+def make_event(text: str, stamp_s: float = 0.0) -> tuple[int, bytes]:
+    return EVENT_KIND, encode_row(EVENT, stamp_s=stamp_s, text=text)

@@ -1,0 +1,93 @@
+"""A status socket with a clock of its own, and clients that the kernel takes for whom a test wants."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import msgpack
+
+from firmware_host.connection import Caller
+from firmware_host.rights import Group, Peer, Rights
+from firmware_host.status_socket import RefusedError, StatusSocket
+from firmware_host.ticker import PERIOD_S
+
+
+def refuse(params: dict[str, Any], caller: Caller) -> Any:
+    raise RefusedError("not now")
+
+
+METHODS: dict[str, Callable[[dict[str, Any], Caller], Any]] = {
+    "echo": lambda params, caller: params,
+    "refuse": refuse,
+    "long": lambda params, caller: "x" * 300_000,
+}
+
+
+RIGHTS = Rights(readers=Group("viewers", 70), operators=Group("pilots", 71), own_uid=1)
+OPERATOR, READER, STRANGER = (
+    Peer(500, 1000, frozenset({1000, 71})),
+    Peer(501, 1001, frozenset({1001, 70})),
+    Peer(502, 1002, frozenset({1002})),
+)
+
+
+class Served(StatusSocket):
+    def __init__(self, path: Path) -> None:
+        self.coming: list[Peer] = []
+        super().__init__(path, METHODS, RIGHTS, lambda connection: self.coming.pop(0))
+        self.now_s = 1000.0
+
+    def tick(self, ticks: int = 1) -> None:
+        for _ in range(ticks):
+            self.now_s += PERIOD_S
+            self.serve(self.now_s)
+
+
+def connect(served: Served, peer: Peer = OPERATOR) -> socket.socket:
+    served.coming.append(peer)
+    client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    client.settimeout(2.0)
+    client.connect(str(served.path))
+    return client
+
+
+def serve(served: Served, ticks: int = 6) -> None:
+    served.tick(ticks)
+
+
+def ask(served: Served, client: socket.socket, data: bytes) -> list[Any]:
+    """Everything that comes back within a few ticks."""
+    client.sendall(data)
+    serve(served)
+    client.setblocking(False)
+    unpacker = msgpack.Unpacker(raw=False)
+    while True:
+        try:
+            answer = client.recv(1 << 20)
+        except (BlockingIOError, ConnectionResetError):
+            break
+        if not answer:
+            break
+        unpacker.feed(answer)
+        serve(served)
+    client.settimeout(2.0)
+    return list(unpacker)
+
+
+def unpacked(data: bytes) -> Iterator[Any]:
+    unpacker = msgpack.Unpacker(raw=False)
+    unpacker.feed(data)
+    yield from unpacker
+
+
+def is_open(client: socket.socket) -> bool:
+    client.setblocking(False)
+    try:
+        return bool(client.recv(65536))
+    except BlockingIOError:
+        return True
+    except ConnectionResetError:
+        return False

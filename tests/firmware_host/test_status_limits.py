@@ -1,0 +1,220 @@
+"""Nobody takes the status socket from the others: not by speed, slowness, number, size, or odd requests."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+
+import msgpack
+import pytest
+
+from firmware_host.connection import BURST, LONGEST_SENDING_S, REQUESTS_PER_S, Caller
+from firmware_host.rights import NEEDED, Peer
+from firmware_host.rpc import NOT_PERMITTED
+from firmware_host.status_socket import MOST_CLIENTS
+from tests.firmware_host.served_socket import (
+    METHODS,
+    OPERATOR,
+    READER,
+    STRANGER,
+    Served,
+    ask,
+    connect,
+    is_open,
+    serve,
+    unpacked,
+)
+
+ECHO = msgpack.packb([0, 1, "echo", {}])
+STOP = msgpack.packb([0, 2, "stop", {}])
+
+
+def allow_everybody(served: Served, monkeypatch: pytest.MonkeyPatch) -> list[Caller]:
+    """To echo as to stop. Returns who stopped the robot."""
+    stopped: list[Caller] = []
+    monkeypatch.setitem(NEEDED, "echo", NEEDED["stop"])
+    served.methods = METHODS | {"stop": lambda params, caller: stopped.append(caller)}
+    return stopped
+
+
+def flood(clients: list[socket.socket], data: bytes) -> None:
+    """As much as each can send; the answers are thrown away."""
+    for client in clients:
+        client.setblocking(False)
+        with contextlib.suppress(OSError):
+            while client.recv(65536):
+                pass
+        with contextlib.suppress(OSError):
+            while True:
+                client.send(data)
+
+
+@pytest.mark.parametrize("data", [ECHO * 20, ECHO * 20 + ECHO[:3], ECHO[:3], STOP * 20], ids=str)
+def test_a_stop_amid_fifteen_floods_waits_no_longer_than_there_are_clients(
+    served: Served, monkeypatch: pytest.MonkeyPatch, data: bytes
+) -> None:
+    stopped = allow_everybody(served, monkeypatch)
+    flooding = [connect(served, STRANGER) for _ in range(MOST_CLIENTS - 1)]
+    serve(served, MOST_CLIENTS)
+    longest = 0
+    for _ in range(20):
+        flood(flooding, data)
+        served.tick()
+        person = connect(served, OPERATOR)
+        person.sendall(STOP)
+        ticks = 0
+        while not any(caller.peer == OPERATOR for caller in stopped):
+            flood(flooding, data)
+            served.tick()
+            ticks += 1
+            assert ticks < 100
+        longest = max(longest, ticks)
+        stopped.clear()
+        person.close()
+        serve(served, 3)
+    assert longest <= 1 + MOST_CLIENTS  # a tick to be let in, then its turn
+
+
+def test_a_request_too_many_waits_until_its_time_comes(served: Served) -> None:
+    fast, other = connect(served), connect(served, READER)
+    serve(served, 4)
+    fast.sendall(ECHO * 400)
+    fast.setblocking(False)
+    begin_s, answers = served.now_s, msgpack.Unpacker(raw=False)
+    times_s = []
+    for _ in range(1500):
+        served.tick()
+        with contextlib.suppress(BlockingIOError):
+            answers.feed(fast.recv(65536))
+        times_s += [served.now_s - begin_s for _ in answers]
+    assert len(times_s) == 400  # none is lost
+    assert all(number < BURST + REQUESTS_PER_S * t_s + 1.0 for number, t_s in enumerate(times_s))
+    assert ask(served, other, msgpack.packb([0, 1, "status", {}]))
+
+
+def test_the_rate_of_one_is_not_taken_from_the_others(served: Served) -> None:
+    fast, other = connect(served), connect(served)
+    serve(served, 4)
+    fast.sendall(ECHO * 300)
+    serve(served, 200)  # its burst is spent
+    other.sendall(ECHO)
+    serve(served, 3)
+    other.setblocking(False)
+    assert len(list(unpacked(other.recv(4096)))) == 1
+
+
+def test_half_a_request_is_waited_for_only_so_long(served: Served) -> None:
+    slow, idle = connect(served), connect(served)
+    serve(served, 4)
+    slow.sendall(ECHO + ECHO[:4])
+    serve(served, 6)
+    served.now_s += 0.9 * LONGEST_SENDING_S
+    slow.sendall(ECHO[4:5])  # a trickle is no more patience
+    serve(served, 6)
+    assert served.counters["dropped_slow_clients"] == 0
+    served.now_s += 0.2 * LONGEST_SENDING_S
+    serve(served, 1)
+    assert served.counters["dropped_slow_clients"] == 1
+    assert len(list(unpacked(slow.recv(4096)))) == 1 and slow.recv(1) == b""
+    served.now_s += 1e6
+    serve(served, 2)
+    assert ask(served, idle, ECHO)  # who asks nothing may stay
+
+
+def test_a_client_that_has_asked_may_be_idle_for_as_long_as_it_likes(served: Served) -> None:
+    client = connect(served)
+    assert ask(served, client, ECHO)
+    served.now_s += 1e6
+    serve(served, 2)
+    assert ask(served, client, ECHO)
+
+
+def test_a_request_in_two_halves_is_answered_where_the_second_comes_in_time(served: Served) -> None:
+    client = connect(served)
+    for _ in range(3):  # each has its own time
+        assert ask(served, client, ECHO[:4]) == []
+        served.now_s += 0.8 * LONGEST_SENDING_S
+        assert ask(served, client, ECHO[4:]) == [[1, 1, None, {}]]
+
+
+@pytest.mark.parametrize(
+    ("peer", "allowed"),
+    [
+        (STRANGER, {"hello", "stop", "disarm"}),
+        (READER, {"hello", "stop", "disarm", "status", "strides", "map", "check"}),
+        (OPERATOR, None),
+        (Peer(1, 0, frozenset({0})), None),
+        (Peer(1, 1, frozenset()), None),  # the daemon's own user
+    ],
+)
+def test_each_may_do_what_is_theirs(served: Served, peer: Peer, allowed: set[str] | None) -> None:
+    methods = ["hello", "stop", "disarm", "status", "strides", "map", "check"]
+    methods += ["arm", "walk", "clear", "lease", "release", "reset_timing", "fail"]
+    served.methods = {method: METHODS["echo"] for method in methods}
+    client = connect(served, peer)
+    done = {method for method in methods if ask(served, client, msgpack.packb([0, 1, method, {}]))[0][2] is None}
+    assert done == (set(methods) if allowed is None else allowed)
+    assert served.counters["not_permitted"] == len(methods) - len(done)
+
+
+def test_a_refusal_says_which_group_to_join(served: Served) -> None:
+    served.methods = METHODS | {"status": METHODS["echo"]}
+    client = connect(served, STRANGER)
+    ((_, _, reading, _),) = ask(served, client, msgpack.packb([0, 1, "status", {}]))
+    ((_, _, driving, _),) = ask(served, client, ECHO)
+    assert reading.startswith(NOT_PERMITTED) and "'adduser YOU viewers'" in reading
+    assert driving.startswith(NOT_PERMITTED) and "'adduser YOU pilots'" in driving
+
+
+def test_one_user_s_connections_keep_nobody_else_out(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped = allow_everybody(served, monkeypatch)
+    operator, reader = connect(served, OPERATOR), connect(served, READER)
+    strangers = []
+    for _ in range(4 * MOST_CLIENTS):
+        strangers.append(connect(served, STRANGER))
+        served.tick()
+    assert is_open(operator) and is_open(reader)  # although they were still for longest
+    late = connect(served, Peer(9, 1009, frozenset()))
+    late.sendall(STOP)
+    serve(served, 6)
+    assert [caller.peer.uid for caller in stopped] == [1009]
+    assert served.counters["clients"] == MOST_CLIENTS
+
+
+def test_where_every_client_is_another_user_the_least_trusted_goes(served: Served) -> None:
+    operator = connect(served, OPERATOR)
+    others = [connect(served, Peer(9, 2000 + place, frozenset())) for place in range(MOST_CLIENTS - 1)]
+    serve(served, MOST_CLIENTS)
+    connect(served, Peer(9, 3000, frozenset()))
+    serve(served, 2)
+    assert is_open(operator) and not is_open(others[0]) and is_open(others[1])
+    assert served.counters["dropped_for_others"] == 1
+
+
+def test_a_hang_up_is_told_with_its_caller(served: Served) -> None:
+    gone: list[Caller] = []
+    served.on_hang_up = gone.append
+    served.methods = {"whoami": lambda params, caller: str(caller)}
+    first, second = connect(served), connect(served)
+    assert ask(served, first, msgpack.packb([0, 1, "whoami", {}])) == [[1, 1, None, "uid 1000 (process 500)"]]
+    first.close()
+    serve(served, 3)
+    third = connect(served)  # has the descriptor of the first
+    serve(served, 3)
+    assert {caller.connection for caller in gone} == {1}
+    third.close()
+    second.close()
+    serve(served, 3)
+    assert {caller.connection for caller in gone} == {1, 2, 3}
+
+
+def test_a_hang_up_is_told_at_once_although_much_is_still_to_be_answered(served: Served) -> None:
+    gone: list[Caller] = []
+    served.on_hang_up = gone.append
+    client = connect(served)
+    serve(served, 3)
+    client.sendall(ECHO * 1000)
+    serve(served, 3)
+    client.close()
+    serve(served, 1)
+    assert gone

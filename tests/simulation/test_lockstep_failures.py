@@ -1,0 +1,133 @@
+"""Failures on purpose in lockstep: what the loop makes of them, without an exception and the same every time."""
+
+from __future__ import annotations
+
+import pytest
+
+from control.controller import WalkOrder
+from control.modes import ENERGISED, Mode
+from control.records import NO_TORQUE
+from drivers.failures import Failures
+from firmware_host.configuration import Configuration
+from firmware_host.log_rows import EVENT
+from firmware_host.recorder import EVENT_KIND, NullRecorder
+from simulation.clay import MUDS
+from simulation.lockstep import Lockstep
+from simulation.track import Track
+
+TRACK = Track([(2.0, MUDS["48.5"])])
+
+
+class EventRecorder(NullRecorder):
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def put(self, kind_index: int, payload: bytes) -> bool:
+        if kind_index == EVENT_KIND:
+            self.texts.append(EVENT.decode(payload)["text"])
+        return True
+
+
+def make_walking(configuration: Configuration, recorder: NullRecorder | None = None) -> Lockstep:
+    lockstep = Lockstep(configuration, TRACK, recorder=recorder, failures=Failures(configuration.bus))
+    lockstep.arm()
+    lockstep.walk(WalkOrder(0.03))
+    lockstep.run_for(0.5)
+    return lockstep
+
+
+def test_a_drive_that_is_unplugged_in_a_walk_is_a_silent_drive(configuration: Configuration) -> None:
+    lockstep = make_walking(configuration)
+    began_s = lockstep.now_s
+    lockstep.fail("left_sweep", "off")
+    assert lockstep.run_until(lambda: lockstep.loop.mode is Mode.DAMPING, 0.02)
+    assert lockstep.run_until(lambda: lockstep.loop.mode is Mode.FAULT, 0.1)
+    assert lockstep.loop.fault is not None
+    assert lockstep.loop.fault.name == "drive_silent" and "left_sweep" in lockstep.loop.fault.sentence
+    assert lockstep.now_s - began_s < configuration.faults.silence_s + 0.006
+    assert lockstep.loop.sent.torques_nm == NO_TORQUE
+
+
+@pytest.mark.parametrize(
+    ("component", "kind", "fault"),
+    [
+        ("right_adduction.error", "off", "drive_disarmed"),
+        ("right_adduction.error", "stuck", "drive_error"),
+        ("left_sweep.command", "off", "drive_error"),  # its watchdog
+        ("bus.right", "stuck", "bus_refuses"),
+        ("loop", "stuck", "loop_stalled"),
+    ],
+)
+def test_each_failure_shows_as_the_fault_that_it_is(
+    configuration: Configuration, component: str, kind: str, fault: str
+) -> None:
+    lockstep = make_walking(configuration)
+    lockstep.fail(component, kind)
+    assert lockstep.run_until(lambda: lockstep.loop.fault is not None, 0.3)
+    assert lockstep.loop.fault is not None and lockstep.loop.fault.name == fault
+
+
+def test_no_failure_brings_an_exception_out_of_the_loop_nor_torque_without_power(configuration: Configuration) -> None:
+    lockstep = make_walking(configuration)
+    limit_nm = configuration.limits.torque_nm
+    for component, kind, _ in list(lockstep.failures.table()):
+        lockstep.fail(component, kind, 0.05)
+        for _ in range(25):
+            lockstep.step()
+            torques_nm = lockstep.loop.sent.torques_nm
+            assert max(map(abs, torques_nm)) <= limit_nm + 1e-9
+            assert lockstep.loop.mode in ENERGISED or torques_nm == NO_TORQUE
+    lockstep.run_for(0.1)
+    assert not lockstep.failures.failing
+
+
+def test_the_same_failure_is_the_same_to_the_last_bit(configuration: Configuration) -> None:
+    first, second = make_walking(configuration), make_walking(configuration)
+    for lockstep in (first, second):
+        lockstep.fail("left_sweep", "intermittent", 0.3)
+        lockstep.fail("right_sweep.current", "garbage", 0.3)
+        lockstep.run_for(0.5)
+    assert repr(first.loop.states) == repr(second.loop.states)
+    assert first.robot.plant.body_m == second.robot.plant.body_m
+
+
+def test_begin_and_end_stand_in_the_log(configuration: Configuration) -> None:
+    recorder = EventRecorder()
+    lockstep = make_walking(configuration, recorder)
+    lockstep.fail("pose", "off", 0.1)
+    lockstep.run_for(0.2)
+    assert [text for text in recorder.texts if "on purpose" in text] == [
+        "failing on purpose: pose off for 0.1 s, asked by lockstep",
+        "end of failing on purpose: pose off",
+    ]
+
+
+def test_a_loop_that_stands_still_misses_ticks_while_the_robot_lives_on(configuration: Configuration) -> None:
+    lockstep = make_walking(configuration)
+    ticks = lockstep.tick_number
+    lockstep.fail("loop", "stuck")
+    lockstep.step()
+    assert lockstep.loop.missed_ticks == lockstep.tick_number - ticks - 1 == 11
+
+
+def test_what_cannot_fail_is_refused(configuration: Configuration) -> None:
+    lockstep = Lockstep(configuration, TRACK, failures=Failures(configuration.bus))
+    with pytest.raises(RuntimeError, match="--list"):
+        lockstep.fail("left_knee", "off")
+
+
+def test_without_failures_nothing_is_wrapped_and_none_can_begin(configuration: Configuration) -> None:
+    lockstep = Lockstep(configuration, TRACK)
+    assert {type(port).__name__ for port in lockstep.loop.drives.ports.values()} == {"MockPort"}
+    assert type(lockstep.loop.pose).__name__ == "SimulatedPose"
+    with pytest.raises(RuntimeError, match="no failures"):
+        lockstep.fail("left_sweep", "off")
+
+
+def test_failures_that_never_begin_change_nothing(configuration: Configuration) -> None:
+    sound = Lockstep(configuration, TRACK)
+    watched = Lockstep(configuration, TRACK, failures=Failures(configuration.bus))
+    for lockstep in (sound, watched):
+        lockstep.arm()
+        lockstep.run_for(0.2)
+    assert repr(sound.loop.states) == repr(watched.loop.states)

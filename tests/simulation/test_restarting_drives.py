@@ -1,0 +1,46 @@
+"""The loop's drives and the simulated ones, end to end: the watchdog read back, a restart noticed."""
+
+from math import isnan
+
+import pytest
+
+from benchmarks.example_robot import load_example
+from control.modes import Mode
+from simulation.clay import MUDS
+from simulation.lockstep import Lockstep, drives_of
+from simulation.track import Track
+
+
+def make_walk(**changes: float) -> Lockstep:
+    configuration = load_example()
+    return Lockstep(configuration, Track([(1.0, MUDS["48.5"])]), drives=drives_of(configuration, **changes))
+
+
+def read_settings(walk: Lockstep, seconds: float) -> None:
+    for _ in range(round(seconds * 380)):
+        walk.loop.drives.request_watchdogs(walk.now_s)
+        walk.step()
+
+
+@pytest.mark.parametrize("watchdog_s", [0.1, 0.025, 0.0])
+def test_the_watchdogs_of_all_drives_are_read_back_within_a_second_and_a_half(watchdog_s: float) -> None:
+    walk = make_walk(watchdog_s=watchdog_s)
+    assert walk.run_until(lambda: walk.loop.mode is Mode.IDLE, 2.0)
+    assert all(isnan(axis.watchdog_s) for axis in walk.loop.drives.axes)
+    read_settings(walk, 1.5)
+    assert [axis.watchdog_s for axis in walk.loop.drives.axes] == [pytest.approx(watchdog_s)] * 4
+
+
+def test_a_drive_that_restarts_is_noticed_and_its_settings_are_asked_for_anew() -> None:
+    walk = make_walk()
+    read_settings(walk, 3.0)
+    assert [axis.restarts for axis in walk.loop.drives.axes] == [0, 0, 0, 0]
+    walk.robot.restart_drive(1)
+    axis = walk.loop.drives.axes[1]
+    assert walk.run_until(lambda: axis.restarts == 1, 1.3)
+    assert axis.version is None
+    assert isnan(axis.watchdog_s)
+    read_settings(walk, 2.0)
+    assert [axis.restarts for axis in walk.loop.drives.axes] == [0, 1, 0, 0]
+    assert axis.watchdog_s == pytest.approx(0.1)
+    assert not any(axis.twins for axis in walk.loop.drives.axes)
