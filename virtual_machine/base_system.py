@@ -28,9 +28,19 @@ NEEDED_HERE = {  # Debian package: the program that it brings
 SUITE = "bookworm"
 GUEST_PYTHON = "3.11"
 PACKAGES = (
-    "linux-image-amd64 initramfs-tools lz4 systemd systemd-sysv libpam-systemd udev dbus kmod iproute2 procps adduser"
-    " python3 python3-venv can-utils"
-).split()
+    *(
+        "linux-image-amd64",
+        "initramfs-tools",
+        "lz4",
+        "kmod",
+        "udev",
+        "systemd",
+        "systemd-sysv",
+        "libpam-systemd",
+        "dbus",
+    ),
+    *("iproute2", "procps", "adduser", "python3", "python3-venv", "can-utils"),
+)
 LEFT_OUT = ("/usr/share/doc/*", "/usr/share/man/*", "/usr/share/locale/*") + tuple(
     f"/lib/modules/*/kernel/{folder}/*"  # two thirds of the kernel's package, for hardware that is not emulated
     for folder in (
@@ -95,7 +105,7 @@ def fingerprint(*texts: bytes) -> str:
 
 def base_system() -> Path:
     """The archive, built where there is none of these packages and dependencies."""
-    key = fingerprint(Path(__file__).read_bytes(), *(text.encode() for text in _requirements()))
+    key = fingerprint(" ".join([*_debian_command(), *INITRAMFS.values(), *PLATFORMS]).encode())
     archive = STORE / f"base-{key}.tar"
     if not archive.exists():
         shutil.rmtree(STORE, ignore_errors=True)
@@ -104,7 +114,7 @@ def base_system() -> Path:
         _fetch_wheels()
         _write_initramfs_settings()
         unfinished = archive.with_suffix(".unfinished")
-        _make_debian(unfinished)
+        run([*_debian_command(), unfinished])
         unfinished.rename(archive)
     return archive
 
@@ -123,7 +133,7 @@ def _write_initramfs_settings() -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def _make_debian(archive: Path) -> None:
+def _debian_command() -> list[str]:
     command = ["mmdebstrap", "--variant=minbase", "--format=tar", f"--include={','.join(PACKAGES)}"]
     command += [f"--dpkgopt=path-exclude={pattern}" for pattern in LEFT_OUT]
     command += [f"--essential-hook=copy-in {STORE / 'settings' / 'etc'} /"]  # before the kernel makes its initramfs
@@ -131,4 +141,4 @@ def _make_debian(archive: Path) -> None:
     command += [f"--customize-hook={IN_THE_GUEST} python3 -m venv /opt/mudskipper/venv"]
     quoted = " ".join(f"'{requirement}'" for requirement in _requirements())
     command += [f"--customize-hook={IN_THE_GUEST} /opt/mudskipper/venv/bin/pip install {quoted}"]
-    run([*command, SUITE, archive])
+    return [*command, SUITE]

@@ -26,7 +26,9 @@ BOOT_S = 240.0
 SLOWEST = 30.0  # times that the guest's clock may run slower than the wall's
 MEMORY_MIB = 768
 PROBE_S = 20.0
-KERNEL_OPTIONS = "root=/dev/vda rw console=ttyS0 quiet panic=-1 mitigations=off audit=0 tsc_early_khz=3000000 tsc=reliable"
+KERNEL_OPTIONS = (
+    "root=/dev/vda rw console=ttyS0 quiet panic=-1 mitigations=off audit=0 tsc_early_khz=3000000 tsc=reliable"
+)
 TRUE_CLOCK = ("-icount", "shift=0,sleep=off")
 
 

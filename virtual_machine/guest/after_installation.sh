@@ -1,7 +1,9 @@
 cd /opt/mudskipper/src/virtual_machine/guest
 
-# An emulated processor is less punctual than a robot's: signals may be older before they count as lost.
-sed -i 's/^\[loop\]/[loop]\nsilence_s = 0.5/' /etc/mudskipper/mudskipper.toml
+# The simulated robot and the daemon share one emulated processor: its messages come less evenly than a drive's.
+sed -i '/^\(late\|quiet\|silence\)_s = /d; s/^\[faults\]/[faults]\nlate_s = 0.1\nquiet_s = 0.1\nsilence_s = 0.2/' \
+    /etc/mudskipper/mudskipper.toml
+/opt/mudskipper/venv/bin/mudskipperd --check-config
 
 install -m 644 simulated-robot.service commands.service /etc/systemd/system/
 systemctl enable simulated-robot commands

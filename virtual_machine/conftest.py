@@ -1,0 +1,42 @@
+"""One virtual machine for all checks, booted once; a check that cuts its power boots it again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from virtual_machine.installed_robot import installed_robot
+from virtual_machine.machine import Machine
+from virtual_machine.robot import Robot
+
+
+@pytest.fixture(scope="session")
+def machine() -> Iterator[Machine]:
+    machine = Machine(installed_robot())
+    try:
+        machine.boot()
+        yield machine
+    finally:
+        machine.close()
+
+
+@pytest.fixture(scope="session")
+def booted(machine: Machine) -> Robot:
+    """As it is after the boot, without anybody's help."""
+    robot = Robot(machine)
+    robot.wait_until_answers()
+    return robot
+
+
+@pytest.fixture
+def robot(booted: Robot) -> Iterator[Robot]:
+    """At rest before and after."""
+    yield booted
+    booted.rest()
+
+
+@pytest.fixture
+def walking(robot: Robot) -> Robot:
+    robot.walk()
+    return robot
