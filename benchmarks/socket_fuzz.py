@@ -60,7 +60,7 @@ class Bench:
         self.streams = OddStreams(seed)
         self.robot = Lockstep(load_example(), Track([(1000.0, MUDS["48.5"])]))
         lease = Lease()
-        calls = OperatorCalls(self.robot.loop, NullRecorder(), [], lambda: self.now_s, lease)
+        calls = OperatorCalls(self.robot.loop, NullRecorder(), [], lambda: self.now_s)
         self._coming = [WITNESS]
         self.socket = StatusSocket(folder / "s", {}, RIGHTS, lambda connection: self._coming.pop(0))
         self.socket.methods = self._counted(calls.methods)

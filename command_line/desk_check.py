@@ -35,7 +35,7 @@ def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
         ports = open_ports(configuration.bus)
     except BusError as problem:
         return [check_item("bus", False, str(problem), "bring the interface up: README, 'On the robot'")]
-    drives = OdriveDrives(configuration.drive, ports)
+    drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
     deadline_s = time.monotonic() + LISTENING_S
     while not drives.heard and time.monotonic() < deadline_s:
         drives.read(time.monotonic())

@@ -7,18 +7,18 @@ import json
 from typing import Any
 
 from command_line import exit_codes
-from command_line.operation import _with_daemon
+from command_line.operation import with_daemon
 from command_line.screen import complain, table
 from firmware_host.status_client import StatusClient
 
 
 def fail(options: argparse.Namespace) -> int:
     if options.list:
-        return _with_daemon(options, lambda client: _show(client, options.json))
+        return with_daemon(options, lambda client: _show(client, options.json))
     if options.component is None or options.kind is None:
         complain("fail needs a COMPONENT and a KIND, or --list")
         return exit_codes.USAGE
-    return _with_daemon(options, lambda client: _fail(client, options))
+    return with_daemon(options, lambda client: _fail(client, options))
 
 
 def _fail(client: StatusClient, options: argparse.Namespace) -> int:

@@ -69,6 +69,7 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
     for name in ("status", "check", "fail"):
         parsers[name].add_argument("--json", action="store_true", help="for machines")
     parsers["watch"].add_argument("--period", type=_seconds, default=0.5, metavar="S", help="between two looks")
+    parsers["arm"].add_argument("--force", action="store_true", help="against what 'check' does not call mandatory")
     depth = parsers["walk"].add_mutually_exclusive_group()
     depth.add_argument("--depth", type=_depth_cm, metavar="CM", help="the same in every stride")
     depth.add_argument("--adaptive", action="store_true", help="chosen from the mud, once a stride (default)")

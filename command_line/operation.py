@@ -18,10 +18,10 @@ Options = argparse.Namespace
 ARMING_S = 5.0
 STOPPING_S = 10.0
 CLEARING_S = 1.5
-MODE_COLOURS = {"fault": RED, "walking": GREEN, "hold": GREEN, "stopping": YELLOW, "arming": YELLOW}
+MODE_COLOURS = {"fault": RED, "damping": RED, "walking": GREEN, "hold": GREEN, "stopping": YELLOW, "arming": YELLOW}
 
 
-def _with_daemon(options: Options, act: Callable[[StatusClient], int]) -> int:
+def with_daemon(options: Options, act: Callable[[StatusClient], int]) -> int:
     try:
         client = StatusClient(options.socket)
         try:
@@ -43,9 +43,9 @@ def status(options: Options) -> int:
     def show(client: StatusClient) -> int:
         report = client.call("status")
         print(json.dumps(report) if options.json else status_text(report))
-        return exit_codes.UNHEALTHY if report["fault"] and report["mode"] == "fault" else exit_codes.OK
+        return exit_codes.UNHEALTHY if report["mode"] in ("fault", "damping") else exit_codes.OK
 
-    return _with_daemon(options, show)
+    return with_daemon(options, show)
 
 
 def watch(options: Options) -> int:
@@ -54,11 +54,11 @@ def watch(options: Options) -> int:
             print("\033[H\033[J" + status_text(client.call("status")), flush=True)
             time.sleep(options.period)
 
-    return _with_daemon(options, show)
+    return with_daemon(options, show)
 
 
 def arm(options: Options) -> int:
-    return _with_daemon(options, lambda client: _request(client, "arm", ("hold",), ARMING_S))
+    return with_daemon(options, lambda client: _request(client, "arm", ("hold",), ARMING_S, force=options.force))
 
 
 def walk(options: Options) -> int:
@@ -66,17 +66,17 @@ def walk(options: Options) -> int:
     if options.depth is not None:
         params["depth_m"] = options.depth / 100.0
     if options.attended:
-        return _with_daemon(options, lambda client: attend(client, params))
-    return _with_daemon(options, lambda client: _request(client, "walk", ("walking",), ARMING_S, **params))
+        return with_daemon(options, lambda client: attend(client, params))
+    return with_daemon(options, lambda client: _request(client, "walk", ("walking",), ARMING_S, **params))
 
 
 def stop(options: Options) -> int:
     at_rest = ("hold", "idle", "boot", "fault")
-    return _with_daemon(options, lambda client: _request(client, "stop", at_rest, STOPPING_S))
+    return with_daemon(options, lambda client: _request(client, "stop", at_rest, STOPPING_S))
 
 
 def disarm(options: Options) -> int:
-    return _with_daemon(options, lambda client: _request(client, "disarm", ("idle", "boot", "fault"), ARMING_S))
+    return with_daemon(options, lambda client: _request(client, "disarm", ("idle", "boot", "fault"), ARMING_S))
 
 
 def clear(options: Options) -> int:
@@ -85,14 +85,20 @@ def clear(options: Options) -> int:
         deadline_s = time.monotonic() + CLEARING_S
         while time.monotonic() < deadline_s:
             report = client.call("status")
-            if report["fault"] is None and report["mode"] in ("idle", "boot"):
+            if report["mode"] in ("idle", "boot") and not stopping_faults(report):
                 print(report["mode"])
                 return exit_codes.OK
             time.sleep(0.05)
-        complain(f"the cause persists: {report['fault']['sentence'] if report['fault'] else report['mode']}")
+        sentences = [fault["sentence"] for fault in stopping_faults(report)]
+        complain(f"the cause persists: {' '.join(sentences) or report['mode']}")
         return exit_codes.REFUSED
 
-    return _with_daemon(options, act)
+    return with_daemon(options, act)
+
+
+def stopping_faults(report: dict[str, Any]) -> list[dict[str, Any]]:
+    """Of a status: the faults that stand and are more than a warning."""
+    return [fault for fault in report["faults"] if fault["reaction"] not in ("none", "warn")]
 
 
 def _request(client: StatusClient, method: str, modes: tuple[str, ...], longest_s: float, **params: Any) -> int:
@@ -116,7 +122,7 @@ def _await(client: StatusClient, modes: tuple[str, ...], longest_s: float) -> in
                 complain(report["notice"])
             return exit_codes.OK
         if report["mode"] == "fault":
-            complain(report["fault"]["sentence"])
+            complain(report["fault"]["sentence"] if report["fault"] else report["notice"])
             return exit_codes.REFUSED
         time.sleep(0.05)
     complain(f"still {report['mode']} after {longest_s:g} s")
@@ -148,7 +154,8 @@ def check(options: Options) -> int:
 
 def _check_line(item: dict[str, Any]) -> str:
     mark = coloured("ok  ", GREEN) if item["ok"] else coloured("FAIL", RED)
-    fix = f"\n       -> {item['fix']}" if item["fix"] and not item["ok"] else ""
+    overruled = "" if item.get("mandatory", True) else "; 'mudskipper arm --force' overrules this"
+    fix = f"\n       -> {item['fix']}{overruled}" if item["fix"] and not item["ok"] else ""
     return f"{mark} {item['id']:22} {item['text']}{fix}"
 
 
@@ -156,12 +163,20 @@ def status_text(report: dict[str, Any]) -> str:
     mode = coloured(report["mode"], MODE_COLOURS.get(report["mode"], BOLD))
     lines = [f"{report['robot']}: {mode}, stride {report['stride']}, {report['phase']}"]
     lines[0] += f", depth {100 * report['depth_m']:.1f} cm, body {number(report['body_x_m'])} m"
-    if report["fault"]:
-        lines.append(coloured(f"fault: {report['fault']['sentence']}", RED))
+    lines += [_fault_line(fault) for fault in report["faults"]]
     notices = [report["notice"]] if report["notice"] else []
+    if report["forced"]:
+        notices.append("armed by force, against what 'mudskipper check' says")
     lines += [coloured(f"warning: {warning}", YELLOW) for warning in notices + report["warnings"]]
     lines += ["", _drives_table(report["drives"]), "", _loop_text(report)]
     return "\n".join(lines)
+
+
+def _fault_line(fault: dict[str, Any]) -> str:
+    colour = YELLOW if fault["reaction"] in ("none", "warn") else RED
+    against = ", against arming" if fault["blocks_arming"] else ""
+    reaction = fault["reaction"].replace("_", " ")
+    return coloured(f"{fault['name']} ({reaction}{against}): {fault['sentence']}\n    -> {fault['what_to_do']}", colour)
 
 
 def _drives_table(drives: list[dict[str, Any]]) -> str:
@@ -193,8 +208,8 @@ def _loop_text(report: dict[str, Any]) -> str:
             f"late   {late['p50']:.0f} us median, {late['p99']:.0f} p99, {late['max']:.0f} worst",
             f"tick   {tick['p50']:.0f} us median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst",
             f"bus    {bus['unknown_frames']} unknown, {bus['garbled_frames']} garbled,"
-            f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends",
-            f"log    {log['path'] or 'off'}, {log['dropped']} rows dropped"
-            + ("" if log["writer_alive"] else coloured(", its writer has died: nothing is recorded", RED)),
+            f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends"
+            + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),
+            f"log    {log['path'] or 'off'}, {log['dropped']} rows dropped",
         )
     )

@@ -91,6 +91,7 @@ class Controller:
         self._fade = 0.0
         self._up = False
         self._waited_s = 0.0  # since the path that ends a walk arrived
+        self.cut_short = False  # the pose that is held is one out of a walk, perhaps in the mud
         self._since_s = self._resting_s = 0.0  # the mode began, all joints rest
         self.target = RESTING
 
@@ -155,6 +156,7 @@ class Controller:
         self.recovery.reset()
         self._since_s = self._resting_s = 0.0
         here = measured_angles(states)
+        self.cut_short = mode is Mode.HOLD and self._mode is Mode.WALKING
         if mode is Mode.HOLD:
             self._pose = self._pose if self._mode is Mode.STOPPING else still(here)
         elif mode is Mode.WALKING:

@@ -32,13 +32,13 @@ _ROWS: tuple[FaultKind, ...] = (
     FaultKind("heartbeat_silent", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 192, "No heartbeat for 0.5 s.", WIRING),
     FaultKind("temperature_silent", "drive", SOFT_STOP, ALWAYS, WHEN_GONE, 382, "No temperature for 1 s.", WIRING),
     FaultKind("drive_error", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 41, "The drive reports an error.", MEND),
-    FaultKind("drive_disarmed", "drive", DRIVES_IDLE, NO, BY_HAND, 41, "It left closed loop by itself.", MEND),
+    FaultKind("drive_disarmed", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 41, "It left closed loop by itself.", MEND),
     FaultKind(
-        "drive_energised", "drive", WARN, ALWAYS, WHEN_GONE, 80,
+        "drive_energised", "drive", WARN, ALWAYS, WHEN_GONE, 117,
         "It is in closed loop though nobody armed it.", "end what else commands it, or 'mudskipper disarm'",
     ),
     FaultKind(
-        "drive_restarted", "drive", DRIVES_IDLE, NO, BY_HAND, 580,
+        "drive_restarted", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 580,
         "The drive started anew.", "check its supply, then 'mudskipper clear'",
     ),
     FaultKind(
@@ -67,41 +67,50 @@ _ROWS: tuple[FaultKind, ...] = (
         "joint_position", "joint", DAMPING, ALWAYS, BY_HAND, 3,
         "A joint is outside of its range.", "move it back by hand, then 'mudskipper clear'",
     ),
-    FaultKind("joint_velocity", "joint", DAMPING, NO, BY_HAND, 5, "A joint is faster than its limit allows.", MEND),
+    FaultKind("joint_velocity", "joint", DAMPING, ALWAYS, BY_HAND, 5, "A joint is faster than its limit allows.", MEND),
     FaultKind(
         "joint_moving", "joint", NONE, ALWAYS, WHEN_GONE, 2,
         "A joint moves while it should rest.", "wait until it is at rest",
     ),
     FaultKind(
-        "joint_current", "joint", DRIVES_IDLE, NO, BY_HAND, 6,
+        "joint_current", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 6,
         "A motor takes more current than its limit.", "check current limits and torque constant, then clear",
     ),
     FaultKind(
-        "joint_not_following", "joint", SOFT_STOP, NO, BY_HAND, 765,
+        "joint_not_following", "joint", SOFT_STOP, ALWAYS, BY_HAND, 765,
         "A joint stands still at full torque for 2 s.", "free what holds it, then 'mudskipper clear'",
     ),
     FaultKind(
-        "encoder_jump", "joint", DAMPING, NO, BY_HAND, 3,
+        "encoder_jump", "joint", DAMPING, ALWAYS, BY_HAND, 3,
         "A position jumped farther than a joint can move.", "check encoder, magnet and cable, then clear",
     ),
-    FaultKind("motor_overheating", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 42, "A motor is nearly too hot.", COOL),
-    FaultKind("motor_hot", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 42, "A motor is too hot.", COOL),
+    FaultKind(
+        "encoder_stuck", "joint", DAMPING, ALWAYS, BY_HAND, 120,
+        "A position stands still while the joint moves.", "check encoder, magnet and cable, then clear",
+    ),
+    FaultKind(
+        "torque_missing", "joint", SOFT_STOP, ALWAYS, BY_HAND, 45,
+        "A motor's current is not that of its torque for 0.1 s.",
+        "check the drive's limits, its torque constant and cables, then clear",
+    ),
+    FaultKind("motor_overheating", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 100, "A motor is nearly too hot.", COOL),
+    FaultKind("motor_hot", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 100, "A motor is too hot.", COOL),
     FaultKind(
         "winding_overheating", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 3,
         "By its currents a winding is nearly too hot.", COOL,
     ),
     FaultKind("winding_hot", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 3, "By its currents a winding is too hot.", COOL),
-    FaultKind("voltage_low", "joint", WARN, NO, WHEN_GONE, 42, "The supply is low.", "charge or change the battery"),
+    FaultKind("voltage_low", "joint", WARN, NO, WHEN_GONE, 100, "The supply is low.", "charge or change the battery"),
     FaultKind(
-        "voltage_under", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 42,
+        "voltage_under", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 100,
         "The supply is too low.", "charge or change the battery",
     ),
     FaultKind(
-        "flipper_stuck", "flipper", DAMPING, NO, BY_HAND, 2,
+        "flipper_stuck", "flipper", DAMPING, ALWAYS, BY_HAND, 2,
         "The mud keeps a flipper whatever was tried.", "free it by hand, then clear, and walk less deep",
     ),
     FaultKind(
-        "arming_failed", "drive", DRIVES_IDLE, NO, BY_HAND, 765,
+        "arming_failed", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 765,
         "A drive did not go into closed loop.", MEND,
     ),
     # the loop itself

@@ -21,15 +21,19 @@ HEARTBEAT_SILENCE_S = 0.5  # drives send one every 100 ms: five in a row are mis
 TEMPERATURE_SILENCE_S = 1.0  # of a drive that has told its temperature before
 ENERGISED_S = 0.2  # two heartbeats, in which a drive that was told to go idle may say that it has not yet
 FAST_SHARE = 1.25  # of the velocity limit, above which no torque of ours drives a joint
-FAST_TICKS = 3
 CURRENT_SHARE = 1.25  # of the drive's current limit
 CURRENT_TICKS = 3
 MOVING_RAD_S = 0.5
 STILL_RAD_S = 0.1
 SATURATED_SHARE = 0.95  # of the torque limit
 STALLED_S = 2.0  # longer than an insertion, a stance or an extraction of the paper's gait takes
-JUMP_RAD = 0.05  # beyond what the fastest joint can do: encoder noise and stamps that are late
 JUMP_SHARE = 2.0  # of the velocity limit
+GONE_RAD = 0.03  # by a joint's own speed, while its angle stayed the same to the last bit
+GONE_S = 0.02  # drives tell an old value once more, now and then
+FROZEN_S = 0.5  # at full torque, by which not even the last bit of angle and speed changes
+MISSING_SHARE = 0.3  # of the torque limit, by which the current differs from the torque that was sent
+MISSING_S = 0.1
+TWO_MESSAGES_S = 0.15  # of those that come every 0.1 s: a single odd one proves nothing
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,8 @@ class FaultBounds:
     late_s: Annotated[float, Bounds(0.003, 2.0)] = 0.0053  # 2 T without position or current: told
     quiet_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0079  # 3 T: damping
     silence_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0263  # 10 T: drives idle; of the loop itself: damping
+    jump_rad: Annotated[float, Bounds(0.01, 10.0)] = 0.05  # beyond what a joint can do: noise, late stamps
+    fast_s: Annotated[float, Bounds(0.003, 2.0)] = 0.0079  # 3 T faster than the velocity limit allows
     lag_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0131  # 5 T missed in a row: soft stop
     lag_share: Annotated[float, Bounds(0.01, 10.0)] = 0.1  # by which 100 ticks take longer than they should
     longest_watchdog_s: Annotated[float, Bounds(0.01, 10.0)] = 0.3  # that a drive may have
@@ -68,6 +74,7 @@ class JointWatch:
         bounds: FaultBounds,
         winding: WindingParameters,
         current_limit_a: float,
+        torque_constant_nm_a: float,
     ) -> None:
         self.joint = joint
         self.winding = Winding(winding)
@@ -78,15 +85,18 @@ class JointWatch:
         self._fast_rad_s = FAST_SHARE * limits.velocity_rad_s
         self._jump_rad_s = JUMP_SHARE * limits.velocity_rad_s
         self._most_a = CURRENT_SHARE * current_limit_a
+        self._constant_nm_a = torque_constant_nm_a
+        self._missing_nm = MISSING_SHARE * limits.torque_nm
         self._saturated_nm = SATURATED_SHARE * limits.torque_nm
         self._nearly_hot_c = (limits.temperature_warm_c + limits.temperature_hot_c) / 2.0  # half of the torque is left
         self.reset()
 
     def reset(self) -> None:
         """But not the winding: it stays as warm as it is."""
-        self._fast_ticks = self._current_ticks = 0
-        self._stalled_s = self._energised_s = 0.0
-        self._angle_rad, self._angle_stamp_s = UNKNOWN, NEVER_S
+        self._current_ticks = 0
+        self._fast_s = self._stalled_s = self._energised_s = self._missing_s = 0.0
+        self._low_s = self._under_s = self._hot_s = self._frozen_s = self._gone_s = self._gone_rad = 0.0
+        self._angle_rad, self._velocity_rad_s, self._angle_stamp_s = UNKNOWN, UNKNOWN, NEVER_S
 
     def update(self, facts: JointFacts, state: DriveState) -> list[Fault]:
         found: list[Fault] = []
@@ -146,11 +156,17 @@ class JointWatch:
         self._energised_s = self._energised_s + facts.dt_s if state.closed_loop and not facts.energised else 0.0
         if self._energised_s > ENERGISED_S:
             found.append(self._fault("drive_energised", f"The {self.joint} drive is in closed loop, unasked."))
-        voltage_v, bounds = state.bus_voltage_v, self._bounds
-        if voltage_v < bounds.voltage_min_v:
+        if state.bus_voltage_v < self._bounds.voltage_low_v or self._low_s:
+            self._watch_voltage(found, facts, state.bus_voltage_v)
+
+    def _watch_voltage(self, found: list[Fault], facts: JointFacts, voltage_v: float) -> None:
+        bounds = self._bounds
+        self._low_s = self._low_s + facts.dt_s if voltage_v < bounds.voltage_low_v else 0.0
+        self._under_s = self._under_s + facts.dt_s if voltage_v < bounds.voltage_min_v else 0.0
+        if self._under_s > TWO_MESSAGES_S:
             text = f"The {self.joint} drive has {voltage_v:.1f} V; {bounds.voltage_min_v:g} V are the least."
             found.append(self._fault("voltage_under", text))
-        elif voltage_v < bounds.voltage_low_v:
+        elif self._low_s > TWO_MESSAGES_S:
             found.append(self._fault("voltage_low", f"The {self.joint} drive has only {voltage_v:.1f} V."))
 
     # motion
@@ -159,15 +175,36 @@ class JointWatch:
         angle_rad, velocity_rad_s = state.angle_rad, abs(state.velocity_rad_s)
         if not self._low_rad <= angle_rad <= self._high_rad:
             found.append(self._out_of_range(angle_rad))
-        self._fast_ticks = self._fast_ticks + 1 if velocity_rad_s > self._fast_rad_s else 0
-        if self._fast_ticks >= FAST_TICKS:
+        self._fast_s = self._fast_s + facts.dt_s if velocity_rad_s > self._fast_rad_s else 0.0
+        if self._fast_s > max(self._bounds.fast_s - facts.dt_s / 2.0, 0.0):
             text = f"The {self.joint} joint turns at {velocity_rad_s:.0f} rad/s."
             found.append(self._fault("joint_velocity", text))
         if velocity_rad_s > MOVING_RAD_S and not facts.energised:
             text = f"The {self.joint} joint moves at {velocity_rad_s:.1f} rad/s."
             found.append(self._fault("joint_moving", text))
         if state.angle_stamp_s != self._angle_stamp_s:
+            self._watch_encoder(found, facts, state)
+
+    def _watch_encoder(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        """From one message to the next."""
+        if state.angle_rad == self._angle_rad:
+            self._watch_frozen(found, facts, state)
+        else:
             self._watch_jump(found, facts, state)
+            self._frozen_s = self._gone_s = self._gone_rad = 0.0
+        self._angle_rad, self._velocity_rad_s = state.angle_rad, state.velocity_rad_s
+        self._angle_stamp_s = state.angle_stamp_s
+
+    def _watch_frozen(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        """An angle that stays the same while the joint moves by its own speed, or at full torque with that speed."""
+        gap_s = state.angle_stamp_s - self._angle_stamp_s
+        self._gone_s += gap_s
+        self._gone_rad += abs(state.velocity_rad_s) * gap_s
+        pushed = facts.energised and abs(facts.torque_nm) >= self._saturated_nm
+        frozen = pushed and state.velocity_rad_s == self._velocity_rad_s
+        self._frozen_s = self._frozen_s + gap_s if frozen else 0.0
+        if (self._gone_rad > GONE_RAD and self._gone_s > GONE_S) or self._frozen_s > FROZEN_S:
+            found.append(self._fault("encoder_stuck", f"The {self.joint} encoder stands still while the joint moves."))
 
     def _out_of_range(self, angle_rad: float) -> Fault:
         low, high = degrees(self._low_rad), degrees(self._high_rad)
@@ -177,9 +214,8 @@ class JointWatch:
     def _watch_jump(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
         """Between two messages; what a stamp is late by may be a tick."""
         step_rad = abs(state.angle_rad - self._angle_rad)
-        gap_s = state.angle_stamp_s - self._angle_stamp_s + facts.dt_s
-        self._angle_rad, self._angle_stamp_s = state.angle_rad, state.angle_stamp_s
-        if step_rad > JUMP_RAD + self._jump_rad_s * gap_s:  # never true of the first one
+        gap_s = max(state.angle_stamp_s - self._angle_stamp_s, 0.0) + facts.dt_s
+        if step_rad > self._bounds.jump_rad + self._jump_rad_s * gap_s:  # never true of the first one
             text = f"The {self.joint} encoder jumped by {degrees(step_rad):.0f} degrees in {gap_s * 1e3:.1f} ms."
             found.append(self._fault("encoder_jump", text))
 
@@ -190,22 +226,36 @@ class JointWatch:
         if self._current_ticks >= CURRENT_TICKS:
             text = f"The {self.joint} motor takes {abs(state.current_a):.1f} A."
             found.append(self._fault("joint_current", text))
+        self._watch_torque(found, facts, state)
         stalled = abs(facts.torque_nm) >= self._saturated_nm and abs(state.velocity_rad_s) < STILL_RAD_S
         self._stalled_s = self._stalled_s + facts.dt_s if stalled and not facts.freeing else 0.0
         if self._stalled_s > STALLED_S:
             text = f"The {self.joint} joint stands still at full torque for {self._stalled_s:.1f} s."
             found.append(self._fault("joint_not_following", text))
 
+    def _watch_torque(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        """A drive that is told to exert a torque and does not: a frozen current, lost commands, a silent clamp."""
+        differs = abs(facts.torque_nm - state.current_a * self._constant_nm_a) > self._missing_nm
+        self._missing_s = self._missing_s + facts.dt_s if differs and facts.moving else 0.0
+        if self._missing_s > MISSING_S:
+            given_nm = state.current_a * self._constant_nm_a
+            text = f"The {self.joint} motor gives {given_nm:.2f} N·m in place of {facts.torque_nm:.2f}."
+            found.append(self._fault("torque_missing", text))
+
     # heat
 
     def _watch_heat(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
         measured_c = state.temperature_c
-        winding_c = self.winding.update(facts.dt_s, state.current_a, measured_c)
+        self._hot_s = self._hot_s + facts.dt_s if self._nearly_hot_c <= measured_c else 0.0
+        if not measured_c < self._nearly_hot_c and not self._hot_s > TWO_MESSAGES_S:
+            measured_c = UNKNOWN
+        current_a = state.current_a if abs(state.current_a) < 2.0 * self._most_a else UNKNOWN  # no motor takes more
+        winding_c = self.winding.update(facts.dt_s, current_a, measured_c)
         if winding_c < self._nearly_hot_c:
             return
-        by_sensor = measured_c >= self._nearly_hot_c
+        hot = winding_c >= self._limits.temperature_hot_c
+        by_sensor = measured_c >= (self._limits.temperature_hot_c if hot else self._nearly_hot_c)
         what, how = ("motor", "") if by_sensor else ("winding", ", by its currents")
         temperature_c = measured_c if by_sensor else winding_c
-        hot = temperature_c >= self._limits.temperature_hot_c
         text = f"The {self.joint} motor has {temperature_c:.0f} degrees C{how}."
         found.append(self._fault(f"{what}_hot" if hot else f"{what}_overheating", text))

@@ -47,6 +47,7 @@ class Health(NamedTuple):
     walk_finished: bool = False  # the strides asked for are done
     raised: bool = False  # the flippers are up, or the wait for them is over
     settled: bool = False  # damped joints are at rest, or the wait for that is over
+    cut_short: bool = False  # the pose that is held is one out of a walk
     rested: bool = False  # the pose was held for so long that nobody seems to need it
     worst: Fault | None = None
     blocking: tuple[Fault, ...] = ()  # against arming
@@ -87,6 +88,9 @@ def _from(*modes: Mode) -> frozenset[Mode]:
 
 
 SOFT_STOP_DONE = Cause("raised, after a fault", lambda request, health: health.raised and _stopped(health))
+STOP_AFTER_FAULT = Cause(
+    "stop, after a fault has held a walk", lambda request, health: request is Request.STOP and health.cut_short
+)
 ARM_ACCEPTED = Cause("arm, and nothing against it", lambda request, health: request is Request.ARM and _well(health))
 WALK_ACCEPTED = Cause("walk", lambda request, health: request is Request.WALK and health.reaction < Reaction.HOLD)
 
@@ -112,6 +116,7 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition(_from(Mode.HOLD), WALK_ACCEPTED, Mode.WALKING),
     Transition(_from(Mode.HOLD), _is("nobody needs it", lambda health: health.rested), Mode.IDLE),
     Transition(_from(Mode.WALKING), _asked(Request.STOP), Mode.STOPPING),
+    Transition(_from(Mode.HOLD), STOP_AFTER_FAULT, Mode.STOPPING),
     Transition(_from(Mode.WALKING), _is("strides done", lambda health: health.walk_finished), Mode.STOPPING),
     Transition(_from(Mode.WALKING), _at_least(Reaction.HOLD), Mode.HOLD),
     Transition(_from(Mode.STOPPING), SOFT_STOP_DONE, Mode.FAULT),

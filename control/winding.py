@@ -6,7 +6,8 @@ One heat capacity that the copper loss warms and the room cools:
 
 with i_q the peak of the phase current, as ODrive and moteus tell it; 0.0039 per kelvin is copper's. The resistance is
 the R60's; its thermal resistance is a placeholder in the only public source, and the time constant is an estimate on
-the quick side: measure yours. A sensor that reads higher corrects the model.
+the quick side: measure yours. A sensor that reads higher corrects the model. Neither is believed beyond HOTTEST_C, or
+one absurd message would stand for hours.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from control.bounds import Bounds
 
 COPPER_PER_K = 0.0039
 REFERENCE_C = 25.0
+HOTTEST_C = 250.0  # enamel has burnt by then
 
 
 @dataclass(frozen=True)
@@ -49,5 +51,5 @@ class Winding:
         temperature_c += (parameters.room_c + rise_k - temperature_c) * dt_s / (parameters.time_constant_s + dt_s)
         if measured_c > temperature_c:  # never true of NaN
             temperature_c = measured_c
-        self.temperature_c = temperature_c
-        return temperature_c
+        self.temperature_c = min(temperature_c, HOTTEST_C)
+        return self.temperature_c

@@ -247,6 +247,13 @@ def _fault_problems(configuration: Configuration) -> Iterator[str]:
         low, high = getattr(bounds, milder), getattr(bounds, harder)
         if low > high:
             yield f"faults.{milder} = {low}: must be at most faults.{harder} = {high}"
+    room_c, limits = configuration.winding.room_c, configuration.limits
+    nearly_hot_c = (limits.temperature_warm_c + limits.temperature_hot_c) / 2.0
+    if room_c >= nearly_hot_c:
+        yield (
+            f"winding.room_c = {room_c}: must be less than {nearly_hot_c:g}, the middle of limits.temperature_warm_c"
+            " and temperature_hot_c, or a resting motor counts as too hot"
+        )
     if bounds.voltage_min_v > bounds.voltage_low_v:
         yield (
             f"faults.voltage_min_v = {bounds.voltage_min_v}: must be at most"

@@ -127,10 +127,10 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         recorder = failing_recorder(open_recorder(configuration), failures)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
         wall_clock = failing_clock(time.time, failures)
-        loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock)
-        warnings: list[str] = []
         lease = Lease()
-        calls = OperatorCalls(loop, recorder, warnings, time.monotonic, lease)
+        loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock, lease=lease)
+        warnings: list[str] = []
+        calls = OperatorCalls(loop, recorder, warnings, time.monotonic)
         status.methods = with_failures(calls.methods, failures, loop.event, time.monotonic)
         status.on_hang_up = lease.hang_up
         status.report_bug = lambda sentence: loop.event(time.monotonic(), sentence)

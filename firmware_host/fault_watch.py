@@ -20,14 +20,17 @@ from drivers.odrive_axis import OdriveAxis
 from drivers.odrive_codec import error_text
 from drivers.odrive_drives import OdriveDrives
 from firmware_host.configuration import Configuration
+from firmware_host.log_watch import LogWatch
 from firmware_host.loop_watch import LoopWatch
+from firmware_host.recorder import LogReport
 from firmware_host.ticker import PERIOD_S, Beat
 
 ARMING_S = 2.0  # a drive that takes longer to go into closed loop does not mean to
 REFUSED_TICKS = 3  # in a row, in each of which one bus lost a command
 FIRMWARE = (0, 6)  # major and minor version whose messages the codec knows
 POSE_FORGOTTEN_S = 10.0  # a motion capture that was switched off on purpose
-UNTRUSTED = frozenset({"encoder_jump", "position_stale", "position_silent", "drive_quiet", "drive_silent"})
+BROKEN = frozenset({"encoder_jump", "encoder_stuck"})  # told in some ticks, true in all of them
+BLIND = frozenset({"position_stale", "position_silent", "drive_quiet", "drive_silent"})
 EXPLAINED = frozenset({"drive_error", "drive_disarmed"})  # by the drive's own words
 
 
@@ -48,6 +51,8 @@ class Situation(NamedTuple):
     sent: LimitedTorques  # in the tick before
     freeing: bool  # a recovery pulls at full torque
     wall_minus_monotonic_s: float
+    log: LogReport
+    lease_holder: str  # who has lost it; empty: nobody
 
 
 class FaultWatch:
@@ -63,10 +68,12 @@ class FaultWatch:
                 configuration.faults,
                 configuration.winding,
                 configuration.drive[joint].current_limit_a,
+                configuration.drive[joint].torque_constant_nm_a,
             )
             for joint, span in zip(JOINTS, configuration.joint_ranges, strict=True)
         )
         self._loop = LoopWatch(configuration.faults)
+        self._log = LogWatch(configuration.faults)
         self._longest_watchdog_s = configuration.faults.longest_watchdog_s
         self._warm_c = configuration.limits.temperature_warm_c
         self.reset()
@@ -75,11 +82,13 @@ class FaultWatch:
         for joint in self.joints:
             joint.reset()
         self._loop.reset()
+        self._log.reset()
         self._failed_sends = {name: port.failed_sends for name, port in self._drives.ports.items()}
         self._refused_ticks = dict.fromkeys(self._drives.ports, 0)
         self._restarts = {axis.joint: axis.restarts for axis in self._drives.axes}
         self._refused_commands = self._drives.gate.refused
         self._pose_stamp_s: float | None = None
+        self._broken: set[str] = set()  # encoders, until torque is off
         self.trusted: tuple[bool, ...] = ALL_TRUSTED  # of the joints' encoders
 
     def with_winding_heat(self, states: DriveStates) -> DriveStates:
@@ -95,12 +104,15 @@ class FaultWatch:
     def update(self, beat: Beat, situation: Situation) -> list[Fault]:
         """Everything that is wrong in this tick."""
         found = self._loop.update(beat, situation.wall_minus_monotonic_s)
+        found += self._log.update(situation.log)
         self._watch_buses(found)
+        if situation.lease_holder:
+            text = f"{situation.lease_holder} promised to attend the robot and is gone."
+            found.append(make_fault("lease_lost", "", text))
         if situation.mode is Mode.BOOT and not self._drives.heard:
             return found
         self._watch_joints(found, beat, situation)
-        blind = {fault.subject for fault in found if fault.name in UNTRUSTED}
-        self.trusted = tuple(joint not in blind for joint in JOINTS) if blind else ALL_TRUSTED
+        self._watch_trust(found, situation.mode)
         if not situation.sent.finite:
             found.append(make_fault("torque_not_finite", "", "A torque was not a finite number."))
         if situation.mode is Mode.ARMING and beat.now_s - situation.mode_since_s > ARMING_S:
@@ -134,6 +146,14 @@ class FaultWatch:
                 beat.now_s, dt_s, mode in ENERGISED, mode in MOVING, torque_nm, situation.freeing or mode not in HELD
             )
             found += [_explained(fault, axis) for fault in joint.update(facts, state)]
+
+    def _watch_trust(self, found: list[Fault], mode: Mode) -> None:
+        """What breaks an encoder shows in some ticks only, silence in all of its own."""
+        if mode not in ENERGISED:
+            self._broken.clear()
+        self._broken.update(fault.subject for fault in found if fault.name in BROKEN)
+        blind = self._broken.union(fault.subject for fault in found if fault.name in BLIND)
+        self.trusted = tuple(joint not in blind for joint in JOINTS) if blind else ALL_TRUSTED
 
     def _watch_arming(self, found: list[Fault], states: DriveStates) -> None:
         for joint, state in zip(JOINTS, states, strict=True):

@@ -27,6 +27,9 @@ from firmware_host.log_rows import CDR_HEADER, EVENT, FORMAT_OF, ROW_KINDS, STRI
 DAMAGE = (McapError, ValueError, RuntimeError, OverflowError, MemoryError, struct.error)  # what reading it may raise
 
 
+ADVICE = "'mudskipper log recover' keeps what is sound"
+
+
 class LogError(ValueError):
     """A log that cannot be read: one sentence with the file, the place and the reason."""
 
@@ -52,10 +55,12 @@ def read_log(path: Path) -> Log:
     except DAMAGE as error:
         finished = len(contents) > len(MCAP0_MAGIC) and contents.endswith(MCAP0_MAGIC)
         if finished or not _is_cut(error, stream.tell() == len(contents)):
-            raise LogError(f"{path}: damaged before byte {stream.tell()}: {error}") from None
+            raise LogError(f"{path}: damaged before byte {stream.tell()}: {error}; {ADVICE}") from None
         complete = False
     if complete and found.messages != found.messages_promised:
-        raise LogError(f"{path}: damaged: only {found.messages} of its {found.messages_promised} rows can be found")
+        raise LogError(
+            f"{path}: damaged: only {found.messages} of its {found.messages_promised} rows can be found; {ADVICE}"
+        )
     return Log(
         found.metadata,
         found.configuration_text,
@@ -200,6 +205,8 @@ def log_summary(log: Log) -> dict[str, str | int | float | bool]:
     duration_s = float(stamps_s[-1] - stamps_s[0]) if len(stamps_s) else 0.0
     return {
         "robot": log.metadata.get("robot", ""),
+        "run": log.metadata.get("run_id", ""),
+        "segment": log.metadata.get("segment", ""),
         "started": _start_time(log),
         "duration_s": duration_s,
         "ticks": len(stamps_s),
@@ -208,6 +215,7 @@ def log_summary(log: Log) -> dict[str, str | int | float | bool]:
         "strides": len(log.strides),
         "events": len(log.events),
         "complete": log.complete,
+        "recovered": log.metadata.get("recovered") == "true",
     }
 
 

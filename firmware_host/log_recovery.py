@@ -86,10 +86,10 @@ def recover_log(path: Path) -> Recovered:
         if not contents:
             path.unlink()
             return Recovered(path, 0, 0, "empty, removed")
-        if _is_whole(target) and target != path:
+        if target != path and _is_whole(target):
             path.unlink()
             return Recovered(target, 0, 0, "was recovered before")
-        if _is_whole(path):
+        if contents.endswith(MCAP0_MAGIC) and _is_whole(path):
             return _finish_move(path, target)
         return _rewrite(path, target, salvage_rows(path, contents))
 

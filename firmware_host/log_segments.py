@@ -20,7 +20,16 @@ from pathlib import Path
 from typing import Any
 
 from firmware_host.log_file import LogFile, Rows
-from firmware_host.log_folder import ACTIVE, DONE, free_logs, log_files, remove_log, segment_path, unfinished_files
+from firmware_host.log_folder import (
+    ACTIVE,
+    DONE,
+    finished_path,
+    free_logs,
+    log_files,
+    remove_log,
+    segment_path,
+    unfinished_files,
+)
 from firmware_host.log_parameters import LogParameters
 from firmware_host.log_rows import EVENT
 from firmware_host.recorder import EVENT_KIND, STAMP
@@ -86,6 +95,8 @@ class LogSegments:
         self.path = segment_path(self._first, self._segment)
         try:
             self._make_room()
+            if finished_path(self.path).exists():
+                raise FileExistsError(errno.EEXIST, "File exists")
             self._file = LogFile(self.path, self._opening_of(self._segment))
             self._segment += 1
             self._first_stamp_s = None

@@ -21,6 +21,7 @@ from drivers.odrive_drives import OdriveDrives
 from drivers.pose_port import PoseSource
 from firmware_host.configuration import Configuration
 from firmware_host.fault_watch import FaultWatch, Situation
+from firmware_host.lease import Lease
 from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK
 from firmware_host.mud_learning import MudLearning
 from firmware_host.recorder import Recording
@@ -42,11 +43,13 @@ class Loop:
         recorder: Recording,
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
+        lease: Lease | None = None,
     ) -> None:
         self.configuration = configuration
         self.drives = drives
         self.pose = pose
         self.recorder = recorder
+        self.lease = lease or Lease()
         self.timing = LoopTiming()
         self.learning = MudLearning(configuration)
         self.controller = controller_of(configuration)
@@ -77,6 +80,7 @@ class Loop:
         self._adapt(beat.now_s)
         self.health = self._examine(beat)
         self._change_mode(next_mode(self.mode, self._request_now(), self.health), beat.now_s)
+        self.forced = self.forced and self.mode in ENERGISED
         step_s = min(1 + beat.missed, LONGEST_STEP_TICKS) * PERIOD_S
         wanted = self.controller.step(step_s, self.mode, self.states, self._trusted())
         self.sent = self._limit(wanted)
@@ -88,6 +92,11 @@ class Loop:
         """The worst that stands and is more than a warning."""
         return self.faults.worst if self.faults.reaction >= Reaction.HOLD else None
 
+    @property
+    def temperatures_c(self) -> tuple[float, ...]:
+        """Of the motors, measured or reckoned."""
+        return tuple(joint.winding.temperature_c for joint in self._fault_watch.joints)
+
     def _adapt(self, now_s: float) -> None:
         """Once a stride, in swing, the gait changes; and where an insertion meets firm mud."""
         closed, sentences = self.learning.step(self.controller)
@@ -98,7 +107,7 @@ class Loop:
 
     def _examine(self, beat: Beat) -> Health:
         """Faults as data, and what else the mode depends on."""
-        present = self._fault_watch.update(beat, self._situation()) + self.learning.faults
+        present = self._fault_watch.update(beat, self._situation(beat.now_s)) + self.learning.faults
         if self.controller.fault:
             present.append(self.controller.fault)
         clearing = beat.now_s <= self._clear_until_s
@@ -110,12 +119,16 @@ class Loop:
             walk_finished=self.controller.walk_finished,
             raised=self.controller.raised,
             settled=self.controller.settled,
+            cut_short=self.controller.cut_short,
             rested=self.controller.rested,
             worst=self.faults.worst,
             blocking=tuple(self.faults.blocking(self.forced)),
         )
 
-    def _situation(self) -> Situation:
+    def _situation(self, now_s: float) -> Situation:
+        lost = self.lease.lost(now_s)
+        if lost and self.mode not in ENERGISED:  # nothing is left to attend to
+            self.lease.reset()
         return Situation(
             self.mode,
             self._mode_since_s,
@@ -124,6 +137,8 @@ class Loop:
             self.sent,
             self.controller.recovery.attempt > 0,
             self._wall_clock() - self._clock(),
+            self.recorder.report(),
+            str(self.lease.holder) if lost else "",
         )
 
     def _tell_faults(self, now_s: float) -> None:
@@ -169,7 +184,7 @@ class Loop:
             return "the daemon is ending"
         if order is not None and not self._reaches(order.depth_m):
             return f"depth {order.depth_m:g} m: out of the flippers' reach over the sweep"
-        health = self.health._replace(blocking=tuple(self.faults.blocking(forced or self.forced)))
+        health = self.health._replace(blocking=tuple(self.faults.blocking(forced)))
         return refusal(self.mode, request, health)
 
     def _reaches(self, depth_m: float) -> bool:
@@ -187,9 +202,8 @@ class Loop:
         self._tell_change(mode, now_s)
         if mode is Mode.WALKING:
             self.learning.reset(self.controller.order.depth_m)
-        if mode is Mode.IDLE:
-            self.forced = False
         if mode is Mode.ARMING:
+            self._clear_until_s = NEVER_S  # what begins from here on was not meant
             self.drives.arm(now_s, at_once=True)
         elif self.mode in ENERGISED and mode not in ENERGISED:
             self.drives.disarm(now_s, at_once=True)

@@ -18,7 +18,7 @@ from control.records import JOINTS
 from drivers.odrive_codec import error_text
 from firmware_host.arming_checks import arming_checks
 from firmware_host.connection import Caller
-from firmware_host.lease import LONGEST_S, SHORTEST_S, Lease
+from firmware_host.lease import LONGEST_S, SHORTEST_S
 from firmware_host.loop import Loop
 from firmware_host.recorder import Recording
 from firmware_host.reports import belief_report, known, map_report, stride_report
@@ -43,10 +43,9 @@ class OperatorCalls:
         recorder: Recording,
         warnings: list[str],
         clock: Callable[[], float],
-        lease: Lease | None = None,
     ) -> None:
         self._loop = loop
-        self._lease = lease or Lease()
+        self._lease = loop.lease
         self._recorder = recorder
         self._warnings = warnings
         self._clock = clock
@@ -83,7 +82,8 @@ class OperatorCalls:
             "fault": _fault(loop),
             "faults": [_fault_report(fault) for fault in loop.faults.standing],
             "forced": loop.forced,
-            "notice": loop.notice if self._recorder.writer_alive else "the log's writer has died: nothing is recorded",
+            "notice": loop.notice,
+            "lease": str(loop.lease.holder) if loop.lease.held else None,
             "phase": loop.target_before.phase.name.lower(),
             "stride": loop.target_before.stride,
             "depth_m": loop.controller.gait.commanded_depth_m,
@@ -94,11 +94,18 @@ class OperatorCalls:
             "loop": loop.timing.summary(),
             "warnings": self._warnings,
             "bus": self._bus(),
-            "log": {
-                "path": str(self._recorder.path) if self._recorder.path else None,
-                "dropped": self._recorder.dropped,
-                "writer_alive": self._recorder.writer_alive,
-            },
+            "log": self._log(),
+        }
+
+    def _log(self) -> dict[str, Any]:
+        report = self._recorder.report()
+        return {
+            "path": str(self._recorder.path) if self._recorder.path else None,
+            "dropped": report.dropped,
+            "writer_alive": report.alive,
+            "problem": report.problem,
+            "free_share": known(report.free_share),
+            "slowest_write_s": known(report.slowest_write_s),
         }
 
     def _drive(self, place: int) -> dict[str, Any]:
@@ -114,6 +121,9 @@ class OperatorCalls:
             "temperature_c": known(state.temperature_c),
             "bus_voltage_v": known(state.bus_voltage_v),
             "firmware": ".".join(map(str, axis.version)) if axis.version else None,
+            "hardware": axis.hardware or None,
+            "watchdog_s": known(axis.watchdog_s),
+            "winding_c": round(self._loop.temperatures_c[place], 1),
             "angle_age_s": known(now_s - state.angle_stamp_s),
             "current_age_s": known(now_s - state.current_stamp_s),
             "heartbeat_age_s": known(now_s - state.heartbeat_stamp_s),
@@ -124,6 +134,9 @@ class OperatorCalls:
         return {
             "unknown_frames": drives.unknown_frames,
             "garbled_frames": drives.garbled_frames,
+            "refused_commands": drives.gate.refused,
+            "state": {name: port.state.name.lower() for name, port in drives.ports.items()},
+            "last_error": {name: port.last_error for name, port in drives.ports.items() if port.last_error},
             "error_frames": sum(port.error_frames for port in drives.ports.values()),
             "failed_sends": sum(port.failed_sends for port in drives.ports.values()),
         }

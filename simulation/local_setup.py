@@ -63,11 +63,15 @@ viscous_nm_s = 0.002
 late_s = 0.5
 quiet_s = 0.5
 silence_s = 0.5
+disk_free_share = 0.0
+jump_rad = 2.0
+fast_s = 0.2
 lag_s = 0.5
 lag_share = 1.0
 
 [log]
 directory = {logs}
+min_free_share = 0.0  # a full disk of a desk is no reason to free anybody's logs
 
 [status]
 socket = {status}

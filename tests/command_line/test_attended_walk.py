@@ -72,7 +72,6 @@ def test_a_stop_from_elsewhere_ends_it(bench: Any) -> None:
     assert attendant.returncode == exit_codes.OK and said.splitlines()[-1] == "hold"
 
 
-@pytest.mark.xfail(strict=True, raises=AssertionError, reason="the loop does not heed a lost lease")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_robot_whose_attendant_dies_or_hangs_stops(bench: Any, number: signal.Signals) -> None:
     bench.run("arm")

@@ -65,7 +65,7 @@ def test_sigterm_in_a_walk_finishes_safely(bench: Any) -> None:
 def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log(bench: Any) -> None:
     bench.run("arm")
     bench.run("walk")
-    bench.wait_for(lambda report: report["phase"] == "stance")
+    bench.wait_for(lambda report: report["phase"] == "insertion")  # the mud holds what still pushes for a moment
     bench.daemon.kill()
     bench.daemon.wait(5)
     bench.daemon.stderr.close()

@@ -1,10 +1,21 @@
 """What the controller wants in each mode, read back through gains that turn torques into targets."""
 
-from math import radians
+from math import nan, radians
 
 import pytest
 
-from control.controller import RESTING, Controller, MotionParameters, WalkOrder
+from control.controller import (
+    ALL_TRUSTED,
+    DAMPING_NM,
+    DAMPING_S,
+    RAISING_S,
+    RESTING,
+    SETTLED_S,
+    SOFT_STOP_S,
+    Controller,
+    MotionParameters,
+    WalkOrder,
+)
 from control.gait import GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains
@@ -225,3 +236,137 @@ def test_outside_of_the_gait_the_target_is_at_rest() -> None:
     for mode in (Mode.HOLD, Mode.WALKING, Mode.STOPPING, Mode.HOLD):
         wanted_pose(controller, mode)
         assert controller.target is RESTING
+
+
+def turning_at(velocities: tuple[float, ...], pose: JointAngles = POSE) -> DriveStates:
+    a, b, c, d = (
+        DriveState(angle_rad=angle, velocity_rad_s=velocity) for angle, velocity in zip(pose, velocities, strict=True)
+    )
+    return a, b, c, d
+
+
+def ticks_until_settled(velocities: tuple[float, ...], trusted: tuple[bool, ...] = ALL_TRUSTED) -> int:
+    controller = weightless()
+    for tick in range(1, 2000):
+        controller.step(TICK_S, Mode.DAMPING, turning_at(velocities), trusted)
+        if controller.settled:
+            return tick
+    raise AssertionError("it never settled")
+
+
+REST = (0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("before", [Mode.HOLD, Mode.WALKING, Mode.STOPPING])
+def test_damping_forgets_every_target_at_once(before: Mode) -> None:
+    controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(), recovery())
+    controller.order = WalkOrder(0.03)
+    for _ in range(500):
+        controller.step(TICK_S, before, states_at(POSE))
+    assert controller.step(TICK_S, Mode.DAMPING, states_at(POSE)) == NO_TORQUE
+    assert controller.target is RESTING
+
+
+def test_damping_brakes_each_joint_and_never_with_more_than_its_share() -> None:
+    controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(), recovery())
+    torques = controller.step(TICK_S, Mode.DAMPING, turning_at((2.0, -2.0, 100.0, -100.0)))
+    assert torques == pytest.approx((-0.12, 0.16, -DAMPING_NM, DAMPING_NM))
+
+
+def test_a_joint_whose_encoder_is_not_trusted_is_not_damped() -> None:
+    controller = weightless(JointGains())
+    torques = controller.step(TICK_S, Mode.DAMPING, turning_at((2.0, nan, 2.0, 2.0)), (False, False, True, True))
+    assert torques == pytest.approx((0.0, 0.0, -0.12, -0.16))
+
+
+def test_joints_have_settled_once_all_rest_for_a_while() -> None:
+    assert ticks_until_settled(REST) == pytest.approx(SETTLED_S / TICK_S, abs=1)
+    assert ticks_until_settled((0.09, -0.09, 0.09, -0.09)) == pytest.approx(SETTLED_S / TICK_S, abs=1)
+
+
+@pytest.mark.parametrize("velocities", [(0.11, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, -0.11), (0.0, nan, 0.0, 0.0)])
+def test_joints_that_do_not_rest_are_given_up_in_bounded_time(velocities: tuple[float, ...]) -> None:
+    assert ticks_until_settled(velocities) == pytest.approx(DAMPING_S / TICK_S, abs=1)
+
+
+def test_the_rest_of_a_joint_that_nobody_sees_is_not_waited_for() -> None:
+    ticks = ticks_until_settled((nan, 5.0, 0.0, 0.0), (False, False, True, True))
+    assert ticks == pytest.approx(SETTLED_S / TICK_S, abs=1)
+
+
+def test_a_joint_that_moves_once_more_is_waited_for_anew() -> None:
+    controller = weightless()
+    for tick in range(1, 220):
+        speed = 1.0 if tick == 100 else 0.0
+        controller.step(TICK_S, Mode.DAMPING, turning_at((speed, 0.0, 0.0, 0.0)))
+        assert not (controller.settled and tick < 100 + SETTLED_S / TICK_S)
+    assert controller.settled
+
+
+def test_settled_is_told_only_while_damping_and_of_this_time() -> None:
+    controller = weightless()
+    for _ in range(200):
+        controller.step(TICK_S, Mode.DAMPING, states_at(POSE))
+    assert controller.settled
+    controller.step(TICK_S, Mode.FAULT, states_at(POSE))
+    assert not controller.settled
+    controller.step(TICK_S, Mode.DAMPING, states_at(POSE))
+    assert not controller.settled
+
+
+def test_a_walk_that_a_fault_holds_stays_at_the_measured_pose_with_its_whole_stiffness() -> None:
+    controller = weightless()
+    controller.order = WalkOrder(0.03)
+    path_to_the_gait(controller)
+    for _ in range(300):
+        wanted_pose(controller, Mode.WALKING)
+    here = (0.35, -0.6, 0.25, -0.7)
+    assert wanted_pose(controller, Mode.HOLD, here) == pytest.approx(here)
+    assert wanted_pose(controller, Mode.HOLD, POSE) == pytest.approx(here)
+
+
+def test_a_pose_that_nobody_needs_is_told_after_its_time_and_never_without_one() -> None:
+    def ticks_held(longest_s: float) -> int | None:
+        motion = MotionParameters(longest_hold_s=longest_s)
+        controller = Controller(GAIT, GEOMETRY, SPRING, ArmMass(), motion, recovery())
+        for tick in range(1, 1000):
+            controller.step(TICK_S, Mode.HOLD, states_at(POSE))
+            if controller.rested:
+                return tick
+        return None
+
+    assert ticks_held(1.0) == pytest.approx(380, abs=2)
+    assert ticks_held(0.0) is None
+    assert ticks_held(10.0) is None
+
+
+def test_the_time_of_holding_begins_anew_with_every_hold_and_does_not_run_elsewhere() -> None:
+    motion = MotionParameters(longest_hold_s=1.0)
+    controller = Controller(GAIT, GEOMETRY, SPRING, ArmMass(), motion, recovery())
+    controller.order = WalkOrder(0.03)
+    for mode in (Mode.HOLD, Mode.WALKING, Mode.STOPPING, Mode.HOLD):
+        for _ in range(370):
+            controller.step(TICK_S, mode, states_at(RAISED))
+            assert not controller.rested
+
+
+def stopping_ticks(pose: JointAngles) -> int:
+    """Of flippers that stay where they are, whatever torque there is."""
+    controller = weightless()
+    for tick in range(1, 3000):
+        controller.step(TICK_S, Mode.STOPPING, states_at(pose))
+        if controller.raised:
+            return tick
+    raise AssertionError("it never ended")
+
+
+@pytest.mark.parametrize("low_rad", [-0.2, -0.7, -1.3])
+def test_flippers_that_the_mud_keeps_are_waited_for_but_not_long(low_rad: float) -> None:
+    ticks = stopping_ticks((0.0, low_rad, 0.0, low_rad))
+    assert ticks * TICK_S == pytest.approx(RAISING_S - low_rad, abs=0.15)
+    assert ticks * TICK_S < SOFT_STOP_S
+
+
+def test_a_stop_never_takes_longer_than_a_soft_stop_may() -> None:
+    """Also on a path that is too long for it: of an arm that was turned far up by hand."""
+    assert stopping_ticks((0.0, 3.0, 0.0, 3.0)) * TICK_S == pytest.approx(SOFT_STOP_S, abs=0.01)

@@ -1,6 +1,6 @@
 """The PD law's signs, and its gravity term against the numeric gradient of potential energy."""
 
-from math import pi
+from math import nan, pi
 
 import numpy as np
 import pytest
@@ -8,17 +8,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.joint_path import still
-from control.joint_pd import ArmMass, JointGains, joint_torques_nm, pd_torque_nm
+from control.joint_pd import ArmMass, JointGains, damping_torques_nm, joint_torques_nm, pd_torque_nm
 from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, JointTarget
 
 WEIGHTLESS = ArmMass(arm_mass_kg=0.0)
 angles = st.floats(-pi / 2, pi / 2)
 poses = st.tuples(angles, angles, angles, angles)
+speeds = st.floats(-100.0, 100.0)
+speeds_of_four = st.tuples(speeds, speeds, speeds, speeds)
+gains_of_any_size = st.builds(JointGains, *[st.floats(0.0, 5.0)] * 4)
+trusts = st.tuples(st.booleans(), st.booleans(), st.booleans(), st.booleans())
+ALL = (True, True, True, True)
 masses = st.builds(ArmMass, arm_mass_kg=st.floats(0.0, 20.0), center_of_mass_m=st.floats(0.0, 1.0))
 
 
 def resting(pose: JointAngles) -> DriveStates:
     a, b, c, d = (DriveState(angle_rad=angle, velocity_rad_s=0.0) for angle in pose)
+    return a, b, c, d
+
+
+def turning(velocities: tuple[float, ...]) -> DriveStates:
+    a, b, c, d = (DriveState(angle_rad=0.3, velocity_rad_s=velocity) for velocity in velocities)
     return a, b, c, d
 
 
@@ -85,3 +95,39 @@ def test_the_fade_scales_every_torque_alike(target: JointAngles, pose: JointAngl
     whole = joint_torques_nm(still(target), resting(pose), JointGains(), ArmMass(), 1.0)
     faded = joint_torques_nm(still(target), resting(pose), JointGains(), ArmMass(), fade)
     assert faded == pytest.approx([fade * torque for torque in whole], abs=1e-12)
+
+
+@given(speeds_of_four, gains_of_any_size, trusts, st.floats(0.0, 5.0))
+def test_damping_never_gives_a_joint_energy(
+    velocities: tuple[float, float, float, float], gains: JointGains, trusted: tuple[bool, ...], largest_nm: float
+) -> None:
+    torques = damping_torques_nm(turning(velocities), gains, trusted, largest_nm)
+    for torque_nm, velocity in zip(torques, velocities, strict=True):
+        assert torque_nm * velocity <= 0.0
+        assert abs(torque_nm) <= largest_nm
+
+
+@given(speeds_of_four, gains_of_any_size, trusts)
+def test_joints_are_damped_in_proportion_to_their_speed_where_their_encoder_is_trusted(
+    velocities: tuple[float, float, float, float], gains: JointGains, trusted: tuple[bool, ...]
+) -> None:
+    torques = damping_torques_nm(turning(velocities), gains, trusted, 1e9)
+    dampings = (gains.sweep_damping_nm_s_rad, gains.adduction_damping_nm_s_rad) * 2
+    for torque_nm, velocity, damping, trust in zip(torques, velocities, dampings, trusted, strict=True):
+        assert torque_nm == pytest.approx(-damping * velocity if trust else 0.0)
+
+
+def test_damping_is_capped_from_both_sides() -> None:
+    gains = JointGains(8.0, 0.1, 10.0, 0.1)
+    torques = damping_torques_nm(turning((3.0, 5.0, -5.0, -3.0)), gains, ALL, 0.4)
+    assert torques == pytest.approx((-0.3, -0.4, 0.4, 0.3))
+
+
+def test_a_damped_joint_does_not_feel_where_it_is() -> None:
+    states = resting((1.0, -1.0, 0.5, -0.5))
+    assert damping_torques_nm(states, JointGains(), ALL, 0.4) == NO_TORQUE
+
+
+def test_the_speed_of_an_encoder_that_is_not_trusted_may_be_anything() -> None:
+    torques = damping_torques_nm(turning((nan, 1e300, 2.0, nan)), JointGains(), (False, False, True, False), 0.4)
+    assert torques == pytest.approx((0.0, 0.0, -0.12, 0.0))

@@ -22,8 +22,9 @@ FLAGS = (False, True)
 OF_REACTION = {kind.reaction: Fault(kind, "left_sweep", f"{kind.meaning}") for kind in KINDS.values()}
 WORST: list[Fault | None] = [None, *OF_REACTION.values()]
 HEALTHS = [
-    Health(heard, closed, finished, raised, settled, rested, fault, blocking)
-    for heard, closed, finished, raised, settled, rested in product(FLAGS, FLAGS, FLAGS, FLAGS, FLAGS, FLAGS)
+    Health(heard, closed, finished, raised, settled, cut_short, rested, fault, blocking)
+    for heard, closed, finished in product(FLAGS, FLAGS, FLAGS)
+    for raised, settled, cut_short, rested in product(FLAGS, FLAGS, FLAGS, FLAGS)
     for fault, blocking in product(WORST, ((), (OF_REACTION[Reaction.NONE],)))
 ]
 EVERYTHING = list(product(Mode, Request, HEALTHS))
@@ -122,6 +123,15 @@ def test_a_walk_ends_by_raising_the_flippers() -> None:
     assert next_mode(Mode.WALKING, Request.STOP, WELL) is Mode.STOPPING
     assert next_mode(Mode.WALKING, Request.NONE, WELL._replace(walk_finished=True)) is Mode.STOPPING
     assert next_mode(Mode.WALKING, Request.NONE, WELL) is Mode.WALKING
+
+
+def test_a_stop_raises_flippers_that_a_fault_left_in_the_mud() -> None:
+    """And moves nothing of a robot that holds a pose for another reason."""
+    for health in (WELL, faulty(Reaction.WARN), faulty(Reaction.HOLD)):
+        cut_short = health._replace(cut_short=True)
+        assert next_mode(Mode.HOLD, Request.STOP, cut_short) is Mode.STOPPING
+        assert next_mode(Mode.HOLD, Request.NONE, cut_short) is Mode.HOLD
+        assert next_mode(Mode.HOLD, Request.STOP, health) is Mode.HOLD
 
 
 def test_a_stop_for_a_person_ends_in_hold_and_one_for_a_fault_without_torque() -> None:

@@ -183,6 +183,40 @@ def test_a_current_limit_below_the_torque_limit_is_refused(example_text: str) ->
     ]
 
 
+@pytest.mark.parametrize(
+    ("milder", "harder"), [("late_s", "quiet_s"), ("quiet_s", "silence_s"), ("lag_s", "silence_s")]
+)
+def test_a_harder_reaction_may_not_come_before_a_milder_one(milder: str, harder: str) -> None:
+    others = "".join(f"{key} = 0.2\n" for key in {"late_s", "quiet_s", "lag_s", "silence_s"} - {milder, harder})
+    if milder == "quiet_s":
+        others = others.replace("late_s = 0.2", "late_s = 0.01")
+    if milder == "late_s":
+        others = others.replace("silence_s = 0.2", "silence_s = 0.4")
+    text = f"{minimal_text()}\n[faults]\n{others}"
+    wrong = text + f"{milder} = 0.3\n{harder} = 0.25\n"
+    assert problems_of(wrong) == [f"faults.{milder} = 0.3: must be at most faults.{harder} = 0.25"]
+    parse_configuration(text + f"{milder} = 0.25\n{harder} = 0.25\n")
+
+
+def test_the_least_voltage_must_not_be_above_the_low_one() -> None:
+    wrong = f"{minimal_text()}\n[faults]\nvoltage_low_v = 20.0\nvoltage_min_v = 20.5\n"
+    assert problems_of(wrong) == ["faults.voltage_min_v = 20.5: must be at most faults.voltage_low_v = 20.0"]
+    parse_configuration(f"{minimal_text()}\n[faults]\nvoltage_low_v = 0.0\nvoltage_min_v = 0.0\n")
+
+
+def test_a_room_in_which_every_motor_counts_as_hot_is_refused() -> None:
+    text = f"{minimal_text()}\n[limits]\ntemperature_warm_c = 40.0\ntemperature_hot_c = 60.0\n"
+    (problem,) = problems_of(f"{text}\n[winding]\nroom_c = 50.0\n")
+    assert problem.startswith("winding.room_c = 50.0: must be less than 50, ")
+    parse_configuration(f"{text}\n[winding]\nroom_c = 49.0\n")
+
+
+@pytest.mark.parametrize("line", ["quiet_s = 0.0", "silence_s = nan", "lag_share = 0.0", "late_s = true"])
+def test_bounds_of_faults_have_bounds_themselves(line: str) -> None:
+    problems = problems_of(f"{minimal_text()}\n[faults]\n{line}\n")
+    assert any(problem.startswith(f"faults.{line.split()[0]} = ") for problem in problems)
+
+
 def test_endless_numbers_and_nesting_are_no_toml() -> None:
     assert problems_of("x = " + "9" * 5000)[0].startswith("not a TOML file")
     assert problems_of("x = " + "[" * 5000)[0].startswith("not a TOML file")

@@ -102,6 +102,8 @@ def test_strides_and_events_are_dictionaries(whole: Log) -> None:
 def test_the_summary_tells_what_happened(whole: Log) -> None:
     assert log_summary(whole) == {
         "robot": "mudskipper-1",
+        "run": "",
+        "segment": "",
         "started": "2023-11-14T22:13:20+00:00",
         "duration_s": pytest.approx((TICKS - 1) / 380),
         "ticks": TICKS,
@@ -110,6 +112,7 @@ def test_the_summary_tells_what_happened(whole: Log) -> None:
         "strides": 2,
         "events": 3,
         "complete": True,
+        "recovered": False,
     }
 
 

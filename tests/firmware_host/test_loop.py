@@ -17,7 +17,7 @@ from firmware_host.configuration import Configuration, parse_configuration
 from firmware_host.log_rows import EVENT
 from firmware_host.loop import EVENT_KIND, STRIDE_KIND, TICK_KIND
 from firmware_host.operator_calls import OperatorCalls
-from firmware_host.recorder import NullRecorder
+from firmware_host.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.ticker import PERIOD_S, Beat
 from simulation.clay import MUDS, Clay
 from simulation.lockstep import Lockstep
@@ -32,11 +32,15 @@ class ListRecorder(NullRecorder):
     """Keeps every row."""
 
     def __init__(self) -> None:
+        self.health = HEALTHY
         self.rows: list[tuple[int, bytes]] = []
 
     def put(self, kind_index: int, payload: bytes) -> bool:
         self.rows.append((kind_index, payload))
         return True
+
+    def report(self) -> LogReport:
+        return self.health
 
     def texts(self) -> list[str]:
         return [EVENT.decode(payload)["text"] for kind, payload in self.rows if kind == EVENT_KIND]
@@ -361,11 +365,12 @@ def test_a_fixed_depth_stays_fixed(robot: Lockstep) -> None:
 
 
 def test_a_log_that_is_lost_is_told(robot: Lockstep) -> None:
-    robot.run_for(0.1)
+    robot.arm()
     recorder = recorder_of(robot)
-    recorder.writer_alive = False
-    calls = OperatorCalls(robot.loop, recorder, [], lambda: robot.now_s)
-    assert calls.status({})["notice"] == "the log's writer has died: nothing is recorded"
+    recorder.health = HEALTHY._replace(alive=False)
+    robot.step()
+    told = OperatorCalls(robot.loop, recorder, [], lambda: robot.now_s).status({})
+    assert told["fault"]["name"] == "recorder_dead" and not told["log"]["writer_alive"]
 
 
 def test_nothing_cancels_a_clear_that_waits_for_the_drives(robot: Lockstep) -> None:

@@ -10,7 +10,6 @@ import pytest
 from control.modes import Mode
 from firmware_host.configuration import Configuration
 from firmware_host.connection import Caller
-from firmware_host.lease import Lease
 from firmware_host.log_rows import EVENT
 from firmware_host.loop import EVENT_KIND
 from firmware_host.operator_calls import OperatorCalls
@@ -43,8 +42,8 @@ class Robot:
     def __init__(self, configuration: Configuration) -> None:
         self.events = Events()
         self.steps = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=self.events)
-        self.lease = Lease()
-        calls = OperatorCalls(self.steps.loop, self.events, [], lambda: self.steps.now_s, self.lease)
+        self.lease = self.steps.loop.lease
+        calls = OperatorCalls(self.steps.loop, self.events, [], lambda: self.steps.now_s)
         self._methods = calls.methods
         self.names = set(self._methods)
 

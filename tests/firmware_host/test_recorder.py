@@ -23,6 +23,8 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
+from firmware_host.log_folder import DONE, first_path, unfinished_files
+from firmware_host.log_parameters import LogParameters
 from firmware_host.log_reader import read_log
 from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK, RowKind
 from firmware_host.recorder import (
@@ -296,6 +298,25 @@ def test_a_disk_that_refuses_costs_rows_that_the_log_counts(tmp_path: Path, capf
     assert log.ticks["stamp_s"].tolist() == [float(number) for number in range(lost, put)]
     assert log.events[0]["text"].endswith("the log could not be written: File too large")
     assert capfd.readouterr().err.count("\n") == 1
+
+
+def test_what_a_killed_writer_left_is_recovered_at_the_next_start(tmp_path: Path) -> None:
+    killed = Recorder(first_path(tmp_path, "1"), CONFIGURATION, {"robot": "test"}, LogParameters())
+    for number in range(500):
+        killed.put(TICK_KIND, make_tick(float(number)))
+    wait_until(lambda: killed.path.exists() and killed.path.stat().st_size > 50_000)
+    os.kill(killed.writer_pid, signal.SIGKILL)
+    assert not killed.close(TIMEOUT_S)
+    recorder = Recorder(first_path(tmp_path, "2"), CONFIGURATION, {"robot": "test"}, LogParameters())
+    recorder.put(TICK_KIND, make_tick(1.0))
+    wait_until((tmp_path / DONE / "1-0000.mcap").exists)
+    assert recorder.close(TIMEOUT_S)
+    assert recorder.path == tmp_path / DONE / "2-0000.mcap"
+    wait_until(lambda: not unfinished_files(tmp_path))
+    recovered = read_log(tmp_path / DONE / "1-0000.mcap")
+    assert recovered.complete and recovered.metadata["recovered"] == "true"
+    assert recovered.ticks["stamp_s"].tolist() == [float(number) for number in range(len(recovered.ticks))]
+    assert len(recovered.ticks) > 100
 
 
 def look(recorder: Recorder) -> LogReport:

@@ -181,6 +181,18 @@ def test_one_user_s_connections_keep_nobody_else_out(served: Served, monkeypatch
     assert served.counters["clients"] == MOST_CLIENTS
 
 
+def test_among_users_with_as_many_the_newcomer_s_own_makes_room(served: Served) -> None:
+    gone: list[Caller] = []
+    served.on_hang_up = gone.append
+    others = [connect(served, READER) for _ in range(MOST_CLIENTS // 2)]  # still for longest
+    own = [connect(served, OPERATOR) for _ in range(MOST_CLIENTS // 2)]
+    serve(served, MOST_CLIENTS)
+    late = connect(served, OPERATOR)
+    serve(served, 2)
+    assert all(map(is_open, others)) and [is_open(client) for client in own] == [False] + [True] * (len(own) - 1)
+    assert is_open(late) and [caller.connection for caller in gone] == [1 + len(others)]  # told of, as any that ends
+
+
 def test_where_every_client_is_another_user_the_least_trusted_goes(served: Served) -> None:
     operator = connect(served, OPERATOR)
     others = [connect(served, Peer(9, 2000 + place, frozenset())) for place in range(MOST_CLIENTS - 1)]

@@ -84,6 +84,7 @@ def test_a_client_that_does_not_fetch_its_answers_is_dropped(served: Served) -> 
         for _ in range(100):
             client.sendall(b"\xc0")
             served.tick()
+    assert served.counters["dropped_slow_clients"] == 1
 
 
 def test_a_slow_client_still_gets_a_long_answer_whole(served: Served) -> None:

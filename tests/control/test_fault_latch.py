@@ -1,0 +1,236 @@
+"""When faults begin, stand and end: single claims, and a model that is told the same and must agree for ever."""
+
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+
+from control.fault_kinds import KINDS, make_fault
+from control.fault_latch import GOOD_TICKS, FaultLatch
+from control.faults import Blocks, Clears, Fault, Reaction
+
+
+def fault_of(name: str, subject: str = "left_sweep") -> Fault:
+    return make_fault(name, subject, KINDS[name].meaning)
+
+
+LATE, STALE, HOT = fault_of("drive_late"), fault_of("current_stale"), fault_of("motor_overheating", "right_sweep")
+QUIET, SILENT, BUG = fault_of("drive_quiet"), fault_of("drive_silent"), fault_of("torque_not_finite", "")
+DISK = fault_of("disk_low", "")
+ALL = [LATE, STALE, HOT, QUIET, SILENT, BUG, DISK, fault_of("drive_silent", "right_sweep")]
+
+
+def ticks_standing(fault: Fault, energised: bool, energised_after: bool, clearing: bool = False) -> int:
+    """After a tick in which it was there; 1000 and more are for ever."""
+    latch = FaultLatch()
+    latch.update([fault], energised)
+    for tick in range(1, 1001):
+        latch.update([], energised_after, clearing)
+        if not latch.standing:
+            return tick
+    return 1001
+
+
+FOR_EVER, A_WHILE = 1001, GOOD_TICKS + 1
+
+
+@pytest.mark.parametrize("fault", [LATE, HOT, QUIET, SILENT, BUG])
+def test_where_torque_was_off_a_fault_ends_with_its_cause(fault: Fault) -> None:
+    assert ticks_standing(fault, False, False) == A_WHILE
+
+
+@pytest.mark.parametrize(
+    ("fault", "energised_after", "expected"),
+    [
+        (LATE, True, A_WHILE),  # a warning
+        (STALE, True, A_WHILE),  # it only holds
+        (HOT, True, FOR_EVER),  # a soft stop goes to its end
+        (QUIET, True, FOR_EVER),
+        (HOT, False, A_WHILE),
+        (QUIET, False, A_WHILE),
+        (SILENT, True, FOR_EVER),
+        (SILENT, False, FOR_EVER),
+        (BUG, True, FOR_EVER),
+        (BUG, False, FOR_EVER),
+    ],
+)
+def test_where_torque_was_on_it_stands_by_its_kind(fault: Fault, energised_after: bool, expected: int) -> None:
+    assert ticks_standing(fault, True, energised_after) == expected
+
+
+@pytest.mark.parametrize(("fault", "expected"), [(HOT, 1), (QUIET, 1), (SILENT, 1), (BUG, FOR_EVER)])
+def test_a_person_clears_all_but_a_bug(fault: Fault, expected: int) -> None:
+    assert ticks_standing(fault, True, False, clearing=True) == expected
+
+
+def test_clearing_does_not_help_while_the_cause_lasts() -> None:
+    latch = FaultLatch()
+    latch.update([SILENT], True)
+    for _ in range(100):
+        latch.update([SILENT], False, clearing=True)
+        assert latch.standing == [SILENT]
+    latch.update([], False, clearing=True)
+    assert not latch.standing
+
+
+def test_what_was_latched_once_stays_so_however_often_it_is_seen_without_torque() -> None:
+    latch = FaultLatch()
+    latch.update([SILENT], True)
+    for _ in range(100):
+        latch.update([SILENT], False)
+    for _ in range(500):
+        latch.update([], False)
+    assert latch.standing == [SILENT]
+
+
+def test_what_was_seen_without_torque_is_latched_once_torque_meets_it() -> None:
+    latch = FaultLatch()
+    latch.update([SILENT], False)
+    latch.update([SILENT], True)
+    for _ in range(500):
+        latch.update([], False)
+    assert latch.standing == [SILENT]
+
+
+def test_a_fault_that_comes_and_goes_is_one_fault() -> None:
+    latch = FaultLatch()
+    begun = over = 0
+    for tick in range(1000):
+        latch.update([LATE] if tick % (GOOD_TICKS + 1) == 0 else [], True)
+        begun, over = begun + len(latch.begun), over + len(latch.over)
+    assert (begun, over) == (1, 0)
+
+
+def test_news_is_told_in_one_tick_only() -> None:
+    latch = FaultLatch()
+    told = []
+    for tick in range(200):
+        latch.update([LATE, HOT] if tick < 3 else [], False)
+        told.append((latch.begun, latch.over))
+    assert told[0] == ([LATE, HOT], [])
+    assert told[2 + A_WHILE] == ([], [LATE, HOT])
+    assert sum(len(begun) + len(over) for begun, over in told) == 4
+
+
+def test_the_sentence_is_that_of_the_last_time_and_the_news_that_of_the_first() -> None:
+    latch = FaultLatch()
+    latch.update([LATE], False)
+    later = LATE._replace(sentence="No position came for 9 ms.")
+    latch.update([later], False)
+    assert (latch.begun, latch.standing) == ([], [later])
+
+
+def test_the_same_fault_of_two_joints_is_two() -> None:
+    latch = FaultLatch()
+    other = fault_of("drive_late", "right_sweep")
+    latch.update([LATE, other], False)
+    assert latch.standing == [LATE, other]
+
+
+def test_the_worst_is_the_hardest_and_of_equals_the_first() -> None:
+    latch = FaultLatch()
+    latch.update([LATE], True)
+    assert latch.worst == LATE
+    latch.update([HOT], True)
+    latch.update([QUIET, SILENT], True)
+    latch.update([fault_of("drive_silent", "right_sweep")], True)
+    assert (latch.worst, latch.reaction) == (SILENT, Reaction.DRIVES_IDLE)
+
+
+def test_without_a_fault_there_is_no_reaction() -> None:
+    latch = FaultLatch()
+    latch.update([], True)
+    assert (latch.worst, latch.reaction, latch.blocking()) == (None, Reaction.NONE, [])
+    latch.update([LATE], False)
+    for _ in range(A_WHILE):
+        latch.update([], False)
+    assert (latch.worst, latch.reaction) == (None, Reaction.NONE)
+
+
+def test_force_overrules_what_may_be_overruled() -> None:
+    latch = FaultLatch()
+    latch.update([LATE, DISK, HOT], False)
+    assert latch.blocking() == [DISK, HOT]
+    assert latch.blocking(forced=True) == [HOT]
+
+
+def test_missed_ticks_count_as_time() -> None:
+    latch = FaultLatch()
+    latch.update([LATE], False)
+    latch.update([], False, ticks=GOOD_TICKS)
+    assert latch.standing == [LATE]
+    latch.update([], False)
+    assert not latch.standing
+
+
+def test_a_reset_forgets_everything_even_a_bug() -> None:
+    latch = FaultLatch()
+    latch.update([BUG], True)
+    latch.reset()
+    latch.update([], True)
+    assert (latch.standing, latch.worst, latch.begun, latch.over) == ([], None, [], [])
+
+
+class Oracle(RuleBasedStateMachine):
+    """Keeps the whole history of each fault and judges it anew every tick, from the words of the page of faults."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.latch = FaultLatch()
+        self.now = 0
+        self.last_seen: dict[Fault, int] = {}  # of those that stand
+        self.met_torque: set[Fault] = set()
+        self.news: dict[Fault, int] = dict.fromkeys(ALL, 0)  # begun less over
+
+    @rule(
+        present=st.lists(st.sampled_from(ALL), unique=True, max_size=4),
+        energised=st.booleans(),
+        clearing=st.booleans(),
+        ticks=st.sampled_from([1, 1, 2, 40]),
+        times=st.sampled_from([1, 1, 30]),
+    )
+    def tick(self, present: list[Fault], energised: bool, clearing: bool, ticks: int, times: int) -> None:
+        for _ in range(times):
+            self.once(present, energised, clearing, ticks)
+
+    def once(self, present: list[Fault], energised: bool, clearing: bool, ticks: int) -> None:
+        self.now += ticks
+        self.latch.update(present, energised, clearing, ticks)
+        begun = [fault for fault in present if fault not in self.last_seen]
+        for fault in present:
+            self.last_seen[fault] = self.now
+            if energised:
+                self.met_torque.add(fault)
+        over = [fault for fault in self.last_seen if fault not in present and self.ends(fault, energised, clearing)]
+        for fault in over:
+            del self.last_seen[fault]
+            self.met_torque.discard(fault)
+        assert sorted(self.latch.begun) == sorted(begun)
+        assert sorted(self.latch.over) == sorted(over)
+        for fault in self.latch.begun:
+            self.news[fault] += 1
+        for fault in self.latch.over:
+            self.news[fault] -= 1
+
+    def ends(self, fault: Fault, energised: bool, clearing: bool) -> bool:
+        gone_for_a_while = self.now - self.last_seen[fault] > 50
+        if fault not in self.met_torque:
+            return gone_for_a_while
+        by_itself = {
+            Clears.WHEN_GONE: gone_for_a_while and not (energised and fault.kind.reaction >= Reaction.SOFT_STOP),
+            Clears.BY_HAND: False,
+            Clears.BY_RESTART: False,
+        }[fault.kind.clears]
+        return by_itself or (clearing and fault.kind.clears is not Clears.BY_RESTART)
+
+    @invariant()
+    def they_agree(self) -> None:
+        standing = set(self.last_seen)
+        assert set(self.latch.standing) == standing
+        assert self.latch.reaction == max((fault.kind.reaction for fault in standing), default=Reaction.NONE)
+        assert set(self.latch.blocking()) == {fault for fault in standing if fault.kind.blocks is not Blocks.NO}
+        assert self.news == {fault: int(fault in standing) for fault in ALL}
+
+
+TestAgainstAModel = Oracle.TestCase
+TestAgainstAModel.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)

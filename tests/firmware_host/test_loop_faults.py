@@ -1,0 +1,561 @@
+"""The whole program when something fails: how soon it reacts, what it does to the joints, and that it stays disarmed.
+
+Robots are walked into each phase once and copied from there, so that every failure meets the same moment.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from control.controller import SOFT_STOP_S, WalkOrder
+from control.fault_kinds import KINDS
+from control.faults import Clears, Reaction
+from control.modes import ENERGISED, HELD, Mode, Request
+from control.records import JOINTS, NO_TORQUE, Phase
+from drivers import odrive_codec as codec
+from drivers.can_port import BusState
+from drivers.mock_bus import MockPort
+from drivers.odrive_codec import AxisState, Message
+from firmware_host.configuration import Configuration
+from firmware_host.log_rows import EVENT
+from firmware_host.loop import EVENT_KIND
+from firmware_host.recorder import NullRecorder
+from firmware_host.ticker import PERIOD_S
+from simulation.clay import MUDS, Clay
+from simulation.disturbances import LAB
+from simulation.lockstep import Lockstep
+from simulation.motion_capture import SimulatedPose
+from simulation.track import Track
+
+WALK = WalkOrder(0.03, adaptive=False)
+MOMENTS = ("holding", "raising", "insertion", "stance", "extraction", "swing", "stopping")
+SHARED = {id(each): each for each in vars(codec).values() if isinstance(each, Message)}  # constants, by identity
+UP_RAD = 0.12
+Cause = Callable[[Lockstep], None]
+Copied = Callable[[str], Lockstep]
+
+
+class EventRecorder(NullRecorder):
+    """Keeps the sentences."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def put(self, kind_index: int, payload: bytes) -> bool:
+        if kind_index == EVENT_KIND:
+            self.texts.append(EVENT.decode(payload)["text"])
+        return True
+
+
+def texts_of(robot: Lockstep) -> list[str]:
+    recorder = robot.loop.recorder
+    assert isinstance(recorder, EventRecorder)
+    return recorder.texts
+
+
+def mode_of(robot: Lockstep) -> Mode:
+    return robot.loop.mode
+
+
+def make_robot(configuration: Configuration, clay: Clay = MUDS["48.5"]) -> Lockstep:
+    return Lockstep(configuration, Track([(5.0, clay)]), recorder=EventRecorder())
+
+
+def copy_of(robot: Lockstep) -> Lockstep:
+    return copy.deepcopy(robot, dict(SHARED))
+
+
+def until_phase(robot: Lockstep, phase: Phase, and_for_s: float) -> None:
+    assert robot.run_until(lambda: robot.loop.target_before.phase is phase, 5.0)
+    robot.run_for(and_for_s)
+
+
+@pytest.fixture(scope="module")
+def moments(configuration: Configuration) -> dict[str, Lockstep]:
+    """One robot in each of them."""
+    robot = make_robot(configuration)
+    robot.run_for(2.0)
+    found = {"idle": copy_of(robot)}
+    robot.arm()
+    robot.run_for(0.6)
+    found["holding"] = copy_of(robot)
+    robot.walk(WALK)
+    robot.run_for(0.1)
+    found["raising"] = copy_of(robot)
+    for phase, and_for_s in ((Phase.INSERTION, 0.1), (Phase.STANCE, 0.1), (Phase.EXTRACTION, 0.02), (Phase.SWING, 0.2)):
+        until_phase(robot, phase, and_for_s)
+        found[phase.name.lower()] = copy_of(robot)
+    until_phase(robot, Phase.STANCE, 0.1)
+    robot.loop.request(Request.STOP, robot.now_s)
+    robot.run_for(0.1)
+    assert mode_of(robot) is Mode.STOPPING
+    return found | {"stopping": robot}
+
+
+@pytest.fixture
+def at(moments: dict[str, Lockstep]) -> Copied:
+    return lambda moment: copy_of(moments[moment])
+
+
+# causes
+
+
+def mute(robot: Lockstep, place: int, *messages: Message) -> None:
+    """A drive sends everything but these; without any it sends nothing."""
+    drive = robot.robot.drives[place]
+    everything, silent = drive.cyclic_frames, {message.command for message in messages}
+    drive.cyclic_frames = lambda now_s: (  # type: ignore[method-assign]
+        frame for frame in everything(now_s) if silent and frame.arbitration_id & 0x1F not in silent
+    )
+
+
+def unmute(robot: Lockstep, place: int) -> None:
+    del robot.robot.drives[place].cyclic_frames
+
+
+def muted(*messages: Message) -> Cause:
+    return lambda robot: mute(robot, 1, *messages)
+
+
+def altered(place: int = 1, /, **changes: float) -> Cause:
+    """What a drive measures, or tells of itself."""
+
+    def alter(robot: Lockstep) -> None:
+        drive = robot.robot.drives[place]
+        drive.parameters = replace(drive.parameters, **changes)  # type: ignore[arg-type]
+
+    return alter
+
+
+def idled(robot: Lockstep) -> None:
+    robot.robot.drives[1].axis_state = AxisState.IDLE
+
+
+def port_of(robot: Lockstep, bus: str = "left") -> MockPort:
+    port = robot.loop.drives.ports[bus]
+    assert isinstance(port, MockPort)
+    return port
+
+
+def bus_off(robot: Lockstep) -> None:
+    port_of(robot).state = BusState.OFF
+
+
+def bus_full(robot: Lockstep) -> None:
+    port_of(robot).full = True
+
+
+CAUSES: dict[str, Cause] = {
+    "drive_late": muted(),
+    "drive_quiet": muted(),
+    "drive_silent": muted(),
+    "position_stale": muted(codec.GET_ENCODER_ESTIMATES),
+    "position_silent": muted(codec.GET_ENCODER_ESTIMATES),
+    "current_stale": muted(codec.GET_IQ),
+    "current_silent": muted(codec.GET_IQ),
+    "heartbeat_silent": muted(codec.HEARTBEAT),
+    "temperature_silent": muted(codec.GET_TEMPERATURE),
+    "drive_error": lambda robot: robot.robot.drives[1]._disarm(codec.ERROR_WATCHDOG),
+    "drive_disarmed": idled,
+    "encoder_jump": altered(encoder_offset_rad=0.4),
+    "joint_position": altered(encoder_offset_rad=2.0),
+    "motor_overheating": altered(temperature_c=85.0),
+    "motor_hot": altered(temperature_c=95.0),
+    "voltage_low": altered(bus_voltage_v=19.0),
+    "voltage_under": altered(bus_voltage_v=17.0),
+    "bus_off": bus_off,
+    "bus_refuses": bus_full,
+}
+AFTER = {
+    Reaction.WARN: HELD,
+    Reaction.HOLD: {Mode.HOLD, Mode.STOPPING},
+    Reaction.SOFT_STOP: {Mode.STOPPING, Mode.DAMPING, Mode.FAULT},
+    Reaction.DAMPING: {Mode.DAMPING, Mode.FAULT},
+    Reaction.DRIVES_IDLE: {Mode.FAULT},
+}
+
+
+def ticks_until(robot: Lockstep, name: str, longest: int) -> int:
+    for tick in range(1, longest + 1):
+        robot.step()
+        if name in {fault.name for fault in robot.loop.faults.begun}:
+            return tick
+    raise AssertionError(f"no {name} in {longest} ticks, but {robot.loop.faults.standing}")
+
+
+@pytest.mark.parametrize("name", CAUSES)
+def test_every_cause_is_met_by_its_reaction_within_its_ticks(at: Copied, name: str) -> None:
+    for moment in ("holding", "stance", "stopping"):
+        robot, kind = at(moment), KINDS[name]
+        CAUSES[name](robot)
+        ticks_until(robot, name, kind.bound_ticks)
+        assert mode_of(robot) in AFTER[kind.reaction], moment
+        if kind.reaction is Reaction.DRIVES_IDLE:
+            assert robot.loop.sent.torques_nm == NO_TORQUE
+
+
+def test_a_drive_that_starts_anew_is_told_within_its_ticks_and_needs_a_clear(at: Copied) -> None:
+    robot = at("stance")
+    robot.robot.drives[1].restart(robot.now_s)
+    ticks_until(robot, "drive_restarted", KINDS["drive_restarted"].bound_ticks)
+    robot.run_for(2.0)
+    assert mode_of(robot) is Mode.FAULT
+    assert [fault.name for fault in robot.loop.faults.standing if fault.kind.clears is Clears.BY_HAND] == [
+        "drive_silent"
+    ]
+    assert robot.loop.request(Request.CLEAR, robot.now_s) is None
+    assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.6)
+    robot.run_for(1.5)  # in which version and watchdog are read anew
+    assert robot.loop.request(Request.ARM, robot.now_s) is None
+
+
+def test_a_drive_that_somebody_else_arms_is_told_within_its_ticks(at: Copied) -> None:
+    robot = at("idle")
+    drive = robot.robot.drives[1]
+    drive.receive = lambda frame, now_s: []  # type: ignore[method-assign]
+    altered(watchdog_s=0.0)(robot)
+    drive.axis_state = AxisState.CLOSED_LOOP
+    ticks_until(robot, "drive_energised", KINDS["drive_energised"].bound_ticks)
+    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
+
+
+def test_a_place_that_is_lost_is_told_within_its_ticks_and_the_walk_goes_on(at: Copied) -> None:
+    robot = at("stance")
+    pose = robot.loop.pose
+    assert isinstance(pose, SimulatedPose)
+    pose._capture.step = lambda now_s, plant: iter(())  # type: ignore[method-assign]
+    ticks_until(robot, "pose_lost", KINDS["pose_lost"].bound_ticks)
+    robot.run_for(0.5)
+    assert mode_of(robot) is Mode.WALKING
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+@pytest.mark.parametrize("joint", [0, 3])
+def test_a_drive_that_falls_silent_leads_to_damping_and_then_to_idle_drives(
+    at: Copied, moment: str, joint: int
+) -> None:
+    robot = at(moment)
+    mute(robot, joint)
+    ticks: dict[Mode, int] = {}
+    for tick in range(1, 20):
+        robot.step()
+        ticks.setdefault(mode_of(robot), tick)
+    assert ticks[Mode.DAMPING] <= KINDS["drive_quiet"].bound_ticks
+    assert ticks[Mode.DAMPING] < ticks[Mode.FAULT] <= KINDS["drive_silent"].bound_ticks
+    assert robot.loop.sent.torques_nm == NO_TORQUE
+    assert all(drive.axis_state is AxisState.IDLE for drive in robot.robot.drives)
+    assert JOINTS[joint] in robot.loop.notice and "stopped by drive_silent" in robot.loop.notice
+
+
+def test_a_drive_that_falls_silent_while_arming_ends_it_without_torque(at: Copied) -> None:
+    robot = at("idle")
+    assert robot.loop.request(Request.ARM, robot.now_s) is None
+    robot.step()
+    assert mode_of(robot) is Mode.ARMING
+    mute(robot, 2)
+    for _ in range(KINDS["drive_silent"].bound_ticks):
+        robot.step()
+        assert robot.loop.sent.torques_nm == NO_TORQUE
+    assert mode_of(robot) is Mode.FAULT
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_damping_never_speeds_a_joint_up(at: Copied, moment: str) -> None:
+    """From the third tick on, which the slew limit takes to let go of the torque before."""
+    robot = at(moment)
+    mute(robot, 1, codec.GET_ENCODER_ESTIMATES)
+    ticks = 0
+    while mode_of(robot) is not Mode.FAULT:
+        robot.step()
+        ticks += mode_of(robot) is Mode.DAMPING
+        if mode_of(robot) is Mode.DAMPING and ticks == 3:
+            unmute(robot, 1)  # as a plug that slips in again
+        if mode_of(robot) is Mode.DAMPING and ticks > 3:
+            for torque_nm, state in zip(robot.loop.sent.torques_nm, robot.loop.states, strict=True):
+                assert torque_nm * state.velocity_rad_s <= 0.0
+                assert abs(torque_nm) <= 0.4
+        assert ticks * PERIOD_S < 3.1
+    assert ticks > 100
+    assert robot.loop.fault is not None and robot.loop.fault.name == "position_stale"
+
+
+def test_a_joint_whose_encoder_jumped_gets_no_torque_until_the_drives_are_idle(at: Copied) -> None:
+    robot = at("stance")
+    altered(0, encoder_offset_rad=-0.4)(robot)
+    ticks_until(robot, "encoder_jump", KINDS["encoder_jump"].bound_ticks)
+    assert mode_of(robot) is Mode.DAMPING
+    robot.run_for(3 * PERIOD_S)
+    torques = []
+    while mode_of(robot) is Mode.DAMPING:
+        torques.append(robot.loop.sent.torques_nm)
+        robot.step()
+    assert len(torques) > 50
+    assert {each[0] for each in torques} == {0.0}
+    assert any(each[2] for each in torques)  # the other joints are braked
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_after_a_soft_stop_the_flippers_are_up_and_the_drives_idle(at: Copied, moment: str) -> None:
+    robot = at(moment)
+    altered(bus_voltage_v=17.0)(robot)
+    ticks_until(robot, "voltage_under", KINDS["voltage_under"].bound_ticks)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, SOFT_STOP_S + 0.2)
+    assert all(abs(robot.robot.plant.angles_rad[joint]) < UP_RAD for joint in (1, 3))
+    robot.step()
+    assert all(drive.axis_state is AxisState.IDLE for drive in robot.robot.drives)
+
+
+def test_a_soft_stop_in_mud_that_keeps_the_flippers_ends_in_time_as_well(at: Copied) -> None:
+    robot = at("stance")
+    for arm in robot.robot.plant.arms:
+        arm.track = Track([(5.0, Clay("40 kPa", 40e3))])
+    altered(bus_voltage_v=17.0)(robot)
+    ticks_until(robot, "voltage_under", KINDS["voltage_under"].bound_ticks)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, SOFT_STOP_S + 0.2)
+    assert robot.robot.plant.angles_rad[1] < -UP_RAD
+
+
+def test_a_worse_fault_in_a_soft_stop_is_heeded_at_once(at: Copied) -> None:
+    robot = at("stance")
+    altered(bus_voltage_v=17.0)(robot)
+    robot.run_for(0.2)
+    assert mode_of(robot) is Mode.STOPPING
+    mute(robot, 0)
+    robot.run_for(KINDS["drive_silent"].bound_ticks * PERIOD_S)
+    assert mode_of(robot) is Mode.FAULT
+
+
+def test_a_fault_that_ends_with_its_cause_ends_by_itself_but_nobody_arms(at: Copied) -> None:
+    robot = at("holding")
+    altered(bus_voltage_v=17.0)(robot)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, 4.0)
+    robot.run_for(0.5)
+    assert mode_of(robot) is Mode.FAULT  # the cause lasts
+    altered(bus_voltage_v=24.0)(robot)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.5)
+    for _ in range(500):
+        robot.step()
+        assert mode_of(robot) is Mode.IDLE
+        assert not any(drive.axis_state is AxisState.CLOSED_LOOP for drive in robot.robot.drives)
+    assert robot.loop.fault is None
+    assert "stopped by voltage_under" in robot.loop.notice  # still told
+    assert robot.loop.request(Request.ARM, robot.now_s) is None
+
+
+@pytest.mark.parametrize("name", ["drive_silent", "encoder_jump", "drive_disarmed"])
+def test_what_a_person_must_clear_stands_until_then_and_against_force(at: Copied, name: str) -> None:
+    robot = at("stance")
+    usual = robot.robot.drives[1].parameters
+    CAUSES[name](robot)
+    assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, 4.0)
+    robot.robot.drives[1].parameters = usual
+    robot.robot.drives[1].__dict__.pop("cyclic_frames", None)
+    robot.run_for(1.0)
+    assert mode_of(robot) is Mode.FAULT
+    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
+    assert robot.loop.request(Request.CLEAR, robot.now_s) is None
+    assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.6)
+    robot.run_for(0.5)
+    assert mode_of(robot) is Mode.IDLE and not robot.loop.faults.standing
+    assert sum(text.startswith(f"fault {name} ") for text in texts_of(robot)) == 1
+
+
+def test_a_clear_does_not_reach_into_the_time_after_it(at: Copied) -> None:
+    robot = at("idle")
+    assert robot.loop.request(Request.CLEAR, robot.now_s) is None
+    robot.step()
+    cleared_s = robot.now_s
+    assert robot.loop.request(Request.ARM, robot.now_s) is None
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 0.3)
+    CAUSES["encoder_jump"](robot)
+    ticks_until(robot, "encoder_jump", 5)
+    assert robot.now_s - cleared_s < 0.4
+    assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, 4.0)
+    robot.run_for(1.0)
+    assert mode_of(robot) is Mode.FAULT
+
+
+def test_a_bug_stands_until_a_restart(at: Copied) -> None:
+    robot = at("holding")
+    gains = robot.loop.controller.gains
+    robot.loop.controller.gains = replace(gains, sweep_stiffness_nm_rad=float("nan"))
+    robot.run_for(0.02)
+    robot.loop.controller.gains = gains
+    assert mode_of(robot) is Mode.FAULT
+    for _ in range(3):
+        robot.loop.request(Request.CLEAR, robot.now_s)
+        robot.run_for(0.6)
+    assert mode_of(robot) is Mode.FAULT
+    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
+
+
+# force
+
+
+@pytest.fixture
+def unread(configuration: Configuration) -> Lockstep:
+    """A robot with a drive whose watchdog nobody could read."""
+    robot = make_robot(configuration)
+    robot.robot.drives[2]._read_parameter = lambda data: []  # type: ignore[method-assign]
+    robot.run_for(1.5)
+    assert {fault.name for fault in robot.loop.faults.blocking()} == {"watchdog_unknown"}
+    return robot
+
+
+def test_force_is_logged_with_all_that_it_overrules(unread: Lockstep) -> None:
+    refused = unread.loop.request(Request.ARM, unread.now_s)
+    assert refused is not None and "right_sweep" in refused
+    assert unread.loop.request(Request.ARM, unread.now_s, forced=True) is None
+    assert unread.run_until(lambda: mode_of(unread) is Mode.HOLD, 1.0)
+    assert unread.loop.forced
+    overruled = [text for text in texts_of(unread) if text.startswith("armed by force despite ")]
+    assert len(overruled) == 1 and "watchdog_unknown" in overruled[0] and "right_sweep" in overruled[0]
+    assert "request arm by force" in texts_of(unread)
+
+
+def test_force_ends_with_the_torque(unread: Lockstep) -> None:
+    assert unread.loop.request(Request.ARM, unread.now_s, forced=True) is None
+    assert unread.run_until(lambda: mode_of(unread) is Mode.HOLD, 1.0)
+    unread.loop.request(Request.DISARM, unread.now_s)
+    unread.step()
+    assert not unread.loop.forced
+    assert unread.loop.request(Request.ARM, unread.now_s) is not None
+
+
+def test_force_that_came_to_nothing_leaves_nothing_behind(unread: Lockstep) -> None:
+    assert unread.loop.request(Request.ARM, unread.now_s, forced=True) is None
+    unread.loop.request(Request.DISARM, unread.now_s)
+    unread.step()
+    assert mode_of(unread) is Mode.IDLE
+    assert unread.loop.request(Request.ARM, unread.now_s) is not None
+    unread.run_for(0.1)
+    assert mode_of(unread) is Mode.IDLE
+
+
+def test_force_where_nothing_is_to_be_overruled_is_none(at: Copied) -> None:
+    robot = at("idle")
+    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is None
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
+    assert not robot.loop.forced
+    assert not any("despite" in text for text in texts_of(robot))
+
+
+@pytest.mark.parametrize("name", ["drive_silent", "voltage_under", "motor_hot", "current_stale", "joint_position"])
+def test_what_is_mandatory_is_never_overruled(at: Copied, name: str) -> None:
+    robot = at("idle")
+    CAUSES[name](robot)
+    ticks_until(robot, name, KINDS[name].bound_ticks)
+    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
+    robot.run_for(0.1)
+    assert mode_of(robot) is Mode.IDLE
+    assert not any("despite" in text for text in texts_of(robot))
+
+
+# faults that hold, and warnings
+
+
+def hold_by_a_fault(robot: Lockstep) -> None:
+    """The currents of one drive are lost for five ticks, more than it takes, less than what stops."""
+    mute(robot, 1, codec.GET_IQ)
+    ticks_until(robot, "current_stale", KINDS["current_stale"].bound_ticks)
+    unmute(robot, 1)
+
+
+def test_a_stop_during_a_fault_that_holds_lifts_the_flippers(at: Copied) -> None:
+    robot = at("stance")
+    hold_by_a_fault(robot)
+    assert mode_of(robot) is Mode.HOLD
+    assert robot.loop.faults.reaction is Reaction.HOLD
+    assert robot.robot.plant.angles_rad[1] < -UP_RAD
+    assert robot.loop.request(Request.STOP, robot.now_s) is None
+    robot.step()
+    assert mode_of(robot) is Mode.STOPPING
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, SOFT_STOP_S)
+    assert all(abs(robot.robot.plant.angles_rad[joint]) < UP_RAD for joint in (1, 3))
+
+
+def test_a_fault_that_holds_is_over_by_itself_and_then_the_robot_walks_again_when_told(at: Copied) -> None:
+    robot = at("stance")
+    hold_by_a_fault(robot)
+    assert robot.loop.request(Request.WALK, robot.now_s, WALK) is not None
+    robot.run_for(0.2)
+    assert (mode_of(robot), robot.loop.faults.standing) == (Mode.HOLD, [])
+    assert robot.loop.request(Request.WALK, robot.now_s, WALK) is None
+    robot.step()
+    assert mode_of(robot) is Mode.WALKING
+
+
+def test_warnings_change_no_torque(at: Copied) -> None:
+    well, warned = at("insertion"), at("insertion")
+    altered(bus_voltage_v=19.0)(warned)
+    port_of(warned).state = BusState.WARNING
+    clock = warned.loop._wall_clock
+    warned.loop._wall_clock = lambda: clock() + (3600.0 if warned.tick_number % 100 < 50 else 0.0)
+    for _ in range(500):
+        well.step()
+        warned.step()
+        assert warned.loop.sent == well.loop.sent
+    assert mode_of(warned) is Mode.WALKING
+    assert {"voltage_low", "bus_warning", "clock_step"} <= {fault.name for fault in warned.loop.faults.standing}
+
+
+def test_a_robot_that_nobody_needs_lets_go_by_itself(configuration: Configuration) -> None:
+    motion = replace(configuration.motion, longest_hold_s=1.0)
+    robot = make_robot(replace(configuration, motion=motion))
+    robot.arm()
+    robot.run_for(0.9)
+    assert mode_of(robot) is Mode.HOLD
+    robot.run_for(0.2)
+    assert mode_of(robot) is Mode.IDLE
+    assert not any(drive.axis_state is AxisState.CLOSED_LOOP for drive in robot.robot.drives)
+
+
+# no false alarms
+
+
+def faults_told(robot: Lockstep) -> list[str]:
+    """Since it was ready to be armed."""
+    texts = texts_of(robot)
+    return [text for text in texts[texts.index("request arm") :] if text.startswith("fault ")]
+
+
+@pytest.mark.parametrize("mud", MUDS)
+def test_a_walk_is_no_fault(configuration: Configuration, mud: str) -> None:
+    robot = make_robot(configuration, MUDS[mud])
+    robot.arm()
+    robot.walk(WalkOrder(0.05, False, 1))
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 12.0)
+    assert faults_told(robot) == []
+
+
+def test_a_recovery_in_the_stiffest_clay_is_no_fault(configuration: Configuration) -> None:
+    robot = make_robot(configuration, Clay("9 kPa", 9000.0))
+    robot.arm()
+    robot.walk(WalkOrder(0.03, False, 1))
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 20.0)
+    assert any("attempt" in text for text in texts_of(robot))
+    assert faults_told(robot) == []
+
+
+def test_a_walk_with_a_labs_disturbances_is_no_fault(configuration: Configuration) -> None:
+    robot = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=EventRecorder(), disturbances=LAB)
+    robot.arm()
+    robot.walk(WalkOrder(0.03, True, 2))
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 15.0)
+    assert faults_told(robot) == []
+
+
+def test_disarm_is_obeyed_in_every_moment_of_a_fault(at: Copied) -> None:
+    for name in ("voltage_under", "bus_refuses", "current_stale"):
+        robot = at("stance")
+        CAUSES[name](robot)
+        ticks_until(robot, name, KINDS[name].bound_ticks)
+        assert mode_of(robot) in ENERGISED
+        assert robot.loop.request(Request.DISARM, robot.now_s) is None
+        robot.step()
+        assert mode_of(robot) in (Mode.IDLE, Mode.FAULT)
+        assert robot.loop.sent.torques_nm == NO_TORQUE

@@ -1,0 +1,189 @@
+"""What the loop learns of strides that somebody else estimated: numbers, depths, and nonsense."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import inf, nan
+from typing import Any
+
+import pytest
+
+from control.controller import WalkOrder
+from control.gait import GaitParameters
+from control.records import NO_LOAD, Estimate, GaitTarget, Phase, StrideEstimate
+from estimation.mud import MudReading
+from firmware_host.configuration import Configuration
+from firmware_host.mud_learning import FIRM_TICKS, KEPT_STRIDES, LARGEST_N_M3, MudLearning
+
+GOOD = Estimate(2e6, 1e5, 100, True)
+
+
+def stride(flipper: str = "left", index: int = 0, **changes: Any) -> StrideEstimate:
+    values: dict[str, Any] = {
+        "k_p": GOOD, "k_s": GOOD, "k_e": GOOD, "surface_m": 0.0, "depth_m": 0.03, "released": True,
+        "insertion_force_n": 2.0, "stance_force_n": 1.0, "extraction_force_n": -1.0, "step_m": 0.05,
+    }  # fmt: skip
+    return StrideEstimate(flipper, index, 0.0, 2.0, 0.5, 0.5, 0.2, **(values | changes))
+
+
+@dataclass
+class MadeUpGait:
+    """As much of a gait as learning touches."""
+
+    commanded_depth_m: float = 0.03
+    next_depth_m: float = 0.03
+    parameters: GaitParameters = GaitParameters()
+    next_parameters: GaitParameters = GaitParameters()
+    ended: int = 0
+
+    def end_insertion(self) -> bool:
+        self.ended += 1
+        return self.ended == 1
+
+
+@dataclass
+class MadeUpController:
+    order: WalkOrder
+    gait: MadeUpGait = field(default_factory=MadeUpGait)
+    target: GaitTarget = GaitTarget(Phase.INSERTION, 0, 0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture
+def learning(configuration: Configuration) -> MudLearning:
+    made = MudLearning(configuration)
+    made.reset(0.03)
+    return made
+
+
+def step(learning: MudLearning, controller: MadeUpController) -> tuple[list[Any], list[str]]:
+    closed, sentences = learning.step(controller)  # type: ignore[arg-type]
+    return list(closed), sentences
+
+
+def test_strides_of_both_flippers_are_numbered_through(learning: MudLearning) -> None:
+    controller = MadeUpController(WalkOrder(0.04, adaptive=False))
+    numbers = []
+    for index in range(3):
+        learning.reading = MudReading(strides=(stride("left", index), stride("right", index)))
+        closed, _ = step(learning, controller)
+        numbers += [(each.number, each.estimate.flipper, each.chosen_depth_m) for each in closed]
+    assert numbers == [(number, ("left", "right")[number % 2], 0.04) for number in range(6)]
+    assert learning.strides_closed == 6
+
+
+def test_a_fixed_depth_is_what_was_ordered_whatever_the_mud_tells(learning: MudLearning) -> None:
+    controller = MadeUpController(WalkOrder(0.045, adaptive=False))
+    learning.reading = MudReading(strides=(stride(k_p=Estimate(1e9, 1.0, 100, True)),))
+    step(learning, controller)
+    assert controller.gait.next_depth_m == 0.045
+
+
+def test_without_a_stride_nothing_is_learned_or_said(learning: MudLearning) -> None:
+    controller = MadeUpController(WalkOrder(0.03))
+    assert step(learning, controller) == ([], [])
+    assert learning.faults == []
+
+
+def test_only_strides_of_late_are_kept_but_all_are_counted(learning: MudLearning) -> None:
+    controller = MadeUpController(WalkOrder(0.03, adaptive=False))
+    for index in range(KEPT_STRIDES + 50):
+        learning.reading = MudReading(strides=(stride("left", index),))
+        step(learning, controller)
+    assert len(learning.strides) == KEPT_STRIDES
+    assert learning.strides_closed == KEPT_STRIDES + 50
+    assert learning.strides[-1].number == KEPT_STRIDES + 49
+
+
+def test_a_new_walk_keeps_the_strides_before_it(learning: MudLearning) -> None:
+    learning.reading = MudReading(strides=(stride(),))
+    step(learning, MadeUpController(WalkOrder(0.03, adaptive=False)))
+    learning.reset(0.03)
+    assert len(learning.strides) == learning.strides_closed == 1
+
+
+# firm mud
+
+
+def firm_ticks(learning: MudLearning, order: WalkOrder, phase: Phase, loads: list[bool]) -> list[bool]:
+    """In which ticks the gait was told to end its insertion."""
+    target = GaitTarget(phase, 0, 0.0, 0.0, 0.02, 0.1)
+    controller = MadeUpController(order, target=target)
+    limit_nm = learning.adaptation.largest_insertion_nm
+    told = []
+    for firm in loads:
+        load = NO_LOAD._replace(adduction_torque_nm=limit_nm + 0.01 if firm else limit_nm)
+        learning.reading = MudReading(left=NO_LOAD, right=load)
+        before = controller.gait.ended
+        step(learning, controller)
+        told.append(controller.gait.ended > before)
+    return told
+
+
+def test_an_insertion_ends_at_a_load_that_stays_and_not_at_one_odd_sample(learning: MudLearning) -> None:
+    adaptive = WalkOrder(0.03, adaptive=True)
+    assert firm_ticks(learning, adaptive, Phase.INSERTION, [True] * 4) == [False] * (FIRM_TICKS - 1) + [True, True]
+    learning.reset(0.03)
+    assert not any(firm_ticks(learning, adaptive, Phase.INSERTION, [True, True, False] * 5))
+
+
+@pytest.mark.parametrize(
+    ("adaptive", "phase"), [(False, Phase.INSERTION), (True, Phase.STANCE), (True, Phase.EXTRACTION)]
+)
+def test_only_an_insertion_whose_depth_is_chosen_is_ended(learning: MudLearning, adaptive: bool, phase: Phase) -> None:
+    assert not any(firm_ticks(learning, WalkOrder(0.03, adaptive=adaptive), phase, [True] * 10))
+
+
+def test_the_end_of_an_insertion_is_told_once(learning: MudLearning) -> None:
+    controller = MadeUpController(WalkOrder(0.03))
+    load = NO_LOAD._replace(adduction_torque_nm=10.0)
+    learning.reading = MudReading(left=load, right=load)
+    told = [sentence for _ in range(10) for sentence in step(learning, controller)[1]]
+    assert told == ["insertion ended at 0.0300 m: firm mud"]
+
+
+# nonsense
+
+
+@pytest.mark.parametrize("name", ["k_p", "k_s", "k_e"])
+@pytest.mark.parametrize("value", [nan, inf, -inf, LARGEST_N_M3, -1.01 * LARGEST_N_M3])
+def test_a_coefficient_that_no_mud_has_is_told(learning: MudLearning, name: str, value: float) -> None:
+    learning.reading = MudReading(strides=(stride("right", 7, **{name: Estimate(value, 1e5, 100, True)}),))
+    (fault,) = learning.faults
+    assert (fault.name, fault.subject) == ("estimate_wild", "right")
+    assert fault.sentence == "The right flipper's stride 7 tells nonsense."
+
+
+@pytest.mark.parametrize("std_error", [nan, inf, LARGEST_N_M3])
+def test_a_doubt_that_is_no_number_is_told_as_well(learning: MudLearning, std_error: float) -> None:
+    learning.reading = MudReading(strides=(stride(k_s=Estimate(2e6, std_error, 100, True)),))
+    assert [fault.name for fault in learning.faults] == ["estimate_wild"]
+
+
+@pytest.mark.parametrize(
+    "estimate",
+    [
+        GOOD,
+        Estimate(0.99 * LARGEST_N_M3, 1e5, 100, True),
+        Estimate(nan, nan, 0, False, "no samples"),  # it says itself that it is not valid
+        Estimate(-1e4, 1e5, 100, True),  # within its doubt of none
+    ],
+)
+def test_what_is_within_bounds_or_not_valid_is_no_nonsense(learning: MudLearning, estimate: Estimate) -> None:
+    learning.reading = MudReading(strides=(stride(k_e=estimate),))
+    assert learning.faults == []
+
+
+def test_nonsense_never_leads_out_of_the_depths_that_may_be_chosen(
+    learning: MudLearning, configuration: Configuration
+) -> None:
+    """What is known of the mud does not believe it; a depth is chosen all the same."""
+    controller = MadeUpController(WalkOrder(0.03))
+    estimator = learning.estimator
+    for index, value in enumerate((nan, inf, -inf, 1e300, -1e300, 0.0)):
+        wild = Estimate(value, abs(value), 100, True)
+        strides = (stride("left", index, k_p=wild, k_s=wild, k_e=wild),)
+        estimator.belief = estimator._knowledge.update(strides)
+        learning.reading = MudReading(strides=strides)
+        step(learning, controller)
+        bounds = configuration.adaptation
+        assert bounds.min_depth_m <= controller.gait.next_depth_m <= bounds.max_depth_m
