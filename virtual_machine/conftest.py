@@ -25,7 +25,7 @@ def machine() -> Iterator[Machine]:
 def booted(machine: Machine) -> Robot:
     """As it is after the boot, without anybody's help."""
     robot = Robot(machine)
-    robot.wait_until_answers()
+    robot.wait_until_ready()
     return robot
 
 

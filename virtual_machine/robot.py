@@ -16,6 +16,7 @@ if [ -e good.toml ]; then mv good.toml mudskipper.toml; fi
 for bus in vcan0 vcan1; do
     ip link show $bus >/dev/null 2>&1 || ip link add $bus type vcan
     ip link set $bus up
+    cansend $bus 20000100#0000000000000000
 done
 systemctl reset-failed
 systemctl start simulated-robot mudskipper
@@ -63,8 +64,9 @@ class Robot:
         """Until a shell command succeeds."""
         self.shell(f"until {condition}; do sleep 0.1; done", longest_s)
 
-    def wait_until_answers(self) -> None:
-        self.wait_for('systemctl is-active --quiet mudskipper && mudskipper status --json | grep -q \'"mode": "idle"\'')
+    def wait_until_ready(self) -> None:
+        """To be armed."""
+        self.wait_for("mudskipper check >/dev/null")
 
     def walk(self) -> None:
         """From idle; returns in the first stride."""
@@ -74,7 +76,7 @@ class Robot:
     def rest(self) -> None:
         """From whatever a check has left behind: idle, without faults, as after a start."""
         self.shell(REST)
-        self.wait_until_answers()
+        self.wait_until_ready()
 
     def torque_is_off(self) -> bool:
         return not any(drive["closed_loop"] for drive in self.status()["drives"])

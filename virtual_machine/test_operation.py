@@ -20,12 +20,11 @@ def test_an_operator_arms_walks_stops_and_disarms(robot: Robot) -> None:
     assert robot.torque_is_off()
 
 
-@pytest.mark.parametrize("words", ["arm", "walk", "status", "check", "clear"])
-def test_a_stranger_is_refused(robot: Robot, words: str) -> None:
-    answer = robot.operate(words, user=STRANGER)
-    assert answer.status == exit_codes.NOT_PERMITTED if words != "check" else answer.status != exit_codes.OK
-    assert "group mudskipper" in answer.errors + answer.output
-    assert robot.status()["mode"] == "idle"
+@pytest.mark.parametrize("words", ["arm", "walk", "status", "clear"])
+def test_a_stranger_is_refused(booted: Robot, words: str) -> None:
+    answer = booted.operate(words, user=STRANGER)
+    assert answer.status == exit_codes.NOT_PERMITTED
+    assert "group mudskipper" in answer.errors
 
 
 def test_a_stranger_may_stop_a_walk(walking: Robot) -> None:

@@ -29,7 +29,7 @@ def cut_s(booted: Robot) -> float:
     when_s = uptime_s(booted)
     booted.machine.cut_power()
     booted.machine.boot()
-    booted.wait_until_answers()
+    booted.wait_until_ready()
     return when_s
 
 
