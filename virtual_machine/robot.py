@@ -62,7 +62,10 @@ class Robot:
 
     def wait_for(self, condition: str, longest_s: float = 20.0) -> None:
         """Until a shell command succeeds."""
-        self.shell(f"until {condition}; do sleep 0.1; done", longest_s)
+        self.shell(f"until {condition}; do sleep 0.5; done", longest_s)
+
+    def wait_until_answers(self) -> None:
+        self.wait_for("mudskipper status --json | grep -q closed_loop")
 
     def wait_until_ready(self) -> None:
         """To be armed."""

@@ -14,7 +14,7 @@ def test_a_killed_daemon_is_started_again_and_is_disarmed(walking: Robot) -> Non
     process, before = walking.unit("MainPID"), restarts(walking)
     walking.shell(f"kill -KILL {process}")
     walking.wait_for(f"test $(systemctl show --value --property=NRestarts mudskipper) -gt {before}")
-    walking.wait_until_ready()
+    walking.wait_until_answers()
     assert walking.unit("MainPID") != process
     assert restarts(walking) == before + 1
     assert walking.torque_is_off()
@@ -24,7 +24,7 @@ def test_a_daemon_that_hangs_is_ended_by_the_watchdog_and_started_again_disarmed
     process, before = walking.unit("MainPID"), restarts(walking)
     walking.shell(f"kill -STOP {process}")
     walking.wait_for(f"test $(systemctl show --value --property=NRestarts mudskipper) -gt {before}")
-    walking.wait_until_ready()
+    walking.wait_until_answers()
     assert walking.unit("MainPID") != process
     assert "Watchdog timeout (limit 2s)!" in walking.journal()
     assert walking.torque_is_off()
