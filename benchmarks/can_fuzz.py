@@ -142,7 +142,8 @@ def fuzz_drives(configuration: Configuration, frames: int, fuzzing: Fuzzing, pro
     """The drives alone."""
     buses = {name: MockBus() for name in configuration.bus}
     far = {name: bus.open() for name, bus in buses.items()}
-    drives = OdriveDrives(configuration.drive, {name: bus.open() for name, bus in buses.items()}, configuration.limits)
+    wires = {name: bus.open() for name, bus in buses.items()}
+    drives = OdriveDrives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
     source = iter(FrameSource(node_ids(configuration), seed))
     for number in range(frames // FRAMES_PER_TICK):
         feed(source, far, fuzzing)

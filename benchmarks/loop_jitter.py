@@ -104,7 +104,9 @@ class DaemonLoop:
     """The daemon's parts and its loop's body; what it opens is closed with `stack`."""
 
     def __init__(self, configuration: Configuration, folder: Path, stack: ExitStack) -> None:
-        drives = OdriveDrives(configuration.drive, open_ports(configuration.bus), configuration.limits)
+        drives = OdriveDrives(
+            configuration.drive, open_ports(configuration.bus), configuration.limits, configuration.watchdog_endpoints
+        )
         stack.callback(drives.close)
         pose = PosePort(Path(configuration.pose.socket))
         stack.callback(pose.close)

@@ -203,7 +203,7 @@ class TimedWalk:
             {joint: configuration.drive[joint].bus for joint in JOINTS},
             wiring.robot,
         )
-        drives = OdriveDrives(configuration.drive, wiring.loop, configuration.limits)
+        drives = OdriveDrives(configuration.drive, wiring.loop, configuration.limits, configuration.watchdog_endpoints)
         pose, clock = self.walk.loop.pose, lambda: self.walk.now_s
         self.walk.loop = Loop(configuration, drives, pose, recorder, clock)
         self.recorder = recorder

@@ -11,10 +11,11 @@ from math import degrees, isfinite, radians
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
+from control.encoder_watch import EncoderWatch
 from control.fault_kinds import make_fault
 from control.faults import Fault
 from control.limits import JointLimits, JointRange
-from control.records import NEVER_S, UNKNOWN, DriveState
+from control.records import UNKNOWN, DriveState
 from control.winding import Winding, WindingParameters
 
 HEARTBEAT_SILENCE_S = 0.5  # drives send one every 100 ms: five in a row are missing
@@ -28,9 +29,6 @@ STILL_RAD_S = 0.1
 SATURATED_SHARE = 0.95  # of the torque limit
 STALLED_S = 2.0  # longer than an insertion, a stance or an extraction of the paper's gait takes
 JUMP_SHARE = 2.0  # of the velocity limit
-GONE_RAD = 0.03  # by a joint's own speed, while its angle stayed the same to the last bit
-GONE_S = 0.02  # drives tell an old value once more, now and then
-FROZEN_S = 0.5  # at full torque, by which not even the last bit of angle and speed changes
 MISSING_SHARE = 0.3  # of the torque limit, by which the current differs from the torque that was sent
 MISSING_S = 0.1
 TWO_MESSAGES_S = 0.15  # of those that come every 0.1 s: a single odd one proves nothing
@@ -83,7 +81,7 @@ class JointWatch:
         self._low_rad = span.min_rad - radians(limits.position_margin_deg)
         self._high_rad = span.max_rad + radians(limits.position_margin_deg)
         self._fast_rad_s = FAST_SHARE * limits.velocity_rad_s
-        self._jump_rad_s = JUMP_SHARE * limits.velocity_rad_s
+        self._encoder = EncoderWatch(bounds.jump_rad, JUMP_SHARE * limits.velocity_rad_s)
         self._most_a = CURRENT_SHARE * current_limit_a
         self._constant_nm_a = torque_constant_nm_a
         self._missing_nm = MISSING_SHARE * limits.torque_nm
@@ -95,8 +93,8 @@ class JointWatch:
         """But not the winding: it stays as warm as it is."""
         self._current_ticks = 0
         self._fast_s = self._stalled_s = self._energised_s = self._missing_s = 0.0
-        self._low_s = self._under_s = self._hot_s = self._frozen_s = self._gone_s = self._gone_rad = 0.0
-        self._angle_rad, self._velocity_rad_s, self._angle_stamp_s = UNKNOWN, UNKNOWN, NEVER_S
+        self._low_s = self._under_s = self._hot_s = 0.0
+        self._encoder.reset()
 
     def update(self, facts: JointFacts, state: DriveState) -> list[Fault]:
         found: list[Fault] = []
@@ -182,42 +180,15 @@ class JointWatch:
         if velocity_rad_s > MOVING_RAD_S and not facts.energised:
             text = f"The {self.joint} joint moves at {velocity_rad_s:.1f} rad/s."
             found.append(self._fault("joint_moving", text))
-        if state.angle_stamp_s != self._angle_stamp_s:
-            self._watch_encoder(found, facts, state)
-
-    def _watch_encoder(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
-        """From one message to the next."""
-        if state.angle_rad == self._angle_rad:
-            self._watch_frozen(found, facts, state)
-        else:
-            self._watch_jump(found, facts, state)
-            self._frozen_s = self._gone_s = self._gone_rad = 0.0
-        self._angle_rad, self._velocity_rad_s = state.angle_rad, state.velocity_rad_s
-        self._angle_stamp_s = state.angle_stamp_s
-
-    def _watch_frozen(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
-        """An angle that stays the same while the joint moves by its own speed, or at full torque with that speed."""
-        gap_s = state.angle_stamp_s - self._angle_stamp_s
-        self._gone_s += gap_s
-        self._gone_rad += abs(state.velocity_rad_s) * gap_s
         pushed = facts.energised and abs(facts.torque_nm) >= self._saturated_nm
-        frozen = pushed and state.velocity_rad_s == self._velocity_rad_s
-        self._frozen_s = self._frozen_s + gap_s if frozen else 0.0
-        if (self._gone_rad > GONE_RAD and self._gone_s > GONE_S) or self._frozen_s > FROZEN_S:
-            found.append(self._fault("encoder_stuck", f"The {self.joint} encoder stands still while the joint moves."))
+        problem = self._encoder.update(state, facts.dt_s, pushed)
+        if problem:
+            found.append(self._fault(problem, f"The {self.joint} {self._encoder.sentence}"))
 
     def _out_of_range(self, angle_rad: float) -> Fault:
         low, high = degrees(self._low_rad), degrees(self._high_rad)
         text = f"The {self.joint} joint is at {degrees(angle_rad):.1f} degrees, outside of {low:.0f} to {high:.0f}."
         return self._fault("joint_position", text)
-
-    def _watch_jump(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
-        """Between two messages; what a stamp is late by may be a tick."""
-        step_rad = abs(state.angle_rad - self._angle_rad)
-        gap_s = max(state.angle_stamp_s - self._angle_stamp_s, 0.0) + facts.dt_s
-        if step_rad > self._bounds.jump_rad + self._jump_rad_s * gap_s:  # never true of the first one
-            text = f"The {self.joint} encoder jumped by {degrees(step_rad):.0f} degrees in {gap_s * 1e3:.1f} ms."
-            found.append(self._fault("encoder_jump", text))
 
     # load
 

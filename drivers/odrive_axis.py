@@ -52,10 +52,6 @@ class WatchdogEndpoints:
     timeout: Annotated[int, Bounds(1, 65535)]  # of axis0.config.watchdog_timeout
 
 
-# No board has hardware 0.0.0: these are the numbers of simulation/odrive.py. Real ones come from the configuration.
-KNOWN_ENDPOINTS = (WatchdogEndpoints("0.6.11", "0.0.0", 2, 1),)
-
-
 class Version(NamedTuple):
     major: int
     minor: int
@@ -77,7 +73,7 @@ class OdriveAxis:
         self.joint = joint
         self.parameters = parameters
         self._outlet = outlet
-        self._endpoints = (*endpoints, *KNOWN_ENDPOINTS)
+        self._endpoints = tuple(endpoints)
         self._rad_per_turn = parameters.sign * TURN_RAD
         self._torque_id = arbitration_id(parameters.node_id, codec.SET_INPUT_TORQUE)
         self._twin_watch = TwinWatch(parameters.heartbeat_period_s)

@@ -59,6 +59,13 @@ viscous_nm_s = 0.002
 [friction.right_adduction]
 viscous_nm_s = 0.002
 
+# Where the simulated drives keep their watchdogs.
+[[watchdog_endpoints]]
+firmware = "0.6.11"
+hardware = "0.0.0"
+enable = 2
+timeout = 1
+
 [faults]
 late_s = 0.5
 quiet_s = 0.5

@@ -32,7 +32,10 @@ TURN_RAD = 2.0 * pi
 SECOND_HARMONIC = 0.25
 REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
 VERSION_FIELDS = (2, 0, 0, 0, 0, 6, 11, 0)  # protocol 2, no real board, firmware 0.6.11
-WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = 1, 2  # this drive's own numbers: every real build has others
+WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = (
+    1,
+    2,
+)  # of hardware 0.0.0, which no board has: every real build has others
 BOOT_S = 1.0  # silence of a drive that restarts
 
 

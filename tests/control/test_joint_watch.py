@@ -13,6 +13,8 @@ from control.faults import Reaction
 from control.joint_watch import (
     CURRENT_TICKS,
     HEARTBEAT_SILENCE_S,
+    MISSING_S,
+    MISSING_SHARE,
     TEMPERATURE_SILENCE_S,
     TWO_MESSAGES_S,
     FaultBounds,
@@ -538,3 +540,43 @@ def test_a_watch_forgets_garbage_once_the_signals_are_good_again(states: list[Dr
         now_s = START_S + tick * TICK_S
         found = set(seen(watch, fresh(now_s), now_s))
     assert found <= {"winding_hot", "winding_overheating"}
+
+
+# torque that is not there
+
+
+def missing_ticks(sent_nm: float, current_a: float, moving: bool = True) -> int | None:
+    watch = make_watch()
+    for tick in range(1, 200):
+        state = fresh(START_S + tick * TICK_S, current_a=current_a)
+        if "torque_missing" in seen(watch, state, START_S + tick * TICK_S, torque_nm=sent_nm, moving=moving):
+            return tick
+    return None
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_torque_is_missing_beyond_its_share_of_the_limit_and_not_before(sign: float) -> None:
+    share_nm = MISSING_SHARE * LIMITS.torque_nm
+    assert missing_ticks(sign * (share_nm + 1e-6), 0.0) is not None
+    assert missing_ticks(sign * (share_nm - 1e-6), 0.0) is None
+    assert missing_ticks(0.0, sign * (share_nm + 1e-6) / 0.083) is not None
+
+
+def test_a_missing_torque_is_noticed_within_its_ticks() -> None:
+    ticks = missing_ticks(0.7, 0.0)
+    assert ticks is not None
+    assert MISSING_S / TICK_S <= ticks <= KINDS["torque_missing"].bound_ticks
+
+
+def test_no_torque_is_missed_of_a_drive_that_is_not_in_closed_loop() -> None:
+    assert missing_ticks(0.7, 0.0, moving=False) is None
+
+
+def test_a_current_that_follows_within_ticks_is_not_missed() -> None:
+    """The current told in a tick answers the torque of the tick before."""
+    watch, before_nm = make_watch(), 0.0
+    for tick in range(400):
+        now_s, sent_nm = START_S + tick * TICK_S, 0.7 if tick // 30 % 2 else -0.7
+        state = fresh(now_s, current_a=before_nm / 0.083, velocity_rad_s=1.0, angle_rad=0.1 + 1e-3 * (tick % 2))
+        assert "torque_missing" not in seen(watch, state, now_s, torque_nm=sent_nm)
+        before_nm = sent_nm
