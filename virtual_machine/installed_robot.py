@@ -72,7 +72,7 @@ def _make_disk(archive: Path, disk: Disk) -> None:
     with tarfile.open(work / "src.tar", "w") as source:
         for path in _project_files():
             source.add(path, str(Path("opt/mudskipper/src") / path.relative_to(PROJECT)), filter=_owned_by_root)
-    (work / "install.sh").write_text(_installation(), encoding="utf-8")
+    (work / "install.sh").write_text(installation(), encoding="utf-8")
     _install(archive, work)
     _write_image(work, disk)
     shutil.rmtree(work, ignore_errors=True)
@@ -84,7 +84,8 @@ def _owned_by_root(member: tarfile.TarInfo) -> tarfile.TarInfo:
     return member
 
 
-def _installation() -> str:
+def installation() -> str:
+    """The script that runs in the disk's folder."""
     lines = [line for heading in HEADINGS for line in _readme_commands(heading)]
     wanted = [line for line in lines if not line.startswith((*DONE_ALREADY, *WANTS_A_RUNNING_ROBOT))]
     before = (GUEST_FILES / "before_installation.sh").read_text(encoding="utf-8")
