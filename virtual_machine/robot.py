@@ -76,6 +76,13 @@ class Robot:
         assert self.succeed("arm") == "hold\n"
         self.succeed("walk", "--depth", "3")
 
+    def walks_well(self) -> bool:
+        answer = self.operate("status", "--json")
+        if answer.status != 0:
+            return False
+        report = json.loads(answer.output)
+        return report["mode"] == "walking" and not report["faults"]
+
     def rest(self) -> None:
         """From whatever a check has left behind: idle, without faults, as after a start."""
         self.shell(REST)
