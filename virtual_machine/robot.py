@@ -20,6 +20,7 @@ for bus in vcan0 vcan1; do
 done
 systemctl reset-failed
 systemctl start simulated-robot mudskipper
+until mudskipper status --json 2>/dev/null | grep -q closed_loop; do sleep 0.5; done
 mudskipper disarm >/dev/null
 mudskipper clear >/dev/null 2>&1
 true
