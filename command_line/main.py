@@ -187,6 +187,7 @@ def _add_experiments(commands: Commands) -> None:  # type: ignore[valid-type]
     estimation.add_argument("--layers", metavar="A,B", help="disturbances, separated by commas, or none (default: all)")
     _add_trackway(names)
     _add_sweep(names)
+    _add_faults(names)
     fit = _add(names, "mud-fit", "walking.run_mud_fit", "The simulator's muds, fitted to the paper's fixed depths.")
     _add_report(fit, "the muds are the simulator's", "write JSON there")
     fit.add_argument("--seeds", type=_seeds, default=2, metavar="N", help="walks of each point (default: 2)")
@@ -216,6 +217,14 @@ def _add_sweep(names: Commands) -> None:  # type: ignore[valid-type]
     sweep.add_argument("--strength", action="append", type=_strength_pa, metavar="PA", help="repeatable (default: 12)")
     sweep.add_argument("--method", action="append", metavar="NAME", help="of adaptation, repeatable (default: all)")
     sweep.add_argument("--seeds", type=_seeds, default=2, metavar="N", help="walks of each point (default: 2)")
+
+
+def _add_faults(names: Commands) -> None:  # type: ignore[valid-type]
+    faults = _add(names, "faults", "fault_trials.run_faults", "Every fault in every phase, against its bounds.")
+    _add_report(faults, "what fails is a simulated robot", "write JSON and picture there")
+    faults.add_argument("--seeds", type=_seeds, default=1, metavar="N", help="cells of each pair (default: 1)")
+    faults.add_argument("--fault", action="append", metavar="NAME", help="repeatable (default: all)")
+    faults.add_argument("--phase", action="append", metavar="NAME", help="repeatable (default: all)")
 
 
 def _compartment_m(text: str) -> float:

@@ -30,6 +30,7 @@ from control.records import (
     Torques,
 )
 from control.recovery import Recovery
+from control.stillness import Stillness
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ RAISING_S = 1.0  # to wait for flippers that the mud holds
 SOFT_STOP_S = 3.0  # for raising them altogether
 DAMPING_S = 3.0  # longest, for joints that do not come to rest
 SETTLED_S = 0.3  # that all joints have to rest
-SETTLED_RAD_S = 0.1
+SETTLED_RAD = 0.02  # and stay where they are to within
 DAMPING_NM = 0.4  # at most, of each joint: half of what the motors may do
 ALL_TRUSTED = (True, True, True, True)
 
@@ -92,6 +93,7 @@ class Controller:
         self._up = False
         self._waited_s = 0.0  # since the path that ends a walk arrived
         self.cut_short = False  # the pose that is held is one out of a walk, perhaps in the mud
+        self._stillness = tuple(Stillness(SETTLED_RAD) for _ in range(4))
         self._since_s = self._resting_s = 0.0  # the mode began, all joints rest
         self.target = RESTING
 
@@ -125,36 +127,44 @@ class Controller:
     def is_up(self, states: DriveStates) -> bool:
         return all(abs(states[joint].angle_rad) < UP_RAD for joint in (1, 3))
 
-    def step(self, dt_s: float, mode: Mode, states: DriveStates, trusted: tuple[bool, ...] = ALL_TRUSTED) -> Torques:
+    def step(
+        self,
+        dt_s: float,
+        mode: Mode,
+        states: DriveStates,
+        trusted: tuple[bool, ...] = ALL_TRUSTED,
+        elapsed_s: float = 0.0,
+    ) -> Torques:
         """Torques wanted of the four joints; `target` then says where in the stride they belong to.
 
-        Joints whose encoder is not `trusted` are not damped: their speed may be made up.
+        Joints whose encoder is not `trusted` are not damped: their speed may be made up. `elapsed_s`, where it is more
+        than `dt_s`, is the time that has really passed; paths and gait do not hurry after a gap.
         """
         if mode is not self._mode:
             self._enter(mode, states)
         self.target = RESTING
-        self._since_s += dt_s
+        elapsed_s = max(elapsed_s, dt_s)
+        self._since_s += elapsed_s
         if mode not in MOVING:
             return NO_TORQUE
         if mode is Mode.DAMPING:
-            return self._damp(dt_s, states, trusted)
+            return self._damp(elapsed_s, states, trusted)
         self._fade = min(1.0, self._fade + dt_s / max(self.motion.fade_in_s, dt_s))
         if mode is Mode.STOPPING and self._path is not None and self._path.finished:
             self._up = self.is_up(states)
-            self._waited_s += dt_s
+            self._waited_s += elapsed_s
         return joint_torques_nm(self._targets(dt_s, mode, states), states, self.gains, self.mass, self._fade)
 
-    def _damp(self, dt_s: float, states: DriveStates, trusted: tuple[bool, ...]) -> Torques:
-        moving = any(
-            trust and not abs(state.velocity_rad_s) < SETTLED_RAD_S
-            for state, trust in zip(states, trusted, strict=True)
-        )
-        self._resting_s = 0.0 if moving else self._resting_s + dt_s
+    def _damp(self, elapsed_s: float, states: DriveStates, trusted: tuple[bool, ...]) -> Torques:
+        still = [each.update(state.angle_rad, elapsed_s) for each, state in zip(self._stillness, states, strict=True)]
+        rests = all(quiet or not trust for quiet, trust in zip(still, trusted, strict=True))
+        self._resting_s = self._resting_s + elapsed_s if rests else 0.0
         return damping_torques_nm(states, self.gains, trusted, DAMPING_NM)
 
     def _enter(self, mode: Mode, states: DriveStates) -> None:
         self.recovery.reset()
         self._since_s = self._resting_s = 0.0
+        self._stillness = tuple(Stillness(SETTLED_RAD) for _ in states)
         here = measured_angles(states)
         self.cut_short = mode is Mode.HOLD and self._mode is Mode.WALKING
         if mode is Mode.HOLD:

@@ -1,8 +1,10 @@
 """Whether an encoder tells of a joint: positions that jump, and positions that stand still while the joint moves.
 
-From one message to the next a joint goes no farther than its speed allows; and what the drive tells as speed must,
-summed up, be seen in the angle. A magnet that slips or a cable that breaks shows in the first way, a sensor that hangs
-in the second: with a made-up angle the position loop would drive the joint to its stop at full torque.
+From one message to the next a joint goes as far as the speeds say that the drive tells with its angles; and what these
+speeds sum up to must be seen in the angle. A magnet that slips or a cable that breaks shows in the first way, a sensor
+that hangs in the second: with a made-up angle the position loop would drive the joint to its stop at full torque. Of a
+sensor that hangs while the joint rests, its speed betrays it: a live one that is not zero does not stay the same to the
+last bit.
 """
 
 from __future__ import annotations
@@ -13,15 +15,14 @@ from control.records import NEVER_S, UNKNOWN, DriveState
 
 GONE_RAD = 0.03  # by the joint's own speed, while its angle stayed the same to the last bit
 GONE_S = 0.02  # drives tell an old value once more, now and then
-FROZEN_S = 0.5  # at full torque, by which not even the last bit of angle and speed changes
+FROZEN_S = 0.1  # in which not even the last bit of angle and of a speed that is not zero changes
 
 
 class EncoderWatch:
     """Owns the last message, and what the speed has summed up to since the angle last changed."""
 
-    def __init__(self, jump_rad: float, fastest_rad_s: float) -> None:
+    def __init__(self, jump_rad: float) -> None:
         self._jump_rad = jump_rad
-        self._fastest_rad_s = fastest_rad_s
         self.reset()
 
     def reset(self) -> None:
@@ -32,33 +33,36 @@ class EncoderWatch:
     def _begin_count(self) -> None:
         self._gone_s = self._gone_rad = self._frozen_s = 0.0
 
-    def update(self, state: DriveState, dt_s: float, pushed: bool) -> str:
-        """Name of a fault, or nothing. `pushed`: at full torque. `dt_s`: what a stamp may be late by."""
+    def update(self, state: DriveState, dt_s: float) -> str:
+        """Name of a fault, or nothing. `dt_s`: what a stamp may be late by."""
         if state.angle_stamp_s == self._stamp_s:
             return ""
         gap_s = max(state.angle_stamp_s - self._stamp_s, 0.0)
         if state.angle_rad == self._angle_rad:
-            problem = self._count(state, gap_s, pushed)
+            problem = self._count(state, gap_s)
         else:
-            problem = self._measure(state, gap_s + dt_s)
+            problem = self._measure(state, gap_s, dt_s)
             self._begin_count()
         self._angle_rad, self._velocity_rad_s, self._stamp_s = (
             state.angle_rad, state.velocity_rad_s, state.angle_stamp_s
         )  # fmt: skip
         return problem
 
-    def _measure(self, state: DriveState, gap_s: float) -> str:
-        step_rad = abs(state.angle_rad - self._angle_rad)
-        if not step_rad > self._jump_rad + self._fastest_rad_s * gap_s:  # always so for the first one
+    def _measure(self, state: DriveState, gap_s: float, dt_s: float) -> str:
+        """By how much the way differs from that of the mean speed, beyond what a late stamp makes of the higher one."""
+        step_rad = state.angle_rad - self._angle_rad
+        odd_rad = abs(step_rad - (state.velocity_rad_s + self._velocity_rad_s) / 2.0 * gap_s)
+        late_rad = max(abs(state.velocity_rad_s), abs(self._velocity_rad_s)) * dt_s
+        if not odd_rad > self._jump_rad + late_rad:  # always so for the first one
             return ""
-        self.sentence = f"encoder jumped by {degrees(step_rad):.0f} degrees in {gap_s * 1e3:.1f} ms."
+        self.sentence = f"encoder jumped by {degrees(abs(step_rad)):.0f} degrees in {gap_s * 1e3:.1f} ms."
         return "encoder_jump"
 
-    def _count(self, state: DriveState, gap_s: float, pushed: bool) -> str:
+    def _count(self, state: DriveState, gap_s: float) -> str:
         """With its sign, since a speed at rest is noise about zero."""
         self._gone_s += gap_s
         self._gone_rad += state.velocity_rad_s * gap_s
-        frozen = pushed and state.velocity_rad_s == self._velocity_rad_s
+        frozen = state.velocity_rad_s == self._velocity_rad_s != 0.0
         self._frozen_s = self._frozen_s + gap_s if frozen else 0.0
         moved = abs(self._gone_rad) > GONE_RAD and self._gone_s > GONE_S
         if not moved and self._frozen_s <= FROZEN_S:

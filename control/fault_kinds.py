@@ -1,7 +1,8 @@
 """The table of all faults, from which docs/faults.md, `mudskipper check` and the modes' reactions are made.
 
 A bound is the number of 380 Hz ticks from the cause to the reaction with the default bounds of [faults] and the
-messages' periods of the README: position and current every 2 ms, everything else every 100 ms (38 ticks).
+messages' periods of the README: position and current every 2 ms, everything else every 100 ms (38 ticks). A loop lags
+that misses a tenth of 100 ticks: one after each tick adds up to that in 11, six in a row show at once.
 """
 
 from __future__ import annotations
@@ -31,15 +32,16 @@ _ROWS: tuple[FaultKind, ...] = (
     FaultKind("current_silent", "drive", SOFT_STOP, ALWAYS, BY_HAND, 12, "No current for ten ticks.", WIRING),
     FaultKind("heartbeat_silent", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 192, "No heartbeat for 0.5 s.", WIRING),
     FaultKind("temperature_silent", "drive", SOFT_STOP, ALWAYS, WHEN_GONE, 382, "No temperature for 1 s.", WIRING),
+    FaultKind("voltage_silent", "drive", WARN, UNLESS_FORCED, WHEN_GONE, 382, "No bus voltage for 1 s.", WIRING),
     FaultKind("drive_error", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 41, "The drive reports an error.", MEND),
     FaultKind("drive_disarmed", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 41, "It left closed loop by itself.", MEND),
     FaultKind(
         "drive_energised", "drive", WARN, ALWAYS, WHEN_GONE, 117,
-        "It is in closed loop though nobody armed it.", "end what else commands it, or 'mudskipper disarm'",
+        "It is energised though nobody armed it.", "end what else commands it, or 'mudskipper disarm'",
     ),
     FaultKind(
         "drive_restarted", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 580,
-        "The drive started anew.", "check its supply, then 'mudskipper clear'",
+        "The drive started anew.", "check its supply and its joint's angle, then 'mudskipper clear'", True,
     ),
     FaultKind(
         "drive_version", "drive", NONE, ALWAYS, WHEN_GONE, 2,
@@ -120,7 +122,11 @@ _ROWS: tuple[FaultKind, ...] = (
         "The gate to the wire refused a command.", REPORT,
     ),
     FaultKind("loop_overrun", "loop", WARN, NO, WHEN_GONE, 1, "A tick was missed.", BUSY),
-    FaultKind("loop_lagging", "loop", SOFT_STOP, ALWAYS, WHEN_GONE, 2, "The loop does not keep its rate.", BUSY),
+    FaultKind("loop_lagging", "loop", SOFT_STOP, ALWAYS, WHEN_GONE, 11, "The loop does not keep its rate.", BUSY),
+    FaultKind(
+        "loop_crawling", "loop", DRIVES_IDLE, ALWAYS, BY_HAND, 25,
+        "Commands leave too seldom to brake a joint.", BUSY,
+    ),
     FaultKind("loop_stalled", "loop", DAMPING, ALWAYS, WHEN_GONE, 2, "The loop stood still.", BUSY),
     FaultKind(
         "clock_step", "clock", WARN, NO, WHEN_GONE, 2,

@@ -18,7 +18,7 @@ GOOD_TICKS = 50  # without its cause before a fault is over
 class Standing(NamedTuple):
     fault: Fault  # as last seen
     last_tick: int
-    latched: bool  # torque was on while it was seen
+    latched: bool  # torque was on while it was seen, or it is of a kind for which that is all the same
 
 
 class FaultLatch:
@@ -66,7 +66,11 @@ class FaultLatch:
         before = self._standing.get(key)
         if before is None:
             self.begun.append(fault)
-        self._standing[key] = Standing(fault, self._tick, energised or (before is not None and before.latched))
+        self._standing[key] = Standing(
+            fault,
+            self._tick,
+            energised or fault.kind.latches_idle or (before is not None and before.latched),
+        )
 
     def _is_over(self, standing: Standing, energised: bool, clearing: bool) -> bool:
         fault, last_tick, latched = standing

@@ -37,8 +37,8 @@ lead to FAULT, since there is no torque yet. A software stop is no emergency sto
 """
 LASTING = """\
 *Ticks* are the most that pass from the cause to the reaction, at 380 Hz and with the default bounds. *Ends* tells what
-ends a fault that met a robot with torque on: a cause that has been gone for 50 ticks, or a person's `clear` after
-that. Where torque was off, every fault ends with its cause. *Against arming* faults are the lines that `mudskipper
+ends a fault that met a robot with torque on: a cause that has been gone for 50 ticks, or a person's `clear` once it is
+gone. Where torque was off, every fault ends with its cause. *Against arming* faults are the lines that `mudskipper
 check` fails; `arm --force` overrules those that are marked so.
 """
 

@@ -46,6 +46,7 @@ class FaultKind(NamedTuple):
     bound_ticks: int  # from the cause to the reaction, at the default bounds
     meaning: str
     what_to_do: str
+    latches_idle: bool = False  # it is not over by itself where torque was off either
 
 
 class Fault(NamedTuple):

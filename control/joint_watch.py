@@ -16,19 +16,20 @@ from control.fault_kinds import make_fault
 from control.faults import Fault
 from control.limits import JointLimits, JointRange
 from control.records import UNKNOWN, DriveState
+from control.stillness import Stillness
 from control.winding import Winding, WindingParameters
 
-HEARTBEAT_SILENCE_S = 0.5  # drives send one every 100 ms: five in a row are missing
-TEMPERATURE_SILENCE_S = 1.0  # of a drive that has told its temperature before
+MOST_SEEN_S = 0.03  # that one tick adds to any duration: a loop that stood still for longer did not look
+MISSING_HEARTBEATS = 5  # in a row
+SLOW_SILENCE_S = 1.0  # of temperature and bus voltage, once they were told
 ENERGISED_S = 0.2  # two heartbeats, in which a drive that was told to go idle may say that it has not yet
 FAST_SHARE = 1.25  # of the velocity limit, above which no torque of ours drives a joint
 CURRENT_SHARE = 1.25  # of the drive's current limit
 CURRENT_TICKS = 3
-MOVING_RAD_S = 0.5
-STILL_RAD_S = 0.1
+STILL_RAD = 0.03
+REST_S = 0.1  # within STILL_RAD, and a joint is at rest
 SATURATED_SHARE = 0.95  # of the torque limit
 STALLED_S = 2.0  # longer than an insertion, a stance or an extraction of the paper's gait takes
-JUMP_SHARE = 2.0  # of the velocity limit
 MISSING_SHARE = 0.3  # of the torque limit, by which the current differs from the torque that was sent
 MISSING_S = 0.1
 TWO_MESSAGES_S = 0.15  # of those that come every 0.1 s: a single odd one proves nothing
@@ -44,6 +45,7 @@ class FaultBounds:
     jump_rad: Annotated[float, Bounds(0.01, 10.0)] = 0.05  # beyond what a joint can do: noise, late stamps
     fast_s: Annotated[float, Bounds(0.003, 2.0)] = 0.0079  # 3 T faster than the velocity limit allows
     lag_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0131  # 5 T missed in a row: soft stop
+    crawl_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0105  # 4 T, the mean of five ticks: too seldom to brake a joint
     lag_share: Annotated[float, Bounds(0.01, 10.0)] = 0.1  # by which 100 ticks take longer than they should
     longest_watchdog_s: Annotated[float, Bounds(0.01, 10.0)] = 0.3  # that a drive may have
     voltage_low_v: Annotated[float, Bounds(0.0, 100.0)] = 20.0  # told; 0: never
@@ -60,7 +62,7 @@ class JointFacts(NamedTuple):
     energised: bool  # torque is or may be on
     moving: bool  # closed loop is expected of the drive
     torque_nm: float  # sent in the tick before
-    freeing: bool  # a recovery pulls at full torque on purpose
+    may_stand_still: bool  # whatever the torque: no stiffness, or a recovery that pulls on purpose
 
 
 class JointWatch:
@@ -73,6 +75,7 @@ class JointWatch:
         winding: WindingParameters,
         current_limit_a: float,
         torque_constant_nm_a: float,
+        heartbeat_period_s: float = 0.1,
     ) -> None:
         self.joint = joint
         self.winding = Winding(winding)
@@ -81,9 +84,11 @@ class JointWatch:
         self._low_rad = span.min_rad - radians(limits.position_margin_deg)
         self._high_rad = span.max_rad + radians(limits.position_margin_deg)
         self._fast_rad_s = FAST_SHARE * limits.velocity_rad_s
-        self._encoder = EncoderWatch(bounds.jump_rad, JUMP_SHARE * limits.velocity_rad_s)
+        self._encoder = EncoderWatch(bounds.jump_rad)
+        self._stillness = Stillness(STILL_RAD)
         self._most_a = CURRENT_SHARE * current_limit_a
         self._constant_nm_a = torque_constant_nm_a
+        self._heartbeat_silence_s = MISSING_HEARTBEATS * heartbeat_period_s
         self._missing_nm = MISSING_SHARE * limits.torque_nm
         self._saturated_nm = SATURATED_SHARE * limits.torque_nm
         self._nearly_hot_c = (limits.temperature_warm_c + limits.temperature_hot_c) / 2.0  # half of the torque is left
@@ -95,13 +100,16 @@ class JointWatch:
         self._fast_s = self._stalled_s = self._energised_s = self._missing_s = 0.0
         self._low_s = self._under_s = self._hot_s = 0.0
         self._encoder.reset()
+        self._stillness.reset()
 
     def update(self, facts: JointFacts, state: DriveState) -> list[Fault]:
         found: list[Fault] = []
+        # One sample after a gap says nothing of what was in the gap.
+        seen = facts if facts.dt_s <= MOST_SEEN_S else facts._replace(dt_s=MOST_SEEN_S)
         self._watch_signals(found, facts, state)
-        self._watch_drive(found, facts, state)
-        self._watch_motion(found, facts, state)
-        self._watch_load(found, facts, state)
+        self._watch_drive(found, seen, state)
+        self._watch_motion(found, seen, state)
+        self._watch_load(found, seen, state)
         self._watch_heat(found, facts, state)
         return found
 
@@ -115,10 +123,14 @@ class JointWatch:
         position_s, current_s = now_s - state.angle_stamp_s, now_s - state.current_stamp_s
         if position_s > bounds.late_s or current_s > bounds.late_s:
             found.append(self._late(position_s, current_s))
-        if now_s - state.heartbeat_stamp_s > HEARTBEAT_SILENCE_S:
+            if current_s > bounds.silence_s and found[-1].name in ("drive_quiet", "position_stale"):
+                found.append(self._silence("current_silent", "current", current_s))
+        if now_s - state.heartbeat_stamp_s > self._heartbeat_silence_s:
             found.append(self._silence("heartbeat_silent", "heartbeat", now_s - state.heartbeat_stamp_s))
-        if isfinite(state.temperature_stamp_s) and now_s - state.temperature_stamp_s > TEMPERATURE_SILENCE_S:
+        if isfinite(state.temperature_stamp_s) and now_s - state.temperature_stamp_s > SLOW_SILENCE_S:
             found.append(self._silence("temperature_silent", "temperature", now_s - state.temperature_stamp_s))
+        if isfinite(state.bus_voltage_stamp_s) and now_s - state.bus_voltage_stamp_s > SLOW_SILENCE_S:
+            found.append(self._silence("voltage_silent", "bus voltage", now_s - state.bus_voltage_stamp_s))
 
     def _late(self, position_s: float, current_s: float) -> Fault:
         """The hardest of what two ages say: both signals gone, one of them, or a frame that is late."""
@@ -177,11 +189,11 @@ class JointWatch:
         if self._fast_s > max(self._bounds.fast_s - facts.dt_s / 2.0, 0.0):
             text = f"The {self.joint} joint turns at {velocity_rad_s:.0f} rad/s."
             found.append(self._fault("joint_velocity", text))
-        if velocity_rad_s > MOVING_RAD_S and not facts.energised:
-            text = f"The {self.joint} joint moves at {velocity_rad_s:.1f} rad/s."
-            found.append(self._fault("joint_moving", text))
-        pushed = facts.energised and abs(facts.torque_nm) >= self._saturated_nm
-        problem = self._encoder.update(state, facts.dt_s, pushed)
+        if not self._stillness.update(angle_rad, facts.dt_s):
+            self._stalled_s = 0.0
+        if self._stillness.still_s < REST_S and not facts.energised:
+            found.append(self._fault("joint_moving", f"The {self.joint} joint moves."))
+        problem = self._encoder.update(state, facts.dt_s)
         if problem:
             found.append(self._fault(problem, f"The {self.joint} {self._encoder.sentence}"))
 
@@ -198,8 +210,10 @@ class JointWatch:
             text = f"The {self.joint} motor takes {abs(state.current_a):.1f} A."
             found.append(self._fault("joint_current", text))
         self._watch_torque(found, facts, state)
-        stalled = abs(facts.torque_nm) >= self._saturated_nm and abs(state.velocity_rad_s) < STILL_RAD_S
-        self._stalled_s = self._stalled_s + facts.dt_s if stalled and not facts.freeing else 0.0
+        if facts.may_stand_still:
+            self._stalled_s = 0.0
+        elif abs(facts.torque_nm) >= self._saturated_nm > 0.0:  # with pauses, as long as the joint stays where it is
+            self._stalled_s += facts.dt_s
         if self._stalled_s > STALLED_S:
             text = f"The {self.joint} joint stands still at full torque for {self._stalled_s:.1f} s."
             found.append(self._fault("joint_not_following", text))
@@ -221,6 +235,8 @@ class JointWatch:
         if not measured_c < self._nearly_hot_c and not self._hot_s > TWO_MESSAGES_S:
             measured_c = UNKNOWN
         current_a = state.current_a if abs(state.current_a) < 2.0 * self._most_a else UNKNOWN  # no motor takes more
+        if facts.now_s - state.current_stamp_s > self._bounds.silence_s:  # an old one does not warm for ever
+            current_a = facts.torque_nm / self._constant_nm_a
         winding_c = self.winding.update(facts.dt_s, current_a, measured_c)
         if winding_c < self._nearly_hot_c:
             return

@@ -1,7 +1,7 @@
 """Modes of the robot, and the table of transitions between them.
 
 `next_mode` is a pure function: of the rows that begin in the present mode, the first one whose cause holds counts. A
-fault acts by its reaction alone (faults.py), so a new fault needs no new row. docs/modes.md is drawn from this table.
+fault acts by its reaction alone (faults.py), so a new fault needs no new row. docs/faults.md is drawn from this table.
 Nothing arms by itself: the only way to torque leads over `arm`.
 """
 
@@ -112,6 +112,7 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition(_from(Mode.HOLD, Mode.WALKING), _at_least(Reaction.SOFT_STOP), Mode.STOPPING),
     Transition(_from(Mode.BOOT), _is("all drives heard", lambda health: health.drives_heard), Mode.IDLE),
     Transition(_from(Mode.IDLE), ARM_ACCEPTED, Mode.ARMING),
+    Transition(_from(Mode.ARMING), _asked(Request.STOP), Mode.IDLE),
     Transition(_from(Mode.ARMING), _is("closed loop", lambda health: health.closed_loop), Mode.HOLD),
     Transition(_from(Mode.HOLD), WALK_ACCEPTED, Mode.WALKING),
     Transition(_from(Mode.HOLD), _is("nobody needs it", lambda health: health.rested), Mode.IDLE),

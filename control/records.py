@@ -47,6 +47,7 @@ class DriveState(NamedTuple):
     temperature_c: float = UNKNOWN
     temperature_stamp_s: float = NEVER_S
     bus_voltage_v: float = UNKNOWN
+    bus_voltage_stamp_s: float = NEVER_S
 
 
 DriveStates = tuple[DriveState, DriveState, DriveState, DriveState]  # in the order of JOINTS

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import isfinite, nan, pi
+from math import isfinite, isnan, nan, pi
 from typing import Annotated, NamedTuple, Protocol
 
 from control.bounds import Bounds
@@ -28,6 +28,7 @@ RESTART_SILENCE_S = 0.3  # three heartbeats
 LONGEST_WATCHDOG_S = 3600.0  # a number beyond is no time-out
 LARGEST_FLOAT = 3.4e38  # of binary32
 TURN_RAD = 2.0 * pi
+QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,8 @@ class DriveParameters:
     sign: Annotated[int, Bounds(-1, 1)] = 1  # -1 for a mirrored motor; 0 is refused
     zero_turn: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0  # encoder reading at joint angle zero
     torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0)] = 0.083  # 60 / (2π · 115 rpm/V), as in the paper
-    velocity_limit_turn_s: Annotated[float, Bounds(0.1, 200.0)] = 10.0  # also bounds torque: see `arm`
+    velocity_limit_turn_s: Annotated[float, Bounds(0.1, 200.0)] = 4.0  # also bounds torque: see `prepare`
+    velocity_gain_nm_s_turn: Annotated[float, Bounds(0.01, 20.0)] = 0.5
     current_limit_a: Annotated[float, Bounds(0.1, 200.0)] = 12.0
     heartbeat_period_s: Annotated[float, Bounds(0.01, 1.0)] = 0.1  # as set on the drive, of which this is the default
 
@@ -83,9 +85,10 @@ class OdriveAxis:
         self._angle_rad = self._velocity_rad_s = self._current_a = UNKNOWN
         self._angle_stamp_s = self._current_stamp_s = self._heartbeat_stamp_s = NEVER_S
         self._temperature_c = self._bus_voltage_v = UNKNOWN
-        self._temperature_stamp_s = NEVER_S
+        self._temperature_stamp_s = self._bus_voltage_stamp_s = NEVER_S
         self._read_s = self._read_before_s = NEVER_S
         self.closed_loop = False
+        self.busy_state = 0  # of a drive that calibrates, homes or does whatever else nobody here has asked for
         self._error_flags = 0
         self.disarm_reason = 0
         self.restarts = 0
@@ -130,6 +133,8 @@ class OdriveAxis:
 
     def _receive_current(self, data: bytes, now_s: float) -> None:
         _, measured_a = codec.GET_IQ.decode(data)
+        if isnan(measured_a) and not self.closed_loop:  # nothing is measured where nothing flows
+            measured_a = 0.0
         _require_finite(measured_a)
         if now_s - self._current_stamp_s > RESTART_SILENCE_S:
             self._heed_silence()
@@ -146,6 +151,7 @@ class OdriveAxis:
             self._starting = False
         self._twin_watch.heed_heartbeat(self._read_s, self._read_before_s)
         self.closed_loop = state == AxisState.CLOSED_LOOP
+        self.busy_state = 0 if state in QUIET_STATES else state
         self._heartbeat_stamp_s = now_s
 
     def _heed_silence(self) -> None:
@@ -169,6 +175,7 @@ class OdriveAxis:
 
     def _receive_bus_voltage(self, data: bytes, now_s: float) -> None:
         self._bus_voltage_v, _ = codec.GET_BUS_VOLTAGE_CURRENT.decode(data)
+        self._bus_voltage_stamp_s = now_s
 
     def _receive_version(self, data: bytes, now_s: float) -> None:
         fields = codec.GET_VERSION.decode(data)
@@ -222,6 +229,7 @@ class OdriveAxis:
             self._temperature_c,
             self._temperature_stamp_s,
             self._bus_voltage_v,
+            self._bus_voltage_stamp_s,
         )
 
     @property
@@ -235,16 +243,20 @@ class OdriveAxis:
         data = codec.SET_INPUT_TORQUE.encode(self.parameters.sign * torque_nm)
         self._outlet.send(Frame(self._torque_id, data))
 
-    def arm(self) -> None:
-        """Torque mode, limits, zero torque, closed loop.
+    def prepare(self) -> None:
+        """Torque mode, limits, velocity gain, zero torque.
 
-        In torque mode ODrive clamps torque to (velocity limit - velocity) times its velocity gain, silently; the
-        velocity limit is set here so that the clamp lies above every torque that we command.
+        In torque mode ODrive clamps torque to (velocity limit - velocity) times its velocity gain, silently. Both are
+        set so that the clamp lies above every torque that we command of a joint within its own velocity limit, and
+        takes the torque of a faster one, also when this program is dead and its last command still holds.
         """
-        limits = (self.parameters.velocity_limit_turn_s, self.parameters.current_limit_a)
+        parameters = self.parameters
         self._transmit(codec.SET_CONTROLLER_MODE, codec.TORQUE_CONTROL, codec.PASSTHROUGH)
-        self._transmit(codec.SET_LIMITS, *limits)
+        self._transmit(codec.SET_LIMITS, parameters.velocity_limit_turn_s, parameters.current_limit_a)
+        self._transmit(codec.SET_VEL_GAINS, parameters.velocity_gain_nm_s_turn, 0.0)
         self._transmit(codec.SET_INPUT_TORQUE, 0.0)
+
+    def close_loop(self) -> None:
         self._transmit(codec.SET_AXIS_STATE, AxisState.CLOSED_LOOP)
 
     def disarm(self) -> None:
@@ -258,9 +270,9 @@ class OdriveAxis:
         self._request(codec.GET_VERSION)
 
     def request_watchdog(self) -> None:
-        """Where it is not known and the numbers of the drive's build are."""
+        """Where the numbers of the drive's build are known."""
         endpoints = self._watchdog_endpoints
-        if endpoints is None or isfinite(self.watchdog_s):
+        if endpoints is None:
             return
         for endpoint in (endpoints.enable, endpoints.timeout):
             self._transmit(codec.RX_SDO, codec.SDO_READ, endpoint, 0)

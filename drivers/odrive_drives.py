@@ -8,6 +8,7 @@ it, and the frames of strangers, garbled ones included, are counted and ignored.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
 
 from control.limits import JointLimits
 from control.records import JOINTS, NEVER_S, DriveStates, Torques
@@ -19,8 +20,9 @@ from drivers.odrive_codec import GarbledMessageError
 from drivers.transmit_gate import TransmitGate
 
 REPEAT_S = 0.1  # between two requests to change the axis state, of which the heartbeat tells the result
-LONGEST_IN_QUEUE_S = 0.05  # a stamp older than that is of another clock
-VERSION_REPEAT_S = 0.5  # between two questions for the same
+LONGEST_IN_QUEUE_S = 2.0  # a stamp older than that is of another clock
+VERSION_REPEAT_S = 0.5  # between two questions for the same that was not answered
+REFRESH_S = 2.0  # between two questions for what was answered: somebody may change a drive over USB
 TICK_S = 1.0 / 380.0  # of the loop
 
 
@@ -79,6 +81,10 @@ class OdriveDrives:
         return table
 
     @property
+    def _lost(self) -> int:
+        return sum(port.failed_sends for port in self.ports.values())
+
+    @property
     def heard(self) -> bool:
         return all(axis.heard for axis in self.axes)
 
@@ -89,14 +95,22 @@ class OdriveDrives:
             axis.send_torque(torque_nm)
 
     def arm(self, now_s: float, at_once: bool = False) -> None:
-        """Open the gate and ask for closed loop: all `at_once`, else every REPEAT_S those not in it yet."""
+        """Open the gate and prepare all drives `at_once`; else ask those not in it yet for closed loop, every REPEAT_S.
+
+        A drive is prepared again before it is asked, and nothing is asked for while frames are lost on the way.
+        """
         self.gate.open()
         if not at_once and now_s - self._armed_s < REPEAT_S:
             return
-        self._armed_s = now_s
-        for axis in self.axes:
-            if at_once or not axis.closed_loop:
-                axis.arm()
+        self._armed_s = NEVER_S if at_once else now_s
+        lost_before = self._lost
+        late = [axis for axis in self.axes if at_once or not axis.closed_loop]
+        for axis in late:
+            axis.prepare()
+        if at_once or self._lost > lost_before:
+            return
+        for axis in late:
+            axis.close_loop()
 
     def disarm(self, now_s: float, at_once: bool = False) -> None:
         """Close the gate; zero torque and idle for all `at_once`, else every REPEAT_S for those in closed loop."""
@@ -113,21 +127,24 @@ class OdriveDrives:
             axis.clear_errors()
 
     def request_versions(self, now_s: float) -> None:
-        """Of the drives that did not tell theirs yet, every VERSION_REPEAT_S."""
-        if now_s - self._version_asked_s < VERSION_REPEAT_S:
+        """Every VERSION_REPEAT_S of drives that did not tell theirs yet, every REFRESH_S of all."""
+        known = all(axis.version is not None for axis in self.axes)
+        if now_s - self._version_asked_s < (REFRESH_S if known else VERSION_REPEAT_S):
             return
         self._version_asked_s = now_s
         for axis in self.axes:
-            if axis.version is None:
+            if known or axis.version is None:
                 axis.request_version()
 
     def request_watchdogs(self, now_s: float) -> None:
-        """Of the drives whose version is known and whose watchdog is not, every VERSION_REPEAT_S."""
-        if now_s - self._watchdog_asked_s < VERSION_REPEAT_S:
+        """The same of the watchdogs of those whose version is known."""
+        known = all(isfinite(axis.watchdog_s) for axis in self.axes)
+        if now_s - self._watchdog_asked_s < (REFRESH_S if known else VERSION_REPEAT_S):
             return
         self._watchdog_asked_s = now_s
         for axis in self.axes:
-            axis.request_watchdog()
+            if known or not isfinite(axis.watchdog_s):
+                axis.request_watchdog()
 
     def close(self) -> None:
         for port in self.ports.values():

@@ -102,7 +102,9 @@ class GatedPort:
     def _admit(self, drive: DriveParameters) -> None:
         node_id = drive.node_id
         limits = codec.SET_LIMITS.encode(drive.velocity_limit_turn_s, drive.current_limit_a)
+        gains = codec.SET_VEL_GAINS.encode(drive.velocity_gain_nm_s_turn, 0.0)
         self._sent_nm[arbitration_id(node_id, codec.SET_INPUT_TORQUE)] = 0.0
+        self._payloads[arbitration_id(node_id, codec.SET_VEL_GAINS)] = frozenset({gains})
         self._payloads[arbitration_id(node_id, codec.SET_AXIS_STATE)] = frozenset({IDLE})
         self._payloads[arbitration_id(node_id, codec.SET_CONTROLLER_MODE)] = frozenset({TORQUE_MODE})
         self._payloads[arbitration_id(node_id, codec.SET_LIMITS)] = frozenset({limits})

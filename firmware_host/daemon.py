@@ -92,9 +92,10 @@ class Shutdown:
             self._idle_since_s = self._idle_since_s or now_s
             all_idle = not any(state.closed_loop for state in loop.states)
             return all_idle or now_s - self._idle_since_s > GOODBYE_S
-        if now_s - self._since_s > LONGEST_SHUTDOWN_S or loop.mode in (Mode.HOLD, Mode.ARMING):
+        in_the_mud = loop.mode is Mode.WALKING or loop.controller.cut_short
+        if now_s - self._since_s > LONGEST_SHUTDOWN_S or (loop.mode in (Mode.HOLD, Mode.ARMING) and not in_the_mud):
             loop.request(Request.DISARM, now_s)
-        elif loop.mode is Mode.WALKING:
+        elif in_the_mud:
             loop.request(Request.STOP, now_s)
         return False
 
@@ -172,8 +173,9 @@ def _end_safely(loop: Loop, problem: Exception) -> int:
             axis.disarm()
     place = traceback.extract_tb(problem.__traceback__)[-1]
     sentence = f"{type(problem).__name__}: {problem} ({Path(place.filename).name}, line {place.lineno})"
-    loop.event(time.monotonic(), f"stopped by a bug: {sentence}")
     print(f"mudskipperd: stopped by a bug, the drives are idle: {sentence}", file=sys.stderr)
+    with suppress(Exception):  # or the log
+        loop.event(time.monotonic(), f"stopped by a bug: {sentence}")
     return EXIT_FAILED
 
 

@@ -14,7 +14,7 @@ from control.faults import Fault
 from control.joint_watch import JointFacts, JointWatch
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
-from control.records import JOINTS, BodyPose, DriveStates
+from control.records import JOINTS, NEVER_S, BodyPose, DriveStates
 from drivers.can_port import BusState
 from drivers.odrive_axis import OdriveAxis
 from drivers.odrive_codec import error_text
@@ -28,6 +28,7 @@ from firmware_host.ticker import PERIOD_S, Beat
 ARMING_S = 2.0  # a drive that takes longer to go into closed loop does not mean to
 REFUSED_TICKS = 3  # in a row, in each of which one bus lost a command
 FIRMWARE = (0, 6)  # major and minor version whose messages the codec knows
+BUS_TROUBLE_S = 2.0  # after the last error frame
 POSE_FORGOTTEN_S = 10.0  # a motion capture that was switched off on purpose
 BROKEN = frozenset({"encoder_jump", "encoder_stuck"})  # told in some ticks, true in all of them
 BLIND = frozenset({"position_stale", "position_silent", "drive_quiet", "drive_silent"})
@@ -49,7 +50,7 @@ class Situation(NamedTuple):
     states: DriveStates
     body: BodyPose
     sent: LimitedTorques  # in the tick before
-    freeing: bool  # a recovery pulls at full torque
+    freeing: bool  # a recovery pulls at full torque on purpose
     wall_minus_monotonic_s: float
     log: LogReport
     lease_holder: str  # who has lost it; empty: nobody
@@ -69,6 +70,7 @@ class FaultWatch:
                 configuration.winding,
                 configuration.drive[joint].current_limit_a,
                 configuration.drive[joint].torque_constant_nm_a,
+                configuration.drive[joint].heartbeat_period_s,
             )
             for joint, span in zip(JOINTS, configuration.joint_ranges, strict=True)
         )
@@ -84,6 +86,8 @@ class FaultWatch:
         self._loop.reset()
         self._log.reset()
         self._failed_sends = {name: port.failed_sends for name, port in self._drives.ports.items()}
+        self._error_frames = {name: port.error_frames for name, port in self._drives.ports.items()}
+        self._error_s = dict.fromkeys(self._drives.ports, NEVER_S)
         self._refused_ticks = dict.fromkeys(self._drives.ports, 0)
         self._restarts = {axis.joint: axis.restarts for axis in self._drives.axes}
         self._refused_commands = self._drives.gate.refused
@@ -92,8 +96,10 @@ class FaultWatch:
         self.trusted: tuple[bool, ...] = ALL_TRUSTED  # of the joints' encoders
 
     def with_winding_heat(self, states: DriveStates) -> DriveStates:
-        """The states with the windings' temperatures where these are warm enough for the limits to heed them."""
-        if all(joint.winding.temperature_c <= self._warm_c for joint in self.joints):
+        """With the temperatures that the watches believe, where one is warm enough for the limits to heed it."""
+        if all(joint.winding.temperature_c <= self._warm_c for joint in self.joints) and not any(
+            state.temperature_c > self._warm_c for state in states
+        ):
             return states
         a, b, c, d = (
             state._replace(temperature_c=joint.winding.temperature_c)
@@ -105,7 +111,7 @@ class FaultWatch:
         """Everything that is wrong in this tick."""
         found = self._loop.update(beat, situation.wall_minus_monotonic_s)
         found += self._log.update(situation.log)
-        self._watch_buses(found)
+        self._watch_buses(found, beat.now_s)
         if situation.lease_holder:
             text = f"{situation.lease_holder} promised to attend the robot and is gone."
             found.append(make_fault("lease_lost", "", text))
@@ -120,12 +126,18 @@ class FaultWatch:
         self._watch_gate(found)
         for axis in self._drives.axes:
             self._watch_axis(found, axis)
+            if axis.busy_state and situation.mode not in ENERGISED:
+                text = f"The {axis.joint} drive does something of its own: axis state {axis.busy_state}."
+                found.append(make_fault("drive_energised", axis.joint, text))
         self._watch_pose(found, beat.now_s, situation.body)
         return found
 
-    def _watch_buses(self, found: list[Fault]) -> None:
+    def _watch_buses(self, found: list[Fault], now_s: float) -> None:
+        """A warning ends with the error frames: not every CAN driver tells that its controller has recovered."""
         for name, port in self._drives.ports.items():
-            if port.state is not BusState.ACTIVE:
+            if port.error_frames > self._error_frames[name]:
+                self._error_frames[name], self._error_s[name] = port.error_frames, now_s
+            if port.state is BusState.OFF or (port.state and now_s - self._error_s[name] < BUS_TROUBLE_S):
                 kind, text = BUS_FAULTS[port.state]
                 found.append(make_fault(kind, name, f"The {name} bus {text}: {port.last_error or 'no word why'}."))
             lost = port.failed_sends > self._failed_sends[name]

@@ -82,7 +82,8 @@ class Loop:
         self._change_mode(next_mode(self.mode, self._request_now(), self.health), beat.now_s)
         self.forced = self.forced and self.mode in ENERGISED
         step_s = min(1 + beat.missed, LONGEST_STEP_TICKS) * PERIOD_S
-        wanted = self.controller.step(step_s, self.mode, self.states, self._trusted())
+        elapsed_s = (1 + beat.missed) * PERIOD_S
+        wanted = self.controller.step(step_s, self.mode, self.states, self._trusted(), elapsed_s)
         self.sent = self._limit(wanted)
         self._command(beat.now_s)
         self._record(beat)
@@ -126,8 +127,8 @@ class Loop:
         )
 
     def _situation(self, now_s: float) -> Situation:
-        lost = self.lease.lost(now_s)
-        if lost and self.mode not in ENERGISED:  # nothing is left to attend to
+        lost_by = str(self.lease.holder) if self.lease.lost(now_s) else ""
+        if lost_by and self.mode not in ENERGISED:  # nothing is left to attend to
             self.lease.reset()
         return Situation(
             self.mode,
@@ -138,7 +139,7 @@ class Loop:
             self.controller.recovery.attempt > 0,
             self._wall_clock() - self._clock(),
             self.recorder.report(),
-            str(self.lease.holder) if lost else "",
+            lost_by,
         )
 
     def _tell_faults(self, now_s: float) -> None:

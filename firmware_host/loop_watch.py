@@ -10,6 +10,7 @@ from control.joint_watch import FaultBounds
 from firmware_host.ticker import PERIOD_S, Beat
 
 MEAN_TICKS = 100
+CRAWL_TICKS = 5
 STEP_S = 0.1  # by which a clock on the wall does not drift between two ticks
 
 
@@ -42,6 +43,10 @@ class LoopWatch:
         elif beat.missed:
             found.append(make_fault("loop_overrun", "", f"The loop missed {beat.missed} of its ticks."))
         self._stamps_s.append(beat.now_s)
+        if len(self._stamps_s) > CRAWL_TICKS:
+            mean_s = (beat.now_s - self._stamps_s[-1 - CRAWL_TICKS]) / CRAWL_TICKS
+            if mean_s > self._bounds.crawl_s:
+                found.append(make_fault("loop_crawling", "", f"The loop's ticks take {1e3 * mean_s:.0f} ms."))
         if len(self._stamps_s) > MEAN_TICKS:
             share = (beat.now_s - self._stamps_s[0]) / (MEAN_TICKS * PERIOD_S) - 1.0
             if share > self._bounds.lag_share:

@@ -75,6 +75,7 @@ jump_rad = 2.0
 fast_s = 0.2
 lag_s = 0.5
 lag_share = 1.0
+crawl_s = 0.5
 
 [log]
 directory = {logs}

@@ -80,16 +80,16 @@ class Lockstep:
         motion_capture: MotionCaptureParameters = AT_EVERY_TICK,
         failures: Failures | None = None,
     ) -> None:
-        buses = {name: MockBus() for name in configuration.bus}
+        self.buses = {name: MockBus() for name in configuration.bus}
         self.robot = SimulatedRobot(
             plant or plant_of(configuration, disturbances, fixed_base),
             track,
             drives or drives_of(configuration, **drive_changes(disturbances)),
             {joint: configuration.drive[joint].bus for joint in JOINTS},
-            {name: bus.open() for name, bus in buses.items()},
+            {name: bus.open() for name, bus in self.buses.items()},
             seed,
         )
-        wires = failing_ports({name: bus.open() for name, bus in buses.items()}, configuration.drive, failures)
+        wires = failing_ports({name: bus.open() for name, bus in self.buses.items()}, configuration.drive, failures)
         ports = OdriveDrives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
         pose = failing_pose(SimulatedPose(self.robot.plant, motion_capture, seed + 1), failures)
         rows = failing_recorder(recorder or NullRecorder(), failures)

@@ -5,7 +5,7 @@ clamp and the current limits, cyclic messages, requests by remote frame. What no
 joint, each off at 0. The motor's true constant differs from the one that the drive reckons with; current follows its
 command with a first-order lag; magnets pull towards detents at any current. The encoder has steps, noise and an
 offset, the current noise. Messages arrive late by evenly drawn times, though in order, and some tell their old values
-again. (The velocity is the drive's own filtered one and has no noise here.)
+again.
 
 Cogging is the slope of an energy that repeats n times a turn, so it takes as much as it gives, and no pure sine:
 
@@ -62,6 +62,7 @@ class OdriveParameters:
     message_delay_s: Annotated[float, Bounds(0.0, 0.05)] = 0.0  # longest
     repeated_share: Annotated[float, Bounds(0.0, 0.99)] = 0.0  # of the messages of angle, and of current
     velocity_gain_nm_s_turn: Annotated[float, Bounds(0.0, 100.0)] = 1.0 / 6.0  # ODrive's default vel_gain, in the clamp
+    velocity_noise_rad_s: Annotated[float, Bounds(0.0, 5.0)] = 0.0  # of the drive's estimate
     temperature_c: Annotated[float, Bounds(-50.0, 200.0)] = 30.0
     bus_voltage_v: Annotated[float, Bounds(0.0, 100.0)] = 24.0
     motor_current_limit_a: Annotated[float, Bounds(0.0, inf)] = inf  # the motor's own clip, whatever limit the bus sets
@@ -82,6 +83,7 @@ class SimulatedOdrive:
         self._setpoint_nm = 0.0  # at the motor
         self._modes = (0, 0)
         self._velocity_limit_turn_s, self._current_limit_a = 2.0, 10.0  # ODrive's defaults
+        self._velocity_gain_nm_s_turn = self.parameters.velocity_gain_nm_s_turn
         self._fed_s = now_s
         self._current_a = 0.0
         self._stepped_s = now_s
@@ -132,6 +134,8 @@ class SimulatedOdrive:
             self._modes = codec.SET_CONTROLLER_MODE.decode(data)
         elif command == codec.SET_LIMITS.command:
             self._set_limits(*codec.SET_LIMITS.decode(data))
+        elif command == codec.SET_VEL_GAINS.command:
+            self._set_gain(codec.SET_VEL_GAINS.decode(data)[0])
         elif command == codec.CLEAR_ERRORS.command:
             self.errors = 0
         elif command == codec.ESTOP.command:
@@ -157,6 +161,11 @@ class SimulatedOdrive:
             raise GarbledMessageError("not a finite number")
         self._setpoint_nm = torque_nm
         self._fed_s = now_s
+
+    def _set_gain(self, velocity_gain_nm_s_turn: float) -> None:
+        if not isfinite(velocity_gain_nm_s_turn):
+            raise GarbledMessageError("not a finite number")
+        self._velocity_gain_nm_s_turn = velocity_gain_nm_s_turn
 
     def _set_limits(self, velocity_turn_s: float, current_a: float) -> None:
         if not isfinite(velocity_turn_s + current_a):
@@ -194,7 +203,7 @@ class SimulatedOdrive:
     def _reckoned_nm(self, now_s: float) -> float:
         """What the drive believes to exert: clamped as it clamps, and as far as the current has come."""
         parameters = self.parameters
-        gain, limit = parameters.velocity_gain_nm_s_turn, self._velocity_limit_turn_s
+        gain, limit = self._velocity_gain_nm_s_turn, self._velocity_limit_turn_s
         torque_nm = min(max(self._setpoint_nm, (-limit - self._turns_s) * gain), (limit - self._turns_s) * gain)
         largest_a = min(self._current_limit_a, parameters.motor_current_limit_a)
         largest_nm = largest_a * parameters.torque_constant_nm_a
@@ -263,7 +272,10 @@ class SimulatedOdrive:
             wrong_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
         turns = self._turns + parameters.sign * wrong_rad / TURN_RAD
         told_turns = round(turns * parameters.encoder_counts) / parameters.encoder_counts
-        return codec.GET_ENCODER_ESTIMATES.encode(told_turns, self._turns_s)
+        turns_s = self._turns_s
+        if parameters.velocity_noise_rad_s:
+            turns_s += self._random.gauss(0.0, parameters.velocity_noise_rad_s) / TURN_RAD
+        return codec.GET_ENCODER_ESTIMATES.encode(told_turns, turns_s)
 
     def _iq(self) -> bytes:
         noise_a = self.parameters.current_noise_a

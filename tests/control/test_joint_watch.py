@@ -12,10 +12,9 @@ from control.fault_kinds import KINDS
 from control.faults import Reaction
 from control.joint_watch import (
     CURRENT_TICKS,
-    HEARTBEAT_SILENCE_S,
     MISSING_S,
     MISSING_SHARE,
-    TEMPERATURE_SILENCE_S,
+    SLOW_SILENCE_S,
     TWO_MESSAGES_S,
     FaultBounds,
     JointFacts,
@@ -129,8 +128,8 @@ def test_a_healthy_drive_shows_no_fault() -> None:
         (("angle_stamp_s",), BOUNDS.silence_s, "position_stale", "position_silent"),
         (("current_stamp_s",), BOUNDS.silence_s, "current_stale", "current_silent"),
         (("angle_stamp_s", "current_stamp_s"), BOUNDS.silence_s, "drive_quiet", "drive_silent"),
-        (("heartbeat_stamp_s",), HEARTBEAT_SILENCE_S, None, "heartbeat_silent"),
-        (("temperature_stamp_s",), TEMPERATURE_SILENCE_S, None, "temperature_silent"),
+        (("heartbeat_stamp_s",), 0.5, None, "heartbeat_silent"),
+        (("temperature_stamp_s",), SLOW_SILENCE_S, None, "temperature_silent"),
     ],
 )
 def test_a_signal_counts_as_gone_from_its_bound_on(
@@ -371,11 +370,11 @@ def test_a_joint_at_the_velocity_limit_never_jumps() -> None:
 # load
 
 
-def stalled_ticks(torque_nm: float, velocity_rad_s: float, freeing: bool = False, ticks: int = 900) -> int | None:
+def stalled_ticks(torque_nm: float, velocity_rad_s: float, excused: bool = False, ticks: int = 900) -> int | None:
     watch = make_watch()
     state = HEALTHY._replace(velocity_rad_s=velocity_rad_s)
     for tick in range(1, ticks):
-        if "joint_not_following" in seen(watch, state, torque_nm=torque_nm, freeing=freeing):
+        if "joint_not_following" in seen(watch, state, torque_nm=torque_nm, may_stand_still=excused):
             return tick
     return None
 
@@ -388,7 +387,7 @@ def test_a_joint_that_stands_still_at_full_torque_does_not_follow() -> None:
 
 
 @pytest.mark.parametrize(
-    ("torque_nm", "velocity_rad_s", "freeing"),
+    ("torque_nm", "velocity_rad_s", "excused"),
     [
         (0.94 * LIMITS.torque_nm, 0.0, False),  # not saturated
         (LIMITS.torque_nm, 0.11, False),  # it moves
@@ -397,8 +396,8 @@ def test_a_joint_that_stands_still_at_full_torque_does_not_follow() -> None:
         (0.0, 0.0, False),
     ],
 )
-def test_everything_else_follows_or_is_excused(torque_nm: float, velocity_rad_s: float, freeing: bool) -> None:
-    assert stalled_ticks(torque_nm, velocity_rad_s, freeing, 2000) is None
+def test_everything_else_follows_or_is_excused(torque_nm: float, velocity_rad_s: float, excused: bool) -> None:
+    assert stalled_ticks(torque_nm, velocity_rad_s, excused, 2000) is None
 
 
 def test_one_tick_of_motion_begins_the_wait_anew() -> None:
@@ -416,6 +415,13 @@ def test_missed_ticks_count_for_as_long_as_they_lasted() -> None:
         if "joint_not_following" in seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=10.0 * TICK_S)
     ]
     assert found[0] == pytest.approx(76, abs=1)
+
+
+def test_one_sample_after_a_long_stall_is_no_proof_of_what_lasted() -> None:
+    """A daemon that hung for seconds looks once."""
+    watch = make_watch()
+    stalled = seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=3.0)
+    assert set(stalled).isdisjoint({"joint_not_following", "torque_missing", "joint_velocity"})
 
 
 @pytest.mark.parametrize("missed", [1, 5, 9, 200])

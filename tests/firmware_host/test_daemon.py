@@ -103,6 +103,28 @@ def test_a_bug_idles_all_drives_that_can_be_reached(robot: Lockstep, capsys: pyt
     assert "Traceback" not in said
 
 
+def test_a_bug_in_the_log_does_not_keep_the_drives_from_their_end(robot: Lockstep) -> None:
+    def broken(kind_index: int, payload: bytes) -> bool:
+        raise DeliberateBugError
+
+    robot.loop.recorder.put = broken  # type: ignore[method-assign]
+    assert _end_safely(robot.loop, caught(DeliberateBugError())) == EXIT_FAILED
+    robot.robot.advance(robot.now_s + 0.01)
+    assert states_of(robot) == [AxisState.IDLE] * 4
+
+
+class DeliberateBugError(Exception):
+    pass
+
+
+def caught(problem: Exception) -> Exception:
+    """With the traceback of having been raised."""
+    try:
+        raise problem
+    except DeliberateBugError:
+        return problem
+
+
 class Notices(SystemdNotifier):
     def __init__(self) -> None:
         super().__init__("")

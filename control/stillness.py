@@ -1,0 +1,25 @@
+"""For how long a joint has stood still, by its angle: its speed is an estimate with noise, also of a joint at rest."""
+
+from __future__ import annotations
+
+from control.records import UNKNOWN
+
+
+class Stillness:
+    """Owns the place at which a joint was last seen to arrive."""
+
+    def __init__(self, band_rad: float) -> None:
+        self._band_rad = band_rad
+        self.reset()
+
+    def reset(self) -> None:
+        self._place_rad = UNKNOWN
+        self.still_s = 0.0  # within the band about the place
+
+    def update(self, angle_rad: float, dt_s: float) -> bool:
+        """Whether the joint is still where it was."""
+        if abs(angle_rad - self._place_rad) <= self._band_rad:
+            self.still_s += dt_s
+            return True
+        self._place_rad, self.still_s = angle_rad, 0.0
+        return False

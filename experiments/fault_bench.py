@@ -1,0 +1,133 @@
+"""A robot in lockstep on which more can go wrong than on its wires: strangers on the bus, a loop that stands still or
+dies, bugs, hands on its joints, a twin of a drive. A loop that raises an exception is ended as the daemon ends it.
+
+Every step is one period of the loop, also while the loop stands still; it then misses that tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr
+from io import StringIO
+from random import Random
+
+from control.records import JOINTS
+from control.winding import Winding
+from drivers.failures import Failures, end_text
+from drivers.frames import Frame
+from drivers.odrive_codec import Message, arbitration_id
+from firmware_host.configuration import Configuration
+from firmware_host.daemon import _end_safely as end_safely
+from firmware_host.log_rows import EVENT
+from firmware_host.loop import TICK_KIND
+from firmware_host.recorder import EVENT_KIND, HEALTHY, LogReport, NullRecorder
+from firmware_host.ticker import PERIOD_S, Beat
+from simulation.lockstep import Lockstep
+from simulation.odrive import SimulatedOdrive
+from simulation.plant import Arm
+from simulation.track import Track
+
+Act = Callable[[], None]
+
+
+class CountingRecorder(NullRecorder):
+    """A Recording. Owns the count of the ticks' rows, the sentences of the events, and what its writer would tell."""
+
+    def __init__(self) -> None:
+        self.ticks = 0
+        self.texts: list[str] = []
+        self.told = HEALTHY
+
+    def report(self) -> LogReport:
+        return self.told
+
+    def put(self, kind_index: int, payload: bytes) -> bool:
+        if kind_index == TICK_KIND:
+            self.ticks += 1
+        elif kind_index == EVENT_KIND:
+            self.texts.append(EVENT.decode(payload)["text"])
+        return True
+
+
+class FaultBench(Lockstep):
+    def __init__(self, configuration: Configuration, track: Track, seed: int) -> None:
+        self.rows = CountingRecorder()
+        failures = Failures(configuration.bus, seed)
+        super().__init__(configuration, track, seed, recorder=self.rows, failures=failures)
+        self._strangers = {name: bus.open() for name, bus in self.buses.items()}
+        self._acts: list[Act] = []  # of every step, after the robot's and before the loop's
+        self.ticks_made = 0
+        self.stands_still = 0  # periods to come in which the loop does nothing
+        self.dead = False
+        self.bug = ""  # the exception that ended the loop
+        self._missed = 0
+
+    def step(self) -> None:
+        if not self._missed:
+            self.stands_still += int(self._stalls.next_s() / PERIOD_S)
+        self.tick_number += 1
+        self.robot.advance(self.now_s)
+        for act in tuple(self._acts):
+            act()
+        if self.dead:
+            return
+        if self.stands_still:
+            self.stands_still -= 1
+            self._missed += 1
+            return
+        self._tick()
+
+    def _tick(self) -> None:
+        for failure in self.failures.update(self.now_s):
+            self.loop.event(self.now_s, end_text(failure))
+        missed, self._missed = self._missed, 0
+        self.ticks_made += 1
+        try:
+            self.loop.tick(Beat(self.now_s, missed * PERIOD_S, self.tick_number, missed))
+        except Exception as problem:  # noqa: BLE001 - as in the daemon, the one place where surprises end
+            self.bug, self.dead = f"{type(problem).__name__}: {problem}", True
+            with redirect_stderr(StringIO()):
+                end_safely(self.loop, problem)
+
+    @contextmanager
+    def acting(self, act: Act) -> Iterator[None]:
+        """`act` in every step meanwhile."""
+        self._acts.append(act)
+        yield
+        self._acts.remove(act)
+
+    def say(self, joint: str, message: Message, *values: float, value: bytes = b"") -> None:
+        """A frame on the bus in the name of a joint's drive, or to it, that is from neither drive nor loop."""
+        drive = self.loop.configuration.drive[joint]
+        frame = Frame(arbitration_id(drive.node_id, message), message.encode(*values) + value)
+        self._strangers[drive.bus].send(frame)
+
+    def drive(self, joint: str) -> SimulatedOdrive:
+        return self.robot.drives[JOINTS.index(joint)]
+
+    def arm_of(self, joint: str) -> Arm:
+        return self.robot.plant.arms[JOINTS.index(joint) // 2]
+
+    def winding(self, joint: str) -> Winding:
+        """The loop's own reckoning of it, which is seconds away from any heat."""
+        return self.loop._fault_watch.joints[JOINTS.index(joint)].winding
+
+    def add_twin(self, joint: str, angle_rad: float) -> Act:
+        """A second drive with the id of the joint's own, on its bus: what it does in a step."""
+        port = self.buses[self.loop.configuration.drive[joint].bus].open()
+        twin = SimulatedOdrive(self.drive(joint).parameters, Random(f"twin {joint}"))
+        twin.reset(self.now_s)
+
+        def live() -> None:
+            twin.measure(angle_rad, 0.0)
+            for frame in port.receive():
+                for answer in twin.receive(frame, self.now_s):
+                    port.send(answer)
+            for frame in twin.cyclic_frames(self.now_s):
+                port.send(frame)
+
+        return live
+
+    def torques_nm(self) -> list[float]:
+        """That the motors exert now."""
+        return [drive.torque_nm(self.robot.now_s) for drive in self.robot.drives]

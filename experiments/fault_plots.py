@@ -1,0 +1,74 @@
+"""The faults as a picture: how much of its bound each reaction took, by fault and phase."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
+import numpy as np  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
+
+COLUMNS = 2  # panels side by side: there are many faults
+HIGHEST_PERCENT = 100.0
+DARK_PERCENT = 65.0  # from here on letters are white
+
+
+def plot_faults(report: dict[str, Any], path: Path) -> None:
+    """Numbers are ticks, of the slowest seed; the colour is their share of the bound; a red cross is not ok."""
+    rows = report["faults"]
+    phases = [phase for phase in report["settings"]["phases"] if any(c["phase"] == phase for c in report["cells"])]
+    columns = min(COLUMNS, len(rows))
+    per_panel = -(-len(rows) // columns)
+    figure, panels = plt.subplots(
+        1, columns, figsize=(12.0, 1.6 + 0.22 * per_panel), squeeze=False, constrained_layout=True
+    )
+    for i, panel in enumerate(panels[0]):
+        mesh = _plot_panel(panel, report, rows[i * per_panel : (i + 1) * per_panel], phases)
+    bar = figure.colorbar(mesh, ax=list(panels[0]), pad=0.01, shrink=0.6, aspect=40, extend="max")
+    bar.set_label("slowest reaction, % of its bound; the numbers are ticks of 2.63 ms")
+    ok, cells = report["ok"], len(report["cells"])
+    figure.suptitle(f"From the cause to the reaction: {ok} of {cells} cells within every bound", fontsize="medium")
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def _plot_panel(panel: Axes, report: dict[str, Any], rows: Sequence[dict[str, Any]], phases: Sequence[str]) -> Any:
+    percent = np.full((len(rows), len(phases)), np.nan)
+    for y, row in enumerate(rows):
+        for x, phase in enumerate(phases):
+            cells = [c for c in report["cells"] if (c["way"], c["phase"]) == (row["way"], phase)]
+            if cells:
+                percent[y, x] = _write_cell(panel, x, y, cells)
+    colours = plt.get_cmap("YlGnBu").with_extremes(bad="#f4f4f4")
+    mesh = panel.imshow(percent, cmap=colours, vmin=0.0, vmax=HIGHEST_PERCENT, aspect="auto")
+    panel.set_xticks(range(len(phases)), list(phases), rotation=35, ha="left", fontsize="small")
+    panel.xaxis.tick_top()
+    panel.set_yticks(range(len(rows)), [_label(row) for row in rows], fontsize="x-small")
+    panel.set_xticks(np.arange(len(phases) + 1) - 0.5, minor=True)
+    panel.set_yticks(np.arange(len(rows) + 1) - 0.5, minor=True)
+    panel.grid(which="minor", color="white", linewidth=1.0)
+    panel.tick_params(length=0, which="both")
+    for side in panel.spines.values():
+        side.set_visible(False)
+    return mesh
+
+
+def _label(row: dict[str, Any]) -> str:
+    bound = "" if row["bound_ticks"] is None else f"  ≤ {row['bound_ticks']}"
+    return f"{row['way']}{bound}"
+
+
+def _write_cell(panel: Axes, x: int, y: int, cells: Sequence[dict[str, Any]]) -> float:
+    """The slowest reaction in ticks. Returns its share of the bound in percent; what has no bound is white."""
+    ticks, bound = max((c["reaction_ticks"] or 0 for c in cells), default=0), cells[0]["bound_ticks"]
+    share = 100.0 * ticks / bound if bound else 0.0
+    text = str(ticks) if bound else "·"
+    panel.text(x, y, text, ha="center", va="center", fontsize=6.5, color="white" if share > DARK_PERCENT else "#333333")
+    if not all(cell["ok"] for cell in cells):
+        panel.plot(x, y, "x", color="tab:red", markersize=11, markeredgewidth=2.0)
+    return share

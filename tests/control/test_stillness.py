@@ -1,0 +1,31 @@
+"""Rest is judged by the angle."""
+
+from random import Random
+
+import pytest
+
+from control.stillness import Stillness
+
+
+def test_a_joint_is_still_within_its_band_and_for_as_long_as_it_stays_there() -> None:
+    stillness = Stillness(0.03)
+    assert not stillness.update(1.0, 0.1)
+    assert stillness.update(1.03 - 1e-9, 0.1)
+    assert stillness.update(0.97 + 1e-9, 0.1)
+    assert stillness.still_s == pytest.approx(0.2)
+    assert not stillness.update(1.04, 0.1)
+    assert stillness.still_s == 0.0
+
+
+def test_noise_of_the_encoder_is_no_motion_and_a_slow_creep_is() -> None:
+    random, stillness = Random(1), Stillness(0.03)
+    stillness.update(0.5, 0.1)
+    assert all(stillness.update(random.gauss(0.5, 0.002), 0.1) for _ in range(1000))
+    stillness.reset()
+    moved = [not stillness.update(0.001 * step, 0.1) for step in range(200)]
+    assert sum(moved) == 1 + 199 // 31
+
+
+def test_an_angle_that_is_no_number_is_never_still() -> None:
+    stillness = Stillness(0.03)
+    assert not any(stillness.update(float("nan"), 0.1) for _ in range(10))
