@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-.PHONY: help setup demo test mutants lint clean
+.PHONY: help setup demo test test-vm mutants lint clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -17,6 +17,10 @@ demo: .venv/setup  ## a simulated robot walks over three muds, in real time
 test: .venv/test  ## every test, without network
 	$(BIN)/python -m pytest -q $(ARGS)
 
+test-vm: .venv/test  ## the daemon under systemd on a real kernel, in a virtual machine
+	@$(BIN)/python -m virtual_machine.installed_robot
+	$(BIN)/python -m pytest -v virtual_machine $(ARGS)
+
 mutants: .venv/test  ## change the transmit gate in 204 places; its tests must notice each
 	$(BIN)/python -m tests.drivers.gate_mutants
 
@@ -26,7 +30,7 @@ lint: .venv/test  ## ruff and mypy --strict
 	$(BIN)/mypy
 
 clean:  ## remove the environment and what was built
-	rm -rf .venv build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .virtual_machine build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 .venv/setup: pyproject.toml
 	@echo "Installing into .venv (a minute or two) ..."

@@ -1,0 +1,59 @@
+"""The same installation on buses inside the kernel: what the README changes for them fits together."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from firmware_host.configuration import load_configuration
+from virtual_machine.installed_robot import installation
+
+ROOT = Path(__file__).resolve().parents[2]
+SYSTEMD = ROOT / "systemd"
+BUSES = {"vcan0", "vcan1"}
+
+
+@pytest.fixture
+def edited(tmp_path: Path) -> Path:
+    """Copies of configuration and unit after the README's own `sed`."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (line,) = [line for line in readme.splitlines() if line.startswith("sed -i ")]
+    program, in_place, expression, *paths = shlex.split(line)
+    assert {Path(path).name for path in paths} == {"mudskipper.toml", "mudskipper.service"}
+    for path in paths:
+        copy = tmp_path / Path(path).name
+        copy.write_text((SYSTEMD / copy.name).read_text(encoding="utf-8"), encoding="utf-8")
+        subprocess.run([program, in_place, expression, str(copy)], check=True, timeout=10.0)
+    return tmp_path
+
+
+def test_the_configuration_names_the_virtual_buses_and_no_others(edited: Path) -> None:
+    buses = load_configuration(edited / "mudskipper.toml").bus.values()
+    assert {bus.channel for bus in buses} == BUSES
+
+
+def test_the_unit_waits_for_the_virtual_buses_and_no_others(edited: Path) -> None:
+    text = (edited / "mudskipper.service").read_text(encoding="utf-8")
+    assert set(re.findall(r"sys-subsystem-net-devices-(\w+)\.device", text)) == BUSES
+    for key in ("BindsTo", "After", "WantedBy"):
+        assert all(f"{key}=" in text and f"devices-{bus}.device" in text for bus in BUSES)
+
+
+def test_the_network_files_make_them_and_bring_them_up() -> None:
+    texts = [path.read_text(encoding="utf-8") for path in sorted(SYSTEMD.glob("80-vcan*.netdev"))]
+    assert {name for text in texts for name in re.findall(r"^Name=(\w+)$", text, re.MULTILINE)} == BUSES
+    assert all("Kind=vcan" in text.splitlines() for text in texts)
+    network = (SYSTEMD / "80-vcan.network").read_text(encoding="utf-8").splitlines()
+    assert f"Name={' '.join(sorted(BUSES))}" in network
+    assert "RequiredForOnline=no" in network
+
+
+def test_the_virtual_machine_is_installed_by_the_readme_s_commands() -> None:
+    script = installation()
+    for part in ("pip install /opt/mudskipper/src", "systemd-sysusers", "80-can.link", "80-vcan.network", "sed -i"):
+        assert part in script
+    assert "git clone" not in script  # the working tree is copied instead

@@ -1,0 +1,144 @@
+"""Debian 12 as a robot has it before the project comes: kernel, systemd, Python, and what the project depends on.
+
+mmdebstrap makes it from Debian's own packages, as root or with user namespaces, and it is kept as a tar archive until
+the list of packages or the project's dependencies change. The guest has no network, so the dependencies are fetched
+here, for the guest's Python, and installed from a folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+PROJECT = Path(__file__).resolve().parent.parent
+STORE = PROJECT / ".virtual_machine"
+NEEDED_HERE = {  # Debian package: the program that it brings
+    "qemu-system-x86": "qemu-system-x86_64",
+    "mmdebstrap": "mmdebstrap",
+    "debian-archive-keyring": "",
+    "e2fsprogs": "mke2fs",
+    "fakeroot": "fakeroot",
+}
+SUITE = "bookworm"
+GUEST_PYTHON = "3.11"
+PACKAGES = (
+    *(
+        "linux-image-amd64",
+        "initramfs-tools",
+        "lz4",
+        "kmod",
+        "udev",
+        "systemd",
+        "systemd-sysv",
+        "libpam-systemd",
+        "dbus",
+    ),
+    *("iproute2", "procps", "adduser", "python3", "python3-venv", "can-utils"),
+)
+LEFT_OUT = ("/usr/share/doc/*", "/usr/share/man/*", "/usr/share/locale/*") + tuple(
+    f"/lib/modules/*/kernel/{folder}/*"  # two thirds of the kernel's package, for hardware that is not emulated
+    for folder in (
+        *("sound", "drivers/gpu", "drivers/media", "drivers/staging", "drivers/infiniband", "drivers/scsi"),
+        *("drivers/net/wireless", "drivers/net/ethernet", "drivers/usb", "drivers/iio", "drivers/hwmon"),
+    )
+)
+INITRAMFS = {  # no more than reaches the disk: every megabyte of it costs a second of emulation
+    "etc/initramfs-tools/conf.d/small": "MODULES=list\nCOMPRESS=lz4\nFSTYPE=ext4\n",
+    "etc/initramfs-tools/modules": "virtio_pci\nvirtio_blk\next4\n",
+}
+WHEELS = "/opt/wheels"
+PLATFORMS = ("manylinux_2_28_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64")
+IN_THE_GUEST = (
+    "env -i PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8"
+    f' PIP_NO_INDEX=1 PIP_FIND_LINKS={WHEELS} PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_ROOT_USER_ACTION=ignore chroot "$1"'
+)
+
+
+class BuildError(Exception):
+    """The image cannot be built; the text says why and what to do."""
+
+
+def install_what_is_missing() -> None:
+    """The only thing that is ever installed outside of the project's folder, and only after it was named."""
+    missing = [package for package in NEEDED_HERE if not _installed(package)]
+    if not missing:
+        return
+    command = ["apt-get", "install", "--yes", "--no-install-recommends", *missing]
+    if os.geteuid() != 0:
+        command = ["sudo", *command]
+    print(f"Installing Debian packages: {' '.join(missing)}", flush=True)
+    if shutil.which(command[0]) is None:
+        raise BuildError(f"As root: {' '.join(command[1:])}")
+    run(command)
+
+
+def _installed(package: str) -> bool:
+    program = NEEDED_HERE[package]
+    return shutil.which(program) is not None if program else Path("/usr/share/keyrings/" + package + ".gpg").exists()
+
+
+def run(command: Sequence[str | Path]) -> None:
+    """Its words are shown only where it fails."""
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    if done.returncode != 0:
+        words = done.stdout.decode(errors="replace")
+        raise BuildError(f"{words}\n{command[0]} failed with status {done.returncode}: the last lines above say why.")
+
+
+def _requirements() -> list[str]:
+    document = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))
+    return [*document["project"]["dependencies"], *document["build-system"]["requires"]]
+
+
+def fingerprint(*texts: bytes) -> str:
+    digest = hashlib.sha256()
+    for text in texts:
+        digest.update(hashlib.sha256(text).digest())
+    return digest.hexdigest()[:16]
+
+
+def base_system() -> Path:
+    """The archive, built where there is none of these packages and dependencies."""
+    key = fingerprint(" ".join([*_debian_command(), *INITRAMFS.values(), *PLATFORMS]).encode())
+    archive = STORE / f"base-{key}.tar"
+    if not archive.exists():
+        shutil.rmtree(STORE, ignore_errors=True)
+        STORE.mkdir()
+        print("Building Debian with the project's dependencies (two minutes) ...", flush=True)
+        _fetch_wheels()
+        _write_initramfs_settings()
+        unfinished = archive.with_suffix(".unfinished")
+        run([*_debian_command(), unfinished])
+        unfinished.rename(archive)
+    return archive
+
+
+def _fetch_wheels() -> None:
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--dest", str(STORE / "wheels")]
+    command += ["--only-binary=:all:", "--implementation=cp", f"--python-version={GUEST_PYTHON}"]
+    command += [f"--platform={platform}" for platform in PLATFORMS]
+    run([*command, *_requirements()])
+
+
+def _write_initramfs_settings() -> None:
+    for name, text in INITRAMFS.items():
+        path = STORE / "settings" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def _debian_command() -> list[str]:
+    command = ["mmdebstrap", "--variant=minbase", "--format=tar", f"--include={','.join(PACKAGES)}"]
+    command += [f"--dpkgopt=path-exclude={pattern}" for pattern in LEFT_OUT]
+    command += [f"--essential-hook=copy-in {STORE / 'settings' / 'etc'} /"]  # before the kernel makes its initramfs
+    command += [f"--customize-hook=copy-in {STORE / 'wheels'} /opt"]
+    command += [f"--customize-hook={IN_THE_GUEST} python3 -m venv /opt/mudskipper/venv"]
+    quoted = " ".join(f"'{requirement}'" for requirement in _requirements())
+    command += [f"--customize-hook={IN_THE_GUEST} /opt/mudskipper/venv/bin/pip install {quoted}"]
+    return [*command, SUITE]

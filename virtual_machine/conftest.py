@@ -1,0 +1,45 @@
+"""One virtual machine for all checks, booted once; a check that cuts its power boots it again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from virtual_machine.installed_robot import installed_robot
+from virtual_machine.machine import Machine
+from virtual_machine.robot import Robot
+
+
+@pytest.fixture(scope="session")
+def machine() -> Iterator[Machine]:
+    machine = Machine(installed_robot())
+    try:
+        machine.boot()
+        yield machine
+    finally:
+        machine.close()
+
+
+@pytest.fixture(scope="session")
+def booted(machine: Machine) -> Robot:
+    """As it is after the boot, without anybody's help."""
+    robot = Robot(machine)
+    robot.wait_until_ready()
+    return robot
+
+
+@pytest.fixture
+def robot(booted: Robot) -> Robot:
+    """At rest, without faults."""
+    booted.rest()
+    return booted
+
+
+@pytest.fixture
+def walking(booted: Robot) -> Robot:
+    """In a walk, where need be that of the check before: every second of the guest costs several of ours."""
+    if not booted.walks_well():
+        booted.rest()
+        booted.walk()
+    return booted

@@ -1,0 +1,38 @@
+"""What people may ask of the robot through its socket, by who they are."""
+
+from __future__ import annotations
+
+import pytest
+
+from command_line import exit_codes
+from virtual_machine.robot import STRANGER, Robot
+
+
+def test_an_operator_arms_walks_stops_and_disarms(robot: Robot) -> None:
+    assert robot.succeed("arm") == "hold\n"
+    assert robot.succeed("walk", "--depth", "3") == "walking\n"
+    robot.shell("sleep 2")
+    report = robot.status()
+    assert (report["mode"], report["fault"]) == ("walking", None)
+    assert report["stride"] >= 0
+    assert robot.succeed("stop") == "hold\n"
+    assert robot.succeed("disarm") == "idle\n"
+    assert robot.torque_is_off()
+
+
+@pytest.mark.parametrize("words", ["arm", "walk", "status", "clear"])
+def test_a_stranger_is_refused(booted: Robot, words: str) -> None:
+    answer = booted.operate(words, user=STRANGER)
+    assert answer.status == exit_codes.NOT_PERMITTED
+    assert "group mudskipper" in answer.errors
+
+
+def test_a_stranger_may_stop_a_walk(walking: Robot) -> None:
+    walking.operate("stop", user=STRANGER)
+    walking.wait_for('mudskipper status --json | grep -q \'"mode": "hold"\'')
+
+
+def test_a_stranger_reads_neither_log_nor_state(booted: Robot) -> None:
+    answer = booted.machine.run("ls /var/lib/mudskipper/logs", user=STRANGER)
+    assert answer.status != 0
+    assert "Permission denied" in answer.errors
