@@ -30,7 +30,8 @@ class Bench:
         self.axes = [OdriveAxis(joint, drives[joint], self.ports[drives[joint].bus]) for joint in JOINTS]
         self.now_s = self.peer.robot.now_s
         for axis in self.axes:
-            axis.arm()
+            axis.prepare()
+            axis.close_loop()
         self.step(0.002)
 
     def step(self, duration_s: float) -> None:
