@@ -29,7 +29,7 @@ from firmware_host.host_facts import (
 )
 from firmware_host.operator_calls import software_version
 from firmware_host.rights import load_rights
-from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
+from firmware_host.status_client import CallRefusedError, DroppedError, NoDaemonError, NotPermittedError, StatusClient
 
 ROOT = Path("/")
 MARKS = {Level.OK: ("ok  ", GREEN), Level.WARN: ("warn", YELLOW), Level.FAIL: ("FAIL", RED)}
@@ -78,6 +78,8 @@ def _ask_daemon(socket: Path, longest_watchdog_s: float) -> tuple[int | None, li
             client.close()
     except NotPermittedError as problem:
         return pid, [warn("daemon", str(problem), "or run this with sudo")]
+    except DroppedError as problem:
+        return pid, [warn("daemon", str(problem), "try again")]
     except NoDaemonError as problem:
         return pid, [warn("daemon", f"{problem}: drives and their watchdogs are not known", START)]
     except CallRefusedError as problem:
