@@ -15,6 +15,7 @@ from control.records import NEVER_S, UNKNOWN, DriveState
 
 GONE_RAD = 0.03  # by the joint's own speed, while its angle stayed the same to the last bit
 GONE_S = 0.02  # drives tell an old value once more, now and then
+LONGEST_GAP_S = 0.03  # between two messages, over which two speeds say where a joint has gone
 FROZEN_S = 0.1  # in which not even the last bit of angle and of a speed that is not zero changes
 
 
@@ -51,6 +52,8 @@ class EncoderWatch:
     def _measure(self, state: DriveState, gap_s: float, dt_s: float) -> str:
         """By how much the way differs from that of the mean speed, beyond what a late stamp makes of the higher one."""
         step_rad = state.angle_rad - self._angle_rad
+        if gap_s > LONGEST_GAP_S:
+            return ""
         odd_rad = abs(step_rad - (state.velocity_rad_s + self._velocity_rad_s) / 2.0 * gap_s)
         late_rad = max(abs(state.velocity_rad_s), abs(self._velocity_rad_s)) * dt_s
         if not odd_rad > self._jump_rad + late_rad:  # always so for the first one

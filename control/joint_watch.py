@@ -210,10 +210,8 @@ class JointWatch:
             text = f"The {self.joint} motor takes {abs(state.current_a):.1f} A."
             found.append(self._fault("joint_current", text))
         self._watch_torque(found, facts, state)
-        if facts.may_stand_still:
-            self._stalled_s = 0.0
-        elif abs(facts.torque_nm) >= self._saturated_nm > 0.0:  # with pauses, as long as the joint stays where it is
-            self._stalled_s += facts.dt_s
+        pushed = abs(facts.torque_nm) >= self._saturated_nm > 0.0 and not facts.may_stand_still
+        self._stalled_s = self._stalled_s + facts.dt_s if pushed else 0.0
         if self._stalled_s > STALLED_S:
             text = f"The {self.joint} joint stands still at full torque for {self._stalled_s:.1f} s."
             found.append(self._fault("joint_not_following", text))

@@ -39,6 +39,14 @@ def writer_lost_rows(bench: FaultBench, joint: str) -> Iterator[None]:
     yield
 
 
+@contextmanager
+def port_lost_frames(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Of the port behind the one that may fail on purpose."""
+    port = bench.loop.drives.ports[bench.loop.configuration.drive[joint].bus]
+    vars(port).get("_port", port).lost_frames += 3
+    yield
+
+
 def heated(temperature_c: float) -> Cause:
     """It cools as slowly as it is reckoned to."""
 

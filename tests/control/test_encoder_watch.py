@@ -56,10 +56,17 @@ def test_readings_that_leap_about_a_joint_at_rest_are_told_again_and_again() -> 
     assert len(found) > 50
 
 
-def test_after_a_gap_a_joint_may_be_where_its_speed_took_it() -> None:
+@pytest.mark.parametrize(("gap_s", "expected"), [(0.029, "encoder_jump"), (0.031, "")])
+def test_after_a_long_gap_a_joint_may_be_anywhere(gap_s: float, expected: str) -> None:
+    encoder = EncoderWatch(JUMP_RAD)
+    assert encoder.update(DriveState(angle_rad=0.0, velocity_rad_s=0.0, angle_stamp_s=0.0), TICK_S) == ""
+    assert encoder.update(DriveState(angle_rad=0.75, velocity_rad_s=0.0, angle_stamp_s=gap_s), TICK_S) == expected
+
+
+def test_after_a_short_gap_a_joint_may_be_where_its_speed_took_it() -> None:
     encoder = EncoderWatch(JUMP_RAD)
     assert encoder.update(DriveState(angle_rad=0.0, velocity_rad_s=15.0, angle_stamp_s=0.0), TICK_S) == ""
-    assert encoder.update(DriveState(angle_rad=0.75, velocity_rad_s=15.0, angle_stamp_s=0.05), TICK_S) == ""
+    assert encoder.update(DriveState(angle_rad=0.3, velocity_rad_s=15.0, angle_stamp_s=0.02), TICK_S) == ""
 
 
 def test_a_stamp_that_goes_back_is_no_jump_by_itself() -> None:

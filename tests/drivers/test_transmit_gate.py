@@ -375,6 +375,7 @@ def test_nothing_but_the_gate_sends_on_a_port() -> None:
         "transmit_gate.py": {"self._port"},
         "odrive_axis.py": {"self._outlet"},
         "can_port.py": {"self._bus"},  # python-can's
+        "socketcan_port.py": {"self._socket"},  # the same bus's socket
         "reopening_port.py": {"port"},  # behind the gate too: stands before a wire that may vanish
         "failing_port.py": {"self._port"},  # behind the gate: what fails on purpose stands in for the wire
         "local_bus.py": {"self._link", "peer.connection"},
