@@ -73,7 +73,7 @@ _ROWS: tuple[FaultKind, ...] = (
     ),
     FaultKind("joint_velocity", "joint", DAMPING, ALWAYS, BY_HAND, 5, "A joint is faster than its limit allows.", MEND),
     FaultKind(
-        "joint_moving", "joint", NONE, ALWAYS, WHEN_GONE, 2,
+        "joint_moving", "joint", NONE, ALWAYS, WHEN_GONE, 40,
         "A joint moves while it should rest.", "wait until it is at rest",
     ),
     FaultKind(

@@ -169,7 +169,7 @@ BY_NAME = {way.name: way for way in WAYS}
 
 AWAY = (
     "drive_late", "current_stale", "position_stale", "drive_quiet", "drive_silent", "heartbeat_silent",
-    "temperature_silent", "drive_energised", "drive_error", "drive_restarted", "drive_version", "watchdog_unknown",
+    "temperature_silent", "voltage_silent", "drive_energised", "drive_error", "drive_restarted", "drive_version", "watchdog_unknown",
 )  # fmt: skip
 DEAF = ("drive_error", "drive_disarmed", "torque_missing")
 BRINGS: dict[str, tuple[str, ...]] = {
@@ -182,12 +182,19 @@ BRINGS: dict[str, tuple[str, ...]] = {
     "heartbeat_silent": ("drive_energised",),
     "drive_error": ("drive_disarmed", "torque_missing"),
     "drive_restarted": AWAY,
-    "drive_twins": ("encoder_jump", "drive_disarmed", "joint_position"),  # the other one's encoder is elsewhere
+    "drive_twins": (
+        "encoder_jump",
+        "joint_moving",
+        "drive_disarmed",
+        "joint_position",
+    ),  # the other one's encoder is elsewhere
     "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version"),
     "bus_off": (*AWAY, *DEAF, "bus_refuses"),
     "bus_refuses": DEAF,
     "joint_position": ("encoder_jump",),
     "encoder_stuck": ("encoder_jump",),  # when it goes on
+    "encoder_jump": ("joint_moving",),
+    "joint_velocity": ("encoder_stuck",),  # it is held where it is and told to be fast
     "motor_overheating": ("winding_overheating",),
     "motor_hot": ("winding_hot",),
     "loop_lagging": ("loop_overrun",),
