@@ -169,7 +169,8 @@ BY_NAME = {way.name: way for way in WAYS}
 
 AWAY = (
     "drive_late", "current_stale", "position_stale", "drive_quiet", "drive_silent", "heartbeat_silent",
-    "temperature_silent", "voltage_silent", "drive_energised", "drive_error", "drive_restarted", "drive_version", "watchdog_unknown",
+    "temperature_silent", "voltage_silent", "drive_energised", "drive_error", "drive_restarted", "drive_version",
+    "watchdog_unknown",
 )  # fmt: skip
 DEAF = ("drive_error", "drive_disarmed", "torque_missing")
 BRINGS: dict[str, tuple[str, ...]] = {
