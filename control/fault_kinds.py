@@ -2,7 +2,7 @@
 
 A bound is the number of 380 Hz ticks from the cause to the reaction with the default bounds of [faults] and the
 messages' periods of the README: position and current every 2 ms, everything else every 100 ms (38 ticks). A loop lags
-that misses a tenth of 100 ticks: one after each tick adds up to that in 11, six in a row show at once.
+that misses six ticks in a row, which shows at once, or a tenth of 100, which takes as many at the most.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ _ROWS: tuple[FaultKind, ...] = (
         "The gate to the wire refused a command.", REPORT,
     ),
     FaultKind("loop_overrun", "loop", WARN, NO, WHEN_GONE, 1, "A tick was missed.", BUSY),
-    FaultKind("loop_lagging", "loop", SOFT_STOP, ALWAYS, WHEN_GONE, 11, "The loop does not keep its rate.", BUSY),
+    FaultKind("loop_lagging", "loop", SOFT_STOP, ALWAYS, WHEN_GONE, 101, "The loop does not keep its rate.", BUSY),
     FaultKind(
         "loop_crawling", "loop", DRIVES_IDLE, ALWAYS, BY_HAND, 25,
         "Commands leave too seldom to brake a joint.", BUSY,
