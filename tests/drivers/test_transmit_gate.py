@@ -28,10 +28,12 @@ ZERO = bytes(4)
 IDLE, CLOSED_LOOP = b"\1\0\0\0", b"\x08\0\0\0"
 TORQUE_MODE = bytes.fromhex("01000000 01000000")
 CONFIGURED = bytes.fromhex("00000041 0000c040")  # 8 turns/s, 6 A
+GAINS = bytes.fromhex("0000003f 00000000")  # 0.5 N·m per turn/s, no integrator
 HARMLESS = [
     Frame(0x047, IDLE),
     Frame(0x04B, TORQUE_MODE),
     Frame(0x04F, CONFIGURED),
+    Frame(0x05B, GAINS),
     Frame(0x058, b"\0"),
     Frame(0x04E, ZERO),
     Frame(0x04E, bytes.fromhex("00000080")),  # minus zero
@@ -92,6 +94,8 @@ REFUSED = [
     Frame(0x056, b"\0"),  # reboot
     Frame(0x05F),  # firmware update
     Frame(0x047, b"\3\0\0\0"),  # calibration
+    Frame(0x05B, bytes.fromhex("0000003f 0000803f")),  # an integrator
+    Frame(0x05B, bytes.fromhex("0000803f 00000000")),
     Frame(0x047, b"\1"),
     Frame(0x047, b"\1\0\0\0\0"),
     Frame(0x047, IDLE, is_extended=True),
