@@ -50,7 +50,7 @@ def test_a_walk_goes_on_through_garbage(walking: Robot) -> None:
     inject(walking, *GARBAGE * 5)
     report = walking.status()
     assert report["mode"] == "walking"
-    assert report["bus"]["unknown_frames"] > before["unknown_frames"]
+    assert report["bus"]["unknown_frames"] == before["unknown_frames"]  # the kernel keeps strangers away
     assert report["bus"]["garbled_frames"] > before["garbled_frames"]
     assert walking.unit("NRestarts") == "0"
 
