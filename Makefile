@@ -19,7 +19,7 @@ test: .venv/test  ## every test, without network
 
 test-vm: .venv/test  ## the daemon under systemd on a real kernel, in a virtual machine
 	@$(BIN)/python -m virtual_machine.installed_robot
-	$(BIN)/python -m pytest -v -n 2 --dist loadfile virtual_machine $(ARGS)
+	$(BIN)/python -m pytest -v virtual_machine $(ARGS)
 
 mutants: .venv/test  ## change the transmit gate in 204 places; its tests must notice each
 	$(BIN)/python -m tests.drivers.gate_mutants

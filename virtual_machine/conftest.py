@@ -1,4 +1,4 @@
-"""One virtual machine for all checks of a process, booted once; a check that cuts its power boots it again."""
+"""One virtual machine for all checks, booted once; a check that cuts its power boots it again."""
 
 from __future__ import annotations
 
