@@ -52,7 +52,7 @@ class OddConfigurations:
     def __init__(self, seed: int) -> None:
         self._chance = random.Random(seed)
         example = (ROOT / "systemd" / "mudskipper.toml").read_text(encoding="utf-8")
-        local = configuration_text(Path("/tmp/m"), Path("/tmp/m/logs"))
+        local = configuration_text(Path("m"), Path("m/logs"))
         self._texts = {False: [example, example + FURTHER.replace("sweep", "adduction"), local]}
         self._texts[True] = [(ROOT / "simulation" / "example_world.toml").read_text(encoding="utf-8")]
         self._makers: dict[str, tuple[int, Callable[[bool], OddFile]]] = {

@@ -164,7 +164,8 @@ class Controller:
     def _enter(self, mode: Mode, states: DriveStates) -> None:
         self.recovery.reset()
         self._since_s = self._resting_s = 0.0
-        self._stillness = tuple(Stillness(SETTLED_RAD) for _ in states)
+        for stillness in self._stillness:
+            stillness.reset()
         here = measured_angles(states)
         self.cut_short = mode is Mode.HOLD and self._mode is Mode.WALKING
         if mode is Mode.HOLD:

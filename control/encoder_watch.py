@@ -51,12 +51,12 @@ class EncoderWatch:
 
     def _measure(self, state: DriveState, gap_s: float, dt_s: float) -> str:
         """By how much the way differs from that of the mean speed, beyond what a late stamp makes of the higher one."""
-        step_rad = state.angle_rad - self._angle_rad
-        if gap_s > LONGEST_GAP_S:
+        if gap_s > LONGEST_GAP_S:  # also that before the first one
             return ""
+        step_rad = state.angle_rad - self._angle_rad
         odd_rad = abs(step_rad - (state.velocity_rad_s + self._velocity_rad_s) / 2.0 * gap_s)
         late_rad = max(abs(state.velocity_rad_s), abs(self._velocity_rad_s)) * dt_s
-        if not odd_rad > self._jump_rad + late_rad:  # always so for the first one
+        if not odd_rad > self._jump_rad + late_rad:
             return ""
         self.sentence = f"encoder jumped by {degrees(abs(step_rad)):.0f} degrees in {gap_s * 1e3:.1f} ms."
         return "encoder_jump"

@@ -131,7 +131,7 @@ class OdriveDrives:
     def request_versions(self, now_s: float) -> None:
         """Every VERSION_REPEAT_S of drives that did not tell theirs yet, every REFRESH_S of all."""
         known = all(axis.version is not None for axis in self.axes)
-        if now_s - self._version_asked_s < (REFRESH_S if known else VERSION_REPEAT_S):
+        if now_s - self._version_asked_s < _repeat_s(known):
             return
         self._version_asked_s = now_s
         for axis in self.axes:
@@ -141,7 +141,7 @@ class OdriveDrives:
     def request_watchdogs(self, now_s: float) -> None:
         """The same of the watchdogs of those whose version is known."""
         known = all(isfinite(axis.watchdog_s) for axis in self.axes)
-        if now_s - self._watchdog_asked_s < (REFRESH_S if known else VERSION_REPEAT_S):
+        if now_s - self._watchdog_asked_s < _repeat_s(known):
             return
         self._watchdog_asked_s = now_s
         for axis in self.axes:
@@ -151,6 +151,11 @@ class OdriveDrives:
     def close(self) -> None:
         for port in self.ports.values():
             port.close()
+
+
+def _repeat_s(known: bool) -> float:
+    """Between two questions."""
+    return REFRESH_S if known else VERSION_REPEAT_S
 
 
 def _stamp_s(frame: Frame, now_s: float) -> float:

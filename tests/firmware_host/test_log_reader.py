@@ -16,6 +16,7 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from firmware_host.log_file import LogFile
 from firmware_host.log_reader import LayoutError, Log, LogError, log_summary, read_log
 from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK, RowKind
+from tests.firmware_host.made_up_rows import encode_row
 
 WALL_NS = 1_700_000_000_000_000_000  # 2023-11-14 22:13:20 UTC
 OPENING: dict[str, Any] = {
@@ -24,15 +25,6 @@ OPENING: dict[str, Any] = {
     "wall_minus_monotonic_ns": WALL_NS,
 }
 TICKS = 1000  # six chunks
-
-
-def encode_row(kind: RowKind, **known: Any) -> bytes:
-    """A row with the given fields; the others hold zeros."""
-    values: list[Any] = []
-    for field in kind.fields:
-        value = known.get(field.name, "" if field.kind == "string" else [0] * field.count)
-        values.extend([value] if isinstance(value, str) or not hasattr(value, "__len__") else value)
-    return kind.encode(*values)
 
 
 def make_tick(number: int) -> bytes:
