@@ -8,7 +8,8 @@ reading itself, until they are answered.
 A place is stamped with the moment of its exposure, as far as that can be known: from version 3.0 on the frames tell how
 long ago their cameras' shutters were open when they were sent, and the quickest frame of late tells the difference
 of the clocks. What always passes on top of it, between sending and arriving or in a program that tells nothing, is
-`latency_s`. A frame in which the body is not tracked, or holds every digit of the one before, is no new pose.
+`latency_s`. A frame in which the body is not tracked, or holds every digit of the one before, is no new pose; and after
+a long gap or a leap the first is not believed before a second one follows: capture that is lost shows old places.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ from drivers.pose_timing import LeastDelay, PoseForecast
 from drivers.track_axis import Direction
 
 MOST_PACKETS_PER_READ = 16  # of each socket: a hundred bodies at 240 Hz are one in two ticks
+DOUBTED_S = 0.5  # a pose after so long a gap is believed when a second one follows
 REQUEST_S = 1.0  # between requests; Motive forgets a client that is silent for several seconds
 ANY_ADDRESS = "0.0.0.0"
 
@@ -97,7 +99,7 @@ class NatNetPort:
         self._ticks_per_s = 0
         self._identity = self.parameters.body_id
         self._named = not self.parameters.body  # whether the id is known
-        self._now_s = self._asked_s = self._heard_s = self._taken_s = NEVER_S
+        self._now_s = self._asked_s = self._heard_s = self._seen_s = self._taken_s = NEVER_S
         self._body: RigidBody | None = None
         self._software_s = NEVER_S
         self._delay, self._forecast = LeastDelay(), PoseForecast()
@@ -197,11 +199,14 @@ class NatNetPort:
             self._take_pose(body, exposed_s, sent_s, now_s)
 
     def _take_pose(self, body: RigidBody, exposed_s: float, sent_s: float, now_s: float) -> None:
-        self.poses += 1
-        self._taken_s = now_s
-        self._stamp_s = min(exposed_s + self._delay.update(now_s, sent_s) - self.parameters.latency_s, now_s)
         (x_m, y_m, z_m), (a, b, c) = body.position_m, self._direction
-        self._forecast.add(self._stamp_s, a * x_m + b * y_m + c * z_m)
+        place_m = a * x_m + b * y_m + c * z_m
+        self._stamp_s = min(exposed_s + self._delay.update(now_s, sent_s) - self.parameters.latency_s, now_s)
+        follows = self._forecast.add(self._stamp_s, place_m) and now_s - self._seen_s <= DOUBTED_S
+        self._seen_s = now_s
+        self._taken_s = now_s if follows else NEVER_S
+        self.poses += follows
+        self.lost += not follows
 
     def report(self) -> PoseReport:
         version = f" {self._version}" if self._version else ""

@@ -50,14 +50,16 @@ class PoseForecast:
     def reset(self) -> None:
         self._places: deque[tuple[float, float]] = deque()
 
-    def add(self, stamp_s: float, x_m: float) -> None:
-        """In order; a place that is not newer than the last one begins afresh."""
+    def add(self, stamp_s: float, x_m: float) -> bool:
+        """Whether the body can have come there from the place before; else this one is the first."""
         places = self._places
-        if places and (stamp_s <= places[-1][0] or abs(x_m - places[-1][1]) > LEAP_M):
+        follows = bool(places) and stamp_s > places[-1][0] and abs(x_m - places[-1][1]) <= LEAP_M
+        if not follows:
             places.clear()
         places.append((stamp_s, x_m))
         while len(places) > 2 and stamp_s - places[1][0] >= SPEED_S:
             places.popleft()
+        return follows
 
     def at(self, now_s: float) -> float:
         if not self._places:
