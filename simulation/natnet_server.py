@@ -191,3 +191,9 @@ class NatNetServer:
 
     def close(self) -> None:
         self._socket.close()
+
+    def __enter__(self) -> NatNetServer:
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        self.close()
