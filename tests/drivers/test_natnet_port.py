@@ -232,7 +232,7 @@ def test_a_server_that_comes_back_with_another_version_is_understood(open_labora
         ({"group": GROUP, "interface": "nothing0"}, f"in group {GROUP}, port 1511 on nothing0: No such device"),
     ],
 )
-def test_an_interface_that_is_not_there_is_told(changes: dict[str, str], sentence: str) -> None:
+def test_an_interface_that_is_not_there_is_told(changes: dict[str, Any], sentence: str) -> None:
     with pytest.raises(PoseSourceError, match=sentence):
         NatNetPort(replace(NatNetParameters(server=LOOPBACK, group=""), **changes), ALONG_X)
 

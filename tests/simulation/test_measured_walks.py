@@ -1,5 +1,5 @@
-"""The authors' walks through the whole way of a pose: captured places as NatNet frames over UDP, read tick by tick beside
-the joints, against what their log says directly.
+"""The authors' walks through the whole way of a pose: captured places as NatNet frames over UDP, read tick by tick
+beside the joints, against what their log says directly.
 
 What the capture says is worked out here, from the log's own columns.
 """
@@ -64,7 +64,7 @@ class Capture:
 
 @cache
 def capture_of(path: Path) -> Capture:
-    lines = gzip.open(path, "rt", encoding="utf-8").read().splitlines()
+    lines = gzip.decompress(path.read_bytes()).decode().splitlines()
     names = [name.strip() for name in lines[1].split(",")]
     table = np.loadtxt(lines[2:], delimiter=",")
     time_s, state = (table[:, names.index(name)] for name in ("time", "turtle_state"))
