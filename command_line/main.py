@@ -248,7 +248,7 @@ def _add_trackway(names: Commands) -> None:  # type: ignore[valid-type]
     _add_report(trackway, "robot and muds are simulated; else a daemon's robot walks", "for report, pictures and log")
     _add_socket(trackway)
     trackway.add_argument(
-        "--trials", "--seeds", type=_seeds, metavar="N", help="of each gait (default: 5 simulated, 3 of a real robot)"
+        "--trials", "--seeds", type=_seeds, metavar="N", help="of each gait (default: 3, as the paper)"
     )
     trackway.add_argument(
         "--method", action="append", metavar="NAME", help="of adaptation, repeatable to compare (default: default)"
