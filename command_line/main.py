@@ -8,6 +8,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper
 from math import isfinite
@@ -111,12 +112,10 @@ def _finite(text: str) -> float:
 
 def _joint_angle(text: str) -> tuple[str, float]:
     joint, _, angle_deg = text.partition("=")
-    try:
-        return joint, _finite(angle_deg)
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"{text}: must be a joint and its angle in degrees, as left_sweep=10"
-        ) from None
+    with suppress(ValueError):
+        if joint and isfinite(float(angle_deg)):
+            return joint, float(angle_deg)
+    raise argparse.ArgumentTypeError(f"{text}: must be a joint and its angle in degrees, as left_sweep=10") from None
 
 
 def _seconds(text: str) -> float:
