@@ -37,8 +37,12 @@ class PoseReport(NamedTuple):
     what_to_do: str = ""
 
     @property
-    def text(self) -> str:
-        return f"{self.source}: {self.poses} poses, {self.garbled} messages garbled, {self.lost} without the body"
+    def sentence(self) -> str:
+        """A robot walks without a pose, and knows less: trouble is a warning."""
+        counted = f"{self.source}: {self.poses} poses, {self.garbled} messages garbled, {self.lost} without the body"
+        if not self.trouble:
+            return counted
+        return f"warning: {self.trouble} {self.what_to_do[:1].upper()}{self.what_to_do[1:]}. {counted}"
 
 
 NO_SOURCE = PoseReport()

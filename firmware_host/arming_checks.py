@@ -13,7 +13,6 @@ from typing import Any
 from control.faults import Blocks, Fault
 from control.records import DriveState
 from drivers.odrive_axis import OdriveAxis
-from drivers.pose_port import PoseReport
 from firmware_host.loop import Loop
 from firmware_host.reports import check_item
 
@@ -33,7 +32,7 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
     lines["log"] = log_text
     pose = loop.pose.report()
     if pose.source:
-        lines["pose"] = _pose_text(pose)
+        lines["pose"] = pose.sentence
     faults = loop.faults.standing
     for fault in faults:
         lines.setdefault(fault.check, "")
@@ -43,13 +42,6 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
         for identity, text in lines.items()
     ]
     return items + [check_item("realtime", True, f"warning: {warning}", "") for warning in warnings]
-
-
-def _pose_text(pose: PoseReport) -> str:
-    """A robot walks without a pose, and knows less."""
-    if not pose.trouble:
-        return pose.text
-    return f"warning: {pose.trouble} {pose.what_to_do[:1].upper()}{pose.what_to_do[1:]}. {pose.text}"
 
 
 def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> dict[str, Any]:
