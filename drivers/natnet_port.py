@@ -99,9 +99,9 @@ class NatNetPort:
         self._ticks_per_s = 0
         self._identity = self.parameters.body_id
         self._named = not self.parameters.body  # whether the id is known
+        self._models_changed = False
         self._now_s = self._asked_s = self._heard_s = self._seen_s = self._taken_s = NEVER_S
         self._body: RigidBody | None = None
-        self._software_s = NEVER_S
         self._delay, self._forecast = LeastDelay(), PoseForecast()
         self._stamp_s = NEVER_S
 
@@ -113,7 +113,6 @@ class NatNetPort:
             asking = _udp_socket(parameters.interface)
             self._sockets.append(asking)
             asking.bind((_address_of(parameters.interface), 0))
-            asking.connect((parameters.server, parameters.command_port))
 
     def read(self, now_s: float) -> BodyPose:
         self._now_s = now_s
@@ -129,13 +128,14 @@ class NatNetPort:
     def _ask(self, now_s: float) -> None:
         silent = now_s - self._heard_s > REQUEST_S
         self._request(CONNECT if self._version is None or silent else KEEP_ALIVE)
-        if not self._named:
+        if self.parameters.body and (self._models_changed or not self._named):
+            self._models_changed = False
             self._request(REQUEST_MODEL)
 
     def _request(self, message: int) -> None:
         try:
-            self._sockets[-1].send(encode_request(message))
-        except OSError:  # no network for the moment, or nobody at the other end: it is asked again
+            self._sockets[-1].sendto(encode_request(message), (self.parameters.server, self.parameters.command_port))
+        except OSError:  # no network for the moment: it is asked again
             return
 
     def _drain(self, arriving: socket.socket, now_s: float) -> None:
@@ -144,8 +144,8 @@ class NatNetPort:
                 packet, sender = arriving.recvfrom(LONGEST_PACKET)
             except BlockingIOError:
                 return
-            except OSError:  # the network tells that a request found nobody
-                continue
+            except OSError:  # the network went down
+                return
             if self.parameters.server and sender[0] != self.parameters.server:
                 self.garbled += 1  # nobody else's business
                 continue
@@ -182,8 +182,7 @@ class NatNetPort:
 
     def _take_frame(self, packet: bytes, now_s: float, layout: FrameLayout) -> None:
         frame = layout.decode_frame(packet, self._identity)
-        if frame.models_changed and self.parameters.body:
-            self._request(REQUEST_MODEL)
+        self._models_changed = self._models_changed or frame.models_changed
         body = frame.body
         if body is None or not body.tracked:
             self.lost += 1
@@ -206,7 +205,9 @@ class NatNetPort:
         self._seen_s = now_s
         self._taken_s = now_s if follows else NEVER_S
         self.poses += follows
-        self.lost += not follows
+        if not follows:
+            self.lost += 1
+            self._unseen = "motion capture's poses leap, or come seconds apart."
 
     def report(self) -> PoseReport:
         version = f" {self._version}" if self._version else ""

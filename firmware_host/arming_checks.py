@@ -33,7 +33,7 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
     pose = loop.pose.report()
     if pose.source:
         lines["pose"] = pose.sentence
-    faults = loop.faults.standing
+    faults = [fault for fault in loop.faults.standing if fault.check != "pose" or not pose.trouble]  # which says more
     for fault in faults:
         lines.setdefault(fault.check, "")
     unheard = {f"drive.{axis.joint}" for axis in loop.drives.axes if not axis.heard}

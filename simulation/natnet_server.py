@@ -15,7 +15,7 @@ from contextlib import suppress
 from struct import pack
 from typing import NamedTuple
 
-from drivers.natnet_codec import CONNECT, FRAME, MODEL, REQUEST_MODEL, SERVER_INFO, NatNetVersion
+from drivers.natnet_codec import CONNECT, FRAME, MODEL, MODELS_CHANGED, REQUEST_MODEL, SERVER_INFO, NatNetVersion
 
 TICKS_PER_S = 10_000_000  # of Windows's performance counter
 CLOCK_AHEAD_S = 1000.0  # the server's clock is its own: by so much it is ahead of the one that `step` is told
@@ -58,7 +58,12 @@ def encode_rigid_body(version: NatNetVersion, identity: int, pose: RecordedPose)
 
 
 def encode_frame(
-    version: NatNetVersion, number: int, bodies: Iterable[bytes], times: FrameTimes, crowded: bool = False
+    version: NatNetVersion,
+    number: int,
+    bodies: Iterable[bytes],
+    times: FrameTimes,
+    crowded: bool = False,
+    models_changed: bool = False,
 ) -> bytes:
     """`bodies` as encode_rigid_body makes them; `crowded`: with a skeleton, markers, force plates and devices."""
     bone = encode_rigid_body(version, 65537, RecordedPose(0.0, (9.0, 9.0, 9.0)))
@@ -85,16 +90,16 @@ def encode_frame(
         content = b"".join(elements)
         if is_there:
             payload += pack("<i", len(elements)) + (pack("<i", len(content)) if version >= (4, 1) else b"") + content
-    return encode_message(FRAME, payload + _frame_end(version, times))
+    return encode_message(FRAME, payload + _frame_end(version, times, models_changed))
 
 
-def _frame_end(version: NatNetVersion, times: FrameTimes) -> bytes:
+def _frame_end(version: NatNetVersion, times: FrameTimes, models_changed: bool) -> bytes:
     end = pack("<II", 0, 0) + pack("<d" if version >= (2, 7) else "<f", times.software_s)
     if version >= (3, 0):
         end += pack("<QQQ", times.exposed_ticks, times.received_ticks, times.sent_ticks)
     if version >= (4, 1):
         end += pack("<II", 0, 0)
-    return end + pack("<Hi", 0, 0)
+    return end + pack("<Hi", MODELS_CHANGED if models_changed else 0, 0)
 
 
 def encode_models(version: NatNetVersion, bodies: Iterable[tuple[str, int]]) -> bytes:
@@ -137,6 +142,7 @@ class NatNetServer:
         self._has_target = target is not None
         self._clients: list[Address] = [target] if target else []
         self._number = 0
+        self._models_changed = False
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(address[0]))
@@ -146,6 +152,10 @@ class NatNetServer:
     def add(self, pose: RecordedPose) -> None:
         """To be sent when it is due."""
         self._poses.append(pose)
+
+    def change_model(self, identity: int) -> None:
+        """Give the body another streaming id, and tell so in the next frame."""
+        self.identity, self._models_changed = identity, True
 
     def step(self, now_s: float) -> int:
         """Answer requests, and send the frames that are due: how many those are."""
@@ -162,7 +172,8 @@ class NatNetServer:
         sent_ticks = round((exposed_s + self.latency_s) * TICKS_PER_S)
         times = FrameTimes(exposed_s, round(exposed_s * TICKS_PER_S), sent_ticks, sent_ticks)
         body = encode_rigid_body(self.version, self.identity, pose)
-        self.send_packet(encode_frame(self.version, self._number, [body], times, self.crowded))
+        changed, self._models_changed = self._models_changed, False
+        self.send_packet(encode_frame(self.version, self._number, [body], times, self.crowded, changed))
 
     def send_packet(self, packet: bytes) -> None:
         """To all clients. What nobody takes is lost, as on any network."""

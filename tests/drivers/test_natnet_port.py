@@ -126,6 +126,14 @@ def test_a_body_is_found_by_name_or_by_id(open_laboratory: Open) -> None:
         assert trouble == ("there is no rigid body named 'somebody'." if "body" in how else NOT_SEEN)
 
 
+def test_a_body_that_is_defined_anew_is_looked_for_by_its_name_again(open_laboratory: Open) -> None:
+    lab = open_laboratory(moving(3.0), {"body": "mudskipper"}, identity=7)
+    assert known(lab.run(1.0))
+    lab.server.change_model(8)
+    assert not known(lab.run(1.2)[30:])
+    assert known(lab.run(2.9))
+
+
 @pytest.mark.parametrize("interface", ["lo", LOOPBACK])
 def test_multicast_frames_are_heard_on_an_interface(open_laboratory: Open, interface: str) -> None:
     """Without any answer, where the version is configured."""
