@@ -219,6 +219,7 @@ def _add_experiments(commands: Commands) -> None:  # type: ignore[valid-type]
     _add_trackway(names)
     _add_sweep(names)
     _add_faults(names)
+    _add_flipper(names)
     fit = _add(names, "mud-fit", "walking.run_mud_fit", "The simulator's muds, fitted to the paper's fixed depths.")
     _add_report(fit, "the muds are the simulator's", "write JSON there")
     fit.add_argument("--seeds", type=_seeds, default=2, metavar="N", help="walks of each point (default: 2)")
@@ -256,6 +257,35 @@ def _add_faults(names: Commands) -> None:  # type: ignore[valid-type]
     faults.add_argument("--seeds", type=_seeds, default=1, metavar="N", help="cells of each pair (default: 1)")
     faults.add_argument("--fault", action="append", metavar="NAME", help="repeatable (default: all)")
     faults.add_argument("--phase", action="append", metavar="NAME", help="repeatable (default: all)")
+
+
+def _add_flipper(names: Commands) -> None:  # type: ignore[valid-type]
+    flipper = _add(names, "flipper", "flipper.run_flipper", "A single flipper on a fixed base: coefficients of muds.")
+    _add_bench(flipper)
+    flipper.add_argument("--mud", action="append", metavar="NAME", help="as its water in percent, repeatable")
+    flipper.add_argument("--trials", type=_trials, default=3, metavar="N", help="of each mud (default: 3)")
+    flipper.add_argument("--depth", type=_depth_cm, default=3.0, metavar="CM", help="(default: 3)")
+    flipper.add_argument("--strides", type=_trials, default=1, metavar="N", help="of each trial (default: 1)")
+    flipper.add_argument("--flipper", choices=("left", "right"), default="right", help="in the mud (default: right)")
+    flipper.add_argument("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
+
+
+def _add_bench(experiment: argparse.ArgumentParser) -> None:
+    """Options of an experiment that a person makes at a robot, or nobody at a simulated one."""
+    _add_report(experiment, "robot and muds are simulated, nothing is asked", "for report, logs and what was measured")
+    experiment.add_argument(
+        "--socket",
+        type=Path,
+        default=Path(os.environ.get("MUDSKIPPER_SOCKET", DEFAULT_SOCKET)),
+        help="of the daemon (default: $MUDSKIPPER_SOCKET or %(default)s)",
+    )
+
+
+def _trials(text: str) -> int:
+    value = int(text)
+    if not 1 <= value <= 100:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 1 to 100")
+    return value
 
 
 def _compartment_m(text: str) -> float:

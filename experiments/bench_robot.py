@@ -126,6 +126,7 @@ def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
     before = robot.call("status")
     order = {"strides": strides} | ({} if depth_m is None else {"depth_m": depth_m})
     robot.call("walk", **order)
+    robot.wait(POLL_S)  # it begins with the next tick
     after = wait_until(robot, lambda now: now["mode"] not in ("walking", "stopping"), strides * STRIDE_S, "the walk")
     if after["mode"] != "hold" or after["notice"]:
         raise BenchError(f"the walk ended early: {told_by(after)}")
