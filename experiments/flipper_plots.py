@@ -73,7 +73,7 @@ def _plot_depths(panel: Axes, course: StrideCourse, surface_m: float) -> None:
     panel.axhline(100.0 * surface_m, color=GREY, linewidth=0.8, linestyle=":", label="surface found")
     panel.invert_yaxis()
     panel.set_ylabel("depth (cm)")
-    panel.legend(fontsize="small", ncols=3, loc="lower right")
+    panel.legend(fontsize="small", ncols=3, loc="center")
 
 
 def _plot_angles(panel: Axes, course: StrideCourse) -> None:
@@ -82,7 +82,7 @@ def _plot_angles(panel: Axes, course: StrideCourse) -> None:
         course.time_s, np.degrees(course.adduction_rad), "--", color="tab:red", label="adduction $\\beta$", **THIN
     )
     panel.set_ylabel("joint angle (°)")
-    panel.legend(fontsize="small", ncols=2, loc="lower right")
+    panel.legend(fontsize="small", loc="center left", bbox_to_anchor=(0.06, 0.5))
 
 
 def _plot_upward(panel: Axes, course: StrideCourse, laws: ModelledForces) -> None:

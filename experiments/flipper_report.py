@@ -51,7 +51,7 @@ def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], config
         caption += " G to I: beside a load cell's; on the grey line both are equal."
     draw = partial(plot_coefficients, report["muds"], firsts, configuration.geometry)
     figure = Figure("figure5", caption, draw)
-    return Section("Coefficients of the muds", _told(report), mud_rows(report["muds"]), [figure])
+    return Section("Coefficients of the muds", _told(report), rows=mud_rows(report["muds"]), figures=[figure])
 
 
 def _told(report: Mapping[str, Any]) -> str:
@@ -69,7 +69,7 @@ def _told(report: Mapping[str, Any]) -> str:
 
 def _errors(report: Mapping[str, Any]) -> Section:
     text = f"Median error of single strides, in brackets the bias. {TRUTHS[report['settings']['truth']]}"
-    return Section("Beside the load cell", text, error_text_rows(report["errors"]))
+    return Section("Beside the load cell", text, rows=error_text_rows(report["errors"]))
 
 
 def _forces(report: Mapping[str, Any]) -> Section:
@@ -78,7 +78,7 @@ def _forces(report: Mapping[str, Any]) -> Section:
         f"of one trial (root mean square). The authors' are those of their raw logs in the mud that they call "
         f"{AUTHORS_MUD}, whose water they do not say."
     )
-    return Section("Forces", text, force_rows(report))
+    return Section("Forces", text, rows=force_rows(report))
 
 
 def force_rows(report: Mapping[str, Any]) -> list[list[str]]:
