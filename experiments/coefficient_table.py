@@ -97,7 +97,7 @@ def judged(rows: Iterable[Beside], setup: str) -> list[Judged]:
         Judged(setup, row.mud, name, row.method, estimate_of(row.stride[name]), float(truth), UNKNOWN)
         for row in rows
         for name in COEFFICIENTS
-        if (truth := row.truth.get(name)) is not None
+        if (truth := row.truth.get(name)) is not None and row.stride[name] is not None
     ]
 
 

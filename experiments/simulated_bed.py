@@ -25,6 +25,7 @@ from firmware_host.file_recorder import FileRecorder
 from firmware_host.ticker import PERIOD_S
 from simulation.disturbances import LAB, Disturbances, drive_changes
 from simulation.lockstep import Lockstep, drives_of
+from simulation.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
 from simulation.odrive import OdriveParameters
 from simulation.track import Track
 from simulation.witness import StrideTruth, StrokeWitness
@@ -50,7 +51,13 @@ class WitnessedLockstep(Lockstep):
 
 
 def simulated_bench(
-    folder: Path, configuration: Configuration, track: Track, seed: int, fixed_base: bool, disturbances: Disturbances
+    folder: Path,
+    configuration: Configuration,
+    track: Track,
+    seed: int,
+    fixed_base: bool,
+    disturbances: Disturbances,
+    motion_capture: MotionCaptureParameters = AT_EVERY_TICK,
 ) -> tuple[LockstepRobot, WitnessedLockstep]:
     """A robot with its log in `folder`, which may hold those of earlier ones."""
     recorder = FileRecorder(_new_log(folder), configuration)
@@ -63,6 +70,7 @@ def simulated_bench(
         disturbances=disturbances,
         fixed_base=fixed_base,
         drives=drives,
+        motion_capture=motion_capture,
     )
     return LockstepRobot(lockstep, recorder), lockstep
 

@@ -37,6 +37,7 @@ class StrideCourse(NamedTuple):
     adduction_nm: Floats
     force_x_n: Floats  # forward
     force_z_n: Floats  # up
+    body_m: Floats  # along the track
 
     def during(self, phase: Phase) -> Truths:
         return np.asarray(self.phase == phase, np.bool_)
@@ -60,6 +61,7 @@ def course_of(log: Log, flipper: str, start_s: float) -> StrideCourse:
         rows["adduction_load_nm"][:, place],
         rows["force_x_n"][:, place],
         rows["force_z_n"][:, place],
+        rows["body_x_m"],
     )
 
 
@@ -73,7 +75,7 @@ def thinned(course: StrideCourse) -> StrideCourse:
 
 def course_row(course: StrideCourse) -> dict[str, list[float | None]]:
     """As JSON can hold it."""
-    return {name: [_known(value) for value in column.tolist()] for name, column in course._asdict().items()}
+    return {name: [known(value) for value in column.tolist()] for name, column in course._asdict().items()}
 
 
 def course_of_row(row: Mapping[str, Any]) -> StrideCourse:
@@ -81,5 +83,5 @@ def course_of_row(row: Mapping[str, Any]) -> StrideCourse:
     return StrideCourse(**(columns | {"phase": columns["phase"].astype(np.int64)}))
 
 
-def _known(value: float) -> float | None:
+def known(value: float) -> float | None:
     return round(value, DIGITS) if np.isfinite(value) else None
