@@ -315,7 +315,9 @@ def _add_walk(names: Commands) -> None:  # type: ignore[valid-type]
     )
     walk.add_argument("--trials", type=_trials, default=3, metavar="N", help="over the muds (default: 3)")
     walk.add_argument("--depth", type=_depth_cm, default=3.0, metavar="CM", help="(default: 3)")
-    walk.add_argument("--soft", metavar="NAME", help="mud in which to walk at 3 and at 5 cm, beside the trackway's")
+    walk.add_argument(
+        "--soft", action="append", metavar="NAME", help="mud in which to walk at 3 and at 5 cm besides, repeatable"
+    )
     walk.add_argument("--flipper", choices=("left", "right"), default="right", help="to look at (default: right)")
     walk.add_argument("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
 

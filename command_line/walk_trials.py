@@ -35,18 +35,18 @@ def run_walk(options: argparse.Namespace) -> int:
         return refuse("name the muds of the trackway in their order: --mud 47.6=61 --mud 49.5=61 --mud 51.2=61")
     if len({mud.name for mud in muds}) < len(muds):
         return refuse("--mud: each mud needs a name of its own")
-    soft = options.soft or (walk_mapping.SOFT if options.simulated else "")
+    soft = tuple(dict.fromkeys(mud_name(name) for name in options.soft or ()))
     plan = walk_mapping.Plan(
         muds or walk_mapping.MUDS,
         options.trials,
         options.depth / 100.0,
-        mud_name(soft) if soft else "",
+        soft or (walk_mapping.SOFT if options.simulated else ()),
         flipper=options.flipper,
         simulated=options.simulated,
     )
     if options.simulated:
         try:
-            [clay_of_water(float(name)) for name in (*(mud.name for mud in plan.muds), plan.soft)]
+            [clay_of_water(float(name)) for name in (*(mud.name for mud in plan.muds), *plan.soft)]
         except ValueError as problem:
             return refuse(f"--mud: simulated muds are named after their water in percent: {problem}")
     return conduct_bench(options, "trials", lambda desk: _find(options, plan, desk))

@@ -8,7 +8,7 @@ from typing import Any
 
 from experiments.coefficient_table import error_text_rows, mud_rows
 from experiments.flipper import AUTHORS_MUD, AUTHORS_N, Plan, muds_of, trials_of
-from experiments.mud_looks import mud_text
+from experiments.mud_looks import file_name, mud_text
 from experiments.notebook import Entry
 from experiments.report_page import Figure, Section
 from firmware_host.configuration import Configuration
@@ -101,17 +101,13 @@ def _strides(firsts: Mapping[str, Entry], configuration: Configuration, method: 
     law = MODELLED_PAPER if method == "paper" else MODELLED
     figures = [
         Figure(
-            f"figure4_{_file_name(mud)}",
+            f"figure4_{file_name(mud)}",
             f"Figure 4 of the paper, mud {mud_text(mud)}. {law}",
             partial(plot_stride, trial, configuration.geometry, method),
         )
         for mud, trial in firsts.items()
     ]
     return Section("Strides", figures=figures)
-
-
-def _file_name(mud: str) -> str:
-    return "".join(letter if letter.isalnum() or letter in ".-" else "_" for letter in mud)
 
 
 def text_of(report: Mapping[str, Any]) -> list[tuple[str, Sequence[Sequence[str]]]]:

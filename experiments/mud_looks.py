@@ -57,3 +57,8 @@ def are_waters(muds: Sequence[str]) -> bool:
         return bool([float(mud) for mud in muds])
     except ValueError:
         return False
+
+
+def file_name(mud: str) -> str:
+    """As a part of one."""
+    return "".join(letter if letter.isalnum() or letter in ".-" else "_" for letter in mud)

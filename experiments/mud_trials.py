@@ -9,6 +9,7 @@ the person decides. Torque is off whenever hands may be in the mud.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -20,7 +21,7 @@ from firmware_host.status_client import CallRefusedError
 MOST_ATTEMPTS = 3
 RAISING_S = 10.0
 ASKED = {GO_ON: "go on", SKIP: "leave this trial out", REDO: "measure the last one again"}
-SPOILT = {GO_ON: "repeat it", SKIP: "leave it out"}
+SPOILT = {GO_ON: "clear what is wrong, and repeat it", SKIP: "leave it out"}
 DOUBTFUL = {GO_ON: "keep it", REDO: "measure it again", SKIP: "leave it out"}
 
 Truths = dict[int, dict[str, float | None]]  # N/m³ by stride and coefficient
@@ -114,7 +115,9 @@ def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) 
         rest(bench.robot)
         if attempt >= MOST_ATTEMPTS:
             raise BenchError(f"{trial} went wrong {attempt} times; the last time: {problem}") from problem
-        return bench.person.ask(f"{trial} went wrong: {problem}.", SPOILT, _nothing) == SKIP
+        answer = bench.person.ask(f"{trial} went wrong: {str(problem).rstrip('.')}.", SPOILT, _nothing)
+        _clear(bench.robot)
+        return answer == SKIP
     rest(bench.robot)
     for remark in entry["remarks"]:
         bench.person.tell(f"{trial}: {remark}")
@@ -122,6 +125,13 @@ def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) 
     if answer == GO_ON:
         bench.notebook.write(trial.key, entry)
     return answer != REDO
+
+
+def _clear(robot: BenchRobot) -> None:
+    """Faults that stand against arming, now that a person has seen them. What stays is told by the next attempt."""
+    if any(fault["blocks_arming"] for fault in robot.call("status")["faults"]):
+        with suppress(CallRefusedError):
+            robot.call("clear")
 
 
 def rest(robot: BenchRobot) -> None:
@@ -135,6 +145,8 @@ def rest(robot: BenchRobot) -> None:
 def leave(bench: Bench, folder: Path) -> list[Path]:
     """Torque off, all logs in the folder, the connection closed; what fails of that is told. The folder's logs."""
     try:
+        if bench.robot.call("status")["mode"] == "walking":
+            bench.person.tell("the flippers are raised, then torque goes off")
         rest(bench.robot)
         bench.robot.copy_logs(folder)
     except (BenchError, CallRefusedError) as problem:

@@ -26,7 +26,7 @@ from firmware_host.configuration import Configuration
 from firmware_host.log_reader import Log
 
 MUDS = tuple(Mud(name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
-SOFT = "53.1"  # of figure 7; its caption calls it 53.8 %, Table I 53.1 %
+SOFT = ("53.1", "51.2")  # figure 7 has the first, called 53.8 % there; the other yields at 3 cm and holds at 5 cm here
 SOFT_DEPTHS_M = (0.03, 0.05)
 METHODS = (DEFAULT, PAPER, COMPENSATED)
 BORDER_M = 0.03  # a plate that goes down nearer to a border than this may be in either mud
@@ -42,7 +42,7 @@ class Plan:
     muds: tuple[Mud, ...] = MUDS
     trials: int = 3  # as the paper
     depth_m: float = 0.03
-    soft: str = ""  # a mud's name; empty: without that part
+    soft: tuple[str, ...] = ()  # muds in which to walk at SOFT_DEPTHS_M
     soft_strides: int = 5
     flipper: str = "right"
     simulated: bool = False
@@ -54,7 +54,7 @@ class Plan:
             "experiment": "walk",
             "muds": [[mud.name, mud.length_m] for mud in self.muds],
             "depth_m": self.depth_m,
-            "soft": self.soft,
+            "soft": list(self.soft),
             "soft_strides": self.soft_strides,
             "flipper": self.flipper,
             "simulated": self.simulated,
@@ -65,8 +65,9 @@ class Plan:
         over = " ".join(mud.name for mud in self.muds)
         walks = [PlannedTrial(f"walk/{number}", over, number, self.trials) for number in range(1, self.trials + 1)]
         return walks + [
-            PlannedTrial(soft_key(depth_m, number), f"{self.soft} at {100.0 * depth_m:g} cm", number, self.trials)
-            for depth_m in (SOFT_DEPTHS_M if self.soft else ())
+            PlannedTrial(soft_key(mud, depth_m, number), soft_name(mud, depth_m), number, self.trials)
+            for mud in self.soft
+            for depth_m in SOFT_DEPTHS_M
             for number in range(1, self.trials + 1)
         ]
 
@@ -86,8 +87,12 @@ class Plan:
         return self.muds[sum(plates_m >= border_m for border_m in self.borders_m)].name
 
 
-def soft_key(depth_m: float, number: int) -> str:
-    return f"soft {100.0 * depth_m:g} cm/{number}"
+def soft_name(mud: str, depth_m: float) -> str:
+    return f"{mud} at {100.0 * depth_m:g} cm"
+
+
+def soft_key(mud: str, depth_m: float, number: int) -> str:
+    return f"soft {soft_name(mud, depth_m)}/{number}"
 
 
 def run(bench: Bench, plan: Plan, show: Show) -> None:
@@ -97,7 +102,7 @@ def run(bench: Bench, plan: Plan, show: Show) -> None:
 
 def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     """One walk. Raises SpoiltTrialError, BenchError."""
-    depths = {soft_key(depth_m, trial.number): depth_m for depth_m in SOFT_DEPTHS_M}
+    depths = {soft_key(mud, depth_m, trial.number): depth_m for mud in plan.soft for depth_m in SOFT_DEPTHS_M}
     if trial.key in depths:
         return _walk_in_soft(bench, plan, trial, depths[trial.key])
     return _walk_over(bench, plan, trial)

@@ -9,7 +9,7 @@ from typing import Any
 from experiments.coefficient_table import TruthOfMud, error_text_rows, mud_rows
 from experiments.estimation_methods import method_of
 from experiments.flipper_report import TRUTHS
-from experiments.mud_looks import mud_text
+from experiments.mud_looks import file_name, mud_text
 from experiments.notebook import Entry
 from experiments.report_page import Figure, Section
 from experiments.walk_mapping import SOFT_DEPTHS_M, Plan, reach_of
@@ -27,8 +27,7 @@ def sections_of(
     truth: TruthOfMud | None,
 ) -> list[Section]:
     sections = [_walk_section(report, plan, entries, configuration, truth)]
-    if report["soft"]:
-        sections.append(_soft_section(report, plan, entries))
+    sections += [_soft_section(soft, plan, entries) for soft in report["soft"] if soft["depths"]]
     for heading, rows in text_of(report)[1:]:
         sections.append(Section(heading, rows=rows))
     remarks = "\n\n".join(f"{remark}." for remark in report["remarks"])
@@ -65,7 +64,7 @@ def _walk_section(
 def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
     gait = configuration.gait
     paragraphs = [
-        f"All strides of all trials by method {method_of(configuration.estimation)}, as the daemon told them. Its gait: "
+        f"All strides of all trials by method {method_of(configuration.estimation)}, as the daemon told. Its gait: "
         f"insertion at {gait.insertion_speed_m_s:g} m/s, stance at {gait.stance_speed_m_s:g} m/s, pauses of "
         f"{gait.pause_s:g} s.",
         f"{report['at_a_border']} strides went down too near to a border, or behind the last mud, and are left out of "
@@ -76,18 +75,20 @@ def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
     return "\n\n".join([*paragraphs, TRUTHS[report["settings"]["truth"]]])
 
 
-def _soft_section(report: Mapping[str, Any], plan: Plan, entries: Mapping[str, Entry]) -> Section:
+def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Entry]) -> Section:
     from experiments.walk_mapping_plots import plot_soft
 
-    walks = {100.0 * depth_m: soft_walks_of(plan, entries, depth_m) for depth_m in SOFT_DEPTHS_M}
+    mud = soft["mud"]
+    walks = {100.0 * depth_m: soft_walks_of(plan, entries, mud, depth_m) for depth_m in SOFT_DEPTHS_M}
     caption = (
         "Figure 7 of the paper. A: forward force in one stance. B: k_s by method, mean and standard deviation over "
         "strides; hatched: a lower bound. The paper's law stands here without its trigger at 0.5 N, which finds the "
         "surface of soft mud too deep: the surface is the default method's."
     )
-    draw = partial(plot_soft, report["soft"], {depth: told for depth, told in walks.items() if told})
+    draw = partial(plot_soft, soft, {depth: told for depth, told in walks.items() if told})
     text = "Where the mud bears more than the body's drag, the flipper feels that drag and not the mud's strength."
-    return Section(f"Soft mud, {mud_text(plan.soft)}", text, figures=[Figure("figure7", caption, draw)])
+    name = f"figure7_{file_name(mud)}"
+    return Section(f"Soft mud, {mud_text(mud)}", text, figures=[Figure(name, caption, draw)])
 
 
 def text_of(report: Mapping[str, Any]) -> Tables:

@@ -22,7 +22,7 @@ from experiments.estimation_methods import method_of
 from experiments.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.notebook import Entry
 from experiments.stride_course import course_of_row
-from experiments.walk_mapping import SOFT_DEPTHS_M, Plan, reach_of, soft_key
+from experiments.walk_mapping import SOFT_DEPTHS_M, Plan, reach_of, soft_key, soft_name
 from firmware_host.configuration import Configuration
 
 Told = Mapping[str, Any]
@@ -43,8 +43,8 @@ def walks_of(plan: Plan, entries: Mapping[str, Entry]) -> list[Entry]:
     return [entries[trial.key] for trial in plan.planned if trial.key in entries and trial.key.startswith("walk/")]
 
 
-def soft_walks_of(plan: Plan, entries: Mapping[str, Entry], depth_m: float) -> list[Entry]:
-    keys = [soft_key(depth_m, number) for number in range(1, plan.trials + 1)]
+def soft_walks_of(plan: Plan, entries: Mapping[str, Entry], mud: str, depth_m: float) -> list[Entry]:
+    keys = [soft_key(mud, depth_m, number) for number in range(1, plan.trials + 1)]
     return [entries[key] for key in keys if key in entries]
 
 
@@ -74,24 +74,21 @@ def _placed(
         yield PlacedStride(walk["trial"], method, mud, plates_m, stride, told)
 
 
-def soft_strides(plan: Plan, entries: Mapping[str, Entry], truth: TruthOfMud | None) -> list[tuple[float, Beside]]:
-    """With the depth of each. The first stride of a walk starts from a standing body and is left out."""
+def soft_strides(plan: Plan, entries: Mapping[str, Entry], truth: TruthOfMud | None) -> list[Beside]:
+    """Of all walks in soft muds. The first stride of each starts from a standing body and is left out."""
     return [
-        (depth_m, Beside(soft_name(plan, depth_m), method, stride, _soft_truth(plan, walk, stride, truth)))
+        Beside(soft_name(mud, depth_m), method, stride, _soft_truth(mud, walk, stride, truth))
+        for mud in plan.soft
         for depth_m in SOFT_DEPTHS_M
-        for walk in soft_walks_of(plan, entries, depth_m)
+        for walk in soft_walks_of(plan, entries, mud, depth_m)
         for method, strides in walk["strides"].items()
         for stride in strides[1:]
     ]
 
 
-def soft_name(plan: Plan, depth_m: float) -> str:
-    return f"{plan.soft} at {100.0 * depth_m:g} cm"
-
-
-def _soft_truth(plan: Plan, walk: Entry, stride: Told, truth: TruthOfMud | None) -> Mapping[str, float | None]:
+def _soft_truth(mud: str, walk: Entry, stride: Told, truth: TruthOfMud | None) -> Mapping[str, float | None]:
     if truth:
-        return truth.get(plan.soft, {})
+        return truth.get(mud, {})
     told: Mapping[str, float | None] = walk["truths"].get(str(stride["index"]), {})
     return told
 
@@ -103,12 +100,11 @@ def report_of(
     placed = placed_strides(plan, entries, configuration, truth)
     certain = [Beside(each.mud, each.method, each.stride, each.truth) for each in placed if each.mud]
     soft = soft_strides(plan, entries, truth)
-    in_soft = [row for _, row in soft]
     return {
         "experiment": "walk",
         "muds": [_mud_report(mud.name, method, certain) for mud in plan.muds],
-        "soft": _soft_report(plan, entries, soft) if soft else None,
-        "errors": error_table([*certain, *in_soft], "walking"),
+        "soft": [{"mud": mud, "depths": _soft_report(plan, entries, mud, soft)} for mud in plan.soft],
+        "errors": error_table([*certain, *soft], "walking"),
         "beside_paper": _beside_paper(plan, entries, certain, soft),
         "without_pose": sum(walk["start_m"] is None for walk in walks_of(plan, entries)),
         "at_a_border": sum(not each.mud for each in placed if each.method == method),
@@ -133,25 +129,21 @@ def truth_over(rows: Sequence[Beside]) -> dict[str, float]:
     return {name: median(each) for name, each in values.items() if each}
 
 
-def _soft_report(plan: Plan, entries: Mapping[str, Entry], soft: Sequence[tuple[float, Beside]]) -> dict[str, Any]:
+def _soft_report(plan: Plan, entries: Mapping[str, Entry], mud: str, strides: Sequence[Beside]) -> list[dict[str, Any]]:
     """k_s by depth and method, beside the load cell's."""
-    methods = list(dict.fromkeys(row.method for _, row in soft))
-    depths = [depth_m for depth_m in SOFT_DEPTHS_M if any(each == depth_m for each, _ in soft)]
-    return {
-        "mud": plan.soft,
-        "depths": [
-            {
-                "depth_cm": 100.0 * depth_m,
-                "k_s": {
-                    method: gathered(r.stride["k_s"] for each, r in soft if each == depth_m and r.method == method)
-                    for method in methods
-                },
-                "truth": truth_over([row for each, row in soft if each == depth_m]).get("k_s"),
-                "thrust_n": _thrust_n(soft_walks_of(plan, entries, depth_m)),
-            }
-            for depth_m in depths
-        ],
-    }
+    return [
+        {
+            "depth_cm": 100.0 * depth_m,
+            "k_s": {
+                method: gathered(row.stride["k_s"] for row in own if row.method == method)
+                for method in dict.fromkeys(row.method for row in own)
+            },
+            "truth": truth_over(own).get("k_s"),
+            "thrust_n": _thrust_n(soft_walks_of(plan, entries, mud, depth_m)),
+        }
+        for depth_m in SOFT_DEPTHS_M
+        if (own := [row for row in strides if row.mud == soft_name(mud, depth_m)])
+    ]
 
 
 def _thrust_n(walks: Sequence[Entry]) -> float | None:
@@ -166,36 +158,31 @@ def _thrust_n(walks: Sequence[Entry]) -> float | None:
 
 
 def _beside_paper(
-    plan: Plan, entries: Mapping[str, Entry], certain: Sequence[Beside], soft: Sequence[tuple[float, Beside]]
+    plan: Plan, entries: Mapping[str, Entry], certain: Sequence[Beside], soft: Sequence[Beside]
 ) -> list[dict[str, Any]]:
-    """What the paper tells in words or numbers, and ours by its law with the surface known.
-
-    Its load cell measured at 3 cm.
-    """
+    """What the paper tells in words or numbers, and ours by its law with the surface known."""
     rows = [
         _finding(f"k_s over the load cell's, {mud.name}", "well below 1", _ratio(certain, mud.name))
         for mud in plan.muds
     ]
-    if soft:
-        strides = [row for _, row in soft]
-        at_3, at_5 = (soft_name(plan, depth_m) for depth_m in SOFT_DEPTHS_M)
-        cell = truth_over([row for row in strides if row.mud == at_3]).get("k_s")
-        rows += [
-            _finding(f"k_s over the load cell's, {at_3}", "close to 1", _ratio(strides, at_3)),
-            _finding(f"k_s over the load cell's, {at_5}", "-", _ratio(strides, at_5)),
-            _finding(f"k_s over the load cell's at 3 cm, {at_5}", "0.5", _ratio(strides, at_5, cell=cell)),
-            _finding(
-                f"k_s over the load cell's at 3 cm, {at_5}, drag added",
-                "better",
-                _ratio(strides, at_5, KNOWN_COMPENSATED, cell),
-            ),
-            _finding(
-                f"thrust of both flippers in stance, {at_5} (N)",
-                f"{PAPER_DRAG_N:g}",
-                _thrust_n(soft_walks_of(plan, entries, SOFT_DEPTHS_M[1])),
-            ),
-        ]
-    return rows
+    return rows + [row for mud in plan.soft for row in _soft_beside_paper(plan, entries, mud, soft)]
+
+
+def _soft_beside_paper(
+    plan: Plan, entries: Mapping[str, Entry], mud: str, soft: Sequence[Beside]
+) -> list[dict[str, Any]]:
+    """The paper's load cell measured at 3 cm."""
+    at_3, at_5 = (soft_name(mud, depth_m) for depth_m in SOFT_DEPTHS_M)
+    cell = truth_over([row for row in soft if row.mud == at_3]).get("k_s")
+    added = _ratio(soft, at_5, KNOWN_COMPENSATED, cell)
+    thrust_n = _thrust_n(soft_walks_of(plan, entries, mud, SOFT_DEPTHS_M[1]))
+    return [
+        _finding(f"k_s over the load cell's at 3 cm, {at_3}", "close to 1", _ratio(soft, at_3, cell=cell)),
+        _finding(f"k_s over the load cell's at 3 cm, {at_5}", "0.5", _ratio(soft, at_5, cell=cell)),
+        _finding(f"k_s over the load cell's at 3 cm, {at_5}, drag added", "better", added),
+        _finding(f"k_s over the load cell's at 5 cm, {at_5}", "-", _ratio(soft, at_5)),
+        _finding(f"thrust of both flippers in stance, {at_5} (N)", f"{PAPER_DRAG_N:g}", thrust_n),
+    ]
 
 
 def _finding(what: str, paper: str, ours: float | None) -> dict[str, Any]:
