@@ -16,7 +16,7 @@ from typing import Any
 from control.modes import Mode
 from experiments.bench_robot import disarm
 from experiments.estimation import TORQUE_ERROR
-from experiments.load_cell_truth import load_cell_truth
+from experiments.load_cell_truth import true_coefficients
 from experiments.lockstep_robot import LockstepRobot
 from experiments.mud_trials import PlannedTrial, Truths
 from experiments.person import GO_ON
@@ -122,5 +122,5 @@ class CarriedBed:
         """By the plate as the flipper carried it."""
         configuration, plant = self._robot.configuration, self._lockstep.robot.plant
         relaxation, pause_s = plant.parameters.disturbances.relaxation, configuration.gait.pause_s
-        truth = load_cell_truth(stride, configuration.geometry, relaxation, pause_s)
-        return {name: value if isfinite(value) else None for name, value in truth.leaning._asdict().items()}
+        truth = true_coefficients(stride, configuration.geometry, relaxation, pause_s, upright=False)
+        return {name: value if isfinite(value) else None for name, value in truth._asdict().items()}

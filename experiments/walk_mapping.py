@@ -43,7 +43,7 @@ class Plan:
     trials: int = 3  # as the paper
     depth_m: float = 0.03
     soft: tuple[str, ...] = ()  # muds in which to walk at SOFT_DEPTHS_M
-    soft_strides: int = 5
+    soft_strides: int = 4
     flipper: str = "right"
     simulated: bool = False
 

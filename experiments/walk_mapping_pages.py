@@ -16,6 +16,11 @@ from experiments.walk_mapping import SOFT_DEPTHS_M, Plan, reach_of
 from experiments.walk_mapping_report import placed_strides, soft_walks_of, walks_of
 from firmware_host.configuration import Configuration
 
+SIMULATED_DRAG = (
+    " The simulated body's drag grows with speed, to two and more times the paper's 2.5 N: so a firmer mud than the "
+    "paper's is the one that yields at 3 cm and holds at 5 cm, and a part of the difference between these depths is the "
+    "mud's own, whose k_s falls with depth (see the load cell)."
+)
 Tables = list[tuple[str, Sequence[Sequence[str]]]]
 
 
@@ -87,6 +92,7 @@ def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Ent
     )
     draw = partial(plot_soft, soft, {depth: told for depth, told in walks.items() if told})
     text = "Where the mud bears more than the body's drag, the flipper feels that drag and not the mud's strength."
+    text += SIMULATED_DRAG if plan.simulated else ""
     name = f"figure7_{file_name(mud)}"
     return Section(f"Soft mud, {mud_text(mud)}", text, figures=[Figure(name, caption, draw)])
 
