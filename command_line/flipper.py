@@ -12,7 +12,7 @@ from experiments.coefficient_table import load_truth, mud_name
 from experiments.daemon_robot import DaemonRobot
 from experiments.flipper_report import sections_of, text_of
 from experiments.flipper_simulation import flipper_bench
-from experiments.mud_trials import Bench, PlannedTrial, PromptedBed, leave
+from experiments.mud_trials import Bench, PlannedTrial, PromptedBed, leave, require_some
 from experiments.notebook import Notebook
 from simulation.clay import clay_of_water
 
@@ -52,6 +52,7 @@ def _find(options: argparse.Namespace, plan: flipper.Plan, desk: Desk) -> Findin
         flipper.run(bench, plan, desk.show)
     finally:
         logs = leave(bench, desk.folder)
+    require_some(notebook)
     report = flipper.report_of(plan, notebook.entries, configuration, truth)
     sections = sections_of(report, plan, notebook.entries, configuration)
     text = "\n\n".join(f"{title}\n{table(rows)}" for title, rows in text_of(report))

@@ -10,7 +10,7 @@ from command_line.screen import table
 from experiments import walk_mapping
 from experiments.coefficient_table import load_truth, mud_name
 from experiments.daemon_robot import DaemonRobot
-from experiments.mud_trials import Bench, PlannedTrial, PromptedBed, leave
+from experiments.mud_trials import Bench, PlannedTrial, PromptedBed, leave, require_some
 from experiments.notebook import Notebook
 from experiments.trackway_trials import Mud
 from experiments.walk_mapping_pages import sections_of, text_of
@@ -61,6 +61,7 @@ def _find(options: argparse.Namespace, plan: walk_mapping.Plan, desk: Desk) -> F
         walk_mapping.run(bench, plan, desk.show)
     finally:
         logs = leave(bench, desk.folder)
+    require_some(notebook)
     report = report_of(plan, notebook.entries, configuration, truth)
     sections = sections_of(report, plan, notebook.entries, configuration, truth)
     text = "\n\n".join(f"{title}\n{table(rows)}" for title, rows in text_of(report))

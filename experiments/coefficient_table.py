@@ -86,6 +86,12 @@ def load_truth(path: Path) -> TruthOfMud:
     return {mud_name(mud): coefficients for mud, coefficients in truth.items()}
 
 
+def missing_text(truth: TruthOfMud | None, muds: Iterable[str]) -> str:
+    """Of which muds another experiment's truth says nothing; empty where it says something of all, or there is none."""
+    missing = [mud for mud in muds if truth is not None and mud not in truth]
+    return f"The file given with --truth says nothing of {', '.join(missing)}." if missing else ""
+
+
 def mud_name(name: str) -> str:
     """However a water content is written: 47.6, w = 47.6 % or 47.6%."""
     return name.removeprefix("w").replace("=", "").replace("%", "").strip() or name

@@ -18,7 +18,7 @@ import numpy as np
 from control.records import Phase
 from experiments.base_watch import load_remarks, pose_remarks, surface_remarks
 from experiments.bench_robot import BenchError, arm, walk
-from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathered
+from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text
 from experiments.error_table import COEFFICIENTS
 from experiments.estimation_methods import DEFAULT, PAPER, method_of, strides_by_method
 from experiments.modelled_force import misfit_n, modelled_forces
@@ -150,6 +150,7 @@ def report_of(
         "largest_forces_n": {mud: _largest_forces(trials, method) for mud, trials in by_mud.items()},
         "misfit_n": {mud: _misfits(trials[0], configuration, method) for mud, trials in by_mud.items()},
         "later_strokes": _later_strokes(by_mud, method),
+        "missing_truth": missing_text(truth, by_mud),
         "settings": plan.kept | {"method": method, "truth": "file" if truth else "bed"},
     }
 

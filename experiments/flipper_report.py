@@ -56,7 +56,7 @@ def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], config
 
 def _told(report: Mapping[str, Any]) -> str:
     falls = {name: fell for name, fell in report["falls_with_water"].items() if fell is not None}
-    paragraphs = []
+    paragraphs = [report["missing_truth"]] if report["missing_truth"] else []
     if falls:
         fell = ", ".join(f"{name} {'yes' if fell else 'no'}" for name, fell in falls.items())
         paragraphs.append(f"Does a coefficient fall with water from mud to mud, as in the paper? {fell}.")

@@ -156,5 +156,11 @@ def leave(bench: Bench, folder: Path) -> list[Path]:
     return sorted(folder.glob("*.mcap"))
 
 
+def require_some(notebook: Notebook) -> None:
+    """Raises BenchError for an experiment that has nothing to report."""
+    if not notebook.entries:
+        raise BenchError("nothing was measured: every trial was left out")
+
+
 def _nothing() -> None:
     """Torque is off while a person is asked: nobody has to look after the robot."""

@@ -8,12 +8,14 @@ is the body's drag and not the mud's strength. Every method of estimation sees t
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 from math import ceil, radians, sin
 from typing import Any
 
 from experiments.bench_robot import ARMING_S, UNDER_WAY, Status, arm, strides_since, told_by, wait_until, walk
+from experiments.error_table import COEFFICIENTS
 from experiments.estimation_methods import COMPENSATED, DEFAULT, PAPER, method_of, strides_by_method
 from experiments.known_surface import strides_with_known_surface
 from experiments.mud_trials import RAISING_S, Bench, PlannedTrial, SpoiltTrialError, conduct_trials
@@ -156,6 +158,14 @@ def _follow(bench: Bench, plan: Plan, start_m: float | None) -> str:
     return ""
 
 
+def require_mud(strides: Sequence[Mapping[str, Any]], flipper: str) -> None:
+    """Raises SpoiltTrialError where no stride told of any."""
+    if not strides:
+        raise SpoiltTrialError(f"the daemon closed no stride of the {flipper} flipper")
+    if not any(stride[name]["valid"] for stride in strides for name in COEFFICIENTS):
+        raise SpoiltTrialError("no stride met mud: look how high the axes are (geometry.axis_height_m)")
+
+
 def reach_of(configuration: Configuration) -> float:
     """How far in front of the body the plates go down."""
     return configuration.geometry.flipper_length_m * sin(radians(configuration.gait.sweep_angle_deg))
@@ -175,14 +185,11 @@ def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float)
 
 
 def _entry(bench: Bench, plan: Plan, trial: PlannedTrial, log: Log, closed: int) -> Entry:
-    """What all walks have. Raises SpoiltTrialError for one without a stride that felt mud."""
+    """What all walks have. Raises SpoiltTrialError."""
     robot = bench.robot
     told = strides_since(robot, closed)
     strides = strides_by_method(told, log, robot.configuration, plan.flipper, METHODS)
     own = strides[method_of(robot.configuration.estimation)]
-    if not own:
-        raise SpoiltTrialError(f"the daemon closed no stride of the {plan.flipper} flipper")
-    if not any(stride[name]["valid"] for stride in own for name in ("k_p", "k_s", "k_e")):
-        raise SpoiltTrialError("no stride met mud: look how high the axes are (geometry.axis_height_m)")
+    require_mud(own, plan.flipper)
     strides |= strides_with_known_surface(strides[DEFAULT], log, robot.configuration, plan.flipper)
     return {"trial": trial.number, "strides": strides, "truths": bench.bed.truths(plan.flipper)}

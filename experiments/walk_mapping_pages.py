@@ -17,8 +17,8 @@ from experiments.walk_mapping_report import placed_strides, soft_walks_of, walks
 from firmware_host.configuration import Configuration
 
 SIMULATED_DRAG = (
-    " The simulated body's drag grows with speed, to two and more times the paper's 2.5 N: so a firmer mud than the "
-    "paper's is the one that yields at 3 cm and holds at 5 cm, and a part of the difference between these depths is the "
+    " The simulated body's drag grows with speed, to two and more times the paper's 2.5 N: so a firmer mud than "
+    "the paper's is the one that yields at 3 cm and holds at 5 cm. Part of the difference between these depths is the "
     "mud's own, whose k_s falls with depth (see the load cell)."
 )
 Tables = list[tuple[str, Sequence[Sequence[str]]]]
@@ -77,7 +77,7 @@ def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
     ]
     if report["without_pose"]:
         paragraphs.append(f"{report['without_pose']} walks had no pose: strides are given to muds by their order.")
-    return "\n\n".join([*paragraphs, TRUTHS[report["settings"]["truth"]]])
+    return "\n\n".join([*paragraphs, TRUTHS[report["settings"]["truth"]], report["missing_truth"]])
 
 
 def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Entry]) -> Section:

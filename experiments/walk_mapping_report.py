@@ -16,7 +16,7 @@ import numpy as np
 
 from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
-from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathered
+from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text
 from experiments.error_table import COEFFICIENTS
 from experiments.estimation_methods import method_of
 from experiments.known_surface import KNOWN, KNOWN_COMPENSATED
@@ -109,6 +109,7 @@ def report_of(
         "without_pose": sum(walk["start_m"] is None for walk in walks_of(plan, entries)),
         "at_a_border": sum(not each.mud for each in placed if each.method == method),
         "remarks": [f"{key}: {remark}" for key, entry in entries.items() for remark in entry["remarks"]],
+        "missing_truth": missing_text(truth, dict.fromkeys([*(mud.name for mud in plan.muds), *plan.soft])),
         "settings": plan.kept | {"method": method, "truth": "file" if truth else "bed"},
     }
 
