@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from pathlib import Path
 
 import pytest
 
 from command_line import exit_codes
 from command_line.main import main
+from command_line.terminal_person import TerminalPerson
 
 FLIPPER = ["experiment", "flipper", "--simulated", "--mud", "49.5", "--trials", "1"]
 WALK = [
@@ -109,3 +112,16 @@ def test_a_truth_that_is_none_is_refused_before_anything_begins(
     assert main([*FLIPPER, "--truth", str(tmp_path / "none"), "--out", str(tmp_path / "out")]) == exit_codes.REFUSED
     assert "--truth" in capsys.readouterr().err
     assert not list((tmp_path / "out").glob("*.mcap"))
+
+
+def test_a_question_does_not_begin_in_the_middle_of_a_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, sink = os.pipe()
+    os.write(sink, b"\n")
+    with open(source) as typed:
+        monkeypatch.setattr(sys, "stdin", typed)
+        person = TerminalPerson(lambda: print("<room>", end="", file=sys.stderr))
+        person.ask("Ready?", {"": "yes"}, lambda: None)
+    os.close(sink)
+    assert capsys.readouterr().err.startswith("<room>Ready?")
