@@ -27,6 +27,7 @@ from experiments.notebook import Entry
 from experiments.side_by_side import Show
 from experiments.stride_course import StrideCourse, course_of, course_of_row, course_row, thinned
 from firmware_host.configuration import Configuration
+from firmware_host.log_reader import Log
 
 MUDS = ("47.6", "48.6", "49.5", "50.3", "51.2")  # the paper's, by their water in percent
 METHODS = (DEFAULT, PAPER)
@@ -92,24 +93,23 @@ def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     walked = walk(robot, plan.depth_m, plan.strides)
     robot.wait(SETTLED_S)
     after = robot.call("status")
-    log, configuration = robot.record(walked.from_s, after["now_s"]), robot.configuration
-    strides = strides_by_method(walked.strides, log, configuration, plan.flipper, METHODS)
-    own = strides[method_of(configuration.estimation)]
+    log = robot.record(walked.from_s, after["now_s"])
+    strides = strides_by_method(walked.strides, log, robot.configuration, plan.flipper, METHODS)
+    told = _told(log, strides[method_of(robot.configuration.estimation)], robot.configuration, plan.flipper)
+    told["remarks"] += pose_remarks(before_m, after["body_x_m"])
+    when = {"from_s": walked.from_s, "to_s": after["now_s"]}
+    truths = bench.bed.truths(plan.flipper)
+    return {"mud": trial.mud, "trial": trial.number, "strides": strides, "truths": truths} | told | when
+
+
+def _told(log: Log, own: Sequence[dict[str, Any]], configuration: Configuration, flipper: str) -> Entry:
+    """The first stride's course and what is to be remarked. Raises SpoiltTrialError."""
     if not own:
-        raise SpoiltTrialError(f"the daemon closed no stride of the {plan.flipper} flipper")
-    course = course_of(log, plan.flipper, own[0]["t_start_s"])
+        raise SpoiltTrialError(f"the daemon closed no stride of the {flipper} flipper")
+    course = course_of(log, flipper, own[0]["t_start_s"])
     require_mud(course)
-    remarks = pose_remarks(before_m, after["body_x_m"]) + load_remarks(log, configuration, plan.flipper)
-    return {
-        "mud": trial.mud,
-        "trial": trial.number,
-        "strides": strides,
-        "truths": bench.bed.truths(plan.flipper),
-        "course": course_row(thinned(course)),
-        "remarks": remarks + surface_remarks(own[0]),
-        "from_s": walked.from_s,
-        "to_s": after["now_s"],
-    }
+    remarks = load_remarks(log, configuration, flipper) + surface_remarks(own[0])
+    return {"course": course_row(thinned(course)), "remarks": remarks}
 
 
 def require_mud(course: StrideCourse) -> None:

@@ -134,28 +134,48 @@ def _follow(bench: Bench, plan: Plan, start_m: float | None) -> str:
     robot = bench.robot
     reach_m = reach_of(robot.configuration)
     strides = ceil(plan.length_m / (2.0 * reach_m))  # without a pose no more: they cannot lead beyond the end
-    order = strides if start_m is None else SLIPPING * strides
-    robot.call("walk", depth_m=plan.depth_m, strides=order)
+    robot.call("walk", depth_m=plan.depth_m, strides=strides if start_m is None else SLIPPING * strides)
     status = wait_until(robot, lambda now: now["mode"] != "hold", ARMING_S, "beginning to walk")
-    seen_s = advanced_s = status["now_s"]
-    farthest_m = start_m or 0.0
+    advance = Advance(start_m, plan.length_m - reach_m, status["now_s"])
     while status["mode"] == "walking":
-        now_s, body_m = status["now_s"], status["body_x_m"]
-        if start_m is not None and body_m is not None:
-            seen_s = now_s
-            if body_m > farthest_m + ADVANCED_M:
-                farthest_m, advanced_s = body_m, now_s
-            if body_m - start_m + reach_m >= plan.length_m and status["phase"] == "insertion":
-                robot.call("stop")
-                return ""
-            if now_s - advanced_s > STUCK_S:
-                robot.call("stop")
-                return f"the robot came no farther than {100.0 * (farthest_m - start_m):.0f} cm"
-        elif start_m is not None and now_s - seen_s > LOST_S:
-            raise SpoiltTrialError("the body's place is not told any more: see that motion capture sees the robot")
+        end = advance.judge(status)
+        if end is not None:
+            robot.call("stop")
+            return end
         robot.wait(LOOK_S)
         status = robot.call("status")
     return ""
+
+
+class Advance:
+    """Owns how far a walk has come. Without a place to begin with, it goes on until its strides are done."""
+
+    def __init__(self, start_m: float | None, length_m: float, now_s: float) -> None:
+        self._start_m = start_m
+        self._length_m = length_m
+        self._farthest_m = start_m or 0.0
+        self._seen_s = self._advanced_s = now_s
+
+    def judge(self, status: Status) -> str | None:
+        """None while the walk is to go on; then why it ends, or nothing at its proper end. Raises SpoiltTrialError."""
+        now_s, body_m = status["now_s"], status["body_x_m"]
+        if self._start_m is None:
+            return None
+        if body_m is None:
+            self._miss(now_s)
+            return None
+        self._seen_s = now_s
+        if body_m > self._farthest_m + ADVANCED_M:
+            self._farthest_m, self._advanced_s = body_m, now_s
+        if body_m - self._start_m >= self._length_m and status["phase"] == "insertion":
+            return ""
+        if now_s - self._advanced_s > STUCK_S:
+            return f"the robot came no farther than {100.0 * (self._farthest_m - self._start_m):.0f} cm"
+        return None
+
+    def _miss(self, now_s: float) -> None:
+        if now_s - self._seen_s > LOST_S:
+            raise SpoiltTrialError("the body's place is not told any more: see that motion capture sees the robot")
 
 
 def require_mud(strides: Sequence[Mapping[str, Any]], flipper: str) -> None:

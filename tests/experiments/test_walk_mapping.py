@@ -19,7 +19,7 @@ from experiments.mud_trials import Bench, SpoiltTrialError
 from experiments.notebook import Entry, Notebook
 from experiments.simulated_bed import CarriedBed
 from experiments.trackway_trials import Mud
-from experiments.walk_mapping import MUDS, Plan, measure, reach_of, require_mud
+from experiments.walk_mapping import MUDS, Advance, Plan, measure, reach_of, require_mud
 from experiments.walk_mapping_pages import sections_of, text_of
 from experiments.walk_mapping_report import placed_strides, report_of, walks_of
 from experiments.walk_simulation import walking_bench
@@ -202,3 +202,28 @@ def test_a_pose_that_is_lost_on_the_way_spoils_the_walk(tmp_path: Path) -> None:
 
 def test_plates_go_down_half_an_arm_in_front() -> None:
     assert reach_of(CONFIGURATION) == pytest.approx(0.06)
+
+
+# how far a walk has come
+
+
+def looks(*seen: tuple[float, float | None, str]) -> list[str | None]:
+    """What is judged of a walk of 50 cm that began at 1 m."""
+    advance = Advance(1.0, 0.5, 0.0)
+    return [advance.judge({"now_s": now_s, "body_x_m": body_m, "phase": phase}) for now_s, body_m, phase in seen]
+
+
+def test_a_walk_ends_with_the_insertion_behind_the_last_mud() -> None:
+    told = looks((1.0, 1.4, "insertion"), (2.0, 1.51, "stance"), (3.0, 1.51, "insertion"))
+    assert told == [None, None, ""]
+
+
+def test_a_robot_that_does_not_come_on_is_stopped_and_told_where() -> None:
+    told = looks((1.0, 1.2, "stance"), (60.0, 1.22, "swing"), (61.5, 1.22, "swing"))
+    assert told == [None, None, "the robot came no farther than 20 cm"]
+
+
+def test_a_place_that_is_missed_for_a_moment_is_waited_for() -> None:
+    assert looks((1.0, 1.2, "stance"), (2.9, None, "stance"), (3.0, 1.3, "swing")) == [None, None, None]
+    with pytest.raises(SpoiltTrialError, match="not told any more"):
+        looks((1.0, 1.2, "stance"), (3.1, None, "stance"))
