@@ -145,9 +145,10 @@ def mud_rows(muds: Sequence[Mapping[str, Any]]) -> list[list[str]]:
 
 
 def error_text_rows(errors: Sequence[Mapping[str, Any]]) -> list[list[str]]:
-    """A table with its head: the median error of each coefficient by mud and method."""
+    """A table with its head: the median error of each coefficient by mud and method, muds one after the other."""
     head = ["mud", "method", *(f"{name} error" for name in COEFFICIENTS), "strides"]
-    keys = list(dict.fromkeys((row["mud"], row["method"]) for row in errors))
+    muds = list(dict.fromkeys(row["mud"] for row in errors))
+    keys = sorted(dict.fromkeys((row["mud"], row["method"]) for row in errors), key=lambda key: muds.index(key[0]))
     rows = [head]
     for key in keys:
         own = {row["coefficient"]: row for row in errors if (row["mud"], row["method"]) == key}
@@ -161,12 +162,12 @@ def _strides(row: Mapping[str, Any]) -> int:
 
 
 def _error_text(row: Mapping[str, Any]) -> str:
-    """A bound is told as one, with its median share of the truth."""
+    """A bound is told as one, with its median share of the truth, and how many there were."""
     parts = []
     if row["median"] is not None:
         parts.append(f"{100.0 * row['median']:.1f} % ({100.0 * row['bias']:+.0f} %)")
     if row["bounds"]:
-        parts.append(f"≥ {100.0 * row['bound_over_truth']:.0f} % of it, {row['bounds']} times")
+        parts.append(f"≥ {100.0 * row['bound_over_truth']:.0f} % of it ({row['bounds']})")
     if row["not_valid"]:
-        parts.append(f"nothing {row['not_valid']} times")
+        parts.append(f"nothing ({row['not_valid']})")
     return ", ".join(parts) or "-"

@@ -101,7 +101,12 @@ def text_of(report: Mapping[str, Any]) -> Tables:
     """Titles and tables for the screen."""
     tables: Tables = [("Coefficients", mud_rows(report["muds"]))]
     if report["errors"]:
-        tables.append(("Median error of single strides (bias); bounds as ≥", error_text_rows(report["errors"])))
+        tables.append(
+            (
+                "Median error of single strides (bias); how many told a bound (≥), or nothing",
+                error_text_rows(report["errors"]),
+            )
+        )
     return [*tables, ("The paper's findings, ours by its law with the surface known", paper_rows(report))]
 
 

@@ -109,7 +109,7 @@ def test_errors_are_those_of_values_and_bounds_are_told_as_bounds() -> None:
     ]
     errors = error_table((Beside("49.5", "default", stride, truth) for stride in strides), "walking")
     (row,) = error_text_rows(errors)[1:]
-    assert row == ["49.5", "default", "20.0 % (+20 %)", "≥ 70 % of it, 2 times", "-", "2"]
+    assert row == ["49.5", "default", "20.0 % (+20 %)", "≥ 70 % of it (2)", "-", "2"]
 
 
 def test_a_method_that_says_nothing_of_a_coefficient_has_no_row_of_it() -> None:
@@ -125,3 +125,9 @@ def test_a_table_of_muds_has_the_load_cell_beside() -> None:
     assert len(head) == len(row)
     assert row[:4] == ["47.6", "1.600 ± 0.100", "9 %", "1.550"]
     assert row[6] == "-"
+
+
+def test_methods_of_one_mud_stand_together() -> None:
+    rows = [Beside(mud, method, make_stride(), {"k_p": 1e6}) for method in ("one", "two") for mud in ("b", "a")]
+    table = error_text_rows(error_table(rows, "walking"))
+    assert [row[:2] for row in table[1:]] == [["b", "one"], ["b", "two"], ["a", "one"], ["a", "two"]]
