@@ -62,8 +62,8 @@ class LoadCellPort:
         self.lines = self.garbled_lines = self.overloads = self.unpluggings = 0
         self.last_garbled = self.last_problem = ""
         self.clock = LineClock(baud)
-        self._open_line = open_line or open_serial
-        self._line: Any = self._open_line(path, baud)
+        self.open_line = open_line or open_serial
+        self._line: Any = self.open_line(path, baud)
         self._heard_s: float | None = None
         self._retry_s = 0.0
         self._start_line()
@@ -171,7 +171,7 @@ class LoadCellPort:
             return False
         self._retry_s = now_s + RETRY_S
         try:
-            self._line = self._open_line(self.path, self.baud)
+            self._line = self.open_line(self.path, self.baud)
         except LoadCellPortError as problem:
             self.last_problem = str(problem)
             return False

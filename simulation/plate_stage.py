@@ -69,6 +69,7 @@ class PlateStage:
     def __init__(self, plate: CarriedPlate, parameters: StageParameters | None = None) -> None:
         self.plate = plate
         self.parameters = parameters or StageParameters()
+        self.hung_n = 0.0  # a calibration weight on the cell
         self.reset()
 
     def reset(self) -> None:
@@ -136,7 +137,7 @@ class PlateStage:
             moved_m = self._place_m(start_s, wanted, self._time_s) - self._place_m(start_s, wanted, before_s)
             forward_m, upward_m = (moved_m, 0.0) if wanted.sideways else (0.0, moved_m)
         forward_n, upward_n = self.plate.step(dt_s, forward_m / dt_s, upward_m / dt_s)
-        self.force_n = forward_n if self.along_sideways else upward_n
+        self.force_n = self.hung_n + (forward_n if self.along_sideways else upward_n)
         return self.force_n * dt_s
 
     def _drive_at(self, now_s: float) -> tuple[float, Drive] | None:
