@@ -35,7 +35,8 @@ PATTERNS = {
     NUMBER: rf"(?:[A-Za-z][\w ./#()-]*[:=] *)?{_NUMBER} *{_UNIT}?",
 }
 OVERLOADED = re.compile(
-    r"(?:OL|UL) *,.*|.*\b(?:OL|UL|OFL|UFL|OVER|UNDER|OVERLOAD|UNDERLOAD|OUT OF RANGE|E?RR?[ -]?\d+)\b.*|[^0-9]*[-_=^~]{4,}.*",
+    r"(?:OL|UL) *,.*|.*\b(?:OL|UL|OFL|UFL|OVER|UNDER|OVERLOAD|UNDERLOAD|OUT OF RANGE|E?RR?[ -]?\d+)\b.*"
+    r"|[^0-9]*[-_=^~]{4,}.*",
     re.IGNORECASE,
 )
 
@@ -106,9 +107,7 @@ def printable(line: bytes) -> str | None:
 
 
 def describe_formats() -> str:
-    return (
-        f"{AUTO}, {', '.join(sorted(PATTERNS))}, {COLUMN}1 to {COLUMN}9, or a regular expression with (?P<value>...)"
-    )
+    return f"{AUTO}, {', '.join(sorted(PATTERNS))}, {COLUMN}1 to {COLUMN}9, or a regular expression with (?P<value>...)"
 
 
 def find_format(lines: Sequence[bytes]) -> LineFormat | None:

@@ -42,7 +42,7 @@ def fit_curve(
 
     def residuals(parameters: Array) -> tuple[Array, Array]:
         columns = shapes(parameters)
-        factors = np.linalg.lstsq(columns, y, rcond=None)[0]
+        factors = np.asarray(np.linalg.lstsq(columns, y, rcond=None)[0], dtype=np.float64)
         away = noise * (parameters - prior.means) / prior.std_errors
         return np.concatenate([columns @ factors - y, away]), factors
 
@@ -85,7 +85,9 @@ def _search(residuals: Residuals, place: Array, rounds: int) -> Array:
 
 def _slopes(residuals: Residuals, place: Array) -> Array:
     steps = DIFFERENCES * np.eye(len(place))
-    return np.stack([(residuals(place + step)[0] - residuals(place - step)[0]) / (2.0 * DIFFERENCES) for step in steps], 1)
+    return np.stack(
+        [(residuals(place + step)[0] - residuals(place - step)[0]) / (2.0 * DIFFERENCES) for step in steps], 1
+    )
 
 
 def _std_errors(residuals: Residuals, place: Array, told: Array) -> Array:

@@ -33,6 +33,7 @@ from experiments.loadcell_recording import CellRecorder, examine_lines
 from experiments.loadcell_trials import TrialBench, TrialPlan, load_all, measure_all
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, Person
+from experiments.side_by_side import Show
 
 CALIBRATION = "calibration.json"
 WEIGHING_S = 2.0
@@ -136,7 +137,7 @@ def _readings(recorder: CellRecorder) -> list[float]:
 
 
 def heed_rate(recorder: CellRecorder, person: Person, settings: StageSettings) -> None:
-    """An amplifier too slow for the stroke is told before anything is measured. Raises BenchError where that ends it."""
+    """An amplifier too slow for the stroke is told first. Raises BenchError where that ends it."""
     rate_hz = recorder.port.rate_hz
     if rate_hz is None:
         raise BenchError("too few lines come to tell their rate: check the amplifier")
@@ -146,9 +147,9 @@ def heed_rate(recorder: CellRecorder, person: Person, settings: StageSettings) -
         return
     slower_m_s = settings.speed_m_s * samples / LEAST_SAMPLES
     person.tell(
-        f"the amplifier sends {rate_hz:.0f} lines/s, so an insertion of {duration_s:.2g} s has only {samples:.0f} samples "
-        f"and wants {LEAST_SAMPLES}: set an HX711's RATE pin high (80 samples/s), choose a faster rate of the indicator, "
-        f"or move the stage at --speed {slower_m_s:.2g}"
+        f"the amplifier sends {rate_hz:.0f} lines/s: an insertion of {duration_s:.2g} s has only {samples:.0f} samples "
+        f"and wants {LEAST_SAMPLES}. Set an HX711's RATE pin high (80 samples/s), choose a faster rate of the "
+        f"indicator, or move the stage at --speed {slower_m_s:.2g}"
     )
     if person.ask("Go on all the same?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
         raise BenchError("stopped: the amplifier is too slow for the stroke")
@@ -161,9 +162,11 @@ class Results(NamedTuple):
     compared: list[Compared]
 
 
-def conclude(folder: Path, notebook: Notebook, plan: TrialPlan, compare: Mapping[str, Any] | None) -> Results:
+def conclude(
+    folder: Path, notebook: Notebook, plan: TrialPlan, compare: Mapping[str, Any] | None, show: Show
+) -> Results:
     """From what is on the disk."""
-    trials = analyse(load_all(folder, notebook), plan.settings)
+    trials = analyse(load_all(folder, notebook), plan.settings, show)
     errors = {key: _relative_error(entry) for key, entry in notebook.entries.items() if "calibration" in entry}
     muds = {}
     for mud in dict.fromkeys(trial.recorded.mud for trial in trials):
@@ -274,7 +277,10 @@ def _trial_described(trial: Analysed, entry: Mapping[str, Any]) -> dict[str, Any
     return {
         "key": trial.recorded.key,
         **entry,
-        **{name: {"value": _number(c.value), "std_error": _number(c.std_error)} for name, c in trial.coefficients.items()},
+        **{
+            name: {"value": _number(c.value), "std_error": _number(c.std_error)}
+            for name, c in trial.coefficients.items()
+        },
         "speed_m_s": None if trial.pace is None else _number(trial.pace.speed_m_s),
         "problem": trial.problem,
         "remark": trial.remark,

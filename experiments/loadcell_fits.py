@@ -26,8 +26,8 @@ from control.plate import submerged_part
 from estimation.origin_fit import fit_through_origin
 from experiments.curve_fit import Array
 from experiments.loadcell_motion import (
-    REVERSAL_SHARE,
     RATE_EXPONENT,
+    REVERSAL_SHARE,
     YIELD_M,
     Course,
     Extraction,
@@ -43,6 +43,7 @@ from experiments.loadcell_motion import (
     find_shear,
     wide_pace,
 )
+from experiments.side_by_side import Show
 
 SHEAR, INSERTION = "shear", "insertion"
 KINDS = (SHEAR, INSERTION)
@@ -105,9 +106,14 @@ class OfMud(NamedTuple):
     repeatability: float  # scatter of the trials over their mean
 
 
-def analyse(trials: Sequence[Recorded], settings: StageSettings) -> list[Analysed]:
+def analyse(
+    trials: Sequence[Recorded], settings: StageSettings, show: Show = lambda done, total: None
+) -> list[Analysed]:
     """All trials of one stage; the second time near its median pace."""
-    first = [analyse_trial(trial, settings, wide_pace(settings)) for trial in trials]
+    first = []
+    for done, trial in enumerate(trials):
+        show(done, len(trials))
+        first.append(analyse_trial(trial, settings, wide_pace(settings)))
     paces = [told.pace for told in first if told.pace is not None]
     if len(paces) < 3:
         return first

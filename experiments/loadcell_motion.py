@@ -34,7 +34,9 @@ YIELD_M = 0.001  # in which a jump comes about
 RATE_EXPONENT = 0.4
 RELAXING_S = 0.2
 JUMP_PRICE = 4.0  # logarithms of the number of samples that a jump must save
-STARTS = tuple((speed, ramp) for speed in (-0.15, 0.0, 0.15) for ramp in (-1.0, 0.7))  # logarithms, beside what is expected
+STARTS = tuple(
+    (speed, ramp) for speed in (-0.15, 0.0, 0.15) for ramp in (-1.0, 0.7)
+)  # logarithms, beside what is expected
 NARROW = 0.05  # doubt of a speed from which one start is enough
 AFTER_OUT_S = 0.3
 OUT_MARGIN = 1.5  # how much later the end may lie than the last sample that clearly pulls
@@ -132,8 +134,8 @@ def find_contact(times_s: Array, forces_n: Array) -> Course:
     largest_n = float(np.quantile(away_n, 0.995))
     if largest_n < max(CONTACT_NOISES * noise_n, LEAST_FORCE_N):
         raise StrokeError(
-            f"no contact: the force stayed within {largest_n:.3f} N of its zero. Does the stage reach the mud, does the "
-            "cell measure along the stroke, and was the stage started in time?"
+            f"no contact: the force stayed within {largest_n:.3f} N of its zero. Does the stage reach the mud, does "
+            "the cell measure along the stroke, and was the stage started in time?"
         )
     near = away_n > max(CONTACT_NOISES * noise_n, CONTACT_SHARE * largest_n)
     begins = np.flatnonzero(near[:-1] & near[1:])

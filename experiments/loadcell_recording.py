@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from drivers.load_cell_lines import NUMBER, LineFormat, find_format
-from drivers.load_cell_port import COMMON_BAUDS, SILENT_S, LoadCellPort, LoadCellPortError, Sample
+from drivers.load_cell_port import COMMON_BAUDS, LoadCellPort, LoadCellPortError, Sample
 from experiments.bench_robot import BenchError
 from experiments.loadcell_motion import CONTACT_NOISES, LEAST_FORCE_N, LEAST_NOISE_N, QUIET_S
 
@@ -108,8 +108,8 @@ class CellRecorder:
         if self.port.overloads and self.port.arrivals.readable > 0.5:
             return "the load cell says that it is overloaded with nothing on it: check its mounting and its wires"
         return (
-            f"no samples come from {self.port.path}: check the amplifier's power and cable, and that it sends by itself "
-            "and not only when asked"
+            f"no samples come from {self.port.path}: check the amplifier's power and cable, and that it sends by "
+            "itself and not only when asked"
         )
 
     def record(self, noise_n: float, patience_s: float, stroke_s: float) -> Stretch:
@@ -188,7 +188,8 @@ def examine_lines(recorder: CellRecorder, name: str) -> str:
         found = find_format(lines)
         advice = f"--format {found.name} does" if found else _columns_told(lines)
         raise BenchError(
-            f"the format {name!r} reads {100.0 * arrivals.readable:.0f} % of the lines, such as {_shown(lines)}; {advice}"
+            f"the format {name!r} reads {100.0 * arrivals.readable:.0f} % of the lines, such as {_shown(lines)}; "
+            + advice
         )
     return name
 
@@ -202,7 +203,9 @@ def _columns_told(lines: Sequence[bytes]) -> str:
     if readable:
         names = " or ".join(f"--format column{column}" for column in readable)
         return f"Choose the column of the load with {names}"
-    return "Is it a load cell's amplifier? Give --format a regular expression with (?P<value>...) that fits a whole line"
+    return (
+        "Is it a load cell's amplifier? Give --format a regular expression with (?P<value>...) that fits a whole line"
+    )
 
 
 def _reads(name: str, lines: Sequence[bytes]) -> bool:

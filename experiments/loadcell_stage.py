@@ -69,8 +69,8 @@ class AttendedStage:
     def prepare(self, trial: Trial, trials: int) -> str:
         along = "along the drag" if trial.kind == SHEAR else "upright, along the stroke"
         question = (
-            f"Mud {trial.mud}, {trial.kind} {trial.number} of {trials}: re-mix and level the mud, wipe the plate, hang it "
-            f"2 cm clear above the mud, the cell {along}. Ready?"
+            f"Mud {trial.mud}, {trial.kind} {trial.number} of {trials}: re-mix and level the mud, wipe the plate, hang "
+            f"it 2 cm clear above the mud, the cell {along}. Ready?"
         )
         answers = {GO_ON: "tare and go on", SKIP: "skip this trial", REDO: "the last one again"}
         return self._person.ask(question, answers, self._meanwhile)
@@ -110,6 +110,7 @@ class SimulatedStage:
     def prepare(self, trial: Trial, trials: int) -> str:
         self._bench.stage.hung_n = 0.0
         self._bench.stage.place_over(self._plates[trial.mud], trial.kind == SHEAR)
+        self._bench.pass_time(SETTLING_S)
         return GO_ON
 
     def lower(self) -> None:

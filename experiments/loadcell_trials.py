@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from experiments.loadcell_recording import CellRecorder, Stretch, Tare
 from experiments.loadcell_stage import Stage, Trial
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP, Person
+from experiments.side_by_side import Show
 
 RAW = "raw"
 COLUMNS = ("t_s", "force_n", "overloaded")
@@ -33,8 +34,6 @@ MISSING_SHARE = 0.15  # of the samples of a stroke
 FLAT_SAMPLES = 8  # alike at the largest force: a cell that stops there without a word
 SLOW = 1.6  # times the duration of a stroke that is recorded at least
 RESERVE_S = 1.5
-
-Show = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -165,8 +164,8 @@ def judge(recorded: Recorded, stretch: Stretch, before: Tare, after: Tare, setti
     moved_n, largest_n = abs(after.force_n - before.force_n), _largest_n(recorded)
     if moved_n > max(LEAST_DRIFT_N, DRIFT_SHARE * largest_n):
         told.append(
-            f"the zero moved by {moved_n:.3f} N over the trial: something slipped, mud clings to the plate, or the cell "
-            "drifts. Wipe the plate, check the mounting, let the amplifier warm up"
+            f"the zero moved by {moved_n:.3f} N over the trial: something slipped, mud clings to the plate, or the "
+            "cell drifts. Wipe the plate, check the mounting, let the amplifier warm up"
         )
     missing = missing_share(analysed)
     if missing > MISSING_SHARE:

@@ -1,8 +1,8 @@
 """A bench with a stage, a plate, a load cell and its amplifier, and its own time: all of II-E but the people.
 
 Time passes when it is told to, as fast as the machine can, or with the clock on the wall where this module is run by
-itself: `python -m simulation.load_cell_bench LINK [--mud W]` puts an amplifier at LINK, to be opened as any serial port,
-and obeys words on its standard input: insert, lower, drag, lift, remix [W], hang [G], unplug, plug, quit.
+itself: `python -m simulation.load_cell_bench LINK [--mud W]` puts an amplifier at LINK, to be opened as any serial
+port, and obeys words on its standard input: insert, lower, drag, lift, remix [W], turn, hang [G], unplug, plug, quit.
 """
 
 from __future__ import annotations

@@ -94,7 +94,7 @@ class PlateStage:
         self._drive(start_s, [Drive(-way_m, speed_m_s, hold_s), Drive(way_m, speed_m_s)])
 
     def lower(self, start_s: float, depth_m: float) -> None:
-        self._drive(start_s, [Drive(-depth_m - self.plate.depth_m, GUIDE_SPEED_M_S)])
+        self._drive(start_s, [Drive(self.plate.depth_m - depth_m, GUIDE_SPEED_M_S)])
 
     def lift(self, start_s: float) -> None:
         self._drive(start_s, [Drive(LIFTED_M + self.plate.depth_m, GUIDE_SPEED_M_S)])
@@ -151,7 +151,5 @@ class PlateStage:
         return min((start_s for start_s, _ in self._drives if start_s > now_s), default=float("inf"))
 
     def _place_m(self, start_s: float, drive: Drive, now_s: float) -> float:
-        way_m = ramped_way_m(
-            now_s - start_s, abs(drive.way_m), drive.speed_m_s, self.parameters.acceleration_m_s2
-        )
+        way_m = ramped_way_m(now_s - start_s, abs(drive.way_m), drive.speed_m_s, self.parameters.acceleration_m_s2)
         return way_m if drive.way_m > 0.0 else -way_m
