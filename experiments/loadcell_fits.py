@@ -106,9 +106,7 @@ class OfMud(NamedTuple):
     repeatability: float  # scatter of the trials over their mean
 
 
-def analyse(
-    trials: Sequence[Recorded], settings: StageSettings, show: Show = lambda done, total: None
-) -> list[Analysed]:
+def analyse(trials: Sequence[Recorded], settings: StageSettings, show: Show) -> list[Analysed]:
     """All trials of one stage; the second time near its median pace."""
     first = []
     for done, trial in enumerate(trials):

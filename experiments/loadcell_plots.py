@@ -31,6 +31,7 @@ MODEL: dict[str, Any] = {"color": "tab:red", "linestyle": (0, (5, 2)), "linewidt
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 NAMES = {"k_p": "$k_p$", "k_s": "$k_s$", "k_e": "$k_e$"}
 BEFORE_S, BEHIND_S = 0.3, 0.4
+SHOWN_ABOVE_M = 0.01  # the mud
 DPI = 110
 
 
@@ -63,7 +64,7 @@ def _plot_insertion(
     end_s = course.times_s[-1] if trial.extraction is None else trial.extraction.out_s
     shown = (course.times_s > motion.surface_s - BEFORE_S) & (course.times_s < end_s + BEHIND_S)
     since_s, forces_n = course.times_s[shown] - motion.surface_s, course.forces_n[shown] - motion.level_n
-    depths_cm = 100.0 * np.clip(depths_m[shown], -2.0 * settings.depth_m, None)
+    depths_cm = 100.0 * np.where(depths_m[shown] < -SHOWN_ABOVE_M, np.nan, depths_m[shown])
     look: dict[str, Any] = {"color": colour, "linewidth": 1.0}
     vertical.plot(since_s, forces_n, label=label, **look)
     depth.plot(since_s, depths_cm, **look)

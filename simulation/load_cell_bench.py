@@ -98,6 +98,7 @@ def main() -> None:
     options = parser.parse_args()
     amplifier = AmplifierParameters(rate_hz=options.rate, style=options.style, baud=options.baud)
     bench = EmulatedBench(clay_plate(options.mud), options.link, amplifier)
+    bench.amplifier.awaits_delivery = False  # somebody else reads at any moment
     begin_s, words = time.monotonic(), [""]
     try:
         while words != ["quit"]:
