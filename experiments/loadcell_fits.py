@@ -25,19 +25,17 @@ import numpy as np
 from control.plate import submerged_part
 from estimation.origin_fit import fit_through_origin
 from experiments.curve_fit import Array
+from experiments.loadcell_contact import Course, StrokeError, find_contact, without_spikes
 from experiments.loadcell_motion import (
     RATE_EXPONENT,
     REVERSAL_SHARE,
     YIELD_M,
-    Course,
     Extraction,
     Insertion,
     Pace,
     Shear,
     StageSettings,
-    StrokeError,
     descent,
-    find_contact,
     find_extraction,
     find_insertion,
     find_shear,
@@ -55,7 +53,6 @@ MEDIAN_ERROR = 1.25  # times that of a mean
 AGREEING = 3.0  # standard errors
 BLOCKS = 8  # of a steady shear, whose means tell its scatter
 NORMAL_MAD = 1.4826
-SPIKE_NOISES = 12.0
 
 
 class Coefficient(NamedTuple):
@@ -154,21 +151,6 @@ def analyse_trial(trial: Recorded, settings: StageSettings, expected: Pace) -> A
         return analysed(trial, course, settings, expected)
     except (StrokeError, np.linalg.LinAlgError) as problem:
         return Analysed(trial, problem=str(problem))
-
-
-def without_spikes(forces_n: Array) -> Array:
-    """Single samples far from neighbours that agree: a garbled digit, a knock."""
-    if len(forces_n) < 5:
-        return forces_n
-    before, after = forces_n[:-2], forces_n[2:]
-    steps = np.abs(np.diff(forces_n))
-    usual_n = max(float(np.median(steps)), 1e-6)
-    middle_n = (before + after) / 2.0
-    apart_n = np.abs(forces_n[1:-1] - middle_n)
-    spikes = apart_n > np.maximum(SPIKE_NOISES * usual_n, 3.0 * np.abs(after - before))
-    mended = forces_n.copy()
-    mended[1:-1][spikes] = middle_n[spikes]
-    return mended
 
 
 def volume_m3(settings: StageSettings, depths_m: Array) -> Array:

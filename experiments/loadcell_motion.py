@@ -24,12 +24,9 @@ from numpy.typing import NDArray
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
 from experiments.curve_fit import Array, CurveFit, Prior, fit_curve
+from experiments.loadcell_contact import CONTACT_NOISES, CONTACT_SHARE, LEAST_FORCE_N, Course, StrokeError
 
-QUIET_S = 0.4  # before a stroke, that tells zero and noise
 BEFORE_S, AFTER_S = 0.25, 0.2  # of the fit, around the way down
-LEAST_NOISE_N = 1e-3
-CONTACT_NOISES, CONTACT_SHARE = 6.0, 0.03  # of the largest force
-LEAST_FORCE_N = 0.03
 YIELD_M = 0.001  # in which a jump comes about
 RATE_EXPONENT = 0.4
 RELAXING_S = 0.2
@@ -45,10 +42,6 @@ VALLEY = 2.0  # times the least square may be that of the first valley
 KNOTS = np.array([0.0, 1 / 6, 1 / 3, 1 / 2, 3 / 4])  # of the chain, in depths
 FALLEN_SHARE, LOW_S = 0.93, 0.2  # of a steady shear: the stage has stopped
 REVERSAL_SHARE = 0.25  # of the way up, as in the estimator
-
-
-class StrokeError(Exception):
-    """The force's course is no such stroke; the text says what it lacks."""
 
 
 @dataclass(frozen=True)
@@ -82,17 +75,6 @@ class Pace(NamedTuple):
     acceleration_doubt: float
 
 
-class Course(NamedTuple):
-    """Force against time, the cell's sign turned so that the mud resists the first motion with a positive force."""
-
-    times_s: Array
-    forces_n: Array
-    begin: int  # index of the first sample in contact
-    level_n: float
-    noise_n: float
-    turned: bool
-
-
 class Insertion(NamedTuple):
     surface_s: float
     surface_std_error_s: float
@@ -121,32 +103,6 @@ class Shear(NamedTuple):
 def wide_pace(settings: StageSettings) -> Pace:
     """Before anything was measured: the speed that was set, give or take; ramps from 0.2 to 20 m/s²."""
     return Pace(settings.speed_m_s, 2.0, 0.15, 1.2)
-
-
-def find_contact(times_s: Array, forces_n: Array) -> Course:
-    """Raises StrokeError where nothing happens, or where it had begun already."""
-    if len(times_s) < 8 or times_s[-1] - times_s[0] < 2.0 * QUIET_S:
-        raise StrokeError("hardly any sample was recorded")
-    quiet_n = forces_n[times_s < times_s[0] + QUIET_S]
-    level_n = float(np.median(quiet_n))
-    noise_n = max(1.4826 * float(np.median(np.abs(quiet_n - level_n))), LEAST_NOISE_N)
-    away_n = np.abs(forces_n - level_n)
-    largest_n = float(np.quantile(away_n, 0.995))
-    if largest_n < max(CONTACT_NOISES * noise_n, LEAST_FORCE_N):
-        raise StrokeError(
-            f"no contact: the force stayed within {largest_n:.3f} N of its zero. Does the stage reach the mud, does "
-            "the cell measure along the stroke, and was the stage started in time?"
-        )
-    near = away_n > max(CONTACT_NOISES * noise_n, CONTACT_SHARE * largest_n)
-    begins = np.flatnonzero(near[:-1] & near[1:])
-    if not len(begins):
-        raise StrokeError("no contact: only single samples left the zero")
-    begin = int(begins[0])
-    if times_s[begin] - times_s[0] < QUIET_S:
-        raise StrokeError("the stage was moving already when the recording began: start it later")
-    turned = bool(np.median(forces_n[begin : begin + 6]) < level_n)
-    sign = -1.0 if turned else 1.0
-    return Course(times_s, sign * forces_n, begin, sign * level_n, noise_n, turned)
 
 
 def find_insertion(course: Course, settings: StageSettings, expected: Pace) -> Insertion:

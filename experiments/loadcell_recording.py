@@ -15,7 +15,7 @@ import numpy as np
 from drivers.load_cell_lines import NUMBER, LineFormat, find_format
 from drivers.load_cell_port import COMMON_BAUDS, LoadCellPort, LoadCellPortError, Sample
 from experiments.bench_robot import BenchError
-from experiments.loadcell_motion import CONTACT_NOISES, LEAST_FORCE_N, LEAST_NOISE_N, QUIET_S
+from experiments.loadcell_contact import CONTACT_NOISES, LEAST_FORCE_N, LEAST_NOISE_N, QUIET_S
 
 POLL_S = 0.01
 LISTENING_S = 2.0
@@ -24,6 +24,7 @@ PROBE_S = 0.8
 TEXT_SHARE, READABLE_SHARE = 0.8, 0.6  # below it, it is another baud rate; another format
 ABSENCE_S = 300.0  # an adapter may be away
 CONTACT_SAMPLES = 3
+FOLLOWING = 0.01  # of a zero that drifts while nobody starts, per sample
 
 
 class BenchClock(Protocol):
@@ -161,6 +162,8 @@ class _Contact:
             return False
         far = sample.overloaded or abs(sample.force_n - self._level_n) > self._bound_n
         self._away = self._away + 1 if far else 0
+        if not far:
+            self._level_n += FOLLOWING * (sample.force_n - self._level_n)
         return self._away >= CONTACT_SAMPLES
 
 
