@@ -10,6 +10,7 @@ import csv
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +82,7 @@ def measure_all(bench: TrialBench, plan: TrialPlan) -> None:
 
 def measure(bench: TrialBench, trial: Trial, plan: TrialPlan) -> None:
     """Once, or again where it came to nothing; the plate is ready."""
-    for attempt in range(1, 1000):
+    for attempt in count(1):
         entry, problems = record(bench, trial, plan, attempt)
         if not problems:
             return bench.notebook.write(trial.key, entry)
@@ -90,9 +91,9 @@ def measure(bench: TrialBench, trial: Trial, plan: TrialPlan) -> None:
         answer = bench.person.ask(f"{trial.key} is in doubt. What now?", _answers(attempt), bench.recorder.drain)
         if answer == KEEP:
             return bench.notebook.write(trial.key, entry | {"kept_in_spite_of": problems})
-        if answer == SKIP or (answer == GO_ON and attempt >= MOST_ATTEMPTS):
+        given_up = answer == SKIP or (answer == GO_ON and attempt >= MOST_ATTEMPTS)
+        if given_up or bench.stage.prepare(trial, plan.trials) == SKIP:
             return bench.notebook.write(trial.key, entry | {"skipped": True, "why": problems})
-        bench.stage.prepare(trial, plan.trials)
     return None
 
 

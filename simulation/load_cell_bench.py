@@ -47,6 +47,7 @@ class EmulatedBench:
         self.amplifier = EmulatedAmplifier(self.stage.mean_force_n, amplifier or AmplifierParameters(), link, seed)
         self.events: list[Event] = []
         self._now_s = 0.0
+        self.stage.mean_force_n(0.0)
 
     def now_s(self) -> float:
         return self._now_s

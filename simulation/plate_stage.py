@@ -60,6 +60,8 @@ def ramped_way_m(time_s: float, way_m: float, speed_m_s: float, acceleration_m_s
 
 def ramped_duration_s(way_m: float, speed_m_s: float, acceleration_m_s2: float) -> float:
     peak_m_s = min(speed_m_s, sqrt(way_m * acceleration_m_s2))
+    if peak_m_s == 0.0:
+        return 0.0
     return way_m / peak_m_s + peak_m_s / acceleration_m_s2
 
 
