@@ -51,6 +51,7 @@ LEAST_SPEED_DOUBT, LEAST_RAMP_DOUBT = 0.005, 0.1  # of a stage, from trial to tr
 SET_SPEED_DOUBT = 0.01  # of a stage's controller
 MEDIAN_ERROR = 1.25  # times that of a mean
 AGREEING = 3.0  # standard errors
+RESIDUAL_NOISES, RESIDUAL_SHARE = 4.0, 0.05
 BLOCKS = 8  # of a steady shear, whose means tell its scatter
 NORMAL_MAD = 1.4826
 
@@ -162,13 +163,23 @@ def volume_m3(settings: StageSettings, depths_m: Array) -> Array:
 def _insertion(trial: Recorded, course: Course, settings: StageSettings, expected: Pace) -> Analysed:
     motion = find_insertion(course, settings, expected)
     told = {"k_p": _k_p(course, motion, settings)}
-    extraction, remark = None, ""
+    extraction, remark = None, _course_remark(course, motion)
     try:
         extraction = find_extraction(course, motion, settings)
         told["k_e"] = _k_e(course, motion, extraction, settings)
     except StrokeError as problem:
         told["k_e"], remark = NOT_KNOWN, str(problem)
     return Analysed(trial, course, motion, extraction, told, "", remark)
+
+
+def _course_remark(course: Course, motion: Insertion) -> str:
+    largest_n = motion.jump_n + motion.rise_n
+    if motion.residual_n <= max(RESIDUAL_NOISES * course.noise_n, RESIDUAL_SHARE * largest_n):
+        return ""
+    return (
+        f"the force is {motion.residual_n:.3f} N off the course of a stage of one speed: it stuttered, was moved by "
+        "hand, or the mud has lumps, and its depth is in doubt"
+    )
 
 
 def _k_p(course: Course, motion: Insertion, settings: StageSettings) -> Coefficient:

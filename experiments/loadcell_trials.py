@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from drivers.load_cell_port import Sample
-from experiments.loadcell_fits import INSERTION, KINDS, Analysed, Recorded, analyse_trial
+from experiments.loadcell_fits import INSERTION, KINDS, Analysed, Recorded, analyse_trial, speed_remark
 from experiments.loadcell_motion import Insertion, Shear, StageSettings, wide_pace
 from experiments.loadcell_recording import CellRecorder, Stretch, Tare
 from experiments.loadcell_stage import Stage, Trial
@@ -116,7 +116,10 @@ def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tu
     stage.lift()
     after = recorder.tare()
     entry = _entry(trial, name, recorder, stretch, before, after)
-    return entry, judge(load_recorded(bench.folder, trial.key, entry), stretch, before, after, plan.settings)
+    recorded = load_recorded(bench.folder, trial.key, entry)
+    analysed = analyse_trial(recorded, plan.settings, wide_pace(plan.settings))
+    _heed_speed(bench, analysed, plan.settings)
+    return entry, judge(analysed, stretch, before, after)
 
 
 def stroke_s(kind: str, settings: StageSettings) -> float:
@@ -124,6 +127,13 @@ def stroke_s(kind: str, settings: StageSettings) -> float:
     if kind == INSERTION:
         return 2.0 * SLOW * settings.depth_m / settings.speed_m_s + settings.hold_s + RESERVE_S
     return SLOW * settings.shear_way_m / settings.speed_m_s
+
+
+def _heed_speed(bench: TrialBench, analysed: Analysed, settings: StageSettings) -> None:
+    """Told while the stage can still be set; nothing to repeat the trial for."""
+    remark = speed_remark(analysed.pace, settings) if analysed.pace is not None else ""
+    if remark:
+        bench.person.tell(f"{analysed.recorded.key}: {remark}")
 
 
 def _entry(
@@ -147,9 +157,9 @@ def _entry(
     }
 
 
-def judge(recorded: Recorded, stretch: Stretch, before: Tare, after: Tare, settings: StageSettings) -> list[str]:
+def judge(analysed: Analysed, stretch: Stretch, before: Tare, after: Tare) -> list[str]:
     """What a trial should not be kept with."""
-    told = []
+    told, recorded = list[str](), analysed.recorded
     if stretch.unpluggings:
         told.append("the load cell was unplugged in the middle of it")
     if stretch.overloads or is_clipped(recorded.forces_n):
@@ -160,7 +170,6 @@ def judge(recorded: Recorded, stretch: Stretch, before: Tare, after: Tare, setti
     lines = len(stretch.samples) + stretch.garbled_lines
     if stretch.garbled_lines > GARBLED_SHARE * lines:
         told.append(f"{stretch.garbled_lines} of {lines} lines were garbled: check cable and ground")
-    analysed = analyse_trial(recorded, settings, wide_pace(settings))
     told += [each for each in (analysed.problem, analysed.remark) if each]
     moved_n, largest_n = abs(after.force_n - before.force_n), _largest_n(recorded)
     if moved_n > max(LEAST_DRIFT_N, DRIFT_SHARE * largest_n):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +33,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("loadcell")
 
 
-@pytest.fixture
-def report(folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
-    """The first time all is measured, then it is in the folder."""
+@pytest.fixture(scope="module")
+def report(folder: Path) -> dict[str, Any]:
     (folder / "flipper.json").write_text(json.dumps(FLIPPER))
-    out = str(folder / "out")
-    status, data, _ = run(capsys, *SHORT, "--out", out, "--compare", str(folder / "flipper.json"))
+    printed = StringIO()
+    with redirect_stdout(printed):
+        status = main([*SHORT, "--out", str(folder / "out"), "--compare", str(folder / "flipper.json")])
     assert status == exit_codes.OK
-    told: dict[str, Any] = json.loads(data)
+    told: dict[str, Any] = json.loads(printed.getvalue())
     return told
 
 

@@ -170,3 +170,16 @@ def test_the_doubt_of_a_mud_holds_scatter_calibration_and_the_speed_that_all_sha
     everything = of_mud(told, "k_p", 0.03)
     assert everything.std_error**2 == pytest.approx(plain.std_error**2 + (0.02**2 + 0.03**2) * plain.value**2)
     assert of_mud([], "k_p", 0.0).trials == ()
+
+
+def test_a_stage_that_stutters_is_doubted(insertion: Recorded) -> None:
+    """It stood still for 0.1 s, half-way down."""
+    told = one(insertion)
+    assert isinstance(told.motion, Insertion) and told.remark == ""
+    half_s = told.motion.surface_s + 0.15
+    place = int(np.searchsorted(insertion.times_s, half_s))
+    forces_n = np.concatenate(
+        [insertion.forces_n[:place], np.full(8, insertion.forces_n[place]), insertion.forces_n[place:]]
+    )
+    times_s = np.concatenate([insertion.times_s, insertion.times_s[-1] + 0.0125 * np.arange(1, 9)])
+    assert "one speed" in one(insertion._replace(times_s=times_s, forces_n=forces_n)).remark
