@@ -58,6 +58,7 @@ class Compared(NamedTuple):
     sensed_std_error: float
     truth: float
     truth_std_error: float
+    at_least: bool = False  # the flipper felt no more than that the mud bears so much
 
     @property
     def ratio(self) -> float:
@@ -218,9 +219,11 @@ def compared_with(flipper: Mapping[str, Any] | None, muds: Mapping[str, Mapping[
     rows = []
     for mud, coefficients in muds.items():
         for name, truth in coefficients.items():
-            value, error = _sensed(sensed.get(_mud_key(mud), {}).get(name))
+            told = sensed.get(_mud_key(mud), {}).get(name)
+            value, error = _sensed(told)
             if isfinite(value) and isfinite(truth.value):
-                rows.append(Compared(mud, name, value, error, truth.value, truth.std_error))
+                at_least = bool(told.get("at_least"))
+                rows.append(Compared(mud, name, value, error, truth.value, truth.std_error, at_least))
     return rows
 
 

@@ -179,6 +179,7 @@ def _plot_pair(panel: Axes, row: Compared, place: int) -> None:
         fmt=MARKERS[place % len(MARKERS)],
         color=COLOURS[place % len(COLOURS)],
         markeredgecolor="black",
+        lolims=row.at_least,
         capsize=2,
         label=row.mud,
     )

@@ -108,9 +108,9 @@ def compared_rows(compared: Sequence[Compared]) -> list[list[str]]:
             [
                 row.mud,
                 row.coefficient,
-                _with_error(row.sensed, row.sensed_std_error, 1e6),
+                ("≥ " if row.at_least else "") + _with_error(row.sensed, row.sensed_std_error, 1e6),
                 _with_error(row.truth, row.truth_std_error, 1e6),
-                _with_error(row.ratio, row.ratio_std_error, 1.0),
+                ("≥ " if row.at_least else "") + _with_error(row.ratio, row.ratio_std_error, 1.0),
             ]
             for row in compared
         ),

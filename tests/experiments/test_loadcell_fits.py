@@ -178,8 +178,6 @@ def test_a_stage_that_stutters_is_doubted(insertion: Recorded) -> None:
     assert isinstance(told.motion, Insertion) and told.remark == ""
     half_s = told.motion.surface_s + 0.15
     place = int(np.searchsorted(insertion.times_s, half_s))
-    forces_n = np.concatenate(
-        [insertion.forces_n[:place], np.full(8, insertion.forces_n[place]), insertion.forces_n[place:]]
-    )
+    forces_n = np.insert(insertion.forces_n, place, np.full(8, insertion.forces_n[place]))
     times_s = np.concatenate([insertion.times_s, insertion.times_s[-1] + 0.0125 * np.arange(1, 9)])
     assert "one speed" in one(insertion._replace(times_s=times_s, forces_n=forces_n)).remark
