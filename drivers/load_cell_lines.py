@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from math import isfinite
 from typing import NamedTuple
 
 GRAVITY_M_S2 = 9.80665
@@ -78,6 +79,8 @@ class LineFormat:
         try:
             value = float(match["value"].replace(" ", ""))
         except ValueError:  # whatever a pattern of one's own lets through
+            return None
+        if not isfinite(value):
             return None
         unit = (match.groupdict().get("unit") or "").lower()
         unit = COUNTS if unit == "count" else unit

@@ -13,6 +13,7 @@ import os
 import select
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from drivers.load_cell_calibration import LoadCellCalibration
@@ -104,6 +105,8 @@ class LoadCellPort:
             return []
         try:
             arrived = self._fetch()
+        except BlockingIOError:  # somebody else has read it
+            arrived = b""
         except OSError as problem:
             self._lose(problem, now_s)
             return []
@@ -182,7 +185,8 @@ class LoadCellPort:
     def close(self) -> None:
         line, self._line = self._line, None
         if line is not None:
-            line.close()
+            with suppress(OSError):  # of a device that is gone already
+                line.close()
 
 
 def open_serial(path: str, baud: int) -> Any:

@@ -77,6 +77,7 @@ def plan_of_notebook(settings: StageSettings) -> dict[str, Any]:
 def measure(bench: TrialBench, plan: TrialPlan, cell: CellSettings) -> None:
     """From an open port to all trials. Raises BenchError with what to do."""
     port = bench.recorder.port
+    bench.person.tell(f"listening to {port.path} at {port.baud} baud")
     port.line_format = LineFormat(examine_lines(bench.recorder, cell.format_name))
     port.calibration = settle_calibration(bench, cell)
     heed_rate(bench.recorder, bench.person, plan.settings)
@@ -222,7 +223,7 @@ def compared_with(flipper: Mapping[str, Any] | None, muds: Mapping[str, Mapping[
             told = sensed.get(_mud_key(mud), {}).get(name)
             value, error = _sensed(told)
             if isfinite(value) and isfinite(truth.value):
-                at_least = bool(told.get("at_least"))
+                at_least = isinstance(told, dict) and bool(told.get("at_least"))
                 rows.append(Compared(mud, name, value, error, truth.value, truth.std_error, at_least))
     return rows
 

@@ -47,6 +47,7 @@ SHEAR, INSERTION = "shear", "insertion"
 KINDS = (SHEAR, INSERTION)
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 SPEED_BOUND = 0.05  # from the one that was set, beyond which it is said
+SINGLE_SPEED_BOUND = 0.12  # the same of a single trial, before it is known beside the others
 LEAST_SPEED_DOUBT, LEAST_RAMP_DOUBT = 0.005, 0.1  # of a stage, from trial to trial
 SET_SPEED_DOUBT = 0.01  # of a stage's controller
 MEDIAN_ERROR = 1.25  # times that of a mean
@@ -257,9 +258,9 @@ def depths_of(trial: Analysed, settings: StageSettings) -> Array | None:
     return np.minimum(down_m, up_m)
 
 
-def speed_remark(pace: Pace, settings: StageSettings) -> str:
+def speed_remark(pace: Pace, settings: StageSettings, bound: float = SPEED_BOUND) -> str:
     ratio = pace.speed_m_s / settings.speed_m_s
-    if abs(ratio - 1.0) <= max(SPEED_BOUND, 2.0 * pace.speed_doubt):
+    if abs(ratio - 1.0) <= max(bound, 2.0 * pace.speed_doubt):
         return ""
     return (
         f"the stage moved at {pace.speed_m_s:.3f} m/s, and {settings.speed_m_s:.3f} m/s was set: the depth's course is "

@@ -18,11 +18,11 @@ from experiments.bench_robot import BenchError
 from experiments.loadcell_contact import CONTACT_NOISES, LEAST_FORCE_N, LEAST_NOISE_N, QUIET_S
 
 POLL_S = 0.01
-LISTENING_S = 2.0
+LISTENING_S, STARTING_S = 2.0, 4.0
 TARE_S = 1.0
 PROBE_S = 0.8
 TEXT_SHARE, READABLE_SHARE = 0.8, 0.6  # below it, it is another baud rate; another format
-ABSENCE_S = 300.0  # an adapter may be away
+ABSENCE_S = 300.0  # for which an adapter may be away
 CONTACT_SAMPLES = 3
 FOLLOWING = 0.01  # of a zero that drifts while nobody starts, per sample
 
@@ -97,13 +97,18 @@ class CellRecorder:
 
     def tare(self) -> Tare:
         """Raises BenchError where nothing comes."""
-        self.drain()
-        forces_n = [sample.force_n for sample in self.listen(TARE_S) if not sample.overloaded]
+        forces_n = self._steady_forces_n()
+        if len(forces_n) < 4 and not self.port.is_there:
+            forces_n = self._steady_forces_n()
         if len(forces_n) < 4:
             raise BenchError(self._silence())
         middle_n = float(np.median(forces_n))
         noise_n = max(1.4826 * float(np.median(np.abs(np.array(forces_n) - middle_n))), LEAST_NOISE_N)
         return Tare(float(np.mean(forces_n)), noise_n, len(forces_n))
+
+    def _steady_forces_n(self) -> list[float]:
+        self.drain()
+        return [sample.force_n for sample in self.listen(TARE_S) if not sample.overloaded]
 
     def _silence(self) -> str:
         if self.port.overloads and self.port.arrivals.readable > 0.5:
@@ -174,6 +179,8 @@ def examine_lines(recorder: CellRecorder, name: str) -> str:
     """
     port = recorder.port
     recorder.listen(LISTENING_S)
+    if not port.recent_lines:  # a board that starts anew when its port is opened takes its time
+        recorder.listen(STARTING_S)
     arrivals, lines = port.arrivals, port.recent_lines
     if not lines:
         raise BenchError(

@@ -17,7 +17,15 @@ from typing import Any
 import numpy as np
 
 from drivers.load_cell_port import Sample
-from experiments.loadcell_fits import INSERTION, KINDS, Analysed, Recorded, analyse_trial, speed_remark
+from experiments.loadcell_fits import (
+    INSERTION,
+    KINDS,
+    SINGLE_SPEED_BOUND,
+    Analysed,
+    Recorded,
+    analyse_trial,
+    speed_remark,
+)
 from experiments.loadcell_motion import Insertion, Shear, StageSettings, wide_pace
 from experiments.loadcell_recording import CellRecorder, Stretch, Tare
 from experiments.loadcell_stage import Stage, Trial
@@ -131,7 +139,7 @@ def stroke_s(kind: str, settings: StageSettings) -> float:
 
 def _heed_speed(bench: TrialBench, analysed: Analysed, settings: StageSettings) -> None:
     """Told while the stage can still be set; nothing to repeat the trial for."""
-    remark = speed_remark(analysed.pace, settings) if analysed.pace is not None else ""
+    remark = speed_remark(analysed.pace, settings, SINGLE_SPEED_BOUND) if analysed.pace is not None else ""
     if remark:
         bench.person.tell(f"{analysed.recorded.key}: {remark}")
 

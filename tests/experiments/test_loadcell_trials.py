@@ -185,7 +185,7 @@ def test_an_amplifier_too_slow_for_the_stroke_is_told_before_anything_is_measure
     laboratory = make(amplifier=AmplifierParameters(rate_hz=10.0), person=Answering("q"))
     with pytest.raises(BenchError, match="too slow"):
         laboratory.measure(CellSettings(scale_n=1.0))
-    assert "RATE pin" in laboratory.person.told[0] and "--speed 0.02" in laboratory.person.told[0]
+    assert "RATE pin" in laboratory.person.told[1] and "--speed 0.02" in laboratory.person.told[1]
     assert not laboratory.notebook.begun
 
 
@@ -194,7 +194,7 @@ def test_weights_that_say_nothing_are_asked_for_again(make: Make) -> None:
     laboratory.trial_bench.stage.weigh = lambda which: 2.0  # type: ignore[method-assign]
     with pytest.raises(BenchError, match="not calibrated"):
         laboratory.measure()
-    assert "both weights are" in laboratory.person.told[0]
+    assert "both weights are" in laboratory.person.told[1]
 
 
 def test_a_cell_that_stays_away_ends_it_with_a_sentence(make: Make) -> None:
@@ -202,8 +202,16 @@ def test_a_cell_that_stays_away_ends_it_with_a_sentence(make: Make) -> None:
     laboratory.recorder.listen(0.5)
     laboratory.bench.amplifier.unplug()
     with pytest.raises(BenchError, match="did not come back"):
-        laboratory.recorder.listen(0.5) and laboratory.recorder.listen(0.5)
         laboratory.recorder.tare()
+
+
+def test_a_tare_in_which_the_cell_is_unplugged_is_taken_again(make: Make) -> None:
+    laboratory = make()
+    laboratory.recorder.listen(0.5)
+    laboratory.at(0.02, laboratory.bench.amplifier.unplug)
+    laboratory.at(3.0, laboratory.bench.amplifier.plug_in)
+    assert laboratory.recorder.tare().samples > 60
+    assert laboratory.port.unpluggings == 1
 
 
 def test_a_person_is_asked_for_everything_that_hands_do() -> None:
