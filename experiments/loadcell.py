@@ -285,7 +285,7 @@ def _trial_described(trial: Analysed, entry: Mapping[str, Any]) -> dict[str, Any
             name: {"value": _number(c.value), "std_error": _number(c.std_error)}
             for name, c in trial.coefficients.items()
         },
-        "speed_m_s": None if trial.pace is None else _number(trial.pace.speed_m_s),
+        "speed_m_s": None if trial.speed_m_s is None else _number(trial.speed_m_s),
         "problem": trial.problem,
         "remark": trial.remark,
     }

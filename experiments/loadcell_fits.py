@@ -95,6 +95,13 @@ class Analysed:
     def pace(self) -> Pace | None:
         return self.motion.pace if isinstance(self.motion, Insertion) else None
 
+    @property
+    def speed_m_s(self) -> float | None:
+        """Of the stage, as found; a shear tells it roughly, from when the force began and fell."""
+        if isinstance(self.motion, Shear):
+            return self.motion.speed_m_s
+        return None if self.pace is None else self.pace.speed_m_s
+
 
 class OfMud(NamedTuple):
     """One coefficient of one mud."""

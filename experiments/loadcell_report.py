@@ -94,7 +94,7 @@ def trial_rows(trials: Sequence[Analysed]) -> list[list[str]]:
     for trial in trials:
         told = [trial.coefficients.get(name) for name in COEFFICIENTS]
         cells = ["" if each is None else _with_error(each.value, each.std_error, 1e6) for each in told]
-        speed = "" if trial.pace is None else f"{trial.pace.speed_m_s:.4f}"
+        speed = "-" if trial.speed_m_s is None or not isfinite(trial.speed_m_s) else f"{trial.speed_m_s:.3f}"
         label = f"{trial.recorded.kind} {trial.recorded.key.rsplit('/', 1)[-1]}"
         rows.append([label, *cells, speed, trial.problem or trial.remark])
     return [head, *rows]
