@@ -108,7 +108,7 @@ class EmulatedAmplifier:
     def _convert(self, at_s: float) -> None:
         force_n = self.mean_force_n(at_s) + self._random.gauss(0.0, self.parameters.noise_n)
         force_n += self.parameters.drift_n_s * (at_s - (self._started_s or 0.0))
-        if not self._random.random() < 1.0 - self.parameters.drop_out_rate_hz / self.parameters.rate_hz:
+        if self._random.random() < self.parameters.drop_out_rate_hz / self.parameters.rate_hz:
             self._silent_until_s = at_s + self.parameters.drop_out_s
         if self.is_plugged_in and at_s >= self._silent_until_s:
             self._waiting += self._spoilt(self._line(force_n, at_s))
