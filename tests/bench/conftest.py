@@ -1,0 +1,166 @@
+"""The bench's stages on one rig: opened once, each stage only after the one before it, idle whatever happens.
+
+    pytest tests/bench --can can0             a robot, asked before it moves
+    pytest tests/bench --config FILE          the same on the interfaces of the configuration
+    pytest tests/bench --simulated            a simulated robot, as fast as it computes
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Generator, Iterator
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from experiments.bench_attendant import AbsentAttendant, AskedAttendant, Attendant, SimulatedAttendant
+from experiments.bench_channels import on_channels
+from experiments.bench_rig import HardwareRig, Rig, SimulatedRig, lying_m
+from experiments.bench_robot import BenchError
+from experiments.bench_stand import Stand
+from firmware_host.configuration import Configuration, ConfigurationError, load_configuration
+from tests.bench.staged_bench import BenchReport, StagedBench, UncapturedPerson, stage_name, stage_of
+
+INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
+EXAMPLE = Path(__file__).parent.parent.parent / "systemd" / "mudskipper.toml"
+REPORT = pytest.StashKey[BenchReport]()
+NOT_ASKED_FOR = "needs a robot (--can CHANNEL, or --config FILE) or --simulated"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[REPORT] = BenchReport()
+
+
+def report_of(config: pytest.Config) -> BenchReport:
+    """This file may have been found only after pytest was configured."""
+    return config.stash.setdefault(REPORT, BenchReport())
+
+
+@pytest.fixture(scope="session")
+def opened(request: pytest.FixtureRequest) -> Iterator[Stand | str]:
+    """The stand, or why there is none."""
+    options = request.config.option
+    if not (options.simulated or options.can or options.config):
+        pytest.skip(NOT_ASKED_FOR)
+    path = Path(options.config) if options.config else configuration_path(options.simulated)
+    try:
+        configuration = load_configuration(path)
+        rig, attendant = open_rig(request.config, on_channels(configuration, options.can or []))
+    except (ConfigurationError, BenchError) as problem:
+        yield f"{path}: {problem}" if isinstance(problem, ConfigurationError) else str(problem)
+        return
+    kind = "simulated" if options.simulated else "hardware"
+    stamp = datetime.now(UTC).isoformat(timespec="seconds")
+    robot = {"robot": configuration.robot.name, "rig": kind, "begun": stamp, "configuration": str(path)}
+    report_of(request.config).robot = robot | {"warnings": list(rig.warnings)}
+    stand = Stand(rig, attendant)
+    try:
+        yield stand
+    finally:
+        stand.end()
+        rig.close()
+
+
+def configuration_path(simulated: bool) -> Path:
+    return INSTALLED if INSTALLED.exists() and not simulated else EXAMPLE
+
+
+def open_rig(config: pytest.Config, configuration: Configuration) -> tuple[Rig, Attendant]:
+    """Raises BenchError."""
+    if config.option.simulated:
+        simulated = SimulatedRig(configuration)
+        return simulated, SimulatedAttendant(simulated)
+    attendant = attendant_at(config)
+    return HardwareRig(configuration), attendant
+
+
+def attendant_at(config: pytest.Config) -> Attendant:
+    """Raises BenchError where nobody can be asked and nobody has said yes beforehand."""
+    capture = config.pluginmanager.getplugin("capturemanager")
+    if capture is not None:
+        capture.suspend(in_=True)
+    somebody = sys.stdin is not None and sys.stdin.isatty()
+    if capture is not None:
+        capture.resume()
+    if somebody:
+        return AskedAttendant(UncapturedPerson(config), config.option.yes)
+    if config.option.yes:
+        return AbsentAttendant()
+    raise BenchError("The robot will move, and nobody can be asked: run this on a terminal, or with --yes.")
+
+
+@pytest.fixture(autouse=True)
+def bench(request: pytest.FixtureRequest, opened: Stand | str) -> Iterator[StagedBench]:
+    report, stage = report_of(request.config), stage_of(request.path)
+    if isinstance(opened, str):
+        if report.tests:
+            pytest.skip("the bench did not open")
+        pytest.fail(opened, pytrace=False)
+    obstacle = report.obstacle(stage)
+    if obstacle:
+        pytest.skip(obstacle)
+    ask_before_moving(request, opened)
+    yield StagedBench(opened, report)
+    try:
+        opened.let_go()
+    except BenchError as problem:
+        opened.end()
+        pytest.fail(str(problem), pytrace=False)
+
+
+def ask_before_moving(request: pytest.FixtureRequest, stand: Stand) -> None:
+    """Once for each stage that moves something."""
+    module = request.module
+    assert isinstance(module, ModuleType)
+    what = getattr(module, "MOVES", "")
+    if not what or getattr(module, "asked", False):
+        return
+    lying_cm = 100.0 * lying_m(stand.configuration.geometry)
+    where = (
+        f"The robot stands on blocks; idle, its flippers lie on something soft, {lying_cm:.0f} cm below their axes."
+        " Nobody's hands are near them, and the power switch is at hand."
+    )
+    sentence = f"{stage_name(stage_of(request.path)).capitalize()}: {what}\n{where}"
+    if not stand.attendant.consents(sentence, stand.look_on):
+        pytest.skip("a person did not want the robot to move")
+    module.asked = True  # type: ignore[attr-defined]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
+    """What ends a measurement is a sentence for people, not a traceback."""
+    try:
+        return (yield)
+    except BenchError as problem:
+        pytest.fail(str(problem), pytrace=False)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    told = yield
+    decided = told.when == "call" or not told.passed
+    if decided and item.path.parent == Path(__file__).parent and stage_of(item.path):
+        why = told.longrepr[2] if isinstance(told.longrepr, tuple) else told.longreprtext
+        report_of(item.config).close_test(stage_of(item.path), item.name, told.outcome, why)
+    return told
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    report, path = report_of(config), config.option.bench_report
+    if not report.robot:
+        return
+    terminalreporter.section("bench")
+    for line, good in report.lines(brief=config.get_verbosity() < 0):
+        terminalreporter.write_line(line, **({} if good else {"red": True}))
+    for warning in report.robot["warnings"]:
+        terminalreporter.write_line(f"warning: {warning}")
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    report, path = report_of(session.config), session.config.option.bench_report
+    if path and report.robot:
+        with suppress(OSError):
+            report.write(Path(path))
