@@ -20,7 +20,7 @@ from firmware_host.ticker import PERIOD_S
 from simulation.plant import END_STOPS_RAD
 
 WAYS = {"sweep": "swing forward", "adduction": "rise"}
-TURNING_S = 0.5  # of a simulated hand, from the middle to a stop
+TURNING_S = 0.25  # of a simulated hand, from the middle to a stop
 SEEN_RAD = radians(4.0)  # what eyes notice
 
 

@@ -32,7 +32,9 @@ def on_channels(configuration: Configuration, given: Sequence[str]) -> Configura
     for (bus_name, node_id), count in Counter((drive.bus, drive.node_id) for drive in drives.values()).items():
         if count > 1:
             channel = buses[bus_name].channel
-            raise BenchError(f"{count} drives have the node id {node_id} on {channel}: give each bus its own --can NAME=channel.")
+            raise BenchError(
+                f"{count} drives have the node id {node_id} on {channel}: give each bus its own --can NAME=channel."
+            )
     return replace(configuration, bus=buses, drive=drives)
 
 

@@ -80,13 +80,17 @@ class HardwareRig:
         self._pose = PosePort(Path(configuration.pose.socket) if configuration.pose.socket else None)
         self.loop = Loop(configuration, drives, self._pose, NullRecorder())
         options = configuration.loop
-        self.warnings = prepare_loop(options.priority, options.cpu, options.lock_memory)
+        self.warnings: Sequence[str] = prepare_loop(options.priority, options.cpu, options.lock_memory)
         self._ticker = Ticker()
-        self.now_s = time.monotonic()
+        self._now_s = time.monotonic()
+
+    @property
+    def now_s(self) -> float:
+        return self._now_s
 
     def wait(self) -> Beat:
         beat = self._ticker.wait()
-        self.now_s = beat.now_s
+        self._now_s = beat.now_s
         return beat
 
     def close(self) -> None:

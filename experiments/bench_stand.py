@@ -143,9 +143,11 @@ class Stand:
         unheard = f"{silent}: nothing is heard; check power, wiring and node ids."
         raise BenchError(f"The robot cannot be armed: {told or unheard}")
 
-    def move(self, way_points: Sequence[JointAngles], speed_rad_s: float | None = None) -> list[Sample]:
+    def move(
+        self, way_points: Sequence[JointAngles], speed_rad_s: float | None = None, law: Law | None = None
+    ) -> list[Sample]:
         """In hold, along a smooth path, until its end."""
-        self.controller.law = None
+        self.controller.law = law
         self.controller.follow(way_points, speed_rad_s or self.configuration.motion.path_speed_rad_s)
         return self.run_until(lambda sample: not self.controller.moving, 60.0, "The end of a path")
 

@@ -20,8 +20,8 @@ from firmware_host.ticker import PERIOD_S
 STEP_NM = 0.01  # a fifth of what holds an arm of the default mass level
 STEP_S = 0.03  # for the joint to begin to move before more torque comes
 MOST_NM = 0.2  # a quarter of what the motors may do, four times what an arm weighs: no finger is hurt
-MOVED_RAD = 0.02  # beyond noise and the slack of a plate on what it lies on; the torque ends there
-OTHERS_RAD = 0.01  # that another joint may be shaken
+MOVED_RAD = 0.03  # beyond noise and the slack of a plate on what it lies on; the torque ends there
+OTHERS_RAD = 0.02  # that another joint may be shaken
 SHOWN_RAD = radians(12.0)  # 2.5 cm at the end of an arm: plain to see
 SHOWING_RAD_S = 0.5
 FEWEST_A = 0.05  # of the current's sign: noise averages out below that
@@ -64,8 +64,13 @@ def nudged(stand: Stand, joint: str) -> Readings:
 
 def _agreement(joint: str, begun: DriveStates, samples: list[Sample], nudge: Nudge) -> Readings:
     place = nudge.place
-    moved_rad = [end - start for start, end in zip(measured_angles(begun), measured_angles(samples[-1].states), strict=True)]
-    stuck = f"check drive.{joint}.sign (a flipper that is pressed down does not move), its coupling, and what blocks it"
+    moved_rad = [
+        end - start for start, end in zip(measured_angles(begun), measured_angles(samples[-1].states), strict=True)
+    ]
+    stuck = (
+        f"free what blocks it; else the motor presses a flipper down: check drive.{joint}.sign, and whether its node id"
+        " is another joint's"
+    )
     yield Reading(f"{joint}: torque that moves it", nudge.torque_nm if nudge.moved else nan, "N·m", 0.0, MOST_NM, stuck)
     contrary = f"calibrate the drive of {joint} anew: its encoder counts against its motor"
     way_rad = moved_rad[place]
@@ -81,16 +86,22 @@ def _agreement(joint: str, begun: DriveStates, samples: list[Sample], nudge: Nud
             yield Reading(f"{joint}: {other} meanwhile", other_rad, "rad", -OTHERS_RAD, OTHERS_RAD, advice)
 
 
+def gently(held: Torques, states: DriveStates) -> Torques:
+    """A law: what holds the pose, as far as a tiny torque can."""
+    a, b, c, d = (min(max(torque_nm, -MOST_NM), MOST_NM) for torque_nm in held)
+    return a, b, c, d
+
+
 def shown(stand: Stand, joint: str) -> Readings:
     """Whether eyes agree with the encoders."""
     place, attendant = joint_place(joint), stand.attendant
-    stand.arm()
+    stand.arm(gently)
     here = measured_angles(stand.run_for(stand.configuration.motion.fade_in_s)[-1].states)
     attendant.watch()
-    stand.move([_with(here, place, SHOWN_RAD)], SHOWING_RAD_S)
+    stand.move([_with(here, place, SHOWN_RAD)], SHOWING_RAD_S, gently)
     stand.run_for(0.3)
     attendant.look()
-    stand.move([here], SHOWING_RAD_S)
+    stand.move([here], SHOWING_RAD_S, gently)
     stand.let_go()
     sight = attendant.saw(joint, stand.look_on)
     side, kind = joint.split("_")

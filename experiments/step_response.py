@@ -1,10 +1,11 @@
 """From the tick of a command to the tick in which the answering current is seen, and how large it is.
 
-The flippers are held level. Now and then, at a phase that chance shifts against the drives' own clocks, the joint under
-test gets a quick +T, -T, -T, +T on top of what holds it, which leaves it where it was and at rest. The steps from +T to
--T and back are twice T, so half of them stands far above the current's noise. A delay of one tick is the least there
-is: what is sent at the end of a tick can be answered in the next. Plateaus are compared with the torque that was
-commanded, by the configured torque constant: the drive converts by its own, so the two must agree.
+The flippers lie, and nothing holds them: before the delay is known, stiffness may make a joint tremble. Now and then,
+at a phase that chance shifts against the drives' own clocks, the joint under test gets a quick +T, -T, -T, +T, which
+leaves it about where it was. The steps from +T to -T and back are twice T, so half of them stands far above the
+current's noise. A delay of one tick is the least there is: what is sent at the end of a tick can be answered in the
+next. Plateaus are compared with the torque that was commanded, by the configured torque constant: the drive converts by
+its own, so the two must agree.
 """
 
 from __future__ import annotations
@@ -13,14 +14,15 @@ from random import Random
 from statistics import median
 from typing import NamedTuple
 
-from control.records import DriveStates, Torques
+from control.records import NO_TORQUE, DriveStates, Torques
 from experiments.bench_reading import Reading, Readings
 from experiments.bench_stand import Sample, Stand, joint_place
 
 PULSE_NM = 0.08  # a tenth of what the motors may do: some ten times a current's noise
 QUARTER_TICKS = 4  # 11 ms: the joint comes to 2 rad/s and moves by 2 degrees
+SETTLED_TICKS = 2  # at the end of a plateau, when a slow current has come as well
 PULSES = 16  # two steps each
-LEAST_WAIT_TICKS, MOST_WAIT_TICKS = 25, 45  # between two of them: for the joint to settle
+LEAST_WAIT_TICKS, MOST_WAIT_TICKS = 25, 45  # between two of them: for the joint to come to rest
 LONGEST_TICKS = 2 * QUARTER_TICKS  # after which an answer belongs to another step
 MEDIAN_TICKS = 2  # of the delay, with which the joints' damping is stable
 WORST_TICKS = 3  # beyond, a drive counts as silent
@@ -33,7 +35,7 @@ class Pulse(NamedTuple):
 
 
 class Pulses:
-    """A law: quick doublets on one joint."""
+    """A law: quick doublets on one joint, no torque on the others."""
 
     def __init__(self, place: int, random: Random) -> None:
         self.place = place
@@ -45,16 +47,11 @@ class Pulses:
             tick += 4 * QUARTER_TICKS
         self.ticks = tick + LEAST_WAIT_TICKS
         self._tick = 0
-        self._bias_nm = 0.0
 
     def __call__(self, held: Torques, states: DriveStates) -> Torques:
-        """While a pulse lasts the stiffness is out of it: the last torque before it goes on."""
         pulse_nm = self._pulse_nm(self._tick)
         self._tick += 1
-        if pulse_nm == 0.0:
-            self._bias_nm = held[self.place]
-            return held
-        a, b, c, d = (self._bias_nm + pulse_nm if place == self.place else nm for place, nm in enumerate(held))
+        a, b, c, d = (pulse_nm if place == self.place else 0.0 for place in range(4))
         return a, b, c, d
 
     def _pulse_nm(self, tick: int) -> float:
@@ -66,11 +63,12 @@ class Pulses:
 
 
 def step_response(stand: Stand, joint: str, seed: int = 1) -> Readings:
-    """With the flippers level, in hold."""
+    """Raises BenchError where a fault ends it."""
     pulses = Pulses(joint_place(joint), Random(f"{joint} {seed}"))
+    stand.arm(lambda held, states: NO_TORQUE)
     stand.controller.law = pulses
     samples = [stand.tick_soundly() for _ in range(pulses.ticks)]
-    stand.controller.law = None
+    stand.let_go()
     constant_nm_a = stand.configuration.drive[joint].torque_constant_nm_a
     delays = [
         delay_ticks(samples, pulses.place, pulse.begins + quarter * QUARTER_TICKS, constant_nm_a)
@@ -97,12 +95,11 @@ def delay_ticks(samples: list[Sample], place: int, step: int, constant_nm_a: flo
 
 
 def size_ratio(samples: list[Sample], pulses: Pulses, constant_nm_a: float) -> float:
-    """Of the plateaus between two steps, against what was sent; bias and noise go out by the pulses' two signs."""
+    """Of the long plateaus' ends against what was sent; bias and noise go out by the pulses' two signs."""
     given_nm = sent_nm = 0.0
     for pulse in pulses.schedule:
-        third, fourth = pulse.begins + 3 * QUARTER_TICKS, pulse.begins + 4 * QUARTER_TICKS
-        for end, settled, way in ((third, QUARTER_TICKS, -pulse.sign), (fourth, QUARTER_TICKS // 2, pulse.sign)):
-            for tick in range(end - settled + 1, end + 1):  # the answer to a command is in the tick after it
-                given_nm += way * samples[tick].states[pulses.place].current_a * constant_nm_a
-                sent_nm += way * samples[tick - 1].sent_nm[pulses.place]
+        end, way = pulse.begins + 3 * QUARTER_TICKS, -pulse.sign
+        for tick in range(end - SETTLED_TICKS + 1, end + 1):  # the answer to a command is in the tick after it
+            given_nm += way * samples[tick].states[pulses.place].current_a * constant_nm_a
+            sent_nm += way * samples[tick - 1].sent_nm[pulses.place]
     return given_nm / sent_nm

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from math import degrees, nan, radians
 
-from control.controller import ALL_TRUSTED, DAMPING_NM, SOFT_STOP_S, WalkOrder, measured_angles
+from control.controller import ALL_TRUSTED, DAMPING_NM, RAISING_S, SOFT_STOP_S, WalkOrder, measured_angles
 from control.joint_pd import damping_torques_nm
 from control.modes import Mode, Request
 from control.records import DriveState, DriveStates, JointAngles, Phase, Torques
@@ -29,10 +29,11 @@ REST_TICKS = 20  # that all of them are slow: no turning point
 SWING_RAD = radians(30.0)
 SOFT_REST_S = 0.3  # of the sweep, which has only to brake; the flippers rise meanwhile
 SOFT_TRAVEL_DEG = 15.0
-DAMPED_REST_S = 0.5
-DAMPED_TRAVEL_DEG = 25.0  # at 4 rad/s with 0.06 N·m s/rad and an arm of 0.0004 kg m²: 1.5, and friction that differs
+SOFT_WHOLE_S = RAISING_S + 0.2  # the way up takes half of that; after it, the loop waits as long for what is held down
+DAMPED_REST_S = 0.2
+DAMPED_TRAVEL_DEG = 8.0  # at 4 rad/s with 0.06 N·m s/rad and an arm of 0.0004 kg m²: 1.5, and arms that differ
 OFF_TICKS = 4  # of the commands' way, the current's end, and the message that tells it
-QUIET_A = 0.5  # less than this is noise
+QUIET_A = 0.4  # less than this is noise
 STARTING = tuple(radians(angle_deg) for angle_deg in (20.0, 10.0))  # sweep and adduction, from and to
 CUT_RAD_S = 1.0
 COASTING_S = 1.5
@@ -52,7 +53,7 @@ def soft_stop(stand: Stand) -> Readings:
     yield from _sweep_readings("soft stop", samples, begun, SOFT_REST_S, SOFT_TRAVEL_DEG)
     whole_s = len(samples) * PERIOD_S
     advice = "something holds the flippers down: see that they hang free"
-    yield Reading("soft stop: until the flippers are up", whole_s, "s", 0.0, SOFT_STOP_S, advice)
+    yield Reading("soft stop: until the flippers are up", whole_s, "s", 0.0, SOFT_WHOLE_S, advice)
 
 
 def _in_full_stance(stand: Stand, sample: Sample) -> bool:
@@ -68,7 +69,7 @@ def damping(stand: Stand) -> Readings:
     stand.run_until(lambda sample: _is_fast(sample, FULL_SHARE * FAST_RAD_S), 2.0, "The full speed of a sweep")
     begun = measured_angles(stand.loop.states)
     stand.controller.law = lambda held, states: _brake(stand, states)
-    samples = stand.run_for(DAMPED_REST_S + 0.2)
+    samples = stand.run_for(2.0 * DAMPED_REST_S)
     stand.hold_here()
     yield from _sweep_readings("damping", samples, begun, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
 
@@ -80,8 +81,8 @@ def _brake(stand: Stand, states: DriveStates) -> Torques:
 def torque_off(stand: Stand) -> Readings:
     """In hold, level, at the begin; idle at the end. Currents are large where all joints speed up."""
     sweep, adduction = STARTING
-    stand.move([(-sweep, adduction, -sweep, adduction)])
-    stand.controller.follow([(sweep, -adduction, sweep, -adduction)], FAST_RAD_S)
+    stand.move([(-sweep, -adduction, -sweep, -adduction)])
+    stand.controller.follow([(sweep, adduction, sweep, adduction)], FAST_RAD_S)
     stand.run_until(lambda sample: _is_fast(sample, CUT_RAD_S, range(4)), 2.0, "A motion of all joints")
     begun = stand.loop.states
     stand.loop.request(Request.DISARM, stand.rig.now_s)
@@ -93,7 +94,9 @@ def torque_off(stand: Stand) -> Readings:
     yield Reading("torque off: until the sweep rests", rest_s, "s", 0.0, COASTING_S, "see what drives it on")
     for place, side in zip(SWEEPS, ("left", "right"), strict=True):
         way_deg = degrees(max(abs(sample.states[place].angle_rad - begun[place].angle_rad) for sample in samples))
-        yield Reading(f"torque off: way of the {side} sweep", way_deg, "deg", 0.0, COASTING_DEG, "see what drives it on")
+        yield Reading(
+            f"torque off: way of the {side} sweep", way_deg, "deg", 0.0, COASTING_DEG, "see what drives it on"
+        )
 
 
 def _off_readings(axis: OdriveAxis, begun: DriveState, samples: Sequence[Sample], place: int) -> Readings:

@@ -1,7 +1,7 @@
 """How well the joints follow a path in air: the largest error, its mean square, and by how much they come late.
 
-The lag is where the measured angle fits the commanded one best (normalised cross-correlation without their means, with
-a parabola through the best three ticks), so a constant error does not look like one. It is negative where a joint leads.
+The lag is where the measured angle fits the commanded one best (normalised cross-correlation without their means, and a
+parabola through the best three ticks), so a constant error does not look like one. Where a joint leads it is negative.
 """
 
 from __future__ import annotations

@@ -14,12 +14,13 @@ from experiments.bench_reading import Reading, Readings
 from experiments.bench_stand import Sample, Stand
 from firmware_host.ticker import PERIOD_S
 
-PRESSING_NM = 0.05  # down: what the arm weighs once more; a sweep joint gets none, nothing would hold it
+PRESSING_NM = 0.08  # down: what an arm weighs twice more; a sweep joint gets none, nothing would hold it
 PRESSING_S = 0.5
 PATIENCE_S = 0.5  # beyond the longest watchdog: then torque is taken off by command
 TELLING_S = 0.3  # for the drives to tell why
 LATE_TICKS = 3  # of the message that tells it, its way, and the tick that reads it
 GONE_SHARE = 0.5  # of the current
+GONE_TICKS = 5  # in a row, with less than that: one alone may be noise
 
 
 def press(held: Torques, states: DriveStates) -> Torques:
@@ -57,11 +58,11 @@ def watchdog_times(stand: Stand) -> Readings:
 
 
 def _gone_s(pressed: list[Sample], silence: list[Sample], place: int) -> float:
-    """Until the current stays below half of what flowed."""
+    """Until the current is less than half of what flowed, and stays so."""
     flowed_a = sum(sample.states[place].current_a for sample in pressed[-40:]) / 40.0
-    flows = [sample.states[place].current_a / flowed_a > GONE_SHARE for sample in silence]
-    last = max((tick for tick, flowing in enumerate(flows) if flowing), default=-1)
-    return silence[last + 1].beat.now_s - pressed[-1].beat.now_s if last + 1 < len(silence) else nan
+    gone = [sample.states[place].current_a / flowed_a < GONE_SHARE for sample in silence]
+    first = next((tick for tick in range(len(gone)) if all(gone[tick : tick + GONE_TICKS])), None)
+    return nan if first is None else silence[first].beat.now_s - pressed[-1].beat.now_s
 
 
 def _reasons(stand: Stand) -> Readings:

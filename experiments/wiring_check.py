@@ -1,4 +1,4 @@
-"""What can be said of a robot's wiring without moving anything: who talks on the buses, how often, and how they are set.
+"""What can be said of a robot's wiring without moving anything: who talks on the buses, how often, how they are set.
 
 Ids and rates come from what was overheard before the loop took the buses over. Then the loop stands by, asks for
 versions and watchdogs, and feeds zero torque to idle drives, as the daemon does.
@@ -7,23 +7,23 @@ versions and watchdogs, and feeds zero torque to idle drives, as the daemon does
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from math import inf, nan
+from collections.abc import Callable, Mapping
+from math import inf, isfinite, nan
 
 from control.records import JOINTS
 from drivers import odrive_codec as codec
 from drivers.bus_load import COMMAND_HZ, MOST_SHARE, SLOW_HZ, TORQUE_BYTES, bus_load, frame_bits
 from drivers.can_port import CanPort
 from drivers.frames import Frame
-from drivers.odrive_axis import DriveParameters
+from drivers.odrive_axis import DriveParameters, OdriveAxis
 from drivers.odrive_codec import Message, arbitration_id
 from experiments.bench_reading import Reading, Readings
 from experiments.bench_stand import Stand
 from firmware_host.fault_watch import FIRMWARE
-from firmware_host.ticker import RATE_HZ
+from firmware_host.ticker import PERIOD_S, RATE_HZ
 
-ASKING_S = 1.5  # for versions, then watchdogs: asked every 0.5 s
-STANDING_BY_S = 1.0
+ASKING_S = 3.0  # longest, for versions and then for watchdogs: asked every 0.5 s
+STANDING_BY_S = 0.6  # six heartbeats
 COMMANDS = (  # that a drive obeys and never sends
     codec.ESTOP,
     codec.SET_AXIS_STATE,
@@ -49,7 +49,14 @@ def ids_heard(stand: Stand) -> Readings:
     """Every drive under its id on its bus."""
     for joint, drive in stand.configuration.drive.items():
         rate_hz = _messages_of(stand, drive.bus, drive.node_id) / stand.rig.overheard.duration_s
-        yield Reading(f"{joint}: messages of node {drive.node_id} on {drive.bus}", rate_hz, "Hz", 1.0, inf, _whereabouts(stand, drive))
+        yield Reading(
+            f"{joint}: messages of node {drive.node_id} on {drive.bus}",
+            rate_hz,
+            "Hz",
+            1.0,
+            inf,
+            _whereabouts(stand, drive),
+        )
 
 
 def _messages_of(stand: Stand, bus: str, node_id: int) -> int:
@@ -136,7 +143,7 @@ def _bits(frame: Frame) -> int:
 
 def firmware(stand: Stand) -> Readings:
     """That whose messages are known."""
-    stand.run_for(ASKING_S)
+    _ask(stand, lambda axis: axis.version is not None)
     supported = float(f"{FIRMWARE[0]}.{FIRMWARE[1]}")
     for axis in stand.drives.axes:
         version = float(f"{axis.version.major}.{axis.version.minor}") if axis.version else nan
@@ -144,9 +151,17 @@ def firmware(stand: Stand) -> Readings:
         yield Reading(f"{axis.joint}: firmware", version, "", supported, supported, advice)
 
 
+def _ask(stand: Stand, known: Callable[[OdriveAxis], bool]) -> None:
+    """Until all have answered, or will not."""
+    for _ in range(round(ASKING_S / PERIOD_S)):
+        if all(known(axis) for axis in stand.drives.axes):
+            return
+        stand.tick_soundly()
+
+
 def watchdogs(stand: Stand) -> Readings:
     """On, and quick enough, by the drives' own word."""
-    stand.run_for(ASKING_S)
+    _ask(stand, lambda axis: isfinite(axis.watchdog_s))
     longest_s = stand.configuration.faults.longest_watchdog_s
     for axis in stand.drives.axes:
         unknown = axis.watchdog_s != axis.watchdog_s
@@ -167,7 +182,9 @@ def quiet_buses(stand: Stand) -> Readings:
         told = port.last_error or port.last_send_error
         yield Reading(f"{name}: errors and losses", lost, "", 0, 0, f"{told}: {wires}" if told else wires)
     for joint, state in zip(JOINTS, stand.loop.states, strict=True):
-        advice = f"{codec.error_text(state.error_flags)}: mend the cause, clear it with odrivetool or 'mudskipper clear'"
+        advice = (
+            f"{codec.error_text(state.error_flags)}: mend the cause, clear it with odrivetool or 'mudskipper clear'"
+        )
         yield Reading(f"{joint}: error flags", state.error_flags, "", 0, 0, advice)
     advice = "end what else runs on this computer, and give this program real-time priority (README, 'On the robot')"
     yield Reading("ticks missed", 100.0 * missed / len(samples), "%", 0.0, 100.0 * MOST_MISSED_SHARE, advice)

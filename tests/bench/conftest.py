@@ -1,8 +1,8 @@
 """The bench's stages on one rig: opened once, each stage only after the one before it, idle whatever happens.
 
-    pytest tests/bench --can can0             a robot, asked before it moves
-    pytest tests/bench --config FILE          the same on the interfaces of the configuration
-    pytest tests/bench --simulated            a simulated robot, as fast as it computes
+pytest tests/bench --can can0             a robot, asked before it moves
+pytest tests/bench --config FILE          the same on the interfaces of the configuration
+pytest tests/bench --simulated            a simulated robot, as fast as it computes
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    report, path = report_of(config), config.option.bench_report
+    report = report_of(config)
     if not report.robot:
         return
     terminalreporter.section("bench")
