@@ -66,7 +66,10 @@ class Rig(Protocol):
 
 
 class HardwareRig:
-    """Real buses and real time. Raises BenchError where a daemon runs or a bus does not open."""
+    """Real buses and real time. Raises BenchError where a daemon runs or a bus does not open.
+
+    The process is as punctual as the daemon while the rig is open. Memory is not locked: that could not be undone.
+    """
 
     def __init__(self, configuration: Configuration) -> None:
         refuse_beside_daemon(Path(configuration.status.socket))
@@ -79,8 +82,9 @@ class HardwareRig:
         drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         self._pose = PosePort(Path(configuration.pose.socket) if configuration.pose.socket else None)
         self.loop = Loop(configuration, drives, self._pose, NullRecorder())
+        self._processors = os.sched_getaffinity(0)
         options = configuration.loop
-        self.warnings: Sequence[str] = prepare_loop(options.priority, options.cpu, options.lock_memory)
+        self.warnings: Sequence[str] = prepare_loop(options.priority, options.cpu, lock_memory=False)
         self._ticker = Ticker()
         self._now_s = time.monotonic()
 
@@ -96,6 +100,7 @@ class HardwareRig:
     def close(self) -> None:
         self.loop.drives.close()
         self._pose.close()
+        os.sched_setaffinity(0, self._processors)
         gc.unfreeze()
         gc.enable()
         with suppress(PermissionError):

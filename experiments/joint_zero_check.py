@@ -36,19 +36,22 @@ def rest_pose(stand: Stand) -> Readings:
 
 
 def level_pose(stand: Stand) -> Readings:
-    """Held by hand, all four read zero. Nothing where nobody is there."""
-    if stand.attendant.holds_level(stand.look_on):
-        angles = _mean_angles(stand.run_for(LOOKING_S))
-        stand.attendant.lets_go()
-        for joint, angle_rad in zip(JOINTS, angles, strict=True):
-            what = f"{joint}: held level and straight out"
-            yield Reading(what, degrees(angle_rad), "deg", -LEVEL_DEG, LEVEL_DEG, ZERO.format(joint=joint))
+    """Held by hand, all four read zero."""
+    if not stand.attendant.holds_level(stand.look_on):
+        yield Reading("flippers held level by hand (0: nobody did)", 0.0)
+        return
+    angles = _mean_angles(stand.run_for(LOOKING_S))
+    stand.attendant.lets_go()
+    for joint, angle_rad in zip(JOINTS, angles, strict=True):
+        what = f"{joint}: held level and straight out"
+        yield Reading(what, degrees(angle_rad), "deg", -LEVEL_DEG, LEVEL_DEG, ZERO.format(joint=joint))
 
 
 def turned(stand: Stand, joint: str) -> Readings:
     """By hand, from stop to stop: that joint turns most, and its limits lie within the stops."""
     seen: list[JointAngles] = []
     if not stand.attendant.turns(joint, lambda: seen.extend(map(_angles, stand.run_for(LOOK_S)))):
+        yield Reading(f"{joint}: turned by hand (0: nobody did)", 0.0)
         return
     stand.attendant.lets_go()
     turns_deg = [degrees(max(angles) - min(angles)) for angles in zip(*seen, strict=True)]

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Generator, Iterator
-from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
@@ -22,7 +20,7 @@ from experiments.bench_rig import HardwareRig, Rig, SimulatedRig, lying_m
 from experiments.bench_robot import BenchError
 from experiments.bench_stand import Stand
 from firmware_host.configuration import Configuration, ConfigurationError, load_configuration
-from tests.bench.staged_bench import BenchReport, StagedBench, UncapturedPerson, stage_name, stage_of
+from tests.bench.staged_bench import FAILED, BenchReport, StagedBench, UncapturedPerson, stage_name, stage_of
 
 INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
 EXAMPLE = Path(__file__).parent.parent.parent / "systemd" / "mudskipper.toml"
@@ -42,20 +40,20 @@ def report_of(config: pytest.Config) -> BenchReport:
 @pytest.fixture(scope="session")
 def opened(request: pytest.FixtureRequest) -> Iterator[Stand | str]:
     """The stand, or why there is none."""
-    options = request.config.option
+    options, robot = request.config.option, report_of(request.config).robot
     if not (options.simulated or options.can or options.config):
         pytest.skip(NOT_ASKED_FOR)
     path = Path(options.config) if options.config else configuration_path(options.simulated)
+    kind = "simulated" if options.simulated else "hardware"
+    stamp = datetime.now(UTC).isoformat(timespec="seconds")
+    robot |= {"rig": kind, "begun": stamp, "configuration": str(path), "warnings": []}
     try:
         configuration = load_configuration(path)
         rig, attendant = open_rig(request.config, on_channels(configuration, options.can or []))
     except (ConfigurationError, BenchError) as problem:
         yield f"{path}: {problem}" if isinstance(problem, ConfigurationError) else str(problem)
         return
-    kind = "simulated" if options.simulated else "hardware"
-    stamp = datetime.now(UTC).isoformat(timespec="seconds")
-    robot = {"robot": configuration.robot.name, "rig": kind, "begun": stamp, "configuration": str(path)}
-    report_of(request.config).robot = robot | {"warnings": list(rig.warnings)}
+    robot |= {"robot": configuration.robot.name, "warnings": list(rig.warnings)}
     stand = Stand(rig, attendant)
     try:
         yield stand
@@ -92,17 +90,18 @@ def attendant_at(config: pytest.Config) -> Attendant:
     raise BenchError("The robot will move, and nobody can be asked: run this on a terminal, or with --yes.")
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def bench(request: pytest.FixtureRequest, opened: Stand | str) -> Iterator[StagedBench]:
     report, stage = report_of(request.config), stage_of(request.path)
+    report.begin(stage, request.node.name)
+    obstacle = report.obstacle(stage)
+    if obstacle:
+        pytest.skip(obstacle)
     if isinstance(opened, str):
         if report.tests:
             pytest.skip("the bench did not open")
         pytest.fail(opened, pytrace=False)
-    obstacle = report.obstacle(stage)
-    if obstacle:
-        pytest.skip(obstacle)
-    ask_before_moving(request, opened)
+    ask_before_moving(request, opened, report, stage)
     yield StagedBench(opened, report)
     try:
         opened.let_go()
@@ -111,22 +110,19 @@ def bench(request: pytest.FixtureRequest, opened: Stand | str) -> Iterator[Stage
         pytest.fail(str(problem), pytrace=False)
 
 
-def ask_before_moving(request: pytest.FixtureRequest, stand: Stand) -> None:
+def ask_before_moving(request: pytest.FixtureRequest, stand: Stand, report: BenchReport, stage: int) -> None:
     """Once for each stage that moves something."""
-    module = request.module
-    assert isinstance(module, ModuleType)
-    what = getattr(module, "MOVES", "")
-    if not what or getattr(module, "asked", False):
+    what = getattr(request.module, "MOVES", "")
+    if not what or stage in report.consents:
         return
     lying_cm = 100.0 * lying_m(stand.configuration.geometry)
     where = (
         f"The robot stands on blocks; idle, its flippers lie on something soft, {lying_cm:.0f} cm below their axes."
         " Nobody's hands are near them, and the power switch is at hand."
     )
-    sentence = f"{stage_name(stage_of(request.path)).capitalize()}: {what}\n{where}"
-    if not stand.attendant.consents(sentence, stand.look_on):
+    if not stand.attendant.consents(f"{stage_name(stage).capitalize()}: {what}\n{where}", stand.look_on):
         pytest.skip("a person did not want the robot to move")
-    module.asked = True  # type: ignore[attr-defined]
+    report.consents.add(stage)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -141,26 +137,27 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     told = yield
-    decided = told.when == "call" or not told.passed
-    if decided and item.path.parent == Path(__file__).parent and stage_of(item.path):
-        why = told.longrepr[2] if isinstance(told.longrepr, tuple) else told.longreprtext
-        report_of(item.config).close_test(stage_of(item.path), item.name, told.outcome, why)
+    if told.when == "teardown" or not told.passed:
+        report = report_of(item.config)
+        report.worsen(told.outcome, told.longrepr[2] if isinstance(told.longrepr, tuple) else told.longreprtext)
+        if told.when == "teardown":
+            report.end()
     return told
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    report = report_of(config)
+    report, path = report_of(config), config.option.bench_report
     if not report.robot:
         return
+    report.worsen(FAILED, "interrupted")  # a test that is still under way
+    report.end()
     terminalreporter.section("bench")
     for line, good in report.lines(brief=config.get_verbosity() < 0):
         terminalreporter.write_line(line, **({} if good else {"red": True}))
     for warning in report.robot["warnings"]:
         terminalreporter.write_line(f"warning: {warning}")
-
-
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    report, path = report_of(session.config), session.config.option.bench_report
-    if path and report.robot:
-        with suppress(OSError):
+    if path:
+        try:
             report.write(Path(path))
+        except OSError as problem:
+            terminalreporter.write_line(f"the report was not written to {path}: {problem.strerror}", red=True)

@@ -34,12 +34,28 @@ class BenchReport:
     def __init__(self) -> None:
         self.robot: dict[str, Any] = {}
         self.tests: list[dict[str, Any]] = []
-        self.readings: list[Reading] = []  # of the test under way
+        self.consents: set[int] = set()  # stages in which a person lets the robot move
+        self._test: dict[str, Any] | None = None  # under way
 
-    def close_test(self, stage: int, name: str, outcome: str, why: str) -> None:
-        entry = {"stage": stage, "name": STAGES[stage - 1], "test": name, "outcome": outcome, "why": why}
-        self.tests.append(entry | {"readings": self.readings})
-        self.readings = []
+    def begin(self, stage: int, test: str) -> None:
+        names = {"stage": stage, "name": STAGES[stage - 1], "test": test}
+        self._test = names | {"outcome": PASSED, "why": "", "readings": []}
+
+    def keep(self, reading: Reading) -> None:
+        """Of the test under way."""
+        if self._test is not None:
+            self._test["readings"].append(reading)
+
+    def worsen(self, outcome: str, why: str) -> None:
+        """What was told first of the test under way remains."""
+        if self._test is not None and self._test["outcome"] == PASSED:
+            self._test |= {"outcome": outcome, "why": why}
+
+    def end(self) -> None:
+        """The test under way, if there is one."""
+        if self._test is not None:
+            self.tests.append(self._test)
+        self._test = None
 
     def outcome_of(self, stage: int) -> str:
         """Passed only where all of its tests were run and passed."""
@@ -93,7 +109,7 @@ class StagedBench:
         """Keep them, and fail with a sentence for each that is out of its bounds."""
         wrong = []
         for reading in readings:
-            self.report.readings.append(reading)
+            self.report.keep(reading)
             if not reading.good:
                 wrong.append(reading.sentence)
         if wrong:
