@@ -49,7 +49,7 @@ def level_pose(stand: Stand) -> Readings:
 
 def turned(stand: Stand, joint: str) -> Readings:
     """By hand, from stop to stop: that joint turns most, and its limits lie within the stops."""
-    seen: list[JointAngles] = []
+    seen = [_mean_angles(stand.run_for(LOOK_S))]
     if not stand.attendant.turns(joint, lambda: seen.extend(map(_angles, stand.run_for(LOOK_S)))):
         yield Reading(f"{joint}: turned by hand (0: nobody did)", 0.0)
         return

@@ -152,6 +152,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     report.worsen(FAILED, "interrupted")  # a test that is still under way
     report.end()
     terminalreporter.section("bench")
+    terminalreporter.write_line(f"{report.robot['rig']}, configuration {report.robot['configuration']}")
     for line, good in report.lines(brief=config.get_verbosity() < 0):
         terminalreporter.write_line(line, **({} if good else {"red": True}))
     for warning in report.robot["warnings"]:

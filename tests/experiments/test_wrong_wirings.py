@@ -126,14 +126,14 @@ def hold_down(rig: SimulatedRig) -> None:
 
 
 class Stumbler:
-    """A drive that starts anew in the fifth stride."""
+    """A drive that starts anew in the third stride."""
 
     def __init__(self) -> None:
         self.done = False
 
     def __call__(self, rig: SimulatedRig) -> None:
         walking = hasattr(rig, "loop") and rig.loop.mode is Mode.WALKING
-        if walking and rig.loop.target_before.stride == 5 and not self.done:
+        if walking and rig.loop.target_before.stride == 2 and not self.done:
             self.done = True
             rig.robot.restart_drive(2)
 
@@ -163,9 +163,9 @@ WRONG = (
     ),
     Wrong(
         "adduction's sign",
-        lambda c: SimulatedRig(c, built(c, right_adduction={"sign": -1})),
+        lambda c: SimulatedRig(c, built(c, left_adduction={"sign": 1})),
         "signs",
-        "drive.right_adduction.sign",
+        "drive.left_adduction.sign",
     ),
     Wrong(
         "encoder offset",
@@ -186,7 +186,13 @@ WRONG = (
         "currents",
         "drive.right_sweep.torque_constant_nm_a",
     ),
-    Wrong("slow drive", lambda c: with_drive(c, "left_sweep", current_lag_s=0.006), "currents", "slow current loop"),
+    Wrong(
+        "slow drive",
+        lambda c: with_drive(c, "left_sweep", current_lag_s=0.006),
+        "currents",
+        "slow current loop",
+        "currents",
+    ),
     Wrong(
         "repeater",
         lambda c: SimulatedRig(c, others=[Repeater()]),
