@@ -195,6 +195,11 @@ class Stand:
             axis.disarm()
 
 
+def first_lasting(flags: Sequence[bool], ticks: int) -> int | None:
+    """From which tick on so many in a row are true: a single one may be noise, or a turning point."""
+    return next((first for first in range(len(flags) - ticks + 1) if all(flags[first : first + ticks])), None)
+
+
 def joint_place(joint: str) -> int:
     return JOINTS.index(joint)
 

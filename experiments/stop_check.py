@@ -18,7 +18,7 @@ from control.records import DriveState, DriveStates, JointAngles, Phase, Torques
 from drivers.odrive_axis import OdriveAxis
 from experiments.bench_reading import Reading, Readings
 from experiments.bench_robot import BenchError
-from experiments.bench_stand import Sample, Stand
+from experiments.bench_stand import Sample, Stand, first_lasting
 from experiments.stroke_tracking import FAST_RAD_S, WALK_DEPTH_M
 from firmware_host.ticker import PERIOD_S
 
@@ -33,6 +33,7 @@ SOFT_WHOLE_S = RAISING_S + 0.2  # the way up takes half of that; after it, the l
 DAMPED_REST_S = 0.2
 DAMPED_TRAVEL_DEG = 8.0  # at 4 rad/s with 0.06 N·m s/rad and an arm of 0.0004 kg m²: 1.5, and arms that differ
 OFF_TICKS = 4  # of the commands' way, the current's end, and the message that tells it
+QUIET_TICKS = 5  # in a row
 QUIET_A = 0.4  # less than this is noise
 STARTING = tuple(radians(angle_deg) for angle_deg in (20.0, 10.0))  # sweep and adduction, from and to
 CUT_RAD_S = 1.0
@@ -102,9 +103,9 @@ def torque_off(stand: Stand) -> Readings:
 def _off_readings(axis: OdriveAxis, begun: DriveState, samples: Sequence[Sample], place: int) -> Readings:
     joint, flowed_a = axis.joint, abs(begun.current_a)
     yield Reading(f"{joint}: torque off, current before", flowed_a, "A", 2.0 * QUIET_A, 100.0, "too little to tell")
-    loud = [tick for tick, sample in enumerate(samples) if abs(sample.states[place].current_a) > QUIET_A]
+    quiet = first_lasting([abs(sample.states[place].current_a) < QUIET_A for sample in samples], QUIET_TICKS)
     advice = "the drive does not obey 'idle': have the power switch at hand, and check its firmware"
-    ticks = 1 + max(loud, default=-1)
+    ticks = nan if quiet is None else quiet
     yield Reading(f"{joint}: torque off, until no current flows", ticks, "ticks", 0, OFF_TICKS, advice)
     idle_s = next((PERIOD_S * n for n, s in enumerate(samples, 1) if not s.states[place].closed_loop), nan)
     latest_s = axis.parameters.heartbeat_period_s + OFF_TICKS * PERIOD_S
@@ -134,4 +135,4 @@ def _sweep_readings(
 def rest_tick(samples: Sequence[Sample]) -> int | None:
     """From which tick on all sweeps are slow, for a while."""
     slow = [all(abs(sample.states[place].velocity_rad_s) < REST_RAD_S for place in SWEEPS) for sample in samples]
-    return next((n for n in range(len(slow) - REST_TICKS) if all(slow[n : n + REST_TICKS])), None)
+    return first_lasting(slow, REST_TICKS)

@@ -11,7 +11,7 @@ from math import nan
 from control.records import JOINTS, DriveStates, Torques
 from drivers import odrive_codec as codec
 from experiments.bench_reading import Reading, Readings
-from experiments.bench_stand import Sample, Stand
+from experiments.bench_stand import Sample, Stand, first_lasting
 from firmware_host.ticker import PERIOD_S
 
 PRESSING_NM = 0.08  # down: what an arm weighs twice more; a sweep joint gets none, nothing would hold it
@@ -20,7 +20,7 @@ PATIENCE_S = 0.5  # beyond the longest watchdog: then torque is taken off by com
 TELLING_S = 0.3  # for the drives to tell why
 LATE_TICKS = 3  # of the message that tells it, its way, and the tick that reads it
 GONE_SHARE = 0.5  # of the current
-GONE_TICKS = 5  # in a row, with less than that: one alone may be noise
+GONE_TICKS = 5  # in a row, with less than that
 
 
 def press(held: Torques, states: DriveStates) -> Torques:
@@ -35,7 +35,7 @@ def let_watchdogs_trip(stand: Stand) -> tuple[list[Sample], list[Sample]]:
     silence: list[Sample] = []
     for _ in range(round((stand.configuration.faults.longest_watchdog_s + PATIENCE_S) / PERIOD_S)):
         silence.append(stand.listen())
-        if not any(state.closed_loop for state in silence[-1].states):
+        if not any(state.closed_loop for sample in silence[-GONE_TICKS:] for state in sample.states):
             break
     stand.drives.disarm(stand.rig.now_s, at_once=True)
     return pressed, silence
@@ -61,7 +61,7 @@ def _gone_s(pressed: list[Sample], silence: list[Sample], place: int) -> float:
     """Until the current is less than half of what flowed, and stays so."""
     flowed_a = sum(sample.states[place].current_a for sample in pressed[-40:]) / 40.0
     gone = [sample.states[place].current_a / flowed_a < GONE_SHARE for sample in silence]
-    first = next((tick for tick in range(len(gone)) if all(gone[tick : tick + GONE_TICKS])), None)
+    first = first_lasting(gone, GONE_TICKS)
     return nan if first is None else silence[first].beat.now_s - pressed[-1].beat.now_s
 
 

@@ -14,7 +14,7 @@ from experiments.bench_attendant import AbsentAttendant, SimulatedAttendant
 from experiments.bench_reading import Reading
 from experiments.bench_rig import SimulatedRig
 from experiments.bench_robot import BenchError
-from experiments.bench_stand import Stand
+from experiments.bench_stand import Stand, first_lasting
 from experiments.joint_zero_check import level_pose, turned
 from experiments.sign_check import MOST_NM, gently, shown
 from experiments.stroke_tracking import lag_ticks
@@ -144,6 +144,11 @@ def test_the_lag_of_a_shifted_motion_is_found(shift: float) -> None:
     ticks = np.arange(600.0)
     commanded, measured = (np.sin((ticks - late) / 20.0) + 0.3 * np.sin((ticks - late) / 7.0) for late in (0.0, shift))
     assert lag_ticks(commanded, 0.9 * measured + 0.5) == pytest.approx(shift, abs=0.05)
+
+
+@pytest.mark.parametrize(("flags", "first"), [("1100111", 4), ("0111", 1), ("0110", None), ("", None)])
+def test_what_lasts_begins_where_enough_follow(flags: str, first: int | None) -> None:
+    assert first_lasting([flag == "1" for flag in flags], 3) == first
 
 
 def test_where_nothing_moves_there_is_no_lag() -> None:
