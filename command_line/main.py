@@ -8,6 +8,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper
 from math import isfinite
@@ -53,6 +54,7 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
         "watch": "The status, again and again, until Ctrl-C.",
         "arm": "Switch torque on; the robot holds its pose.",
         "walk": "Walk, with the depth adapted to the mud or fixed.",
+        "move": "Take joints slowly to other angles, while the robot holds its pose.",
         "stop": "End a walk: raise the flippers and hold.",
         "disarm": "Switch torque off, at once, in any state.",
         "clear": "Clear a fault and the drives' errors.",
@@ -61,12 +63,7 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
     parsers = {name: _add(commands, name, f"operation.{name}", text) for name, text in described.items()}
     parsers["fail"] = _add_fail(commands)
     for parser in parsers.values():
-        parser.add_argument(
-            "--socket",
-            type=Path,
-            default=Path(os.environ.get("MUDSKIPPER_SOCKET", DEFAULT_SOCKET)),
-            help="of the daemon (default: $MUDSKIPPER_SOCKET or %(default)s)",
-        )
+        _add_socket(parser)
     for name in ("status", "check", "fail"):
         parsers[name].add_argument("--json", action="store_true", help="for machines")
     parsers["watch"].add_argument("--period", type=_seconds, default=0.5, metavar="S", help="between two looks")
@@ -76,6 +73,7 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
     depth.add_argument("--adaptive", action="store_true", help="chosen from the mud, once a stride (default)")
     parsers["walk"].add_argument("--strides", type=_count, default=0, metavar="N", help="then stop (default: go on)")
     parsers["walk"].add_argument("--attended", action="store_true", help="stay; the robot stops when this ends")
+    parsers["move"].add_argument("angles", type=_joint_angle, nargs="+", metavar="JOINT=DEG", help="left_sweep=10 ...")
     parsers["check"].add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
     _add_installation(commands)
 
@@ -110,6 +108,14 @@ def _finite(text: str) -> float:
     if not isfinite(value):
         raise argparse.ArgumentTypeError(f"{text}: must be a number")
     return value
+
+
+def _joint_angle(text: str) -> tuple[str, float]:
+    joint, _, angle_deg = text.partition("=")
+    with suppress(ValueError):
+        if joint and isfinite(float(angle_deg)):
+            return joint, float(angle_deg)
+    raise argparse.ArgumentTypeError(f"{text}: must be a joint and its angle in degrees, as left_sweep=10") from None
 
 
 def _seconds(text: str) -> float:
@@ -177,6 +183,12 @@ def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
     info = _add(actions, "info", "logs.info", "What a log holds.")
     info.add_argument("files", type=Path, nargs="+", metavar="FILE", help="several are segments of one run")
     info.add_argument("--json", action="store_true")
+    report = _add(actions, "report", "log_report.log_report", "What a log tells, as one page with its pictures.")
+    report.add_argument(
+        "files", type=Path, nargs="+", metavar="FILE", help="our log, its segments, or the authors' CSV"
+    )
+    report.add_argument("--out", type=Path, metavar="DIR", help="(default: a folder named after the log)")
+    report.add_argument("--json", action="store_true", help="its numbers on standard output")
     export = _add(actions, "export", "logs.export", "A log in the columns of the authors' plotter.")
     export.add_argument("file", type=Path)
     export.add_argument("--csv", action="store_true", required=True, help="the format; there is one so far")
@@ -232,13 +244,26 @@ def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -
 
 def _add_trackway(names: Commands) -> None:  # type: ignore[valid-type]
     trackway = _add(names, "trackway", "walking.run_trackway", "Three muds in a row, at fixed and at chosen depths.")
-    _add_report(trackway, "robot and muds are simulated", "write JSON and picture there")
-    trackway.add_argument("--seeds", type=_seeds, default=5, metavar="N", help="trials of each gait (default: 5)")
+    _add_report(trackway, "robot and muds are simulated; else a daemon's robot walks", "for report, pictures and log")
+    _add_socket(trackway)
+    trackway.add_argument(
+        "--trials", "--seeds", type=_seeds, metavar="N", help="of each gait (default: 3, as the paper)"
+    )
     trackway.add_argument(
         "--method", action="append", metavar="NAME", help="of adaptation, repeatable to compare (default: default)"
     )
     trackway.add_argument(
         "--compartment", type=_compartment_m, default=0.61, metavar="M", help="length of each mud (default: 0.61)"
+    )
+    trackway.add_argument("--mud", action="append", metavar="NAME", help="of a real trackway, one after the other")
+
+
+def _add_socket(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--socket",
+        type=Path,
+        default=Path(os.environ.get("MUDSKIPPER_SOCKET", DEFAULT_SOCKET)),
+        help="of the daemon (default: $MUDSKIPPER_SOCKET or %(default)s)",
     )
 
 

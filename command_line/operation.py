@@ -6,7 +6,7 @@ import argparse
 import json
 import time
 from collections.abc import Callable
-from math import degrees
+from math import degrees, radians
 from typing import Any
 
 from command_line import exit_codes
@@ -78,6 +78,22 @@ def walk(options: Options) -> int:
     if options.attended:
         return with_daemon(options, lambda client: attend(client, params))
     return with_daemon(options, lambda client: _request(client, "walk", ("walking",), ARMING_S, **params))
+
+
+def move(options: Options) -> int:
+    """Until the joints are there."""
+
+    def act(client: StatusClient) -> int:
+        client.call("move", **{f"{joint}_rad": radians(angle_deg) for joint, angle_deg in options.angles})
+        while (report := client.call("status"))["moving"]:
+            time.sleep(0.05)
+        print(report["mode"])
+        if report["mode"] == "hold":
+            return exit_codes.OK
+        complain(report["notice"] or f"the robot is in {report['mode']}")
+        return exit_codes.REFUSED
+
+    return with_daemon(options, act)
 
 
 def stop(options: Options) -> int:
@@ -178,6 +194,8 @@ def status_text(report: dict[str, Any]) -> str:
     notices = [report["notice"]] if report["notice"] else []
     if report["forced"]:
         notices.append("armed by force, against what 'mudskipper check' says")
+    if report["pose"]["trouble"]:
+        notices.append(f"{report['pose']['trouble']} 'mudskipper check' says what to do")
     lines += [coloured(f"warning: {warning}", YELLOW) for warning in notices + report["warnings"]]
     lines += ["", _drives_table(report["drives"]), "", _loop_text(report)]
     return "\n".join(lines)
@@ -218,7 +236,8 @@ def _drives_table(drives: list[dict[str, Any]]) -> str:
 
 def _loop_text(report: dict[str, Any]) -> str:
     loop, bus, log = report["loop"], report["bus"], report["log"]
-    late, tick = loop["wake_late_us"], loop["tick_us"]
+    late, tick, pose = loop["wake_late_us"], loop["tick_us"], report["pose"]
+    seen = f"{pose['source']}: {pose['poses']} poses, {pose['garbled']} garbled, {pose['lost']} without the body"
     return "\n".join(
         (
             f"loop   {loop['rate_hz']:.2f} Hz, {loop['ticks']} ticks, {loop['missed_ticks']} missed",
@@ -228,6 +247,7 @@ def _loop_text(report: dict[str, Any]) -> str:
             f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends"
             + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")
             + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),
+            f"pose   {seen if pose['source'] else 'none'}",
             f"log    {log['path'] or 'off'}, {log['dropped']} rows dropped",
         )
     )

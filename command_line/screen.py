@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import time
 from collections.abc import Sequence
@@ -12,12 +13,18 @@ from typing import Any
 RED, GREEN, YELLOW, BOLD, PLAIN = "\033[31m", "\033[32m", "\033[33m", "\033[1m", "\033[0m"
 PATIENCE_S = 2.0  # of a person who sees nothing
 SOON_S = 0.1
+BAR_WIDTH = 20  # characters
 
 
 def coloured(text: str, colour: str) -> str:
     if not sys.stdout.isatty() or "NO_COLOR" in os.environ:
         return text
     return f"{colour}{text}{PLAIN}"
+
+
+def plain(text: str) -> str:
+    """Without its colours."""
+    return re.sub(r"\033\[\d+m", "", text)
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
@@ -38,6 +45,11 @@ def size_text(size: float) -> str:
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
 
 
+def bar(done: int, total: int) -> str:
+    filled = BAR_WIDTH * min(done, total) // max(total, 1)
+    return f"[{'#' * filled}{'.' * (BAR_WIDTH - filled)}]"
+
+
 class Progress:
     """One line on a terminal's standard error while something takes its time; silent anywhere else."""
 
@@ -56,7 +68,7 @@ class Progress:
     def show(self, done: int, total: int) -> None:
         if self._shown and time.monotonic() >= self._due_s:
             self._due_s = time.monotonic() + self._interval_s
-            print(f"\r\033[K{done} of {total} {self._what}", end="", file=sys.stderr, flush=True)
+            print(f"\r\033[K{bar(done, total)} {done} of {total} {self._what}", end="", file=sys.stderr, flush=True)
 
     def clear(self) -> None:
         if self._shown:
