@@ -23,7 +23,7 @@ from drivers.can_port import CanPort
 from drivers.frames import Frame
 from drivers.mock_bus import MockBus, MockPort
 from drivers.odrive_drives import OdriveDrives
-from drivers.pose_port import PosePort
+from drivers.pose_port import NoPose
 from experiments.bench_robot import BenchError
 from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration import Configuration
@@ -34,7 +34,6 @@ from firmware_host.status_client import NoDaemonError, NotPermittedError, Status
 from firmware_host.ticker import PERIOD_S, Beat, Ticker
 from simulation.clay import Clay
 from simulation.lockstep import drives_of, plant_of
-from simulation.motion_capture import AT_EVERY_TICK, SimulatedPose
 from simulation.odrive import OdriveParameters
 from simulation.robot import SimulatedRobot
 from simulation.track import Track
@@ -80,8 +79,7 @@ class HardwareRig:
             raise BenchError(f"{problem}.") from problem
         self.overheard = listen(ports)
         drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
-        self._pose = PosePort(Path(configuration.pose.socket) if configuration.pose.socket else None)
-        self.loop = Loop(configuration, drives, self._pose, NullRecorder())
+        self.loop = Loop(configuration, drives, NoPose(), NullRecorder())
         self._processors = os.sched_getaffinity(0)
         options = configuration.loop
         self.warnings: Sequence[str] = prepare_loop(options.priority, options.cpu, lock_memory=False)
@@ -99,7 +97,6 @@ class HardwareRig:
 
     def close(self) -> None:
         self.loop.drives.close()
-        self._pose.close()
         os.sched_setaffinity(0, self._processors)
         gc.unfreeze()
         gc.enable()
@@ -169,8 +166,7 @@ class SimulatedRig:
         self.overheard = self._listen()
         wires = {name: bus.open() for name, bus in self.buses.items()}
         odrives = OdriveDrives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
-        pose = SimulatedPose(self.robot.plant, AT_EVERY_TICK, seed + 1)
-        self.loop = Loop(configuration, odrives, pose, NullRecorder(), self._clock, self._clock)
+        self.loop = Loop(configuration, odrives, NoPose(), NullRecorder(), self._clock, self._clock)
         self.warnings: Sequence[str] = ()
 
     @property
