@@ -91,7 +91,7 @@ class BenchReport:
                 if brief and reading.good:
                     continue
                 mark = "  " if reading.good else "! "
-                row = f"{mark}{test['stage']} {reading.what:<58} {reading.value_text:>16}   {reading.bounds_text}"
+                row = f"{mark}{test['stage']} {reading.what:<66} {reading.value_text:>16}   {reading.bounds_text}"
                 yield row.rstrip(), reading.good
         for number, name in enumerate(STAGES, 1):
             outcome = self.outcome_of(number)
