@@ -14,7 +14,7 @@ from typing import Any
 import msgpack
 import pytest
 
-from command_line import exit_codes, main
+from command_line import commands, exit_codes, main
 from control.modes import Mode
 from firmware_host.configuration import EXIT_CONFIGURATION, StatusParameters
 from firmware_host.log_reader import read_log
@@ -210,4 +210,4 @@ def test_ctrl_c_ends_a_watch_quietly(bench: Any) -> None:
 def test_the_command_line_and_the_daemon_agree() -> None:
     """What the command line must not import from the daemon, since `status` has to start at once."""
     assert exit_codes.CONFIGURATION == EXIT_CONFIGURATION
-    assert StatusParameters().socket == main.DEFAULT_SOCKET
+    assert StatusParameters().socket == commands.DEFAULT_SOCKET

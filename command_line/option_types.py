@@ -1,0 +1,117 @@
+"""What a person may type for a number: each kind with its bounds, refused in a sentence."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from contextlib import suppress
+from math import isfinite, nan
+from pathlib import Path
+
+
+def between(low: float, high: float, unit: str = "") -> Callable[[str], float]:
+    """A number within its bounds."""
+
+    def value_of(text: str) -> float:
+        value = _number(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text}: must be from {low:.15g} to {high:.15g}{unit and ' '}{unit}")
+        return value
+
+    return value_of
+
+
+def whole(low: int, high: int) -> Callable[[str], int]:
+    """A whole number within its bounds."""
+
+    def value_of(text: str) -> int:
+        value = _number(text)
+        if not (low <= value <= high and value == int(value)):
+            raise argparse.ArgumentTypeError(f"{text}: must be a whole number from {low} to {high}")
+        return int(value)
+
+    return value_of
+
+
+def _number(text: str) -> float:
+    """NaN for what is none, which no bounds let through."""
+    with suppress(ValueError):
+        return float(text)
+    return nan
+
+
+def finite(text: str) -> float:
+    value = float(text)
+    if not isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text}: must be a number")
+    return value
+
+
+def positive(text: str) -> float:
+    value = float(text)
+    if not (value > 0.0 and isfinite(value)):
+        raise argparse.ArgumentTypeError(f"{text}: must be more than 0")
+    return value
+
+
+def depth_cm(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value <= 20.0:
+        raise argparse.ArgumentTypeError(f"{text}: must be more than 0 and at most 20")
+    return value
+
+
+def joint_angle(text: str) -> tuple[str, float]:
+    joint, _, angle_deg = text.partition("=")
+    with suppress(ValueError):
+        if joint and isfinite(float(angle_deg)):
+            return joint, float(angle_deg)
+    raise argparse.ArgumentTypeError(f"{text}: must be a joint and its angle in degrees, as left_sweep=10")
+
+
+def mud_length(text: str) -> tuple[str, float]:
+    name, _, length_cm = text.partition("=")
+    try:
+        value = finite(length_cm or "61")
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text}: must be a mud and its length in cm, as 47.6=61") from None
+    if not (name and 20.0 <= value <= 10000.0):
+        raise argparse.ArgumentTypeError(f"{text}: a mud needs a name, and a length from 20 to 10000 cm")
+    return name, value
+
+
+def plate_cm(text: str) -> tuple[float, float, float]:
+    """3x3.5 or, with its thickness, 3x3.5x0.4."""
+    sides = text.lower().removesuffix("cm").split("x")
+    if len(sides) not in (2, 3):
+        raise argparse.ArgumentTypeError(f"{text}: must be width x height, or width x height x thickness, in cm")
+    width, height, thickness = (float(side) for side in [*sides, "0.4"][:3])
+    if not (0.2 <= width <= 50.0 and 0.2 <= height <= 50.0 and 0.02 <= thickness <= 10.0):
+        raise argparse.ArgumentTypeError(f"{text}: width and height must be from 0.2 to 50, thickness from 0.02 to 10")
+    return width, height, thickness
+
+
+def weights_g(text: str) -> tuple[float, ...]:
+    try:
+        values = tuple(sorted({float(part) for part in text.split(",") if part.strip()}))
+    except ValueError:
+        values = ()
+    if len(values) < 2 or not all(1.0 <= value <= 5000.0 for value in values):
+        raise argparse.ArgumentTypeError(f"{text}: must be two weights or more, from 1 to 5000 g, such as 100,200,400")
+    return values
+
+
+def picture(*endings: str) -> Callable[[str], Path]:
+    def path(text: str) -> Path:
+        if not text.endswith(endings):
+            raise argparse.ArgumentTypeError(f"{text}: must end with {' or '.join(endings)}")
+        return Path(text)
+
+    return path
+
+
+def lever_m(text: str) -> float:
+    value = float(text)
+    if not 1.0 <= value <= 100.0:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 1 to 100 cm")
+    return value / 100.0
