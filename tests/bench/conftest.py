@@ -94,14 +94,16 @@ def attendant_at(config: pytest.Config) -> Attendant:
 def bench(request: pytest.FixtureRequest, opened: Stand | str) -> Iterator[StagedBench]:
     report, stage = report_of(request.config), stage_of(request.path)
     report.begin(stage, request.node.name)
-    obstacle = report.obstacle(stage)
+    moves = getattr(request.module, "MOVES", "")
+    obstacle = report.obstacle(stage) or (moves and report.stumble(stage, request.node.name))
     if obstacle:
         pytest.skip(obstacle)
     if isinstance(opened, str):
         if report.tests:
             pytest.skip("the bench did not open")
         pytest.fail(opened, pytrace=False)
-    ask_before_moving(request, opened, report, stage)
+    if moves:
+        ask_before_moving(moves, opened, report, stage)
     yield StagedBench(opened, report)
     try:
         opened.let_go()
@@ -110,19 +112,21 @@ def bench(request: pytest.FixtureRequest, opened: Stand | str) -> Iterator[Stage
         pytest.fail(str(problem), pytrace=False)
 
 
-def ask_before_moving(request: pytest.FixtureRequest, stand: Stand, report: BenchReport, stage: int) -> None:
-    """Once for each stage that moves something."""
-    what = getattr(request.module, "MOVES", "")
-    if not what or stage in report.consents:
-        return
+def ask_before_moving(what: str, stand: Stand, report: BenchReport, stage: int) -> None:
+    """Once for each stage that moves something, whatever the answer."""
+    if stage not in report.consents:
+        report.consents[stage] = lets_move(what, stand, stage)
+    if not report.consents[stage]:
+        pytest.skip("a person did not want the robot to move")
+
+
+def lets_move(what: str, stand: Stand, stage: int) -> bool:
     lying_cm = 100.0 * lying_m(stand.configuration.geometry)
     where = (
         f"The robot stands on blocks; idle, its flippers lie on something soft, {lying_cm:.0f} cm below their axes."
         " Nobody's hands are near them, and the power switch is at hand."
     )
-    if not stand.attendant.consents(f"{stage_name(stage).capitalize()}: {what}\n{where}", stand.look_on):
-        pytest.skip("a person did not want the robot to move")
-    report.consents.add(stage)
+    return stand.attendant.consents(f"{stage_name(stage).capitalize()}: {what}\n{where}", stand.look_on)
 
 
 @pytest.hookimpl(wrapper=True)
