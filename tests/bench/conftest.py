@@ -109,7 +109,8 @@ def bench(request: pytest.FixtureRequest, opened: Stand | str) -> Iterator[Stage
         opened.let_go()
     except BenchError as problem:
         opened.end()
-        pytest.fail(str(problem), pytrace=False)
+        report.out_of_hand = str(problem)
+        pytest.fail(report.out_of_hand, pytrace=False)
 
 
 def ask_before_moving(what: str, stand: Stand, report: BenchReport, stage: int) -> None:

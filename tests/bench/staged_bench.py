@@ -41,6 +41,7 @@ class BenchReport:
         self.robot: dict[str, Any] = {}
         self.tests: list[dict[str, Any]] = []
         self.consents: dict[int, bool] = {}  # by stage: whether a person lets the robot move
+        self.out_of_hand = ""  # why no test may begin any more: a drive kept its torque
         self._test: dict[str, Any] | None = None  # under way
 
     def begin(self, stage: int, test: str) -> None:
@@ -72,6 +73,8 @@ class BenchReport:
 
     def obstacle(self, stage: int) -> str:
         """Why a stage may not begin; empty where it may."""
+        if self.out_of_hand:
+            return self.out_of_hand
         for earlier in range(1, stage):
             outcome = self.outcome_of(earlier)
             if outcome == FAILED:

@@ -174,6 +174,12 @@ def test_a_stage_begins_where_all_before_it_have_passed() -> None:
     assert report_with().obstacle(1) == ""
 
 
+def test_nothing_begins_after_a_drive_that_kept_its_torque() -> None:
+    report = report_with(PASSED)
+    report.out_of_hand = "left_sweep: cut the power"
+    assert [report.obstacle(stage) for stage in (1, 2)] == ["left_sweep: cut the power"] * 2
+
+
 def test_what_was_told_first_of_a_test_remains() -> None:
     report = BenchReport()
     report.begin(1, "test")
