@@ -116,6 +116,7 @@ def bench(request: pytest.FixtureRequest, opened: Stand | str) -> Iterator[Stage
 def ask_before_moving(what: str, stand: Stand, report: BenchReport, stage: int) -> None:
     """Once for each stage that moves something, whatever the answer."""
     if stage not in report.consents:
+        report.consents[stage] = False  # where no answer comes
         report.consents[stage] = lets_move(what, stand, stage)
     if not report.consents[stage]:
         pytest.skip("a person did not want the robot to move")
@@ -144,10 +145,15 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     told = yield
     if told.when == "teardown" or not told.passed:
         report = report_of(item.config)
-        report.worsen(told.outcome, told.longrepr[2] if isinstance(told.longrepr, tuple) else told.longreprtext)
+        report.worsen(told.outcome, why_of(told))
         if told.when == "teardown":
             report.end()
     return told
+
+
+def why_of(told: pytest.TestReport) -> str:
+    """Of one that was skipped, pytest has a place before its reason, which begins with a word of pytest's own."""
+    return told.longrepr[2].removeprefix("Skipped: ") if isinstance(told.longrepr, tuple) else told.longreprtext
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:

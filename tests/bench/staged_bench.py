@@ -112,7 +112,14 @@ class BenchReport:
             yield from table_lines(f"stage {number}, {name}", [each for each in readings if not (brief and each.good)])
         for number, name in enumerate(STAGES, 1):
             outcome = self.outcome_of(number)
-            yield f"stage {number}, {name}: {outcome}{self._omissions(number)}", outcome == PASSED
+            told = self._omissions(number) if outcome == PASSED else self._reason(number, outcome)
+            yield f"stage {number}, {name}: {outcome}{told}", outcome == PASSED
+
+    def _reason(self, stage: int, outcome: str) -> str:
+        """The first line of what was told first."""
+        of_stage = [test for test in self.tests if (test["stage"], test["outcome"]) == (stage, outcome)]
+        lines = [line for test in of_stage for line in test["why"].splitlines()]
+        return f": {lines[0]}" if lines else ""
 
     def _omissions(self, stage: int) -> str:
         """What nobody was there for is no part of what was passed."""
