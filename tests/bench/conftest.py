@@ -20,7 +20,7 @@ from experiments.bench_rig import HardwareRig, Rig, SimulatedRig, lying_m
 from experiments.bench_robot import BenchError
 from experiments.bench_stand import Stand
 from firmware_host.configuration import Configuration, ConfigurationError, load_configuration
-from tests.bench.staged_bench import FAILED, BenchReport, StagedBench, UncapturedPerson, stage_name, stage_of
+from tests.bench.staged_bench import SKIPPED, BenchReport, StagedBench, UncapturedPerson, stage_name, stage_of
 
 INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
 EXAMPLE = Path(__file__).parent.parent.parent / "systemd" / "mudskipper.toml"
@@ -160,7 +160,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     report, path = report_of(config), config.option.bench_report
     if not report.robot:
         return
-    report.worsen(FAILED, "interrupted")  # a test that is still under way
+    report.worsen(SKIPPED, "interrupted")  # a test that is still under way
     report.end()
     terminalreporter.section("bench")
     terminalreporter.write_line(f"{report.robot['rig']}, configuration {report.robot['configuration']}")

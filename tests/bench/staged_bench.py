@@ -112,14 +112,13 @@ class BenchReport:
             yield from table_lines(f"stage {number}, {name}", [each for each in readings if not (brief and each.good)])
         for number, name in enumerate(STAGES, 1):
             outcome = self.outcome_of(number)
-            told = self._omissions(number) if outcome == PASSED else self._reason(number, outcome)
+            told = self._reason(number) if outcome == SKIPPED else self._omissions(number)
             yield f"stage {number}, {name}: {outcome}{told}", outcome == PASSED
 
-    def _reason(self, stage: int, outcome: str) -> str:
-        """The first line of what was told first."""
-        of_stage = [test for test in self.tests if (test["stage"], test["outcome"]) == (stage, outcome)]
-        lines = [line for test in of_stage for line in test["why"].splitlines()]
-        return f": {lines[0]}" if lines else ""
+    def _reason(self, stage: int) -> str:
+        """What was told first; why a test failed stands above."""
+        reasons = [test["why"] for test in self.tests if (test["stage"], test["outcome"]) == (stage, SKIPPED)]
+        return f": {reasons[0]}" if reasons else ""
 
     def _omissions(self, stage: int) -> str:
         """What nobody was there for is no part of what was passed."""
