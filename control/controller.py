@@ -88,6 +88,7 @@ class Controller:
         self.recovery.reset()
         self._mode = Mode.IDLE
         self._path: JointPath | None = None
+        self._move: JointPath | None = None  # to another pose, in hold
         self._pose: JointTargets = still((0.0, 0.0, 0.0, 0.0))
         self._fade = 0.0
         self._up = False
@@ -117,6 +118,17 @@ class Controller:
     def rested(self) -> bool:
         """The pose was held for so long that nobody seems to need it."""
         return self._mode is Mode.HOLD and 0.0 < self.motion.longest_hold_s < self._since_s
+
+    @property
+    def moving(self) -> bool:
+        """On the way to a pose that was asked for."""
+        return self._move is not None and not self._move.finished
+
+    def move(self, angles: Sequence[float | None]) -> None:
+        """In hold, take these joints slowly there, in the order of JOINTS; None: where it is held."""
+        held = tuple(target.angle_rad for target in self._pose)
+        a, b, c, d = (there if there is not None else here for there, here in zip(angles, held, strict=True))
+        self._move = JointPath((held[0], held[1], held[2], held[3]), [(a, b, c, d)], self.motion.path_speed_rad_s)
 
     @property
     def fault(self) -> Fault | None:
@@ -163,6 +175,7 @@ class Controller:
 
     def _enter(self, mode: Mode, states: DriveStates) -> None:
         self.recovery.reset()
+        self._move = None
         self._since_s = self._resting_s = 0.0
         for stillness in self._stillness:
             stillness.reset()
@@ -191,11 +204,16 @@ class Controller:
 
     def _targets(self, dt_s: float, mode: Mode, states: DriveStates) -> JointTargets:
         if mode is Mode.HOLD or self._path is None:
-            return self._pose
+            return self._held_pose(dt_s)
         if mode is Mode.STOPPING or not self._path.finished:
             self._pose = self._path.step(dt_s)
             return self._pose
         return self._gait_targets(dt_s, states)
+
+    def _held_pose(self, dt_s: float) -> JointTargets:
+        if self._move is not None and not self._move.finished:
+            self._pose = self._move.step(dt_s)
+        return self._pose
 
     def _gait_targets(self, dt_s: float, states: DriveStates) -> JointTargets:
         """The gait's own, or those that free the flippers for which it waits with the swing."""

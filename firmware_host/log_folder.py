@@ -71,6 +71,15 @@ def log_files(folder: Path, *places: str) -> list[Path]:
     return sorted(found, key=lambda path: path.name)
 
 
+def run_files(path: Path) -> list[Path]:
+    """All segments of the run that this one is of, wherever they lie now, in their order."""
+    folder = path.parent.parent if path.parent.name in (ACTIVE, DONE, KEPT) else path.parent
+    run = re.sub(r"-\d{4,}$", "", path.stem)
+    segments = re.compile(re.escape(run) + r"-(\d{4,})")
+    found = {file.name: file for file in log_files(folder, TOP, ACTIVE, DONE, KEPT) if segments.fullmatch(file.stem)}
+    return [found[name] for name in sorted(found, key=lambda name: int(name.removesuffix(ENDING).rpartition("-")[2]))]
+
+
 def unfinished_files(folder: Path) -> list[Path]:
     """What recovery has to look at, the files of living writers included."""
     found = [path for ending in (ENDING, BROKEN, PART) for path in (folder / ACTIVE).glob(f"*{ending}")]

@@ -13,7 +13,7 @@ from typing import Any
 
 from control.controller import WalkOrder
 from control.faults import Blocks, Fault
-from control.modes import ENERGISED, Request
+from control.modes import ENERGISED, Mode, Request
 from control.records import JOINTS
 from drivers.odrive_codec import error_text
 from firmware_host.arming_checks import arming_checks
@@ -61,6 +61,7 @@ class OperatorCalls:
             "check": lambda params, caller: self.check(params),
             "arm": self.arm,
             "walk": self.walk,
+            "move": self.move,
             "stop": lambda params, caller: self._request(caller, Request.STOP),
             "disarm": lambda params, caller: self._request(caller, Request.DISARM),
             "clear": lambda params, caller: self._request(caller, Request.CLEAR),
@@ -78,7 +79,9 @@ class OperatorCalls:
             "schema": "status/1",
             "robot": loop.configuration.robot.name,
             "version": self._version,
+            "now_s": self._clock(),  # as the log's stamps
             "mode": loop.mode.name.lower(),
+            "moving": loop.controller.moving,
             "fault": _fault(loop),
             "faults": [_fault_report(fault) for fault in loop.faults.standing],
             "forced": loop.forced,
@@ -178,6 +181,22 @@ class OperatorCalls:
             raise RefusedError(f"depth_m = {depth_m}: must be more than 0 and at most {deepest_m}")
         return self._request(caller, Request.WALK, WalkOrder(float(depth_m), False, strides))
 
+    def move(self, params: dict[str, Any], caller: Caller) -> str:
+        """Joints to `angles_rad`, by name, slowly, while the robot holds its pose."""
+        angles_rad = _joint_angles(params.get("angles_rad"))
+        loop = self._loop
+        if loop.mode is not Mode.HOLD:
+            raise RefusedError(f"cannot move joints in mode {loop.mode.name.lower()}: only in hold, so arm first")
+        ranges = dict(zip(JOINTS, loop.configuration.joint_ranges, strict=True))
+        for joint, angle_rad in angles_rad.items():
+            if not ranges[joint].min_rad <= angle_rad <= ranges[joint].max_rad:
+                low, high = ranges[joint]
+                raise RefusedError(f"{joint} = {angle_rad:g} rad: must be from {low:.3f} to {high:.3f}")
+        way = ", ".join(f"{joint} to {angle_rad:.4f} rad" for joint, angle_rad in angles_rad.items())
+        loop.event(self._clock(), f"move {way} by {caller}")
+        loop.controller.move([angles_rad.get(joint) for joint in JOINTS])
+        return "accepted"
+
     def lease(self, params: dict[str, Any], caller: Caller) -> str:
         """Promise to renew it within `for_s`, or to be stopped."""
         for_s = params.get("for_s")
@@ -233,6 +252,18 @@ def _fault_report(fault: Fault) -> dict[str, Any]:
         "reaction": kind.reaction.name.lower(),
         "blocks_arming": kind.blocks is not Blocks.NO,
     }
+
+
+def _joint_angles(angles_rad: Any) -> dict[str, float]:
+    """Raises RefusedError for what are no angles."""
+    if not isinstance(angles_rad, dict) or not angles_rad:
+        raise RefusedError(f"angles_rad = {angles_rad!r}: must be angles by the names of joints")
+    for joint, angle_rad in angles_rad.items():
+        if joint not in JOINTS:
+            raise RefusedError(f"{joint!r} is no joint: it must be one of {', '.join(JOINTS)}")
+        if isinstance(angle_rad, bool) or not isinstance(angle_rad, int | float) or not isfinite(angle_rad):
+            raise RefusedError(f"{joint} = {angle_rad!r}: must be a number")
+    return angles_rad
 
 
 def _integer(params: dict[str, Any], name: str, low: int, high: int) -> int:

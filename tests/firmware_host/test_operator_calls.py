@@ -101,7 +101,7 @@ def test_a_request_that_is_refused_is_nobody_s(robot: Robot) -> None:
 
 
 def test_whatever_moves_the_robot_is_for_operators(robot: Robot) -> None:
-    assert robot.names - NEEDED.keys() == {"arm", "walk", "clear", "lease", "release", "reset_timing"}
+    assert robot.names - NEEDED.keys() == {"arm", "walk", "move", "clear", "lease", "release", "reset_timing"}
 
 
 def test_there_is_no_lease_while_torque_is_off(robot: Robot) -> None:
@@ -173,3 +173,49 @@ def test_the_notice_of_a_stop_is_made_of_whole_sentences(armed: Robot) -> None:
     assert notice.startswith("stopped by lease_lost: ") and notice.endswith(
         "is gone. Look after the robot, then arm again."
     )
+
+
+def test_a_held_joint_moves_where_it_is_asked_to_and_the_others_stay(armed: Robot) -> None:
+    held_rad = [drive["angle_rad"] for drive in armed.ask("status")["drives"]]
+    armed.ask("move", BEN, angles_rad={"left_sweep": 0.3, "left_adduction": 0.2})
+    assert armed.ask("status")["moving"]
+    armed.steps.run_until(lambda: not armed.ask("status")["moving"], 5.0)
+    armed.steps.run_for(0.5)
+    angles_rad = [drive["angle_rad"] for drive in armed.ask("status")["drives"]]
+    assert angles_rad == pytest.approx([0.3, 0.2, held_rad[2], held_rad[3]], abs=0.02)
+    assert armed.ask("status")["mode"] == "hold"
+    assert armed.events.about("move")[-1].endswith("left_adduction to 0.2000 rad by uid 1001 (process 78)")
+
+
+def test_a_move_ends_with_hold(armed: Robot) -> None:
+    armed.ask("move", angles_rad={"left_sweep": 0.3})
+    armed.ask("stop")
+    armed.steps.run_for(0.1)
+    armed.ask("disarm")
+    armed.steps.run_for(0.1)
+    assert not armed.ask("status")["moving"]
+
+
+@pytest.mark.parametrize(
+    ("angles_rad", "sentence"),
+    [
+        (None, "must be angles by the names of joints"),
+        ({}, "must be angles"),
+        ({"tail": 0.1}, "'tail' is no joint"),
+        ({"left_sweep": "far"}, "left_sweep = 'far': must be a number"),
+        ({"left_sweep": True}, "must be a number"),
+        ({"left_sweep": nan}, "must be a number"),
+        ({"left_sweep": 3.0}, "left_sweep = 3 rad: must be from"),
+        ({"right_adduction": -3.0}, "right_adduction = -3 rad: must be from"),
+    ],
+)
+def test_a_move_to_nowhere_is_refused_with_its_reason(armed: Robot, angles_rad: Any, sentence: str) -> None:
+    with pytest.raises(RefusedError, match=sentence):
+        armed.ask("move", angles_rad=angles_rad)
+    assert not armed.ask("status")["moving"]
+
+
+def test_nothing_moves_before_the_robot_holds_its_pose(robot: Robot) -> None:
+    robot.steps.run_for(1.0)
+    with pytest.raises(RefusedError, match="only in hold, so arm first"):
+        robot.ask("move", angles_rad={"left_sweep": 0.1})

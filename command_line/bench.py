@@ -1,0 +1,85 @@
+"""Conducting an experiment at the bench: a folder, a person, progress, and in the end a report.
+
+Whatever ends it early, a fault of the robot or Ctrl-C, the robot is stopped first, and what was measured is in the
+folder: the same command goes on from there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from command_line import exit_codes
+from command_line.screen import Progress, complain
+from command_line.terminal_person import AbsentPersonError, TerminalPerson
+from experiments.bench_robot import BenchError
+from experiments.notebook import NAME, NotebookError
+from experiments.person import Person, Willing
+from experiments.report_page import Section, write_report
+from firmware_host.status_client import CallRefusedError
+from firmware_host.toml_records import ConfigurationError
+
+Report = dict[str, Any]
+Show = Callable[[int, int], None]
+
+
+class Desk(NamedTuple):
+    """What an experiment works with."""
+
+    folder: Path  # exists
+    person: Person
+    show: Show  # how much is done, of how much
+
+
+class Finding(NamedTuple):
+    """What came of it."""
+
+    report: Report  # with the name of the experiment
+    title: str
+    sections: Sequence[Section]
+    text: str  # for people, on the screen
+    logs: Sequence[Path] = ()
+
+
+def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], Finding]) -> int:
+    """`what` there is progress in. Options are `out`, `json` and `simulated`. `run` leaves the robot at rest."""
+    folder: Path = options.out or Path(f"mudskipper-{options.name}")
+    folder.mkdir(parents=True, exist_ok=True)  # what cannot be is refused before the work
+    try:
+        finding = _run(options, folder, what, run)
+        written = write_report(folder, finding.report, finding.title, finding.sections, finding.logs)
+    except ConfigurationError as problem:
+        for sentence in problem.problems:
+            complain(sentence)
+        return exit_codes.CONFIGURATION
+    except (BenchError, NotebookError, CallRefusedError, AbsentPersonError) as problem:
+        return _end(folder, str(problem), exit_codes.REFUSED)
+    except KeyboardInterrupt:
+        return _end(folder, "interrupted", exit_codes.INTERRUPTED)
+    print(json.dumps(finding.report) if options.json else finding.text)
+    print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
+    return exit_codes.OK
+
+
+def _run(options: argparse.Namespace, folder: Path, what: str, run: Callable[[Desk], Finding]) -> Finding:
+    progress = Progress(what)
+
+    def tell(sentence: str) -> None:
+        progress.clear()
+        print(sentence, file=sys.stderr, flush=True)
+
+    try:
+        return run(Desk(folder, Willing(tell) if options.simulated else TerminalPerson(), progress.show))
+    finally:
+        progress.clear()
+
+
+def _end(folder: Path, sentence: str, status: int) -> int:
+    complain(sentence)
+    if (folder / NAME).exists():
+        complain(f"what was measured is in {folder}: the same command goes on from there")
+    return status

@@ -1,0 +1,50 @@
+"""The person at the bench, asked on a terminal. While an answer is waited for the robot is looked after."""
+
+from __future__ import annotations
+
+import math
+import select
+import sys
+from collections.abc import Callable, Mapping
+
+LOOK_S = 0.1
+
+
+class AbsentPersonError(Exception):
+    """Nobody can be asked: the input has ended."""
+
+
+class TerminalPerson:
+    """A Person. Questions go to standard error, so that data can be piped."""
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        offered = ", ".join(f"{key or 'Enter'}: {meaning}" for key, meaning in answers.items())
+        while True:
+            said = self._hear(f"{question}\n  [{offered}] ", meanwhile).lower()
+            if said in answers:
+                return said
+            self.tell(f"{said!r} is none of the answers")
+
+    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
+        while True:
+            said = self._hear(f"{question} ", meanwhile)
+            try:
+                number = float(said.replace(",", "."))
+            except ValueError:
+                number = math.nan
+            if low <= number <= high:
+                return number
+            self.tell(f"{said!r} is no number from {low:g} to {high:g}")
+
+    def tell(self, sentence: str) -> None:
+        print(sentence, file=sys.stderr, flush=True)
+
+    def _hear(self, prompt: str, meanwhile: Callable[[], None]) -> str:
+        """One line. Raises AbsentPersonError where there will be none."""
+        print(prompt, end="", file=sys.stderr, flush=True)
+        while not select.select([sys.stdin], [], [], LOOK_S)[0]:
+            meanwhile()
+        line = sys.stdin.readline()
+        if not line:
+            raise AbsentPersonError("the input has ended, and a person has to be asked: run it on a terminal")
+        return line.strip()

@@ -1,0 +1,150 @@
+"""A robot as an experiment operates it: the daemon's calls, time that passes, and what the log holds of it.
+
+The calls are those of the status socket. Behind them is the daemon on a robot, or the daemon's own loop in step with a
+simulated one; an experiment cannot tell which. Everything that it knows of the robot comes from answers and log.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from firmware_host.configuration import Configuration
+from firmware_host.log_reader import Log
+from firmware_host.status_client import CallRefusedError
+
+POLL_S = 0.05
+ARMING_S = 10.0
+MOVING_S = 20.0
+STRIDE_S = 60.0  # longest, with pauses and recoveries
+UNDER_WAY = ("walking", "stopping", "damping")
+ENERGISED = ("arming", "hold", *UNDER_WAY)
+
+
+class BenchError(Exception):
+    """The experiment cannot go on; the text says why, and what to do."""
+
+
+class BenchRobot(Protocol):
+    @property
+    def configuration(self) -> Configuration: ...
+
+    def call(self, method: str, **params: Any) -> Any:
+        """The daemon's answer. Raises CallRefusedError with its sentence, BenchError where none comes."""
+
+    def wait(self, duration_s: float) -> None:
+        """Time passes for the robot, attended: it stops by itself where this program no longer is."""
+
+    def record(self, from_s: float, to_s: float) -> Log:
+        """What the log holds of a time by the robot's clock (`now_s` of its status). Raises BenchError."""
+
+    def copy_logs(self, folder: Path) -> list[Path]:
+        """The logs of this run, in a folder. Raises BenchError."""
+
+    def close(self) -> None:
+        """Torque off, connection closed. Never raises what `call` may raise."""
+
+
+class Walked(NamedTuple):
+    """A walk that ended with all its strides, and when it was, by the robot's clock."""
+
+    strides: list[dict[str, Any]]  # as the status socket tells them, of both flippers
+    from_s: float
+    to_s: float
+
+
+Status = dict[str, Any]
+
+
+def wait_until(robot: BenchRobot, done: Callable[[Status], bool], longest_s: float, what: str) -> Status:
+    """The status that `done` accepts. Raises BenchError with `what` it was that did not happen."""
+    status: Status = robot.call("status")
+    begun_s = status["now_s"]
+    while not done(status):
+        if status["now_s"] - begun_s > longest_s:
+            raise BenchError(f"{what} did not happen within {longest_s:g} s: the robot is in {status['mode']}")
+        robot.wait(POLL_S)
+        status = robot.call("status")
+    return status
+
+
+def arm(robot: BenchRobot) -> None:
+    """From whatever it does to holding its pose. Raises BenchError with what stands against it."""
+    status = robot.call("status")
+    if status["mode"] in ("arming", *UNDER_WAY):
+        status = wait_until(robot, lambda now: now["mode"] in ("hold", "idle", "fault"), ARMING_S, "coming to rest")
+    if status["mode"] == "hold":
+        return
+    if status["mode"] == "fault":
+        robot.call("clear")
+    try:
+        wait_until(robot, lambda now: now["mode"] == "idle" and not _blocked(now), ARMING_S, "being ready to arm")
+        robot.call("arm")
+        wait_until(robot, lambda now: now["mode"] == "hold", ARMING_S, "arming")
+    except (BenchError, CallRefusedError) as problem:
+        raise BenchError(_why_not_armed(robot, str(problem))) from problem
+
+
+def _blocked(status: Status) -> bool:
+    return any(fault["blocks_arming"] for fault in status["faults"])
+
+
+def _why_not_armed(robot: BenchRobot, problem: str) -> str:
+    faults = [f"{fault['sentence']} {fault['what_to_do']}" for fault in robot.call("status")["faults"]]
+    return f"the robot is not armed: {' '.join(faults) or problem}; 'mudskipper check' tells more"
+
+
+def disarm(robot: BenchRobot) -> None:
+    robot.call("disarm")
+    wait_until(robot, lambda now: now["mode"] not in ENERGISED, ARMING_S, "switching torque off")
+
+
+def move(robot: BenchRobot, angles_rad: Mapping[str, float]) -> None:
+    """Joints of a robot that holds its pose, until they are there. Raises BenchError."""
+    require_hold(robot.call("status"))
+    robot.call("move", angles_rad=dict(angles_rad))
+    require_hold(wait_until(robot, lambda now: not now["moving"], MOVING_S, "moving the joints"))
+
+
+def require_hold(status: Status) -> None:
+    """Raises BenchError with the daemon's own sentence where the robot does not hold its pose."""
+    if status["mode"] != "hold":
+        raise BenchError(f"the robot no longer holds its pose: {told_by(status)}")
+
+
+def told_by(status: Status) -> str:
+    """Why a robot is in the mode that it is in."""
+    fault = status["fault"]["sentence"] if status["fault"] else f"it is in {status['mode']}"
+    return str(status["notice"] or fault)
+
+
+def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
+    """From hold to hold, at a fixed depth, or at chosen ones for None. Raises BenchError where a fault ends it."""
+    before = robot.call("status")
+    order = {"strides": strides} | ({} if depth_m is None else {"depth_m": depth_m})
+    robot.call("walk", **order)
+    after = wait_until(robot, lambda now: now["mode"] not in ("walking", "stopping"), strides * STRIDE_S, "the walk")
+    if after["mode"] != "hold" or after["notice"]:
+        raise BenchError(f"the walk ended early: {told_by(after)}")
+    return Walked(strides_since(robot, before["strides_closed"]), before["now_s"], after["now_s"])
+
+
+def strides_since(robot: BenchRobot, number: int) -> list[dict[str, Any]]:
+    """All that closed from `number` on."""
+    found: list[dict[str, Any]] = []
+    while fetched := robot.call("strides", since=number + len(found)):
+        found += fetched
+    return found
+
+
+def cut(log: Log, from_s: float, to_s: float) -> Log:
+    """Only the rows between two moments."""
+    stamps_s = log.ticks["stamp_s"]
+    return log._replace(
+        ticks=log.ticks[np.searchsorted(stamps_s, from_s) : np.searchsorted(stamps_s, to_s, side="right")],
+        strides=[row for row in log.strides if from_s <= row["stamp_s"] <= to_s],
+        events=[row for row in log.events if from_s <= row["stamp_s"] <= to_s],
+    )

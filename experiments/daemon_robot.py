@@ -1,0 +1,128 @@
+"""The robot that a daemon controls, through the daemon's socket and from the logs that it leaves on this computer.
+
+While torque is on, this program holds a dead man's lease and renews it whenever it waits: where it dies or hangs, the
+daemon stops the robot. The log is read while it is being written; the writer's last rows come half a second late.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from experiments.bench_robot import UNDER_WAY, BenchError, cut
+from firmware_host.configuration import Configuration, parse_configuration
+from firmware_host.log_folder import run_files
+from firmware_host.log_reader import Log, LogError, read_log, read_logs
+from firmware_host.log_recovery import recover_log
+from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
+
+PROMISE_S = 2.0  # of the lease
+RENEWAL_S = 0.2
+WRITTEN_S = 10.0  # to wait for rows that are on their way to the disk
+START_IT = "Start it with 'systemctl start mudskipper', or name its socket with --socket."
+
+
+class DaemonRobot:
+    """A BenchRobot. Owns the connection."""
+
+    def __init__(self, socket: Path) -> None:
+        """Raises BenchError where there is no daemon, or it does not let this user drive."""
+        self._socket = socket
+        try:
+            self._client = StatusClient(socket)
+        except (NoDaemonError, NotPermittedError) as problem:
+            raise BenchError(f"{problem}. {START_IT}") from problem
+        self._configuration: Configuration | None = None
+        self._renewed_s = 0.0
+        self._logs: list[Path] = []
+
+    @property
+    def configuration(self) -> Configuration:
+        """As the daemon runs with it, from its log."""
+        if self._configuration is None:
+            self._configuration = parse_configuration(self._read(self._segments()[-1:]).configuration_text)
+        return self._configuration
+
+    def call(self, method: str, **params: Any) -> Any:
+        try:
+            return self._client.call(method, **params)
+        except (NoDaemonError, NotPermittedError) as problem:
+            raise BenchError(str(problem)) from problem
+
+    def wait(self, duration_s: float) -> None:
+        end_s = time.monotonic() + duration_s
+        while (left_s := end_s - time.monotonic()) > 0.0:
+            time.sleep(min(left_s, RENEWAL_S))
+            self._renew()
+
+    def _renew(self) -> None:
+        """Refused while torque is off, and where the lease was lost, which the status tells."""
+        now_s = time.monotonic()
+        if now_s - self._renewed_s < RENEWAL_S:
+            return
+        self._renewed_s = now_s
+        with suppress(CallRefusedError):
+            self.call("lease", for_s=PROMISE_S)
+
+    def record(self, from_s: float, to_s: float) -> Log:
+        deadline_s = time.monotonic() + WRITTEN_S
+        while True:
+            log = self._read_since(from_s)
+            if len(log.ticks) and log.ticks["stamp_s"][-1] >= to_s:
+                return cut(log, from_s, to_s)
+            if time.monotonic() > deadline_s:
+                raise BenchError("the log does not hold what was just done: 'mudskipper status' tells how it is")
+            self.wait(RENEWAL_S)
+
+    def _read_since(self, from_s: float) -> Log:
+        """As few of the run's last segments as hold it."""
+        segments = self._segments()
+        for count in range(1, len(segments) + 1):
+            log = self._read(segments[-count:])
+            if len(log.ticks) and log.ticks["stamp_s"][0] <= from_s:
+                break
+        return log
+
+    def _read(self, segments: list[Path]) -> Log:
+        try:
+            return read_logs(segments)
+        except LogError as problem:
+            raise BenchError(f"the daemon's log cannot be read: {problem}") from problem
+
+    def _segments(self) -> list[Path]:
+        path = self.call("status")["log"]["path"]
+        if path is None:
+            raise BenchError("the daemon writes no log: set log.enabled = true in its configuration")
+        self._logs = run_files(Path(path)) or [Path(path)]
+        return self._logs
+
+    def copy_logs(self, folder: Path) -> list[Path]:
+        """Those of the daemon's present run; the one under way is ended in the copy."""
+        try:
+            return [self._copy(log, folder / log.name) for log in self._segments()]
+        except (OSError, LogError) as problem:
+            raise BenchError(f"the daemon's log cannot be copied: {problem}") from problem
+
+    def _copy(self, log: Path, copy: Path) -> Path:
+        shutil.copyfile(log, copy)
+        if not read_log(copy).complete:
+            recover_log(copy)
+        return copy
+
+    def close(self) -> None:
+        with suppress(BenchError, CallRefusedError):
+            if self.call("status")["mode"] == "walking":
+                self.call("stop")
+                self._wait_for_hold()
+            self.call("disarm")
+            self.call("release")
+        self._client.close()
+
+    def _wait_for_hold(self) -> None:
+        """Flippers in the mud are raised before torque goes off."""
+        end_s = time.monotonic() + WRITTEN_S
+        while self.call("status")["mode"] in UNDER_WAY and time.monotonic() < end_s:
+            self.wait(RENEWAL_S)

@@ -1,0 +1,35 @@
+"""The person at the bench, as an experiment needs them: somebody who does what is asked and says how it went."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+GO_ON, SKIP, REDO = "", "s", "r"  # keys of answers; the first one is the Enter key alone
+
+
+class Person(Protocol):
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        """The key of one of `answers` (key to press, what it means). `meanwhile` is called ten times a second."""
+
+    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
+        """A number within its bounds."""
+
+    def tell(self, sentence: str) -> None:
+        """Something that a person should know."""
+
+
+class Willing:
+    """Does everything at once and is always content: the person at a simulated bench."""
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell = tell
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        return next(iter(answers))
+
+    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
+        return low
+
+    def tell(self, sentence: str) -> None:
+        self._tell(sentence)
