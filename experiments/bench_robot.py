@@ -105,7 +105,7 @@ def disarm(robot: BenchRobot) -> None:
 def move(robot: BenchRobot, angles_rad: Mapping[str, float]) -> None:
     """Joints of a robot that holds its pose, until they are there. Raises BenchError."""
     require_hold(robot.call("status"))
-    robot.call("move", angles_rad=dict(angles_rad))
+    robot.call("move", **{f"{joint}_rad": angle_rad for joint, angle_rad in angles_rad.items()})
     require_hold(wait_until(robot, lambda now: not now["moving"], MOVING_S, "moving the joints"))
 
 
@@ -126,6 +126,7 @@ def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
     before = robot.call("status")
     order = {"strides": strides} | ({} if depth_m is None else {"depth_m": depth_m})
     robot.call("walk", **order)
+    wait_until(robot, lambda now: now["mode"] != "hold", ARMING_S, "beginning to walk")  # a request waits for its tick
     after = wait_until(robot, lambda now: now["mode"] not in ("walking", "stopping"), strides * STRIDE_S, "the walk")
     if after["mode"] != "hold" or after["notice"]:
         raise BenchError(f"the walk ended early: {told_by(after)}")

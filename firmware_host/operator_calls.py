@@ -182,8 +182,8 @@ class OperatorCalls:
         return self._request(caller, Request.WALK, WalkOrder(float(depth_m), False, strides))
 
     def move(self, params: dict[str, Any], caller: Caller) -> str:
-        """Joints to `angles_rad`, by name, slowly, while the robot holds its pose."""
-        angles_rad = _joint_angles(params.get("angles_rad"))
+        """Joints to angles, slowly, while the robot holds its pose: `left_sweep_rad` and so on, one or several."""
+        angles_rad = _joint_angles(params)
         loop = self._loop
         if loop.mode is not Mode.HOLD:
             raise RefusedError(f"cannot move joints in mode {loop.mode.name.lower()}: only in hold, so arm first")
@@ -191,7 +191,7 @@ class OperatorCalls:
         for joint, angle_rad in angles_rad.items():
             if not ranges[joint].min_rad <= angle_rad <= ranges[joint].max_rad:
                 low, high = ranges[joint]
-                raise RefusedError(f"{joint} = {angle_rad:g} rad: must be from {low:.3f} to {high:.3f}")
+                raise RefusedError(f"{joint}_rad = {angle_rad:g}: must be from {low:.3f} to {high:.3f}")
         way = ", ".join(f"{joint} to {angle_rad:.4f} rad" for joint, angle_rad in angles_rad.items())
         loop.event(self._clock(), f"move {way} by {caller}")
         loop.controller.move([angles_rad.get(joint) for joint in JOINTS])
@@ -254,16 +254,17 @@ def _fault_report(fault: Fault) -> dict[str, Any]:
     }
 
 
-def _joint_angles(angles_rad: Any) -> dict[str, float]:
-    """Raises RefusedError for what are no angles."""
-    if not isinstance(angles_rad, dict) or not angles_rad:
-        raise RefusedError(f"angles_rad = {angles_rad!r}: must be angles by the names of joints")
-    for joint, angle_rad in angles_rad.items():
-        if joint not in JOINTS:
-            raise RefusedError(f"{joint!r} is no joint: it must be one of {', '.join(JOINTS)}")
+def _joint_angles(params: dict[str, Any]) -> dict[str, float]:
+    """By the names of joints. Raises RefusedError for what are no angles."""
+    names = {f"{joint}_rad": joint for joint in JOINTS}
+    if not params:
+        raise RefusedError(f"no joint is named: at least one of {', '.join(names)}")
+    for name, angle_rad in params.items():
+        if name not in names:
+            raise RefusedError(f"{name!r} is no joint's angle: it must be one of {', '.join(names)}")
         if isinstance(angle_rad, bool) or not isinstance(angle_rad, int | float) or not isfinite(angle_rad):
-            raise RefusedError(f"{joint} = {angle_rad!r}: must be a number")
-    return angles_rad
+            raise RefusedError(f"{name} = {angle_rad!r}: must be a number")
+    return {names[name]: angle_rad for name, angle_rad in params.items()}
 
 
 def _integer(params: dict[str, Any], name: str, low: int, high: int) -> int:

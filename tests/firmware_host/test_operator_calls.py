@@ -177,7 +177,7 @@ def test_the_notice_of_a_stop_is_made_of_whole_sentences(armed: Robot) -> None:
 
 def test_a_held_joint_moves_where_it_is_asked_to_and_the_others_stay(armed: Robot) -> None:
     held_rad = [drive["angle_rad"] for drive in armed.ask("status")["drives"]]
-    armed.ask("move", BEN, angles_rad={"left_sweep": 0.3, "left_adduction": 0.2})
+    armed.ask("move", BEN, left_sweep_rad=0.3, left_adduction_rad=0.2)
     assert armed.ask("status")["moving"]
     armed.steps.run_until(lambda: not armed.ask("status")["moving"], 5.0)
     armed.steps.run_for(0.5)
@@ -188,7 +188,7 @@ def test_a_held_joint_moves_where_it_is_asked_to_and_the_others_stay(armed: Robo
 
 
 def test_a_move_ends_with_hold(armed: Robot) -> None:
-    armed.ask("move", angles_rad={"left_sweep": 0.3})
+    armed.ask("move", left_sweep_rad=0.3)
     armed.ask("stop")
     armed.steps.run_for(0.1)
     armed.ask("disarm")
@@ -199,23 +199,23 @@ def test_a_move_ends_with_hold(armed: Robot) -> None:
 @pytest.mark.parametrize(
     ("angles_rad", "sentence"),
     [
-        (None, "must be angles by the names of joints"),
-        ({}, "must be angles"),
-        ({"tail": 0.1}, "'tail' is no joint"),
-        ({"left_sweep": "far"}, "left_sweep = 'far': must be a number"),
-        ({"left_sweep": True}, "must be a number"),
-        ({"left_sweep": nan}, "must be a number"),
-        ({"left_sweep": 3.0}, "left_sweep = 3 rad: must be from"),
-        ({"right_adduction": -3.0}, "right_adduction = -3 rad: must be from"),
+        ({}, "no joint is named: at least one of left_sweep_rad"),
+        ({"tail_rad": 0.1}, "'tail_rad' is no joint's angle"),
+        ({"left_sweep": 0.1}, "'left_sweep' is no joint's angle"),
+        ({"left_sweep_rad": "far"}, "left_sweep_rad = 'far': must be a number"),
+        ({"left_sweep_rad": True}, "must be a number"),
+        ({"left_sweep_rad": nan}, "must be a number"),
+        ({"left_sweep_rad": 3.0}, "left_sweep_rad = 3: must be from"),
+        ({"right_adduction_rad": -3.0}, "right_adduction_rad = -3: must be from"),
     ],
 )
-def test_a_move_to_nowhere_is_refused_with_its_reason(armed: Robot, angles_rad: Any, sentence: str) -> None:
+def test_a_move_to_nowhere_is_refused_with_its_reason(armed: Robot, angles_rad: dict[str, Any], sentence: str) -> None:
     with pytest.raises(RefusedError, match=sentence):
-        armed.ask("move", angles_rad=angles_rad)
+        armed.ask("move", **angles_rad)
     assert not armed.ask("status")["moving"]
 
 
 def test_nothing_moves_before_the_robot_holds_its_pose(robot: Robot) -> None:
     robot.steps.run_for(1.0)
     with pytest.raises(RefusedError, match="only in hold, so arm first"):
-        robot.ask("move", angles_rad={"left_sweep": 0.1})
+        robot.ask("move", left_sweep_rad=0.1)

@@ -1,0 +1,92 @@
+"""An experiment operates a simulated robot through the daemon's calls, and finds in the log what it did."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from control.modes import Mode
+from control.records import JOINTS
+from experiments.bench_robot import BenchError, arm, disarm, move, walk
+from experiments.lockstep_robot import LockstepRobot, simulated_configuration
+from firmware_host.file_recorder import FileRecorder
+from firmware_host.log_reader import read_log
+from firmware_host.status_client import CallRefusedError
+from simulation.clay import MUDS
+from simulation.lockstep import Lockstep
+from simulation.track import Track
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Iterator[LockstepRobot]:
+    configuration = simulated_configuration()
+    recorder = FileRecorder(tmp_path / "log.mcap", configuration)
+    made = LockstepRobot(Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=recorder), recorder)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+def test_a_walk_comes_back_with_its_strides_and_its_rows(robot: LockstepRobot, tmp_path: Path) -> None:
+    arm(robot)
+    walked = walk(robot, 0.03, 2)
+    assert [(stride["flipper"], stride["index"]) for stride in walked.strides] == [
+        ("left", 0), ("right", 0), ("left", 1), ("right", 1),
+    ]  # fmt: skip
+    rows = robot.record(walked.from_s, walked.to_s)
+    assert len(rows.strides) == 4
+    assert np.sum(rows.ticks["mode"] == Mode.WALKING) > 0.9 * 380 * 2 * 2.0
+    assert walked.from_s <= rows.ticks["stamp_s"][0] and rows.ticks["stamp_s"][-1] <= walked.to_s
+    disarm(robot)
+    (log,) = robot.copy_logs(tmp_path / "..")
+    assert read_log(log).complete
+
+
+def test_a_joint_is_where_it_was_moved_to(robot: LockstepRobot) -> None:
+    arm(robot)
+    move(robot, {"right_adduction": 0.2})
+    robot.wait(0.5)
+    assert robot.call("status")["drives"][3]["angle_rad"] == pytest.approx(0.2, abs=0.02)
+
+
+def test_whatever_the_robot_does_arming_leads_to_hold(robot: LockstepRobot) -> None:
+    arm(robot)
+    robot.call("walk", depth_m=0.03)
+    robot.wait(3.0)
+    robot.call("stop")
+    arm(robot)
+    assert robot.call("status")["mode"] == "hold"
+
+
+def test_the_daemon_s_sentence_comes_back_where_it_refuses(robot: LockstepRobot) -> None:
+    with pytest.raises(CallRefusedError):
+        robot.call("walk", depth_m=0.03)
+    with pytest.raises(BenchError, match="no longer holds its pose"):
+        move(robot, {"right_adduction": 0.2})
+
+
+def test_a_fault_that_ends_a_walk_is_told_in_its_own_words(
+    robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm(robot)
+    pulled_s = robot.lockstep.now_s + 2.0
+
+    def wait(duration_s: float) -> None:
+        if robot.lockstep.now_s > pulled_s:
+            robot.lockstep.robot.restart_drive(JOINTS.index("right_sweep"))
+        robot.lockstep.run_for(duration_s)
+
+    monkeypatch.setattr(robot, "wait", wait)
+    with pytest.raises(BenchError, match="the walk ended early: stopped by .*right_sweep"):
+        walk(robot, 0.03, 1)
+
+
+def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) -> None:
+    arm(robot)
+    robot.close()
+    log = robot.record(0.0, 1e9)
+    assert log.complete and log.ticks["mode"][-1] == Mode.IDLE
