@@ -6,11 +6,13 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from command_line import exit_codes
-from command_line.screen import Progress, complain
+from command_line.screen import Progress, complain, plain
+from experiments.report_page import Figure, Section, write_report
 
 Report = dict[str, Any]
 Show = Callable[[int, int], None]
@@ -32,9 +34,11 @@ def conduct(
     if options.out is not None:
         options.out.mkdir(parents=True, exist_ok=True)  # what cannot be is refused before the minutes of work
     report = _run(what, run)
+    text = text_of(report)
     if options.out is not None:
-        _write(options.out / report["experiment"], report, plot)
-    print(json.dumps(report) if options.json else text_of(report))
+        written = _write(options.out, report, text, plot)
+        print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
+    print(json.dumps(report) if options.json else text)
     return exit_codes.OK
 
 
@@ -46,10 +50,7 @@ def _run(what: str, run: Callable[[Show], Report]) -> Report:
         progress.clear()
 
 
-def _write(stem: Path, report: Report, plot: Callable[[Report, Path], None] | None) -> None:
-    written = [stem.with_suffix(".json")]
-    written[0].write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    if plot is not None:
-        written.append(stem.with_suffix(".png"))
-        plot(report, written[1])
-    print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
+def _write(folder: Path, report: Report, text: str, plot: Callable[[Report, Path], None] | None) -> list[Path]:
+    name = report["experiment"]
+    figures = [] if plot is None else [Figure(name, "", partial(plot, report))]
+    return write_report(folder, report, f"Experiment: {name}", [Section("Result", screen=plain(text), figures=figures)])

@@ -53,6 +53,7 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
         "watch": "The status, again and again, until Ctrl-C.",
         "arm": "Switch torque on; the robot holds its pose.",
         "walk": "Walk, with the depth adapted to the mud or fixed.",
+        "move": "Take joints slowly to other angles, while the robot holds its pose.",
         "stop": "End a walk: raise the flippers and hold.",
         "disarm": "Switch torque off, at once, in any state.",
         "clear": "Clear a fault and the drives' errors.",
@@ -76,6 +77,7 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
     depth.add_argument("--adaptive", action="store_true", help="chosen from the mud, once a stride (default)")
     parsers["walk"].add_argument("--strides", type=_count, default=0, metavar="N", help="then stop (default: go on)")
     parsers["walk"].add_argument("--attended", action="store_true", help="stay; the robot stops when this ends")
+    parsers["move"].add_argument("angles", type=_joint_angle, nargs="+", metavar="JOINT=DEG", help="left_sweep=10 ...")
     parsers["check"].add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
     _add_installation(commands)
 
@@ -110,6 +112,16 @@ def _finite(text: str) -> float:
     if not isfinite(value):
         raise argparse.ArgumentTypeError(f"{text}: must be a number")
     return value
+
+
+def _joint_angle(text: str) -> tuple[str, float]:
+    joint, _, angle_deg = text.partition("=")
+    try:
+        return joint, _finite(angle_deg)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text}: must be a joint and its angle in degrees, as left_sweep=10"
+        ) from None
 
 
 def _seconds(text: str) -> float:
@@ -177,6 +189,12 @@ def _add_logs(commands: Commands) -> None:  # type: ignore[valid-type]
     info = _add(actions, "info", "logs.info", "What a log holds.")
     info.add_argument("files", type=Path, nargs="+", metavar="FILE", help="several are segments of one run")
     info.add_argument("--json", action="store_true")
+    report = _add(actions, "report", "log_report.log_report", "What a log tells, as one page with its pictures.")
+    report.add_argument(
+        "files", type=Path, nargs="+", metavar="FILE", help="our log, its segments, or the authors' CSV"
+    )
+    report.add_argument("--out", type=Path, metavar="DIR", help="(default: a folder named after the log)")
+    report.add_argument("--json", action="store_true", help="its numbers on standard output")
     export = _add(actions, "export", "logs.export", "A log in the columns of the authors' plotter.")
     export.add_argument("file", type=Path)
     export.add_argument("--csv", action="store_true", required=True, help="the format; there is one so far")

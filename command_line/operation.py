@@ -6,7 +6,7 @@ import argparse
 import json
 import time
 from collections.abc import Callable
-from math import degrees
+from math import degrees, radians
 from typing import Any
 
 from command_line import exit_codes
@@ -78,6 +78,22 @@ def walk(options: Options) -> int:
     if options.attended:
         return with_daemon(options, lambda client: attend(client, params))
     return with_daemon(options, lambda client: _request(client, "walk", ("walking",), ARMING_S, **params))
+
+
+def move(options: Options) -> int:
+    """Until the joints are there."""
+
+    def act(client: StatusClient) -> int:
+        client.call("move", **{f"{joint}_rad": radians(angle_deg) for joint, angle_deg in options.angles})
+        while (report := client.call("status"))["moving"]:
+            time.sleep(0.05)
+        print(report["mode"])
+        if report["mode"] == "hold":
+            return exit_codes.OK
+        complain(report["notice"] or f"the robot is in {report['mode']}")
+        return exit_codes.REFUSED
+
+    return with_daemon(options, act)
 
 
 def stop(options: Options) -> int:

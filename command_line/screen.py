@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import time
 from collections.abc import Sequence
@@ -18,6 +19,11 @@ def coloured(text: str, colour: str) -> str:
     if not sys.stdout.isatty() or "NO_COLOR" in os.environ:
         return text
     return f"{colour}{text}{PLAIN}"
+
+
+def plain(text: str) -> str:
+    """Without its colours."""
+    return re.sub(r"\033\[\d+m", "", text)
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:

@@ -22,6 +22,7 @@ h1, h2, table, footer { font-family: Helvetica, Arial, sans-serif }
 h1 { font-size: 1.6em; margin-bottom: 0 } h2 { font-size: 1.15em; margin-top: 2em }
 table { border-collapse: collapse; font-size: 0.85em; margin: 1em 0 }
 th { text-align: left; border-bottom: 1.5px solid #111 } td { border-bottom: 1px solid #ccc }
+pre { font-size: 0.78em; line-height: 1.35; overflow-x: auto }
 th, td { padding: 0.25em 1.2em 0.25em 0; vertical-align: top; white-space: nowrap }
 figure { margin: 1em 0; break-inside: avoid } img { max-width: 100% }
 figcaption, footer, .when { color: #444; font-size: 0.9em } footer { margin-top: 3em; border-top: 1px solid #ccc }
@@ -42,6 +43,7 @@ class Figure:
 class Section:
     heading: str
     text: str = ""  # paragraphs are separated by an empty line
+    screen: str = ""  # as it looks on a terminal
     rows: Rows = ()  # of a table, the head first
     figures: Sequence[Figure] = ()
 
@@ -94,8 +96,9 @@ def _version() -> str:
 def _section(section: Section, folder: Path) -> str:
     paragraphs = [f"<p>{escape(part)}</p>" for part in section.text.split("\n\n") if part]
     figures = [_figure(figure, _place(figure, folder)) for figure in section.figures]
+    screen = [f"<pre>{escape(section.screen)}</pre>"] if section.screen else []
     parts = [f"<h2>{escape(section.heading)}</h2>", *paragraphs, *([_table(section.rows)] if section.rows else [])]
-    return "\n".join([*parts, *figures])
+    return "\n".join([*parts, *screen, *figures])
 
 
 def _table(rows: Rows) -> str:

@@ -163,9 +163,9 @@ def test_json_is_one_object_with_the_promised_keys_and_is_written_too(
         assert (row["setup"], row["mud"], row["strides"]) == ("single flipper", "49.5", 2)
         assert 0.0 <= row["median"] <= row["p95"]
         assert 0.0 <= row["coverage"] <= 1.0
-    assert json.loads((out / "estimation.json").read_text(encoding="utf-8")) == report
+    assert json.loads((out / "summary.json").read_text(encoding="utf-8")) == report
     assert (out / "estimation.png").read_bytes().startswith(b"\x89PNG")
-    assert "estimation.json" in printed.err
+    assert "summary.json" in printed.err and "report.html" in printed.err
 
 
 def test_a_person_gets_a_table_of_errors_plates_and_boundaries(capsys: pytest.CaptureFixture[str]) -> None:

@@ -76,4 +76,4 @@ def test_the_report_is_for_machines_too(plans: list[Plan], capsys: pytest.Captur
     main(["experiment", "faults", "--simulated", "--json", "--out", str(tmp_path)])
     report = json.loads(capsys.readouterr().out)
     assert report["cells"][0].items() >= {"fault": "drive_quiet", "phase": "hold", "bound_ticks": 5}.items()
-    assert (tmp_path / "faults.png").exists() and (tmp_path / "faults.json").exists()
+    assert (tmp_path / "faults.png").exists() and (tmp_path / "report.html").exists()

@@ -1,0 +1,67 @@
+"""A report is one page that needs nothing beside it, and its numbers and pictures apart."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+from experiments.report_page import Figure, Section, write_report
+
+DOT = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR4nGNgYGD4DwABBAEAwS2OUAAAAABJRU5ErkJggg=="
+)
+
+
+def draw_dot(path: Path) -> None:
+    path.write_bytes(DOT)
+
+
+SECTION = Section(
+    "Torque < force & such",
+    "First.\n\nSecond: k_p > 1.",
+    "a  b < c",
+    [["mud", "k_p"], ["48.5 %", "1.20 <N/cm³>"]],
+    [Figure("dots", 'A "dot" & more', draw_dot)],
+)
+
+
+class Elements(HTMLParser):
+    """Counts what is opened and closed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in ("meta", "img"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def test_the_page_holds_its_pictures_and_asks_for_nothing(tmp_path: Path) -> None:
+    log = tmp_path / "a.mcap"
+    written = write_report(tmp_path / "out", {"experiment": "x", "value": 1.5}, "Title", [SECTION], [log])
+    assert [path.name for path in written] == ["report.html", "summary.json", "dots.png", "a.mcap"]
+    page = written[0].read_text(encoding="utf-8")
+    assert base64.b64encode(DOT).decode() in page
+    assert not re.findall(r"(?:src|href)=\"(?!data:)", page)
+    assert json.loads(written[1].read_text(encoding="utf-8")) == {"experiment": "x", "value": 1.5}
+    assert written[2].read_bytes() == DOT
+
+
+def test_whatever_is_told_is_shown_as_it_is(tmp_path: Path) -> None:
+    page = write_report(tmp_path, {}, "A < B", [SECTION])[0].read_text(encoding="utf-8")
+    elements = Elements()
+    elements.feed(page)
+    assert not elements.open
+    for text in ("A < B", "Torque < force & such", "Second: k_p > 1.", "a  b < c", "1.20 <N/cm³>", 'A "dot" & more'):
+        assert text in elements.text
