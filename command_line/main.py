@@ -62,12 +62,7 @@ def _add_operation(commands: Commands) -> None:  # type: ignore[valid-type]
     parsers = {name: _add(commands, name, f"operation.{name}", text) for name, text in described.items()}
     parsers["fail"] = _add_fail(commands)
     for parser in parsers.values():
-        parser.add_argument(
-            "--socket",
-            type=Path,
-            default=Path(os.environ.get("MUDSKIPPER_SOCKET", DEFAULT_SOCKET)),
-            help="of the daemon (default: $MUDSKIPPER_SOCKET or %(default)s)",
-        )
+        _add_socket(parser)
     for name in ("status", "check", "fail"):
         parsers[name].add_argument("--json", action="store_true", help="for machines")
     parsers["watch"].add_argument("--period", type=_seconds, default=0.5, metavar="S", help="between two looks")
@@ -250,13 +245,26 @@ def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -
 
 def _add_trackway(names: Commands) -> None:  # type: ignore[valid-type]
     trackway = _add(names, "trackway", "walking.run_trackway", "Three muds in a row, at fixed and at chosen depths.")
-    _add_report(trackway, "robot and muds are simulated", "write JSON and picture there")
-    trackway.add_argument("--seeds", type=_seeds, default=5, metavar="N", help="trials of each gait (default: 5)")
+    _add_report(trackway, "robot and muds are simulated; else a daemon's robot walks", "for report, pictures and log")
+    _add_socket(trackway)
+    trackway.add_argument(
+        "--trials", "--seeds", type=_seeds, metavar="N", help="of each gait (default: 5 simulated, 3 of a real robot)"
+    )
     trackway.add_argument(
         "--method", action="append", metavar="NAME", help="of adaptation, repeatable to compare (default: default)"
     )
     trackway.add_argument(
         "--compartment", type=_compartment_m, default=0.61, metavar="M", help="length of each mud (default: 0.61)"
+    )
+    trackway.add_argument("--mud", action="append", metavar="NAME", help="of a real trackway, one after the other")
+
+
+def _add_socket(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--socket",
+        type=Path,
+        default=Path(os.environ.get("MUDSKIPPER_SOCKET", DEFAULT_SOCKET)),
+        help="of the daemon (default: $MUDSKIPPER_SOCKET or %(default)s)",
     )
 
 

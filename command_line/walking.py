@@ -4,28 +4,63 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
+from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import conduct, refuse
 from command_line.screen import number, table
-from experiments import depth_sweep, mud_fit, trackway
+from experiments import depth_sweep, mud_fit, trackway, trackway_trials
+from experiments.daemon_robot import DaemonRobot
 from experiments.mud_fit import cells_beside_paper
+from experiments.notebook import Notebook
+from experiments.paper_table import ADAPTIVE, PAPER_TABLE
+from experiments.report_page import Figure, Section
+from experiments.trackway_trials import AskedTrackway
 
 SIMULATED_ONLY = "the muds are those of the simulator: this experiment runs with --simulated only"
 
 
 def run_trackway(options: argparse.Namespace) -> int:
     if not options.simulated:
-        return refuse(SIMULATED_ONLY)
+        return _walk_at_the_bench(options)
     try:
         rules = trackway.rules_of(_unique(options.method) or ["default"])
     except ValueError as problem:
         return refuse(str(problem))
-    plan = trackway.Plan(rules=rules, seeds=options.seeds, compartment_m=options.compartment)
+    plan = trackway.Plan(rules=rules, seeds=options.trials or trackway.Plan.seeds, compartment_m=options.compartment)
     return conduct(options, "walks", lambda show: trackway.run(plan, show), trackway_text, _plot_trackway)
+
+
+def _walk_at_the_bench(options: argparse.Namespace) -> int:
+    """On the robot of a daemon, over muds that a person has prepared."""
+    if options.method:
+        return refuse("--method is for --simulated: a robot chooses its depths as its configuration says")
+    names = options.mud or list(PAPER_TABLE[ADAPTIVE])
+    if len(set(names)) < len(names):
+        return refuse("--mud: each needs a name of its own")
+    muds = tuple(trackway_trials.Mud(name, options.compartment) for name in names)
+    plan = trackway_trials.Plan(muds, options.trials or trackway_trials.Plan.trials)
+    return conduct_bench(options, "walks", lambda desk: _walked(plan, desk, options.socket))
+
+
+def _walked(plan: trackway_trials.Plan, desk: Desk, socket: Path) -> Finding:
+    notebook = Notebook(desk.folder, asdict(plan))
+    robot = DaemonRobot(socket)
+    try:
+        report = trackway_trials.run(plan, AskedTrackway(robot, desk.person), notebook, desk.show)
+        logs = robot.copy_logs(desk.folder)
+    finally:
+        robot.close()
+    text = trackway_text(report)
+    figure = Figure(
+        "trackway", "One walk of each gait, and Table I beside the paper's.", partial(_plot_trackway, report)
+    )
+    sections = [Section("Table I", screen=text, figures=[figure])]
+    return Finding(report, "The trackway: Table I of the paper", sections, text, logs)
 
 
 def run_sweep(options: argparse.Namespace) -> int:
@@ -70,7 +105,9 @@ def _plot_sweep(report: dict[str, Any], path: Path) -> None:
 
 
 def trackway_text(report: dict[str, Any]) -> str:
-    parts = [_speeds_text(report), _failures_text(report), _best_text(report)]
+    parts = [_speeds_text(report), _failures_text(report)]
+    if "best_constant_depth" in report:
+        parts.append(_best_text(report))
     short = sum(cell["short_trials"] for row in report["table"].values() for cell in row.values())
     if short:
         parts.append(f"Fewer than three strides in a mud, all of them counted: {short} times.")
@@ -78,7 +115,7 @@ def trackway_text(report: dict[str, Any]) -> str:
 
 
 def _speeds_text(report: dict[str, Any]) -> str:
-    muds = list(report["settings"]["strength_pa"])
+    muds = list(report["settings"]["mud_length_cm"])
     head = ["cm/s", *(f"w = {mud} %" for mud in muds), "all muds"]
     rows = [head]
     for rule, row in report["table"].items():
@@ -111,7 +148,7 @@ def _paper_text(report: dict[str, Any], rule: str, mud: str) -> str:
 
 
 def _failures_text(report: dict[str, Any]) -> str:
-    muds = list(report["settings"]["strength_pa"])
+    muds = list(report["settings"]["mud_length_cm"])
     rows = [["", *(f"w = {mud} %" for mud in muds), "ends"]]
     for rule, row in report["table"].items():
         ends = ", ".join(f"{count} {end}" for end, count in report["ends"][rule].items())

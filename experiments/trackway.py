@@ -9,7 +9,7 @@ mud alone, on a long track.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
@@ -95,8 +95,27 @@ def report_of(plan: Plan, walks: dict[str, list[Walk]], constant_cm_s: dict[str,
     """`walks` by rule, `constant_cm_s` by mud and depth in metres."""
     arm_m = configuration_for(plan.rules[0]).geometry.flipper_length_m
     names = [clay.name for clay in plan.muds]
-    cells = {rule: {mud: cell(trials, mud, arm_m) for mud in names} for rule, trials in walks.items()}
     best = {mud: best_depth(speeds) for mud, speeds in constant_cm_s.items()}
+    beside_paper = paper_report(walks, names, arm_m)
+    return beside_paper | {
+        "best_constant_depth": best,
+        "best_constant_mean_over_muds": round(sum(each["mean"] for each in best.values()) / len(best), 3),
+        "over_best": {
+            rule: {mud: _ratio(row[mud]["mean"], best[mud]["mean"]) for mud in names}
+            for rule, row in beside_paper["table"].items()
+        },
+        "constant_depth_cm_s": {
+            mud: {f"{100.0 * depth_m:g}": round(speed, 3) for depth_m, speed in speeds.items()}
+            for mud, speeds in constant_cm_s.items()
+        },
+        "ends": {rule: dict(Counter(end_of(plan, trial) for trial in trials)) for rule, trials in walks.items()},
+        "settings": _settings(plan),
+    }
+
+
+def paper_report(walks: Mapping[str, Sequence[Walk]], names: Sequence[str], arm_m: float) -> dict[str, Any]:
+    """Trials by rule through muds of these names, wherever they were walked, and the paper's beside them."""
+    cells = {rule: {mud: cell(trials, mud, arm_m) for mud in names} for rule, trials in walks.items()}
     return {
         "experiment": "trackway",
         "table": cells,
@@ -104,24 +123,13 @@ def report_of(plan: Plan, walks: dict[str, list[Walk]], constant_cm_s: dict[str,
             rule: {figure: mean_over_muds(row, figure) for figure in ("mean", "mean_all")}
             for rule, row in cells.items()
         },
-        "best_constant_depth": best,
-        "best_constant_mean_over_muds": round(sum(each["mean"] for each in best.values()) / len(best), 3),
-        "over_best": {
-            rule: {mud: _ratio(row[mud]["mean"], best[mud]["mean"]) for mud in names} for rule, row in cells.items()
-        },
         "paper": {rule: {mud: told._asdict() for mud, told in row.items()} for rule, row in PAPER_TABLE.items()},
         "within_one_sd": {
             rule: {mud: within_one_sd(cells[rule][mud]["mean"], told) for mud, told in PAPER_TABLE[rule].items()}
             for rule in FIXED_DEPTHS_M
             if rule in cells and set(names) == set(PAPER_TABLE[rule])
         },
-        "constant_depth_cm_s": {
-            mud: {f"{100.0 * depth_m:g}": round(speed, 3) for depth_m, speed in speeds.items()}
-            for mud, speeds in constant_cm_s.items()
-        },
-        "ends": {rule: dict(Counter(end_of(plan, trial) for trial in trials)) for rule, trials in walks.items()},
         "walks": {rule: [_strides_of(trial, arm_m) for trial in trials] for rule, trials in walks.items()},
-        "settings": _settings(plan),
     }
 
 
@@ -154,7 +162,7 @@ def _strides_of(walk: Walk, arm_m: float) -> list[dict[str, Any]]:
 def _settings(plan: Plan) -> dict[str, Any]:
     return {
         "seeds": plan.seeds,
-        "compartment_m": plan.compartment_m,
+        "mud_length_cm": {clay.name: 100.0 * plan.compartment_m for clay in plan.muds},
         "methods": {rule.name: rule.method for rule in plan.rules if rule.method},
         "strength_pa": {clay.name: clay.strength_pa for clay in plan.muds},
         "constant_strides": CONSTANT_STRIDES,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -62,19 +63,29 @@ def _colours(rules: Sequence[str]) -> dict[str, str]:
     return {rule: COLOURS[rule] if rule in COLOURS else next(others) for rule in rules}
 
 
+def _mud_regions(report: dict[str, Any]) -> list[tuple[str, float, float]]:
+    """Name, beginning and end in cm along the track."""
+    lengths_cm = report["settings"]["mud_length_cm"]
+    ends_cm = list(accumulate(lengths_cm.values()))
+    return [(mud, end - length, end) for (mud, length), end in zip(lengths_cm.items(), ends_cm, strict=True)]
+
+
 def _shade_muds(panel: Axes, report: dict[str, Any]) -> None:
-    length_cm = 100.0 * report["settings"]["compartment_m"]
-    muds = len(report["settings"]["strength_pa"])
-    for i in range(muds):
-        panel.axvspan(i * length_cm, (i + 1) * length_cm, color=MUD_SHADES[i % len(MUD_SHADES)], zorder=0)
-    panel.set_xlim(0.0, muds * length_cm)
+    regions = _mud_regions(report)
+    for i, (_, begin_cm, end_cm) in enumerate(regions):
+        panel.axvspan(begin_cm, end_cm, color=MUD_SHADES[i % len(MUD_SHADES)], zorder=0)
+    panel.set_xlim(0.0, regions[-1][2])
 
 
 def _name_muds(panel: Axes, report: dict[str, Any]) -> None:
-    length_cm, high = 100.0 * report["settings"]["compartment_m"], panel.get_xaxis_transform()
-    for i, mud in enumerate(report["settings"]["strength_pa"]):
-        place_cm = (i + 0.5) * length_cm
-        panel.text(place_cm, 0.97, f"w = {mud} %", transform=high, ha="center", va="top", color=TEXT)
+    high = panel.get_xaxis_transform()
+    for mud, begin_cm, end_cm in _mud_regions(report):
+        panel.text((begin_cm + end_cm) / 2.0, 0.97, _mud_name(mud), transform=high, ha="center", va="top", color=TEXT)
+
+
+def _mud_name(mud: str) -> str:
+    """One that is called after its water, or anything else."""
+    return f"w = {mud} %" if mud[-1:].isdigit() else mud
 
 
 def _plot_walk(panel: Axes, strides: Sequence[Mapping[str, Any]], figure: str, colour: str) -> None:
@@ -95,27 +106,30 @@ def _legend(colours: Mapping[str, str], report: dict[str, Any]) -> list[Line2D]:
 
 def _plot_speeds(panel: Axes, report: dict[str, Any], colours: Mapping[str, str]) -> None:
     """Bars are the paper's, dots ours; whiskers one standard deviation of each."""
-    muds, width = list(report["settings"]["strength_pa"]), 0.8 / len(colours)
+    muds, width = list(report["settings"]["mud_length_cm"]), 0.8 / len(colours)
     for i, (rule, colour) in enumerate(colours.items()):
         places = [mud + (i - (len(colours) - 1) / 2.0) * width for mud in range(len(muds))]
         paper = report["paper"].get(rule)
-        if paper is not None:
-            told = [paper[mud] for mud in muds]
-            panel.bar(places, [each["mean"] for each in told], 0.92 * width, yerr=[each["sd"] for each in told],
+        told = [(place, paper[mud]) for place, mud in zip(places, muds, strict=True) if paper and mud in paper]
+        if told:
+            panel.bar([place for place, _ in told], [each["mean"] for _, each in told], 0.92 * width,
+                      yerr=[each["sd"] for _, each in told],
                       color=colour, alpha=0.3, ecolor="grey", capsize=3)  # fmt: skip
         cells = [report["table"][rule][mud] for mud in muds]
         reached = [(place, cell) for place, cell in zip(places, cells, strict=True) if cell["mean"] is not None]
         panel.errorbar([place for place, _ in reached], [cell["mean"] for _, cell in reached],
                        yerr=[cell["sd"] or 0.0 for _, cell in reached], fmt="o", color=colour,
                        markeredgecolor="black", markeredgewidth=0.6, markersize=7, capsize=3)  # fmt: skip
-    for mud, best in enumerate(report["best_constant_depth"].values()):
+    best_depths = report.get("best_constant_depth", {})
+    for mud, best in enumerate(best_depths.values()):
         panel.hlines(best["mean"], mud - 0.42, mud + 0.42, color=TEXT, linewidth=1.0, linestyle=":")
-    panel.set_xticks(range(len(muds)), [f"w = {mud} %" for mud in muds])
+    panel.set_xticks(range(len(muds)), [_mud_name(mud) for mud in muds])
     panel.set_ylim(0.0, max(panel.get_ylim()[1], 9.0))
     panel.set_ylabel("speed (cm/s)")
-    panel.set_title("Table I: the paper's (bars), simulated (dots)", fontsize="medium")
-    dots = Line2D([], [], color=TEXT, linestyle=":", label="best constant depth, simulated")
-    panel.legend(handles=[dots], fontsize="small", loc="upper right")
+    panel.set_title("Table I: the paper's (bars), ours (dots)", fontsize="medium")
+    if best_depths:
+        dots = Line2D([], [], color=TEXT, linestyle=":", label="best constant depth")
+        panel.legend(handles=[dots], fontsize="small", loc="upper right")
 
 
 def plot_sweep(report: dict[str, Any], path: Path) -> None:

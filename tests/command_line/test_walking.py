@@ -47,7 +47,22 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 # what is refused
 
 
-@pytest.mark.parametrize("name", NAMES)
+def test_without_a_daemon_nobody_walks_over_a_real_trackway(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, no_walks: None
+) -> None:
+    status = main(["experiment", "trackway", "--socket", str(tmp_path / "none"), "--out", str(tmp_path)])
+    assert status == exit_codes.REFUSED
+    assert "no daemon answers" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [("--method", "paper"), ("--mud", "soft", "--mud", "soft")])
+def test_what_a_real_trackway_cannot_have_is_refused(
+    arguments: tuple[str, str], capsys: pytest.CaptureFixture[str], no_walks: None
+) -> None:
+    assert arguments[0] in refusal(capsys, "trackway", *arguments)
+
+
+@pytest.mark.parametrize("name", ["sweep", "mud-fit"])
 def test_without_simulation_there_are_no_muds(name: str, capsys: pytest.CaptureFixture[str], no_walks: None) -> None:
     assert "--simulated" in refusal(capsys, name)
 

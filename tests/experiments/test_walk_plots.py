@@ -24,7 +24,7 @@ def trackway(*rules: str, mean: float | None = 6.0) -> dict[str, Any]:
         "walks": {rule: [strides] for rule in rules},
         "paper": {"3 cm": dict.fromkeys(MUDS, {"mean": 7.6, "sd": 0.5})},
         "best_constant_depth": dict.fromkeys(MUDS, {"depth_cm": 2.5, "mean": 8.0}),
-        "settings": {"compartment_m": 0.61, "strength_pa": dict.fromkeys(MUDS, 1000.0)},
+        "settings": {"mud_length_cm": dict.fromkeys(MUDS, 61.0)},
     }
 
 

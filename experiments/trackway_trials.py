@@ -1,0 +1,196 @@
+"""Table I at the bench: a person levels the mud, the robot walks over the trackway, and the pose says how far it came.
+
+After section III-D of the paper. Each trial begins with the sweep axes over the beginning of the first mud; the body's
+place there is the trackway's zero. The trials of the gaits alternate, so that mud which dries or softens meanwhile
+falls on none of them alone. A walk is stopped where the plates go down behind the last mud, after 90 s in one mud, or
+by a fault. Its strides are read from the log (log_strides.py), and the table is that of the simulated trackway.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from itertools import accumulate
+from math import radians, sin
+from typing import Any, Protocol
+
+from experiments.bench_robot import UNDER_WAY, BenchError, BenchRobot, Status, arm, disarm, told_by, wait_until
+from experiments.depth_rule import DepthRule
+from experiments.log_strides import walked_strides
+from experiments.notebook import Notebook
+from experiments.paper_table import ADAPTIVE, FIXED_DEPTHS_M
+from experiments.person import GO_ON, REDO, SKIP, Person
+from experiments.side_by_side import Show
+from experiments.trackway import STUCK_S, paper_report
+from experiments.walk import Walk, WalkedStride, speed_m_s
+
+PATIENCE_S = 900.0  # for a whole walk
+RAISING_S = 20.0
+LOOK_S = 0.05
+BEHIND = ""  # the last mud
+
+
+class Trackway(Protocol):
+    """What a person does between two trials."""
+
+    def prepare(self, trial: str) -> BenchRobot:
+        """The robot at the start, the mud levelled."""
+
+    def judge(self, told: str) -> str:
+        """GO_ON, SKIP to keep this trial out, or REDO it."""
+
+
+class AskedTrackway:
+    """A Trackway: a person's."""
+
+    def __init__(self, robot: BenchRobot, person: Person) -> None:
+        self._robot = robot
+        self._person = person
+
+    def prepare(self, trial: str) -> BenchRobot:
+        question = f"{trial}: level the mud, and put the sweep axes over the beginning of the first mud."
+        self._person.ask(question, {GO_ON: "the robot may walk"}, self._meanwhile)
+        return self._robot
+
+    def judge(self, told: str) -> str:
+        answers = {GO_ON: "keep it", REDO: "walk it again", SKIP: "leave it out"}
+        return self._person.ask(told, answers, self._meanwhile)
+
+    def _meanwhile(self) -> None:
+        self._robot.wait(LOOK_S)
+
+
+@dataclass(frozen=True)
+class Mud:
+    name: str
+    length_m: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    muds: tuple[Mud, ...]
+    trials: int = 3  # as the paper
+    depths_m: tuple[float, ...] = tuple(FIXED_DEPTHS_M.values())
+
+    @property
+    def length_m(self) -> float:
+        return sum(mud.length_m for mud in self.muds)
+
+    @property
+    def rules(self) -> tuple[DepthRule, ...]:
+        """The adaptive one chooses by the method that the robot is configured with."""
+        fixed = (DepthRule(f"{100.0 * depth_m:g} cm", depth_m) for depth_m in self.depths_m)
+        return (*fixed, DepthRule(ADAPTIVE, 0.0, "configured"))
+
+    def orders(self) -> Iterator[tuple[str, DepthRule]]:
+        """By key in the notebook."""
+        for trial in range(1, self.trials + 1):
+            for rule in self.rules:
+                yield f"{rule.name}, trial {trial}", rule
+
+    def mud_at(self, place_m: float) -> str:
+        """Where the plates go down; BEHIND the last one, and the first one also before its beginning."""
+        ends_m = accumulate(mud.length_m for mud in self.muds)
+        return next((mud.name for mud, end_m in zip(self.muds, ends_m, strict=True) if place_m < end_m), BEHIND)
+
+
+def run(plan: Plan, trackway: Trackway, notebook: Notebook, show: Show) -> dict[str, Any]:
+    """The report. Raises BenchError where the robot cannot walk; what was walked is in the notebook."""
+    orders = list(plan.orders())
+    for done, (key, rule) in enumerate(orders):
+        show(done, len(orders))
+        while key not in notebook.entries:
+            _walk_trial(plan, key, rule, trackway, notebook)
+    return report_of(plan, notebook)
+
+
+def _walk_trial(plan: Plan, key: str, rule: DepthRule, trackway: Trackway, notebook: Notebook) -> None:
+    robot = trackway.prepare(key)
+    arm_m = robot.configuration.geometry.flipper_length_m
+    walk = walk_over(robot, plan, rule)
+    verdict = trackway.judge(told_of(key, walk))
+    if verdict == REDO:
+        return
+    strides = [stride._asdict() for stride in walk.strides]
+    notebook.write(key, {"strides": strides, "fault": walk.fault, "arm_m": arm_m, "skipped": verdict == SKIP})
+
+
+def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> Walk:
+    """One trial, from torque on to torque off. Raises BenchError, with torque off where the robot can be reached."""
+    arm(robot)
+    before: Status = robot.call("status")
+    start_m = before["body_x_m"]
+    if start_m is None:
+        disarm(robot)
+        raise BenchError("the body's place is not known: motion capture or rail encoder tell nothing; see [pose]")
+    robot.call("walk", **({} if rule.method else {"depth_m": rule.depth_m}))
+    end = _follow(robot, plan, start_m)
+    after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
+    fault = end or ("" if after["mode"] == "hold" else told_by(after))
+    log = robot.record(before["now_s"], after["now_s"])
+    if after["mode"] == "hold":
+        disarm(robot)
+    strides = walked_strides(log, robot.configuration, lambda place_m: plan.mud_at(place_m - start_m))
+    return Walk([stride._replace(place_m=stride.place_m - start_m) for stride in strides], fault)
+
+
+def _follow(robot: BenchRobot, plan: Plan, start_m: float) -> str:
+    """Until the walk is over, or has to be stopped: why, where that is no success."""
+    status = wait_until(robot, lambda now: now["mode"] != "hold", RAISING_S, "beginning to walk")
+    gait, geometry = robot.configuration.gait, robot.configuration.geometry
+    reach_m = geometry.flipper_length_m * sin(radians(gait.sweep_angle_deg))
+    begun_s = entered_s = status["now_s"]
+    mud = plan.muds[0].name
+    while status["mode"] == "walking":
+        body_m = status["body_x_m"]
+        there = mud if body_m is None else plan.mud_at(body_m - start_m + reach_m)
+        if there != mud:
+            mud, entered_s = there, status["now_s"]
+        if mud == BEHIND and status["phase"] == "insertion":
+            robot.call("stop")
+            return ""
+        if mud != BEHIND and status["now_s"] - entered_s > STUCK_S or status["now_s"] - begun_s > PATIENCE_S:
+            robot.call("stop")
+            return f"stuck in {mud}"
+        robot.wait(LOOK_S)
+        status = robot.call("status")
+    return told_by(status)
+
+
+def told_of(key: str, walk: Walk) -> str:
+    """A trial in a line."""
+    seen = [stride for stride in walk.strides if stride.step_m == stride.step_m]
+    speed = f"{100.0 * speed_m_s(seen):.1f} cm/s" if seen else "no stride with a pose"
+    lost = len(walk.strides) - len(seen)
+    without = f", {lost} of them without a pose" if lost else ""
+    return f"{key}: {len(walk.strides)} strides{without}, {speed}{'; ' + walk.fault if walk.fault else ''}"
+
+
+def report_of(plan: Plan, notebook: Notebook) -> dict[str, Any]:
+    """Strides without a length, or in no mud, are told of and not counted."""
+    walks: dict[str, list[Walk]] = {rule.name: [] for rule in plan.rules}
+    ends: dict[str, dict[str, int]] = {rule.name: {} for rule in plan.rules}
+    uncounted, arm_m = 0, 0.0
+    for key, rule in plan.orders():
+        entry = notebook.entries[key]
+        if entry["skipped"]:
+            continue
+        strides = [WalkedStride(**stride) for stride in entry["strides"]]
+        counted = _counted(strides)
+        uncounted, arm_m = uncounted + len(strides) - len(counted), entry["arm_m"]
+        walks[rule.name].append(Walk(counted, entry["fault"]))
+        end = entry["fault"] or "past the end"
+        ends[rule.name][end] = ends[rule.name].get(end, 0) + 1
+    return paper_report(walks, [mud.name for mud in plan.muds], arm_m) | {
+        "ends": ends,
+        "strides_without_pose": uncounted,
+        "settings": {
+            "seeds": plan.trials,
+            "mud_length_cm": {mud.name: 100.0 * mud.length_m for mud in plan.muds},
+            "muds": [asdict(mud) for mud in plan.muds],
+        },
+    }
+
+
+def _counted(strides: Sequence[WalkedStride]) -> list[WalkedStride]:
+    return [stride for stride in strides if stride.step_m == stride.step_m and stride.mud != BEHIND]

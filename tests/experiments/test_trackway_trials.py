@@ -1,0 +1,128 @@
+"""Table I walked through the daemon's calls: every trial counts once, is stopped where it should be, and is kept."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from command_line.walking import trackway_text
+from experiments.bench_robot import BenchError
+from experiments.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.notebook import Notebook
+from experiments.person import GO_ON, REDO, SKIP
+from experiments.trackway_trials import Mud, Plan, run
+from experiments.walk import StrideRecord
+from experiments.walk_plots import plot_trackway
+from firmware_host.file_recorder import FileRecorder
+from firmware_host.ticker import PERIOD_S
+from simulation.clay import MUDS
+from simulation.lockstep import Lockstep
+from simulation.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
+from simulation.track import Track
+
+SHORT = Plan((Mud("48.5", 0.3), Mud("53.1", 0.3)), trials=1, depths_m=(0.03,))
+TINY = Plan((Mud("48.5", 0.15),), trials=1, depths_m=(0.03,))
+
+
+class SimulatedTrackway:
+    """A robot of its own for each trial, and a person who says what the test tells them to."""
+
+    def __init__(self, folder: Path, verdicts: Iterator[str], capture: MotionCaptureParameters = AT_EVERY_TICK) -> None:
+        self.folder, self.verdicts, self.capture = folder, verdicts, capture
+        self.prepared: list[str] = []
+        self.told: list[str] = []
+        self.truth: list[StrideRecord] = []
+
+    def prepare(self, trial: str) -> LockstepRobot:
+        self.prepared.append(trial)
+        configuration = simulated_configuration()
+        recorder = FileRecorder(self.folder / f"{len(self.prepared)}.mcap", configuration)
+        track = Track([(mud.length_m, MUDS[mud.name]) for mud in SHORT.muds])
+        lockstep = Lockstep(configuration, track, recorder=recorder, motion_capture=self.capture)
+        self.truth.append(StrideRecord(lockstep, track))
+        return WatchedRobot(lockstep, recorder, self.truth[-1])
+
+    def judge(self, told: str) -> str:
+        self.told.append(told)
+        return next(self.verdicts)
+
+
+class WatchedRobot(LockstepRobot):
+    """The plant's truth is looked at once a tick."""
+
+    def __init__(self, lockstep: Lockstep, recorder: FileRecorder, truth: StrideRecord) -> None:
+        super().__init__(lockstep, recorder)
+        self._truth = truth
+
+    def wait(self, duration_s: float) -> None:
+        for _ in range(round(duration_s / PERIOD_S)):
+            self.lockstep.step()
+            self._truth.look()
+
+
+def always(verdict: str) -> Iterator[str]:
+    while True:
+        yield verdict
+
+
+def unseen(done: int, total: int) -> None:
+    """Nobody waits."""
+
+
+def test_the_table_of_the_log_is_that_of_the_plant(tmp_path: Path) -> None:
+    trackway = SimulatedTrackway(tmp_path, always(GO_ON))
+    report = run(SHORT, trackway, Notebook(tmp_path, {}), unseen)
+    assert trackway.prepared == ["3 cm, trial 1", "adaptive, trial 1"]
+    assert {tuple(ends) for ends in report["ends"].values()} == {("past the end",)}
+    for rule, record in zip(("3 cm", "adaptive"), trackway.truth, strict=True):
+        told, true = report["walks"][rule][0], [stride for stride in record.strides if stride.place_m < 0.6]
+        assert len(told) == len(true) >= 5
+        for stride, truth in zip(told, true, strict=True):
+            assert stride["mud"] == truth.mud
+            assert stride["step_cm"] == pytest.approx(100.0 * truth.step_m, abs=0.05)
+            assert stride["duration_s"] == pytest.approx(truth.duration_s, abs=0.01)
+    json.dumps(report, allow_nan=False)
+    plot_trackway(report, tmp_path / "trackway.png")
+    assert "Table I" in trackway_text(report)
+
+
+def test_a_trial_that_is_redone_counts_once_and_one_that_is_skipped_not_at_all(tmp_path: Path) -> None:
+    trackway = SimulatedTrackway(tmp_path, iter([REDO, GO_ON, SKIP]))
+    report = run(TINY, trackway, Notebook(tmp_path, {}), unseen)
+    assert trackway.prepared == ["3 cm, trial 1", "3 cm, trial 1", "adaptive, trial 1"]
+    assert len(report["walks"]["3 cm"]) == 1 and report["walks"]["adaptive"] == []
+    assert report["table"]["adaptive"]["48.5"]["mean"] is None
+
+
+def test_what_was_walked_is_not_walked_again(tmp_path: Path) -> None:
+    trackway = SimulatedTrackway(tmp_path, iter([GO_ON]))
+    with pytest.raises(StopIteration):  # the person has gone
+        run(TINY, trackway, Notebook(tmp_path, {}), unseen)
+    again = SimulatedTrackway(tmp_path / "again", always(GO_ON))
+    report = run(TINY, again, Notebook(tmp_path, {}), unseen)
+    assert again.prepared == ["adaptive, trial 1"]
+    assert len(report["walks"]["3 cm"]) == 1
+
+
+def test_without_a_pose_nobody_walks(tmp_path: Path) -> None:
+    trackway = SimulatedTrackway(tmp_path, always(GO_ON), MotionCaptureParameters(rate_hz=0.001))
+    with pytest.raises(BenchError, match="the body's place is not known"):
+        run(TINY, trackway, Notebook(tmp_path, {}), unseen)
+
+
+def test_strides_of_which_the_pose_was_lost_are_told_and_not_counted(tmp_path: Path) -> None:
+    capture = MotionCaptureParameters(rate_hz=120.0, dropouts_per_s=1.0, dropout_s=0.4)
+    trackway = SimulatedTrackway(tmp_path, always(GO_ON), capture)
+    report = run(TINY, trackway, Notebook(tmp_path, {}), unseen)
+    assert report["strides_without_pose"] > 0
+    json.dumps(report, allow_nan=False)
+
+
+@pytest.mark.parametrize(
+    ("place_m", "mud"), [(-0.1, "48.5"), (0.0, "48.5"), (0.299, "48.5"), (0.3, "53.1"), (0.6, ""), (9.0, "")]
+)
+def test_a_mud_reaches_from_its_border_to_the_next(place_m: float, mud: str) -> None:
+    assert SHORT.mud_at(place_m) == mud
