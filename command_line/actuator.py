@@ -1,4 +1,4 @@
-"""`mudskipper experiment actuator`: calibration weights on one joint after the other, and what that says of its motor."""
+"""`mudskipper experiment actuator`: weights on one joint after the other, and what that says of the motors."""
 
 from __future__ import annotations
 
@@ -9,16 +9,18 @@ from functools import partial
 from pathlib import Path
 
 from command_line.bench import Desk, Finding, conduct_bench
+from command_line.main import DEFAULT_CONFIG
 from command_line.screen import table
+from control.joint_pd import GRAVITY_M_S2
 from experiments.actuator_bench import ActuatorBench, RobotBench, SimulatedBench
 from experiments.actuator_fit import JointFit, fit_joint
-from experiments.actuator_plan import Plan
+from experiments.actuator_plan import PAPER_WEIGHTS_G, Plan
 from experiments.actuator_report import TITLE, left_out, report_of, sections_of, table_of
 from experiments.actuator_simulation import bench_configuration
 from experiments.bench_robot import BenchError
 from experiments.configuration_change import changed_text, difference, replace_file
 from experiments.daemon_robot import DaemonRobot
-from firmware_host.configuration import load_configuration
+from firmware_host.configuration import Configuration, load_configuration
 from firmware_host.toml_records import read_text
 
 DEFAULT_JOINTS = ("right_adduction", "right_sweep")
@@ -35,9 +37,7 @@ def _calibrate(options: argparse.Namespace, desk: Desk) -> Finding:
     bench = _bench(options)
     try:
         target = _target(options, desk, bench) if options.apply else None
-        lever_m = options.lever or bench.configuration.geometry.flipper_length_m
-        joints = tuple(dict.fromkeys(options.joint or DEFAULT_JOINTS))
-        plan = Plan(joints, options.weights, options.trials, lever_m, options.gravity)
+        plan = _plan(options, bench.configuration)
         readings = bench.calibrate(plan, desk.folder, desk.person, desk.show)
         logs = bench.copy_logs(desk.folder)
     finally:
@@ -45,12 +45,12 @@ def _calibrate(options: argparse.Namespace, desk: Desk) -> Finding:
     drives = bench.configuration.drive
     fits = [
         fit
-        for joint in joints
+        for joint in plan.joints
         if (fit := fit_joint(joint, plan, readings[joint], drives[joint].torque_constant_nm_a)) is not None
     ]
     written = _apply(target, fits, desk) if target else ""
     omitted = len(left_out(plan, readings))
-    text = "\n".join([table(table_of(fits)), *_remarks(joints, fits, omitted), *([written] if written else [])])
+    text = "\n".join([table(table_of(fits)), *_remarks(plan.joints, fits, omitted), *([written] if written else [])])
     return Finding(report_of(plan, readings, fits), TITLE, sections_of(plan, readings, fits), text, logs)
 
 
@@ -59,6 +59,16 @@ def _bench(options: argparse.Namespace) -> ActuatorBench:
         configuration = load_configuration(options.config) if options.config else bench_configuration()
         return SimulatedBench(configuration, options.seed)
     return RobotBench(DaemonRobot(options.socket))
+
+
+def _plan(options: argparse.Namespace, configuration: Configuration) -> Plan:
+    return Plan(
+        tuple(dict.fromkeys(options.joint or DEFAULT_JOINTS)),
+        options.weights or PAPER_WEIGHTS_G,
+        options.trials,
+        options.lever_m or configuration.geometry.flipper_length_m,
+        options.gravity or GRAVITY_M_S2,
+    )
 
 
 def _remarks(joints: Sequence[str], fits: Sequence[JointFit], omitted: int) -> list[str]:
@@ -80,7 +90,7 @@ def _target(options: argparse.Namespace, desk: Desk, bench: ActuatorBench) -> Pa
         copy: Path = desk.folder / COPY
         copy.write_text(bench.configuration.text, encoding="utf-8")
         return copy
-    path: Path = options.config or options.default_config
+    path: Path = options.config or Path(DEFAULT_CONFIG)
     if read_text(path) != bench.configuration.text:
         raise BenchError(f"the daemon does not run with {path}: name its file with --config, or restart it")
     if not (os.access(path, os.W_OK) and os.access(path.resolve().parent, os.W_OK)):

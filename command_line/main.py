@@ -15,6 +15,7 @@ from pathlib import Path
 
 from command_line import exit_codes
 from command_line.screen import complain
+from control.records import JOINTS
 
 DEFAULT_SOCKET = "/run/mudskipper/mudskipper.sock"
 METHODS = ("default", "paper")  # of estimation
@@ -229,6 +230,7 @@ def _add_experiments(commands: Commands) -> None:  # type: ignore[valid-type]
     muds.add_argument("--mud", action="append", type=float, metavar="W", help="water content in percent, repeatable")
     muds.add_argument("--strength", action="append", type=_strength_pa, metavar="PA", help="instead, repeatable")
     estimation.add_argument("--layers", metavar="A,B", help="disturbances, separated by commas, or none (default: all)")
+    _add_actuator(names)
     _add_trackway(names)
     _add_sweep(names)
     _add_faults(names)
@@ -241,6 +243,57 @@ def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -
     experiment.add_argument("--simulated", action="store_true", help=simulated)
     experiment.add_argument("--json", action="store_true", help="for machines")
     experiment.add_argument("--out", type=Path, metavar="DIR", help=out)
+
+
+def _add_actuator(names: Commands) -> None:  # type: ignore[valid-type]
+    actuator = _add(names, "actuator", "actuator.run_actuator", "Weights on a joint: torque constants and friction.")
+    _add_report(actuator, "a simulated motor holds the weights, and nobody is asked", "for report, pictures and log")
+    _add_socket(actuator)
+    actuator.add_argument(
+        "--joint", action="append", choices=JOINTS, help="repeatable (default: right_adduction, right_sweep)"
+    )
+    actuator.add_argument(
+        "--lever", type=_lever_m, metavar="CM", dest="lever_m", help="axle to weight (default: the flipper's length)"
+    )
+    actuator.add_argument("--weights", type=_weights_g, metavar="G,G,...", help="in grams (default: the paper's)")
+    actuator.add_argument("--trials", type=_trials, default=5, metavar="N", help="passes through them (default: 5)")
+    actuator.add_argument("--gravity", type=_gravity_m_s2, metavar="M/S2", help="of this place (default: 9.81)")
+    actuator.add_argument(
+        "--apply", action="store_true", help="write what was fitted to the configuration, if you agree"
+    )
+    actuator.add_argument("--config", type=Path, metavar="FILE", help=f"to change (default: {DEFAULT_CONFIG})")
+    actuator.add_argument("--seed", type=int, default=1, help="of the simulated motor")
+
+
+def _lever_m(text: str) -> float:
+    value = float(text)
+    if not 1.0 <= value <= 100.0:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 1 to 100 cm")
+    return value / 100.0
+
+
+def _weights_g(text: str) -> tuple[float, ...]:
+    try:
+        values = tuple(sorted({float(part) for part in text.split(",") if part.strip()}))
+    except ValueError:
+        values = ()
+    if len(values) < 2 or not all(1.0 <= value <= 5000.0 for value in values):
+        raise argparse.ArgumentTypeError(f"{text}: must be two weights or more, from 1 to 5000 g, such as 100,200,400")
+    return values
+
+
+def _trials(text: str) -> int:
+    value = int(text)
+    if not 1 <= value <= 50:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 1 to 50")
+    return value
+
+
+def _gravity_m_s2(text: str) -> float:
+    value = float(text)
+    if not 9.7 <= value <= 9.9:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 9.7 to 9.9, as anywhere on Earth")
+    return value
 
 
 def _add_trackway(names: Commands) -> None:  # type: ignore[valid-type]

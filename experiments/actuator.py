@@ -14,8 +14,9 @@ from math import degrees
 from typing import Any
 
 from experiments.actuator_doubt import Doubt, doubt_of
+from experiments.actuator_fit import current_per_nm
 from experiments.actuator_hand import Hand
-from experiments.actuator_plan import Plan, Step, letting_go_c, stays_cool, steps_of
+from experiments.actuator_plan import Plan, Step, largest_current_a, letting_go_c, stays_cool, steps_of
 from experiments.actuator_reading import HeldJoint, MovedError, Reading
 from experiments.bench_robot import BenchError, BenchRobot, arm
 from experiments.notebook import Notebook
@@ -100,7 +101,14 @@ class Calibration:
             self._cool(step)
 
     def _is_cool(self, step: Step) -> bool:
-        return stays_cool(self._plan, self._robot.configuration, self._joint, step.weight_g, self._winding_c())
+        return stays_cool(self._robot.configuration, self._expected_a(step), self._winding_c())
+
+    def _expected_a(self, step: Step) -> float:
+        """By what the weights so far have taken."""
+        per_nm = current_per_nm(self._plan, self._notebook.entries)
+        if per_nm is None:
+            return largest_current_a(self._plan, self._robot.configuration, self._joint, step.weight_g)
+        return per_nm * self._plan.torque_nm(step.weight_g)
 
     def _cool(self, step: Step) -> None:
         if self._is_cool(step):
@@ -111,7 +119,9 @@ class Calibration:
         waited_s = 0.0
         while not self._is_cool(step):
             if waited_s > LONGEST_COOLING_S:
-                raise BenchError(f"the {self._joint} winding does not cool: check [winding] and the drive's temperature")
+                raise BenchError(
+                    f"the {self._joint} winding does not cool: check [winding] and the drive's temperature"
+                )
             self._robot.wait(COOLING_S)
             waited_s += COOLING_S
 

@@ -47,7 +47,9 @@ def doubt_of(
 def _doubt(plan: Plan, asked_g: float, held_g: float) -> Doubt:
     reads = f"the motor holds {held_g:.0f} g"
     if not asked_g:
-        return Doubt(f"{reads} although the arm should be empty: is something still hanging, or does it touch anything?")
+        return Doubt(
+            f"{reads} although the arm should be empty: is something still hanging, or does it touch anything?"
+        )
     if held_g < SLIPPED_SHARE * asked_g:
         return Doubt(f"{reads}, not {asked_g:g} g: did it slip off?")
     nearest_g = min(plan.weights_g, key=lambda weight_g: _distance(held_g, weight_g))

@@ -125,6 +125,13 @@ def direction_of(loads: Sequence[Load]) -> int:
     return -1 if sum(load.torque_nm * load.current_a for load in loads) >= 0.0 else 1
 
 
+def current_per_nm(plan: Plan, entries: Mapping[str, Entry]) -> float | None:
+    """Of the heavier weights so far; None where there were none."""
+    loads = [load for load in raw_loads(plan, entries) if load.torque_nm >= LIGHT_NM and not load.doubtful]
+    total_nm = sum(load.torque_nm for load in loads)
+    return abs(sum(load.current_a for load in loads)) / total_nm if loads else None
+
+
 def can_fit(loads: Sequence[Load]) -> bool:
     return len(loads) >= FEWEST and len({load.weight_g for load in loads}) > 1
 

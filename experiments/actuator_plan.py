@@ -1,4 +1,4 @@
-"""What of the actuator calibration is decided before it begins: joints, weights, lever, trials, and whether they can be.
+"""What of the actuator calibration is decided before it begins: joints, weights, lever, trials; whether they can be.
 
 The paper hangs eight weights from 10 to 800 g on one flipper (section II-B). A trial here is one pass through all of
 them in rising order, each hung anew, and not eight weights five times over: so what repeats badly (the hook's place on
@@ -26,7 +26,7 @@ from firmware_host.configuration import Configuration
 PAPER_WEIGHTS_G = (10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 600.0, 800.0)
 PAPER_TRIALS = 5
 LARGEST_ERROR = 0.2  # by which a torque constant may be known wrongly: 60/(2π KV) for 8.27/KV is 15 % of it
-HANGING_S = 15.0  # that a weight hangs: until Enter is pressed, two readings, until it is taken off
+HANGING_S = 14.0  # that a weight hangs: until Enter is pressed, both approaches, until it is taken off
 COOL_K = 5.0  # below the temperature at which the robot lets go
 
 
@@ -92,7 +92,8 @@ def _problems(plan: Plan, configuration: Configuration) -> Iterator[str]:
             f" set recovery.attempts = 0; or {lighter} (--weights), or at a shorter --lever"
         )
     for joint in plan.joints:
-        if not stays_cool(plan, configuration, joint, heaviest_g, configuration.winding.room_c):
+        most_a = largest_current_a(plan, configuration, joint, heaviest_g)
+        if not stays_cool(configuration, most_a, configuration.winding.room_c):
             yield (
                 f"winding.thermal_resistance_k_w = {configuration.winding.thermal_resistance_k_w:g}: {heaviest_g:g} g"
                 f" would warm the winding of {joint} beyond {letting_go_c(configuration):g} degrees C within"
@@ -105,12 +106,15 @@ def letting_go_c(configuration: Configuration) -> float:
     return (configuration.limits.temperature_warm_c + configuration.limits.temperature_hot_c) / 2.0
 
 
-def stays_cool(plan: Plan, configuration: Configuration, joint: str, weight_g: float, winding_c: float) -> bool:
-    """Whether a winding of this temperature bears the weight as long as it usually hangs."""
+def largest_current_a(plan: Plan, configuration: Configuration, joint: str, weight_g: float) -> float:
+    """That the weight may take, as long as nothing was measured."""
+    return plan.torque_nm(weight_g) * (1.0 + LARGEST_ERROR) / configuration.drive[joint].torque_constant_nm_a
+
+
+def stays_cool(configuration: Configuration, current_a: float, winding_c: float) -> bool:
+    """Whether a winding of this temperature bears the current as long as a weight usually hangs."""
     winding = Winding(configuration.winding)
     winding.temperature_c = winding_c
-    constant_nm_a = configuration.drive[joint].torque_constant_nm_a
-    current_a = plan.torque_nm(weight_g) * (1.0 + LARGEST_ERROR) / constant_nm_a
     for _ in range(round(HANGING_S)):
         winding.update(1.0, current_a, nan)
     return winding.temperature_c <= letting_go_c(configuration) - COOL_K

@@ -25,11 +25,12 @@ from experiments.bench_robot import BenchRobot, move, require_hold
 
 OFF_RAD = radians(1.0)  # to the side, before an approach
 STEP_RAD = radians(0.6)  # at most at once: a hanging weight must not be thrown about
-NEAR_RAD = radians(0.03)  # to level: a count and a half of the encoder
-PART = 0.6  # of the way that is left, of each step
-SMALLEST_RAD = radians(0.01)
-MOST_STEPS = 40
+NEAR_RAD = radians(0.04)  # to level: two counts of the encoder
+PART = 0.35  # of the way that is left, of each step: a heavy arm goes on twice as far before friction stops it
+SMALLEST_RAD = radians(0.03)
+MOST_STEPS, MOST_TRIES = 30, 3
 QUIET_S = 0.2  # after the last step
+REST_S, REST_RAD, MOST_RESTS = 0.04, radians(0.03), 15  # between two looks at a joint that comes to rest
 WINDOW_S, SAMPLE_S = 1.0, 0.01
 MOST_WINDOWS = 8
 STILL_RAD = radians(0.08)
@@ -101,18 +102,36 @@ class HeldJoint:
         return Sample(status["now_s"], drive["angle_rad"], drive["current_a"], drive["winding_c"])
 
     def _from(self, direction: float) -> Side:
-        self._hold(self.held_rad - self._angle_rad() - direction * OFF_RAD)
-        self._robot.wait(QUIET_S)
+        self._go_off(direction)
         for _ in range(MOST_STEPS):
-            left_rad = -direction * self._angle_rad()
+            left_rad = -direction * self._resting_rad()
             if left_rad <= NEAR_RAD:
                 break
             self._hold(self.held_rad + direction * min(max(PART * left_rad, SMALLEST_RAD), STEP_RAD))
         self._robot.wait(QUIET_S)
         return self._settled()
 
+    def _go_off(self, direction: float) -> None:
+        """To the side from which the approach comes, also where the first look met a swinging arm."""
+        for _ in range(MOST_TRIES):
+            self._hold(self.held_rad - self._resting_rad() - direction * OFF_RAD)
+            self._robot.wait(QUIET_S)
+            if -direction * self._resting_rad() > OFF_RAD / 2.0:
+                return
+
     def _angle_rad(self) -> float:
         return self.sample().angle_rad
+
+    def _resting_rad(self) -> float:
+        """The angle once it hardly changes, or has had its time."""
+        before_rad = self._angle_rad()
+        for _ in range(MOST_RESTS):
+            self._robot.wait(REST_S)
+            angle_rad = self._angle_rad()
+            if abs(angle_rad - before_rad) <= REST_RAD:
+                break
+            before_rad = angle_rad
+        return angle_rad
 
     def _hold(self, angle_rad: float) -> None:
         """In steps that do not throw the weight about."""

@@ -19,29 +19,29 @@ PAPER_REPEATABILITY = 0.032
 PAPER_CONSTANT_NM_A = 0.083
 
 METHOD = """\
-A motor holds the flipper level while calibration weights hang on it (the paper's section II-B). A trial is one pass \
-through all weights in rising order, each hung anew; the empty arm is read before and after each pass, and what it takes \
-is taken off. The held angle is raised until the loaded arm itself is level, so that every weight has the same lever and \
-meets the magnets' cogging in the same place. The place is approached from below and from above: the mean of the two \
-currents is the load, half of their difference is dry friction.
+A motor holds the flipper level while calibration weights hang on it (the paper's section II-B). A trial is one pass
+through all weights in rising order, each hung anew; the empty arm is read before and after each pass, and what it takes
+is taken off. The held angle is raised until the loaded arm itself is level, so that every weight has the same lever
+and meets the magnets' cogging in the same place. The place is approached from below and from above: the mean of the
+two currents is the load, half of their difference is dry friction.
 
-The line is current on torque, since the weights are known better than the currents: k_t is one over its slope, with \
-the standard error of an ordinary least-squares fit. It does not hold the doubt of the lever: a millimetre of 12 cm is \
+The line is current on torque, since the weights are known better than the currents: k_t is one over its slope, with
+the standard error of an ordinary least-squares fit. It does not hold the doubt of the lever: a millimetre of 12 cm is
 0.8 % of k_t. The error with the fitted constant is each trial's by the constant of the other trials.
 
-Repeatability is the standard deviation over the trials of a weight relative to their mean, averaged over the weights, \
-as in the paper. Friction is that of the arm at rest, from the lightest loads; a joint that moves may have a quarter \
+Repeatability is the standard deviation over the trials of a weight relative to their mean, averaged over the weights,
+as in the paper. Friction is that of the arm at rest, from the lightest loads; a joint that moves may have a quarter
 more."""
 
 SETTING = """\
-The constant stands in two places, and both must say the same. torque_constant_nm_a of [drive.JOINT] in the \
-configuration turns the current that the drive reports into torque: every force and coefficient is proportional to it. \
-odrv0.axis0.config.motor.torque_constant in the drive (over USB with odrivetool, then save_configuration) turns the \
-torque that is commanded into current. The reported current itself does not depend on either. While only one of them is \
-set, the robot feels forces rightly and pushes wrongly, or the other way round.
+The constant stands in two places, and both must say the same. torque_constant_nm_a of [drive.JOINT] in the
+configuration turns the current that the drive reports into torque: every force and coefficient is proportional to it.
+odrv0.axis0.config.motor.torque_constant in the drive (over USB with odrivetool, then save_configuration) turns the
+torque that is commanded into current. The reported current itself does not depend on either. While only one of them
+is set, the robot feels forces rightly and pushes wrongly, or the other way round.
 
-60/(2π KV) = 0.083 N·m/A for 115 rpm/V is the constant of a motor whose current is counted as direct current. ODrive \
-counts the peak of the phase current, for which the same motor gives 8.27/KV = 0.0719. Which holds for these drives is \
+60/(2π KV) = 0.083 N·m/A for 115 rpm/V is the constant of a motor whose current is counted as direct current. ODrive
+counts the peak of the phase current, for which the same motor gives 8.27/KV = 0.0719. Which holds for these drives is
 what this experiment tells."""
 
 

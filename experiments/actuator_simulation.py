@@ -42,7 +42,7 @@ LEVER_SD_M = 0.0003
 
 
 def bench_configuration() -> Configuration:
-    """That of the simulated robot, with the current limit of the authors' drives in their trials with a single flipper."""
+    """That of the simulated robot, with the current limit of the authors' drives at their single flipper."""
     sections = f"[limits]\ntorque_nm = {BENCH_TORQUE_NM}\n\n[recovery]\nattempts = 0  # no mud holds a flipper here\n"
     return simulated_configuration(sections, drive=f"current_limit_a = {BENCH_CURRENT_A}")
 

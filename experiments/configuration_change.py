@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import os
 import tempfile
+import tomllib
 from collections.abc import Mapping, MutableMapping
 from difflib import unified_diff
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import Table
 
 from experiments.bench_robot import BenchError
 from firmware_host.configuration import parse_configuration
@@ -26,7 +29,7 @@ BACKUP = ".before"
 
 
 def changed_text(text: str, changes: Changes) -> str:
-    """Raises BenchError where it would not be a configuration."""
+    """Raises BenchError where it would not be a configuration, or would say anything else than before."""
     try:
         document = tomlkit.parse(text)
         for path, value in changes.items():
@@ -34,19 +37,38 @@ def changed_text(text: str, changes: Changes) -> str:
         changed = tomlkit.dumps(document)
         parse_configuration(changed)
     except TOMLKitError as problem:
-        raise BenchError(f"the configuration cannot be changed, it is not a TOML file: {problem}") from problem
+        raise BenchError(f"the configuration cannot be changed: {problem}") from problem
     except ConfigurationError as problem:
         raise BenchError(f"the configuration stays as it is, since changed it would be wrong: {problem}") from problem
+    if tomllib.loads(changed) != _expected(text, changes):
+        raise BenchError(
+            "the configuration stays as it is: its tables are written in a way that cannot be changed here"
+        )
     return changed
 
 
+def _expected(text: str, changes: Changes) -> dict[str, Any]:
+    document = tomllib.loads(text)
+    for path, value in changes.items():
+        table = document
+        for name in path[:-1]:
+            table = table.setdefault(name, {})
+        table[path[-1]] = value
+    return document
+
+
 def _set(document: MutableMapping[str, Any], path: tuple[str, ...], value: float) -> None:
+    """A new key goes below the last one of its table, above what is said of the next table."""
     table = document
     for depth, name in enumerate(path[:-1]):
         if name not in table:
             table[name] = tomlkit.table(is_super_table=depth < len(path) - 2)
         table = table[name]
+    body = table.value.body if isinstance(table, Table) and path[-1] not in table else []
+    trailing = list(reversed([*takewhile(lambda item: item[0] is None, reversed(body))]))
+    del body[len(body) - len(trailing) :]
     table[path[-1]] = value
+    body.extend(trailing)
 
 
 def difference(before: str, after: str, name: str) -> str:
