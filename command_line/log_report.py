@@ -79,8 +79,14 @@ def _told(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Section]]:
 
 def _summary_section(log: Log) -> Section:
     unfinished = "" if log.complete else "The log was not finished: everything up to where it ends was read."
-    rows = [["", ""], *([name.replace("_", " "), str(value)] for name, value in log_summary(log).items())]
+    rows = [["", ""], *([name, _shown(value)] for name, value in log_summary(log).items())]
     return Section("What the log holds", unfinished, rows=rows)
+
+
+def _shown(value: str | int | float | bool) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.2f}" if isinstance(value, float) else str(value)
 
 
 def _walk_sections(files: Sequence[Path], watch: Watch) -> list[Section]:

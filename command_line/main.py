@@ -8,6 +8,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper
 from math import isfinite
@@ -112,12 +113,10 @@ def _finite(text: str) -> float:
 
 def _joint_angle(text: str) -> tuple[str, float]:
     joint, _, angle_deg = text.partition("=")
-    try:
-        return joint, _finite(angle_deg)
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"{text}: must be a joint and its angle in degrees, as left_sweep=10"
-        ) from None
+    with suppress(ValueError):
+        if joint and isfinite(float(angle_deg)):
+            return joint, float(angle_deg)
+    raise argparse.ArgumentTypeError(f"{text}: must be a joint and its angle in degrees, as left_sweep=10") from None
 
 
 def _seconds(text: str) -> float:
@@ -301,7 +300,7 @@ def _add_trackway(names: Commands) -> None:  # type: ignore[valid-type]
     _add_report(trackway, "robot and muds are simulated; else a daemon's robot walks", "for report, pictures and log")
     _add_socket(trackway)
     trackway.add_argument(
-        "--trials", "--seeds", type=_seeds, metavar="N", help="of each gait (default: 5 simulated, 3 of a real robot)"
+        "--trials", "--seeds", type=_seeds, metavar="N", help="of each gait (default: 3, as the paper)"
     )
     trackway.add_argument(
         "--method", action="append", metavar="NAME", help="of adaptation, repeatable to compare (default: default)"

@@ -13,6 +13,7 @@ from typing import Any
 RED, GREEN, YELLOW, BOLD, PLAIN = "\033[31m", "\033[32m", "\033[33m", "\033[1m", "\033[0m"
 PATIENCE_S = 2.0  # of a person who sees nothing
 SOON_S = 0.1
+BAR_WIDTH = 20  # characters
 
 
 def coloured(text: str, colour: str) -> str:
@@ -44,6 +45,11 @@ def size_text(size: float) -> str:
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
 
 
+def bar(done: int, total: int) -> str:
+    filled = BAR_WIDTH * min(done, total) // max(total, 1)
+    return f"[{'#' * filled}{'.' * (BAR_WIDTH - filled)}]"
+
+
 class Progress:
     """One line on a terminal's standard error while something takes its time; silent anywhere else."""
 
@@ -62,7 +68,7 @@ class Progress:
     def show(self, done: int, total: int) -> None:
         if self._shown and time.monotonic() >= self._due_s:
             self._due_s = time.monotonic() + self._interval_s
-            print(f"\r\033[K{done} of {total} {self._what}", end="", file=sys.stderr, flush=True)
+            print(f"\r\033[K{bar(done, total)} {done} of {total} {self._what}", end="", file=sys.stderr, flush=True)
 
     def clear(self) -> None:
         if self._shown:

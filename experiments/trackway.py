@@ -41,9 +41,9 @@ class Plan:
     rules: tuple[DepthRule, ...] = (*FIXED, chosen_by("default", ADAPTIVE))
     muds: tuple[Clay, ...] = tuple(MUDS.values())
     compartment_m: float = COMPARTMENT_M
-    seeds: int = 5
+    seeds: int = 3  # as the paper
     constant_depths_m: tuple[float, ...] = depths_m(0.0025)
-    constant_seeds: int = 2
+    constant_seeds: int = 1
 
     @property
     def seed_range(self) -> range:

@@ -114,7 +114,7 @@ def _plot_speeds(panel: Axes, report: dict[str, Any], colours: Mapping[str, str]
         if told:
             panel.bar([place for place, _ in told], [each["mean"] for _, each in told], 0.92 * width,
                       yerr=[each["sd"] for _, each in told],
-                      color=colour, alpha=0.3, ecolor="grey", capsize=3)  # fmt: skip
+                      color="0.85", edgecolor="0.6", ecolor="0.5", capsize=3)  # fmt: skip
         cells = [report["table"][rule][mud] for mud in muds]
         reached = [(place, cell) for place, cell in zip(places, cells, strict=True) if cell["mean"] is not None]
         panel.errorbar([place for place, _ in reached], [cell["mean"] for _, cell in reached],
@@ -126,7 +126,7 @@ def _plot_speeds(panel: Axes, report: dict[str, Any], colours: Mapping[str, str]
     panel.set_xticks(range(len(muds)), [_mud_name(mud) for mud in muds])
     panel.set_ylim(0.0, max(panel.get_ylim()[1], 9.0))
     panel.set_ylabel("speed (cm/s)")
-    panel.set_title("Table I: the paper's (bars), ours (dots)", fontsize="medium")
+    panel.set_title("Table I: the paper's (grey bars), ours (dots)", fontsize="medium")
     if best_depths:
         dots = Line2D([], [], color=TEXT, linestyle=":", label="best constant depth")
         panel.legend(handles=[dots], fontsize="small", loc="upper right")

@@ -28,6 +28,9 @@ def test_a_whole_session(bench: Any) -> None:
     too_early = bench.run("walk")
     assert too_early.returncode == exit_codes.REFUSED and "arm" in too_early.stderr
     assert bench.run("arm").stdout == "hold\n"
+    assert bench.run("move", "left_sweep=10", "right_sweep=10").stdout == "hold\n"
+    assert abs(json.loads(bench.run("status", "--json").stdout)["drives"][0]["angle_rad"] - 0.1745) < 0.03
+    assert "must be from" in bench.run("move", "left_sweep=170").stderr
     assert bench.run("walk", "--depth", "3").stdout == "walking\n"
     bench.wait_for(lambda report: report["strides_closed"] >= 2)
     status = json.loads(bench.run("status", "--json").stdout)
@@ -42,6 +45,13 @@ def test_a_whole_session(bench: Any) -> None:
     (path,) = (bench.logs / "done").glob("*.mcap")
     assert read_log(path).complete
     assert len(replay_file(path).strides) >= 2
+
+
+@pytest.mark.parametrize("text", ["left_sweep", "left_sweep=", "left_sweep=far", "left_sweep=nan", "=3"])
+def test_what_is_no_angle_of_a_joint_is_wrong_usage(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main.main(["move", text])
+    assert "must be a joint and its angle in degrees" in capsys.readouterr().err
 
 
 def test_sigterm_in_a_walk_finishes_safely(bench: Any) -> None:
