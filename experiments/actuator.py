@@ -16,8 +16,8 @@ from typing import Any
 from experiments.actuator_doubt import Doubt, doubt_of
 from experiments.actuator_fit import current_per_nm
 from experiments.actuator_hand import Hand
-from experiments.actuator_plan import Plan, Step, largest_current_a, letting_go_c, stays_cool, steps_of
-from experiments.actuator_reading import HeldJoint, MovedError, Reading
+from experiments.actuator_plan import COOL_K, Plan, Step, largest_current_a, stays_cool, steps_of
+from experiments.actuator_reading import HeldJoint, MovedError, Reading, WarmError
 from experiments.bench_robot import BenchError, BenchRobot, arm
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP, Person
@@ -26,7 +26,6 @@ from firmware_host.status_client import CallRefusedError
 KEEP, OTHER = "k", "o"
 MOST_FAULTS = 5  # of one weight
 MOST_REPEATS = 3  # of one weight that does not come to rest, or does not fit
-WARM_K = 3.0  # below letting go, where a person is told
 COOLING_S, LONGEST_COOLING_S = 1.0, 1800.0
 TICK_S = 0.01  # of waiting for a person, in which the robot is attended
 
@@ -81,10 +80,21 @@ class Calibration:
                 self._notebook.write(step.key, {"skipped": "on request"})
             elif answer == GO_ON:
                 self._read(step)
+        except WarmError as problem:
+            self._count(step, problem)
+            self._person.tell(f"{_named(step)} was not read: {problem}.")
+            self._hand.take_off()
         except (BenchError, CallRefusedError) as problem:
             self._recover(step, problem)
-            return GO_ON
-        return answer
+        else:
+            return answer
+        return GO_ON
+
+    def _count(self, step: Step, problem: Exception) -> None:
+        """Raises the problem where it does not end."""
+        self._faults[step.key] = self._faults.get(step.key, 0) + 1
+        if self._faults[step.key] >= MOST_FAULTS:
+            raise BenchError(f"{_named(step)} of {self._joint} cannot be read: {problem}") from problem
 
     # the robot
 
@@ -132,18 +142,18 @@ class Calibration:
     def _watch(self) -> None:
         """While a person is waited for."""
         self._robot.wait(TICK_S)
-        limit_c = letting_go_c(self._robot.configuration) - WARM_K
-        if not self._warned and self._winding_c() > limit_c:
+        warm_c, winding_c = self._robot.configuration.limits.temperature_warm_c - COOL_K, self._winding_c()
+        if not self._warned and winding_c > warm_c:
             self._warned = True
-            self._person.tell(f"The {self._joint} winding has {limit_c:.0f} degrees C, and the robot will let go.")
+            self._person.tell(f"The {self._joint} winding has {winding_c:.0f} degrees C: a weight would fall soon.")
             self._hand.take_off()
 
     def _recover(self, step: Step, problem: Exception) -> None:
-        """From a robot that let go. Raises the problem where it was another, or does not end."""
+        """From a robot that let go. Raises the problem where it is another."""
         status = self._robot.call("status")
-        self._faults[step.key] = self._faults.get(step.key, 0) + 1
-        if status["mode"] == "hold" or self._faults[step.key] >= MOST_FAULTS:
+        if status["mode"] == "hold":
             raise problem
+        self._count(step, problem)
         self._person.tell(f"{_named(step)} was not read: {problem}.")
         what_to_do = {fault["what_to_do"] for fault in status["faults"] if fault["blocks_arming"]}
         for sentence in sorted(what_to_do):

@@ -26,8 +26,8 @@ from firmware_host.configuration import Configuration
 PAPER_WEIGHTS_G = (10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 600.0, 800.0)
 PAPER_TRIALS = 5
 LARGEST_ERROR = 0.2  # by which a torque constant may be known wrongly: 60/(2π KV) for 8.27/KV is 15 % of it
-HANGING_S = 14.0  # that a weight hangs: until Enter is pressed, both approaches, until it is taken off
-COOL_K = 5.0  # below the temperature at which the robot lets go
+HANGING_S = 12.0  # that a weight hangs: until Enter is pressed, both approaches, until it is taken off
+COOL_K = 2.0  # below limits.temperature_warm_c, above which torque fades and a heavy weight falls
 
 
 @dataclass(frozen=True)
@@ -96,14 +96,9 @@ def _problems(plan: Plan, configuration: Configuration) -> Iterator[str]:
         if not stays_cool(configuration, most_a, configuration.winding.room_c):
             yield (
                 f"winding.thermal_resistance_k_w = {configuration.winding.thermal_resistance_k_w:g}: {heaviest_g:g} g"
-                f" would warm the winding of {joint} beyond {letting_go_c(configuration):g} degrees C within"
+                f" would warm the winding of {joint} beyond {configuration.limits.temperature_warm_c:g} degrees C in"
                 f" {HANGING_S:g} s; hang lighter weights (--weights), or at a shorter --lever"
             )
-
-
-def letting_go_c(configuration: Configuration) -> float:
-    """Where a warm winding ends the hold."""
-    return (configuration.limits.temperature_warm_c + configuration.limits.temperature_hot_c) / 2.0
 
 
 def largest_current_a(plan: Plan, configuration: Configuration, joint: str, weight_g: float) -> float:
@@ -117,4 +112,4 @@ def stays_cool(configuration: Configuration, current_a: float, winding_c: float)
     winding.temperature_c = winding_c
     for _ in range(round(HANGING_S)):
         winding.update(1.0, current_a, nan)
-    return winding.temperature_c <= letting_go_c(configuration) - COOL_K
+    return winding.temperature_c <= configuration.limits.temperature_warm_c - COOL_K

@@ -42,6 +42,10 @@ class MovedError(Exception):
     """The joint or its load did not come to rest; the text says what moved."""
 
 
+class WarmError(Exception):
+    """The winding came near the temperature above which torque fades, and the weight would fall."""
+
+
 class Sample(NamedTuple):
     now_s: float
     angle_rad: float
@@ -86,10 +90,11 @@ class HeldJoint:
         self._robot = robot
         self._joint = joint
         self._place = JOINTS.index(joint)
+        self._warm_c = robot.configuration.limits.temperature_warm_c
         self.held_rad = self.sample().angle_rad  # arming holds the pose that it finds
 
     def read(self) -> Reading:
-        """Raises MovedError, and BenchError where the robot does not hold any more."""
+        """Raises MovedError, WarmError, and BenchError where the robot does not hold any more."""
         below = self._from(1.0)
         above = self._from(-1.0)
         last = self.sample()
@@ -99,6 +104,8 @@ class HeldJoint:
         status: dict[str, Any] = self._robot.call("status")
         require_hold(status)
         drive = status["drives"][self._place]
+        if drive["winding_c"] >= self._warm_c:
+            raise WarmError(f"the {self._joint} winding has {drive['winding_c']:.0f} degrees C")
         return Sample(status["now_s"], drive["angle_rad"], drive["current_a"], drive["winding_c"])
 
     def _from(self, direction: float) -> Side:

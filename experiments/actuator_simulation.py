@@ -37,7 +37,7 @@ COULOMB_NM = 0.013
 CURRENT_NOISE_A = 0.2
 ENCODER_NOISE_RAD = 1e-4  # a quarter of a count
 BENCH_TORQUE_NM = 1.4  # what BENCH_CURRENT_A give by either constant
-HANGING_S = 1.0  # until a weight hangs quietly
+HANGING_S, HANGING_PARTS = 1.0, 20  # until a weight hangs quietly, and in how many steps it comes down
 LEVER_SD_M = 0.0003
 
 
@@ -100,8 +100,12 @@ class SimulatedHand:
             arm.mount.held = held
 
     def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
-        self.mount.hang(step.weight_g / 1000.0, self._plan.lever_m + self._random.gauss(0.0, LEVER_SD_M))
-        self._lockstep.run_for(HANGING_S)
+        """Gently: what is dropped on the arm swings it down to its end."""
+        before_kg, lever_m = self.mount.mass_kg, self._plan.lever_m + self._random.gauss(0.0, LEVER_SD_M)
+        for part in range(1, HANGING_PARTS + 1):
+            more_kg = (step.weight_g / 1000.0 - before_kg) * part / HANGING_PARTS
+            self.mount.hang(before_kg + more_kg, lever_m)
+            self._lockstep.run_for(HANGING_S / HANGING_PARTS)
         return GO_ON
 
     def take_off(self) -> None:
