@@ -37,14 +37,19 @@ class TerminalPerson:
             self.tell(f"{said!r} is no number from {low:g} to {high:g}")
 
     def tell(self, sentence: str) -> None:
-        print(sentence, file=sys.stderr, flush=True)
+        print(f"{_cleared()}{sentence}", file=sys.stderr, flush=True)
 
     def _hear(self, prompt: str, meanwhile: Callable[[], None]) -> str:
         """One line. Raises AbsentPersonError where there will be none."""
-        print(prompt, end="", file=sys.stderr, flush=True)
+        print(f"{_cleared()}{prompt}", end="", file=sys.stderr, flush=True)
         while not select.select([sys.stdin], [], [], LOOK_S)[0]:
             meanwhile()
         line = sys.stdin.readline()
         if not line:
             raise AbsentPersonError("the input has ended, and a person has to be asked: run it on a terminal")
         return line.strip()
+
+
+def _cleared() -> str:
+    """Takes away a bar of progress that stands in the line."""
+    return "\r\033[K" if sys.stderr.isatty() else ""

@@ -18,7 +18,7 @@ from experiments.actuator_fit import current_per_nm
 from experiments.actuator_hand import Hand
 from experiments.actuator_plan import COOL_K, Plan, Step, largest_current_a, stays_cool, steps_of
 from experiments.actuator_reading import HeldJoint, MovedError, Reading, WarmError
-from experiments.bench_robot import BenchError, BenchRobot, arm
+from experiments.bench_robot import BenchError, BenchRobot, arm, require_hold
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP, Person
 from firmware_host.status_client import CallRefusedError
@@ -101,6 +101,7 @@ class Calibration:
     def _hold(self, step: Step) -> None:
         """With torque on, an empty arm, and a winding that bears what comes."""
         if self._held is None or self._robot.call("status")["mode"] != "hold":
+            self._held = None
             self._hand.hold_level(self._joint, self._watch)
             self._cool(step)
             arm(self._robot)
@@ -140,7 +141,12 @@ class Calibration:
         return float(next(drive["winding_c"] for drive in drives if drive["joint"] == self._joint))
 
     def _watch(self) -> None:
-        """While a person is waited for."""
+        """While a person is waited for. Raises BenchError where the robot lets go meanwhile."""
+        self._attend()
+        if self._held is not None:
+            require_hold(self._robot.call("status"))
+
+    def _attend(self) -> None:
         self._robot.wait(TICK_S)
         warm_c, winding_c = self._robot.configuration.limits.temperature_warm_c - COOL_K, self._winding_c()
         if not self._warned and winding_c > warm_c:
@@ -196,7 +202,7 @@ class Calibration:
         if doubt.other_g is not None:
             answers[OTHER] = f"it was the {doubt.other_g:g} g"
         self._doubts[step.key] = self._doubts.get(step.key, 0) + 1
-        answer = self._person.ask(f"{_named(step)}: {doubt.sentence}", answers, self._watch)
+        answer = self._person.ask(f"{_named(step)}: {doubt.sentence}", answers, self._attend)  # a reading is at stake
         if answer == OTHER and doubt.other_g is not None:
             self._take_as(replace(step, weight_g=doubt.other_g), reading)
         elif answer == KEEP or self._doubts[step.key] >= MOST_REPEATS:

@@ -36,7 +36,8 @@ class PersonsHand:
         axle = "sweep" if joint.endswith("sweep") else "adduction"
         self._person.ask(
             f"Mount the robot with the {axle} axle of the {joint.split('_')[0]} flipper horizontal and the flipper out"
-            " over the edge. Take every weight off, hold the flipper level, and keep hands off the others.",
+            " over the edge, the other joints propped within their range. Take every weight off and hold the flipper"
+            " level: all four motors will hold.",
             {GO_ON: "it is held"},
             meanwhile,
         )

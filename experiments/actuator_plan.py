@@ -1,9 +1,11 @@
 """What of the actuator calibration is decided before it begins: joints, weights, lever, trials; whether they can be.
 
 The paper hangs eight weights from 10 to 800 g on one flipper (section II-B). A trial here is one pass through all of
-them in rising order, each hung anew, and not eight weights five times over: so what repeats badly (the hook's place on
-the arm, the magnets' warmth) shows in the spread between trials, and the winding cools while the light ones hang. The
-empty arm is read before the first and after every pass: what it takes to hold is the tare of both its neighbours.
+them, each hung anew, and not eight weights five times over: so what repeats badly (the hook's place on the arm, the
+magnets' warmth) shows in the spread between trials. The empty arm is read before the first and after every pass: what
+it takes to hold is the tare of both its neighbours. The first pass rises, so that what is wrong with the bench shows
+with the lightest weights, and the heaviest are judged by a constant that is known. The others take heavy and light in
+turn: 800 g warm a winding by 20 K in the ten seconds of a reading, and it cools while the light ones hang.
 
 Before a weight is asked for, its torque must be within the limits that the robot is configured with. The torque that
 leaves for the drive may be larger than the weight's own by as much as the torque constant is known wrongly, and a joint
@@ -12,7 +14,7 @@ that stands still near its limit is a fault. What the winding bears is asked aga
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from math import nan
 from typing import Any
@@ -61,9 +63,21 @@ class Step:
 
 
 def steps_of(plan: Plan) -> list[Step]:
-    weights_g = sorted(plan.weights_g)
-    passes = (Step(trial, weight_g) for trial in range(1, plan.trials + 1) for weight_g in (*weights_g, 0.0))
+    rising_g, mixed_g = sorted(plan.weights_g), in_turn(plan.weights_g)
+    passes = (
+        Step(trial, weight_g)
+        for trial in range(1, plan.trials + 1)
+        for weight_g in (*(rising_g if trial == 1 else mixed_g), 0.0)
+    )
     return [Step(0, 0.0), *passes]
+
+
+def in_turn(weights_g: Sequence[float]) -> list[float]:
+    """The heaviest, the lightest, the next heaviest ..."""
+    left, ordered = sorted(weights_g), list[float]()
+    while left:
+        ordered.append(left.pop(-1 if len(ordered) % 2 == 0 else 0))
+    return ordered
 
 
 def require_possible(plan: Plan, configuration: Configuration) -> None:

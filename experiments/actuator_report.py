@@ -20,10 +20,10 @@ PAPER_CONSTANT_NM_A = 0.083
 
 METHOD = """\
 A motor holds the flipper level while calibration weights hang on it (the paper's section II-B). A trial is one pass
-through all weights in rising order, each hung anew; the empty arm is read before and after each pass, and what it takes
-is taken off. The held angle is raised until the loaded arm itself is level, so that every weight has the same lever
-and meets the magnets' cogging in the same place. The place is approached from below and from above: the mean of the
-two currents is the load, half of their difference is dry friction.
+through all weights, each hung anew; the empty arm is read before and after each pass, and what it takes is taken off.
+The held angle is raised until the loaded arm itself is level, so that every weight has the same lever and meets the
+magnets' cogging in the same place. The place is approached from below and from above: the mean of the two currents is
+the load, half of their difference is dry friction.
 
 The line is current on torque, since the weights are known better than the currents: k_t is one over its slope, with
 the standard error of an ordinary least-squares fit. It does not hold the doubt of the lever: a millimetre of 12 cm is

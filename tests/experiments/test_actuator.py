@@ -71,6 +71,7 @@ class ScriptedHand:
         meanwhile()
 
     def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
+        self.meanwhile = meanwhile
         meanwhile()
         self.asked.append(step.key)
         self.robot.hanging_g = step.weight_g
@@ -227,6 +228,18 @@ def test_a_robot_that_lets_go_is_told_of_armed_again_and_the_weight_is_read_anew
     assert sorted(entries) == sorted(KEYS) and case.robot.armed == 2
     assert any("400 g was not read" in told and sentence in told for told in case.person.told)
     assert case.hand.asked.count(Step(1, 400.0).key) == 2
+
+
+def test_a_robot_that_lets_go_while_a_person_thinks_is_told_at_once(case: Case) -> None:
+    def doze() -> str:
+        case.robot.mode, case.robot.sentence = "fault", "The supply is low."
+        case.hand.meanwhile()
+        raise AssertionError("nobody was told")
+
+    case.on(Step(1, 200.0), doze)
+    entries = case.run()
+    assert any("200 g was not read" in told and "supply is low" in told for told in case.person.told)
+    assert sorted(entries) == sorted(KEYS)
 
 
 def test_a_robot_that_always_lets_go_ends_it_in_its_own_words(case: Case) -> None:

@@ -6,18 +6,25 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.actuator_plan import Plan, Step, require_possible, stays_cool, steps_of
+from experiments.actuator_plan import PAPER_WEIGHTS_G, Plan, Step, in_turn, require_possible, stays_cool, steps_of
 from experiments.actuator_simulation import bench_configuration
 from experiments.bench_robot import BenchError
 from firmware_host.configuration import Configuration
 
 
-def test_every_pass_rises_between_two_readings_of_the_empty_arm() -> None:
-    steps = steps_of(Plan(("left_sweep",), weights_g=(50.0, 10.0), trials=2))
+def test_passes_lie_between_readings_of_the_empty_arm_and_only_the_first_rises() -> None:
+    steps = steps_of(Plan(("left_sweep",), weights_g=(400.0, 10.0, 50.0), trials=3))
     assert [(step.trial, step.weight_g) for step in steps] == [
-        (0, 0.0), (1, 10.0), (1, 50.0), (1, 0.0), (2, 10.0), (2, 50.0), (2, 0.0),
+        (0, 0.0),
+        (1, 10.0), (1, 50.0), (1, 400.0), (1, 0.0),
+        (2, 400.0), (2, 10.0), (2, 50.0), (2, 0.0),
+        (3, 400.0), (3, 10.0), (3, 50.0), (3, 0.0),
     ]  # fmt: skip
     assert len({step.key for step in steps}) == len(steps)
+
+
+def test_heavy_and_light_come_in_turn() -> None:
+    assert in_turn(PAPER_WEIGHTS_G) == [800.0, 10.0, 600.0, 20.0, 400.0, 50.0, 200.0, 100.0]
 
 
 def test_the_torque_is_that_of_the_lever() -> None:
