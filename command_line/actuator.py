@@ -48,10 +48,11 @@ def _calibrate(options: argparse.Namespace, desk: Desk) -> Finding:
         for joint in plan.joints
         if (fit := fit_joint(joint, plan, readings[joint], drives[joint].torque_constant_nm_a)) is not None
     ]
-    written = _apply(target, fits, desk) if target else ""
+    applied = _applied(target, fits, desk) if target else ""
     omitted = len(left_out(plan, readings))
-    text = "\n".join([table(table_of(fits)), *_remarks(plan.joints, fits, omitted), *([written] if written else [])])
-    return Finding(report_of(plan, readings, fits), TITLE, sections_of(plan, readings, fits), text, logs)
+    text = "\n".join([table(table_of(fits)), *_remarks(plan.joints, fits, omitted), *([applied] if applied else [])])
+    report = report_of(plan, readings, fits) | {"applied": applied or None}
+    return Finding(report, TITLE, sections_of(plan, readings, fits), text, logs)
 
 
 def _bench(options: argparse.Namespace) -> ActuatorBench:
@@ -98,8 +99,15 @@ def _target(options: argparse.Namespace, desk: Desk, bench: ActuatorBench) -> Pa
     return path
 
 
+def _applied(path: Path, fits: Sequence[JointFit], desk: Desk) -> str:
+    """What was done. A file that cannot be changed costs no report."""
+    try:
+        return _apply(path, fits, desk)
+    except BenchError as problem:
+        return f"nothing was applied: {problem}"
+
+
 def _apply(path: Path, fits: Sequence[JointFit], desk: Desk) -> str:
-    """What was done. Raises BenchError where the file stays as it is against the person's will."""
     before = read_text(path)
     changes = {key: value for fit in fits for key, value in changes_of(fit).items()}
     for fit in fits:

@@ -53,7 +53,8 @@ def plot_errors(fits: Sequence[JointFit], path: Path) -> None:
                 1e3 * (fit.fitted_nm(load) - load.torque_nm) for load in fit.loads if load.weight_g == weight_g
             ]
             mean_mnm = fmean(errors_mnm)
-            axis.plot([place - 0.28, place + 0.28], [mean_mnm, mean_mnm], color="black", linewidth=1.8, zorder=3)
+            mean_label = "their mean" if place == len(weights_g) - 1 else None
+            axis.plot([place - 0.28, place + 0.28], [mean_mnm] * 2, color="black", linewidth=1.8, label=mean_label)
             axis.plot(
                 [place] * len(errors_mnm),
                 errors_mnm,

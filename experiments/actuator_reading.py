@@ -36,6 +36,8 @@ MOST_WINDOWS = 8
 STILL_RAD = radians(0.08)
 DRIFT_A = 0.05  # between the halves of a window, beyond what noise explains
 SIGMAS = 4.0
+CHANGED_A = 1.5  # between the approaches: eight times the friction of a motor of this size
+HIGHEST_RAD = radians(25.0)  # that the held angle may be away from level: four times the sag of 800 g
 
 
 class MovedError(Exception):
@@ -97,7 +99,9 @@ class HeldJoint:
         """Raises MovedError, WarmError, and BenchError where the robot does not hold any more."""
         below = self._from(1.0)
         above = self._from(-1.0)
-        last = self.sample()
+        last, change_a = self.sample(), below.current_a - above.current_a
+        if abs(change_a) > CHANGED_A:
+            raise MovedError(f"the two approaches differ by {change_a:+.1f} A, as if the load had changed between them")
         return Reading(last.now_s, below, above, last.winding_c)
 
     def sample(self) -> Sample:
@@ -142,6 +146,8 @@ class HeldJoint:
 
     def _hold(self, angle_rad: float) -> None:
         """In steps that do not throw the weight about."""
+        if abs(angle_rad) > HIGHEST_RAD:
+            raise MovedError("the motor does not bring the arm level: does too much hang on it, or is it in the way")
         steps = max(1, round(abs(angle_rad - self.held_rad) / STEP_RAD + 0.5))
         start_rad = self.held_rad
         for step in range(1, steps + 1):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import pty
@@ -13,11 +14,21 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
+from command_line.actuator import _applied as applied
+from command_line.actuator import _target as target_of
+from command_line.bench import Desk
 from command_line.main import main
+from experiments.actuator import Show
+from experiments.actuator_bench import Readings
+from experiments.actuator_fit import fit_joint
+from experiments.actuator_plan import Plan
 from experiments.actuator_simulation import TRUE_CONSTANT_NM_A
+from experiments.bench_robot import BenchError
 from experiments.notebook import Notebook
-from firmware_host.configuration import load_configuration
+from experiments.person import Person, Willing
+from firmware_host.configuration import load_configuration, parse_configuration
 from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
+from tests.experiments.test_actuator_fit import made_entries
 
 SHORT = ("experiment", "actuator", "--simulated", "--joint", "right_sweep", "--weights", "100,400,600", "--trials", "1")
 
@@ -120,3 +131,69 @@ def run_at_terminal(bench: Bench, command: list[str], answers: dict[str, str]) -
         killer.cancel()
         os.close(person)
     return shown
+
+
+class Plain:
+    """An ActuatorBench of which only the configuration is asked."""
+
+    def __init__(self, text: str) -> None:
+        self.configuration = parse_configuration(text)
+
+    def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
+        raise NotImplementedError
+
+    def copy_logs(self, folder: Path) -> list[Path]:
+        return []
+
+    def close(self) -> None:
+        pass
+
+
+def made_options(**values: object) -> argparse.Namespace:
+    return argparse.Namespace(**({"simulated": False, "apply": True, "config": None} | values))
+
+
+def made_desk(folder: Path, told: list[str]) -> Desk:
+    return Desk(folder, Willing(told.append), lambda done, total: None)
+
+
+def test_only_the_file_that_the_daemon_runs_with_is_changed(tmp_path: Path, example_text: str) -> None:
+    path = tmp_path / "other.toml"
+    path.write_text(example_text + "# edited\n", encoding="utf-8")
+    with pytest.raises(BenchError, match=r"the daemon does not run with .*other.toml"):
+        target_of(made_options(config=path), made_desk(tmp_path, []), Plain(example_text))
+
+
+def test_a_file_that_may_not_be_written_is_refused_before_the_work(
+    tmp_path: Path, example_text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(example_text, encoding="utf-8")
+    assert target_of(made_options(config=path), made_desk(tmp_path, []), Plain(example_text)) == path
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(BenchError, match="you may not write"):
+        target_of(made_options(config=path), made_desk(tmp_path, []), Plain(example_text))
+
+
+def test_a_doubtful_constant_is_not_written_and_a_good_one_is(tmp_path: Path, example_text: str) -> None:
+    path, plan, told = tmp_path / "mudskipper.toml", Plan(("right_sweep",), trials=4), list[str]()
+    path.write_text(example_text, encoding="utf-8")
+    doubtful, good = (fit_joint("right_sweep", plan, made_entries(plan, noise_a=noise), 0.083) for noise in (3.0, 0.02))
+    assert doubtful is not None and good is not None
+    assert "needs no change" in applied(path, [doubtful], made_desk(tmp_path, told))
+    assert "is not written" in told[0] and path.read_text(encoding="utf-8") == example_text
+    assert "is changed" in applied(path, [good], made_desk(tmp_path, told))
+    assert "+torque_constant_nm_a = 0.07" in told[-1]
+    written = load_configuration(path)
+    assert written.drive["right_sweep"].torque_constant_nm_a == pytest.approx(0.0719, abs=0.001)
+    assert written.friction["right_sweep"].coulomb_nm == pytest.approx(good.friction_nm, abs=1e-4)
+
+
+def test_what_cannot_be_applied_costs_no_report(tmp_path: Path, example_text: str) -> None:
+    plan, path = Plan(("right_sweep",), trials=4), tmp_path / "mudskipper.toml"
+    path.write_text(example_text, encoding="utf-8")
+    entries = {key: entry | {"current_a": 2.0 * entry["current_a"]} for key, entry in made_entries(plan).items()}
+    fit = fit_joint("right_sweep", plan, entries, 0.083)
+    assert fit is not None
+    told = applied(path, [fit], made_desk(tmp_path, []))
+    assert told.startswith("nothing was applied: the configuration stays as it is") and "current_limit_a" in told

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from experiments.actuator_plan import Plan, Step
-from experiments.actuator_reading import SAMPLE_S, HeldJoint, MovedError, Sample, unrest
+from experiments.actuator_reading import SAMPLE_S, HeldJoint, MovedError, Sample, Side, unrest
 from experiments.actuator_simulation import COULOMB_NM, TRUE_CONSTANT_NM_A, bench_configuration, simulated_bench
 from experiments.bench_robot import BenchError, arm
 
@@ -58,6 +58,45 @@ def test_an_arm_that_never_rests_is_not_read(tmp_path: Path) -> None:
         robot.call("disarm")
         plain_wait(0.1)
         with pytest.raises(BenchError, match="no longer holds its pose"):
+            held.read()
+    finally:
+        robot.close()
+
+
+def test_a_load_that_the_motor_does_not_lift_is_told(tmp_path: Path) -> None:
+    joint, plan = "right_adduction", Plan(("right_adduction",))
+    robot, hand = simulated_bench(bench_configuration(), joint, plan, 4, tmp_path / "log.mcap")
+    try:
+        hand.hold_level(joint, nothing)
+        arm(robot)
+        held = HeldJoint(robot, joint)
+        with pytest.raises(MovedError, match="does not bring the arm level"):  # a hand holds it 30 degrees down
+            robot.lockstep.robot.plant.arms[1].adduction_rad = -0.55
+            held.read()
+    finally:
+        robot.close()
+
+
+def test_a_weight_that_slips_off_between_the_approaches_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    joint, plan = "left_adduction", Plan(("left_adduction",))
+    robot, hand = simulated_bench(bench_configuration(), joint, plan, 5, tmp_path / "log.mcap")
+    try:
+        hand.hold_level(joint, nothing)
+        arm(robot)
+        hand.let_go(nothing)
+        hand.hang(Step(1, 200.0), nothing)
+        held = HeldJoint(robot, joint)
+        settled = HeldJoint._settled
+
+        def slipping(self: HeldJoint) -> Side:
+            side = settled(self)
+            hand.take_off()
+            return side
+
+        monkeypatch.setattr(HeldJoint, "_settled", slipping)
+        with pytest.raises(MovedError, match=r"differ by \+3\.[0-9] A, as if the load had changed"):
             held.read()
     finally:
         robot.close()
