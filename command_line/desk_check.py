@@ -1,21 +1,24 @@
 """`mudskipper check` where no daemon runs: would one start here, and are the drives there?
 
-Listens only; nothing is transmitted.
+Listens only; nothing is transmitted on a bus.
 """
 
 from __future__ import annotations
 
 import os
 import time
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from drivers.odrive_drives import OdriveDrives
+from drivers.pose_port import PoseSourceError
 from firmware_host.buses import BusError, open_ports
 from firmware_host.can_links import examine_bus, read_links
 from firmware_host.configuration import Configuration, ConfigurationError, load_configuration
 from firmware_host.host_checks import Account, examine_folder, examine_limits
 from firmware_host.host_facts import process_limits
+from firmware_host.pose_sources import open_pose
 from firmware_host.reports import check_item
 
 LISTENING_S = 0.6  # six heartbeats
@@ -29,7 +32,7 @@ def desk_check(path: Path, why_no_daemon: str) -> list[dict[str, Any]]:
     except ConfigurationError as problem:
         return items + [check_item("configuration", False, sentence, f"edit {path}") for sentence in problem.problems]
     items.append(check_item("configuration", True, str(path), ""))
-    return items + _drive_items(configuration) + _host_items(configuration)
+    return items + _drive_items(configuration) + _pose_items(configuration) + _host_items(configuration)
 
 
 def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
@@ -49,6 +52,21 @@ def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
     ]
     drives.close()
     return items
+
+
+def _pose_items(configuration: Configuration) -> list[dict[str, Any]]:
+    """Of a source at the other end of a wire. Without a pose a robot walks, but its daemon wants the source to open."""
+    if configuration.pose.chosen not in ("natnet", "rail_encoder"):
+        return []
+    try:
+        pose = open_pose(configuration.pose)
+    except PoseSourceError as problem:
+        return [check_item("pose", False, str(problem), "plug it in, or correct [pose] in the configuration")]
+    deadline_s = time.monotonic() + LISTENING_S
+    while not isfinite(pose.read(time.monotonic()).x_m) and time.monotonic() < deadline_s:
+        time.sleep(0.01)
+    pose.close()
+    return [check_item("pose", True, pose.report().sentence, "")]
 
 
 def _host_items(configuration: Configuration) -> list[dict[str, Any]]:

@@ -194,6 +194,8 @@ def status_text(report: dict[str, Any]) -> str:
     notices = [report["notice"]] if report["notice"] else []
     if report["forced"]:
         notices.append("armed by force, against what 'mudskipper check' says")
+    if report["pose"]["trouble"]:
+        notices.append(f"{report['pose']['trouble']} 'mudskipper check' says what to do")
     lines += [coloured(f"warning: {warning}", YELLOW) for warning in notices + report["warnings"]]
     lines += ["", _drives_table(report["drives"]), "", _loop_text(report)]
     return "\n".join(lines)
@@ -234,7 +236,8 @@ def _drives_table(drives: list[dict[str, Any]]) -> str:
 
 def _loop_text(report: dict[str, Any]) -> str:
     loop, bus, log = report["loop"], report["bus"], report["log"]
-    late, tick = loop["wake_late_us"], loop["tick_us"]
+    late, tick, pose = loop["wake_late_us"], loop["tick_us"], report["pose"]
+    seen = f"{pose['source']}: {pose['poses']} poses, {pose['garbled']} garbled, {pose['lost']} without the body"
     return "\n".join(
         (
             f"loop   {loop['rate_hz']:.2f} Hz, {loop['ticks']} ticks, {loop['missed_ticks']} missed",
@@ -244,6 +247,7 @@ def _loop_text(report: dict[str, Any]) -> str:
             f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends"
             + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")
             + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),
+            f"pose   {seen if pose['source'] else 'none'}",
             f"log    {log['path'] or 'off'}, {log['dropped']} rows dropped",
         )
     )

@@ -7,7 +7,7 @@ from math import isfinite
 
 from control.records import BodyPose
 from drivers.failures import NO_NUMBERS, Failure, FailureKind, Failures
-from drivers.pose_port import PoseSource
+from drivers.pose_port import PoseReport, PoseSource
 
 LATE_S = 0.2
 FAR_M = 100.0  # garbage that might be true
@@ -26,6 +26,9 @@ class FailingPose:
         body = self._pose.read(now_s)
         failure = self._failures.of("pose")
         return body if failure is None else self._spoiled(body, failure, now_s)
+
+    def report(self) -> PoseReport:
+        return self._pose.report()
 
     def _spoiled(self, body: BodyPose, failure: Failure, now_s: float) -> BodyPose:
         if self._since is not failure:

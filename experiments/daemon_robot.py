@@ -14,7 +14,7 @@ from typing import Any
 
 from experiments.bench_robot import UNDER_WAY, BenchError, cut
 from firmware_host.configuration import Configuration, parse_configuration
-from firmware_host.log_folder import run_files
+from firmware_host.log_folder import present_path, run_files
 from firmware_host.log_reader import Log, LogError, read_log, read_logs
 from firmware_host.log_recovery import recover_log
 from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
@@ -37,13 +37,13 @@ class DaemonRobot:
             raise BenchError(f"{problem}. {START_IT}") from problem
         self._configuration: Configuration | None = None
         self._renewed_s = 0.0
-        self._logs: list[Path] = []
 
     @property
     def configuration(self) -> Configuration:
         """As the daemon runs with it, from its log."""
-        if self._configuration is None:
-            self._configuration = parse_configuration(self._read(self._segments()[-1:]).configuration_text)
+        while self._configuration is None:
+            log = self._read(self._segments()[-1:])
+            self._configuration = log and parse_configuration(log.configuration_text)
         return self._configuration
 
     def call(self, method: str, **params: Any) -> Any:
@@ -71,33 +71,40 @@ class DaemonRobot:
         deadline_s = time.monotonic() + WRITTEN_S
         while True:
             log = self._read_since(from_s)
-            if len(log.ticks) and log.ticks["stamp_s"][-1] >= to_s:
+            if log is not None and len(log.ticks) and log.ticks["stamp_s"][-1] >= to_s:
                 return cut(log, from_s, to_s)
             if time.monotonic() > deadline_s:
                 raise BenchError("the log does not hold what was just done: 'mudskipper status' tells how it is")
             self.wait(RENEWAL_S)
 
-    def _read_since(self, from_s: float) -> Log:
-        """As few of the run's last segments as hold it."""
+    def _read_since(self, from_s: float) -> Log | None:
+        """As few of the run's last segments as hold it; None where one was just moved to its place."""
         segments = self._segments()
         for count in range(1, len(segments) + 1):
             log = self._read(segments[-count:])
-            if len(log.ticks) and log.ticks["stamp_s"][0] <= from_s:
-                break
+            if log is None or (len(log.ticks) and log.ticks["stamp_s"][0] <= from_s):
+                return log
         return log
 
-    def _read(self, segments: list[Path]) -> Log:
+    def _read(self, segments: list[Path]) -> Log | None:
+        """None where one was only just made, or has gone: a segment that is whole moves to another folder."""
         try:
             return read_logs(segments)
         except LogError as problem:
+            if not all(segment.exists() and segment.stat().st_size for segment in segments):
+                return None
             raise BenchError(f"the daemon's log cannot be read: {problem}") from problem
 
     def _segments(self) -> list[Path]:
         path = self.call("status")["log"]["path"]
         if path is None:
             raise BenchError("the daemon writes no log: set log.enabled = true in its configuration")
-        self._logs = run_files(Path(path)) or [Path(path)]
-        return self._logs
+        end_s = time.monotonic() + WRITTEN_S
+        while not (segments := run_files(Path(path))):  # its writer has only just started
+            if time.monotonic() > end_s:
+                raise BenchError(f"the daemon's log {path} is not on this computer")
+            self.wait(RENEWAL_S)
+        return segments
 
     def copy_logs(self, folder: Path) -> list[Path]:
         """Those of the daemon's present run; the one under way is ended in the copy."""
@@ -107,7 +114,7 @@ class DaemonRobot:
             raise BenchError(f"the daemon's log cannot be copied: {problem}") from problem
 
     def _copy(self, log: Path, copy: Path) -> Path:
-        shutil.copyfile(log, copy)
+        shutil.copyfile(present_path(log), copy)
         if not read_log(copy).complete:
             recover_log(copy)
         return copy

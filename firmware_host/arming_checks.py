@@ -30,7 +30,10 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
         lines[f"bus.{name}"] = f"{port.error_frames} error frames, {port.failed_sends} failed sends{lost}"
     lines["loop"] = f"{loop.timing.rate_hz:.1f} Hz, {loop.missed_ticks} ticks missed since the start"
     lines["log"] = log_text
-    faults = loop.faults.standing
+    pose = loop.pose.report()
+    if pose.source:
+        lines["pose"] = pose.sentence
+    faults = [fault for fault in loop.faults.standing if fault.check != "pose" or not pose.trouble]  # which says more
     for fault in faults:
         lines.setdefault(fault.check, "")
     unheard = {f"drive.{axis.joint}" for axis in loop.drives.axes if not axis.heard}

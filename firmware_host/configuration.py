@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from math import radians
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from control.adaptation import AdaptationParameters
 from control.bounds import Bounds
@@ -25,7 +25,9 @@ from control.records import JOINTS
 from control.recovery import RecoveryParameters
 from control.winding import WindingParameters
 from drivers.failures import FailureParameters
+from drivers.natnet_port import NatNetParameters
 from drivers.odrive_axis import DriveParameters, WatchdogEndpoints
+from drivers.rail_encoder import RailEncoderParameters
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
 from firmware_host.configuration_problems import contradictions
@@ -69,7 +71,18 @@ class StatusParameters:
 
 @dataclass(frozen=True)
 class PoseParameters:
-    socket: str = ""  # where a motion-capture bridge sends the body's place; empty: there is none
+    """Where the body's place along the track is known from."""
+
+    source: Literal["", "none", "socket", "natnet", "rail_encoder"] = ""  # empty: the socket where one is named
+    socket: str = ""  # where a motion-capture bridge sends the place
+    axis: object = "x"  # of motion capture's frame, along the track: x, -z, or three numbers
+    origin_m: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0  # along the axis, or of the encoder, where x is zero
+    natnet: NatNetParameters = NatNetParameters()
+    rail_encoder: RailEncoderParameters = RailEncoderParameters()
+
+    @property
+    def chosen(self) -> str:
+        return self.source or ("socket" if self.socket else "none")
 
 
 @dataclass(frozen=True)

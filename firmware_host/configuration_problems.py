@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from control.gait_adaptation import candidates
 from control.records import JOINTS
+from firmware_host.pose_problems import pose_problems
 
 if TYPE_CHECKING:
     from firmware_host.configuration import Configuration
@@ -24,6 +25,7 @@ ROUNDING = 1e-6  # of numbers that a file gives with few digits
 def contradictions(configuration: Configuration) -> Iterator[str]:
     """Each with key, value and bound."""
     yield from _text_problems(configuration)
+    yield from pose_problems(configuration.pose)
     yield from _drive_problems(configuration)
     yield from _friction_problems(configuration)
     yield from _motor_force_problems(configuration)

@@ -23,7 +23,7 @@ from drivers.failing_port import failing_ports
 from drivers.failing_pose import failing_pose
 from drivers.failures import Failures
 from drivers.odrive_drives import OdriveDrives
-from drivers.pose_port import PosePort
+from drivers.pose_port import OpenedPose, PoseSourceError
 from drivers.reopening_port import ReopeningPort
 from firmware_host.buses import BusError, reopening_ports
 from firmware_host.configuration import (
@@ -39,6 +39,7 @@ from firmware_host.lease import Lease
 from firmware_host.log_folder import first_path, new_run_id
 from firmware_host.loop import Loop
 from firmware_host.operator_calls import OperatorCalls, software_version
+from firmware_host.pose_sources import open_pose
 from firmware_host.realtime import prepare_loop
 from firmware_host.recorder import NullRecorder, Recorder
 from firmware_host.rights import Rights, load_rights
@@ -115,7 +116,10 @@ def open_recorder(configuration: Configuration) -> Recorder | NullRecorder:
 
 
 def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int:
-    """Until `shutdown` is wanted and done. Raises BusError, AlreadyServedError or OSError before it has begun."""
+    """Until `shutdown` is wanted and done.
+
+    Raises BusError, PoseSourceError, AlreadyServedError or OSError before it has begun.
+    """
     with ExitStack() as stack:
         # First: it refuses to be the second daemon.
         status = StatusSocket(Path(configuration.status.socket), {}, rights)
@@ -125,7 +129,7 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         ports = failing_ports(buses, configuration.drive, failures)
         drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         stack.callback(drives.close)
-        pose = PosePort(Path(configuration.pose.socket) if configuration.pose.socket else None)
+        pose = open_pose(configuration.pose)
         stack.callback(pose.close)
         recorder = failing_recorder(open_recorder(configuration), failures)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
@@ -144,12 +148,13 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         warnings += prepare_loop(options.priority, options.cpu, options.lock_memory)
         for warning in warnings:
             print(f"warning: {warning}", file=sys.stderr)
-        return _run_loop(loop, buses, failures, status, notifier, shutdown)
+        return _run_loop(loop, buses, pose, failures, status, notifier, shutdown)
 
 
 def _run_loop(
     loop: Loop,
     buses: Mapping[str, ReopeningPort],
+    pose: OpenedPose,
     failures: Failures | None,
     status: StatusSocket,
     notifier: SystemdNotifier,
@@ -166,6 +171,7 @@ def _run_loop(
             status.serve(now_s)
             watchdog.update(beat, loop.mode)
             reopen_buses(loop, buses, now_s)
+            reopen_pose(loop, pose, now_s)
         notifier.send("STOPPING=1")
         return 0
     except Exception as problem:  # noqa: BLE001 - the one place where surprises end
@@ -182,6 +188,12 @@ def reopen_buses(loop: Loop, buses: Mapping[str, ReopeningPort], now_s: float) -
     for name, port in buses.items():
         if port.reopen(now_s):
             loop.event(now_s, f"bus {name} opened again")
+
+
+def reopen_pose(loop: Loop, pose: OpenedPose, now_s: float) -> None:
+    """The same for a source that was unplugged."""
+    if loop.mode not in ENERGISED and pose.reopen(now_s):
+        loop.event(now_s, "the pose's source was opened again; its zero may be another one")
 
 
 def _end_safely(loop: Loop, problem: Exception) -> int:
@@ -213,7 +225,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _on_signals(shutdown.ask)
     try:
         return run(configuration, rights, shutdown)
-    except (BusError, AlreadyServedError) as problem:
+    except (BusError, PoseSourceError, AlreadyServedError) as problem:
         return _refuse([f"mudskipperd: {problem}"], EXIT_FAILED)
     except OSError as problem:
         place = f" {problem.filename}" if problem.filename else ""

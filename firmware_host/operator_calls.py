@@ -92,6 +92,7 @@ class OperatorCalls:
             "stride": loop.target_before.stride,
             "depth_m": loop.controller.gait.commanded_depth_m,
             "body_x_m": known(loop.body.x_m),
+            "pose": loop.pose.report()._asdict(),
             "drives": [self._drive(place) for place in range(len(JOINTS))],
             "strides_closed": loop.learning.strides_closed,
             "mud": belief_report(loop.learning.estimator.belief),

@@ -16,7 +16,7 @@ from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
 from control.records import NEVER_S, BodyPose
-from drivers.pose_port import STALE_S
+from drivers.pose_port import NO_SOURCE, STALE_S, PoseReport
 from simulation.plant import Plant
 
 
@@ -93,3 +93,6 @@ class SimulatedPose:
         for frame in self._capture.step(now_s, self._plant):
             self._pose = BodyPose(now_s, frame.x_m)
         return self._pose if now_s - self._pose.stamp_s <= STALE_S else BodyPose()
+
+    def report(self) -> PoseReport:
+        return NO_SOURCE

@@ -1,8 +1,8 @@
 """The simulated robot as a process of its own, in real time, on the buses that a configuration names.
 
 It reads of the configuration what a real robot's wiring would fix: buses, node ids, signs, geometry. The body's place
-goes to the pose socket at motion-capture rate. SIGUSR1 stands for the person who moves the flippers back by hand, where
-they came to lie at their mechanical stops, beyond the limits: no torque leads back from there.
+goes where its pose is to come from, at motion-capture rate. SIGUSR1 stands for the person who moves the flippers back
+by hand, where they came to lie at their mechanical stops, beyond the limits: no torque leads back from there.
 """
 
 from __future__ import annotations
@@ -17,13 +17,11 @@ from contextlib import suppress
 from pathlib import Path
 
 from control.records import JOINTS
-from drivers.pose_port import PoseSender
 from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration import EXIT_CONFIGURATION, Configuration, ConfigurationError, load_configuration
 from firmware_host.ticker import Ticker
 from simulation.clay import MUDS
-from simulation.motion_capture import OF_THE_PAPER, MotionCapture
-from simulation.plant import Plant
+from simulation.pose_broadcast import PoseBroadcast
 from simulation.robot import SimulatedRobot
 from simulation.track import COMPARTMENT_M, Track
 from simulation.world import World, load_world
@@ -33,19 +31,6 @@ WATCHDOG_S = 0.25  # of the simulated drives, on processors that everything shar
 LONGEST_CATCH_UP_S = 0.02  # a robot that was held up for longer has lost that time: commands waited meanwhile
 NICENESS = -10  # where it is permitted: a real robot does not wait for its computer
 PR_SET_PDEATHSIG = 1
-
-
-class PoseBroadcast:
-    """Sends the body's place as motion capture sees it."""
-
-    def __init__(self, path: str, seed: int) -> None:
-        self._sender = PoseSender(Path(path)) if path else None
-        self._capture = MotionCapture(OF_THE_PAPER, seed)
-
-    def step(self, now_s: float, plant: Plant) -> None:
-        if self._sender is not None:
-            for frame in self._capture.step(now_s, plant):
-                self._sender.send(*frame)
 
 
 class Peer:
@@ -61,7 +46,7 @@ class Peer:
             seed,
             start_s=self.ticker.wait().now_s,
         )
-        self._pose = PoseBroadcast(configuration.pose.socket, seed + 1)
+        self._pose = PoseBroadcast(configuration.pose, seed + 1)
         self.ended = False
 
     def end(self, number: int, frame: object) -> None:
@@ -80,6 +65,7 @@ class Peer:
         self._pose.step(now_s, self.robot.plant)
 
     def close(self) -> None:
+        self._pose.close()
         for port in self._ports.values():
             port.close()
 
@@ -111,6 +97,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return EXIT_CONFIGURATION
     except BusError as problem:
         print(problem, file=sys.stderr)
+        return 1
+    except OSError as problem:
+        print(f"the body's place cannot be told from here: {problem.strerror or problem}", file=sys.stderr)
         return 1
     signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.lend_hand())
     for number in (signal.SIGTERM, signal.SIGINT):

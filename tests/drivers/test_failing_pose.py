@@ -9,6 +9,7 @@ import pytest
 from control.records import BodyPose
 from drivers.failing_pose import LATE_S, FailingPose, failing_pose
 from drivers.failures import Failures
+from drivers.pose_port import NO_SOURCE, PoseReport
 
 PERIOD_S = 0.01
 BEGIN_S, END_S, STOP_S = 0.5, 1.5, 2.0
@@ -19,6 +20,9 @@ class RisingPose:
 
     def read(self, now_s: float) -> BodyPose:
         return BodyPose(now_s, now_s)
+
+    def report(self) -> PoseReport:
+        return NO_SOURCE
 
 
 def run(kind: str, seed: int = 1) -> list[tuple[float, BodyPose]]:

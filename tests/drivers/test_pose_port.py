@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.records import NEVER_S
-from drivers.pose_port import STALE_S, PosePort, PoseSender
+from drivers.pose_port import STALE_S, NoPose, PosePort, PoseSender, PoseSourceError
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def test_a_pose_ends_when_it_is_stale(port: PosePort, sender: PoseSender) -> Non
 
 def test_there_is_no_pose_without_a_message_or_without_a_socket(port: PosePort) -> None:
     assert port.read(1.0).stamp_s == NEVER_S
-    assert PosePort(None).read(1.0).stamp_s == NEVER_S
+    assert NoPose().read(1.0).stamp_s == NEVER_S
 
 
 def test_a_reset_forgets_the_pose(port: PosePort, sender: PoseSender) -> None:
@@ -118,3 +118,19 @@ def test_a_socket_left_by_a_killed_process_is_replaced(path: Path) -> None:
     send_bytes(path, struct.pack("<dd", 0.0, 0.5))
     assert port.read(1.0).x_m == 0.5
     port.close()
+
+
+def test_a_socket_that_cannot_be_opened_is_told_in_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(PoseSourceError, match="^the pose socket .*/missing/pose cannot be opened: No such file"):
+        PosePort(tmp_path / "missing" / "pose")
+
+
+def test_it_is_told_whether_poses_come(port: PosePort, sender: PoseSender, path: Path) -> None:
+    port.read(0.0)
+    assert port.report().trouble == f"no pose comes through {path} yet."
+    sender.send(0.0, 0.1)
+    send_bytes(path, b"short")
+    port.read(1.0)
+    assert port.report()[1:5] == (1, 1, 0, "")
+    port.read(1.0 + 2.0 * STALE_S)
+    assert "any more" in port.report().trouble and port.report().what_to_do

@@ -1,14 +1,12 @@
 """Motion capture: how often, how late and how well the body's place is known."""
 
 from math import isfinite, isnan
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from control.controller import WalkOrder
 from control.records import BodyPose
-from drivers.pose_port import PosePort
 from firmware_host.configuration import Configuration
 from simulation.clay import MUDS
 from simulation.lockstep import Lockstep
@@ -20,7 +18,6 @@ from simulation.motion_capture import (
     MotionCaptureParameters,
     SimulatedPose,
 )
-from simulation.peer import PoseBroadcast
 from simulation.plant import Plant, PlantParameters
 from simulation.track import Track
 
@@ -132,14 +129,3 @@ def test_the_loop_sees_120_places_a_second_where_it_is_told_so(configuration: Co
             places_m.add(lockstep.loop.body.x_m)
     assert len(seen[AT_EVERY_TICK]) == 380
     assert len(seen[OF_THE_PAPER]) in (120, 121)  # the second may begin between two frames
-
-
-def test_the_peer_broadcasts_at_the_paper_s_rate(short_folder: Path) -> None:
-    port = PosePort(short_folder / "pose")
-    broadcast, plant, received = PoseBroadcast(str(short_folder / "pose"), 1), make_plant(0.7), []
-    for step in range(500):
-        broadcast.step(step * 0.002, plant)
-        received.append(port.read(step * 0.002))
-    port.close()
-    assert len({pose.stamp_s for pose in received}) == 120
-    assert all(abs(pose.x_m - 0.7) < 0.001 for pose in received)  # ten times the noise

@@ -1,0 +1,23 @@
+"""Opens the source of the body's pose that the configuration names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from drivers.natnet_port import NatNetPort
+from drivers.pose_port import NoPose, OpenedPose, PosePort
+from drivers.rail_encoder import RailEncoder
+from drivers.track_axis import AXES, parse_axis
+from firmware_host.configuration import PoseParameters
+
+
+def open_pose(pose: PoseParameters) -> OpenedPose:
+    """Raises PoseSourceError."""
+    match pose.chosen:
+        case "socket":
+            return PosePort(Path(pose.socket))
+        case "natnet":
+            return NatNetPort(pose.natnet, parse_axis(pose.axis) or AXES["x"], pose.origin_m)
+        case "rail_encoder":
+            return RailEncoder(pose.rail_encoder, pose.origin_m)
+    return NoPose()

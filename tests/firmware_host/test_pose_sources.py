@@ -1,0 +1,242 @@
+"""Where the body's place comes from: as configured, as opened, and as a person is told of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from control.modes import Mode
+from control.records import BodyPose
+from drivers.natnet_port import NatNetPort
+from drivers.pose_port import NoPose, PosePort, PoseReport, PoseSender, PoseSourceError
+from drivers.rail_encoder import RailEncoder
+from drivers.track_axis import parse_axis
+from firmware_host.arming_checks import arming_checks
+from firmware_host.configuration import (
+    EXIT_CONFIGURATION,
+    Configuration,
+    ConfigurationError,
+    PoseParameters,
+    parse_configuration,
+)
+from firmware_host.daemon import EXIT_FAILED, main, reopen_pose
+from firmware_host.pose_sources import open_pose
+from simulation.clay import MUDS
+from simulation.local_setup import write_local_setup
+from simulation.lockstep import Lockstep
+from simulation.natnet_server import NatNetServer, RecordedPose
+from simulation.rail_encoder_emulator import RailEncoderEmulator
+from simulation.track import Track
+
+NATNET = 'source = "natnet"\n'
+ENCODER = 'source = "rail_encoder"\n[pose.rail_encoder]\n'
+
+
+def pose_of(example_text: str, section: str) -> PoseParameters:
+    return parse_configuration(f"{example_text}\n[pose]\n{section}").pose
+
+
+def problems_of(example_text: str, section: str) -> list[str]:
+    with pytest.raises(ConfigurationError) as caught:
+        pose_of(example_text, section)
+    return caught.value.problems
+
+
+@pytest.mark.parametrize(
+    ("section", "chosen"),
+    [
+        ("", "none"),
+        ('socket = "/run/pose"', "socket"),
+        ('source = "socket"\nsocket = "/run/pose"', "socket"),
+        ('source = "none"\nsocket = "/run/pose"', "none"),
+        (NATNET + '[pose.natnet]\nserver = "192.168.1.10"', "natnet"),
+        (NATNET + '[pose.natnet]\nversion = "4.1"', "natnet"),
+        (
+            NATNET + 'axis = [0.7, 0, -0.7]\n[pose.natnet]\nserver = "10.0.0.1"\ngroup = ""\ninterface = "eth0"',
+            "natnet",
+        ),
+        (ENCODER + 'device = "/dev/ttyACM0"\nmetres_per_count = -0.00001', "rail_encoder"),
+    ],
+)
+def test_these_sections_choose_a_source(example_text: str, section: str, chosen: str) -> None:
+    assert pose_of(example_text, section).chosen == chosen
+
+
+@pytest.mark.parametrize(
+    ("section", "told"),
+    [
+        ('source = "gps"', "pose.source = 'gps': should be"),
+        ('source = "socket"', "pose.socket = '': must name a socket where pose.source = 'socket'"),
+        (NATNET + 'socket = "/s"\n[pose.natnet]\nversion = "4.1"', "pose.socket = '/s': must be left out where"),
+        ('axis = "w"', "pose.axis = 'w': must be x, y or z"),
+        ("axis = [0, 0, 0]", "pose.axis = [0, 0, 0]: must be x, y or z"),
+        ("axis = [1, 0]", "pose.axis = [1, 0]: must be"),
+        ("axis = [true, 0, 0]", "pose.axis = [True, 0, 0]: must be"),
+        ("axis = [inf, 0, 0]", "pose.axis = [inf, 0, 0]: must be"),
+        ("axis = 1979-05-27", "pose.axis = datetime.date(1979, 5, 27): must be"),
+        ("origin_m = nan", "pose.origin_m = nan: "),
+        (NATNET, "pose.natnet.version = '': must be given where no pose.natnet.server can be asked for it"),
+        (NATNET + '[pose.natnet]\ngroup = ""\nversion = "4.1"', "pose.natnet.server = '': must be given where"),
+        (NATNET + '[pose.natnet]\nserver = "motive.lab"', "pose.natnet.server = 'motive.lab': must be an address"),
+        (NATNET + '[pose.natnet]\nversion = "4.1"\ngroup = "10.0.0.1"', "pose.natnet.group = '10.0.0.1': must be from"),
+        (NATNET + '[pose.natnet]\nversion = "2.5"', "pose.natnet.version = '2.5': must be from 2.6"),
+        (NATNET + '[pose.natnet]\nversion = "4"', "pose.natnet.version = '4': must be from 2.6"),
+        (NATNET + '[pose.natnet]\nversion = "4.1"\nbody = "a"', "pose.natnet.body = 'a': needs a pose.natnet.server"),
+        (
+            NATNET + '[pose.natnet]\nserver = "10.0.0.1"\nbody = "a"\nbody_id = 3',
+            "pose.natnet.body_id = 3: must be left out",
+        ),
+        (NATNET + '[pose.natnet]\nversion = "4.1"\ninterface = "a/b"', "pose.natnet.interface = 'a/b': must be a name"),
+        (NATNET + '[pose.natnet]\nversion = "4.1"\nport = 0', "pose.natnet.port = 0: must be at least 1"),
+        (ENCODER + "metres_per_count = 0.001", "pose.rail_encoder.device = '': must name a serial port"),
+        (ENCODER + 'device = "/dev/ttyACM0"', "pose.rail_encoder.metres_per_count = 0.0: must be given, and not 0"),
+        (
+            ENCODER + 'device = "a"\nmetres_per_count = 2.0',
+            "pose.rail_encoder.metres_per_count = 2.0: must be at most 1.0",
+        ),
+        (ENCODER + "baud = 9600", "pose.rail_encoder.baud: there is no such key"),
+    ],
+)
+def test_what_does_not_go_together_is_refused_by_key_value_and_bound(
+    example_text: str, section: str, told: str
+) -> None:
+    assert any(sentence.startswith(told) for sentence in problems_of(example_text, section))
+
+
+def test_the_section_that_the_example_shows_is_valid(example_text: str) -> None:
+    before, heading, shown = example_text.partition("# [pose]\n")
+    text = before + "".join(line.removeprefix("# ").removeprefix("#") for line in (heading + shown).splitlines(True))
+    pose = parse_configuration(text).pose
+    assert pose.chosen == "natnet" and pose.natnet.body == "mudskipper"
+    assert pose.rail_encoder.metres_per_count == 1e-5
+
+
+def test_an_axis_is_a_unit_vector() -> None:
+    assert parse_axis("x") == (1.0, 0.0, 0.0)
+    assert parse_axis("-z") == (0.0, 0.0, -1.0)
+    assert parse_axis([0, 3, -4.0]) == (0.0, 0.6, -0.8)
+    assert parse_axis("--x") is parse_axis("") is parse_axis(3) is parse_axis(["x", 0, 0]) is None
+
+
+def test_what_is_chosen_is_opened(example_text: str, short_folder: Path) -> None:
+    assert isinstance(open_pose(PoseParameters()), NoPose)
+    with closing(open_pose(PoseParameters(socket=str(short_folder / "pose")))) as pose:
+        assert isinstance(pose, PosePort)
+    natnet = pose_of(
+        example_text, NATNET + 'axis = "-y"\norigin_m = 1.0\n[pose.natnet]\nserver = "127.0.0.1"\ngroup = ""'
+    )
+    with closing(open_pose(natnet)) as pose:
+        assert isinstance(pose, NatNetPort)
+
+
+def test_motion_capture_is_read_along_the_configured_axis(example_text: str) -> None:
+    poses = [RecordedPose(0.01 * frame, (0.0, -3.0 - 1e-6 * frame, 0.0)) for frame in range(20)]
+    with NatNetServer(poses) as server:
+        section = NATNET + 'axis = "-y"\norigin_m = 1.0\n[pose.natnet]\nserver = "127.0.0.1"\ngroup = ""\n'
+        section += f"command_port = {server.address[1]}"
+        with closing(open_pose(pose_of(example_text, section))) as pose:
+            seen = []
+            for tick in range(-1, 19):
+                seen.append(pose.read(0.01 * tick).x_m)
+                server.step(0.01 * tick)
+    assert seen[-1] == pytest.approx(2.0, abs=1e-4)
+
+
+def test_a_rail_encoder_is_opened(example_text: str, tmp_path: Path) -> None:
+    pytest.importorskip("serial", reason="pyserial is not installed")
+    counter = RailEncoderEmulator(tmp_path / "encoder", 1e-5)
+    section = f'{ENCODER}device = "{counter.device}"\nmetres_per_count = 1e-5'
+    with closing(open_pose(pose_of(example_text, section))) as pose:
+        assert isinstance(pose, RailEncoder)
+    counter.unplug()
+    with pytest.raises(PoseSourceError, match="does not open"):
+        open_pose(pose_of(example_text, section))
+
+
+def test_the_daemon_refuses_what_it_cannot_open_in_one_sentence(
+    short_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("serial", reason="pyserial is not installed")
+    path = write_local_setup(short_folder, short_folder / "logs")
+    text = path.read_text(encoding="utf-8")
+    before, _, after = text.partition("[pose]\n")
+    after = after.partition("\n\n")[2]
+    path.write_text(
+        f'{before}[pose]\n{ENCODER}device = "/dev/nothing"\nmetres_per_count = 1e-5\n\n{after}', encoding="utf-8"
+    )
+    assert main(["--config", str(path)]) == EXIT_FAILED
+    told = capsys.readouterr().err
+    assert told == "mudskipperd: the rail encoder /dev/nothing does not open: No such file or directory\n"
+    path.write_text(f"{before}[pose]\n{NATNET}\n{after}", encoding="utf-8")
+    assert main(["--config", str(path)]) == EXIT_CONFIGURATION
+
+
+class MadeUpSource:
+    """A source that was lost, and can be opened again once."""
+
+    def __init__(self) -> None:
+        self.told = PoseReport("camera", 12, 3, 4)
+        self.gone = True
+
+    def read(self, now_s: float) -> BodyPose:
+        return BodyPose()
+
+    def report(self) -> PoseReport:
+        return self.told
+
+    def reopen(self, now_s: float) -> bool:
+        self.gone, was_gone = False, self.gone
+        return was_gone
+
+    def close(self) -> None:
+        return
+
+
+@pytest.fixture
+def robot(configuration: Configuration) -> Iterator[Lockstep]:
+    robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
+    robot.run_until(lambda: robot.loop.mode is Mode.IDLE, 3.0)
+    yield robot
+
+
+def pose_line(robot: Lockstep) -> dict[str, Any]:
+    (line,) = [item for item in arming_checks(robot.loop, "log", []) if item["id"] == "pose"]
+    return line
+
+
+def test_check_tells_of_the_source_and_of_its_trouble_but_lets_arm(robot: Lockstep) -> None:
+    source = robot.loop.pose = MadeUpSource()
+    line = pose_line(robot)
+    assert line["ok"] and line["text"] == "camera: 12 poses, 3 messages garbled, 4 without the body"
+    source.told = source.told._replace(trouble="it is dark.", what_to_do="switch on the light")
+    line = pose_line(robot)
+    assert line["ok"] and line["text"].startswith("warning: it is dark. Switch on the light. camera: 12 poses")
+
+
+def test_a_source_is_opened_again_only_while_the_torque_is_off(robot: Lockstep) -> None:
+    source = MadeUpSource()
+    robot.arm()
+    reopen_pose(robot.loop, source, robot.now_s)
+    assert source.gone
+    robot.loop.mode = Mode.IDLE
+    reopen_pose(robot.loop, source, robot.now_s)
+    assert not source.gone
+
+
+def test_a_socket_s_poses_reach_the_loop(robot: Lockstep, short_folder: Path) -> None:
+    with closing(open_pose(PoseParameters(socket=str(short_folder / "pose")))) as pose:
+        robot.loop.pose = pose
+        sender = PoseSender(short_folder / "pose")
+        sender.send(0.0, 0.25)
+        robot.step()
+        assert robot.loop.body.x_m == 0.25
+        robot.run_for(0.3)
+        assert not isfinite(robot.loop.body.x_m)
+        assert "pose_lost" in {fault.name for fault in robot.loop.faults.standing}
+        assert f"no pose comes through {short_folder}/pose any more. Start" in pose_line(robot)["text"]
+        sender.close()

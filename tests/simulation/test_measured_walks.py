@@ -1,0 +1,165 @@
+"""The authors' walks through the whole way of a pose: captured places as NatNet frames over UDP, read tick by tick
+beside the joints, against what their log says directly.
+
+What the capture says is worked out here, from the log's own columns.
+"""
+
+from __future__ import annotations
+
+import gzip
+import os
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from control.geometry import FlipperGeometry
+from control.records import JointAngles, Phase
+from drivers.natnet_port import NatNetParameters, NatNetPort
+from estimation.mud import Currents, EstimationParameters, MudEstimator
+from firmware_host.lab_csv import LabLog, read_lab_csv
+from firmware_host.replay import LAB_DRIVE, NO_VELOCITY
+from simulation.natnet_server import LOOPBACK, NatNetServer, RecordedPose
+
+Floats = NDArray[np.float64]
+SHARED = Path(os.environ.get("MUDSKIPPER_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
+WALKS = sorted((SHARED / "flipper_in_mud").glob("walk_*.csv.gz"))
+PHASES = tuple(Phase)
+INSERTION, STANCE = 2, 3  # of turtle_state
+FROZEN_S, LEAP_M = 0.5, 0.02
+BOUND_M = 0.003
+LATENCIES_S = (0.0, 0.008)  # from exposure to arrival: none, and a usual one
+
+pytestmark = pytest.mark.skipif(not WALKS, reason="the shared measurements are not beside the repository")
+each_walk = pytest.mark.parametrize("path", WALKS, ids=lambda path: path.name.removesuffix(".csv.gz"))
+each_latency = pytest.mark.parametrize("latency_s", LATENCIES_S)
+
+
+@dataclass(frozen=True)
+class Capture:
+    """What the log says of the body."""
+
+    time_s: Floats
+    state: Floats
+    position_m: Floats  # (n, 3)
+    first: NDArray[np.int64]  # rows in which a pose is new
+    lost: NDArray[np.bool_]  # rows of a pose that was held until it leapt
+    direction: Floats
+
+    @property
+    def x_m(self) -> Floats:
+        """Along the direction in which the stances moved the body; NaN where the capture was lost."""
+        x_m: Floats = np.where(self.lost, np.nan, self.position_m @ self.direction)
+        return x_m
+
+    @property
+    def insertions(self) -> NDArray[np.int64]:
+        return np.flatnonzero((self.state[1:] == INSERTION) & (self.state[:-1] != INSERTION)) + 1
+
+
+@cache
+def capture_of(path: Path) -> Capture:
+    lines = gzip.decompress(path.read_bytes()).decode().splitlines()
+    names = [name.strip() for name in lines[1].split(",")]
+    table = np.loadtxt(lines[2:], delimiter=",")
+    time_s, state = (table[:, names.index(name)] for name in ("time", "turtle_state"))
+    position_m = table[:, [names.index(f"OptitrackPosition_{axis}") for axis in "xyz"]]
+    first = np.flatnonzero(np.any(np.diff(position_m, axis=0, prepend=np.nan) != 0.0, axis=1))
+    ends = np.append(first[1:], len(time_s))
+    leaps_m = np.append(np.linalg.norm(np.diff(position_m[first], axis=0), axis=1), 0.0)
+    lost = np.repeat((time_s[ends - 1] - time_s[first] > FROZEN_S) & (leaps_m > LEAP_M), ends - first)
+    inside = (state[1:] == STANCE) & (state[:-1] == STANCE) & ~lost[1:] & ~lost[:-1]
+    way_m = np.diff(position_m, axis=0)[inside].sum(axis=0)
+    return Capture(time_s, state, position_m, first, lost, way_m / np.linalg.norm(way_m))
+
+
+@dataclass(frozen=True)
+class Walked:
+    """What the robot would have known."""
+
+    x_m: Floats  # of each row
+    ends: NDArray[np.int64]  # rows in which a stride of the left flipper closed
+    steps_m: Floats  # of those strides, by the estimator
+
+
+@cache
+def walked(path: Path, latency_s: float) -> Walked:
+    """Row by row, with the log's time."""
+    capture, lab = capture_of(path), read_lab_csv(path)
+    poses = [RecordedPose(float(capture.time_s[row]), tuple(capture.position_m[row].tolist())) for row in capture.first]
+    server = NatNetServer(poses, latency_s=latency_s, crowded=True)
+    x, y, z = capture.direction.tolist()
+    parameters = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
+    estimator = MudEstimator(FlipperGeometry(), (LAB_DRIVE, LAB_DRIVE), EstimationParameters())
+    places_m, ends, steps_m = [], [], []
+    with closing(server), closing(NatNetPort(parameters, (x, y, z))) as port:
+        connect(server, port)
+        for row, (now_s, phase, angles_rad, currents_a) in enumerate(rows_of(lab)):
+            server.step(now_s)
+            body = port.read(now_s)
+            reading = estimator.update(now_s, phase, angles_rad, NO_VELOCITY, currents_a, body.x_m)
+            places_m.append(body.x_m)
+            ends += [row for stride in reading.strides if stride.flipper == "left"]
+            steps_m += [stride.step_m for stride in reading.strides if stride.flipper == "left"]
+        assert port.garbled == 0
+    return Walked(np.array(places_m), np.array(ends), np.array(steps_m))
+
+
+def connect(server: NatNetServer, port: NatNetPort) -> None:
+    """Before the log begins."""
+    for now_s in (-2.0, -1.0):
+        port.read(now_s)
+        server.step(now_s)
+
+
+def rows_of(lab: LabLog) -> Iterator[tuple[float, Phase, JointAngles, Currents]]:
+    columns = (lab.stamp_s, lab.phase, lab.angle_rad, lab.current_a)
+    for now_s, phase, angles_rad, currents_a in zip(*(column.tolist() for column in columns), strict=True):
+        yield now_s, PHASES[phase], angles_rad, currents_a
+
+
+@each_latency
+@each_walk
+def test_steps_from_insertion_to_insertion_are_those_of_the_capture(path: Path, latency_s: float) -> None:
+    """None is missing where the capture saw both ends, and none is made up where it did not."""
+    capture, starts = capture_of(path), capture_of(path).insertions
+    true_m, told_m = np.diff(capture.x_m[starts]), np.diff(walked(path, latency_s).x_m[starts])
+    assert len(true_m) >= 2
+    seen = np.isfinite(true_m)
+    assert not np.any(np.isfinite(told_m[~seen]))
+    assert np.all(np.abs(told_m - true_m)[seen & np.isfinite(told_m)] < BOUND_M)
+    if latency_s == 0.0:
+        assert np.all(np.isfinite(told_m[seen]))
+
+
+@each_latency
+@each_walk
+def test_the_estimator_s_steps_are_those_of_the_capture(path: Path, latency_s: float) -> None:
+    """Between the moments at which its strides close, as swing begins."""
+    capture, known = capture_of(path), walked(path, latency_s)
+    assert len(known.ends) >= 2
+    true_m = np.diff(capture.x_m[known.ends])
+    assert np.all(np.isfinite(true_m))
+    assert np.all(np.abs(known.steps_m[1:] - true_m) < BOUND_M)
+
+
+@each_walk
+def test_the_place_is_that_of_the_capture_at_all_times(path: Path) -> None:
+    capture, known = capture_of(path), walked(path, 0.0)
+    error_m = np.abs(known.x_m - capture.x_m)
+    error_m = error_m[np.isfinite(error_m)]
+    assert len(error_m) > 0.75 * np.count_nonzero(~capture.lost)
+    assert np.sqrt(np.mean(error_m**2)) < 0.0005 and error_m.max() < 0.01
+
+
+def test_where_the_capture_was_lost_no_pose_is_told() -> None:
+    """In one walk it shows two old places for 6.6 s."""
+    for path in WALKS:
+        capture = capture_of(path)
+        assert not np.any(np.isfinite(walked(path, 0.0).x_m[capture.lost])), path.name
+    assert any(np.any(capture_of(path).lost) for path in WALKS)
