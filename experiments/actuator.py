@@ -16,7 +16,7 @@ from typing import Any
 from experiments.actuator_doubt import Doubt, doubt_of
 from experiments.actuator_fit import current_per_nm
 from experiments.actuator_hand import Hand
-from experiments.actuator_plan import COOL_K, Plan, Step, largest_current_a, stays_cool, steps_of
+from experiments.actuator_plan import COOL_K, READING_S, Plan, Step, largest_current_a, stays_cool, steps_of
 from experiments.actuator_reading import HeldJoint, MovedError, Reading, WarmError
 from experiments.bench_robot import BenchError, BenchRobot, arm, require_hold
 from experiments.notebook import Notebook
@@ -112,7 +112,8 @@ class Calibration:
             self._cool(step)
 
     def _is_cool(self, step: Step) -> bool:
-        return stays_cool(self._robot.configuration, self._expected_a(step), self._winding_c())
+        hangs_s = READING_S + self._hand.lingers_s
+        return stays_cool(self._robot.configuration, self._expected_a(step), self._winding_c(), hangs_s)
 
     def _expected_a(self, step: Step) -> float:
         """By what the weights so far have taken."""

@@ -8,11 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from experiments.actuator_plan import Plan, Step
+from experiments.actuator_plan import PERSON_S, Plan, Step
 from experiments.person import GO_ON, REDO, SKIP, Person
 
 
 class Hand(Protocol):
+    @property
+    def lingers_s(self) -> float:
+        """That a weight hangs beyond its reading."""
+
     def hold_level(self, joint: str, meanwhile: Callable[[], None]) -> None:
         """Nothing hangs, and all flippers are held near level while torque is off."""
 
@@ -27,6 +31,8 @@ class Hand(Protocol):
 
 class PersonsHand:
     """A Hand."""
+
+    lingers_s = PERSON_S
 
     def __init__(self, person: Person, plan: Plan) -> None:
         self._person = person

@@ -28,7 +28,8 @@ from firmware_host.configuration import Configuration
 PAPER_WEIGHTS_G = (10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 600.0, 800.0)
 PAPER_TRIALS = 5
 LARGEST_ERROR = 0.2  # by which a torque constant may be known wrongly: 60/(2π KV) for 8.27/KV is 15 % of it
-HANGING_S = 12.0  # that a weight hangs: until Enter is pressed, both approaches, until it is taken off
+READING_S = 10.0  # of a heavy weight, both approaches
+PERSON_S = 4.0  # that it hangs besides, until Enter is pressed and until it is taken off
 COOL_K = 2.0  # below limits.temperature_warm_c, above which torque fades and a heavy weight falls
 
 
@@ -107,11 +108,11 @@ def _problems(plan: Plan, configuration: Configuration) -> Iterator[str]:
         )
     for joint in plan.joints:
         most_a = largest_current_a(plan, configuration, joint, heaviest_g)
-        if not stays_cool(configuration, most_a, configuration.winding.room_c):
+        if not stays_cool(configuration, most_a, configuration.winding.room_c, READING_S):
             yield (
                 f"winding.thermal_resistance_k_w = {configuration.winding.thermal_resistance_k_w:g}: {heaviest_g:g} g"
                 f" would warm the winding of {joint} beyond {configuration.limits.temperature_warm_c:g} degrees C in"
-                f" {HANGING_S:g} s; hang lighter weights (--weights), or at a shorter --lever"
+                f" {READING_S:g} s; hang lighter weights (--weights), or at a shorter --lever"
             )
 
 
@@ -120,10 +121,10 @@ def largest_current_a(plan: Plan, configuration: Configuration, joint: str, weig
     return plan.torque_nm(weight_g) * (1.0 + LARGEST_ERROR) / configuration.drive[joint].torque_constant_nm_a
 
 
-def stays_cool(configuration: Configuration, current_a: float, winding_c: float) -> bool:
-    """Whether a winding of this temperature bears the current as long as a weight usually hangs."""
+def stays_cool(configuration: Configuration, current_a: float, winding_c: float, hangs_s: float) -> bool:
+    """Whether a winding of this temperature bears the current as long as the weight hangs."""
     winding = Winding(configuration.winding)
     winding.temperature_c = winding_c
-    for _ in range(round(HANGING_S)):
+    for _ in range(round(hangs_s)):
         winding.update(1.0, current_a, nan)
     return winding.temperature_c <= configuration.limits.temperature_warm_c - COOL_K

@@ -73,6 +73,8 @@ def simulated_bench(
 class SimulatedHand:
     """A Hand. Owns what the simulated arms are mounted on."""
 
+    lingers_s = 0.0
+
     def __init__(self, lockstep: Lockstep, joint: str, plan: Plan, seed: int) -> None:
         self._lockstep = lockstep
         self._plan = plan

@@ -60,6 +60,8 @@ class ScriptedRobot:
 class ScriptedHand:
     """A Hand that hangs what it is asked for, unless the script of a step says something else."""
 
+    lingers_s = 2.0
+
     def __init__(self, robot: ScriptedRobot, script: Mapping[str, list[Callable[[], str]]]) -> None:
         self.robot, self.script = robot, {key: list(answers) for key, answers in script.items()}
         self.asked: list[str] = []

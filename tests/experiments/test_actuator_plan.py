@@ -54,6 +54,7 @@ def test_a_weight_that_the_winding_does_not_bear_is_refused() -> None:
 
 def test_a_warm_winding_bears_less_than_a_cool_one() -> None:
     configuration = bench_configuration()
-    assert stays_cool(configuration, 13.0, 35.0)
-    assert not stays_cool(configuration, 13.0, 60.0)
-    assert stays_cool(configuration, 5.0, 60.0)
+    assert stays_cool(configuration, 13.0, 35.0, 10.0)
+    assert not stays_cool(configuration, 13.0, 35.0, 20.0)
+    assert not stays_cool(configuration, 13.0, 60.0, 10.0)
+    assert stays_cool(configuration, 5.0, 60.0, 10.0)
