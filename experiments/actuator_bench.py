@@ -7,20 +7,19 @@ touched when another one goes on.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
-from experiments.actuator import Calibration, Show
+from experiments.actuator import TICK_S, Calibration, Show
 from experiments.actuator_fit import Entry
 from experiments.actuator_hand import PersonsHand
 from experiments.actuator_plan import Plan, require_possible, steps_of
 from experiments.actuator_simulation import simulated_bench
-from experiments.bench_robot import BenchError, BenchRobot
+from experiments.bench_robot import BenchRobot
 from experiments.notebook import Notebook
-from experiments.person import Person, Willing
+from experiments.person import GO_ON, Person, Willing
 from experiments.side_by_side import side_by_side
 from firmware_host.configuration import Configuration, parse_configuration
 
@@ -62,9 +61,15 @@ class RobotBench:
                 show(before * total + done, len(plan.joints) * total)
 
             readings[joint] = Calibration(self._robot, joint, plan, hand, person, notebook, show_all).run()
-            with suppress(BenchError):  # the other joint is mounted with torque off
-                self._robot.call("disarm")
+            self._let_go(joint, person)
         return readings
+
+    def _let_go(self, joint: str, person: Person) -> None:
+        """The next joint is mounted with torque off."""
+        if self._robot.call("status")["mode"] == "hold":
+            question = f"{joint} is done. Hold the flipper: torque goes off."
+            person.ask(question, {GO_ON: "it is held"}, lambda: self._robot.wait(TICK_S))
+            self._robot.call("disarm")
 
     def copy_logs(self, folder: Path) -> list[Path]:
         return self._robot.copy_logs(folder)
