@@ -73,7 +73,7 @@ def _run(options: argparse.Namespace, folder: Path, what: str, run: Callable[[De
         print(sentence, file=sys.stderr, flush=True)
 
     try:
-        return run(Desk(folder, Willing(tell) if options.simulated else TerminalPerson(), progress.show))
+        return run(Desk(folder, Willing(tell) if options.simulated else TerminalPerson(progress.clear), progress.show))
     finally:
         progress.clear()
 

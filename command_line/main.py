@@ -233,6 +233,8 @@ def _add_experiments(commands: Commands) -> None:  # type: ignore[valid-type]
     _add_trackway(names)
     _add_sweep(names)
     _add_faults(names)
+    _add_flipper(names)
+    _add_walk(names)
     fit = _add(names, "mud-fit", "walking.run_mud_fit", "The simulator's muds, fitted to the paper's fixed depths.")
     _add_report(fit, "the muds are the simulator's", "write JSON there")
     fit.add_argument("--seeds", type=_seeds, default=2, metavar="N", help="walks of each point (default: 2)")
@@ -334,6 +336,60 @@ def _add_faults(names: Commands) -> None:  # type: ignore[valid-type]
     faults.add_argument("--seeds", type=_seeds, default=1, metavar="N", help="cells of each pair (default: 1)")
     faults.add_argument("--fault", action="append", metavar="NAME", help="repeatable (default: all)")
     faults.add_argument("--phase", action="append", metavar="NAME", help="repeatable (default: all)")
+
+
+def _add_flipper(names: Commands) -> None:  # type: ignore[valid-type]
+    flipper = _add(names, "flipper", "flipper.run_flipper", "A single flipper on a fixed base: coefficients of muds.")
+    _add_bench(flipper)
+    flipper.add_argument("--mud", action="append", metavar="NAME", help="as its water in percent, repeatable")
+    flipper.add_argument("--trials", type=_trials, default=3, metavar="N", help="of each mud (default: 3)")
+    flipper.add_argument("--depth", type=_depth_cm, default=3.0, metavar="CM", help="(default: 3)")
+    flipper.add_argument("--strides", type=_trials, default=1, metavar="N", help="of each trial (default: 1)")
+    flipper.add_argument("--flipper", choices=("left", "right"), default="right", help="in the mud (default: right)")
+    flipper.add_argument("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
+
+
+def _add_bench(experiment: argparse.ArgumentParser) -> None:
+    """Options of an experiment that a person makes at a robot, or nobody at a simulated one."""
+    _add_report(experiment, "robot and muds are simulated, nothing is asked", "for report, logs and what was measured")
+    _add_socket(experiment)
+
+
+def _add_walk(names: Commands) -> None:  # type: ignore[valid-type]
+    walk = _add(names, "walk", "walk_trials.run_walk", "The walking robot over several muds: coefficients on the way.")
+    _add_bench(walk)
+    walk.add_argument(
+        "--mud",
+        type=_mud_length,
+        action="append",
+        metavar="NAME[=CM]",
+        help="as its water in percent, and its length (default: 61), one after the other along the way",
+    )
+    walk.add_argument("--trials", type=_trials, default=3, metavar="N", help="over the muds (default: 3)")
+    walk.add_argument("--depth", type=_depth_cm, default=3.0, metavar="CM", help="(default: 3)")
+    walk.add_argument(
+        "--soft", action="append", metavar="NAME", help="mud in which to walk at 3 and at 5 cm besides, repeatable"
+    )
+    walk.add_argument("--flipper", choices=("left", "right"), default="right", help="to look at (default: right)")
+    walk.add_argument("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
+
+
+def _mud_length(text: str) -> tuple[str, float]:
+    name, _, length_cm = text.partition("=")
+    try:
+        value = _finite(length_cm or "61")
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text}: must be a mud and its length in cm, as 47.6=61") from None
+    if not (name and 20.0 <= value <= 10000.0):
+        raise argparse.ArgumentTypeError(f"{text}: a mud needs a name, and a length from 20 to 10000 cm")
+    return name, value
+
+
+def _trials(text: str) -> int:
+    value = int(text)
+    if not 1 <= value <= 100:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 1 to 100")
+    return value
 
 
 def _compartment_m(text: str) -> float:

@@ -17,6 +17,10 @@ class AbsentPersonError(Exception):
 class TerminalPerson:
     """A Person. Questions go to standard error, so that data can be piped."""
 
+    def __init__(self, make_room: Callable[[], None] = lambda: None) -> None:
+        """`make_room` is called before every word: a bar of progress stands in its line."""
+        self._make_room = make_room
+
     def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
         offered = ", ".join(f"{key or 'Enter'}: {meaning}" for key, meaning in answers.items())
         while True:
@@ -37,19 +41,16 @@ class TerminalPerson:
             self.tell(f"{said!r} is no number from {low:g} to {high:g}")
 
     def tell(self, sentence: str) -> None:
-        print(f"{_cleared()}{sentence}", file=sys.stderr, flush=True)
+        self._make_room()
+        print(sentence, file=sys.stderr, flush=True)
 
     def _hear(self, prompt: str, meanwhile: Callable[[], None]) -> str:
         """One line. Raises AbsentPersonError where there will be none."""
-        print(f"{_cleared()}{prompt}", end="", file=sys.stderr, flush=True)
+        self._make_room()
+        print(prompt, end="", file=sys.stderr, flush=True)
         while not select.select([sys.stdin], [], [], LOOK_S)[0]:
             meanwhile()
         line = sys.stdin.readline()
         if not line:
             raise AbsentPersonError("the input has ended, and a person has to be asked: run it on a terminal")
         return line.strip()
-
-
-def _cleared() -> str:
-    """Takes away a bar of progress that stands in the line."""
-    return "\r\033[K" if sys.stderr.isatty() else ""

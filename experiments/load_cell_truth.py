@@ -37,15 +37,19 @@ class LoadCellTruth(NamedTuple):
 
 
 def load_cell_truth(stride: StrideTruth, geometry: FlipperGeometry, relaxation: float, hold_s: float) -> LoadCellTruth:
-    leaning, upright = (
-        TrueCoefficients(
-            _insertion(stride, geometry, relaxation, upright),
-            _shear(stride, geometry, upright),
-            _extraction(stride, geometry, relaxation, hold_s, upright),
-        )
-        for upright in (False, True)
-    )
+    leaning, upright = (true_coefficients(stride, geometry, relaxation, hold_s, upright) for upright in (False, True))
     return LoadCellTruth(leaning, upright)
+
+
+def true_coefficients(
+    stride: StrideTruth, geometry: FlipperGeometry, relaxation: float, hold_s: float, upright: bool
+) -> TrueCoefficients:
+    """By one of the two plates."""
+    return TrueCoefficients(
+        _insertion(stride, geometry, relaxation, upright),
+        _shear(stride, geometry, upright),
+        _extraction(stride, geometry, relaxation, hold_s, upright),
+    )
 
 
 def _insertion(stride: StrideTruth, geometry: FlipperGeometry, relaxation: float, upright: bool) -> float:

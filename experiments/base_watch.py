@@ -1,0 +1,76 @@
+"""Whether a base that is to be fixed has moved in a trial: by its pose, by the joints' loads in free air, by the mud.
+
+Before its insertion and after its stride a flipper stands at the same place above the mud. What its joints carry there
+should be the same but for the mud that came along, which pulls at the adduction joint alone. Where the surface is met
+far from where the configuration has it, the base stands at another height, or the mud does.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from control.modes import Mode
+from control.records import FLIPPERS, JOINTS, Phase
+from firmware_host.configuration import Configuration
+from firmware_host.log_reader import Log
+
+POSE_M = 0.002
+SWEEP_NM = 0.05  # three times what the paper's motors repeat to at 0.5 N·m
+ADDUCTION_NM = 0.25  # 2 N of clinging mud, twice what the authors' logs show
+SURFACE_M = 0.01
+LOOK_S = 0.1
+
+
+def pose_remarks(before_m: float | None, after_m: float | None) -> list[str]:
+    if before_m is None or after_m is None or abs(after_m - before_m) <= POSE_M:
+        return []
+    return [f"the base moved by {1000.0 * (after_m - before_m):.1f} mm: clamp it, and measure again"]
+
+
+def load_remarks(log: Log, configuration: Configuration, flipper: str) -> list[str]:
+    """Between the moment before the first insertion and the end of the log, in which the robot holds its pose."""
+    before, after = _before_insertion(log), _at_the_end(log)
+    if not (len(before) and len(after)):
+        return []
+    remarks = []
+    place = 2 * FLIPPERS.index(flipper)
+    for joint, bound_nm in ((place, SWEEP_NM), (place + 1, ADDUCTION_NM)):
+        constant_nm_a = configuration.torque_constants_nm_a[joint]
+        change_nm = constant_nm_a * float(after["current_a"][:, joint].mean() - before["current_a"][:, joint].mean())
+        if isfinite(change_nm) and abs(change_nm) > bound_nm:
+            remarks.append(
+                f"{JOINTS[joint]} carries {abs(change_nm):.2f} N·m more or less in free air than before the stride: "
+                "clean the flipper, see whether the base is firm, and measure again"
+            )
+    return remarks
+
+
+def _before_insertion(log: Log) -> NDArray[np.void]:
+    ticks = log.ticks
+    inserting = np.flatnonzero((ticks["mode"] == Mode.WALKING) & (ticks["phase"] == Phase.INSERTION))
+    if not len(inserting):
+        return ticks[:0]
+    end_s = ticks["stamp_s"][inserting[0]]
+    rows: NDArray[np.void] = ticks[(ticks["stamp_s"] >= end_s - LOOK_S) & (ticks["stamp_s"] < end_s)]
+    return rows
+
+
+def _at_the_end(log: Log) -> NDArray[np.void]:
+    held = log.ticks[log.ticks["mode"] == Mode.HOLD]
+    late: NDArray[np.void] = held[held["stamp_s"] >= log.ticks["stamp_s"][-1] - LOOK_S]
+    return late
+
+
+def surface_remarks(stride: dict[str, Any]) -> list[str]:
+    surface_m = stride["surface_m"]
+    if surface_m is None or abs(surface_m) <= SURFACE_M:
+        return []
+    where = "below" if surface_m > 0.0 else "above"
+    return [
+        f"the mud was met {1000.0 * abs(surface_m):.0f} mm {where} its nominal height: fill it up to "
+        "geometry.axis_height_m under the axes, or measure that height anew"
+    ]

@@ -1,0 +1,173 @@
+"""The coefficients of muds, gathered over trials, and beside a load cell's: what summaries hold and tables show.
+
+A summary has `muds`, a list of objects with the name of the mud and for each of k_p, k_s, k_e in N/m³:
+
+    value        mean over the trials that gave a value
+    std_error    of that mean, by the trials' own scatter; of a single one, what its estimator doubts
+    trials       their values, one by one
+    cv           their standard deviation over their mean; null for a single one
+
+Where the mud held whatever was done (`at_least`), the value is the middle one of the trials' lower bounds.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from math import sqrt
+from pathlib import Path
+from statistics import fmean, median, stdev
+from typing import Any, NamedTuple
+
+from control.records import UNKNOWN, Estimate
+from experiments.bench_robot import BenchError
+from experiments.error_table import COEFFICIENTS, Judged, error_rows
+
+PER_CM3 = 1e-6  # N/cm³ of a N/m³
+Told = Mapping[str, Any]  # an estimate as reports tell it
+TruthOfMud = dict[str, dict[str, float]]  # N/m³ by mud and coefficient
+
+
+class Beside(NamedTuple):
+    """One stride's estimates by one method, and what a load cell reads there."""
+
+    mud: str
+    method: str
+    stride: Mapping[str, Any]
+    truth: Mapping[str, float | None]
+
+
+def gathered(estimates: Iterable[Told]) -> dict[str, Any]:
+    """Of one coefficient in one mud, over its trials."""
+    told = list(estimates)
+    values = [each for each in told if each["valid"] and not each["at_least"]]
+    bounds = [each for each in told if each["valid"] and each["at_least"]]
+    trials = [each["value"] for each in values or bounds]
+    spread = stdev(trials) if len(trials) > 1 else None
+    return {
+        "value": (fmean(trials) if values else median(trials)) if trials else None,
+        "std_error": _std_error(values or bounds, spread),
+        "trials": trials,
+        "cv": spread / fmean(trials) if spread is not None and fmean(trials) else None,
+        "at_least": bool(bounds and not values),
+        "bounds": len(bounds),
+        "not_valid": [each["reason"] for each in told if not each["valid"]],
+    }
+
+
+def _std_error(told: Sequence[Told], spread: float | None) -> float | None:
+    if not told:
+        return None
+    return told[0]["std_error"] if spread is None else spread / sqrt(len(told))
+
+
+def truth_of(muds: Sequence[Mapping[str, Any]]) -> TruthOfMud:
+    """The values of a summary's muds."""
+    return {
+        mud["mud"]: {name: mud[name]["value"] for name in COEFFICIENTS if (mud.get(name) or {}).get("value")}
+        for mud in muds
+    }
+
+
+def load_truth(path: Path) -> TruthOfMud:
+    """Out of another experiment's summary.json. Raises BenchError."""
+    try:
+        truth = truth_of(json.loads(path.read_text(encoding="utf-8"))["muds"])
+        numbers = [value for mud in truth.values() for value in mud.values()]
+        if not all(isinstance(value, int | float) and value > 0.0 for value in numbers):
+            raise ValueError("coefficients must be numbers above 0")
+    except OSError as problem:
+        raise BenchError(f"--truth {path}: {problem.strerror}") from problem
+    except (ValueError, KeyError, TypeError, AttributeError) as problem:
+        raise BenchError(
+            f"--truth {path} is no summary with coefficients of muds ({problem}): "
+            "give the summary.json of 'mudskipper experiment loadcell'"
+        ) from problem
+    return {mud_name(mud): coefficients for mud, coefficients in truth.items()}
+
+
+def missing_text(truth: TruthOfMud | None, muds: Iterable[str]) -> str:
+    """Of which muds another experiment's truth says nothing; empty where it says something of all, or there is none."""
+    missing = [mud for mud in muds if truth is not None and mud not in truth]
+    return f"The file given with --truth says nothing of {', '.join(missing)}." if missing else ""
+
+
+def mud_name(name: str) -> str:
+    """However a water content is written: 47.6, w = 47.6 % or 47.6%."""
+    return name.removeprefix("w").replace("=", "").replace("%", "").strip() or name
+
+
+def judged(rows: Iterable[Beside], setup: str) -> list[Judged]:
+    """One for each coefficient of which there is a truth."""
+    return [
+        Judged(setup, row.mud, name, row.method, estimate_of(row.stride[name]), float(truth), UNKNOWN)
+        for row in rows
+        for name in COEFFICIENTS
+        if (truth := row.truth.get(name)) is not None and row.stride[name] is not None
+    ]
+
+
+def estimate_of(told: Told) -> Estimate:
+    value, std_error = (UNKNOWN if told[name] is None else float(told[name]) for name in ("value", "std_error"))
+    return Estimate(value, std_error, told["samples"], told["valid"], told["reason"], told["at_least"])
+
+
+def error_table(rows: Iterable[Beside], setup: str) -> list[dict[str, Any]]:
+    return error_rows(judged(rows, setup))
+
+
+# as words
+
+
+def coefficient_text(row: Mapping[str, Any]) -> str:
+    """Of `gathered`, in N/cm³."""
+    if row["value"] is None:
+        return "-"
+    doubt = "" if row["std_error"] is None else f" ± {PER_CM3 * row['std_error']:.3f}"
+    return f"{'≥ ' if row['at_least'] else ''}{PER_CM3 * row['value']:.3f}{doubt}"
+
+
+def mud_rows(muds: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """A table with its head: each mud's coefficients, and the load cell's beside them where there is one."""
+    head = ["mud"]
+    for name in COEFFICIENTS:
+        head += [f"{name} (N/cm³)", "cv", "load cell"]
+    rows = [head]
+    for mud in muds:
+        cells = [mud["mud"]]
+        for name in COEFFICIENTS:
+            truth = (mud.get("truth") or {}).get(name)
+            cv = mud[name]["cv"]
+            cells += [coefficient_text(mud[name]), "-" if cv is None else f"{100.0 * cv:.0f} %"]
+            cells.append("-" if truth is None else f"{PER_CM3 * truth:.3f}")
+        rows.append(cells)
+    return rows
+
+
+def error_text_rows(errors: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """A table with its head: the median error of each coefficient by mud and method, muds one after the other."""
+    head = ["mud", "method", *(f"{name} error" for name in COEFFICIENTS), "strides"]
+    muds = list(dict.fromkeys(row["mud"] for row in errors))
+    keys = sorted(dict.fromkeys((row["mud"], row["method"]) for row in errors), key=lambda key: muds.index(key[0]))
+    rows = [head]
+    for key in keys:
+        own = {row["coefficient"]: row for row in errors if (row["mud"], row["method"]) == key}
+        cells = [_error_text(own[name]) if name in own else "-" for name in COEFFICIENTS]
+        rows.append([*key, *cells, str(max(_strides(row) for row in own.values()))])
+    return rows
+
+
+def _strides(row: Mapping[str, Any]) -> int:
+    return int(row["strides"] + row["bounds"] + row["not_valid"])
+
+
+def _error_text(row: Mapping[str, Any]) -> str:
+    """A bound is told as one, with its median share of the truth, and how many there were."""
+    parts = []
+    if row["median"] is not None:
+        parts.append(f"{100.0 * row['median']:.1f} % ({100.0 * row['bias']:+.0f} %)")
+    if row["bounds"]:
+        parts.append(f"≥ {100.0 * row['bound_over_truth']:.0f} % of it ({row['bounds']})")
+    if row["not_valid"]:
+        parts.append(f"nothing ({row['not_valid']})")
+    return ", ".join(parts) or "-"

@@ -1,0 +1,120 @@
+"""What a person is shown of the single flipper's trials: sections with tables and pictures, and the screen's text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from experiments.coefficient_table import error_text_rows, mud_rows
+from experiments.flipper import AUTHORS_MUD, AUTHORS_N, Plan, muds_of, trials_of
+from experiments.mud_looks import file_name, mud_text
+from experiments.notebook import Entry
+from experiments.report_page import Figure, Section
+from firmware_host.configuration import Configuration
+
+STROKES = tuple(AUTHORS_N)
+TRUTHS = {
+    "bed": "The load cell is a virtual one: it repeats the stroke with the flipper's own plate in its mean attitude.",
+    "file": "The load cell is that of the file given with --truth.",
+}
+MODELLED = (
+    "Dashed: the forces by the fitted coefficients, where each is fitted. The default method's laws tell a joint's "
+    "torque; it takes the place of the measured one, and goes with the other joint's measured torque through the map "
+    "from torques to forces that the measured force went through."
+)
+MODELLED_PAPER = "Dashed: the forces by the fitted coefficients and the paper's laws."
+
+
+def sections_of(
+    report: Mapping[str, Any], plan: Plan, entries: Mapping[str, Entry], configuration: Configuration
+) -> list[Section]:
+    method = report["settings"]["method"]
+    firsts = {mud: trials[0] for mud in muds_of(plan, entries) if (trials := trials_of(mud, entries))}
+    sections = [_coefficients(report, firsts, configuration)]
+    if report["errors"]:
+        sections.append(_errors(report))
+    sections.append(_forces(report))
+    sections.append(_strides(firsts, configuration, method))
+    remarks = [f"{mud_text(mud['mud'])}: {remark}." for mud in report["muds"] for remark in mud["remarks"]]
+    return sections + ([Section("What was remarked", "\n\n".join(remarks))] if remarks else [])
+
+
+def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], configuration: Configuration) -> Section:
+    from experiments.flipper_plots import plot_coefficients  # matplotlib takes its time
+
+    caption = (
+        "Figure 5 of the paper. A to C: force of one trial a mud. D to F: coefficients, mean and standard deviation "
+        "over the trials, which are the grey dashes."
+    )
+    if any(mud["truth"] for mud in report["muds"]):
+        caption += " G to I: beside a load cell's; on the grey line both are equal."
+    draw = partial(plot_coefficients, report["muds"], firsts, configuration.geometry)
+    figure = Figure("figure5", caption, draw)
+    return Section("Coefficients of the muds", _told(report), rows=mud_rows(report["muds"]), figures=[figure])
+
+
+def _told(report: Mapping[str, Any]) -> str:
+    falls = {name: fell for name, fell in report["falls_with_water"].items() if fell is not None}
+    paragraphs = [report["missing_truth"]] if report["missing_truth"] else []
+    if falls:
+        fell = ", ".join(f"{name} {'yes' if fell else 'no'}" for name, fell in falls.items())
+        paragraphs.append(f"Does a coefficient fall with water from mud to mud, as in the paper? {fell}.")
+    later = {name: shares for name, shares in report["later_strokes"].items() if shares}
+    for name, shares in later.items():
+        strokes = ", ".join(f"{100.0 * share:.0f} %" for share in shares)
+        paragraphs.append(f"{name} of later strides in the same hole, of the first one's: {strokes}.")
+    return "\n\n".join(paragraphs)
+
+
+def _errors(report: Mapping[str, Any]) -> Section:
+    text = f"Median error of single strides, in brackets the bias. {TRUTHS[report['settings']['truth']]}"
+    return Section("Beside the load cell", text, rows=error_text_rows(report["errors"]))
+
+
+def _forces(report: Mapping[str, Any]) -> Section:
+    text = (
+        "Largest forces of first strides, mean over the trials, and in brackets what the laws leave over of the forces "
+        f"of one trial (root mean square). The authors' are those of their raw logs in the mud that they call "
+        f"{AUTHORS_MUD}, whose water they do not say."
+    )
+    return Section("Forces", text, rows=force_rows(report))
+
+
+def force_rows(report: Mapping[str, Any]) -> list[list[str]]:
+    rows = [["mud", *(f"{stroke} (N)" for stroke in STROKES)]]
+    for mud, forces in report["largest_forces_n"].items():
+        misfits = report["misfit_n"][mud]
+        rows.append([mud_text(mud), *(_force_text(forces[stroke], misfits[stroke]) for stroke in STROKES)])
+    rows.append(["authors' logs", *(f"{low:g} to {high:g}" for low, high in AUTHORS_N.values())])
+    return rows
+
+
+def _force_text(force_n: float | None, misfit_n: float | None) -> str:
+    text = "-" if force_n is None else f"{force_n:.2f}"
+    return text if misfit_n is None else f"{text} ({misfit_n:.2f})"
+
+
+def _strides(firsts: Mapping[str, Entry], configuration: Configuration, method: str) -> Section:
+    from experiments.flipper_plots import plot_stride
+
+    law = MODELLED_PAPER if method == "paper" else MODELLED
+    figures = [
+        Figure(
+            f"figure4_{file_name(mud)}",
+            f"Figure 4 of the paper, mud {mud_text(mud)}. {law}",
+            partial(plot_stride, trial, configuration.geometry, method),
+        )
+        for mud, trial in firsts.items()
+    ]
+    return Section("Strides", figures=figures)
+
+
+def text_of(report: Mapping[str, Any]) -> list[tuple[str, Sequence[Sequence[str]]]]:
+    """Titles and tables for the screen."""
+    tables: list[tuple[str, Sequence[Sequence[str]]]] = [("Coefficients", mud_rows(report["muds"]))]
+    if report["errors"]:
+        tables.append(
+            (f"Median error (bias). {TRUTHS[report['settings']['truth']]}", error_text_rows(report["errors"]))
+        )
+    return [*tables, ("Largest forces, in brackets what the laws leave over", force_rows(report))]

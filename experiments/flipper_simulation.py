@@ -1,0 +1,53 @@
+"""The single flipper's bench in the simulator: the robot on a fixed base over the muds, with the laboratory's
+disturbances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from experiments.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.mud_trials import PlannedTrial
+from experiments.simulated_bed import CarriedBed, simulated_bench
+from experiments.trial import BENCH_CURRENT_A, BENCH_TORQUE_NM
+from firmware_host.configuration import Configuration
+from simulation.clay import clay_of_water
+from simulation.disturbances import LAB, Disturbances
+from simulation.track import Track
+
+PLACE_M = 0.2  # a trial's share of the mud: no stroke finds what another left
+STRIP_M = 100.0  # of each mud
+
+SECTIONS = f"""\
+[gait]
+protocol = "single_flipper"
+
+[estimation]
+fixed_base = true
+surface_error_m = {LAB.surface_sd_m}  # as an operator would see it
+
+[limits]
+torque_nm = {BENCH_TORQUE_NM}
+
+[recovery]
+lead_deg = 12.0  # reaches that torque with the default stiffness
+"""
+DRIVE = f"current_limit_a = {BENCH_CURRENT_A}"
+
+
+def bench_configuration() -> Configuration:
+    return simulated_configuration(SECTIONS, DRIVE)
+
+
+def flipper_bench(
+    folder: Path, muds: Sequence[str], seed: int, disturbances: Disturbances = LAB
+) -> tuple[LockstepRobot, CarriedBed]:
+    """Over strips of the muds, named after their water. Raises ValueError for one that there is not."""
+    track = Track([(STRIP_M, clay_of_water(float(mud))) for mud in muds])
+    robot, lockstep = simulated_bench(folder, bench_configuration(), track, seed, True, disturbances)
+
+    def place_m(trial: PlannedTrial, prepared: int) -> float:
+        return STRIP_M * list(muds).index(trial.mud) + PLACE_M * (prepared + 1)
+
+    return robot, CarriedBed(robot, lockstep, place_m)

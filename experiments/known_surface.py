@@ -1,0 +1,58 @@
+"""The paper's law of shear with the mud's surface known: what remains of its method when the trigger does no harm.
+
+The published method finds the surface where the upward force first passes 0.5 N. In soft mud, and under a flipper to
+which mud clings, that is far too deep, and k_s, which goes with the square of the depth below it, comes out several
+times too large: no word on body drag can then be tested. So here the surface is that of the default method, and all
+else as published: f_x = cos α τ₁ / l over the steady part of the stance, fitted to k_s b z²/2, with half of the body's
+drag added, or not, while the body advances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from control.records import Phase
+from estimation.line_fit import LineFit
+from estimation.paper import ADVANCED_M, STEADY_SHARE
+from experiments.stride_course import StrideCourse, course_of
+from firmware_host.configuration import Configuration
+from firmware_host.log_reader import Log
+from firmware_host.reports import estimate_report
+
+KNOWN, KNOWN_COMPENSATED = "paper's law", "paper's law with drag"
+
+
+def strides_with_known_surface(
+    strides: Sequence[Mapping[str, Any]], log: Log, configuration: Configuration, flipper: str
+) -> dict[str, list[dict[str, Any]]]:
+    """By method, with k_s alone. `strides` are those of the default method."""
+    drags_n = {KNOWN: 0.0, KNOWN_COMPENSATED: configuration.adaptation.body_drag_n}
+    courses = [course_of(log, flipper, stride["t_start_s"]) for stride in strides]
+    return {
+        method: [
+            dict(stride) | {"k_p": None, "k_e": None, "k_s": k_s_of(course, stride, configuration, drag_n)}
+            for course, stride in zip(courses, strides, strict=True)
+        ]
+        for method, drag_n in drags_n.items()
+    }
+
+
+def k_s_of(
+    course: StrideCourse, stride: Mapping[str, Any], configuration: Configuration, drag_n: float
+) -> dict[str, Any]:
+    geometry, stance, fit = configuration.geometry, course.during(Phase.STANCE), LineFit()
+    submerged_m = course.depth_m - (stride["surface_m"] or 0.0)
+    steady = stance & (submerged_m > 0.0) & np.isfinite(course.sweep_nm)
+    if stance.any():
+        steady &= np.abs(course.sweep_rad) <= STEADY_SHARE * abs(course.sweep_rad[stance][0])
+    moments_m3 = geometry.plate_width_m * submerged_m**2 / 2.0
+    forces_n = np.cos(course.sweep_rad) * course.sweep_nm / geometry.flipper_length_m
+    if drag_n and stance.any():
+        advanced = course.body_m - course.body_m[stance][0] > ADVANCED_M
+        forces_n = forces_n + np.where(advanced, drag_n / 2.0, 0.0)
+    for moment_m3, force_n in zip(moments_m3[steady].tolist(), forces_n[steady].tolist(), strict=True):
+        fit.update(moment_m3, force_n)
+    return estimate_report(fit.estimate())

@@ -1,0 +1,64 @@
+"""How muds and phases look in all pictures of the trials: a colour, a line and a mark each, so that print is enough."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
+
+from control.records import Phase  # noqa: E402
+
+INK, GREY = "#222222", "#8a8a8a"
+PHASE_SHADES = {Phase.INSERTION: "#d6e6f4", Phase.STANCE: "#dcefd9", Phase.EXTRACTION: "#fbe3cc"}  # as in the paper
+PHASE_NAMES = {Phase.INSERTION: "insertion", Phase.STANCE: "stance", Phase.EXTRACTION: "extraction"}
+LINES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)))
+MARKS = ("o", "s", "^", "D", "v", "P")
+DOTS_PER_INCH = 110
+LABELS = {"k_p": "$k_p$ penetration", "k_s": "$k_s$ shear", "k_e": "$k_e$ extraction"}
+
+
+def looks_of(muds: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Colour, line and mark of each, from dark to light."""
+    colours = plt.get_cmap("viridis")
+    share = max(len(muds) - 1, 1) / 0.85
+    return {
+        mud: {"color": colours(i / share), "linestyle": LINES[i % len(LINES)], "marker": MARKS[i % len(MARKS)]}
+        for i, mud in enumerate(muds)
+    }
+
+
+def line_of(look: dict[str, Any]) -> dict[str, Any]:
+    return {"color": look["color"], "linestyle": look["linestyle"], "linewidth": 1.4}
+
+
+def mark_of(look: dict[str, Any]) -> dict[str, Any]:
+    return {"color": look["color"], "marker": look["marker"], "markersize": 7.0, "markeredgecolor": INK}
+
+
+def mud_text(name: str) -> str:
+    """Most muds are named after their water in percent."""
+    return f"{name} %" if name[-1:].isdigit() else name
+
+
+def waters_of(muds: Sequence[str]) -> list[float]:
+    """Where each stands on an axis: at its water content, or one after the other."""
+    try:
+        return [float(mud) for mud in muds]
+    except ValueError:
+        return [float(place) for place in range(len(muds))]
+
+
+def are_waters(muds: Sequence[str]) -> bool:
+    try:
+        return bool([float(mud) for mud in muds])
+    except ValueError:
+        return False
+
+
+def file_name(mud: str) -> str:
+    """As a part of one."""
+    return "".join(letter if letter.isalnum() or letter in ".-" else "_" for letter in mud)

@@ -1,0 +1,117 @@
+"""What a person is shown of the walks over several muds: sections with tables and pictures, and the screen's text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from experiments.coefficient_table import TruthOfMud, error_text_rows, mud_rows
+from experiments.estimation_methods import method_of
+from experiments.flipper_report import TRUTHS
+from experiments.mud_looks import file_name, mud_text
+from experiments.notebook import Entry
+from experiments.report_page import Figure, Section
+from experiments.walk_mapping import SOFT_DEPTHS_M, Plan, reach_of
+from experiments.walk_mapping_report import placed_strides, soft_walks_of, walks_of
+from firmware_host.configuration import Configuration
+
+SIMULATED_DRAG = (
+    " The simulated body's drag grows with speed, to two and more times the paper's 2.5 N: so a firmer mud than "
+    "the paper's is the one that yields at 3 cm and holds at 5 cm. Part of the difference between these depths is the "
+    "mud's own, whose k_s falls with depth (see the load cell)."
+)
+Tables = list[tuple[str, Sequence[Sequence[str]]]]
+
+
+def sections_of(
+    report: Mapping[str, Any],
+    plan: Plan,
+    entries: Mapping[str, Entry],
+    configuration: Configuration,
+    truth: TruthOfMud | None,
+) -> list[Section]:
+    sections = [_walk_section(report, plan, entries, configuration, truth)]
+    sections += [_soft_section(soft, plan, entries) for soft in report["soft"] if soft["depths"]]
+    for heading, rows in text_of(report)[1:]:
+        sections.append(Section(heading, rows=rows))
+    remarks = "\n\n".join(f"{remark}." for remark in report["remarks"])
+    return sections + ([Section("What was remarked", remarks)] if remarks else [])
+
+
+def _walk_section(
+    report: Mapping[str, Any],
+    plan: Plan,
+    entries: Mapping[str, Entry],
+    configuration: Configuration,
+    truth: TruthOfMud | None,
+) -> Section:
+    from experiments.walk_mapping_plots import plot_walk_over  # matplotlib takes its time
+
+    strides = placed_strides(plan, entries, configuration, truth)
+    caption = (
+        "Figure 6 of the paper, trial {}. A: place of the body; vertical lines: the plates go down behind a border. B, "
+        "C: forces of the {} flipper. D to F: coefficients by stride, bars are two standard errors, triangles lower "
+        "bounds, arrows values beyond the picture; grey dashes: the load cell."
+    )
+    figures = [
+        Figure(
+            f"figure6_trial{walk['trial']}",
+            caption.format(walk["trial"], plan.flipper),
+            partial(plot_walk_over, plan, walk, strides, reach_of(configuration)),
+        )
+        for walk in walks_of(plan, entries)
+    ]
+    text = _told(report, configuration)
+    return Section("Coefficients along the way", text, rows=mud_rows(report["muds"]), figures=figures)
+
+
+def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
+    gait = configuration.gait
+    paragraphs = [
+        f"All strides of all trials by method {method_of(configuration.estimation)}, as the daemon told. Its gait: "
+        f"insertion at {gait.insertion_speed_m_s:g} m/s, stance at {gait.stance_speed_m_s:g} m/s, pauses of "
+        f"{gait.pause_s:g} s.",
+        f"{report['at_a_border']} strides went down too near to a border, or behind the last mud, and are left out of "
+        "tables.",
+    ]
+    if report["without_pose"]:
+        paragraphs.append(f"{report['without_pose']} walks had no pose: strides are given to muds by their order.")
+    return "\n\n".join([*paragraphs, TRUTHS[report["settings"]["truth"]], report["missing_truth"]])
+
+
+def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Entry]) -> Section:
+    from experiments.walk_mapping_plots import plot_soft
+
+    mud = soft["mud"]
+    walks = {100.0 * depth_m: soft_walks_of(plan, entries, mud, depth_m) for depth_m in SOFT_DEPTHS_M}
+    caption = (
+        "Figure 7 of the paper. A: forward force in one stance. B: k_s by method, mean and standard deviation over "
+        "strides; hatched: a lower bound. The paper's law stands here without its trigger at 0.5 N, which finds the "
+        "surface of soft mud too deep: the surface is the default method's."
+    )
+    draw = partial(plot_soft, soft, {depth: told for depth, told in walks.items() if told})
+    text = "Where the mud bears more than the body's drag, the flipper feels that drag and not the mud's strength."
+    text += SIMULATED_DRAG if plan.simulated else ""
+    name = f"figure7_{file_name(mud)}"
+    return Section(f"Soft mud, {mud_text(mud)}", text, figures=[Figure(name, caption, draw)])
+
+
+def text_of(report: Mapping[str, Any]) -> Tables:
+    """Titles and tables for the screen."""
+    tables: Tables = [("Coefficients", mud_rows(report["muds"]))]
+    if report["errors"]:
+        tables.append(
+            (
+                "Median error of single strides (bias); how many told a bound (≥), or nothing",
+                error_text_rows(report["errors"]),
+            )
+        )
+    return [*tables, ("The paper's findings, ours by its law with the surface known", paper_rows(report))]
+
+
+def paper_rows(report: Mapping[str, Any]) -> list[list[str]]:
+    rows = [["", "paper", "ours"]]
+    for row in report["beside_paper"]:
+        rows.append([row["what"], row["paper"], "-" if row["ours"] is None else f"{row['ours']:.2f}"])
+    return rows

@@ -1,0 +1,127 @@
+"""`mudskipper experiment flipper` and `walk`: one command, no questions, a folder with everything."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.main import main
+from command_line.terminal_person import TerminalPerson
+
+FLIPPER = ["experiment", "flipper", "--simulated", "--mud", "49.5", "--trials", "1"]
+WALK = [
+    "experiment",
+    "walk",
+    "--simulated",
+    "--mud",
+    "47.6=20",
+    "--mud",
+    "51.2 %=20",
+    "--trials",
+    "1",
+    "--soft",
+    "51.2",
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("flipper")
+
+
+@pytest.fixture(scope="module")
+def first(folder: Path) -> int:
+    return main([*FLIPPER, "--out", str(folder)])
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def test_one_command_leaves_page_pictures_numbers_notebook_and_log(first: int, folder: Path) -> None:
+    assert first == exit_codes.OK
+    wanted = {"report.html", "summary.json", "figure4_49.5.png", "figure5.png", "notebook.jsonl", "simulated-001.mcap"}
+    assert wanted <= names(folder)
+    assert json.loads((folder / "summary.json").read_text())["muds"][0]["mud"] == "49.5"
+
+
+def test_the_same_command_again_measures_nothing_twice(
+    first: int, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = (folder / "notebook.jsonl").read_bytes()
+    assert main([*FLIPPER, "--json", "--out", str(folder)]) == exit_codes.OK
+    assert (folder / "notebook.jsonl").read_bytes() == before
+    assert json.loads(capsys.readouterr().out)["experiment"] == "flipper"
+
+
+def test_another_depth_is_another_experiment(first: int, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*FLIPPER, "--depth", "4", "--out", str(folder)]) == exit_codes.REFUSED
+    assert "depth_m = 0.03" in capsys.readouterr().err
+
+
+def test_a_walk_reads_the_flippers_summary_as_its_truth(first: int, folder: Path, tmp_path: Path) -> None:
+    assert main([*WALK, "--truth", str(folder / "summary.json"), "--out", str(tmp_path)]) == exit_codes.OK
+    assert {"report.html", "summary.json", "figure6_trial1.png", "figure7_51.2.png"} <= names(tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["settings"]["muds"] == [["47.6", 0.2], ["51.2", 0.2]]
+    assert summary["settings"]["truth"] == "file"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["experiment", "flipper"], "--mud 47.6"),
+        (["experiment", "walk"], "--mud 47.6=61"),
+        (["experiment", "flipper", "--simulated", "--mud", "clay"], "water in percent"),
+        (["experiment", "flipper", "--simulated", "--mud", "70"], "70 % of water"),
+        (["experiment", "walk", "--simulated", "--soft", "clay"], "water in percent"),
+        (["experiment", "walk", "--mud", "47.6", "--mud", "47.6=30"], "a name of its own"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_begins(
+    arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*arguments, "--out", str(tmp_path / "none")]) == exit_codes.USAGE
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize("mud", ["=30", "47.6=long", "47.6=3", "47.6=nan"])
+def test_a_length_that_is_none_is_a_mistake_of_usage(mud: str) -> None:
+    with pytest.raises(SystemExit):
+        main(["experiment", "walk", "--mud", mud])
+
+
+@pytest.mark.parametrize("name", ["flipper", "walk"])
+def test_without_a_daemon_it_is_said_how_to_start_one(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["experiment", name, "--mud", "47.6", "--socket", str(tmp_path / "none.sock")]
+    assert main([*arguments, "--out", str(tmp_path)]) == exit_codes.REFUSED
+    assert "systemctl start mudskipper" in capsys.readouterr().err
+
+
+def test_a_truth_that_is_none_is_refused_before_anything_begins(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*FLIPPER, "--truth", str(tmp_path / "none"), "--out", str(tmp_path / "out")]) == exit_codes.REFUSED
+    assert "--truth" in capsys.readouterr().err
+    assert not list((tmp_path / "out").glob("*.mcap"))
+
+
+def test_a_question_does_not_begin_in_the_middle_of_a_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, sink = os.pipe()
+    os.write(sink, b"\n")
+    with open(source) as typed:
+        monkeypatch.setattr(sys, "stdin", typed)
+        person = TerminalPerson(lambda: print("<room>", end="", file=sys.stderr))
+        person.ask("Ready?", {"": "yes"}, lambda: None)
+    os.close(sink)
+    assert capsys.readouterr().err.startswith("<room>Ready?")

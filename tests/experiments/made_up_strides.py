@@ -1,0 +1,57 @@
+"""Logs and estimates that say what a test wants."""
+
+from __future__ import annotations
+
+from math import radians
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from control.modes import Mode
+from control.records import Phase
+from experiments.lockstep_robot import simulated_configuration
+from experiments.stride_course import StrideCourse
+from firmware_host.log_reader import Log, tick_type
+
+CONFIGURATION = simulated_configuration()
+GEOMETRY = CONFIGURATION.geometry
+RIGHT_SWEEP, RIGHT_ADDUCTION = 2, 3
+
+
+def make_ticks(phases: list[Phase], stride: int = 0, start_s: float = 0.0) -> NDArray[np.void]:
+    """A row of a walk for each phase, a hundredth of a second apart."""
+    ticks = np.zeros(len(phases), tick_type())
+    ticks["stamp_s"] = start_s + 0.01 * np.arange(len(phases))
+    ticks["mode"], ticks["stride"], ticks["phase"] = Mode.WALKING, stride, phases
+    return ticks
+
+
+def make_log(*ticks: NDArray[np.void]) -> Log:
+    rows = np.concatenate(ticks)
+    return Log({}, CONFIGURATION.text, rows, [], [], True)
+
+
+def make_estimate(value: float | None = 1e6, **others: Any) -> dict[str, Any]:
+    told = {"value": value, "std_error": 0.05e6, "samples": 9, "valid": value is not None, "reason": ""}
+    return told | {"at_least": False} | others
+
+
+def make_stride(**others: Any) -> dict[str, Any]:
+    return {name: make_estimate() for name in ("k_p", "k_s", "k_e")} | {"index": 0, "surface_m": 0.0} | others
+
+
+def make_course(phase: Phase, sweeps_deg: list[float], depths_m: list[float], **others: list[float]) -> StrideCourse:
+    """In the pose that puts the edge at each depth."""
+    count = len(depths_m)
+    sweeps_rad = [radians(sweep_deg) for sweep_deg in sweeps_deg]
+    columns: dict[str, Any] = {name: np.zeros(count) for name in StrideCourse._fields} | {
+        "time_s": 0.01 * np.arange(count),
+        "phase": np.full(count, int(phase)),
+        "sweep_rad": np.array(sweeps_rad),
+        "adduction_rad": np.array(
+            [GEOMETRY.adduction_rad(s, d) for s, d in zip(sweeps_rad, depths_m, strict=True)],
+        ),
+        "depth_m": np.array(depths_m),
+    }
+    return StrideCourse(**(columns | {name: np.array(values) for name, values in others.items()}))

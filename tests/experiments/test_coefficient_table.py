@@ -1,0 +1,133 @@
+"""Coefficients over trials, beside a load cell's, and the files that they come from."""
+
+from __future__ import annotations
+
+import json
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.bench_robot import BenchError
+from experiments.coefficient_table import (
+    Beside,
+    coefficient_text,
+    error_table,
+    error_text_rows,
+    gathered,
+    load_truth,
+    mud_name,
+    mud_rows,
+)
+from tests.experiments.made_up_strides import make_estimate, make_stride
+
+
+def test_trials_make_a_mean_with_its_error_and_scatter() -> None:
+    told = gathered(make_estimate(value) for value in (1.0e6, 1.2e6, 1.4e6))
+    assert told["value"] == pytest.approx(1.2e6)
+    assert told["std_error"] == pytest.approx(0.2e6 / sqrt(3))
+    assert told["cv"] == pytest.approx(1 / 6)
+    assert told["trials"] == [1.0e6, 1.2e6, 1.4e6]
+
+
+def test_one_trial_has_the_doubt_of_its_own_estimate() -> None:
+    told = gathered([make_estimate(1e6, std_error=7e4)])
+    assert (told["value"], told["std_error"], told["cv"]) == (1e6, 7e4, None)
+
+
+def test_bounds_do_not_mix_with_values() -> None:
+    mixed = gathered([make_estimate(1e6), make_estimate(9e6, at_least=True)])
+    assert (mixed["value"], mixed["at_least"], mixed["bounds"]) == (1e6, False, 1)
+    bounds = gathered(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
+    assert (bounds["value"], bounds["at_least"], bounds["bounds"]) == (2e6, True, 3)
+    assert coefficient_text(bounds).startswith("≥ 2.000")
+
+
+def test_what_is_not_valid_counts_for_nothing_but_is_told() -> None:
+    told = gathered([make_estimate(1e6), make_estimate(None, reason="too short")])
+    assert (told["value"], told["not_valid"]) == (1e6, ["too short"])
+    nothing = gathered([make_estimate(None, reason="too short")])
+    assert (nothing["value"], nothing["std_error"], nothing["trials"]) == (None, None, [])
+    assert coefficient_text(nothing) == "-"
+
+
+@pytest.mark.parametrize("written", ["47.6", "47.6 %", "47.6%", "w = 47.6 %", "w=47.6"])
+def test_a_water_content_is_the_same_however_it_is_written(written: str) -> None:
+    assert mud_name(written) == "47.6"
+
+
+def test_other_names_stay_as_they_are() -> None:
+    assert mud_name("kaolin 2") == "kaolin 2"
+
+
+# a load cell's file
+
+
+def write_truth(folder: Path, contents: Any) -> Path:
+    path = folder / "summary.json"
+    path.write_text(contents if isinstance(contents, str) else json.dumps(contents))
+    return path
+
+
+def test_a_summary_is_read_by_mud_and_coefficient(tmp_path: Path) -> None:
+    muds = [{"mud": "47.6 %", "k_p": {"value": 1e6}, "k_s": {"value": None}}, {"mud": "soft", "k_e": {"value": 2e6}}]
+    assert load_truth(write_truth(tmp_path, {"muds": muds})) == {"47.6": {"k_p": 1e6}, "soft": {"k_e": 2e6}}
+
+
+@pytest.mark.parametrize(
+    "contents",
+    [
+        "no json",
+        "[]",
+        {"other": []},
+        {"muds": [1]},
+        {"muds": [{"k_p": {"value": 1.0}}]},
+        {"muds": [{"mud": "a", "k_p": {"value": -1.0}}]},
+        {"muds": [{"mud": "a", "k_p": {"value": "much"}}]},
+        {"muds": [{"mud": "a", "k_p": 3.0}]},
+    ],
+)
+def test_another_file_is_refused_with_what_to_give(tmp_path: Path, contents: Any) -> None:
+    with pytest.raises(BenchError, match=r"give the summary\.json of 'mudskipper experiment loadcell'"):
+        load_truth(write_truth(tmp_path, contents))
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BenchError, match=r"none\.json: No such file"):
+        load_truth(tmp_path / "none.json")
+
+
+# tables
+
+
+def test_errors_are_those_of_values_and_bounds_are_told_as_bounds() -> None:
+    truth = {"k_p": 1e6, "k_s": 1e6, "k_e": None}
+    strides = [
+        make_stride(k_p=make_estimate(1.1e6), k_s=make_estimate(0.8e6, at_least=True)),
+        make_stride(k_p=make_estimate(1.3e6), k_s=make_estimate(0.6e6, at_least=True)),
+    ]
+    errors = error_table((Beside("49.5", "default", stride, truth) for stride in strides), "walking")
+    (row,) = error_text_rows(errors)[1:]
+    assert row == ["49.5", "default", "20.0 % (+20 %)", "≥ 70 % of it (2)", "-", "2"]
+
+
+def test_a_method_that_says_nothing_of_a_coefficient_has_no_row_of_it() -> None:
+    stride = make_stride(k_p=None, k_e=None)
+    errors = error_table([Beside("49.5", "law", stride, {"k_p": 1e6, "k_s": 1e6, "k_e": 1e6})], "walking")
+    assert [row["coefficient"] for row in errors] == ["k_s"]
+
+
+def test_a_table_of_muds_has_the_load_cell_beside() -> None:
+    told = gathered([make_estimate(1.5e6), make_estimate(1.7e6)])
+    muds = [{"mud": "47.6", "k_p": told, "k_s": told, "k_e": told, "truth": {"k_p": 1.55e6}}]
+    head, row = mud_rows(muds)
+    assert len(head) == len(row)
+    assert row[:4] == ["47.6", "1.600 ± 0.100", "9 %", "1.550"]
+    assert row[6] == "-"
+
+
+def test_methods_of_one_mud_stand_together() -> None:
+    rows = [Beside(mud, method, make_stride(), {"k_p": 1e6}) for method in ("one", "two") for mud in ("b", "a")]
+    table = error_text_rows(error_table(rows, "walking"))
+    assert [row[:2] for row in table[1:]] == [["b", "one"], ["b", "two"], ["a", "one"], ["a", "two"]]

@@ -1,0 +1,213 @@
+"""Trials one after another: nothing is lost, nothing counts twice, and the person decides what is doubtful."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.bench_robot import BenchError
+from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError, Truths, conduct_trials, leave, require_some
+from experiments.notebook import Entry, Notebook
+from experiments.person import GO_ON, REDO, SKIP
+from firmware_host.log_reader import Log
+from tests.experiments.made_up_strides import CONFIGURATION
+
+TRIALS = [PlannedTrial(f"47.6/{number}", "47.6", number, 3) for number in (1, 2, 3)]
+PLAN = {"experiment": "made up"}
+
+
+class StillRobot:
+    """A BenchRobot that does nothing but remember what it was asked for."""
+
+    configuration = CONFIGURATION
+
+    def __init__(self) -> None:
+        self.called: list[str] = []
+        self.mode = "idle"
+        self.blocked = False
+        self.closed = False
+        self.deaf = False
+
+    def call(self, method: str, **params: Any) -> Any:
+        if self.deaf:
+            raise BenchError("the daemon does not answer")
+        self.called.append(method)
+        if method in ("disarm", "stop"):
+            self.mode = "idle"
+        faults = [{"blocks_arming": True}] if self.blocked else []
+        return {"mode": self.mode, "now_s": 0.0, "faults": faults} if method == "status" else "accepted"
+
+    def wait(self, duration_s: float) -> None:
+        raise AssertionError("nothing to wait for")
+
+    def record(self, from_s: float, to_s: float) -> Log:
+        raise AssertionError("nothing was recorded")
+
+    def copy_logs(self, folder: Path) -> list[Path]:
+        return []
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class ScriptedPerson:
+    def __init__(self, *answers: str) -> None:
+        self.answers = list(answers)
+        self.asked: list[str] = []
+        self.told: list[str] = []
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        self.asked.append(question)
+        answer = self.answers.pop(0) if self.answers else GO_ON
+        assert answer in answers
+        return answer
+
+    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
+        return low
+
+    def tell(self, sentence: str) -> None:
+        self.told.append(sentence)
+
+
+class ScriptedBed:
+    def __init__(self, *answers: str) -> None:
+        self.answers = list(answers)
+        self.prepared: list[str] = []
+
+    def prepare(self, trial: PlannedTrial) -> str:
+        self.prepared.append(trial.key)
+        return self.answers.pop(0) if self.answers else GO_ON
+
+    def truths(self, flipper: str) -> Truths:
+        return {}
+
+
+class Session:
+    """A bench of these, and measurements that come as they are told."""
+
+    def __init__(self, folder: Path, person: ScriptedPerson | None = None, bed: ScriptedBed | None = None) -> None:
+        self.robot, self.person, self.bed = StillRobot(), person or ScriptedPerson(), bed or ScriptedBed()
+        self.notebook = Notebook(folder, PLAN)
+        self.bench = Bench(self.robot, self.bed, self.person, self.notebook)
+        self.measured: list[str] = []
+        self.outcomes: list[Entry | BaseException] = []
+        self.shown: list[tuple[int, int]] = []
+
+    def measure(self, trial: PlannedTrial) -> Entry:
+        self.measured.append(trial.key)
+        outcome = self.outcomes.pop(0) if self.outcomes else {"remarks": [], "count": len(self.measured)}
+        if isinstance(outcome, BaseException):
+            raise outcome
+        return outcome
+
+    def conduct(self) -> Session:
+        conduct_trials(self.bench, TRIALS, self.measure, lambda done, of: self.shown.append((done, of)))
+        return self
+
+
+ALL = [trial.key for trial in TRIALS]
+
+
+def test_every_trial_is_prepared_measured_and_written(tmp_path: Path) -> None:
+    session = Session(tmp_path).conduct()
+    assert session.bed.prepared == session.measured == list(session.notebook.entries) == ALL
+    assert session.shown == [(0, 3), (1, 3), (2, 3), (3, 3)]
+
+
+def test_torque_is_off_after_every_trial(tmp_path: Path) -> None:
+    session = Session(tmp_path).conduct()
+    assert session.robot.called.count("disarm") == len(TRIALS)
+
+
+def test_an_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
+    first = Session(tmp_path)
+    first.outcomes = [{"remarks": []}, KeyboardInterrupt()]
+    with pytest.raises(KeyboardInterrupt):
+        first.conduct()
+    second = Session(tmp_path).conduct()
+    assert second.bed.prepared == second.measured == ALL[1:]
+
+
+def test_a_trial_can_be_left_out_and_measured_later(tmp_path: Path) -> None:
+    session = Session(tmp_path, bed=ScriptedBed(GO_ON, SKIP)).conduct()
+    assert list(session.notebook.entries) == [ALL[0], ALL[2]]
+    assert Session(tmp_path).conduct().measured == [ALL[1]]
+
+
+def test_the_last_trial_can_be_measured_again(tmp_path: Path) -> None:
+    session = Session(tmp_path, bed=ScriptedBed(GO_ON, REDO)).conduct()
+    assert session.measured == [ALL[0], ALL[0], ALL[1], ALL[2]]
+    assert session.notebook.entries[ALL[0]]["count"] == 2
+
+
+def test_before_the_first_there_is_none_to_measure_again(tmp_path: Path) -> None:
+    session = Session(tmp_path, bed=ScriptedBed(REDO)).conduct()
+    assert session.measured == ALL
+    assert "nothing was measured" in session.person.told[0]
+
+
+def test_a_fault_is_told_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.outcomes = [BenchError("the walk ended early: a drive is silent.")]
+    session.conduct()
+    assert session.person.asked == ["47.6, trial 1 of 3 went wrong: the walk ended early: a drive is silent."]
+    assert session.bed.prepared == session.measured == [ALL[0], *ALL]
+
+
+def test_a_person_who_repeats_has_seen_the_fault_and_it_is_cleared(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.robot.blocked = True
+    session.outcomes = [SpoiltTrialError("no mud")]
+    session.conduct()
+    assert session.robot.called.count("clear") == 1
+
+
+def test_a_spoilt_trial_can_be_left_out(tmp_path: Path) -> None:
+    session = Session(tmp_path, ScriptedPerson(SKIP))
+    session.outcomes = [SpoiltTrialError("no mud")]
+    session.conduct()
+    assert list(session.notebook.entries) == ALL[1:]
+
+
+def test_a_robot_that_walks_on_is_stopped_before_anybody_is_asked(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.robot.mode = "walking"
+    session.outcomes = [SpoiltTrialError("the pose is lost")]
+    session.conduct()
+    assert session.robot.called[:2] == ["status", "stop"]
+
+
+def test_what_goes_wrong_three_times_ends_the_experiment_with_the_reason(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.outcomes = [{"remarks": []}, *(SpoiltTrialError("no mud") for _ in range(3))]
+    with pytest.raises(BenchError, match="trial 2 of 3 went wrong 3 times; the last time: no mud"):
+        session.conduct()
+    assert list(session.notebook.entries) == ALL[:1]
+
+
+@pytest.mark.parametrize(("answer", "kept"), [(GO_ON, ALL), (SKIP, ALL[1:]), (REDO, ALL)])
+def test_a_doubtful_trial_counts_as_the_person_says(tmp_path: Path, answer: str, kept: list[str]) -> None:
+    session = Session(tmp_path, ScriptedPerson(answer))
+    session.outcomes = [{"remarks": ["the base moved by 5.0 mm"]}]
+    session.conduct()
+    assert session.person.told == ["47.6, trial 1 of 3: the base moved by 5.0 mm"]
+    assert list(session.notebook.entries) == kept
+    assert len(session.measured) == (4 if answer == REDO else 3)
+
+
+def test_a_robot_that_no_longer_answers_is_left_with_a_word(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.robot.deaf = True
+    (tmp_path / "old.mcap").touch()
+    assert leave(session.bench, tmp_path) == [tmp_path / "old.mcap"]
+    assert session.person.told == ["the daemon does not answer"]
+    assert session.robot.closed
+
+
+def test_an_experiment_of_which_nothing_is_left_ends_with_a_word(tmp_path: Path) -> None:
+    with pytest.raises(BenchError, match="nothing was measured"):
+        require_some(Session(tmp_path).notebook)
+    require_some(Session(tmp_path).conduct().notebook)
