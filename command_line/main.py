@@ -385,6 +385,101 @@ def _mud_length(text: str) -> tuple[str, float]:
     return name, value
 
 
+def _gravity_m_s2(text: str) -> float:
+    value = float(text)
+    if not 9.7 <= value <= 9.9:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 9.7 to 9.9, as anywhere on Earth")
+    return value
+
+
+def _add_trackway(names: Commands) -> None:  # type: ignore[valid-type]
+    trackway = _add(names, "trackway", "walking.run_trackway", "Three muds in a row, at fixed and at chosen depths.")
+    _add_report(trackway, "robot and muds are simulated; else a daemon's robot walks", "for report, pictures and log")
+    _add_socket(trackway)
+    trackway.add_argument(
+        "--trials", "--seeds", type=_seeds, metavar="N", help="of each gait (default: 3, as the paper)"
+    )
+    trackway.add_argument(
+        "--method", action="append", metavar="NAME", help="of adaptation, repeatable to compare (default: default)"
+    )
+    trackway.add_argument(
+        "--compartment", type=_compartment_m, default=0.61, metavar="M", help="length of each mud (default: 0.61)"
+    )
+    trackway.add_argument("--mud", action="append", metavar="NAME", help="of a real trackway, one after the other")
+
+
+def _add_socket(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--socket",
+        type=Path,
+        default=Path(os.environ.get("MUDSKIPPER_SOCKET", DEFAULT_SOCKET)),
+        help="of the daemon (default: $MUDSKIPPER_SOCKET or %(default)s)",
+    )
+
+
+def _add_sweep(names: Commands) -> None:  # type: ignore[valid-type]
+    sweep = _add(names, "sweep", "walking.run_sweep", "Speed against depth in muds of any strength.")
+    _add_report(sweep, "robot and muds are simulated", "write JSON and picture there")
+    sweep.add_argument("--strength", action="append", type=_strength_pa, metavar="PA", help="repeatable (default: 12)")
+    sweep.add_argument("--method", action="append", metavar="NAME", help="of adaptation, repeatable (default: all)")
+    sweep.add_argument("--seeds", type=_seeds, default=2, metavar="N", help="walks of each point (default: 2)")
+
+
+def _add_faults(names: Commands) -> None:  # type: ignore[valid-type]
+    faults = _add(names, "faults", "fault_trials.run_faults", "Every fault in every phase, against its bounds.")
+    _add_report(faults, "what fails is a simulated robot", "write JSON and picture there")
+    faults.add_argument("--seeds", type=_seeds, default=1, metavar="N", help="cells of each pair (default: 1)")
+    faults.add_argument("--fault", action="append", metavar="NAME", help="repeatable (default: all)")
+    faults.add_argument("--phase", action="append", metavar="NAME", help="repeatable (default: all)")
+
+
+def _add_flipper(names: Commands) -> None:  # type: ignore[valid-type]
+    flipper = _add(names, "flipper", "flipper.run_flipper", "A single flipper on a fixed base: coefficients of muds.")
+    _add_bench(flipper)
+    flipper.add_argument("--mud", action="append", metavar="NAME", help="as its water in percent, repeatable")
+    flipper.add_argument("--trials", type=_trials, default=3, metavar="N", help="of each mud (default: 3)")
+    flipper.add_argument("--depth", type=_depth_cm, default=3.0, metavar="CM", help="(default: 3)")
+    flipper.add_argument("--strides", type=_trials, default=1, metavar="N", help="of each trial (default: 1)")
+    flipper.add_argument("--flipper", choices=("left", "right"), default="right", help="in the mud (default: right)")
+    flipper.add_argument("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
+
+
+def _add_bench(experiment: argparse.ArgumentParser) -> None:
+    """Options of an experiment that a person makes at a robot, or nobody at a simulated one."""
+    _add_report(experiment, "robot and muds are simulated, nothing is asked", "for report, logs and what was measured")
+    _add_socket(experiment)
+
+
+def _add_walk(names: Commands) -> None:  # type: ignore[valid-type]
+    walk = _add(names, "walk", "walk_trials.run_walk", "The walking robot over several muds: coefficients on the way.")
+    _add_bench(walk)
+    walk.add_argument(
+        "--mud",
+        type=_mud_length,
+        action="append",
+        metavar="NAME[=CM]",
+        help="as its water in percent, and its length (default: 61), one after the other along the way",
+    )
+    walk.add_argument("--trials", type=_trials, default=3, metavar="N", help="over the muds (default: 3)")
+    walk.add_argument("--depth", type=_depth_cm, default=3.0, metavar="CM", help="(default: 3)")
+    walk.add_argument(
+        "--soft", action="append", metavar="NAME", help="mud in which to walk at 3 and at 5 cm besides, repeatable"
+    )
+    walk.add_argument("--flipper", choices=("left", "right"), default="right", help="to look at (default: right)")
+    walk.add_argument("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
+
+
+def _mud_length(text: str) -> tuple[str, float]:
+    name, _, length_cm = text.partition("=")
+    try:
+        value = _finite(length_cm or "61")
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text}: must be a mud and its length in cm, as 47.6=61") from None
+    if not (name and 20.0 <= value <= 10000.0):
+        raise argparse.ArgumentTypeError(f"{text}: a mud needs a name, and a length from 20 to 10000 cm")
+    return name, value
+
+
 def _trials(text: str) -> int:
     value = int(text)
     if not 1 <= value <= 100:
