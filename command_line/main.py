@@ -235,6 +235,7 @@ def _add_experiments(commands: Commands) -> None:  # type: ignore[valid-type]
     _add_faults(names)
     _add_flipper(names)
     _add_walk(names)
+    _add_loadcell(names)
     fit = _add(names, "mud-fit", "walking.run_mud_fit", "The simulator's muds, fitted to the paper's fixed depths.")
     _add_report(fit, "the muds are the simulator's", "write JSON there")
     fit.add_argument("--seeds", type=_seeds, default=2, metavar="N", help="walks of each point (default: 2)")
@@ -382,6 +383,68 @@ def _trials(text: str) -> int:
     value = int(text)
     if not 1 <= value <= 100:
         raise argparse.ArgumentTypeError(f"{text}: must be from 1 to 100")
+    return value
+
+
+def _add_loadcell(names: Commands) -> None:  # type: ignore[valid-type]
+    loadcell = _add(names, "loadcell", "loadcell.loadcell", "A mud's coefficients from a load cell on a linear stage.")
+    _add_report(loadcell, "stage and load cell are emulated", "for report, pictures and samples; goes on where it was")
+    loadcell.add_argument(
+        "--port", metavar="PATH", help="of the cell's amplifier: /dev/serial/by-id/... is the same always"
+    )
+    loadcell.add_argument("--baud", type=_baud, default=115200, metavar="N", help="(default: %(default)s)")
+    loadcell.add_argument(
+        "--format", default="auto", metavar="NAME", help="of its lines: auto, number, indicator, column2, or a pattern"
+    )
+    loadcell.add_argument(
+        "--unit", default="", metavar="U", help="of its numbers: counts, g, kg, N ... (default: as it says)"
+    )
+    loadcell.add_argument("--scale", type=_positive, metavar="X", help="newtons per unit, instead of a calibration")
+    loadcell.add_argument("--calibration", type=Path, metavar="FILE", help="made earlier, instead of two weights")
+    loadcell.add_argument(
+        "--mud", action="append", metavar="NAME", help="repeatable; simulated: water content in percent"
+    )
+    loadcell.add_argument(
+        "--trials", type=_seeds, default=5, metavar="N", help="of shear and of insertion (default: 5)"
+    )
+    loadcell.add_argument("--depth", type=_depth_cm, default=3.0, metavar="CM", help="(default: %(default)s)")
+    loadcell.add_argument(
+        "--plate", type=_plate_cm, default=(3.0, 3.5, 0.4), metavar="WxH", help="or WxHxT, in cm (default: 3x3.5x0.4)"
+    )
+    loadcell.add_argument("--speed", type=_speed_m_s, default=0.1, metavar="M/S", help="of the stage (default: 0.1)")
+    loadcell.add_argument("--compare", type=Path, metavar="FILE", help="summary.json of the flipper experiment")
+    loadcell.add_argument("--seed", type=int, default=1, metavar="N", help="of the simulation")
+
+
+def _plate_cm(text: str) -> tuple[float, float, float]:
+    """3x3.5 or, with its thickness, 3x3.5x0.4."""
+    sides = text.lower().removesuffix("cm").split("x")
+    if len(sides) not in (2, 3):
+        raise argparse.ArgumentTypeError(f"{text}: must be width x height, or width x height x thickness, in cm")
+    width, height, thickness = (float(side) for side in [*sides, "0.4"][:3])
+    if not (0.2 <= width <= 50.0 and 0.2 <= height <= 50.0 and 0.02 <= thickness <= 10.0):
+        raise argparse.ArgumentTypeError(f"{text}: width and height must be from 0.2 to 50, thickness from 0.02 to 10")
+    return width, height, thickness
+
+
+def _speed_m_s(text: str) -> float:
+    value = float(text)
+    if not 0.001 <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 0.001 to 1 m/s")
+    return value
+
+
+def _baud(text: str) -> int:
+    value = int(text)
+    if not 300 <= value <= 4000000:
+        raise argparse.ArgumentTypeError(f"{text}: must be from 300 to 4000000")
+    return value
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not (value > 0.0 and isfinite(value)):
+        raise argparse.ArgumentTypeError(f"{text}: must be more than 0")
     return value
 
 

@@ -22,6 +22,23 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job sta
 ROOT = Path(__file__).parent.parent
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Of the bench (tests/bench), here because pytest asks for options before it looks there."""
+    bench = parser.getgroup("bench", "the robot's bench: tests/bench")
+    bench.addoption("--simulated", action="store_true", help="on a simulated robot, as fast as it computes")
+    bench.addoption(
+        "--can", action="append", metavar="[NAME=]CHANNEL", help="on a robot: SocketCAN channel of all buses, or of one"
+    )
+    bench.addoption("--config", metavar="FILE", help="the robot's configuration, and its CAN interfaces without --can")
+    bench.addoption("--yes", action="store_true", help="do not ask before the robot moves")
+    bench.addoption("--bench-report", metavar="PATH", help="write every figure of the bench there, as JSON")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if config.option.simulated and config.option.can:
+        raise pytest.UsageError("--simulated needs no --can: choose one of them")
+
+
 @pytest.fixture(scope="session")
 def example_text() -> str:
     """The configuration that the README tells a robot's owner to start from."""

@@ -1,0 +1,164 @@
+"""`mudskipper experiment loadcell`: plan, port or emulated bench, tables."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from command_line.bench import Desk, Finding, conduct_bench
+from command_line.conduct import refuse
+from command_line.screen import table
+from drivers.load_cell_calibration import LoadCellCalibration
+from drivers.load_cell_lines import AUTO, COUNTS, NUMBER, UNITS, LineFormat
+from drivers.load_cell_port import LoadCellPort, LoadCellPortError
+from experiments.bench_robot import BenchError
+from experiments.estimation import SINGLE_WATERS
+from experiments.loadcell import (
+    CellSettings,
+    CompareError,
+    Results,
+    conclude,
+    load_flipper,
+    measure,
+    plan_of_notebook,
+    report_of,
+)
+from experiments.loadcell_motion import StageSettings
+from experiments.loadcell_recording import BenchClock, CellRecorder, WallClock
+from experiments.loadcell_report import TITLE, coefficient_rows, compared_rows, sections_of
+from experiments.loadcell_stage import AttendedStage, SimulatedStage, Stage
+from experiments.loadcell_trials import RAW, TrialBench, TrialPlan
+from experiments.notebook import Notebook
+from simulation.load_cell_bench import EmulatedBench, clay_plate
+from simulation.load_cell_emulator import AmplifierParameters
+
+MIXED = "mud"  # the name of one that nobody named
+StageOf = Callable[[CellRecorder], Stage]
+
+
+def loadcell(options: argparse.Namespace) -> int:
+    if not options.simulated and options.port is None:
+        return refuse("name the serial port of the load cell with --port, or use --simulated")
+    try:
+        plan, cell = plan_of(options), cell_of(options)
+        flipper = None if options.compare is None else load_flipper(options.compare)
+    except (ValueError, CompareError) as problem:
+        return refuse(str(problem))
+    return conduct_bench(options, "trials", lambda desk: _found(options, desk, plan, cell, flipper))
+
+
+def plan_of(options: argparse.Namespace) -> TrialPlan:
+    """Raises ValueError for what cannot be."""
+    width_cm, height_cm, thickness_cm = options.plate
+    settings = StageSettings(
+        depth_m=options.depth / 100.0,
+        speed_m_s=options.speed,
+        plate_width_m=width_cm / 100.0,
+        plate_height_m=height_cm / 100.0,
+        plate_thickness_m=thickness_cm / 100.0,
+    )
+    if settings.depth_m > settings.plate_height_m:
+        raise ValueError(f"the depth of {options.depth:g} cm is more than the plate's height of {height_cm:g} cm")
+    named = options.mud or ([f"{water:g}" for water in SINGLE_WATERS] if options.simulated else [MIXED])
+    if len({name.lower() for name in named}) < len(named):
+        raise ValueError("two muds have the same name")
+    if options.simulated:
+        for name in named:
+            _water(name)
+    return TrialPlan(tuple(named), options.trials, settings)
+
+
+def _water(name: str) -> float:
+    """Raises ValueError where it is no water content that there is a mud for."""
+    try:
+        water = float(name)
+    except ValueError:
+        raise ValueError(f"mud {name!r}: a simulated one is a water content in percent, such as 48.6") from None
+    clay_plate(water)
+    return water
+
+
+def cell_of(options: argparse.Namespace) -> CellSettings:
+    """Raises ValueError."""
+    if options.format != AUTO:
+        LineFormat(options.format)
+    if options.unit and options.unit.lower() not in UNITS:
+        raise ValueError(f"unit {options.unit!r}: must be one of {', '.join(UNITS)}")
+    return CellSettings(options.format, options.unit.lower(), options.scale, options.calibration)
+
+
+def _found(
+    options: argparse.Namespace, desk: Desk, plan: TrialPlan, cell: CellSettings, flipper: dict[str, Any] | None
+) -> Finding:
+    bench_name = "simulated" if options.simulated else "load cell"
+    notebook = Notebook(desk.folder, plan_of_notebook(plan.settings) | {"bench": bench_name})
+    missing = [trial for trial in plan.list_trials() if trial.key not in notebook.entries]
+    if notebook.begun:
+        desk.person.tell(f"{len(notebook.entries)} trials are in {desk.folder} already, {len(missing)} are left")
+    described = {"bench": bench_name, "port": options.port, "baud": options.baud, "format": options.format}
+    if missing:
+        with ExitStack() as stack:
+            described |= _measured(options, desk, plan, cell, notebook, stack)
+    results = conclude(desk.folder, notebook, plan, flipper, desk.show)
+    if not results.trials:
+        raise BenchError("no trial was kept, so there is nothing to conclude")
+    report = report_of(results, notebook, plan, described)
+    return Finding(report, TITLE, sections_of(results, plan.settings), text_of(results), [desk.folder / RAW])
+
+
+def _measured(
+    options: argparse.Namespace, desk: Desk, plan: TrialPlan, cell: CellSettings, notebook: Notebook, stack: ExitStack
+) -> dict[str, Any]:
+    """All trials that are missing; what the cell turned out to be."""
+    path, clock, stage_of = (_emulated if options.simulated else _real)(options, desk, plan, stack)
+    port = _open(path, options.baud, cell)
+    stack.callback(port.close)
+    recorder = CellRecorder(port, clock, desk.person.tell)
+    bench = TrialBench(recorder, stage_of(recorder), desk.person, notebook, desk.folder, desk.show)
+    measure(bench, plan, cell)
+    return {
+        "port": path,
+        "format": port.line_format.name,
+        "rate_hz": port.rate_hz,
+        "lines": port.lines,
+        "garbled_lines": port.garbled_lines,
+        "last_garbled": port.last_garbled,
+        "calibration": port.calibration._asdict(),
+    }
+
+
+def _real(
+    options: argparse.Namespace, desk: Desk, plan: TrialPlan, stack: ExitStack
+) -> tuple[str, BenchClock, StageOf]:
+    return options.port, WallClock(), lambda recorder: AttendedStage(plan.settings, desk.person, recorder.drain)
+
+
+def _emulated(
+    options: argparse.Namespace, desk: Desk, plan: TrialPlan, stack: ExitStack
+) -> tuple[str, BenchClock, StageOf]:
+    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mudskipper-")))
+    plates = {mud: clay_plate(_water(mud), plan.settings.plate) for mud in plan.muds}
+    amplifier = AmplifierParameters(baud=options.baud)
+    bench = EmulatedBench(next(iter(plates.values())), folder / "load_cell", amplifier, seed=options.seed)
+    stack.callback(bench.close)
+    return str(folder / "load_cell"), bench, lambda _: SimulatedStage(plan.settings, bench, plates, options.seed)
+
+
+def _open(path: str, baud: int, cell: CellSettings) -> LoadCellPort:
+    """As it comes; what it sends is examined next."""
+    line_format = LineFormat(NUMBER if cell.format_name == AUTO else cell.format_name)
+    try:
+        return LoadCellPort(path, baud, line_format, LoadCellCalibration(cell.unit or COUNTS, 1.0))
+    except LoadCellPortError as problem:
+        raise BenchError(str(problem)) from problem
+
+
+def text_of(results: Results) -> str:
+    parts = [table(coefficient_rows(results.muds))]
+    if results.compared:
+        parts.append(table(compared_rows(results.compared)))
+    return "\n\n".join([*parts, *results.remarks])

@@ -1,0 +1,137 @@
+"""Lines of a load cell's amplifier: from bytes to readings, by a named format or by a pattern of one's own.
+
+There is no standard. Boards with an HX711 or ADS1232 print one number a line, bare or after a label; weighing
+indicators print their state, gross or net, sign, weight and unit, with blanks wherever they like (A&D and its many
+followers: `ST,GS,+  12.34kg`, where ST is stable, US unstable, OL overload); loggers print columns. A cell beyond its
+range answers with letters or dashes in place of a number, or stays at the last count of its converter.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from math import isfinite
+from typing import NamedTuple
+
+GRAVITY_M_S2 = 9.80665
+NEWTONS = {  # per unit of weight or force
+    "n": 1.0,
+    "mn": 1e-3,
+    "kn": 1e3,
+    "mg": 1e-6 * GRAVITY_M_S2,
+    "g": 1e-3 * GRAVITY_M_S2,
+    "kg": GRAVITY_M_S2,
+    "lb": 0.45359237 * GRAVITY_M_S2,
+}
+COUNTS, RATIO = "counts", "mv/v"  # say nothing of newtons by themselves
+UNITS = (*NEWTONS, COUNTS, RATIO)
+LONGEST_LINE_BYTES = 200
+CONVERTER_ENDS = (float(2**23 - 1), float(-(2**23)))  # of 24 bits, as nearly all of these amplifiers have
+
+_NUMBER = r"(?P<value>[+-]?[ ]*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
+_UNIT = r"(?P<unit>kg|mg|g|kN|mN|N|lb|mV/V|counts?)"
+NUMBER, INDICATOR, COLUMN, AUTO = "number", "indicator", "column", "auto"
+PATTERNS = {
+    INDICATOR: rf"(?:ST|US|SD|WT|S|U) *,? *(?:GS|NT|GR|TR|G|N|NET|GROSS) *[,:]? *{_NUMBER} *{_UNIT}?",
+    NUMBER: rf"(?:[A-Za-z][\w ./#()-]*[:=] *)?{_NUMBER} *{_UNIT}?",
+}
+OVERLOADED = re.compile(
+    r"(?:OL|UL) *,.*|.*\b(?:OL|UL|OFL|UFL|OVER|UNDER|OVERLOAD|UNDERLOAD|OUT OF RANGE|E?RR?[ -]?\d+)\b.*"
+    r"|[^0-9]*[-_=^~]{4,}.*",
+    re.IGNORECASE,
+)
+
+
+class Reading(NamedTuple):
+    value: float  # in the unit of the line, or in the configured one
+    unit: str = ""  # in small letters; empty where the line does not say
+    overloaded: bool = False
+
+
+class LineFormat:
+    """`number`, `indicator`, `column2` (columns are separated by blanks, commas, semicolons or tabs; the first is 1),
+    or a regular expression for the whole line with a group named value, and perhaps one named unit.
+    """
+
+    def __init__(self, name: str) -> None:
+        """Raises ValueError for a format that there is not."""
+        self.name = name
+        self._column = 0
+        self._pattern = re.compile("")
+        if name in PATTERNS:
+            self._pattern = re.compile(PATTERNS[name], re.IGNORECASE)
+        elif re.fullmatch(rf"{COLUMN}[1-9]", name):
+            self._column = int(name[-1])
+            self._pattern = re.compile(rf"{_NUMBER} *{_UNIT}?", re.IGNORECASE)
+        elif "(?P<value>" in name:
+            self._pattern = _compiled(name)
+        else:
+            raise ValueError(f"format {name!r}: must be {describe_formats()}")
+
+    def decode(self, line: bytes) -> Reading | None:
+        """None where the line is nothing of this format."""
+        text = printable(line)
+        if text is None:
+            return None
+        match = self._pattern.fullmatch(_column(text, self._column) if self._column else text)
+        if match is None:
+            return Reading(float("nan"), overloaded=True) if OVERLOADED.fullmatch(text) else None
+        try:
+            value = float(match["value"].replace(" ", ""))
+        except ValueError:  # whatever a pattern of one's own lets through
+            return None
+        if not isfinite(value):
+            return None
+        unit = (match.groupdict().get("unit") or "").lower()
+        unit = COUNTS if unit == "count" else unit
+        at_end = unit in ("", COUNTS) and value in CONVERTER_ENDS
+        return Reading(value, unit, at_end)
+
+
+def _compiled(pattern: str) -> re.Pattern[str]:
+    try:
+        return re.compile(pattern)
+    except re.error as problem:
+        raise ValueError(f"format {pattern!r}: not a regular expression: {problem}") from problem
+
+
+def _column(text: str, column: int) -> str:
+    cells = [cell for cell in re.split(r"[,;\t ]+", text) if cell]
+    return cells[column - 1] if column <= len(cells) else ""
+
+
+def printable(line: bytes) -> str | None:
+    """The line as text, stripped, or None where it holds anything else."""
+    try:
+        text = line.decode("ascii").strip()
+    except UnicodeDecodeError:
+        return None
+    return text if text and all(letter.isprintable() or letter == "\t" for letter in text) else None
+
+
+def describe_formats() -> str:
+    return f"{AUTO}, {', '.join(sorted(PATTERNS))}, {COLUMN}1 to {COLUMN}9, or a regular expression with (?P<value>...)"
+
+
+def find_format(lines: Sequence[bytes]) -> LineFormat | None:
+    """The named format that reads most of these lines, at least half of them; columns are left to the operator, who
+    knows which one is the load.
+    """
+    best, most = None, len(lines) / 2.0
+    for name in (INDICATOR, NUMBER):
+        line_format = LineFormat(name)
+        readable = sum(line_format.decode(line) is not None for line in lines)
+        if readable > most:
+            best, most = line_format, readable
+    return best
+
+
+def text_share(lines: Iterable[bytes]) -> float:
+    """How much of what arrives is text at all: at a wrong baud rate little is."""
+    letters = b"".join(lines)
+    return sum(32 <= letter < 127 or letter in b"\t\r\n" for letter in letters) / len(letters) if letters else 0.0
+
+
+def newtons_per(unit: str) -> float | None:
+    """None for counts and for mV/V, which a calibration has to tell."""
+    return NEWTONS.get(unit.lower())

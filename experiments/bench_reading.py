@@ -1,0 +1,48 @@
+"""One measured figure of the bench with its unit and bounds, and what to do where it lies outside of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import inf, isfinite
+from typing import Any, NamedTuple
+
+
+class Reading(NamedTuple):
+    what: str
+    value: float  # NaN: it could not be measured, which is never good
+    unit: str = ""
+    low: float = -inf
+    high: float = inf
+    advice: str = ""
+
+    @property
+    def good(self) -> bool:
+        return self.low <= self.value <= self.high
+
+    @property
+    def value_text(self) -> str:
+        return f"{self.value:.4g} {self.unit}".strip() if self.value == self.value else "unknown"
+
+    @property
+    def bounds_text(self) -> str:
+        if isfinite(self.low) and isfinite(self.high):
+            exactly = self.low == self.high
+            return f"exactly {self.low:.4g}" if exactly else f"{self.low:.4g} to {self.high:.4g}"
+        if isfinite(self.low):
+            return f"at least {self.low:.4g}"
+        return f"at most {self.high:.4g}" if isfinite(self.high) else ""
+
+    @property
+    def sentence(self) -> str:
+        advice = f": {self.advice}" if self.advice else ""
+        return f"{self.what} is {self.value_text}, must be {self.bounds_text}{advice}."
+
+    @property
+    def as_json(self) -> dict[str, Any]:
+        """Without NaN and infinities, which JSON does not have."""
+        numbers = {"value": self.value, "low": self.low, "high": self.high}
+        kept = {name: number if isfinite(number) else None for name, number in numbers.items()}
+        return {"what": self.what, "unit": self.unit, **kept, "good": self.good, "advice": self.advice}
+
+
+Readings = Iterator[Reading]

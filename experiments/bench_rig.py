@@ -1,0 +1,203 @@
+"""The buses of a robot and the daemon's own loop on them, in this process: a real robot's, or a simulated one's.
+
+A `Rig` is all that differs between the two: how the next tick comes about. On hardware the ticker sleeps until it; on
+the simulated robot time is stepped. Before the loop takes the buses over, both listen to them for a second, as bare
+frames: once the drives' ports know which ids are wanted, SocketCAN keeps everybody else's frames away.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from math import radians
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from control.geometry import FlipperGeometry
+from control.records import JOINTS
+from drivers.can_port import CanPort
+from drivers.frames import Frame
+from drivers.mock_bus import MockBus, MockPort
+from drivers.odrive_drives import OdriveDrives
+from drivers.pose_port import NoPose
+from experiments.bench_robot import BenchError
+from firmware_host.buses import BusError, open_ports
+from firmware_host.configuration import Configuration
+from firmware_host.loop import Loop
+from firmware_host.realtime import prepare_loop
+from firmware_host.recorder import NullRecorder
+from firmware_host.status_client import NoDaemonError, NotPermittedError, StatusClient
+from firmware_host.ticker import PERIOD_S, Beat, Ticker
+from simulation.clay import Clay
+from simulation.lockstep import drives_of, plant_of
+from simulation.odrive import OdriveParameters
+from simulation.robot import SimulatedRobot
+from simulation.track import Track
+
+LISTENING_S = 1.0  # ten heartbeats
+LOOK_S = 0.001  # between two looks at a bus that is listened to
+LYING_RAD = radians(-30.0)  # adduction of idle flippers: blocks lift the robot above what they lie on
+CUSHION = Track([(1.0, Clay("cushion", 1e3))])  # bears an idle arm, and gives way to one that falls
+
+
+class Overheard(NamedTuple):
+    duration_s: float
+    frames: Mapping[str, Sequence[Frame]]  # by bus
+
+
+class Rig(Protocol):
+    configuration: Configuration
+    loop: Loop
+    overheard: Overheard
+    warnings: Sequence[str]  # of the operating system, that a person should know
+
+    @property
+    def now_s(self) -> float: ...
+
+    def wait(self) -> Beat:
+        """The next tick comes."""
+
+    def close(self) -> None: ...
+
+
+class HardwareRig:
+    """Real buses and real time. Raises BenchError where a daemon runs or a bus does not open.
+
+    The process is as punctual as the daemon while the rig is open. Memory is not locked: that could not be undone.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        refuse_beside_daemon(Path(configuration.status.socket))
+        self.configuration = configuration
+        try:
+            ports = open_ports(configuration.bus)
+        except BusError as problem:
+            raise BenchError(f"{problem}.") from problem
+        self.overheard = listen(ports)
+        drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
+        self.loop = Loop(configuration, drives, NoPose(), NullRecorder())
+        self._processors = os.sched_getaffinity(0)
+        options = configuration.loop
+        self.warnings: Sequence[str] = prepare_loop(options.priority, options.cpu, lock_memory=False)
+        self._ticker = Ticker()
+        self._now_s = time.monotonic()
+
+    @property
+    def now_s(self) -> float:
+        return self._now_s
+
+    def wait(self) -> Beat:
+        beat = self._ticker.wait()
+        self._now_s = beat.now_s
+        return beat
+
+    def close(self) -> None:
+        self.loop.drives.close()
+        os.sched_setaffinity(0, self._processors)
+        gc.unfreeze()
+        gc.enable()
+        with suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+def refuse_beside_daemon(socket: Path) -> None:
+    """Two programs that command the same drives would fight over them. Raises BenchError."""
+    why = f"The daemon runs (it answers on {socket}) and commands the drives: 'systemctl stop mudskipper' first."
+    try:
+        StatusClient(socket).close()
+    except NoDaemonError:
+        return
+    except NotPermittedError as problem:  # whether one runs cannot be known
+        raise BenchError(f"{problem}; run this as its owner.") from problem
+    raise BenchError(why)
+
+
+def listen(ports: Mapping[str, CanPort]) -> Overheard:
+    frames: dict[str, list[Frame]] = {name: [] for name in ports}
+    begun_s = now_s = time.monotonic()
+    for port in ports.values():
+        port.receive()  # what waited there is of before
+    while now_s - begun_s < LISTENING_S:
+        for name, port in ports.items():
+            frames[name] += port.receive()
+        time.sleep(LOOK_S)
+        now_s = time.monotonic()
+    return Overheard(now_s - begun_s, frames)
+
+
+def lying_m(geometry: FlipperGeometry) -> float:
+    """How far below its axis an idle flipper's edge should lie on the bench."""
+    return -geometry.edge_position(0.0, LYING_RAD)[2]
+
+
+class SimulatedRig:
+    """A robot on blocks, built as `built` says, and a loop that knows of it what `configuration` says.
+
+    `drives` replace what `built` would make. `others` are called before each step with the time: what else is on the
+    buses, and whose hands are on the flippers.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        built: Configuration | None = None,
+        drives: Mapping[str, OdriveParameters] | None = None,
+        seed: int = 1,
+        others: Sequence[Callable[[SimulatedRig], None]] = (),
+    ) -> None:
+        self.configuration = configuration
+        built = built or configuration
+        self.buses = {name: MockBus() for name in configuration.bus}
+        geometry = replace(built.geometry, axis_height_m=lying_m(built.geometry))
+        self.robot = SimulatedRobot(
+            plant_of(built, fixed_base=True, geometry=geometry, joint_coulomb_nm=0.005),
+            CUSHION,
+            drives or usual_drives(built),
+            {joint: built.drive[joint].bus for joint in JOINTS},
+            {name: bus.open() for name, bus in self.buses.items()},
+            seed,
+        )
+        self.others = list(others)
+        self._tick_number = 0
+        self.overheard = self._listen()
+        wires = {name: bus.open() for name, bus in self.buses.items()}
+        odrives = OdriveDrives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
+        self.loop = Loop(configuration, odrives, NoPose(), NullRecorder(), self._clock, self._clock)
+        self.warnings: Sequence[str] = ()
+
+    @property
+    def now_s(self) -> float:
+        return self._tick_number * PERIOD_S
+
+    def _clock(self) -> float:
+        return self.now_s
+
+    def _listen(self) -> Overheard:
+        ears: dict[str, MockPort] = {name: bus.open() for name, bus in self.buses.items()}
+        frames: dict[str, list[Frame]] = {name: [] for name in ears}
+        while self.now_s < LISTENING_S:
+            self.wait()
+            for name, ear in ears.items():
+                frames[name] += ear.receive()
+        for ear in ears.values():
+            ear.close()
+        return Overheard(self.now_s, frames)
+
+    def wait(self) -> Beat:
+        self._tick_number += 1
+        for other in self.others:
+            other(self)
+        self.robot.advance(self.now_s)
+        return Beat(self.now_s, 0.0, self._tick_number, 0)
+
+    def close(self) -> None:
+        self.loop.drives.close()
+
+
+def usual_drives(configuration: Configuration) -> dict[str, OdriveParameters]:
+    """Neither ideal nor odd: some lag, some cogging, messages that come when they come."""
+    return drives_of(configuration, current_lag_s=0.0005, cogging_nm=0.003, message_delay_s=0.0005)

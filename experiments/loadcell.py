@@ -1,0 +1,295 @@
+"""The ground truth of a mud from a load cell on a linear stage (the paper's section II-E), and how a flipper compares.
+
+A plate is dragged 20 cm through the mud at 3 cm of depth, and in other trials let down 3 cm, held for 3 s and drawn
+out, at 0.1 m/s and five times each. The cell's amplifier is a serial port; nobody but its operator knows the stage.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from math import hypot, isfinite
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from drivers.load_cell_calibration import (
+    CalibrationError,
+    LoadCellCalibration,
+    calibrate,
+    of_unit,
+    read_calibration,
+    remarks_on,
+    weigh,
+    write_calibration,
+)
+from drivers.load_cell_lines import COUNTS, LineFormat
+from drivers.load_cell_port import LoadCellPort
+from experiments.bench_robot import BenchError
+from experiments.loadcell_fits import COEFFICIENTS, Analysed, OfMud, analyse, of_mud, speed_remark
+from experiments.loadcell_motion import StageSettings
+from experiments.loadcell_recording import CellRecorder, examine_lines
+from experiments.loadcell_trials import TrialBench, TrialPlan, load_all, measure_all
+from experiments.notebook import Notebook
+from experiments.person import GO_ON, Person
+from experiments.side_by_side import Show
+
+CALIBRATION = "calibration.json"
+WEIGHING_S = 2.0
+LEAST_SAMPLES = 12  # of an insertion
+STOP = "q"
+
+
+@dataclass(frozen=True)
+class CellSettings:
+    """As the operator gave them; an empty unit is that of the lines."""
+
+    format_name: str = "auto"
+    unit: str = ""
+    scale_n: float | None = None  # newtons per unit
+    calibration: Path | None = None
+
+
+class Compared(NamedTuple):
+    mud: str
+    coefficient: str
+    sensed: float
+    sensed_std_error: float
+    truth: float
+    truth_std_error: float
+    at_least: bool = False  # the flipper felt no more than that the mud bears so much
+
+    @property
+    def ratio(self) -> float:
+        return self.sensed / self.truth
+
+    @property
+    def ratio_std_error(self) -> float:
+        return self.ratio * hypot(self.sensed_std_error / self.sensed, self.truth_std_error / self.truth)
+
+
+def plan_of_notebook(settings: StageSettings) -> dict[str, Any]:
+    """What may not change between the trials of one folder; muds and trials may be added."""
+    return {"experiment": "loadcell", **asdict(settings)}
+
+
+def measure(bench: TrialBench, plan: TrialPlan, cell: CellSettings) -> None:
+    """From an open port to all trials. Raises BenchError with what to do."""
+    port = bench.recorder.port
+    bench.person.tell(f"listening to {port.path} at {port.baud} baud")
+    port.line_format = LineFormat(examine_lines(bench.recorder, cell.format_name))
+    port.calibration = settle_calibration(bench, cell)
+    heed_rate(bench.recorder, bench.person, plan.settings)
+    measure_all(bench, plan)
+
+
+def settle_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibration:
+    """From the file that was given, the unit, this folder's earlier one, or made anew. Raises BenchError."""
+    port = bench.recorder.port
+    unit = cell.unit or _unit_of(port)
+    kept = bench.folder / CALIBRATION
+    try:
+        if cell.calibration is not None:
+            return read_calibration(cell.calibration)
+        known = of_unit(unit, cell.scale_n)
+        if known is not None:
+            return known
+        if kept.exists():
+            bench.person.tell(f"calibration from {kept}; remove it to calibrate again")
+            return read_calibration(kept)
+    except CalibrationError as problem:
+        raise BenchError(str(problem)) from problem
+    return _calibrate_anew(bench, unit, kept)
+
+
+def _unit_of(port: LoadCellPort) -> str:
+    """As most lines say, or counts."""
+    readings = [port.line_format.decode(line) for line in port.recent_lines]
+    units = Counter(reading.unit for reading in readings if reading is not None and reading.unit)
+    return units.most_common(1)[0][0] if units else COUNTS
+
+
+def _calibrate_anew(bench: TrialBench, unit: str, kept: Path) -> LoadCellCalibration:
+    """Until two weights tell the span; a person is told what is wrong and asked for other ones."""
+    recorder = bench.recorder
+    recorder.port.calibration = LoadCellCalibration(unit, 1.0)
+    while True:
+        try:
+            weighings = [weigh(bench.stage.weigh(which), _readings(recorder)) for which in (0, 1)]
+            calibration = calibrate(unit, *weighings)
+        except CalibrationError as problem:
+            bench.person.tell(str(problem))
+            if bench.person.ask("Calibrate again?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
+                raise BenchError("the load cell is not calibrated") from problem
+            continue
+        for remark in remarks_on(calibration, *weighings):
+            bench.person.tell(remark)
+        write_calibration(kept, calibration)
+        bench.person.tell(
+            f"calibrated: {calibration.per_newton:.6g} {unit} per N, ± {100.0 * calibration.relative_error:.2g} %; "
+            f"kept in {kept}"
+        )
+        return calibration
+
+
+def _readings(recorder: CellRecorder) -> list[float]:
+    recorder.drain()
+    return [sample.force_n for sample in recorder.listen(WEIGHING_S) if not sample.overloaded]
+
+
+def heed_rate(recorder: CellRecorder, person: Person, settings: StageSettings) -> None:
+    """An amplifier too slow for the stroke is told first. Raises BenchError where that ends it."""
+    rate_hz = recorder.port.rate_hz
+    if rate_hz is None:
+        raise BenchError("too few lines come to tell their rate: check the amplifier")
+    duration_s = settings.depth_m / settings.speed_m_s
+    samples = rate_hz * duration_s
+    if samples >= LEAST_SAMPLES:
+        return
+    slower_m_s = settings.speed_m_s * samples / LEAST_SAMPLES
+    person.tell(
+        f"the amplifier sends {rate_hz:.0f} lines/s: an insertion of {duration_s:.2g} s has only {samples:.0f} samples "
+        f"and wants {LEAST_SAMPLES}. Set an HX711's RATE pin high (80 samples/s), choose a faster rate of the "
+        f"indicator, or move the stage at --speed {slower_m_s:.2g}"
+    )
+    if person.ask("Go on all the same?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
+        raise BenchError("stopped: the amplifier is too slow for the stroke")
+
+
+class Results(NamedTuple):
+    trials: list[Analysed]
+    muds: dict[str, dict[str, OfMud]]  # by mud and coefficient
+    remarks: list[str]
+    compared: list[Compared]
+
+
+def conclude(
+    folder: Path, notebook: Notebook, plan: TrialPlan, compare: Mapping[str, Any] | None, show: Show
+) -> Results:
+    """From what is on the disk."""
+    trials = analyse(load_all(folder, notebook), plan.settings, show)
+    errors = {key: _relative_error(entry) for key, entry in notebook.entries.items() if "calibration" in entry}
+    muds = {}
+    for mud in dict.fromkeys(trial.recorded.mud for trial in trials):
+        of_it = [trial for trial in trials if trial.recorded.mud == mud]
+        error = max(errors[trial.recorded.key] for trial in of_it)
+        muds[mud] = {name: of_mud(of_it, name, error) for name in COEFFICIENTS}
+    return Results(trials, muds, _remarks(trials, plan.settings), compared_with(compare, muds))
+
+
+def _relative_error(entry: Mapping[str, Any]) -> float:
+    return LoadCellCalibration(**entry["calibration"]).relative_error
+
+
+def _remarks(trials: Sequence[Analysed], settings: StageSettings) -> list[str]:
+    told = [f"{trial.recorded.key}: {text}" for trial in trials for text in (trial.problem, trial.remark) if text]
+    by_pace = {
+        remark: trial for trial in trials if trial.pace is not None and (remark := speed_remark(trial.pace, settings))
+    }
+    if len(by_pace) > 3:
+        return [*told, f"in {len(by_pace)} trials {next(iter(by_pace))}"]
+    told += [f"{trial.recorded.key}: {remark}" for remark, trial in by_pace.items()]
+    turned = [trial for trial in trials if trial.course is not None and trial.course.turned]
+    if turned:
+        told.append(f"in {len(turned)} trials the cell measured the other way round; their signs are turned")
+    return told
+
+
+class CompareError(Exception):
+    """The flipper's results cannot be read; the text says why."""
+
+
+def load_flipper(path: Path) -> dict[str, Any]:
+    """The summary of the flipper experiment, or the folder that it is in. Raises CompareError, OSError."""
+    path = path / "summary.json" if path.is_dir() else path
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as problem:
+        raise CompareError(f"{path} is no summary of an experiment: {problem}") from problem
+    if not isinstance(told, dict) or not isinstance(told.get("muds"), list):
+        raise CompareError(f"{path} has no muds: give the summary.json of `mudskipper experiment flipper`")
+    return told
+
+
+def compared_with(flipper: Mapping[str, Any] | None, muds: Mapping[str, Mapping[str, OfMud]]) -> list[Compared]:
+    """Muds of the same name."""
+    if flipper is None:
+        return []
+    sensed = {_mud_key(row.get("mud")): row for row in flipper["muds"] if isinstance(row, dict)}
+    rows = []
+    for mud, coefficients in muds.items():
+        for name, truth in coefficients.items():
+            told = sensed.get(_mud_key(mud), {}).get(name)
+            value, error = _sensed(told)
+            if isfinite(value) and isfinite(truth.value):
+                at_least = isinstance(told, dict) and bool(told.get("at_least"))
+                rows.append(Compared(mud, name, value, error, truth.value, truth.std_error, at_least))
+    return rows
+
+
+def _mud_key(name: Any) -> str:
+    """48.60 and "48.6 %" are one mud."""
+    text = str(name).replace("%", "").strip()
+    try:
+        return f"{float(text):g}"
+    except ValueError:
+        return text.lower()
+
+
+def _sensed(told: Any) -> tuple[float, float]:
+    if not isinstance(told, dict) or not isinstance(told.get("value"), int | float) or not told["value"] > 0.0:
+        return float("nan"), float("nan")
+    error = told.get("std_error")
+    return float(told["value"]), float(error) if isinstance(error, int | float) else 0.0
+
+
+def report_of(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mapping[str, Any]) -> dict[str, Any]:
+    paces = [trial.pace for trial in results.trials if trial.pace is not None]
+    return {
+        "experiment": "loadcell",
+        "settings": asdict(plan.settings),
+        "cell": dict(cell),
+        "stage": {
+            "speed_m_s": _number(sum(p.speed_m_s for p in paces) / len(paces)) if paces else None,
+            "acceleration_m_s2": _number(sum(p.acceleration_m_s2 for p in paces) / len(paces)) if paces else None,
+        },
+        "muds": [
+            {"mud": mud, **{name: _described(told) for name, told in coefficients.items()}}
+            for mud, coefficients in results.muds.items()
+        ],
+        "trials": [_trial_described(trial, notebook.entries[trial.recorded.key]) for trial in results.trials],
+        "left_out": {key: entry for key, entry in notebook.entries.items() if entry.get("skipped")},
+        "remarks": results.remarks,
+        "compared": [
+            each._asdict() | {"ratio": _number(each.ratio), "ratio_std_error": _number(each.ratio_std_error)}
+            for each in results.compared
+        ],
+    }
+
+
+def _described(told: OfMud) -> dict[str, Any]:
+    return {
+        "value": _number(told.value),
+        "std_error": _number(told.std_error),
+        "repeatability": _number(told.repeatability),
+        "trials": [_number(value) for value in told.trials],
+    }
+
+
+def _trial_described(trial: Analysed, entry: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "key": trial.recorded.key,
+        **entry,
+        **{
+            name: {"value": _number(c.value), "std_error": _number(c.std_error)}
+            for name, c in trial.coefficients.items()
+        },
+        "speed_m_s": None if trial.speed_m_s is None else _number(trial.speed_m_s),
+        "problem": trial.problem,
+        "remark": trial.remark,
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if isfinite(value) else None

@@ -1,0 +1,193 @@
+"""The load cell's trials as pictures: force and depth against time with the fits, coefficients, and the flipper's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
+import numpy as np  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
+
+from control.plate import submerged_part  # noqa: E402
+from experiments.loadcell import Compared  # noqa: E402
+from experiments.loadcell_fits import (  # noqa: E402
+    COEFFICIENTS,
+    INSERTION,
+    SHEAR,
+    Analysed,
+    OfMud,
+    depths_of,
+    volume_m3,
+)
+from experiments.loadcell_motion import REVERSAL_SHARE, Insertion, Shear, StageSettings  # noqa: E402
+
+COLOURS = ("tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:cyan")
+MODEL: dict[str, Any] = {"color": "tab:red", "linestyle": (0, (5, 2)), "linewidth": 1.8, "zorder": 5}
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+NAMES = {"k_p": "$k_p$", "k_s": "$k_s$", "k_e": "$k_e$"}
+BEFORE_S, BEHIND_S = 0.3, 0.4
+SHOWN_ABOVE_M = 0.01  # the mud
+DPI = 110
+
+
+def plot_mud(trials: Sequence[Analysed], told: Mapping[str, OfMud], settings: StageSettings, path: Path) -> None:
+    """All trials of one mud, each from its own beginning on; the model is that of the mud's coefficients."""
+    figure, axes = plt.subplots(2, 2, figsize=(12.0, 7.2), constrained_layout=True, height_ratios=(1.5, 1.0))
+    (vertical, shear), (depth, curve) = axes
+    for panel in (vertical, shear, curve):
+        panel.axhline(0.0, color="grey", linewidth=0.6)
+    strokes = [trial for trial in trials if isinstance(trial.motion, Insertion)]
+    for i, trial in enumerate(strokes):
+        _plot_insertion(vertical, depth, curve, trial, settings, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
+    if strokes:
+        _plot_vertical_model(vertical, curve, strokes[-1], told, settings)
+    drags = [trial for trial in trials if isinstance(trial.motion, Shear)]
+    for i, trial in enumerate(drags):
+        _plot_shear(shear, trial, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
+    if drags:
+        _plot_shear_model(shear, drags[-1], told["k_s"], settings)
+    _name_axes(vertical, shear, depth, curve)
+    figure.savefig(path, dpi=DPI)
+    plt.close(figure)
+
+
+def _plot_insertion(
+    vertical: Axes, depth: Axes, curve: Axes, trial: Analysed, settings: StageSettings, colour: str, label: str
+) -> None:
+    motion, course, depths_m = trial.motion, trial.course, depths_of(trial, settings)
+    assert isinstance(motion, Insertion) and course is not None and depths_m is not None
+    end_s = course.times_s[-1] if trial.extraction is None else trial.extraction.out_s
+    shown = (course.times_s > motion.surface_s - BEFORE_S) & (course.times_s < end_s + BEHIND_S)
+    since_s, forces_n = course.times_s[shown] - motion.surface_s, course.forces_n[shown] - motion.level_n
+    depths_cm = 100.0 * np.where(depths_m[shown] < -SHOWN_ABOVE_M, np.nan, depths_m[shown])
+    look: dict[str, Any] = {"color": colour, "linewidth": 1.0}
+    vertical.plot(since_s, forces_n, label=label, **look)
+    depth.plot(since_s, depths_cm, **look)
+    wet = depths_cm >= -0.2
+    curve.plot(depths_cm[wet], forces_n[wet], **look)
+
+
+def _plot_vertical_model(
+    vertical: Axes, curve: Axes, trial: Analysed, told: Mapping[str, OfMud], settings: StageSettings
+) -> None:
+    motion = trial.motion
+    assert isinstance(motion, Insertion)
+    depths_m = np.linspace(0.0, settings.depth_m, 40)
+    down_n = told["k_p"].value * volume_m3(settings, depths_m)
+    vertical.plot(depths_m / motion.pace.speed_m_s, down_n, label="model", **MODEL)
+    curve.plot(100.0 * depths_m, down_n, **MODEL)
+    if trial.extraction is not None:
+        depths_m = (1.0 - REVERSAL_SHARE) * depths_m
+        up_n = -told["k_e"].value * volume_m3(settings, depths_m)
+        out_s = trial.extraction.out_s - motion.surface_s
+        vertical.plot(out_s - depths_m / motion.pace.speed_m_s, up_n, **MODEL)
+        curve.plot(100.0 * depths_m, up_n, **MODEL)
+
+
+def _plot_shear(panel: Axes, trial: Analysed, colour: str, label: str) -> None:
+    motion, course = trial.motion, trial.course
+    assert isinstance(motion, Shear) and course is not None
+    zero_n = -trial.recorded.zero_n if course.turned else trial.recorded.zero_n
+    shown = course.times_s > motion.begin_s - BEFORE_S
+    panel.plot(
+        course.times_s[shown] - motion.begin_s,
+        course.forces_n[shown] - zero_n,
+        color=colour,
+        linewidth=1.0,
+        label=label,
+    )
+
+
+def _plot_shear_model(panel: Axes, trial: Analysed, told: OfMud, settings: StageSettings) -> None:
+    motion = trial.motion
+    assert isinstance(motion, Shear)
+    moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
+    steady_s = [motion.steady_from_s - motion.begin_s, motion.steady_to_s - motion.begin_s]
+    panel.plot(steady_s, [told.value * moment_m3] * 2, label="model", **MODEL)
+
+
+def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:
+    vertical.set_title("insertion, hold, extraction", fontsize="medium")
+    shear.set_title("horizontal shear", fontsize="medium")
+    depth.set_title("depth, as found from the force", fontsize="medium")
+    curve.set_title("force over depth", fontsize="medium")
+    vertical.set_ylabel("force on the plate (N), up positive")
+    shear.set_ylabel("force against the drag (N)")
+    depth.set_ylabel("depth (cm)")
+    depth.invert_yaxis()
+    curve.set_ylabel("force (N)")
+    curve.set_xlabel("depth (cm)")
+    depth.sharex(vertical)
+    depth.set_xlabel("time since the surface (s)")
+    shear.set_xlabel("time since the force began (s)")
+    for panel in (vertical, shear):
+        if panel.get_legend_handles_labels()[0]:
+            panel.legend(fontsize="small", loc="upper right" if panel is vertical else "lower center", ncols=2)
+
+
+def plot_coefficients(muds: Mapping[str, Mapping[str, OfMud]], path: Path) -> None:
+    """Mean with two standard errors, and every trial beside it."""
+    figure, panels = plt.subplots(1, 3, figsize=(11.0, 3.6), constrained_layout=True)
+    names = list(muds)
+    for panel, name in zip(panels, COEFFICIENTS, strict=True):
+        for place, mud in enumerate(names):
+            told = muds[mud][name]
+            marker = MARKERS[place % len(MARKERS)]
+            values = np.array(told.trials) / 1e6
+            panel.plot(place + 0.18 + np.zeros(len(values)), values, ".", color="grey", markersize=4)
+            panel.errorbar(place, told.value / 1e6, yerr=2e-6 * told.std_error, fmt=marker, color="black", capsize=3)
+        panel.set_xticks(range(len(names)), names)
+        panel.set_xlim(-0.6, len(names) - 0.4)
+        panel.set_ylim(0.0, None)
+        panel.set_xlabel("mud")
+        panel.set_ylabel(f"{NAMES[name]} (N/cm³)")
+    figure.savefig(path, dpi=DPI)
+    plt.close(figure)
+
+
+def plot_comparison(rows: Sequence[Compared], path: Path) -> None:
+    """As the paper's figure 5 G to I: the flipper's against the load cell's, and the line on which both agree."""
+    figure, panels = plt.subplots(1, 3, figsize=(11.0, 3.9), constrained_layout=True)
+    muds = list(dict.fromkeys(row.mud for row in rows))
+    for panel, name in zip(panels, COEFFICIENTS, strict=True):
+        of_name = [row for row in rows if row.coefficient == name]
+        reach = 1.15 * max([max(row.sensed, row.truth) / 1e6 for row in of_name], default=1.0)
+        panel.plot([0.0, reach], [0.0, reach], color="grey", linewidth=1.2, zorder=0)
+        for row in of_name:
+            _plot_pair(panel, row, muds.index(row.mud))
+        panel.set_xlim(0.0, reach)
+        panel.set_ylim(0.0, reach)
+        panel.set_aspect("equal")
+        panel.set_xlabel(f"{NAMES[name]} by the load cell (N/cm³)")
+        panel.set_ylabel(f"{NAMES[name]} by the flipper (N/cm³)")
+    panels[0].legend(fontsize="small", title="mud", loc="upper left")
+    figure.savefig(path, dpi=DPI)
+    plt.close(figure)
+
+
+def _plot_pair(panel: Axes, row: Compared, place: int) -> None:
+    panel.errorbar(
+        row.truth / 1e6,
+        row.sensed / 1e6,
+        xerr=2e-6 * row.truth_std_error,
+        yerr=2e-6 * row.sensed_std_error,
+        fmt=MARKERS[place % len(MARKERS)],
+        color=COLOURS[place % len(COLOURS)],
+        markeredgecolor="black",
+        lolims=row.at_least,
+        capsize=2,
+        label=row.mud,
+    )
+
+
+def trials_of(trials: Sequence[Analysed], mud: str) -> list[Analysed]:
+    return [trial for kind in (INSERTION, SHEAR) for trial in trials if _is_of(trial, mud, kind)]
+
+
+def _is_of(trial: Analysed, mud: str, kind: str) -> bool:
+    return trial.recorded.mud == mud and trial.recorded.kind == kind

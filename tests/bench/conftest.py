@@ -1,0 +1,164 @@
+"""The bench's stages on one rig: opened once, each stage only after the one before it, idle whatever happens.
+
+pytest tests/bench --can can0             a robot, asked before it moves
+pytest tests/bench --config FILE          the same on the interfaces of the configuration
+pytest tests/bench --simulated            a simulated robot, as fast as it computes
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Generator, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from experiments.bench_attendant import AbsentAttendant, AskedAttendant, Attendant, SimulatedAttendant
+from experiments.bench_channels import on_channels
+from experiments.bench_rig import HardwareRig, Rig, SimulatedRig, lying_m
+from experiments.bench_robot import BenchError
+from experiments.bench_stand import Stand
+from firmware_host.configuration import Configuration, ConfigurationError, load_configuration
+from tests.bench.staged_bench import FAILED, BenchReport, StagedBench, UncapturedPerson, stage_name, stage_of
+
+INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
+EXAMPLE = Path(__file__).parent.parent.parent / "systemd" / "mudskipper.toml"
+REPORT = pytest.StashKey[BenchReport]()
+NOT_ASKED_FOR = "needs a robot (--can CHANNEL, or --config FILE) or --simulated"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[REPORT] = BenchReport()
+
+
+def report_of(config: pytest.Config) -> BenchReport:
+    """This file may have been found only after pytest was configured."""
+    return config.stash.setdefault(REPORT, BenchReport())
+
+
+@pytest.fixture(scope="session")
+def opened(request: pytest.FixtureRequest) -> Iterator[Stand | str]:
+    """The stand, or why there is none."""
+    options, robot = request.config.option, report_of(request.config).robot
+    if not (options.simulated or options.can or options.config):
+        pytest.skip(NOT_ASKED_FOR)
+    path = Path(options.config) if options.config else configuration_path(options.simulated)
+    kind = "simulated" if options.simulated else "hardware"
+    stamp = datetime.now(UTC).isoformat(timespec="seconds")
+    robot |= {"rig": kind, "begun": stamp, "configuration": str(path), "warnings": []}
+    try:
+        configuration = load_configuration(path)
+        rig, attendant = open_rig(request.config, on_channels(configuration, options.can or []))
+    except (ConfigurationError, BenchError) as problem:
+        yield f"{path}: {problem}" if isinstance(problem, ConfigurationError) else str(problem)
+        return
+    robot |= {"robot": configuration.robot.name, "warnings": list(rig.warnings)}
+    stand = Stand(rig, attendant)
+    try:
+        yield stand
+    finally:
+        stand.end()
+        rig.close()
+
+
+def configuration_path(simulated: bool) -> Path:
+    return INSTALLED if INSTALLED.exists() and not simulated else EXAMPLE
+
+
+def open_rig(config: pytest.Config, configuration: Configuration) -> tuple[Rig, Attendant]:
+    """Raises BenchError."""
+    if config.option.simulated:
+        simulated = SimulatedRig(configuration)
+        return simulated, SimulatedAttendant(simulated)
+    attendant = attendant_at(config)
+    return HardwareRig(configuration), attendant
+
+
+def attendant_at(config: pytest.Config) -> Attendant:
+    """Raises BenchError where nobody can be asked and nobody has said yes beforehand."""
+    capture = config.pluginmanager.getplugin("capturemanager")
+    if capture is not None:
+        capture.suspend(in_=True)
+    somebody = sys.stdin is not None and sys.stdin.isatty()
+    if capture is not None:
+        capture.resume()
+    if somebody:
+        return AskedAttendant(UncapturedPerson(config), config.option.yes)
+    if config.option.yes:
+        return AbsentAttendant()
+    raise BenchError("The robot will move, and nobody can be asked: run this on a terminal, or with --yes.")
+
+
+@pytest.fixture
+def bench(request: pytest.FixtureRequest, opened: Stand | str) -> Iterator[StagedBench]:
+    report, stage = report_of(request.config), stage_of(request.path)
+    report.begin(stage, request.node.name)
+    obstacle = report.obstacle(stage)
+    if obstacle:
+        pytest.skip(obstacle)
+    if isinstance(opened, str):
+        if report.tests:
+            pytest.skip("the bench did not open")
+        pytest.fail(opened, pytrace=False)
+    ask_before_moving(request, opened, report, stage)
+    yield StagedBench(opened, report)
+    try:
+        opened.let_go()
+    except BenchError as problem:
+        opened.end()
+        pytest.fail(str(problem), pytrace=False)
+
+
+def ask_before_moving(request: pytest.FixtureRequest, stand: Stand, report: BenchReport, stage: int) -> None:
+    """Once for each stage that moves something."""
+    what = getattr(request.module, "MOVES", "")
+    if not what or stage in report.consents:
+        return
+    lying_cm = 100.0 * lying_m(stand.configuration.geometry)
+    where = (
+        f"The robot stands on blocks; idle, its flippers lie on something soft, {lying_cm:.0f} cm below their axes."
+        " Nobody's hands are near them, and the power switch is at hand."
+    )
+    if not stand.attendant.consents(f"{stage_name(stage).capitalize()}: {what}\n{where}", stand.look_on):
+        pytest.skip("a person did not want the robot to move")
+    report.consents.add(stage)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
+    """What ends a measurement is a sentence for people, not a traceback."""
+    try:
+        return (yield)
+    except BenchError as problem:
+        pytest.fail(str(problem), pytrace=False)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    told = yield
+    if told.when == "teardown" or not told.passed:
+        report = report_of(item.config)
+        report.worsen(told.outcome, told.longrepr[2] if isinstance(told.longrepr, tuple) else told.longreprtext)
+        if told.when == "teardown":
+            report.end()
+    return told
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    report, path = report_of(config), config.option.bench_report
+    if not report.robot:
+        return
+    report.worsen(FAILED, "interrupted")  # a test that is still under way
+    report.end()
+    terminalreporter.section("bench")
+    terminalreporter.write_line(f"{report.robot['rig']}, configuration {report.robot['configuration']}")
+    for line, good in report.lines(brief=config.get_verbosity() < 0):
+        terminalreporter.write_line(line, **({} if good else {"red": True}))
+    for warning in report.robot["warnings"]:
+        terminalreporter.write_line(f"warning: {warning}")
+    if path:
+        try:
+            report.write(Path(path))
+        except OSError as problem:
+            terminalreporter.write_line(f"the report was not written to {path}: {problem.strerror}", red=True)

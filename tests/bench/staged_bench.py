@@ -1,0 +1,160 @@
+"""What the stages of the bench share: the stand, the figures they measure, and the report of all of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line.terminal_person import AbsentPersonError, TerminalPerson
+from experiments.bench_reading import Reading
+from experiments.bench_stand import Stand
+
+STAGES = ("wiring", "signs", "zeros", "currents", "watchdogs", "strokes", "stops", "strides")
+PASSED, FAILED, SKIPPED = "passed", "failed", "skipped"
+
+
+def stage_of(path: Path) -> int:
+    """By the name of its file: test_3_zeros.py is of stage 3. Other files are of none: 0."""
+    number = path.stem.split("_")[1]
+    return int(number) if number.isdigit() else 0
+
+
+def stage_name(stage: int) -> str:
+    return f"stage {stage}, {STAGES[stage - 1]}"
+
+
+class BenchReport:
+    """Owns what every test of the bench came to."""
+
+    def __init__(self) -> None:
+        self.robot: dict[str, Any] = {}
+        self.tests: list[dict[str, Any]] = []
+        self.consents: set[int] = set()  # stages in which a person lets the robot move
+        self._test: dict[str, Any] | None = None  # under way
+
+    def begin(self, stage: int, test: str) -> None:
+        names = {"stage": stage, "name": STAGES[stage - 1], "test": test}
+        self._test = names | {"outcome": PASSED, "why": "", "readings": []}
+
+    def keep(self, reading: Reading) -> None:
+        """Of the test under way."""
+        if self._test is not None:
+            self._test["readings"].append(reading)
+
+    def worsen(self, outcome: str, why: str) -> None:
+        """What was told first of the test under way remains."""
+        if self._test is not None and self._test["outcome"] == PASSED:
+            self._test |= {"outcome": outcome, "why": why}
+
+    def end(self) -> None:
+        """The test under way, if there is one."""
+        if self._test is not None:
+            self.tests.append(self._test)
+        self._test = None
+
+    def outcome_of(self, stage: int) -> str:
+        """Passed only where all of its tests were run and passed."""
+        outcomes = [test["outcome"] for test in self.tests if test["stage"] == stage]
+        if FAILED in outcomes:
+            return FAILED
+        return PASSED if outcomes and SKIPPED not in outcomes else SKIPPED
+
+    def obstacle(self, stage: int) -> str:
+        """Why a stage may not begin; empty where it may."""
+        for earlier in range(1, stage):
+            outcome = self.outcome_of(earlier)
+            if outcome == FAILED:
+                return f"{stage_name(earlier)}, failed: mend that first"
+            if outcome == SKIPPED:
+                return f"{stage_name(earlier)}, was not passed in this run: the stages go one after the other"
+        return ""
+
+    @property
+    def as_json(self) -> dict[str, Any]:
+        tests = [test | {"readings": [reading.as_json for reading in test["readings"]]} for test in self.tests]
+        stages = {name: self.outcome_of(number) for number, name in enumerate(STAGES, 1)}
+        return {**self.robot, "stages": stages, "tests": tests}
+
+    def write(self, path: Path) -> None:
+        """Raises OSError."""
+        path.write_text(json.dumps(self.as_json, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+    def lines(self, brief: bool) -> Iterator[tuple[str, bool]]:
+        """Of a table, with whether all is well there. `brief`: of the figures only those that are not."""
+        for test in self.tests:
+            for reading in test["readings"]:
+                if brief and reading.good:
+                    continue
+                mark = "  " if reading.good else "! "
+                row = f"{mark}{test['stage']} {reading.what:<66} {reading.value_text:>16}   {reading.bounds_text}"
+                yield row.rstrip(), reading.good
+        for number, name in enumerate(STAGES, 1):
+            outcome = self.outcome_of(number)
+            yield f"stage {number}, {name}: {outcome}", outcome == PASSED
+
+
+class StagedBench:
+    """What a test of the bench is given."""
+
+    def __init__(self, stand: Stand, report: BenchReport) -> None:
+        self.stand = stand
+        self.report = report
+
+    def check(self, readings: Iterable[Reading]) -> None:
+        """Keep them, and fail with a sentence for each that is out of its bounds."""
+        wrong = []
+        for reading in readings:
+            self.report.keep(reading)
+            if not reading.good:
+                wrong.append(reading.sentence)
+        if wrong:
+            pytest.fail("\n".join(wrong), pytrace=False)
+
+    @contextmanager
+    def raised(self) -> Iterator[Stand]:
+        """Flippers level and held; laid down again where all went well, else without torque at once."""
+        self.stand.rise()
+        try:
+            yield self.stand
+        except BaseException:
+            self.stand.let_go()
+            raise
+        self.stand.lie_down()
+
+
+class UncapturedPerson:
+    """A person on the terminal, from whom pytest holds neither questions nor answers back."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self._capture = config.pluginmanager.getplugin("capturemanager")
+        self._person = TerminalPerson()
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        with self._on_terminal():
+            return self._person.ask(f"\n{question}", answers, meanwhile)
+
+    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
+        with self._on_terminal():
+            return self._person.ask_number(f"\n{question}", low, high, meanwhile)
+
+    def tell(self, sentence: str) -> None:
+        with self._on_terminal():
+            self._person.tell(f"\n{sentence}")
+
+    @contextmanager
+    def _on_terminal(self) -> Iterator[None]:
+        if self._capture is None:
+            yield
+            return
+        self._capture.suspend(in_=True)
+        try:
+            yield
+        except AbsentPersonError as problem:
+            pytest.skip(str(problem))
+        finally:
+            self._capture.resume()

@@ -1,0 +1,19 @@
+"""Stage 2: the first torque, one joint after the other."""
+
+import pytest
+
+from control.records import JOINTS
+from experiments.sign_check import nudged, shown
+from tests.bench.staged_bench import StagedBench
+
+MOVES = "each joint moves a little, with at most 0.2 N·m, then by 12 degrees; watch which one moves, and how."
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_a_tiny_torque_moves_that_joint_alone_and_its_signs_agree(bench: StagedBench, joint: str) -> None:
+    bench.check(nudged(bench.stand, joint))
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_eyes_see_the_right_flipper_move_the_right_way(bench: StagedBench, joint: str) -> None:
+    bench.check(shown(bench.stand, joint))

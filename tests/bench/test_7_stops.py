@@ -1,0 +1,21 @@
+"""Stage 7: stops from full speed."""
+
+from experiments.stop_check import damping, soft_stop, torque_off
+from tests.bench.staged_bench import StagedBench
+
+MOVES = "strides are stopped at full speed, softly and by braking; at last torque goes off and the flippers fall."
+
+
+def test_a_soft_stop_ends_a_stride_at_once(bench: StagedBench) -> None:
+    with bench.raised() as stand:
+        bench.check(soft_stop(stand))
+
+
+def test_damping_brakes_a_fast_sweep(bench: StagedBench) -> None:
+    with bench.raised() as stand:
+        bench.check(damping(stand))
+
+
+def test_no_current_flows_once_torque_is_off(bench: StagedBench) -> None:
+    bench.stand.rise()
+    bench.check(torque_off(bench.stand))

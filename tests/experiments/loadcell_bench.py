@@ -1,0 +1,84 @@
+"""An emulated bench with everything that an experiment with a load cell needs, and a person who answers as told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from drivers.load_cell_calibration import LoadCellCalibration
+from drivers.load_cell_lines import LineFormat
+from drivers.load_cell_port import LoadCellPort
+from experiments.loadcell import CellSettings, Results, conclude, measure, plan_of_notebook
+from experiments.loadcell_motion import StageSettings
+from experiments.loadcell_recording import CellRecorder
+from experiments.loadcell_stage import SimulatedStage
+from experiments.loadcell_trials import TrialBench, TrialPlan
+from experiments.notebook import Notebook
+from simulation.load_cell_bench import EmulatedBench, Event
+from simulation.load_cell_emulator import AmplifierParameters
+from simulation.plate_stage import CarriedPlate, StageParameters
+
+SETTINGS = StageSettings()
+
+
+class Answering:
+    """A Person who answers with what is left of `answers`, then with Enter, and remembers what was told."""
+
+    def __init__(self, *answers: str) -> None:
+        self.answers = list(answers)
+        self.told: list[str] = []
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        meanwhile()
+        answer = self.answers.pop(0) if self.answers else next(iter(answers))
+        assert answer in answers
+        return answer
+
+    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
+        return low
+
+    def tell(self, sentence: str) -> None:
+        self.told.append(sentence)
+
+
+class Laboratory:
+    """Owns an emulated bench, the port to it and a notebook in a folder."""
+
+    def __init__(
+        self,
+        folder: Path,
+        muds: Mapping[str, CarriedPlate],
+        person: Answering,
+        trials: int = 1,
+        baud: int = 115200,
+        amplifier: AmplifierParameters | None = None,
+        stage: StageParameters | None = None,
+        seed: int = 1,
+        line_format: str = "number",
+    ) -> None:
+        self.folder, self.person = folder, person
+        self.bench = EmulatedBench(next(iter(muds.values())), folder / "cell", amplifier, stage, seed)
+        self.port = LoadCellPort(
+            str(folder / "cell"), baud, LineFormat(line_format), LoadCellCalibration("counts", 1.0)
+        )
+        self.recorder = CellRecorder(self.port, self.bench, person.tell)
+        self.plan = TrialPlan(tuple(muds), trials, SETTINGS)
+        self.notebook = Notebook(folder, plan_of_notebook(SETTINGS))
+        stage_of_it = SimulatedStage(SETTINGS, self.bench, muds, seed)
+        self.trial_bench = TrialBench(
+            self.recorder, stage_of_it, person, self.notebook, folder, lambda done, total: None
+        )
+
+    def at(self, after_s: float, happen: Callable[[], None]) -> None:
+        event: Event = (self.bench.now_s() + after_s, happen)
+        self.bench.events.append(event)
+
+    def measure(self, cell: CellSettings | None = None) -> None:
+        measure(self.trial_bench, self.plan, cell or CellSettings())
+
+    def conclude(self) -> Results:
+        return conclude(self.folder, self.notebook, self.plan, None, lambda done, total: None)
+
+    def close(self) -> None:
+        self.port.close()
+        self.bench.close()

@@ -1,0 +1,132 @@
+"""The rigs of the bench: real buses in real time, and nobody else who commands them."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from control.records import JOINTS
+from experiments.bench_attendant import AbsentAttendant
+from experiments.bench_channels import on_channels
+from experiments.bench_rig import HardwareRig, SimulatedRig, refuse_beside_daemon
+from experiments.bench_robot import BenchError
+from experiments.bench_stand import Stand
+from experiments.sign_check import nudged
+from experiments.wiring_check import firmware, ids_heard, strangers, watchdogs
+from firmware_host.configuration import BusParameters, Configuration, StatusParameters, load_configuration
+from simulation.local_setup import write_local_setup
+
+ROOT = Path(__file__).parent.parent.parent
+
+
+@pytest.fixture
+def answering(short_folder: Path) -> Iterator[Path]:
+    """A socket on which somebody answers."""
+    path = short_folder / "mudskipper.sock"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
+        listener.bind(str(path))
+        listener.listen()
+        yield path
+
+
+def test_beside_a_daemon_the_bench_does_not_open(configuration: Configuration, answering: Path) -> None:
+    with pytest.raises(BenchError, match="'systemctl stop mudskipper' first"):
+        HardwareRig(replace(configuration, status=StatusParameters(str(answering))))
+
+
+def test_a_socket_that_nobody_answers_on_is_no_daemon(short_folder: Path) -> None:
+    refuse_beside_daemon(short_folder / "mudskipper.sock")
+
+
+def test_a_bus_that_does_not_open_is_told_in_a_sentence(configuration: Configuration, short_folder: Path) -> None:
+    changed = replace(on_channels(configuration, ["nocan9"]), status=StatusParameters(str(short_folder / "s")))
+    with pytest.raises(BenchError, match=r"bus.left \(socketcan nocan9\) does not open: .*\."):
+        HardwareRig(changed)
+
+
+def test_a_refused_bench_says_why_once_and_reports_it(answering: Path, tmp_path: Path) -> None:
+    path = write_local_setup(answering.parent, tmp_path)
+    report = tmp_path / "report.json"
+    arguments = ["tests/bench", "-q", "--config", str(path), "--yes", "--bench-report", str(report)]
+    command = [sys.executable, "-m", "pytest", *arguments]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
+    assert ended.returncode == 1
+    assert ended.stdout.count("systemctl stop mudskipper") == 1
+    told = json.loads(report.read_text(encoding="utf-8"))
+    assert told["stages"] == {"wiring": "failed"} | dict.fromkeys(list(told["stages"])[1:], "skipped")
+
+
+@pytest.fixture
+def local_robot(short_folder: Path, tmp_path: Path) -> Iterator[Configuration]:
+    """A simulated robot as a process of its own, in real time, on local buses."""
+    path = write_local_setup(short_folder, tmp_path)
+    world = short_folder / "world.toml"
+    world.write_text("[[segment]]\nstart_m = 0.0\nend_m = 1.0\nstrength_pa = 500.0\n", encoding="utf-8")
+    command = [sys.executable, "-m", "simulation.peer", "--config", str(path), "--world", str(world)]
+    robot = subprocess.Popen(command, cwd=ROOT)
+    try:
+        yield load_configuration(path)
+    finally:
+        robot.send_signal(signal.SIGTERM)
+        robot.wait(20)
+
+
+def test_on_real_buses_in_real_time_the_first_stages_pass(local_robot: Configuration) -> None:
+    """What a busy computer cannot spoil: rates and delays are for one that has nothing else to do."""
+    rig = HardwareRig(local_robot)
+    while not any(rig.overheard.frames.values()):  # the robot is still starting
+        rig.close()
+        rig = HardwareRig(local_robot)
+    stand = Stand(rig, AbsentAttendant())
+    try:
+        readings = [reading for check in (ids_heard, strangers, firmware, watchdogs) for reading in check(stand)]
+        readings += nudged(stand, "left_sweep")
+    finally:
+        stand.end()
+        rig.close()
+    assert len(readings) > 4 * len(JOINTS)
+    assert [reading.sentence for reading in readings if not reading.good] == []
+
+
+def test_one_channel_for_all_makes_one_bus(configuration: Configuration) -> None:
+    changed = on_channels(configuration, ["can3"])
+    assert changed.bus == {"left": BusParameters("socketcan", "can3")}
+    assert {drive.bus for drive in changed.drive.values()} == {"left"}
+
+
+def test_channels_by_name_replace_those_of_the_configuration(configuration: Configuration) -> None:
+    changed = on_channels(configuration, ["right=can7"])
+    assert changed.bus["right"].channel == "can7"
+    assert changed.bus["left"] == configuration.bus["left"]
+    assert changed.drive == configuration.drive
+    assert on_channels(configuration, []) == configuration
+
+
+def test_drives_with_the_same_id_do_not_share_a_channel(configuration: Configuration) -> None:
+    drive = configuration.drive | {"right_sweep": replace(configuration.drive["right_sweep"], node_id=0)}
+    with pytest.raises(BenchError, match="2 drives have the node id 0 on can0"):
+        on_channels(replace(configuration, drive=drive), ["can0"])
+
+
+@pytest.mark.parametrize("word", ["middle=can0", "left=", ""])
+def test_a_channel_that_fits_no_bus_is_refused(configuration: Configuration, word: str) -> None:
+    with pytest.raises(BenchError, match="--can"):
+        on_channels(configuration, [word])
+
+
+def test_idle_flippers_of_the_simulated_bench_stay_where_they_lie(configuration: Configuration) -> None:
+    rig = SimulatedRig(configuration)
+    before = rig.robot.plant.angles_rad
+    for _ in range(380):
+        rig.loop.tick(rig.wait())
+    assert rig.robot.plant.angles_rad == pytest.approx(before, abs=0.05)
+    low, high = configuration.joint_ranges[1]
+    assert low < before[1] < high

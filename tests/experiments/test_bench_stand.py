@@ -1,0 +1,155 @@
+"""Whatever goes wrong at the bench ends with idle drives and a sentence; its figures are told as they are."""
+
+from __future__ import annotations
+
+from math import nan
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from control.records import NO_TORQUE
+from drivers.odrive_codec import AxisState
+from experiments.bench_attendant import AbsentAttendant, SimulatedAttendant
+from experiments.bench_reading import Reading
+from experiments.bench_rig import SimulatedRig
+from experiments.bench_robot import BenchError
+from experiments.bench_stand import Stand, first_lasting
+from experiments.joint_zero_check import level_pose, turned
+from experiments.sign_check import MOST_NM, gently, shown
+from experiments.stroke_tracking import lag_ticks
+from firmware_host.configuration import Configuration
+from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, BenchReport, StagedBench, stage_of
+
+
+@pytest.fixture
+def rig(configuration: Configuration) -> SimulatedRig:
+    return SimulatedRig(configuration)
+
+
+@pytest.fixture
+def bench(rig: SimulatedRig) -> StagedBench:
+    return StagedBench(Stand(rig, SimulatedAttendant(rig)), BenchReport())
+
+
+def axis_states(rig: SimulatedRig) -> set[AxisState]:
+    return {drive.axis_state for drive in rig.robot.drives}
+
+
+def test_ctrl_c_with_raised_flippers_leaves_the_drives_idle(bench: StagedBench, rig: SimulatedRig) -> None:
+    with pytest.raises(KeyboardInterrupt), bench.raised():
+        assert axis_states(rig) == {AxisState.CLOSED_LOOP}
+        raise KeyboardInterrupt
+    assert axis_states(rig) == {AxisState.IDLE}
+
+
+def test_the_end_idles_the_drives_without_the_loop(bench: StagedBench, rig: SimulatedRig) -> None:
+    bench.stand.arm(lambda held, states: NO_TORQUE)
+    bench.stand.end()
+    rig.wait()
+    assert axis_states(rig) == {AxisState.IDLE}
+
+
+def test_a_fault_ends_a_measurement_with_its_sentence(bench: StagedBench, rig: SimulatedRig) -> None:
+    bench.stand.arm(lambda held, states: NO_TORQUE)
+    rig.robot.restart_drive(1)
+    with pytest.raises(BenchError, match=r"left_adduction.*\."):
+        bench.stand.run_for(1.0)
+
+
+def test_a_drive_that_does_not_let_go_is_told(bench: StagedBench, rig: SimulatedRig) -> None:
+    bench.stand.arm(lambda held, states: NO_TORQUE)
+    for port in rig.buses["right"].ports[1:]:
+        port.full = True
+    rig.others.append(lambda _: rig.robot.drives[3]._set_torque(0.0, rig.now_s))  # somebody feeds its watchdog
+    with pytest.raises(BenchError, match="right_adduction: still in closed loop"):
+        bench.stand.let_go()
+
+
+def test_what_holds_gently_never_exceeds_a_tiny_torque(bench: StagedBench) -> None:
+    held = (1.0, -1.0, 0.1, -0.1)
+    assert gently(held, bench.stand.loop.states) == (MOST_NM, -MOST_NM, 0.1, -0.1)
+
+
+def test_where_nobody_is_there_hands_are_not_needed_and_eyes_not_claimed(configuration: Configuration) -> None:
+    stand = Stand(SimulatedRig(configuration), AbsentAttendant())
+    assert [reading.what for reading in level_pose(stand)] == ["flippers held level by hand (0: nobody did)"]
+    assert [reading.what for reading in turned(stand, "left_sweep")] == ["left_sweep: turned by hand (0: nobody did)"]
+    (reading,) = shown(stand, "left_sweep")
+    assert reading.good
+    assert "nobody looked" in reading.what
+
+
+def test_a_reading_out_of_its_bounds_fails_with_what_to_do(bench: StagedBench) -> None:
+    bench.report.begin(1, "test")
+    good, bad = Reading("speed", 1.0, "m/s", 0.0, 2.0), Reading("load", 90.0, "%", 0.0, 80.0, "take strangers off")
+    with pytest.raises(pytest.fail.Exception) as failure:
+        bench.check([good, bad])
+    assert str(failure.value) == "load is 90 %, must be 0 to 80: take strangers off."
+    bench.report.end()
+    assert bench.report.as_json["tests"][0]["readings"] == [good.as_json, bad.as_json]
+
+
+def test_what_could_not_be_measured_is_never_good_and_is_null_in_json() -> None:
+    reading = Reading("delay", nan, "s")
+    assert not reading.good
+    assert reading.value_text == "unknown"
+    assert reading.as_json["value"] is reading.as_json["low"] is None
+
+
+def report_with(*outcomes: str) -> BenchReport:
+    """One test a stage, from the first stage on."""
+    report = BenchReport()
+    for stage, outcome in enumerate(outcomes, 1):
+        report.begin(stage, "test")
+        report.worsen(outcome, "")
+        report.end()
+    return report
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "obstacle"),
+    [
+        ((), "stage 1, wiring, was not passed in this run"),
+        ((PASSED, FAILED), "stage 2, signs, failed"),
+        ((PASSED, SKIPPED), "stage 2, signs, was not passed"),
+        ((PASSED,), "stage 2, signs, was not passed"),
+    ],
+)
+def test_a_stage_waits_for_all_before_it(outcomes: tuple[str, ...], obstacle: str) -> None:
+    assert obstacle in report_with(*outcomes).obstacle(3)
+
+
+def test_a_stage_begins_where_all_before_it_have_passed() -> None:
+    assert report_with(PASSED, PASSED).obstacle(3) == ""
+    assert report_with().obstacle(1) == ""
+
+
+def test_what_was_told_first_of_a_test_remains() -> None:
+    report = BenchReport()
+    report.begin(1, "test")
+    report.worsen(FAILED, "first")
+    report.worsen(PASSED, "second")
+    report.end()
+    assert (report.tests[0]["outcome"], report.tests[0]["why"]) == (FAILED, "first")
+
+
+def test_only_files_with_a_number_are_stages() -> None:
+    assert stage_of(Path("tests/bench/test_3_zeros.py")) == 3
+    assert stage_of(Path("tests/bench/test_other.py")) == 0
+
+
+@pytest.mark.parametrize("shift", [-2.0, 0.0, 1.4, 6.0])
+def test_the_lag_of_a_shifted_motion_is_found(shift: float) -> None:
+    ticks = np.arange(600.0)
+    commanded, measured = (np.sin((ticks - late) / 20.0) + 0.3 * np.sin((ticks - late) / 7.0) for late in (0.0, shift))
+    assert lag_ticks(commanded, 0.9 * measured + 0.5) == pytest.approx(shift, abs=0.05)
+
+
+@pytest.mark.parametrize(("flags", "first"), [("1100111", 4), ("0111", 1), ("0110", None), ("", None)])
+def test_what_lasts_begins_where_enough_follow(flags: str, first: int | None) -> None:
+    assert first_lasting([flag == "1" for flag in flags], 3) == first
+
+
+def test_where_nothing_moves_there_is_no_lag() -> None:
+    assert np.isnan(lag_ticks(np.zeros(100), np.zeros(100)))

@@ -1,0 +1,183 @@
+"""Coefficients from nothing but force against time: muds with known ones, and clay against its own noise-free curve."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.loadcell_contact import find_contact, without_spikes
+from experiments.loadcell_fits import (
+    COEFFICIENTS,
+    INSERTION,
+    SHEAR,
+    Analysed,
+    Recorded,
+    analyse,
+    analyse_trial,
+    depths_of,
+    of_mud,
+    speed_remark,
+)
+from experiments.loadcell_motion import Insertion, Pace, Shear, StageSettings, wide_pace
+from simulation.clay import clay_of_water
+from simulation.load_cell import LoadCurve, measure_insertion, measure_shear
+from simulation.load_cell_bench import PAPER_PLATE, RELAXATION, clay_plate
+from tests.experiments.made_up_mud import THICKNESS_M, WIDTH_M, LawfulMud, feel
+
+SETTINGS = StageSettings()
+KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
+BOUND = 0.03
+
+
+def look(done: int, total: int) -> None:
+    assert done <= total
+
+
+def found(trials: list[Recorded]) -> dict[str, float]:
+    told = analyse(trials, SETTINGS, look)
+    return {name: of_mud(told, name, 0.0).value for name in COEFFICIENTS}
+
+
+@pytest.mark.parametrize(("seed", "acceleration_m_s2"), [(1, 0.6), (2, 2.0), (3, 8.0)])
+def test_coefficients_of_a_mud_that_obeys_the_laws_come_out_within_three_per_cent(
+    seed: int, acceleration_m_s2: float
+) -> None:
+    mud = LawfulMud(**KNOWN)
+    kinds = [(INSERTION, trial) for trial in range(5)] + [(SHEAR, trial) for trial in range(2)]
+    trials = [feel(mud, kind, 100 * seed + i, acceleration_m_s2=acceleration_m_s2) for kind, i in kinds]
+    assert found(trials) == {name: pytest.approx(value, rel=BOUND) for name, value in KNOWN.items()}
+
+
+@pytest.mark.parametrize(("water", "acceleration_m_s2"), [(47.6, 2.0), (51.2, 0.6)])
+def test_coefficients_of_clay_are_those_of_its_noise_free_curve(water: float, acceleration_m_s2: float) -> None:
+    kinds = [(INSERTION, 1), (INSERTION, 2), (INSERTION, 3), (SHEAR, 4)]
+    trials = [feel(clay_plate(water), kind, seed, acceleration_m_s2=acceleration_m_s2) for kind, seed in kinds]
+    assert found(trials) == {name: pytest.approx(value, rel=BOUND) for name, value in true_of_clay(water).items()}
+
+
+def true_of_clay(water: float) -> dict[str, float]:
+    """By the definitions, without any of the code that is tested."""
+    clay = clay_of_water(water)
+    told = measure_insertion(clay, PAPER_PLATE, 0.0, 0.0, 0.03, 0.1, RELAXATION, 3.0)
+    shear_n = measure_shear(clay, PAPER_PLATE, 0.0, 0.0, 0.03, 0.1)
+    return {
+        "k_p": slope(told.down, 0.03),
+        "k_s": shear_n / (WIDTH_M * 0.03**2 / 2.0),
+        "k_e": -slope(told.up, 0.75 * 0.03),
+    }
+
+
+def slope(curve: LoadCurve, deepest_m: float) -> float:
+    depths_m, forces_n = np.array(curve.depths_m), np.array(curve.forces_n)
+    inside = (depths_m > 0.0) & (depths_m <= deepest_m)
+    volumes_m3 = WIDTH_M * THICKNESS_M * depths_m[inside]
+    return float(volumes_m3 @ forces_n[inside] / (volumes_m3 @ volumes_m3))
+
+
+def one(recorded: Recorded) -> Analysed:
+    return analyse_trial(recorded, SETTINGS, wide_pace(SETTINGS))
+
+
+@pytest.fixture(scope="module")
+def insertion() -> Recorded:
+    return feel(LawfulMud(**KNOWN), INSERTION, 7)
+
+
+def test_a_cell_that_is_mounted_the_other_way_round_tells_the_same(insertion: Recorded) -> None:
+    turned = one(insertion._replace(forces_n=-insertion.forces_n))
+    straight = one(insertion)
+    assert turned.course is not None and turned.course.turned
+    assert turned.coefficients == {name: pytest.approx(told) for name, told in straight.coefficients.items()}
+
+
+def test_the_depth_found_is_that_of_the_stage(insertion: Recorded) -> None:
+    """Started at s, 2 cm above the mud: in it after (2 cm + v²/2a) / v, and 3 s at 3 cm."""
+    told = one(insertion)
+    depths_m = depths_of(told, SETTINGS)
+    assert depths_m is not None and told.course is not None and isinstance(told.motion, Insertion)
+    assert np.max(depths_m) == pytest.approx(0.03)
+    held_s = np.count_nonzero(depths_m > 0.0299) / 80.0
+    assert held_s == pytest.approx(3.0, abs=0.08)
+    assert told.motion.pace.speed_m_s == pytest.approx(0.1, rel=0.08)
+
+
+def test_a_stage_slower_than_it_was_set_is_measured_and_told() -> None:
+    mud = LawfulMud(**KNOWN)
+    told = analyse([feel(mud, INSERTION, seed, speed_m_s=0.08) for seed in range(4)], SETTINGS, look)
+    assert of_mud(told, "k_p", 0.0).value == pytest.approx(KNOWN["k_p"], rel=0.04)
+    for trial in told:
+        assert trial.pace is not None
+        assert trial.pace.speed_m_s == pytest.approx(0.08, rel=0.04)
+        assert "0.100 m/s was set" in speed_remark(trial.pace, SETTINGS)
+
+
+def test_a_stage_as_fast_as_it_was_set_is_not_remarked() -> None:
+    assert speed_remark(Pace(0.102, 2.0, 0.01, 0.1), SETTINGS) == ""
+
+
+def test_a_shear_is_read_where_the_stage_moved() -> None:
+    told = one(feel(clay_plate(49.5), SHEAR, 3, speed_m_s=0.13))  # done after three quarters of the expected time
+    assert isinstance(told.motion, Shear)
+    assert told.motion.speed_m_s == pytest.approx(0.13, rel=0.08)
+    assert told.motion.steady_to_s - told.motion.begin_s < 0.2 / 0.13 + 0.13 / 2.0  # with its ramps
+
+
+@pytest.mark.parametrize("kind", [INSERTION, SHEAR])
+def test_a_trial_without_contact_says_so(kind: str) -> None:
+    air = feel(LawfulMud(0.0, 0.0, 0.0), kind, 1)
+    assert one(air).problem.startswith("no contact")
+    assert one(air).coefficients == {}
+
+
+def test_a_recording_that_begins_in_the_stroke_says_so(insertion: Recorded) -> None:
+    late = insertion.times_s > 1.4
+    told = one(insertion._replace(times_s=insertion.times_s[late], forces_n=insertion.forces_n[late]))
+    assert "moving already" in told.problem
+
+
+def test_a_plate_that_was_not_drawn_out_still_tells_its_insertion(insertion: Recorded) -> None:
+    early = insertion.times_s < 4.0
+    told = one(insertion._replace(times_s=insertion.times_s[early], forces_n=insertion.forces_n[early]))
+    assert "no extraction" in told.remark
+    assert told.coefficients["k_p"].value == pytest.approx(KNOWN["k_p"], rel=0.08)
+    assert np.isnan(told.coefficients["k_e"].value)
+
+
+def test_ten_samples_a_second_are_too_few_for_an_insertion() -> None:
+    assert "samples" in one(feel(LawfulMud(**KNOWN), INSERTION, 1, rate_hz=10.0)).problem
+
+
+def test_a_zero_that_drifts_while_nobody_starts_is_no_contact() -> None:
+    times_s = np.arange(0.0, 40.0, 0.0125)
+    ramp_n = np.where(times_s > 35.0, np.minimum((times_s - 35.0) * 10.0, 2.0), 0.0)
+    noise_n = np.random.default_rng(1).normal(0.0, 0.005, len(times_s))
+    course = find_contact(times_s, 0.004 * times_s + ramp_n + noise_n)
+    assert times_s[course.begin] == pytest.approx(35.0, abs=0.05)
+    assert course.level_n == pytest.approx(0.14, abs=0.01)
+
+
+def test_a_spike_is_taken_out_and_an_edge_is_kept() -> None:
+    forces_n = np.array([0.0, 0.01, 0.0, 9.0, 0.01, 0.0, 0.01, 5.0, 5.01, 5.0, 5.02])
+    assert without_spikes(forces_n).tolist() == pytest.approx([0, 0.01, 0, 0.005, 0.01, 0, 0.01, 5, 5.01, 5, 5.02])
+
+
+def test_the_doubt_of_a_mud_holds_scatter_calibration_and_the_speed_that_all_share(insertion: Recorded) -> None:
+    told = [replace(one(insertion), shared_doubt=0.02) for _ in range(4)]
+    plain = of_mud([replace(each, shared_doubt=0.0) for each in told], "k_p", 0.0)
+    assert plain.repeatability == 0.0
+    everything = of_mud(told, "k_p", 0.03)
+    assert everything.std_error**2 == pytest.approx(plain.std_error**2 + (0.02**2 + 0.03**2) * plain.value**2)
+    assert of_mud([], "k_p", 0.0).trials == ()
+
+
+def test_a_stage_that_stutters_is_doubted(insertion: Recorded) -> None:
+    """It stood still for 0.1 s, half-way down."""
+    told = one(insertion)
+    assert isinstance(told.motion, Insertion) and told.remark == ""
+    half_s = told.motion.surface_s + 0.15
+    place = int(np.searchsorted(insertion.times_s, half_s))
+    forces_n = np.insert(insertion.forces_n, place, np.full(8, insertion.forces_n[place]))
+    times_s = np.concatenate([insertion.times_s, insertion.times_s[-1] + 0.0125 * np.arange(1, 9)])
+    assert "one speed" in one(insertion._replace(times_s=times_s, forces_n=forces_n)).remark
