@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from command_line.bench import Desk, Finding, conduct_bench
-from command_line.main import DEFAULT_CONFIG
+from command_line.commands import DEFAULT_CONFIG
 from command_line.screen import table
 from control.joint_pd import GRAVITY_M_S2
 from experiments.actuator_bench import ActuatorBench, RobotBench, SimulatedBench
