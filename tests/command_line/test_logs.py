@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from command_line import exit_codes, logs, screen
+from command_line import exit_codes, screen
 from command_line.main import main
 from command_line.recorded_walk import read_walk
 from control.controller import WalkOrder
