@@ -15,7 +15,7 @@ demo: .venv/setup  ## a simulated robot walks over three muds, in real time
 	@$(BIN)/mudskipper demo $(ARGS)
 
 test: .venv/test  ## every test, without network
-	$(BIN)/python -m pytest -q --simulated $(ARGS)
+	$(BIN)/python -m pytest -q --simulated --numprocesses 2 --dist loadgroup $(ARGS)
 
 test-vm: .venv/test  ## the daemon under systemd on a real kernel, in a virtual machine
 	@$(BIN)/python -m virtual_machine.installed_robot
