@@ -50,6 +50,7 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError("--simulated needs no --can: choose one of them")
 
 
+@pytest.hookimpl(tryfirst=True)  # before the names of groups are read
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         place = item.path.relative_to(ROOT).as_posix()
