@@ -21,17 +21,6 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job sta
 
 ROOT = Path(__file__).parent.parent
 
-# Folders and files whose tests depend on one another's peace: each stays in one process where tests run in several.
-TOGETHER = {
-    "real time": (
-        "tests/command_line",
-        "tests/benchmarks",
-        "tests/firmware_host",
-        "tests/experiments/test_daemon_robot",
-    ),
-    "bench": ("tests/bench",),  # its stages follow one another
-}
-
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Of the bench (tests/bench), here because pytest asks for options before it looks there."""
@@ -48,15 +37,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     if config.option.simulated and config.option.can:
         raise pytest.UsageError("--simulated needs no --can: choose one of them")
-
-
-@pytest.hookimpl(tryfirst=True)  # before the names of groups are read
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    for item in items:
-        place = item.path.relative_to(ROOT).as_posix()
-        for name, places in TOGETHER.items():
-            if place.startswith(places):
-                item.add_marker(pytest.mark.xdist_group(name))
 
 
 @pytest.fixture(scope="session")
