@@ -58,6 +58,12 @@ def test_a_fault_ends_a_measurement_with_its_sentence(bench: StagedBench, rig: S
         bench.stand.run_for(1.0)
 
 
+def test_a_robot_that_is_not_idle_is_not_armed_again(bench: StagedBench) -> None:
+    bench.stand.arm(lambda held, states: NO_TORQUE)
+    with pytest.raises(BenchError, match=r"cannot be armed: it is in hold\."):
+        bench.stand.arm()
+
+
 def test_a_drive_that_does_not_let_go_is_told(bench: StagedBench, rig: SimulatedRig) -> None:
     bench.stand.arm(lambda held, states: NO_TORQUE)
     for port in rig.buses["right"].ports[1:]:
