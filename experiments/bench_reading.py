@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from typing import Any, NamedTuple
 
 
@@ -14,14 +14,21 @@ class Reading(NamedTuple):
     low: float = -inf
     high: float = inf
     advice: str = ""
+    left_out: bool = False  # nobody was there to do it: neither good nor bad, and the stages go on
 
     @property
     def good(self) -> bool:
-        return self.low <= self.value <= self.high
+        return self.left_out or self.low <= self.value <= self.high
+
+    @property
+    def number_text(self) -> str:
+        if self.left_out:
+            return "left out"
+        return f"{self.value:.4g}" if self.value == self.value else "unknown"
 
     @property
     def value_text(self) -> str:
-        return f"{self.value:.4g} {self.unit}".strip() if self.value == self.value else "unknown"
+        return f"{self.number_text} {self.unit}".strip() if self.value == self.value else self.number_text
 
     @property
     def bounds_text(self) -> str:
@@ -42,7 +49,12 @@ class Reading(NamedTuple):
         """Without NaN and infinities, which JSON does not have."""
         numbers = {"value": self.value, "low": self.low, "high": self.high}
         kept = {name: number if isfinite(number) else None for name, number in numbers.items()}
-        return {"what": self.what, "unit": self.unit, **kept, "good": self.good, "advice": self.advice}
+        return {"what": self.what, "unit": self.unit, **kept, "good": self.good, "left_out": self.left_out,
+                "advice": self.advice}  # fmt: skip
+
+
+def left_out(what: str) -> Reading:
+    return Reading(what, nan, left_out=True)
 
 
 Readings = Iterator[Reading]

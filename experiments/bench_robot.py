@@ -117,8 +117,11 @@ def require_hold(status: Status) -> None:
 
 def told_by(status: Status) -> str:
     """Why a robot is in the mode that it is in."""
-    fault = status["fault"]["sentence"] if status["fault"] else f"it is in {status['mode']}"
-    return str(status["notice"] or fault)
+    if status["notice"]:
+        return str(status["notice"])
+    if status["mode"] == "idle":  # a flipper that falls then is a fault as well, but not the cause
+        return "its torque was taken off"
+    return str(status["fault"]["sentence"]) if status["fault"] else f"it is in {status['mode']}"
 
 
 def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:

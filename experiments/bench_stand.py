@@ -141,7 +141,9 @@ class Stand:
         told = " ".join(f"{fault.sentence} {_capital(fault.kind.what_to_do)}." for fault in self.loop.faults.blocking())
         silent = ", ".join(axis.joint for axis in self.drives.axes if not axis.heard)
         unheard = f"{silent}: nothing is heard; check power, wiring and node ids."
-        raise BenchError(f"The robot cannot be armed: {told or unheard}")
+        raise BenchError(
+            f"The robot cannot be armed: {told or (unheard if silent else f'it is in {self.loop.mode.name.lower()}.')}"
+        )
 
     def move(
         self, way_points: Sequence[JointAngles], speed_rad_s: float | None = None, law: Law | None = None

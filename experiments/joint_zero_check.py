@@ -8,7 +8,7 @@ from math import degrees, inf
 
 from control.controller import measured_angles
 from control.records import JOINTS, JointAngles
-from experiments.bench_reading import Reading, Readings
+from experiments.bench_reading import Reading, Readings, left_out
 from experiments.bench_stand import LOOK_S, Sample, Stand, joint_place
 
 LEVEL_DEG = 5.0  # that hands with a spirit level are off: 1 cm at the end of an arm
@@ -38,7 +38,7 @@ def rest_pose(stand: Stand) -> Readings:
 def level_pose(stand: Stand) -> Readings:
     """Held by hand, all four read zero."""
     if not stand.attendant.holds_level(stand.look_on):
-        yield Reading("flippers held level by hand (0: nobody did)", 0.0)
+        yield left_out("flippers held level by hand")
         return
     angles = _mean_angles(stand.run_for(LOOKING_S))
     stand.attendant.lets_go()
@@ -51,7 +51,7 @@ def turned(stand: Stand, joint: str) -> Readings:
     """By hand, from stop to stop: that joint turns most, and its limits lie within the stops."""
     seen = [_mean_angles(stand.run_for(LOOK_S))]
     if not stand.attendant.turns(joint, lambda: seen.extend(map(_angles, stand.run_for(LOOK_S)))):
-        yield Reading(f"{joint}: turned by hand (0: nobody did)", 0.0)
+        yield left_out(f"{joint}: turned by hand")
         return
     stand.attendant.lets_go()
     turns_deg = [degrees(max(angles) - min(angles)) for angles in zip(*seen, strict=True)]

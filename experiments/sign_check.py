@@ -13,7 +13,7 @@ from math import nan, radians
 from control.controller import measured_angles
 from control.records import JOINTS, NO_TORQUE, DriveStates, Torques
 from experiments.bench_attendant import WAYS, Sight
-from experiments.bench_reading import Reading, Readings
+from experiments.bench_reading import Reading, Readings, left_out
 from experiments.bench_stand import Sample, Stand, joint_place
 from firmware_host.ticker import PERIOD_S
 
@@ -105,10 +105,11 @@ def shown(stand: Stand, joint: str) -> Readings:
     stand.let_go()
     sight = attendant.saw(joint, stand.look_on)
     side, kind = joint.split("_")
-    right = 1.0 if sight in (Sight.RIGHT, Sight.UNSEEN) else 0.0
-    seen = "nobody looked" if sight is Sight.UNSEEN else "seen"
-    what = f"{joint}: the {side} flipper was to {WAYS[kind]} ({seen})"
-    yield Reading(what, right, "", 1.0, 1.0, sight.value.format(joint=joint))
+    what = f"{joint}: the {side} flipper was seen to {WAYS[kind]}"
+    if sight is Sight.UNSEEN:
+        yield left_out(what)
+        return
+    yield Reading(what, sight is Sight.RIGHT, "", 1, 1, sight.value.format(joint=joint))
 
 
 def _with(angles: tuple[float, float, float, float], place: int, more_rad: float) -> tuple[float, float, float, float]:

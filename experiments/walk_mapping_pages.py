@@ -8,7 +8,7 @@ from typing import Any
 
 from experiments.coefficient_table import TruthOfMud, error_text_rows, mud_rows
 from experiments.estimation_methods import method_of
-from experiments.flipper_report import TRUTHS
+from experiments.flipper_report import TRUTHS, doubts
 from experiments.mud_looks import file_name, mud_text
 from experiments.notebook import Entry
 from experiments.report_page import Figure, Section
@@ -21,6 +21,7 @@ SIMULATED_DRAG = (
     "the paper's is the one that yields at 3 cm and holds at 5 cm. Part of the difference between these depths is the "
     "mud's own, whose k_s falls with depth (see the load cell)."
 )
+SCATTER = "± is the standard error of the mean, and cv the variation, by the scatter of the strides of all walks"
 Tables = list[tuple[str, Sequence[Sequence[str]]]]
 
 
@@ -77,7 +78,8 @@ def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
     ]
     if report["without_pose"]:
         paragraphs.append(f"{report['without_pose']} walks had no pose: strides are given to muds by their order.")
-    return "\n\n".join([*paragraphs, TRUTHS[report["settings"]["truth"]], report["missing_truth"]])
+    paragraphs += [f"{SCATTER}.", *doubts(report["settings"]), TRUTHS[report["settings"]["truth"]]]
+    return "\n\n".join([*paragraphs, report["missing_truth"]])
 
 
 def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Entry]) -> Section:
@@ -99,7 +101,8 @@ def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Ent
 
 def text_of(report: Mapping[str, Any]) -> Tables:
     """Titles and tables for the screen."""
-    tables: Tables = [("Coefficients", mud_rows(report["muds"]))]
+    heading = "\n".join([f"Coefficients, {SCATTER}.", *doubts(report["settings"])])
+    tables: Tables = [(heading, mud_rows(report["muds"]))]
     if report["errors"]:
         tables.append(
             (

@@ -20,7 +20,7 @@ from experiments.bench_rig import HardwareRig, Rig, SimulatedRig, lying_m
 from experiments.bench_robot import BenchError
 from experiments.bench_stand import Stand
 from firmware_host.configuration import Configuration, ConfigurationError, load_configuration
-from tests.bench.staged_bench import FAILED, BenchReport, StagedBench, UncapturedPerson, stage_name, stage_of
+from tests.bench.staged_bench import SKIPPED, BenchReport, StagedBench, UncapturedPerson, stage_name, stage_of
 
 INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
 EXAMPLE = Path(__file__).parent.parent.parent / "systemd" / "mudskipper.toml"
@@ -94,35 +94,41 @@ def attendant_at(config: pytest.Config) -> Attendant:
 def bench(request: pytest.FixtureRequest, opened: Stand | str) -> Iterator[StagedBench]:
     report, stage = report_of(request.config), stage_of(request.path)
     report.begin(stage, request.node.name)
-    obstacle = report.obstacle(stage)
+    moves = getattr(request.module, "MOVES", "")
+    obstacle = report.obstacle(stage) or (moves and report.stumble(stage, request.node.name))
     if obstacle:
         pytest.skip(obstacle)
     if isinstance(opened, str):
         if report.tests:
             pytest.skip("the bench did not open")
         pytest.fail(opened, pytrace=False)
-    ask_before_moving(request, opened, report, stage)
+    if moves:
+        ask_before_moving(moves, opened, report, stage)
     yield StagedBench(opened, report)
     try:
         opened.let_go()
     except BenchError as problem:
         opened.end()
-        pytest.fail(str(problem), pytrace=False)
+        report.out_of_hand = str(problem)
+        pytest.fail(report.out_of_hand, pytrace=False)
 
 
-def ask_before_moving(request: pytest.FixtureRequest, stand: Stand, report: BenchReport, stage: int) -> None:
-    """Once for each stage that moves something."""
-    what = getattr(request.module, "MOVES", "")
-    if not what or stage in report.consents:
-        return
+def ask_before_moving(what: str, stand: Stand, report: BenchReport, stage: int) -> None:
+    """Once for each stage that moves something, whatever the answer."""
+    if stage not in report.consents:
+        report.consents[stage] = False  # where no answer comes
+        report.consents[stage] = lets_move(what, stand, stage)
+    if not report.consents[stage]:
+        pytest.skip("a person did not want the robot to move")
+
+
+def lets_move(what: str, stand: Stand, stage: int) -> bool:
     lying_cm = 100.0 * lying_m(stand.configuration.geometry)
     where = (
         f"The robot stands on blocks; idle, its flippers lie on something soft, {lying_cm:.0f} cm below their axes."
         " Nobody's hands are near them, and the power switch is at hand."
     )
-    if not stand.attendant.consents(f"{stage_name(stage).capitalize()}: {what}\n{where}", stand.look_on):
-        pytest.skip("a person did not want the robot to move")
-    report.consents.add(stage)
+    return stand.attendant.consents(f"{stage_name(stage).capitalize()}: {what}\n{where}", stand.look_on)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -139,17 +145,22 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     told = yield
     if told.when == "teardown" or not told.passed:
         report = report_of(item.config)
-        report.worsen(told.outcome, told.longrepr[2] if isinstance(told.longrepr, tuple) else told.longreprtext)
+        report.worsen(told.outcome, why_of(told))
         if told.when == "teardown":
             report.end()
     return told
+
+
+def why_of(told: pytest.TestReport) -> str:
+    """Of one that was skipped, pytest has a place before its reason, which begins with a word of pytest's own."""
+    return told.longrepr[2].removeprefix("Skipped: ") if isinstance(told.longrepr, tuple) else told.longreprtext
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
     report, path = report_of(config), config.option.bench_report
     if not report.robot:
         return
-    report.worsen(FAILED, "interrupted")  # a test that is still under way
+    report.worsen(SKIPPED, "interrupted")  # a test that is still under way
     report.end()
     terminalreporter.section("bench")
     terminalreporter.write_line(f"{report.robot['rig']}, configuration {report.robot['configuration']}")

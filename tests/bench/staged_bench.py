@@ -13,6 +13,7 @@ import pytest
 from command_line.terminal_person import AbsentPersonError, TerminalPerson
 from experiments.bench_reading import Reading
 from experiments.bench_stand import Stand
+from tests.bench.bench_table import table_lines
 
 STAGES = ("wiring", "signs", "zeros", "currents", "watchdogs", "strokes", "stops", "strides")
 PASSED, FAILED, SKIPPED = "passed", "failed", "skipped"
@@ -22,6 +23,11 @@ def stage_of(path: Path) -> int:
     """By the name of its file: test_3_zeros.py is of stage 3. Other files are of none: 0."""
     number = path.stem.split("_")[1]
     return int(number) if number.isdigit() else 0
+
+
+def claim_of(test: str) -> str:
+    """Its name without the joint."""
+    return test.partition("[")[0]
 
 
 def stage_name(stage: int) -> str:
@@ -34,7 +40,8 @@ class BenchReport:
     def __init__(self) -> None:
         self.robot: dict[str, Any] = {}
         self.tests: list[dict[str, Any]] = []
-        self.consents: set[int] = set()  # stages in which a person lets the robot move
+        self.consents: dict[int, bool] = {}  # by stage: whether a person lets the robot move
+        self.out_of_hand = ""  # why no test may begin any more: a drive kept its torque
         self._test: dict[str, Any] | None = None  # under way
 
     def begin(self, stage: int, test: str) -> None:
@@ -66,12 +73,26 @@ class BenchReport:
 
     def obstacle(self, stage: int) -> str:
         """Why a stage may not begin; empty where it may."""
+        if self.out_of_hand:
+            return self.out_of_hand
         for earlier in range(1, stage):
             outcome = self.outcome_of(earlier)
             if outcome == FAILED:
                 return f"{stage_name(earlier)}, failed: mend that first"
             if outcome == SKIPPED:
                 return f"{stage_name(earlier)}, was not passed in this run: the stages go one after the other"
+        return ""
+
+    def stumble(self, stage: int, test: str) -> str:
+        """Why a stage that moves something may not go on with this test; empty where it may.
+
+        The same claim about another joint may still be tried: it tells more, and moves that joint alone.
+        """
+        for earlier in self.tests:
+            if (earlier["stage"], earlier["outcome"]) == (stage, FAILED) and claim_of(earlier["test"]) != claim_of(
+                test
+            ):
+                return f"{earlier['test']} failed: mend that before anything else moves"
         return ""
 
     @property
@@ -86,16 +107,24 @@ class BenchReport:
 
     def lines(self, brief: bool) -> Iterator[tuple[str, bool]]:
         """Of a table, with whether all is well there. `brief`: of the figures only those that are not."""
-        for test in self.tests:
-            for reading in test["readings"]:
-                if brief and reading.good:
-                    continue
-                mark = "  " if reading.good else "! "
-                row = f"{mark}{test['stage']} {reading.what:<66} {reading.value_text:>16}   {reading.bounds_text}"
-                yield row.rstrip(), reading.good
+        for number, name in enumerate(STAGES, 1):
+            readings = [reading for test in self.tests if test["stage"] == number for reading in test["readings"]]
+            yield from table_lines(f"stage {number}, {name}", [each for each in readings if not (brief and each.good)])
         for number, name in enumerate(STAGES, 1):
             outcome = self.outcome_of(number)
-            yield f"stage {number}, {name}: {outcome}", outcome == PASSED
+            told = self._reason(number) if outcome == SKIPPED else self._omissions(number)
+            yield f"stage {number}, {name}: {outcome}{told}", outcome == PASSED
+
+    def _reason(self, stage: int) -> str:
+        """What was told first; why a test failed stands above."""
+        reasons = [test["why"] for test in self.tests if (test["stage"], test["outcome"]) == (stage, SKIPPED)]
+        return f": {reasons[0]}" if reasons else ""
+
+    def _omissions(self, stage: int) -> str:
+        """What nobody was there for is no part of what was passed."""
+        of_stage = [test for test in self.tests if test["stage"] == stage]
+        count = sum(reading.left_out for test in of_stage for reading in test["readings"])
+        return f", without {count} checks that need a person" if count else ""
 
 
 class StagedBench:

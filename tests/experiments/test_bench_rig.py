@@ -64,6 +64,21 @@ def test_a_refused_bench_says_why_once_and_reports_it(answering: Path, tmp_path:
     assert told["stages"] == {"wiring": "failed"} | dict.fromkeys(list(told["stages"])[1:], "skipped")
 
 
+def test_a_joint_whose_encoder_counts_backwards_is_never_held(tmp_path: Path) -> None:
+    """It would run away. All joints are still nudged, and nothing moves after that."""
+    report = tmp_path / "report.json"
+    arguments = ["tests/bench", "-p", "tests.experiments.flipped_encoder", "--simulated", "--bench-report", str(report)]
+    command = [sys.executable, "-m", "pytest", *arguments]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
+    told = json.loads(report.read_text(encoding="utf-8"))
+    assert [test["outcome"] for test in told["tests"] if test["name"] == "signs"] == [
+        *("passed", "passed", "failed", "passed"),
+        *4 * ["skipped"],
+    ]
+    assert set(list(told["stages"].values())[2:]) == {"skipped"}
+    assert float(ended.stdout.partition("fastest: ")[2].split()[0]) < 2.0
+
+
 @pytest.fixture
 def local_robot(short_folder: Path, tmp_path: Path) -> Iterator[Configuration]:
     """A simulated robot as a process of its own, in real time, on local buses."""

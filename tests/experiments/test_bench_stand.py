@@ -8,17 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from control.records import NO_TORQUE
+from control.records import JOINTS, NO_TORQUE
 from drivers.odrive_codec import AxisState
 from experiments.bench_attendant import AbsentAttendant, SimulatedAttendant
-from experiments.bench_reading import Reading
+from experiments.bench_reading import Reading, left_out
 from experiments.bench_rig import SimulatedRig
 from experiments.bench_robot import BenchError
 from experiments.bench_stand import Stand, first_lasting
 from experiments.joint_zero_check import level_pose, turned
-from experiments.sign_check import MOST_NM, gently, shown
+from experiments.sign_check import MOST_NM, gently, nudged, shown
 from experiments.stroke_tracking import lag_ticks
 from firmware_host.configuration import Configuration
+from tests.bench.bench_table import HEADS, table_lines
 from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, BenchReport, StagedBench, stage_of
 
 
@@ -57,6 +58,12 @@ def test_a_fault_ends_a_measurement_with_its_sentence(bench: StagedBench, rig: S
         bench.stand.run_for(1.0)
 
 
+def test_a_robot_that_is_not_idle_is_not_armed_again(bench: StagedBench) -> None:
+    bench.stand.arm(lambda held, states: NO_TORQUE)
+    with pytest.raises(BenchError, match=r"cannot be armed: it is in hold\."):
+        bench.stand.arm()
+
+
 def test_a_drive_that_does_not_let_go_is_told(bench: StagedBench, rig: SimulatedRig) -> None:
     bench.stand.arm(lambda held, states: NO_TORQUE)
     for port in rig.buses["right"].ports[1:]:
@@ -73,11 +80,59 @@ def test_what_holds_gently_never_exceeds_a_tiny_torque(bench: StagedBench) -> No
 
 def test_where_nobody_is_there_hands_are_not_needed_and_eyes_not_claimed(configuration: Configuration) -> None:
     stand = Stand(SimulatedRig(configuration), AbsentAttendant())
-    assert [reading.what for reading in level_pose(stand)] == ["flippers held level by hand (0: nobody did)"]
-    assert [reading.what for reading in turned(stand, "left_sweep")] == ["left_sweep: turned by hand (0: nobody did)"]
-    (reading,) = shown(stand, "left_sweep")
-    assert reading.good
-    assert "nobody looked" in reading.what
+    readings = [*level_pose(stand), *turned(stand, "left_sweep"), *shown(stand, "left_sweep")]
+    assert [(reading.left_out, reading.good, reading.value_text) for reading in readings] == [
+        (True, True, "left out")
+    ] * 3
+
+
+def test_what_nobody_was_there_for_is_not_told_as_passed() -> None:
+    report = BenchReport()
+    report.begin(3, "test")
+    report.keep(left_out("left_sweep: turned by hand"))
+    report.end()
+    lines = [line for line, _ in report.lines(brief=False)]
+    assert "stage 3, zeros: passed, without 1 checks that need a person" in lines
+    assert report.as_json["tests"][0]["readings"][0]["left_out"] is True
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_an_encoder_that_counts_against_its_motor_never_closes_a_loop(rig: SimulatedRig, place: int) -> None:
+    """Feedback would be positive there: each joint's nudge ends by itself, and nothing may hold a pose after it."""
+    drive, report = rig.robot.drives[place], BenchReport()
+    measure = drive.measure
+    drive.measure = lambda angle_rad, velocity_rad_s: measure(-angle_rad, -velocity_rad_s)  # type: ignore[method-assign]
+    stand = Stand(rig, SimulatedAttendant(rig))
+    before = rig.robot.plant.angles_rad
+    farthest_rad = 0.0
+    for joint in JOINTS:
+        test = f"test_a_tiny_torque[{joint}]"
+        assert report.stumble(2, test) == ""
+        report.begin(2, test)
+        good = all([reading.good for reading in nudged(stand, joint)])
+        report.worsen(PASSED if good else FAILED, "")
+        report.end()
+        moved = (abs(there - here) for here, there in zip(before, rig.robot.plant.angles_rad, strict=True))
+        farthest_rad = max(farthest_rad, *moved)
+    assert farthest_rad < 0.15
+    assert report.stumble(2, "test_eyes_see[left_sweep]") == (
+        f"test_a_tiny_torque[{JOINTS[place]}] failed: mend that before anything else moves"
+    )
+    assert report.stumble(6, "test_joints_follow_a_slow_stroke") == ""
+
+
+def test_joints_stand_side_by_side_in_the_table() -> None:
+    well = [Reading(f"{joint}: lag", 1.0 + place, "ms", -9.0, 9.0) for place, joint in enumerate(JOINTS)]
+    lines = list(
+        table_lines("stage 6", [*well[:3], well[3]._replace(value=20.0), Reading("load", 35.0, "%", 0.0, 80.0)])
+    )
+    assert [(line.split(), good) for line, good in lines[1:]] == [
+        (["!", "lag", "1", "2", "3", "!20", "-9", "to", "9", "ms"], False),
+        (["load", "35", "0", "to", "80", "%"], True),
+    ]
+    columns = lines[0][0]
+    assert lines[1][0].index("!20") + 3 == columns.index(HEADS[JOINTS[3]]) + len(HEADS[JOINTS[3]])
+    assert lines[2][0].index("35") + 2 == columns.index("robot") + len("robot")
 
 
 def test_a_reading_out_of_its_bounds_fails_with_what_to_do(bench: StagedBench) -> None:
@@ -123,6 +178,21 @@ def test_a_stage_waits_for_all_before_it(outcomes: tuple[str, ...], obstacle: st
 def test_a_stage_begins_where_all_before_it_have_passed() -> None:
     assert report_with(PASSED, PASSED).obstacle(3) == ""
     assert report_with().obstacle(1) == ""
+
+
+def test_a_stage_that_was_not_done_says_why() -> None:
+    report = report_with(PASSED)
+    report.begin(2, "test")
+    report.worsen(SKIPPED, "interrupted")
+    report.end()
+    lines = [line for line, _ in report.lines(brief=True)]
+    assert lines[:3] == ["stage 1, wiring: passed", "stage 2, signs: skipped: interrupted", "stage 3, zeros: skipped"]
+
+
+def test_nothing_begins_after_a_drive_that_kept_its_torque() -> None:
+    report = report_with(PASSED)
+    report.out_of_hand = "left_sweep: cut the power"
+    assert [report.obstacle(stage) for stage in (1, 2)] == ["left_sweep: cut the power"] * 2
 
 
 def test_what_was_told_first_of_a_test_remains() -> None:

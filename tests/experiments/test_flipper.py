@@ -17,7 +17,7 @@ from experiments import flipper
 from experiments.bench_robot import BenchError
 from experiments.estimation_methods import DEFAULT, PAPER
 from experiments.flipper import Plan, report_of, require_fixed_base, require_mud
-from experiments.flipper_report import force_rows, sections_of, text_of
+from experiments.flipper_report import KNOWN_BIAS, WRONG_CONSTANTS, force_rows, sections_of, text_of
 from experiments.flipper_simulation import DRIVE, SECTIONS, bench_configuration, flipper_bench
 from experiments.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError, leave
@@ -206,6 +206,17 @@ def test_later_strides_in_the_same_hole_are_told_apart() -> None:
     assert told["muds"][0]["k_p"]["value"] == 2e6
 
 
+def test_what_scatter_does_not_show_is_told_beside_the_coefficients() -> None:
+    configuration = bench_configuration()
+    told = {
+        simulated: report_of(Plan(("47.6",), simulated=simulated), entries_of(w47_6=[2e6]), configuration, None)
+        for simulated in (False, True)
+    }
+    assert KNOWN_BIAS in text_of(told[False])[0][0]
+    assert WRONG_CONSTANTS not in text_of(told[False])[0][0]
+    assert WRONG_CONSTANTS in text_of(told[True])[0][0]
+
+
 def test_without_a_load_cell_nothing_is_said_of_errors() -> None:
     entries, plan, configuration = entries_of(w47_6=[2e6]), Plan(("47.6",)), bench_configuration()
     told = report_of(plan, entries, configuration, None)
@@ -221,4 +232,5 @@ def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> Non
     (entry,) = measured()[0].values()
     assert told["muds"][0]["k_p"]["trials"] == [entry["strides"][PAPER][0]["k_p"]["value"]]
     assert told["settings"]["method"] == "paper"
+    assert KNOWN_BIAS not in text_of(told)[0][0]
     assert told["misfit_n"][MUD]["insertion"] > 0.0

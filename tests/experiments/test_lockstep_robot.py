@@ -10,7 +10,7 @@ import pytest
 
 from control.modes import Mode
 from control.records import JOINTS
-from experiments.bench_robot import BenchError, arm, disarm, move, walk
+from experiments.bench_robot import BenchError, arm, disarm, move, told_by, walk
 from experiments.lockstep_robot import LockstepRobot, simulated_configuration
 from firmware_host.file_recorder import FileRecorder
 from firmware_host.log_reader import read_log
@@ -90,3 +90,16 @@ def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) 
     robot.close()
     log = robot.record(0.0, 1e9)
     assert log.complete and log.ticks["mode"][-1] == Mode.IDLE
+
+
+@pytest.mark.parametrize(
+    ("mode", "notice", "told"),
+    [
+        ("idle", "", "its torque was taken off"),
+        ("idle", "the lease was lost", "the lease was lost"),
+        ("fault", "", "The left_sweep joint moves."),
+    ],
+)
+def test_why_a_robot_stopped_is_told_by_its_cause(mode: str, notice: str, told: str) -> None:
+    fault = {"sentence": "The left_sweep joint moves."}
+    assert told_by({"mode": mode, "notice": notice, "fault": fault}) == told

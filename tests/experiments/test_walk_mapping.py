@@ -13,6 +13,7 @@ import pytest
 
 from experiments import walk_mapping
 from experiments.estimation_methods import COMPENSATED, DEFAULT, PAPER
+from experiments.flipper_report import KNOWN_BIAS, WRONG_CONSTANTS
 from experiments.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.lockstep_robot import LockstepRobot
 from experiments.mud_trials import Bench, SpoiltTrialError
@@ -145,7 +146,12 @@ def test_the_report_is_json_with_a_table_and_a_picture_of_everything() -> None:
     assert told["experiment"] == "walk"
     sections = sections_of(told, SHORT, measured(), CONFIGURATION, None)
     assert [f.name for section in sections for f in section.figures] == ["figure6_trial1", "figure7_51.2"]
-    assert [title for title, _ in text_of(told)][0] == "Coefficients"
+    title, rows = text_of(told)[0]
+    assert title.startswith("Coefficients")
+    assert rows[0][0] == "mud"
+    for doubt in (KNOWN_BIAS, WRONG_CONSTANTS):
+        assert doubt in title
+        assert doubt in sections[0].text
 
 
 # without a pose
