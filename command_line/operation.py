@@ -88,7 +88,7 @@ def move(options: Options) -> int:
         while (report := client.call("status"))["moving"]:
             time.sleep(0.05)
         print(report["mode"])
-        if report["mode"] == "hold":
+        if report["mode"] == "hold" and not report["notice"]:
             return exit_codes.OK
         complain(report["notice"] or f"the robot is in {report['mode']}")
         return exit_codes.REFUSED

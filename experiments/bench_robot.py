@@ -77,6 +77,7 @@ def arm(robot: BenchRobot) -> None:
     if status["mode"] in ("arming", *UNDER_WAY):
         status = wait_until(robot, lambda now: now["mode"] in ("hold", "idle", "fault"), ARMING_S, "coming to rest")
     if status["mode"] == "hold":
+        robot.wait(POLL_S)  # which is refused where somebody else attends it
         return
     if status["mode"] == "fault":
         robot.call("clear")
@@ -106,7 +107,10 @@ def move(robot: BenchRobot, angles_rad: Mapping[str, float]) -> None:
     """Joints of a robot that holds its pose, until they are there. Raises BenchError."""
     require_hold(robot.call("status"))
     robot.call("move", **{f"{joint}_rad": angle_rad for joint, angle_rad in angles_rad.items()})
-    require_hold(wait_until(robot, lambda now: not now["moving"], MOVING_S, "moving the joints"))
+    after = wait_until(robot, lambda now: not now["moving"], MOVING_S, "moving the joints")
+    require_hold(after)
+    if after["notice"]:
+        raise BenchError(after["notice"])
 
 
 def require_hold(status: Status) -> None:

@@ -83,6 +83,8 @@ class Loop:
         self.health = self._examine(beat)
         self._change_mode(next_mode(self.mode, self._request_now(), self.health), beat.now_s)
         self.forced = self.forced and self.mode in ENERGISED
+        if self.controller.moving and self.health.reaction >= Reaction.HOLD:
+            self._end_move(beat.now_s)
         step_s = min(1 + beat.missed, LONGEST_STEP_TICKS) * PERIOD_S
         elapsed_s = (1 + beat.missed) * PERIOD_S
         wanted = self.controller.step(step_s, self.mode, self.states, self._trusted(), elapsed_s)
@@ -201,6 +203,13 @@ class Loop:
         health = self.health._replace(blocking=tuple(self.faults.blocking(forced)))
         return refusal(self.mode, request, health)
 
+    @property
+    def against_moving(self) -> str | None:
+        """Why joints that are held should stay where they are, or None."""
+        if self.controller.cut_short:
+            return "the flippers may be in the mud: 'mudskipper stop' raises them first"
+        return self.fault.sentence if self.fault else None
+
     def _reaches(self, depth_m: float) -> bool:
         return 0.0 < depth_m <= self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
 
@@ -209,6 +218,13 @@ class Loop:
         request, self._request = self._request, Request.NONE
         refused = self.ending and request in (Request.ARM, Request.WALK)
         return Request.NONE if refused else request
+
+    def _end_move(self, now_s: float) -> None:
+        """In hold as in a walk, a fault that asks for a still pose has it."""
+        if self.mode is Mode.HOLD:
+            self.controller.end_move()
+            self.notice = f"the joints stopped on their way: {self.fault.sentence if self.fault else ''}"
+            self.event(now_s, self.notice)
 
     def _change_mode(self, mode: Mode, now_s: float) -> None:
         if mode is self.mode:
@@ -232,6 +248,10 @@ class Loop:
         if fault and self.mode in ENERGISED:
             to_do = fault.kind.what_to_do
             self.notice = f"stopped by {fault.name}: {fault.sentence} {to_do[:1].upper()}{to_do[1:]}."
+        if self.mode is Mode.HOLD and mode is Mode.IDLE and self.health.rested:
+            held_s = self.configuration.motion.longest_hold_s
+            self.notice = f"the pose was held for {held_s:g} s without a request: torque went off by itself"
+            self.event(now_s, self.notice)
         if self.mode is Mode.STOPPING and mode is Mode.HOLD and not self.controller.is_up(self.states):
             self.notice = "the flippers did not come out of the mud"
             self.event(now_s, self.notice)

@@ -193,8 +193,10 @@ class OperatorCalls:
             if not ranges[joint].min_rad <= angle_rad <= ranges[joint].max_rad:
                 low, high = ranges[joint]
                 raise RefusedError(f"{joint}_rad = {angle_rad:g}: must be from {low:.3f} to {high:.3f}")
+        self._accept(loop.against_moving)
         way = ", ".join(f"{joint} to {angle_rad:.4f} rad" for joint, angle_rad in angles_rad.items())
         loop.event(self._clock(), f"move {way} by {caller}")
+        loop.notice = ""
         loop.controller.move([angles_rad.get(joint) for joint in JOINTS])
         return "accepted"
 
