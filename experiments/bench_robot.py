@@ -77,7 +77,6 @@ def arm(robot: BenchRobot) -> None:
     if status["mode"] in ("arming", *UNDER_WAY):
         status = wait_until(robot, lambda now: now["mode"] in ("hold", "idle", "fault"), ARMING_S, "coming to rest")
     if status["mode"] == "hold":
-        robot.wait(POLL_S)  # which is refused where somebody else attends it
         return
     if status["mode"] == "fault":
         robot.call("clear")
@@ -121,8 +120,13 @@ def require_hold(status: Status) -> None:
 
 def told_by(status: Status) -> str:
     """Why a robot is in the mode that it is in."""
-    fault = status["fault"]["sentence"] if status["fault"] else f"it is in {status['mode']}"
-    return str(status["notice"] or fault)
+    if status["notice"]:
+        return str(status["notice"])
+    if status["mode"] == "idle":  # what goes idle by itself leaves a notice
+        return "its torque was switched off"
+    if status["fault"]:
+        return str(status["fault"]["sentence"])
+    return "it was told to stop" if status["mode"] == "stopping" else f"it is in {status['mode']}"
 
 
 def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
@@ -134,7 +138,11 @@ def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
     after = wait_until(robot, lambda now: now["mode"] not in ("walking", "stopping"), strides * STRIDE_S, "the walk")
     if after["mode"] != "hold" or after["notice"]:
         raise BenchError(f"the walk ended early: {told_by(after)}")
-    return Walked(strides_since(robot, before["strides_closed"]), before["now_s"], after["now_s"])
+    closed = strides_since(robot, before["strides_closed"])
+    number = len({stride["index"] for stride in closed})
+    if number < strides:
+        raise BenchError(f"the walk ended early, after {number} of {strides} strides: it was told to stop")
+    return Walked(closed, before["now_s"], after["now_s"])
 
 
 def strides_since(robot: BenchRobot, number: int) -> list[dict[str, Any]]:

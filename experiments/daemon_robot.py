@@ -24,6 +24,7 @@ from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPerm
 PROMISE_S = 2.0  # of the lease
 RENEWAL_S = 0.2
 WRITTEN_S = 10.0  # to wait for rows that are on their way to the disk
+OPERATING = ("arm", "walk", "move", "clear", "stop", "disarm")  # refused where another program holds a lease
 START_IT = "Start it with 'systemctl start mudskipper', or name its socket with --socket."
 
 
@@ -51,6 +52,8 @@ class DaemonRobot:
         return self._configuration
 
     def call(self, method: str, **params: Any) -> Any:
+        if method in OPERATING:
+            self._require_alone()
         try:
             return self._client.call(method, **params)
         except (NoDaemonError, NotPermittedError) as problem:
@@ -139,7 +142,6 @@ class DaemonRobot:
     def close(self) -> None:
         """A robot that somebody else operates is left to them."""
         with suppress(BenchError, CallRefusedError):
-            self._require_alone()
             if self.call("status")["mode"] == "walking":
                 self.call("stop")
             self._wait_for_hold()

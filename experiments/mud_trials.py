@@ -142,17 +142,17 @@ def rest(robot: BenchRobot) -> None:
     disarm(robot)
 
 
-def leave(bench: Bench, folder: Path) -> list[Path]:
+def leave(robot: BenchRobot, person: Person, folder: Path) -> list[Path]:
     """Torque off, all logs in the folder, the connection closed; what fails of that is told. The folder's logs."""
     try:
-        if bench.robot.call("status")["mode"] == "walking":
-            bench.person.tell("the flippers are raised, then torque goes off")
-        rest(bench.robot)
-        bench.robot.copy_logs(folder)
+        if robot.call("status")["mode"] == "walking":
+            person.tell("the flippers are raised, then torque goes off")
+        rest(robot)
+        robot.copy_logs(folder)
     except (BenchError, CallRefusedError) as problem:
-        bench.person.tell(str(problem))
+        person.tell(str(problem))
     finally:
-        bench.robot.close()
+        robot.close()
     return sorted(folder.glob("*.mcap"))
 
 

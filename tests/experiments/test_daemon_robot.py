@@ -52,3 +52,19 @@ def test_a_daemon_that_ends_is_told(bench: Bench) -> None:  # noqa: F811
     with pytest.raises(BenchError, match="the daemon on"):
         robot.call("status")
     robot.close()
+
+
+def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> None:  # noqa: F811
+    first, second = DaemonRobot(bench.socket), DaemonRobot(bench.socket)
+    second._name = "somebody else"  # both are this process
+    try:
+        arm(first)
+        first.wait(0.3)
+        with pytest.raises(BenchError, match="operates the robot: wait until it has ended"):
+            walk(second, 0.03, 1)
+        second.close()
+        assert first.call("status")["mode"] == "hold"
+        disarm(first)  # its lease is not over yet
+        first.wait(0.3)
+    finally:
+        first.close()
