@@ -93,8 +93,9 @@ def _blocked(status: Status) -> bool:
 
 
 def _why_not_armed(robot: BenchRobot, problem: str) -> str:
-    faults = [f"{fault['sentence']} {fault['what_to_do']}" for fault in robot.call("status")["faults"]]
-    return f"the robot is not armed: {' '.join(faults) or problem}; 'mudskipper check' tells more"
+    blocking = [fault for fault in robot.call("status")["faults"] if fault["blocks_arming"]]
+    faults = [f"{fault['sentence'].rstrip('.')} ({fault['what_to_do']})" for fault in blocking]
+    return f"the robot is not armed: {'; '.join(faults) or problem}. 'mudskipper check' tells more"
 
 
 def disarm(robot: BenchRobot) -> None:

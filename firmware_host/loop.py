@@ -84,7 +84,7 @@ class Loop:
         self._change_mode(next_mode(self.mode, self._request_now(), self.health), beat.now_s)
         self.forced = self.forced and self.mode in ENERGISED
         if self.controller.moving and self.health.reaction >= Reaction.HOLD:
-            self._end_move(beat.now_s)
+            self._end_move(beat.now_s, self.fault.sentence if self.fault else "a fault stands.")
         step_s = min(1 + beat.missed, LONGEST_STEP_TICKS) * PERIOD_S
         elapsed_s = (1 + beat.missed) * PERIOD_S
         wanted = self.controller.step(step_s, self.mode, self.states, self._trusted(), elapsed_s)
@@ -165,6 +165,8 @@ class Loop:
         if refused:
             return refused
         self._tell_request(request, now_s, forced, by)
+        if request is Request.STOP and self.controller.moving:
+            self._end_move(now_s, f"stop was asked for{f' by {by}' if by else ''}.")
         if request is Request.DISARM and self.mode not in ENERGISED:
             self.drives.disarm(now_s, at_once=True)  # also while not all drives are heard
         elif request is Request.CLEAR:
@@ -203,13 +205,6 @@ class Loop:
         health = self.health._replace(blocking=tuple(self.faults.blocking(forced)))
         return refusal(self.mode, request, health)
 
-    @property
-    def against_moving(self) -> str | None:
-        """Why joints that are held should stay where they are, or None."""
-        if self.controller.cut_short:
-            return "the flippers may be in the mud: 'mudskipper stop' raises them first"
-        return self.fault.sentence if self.fault else None
-
     def _reaches(self, depth_m: float) -> bool:
         return 0.0 < depth_m <= self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
 
@@ -219,11 +214,11 @@ class Loop:
         refused = self.ending and request in (Request.ARM, Request.WALK)
         return Request.NONE if refused else request
 
-    def _end_move(self, now_s: float) -> None:
-        """In hold as in a walk, a fault that asks for a still pose has it."""
+    def _end_move(self, now_s: float, why: str) -> None:
+        """In hold as in a walk: a fault that asks for a still pose has it, and so has whoever asks to stop."""
         if self.mode is Mode.HOLD:
             self.controller.end_move()
-            self.notice = f"the joints stopped on their way: {self.fault.sentence if self.fault else ''}"
+            self.notice = f"the joints stopped on their way: {why}"
             self.event(now_s, self.notice)
 
     def _change_mode(self, mode: Mode, now_s: float) -> None:
