@@ -63,6 +63,8 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
         return _end(folder, str(problem), exit_codes.REFUSED)
     except KeyboardInterrupt:
         return _end(folder, "interrupted", exit_codes.INTERRUPTED)
+    except OSError as problem:  # such as a full disk
+        return _end(folder, f"{problem.filename or folder}: {problem.strerror or problem}", exit_codes.UNHEALTHY)
     print(json.dumps(numbers_told(finding.report), allow_nan=False) if options.json else finding.text)
     print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
     return exit_codes.OK
