@@ -40,6 +40,7 @@ class DaemonRobot:
             raise BenchError(f"{problem}. {START_IT}") from problem
         self._configuration: Configuration | None = None
         self._renewed_s = 0.0
+        self._log: Path | None = None  # as last seen
         self._name: str | None = None  # of this program, as the daemon calls who holds a lease
         self._require_alone()
 
@@ -119,6 +120,7 @@ class DaemonRobot:
         path = self.call("status")["log"]["path"]
         if path is None:
             raise BenchError("the daemon writes no log: set log.enabled = true in its configuration")
+        self._log = Path(path)
         end_s = time.monotonic() + WRITTEN_S
         while not (segments := run_files(Path(path))):  # its writer has only just started
             if time.monotonic() > end_s:
@@ -127,11 +129,19 @@ class DaemonRobot:
         return segments
 
     def copy_logs(self, folder: Path) -> list[Path]:
-        """Those of the daemon's present run; the one under way is ended in the copy."""
+        """Those of the daemon's run, even where it has ended meanwhile; the one under way is ended in the copy."""
         try:
-            return [self._copy(log, folder / log.name) for log in self._segments()]
+            return [self._copy(log, folder / log.name) for log in self._segments_at_last()]
         except (OSError, LogError) as problem:
             raise BenchError(f"the daemon's log cannot be copied: {problem}") from problem
+
+    def _segments_at_last(self) -> list[Path]:
+        try:
+            return self._segments()
+        except BenchError:
+            if self._log is None:
+                raise
+            return run_files(self._log)
 
     def _copy(self, log: Path, copy: Path) -> Path:
         shutil.copyfile(present_path(log), copy)

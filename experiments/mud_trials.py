@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -145,15 +146,20 @@ def rest(robot: BenchRobot) -> None:
 def leave(robot: BenchRobot, person: Person, folder: Path) -> list[Path]:
     """Torque off, all logs in the folder, the connection closed; what fails of that is told. The folder's logs."""
     try:
-        if robot.call("status")["mode"] == "walking":
-            person.tell("the flippers are raised, then torque goes off")
-        rest(robot)
-        robot.copy_logs(folder)
-    except (BenchError, CallRefusedError) as problem:
-        person.tell(str(problem))
+        for step in (partial(_rest_told, robot, person), partial(robot.copy_logs, folder)):
+            try:
+                step()
+            except (BenchError, CallRefusedError) as problem:
+                person.tell(str(problem))
     finally:
         robot.close()
     return sorted(folder.glob("*.mcap"))
+
+
+def _rest_told(robot: BenchRobot, person: Person) -> None:
+    if robot.call("status")["mode"] == "walking":
+        person.tell("the flippers are raised, then torque goes off")
+    rest(robot)
 
 
 def require_some(notebook: Notebook) -> None:

@@ -45,12 +45,15 @@ def test_without_a_daemon_it_is_told_how_to_start_one(tmp_path: Path) -> None:
         DaemonRobot(tmp_path / "none.sock")
 
 
-def test_a_daemon_that_ends_is_told(bench: Bench) -> None:  # noqa: F811
+def test_a_daemon_that_ends_is_told_and_its_log_is_there(bench: Bench, tmp_path: Path) -> None:  # noqa: F811
     robot = DaemonRobot(bench.socket)
+    assert robot.configuration
     bench.daemon.terminate()
     bench.daemon.wait(20)
     with pytest.raises(BenchError, match="the daemon on"):
         robot.call("status")
+    (copy,) = robot.copy_logs(tmp_path)
+    assert read_log(copy).complete
     robot.close()
 
 
