@@ -4,6 +4,9 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
+# Tests in real time, or whose order counts: one after the other, and beside nothing else.
+IN_PEACE := bench benchmarks command_line firmware_host
+
 .PHONY: help setup demo test test-vm mutants lint clean
 
 help:  ## this list
@@ -15,7 +18,8 @@ demo: .venv/setup  ## a simulated robot walks over three muds, in real time
 	@$(BIN)/mudskipper demo $(ARGS)
 
 test: .venv/test  ## every test, without network
-	$(BIN)/python -m pytest -q --simulated $(ARGS)
+	$(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile $(addprefix --ignore=tests/,$(IN_PEACE)) $(ARGS)
+	$(BIN)/python -m pytest -q --simulated $(addprefix tests/,$(IN_PEACE)) $(ARGS)
 
 test-vm: .venv/test  ## the daemon under systemd on a real kernel, in a virtual machine
 	@$(BIN)/python -m virtual_machine.installed_robot

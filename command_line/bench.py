@@ -85,6 +85,6 @@ def _run(options: argparse.Namespace, folder: Path, what: str, run: Callable[[De
 
 def _end(folder: Path, sentence: str, status: int) -> int:
     complain(sentence)
-    if (folder / NAME).exists():
+    if any(folder.rglob(NAME)):
         complain(f"what was measured is in {folder}: the same command goes on from there")
     return status

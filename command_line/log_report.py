@@ -6,15 +6,14 @@ import argparse
 import json
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from command_line import exit_codes
 from command_line.recorded_walk import RecordedWalk, read_walk
-from command_line.screen import PATIENCE_S, Progress, coefficient, complain, number
+from command_line.screen import coefficient, complain, number, watched
 from command_line.stride_choice import choose_strides
 from experiments.report_page import PAGE, Figure, Section, numbers_told, write_report
 from firmware_host.log_reader import Log, LogError, Watch, log_summary, read_logs
@@ -29,7 +28,7 @@ def log_report(options: argparse.Namespace) -> int:
     folder: Path = options.out or _beside(options.files[0])
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with _watched() as watch:
+        with watched() as watch:
             report, sections = _told(options.files, watch)
     except LogError as problem:
         complain(str(problem))
@@ -51,15 +50,6 @@ def _copy(log: Path, folder: Path) -> Path:
     if copy.absolute() != log.absolute():
         shutil.copyfile(log, copy)
     return copy
-
-
-@contextmanager
-def _watched() -> Iterator[Watch]:
-    progress = Progress("", PATIENCE_S)
-    try:
-        yield progress.follow
-    finally:
-        progress.clear()
 
 
 def _told(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Section]]:

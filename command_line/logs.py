@@ -6,18 +6,16 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from command_line import exit_codes
 from command_line.recorded_walk import RecordedWalk, read_walk
-from command_line.screen import PATIENCE_S, STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line
+from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line, watched
 from command_line.stride_choice import Stride, choose_strides, duration_s, outcome_of
 from firmware_host.configuration import ConfigurationError, load_configuration
 from firmware_host.lab_csv import write_lab_csv
 from firmware_host.log_folder import ACTIVE, DONE
-from firmware_host.log_reader import LogError, Watch, log_summary, read_log, read_logs
+from firmware_host.log_reader import LogError, log_summary, read_log, read_logs
 from firmware_host.replay import Replay, replay_files
 from firmware_host.reports import map_report, stride_report
 
@@ -30,7 +28,7 @@ CUT_OFF = "the log is not finished: it is still being written, or was cut off; e
 def replay(options: Options) -> int:
     try:
         configuration = load_configuration(options.config) if options.config else None
-        with _watched() as watch:
+        with watched() as watch:
             replayed = replay_files(options.files, configuration, options.method, watch)
     except ConfigurationError as problem:
         for sentence in problem.problems:
@@ -62,16 +60,6 @@ def _show_replay(replayed: Replay, as_json: bool) -> None:
         )
     if not replayed.complete:
         complain(CUT_OFF)
-
-
-@contextmanager
-def _watched() -> Iterator[Watch]:
-    """Something that a person may have to wait for."""
-    progress = Progress("", PATIENCE_S)
-    try:
-        yield progress.follow
-    finally:
-        progress.clear()
 
 
 def plot(options: Options) -> int:
@@ -124,7 +112,7 @@ def _beside(log: Path, ending: str) -> Path:
 
 def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
     """With what is to be said of it. Raises LogError, also for a picture that nobody could write."""
-    with _watched() as watch:
+    with watched() as watch:
         walk = read_walk(options.files[0], options.walk, options.files[1:], watch)
     if not os.access(path if path.exists() else path.parent, os.W_OK):
         raise LogError(f"{path} cannot be written; choose another place with --out")
@@ -171,7 +159,7 @@ def _draw_film(walk: RecordedWalk, strides: list[Stride], path: Path) -> None:
 
 def info(options: Options) -> int:
     try:
-        with _watched() as watch:
+        with watched() as watch:
             summary = log_summary(read_logs(options.files, watch))
     except LogError as problem:
         complain(str(problem))
@@ -186,7 +174,7 @@ def info(options: Options) -> int:
 
 def export(options: Options) -> int:
     try:
-        with _watched() as watch:
+        with watched() as watch:
             log = read_log(options.file, watch)
     except LogError as problem:
         complain(str(problem))
@@ -197,6 +185,6 @@ def export(options: Options) -> int:
     if options.out.exists() and options.out.samefile(options.file):
         complain(f"{options.out} is the log itself; name another file")
         return exit_codes.USAGE
-    with Path(options.out).open("w", encoding="utf-8") as out, _watched() as watch:
+    with Path(options.out).open("w", encoding="utf-8") as out, watched() as watch:
         write_lab_csv(log, out, watch)
     return exit_codes.OK

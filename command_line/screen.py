@@ -6,7 +6,8 @@ import os
 import re
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from math import isfinite
 from typing import Any
 
@@ -73,6 +74,16 @@ class Progress:
     def clear(self) -> None:
         if self._shown:
             print("\r\033[K", end="", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def watched() -> Iterator[Callable[[str, int, int], None]]:
+    """Something that a person may have to wait for: what is done, how far, of how much."""
+    progress = Progress("", PATIENCE_S)
+    try:
+        yield progress.follow
+    finally:
+        progress.clear()
 
 
 def mud_text(name: str) -> str:

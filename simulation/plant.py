@@ -21,6 +21,7 @@ from control.bounds import Bounds
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.records import JointAngles, Torques
+from simulation.bench_mount import BenchMount
 from simulation.carriage import Carriage
 from simulation.clay import Clay
 from simulation.disturbances import NONE, Disturbances, StrokeHistory, clinging_torques_nm
@@ -66,6 +67,7 @@ class Arm:
         self.history = StrokeHistory(parameters.disturbances, seed)
         self.stones = StoneContact(track.stones) if track.stones else None
         self._disturbed = parameters.disturbances != NONE
+        self.mount: BenchMount | None = None  # over the edge of a bench, in place of the mud
         self.reset()
 
     def reset(self) -> None:
@@ -78,9 +80,13 @@ class Arm:
         self.clay = self.track.clay_at(0.0)
 
     def put_back(self) -> None:
-        """As a person does it by hand: straight out, the plate's edge on the mud. The mud remembers its strokes."""
-        self.sweep_rad = self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = 0.0
-        self.adduction_rad = self.parameters.geometry.adduction_rad(0.0, self.surface_m)
+        """As a person does it by hand: straight out, the plate's edge on the mud; level on a bench.
+
+        The mud remembers its strokes.
+        """
+        self.sweep_rad = self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = self.adduction_rad = 0.0
+        if not self.mount:
+            self.adduction_rad = self.parameters.geometry.adduction_rad(0.0, self.surface_m)
         self.contact.reset()
         if self.stones:
             self.stones.reset()
@@ -100,6 +106,9 @@ class Arm:
         carriage: Carriage | None = None,
     ) -> None:
         """`carriage`: how a free body carries this arm."""
+        if self.mount:
+            self._step_on_bench(self.mount, dt_s, sweep_nm, lift_nm)
+            return
         self.carriage = carriage
         self._look_at_mud(body_m)
         self.force = self.contact.step(
@@ -116,7 +125,24 @@ class Arm:
         if self.stones:
             self._meet_stones(self.stones, dt_s, body_m)
         load_sweep_nm, load_lift_nm = self._load_nm()
-        self._move(dt_s, sweep_nm + load_sweep_nm, lift_nm + load_lift_nm)
+        mass = self.parameters.arm_mass
+        self._move(
+            dt_s,
+            sweep_nm + load_sweep_nm,
+            lift_nm + load_lift_nm,
+            mass.sweep_inertia_kg_m2,
+            mass.adduction_inertia_kg_m2,
+        )
+
+    def _step_on_bench(self, mount: BenchMount, dt_s: float, sweep_nm: float, lift_nm: float) -> None:
+        if mount.held:
+            self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = 0.0
+            return
+        mass, friction_nm_s = self.parameters.arm_mass, self.parameters.joint_friction_nm_s
+        gravity_sweep_nm, gravity_lift_nm = mount.gravity_torques_nm(mass, self.sweep_rad, self.adduction_rad)
+        sweep_nm += gravity_sweep_nm - friction_nm_s * self.sweep_velocity_rad_s
+        lift_nm += gravity_lift_nm - friction_nm_s * self.adduction_velocity_rad_s
+        self._move(dt_s, sweep_nm, lift_nm, *mount.inertias_kg_m2(mass))
 
     def _look_at_mud(self, body_m: float) -> None:
         """Which clay is under the flipper, as firm as earlier strokes have left it, and how high."""
@@ -149,16 +175,16 @@ class Arm:
             sweep_nm, lift_nm = sweep_nm + hanging[0], lift_nm + hanging[1]
         return sweep_nm, lift_nm
 
-    def _move(self, dt_s: float, sweep_nm: float, lift_nm: float) -> None:
-        mass, coulomb_nm = self.parameters.arm_mass, self.parameters.joint_coulomb_nm
-        self.sweep_velocity_rad_s += dt_s * sweep_nm / mass.sweep_inertia_kg_m2
-        self.adduction_velocity_rad_s += dt_s * lift_nm / mass.adduction_inertia_kg_m2
+    def _move(
+        self, dt_s: float, sweep_nm: float, lift_nm: float, sweep_inertia_kg_m2: float, lift_inertia_kg_m2: float
+    ) -> None:
+        coulomb_nm = self.parameters.joint_coulomb_nm
+        self.sweep_velocity_rad_s += dt_s * sweep_nm / sweep_inertia_kg_m2
+        self.adduction_velocity_rad_s += dt_s * lift_nm / lift_inertia_kg_m2
         if coulomb_nm:
             impulse_nm_s = dt_s * coulomb_nm
-            self.sweep_velocity_rad_s = _slowed(self.sweep_velocity_rad_s, impulse_nm_s / mass.sweep_inertia_kg_m2)
-            self.adduction_velocity_rad_s = _slowed(
-                self.adduction_velocity_rad_s, impulse_nm_s / mass.adduction_inertia_kg_m2
-            )
+            self.sweep_velocity_rad_s = _slowed(self.sweep_velocity_rad_s, impulse_nm_s / sweep_inertia_kg_m2)
+            self.adduction_velocity_rad_s = _slowed(self.adduction_velocity_rad_s, impulse_nm_s / lift_inertia_kg_m2)
         self.sweep_rad, self.sweep_velocity_rad_s = _moved(
             self.sweep_rad, self.sweep_velocity_rad_s, dt_s, END_STOPS_RAD[0]
         )

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from command_line import exit_codes, logs, screen
+from command_line import exit_codes, screen
 from command_line.main import main
 from command_line.recorded_walk import read_walk
 from control.controller import WalkOrder
@@ -162,7 +162,7 @@ def test_a_command_that_takes_its_time_says_how_far_it_is(
     monkeypatch.setattr(screen, "SOON_S", 0.0)
     assert main([*command, str(walk)]) == exit_codes.OK
     assert word not in capsys.readouterr().err  # it took no time
-    monkeypatch.setattr(logs, "PATIENCE_S", 1e-9)
+    monkeypatch.setattr(screen, "PATIENCE_S", 1e-9)
     assert main([*command, str(walk)]) == exit_codes.OK
     assert word in capsys.readouterr().err
 

@@ -351,6 +351,15 @@ def test_the_time_of_holding_begins_anew_with_every_hold_and_does_not_run_elsewh
             assert not controller.rested
 
 
+def test_the_time_of_holding_begins_anew_with_every_move() -> None:
+    controller = Controller(GAIT, GEOMETRY, SPRING, ArmMass(), MotionParameters(longest_hold_s=1.0), recovery())
+    for _ in range(4):
+        for _ in range(370):
+            controller.step(TICK_S, Mode.HOLD, states_at(POSE))
+            assert not controller.rested
+        controller.move([None, 0.0, None, None])
+
+
 def stopping_ticks(pose: JointAngles) -> int:
     """Of flippers that stay where they are, whatever torque there is."""
     controller = weightless()

@@ -1,0 +1,135 @@
+"""Where the actuator calibration happens: at a robot, one joint after the other, or at simulated benches side by side.
+
+Each joint has a notebook and a folder of its own below that of the results, so that a joint that is finished is not
+touched when another one goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import Any, Protocol
+
+from experiments.actuator import TICK_S, Calibration, Show
+from experiments.actuator_fit import Entry
+from experiments.actuator_hand import PersonsHand
+from experiments.actuator_plan import Plan, require_possible, steps_of
+from experiments.actuator_simulation import simulated_bench
+from experiments.bench_robot import BenchRobot
+from experiments.notebook import Notebook
+from experiments.person import GO_ON, Person, Willing
+from experiments.side_by_side import side_by_side
+from firmware_host.configuration import Configuration, parse_configuration
+
+Readings = Mapping[str, Mapping[str, Entry]]  # by joint and step
+
+
+class ActuatorBench(Protocol):
+    @property
+    def configuration(self) -> Configuration: ...
+
+    def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
+        """Raises BenchError, NotebookError."""
+
+    def copy_logs(self, folder: Path) -> list[Path]: ...
+
+    def close(self) -> None: ...
+
+
+class RobotBench:
+    """An ActuatorBench with a robot and a person."""
+
+    def __init__(self, robot: BenchRobot) -> None:
+        self._robot = robot
+
+    @property
+    def configuration(self) -> Configuration:
+        return self._robot.configuration
+
+    def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
+        require_possible(plan, self.configuration)
+        hand, count = PersonsHand(person, plan), len(steps_of(plan))
+        readings: dict[str, Mapping[str, Entry]] = {}
+        for number, joint in enumerate(plan.joints):
+            notebook = Notebook(folder / joint, notes_of(plan, joint))
+            if notebook.begun:
+                person.tell(f"{joint}: {len(notebook.entries)} of {count} readings are there already.")
+
+            def show_all(done: int, total: int, before: int = number) -> None:
+                show(before * total + done, len(plan.joints) * total)
+
+            readings[joint] = Calibration(self._robot, joint, plan, hand, person, notebook, show_all).run()
+            self._let_go(joint, person)
+        return readings
+
+    def _let_go(self, joint: str, person: Person) -> None:
+        """The next joint is mounted with torque off."""
+        if self._robot.call("status")["mode"] == "hold":
+            question = f"{joint} is done. Hold the flipper: torque goes off."
+            person.ask(question, {GO_ON: "it is held"}, lambda: self._robot.wait(TICK_S))
+            self._robot.call("disarm")
+
+    def copy_logs(self, folder: Path) -> list[Path]:
+        return self._robot.copy_logs(folder)
+
+    def close(self) -> None:
+        self._robot.close()
+
+
+class SimulatedBench:
+    """An ActuatorBench with a simulated robot of its own for each joint, in a process of its own."""
+
+    def __init__(self, configuration: Configuration, seed: int) -> None:
+        self.configuration = configuration
+        self._seed = seed
+        self._logs: list[Path] = []
+
+    def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
+        require_possible(plan, self.configuration)
+        count = len(steps_of(plan))
+        joints = [partial(_simulate, self.configuration.text, joint, plan, self._seed, folder) for joint in plan.joints]
+        show(0, count * len(joints))
+        outcomes = side_by_side(joints, lambda done, total: show(count * done, count * total))
+        self._logs = [log for _, log in outcomes]
+        return {joint: entries for joint, (entries, _) in zip(plan.joints, outcomes, strict=True)}
+
+    def copy_logs(self, folder: Path) -> list[Path]:
+        return self._logs
+
+    def close(self) -> None:
+        """Nothing runs any more."""
+
+
+def _simulate(text: str, joint: str, plan: Plan, seed: int, folder: Path) -> tuple[dict[str, Any], Path]:
+    configuration = parse_configuration(text)
+    notebook = Notebook(folder / joint, notes_of(plan, joint))
+    log = _new_log(folder, joint)
+    robot, hand = simulated_bench(configuration, joint, plan, seed, log)
+    try:
+        entries = Calibration(robot, joint, plan, hand, Willing(_unheard), notebook, _unseen).run()
+    finally:
+        robot.close()
+    return dict(entries), log
+
+
+def _new_log(folder: Path, joint: str) -> Path:
+    """Beside those of earlier attempts."""
+    number = 1
+    while (log := folder / f"{joint}-{number}.mcap").exists():
+        number += 1
+    return log
+
+
+def notes_of(plan: Plan, joint: str) -> dict[str, Any]:
+    """What must be the same when a joint goes on: the other joints need not be."""
+    return {name: value for name, value in asdict(plan).items() if name != "joints"} | {"joint": joint}
+
+
+def _unheard(sentence: str) -> None:
+    """Many joints at once tell of every reading; their notebooks have it."""
+
+
+def _unseen(done: int, total: int) -> None:
+    """Progress of one joint, in a process without a screen."""

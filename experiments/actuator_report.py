@@ -1,0 +1,185 @@
+"""The report of the actuator calibration: the paper's figure 3 and its numbers beside ours, and what to set where."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from math import isfinite
+from statistics import fmean, stdev
+from typing import Any
+
+from experiments.actuator_fit import Entry, JointFit
+from experiments.actuator_plan import Plan, steps_of
+from experiments.report_page import Figure, Rows, Section
+from firmware_host.reports import known
+
+TITLE = "Actuator calibration"
+PAPER_RMSE_NM = {"adduction": 0.0134, "sweep": 0.0127}
+PAPER_REPEATABILITY = 0.032
+PAPER_CONSTANT_NM_A = 0.083
+
+METHOD = """\
+A motor holds the flipper level while calibration weights hang on it (the paper's section II-B). A trial is one pass
+through all weights, each hung anew; the empty arm is read before and after each pass, and what it takes is taken off.
+The held angle is raised until the loaded arm itself is level, so that every weight has the same lever and meets the
+magnets' cogging in the same place. The place is approached from below and from above: the mean of the two currents is
+the load, half of their difference is dry friction.
+
+The line is current on torque, since the weights are known better than the currents: k_t is one over its slope, with
+the standard error of an ordinary least-squares fit. It does not hold the doubt of the lever: a millimetre of 12 cm is
+0.8 % of k_t. The error with the fitted constant is each trial's by the constant of the other trials.
+
+Repeatability is the standard deviation over the trials of a weight relative to their mean, averaged over the weights,
+as in the paper. Friction is that of the arm at rest, from the lightest loads; a joint that moves may have a quarter
+more."""
+
+SETTING = """\
+The constant stands in two places, and both must say the same. torque_constant_nm_a of [drive.JOINT] in the
+configuration turns the current that the drive reports into torque: every force and coefficient is proportional to it.
+odrv0.axis0.config.motor.torque_constant in the drive (over USB with odrivetool, then save_configuration) turns the
+torque that is commanded into current. The reported current itself does not depend on either. While only one of them
+is set, the robot feels forces rightly and pushes wrongly, or the other way round.
+
+60/(2π KV) = 0.083 N·m/A for 115 rpm/V is the constant of a motor whose current is counted as direct current. ODrive
+counts the peak of the phase current, for which the same motor gives 8.27/KV = 0.0719. Which holds for these drives is
+what this experiment tells."""
+
+
+def report_of(plan: Plan, readings: Mapping[str, Mapping[str, Entry]], fits: Sequence[JointFit]) -> dict[str, Any]:
+    return {
+        "experiment": "actuator",
+        "plan": plan.notes(),
+        "joints": [_joint_report(fit) for fit in fits],
+        "not_fitted": [joint for joint in plan.joints if joint not in {fit.joint for fit in fits}],
+        "left_out": left_out(plan, readings),
+        "readings": {joint: dict(entries) for joint, entries in readings.items()},
+        "paper": {
+            "rmse_nm": PAPER_RMSE_NM,
+            "repeatability": PAPER_REPEATABILITY,
+            "torque_constant_nm_a": PAPER_CONSTANT_NM_A,
+        },
+    }
+
+
+def _joint_report(fit: JointFit) -> dict[str, Any]:
+    values = {
+        "torque_constant_nm_a": fit.line.constant_nm_a,
+        "torque_constant_error_nm_a": fit.line.constant_error_nm_a,
+        "configured_nm_a": fit.configured_nm_a,
+        "rmse_configured_nm": fit.rmse_configured_nm,
+        "rmse_fitted_nm": fit.rmse_fitted_nm,
+        "paper_rmse_nm": paper_rmse_nm(fit.joint),
+        "repeatability": fit.repeatability,
+        "offset_nm": fit.offset_nm,
+        "offset_error_nm": fit.offset_error_nm,
+        "friction_nm": fit.friction_nm,
+        "friction_error_nm": fit.friction_error_nm,
+        "tare_nm": fit.tare_nm,
+        "tare_spread_nm": fit.tare_spread_nm,
+    }
+    told = {name: known(value) for name, value in values.items()}
+    return {"joint": fit.joint, "readings": fit.line.readings, "direction": fit.direction} | told
+
+
+def left_out(plan: Plan, readings: Mapping[str, Mapping[str, Entry]]) -> list[dict[str, Any]]:
+    """What was skipped, or kept with a doubt and not fitted, and why."""
+    return [
+        {"joint": joint, "trial": step.trial, "weight_g": step.weight_g, "why": why}
+        for joint, entries in readings.items()
+        for step in steps_of(plan)
+        if (why := entries.get(step.key, {}).get("skipped") or entries.get(step.key, {}).get("doubt"))
+    ]
+
+
+def paper_rmse_nm(joint: str) -> float:
+    return PAPER_RMSE_NM[joint.split("_")[1]]
+
+
+def sections_of(plan: Plan, readings: Mapping[str, Mapping[str, Entry]], fits: Sequence[JointFit]) -> list[Section]:
+    sections = [Section("Torque constants", rows=table_of(fits), figures=_figures(fits))] if fits else []
+    sections += [Section(f"Weights on {fit.joint}", rows=_weight_rows(fit)) for fit in fits]
+    omitted = left_out(plan, readings)
+    if omitted:
+        rows = [[row["joint"], str(row["trial"]), f"{row['weight_g']:g} g", row["why"]] for row in omitted]
+        sections.append(Section("Left out", rows=[["joint", "trial", "weight", "why"], *rows]))
+    return [*sections, Section("What to set where", SETTING), Section("How it was measured", METHOD)]
+
+
+def table_of(fits: Sequence[JointFit]) -> Rows:
+    """A line a joint, the paper's numbers last."""
+    head = [
+        "joint",
+        "k_t, N·m/A",
+        "configured",
+        "RMSE by it, N·m",
+        "RMSE fitted, N·m",
+        "repeatability",
+        "offset, N·m",
+        "friction, N·m",
+        "readings",
+    ]
+    rows = [
+        [
+            fit.joint,
+            _with_error(fit.line.constant_nm_a, fit.line.constant_error_nm_a, 5),
+            f"{fit.configured_nm_a:g}",
+            f"{fit.rmse_configured_nm:.4f}",
+            f"{fit.rmse_fitted_nm:.4f}",
+            f"{100.0 * fit.repeatability:.1f} %" if isfinite(fit.repeatability) else "-",
+            _with_error(fit.offset_nm, fit.offset_error_nm, 4),
+            _with_error(fit.friction_nm, fit.friction_error_nm, 4),
+            str(fit.line.readings),
+        ]
+        for fit in fits
+    ]
+    paper = [
+        [f"paper, {kind}", "-", f"{PAPER_CONSTANT_NM_A:g}", f"{rmse_nm:.4f}", "-", f"{100 * PAPER_REPEATABILITY:.1f} %"]
+        for kind, rmse_nm in PAPER_RMSE_NM.items()
+    ]
+    return [head, *rows, *([*row, "-", "-", "-"] for row in paper)]
+
+
+def _with_error(value: float, error: float, digits: int) -> str:
+    if not isfinite(value):
+        return "-"
+    return f"{value:.{digits}f}" + (f" ± {error:.{digits}f}" if isfinite(error) else "")
+
+
+def _weight_rows(fit: JointFit) -> Rows:
+    head = ["weight", "trials", "τ_ext, N·m", "τ_sense, configured", "τ_sense, fitted", "spread, N·m", "error, N·m"]
+    rows = []
+    for weight_g in sorted({load.weight_g for load in fit.loads}):
+        loads = [load for load in fit.loads if load.weight_g == weight_g]
+        external_nm, current_a = fmean(load.torque_nm for load in loads), fmean(load.current_a for load in loads)
+        fitted_nm = fmean(fit.fitted_nm(load) for load in loads)
+        spread = f"{stdev(fit.fitted_nm(load) for load in loads):.4f}" if len(loads) > 1 else "-"
+        numbers = [external_nm, fit.configured_nm_a * current_a, fitted_nm]
+        rows.append(
+            [
+                f"{weight_g:g} g",
+                str(len(loads)),
+                *(f"{each:.4f}" for each in numbers),
+                spread,
+                f"{fitted_nm - external_nm:+.4f}",
+            ]
+        )
+    return [head, *rows]
+
+
+def _figures(fits: Sequence[JointFit]) -> list[Figure]:
+    from experiments.actuator_plots import plot_errors, plot_torques  # matplotlib takes its time
+
+    return [
+        Figure(
+            "torques",
+            "Torque by the motor's current against the weights' own, as in the paper's figure 3: with the configured"
+            " and with the fitted constant. Grey: where both are equal.",
+            partial(plot_torques, fits),
+        ),
+        Figure(
+            "errors",
+            "What the torque by the fitted constant misses, each trial by the constant of the others; the bar is the"
+            " mean of the trials. Grey band: the paper's RMSE.",
+            partial(plot_errors, fits),
+        ),
+    ]
