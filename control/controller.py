@@ -132,7 +132,6 @@ class Controller:
         """In hold, take these joints slowly there, in the order of JOINTS; None: where it is held."""
         held = tuple(target.angle_rad for target in self._pose)
         a, b, c, d = (there if there is not None else here for there, here in zip(angles, held, strict=True))
-        self._since_s = 0.0  # somebody needs the pose
         self._move = JointPath((held[0], held[1], held[2], held[3]), [(a, b, c, d)], self.motion.path_speed_rad_s)
 
     @property
