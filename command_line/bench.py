@@ -19,7 +19,7 @@ from command_line.terminal_person import AbsentPersonError, TerminalPerson
 from experiments.bench_robot import BenchError
 from experiments.notebook import NAME, NotebookError
 from experiments.person import Person, Willing
-from experiments.report_page import Section, write_report
+from experiments.report_page import Section, numbers_told, write_report
 from firmware_host.status_client import CallRefusedError
 from firmware_host.toml_records import ConfigurationError
 
@@ -56,11 +56,16 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
         for sentence in problem.problems:
             complain(sentence)
         return exit_codes.CONFIGURATION
-    except (BenchError, NotebookError, CallRefusedError, AbsentPersonError) as problem:
+    except NotebookError as problem:
+        complain(str(problem))
+        return exit_codes.REFUSED
+    except (BenchError, CallRefusedError, AbsentPersonError) as problem:
         return _end(folder, str(problem), exit_codes.REFUSED)
     except KeyboardInterrupt:
         return _end(folder, "interrupted", exit_codes.INTERRUPTED)
-    print(json.dumps(finding.report) if options.json else finding.text)
+    except OSError as problem:  # such as a full disk
+        return _end(folder, f"{problem.filename or folder}: {problem.strerror or problem}", exit_codes.UNHEALTHY)
+    print(json.dumps(numbers_told(finding.report), allow_nan=False) if options.json else finding.text)
     print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
     return exit_codes.OK
 

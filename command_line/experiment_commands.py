@@ -143,9 +143,15 @@ def _add_trackway(names: Commands) -> None:
         "--method", action="append", metavar="NAME", help="of adaptation, repeatable to compare (default: default)"
     )
     trackway.add_argument(
-        "--compartment", type=between(0.2, 100.0), default=0.61, metavar="M", help="length of each mud (default: 0.61)"
+        "--compartment", type=between(0.2, 100.0), metavar="M", help="length of each simulated mud (default: 0.61)"
     )
-    trackway.add_argument("--mud", action="append", metavar="NAME", help="of a real trackway, one after the other")
+    trackway.add_argument(
+        "--mud",
+        type=mud_length,
+        action="append",
+        metavar="NAME[=CM]",
+        help="of a real trackway, and its length (default: 61), one after the other (default: the paper's)",
+    )
 
 
 def _add_sweep(names: Commands) -> None:

@@ -51,7 +51,7 @@ def _find(options: argparse.Namespace, plan: flipper.Plan, desk: Desk) -> Findin
         configuration = bench.robot.configuration
         flipper.run(bench, plan, desk.show)
     finally:
-        logs = leave(bench, desk.folder)
+        logs = leave(bench.robot, desk.person, desk.folder)
     require_some(notebook)
     report = flipper.report_of(plan, notebook.entries, configuration, truth)
     sections = sections_of(report, plan, notebook.entries, configuration)

@@ -15,7 +15,7 @@ from command_line import exit_codes
 from command_line.recorded_walk import RecordedWalk, read_walk
 from command_line.screen import coefficient, complain, number, watched
 from command_line.stride_choice import choose_strides
-from experiments.report_page import PAGE, Figure, Section, write_report
+from experiments.report_page import PAGE, Figure, Section, numbers_told, write_report
 from firmware_host.log_reader import Log, LogError, Watch, log_summary, read_logs
 from firmware_host.replay import Replay, replay_files
 from firmware_host.reports import map_report, stride_report
@@ -35,7 +35,7 @@ def log_report(options: argparse.Namespace) -> int:
         return exit_codes.UNHEALTHY
     logs = [_copy(path, folder) for path in options.files]
     written = write_report(folder, report, f"Log {options.files[0].name}", sections, logs)
-    print(json.dumps(report) if options.json else folder / PAGE)
+    print(json.dumps(numbers_told(report), allow_nan=False) if options.json else folder / PAGE)
     print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
     return exit_codes.OK
 

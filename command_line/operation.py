@@ -81,14 +81,18 @@ def walk(options: Options) -> int:
 
 
 def move(options: Options) -> int:
-    """Until the joints are there."""
+    """Until the joints are there; Ctrl-C stops them on their way."""
 
     def act(client: StatusClient) -> int:
-        client.call("move", **{f"{joint}_rad": radians(angle_deg) for joint, angle_deg in options.angles})
-        while (report := client.call("status"))["moving"]:
-            time.sleep(0.05)
+        try:
+            client.call("move", **{f"{joint}_rad": radians(angle_deg) for joint, angle_deg in options.angles})
+            while (report := client.call("status"))["moving"]:
+                time.sleep(0.05)
+        except KeyboardInterrupt:
+            client.call("stop")
+            raise
         print(report["mode"])
-        if report["mode"] == "hold":
+        if report["mode"] == "hold" and not report["notice"]:
             return exit_codes.OK
         complain(report["notice"] or f"the robot is in {report['mode']}")
         return exit_codes.REFUSED

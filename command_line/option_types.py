@@ -70,6 +70,7 @@ def joint_angle(text: str) -> tuple[str, float]:
 
 
 def mud_length(text: str) -> tuple[str, float]:
+    """A mud's name, and its length in cm: the paper's where none is given."""
     name, _, length_cm = text.partition("=")
     try:
         value = finite(length_cm or "61")

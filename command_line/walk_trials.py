@@ -60,7 +60,7 @@ def _find(options: argparse.Namespace, plan: walk_mapping.Plan, desk: Desk) -> F
         configuration = bench.robot.configuration
         walk_mapping.run(bench, plan, desk.show)
     finally:
-        logs = leave(bench, desk.folder)
+        logs = leave(bench.robot, desk.person, desk.folder)
     require_some(notebook)
     report = report_of(plan, notebook.entries, configuration, truth)
     sections = sections_of(report, plan, notebook.entries, configuration, truth)

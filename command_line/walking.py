@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from statistics import fmean
@@ -14,8 +14,10 @@ from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import conduct, refuse
 from command_line.screen import number, table
 from experiments import depth_sweep, mud_fit, trackway, trackway_trials
+from experiments.coefficient_table import mud_label, mud_name
 from experiments.daemon_robot import DaemonRobot
 from experiments.mud_fit import cells_beside_paper
+from experiments.mud_trials import leave
 from experiments.notebook import Notebook
 from experiments.paper_table import ADAPTIVE, PAPER_TABLE
 from experiments.report_page import Figure, Section
@@ -27,11 +29,17 @@ SIMULATED_ONLY = "the muds are those of the simulator: this experiment runs with
 def run_trackway(options: argparse.Namespace) -> int:
     if not options.simulated:
         return _walk_at_the_bench(options)
+    if options.mud:
+        return refuse("--mud is for a real trackway: the simulated one has the paper's muds")
     try:
         rules = trackway.rules_of(_unique(options.method) or ["default"])
     except ValueError as problem:
         return refuse(str(problem))
-    plan = trackway.Plan(rules=rules, seeds=options.trials or trackway.Plan.seeds, compartment_m=options.compartment)
+    plan = trackway.Plan(
+        rules=rules,
+        seeds=options.trials or trackway.Plan.seeds,
+        compartment_m=options.compartment or trackway.Plan.compartment_m,
+    )
     return conduct(options, "walks", lambda show: trackway.run(plan, show), trackway_text, _plot_trackway)
 
 
@@ -39,22 +47,23 @@ def _walk_at_the_bench(options: argparse.Namespace) -> int:
     """On the robot of a daemon, over muds that a person has prepared."""
     if options.method:
         return refuse("--method is for --simulated: a robot chooses its depths as its configuration says")
-    names = options.mud or list(PAPER_TABLE[ADAPTIVE])
-    if len(set(names)) < len(names):
+    if options.compartment:
+        return refuse("--compartment is for --simulated: the length of a real mud stands with it, as in --mud 48.5=61")
+    lengths_cm = options.mud or [(name, 100.0 * trackway.Plan.compartment_m) for name in PAPER_TABLE[ADAPTIVE]]
+    muds = tuple(trackway_trials.Mud(mud_name(name), length_cm / 100.0) for name, length_cm in lengths_cm)
+    if len({mud.name for mud in muds}) < len(muds):
         return refuse("--mud: each needs a name of its own")
-    muds = tuple(trackway_trials.Mud(name, options.compartment) for name in names)
     plan = trackway_trials.Plan(muds, options.trials or trackway_trials.Plan.trials)
     return conduct_bench(options, "walks", lambda desk: _walked(plan, desk, options.socket))
 
 
 def _walked(plan: trackway_trials.Plan, desk: Desk, socket: Path) -> Finding:
-    notebook = Notebook(desk.folder, asdict(plan))
+    notebook = Notebook(desk.folder, plan.kept)
     robot = DaemonRobot(socket)
     try:
         report = trackway_trials.run(plan, AskedTrackway(robot, desk.person), notebook, desk.show)
-        logs = robot.copy_logs(desk.folder)
     finally:
-        robot.close()
+        logs = leave(robot, desk.person, desk.folder)
     text = trackway_text(report)
     figure = Figure(
         "trackway", "One walk of each gait, and Table I beside the paper's.", partial(_plot_trackway, report)
@@ -109,6 +118,13 @@ def trackway_text(report: dict[str, Any]) -> str:
     if "best_constant_depth" in report:
         parts.append(_best_text(report))
     short = sum(cell["short_trials"] for row in report["table"].values() for cell in row.values())
+    if report.get("left_out"):
+        parts.append(f"Trials left out: {report['left_out']}.")
+    if report.get("strides_without_place"):
+        parts.append(
+            f"Strides that began where the body was not seen, or ended so, not counted: "
+            f"{report['strides_without_place']}."
+        )
     if short:
         parts.append(f"Fewer than three strides in a mud, all of them counted: {short} times.")
     return "\n\n".join(parts)
@@ -116,7 +132,7 @@ def trackway_text(report: dict[str, Any]) -> str:
 
 def _speeds_text(report: dict[str, Any]) -> str:
     muds = list(report["settings"]["mud_length_cm"])
-    head = ["cm/s", *(f"w = {mud} %" for mud in muds), "all muds"]
+    head = ["cm/s", *map(mud_label, muds), "all muds"]
     rows = [head]
     for rule, row in report["table"].items():
         over = report["mean_over_muds"][rule]
@@ -149,7 +165,7 @@ def _paper_text(report: dict[str, Any], rule: str, mud: str) -> str:
 
 def _failures_text(report: dict[str, Any]) -> str:
     muds = list(report["settings"]["mud_length_cm"])
-    rows = [["", *(f"w = {mud} %" for mud in muds), "ends"]]
+    rows = [["", *map(mud_label, muds), "ends"]]
     for rule, row in report["table"].items():
         ends = ", ".join(f"{count} {end}" for end, count in report["ends"][rule].items())
         rows.append([rule, *(_failed(row[mud]) for mud in muds), ends])

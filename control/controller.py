@@ -122,13 +122,16 @@ class Controller:
     @property
     def moving(self) -> bool:
         """On the way to a pose that was asked for."""
-        return self._move is not None and not self._move.finished
+        return self._move is not None
+
+    def end_move(self) -> None:
+        """Joints on their way stay where they are."""
+        self._move = None
 
     def move(self, angles: Sequence[float | None]) -> None:
         """In hold, take these joints slowly there, in the order of JOINTS; None: where it is held."""
         held = tuple(target.angle_rad for target in self._pose)
         a, b, c, d = (there if there is not None else here for there, here in zip(angles, held, strict=True))
-        self._since_s = 0.0  # somebody needs the pose
         self._move = JointPath((held[0], held[1], held[2], held[3]), [(a, b, c, d)], self.motion.path_speed_rad_s)
 
     @property
@@ -212,8 +215,11 @@ class Controller:
         return self._gait_targets(dt_s, states)
 
     def _held_pose(self, dt_s: float) -> JointTargets:
-        if self._move is not None and not self._move.finished:
+        if self._move is not None:
             self._pose = self._move.step(dt_s)
+            self._since_s = 0.0  # somebody needs it
+            if self._move.finished:
+                self._move = None
         return self._pose
 
     def _gait_targets(self, dt_s: float, states: DriveStates) -> JointTargets:

@@ -16,6 +16,7 @@ from control.records import NEVER_S, UNKNOWN, DriveState
 GONE_RAD = 0.03  # by the joint's own speed, while its angle stayed the same to the last bit
 GONE_S = 0.02  # drives tell an old value once more, now and then
 LONGEST_GAP_S = 0.03  # between two messages, over which two speeds say where a joint has gone
+RESTS_RAD_S = 1e-9  # far below any encoder's noise: a speed that has died away may keep its last bit
 FROZEN_S = 0.1  # in which not even the last bit of angle and of a speed that is not zero changes
 
 
@@ -65,7 +66,7 @@ class EncoderWatch:
         """With its sign, since a speed at rest is noise about zero."""
         self._gone_s += gap_s
         self._gone_rad += state.velocity_rad_s * gap_s
-        frozen = state.velocity_rad_s == self._velocity_rad_s != 0.0
+        frozen = state.velocity_rad_s == self._velocity_rad_s and abs(state.velocity_rad_s) > RESTS_RAD_S
         self._frozen_s = self._frozen_s + gap_s if frozen else 0.0
         moved = abs(self._gone_rad) > GONE_RAD and self._gone_s > GONE_S
         if not moved and self._frozen_s <= FROZEN_S:

@@ -18,6 +18,7 @@ import ipaddress
 import os
 import socket
 from dataclasses import dataclass
+from errno import EAFNOSUPPORT
 from struct import pack
 from typing import Annotated
 
@@ -49,6 +50,7 @@ from drivers.track_axis import Direction
 MOST_PACKETS_PER_READ = 16  # of each socket: a hundred bodies at 240 Hz are one in two ticks
 DOUBTED_S = 0.5  # a pose after so long a gap is believed when a second one follows
 REQUEST_S = 1.0  # between requests; Motive forgets a client that is silent for several seconds
+NO_NETWORK = "the service may use no network: add AF_INET to RestrictAddressFamilies= in its unit"
 ANY_ADDRESS = "0.0.0.0"
 
 
@@ -83,14 +85,14 @@ class NatNetPort:
         self._direction, self._origin_m = direction, origin_m
         self._sockets: list[socket.socket] = []
         self.poses = self.garbled = self.lost = 0
-        self._told = ""  # of the server, why its frames cannot be read
-        self._unseen = ""  # why the last frame brought no pose
+        self._told = self._unseen = ""  # why the server's frames cannot be read; why the last one brought no pose
         self.reset()
         try:
             self._open()
         except OSError as problem:
             self.close()
-            raise PoseSourceError(f"NatNet cannot be received {_place(parameters)}: {problem.strerror}") from None
+            why = NO_NETWORK if problem.errno == EAFNOSUPPORT else problem.strerror
+            raise PoseSourceError(f"NatNet cannot be received {_place(parameters)}: {why}") from None
 
     def reset(self) -> None:
         configured = parse_version(self.parameters.version)
@@ -101,6 +103,7 @@ class NatNetPort:
         self._named = not self.parameters.body  # whether the id is known
         self._models_changed = False
         self._now_s = self._asked_s = self._heard_s = self._seen_s = self._taken_s = NEVER_S
+        self._strangers_s, self._stranger = NEVER_S, ""  # who sends and is not the server
         self._body: RigidBody | None = None
         self._delay, self._forecast = LeastDelay(), PoseForecast()
         self._stamp_s = NEVER_S
@@ -142,12 +145,11 @@ class NatNetPort:
         for _ in range(MOST_PACKETS_PER_READ):
             try:
                 packet, sender = arriving.recvfrom(LONGEST_PACKET)
-            except BlockingIOError:
-                return
-            except OSError:  # the network went down
+            except OSError:  # there is no more, or the network went down
                 return
             if self.parameters.server and sender[0] != self.parameters.server:
-                self.garbled += 1  # nobody else's business
+                self.garbled += 1
+                self._strangers_s, self._stranger = now_s, str(sender[0])
                 continue
             try:
                 self._take(packet, now_s)
@@ -226,9 +228,14 @@ class NatNetPort:
                 "choose an older version in its streaming settings, and set pose.natnet.version to that",
             )
         if self._now_s - self._heard_s > STALE_S:
+            if self._now_s - self._strangers_s <= STALE_S:
+                return (
+                    f"packets come from {self._stranger}, and none from {parameters.server}.",
+                    "set pose.natnet.server to the address that motion capture sends from (its local interface)",
+                )
             return (
                 f"no NatNet frame comes {_place(parameters)}.",
-                "check that motion capture streams, to this network or group, and that no firewall is between",
+                "check that motion capture streams to here, and no firewall or IPAddressDeny= is between",
             )
         if self._layout is None:
             return (

@@ -93,8 +93,9 @@ def _blocked(status: Status) -> bool:
 
 
 def _why_not_armed(robot: BenchRobot, problem: str) -> str:
-    faults = [f"{fault['sentence']} {fault['what_to_do']}" for fault in robot.call("status")["faults"]]
-    return f"the robot is not armed: {' '.join(faults) or problem}; 'mudskipper check' tells more"
+    blocking = [fault for fault in robot.call("status")["faults"] if fault["blocks_arming"]]
+    faults = [f"{fault['sentence'].rstrip('.')} ({fault['what_to_do']})" for fault in blocking]
+    return f"the robot is not armed: {'; '.join(faults) or problem}. 'mudskipper check' tells more"
 
 
 def disarm(robot: BenchRobot) -> None:
@@ -106,7 +107,10 @@ def move(robot: BenchRobot, angles_rad: Mapping[str, float]) -> None:
     """Joints of a robot that holds its pose, until they are there. Raises BenchError."""
     require_hold(robot.call("status"))
     robot.call("move", **{f"{joint}_rad": angle_rad for joint, angle_rad in angles_rad.items()})
-    require_hold(wait_until(robot, lambda now: not now["moving"], MOVING_S, "moving the joints"))
+    after = wait_until(robot, lambda now: not now["moving"], MOVING_S, "moving the joints")
+    require_hold(after)
+    if after["notice"]:
+        raise BenchError(after["notice"])
 
 
 def require_hold(status: Status) -> None:
@@ -119,9 +123,13 @@ def told_by(status: Status) -> str:
     """Why a robot is in the mode that it is in."""
     if status["notice"]:
         return str(status["notice"])
-    if status["mode"] == "idle":  # a flipper that falls then is a fault as well, but not the cause
-        return "its torque was taken off"
-    return str(status["fault"]["sentence"]) if status["fault"] else f"it is in {status['mode']}"
+    if (
+        status["mode"] == "idle"
+    ):  # what goes idle by itself leaves a notice; a flipper that falls then is a fault as well
+        return "its torque was switched off"
+    if status["fault"]:
+        return str(status["fault"]["sentence"])
+    return "it was told to stop" if status["mode"] == "stopping" else f"it is in {status['mode']}"
 
 
 def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
@@ -133,7 +141,11 @@ def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
     after = wait_until(robot, lambda now: now["mode"] not in ("walking", "stopping"), strides * STRIDE_S, "the walk")
     if after["mode"] != "hold" or after["notice"]:
         raise BenchError(f"the walk ended early: {told_by(after)}")
-    return Walked(strides_since(robot, before["strides_closed"]), before["now_s"], after["now_s"])
+    closed = strides_since(robot, before["strides_closed"])
+    number = len({stride["index"] for stride in closed})
+    if number < strides:
+        raise BenchError(f"the walk ended early, after {number} of {strides} strides: it was told to stop")
+    return Walked(closed, before["now_s"], after["now_s"])
 
 
 def strides_since(robot: BenchRobot, number: int) -> list[dict[str, Any]]:

@@ -97,6 +97,11 @@ def mud_name(name: str) -> str:
     return name.removeprefix("w").replace("=", "").replace("%", "").strip() or name
 
 
+def mud_label(mud: str) -> str:
+    """One that is called after its water, or anything else."""
+    return f"w = {mud} %" if mud[-1:].isdigit() else mud
+
+
 def judged(rows: Iterable[Beside], setup: str) -> list[Judged]:
     """One for each coefficient of which there is a truth."""
     return [

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import shutil
 import time
+from collections.abc import Callable
 from contextlib import suppress
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPerm
 PROMISE_S = 2.0  # of the lease
 RENEWAL_S = 0.2
 WRITTEN_S = 10.0  # to wait for rows that are on their way to the disk
+OPERATING = ("arm", "walk", "move", "clear", "stop", "disarm")  # refused where another program holds a lease
 START_IT = "Start it with 'systemctl start mudskipper', or name its socket with --socket."
 
 
@@ -37,16 +40,21 @@ class DaemonRobot:
             raise BenchError(f"{problem}. {START_IT}") from problem
         self._configuration: Configuration | None = None
         self._renewed_s = 0.0
+        self._log: Path | None = None  # as last seen
+        self._name: str | None = None  # of this program, as the daemon calls who holds a lease
+        self._require_alone()
 
     @property
     def configuration(self) -> Configuration:
         """As the daemon runs with it, from its log."""
-        while self._configuration is None:
-            log = self._read(self._segments()[-1:])
-            self._configuration = log and parse_configuration(log.configuration_text)
+        if self._configuration is None:
+            log = self._awaited(lambda: self._read(self._segments()[-1:], from_s=inf))
+            self._configuration = parse_configuration(log.configuration_text)
         return self._configuration
 
     def call(self, method: str, **params: Any) -> Any:
+        if method in OPERATING:
+            self._require_alone()
         try:
             return self._client.call(method, **params)
         except (NoDaemonError, NotPermittedError) as problem:
@@ -64,32 +72,45 @@ class DaemonRobot:
         if now_s - self._renewed_s < RENEWAL_S:
             return
         self._renewed_s = now_s
-        with suppress(CallRefusedError):
+        try:
             self.call("lease", for_s=PROMISE_S)
+            self._name = self._name or self.call("status")["lease"]
+        except CallRefusedError:
+            self._require_alone()
+
+    def _require_alone(self) -> None:
+        holder = self.call("status")["lease"]
+        if holder not in (None, self._name):
+            raise BenchError(f"{holder} operates the robot: wait until it has ended, then begin again")
 
     def record(self, from_s: float, to_s: float) -> Log:
-        deadline_s = time.monotonic() + WRITTEN_S
-        while True:
+        def written() -> Log | None:
             log = self._read_since(from_s)
-            if log is not None and len(log.ticks) and log.ticks["stamp_s"][-1] >= to_s:
-                return cut(log, from_s, to_s)
+            return log if log is not None and len(log.ticks) and log.ticks["stamp_s"][-1] >= to_s else None
+
+        return cut(self._awaited(written), from_s, to_s)
+
+    def _awaited(self, written: Callable[[], Log | None]) -> Log:
+        deadline_s = time.monotonic() + WRITTEN_S
+        while (log := written()) is None:
             if time.monotonic() > deadline_s:
                 raise BenchError("the log does not hold what was just done: 'mudskipper status' tells how it is")
             self.wait(RENEWAL_S)
+        return log
 
     def _read_since(self, from_s: float) -> Log | None:
         """As few of the run's last segments as hold it; None where one was just moved to its place."""
         segments = self._segments()
         for count in range(1, len(segments) + 1):
-            log = self._read(segments[-count:])
+            log = self._read(segments[-count:], from_s)
             if log is None or (len(log.ticks) and log.ticks["stamp_s"][0] <= from_s):
                 return log
         return log
 
-    def _read(self, segments: list[Path]) -> Log | None:
+    def _read(self, segments: list[Path], from_s: float) -> Log | None:
         """None where one was only just made, or has gone: a segment that is whole moves to another folder."""
         try:
-            return read_logs(segments)
+            return read_logs(segments, lambda what, done, total: self._renew(), from_s)  # a minute's rows take a second
         except LogError as problem:
             if not all(segment.exists() and segment.stat().st_size for segment in segments):
                 return None
@@ -99,6 +120,7 @@ class DaemonRobot:
         path = self.call("status")["log"]["path"]
         if path is None:
             raise BenchError("the daemon writes no log: set log.enabled = true in its configuration")
+        self._log = Path(path)
         end_s = time.monotonic() + WRITTEN_S
         while not (segments := run_files(Path(path))):  # its writer has only just started
             if time.monotonic() > end_s:
@@ -107,11 +129,19 @@ class DaemonRobot:
         return segments
 
     def copy_logs(self, folder: Path) -> list[Path]:
-        """Those of the daemon's present run; the one under way is ended in the copy."""
+        """Those of the daemon's run, even where it has ended meanwhile; the one under way is ended in the copy."""
         try:
-            return [self._copy(log, folder / log.name) for log in self._segments()]
+            return [self._copy(log, folder / log.name) for log in self._segments_at_last()]
         except (OSError, LogError) as problem:
             raise BenchError(f"the daemon's log cannot be copied: {problem}") from problem
+
+    def _segments_at_last(self) -> list[Path]:
+        try:
+            return self._segments()
+        except BenchError:
+            if self._log is None:
+                raise
+            return run_files(self._log)
 
     def _copy(self, log: Path, copy: Path) -> Path:
         shutil.copyfile(present_path(log), copy)
@@ -120,10 +150,11 @@ class DaemonRobot:
         return copy
 
     def close(self) -> None:
+        """A robot that somebody else operates is left to them."""
         with suppress(BenchError, CallRefusedError):
             if self.call("status")["mode"] == "walking":
                 self.call("stop")
-                self._wait_for_hold()
+            self._wait_for_hold()
             self.call("disarm")
             self.call("release")
         self._client.close()

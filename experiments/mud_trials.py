@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -142,18 +143,23 @@ def rest(robot: BenchRobot) -> None:
     disarm(robot)
 
 
-def leave(bench: Bench, folder: Path) -> list[Path]:
+def leave(robot: BenchRobot, person: Person, folder: Path) -> list[Path]:
     """Torque off, all logs in the folder, the connection closed; what fails of that is told. The folder's logs."""
     try:
-        if bench.robot.call("status")["mode"] == "walking":
-            bench.person.tell("the flippers are raised, then torque goes off")
-        rest(bench.robot)
-        bench.robot.copy_logs(folder)
-    except (BenchError, CallRefusedError) as problem:
-        bench.person.tell(str(problem))
+        for step in (partial(_rest_told, robot, person), partial(robot.copy_logs, folder)):
+            try:
+                step()
+            except (BenchError, CallRefusedError) as problem:
+                person.tell(str(problem))
     finally:
-        bench.robot.close()
+        robot.close()
     return sorted(folder.glob("*.mcap"))
+
+
+def _rest_told(robot: BenchRobot, person: Person) -> None:
+    if robot.call("status")["mode"] == "walking":
+        person.tell("the flippers are raised, then torque goes off")
+    rest(robot)
 
 
 def require_some(notebook: Notebook) -> None:

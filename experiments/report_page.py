@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +25,11 @@ table { border-collapse: collapse; font-size: 0.85em; margin: 1em 0 }
 th { text-align: left; border-bottom: 1.5px solid #111 } td { border-bottom: 1px solid #ccc }
 pre { font-size: 0.78em; line-height: 1.35; overflow-x: auto }
 th, td { padding: 0.25em 1.2em 0.25em 0; vertical-align: top; white-space: nowrap }
+td:last-child { white-space: normal }
+thead { display: table-header-group } tr { break-inside: avoid }
 figure { margin: 1em 0; break-inside: avoid } img { max-width: 100% }
 figcaption, footer, .when { color: #444; font-size: 0.9em } footer { margin-top: 3em; border-top: 1px solid #ccc }
-@media print { body { margin: 0; max-width: none } h2 { break-after: avoid } table { break-inside: avoid } }
+@media print { body { margin: 0; max-width: none } h2 { break-after: avoid } pre { white-space: pre-wrap } }
 """
 
 Rows = Sequence[Sequence[str]]
@@ -54,11 +57,20 @@ def write_report(
     """Everything that was written. `report` becomes the summary. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     summary = folder / SUMMARY
-    summary.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    summary.write_text(json.dumps(numbers_told(report), indent=1, allow_nan=False) + "\n", encoding="utf-8")
     pictures = [_draw(figure, folder) for section in sections for figure in section.figures]
     page = folder / PAGE
-    page.write_text(_page(folder, title, sections, logs), encoding="utf-8")
+    page.write_text(_page(folder, title, sections, logs), encoding="utf-8", errors="replace")  # names of any bytes
     return [page, summary, *pictures, *logs]
+
+
+def numbers_told(report: Any) -> Any:
+    """With None for numbers that are none: JSON has no NaN, and few programs read Python's."""
+    if isinstance(report, Mapping):
+        return {key: numbers_told(value) for key, value in report.items()}
+    if isinstance(report, list | tuple):
+        return [numbers_told(value) for value in report]
+    return None if isinstance(report, float) and not isfinite(report) else report
 
 
 def _draw(figure: Figure, folder: Path) -> Path:
@@ -103,8 +115,8 @@ def _section(section: Section, folder: Path) -> str:
 
 def _table(rows: Rows) -> str:
     head, *body = rows
-    lines = [_row(head, "th"), *(_row(row, "td") for row in body)]
-    return "<table>\n" + "\n".join(lines) + "\n</table>"
+    lines = "\n".join(_row(row, "td") for row in body)
+    return f"<table>\n<thead>{_row(head, 'th')}</thead>\n{lines}\n</table>"
 
 
 def _row(cells: Sequence[str], tag: str) -> str:

@@ -8,7 +8,7 @@ by a fault. Its strides are read from the log (log_strides.py), and the table is
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from itertools import accumulate
 from math import radians, sin
@@ -25,6 +25,8 @@ from experiments.trackway import STUCK_S, paper_report
 from experiments.walk import Walk, WalkedStride, speed_m_s
 
 PATIENCE_S = 900.0  # for a whole walk
+UNSEEN_S = 2.0  # without a pose, before a walk or on it: nobody knows where its end is
+BACKWARDS_M = 0.2  # behind the start: no mud pushes a body back so far
 RAISING_S = 20.0
 LOOK_S = 0.05
 BEHIND = ""  # the last mud
@@ -69,12 +71,17 @@ class Mud:
 @dataclass(frozen=True)
 class Plan:
     muds: tuple[Mud, ...]
-    trials: int = 3  # as the paper
+    trials: int = 3  # of each gait, as the paper
     depths_m: tuple[float, ...] = tuple(FIXED_DEPTHS_M.values())
 
     @property
-    def length_m(self) -> float:
-        return sum(mud.length_m for mud in self.muds)
+    def kept(self) -> dict[str, Any]:
+        """What may not change where an experiment goes on."""
+        return {
+            "experiment": "trackway",
+            "muds": [[mud.name, mud.length_m] for mud in self.muds],
+            "depths_m": list(self.depths_m),
+        }
 
     @property
     def rules(self) -> tuple[DepthRule, ...]:
@@ -117,21 +124,32 @@ def _walk_trial(plan: Plan, key: str, rule: DepthRule, trackway: Trackway, noteb
 
 def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> Walk:
     """One trial, from torque on to torque off. Raises BenchError, with torque off where the robot can be reached."""
+    _require_place(robot)
     arm(robot)
-    before: Status = robot.call("status")
+    before = _require_place(robot)
     start_m = before["body_x_m"]
-    if start_m is None:
-        disarm(robot)
-        raise BenchError("the body's place is not known: motion capture or rail encoder tell nothing; see [pose]")
     robot.call("walk", **({} if rule.method else {"depth_m": rule.depth_m}))
     end = _follow(robot, plan, start_m)
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     fault = end or ("" if after["mode"] == "hold" else told_by(after))
+    disarm(robot)
     log = robot.record(before["now_s"], after["now_s"])
-    if after["mode"] == "hold":
-        disarm(robot)
     strides = walked_strides(log, robot.configuration, lambda place_m: plan.mud_at(place_m - start_m))
     return Walk([stride._replace(place_m=stride.place_m - start_m) for stride in strides], fault)
+
+
+def _require_place(robot: BenchRobot) -> Status:
+    """The status that tells it. Raises BenchError, with torque off."""
+    status: Status = robot.call("status")
+    begun_s = status["now_s"]
+    while status["body_x_m"] is None:
+        if status["now_s"] - begun_s > UNSEEN_S:
+            disarm(robot)
+            why = status["pose"]["trouble"] or "motion capture or rail encoder tell nothing; see [pose]."
+            raise BenchError(f"the body's place is not known: {why} 'mudskipper check' says what to do")
+        robot.wait(LOOK_S)
+        status = robot.call("status")
+    return status
 
 
 def _follow(robot: BenchRobot, plan: Plan, start_m: float) -> str:
@@ -139,22 +157,43 @@ def _follow(robot: BenchRobot, plan: Plan, start_m: float) -> str:
     status = wait_until(robot, lambda now: now["mode"] != "hold", RAISING_S, "beginning to walk")
     gait, geometry = robot.configuration.gait, robot.configuration.geometry
     reach_m = geometry.flipper_length_m * sin(radians(gait.sweep_angle_deg))
-    begun_s = entered_s = status["now_s"]
-    mud = plan.muds[0].name
+    progress = Progress(plan, start_m - reach_m, status["now_s"])
     while status["mode"] == "walking":
-        body_m = status["body_x_m"]
-        there = mud if body_m is None else plan.mud_at(body_m - start_m + reach_m)
-        if there != mud:
-            mud, entered_s = there, status["now_s"]
-        if mud == BEHIND and status["phase"] == "insertion":
+        end = progress.judge(status)
+        if end is not None:
             robot.call("stop")
-            return ""
-        if mud != BEHIND and status["now_s"] - entered_s > STUCK_S or status["now_s"] - begun_s > PATIENCE_S:
-            robot.call("stop")
-            return f"stuck in {mud}"
+            return end
         robot.wait(LOOK_S)
         status = robot.call("status")
     return told_by(status)
+
+
+class Progress:
+    """Owns which mud the plates go down in, since when, and when the body was seen."""
+
+    def __init__(self, plan: Plan, zero_m: float, now_s: float) -> None:
+        """`zero_m`: where the body is when the plates go down at the trackway's beginning."""
+        self._plan, self._zero_m = plan, zero_m
+        self._mud = plan.muds[0].name
+        self._begun_s = self._entered_s = self._seen_s = now_s
+
+    def judge(self, status: Status) -> str | None:
+        """None while the walk is to go on; then what is wrong, or nothing at its proper end."""
+        now_s, body_m = status["now_s"], status["body_x_m"]
+        if body_m is None:
+            unseen = now_s - self._seen_s > UNSEEN_S
+            return "the body's place is not told any more: see that the robot is seen" if unseen else None
+        self._seen_s = now_s
+        plates_m = body_m - self._zero_m
+        mud = self._plan.mud_at(plates_m)
+        if mud != self._mud:
+            self._mud, self._entered_s = mud, now_s
+        if mud == BEHIND and status["phase"] == "insertion":
+            return ""
+        if plates_m < -BACKWARDS_M:
+            return "the body's place falls as the robot walks: turn pose.axis, or the sign of metres_per_count, round"
+        stuck = mud != BEHIND and now_s - self._entered_s > STUCK_S or now_s - self._begun_s > PATIENCE_S
+        return f"stuck in {mud or 'the end'}" if stuck else None
 
 
 def told_of(key: str, walk: Walk) -> str:
@@ -167,30 +206,28 @@ def told_of(key: str, walk: Walk) -> str:
 
 
 def report_of(plan: Plan, notebook: Notebook) -> dict[str, Any]:
-    """Strides without a length, or in no mud, are told of and not counted."""
+    """Strides without a place or a length are told of and not counted; nor do those behind the last mud count."""
     walks: dict[str, list[Walk]] = {rule.name: [] for rule in plan.rules}
     ends: dict[str, dict[str, int]] = {rule.name: {} for rule in plan.rules}
-    uncounted, arm_m = 0, 0.0
+    unseen, left_out, arm_m = 0, 0, 0.0
     for key, rule in plan.orders():
         entry = notebook.entries[key]
         if entry["skipped"]:
+            left_out += 1
             continue
         strides = [WalkedStride(**stride) for stride in entry["strides"]]
-        counted = _counted(strides)
-        uncounted, arm_m = uncounted + len(strides) - len(counted), entry["arm_m"]
-        walks[rule.name].append(Walk(counted, entry["fault"]))
+        seen = [stride for stride in strides if stride.step_m == stride.step_m]
+        unseen, arm_m = unseen + len(strides) - len(seen), entry["arm_m"]
+        walks[rule.name].append(Walk([stride for stride in seen if stride.mud != BEHIND], entry["fault"]))
         end = entry["fault"] or "past the end"
         ends[rule.name][end] = ends[rule.name].get(end, 0) + 1
     return paper_report(walks, [mud.name for mud in plan.muds], arm_m) | {
         "ends": ends,
-        "strides_without_pose": uncounted,
+        "left_out": left_out,
+        "strides_without_place": unseen,
         "settings": {
             "seeds": plan.trials,
             "mud_length_cm": {mud.name: 100.0 * mud.length_m for mud in plan.muds},
             "muds": [asdict(mud) for mud in plan.muds],
         },
     }
-
-
-def _counted(strides: Sequence[WalkedStride]) -> list[WalkedStride]:
-    return [stride for stride in strides if stride.step_m == stride.step_m and stride.mud != BEHIND]

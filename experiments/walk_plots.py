@@ -15,6 +15,7 @@ import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 
+from experiments.coefficient_table import mud_label  # noqa: E402
 from experiments.paper_table import ADAPTIVE  # noqa: E402
 from experiments.walk import EXTRACTION, SLIPPAGE  # noqa: E402
 
@@ -43,7 +44,8 @@ def plot_trackway(report: dict[str, Any], path: Path) -> None:
     ):
         _shade_muds(panel, report)
         for rule, colour in colours.items():
-            _plot_walk(panel, report["walks"][rule][0], name, colour)
+            for walk in report["walks"][rule][:1]:  # none where every trial was left out
+                _plot_walk(panel, walk, name, colour)
         panel.set_ylabel(title)
     low, high = axes["steps"].get_ylim()
     axes["steps"].set_ylim(min(0.0, low), high + 0.1 * (high - low))  # room for the muds' names
@@ -80,12 +82,7 @@ def _shade_muds(panel: Axes, report: dict[str, Any]) -> None:
 def _name_muds(panel: Axes, report: dict[str, Any]) -> None:
     high = panel.get_xaxis_transform()
     for mud, begin_cm, end_cm in _mud_regions(report):
-        panel.text((begin_cm + end_cm) / 2.0, 0.97, _mud_name(mud), transform=high, ha="center", va="top", color=TEXT)
-
-
-def _mud_name(mud: str) -> str:
-    """One that is called after its water, or anything else."""
-    return f"w = {mud} %" if mud[-1:].isdigit() else mud
+        panel.text((begin_cm + end_cm) / 2.0, 0.97, mud_label(mud), transform=high, ha="center", va="top", color=TEXT)
 
 
 def _plot_walk(panel: Axes, strides: Sequence[Mapping[str, Any]], figure: str, colour: str) -> None:
@@ -99,7 +96,7 @@ def _plot_walk(panel: Axes, strides: Sequence[Mapping[str, Any]], figure: str, c
 
 def _legend(colours: Mapping[str, str], report: dict[str, Any]) -> list[Line2D]:
     handles = [Line2D([], [], color=colour, marker="o", markersize=3.5, label=rule) for rule, colour in colours.items()]
-    names = {stride["failure"] for trials in report["walks"].values() for stride in trials[0]}
+    names = {stride["failure"] for trials in report["walks"].values() for trial in trials[:1] for stride in trial}
     look: dict[str, Any] = {"color": "lightgrey", "markeredgecolor": "black", "linestyle": ""}
     return handles + [Line2D([], [], marker=mark, label=name, **look) for name, mark in MARKS.items() if name in names]
 
@@ -123,7 +120,7 @@ def _plot_speeds(panel: Axes, report: dict[str, Any], colours: Mapping[str, str]
     best_depths = report.get("best_constant_depth", {})
     for mud, best in enumerate(best_depths.values()):
         panel.hlines(best["mean"], mud - 0.42, mud + 0.42, color=TEXT, linewidth=1.0, linestyle=":")
-    panel.set_xticks(range(len(muds)), [_mud_name(mud) for mud in muds])
+    panel.set_xticks(range(len(muds)), [mud_label(mud) for mud in muds])
     panel.set_ylim(0.0, max(panel.get_ylim()[1], 9.0))
     panel.set_ylabel("speed (cm/s)")
     panel.set_title("Table I: the paper's (grey bars), ours (dots)", fontsize="medium")

@@ -11,6 +11,7 @@ import struct
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from io import BytesIO
+from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -55,10 +56,10 @@ def unwatched(what: str, done: int, total: int) -> None:
     """Nobody waits for it."""
 
 
-def read_log(path: Path, watch: Watch = unwatched) -> Log:
-    """Raises LogError."""
+def read_log(path: Path, watch: Watch = unwatched, from_s: float = -inf) -> Log:
+    """Of what is before `from_s` only as much as its first chunk holds. Raises LogError."""
     contents = _read_contents(path)
-    stream, found = BytesIO(contents), _Findings()
+    stream, found = BytesIO(contents), _Findings(from_s)
     reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=len(contents))
     try:
         for record in reader.records:
@@ -72,7 +73,7 @@ def read_log(path: Path, watch: Watch = unwatched) -> Log:
         if finished or not _is_cut(error, stream.tell() == len(contents)):
             raise LogError(f"{path}: damaged before byte {stream.tell()}: {error}; {ADVICE}") from None
         complete = False
-    if complete and found.messages != found.messages_promised:
+    if complete and from_s == -inf and found.messages != found.messages_promised:
         raise LogError(
             f"{path}: damaged: only {found.messages} of its {found.messages_promised} rows can be found; {ADVICE}"
         )
@@ -86,9 +87,9 @@ def read_log(path: Path, watch: Watch = unwatched) -> Log:
     )
 
 
-def read_logs(paths: Sequence[Path], watch: Watch = unwatched) -> Log:
+def read_logs(paths: Sequence[Path], watch: Watch = unwatched, from_s: float = -inf) -> Log:
     """One log, or several segments of one run as one. Raises LogError, also where a segment between them is missing."""
-    logs = [read_log(path, watch) for path in paths]
+    logs = [read_log(path, watch, from_s) for path in paths]
     if len(logs) == 1:
         return logs[0]
     if len({log.metadata.get("run_id") for log in logs}) > 1 or "run_id" not in logs[0].metadata:
@@ -143,7 +144,8 @@ def _read_contents(path: Path) -> bytes:
 class _Findings:
     """What the records read so far have said."""
 
-    def __init__(self) -> None:
+    def __init__(self, from_s: float) -> None:
+        self._from_s = from_s
         self.metadata: dict[str, str] = {}
         self.configuration_text = ""
         self.rows: dict[RowKind, list[bytes]] = {kind: [] for kind in ROW_KINDS}
@@ -155,6 +157,8 @@ class _Findings:
         match record:
             case Row() | Message():
                 self._add_row(record)
+            case Chunk() if self._is_before(record):
+                return
             case Chunk():
                 for inner in records_of(open_chunk(record)):
                     self._require_layout(inner, record)
@@ -169,6 +173,13 @@ class _Findings:
                 self.metadata = record.metadata
             case Statistics():
                 self.messages_promised = record.message_count
+
+    def _is_before(self, chunk: Chunk) -> bool:
+        """All its rows, of a chunk behind the first one, which describes the channels."""
+        if self._from_s == -inf or not self._rows_of_channel:
+            return False
+        end_ns = chunk.message_end_time - int(self.metadata.get("wall_minus_monotonic_ns", "0"))
+        return end_ns < 1e9 * self._from_s
 
     def _require_layout(self, record: Row | Schema | Channel, chunk: Chunk) -> None:
         """Where a checksum vouches for it, another layout is another version's and no damage."""

@@ -83,6 +83,8 @@ class Loop:
         self.health = self._examine(beat)
         self._change_mode(next_mode(self.mode, self._request_now(), self.health), beat.now_s)
         self.forced = self.forced and self.mode in ENERGISED
+        if self.controller.moving and self.health.reaction >= Reaction.HOLD:
+            self._end_move(beat.now_s, self.fault.sentence if self.fault else "a fault stands.")
         step_s = min(1 + beat.missed, LONGEST_STEP_TICKS) * PERIOD_S
         elapsed_s = (1 + beat.missed) * PERIOD_S
         wanted = self.controller.step(step_s, self.mode, self.states, self._trusted(), elapsed_s)
@@ -163,6 +165,8 @@ class Loop:
         if refused:
             return refused
         self._tell_request(request, now_s, forced, by)
+        if request is Request.STOP and self.controller.moving:
+            self._end_move(now_s, f"stop was asked for{f' by {by}' if by else ''}.")
         if request is Request.DISARM and self.mode not in ENERGISED:
             self.drives.disarm(now_s, at_once=True)  # also while not all drives are heard
         elif request is Request.CLEAR:
@@ -210,6 +214,13 @@ class Loop:
         refused = self.ending and request in (Request.ARM, Request.WALK)
         return Request.NONE if refused else request
 
+    def _end_move(self, now_s: float, why: str) -> None:
+        """In hold as in a walk: a fault that asks for a still pose has it, and so has whoever asks to stop."""
+        if self.mode is Mode.HOLD:
+            self.controller.end_move()
+            self.notice = f"the joints stopped on their way: {why}"
+            self.event(now_s, self.notice)
+
     def _change_mode(self, mode: Mode, now_s: float) -> None:
         if mode is self.mode:
             return
@@ -232,6 +243,10 @@ class Loop:
         if fault and self.mode in ENERGISED:
             to_do = fault.kind.what_to_do
             self.notice = f"stopped by {fault.name}: {fault.sentence} {to_do[:1].upper()}{to_do[1:]}."
+        if self.mode is Mode.HOLD and mode is Mode.IDLE and self.health.rested:
+            held_s = self.configuration.motion.longest_hold_s
+            self.notice = f"the pose was held for {held_s:g} s without a request: torque went off by itself"
+            self.event(now_s, self.notice)
         if self.mode is Mode.STOPPING and mode is Mode.HOLD and not self.controller.is_up(self.states):
             self.notice = "the flippers did not come out of the mud"
             self.event(now_s, self.notice)

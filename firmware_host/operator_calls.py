@@ -193,8 +193,10 @@ class OperatorCalls:
             if not ranges[joint].min_rad <= angle_rad <= ranges[joint].max_rad:
                 low, high = ranges[joint]
                 raise RefusedError(f"{joint}_rad = {angle_rad:g}: must be from {low:.3f} to {high:.3f}")
+        self._accept(_against_moving(loop))
         way = ", ".join(f"{joint} to {angle_rad:.4f} rad" for joint, angle_rad in angles_rad.items())
         loop.event(self._clock(), f"move {way} by {caller}")
+        loop.notice = ""
         loop.controller.move([angles_rad.get(joint) for joint in JOINTS])
         return "accepted"
 
@@ -253,6 +255,13 @@ def _fault_report(fault: Fault) -> dict[str, Any]:
         "reaction": kind.reaction.name.lower(),
         "blocks_arming": kind.blocks is not Blocks.NO,
     }
+
+
+def _against_moving(loop: Loop) -> str | None:
+    """Why joints that are held should stay where they are, or None."""
+    if loop.controller.cut_short:
+        return "the flippers may be in the mud: 'mudskipper stop' raises them first"
+    return loop.fault.sentence if loop.fault else None
 
 
 def _joint_angles(params: dict[str, Any]) -> dict[str, float]:

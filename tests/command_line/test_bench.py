@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from errno import ENOSPC
 from pathlib import Path
 
 import pytest
@@ -125,3 +126,25 @@ def test_questions_go_where_data_does_not(monkeypatch: pytest.MonkeyPatch, capsy
         TerminalPerson().ask("Well?", ANSWERS, nothing)
     said = capsys.readouterr()
     assert not said.out and "Well?" in said.err
+
+
+def test_a_disk_that_is_full_is_told_with_how_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def run(desk: Desk) -> Finding:
+        Notebook(desk.folder, {}).write("one", {})
+        raise OSError(ENOSPC, "No space left on device")
+
+    assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.UNHEALTHY
+    told = capsys.readouterr().err
+    assert f"{tmp_path}: No space left on device" in told
+    assert "the same command goes on from there" in told
+
+
+def test_another_plan_is_not_told_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Notebook(tmp_path, {"depth_m": 0.03})
+
+    def run(desk: Desk) -> Finding:
+        Notebook(desk.folder, {"depth_m": 0.05})
+        raise AssertionError("it is refused")
+
+    assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.REFUSED
+    assert "the same command" not in capsys.readouterr().err

@@ -227,3 +227,17 @@ def test_a_person_gets_fitted_beside_present_values(capsys: pytest.CaptureFixtur
     assert " ".join(cells.splitlines()[1].split()) == "3 cm w = 48.5 % 7.6 ± 0.5 7.00 7.00"
     assert len(cells.splitlines()) == 1 + 6
     assert len(damping.splitlines()) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--compartment", "0.5"), "--compartment is for --simulated"),
+        (("--simulated", "--mud", "48.5"), "--mud is for a real trackway"),
+        (("--mud", "48.5=5"), "a length from 20 to 10000 cm"),
+    ],
+)
+def test_muds_and_their_lengths_are_given_where_they_count(
+    arguments: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str], no_walks: None
+) -> None:
+    assert sentence in refusal(capsys, "trackway", *arguments)

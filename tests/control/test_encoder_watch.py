@@ -93,6 +93,10 @@ def test_a_joint_at_rest_whose_drive_tells_no_speed_at_all_is_not_stuck() -> Non
     assert told(hanging(0.0, 30000)) == []
 
 
+def test_a_speed_that_has_died_away_to_its_last_bit_is_rest() -> None:
+    assert told(hanging(2.4e-17, 1000)) == []
+
+
 def test_the_noise_of_a_speed_at_rest_is_no_way() -> None:
     random = Random(1)
     assert told((0.3, random.gauss(0.0, 0.1)) for _ in range(30000)) == []

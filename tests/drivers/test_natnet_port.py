@@ -6,6 +6,7 @@ import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from errno import EAFNOSUPPORT
 from math import isfinite
 from typing import Any
 
@@ -251,3 +252,22 @@ def test_without_a_network_it_is_silent_and_asks_again(open_laboratory: Open) ->
     for now_s in (0.0, 0.5, 1.0, 1.1, 2.2, 2.3):
         assert not isfinite(lab.port.read(now_s).x_m)
     assert lab.port.garbled == 0
+
+
+def test_a_service_that_may_use_no_network_is_told_what_to_change(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(family: int, kind: int) -> None:
+        raise OSError(EAFNOSUPPORT, "Address family not supported by protocol")
+
+    monkeypatch.setattr(socket, "socket", refused)
+    with pytest.raises(PoseSourceError, match="add AF_INET to RestrictAddressFamilies="):
+        NatNetPort(NatNetParameters(server=LOOPBACK), ALONG_X)
+
+
+def test_frames_of_another_computer_than_the_one_named_are_told(open_laboratory: Open) -> None:
+    laboratory = open_laboratory(moving(1.0))
+    laboratory.run(0.3)
+    laboratory.port.parameters = replace(laboratory.port.parameters, server="127.0.0.9")
+    laboratory.run(0.3 + 2.0 * STALE_S)
+    report = laboratory.port.report()
+    assert report.trouble == f"packets come from {LOOPBACK}, and none from 127.0.0.9."
+    assert "pose.natnet.server" in report.what_to_do

@@ -45,10 +45,29 @@ def test_without_a_daemon_it_is_told_how_to_start_one(tmp_path: Path) -> None:
         DaemonRobot(tmp_path / "none.sock")
 
 
-def test_a_daemon_that_ends_is_told(bench: Bench) -> None:  # noqa: F811
+def test_a_daemon_that_ends_is_told_and_its_log_is_there(bench: Bench, tmp_path: Path) -> None:  # noqa: F811
     robot = DaemonRobot(bench.socket)
+    assert robot.configuration
     bench.daemon.terminate()
     bench.daemon.wait(20)
     with pytest.raises(BenchError, match="the daemon on"):
         robot.call("status")
+    (copy,) = robot.copy_logs(tmp_path)
+    assert read_log(copy).complete
     robot.close()
+
+
+def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> None:  # noqa: F811
+    first, second = DaemonRobot(bench.socket), DaemonRobot(bench.socket)
+    second._name = "somebody else"  # both are this process
+    try:
+        arm(first)
+        first.wait(0.3)
+        with pytest.raises(BenchError, match="operates the robot: wait until it has ended"):
+            walk(second, 0.03, 1)
+        second.close()
+        assert first.call("status")["mode"] == "hold"
+        disarm(first)  # its lease is not over yet
+        first.wait(0.3)
+    finally:
+        first.close()

@@ -43,7 +43,7 @@ def measured() -> tuple[dict[str, Entry], list[str]]:
         robot, bed = flipper_bench(folder, [MUD], 1)
         bench = Bench(robot, FaultyOnce(robot, bed), person, Notebook(folder, SHORT.kept))
         flipper.run(bench, SHORT, lambda done, of: None)
-        leave(bench, folder)
+        leave(bench.robot, bench.person, folder)
     return bench.notebook.entries, person.asked
 
 

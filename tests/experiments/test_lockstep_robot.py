@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from control.controller import MotionParameters
+from control.joint_watch import FaultBounds
 from control.modes import Mode
 from control.records import JOINTS
-from experiments.bench_robot import BenchError, arm, disarm, move, told_by, walk
+from drivers.failures import Failures
+from experiments.bench_robot import BenchError, arm, disarm, move, require_hold, told_by, walk
 from experiments.lockstep_robot import LockstepRobot, simulated_configuration
 from firmware_host.file_recorder import FileRecorder
 from firmware_host.log_reader import read_log
@@ -24,7 +28,8 @@ from simulation.track import Track
 def robot(tmp_path: Path) -> Iterator[LockstepRobot]:
     configuration = simulated_configuration()
     recorder = FileRecorder(tmp_path / "log.mcap", configuration)
-    made = LockstepRobot(Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=recorder), recorder)
+    track, failures = Track([(5.0, MUDS["48.5"])]), Failures(configuration.bus)
+    made = LockstepRobot(Lockstep(configuration, track, recorder=recorder, failures=failures), recorder)
     try:
         yield made
     finally:
@@ -51,6 +56,52 @@ def test_a_joint_is_where_it_was_moved_to(robot: LockstepRobot) -> None:
     move(robot, {"right_adduction": 0.2})
     robot.wait(0.5)
     assert robot.call("status")["drives"][3]["angle_rad"] == pytest.approx(0.2, abs=0.02)
+
+
+def test_a_walk_that_somebody_else_stops_is_not_taken_for_a_whole_one(
+    robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm(robot)
+    wait, stopped_s = robot.wait, robot.lockstep.now_s + 5.0
+
+    def stopping(duration_s: float) -> None:
+        wait(duration_s)
+        if robot.lockstep.now_s > stopped_s and robot.call("status")["mode"] == "walking":
+            robot.call("stop")
+
+    monkeypatch.setattr(robot, "wait", stopping)
+    with pytest.raises(BenchError, match="ended early, after [1-3] of 4 strides"):
+        walk(robot, 0.03, 4)
+
+
+def test_a_robot_that_was_held_too_long_tells_why_it_let_go(robot: LockstepRobot) -> None:
+    robot.lockstep.loop.controller.motion = MotionParameters(longest_hold_s=1.0)
+    arm(robot)
+    robot.wait(0.8)
+    move(robot, {"right_adduction": 0.2})  # somebody needs it
+    robot.wait(0.8)
+    require_hold(robot.call("status"))
+    robot.wait(0.3)
+    with pytest.raises(BenchError, match="held for .* without a request: torque went off by itself"):
+        move(robot, {"right_adduction": 0.1})
+
+
+def test_a_fault_that_asks_for_a_still_pose_ends_a_move(tmp_path: Path) -> None:
+    configuration = replace(simulated_configuration(), faults=FaultBounds())
+    recorder, failures = FileRecorder(tmp_path / "log.mcap", configuration), Failures(configuration.bus)
+    lockstep = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=recorder, failures=failures)
+    robot = LockstepRobot(lockstep, recorder)
+    arm(robot)
+    robot.call("move", right_sweep_rad=0.6)
+    robot.wait(0.1)
+    lockstep.fail("left_sweep.current", "off", 0.1)
+    robot.wait(0.016)
+    status = robot.call("status")
+    assert not status["moving"] and status["mode"] == "hold"
+    assert "stopped on their way: " in status["notice"] and "current" in status["notice"]
+    with pytest.raises(CallRefusedError, match="current"):
+        robot.call("move", right_sweep_rad=0.6)
+    robot.close()
 
 
 def test_whatever_the_robot_does_arming_leads_to_hold(robot: LockstepRobot) -> None:
@@ -95,7 +146,7 @@ def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) 
 @pytest.mark.parametrize(
     ("mode", "notice", "told"),
     [
-        ("idle", "", "its torque was taken off"),
+        ("idle", "", "its torque was switched off"),
         ("idle", "the lease was lost", "the lease was lost"),
         ("fault", "", "The left_sweep joint moves."),
     ],

@@ -202,7 +202,7 @@ def test_a_robot_that_no_longer_answers_is_left_with_a_word(tmp_path: Path) -> N
     session = Session(tmp_path)
     session.robot.deaf = True
     (tmp_path / "old.mcap").touch()
-    assert leave(session.bench, tmp_path) == [tmp_path / "old.mcap"]
+    assert leave(session.bench.robot, session.bench.person, tmp_path) == [tmp_path / "old.mcap"]
     assert session.person.told == ["the daemon does not answer"]
     assert session.robot.closed
 

@@ -8,6 +8,8 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
+import pytest
+
 from experiments.report_page import Figure, Section, write_report
 
 DOT = base64.b64decode(
@@ -65,3 +67,10 @@ def test_whatever_is_told_is_shown_as_it_is(tmp_path: Path) -> None:
     assert not elements.open
     for text in ("A < B", "Torque < force & such", "Second: k_p > 1.", "a  b < c", "1.20 <N/cm³>", 'A "dot" & more'):
         assert text in elements.text
+
+
+def test_numbers_that_are_none_are_null_for_every_reader_of_json(tmp_path: Path) -> None:
+    report = {"experiment": "x", "k": [1.0, float("nan")], "deep": {"sd": float("inf"), "n": (2, float("nan"))}}
+    _, summary, *_ = write_report(tmp_path, report, "Odd \udcff name", [])
+    strict = json.loads(summary.read_text(encoding="utf-8"), parse_constant=lambda name: pytest.fail(name))
+    assert strict == {"experiment": "x", "k": [1.0, None], "deep": {"sd": None, "n": [2, None]}}

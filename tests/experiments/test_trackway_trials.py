@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,8 +14,8 @@ from experiments.bench_robot import BenchError
 from experiments.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP
-from experiments.trackway_trials import Mud, Plan, run
-from experiments.walk import StrideRecord
+from experiments.trackway_trials import UNSEEN_S, Mud, Plan, report_of, run, walk_over
+from experiments.walk import StrideRecord, Walk
 from experiments.walk_plots import plot_trackway
 from firmware_host.file_recorder import FileRecorder
 from firmware_host.ticker import PERIOD_S
@@ -117,7 +118,7 @@ def test_strides_of_which_the_pose_was_lost_are_told_and_not_counted(tmp_path: P
     capture = MotionCaptureParameters(rate_hz=120.0, dropouts_per_s=1.0, dropout_s=0.4)
     trackway = SimulatedTrackway(tmp_path, always(GO_ON), capture)
     report = run(TINY, trackway, Notebook(tmp_path, {}), unseen)
-    assert report["strides_without_pose"] > 0
+    assert report["strides_without_place"] > 0
     json.dumps(report, allow_nan=False)
 
 
@@ -126,3 +127,61 @@ def test_strides_of_which_the_pose_was_lost_are_told_and_not_counted(tmp_path: P
 )
 def test_a_mud_reaches_from_its_border_to_the_next(place_m: float, mud: str) -> None:
     assert SHORT.mud_at(place_m) == mud
+
+
+class DoubtedRobot(WatchedRobot):
+    """What its status tells of the body's place is altered, and it is asked for something else meanwhile."""
+
+    place: Callable[[float, float | None], float | None]
+    asked: tuple[float, str]
+
+    def call(self, method: str, **params: Any) -> Any:
+        answer = super().call(method, **params)
+        if method != "status":
+            return answer
+        if self.asked[1] and answer["mode"] == "walking" and answer["now_s"] > self.asked[0]:
+            super().call(self.asked[1])
+            self.asked = (0.0, "")
+        return answer | {"body_x_m": self.place(answer["now_s"], answer["body_x_m"])}
+
+
+def doubted_walk(
+    folder: Path, place: Callable[[float, float | None], float | None], asked: tuple[float, str] = (0.0, "")
+) -> tuple[Walk, float]:
+    """A trial, and when it was over."""
+    robot = SimulatedTrackway(folder, always(GO_ON)).prepare("one")
+    robot.__class__ = DoubtedRobot
+    assert isinstance(robot, DoubtedRobot)
+    robot.place, robot.asked = place, asked
+    walk = walk_over(robot, SHORT, SHORT.rules[0])
+    assert robot.call("status")["mode"] in ("idle", "fault")
+    return walk, robot.lockstep.now_s
+
+
+def test_a_robot_that_is_not_seen_any_more_does_not_walk_on(tmp_path: Path) -> None:
+    walk, over_s = doubted_walk(tmp_path, lambda now_s, x_m: x_m if now_s < 6.0 else None)
+    assert "not told any more" in walk.fault
+    assert over_s < 6.0 + UNSEEN_S + 5.0
+    assert walk.strides  # which its log tells
+
+
+def test_a_pose_of_the_wrong_sign_is_told(tmp_path: Path) -> None:
+    walk, _ = doubted_walk(tmp_path, lambda now_s, x_m: x_m and -x_m)
+    assert "turn pose.axis" in walk.fault
+
+
+@pytest.mark.parametrize(("asked", "told"), [("stop", "told to stop"), ("disarm", "torque was switched off")])
+def test_what_somebody_else_asks_for_is_no_end_of_the_trackway(tmp_path: Path, asked: str, told: str) -> None:
+    walk, _ = doubted_walk(tmp_path, lambda now_s, x_m: x_m, (5.0, asked))
+    assert told in walk.fault
+
+
+def test_a_table_of_which_everything_was_left_out_is_still_one(tmp_path: Path) -> None:
+    left_out = {"strides": [], "fault": "", "arm_m": 0.12, "skipped": True}
+    notebook = Notebook(tmp_path, {})
+    for key, _ in TINY.orders():
+        notebook.write(key, left_out)
+    report = report_of(TINY, notebook)
+    assert "Trials left out: 2." in trackway_text(report)
+    plot_trackway(report, tmp_path / "trackway.png")
+    assert (tmp_path / "trackway.png").stat().st_size > 0

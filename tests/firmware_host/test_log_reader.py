@@ -260,3 +260,11 @@ def test_a_row_before_its_channel_is_refused(tmp_path: Path) -> None:
     message = struct.pack("<BQHIQQ", 5, 22, 7, 0, 0, 0)
     with pytest.raises(LogError, match="damaged before byte 39: a row of channel 7, which was not described"):
         read_bytes(tmp_path, MCAP0_MAGIC + message)
+
+
+def test_a_log_read_from_a_moment_on_holds_all_that_came_after(path: Path) -> None:
+    whole, late = read_log(path), read_log(path, from_s=2.0)
+    assert len(late.ticks) < 0.7 * len(whole.ticks)
+    after = whole.ticks[whole.ticks["stamp_s"] >= 2.0]
+    assert len(after) and late.ticks[late.ticks["stamp_s"] >= 2.0]["tick"].tolist() == after["tick"].tolist()
+    assert late.metadata == whole.metadata and late.complete

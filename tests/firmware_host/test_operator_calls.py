@@ -189,11 +189,24 @@ def test_a_held_joint_moves_where_it_is_asked_to_and_the_others_stay(armed: Robo
 
 def test_a_move_ends_with_hold(armed: Robot) -> None:
     armed.ask("move", left_sweep_rad=0.3)
-    armed.ask("stop")
     armed.steps.run_for(0.1)
+    armed.ask("stop", BEN)
+    status = armed.ask("status")
+    assert not status["moving"] and status["mode"] == "hold"
+    assert status["notice"] == "the joints stopped on their way: stop was asked for by uid 1001 (process 78)."
+    armed.steps.run_for(0.5)
+    assert armed.ask("status")["drives"][0]["angle_rad"] < 0.2
+    armed.ask("move", left_sweep_rad=0.3)
+    assert armed.ask("status")["notice"] == ""
     armed.ask("disarm")
     armed.steps.run_for(0.1)
     assert not armed.ask("status")["moving"]
+
+
+def test_flippers_that_may_be_in_the_mud_are_raised_before_they_are_moved(armed: Robot) -> None:
+    armed.steps.loop.controller.cut_short = True
+    with pytest.raises(RefusedError, match="'mudskipper stop' raises them first"):
+        armed.ask("move", left_sweep_rad=0.3)
 
 
 @pytest.mark.parametrize(
