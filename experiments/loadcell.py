@@ -27,7 +27,8 @@ from drivers.load_cell_calibration import (
 from drivers.load_cell_lines import COUNTS, LineFormat
 from drivers.load_cell_port import LoadCellPort
 from experiments.bench_robot import BenchError
-from experiments.loadcell_fits import COEFFICIENTS, Analysed, OfMud, analyse, of_mud, speed_remark
+from experiments.coefficient_table import mud_name
+from experiments.loadcell_fits import COEFFICIENTS, Analysed, OfMud, analyse, bench_doubt, of_mud, speed_remark
 from experiments.loadcell_motion import StageSettings
 from experiments.loadcell_recording import CellRecorder, examine_lines
 from experiments.loadcell_trials import TrialBench, TrialPlan, load_all, measure_all
@@ -162,6 +163,7 @@ class Results(NamedTuple):
     muds: dict[str, dict[str, OfMud]]  # by mud and coefficient
     remarks: list[str]
     compared: list[Compared]
+    flipper: Mapping[str, Any]  # its summary; empty where there is none
 
 
 def conclude(
@@ -174,8 +176,9 @@ def conclude(
     for mud in dict.fromkeys(trial.recorded.mud for trial in trials):
         of_it = [trial for trial in trials if trial.recorded.mud == mud]
         error = max(errors[trial.recorded.key] for trial in of_it)
-        muds[mud] = {name: of_mud(of_it, name, error) for name in COEFFICIENTS}
-    return Results(trials, muds, _remarks(trials, plan.settings), compared_with(compare, muds))
+        doubts = {name: bench_doubt(name, plan.settings, plan.depth_error_m, error) for name in COEFFICIENTS}
+        muds[mud] = {name: of_mud(of_it, name, doubt) for name, doubt in doubts.items()}
+    return Results(trials, muds, _remarks(trials, plan.settings), compared_with(compare, muds), compare or {})
 
 
 def _relative_error(entry: Mapping[str, Any]) -> float:
@@ -229,8 +232,8 @@ def compared_with(flipper: Mapping[str, Any] | None, muds: Mapping[str, Mapping[
 
 
 def _mud_key(name: Any) -> str:
-    """48.60 and "48.6 %" are one mud."""
-    text = str(name).replace("%", "").strip()
+    """48.60 and "w = 48.6 %" are one mud."""
+    text = mud_name(str(name))
     try:
         return f"{float(text):g}"
     except ValueError:
@@ -248,7 +251,7 @@ def report_of(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mappi
     paces = [trial.pace for trial in results.trials if trial.pace is not None]
     return {
         "experiment": "loadcell",
-        "settings": asdict(plan.settings),
+        "settings": asdict(plan.settings) | {"depth_error_m": plan.depth_error_m},
         "cell": dict(cell),
         "stage": {
             "speed_m_s": _number(sum(p.speed_m_s for p in paces) / len(paces)) if paces else None,
@@ -272,6 +275,8 @@ def _described(told: OfMud) -> dict[str, Any]:
     return {
         "value": _number(told.value),
         "std_error": _number(told.std_error),
+        "trials_error": _number(told.trials_error),
+        "bench_error": _number(told.bench_error),
         "repeatability": _number(told.repeatability),
         "trials": [_number(value) for value in told.trials],
     }
