@@ -19,14 +19,13 @@ from experiments.bench_robot import BenchError
 from experiments.estimation import SINGLE_WATERS
 from experiments.loadcell import (
     CellSettings,
-    CompareError,
     Results,
     conclude,
-    load_flipper,
     measure,
     plan_of_notebook,
     report_of,
 )
+from experiments.loadcell_comparison import CompareError, load_flipper
 from experiments.loadcell_motion import StageSettings
 from experiments.loadcell_recording import BenchClock, CellRecorder, WallClock
 from experiments.loadcell_report import (

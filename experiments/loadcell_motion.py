@@ -263,14 +263,19 @@ def find_shear(course: Course, settings: StageSettings, zero_n: float) -> Shear:
     begin_s = float(times_s[course.begin])
     whole_s = settings.shear_way_m / settings.speed_m_s
     half = (times_s > begin_s + 0.35 * whole_s) & (times_s < begin_s + 0.5 * whole_s)
-    if np.count_nonzero(half) < 4:
+    if times_s[-1] < begin_s + 0.5 * whole_s:
         raise StrokeError("the recording ended before the force was steady")
+    if np.count_nonzero(half) < 2:
+        raise StrokeError("hardly a sample on the way: a faster amplifier or a slower stage is needed")
     plateau_n = float(np.median(forces_n[half]))
     stop_s = _falls_s(times_s, forces_n < FALLEN_SHARE * plateau_n, begin_s + 0.5 * whole_s)
     to_s = float(np.nanmin([begin_s + 0.96 * whole_s, stop_s - 0.03]))
     from_s = min(begin_s + 0.5 * whole_s, (begin_s + to_s) / 2.0)
     if np.count_nonzero((times_s >= from_s) & (times_s <= to_s)) < 8 or plateau_n < LEAST_FORCE_N:
-        raise StrokeError("no steady shear: the force fell again before half of the way")
+        raise StrokeError(
+            "no steady shear: the force fell again before half of the way. Was the stage started before the recording, "
+            "or is its way shorter, or its speed higher, than was told?"
+        )
     return Shear(begin_s, from_s, to_s, settings.shear_way_m / (stop_s - begin_s))
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.loadcell import CompareError, compared_with, load_flipper
+from experiments.loadcell_comparison import CompareError, compared_with, load_flipper
 from experiments.loadcell_fits import OfMud
 from simulation.clay import clay_of_water
 from simulation.load_cell import measure_shear

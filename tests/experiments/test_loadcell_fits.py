@@ -160,6 +160,12 @@ def test_ten_samples_a_second_are_too_few_for_an_insertion() -> None:
     assert "samples" in one(feel(LawfulMud(**KNOWN), INSERTION, 1, rate_hz=10.0)).problem
 
 
+def test_ten_samples_a_second_are_enough_for_a_shear() -> None:
+    told = one(feel(LawfulMud(**KNOWN), SHEAR, 1, rate_hz=10.0))
+    assert told.problem == ""
+    assert told.coefficients["k_s"].value == pytest.approx(KNOWN["k_s"], rel=BOUND)
+
+
 def test_a_zero_that_drifts_while_nobody_starts_is_no_contact() -> None:
     times_s = np.arange(0.0, 40.0, 0.0125)
     ramp_n = np.where(times_s > 35.0, np.minimum((times_s - 35.0) * 10.0, 2.0), 0.0)
