@@ -16,8 +16,8 @@ from firmware_host.configuration import Configuration
 STROKES = tuple(AUTHORS_N)
 TRUTHS = {
     "bed": "The load cell is a virtual one: it repeats the stroke with the flipper's own plate in its mean attitude.",
-    "file": "The load cell is that of the file given with --truth. Its plate is upright and the flipper's leans, which in "
-    "the simulator's clay alone makes 14 % more k_p, 4 % less k_s and 2 % less k_e.",
+    "file": "The load cell is that of the file given with --truth. Its plate is upright and the flipper's leans, which "
+    "in the simulator's clay alone makes 14 % more k_p, 4 % less k_s and 2 % less k_e.",
 }
 MODELLED = (
     "Dashed: the forces by the fitted coefficients, where each is fitted. The default method's laws tell a joint's "
