@@ -123,6 +123,13 @@ def _add_loadcell(names: Commands) -> None:
     loadcell.add_argument("--trials", type=SEEDS, default=5, metavar="N", help="of shear and of insertion (default: 5)")
     loadcell.add_argument("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: %(default)s)")
     loadcell.add_argument(
+        "--depth-error",
+        type=between(0.0, 20.0, "mm"),
+        default=0.5,
+        metavar="MM",
+        help="one standard error of the depth that was set (default: %(default)s)",
+    )
+    loadcell.add_argument(
         "--plate", type=plate_cm, default=(3.0, 3.5, 0.4), metavar="WxH", help="or WxHxT, in cm (default: 3x3.5x0.4)"
     )
     loadcell.add_argument(

@@ -19,17 +19,23 @@ from experiments.bench_robot import BenchError
 from experiments.estimation import SINGLE_WATERS
 from experiments.loadcell import (
     CellSettings,
-    CompareError,
     Results,
     conclude,
-    load_flipper,
     measure,
     plan_of_notebook,
     report_of,
 )
+from experiments.loadcell_comparison import CompareError, load_flipper
 from experiments.loadcell_motion import StageSettings
 from experiments.loadcell_recording import BenchClock, CellRecorder, WallClock
-from experiments.loadcell_report import TITLE, coefficient_rows, compared_rows, sections_of
+from experiments.loadcell_report import (
+    LEANING_SHORT,
+    TITLE,
+    coefficient_rows,
+    compared_rows,
+    errors_in_short,
+    sections_of,
+)
 from experiments.loadcell_stage import AttendedStage, SimulatedStage, Stage
 from experiments.loadcell_trials import RAW, TrialBench, TrialPlan
 from experiments.notebook import Notebook
@@ -69,7 +75,7 @@ def plan_of(options: argparse.Namespace) -> TrialPlan:
     if options.simulated:
         for name in named:
             _water(name)
-    return TrialPlan(tuple(named), options.trials, settings)
+    return TrialPlan(tuple(named), options.trials, settings, options.depth_error / 1000.0)
 
 
 def _water(name: str) -> float:
@@ -107,7 +113,7 @@ def _found(
     if not results.trials:
         raise BenchError("no trial was kept, so there is nothing to conclude")
     report = report_of(results, notebook, plan, described)
-    return Finding(report, TITLE, sections_of(results, plan.settings), text_of(results), [desk.folder / RAW])
+    return Finding(report, TITLE, sections_of(results, plan), text_of(results, plan), [desk.folder / RAW])
 
 
 def _measured(
@@ -157,8 +163,8 @@ def _open(path: str, baud: int, cell: CellSettings) -> LoadCellPort:
         raise BenchError(str(problem)) from problem
 
 
-def text_of(results: Results) -> str:
-    parts = [table(coefficient_rows(results.muds))]
+def text_of(results: Results, plan: TrialPlan) -> str:
+    parts = [f"{table(coefficient_rows(results.muds))}\n{errors_in_short(plan)}"]
     if results.compared:
-        parts.append(table(compared_rows(results.compared)))
+        parts.append(f"{table(compared_rows(results.compared))}\n{LEANING_SHORT}")
     return "\n\n".join([*parts, *results.remarks])

@@ -70,7 +70,8 @@ def truth_of(muds: Sequence[Mapping[str, Any]]) -> TruthOfMud:
 
 
 def load_truth(path: Path) -> TruthOfMud:
-    """Out of another experiment's summary.json. Raises BenchError."""
+    """Out of another experiment's summary.json, or the folder that it is in. Raises BenchError."""
+    path = path / "summary.json" if path.is_dir() else path
     try:
         truth = truth_of(json.loads(path.read_text(encoding="utf-8"))["muds"])
         numbers = [value for mud in truth.values() for value in mud.values()]

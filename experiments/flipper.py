@@ -152,6 +152,11 @@ def report_of(
         "later_strokes": _later_strokes(by_mud, method),
         "missing_truth": missing_text(truth, by_mud),
         "settings": plan.kept | {"method": method, "truth": "file" if truth else "bed"},
+        "plate_m": {
+            "width": configuration.geometry.plate_width_m,
+            "height": configuration.geometry.plate_height_m,
+            "thickness": configuration.geometry.plate_thickness_m,
+        },
     }
 
 

@@ -6,11 +6,10 @@ out, at 0.1 m/s and five times each. The cell's amplifier is a serial port; nobo
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from math import hypot, isfinite
+from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,7 +26,8 @@ from drivers.load_cell_calibration import (
 from drivers.load_cell_lines import COUNTS, LineFormat
 from drivers.load_cell_port import LoadCellPort
 from experiments.bench_robot import BenchError
-from experiments.loadcell_fits import COEFFICIENTS, Analysed, OfMud, analyse, of_mud, speed_remark
+from experiments.loadcell_comparison import Compared, compared_with
+from experiments.loadcell_fits import COEFFICIENTS, Analysed, OfMud, analyse, bench_doubt, of_mud, speed_remark
 from experiments.loadcell_motion import StageSettings
 from experiments.loadcell_recording import CellRecorder, examine_lines
 from experiments.loadcell_trials import TrialBench, TrialPlan, load_all, measure_all
@@ -49,24 +49,6 @@ class CellSettings:
     unit: str = ""
     scale_n: float | None = None  # newtons per unit
     calibration: Path | None = None
-
-
-class Compared(NamedTuple):
-    mud: str
-    coefficient: str
-    sensed: float
-    sensed_std_error: float
-    truth: float
-    truth_std_error: float
-    at_least: bool = False  # the flipper felt no more than that the mud bears so much
-
-    @property
-    def ratio(self) -> float:
-        return self.sensed / self.truth
-
-    @property
-    def ratio_std_error(self) -> float:
-        return self.ratio * hypot(self.sensed_std_error / self.sensed, self.truth_std_error / self.truth)
 
 
 def plan_of_notebook(settings: StageSettings) -> dict[str, Any]:
@@ -134,8 +116,13 @@ def _calibrate_anew(bench: TrialBench, unit: str, kept: Path) -> LoadCellCalibra
 
 
 def _readings(recorder: CellRecorder) -> list[float]:
+    """Raises CalibrationError where the cell cannot bear the weight."""
     recorder.drain()
-    return [sample.force_n for sample in recorder.listen(WEIGHING_S) if not sample.overloaded]
+    samples = recorder.listen(WEIGHING_S)
+    readings = [sample.force_n for sample in samples if not sample.overloaded]
+    if len(readings) < len(samples) / 2.0:
+        raise CalibrationError("the load cell is overloaded by this weight: take a lighter one, or check its wires")
+    return readings
 
 
 def heed_rate(recorder: CellRecorder, person: Person, settings: StageSettings) -> None:
@@ -162,6 +149,7 @@ class Results(NamedTuple):
     muds: dict[str, dict[str, OfMud]]  # by mud and coefficient
     remarks: list[str]
     compared: list[Compared]
+    flipper: Mapping[str, Any]  # its summary; empty where there is none
 
 
 def conclude(
@@ -174,81 +162,34 @@ def conclude(
     for mud in dict.fromkeys(trial.recorded.mud for trial in trials):
         of_it = [trial for trial in trials if trial.recorded.mud == mud]
         error = max(errors[trial.recorded.key] for trial in of_it)
-        muds[mud] = {name: of_mud(of_it, name, error) for name in COEFFICIENTS}
-    return Results(trials, muds, _remarks(trials, plan.settings), compared_with(compare, muds))
+        doubts = {name: bench_doubt(name, plan.settings, plan.depth_error_m, error) for name in COEFFICIENTS}
+        muds[mud] = {name: of_mud(of_it, name, doubt) for name, doubt in doubts.items()}
+    return Results(trials, muds, list_remarks(trials, plan.settings), compared_with(compare, muds), compare or {})
 
 
 def _relative_error(entry: Mapping[str, Any]) -> float:
     return LoadCellCalibration(**entry["calibration"]).relative_error
 
 
-def _remarks(trials: Sequence[Analysed], settings: StageSettings) -> list[str]:
+def list_remarks(trials: Sequence[Analysed], settings: StageSettings) -> list[str]:
     told = [f"{trial.recorded.key}: {text}" for trial in trials for text in (trial.problem, trial.remark) if text]
-    by_pace = {
-        remark: trial for trial in trials if trial.pace is not None and (remark := speed_remark(trial.pace, settings))
-    }
+    paced = [(trial.recorded.key, trial.pace) for trial in trials if trial.pace is not None]
+    by_pace = {key: remark for key, pace in paced if (remark := speed_remark(pace, settings))}
     if len(by_pace) > 3:
-        return [*told, f"in {len(by_pace)} trials {next(iter(by_pace))}"]
-    told += [f"{trial.recorded.key}: {remark}" for remark, trial in by_pace.items()]
+        told.append(f"in {len(by_pace)} trials {next(iter(by_pace.values()))}")
+    else:
+        told += [f"{key}: {remark}" for key, remark in by_pace.items()]
     turned = [trial for trial in trials if trial.course is not None and trial.course.turned]
     if turned:
         told.append(f"in {len(turned)} trials the cell measured the other way round; their signs are turned")
     return told
 
 
-class CompareError(Exception):
-    """The flipper's results cannot be read; the text says why."""
-
-
-def load_flipper(path: Path) -> dict[str, Any]:
-    """The summary of the flipper experiment, or the folder that it is in. Raises CompareError, OSError."""
-    path = path / "summary.json" if path.is_dir() else path
-    try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as problem:
-        raise CompareError(f"{path} is no summary of an experiment: {problem}") from problem
-    if not isinstance(told, dict) or not isinstance(told.get("muds"), list):
-        raise CompareError(f"{path} has no muds: give the summary.json of `mudskipper experiment flipper`")
-    return told
-
-
-def compared_with(flipper: Mapping[str, Any] | None, muds: Mapping[str, Mapping[str, OfMud]]) -> list[Compared]:
-    """Muds of the same name."""
-    if flipper is None:
-        return []
-    sensed = {_mud_key(row.get("mud")): row for row in flipper["muds"] if isinstance(row, dict)}
-    rows = []
-    for mud, coefficients in muds.items():
-        for name, truth in coefficients.items():
-            told = sensed.get(_mud_key(mud), {}).get(name)
-            value, error = _sensed(told)
-            if isfinite(value) and isfinite(truth.value):
-                at_least = isinstance(told, dict) and bool(told.get("at_least"))
-                rows.append(Compared(mud, name, value, error, truth.value, truth.std_error, at_least))
-    return rows
-
-
-def _mud_key(name: Any) -> str:
-    """48.60 and "48.6 %" are one mud."""
-    text = str(name).replace("%", "").strip()
-    try:
-        return f"{float(text):g}"
-    except ValueError:
-        return text.lower()
-
-
-def _sensed(told: Any) -> tuple[float, float]:
-    if not isinstance(told, dict) or not isinstance(told.get("value"), int | float) or not told["value"] > 0.0:
-        return float("nan"), float("nan")
-    error = told.get("std_error")
-    return float(told["value"]), float(error) if isinstance(error, int | float) else 0.0
-
-
 def report_of(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mapping[str, Any]) -> dict[str, Any]:
     paces = [trial.pace for trial in results.trials if trial.pace is not None]
     return {
         "experiment": "loadcell",
-        "settings": asdict(plan.settings),
+        "settings": asdict(plan.settings) | {"depth_error_m": plan.depth_error_m},
         "cell": dict(cell),
         "stage": {
             "speed_m_s": _number(sum(p.speed_m_s for p in paces) / len(paces)) if paces else None,
@@ -272,6 +213,8 @@ def _described(told: OfMud) -> dict[str, Any]:
     return {
         "value": _number(told.value),
         "std_error": _number(told.std_error),
+        "trials_error": _number(told.trials_error),
+        "bench_error": _number(told.bench_error),
         "repeatability": _number(told.repeatability),
         "trials": [_number(value) for value in told.trials],
     }

@@ -8,8 +8,8 @@ V is the submerged volume of the upright plate and ∫ζ dA the first moment of 
 bears less while the stage slows down is added back, so a coefficient belongs to the speed of the stage.
 
 A stage moves alike in all trials, so its speed and its ramps are found in each and then fitted again near their median.
-The doubt of one trial holds that of speed, surface and samples; that of a mud is the scatter of its trials, or theirs
-where they are few, and the calibration's, which all share.
+The doubt of one trial holds that of speed, surface and samples, and what the law leaves over. A mud has two: that of
+its trials, which is their scatter or their own doubt where that is more, and that of the bench, which no trial shows.
 """
 
 from __future__ import annotations
@@ -52,9 +52,11 @@ LEAST_SPEED_DOUBT, LEAST_RAMP_DOUBT = 0.005, 0.1  # of a stage, from trial to tr
 SET_SPEED_DOUBT = 0.01  # of a stage's controller
 MEDIAN_ERROR = 1.25  # times that of a mean
 AGREEING = 3.0  # standard errors
-RESIDUAL_NOISES, RESIDUAL_SHARE = 4.0, 0.05
+RESIDUAL_NOISES, RESIDUAL_SHARE = 4.0, 0.03
 BLOCKS = 8  # of a steady shear, whose means tell its scatter
 NORMAL_MAD = 1.4826
+DEPTH_POWERS = {"k_p": 1.0, "k_s": 2.0, "k_e": 1.0}  # with which a depth that was set wrong enters
+CALLIPERS_M = 0.05e-3
 
 
 class Coefficient(NamedTuple):
@@ -104,12 +106,17 @@ class Analysed:
 
 
 class OfMud(NamedTuple):
-    """One coefficient of one mud."""
+    """One coefficient of one mud, with the standard errors that its trials tell and those of the bench."""
 
     value: float
-    std_error: float
+    trials_error: float
     trials: tuple[float, ...]
     repeatability: float  # scatter of the trials over their mean
+    bench_error: float = 0.0
+
+    @property
+    def std_error(self) -> float:
+        return hypot(self.trials_error, self.bench_error)
 
 
 def analyse(trials: Sequence[Recorded], settings: StageSettings, show: Show) -> list[Analysed]:
@@ -128,15 +135,17 @@ def analyse(trials: Sequence[Recorded], settings: StageSettings, show: Show) -> 
 
 def common_pace(paces: Sequence[Pace], settings: StageSettings) -> tuple[Pace, float]:
     """The median of a stage's trials, and what they scatter beyond their own doubts. The speed that was set counts as
-    a measurement of its own, unless the trials say that it was another. And the doubt of that speed.
+    a measurement of its own, unless the trials say that it was another. And the doubt of that speed, which grows where
+    the two do not agree.
     """
     speeds, doubts = [pace.speed_m_s for pace in paces], [pace.speed_doubt for pace in paces]
     speed, scatter = _common(speeds, doubts)
-    error = MEDIAN_ERROR * max(_scatter(speeds), median(doubts), LEAST_SPEED_DOUBT) / sqrt(len(paces))
-    if abs(speed / settings.speed_m_s - 1.0) < AGREEING * hypot(error, SET_SPEED_DOUBT):
+    error = MEDIAN_ERROR * max(stdev(speeds) / speed, median(doubts), LEAST_SPEED_DOUBT) / sqrt(len(paces))
+    apart = abs(speed / settings.speed_m_s - 1.0) / hypot(error, SET_SPEED_DOUBT)
+    if apart < AGREEING:
         told, own = 1.0 / SET_SPEED_DOUBT**2, 1.0 / error**2
         speed = (told * settings.speed_m_s + own * speed) / (told + own)
-        error = 1.0 / sqrt(told + own)
+        error = max(1.0, apart) / sqrt(told + own)
     ramp, ramp_scatter = _common(
         [pace.acceleration_m_s2 for pace in paces], [pace.acceleration_doubt for pace in paces]
     )
@@ -218,7 +227,10 @@ def _slope(settings: StageSettings, depths_m: Array, forces_n: Array, ways_m: Ar
     square = float(np.sum(ways_m * volumes_m3 * volumes_m3))
     fit = fit_through_origin((roots * volumes_m3).tolist(), (roots * forces_n).tolist())
     if fit is None or not square > 0.0:
-        raise StrokeError("fewer than 4 samples in the mud: a faster amplifier or a slower stage is needed")
+        raise StrokeError(
+            "fewer than 4 samples in the mud: the stage stopped on its way or was moved by hand, or a faster amplifier "
+            "or a slower stage is needed"
+        )
     value = float(np.sum(ways_m * volumes_m3 * forces_n)) / square
     if value <= 0.0:
         raise StrokeError("the force does not oppose the motion")
@@ -239,7 +251,16 @@ def _shear(trial: Recorded, course: Course, settings: StageSettings, expected: P
     return Analysed(trial, course, motion, None, {"k_s": told}, "", remark)
 
 
-def of_mud(trials: Sequence[Analysed], name: str, calibration_error: float) -> OfMud:
+def bench_doubt(name: str, settings: StageSettings, depth_error_m: float, calibration_error: float) -> float:
+    """Of a coefficient, as a share: what depth, callipers and calibration make alike in all trials."""
+    depth = DEPTH_POWERS[name] * depth_error_m / settings.depth_m
+    width = CALLIPERS_M / settings.plate_width_m
+    thickness = 0.0 if name == "k_s" else CALLIPERS_M / settings.plate_thickness_m
+    return hypot(depth, width, thickness, calibration_error)
+
+
+def of_mud(trials: Sequence[Analysed], name: str, bench: float) -> OfMud:
+    """`bench`: the doubt of the bench as a share."""
     shared = max((trial.shared_doubt for trial in trials if name in trial.coefficients), default=0.0)
     told = [trial.coefficients[name] for trial in trials if name in trial.coefficients]
     told = [each for each in told if isfinite(each.value)]
@@ -248,8 +269,8 @@ def of_mud(trials: Sequence[Analysed], name: str, calibration_error: float) -> O
     values = [each.value for each in told]
     mean, own = fmean(values), sqrt(fmean([each.std_error**2 for each in told]) / len(told))
     scatter = stdev(values) if len(values) > 1 else nan
-    doubt = max(own, scatter / sqrt(len(values))) if len(values) > 2 else max(own, 0.0)
-    return OfMud(mean, hypot(doubt, calibration_error * mean, shared * mean), tuple(values), scatter / mean)
+    doubt = max(own, scatter / sqrt(len(values))) if len(values) > 1 else own
+    return OfMud(mean, hypot(doubt, shared * mean), tuple(values), scatter / mean, bench * mean)
 
 
 def depths_of(trial: Analysed, settings: StageSettings) -> Array | None:

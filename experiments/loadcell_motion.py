@@ -30,7 +30,8 @@ BEFORE_S, AFTER_S = 0.25, 0.2  # of the fit, around the way down
 YIELD_M = 0.001  # in which a jump comes about
 RATE_EXPONENT = 0.4
 RELAXING_S = 0.2
-JUMP_PRICE = 4.0  # logarithms of the number of samples that a jump must save
+LEVEL, RISE, _, SLOWING, JUMP = range(5)  # factors of the fit
+JUMP_PRICE, SLOWING_PRICE = 4.0, 1.0  # that they must save to be believed
 STARTS = tuple(
     (speed, ramp) for speed in (-0.15, 0.0, 0.15) for ramp in (-1.0, 0.7)
 )  # logarithms, beside what is expected
@@ -83,7 +84,7 @@ class Insertion(NamedTuple):
     level_n: float
     jump_n: float
     rise_n: float  # from surface to full depth, beside the jump
-    slowing_n: float  # that the mud bears less of as the stage stops
+    slowing_n: float  # by which the force changes as the stage stops, 0 or less
     residual_n: float
 
 
@@ -116,13 +117,33 @@ def find_insertion(course: Course, settings: StageSettings, expected: Pace) -> I
     if np.count_nonzero((t >= touched_s) & (t <= top_s)) < 6:
         raise StrokeError("fewer than 6 samples on the way down: a faster amplifier or a slower stage is needed")
     kink, jump = (_best_fit(t, y, touched_s, settings, expected, course.noise_n, jumps) for jumps in (False, True))
-    saved = len(y) * np.log(kink.square / jump.square)
-    chosen = jump if jump.factors[4] > 0.0 and saved > JUMP_PRICE * np.log(len(y)) else kink
-    return _insertion(chosen, depth_m, len(y))
+    pays = jump.factors[JUMP] > 0.0 and _saved(kink, jump, len(y)) > JUMP_PRICE
+    return _insertion(jump if pays else kink, depth_m, len(y))
+
+
+def _saved(plain: CurveFit, richer: CurveFit, samples: int) -> float:
+    """By a richer shape, in logarithms of the number of samples: 1 is the price of a factor by Schwarz's criterion."""
+    return float(samples * np.log(plain.square / richer.square) / np.log(samples))
 
 
 def _best_fit(
     t: Array, y: Array, touched_s: float, settings: StageSettings, expected: Pace, noise_n: float, jumps: bool
+) -> CurveFit:
+    """Mud that bears less as the stage slows down looks much like a longer ramp: only where it pays, and never more."""
+    plain, slow = (_fit(t, y, touched_s, settings, expected, noise_n, jumps, slows) for slows in (False, True))
+    pays = slow.factors[SLOWING] < 0.0 and _saved(plain, slow, len(y)) > SLOWING_PRICE
+    return slow if pays else plain
+
+
+def _fit(
+    t: Array,
+    y: Array,
+    touched_s: float,
+    settings: StageSettings,
+    expected: Pace,
+    noise_n: float,
+    jumps: bool,
+    slows: bool,
 ) -> CurveFit:
     prior = Prior(
         np.array([0.0, np.log(expected.speed_m_s), np.log(expected.acceleration_m_s2)]),
@@ -131,7 +152,7 @@ def _best_fit(
     since_s = t - touched_s
     starts = STARTS if expected.speed_doubt > NARROW else ((0.0, 0.0),)
     best = fit_curve(
-        lambda parameters: _shapes(since_s, parameters, settings.depth_m, jumps),
+        lambda parameters: _shapes(since_s, parameters, settings.depth_m, jumps, slows),
         y,
         [prior.means + np.array([-0.005, speed, ramp]) for speed, ramp in starts],
         prior,
@@ -147,14 +168,16 @@ def _pace_of(parameters: Array, depth_m: float) -> tuple[float, float]:
     return speed_m_s, max(ramp_m_s2, 0.55 * speed_m_s * speed_m_s / depth_m)
 
 
-def _shapes(t: Array, parameters: Array, depth_m: float, jumps: bool) -> Array:
+def _shapes(t: Array, parameters: Array, depth_m: float, jumps: bool, slows: bool) -> Array:
     speed_m_s, acceleration_m_s2 = _pace_of(parameters, depth_m)
     depths_m, shares = descent(t - parameters[0], speed_m_s, acceleration_m_s2, depth_m)
     wet = np.clip(depths_m / YIELD_M, 0.0, 1.0)
     rested_s = np.clip(t - parameters[0] - descent_s(speed_m_s, acceleration_m_s2, depth_m), 0.0, None)
     rest = 1.0 - np.exp(-rested_s / RELAXING_S)
-    columns = [np.ones_like(t), np.clip(depths_m, 0.0, None) / depth_m, wet * (1.0 - shares**RATE_EXPONENT), rest]
-    return np.stack([*columns, wet] if jumps else columns, 1)
+    slowing = wet * (1.0 - shares**RATE_EXPONENT)
+    return np.stack(  # a column of zeros gets the factor 0
+        [np.ones_like(t), np.clip(depths_m, 0.0, None) / depth_m, rest, slows * slowing, jumps * wet], 1
+    )
 
 
 def descent_s(speed_m_s: float, acceleration_m_s2: float, depth_m: float) -> float:
@@ -181,10 +204,10 @@ def _insertion(fit: CurveFit, depth_m: float, samples: int) -> Insertion:
         surface_std_error_s=float(fit.std_errors[0]),
         stop_s=surface_s + descent_s(speed_m_s, acceleration_m_s2, depth_m),
         pace=Pace(speed_m_s, acceleration_m_s2, float(fit.std_errors[1]), float(fit.std_errors[2])),
-        level_n=float(fit.factors[0]),
-        jump_n=float(fit.factors[4]) if len(fit.factors) > 4 else 0.0,
-        rise_n=float(fit.factors[1]),
-        slowing_n=float(fit.factors[2]),
+        level_n=float(fit.factors[LEVEL]),
+        jump_n=float(fit.factors[JUMP]),
+        rise_n=float(fit.factors[RISE]),
+        slowing_n=float(fit.factors[SLOWING]),
         residual_n=float(np.sqrt(fit.square / samples)),
     )
 
@@ -240,14 +263,19 @@ def find_shear(course: Course, settings: StageSettings, zero_n: float) -> Shear:
     begin_s = float(times_s[course.begin])
     whole_s = settings.shear_way_m / settings.speed_m_s
     half = (times_s > begin_s + 0.35 * whole_s) & (times_s < begin_s + 0.5 * whole_s)
-    if np.count_nonzero(half) < 4:
+    if times_s[-1] < begin_s + 0.5 * whole_s:
         raise StrokeError("the recording ended before the force was steady")
+    if np.count_nonzero(half) < 2:
+        raise StrokeError("hardly a sample on the way: a faster amplifier or a slower stage is needed")
     plateau_n = float(np.median(forces_n[half]))
     stop_s = _falls_s(times_s, forces_n < FALLEN_SHARE * plateau_n, begin_s + 0.5 * whole_s)
     to_s = float(np.nanmin([begin_s + 0.96 * whole_s, stop_s - 0.03]))
     from_s = min(begin_s + 0.5 * whole_s, (begin_s + to_s) / 2.0)
     if np.count_nonzero((times_s >= from_s) & (times_s <= to_s)) < 8 or plateau_n < LEAST_FORCE_N:
-        raise StrokeError("no steady shear: the force fell again before half of the way")
+        raise StrokeError(
+            "no steady shear: the force fell again before half of the way. Was the stage started before the recording, "
+            "or is its way shorter, or its speed higher, than was told?"
+        )
     return Shear(begin_s, from_s, to_s, settings.shear_way_m / (stop_s - begin_s))
 
 

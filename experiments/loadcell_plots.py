@@ -14,7 +14,7 @@ import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 
 from control.plate import submerged_part  # noqa: E402
-from experiments.loadcell import Compared  # noqa: E402
+from experiments.loadcell_comparison import Compared  # noqa: E402
 from experiments.loadcell_fits import (  # noqa: E402
     COEFFICIENTS,
     INSERTION,

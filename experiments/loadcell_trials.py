@@ -50,6 +50,7 @@ class TrialPlan:
     muds: tuple[str, ...]
     trials: int
     settings: StageSettings
+    depth_error_m: float = 0.5e-3  # of a ruler, and of mud that is levelled by hand
 
     def list_trials(self) -> list[Trial]:
         numbers = range(1, self.trials + 1)

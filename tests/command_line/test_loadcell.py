@@ -12,14 +12,19 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.loadcell import CompareError, compared_with, load_flipper
+from experiments.loadcell_comparison import CompareError, compared_with, load_flipper
 from experiments.loadcell_fits import OfMud
 from simulation.clay import clay_of_water
 from simulation.load_cell import measure_shear
 from simulation.load_cell_bench import PAPER_PLATE
 
 SHORT = ["experiment", "loadcell", "--simulated", "--json", "--trials", "1", "--mud", "48.6"]
-FLIPPER = {"muds": [{"mud": "48.60", "k_p": {"value": 1.1e6, "std_error": 4e4}, "k_s": {"value": None}, "k_e": 3}]}
+PLATE = {"width": 0.025, "height": 0.07, "thickness": 0.004}
+FLIPPER = {
+    "settings": {"depth_m": 0.04},
+    "plate_m": PLATE,
+    "muds": [{"mud": "48.60", "k_p": {"value": 1.1e6, "std_error": 4e4}, "k_s": {"value": None}, "k_e": 3}],
+}
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -67,6 +72,24 @@ def test_the_flipper_stands_beside_it_where_it_has_a_value(report: dict[str, Any
     (mud,) = report["muds"]
     assert (row["mud"], row["coefficient"]) == ("48.6", "k_p")
     assert row["ratio"] == pytest.approx(1.1e6 / mud["k_p"]["value"])
+
+
+def test_whoever_reads_the_ratio_reads_of_both_plates_and_depths(report: dict[str, Any], folder: Path) -> None:
+    page = (folder / "out" / "report.html").read_text()
+    for told in (
+        "3 x 3.5 cm, 4 mm thick, upright",
+        "2.5 x 7 cm, 4 mm thick, leaning",
+        "went 4 cm deep",
+        "1.14 to 1.15",
+    ):
+        assert told in page
+
+
+def test_what_all_trials_have_alike_is_part_of_the_doubt(report: dict[str, Any]) -> None:
+    (mud,) = report["muds"]
+    told = mud["k_s"]
+    assert told["bench_error"] == pytest.approx(2.0 * 0.5 / 30.0 * told["value"], rel=0.01)
+    assert told["std_error"] == pytest.approx((told["trials_error"] ** 2 + told["bench_error"] ** 2) ** 0.5)
 
 
 def test_another_mud_is_added_to_what_is_there(

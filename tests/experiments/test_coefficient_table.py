@@ -73,6 +73,7 @@ def write_truth(folder: Path, contents: Any) -> Path:
 def test_a_summary_is_read_by_mud_and_coefficient(tmp_path: Path) -> None:
     muds = [{"mud": "47.6 %", "k_p": {"value": 1e6}, "k_s": {"value": None}}, {"mud": "soft", "k_e": {"value": 2e6}}]
     assert load_truth(write_truth(tmp_path, {"muds": muds})) == {"47.6": {"k_p": 1e6}, "soft": {"k_e": 2e6}}
+    assert load_truth(tmp_path) == load_truth(tmp_path / "summary.json")
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,8 @@ from experiments.loadcell_fits import (
     Recorded,
     analyse,
     analyse_trial,
+    bench_doubt,
+    common_pace,
     depths_of,
     of_mud,
     speed_remark,
@@ -48,6 +50,15 @@ def test_coefficients_of_a_mud_that_obeys_the_laws_come_out_within_three_per_cen
     kinds = [(INSERTION, trial) for trial in range(5)] + [(SHEAR, trial) for trial in range(2)]
     trials = [feel(mud, kind, 100 * seed + i, acceleration_m_s2=acceleration_m_s2) for kind, i in kinds]
     assert found(trials) == {name: pytest.approx(value, rel=BOUND) for name, value in KNOWN.items()}
+
+
+def test_an_abrupt_stage_is_not_taken_for_mud_that_bears_more_when_it_is_slower() -> None:
+    """Five trials of one mud alone; a ramp of one sample."""
+    mud = LawfulMud(1.3e6, 0.6e6, 1.4e6)
+    trials = [feel(mud, INSERTION, 4000 + i, acceleration_m_s2=8.0, noise_n=0.01) for i in range(5)]
+    told = analyse(trials, SETTINGS, look)
+    assert of_mud(told, "k_p", 0.0).value == pytest.approx(mud.k_p, rel=0.01)
+    assert of_mud(told, "k_e", 0.0).value == pytest.approx(mud.k_e, rel=0.01)
 
 
 @pytest.mark.parametrize(("water", "acceleration_m_s2"), [(47.6, 2.0), (51.2, 0.6)])
@@ -149,6 +160,12 @@ def test_ten_samples_a_second_are_too_few_for_an_insertion() -> None:
     assert "samples" in one(feel(LawfulMud(**KNOWN), INSERTION, 1, rate_hz=10.0)).problem
 
 
+def test_ten_samples_a_second_are_enough_for_a_shear() -> None:
+    told = one(feel(LawfulMud(**KNOWN), SHEAR, 1, rate_hz=10.0))
+    assert told.problem == ""
+    assert told.coefficients["k_s"].value == pytest.approx(KNOWN["k_s"], rel=BOUND)
+
+
 def test_a_zero_that_drifts_while_nobody_starts_is_no_contact() -> None:
     times_s = np.arange(0.0, 40.0, 0.0125)
     ramp_n = np.where(times_s > 35.0, np.minimum((times_s - 35.0) * 10.0, 2.0), 0.0)
@@ -161,6 +178,22 @@ def test_a_zero_that_drifts_while_nobody_starts_is_no_contact() -> None:
 def test_a_spike_is_taken_out_and_an_edge_is_kept() -> None:
     forces_n = np.array([0.0, 0.01, 0.0, 9.0, 0.01, 0.0, 0.01, 5.0, 5.01, 5.0, 5.02])
     assert without_spikes(forces_n).tolist() == pytest.approx([0, 0.01, 0, 0.005, 0.01, 0, 0.01, 5, 5.01, 5, 5.02])
+
+
+def test_a_millimetre_of_depth_is_seven_per_cent_of_the_shear_and_three_of_the_others() -> None:
+    doubts = {name: bench_doubt(name, SETTINGS, 1e-3, 0.0) for name in COEFFICIENTS}
+    assert doubts == pytest.approx({"k_p": 0.035, "k_s": 0.067, "k_e": 0.035}, abs=0.003)
+    assert bench_doubt("k_s", SETTINGS, 0.0, 0.05) == pytest.approx(0.05, rel=0.01)
+
+
+def test_a_speed_beside_the_one_that_was_set_is_doubted_as_far_as_they_are_apart() -> None:
+    """Trials that agree at 0.097 m/s, and a stage set to 0.1: the truth may be either."""
+    agreed, far = (
+        common_pace([Pace(speed * factor, 2.0, 0.005, 0.1) for factor in (0.99, 1.0, 1.01)], SETTINGS)
+        for speed in (0.1, 0.097)
+    )
+    assert agreed[1] < 0.01
+    assert abs(far[0].speed_m_s / 0.097 - 1.0) < 2.0 * far[1] and abs(far[0].speed_m_s / 0.1 - 1.0) < 2.0 * far[1]
 
 
 def test_the_doubt_of_a_mud_holds_scatter_calibration_and_the_speed_that_all_share(insertion: Recorded) -> None:

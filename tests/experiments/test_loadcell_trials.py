@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,9 @@ import pytest
 from drivers.load_cell_calibration import LoadCellCalibration
 from drivers.load_cell_port import LoadCellPort
 from experiments.bench_robot import BenchError
-from experiments.loadcell import CellSettings
+from experiments.loadcell import CellSettings, list_remarks
 from experiments.loadcell_fits import INSERTION, SHEAR, Analysed
+from experiments.loadcell_motion import Insertion, Pace
 from experiments.loadcell_recording import examine_lines
 from experiments.loadcell_stage import AttendedStage, Trial
 from experiments.loadcell_trials import KEEP, RAW, judge, load_all, measure
@@ -195,6 +197,26 @@ def test_weights_that_say_nothing_are_asked_for_again(make: Make) -> None:
     with pytest.raises(BenchError, match="not calibrated"):
         laboratory.measure()
     assert "both weights are" in laboratory.person.told[1]
+
+
+def test_a_weight_that_the_cell_cannot_bear_is_told_as_one(make: Make) -> None:
+    laboratory = make(person=Answering("q"), amplifier=AmplifierParameters(range_n=1.0))
+    with pytest.raises(BenchError, match="not calibrated"):
+        laboratory.measure()
+    assert "overloaded by this weight" in laboratory.person.told[1]
+
+
+def test_a_stage_at_another_speed_is_remarked_for_every_trial(make: Make) -> None:
+    laboratory = make(trials=2)
+    laboratory.measure()
+    pace = Pace(0.05, 2.0, 0.01, 0.1)
+    trials = [
+        replace(trial, motion=trial.motion._replace(pace=pace))
+        for trial in laboratory.conclude().trials
+        if isinstance(trial.motion, Insertion)
+    ]
+    told = list_remarks(trials, SETTINGS)
+    assert [remark.split(":")[0] for remark in told] == ["made up/insertion/1", "made up/insertion/2"]
 
 
 def test_a_cell_that_stays_away_ends_it_with_a_sentence(make: Make) -> None:
