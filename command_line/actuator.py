@@ -39,9 +39,8 @@ def _calibrate(options: argparse.Namespace, desk: Desk) -> Finding:
         target = _target(options, desk, bench) if options.apply else None
         plan = _plan(options, bench.configuration)
         readings = bench.calibrate(plan, desk.folder, desk.person, desk.show)
-        logs = bench.copy_logs(desk.folder)
     finally:
-        bench.close()
+        logs = bench.leave(desk.folder, desk.person)
     drives = bench.configuration.drive
     fits = [
         fit

@@ -8,11 +8,12 @@ from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import refuse
 from command_line.screen import table
 from experiments import flipper
+from experiments.bench_robot import leave
 from experiments.coefficient_table import load_truth, mud_name
 from experiments.daemon_robot import DaemonRobot
 from experiments.flipper_report import sections_of, text_of
 from experiments.flipper_simulation import flipper_bench
-from experiments.mud_trials import Bench, PlannedTrial, PromptedBed, leave, require_some
+from experiments.mud_trials import Bench, PlannedTrial, PromptedBed, require_some
 from experiments.notebook import Notebook
 from simulation.clay import clay_of_water
 

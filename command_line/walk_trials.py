@@ -8,9 +8,10 @@ from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import refuse
 from command_line.screen import table
 from experiments import walk_mapping
+from experiments.bench_robot import leave
 from experiments.coefficient_table import load_truth, mud_name
 from experiments.daemon_robot import DaemonRobot
-from experiments.mud_trials import Bench, PlannedTrial, PromptedBed, leave, require_some
+from experiments.mud_trials import Bench, PlannedTrial, PromptedBed, require_some
 from experiments.notebook import Notebook
 from experiments.trackway_trials import Mud
 from experiments.walk_mapping_pages import sections_of, text_of

@@ -17,7 +17,7 @@ from experiments.actuator_fit import Entry
 from experiments.actuator_hand import PersonsHand
 from experiments.actuator_plan import Plan, require_possible, steps_of
 from experiments.actuator_simulation import simulated_bench
-from experiments.bench_robot import BenchRobot
+from experiments.bench_robot import BenchRobot, leave
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, Person, Willing
 from experiments.side_by_side import side_by_side
@@ -33,9 +33,8 @@ class ActuatorBench(Protocol):
     def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
         """Raises BenchError, NotebookError."""
 
-    def copy_logs(self, folder: Path) -> list[Path]: ...
-
-    def close(self) -> None: ...
+    def leave(self, folder: Path, person: Person) -> list[Path]:
+        """Torque off, and the logs in the folder, however it has ended."""
 
 
 class RobotBench:
@@ -71,11 +70,8 @@ class RobotBench:
             person.ask(question, {GO_ON: "it is held"}, lambda: self._robot.wait(TICK_S))
             self._robot.call("disarm")
 
-    def copy_logs(self, folder: Path) -> list[Path]:
-        return self._robot.copy_logs(folder)
-
-    def close(self) -> None:
-        self._robot.close()
+    def leave(self, folder: Path, person: Person) -> list[Path]:
+        return leave(self._robot, person, folder)
 
 
 class SimulatedBench:
@@ -84,7 +80,6 @@ class SimulatedBench:
     def __init__(self, configuration: Configuration, seed: int) -> None:
         self.configuration = configuration
         self._seed = seed
-        self._logs: list[Path] = []
 
     def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
         require_possible(plan, self.configuration)
@@ -92,26 +87,22 @@ class SimulatedBench:
         joints = [partial(_simulate, self.configuration.text, joint, plan, self._seed, folder) for joint in plan.joints]
         show(0, count * len(joints))
         outcomes = side_by_side(joints, lambda done, total: show(count * done, count * total))
-        self._logs = [log for _, log in outcomes]
-        return {joint: entries for joint, (entries, _) in zip(plan.joints, outcomes, strict=True)}
+        return dict(zip(plan.joints, outcomes, strict=True))
 
-    def copy_logs(self, folder: Path) -> list[Path]:
-        return self._logs
-
-    def close(self) -> None:
+    def leave(self, folder: Path, person: Person) -> list[Path]:
         """Nothing runs any more."""
+        return sorted(folder.glob("*.mcap"))
 
 
-def _simulate(text: str, joint: str, plan: Plan, seed: int, folder: Path) -> tuple[dict[str, Any], Path]:
+def _simulate(text: str, joint: str, plan: Plan, seed: int, folder: Path) -> dict[str, Any]:
     configuration = parse_configuration(text)
     notebook = Notebook(folder / joint, notes_of(plan, joint))
-    log = _new_log(folder, joint)
-    robot, hand = simulated_bench(configuration, joint, plan, seed, log)
+    robot, hand = simulated_bench(configuration, joint, plan, seed, _new_log(folder, joint))
     try:
         entries = Calibration(robot, joint, plan, hand, Willing(_unheard), notebook, _unseen).run()
     finally:
         robot.close()
-    return dict(entries), log
+    return dict(entries)
 
 
 def _new_log(folder: Path, joint: str) -> Path:

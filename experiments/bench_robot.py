@@ -7,11 +7,13 @@ simulated one; an experiment cannot tell which. Everything that it knows of the 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from experiments.person import Person
 from firmware_host.configuration import Configuration
 from firmware_host.log_reader import Log
 from firmware_host.status_client import CallRefusedError
@@ -19,6 +21,7 @@ from firmware_host.status_client import CallRefusedError
 POLL_S = 0.05
 ARMING_S = 10.0
 MOVING_S = 20.0
+RAISING_S = 10.0
 STRIDE_S = 60.0  # longest, with pauses and recoveries
 UNDER_WAY = ("walking", "stopping", "damping")
 ENERGISED = ("arming", "hold", *UNDER_WAY)
@@ -164,3 +167,30 @@ def cut(log: Log, from_s: float, to_s: float) -> Log:
         strides=[row for row in log.strides if from_s <= row["stamp_s"] <= to_s],
         events=[row for row in log.events if from_s <= row["stamp_s"] <= to_s],
     )
+
+
+def rest(robot: BenchRobot) -> None:
+    """Flippers out of the mud where they can be, then torque off. Raises BenchError where no answer comes."""
+    if robot.call("status")["mode"] == "walking":
+        robot.call("stop")
+        wait_until(robot, lambda status: status["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
+    disarm(robot)
+
+
+def leave(robot: BenchRobot, person: Person, folder: Path) -> list[Path]:
+    """Torque off, all logs in the folder, the connection closed; what fails of that is told. The folder's logs."""
+    try:
+        for step in (partial(_rest_told, robot, person), partial(robot.copy_logs, folder)):
+            try:
+                step()
+            except (BenchError, CallRefusedError) as problem:
+                person.tell(str(problem))
+    finally:
+        robot.close()
+    return sorted(folder.glob("*.mcap"))
+
+
+def _rest_told(robot: BenchRobot, person: Person) -> None:
+    if robot.call("status")["mode"] == "walking":
+        person.tell("the flippers are raised, then torque goes off")
+    rest(robot)

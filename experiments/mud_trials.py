@@ -10,17 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import partial
-from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from experiments.bench_robot import UNDER_WAY, BenchError, BenchRobot, disarm, wait_until
+from experiments.bench_robot import BenchError, BenchRobot, disarm, rest
 from experiments.notebook import Entry, Notebook
 from experiments.person import GO_ON, REDO, SKIP, Person
 from firmware_host.status_client import CallRefusedError
 
 MOST_ATTEMPTS = 3
-RAISING_S = 10.0
 ASKED = {GO_ON: "go on", SKIP: "leave this trial out", REDO: "measure the last one again"}
 SPOILT = {GO_ON: "clear what is wrong, and repeat it", SKIP: "leave it out"}
 DOUBTFUL = {GO_ON: "keep it", REDO: "measure it again", SKIP: "leave it out"}
@@ -133,33 +130,6 @@ def _clear(robot: BenchRobot) -> None:
     if any(fault["blocks_arming"] for fault in robot.call("status")["faults"]):
         with suppress(CallRefusedError):
             robot.call("clear")
-
-
-def rest(robot: BenchRobot) -> None:
-    """Flippers out of the mud where they can be, then torque off. Raises BenchError where no answer comes."""
-    if robot.call("status")["mode"] == "walking":
-        robot.call("stop")
-        wait_until(robot, lambda status: status["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
-    disarm(robot)
-
-
-def leave(robot: BenchRobot, person: Person, folder: Path) -> list[Path]:
-    """Torque off, all logs in the folder, the connection closed; what fails of that is told. The folder's logs."""
-    try:
-        for step in (partial(_rest_told, robot, person), partial(robot.copy_logs, folder)):
-            try:
-                step()
-            except (BenchError, CallRefusedError) as problem:
-                person.tell(str(problem))
-    finally:
-        robot.close()
-    return sorted(folder.glob("*.mcap"))
-
-
-def _rest_told(robot: BenchRobot, person: Person) -> None:
-    if robot.call("status")["mode"] == "walking":
-        person.tell("the flippers are raised, then torque goes off")
-    rest(robot)
 
 
 def require_some(notebook: Notebook) -> None:

@@ -14,7 +14,18 @@ from itertools import accumulate
 from math import radians, sin
 from typing import Any, Protocol
 
-from experiments.bench_robot import UNDER_WAY, BenchError, BenchRobot, Status, arm, disarm, told_by, wait_until
+from experiments.bench_robot import (
+    ARMING_S,
+    RAISING_S,
+    UNDER_WAY,
+    BenchError,
+    BenchRobot,
+    Status,
+    arm,
+    disarm,
+    told_by,
+    wait_until,
+)
 from experiments.depth_rule import DepthRule
 from experiments.log_strides import walked_strides
 from experiments.notebook import Notebook
@@ -27,7 +38,6 @@ from experiments.walk import Walk, WalkedStride, speed_m_s
 PATIENCE_S = 900.0  # for a whole walk
 UNSEEN_S = 2.0  # without a pose, before a walk or on it: nobody knows where its end is
 BACKWARDS_M = 0.2  # behind the start: no mud pushes a body back so far
-RAISING_S = 20.0
 LOOK_S = 0.05
 BEHIND = ""  # the last mud
 
@@ -154,7 +164,7 @@ def _require_place(robot: BenchRobot) -> Status:
 
 def _follow(robot: BenchRobot, plan: Plan, start_m: float) -> str:
     """Until the walk is over, or has to be stopped: why, where that is no success."""
-    status = wait_until(robot, lambda now: now["mode"] != "hold", RAISING_S, "beginning to walk")
+    status = wait_until(robot, lambda now: now["mode"] != "hold", ARMING_S, "beginning to walk")
     gait, geometry = robot.configuration.gait, robot.configuration.geometry
     reach_m = geometry.flipper_length_m * sin(radians(gait.sweep_angle_deg))
     progress = Progress(plan, start_m - reach_m, status["now_s"])

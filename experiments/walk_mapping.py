@@ -14,11 +14,21 @@ from itertools import accumulate
 from math import ceil, radians, sin
 from typing import Any
 
-from experiments.bench_robot import ARMING_S, UNDER_WAY, Status, arm, strides_since, told_by, wait_until, walk
+from experiments.bench_robot import (
+    ARMING_S,
+    RAISING_S,
+    UNDER_WAY,
+    Status,
+    arm,
+    strides_since,
+    told_by,
+    wait_until,
+    walk,
+)
 from experiments.error_table import COEFFICIENTS
 from experiments.estimation_methods import COMPENSATED, DEFAULT, PAPER, method_of, strides_by_method
 from experiments.known_surface import strides_with_known_surface
-from experiments.mud_trials import RAISING_S, Bench, PlannedTrial, SpoiltTrialError, conduct_trials
+from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError, conduct_trials
 from experiments.notebook import Entry
 from experiments.side_by_side import Show
 from experiments.stride_course import course_of, course_row, thinned

@@ -141,11 +141,8 @@ class Plain:
     def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
         raise NotImplementedError
 
-    def copy_logs(self, folder: Path) -> list[Path]:
+    def leave(self, folder: Path, person: Person) -> list[Path]:
         return []
-
-    def close(self) -> None:
-        pass
 
 
 def made_options(**values: object) -> argparse.Namespace:

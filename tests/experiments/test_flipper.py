@@ -14,13 +14,13 @@ import pytest
 
 from control.records import Phase
 from experiments import flipper
-from experiments.bench_robot import BenchError
+from experiments.bench_robot import BenchError, leave
 from experiments.estimation_methods import DEFAULT, PAPER
 from experiments.flipper import Plan, report_of, require_fixed_base, require_mud
 from experiments.flipper_report import KNOWN_BIAS, WRONG_CONSTANTS, force_rows, sections_of, text_of
 from experiments.flipper_simulation import DRIVE, SECTIONS, bench_configuration, flipper_bench
 from experiments.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError, leave
+from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError
 from experiments.notebook import Entry, Notebook
 from experiments.simulated_bed import CarriedBed
 from experiments.stride_course import course_of_row

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from experiments.bench_robot import BenchError
-from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError, Truths, conduct_trials, leave, require_some
+from experiments.bench_robot import BenchError, leave
+from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError, Truths, conduct_trials, require_some
 from experiments.notebook import Entry, Notebook
 from experiments.person import GO_ON, REDO, SKIP
 from firmware_host.log_reader import Log
