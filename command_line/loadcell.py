@@ -38,10 +38,13 @@ from experiments.loadcell_report import (
 )
 from experiments.loadcell_stage import AttendedStage, SimulatedStage, Stage
 from experiments.loadcell_trials import RAW, TrialBench, TrialPlan
+from experiments.loadcell_truth import clay_truth, truth_rows
 from experiments.notebook import Notebook
+from experiments.report_page import Section
 from simulation.load_cell_bench import EmulatedBench, clay_plate
 from simulation.load_cell_emulator import AmplifierParameters
 
+TRUTH = "The same plate in even motion, without stage, cell and noise:"
 MIXED = "mud"  # the name of one that nobody named
 StageOf = Callable[[CellRecorder], Stage]
 
@@ -112,8 +115,15 @@ def _found(
     results = conclude(desk.folder, notebook, plan, flipper, desk.show)
     if not results.trials:
         raise BenchError("no trial was kept, so there is nothing to conclude")
+    truths = {mud: clay_truth(_water(mud), plan.settings) for mud in results.muds} if options.simulated else {}
     report = report_of(results, notebook, plan, described)
-    return Finding(report, TITLE, sections_of(results, plan), text_of(results, plan), [desk.folder / RAW])
+    report["truth"] = {mud: truth._asdict() for mud, truth in truths.items()}
+    sections, text = sections_of(results, plan), text_of(results, plan)
+    if truths:
+        rows = truth_rows(results.muds, truths)
+        sections = [*sections, Section("The simulated muds themselves", TRUTH, rows=rows)]
+        text = f"{text}\n\n{TRUTH}\n{table(rows)}"
+    return Finding(report, TITLE, sections, text, [desk.folder / RAW])
 
 
 def _measured(

@@ -18,7 +18,7 @@ from experiments.actuator_hand import PersonsHand
 from experiments.actuator_plan import Plan, require_possible, steps_of
 from experiments.actuator_simulation import simulated_bench
 from experiments.bench_robot import BenchRobot, leave
-from experiments.notebook import Notebook
+from experiments.notebook import NAME, Notebook
 from experiments.person import GO_ON, Person, Willing
 from experiments.side_by_side import side_by_side
 from firmware_host.configuration import Configuration, parse_configuration
@@ -85,8 +85,11 @@ class SimulatedBench:
         require_possible(plan, self.configuration)
         count = len(steps_of(plan))
         joints = [partial(_simulate, self.configuration.text, joint, plan, self._seed, folder) for joint in plan.joints]
-        show(0, count * len(joints))
-        outcomes = side_by_side(joints, lambda done, total: show(count * done, count * total))
+
+        def look() -> None:
+            show(sum(_readings_in(folder / joint / NAME) for joint in plan.joints), count * len(joints))
+
+        outcomes = side_by_side(joints, _unseen, meanwhile=look)
         return dict(zip(plan.joints, outcomes, strict=True))
 
     def leave(self, folder: Path, person: Person) -> list[Path]:
@@ -103,6 +106,11 @@ def _simulate(text: str, joint: str, plan: Plan, seed: int, folder: Path) -> dic
     finally:
         robot.close()
     return dict(entries)
+
+
+def _readings_in(notebook: Path) -> int:
+    """As lines behind its plan: one that is measured again counts again."""
+    return max(0, notebook.read_bytes().count(b"\n") - 1) if notebook.exists() else 0
 
 
 def _new_log(folder: Path, joint: str) -> Path:

@@ -5,23 +5,36 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from multiprocessing import active_children
 from typing import TypeVar
 
+LOOK_S = 0.5
 Outcome = TypeVar("Outcome")
 Show = Callable[[int, int], None]  # how many of how many are done
 
 
-def side_by_side(trials: Sequence[Callable[[], Outcome]], show: Show, processes: int | None = None) -> list[Outcome]:
-    """What each trial returned, in their order. Trials cross a process border: `functools.partial` does, lambda not."""
+def side_by_side(
+    trials: Sequence[Callable[[], Outcome]],
+    show: Show,
+    processes: int | None = None,
+    meanwhile: Callable[[], None] = lambda: None,
+) -> list[Outcome]:
+    """What each trial returned, in their order. Trials cross a process border: `functools.partial` does, lambda not.
+
+    `meanwhile` is called twice a second, for progress within long trials.
+    """
     outcomes: dict[int, Outcome] = {}
     with _workers(processes or os.cpu_count()) as pool:
         places = {pool.submit(trial): place for place, trial in enumerate(trials)}
-        for done, future in enumerate(as_completed(places), 1):
-            outcomes[places[future]] = future.result()
-            show(done, len(trials))
+        pending = set(places)
+        while pending:
+            finished, pending = wait(pending, LOOK_S, FIRST_COMPLETED)
+            for future in finished:
+                outcomes[places[future]] = future.result()
+                show(len(outcomes), len(trials))
+            meanwhile()
     return [outcomes[place] for place in range(len(trials))]
 
 

@@ -49,6 +49,15 @@ def report(folder: Path) -> dict[str, Any]:
     return told
 
 
+def test_the_true_coefficients_stand_beside_those_of_a_simulated_mud(report: dict[str, Any]) -> None:
+    (told,) = report["muds"]
+    truth = report["truth"]["48.6"]
+    for name in ("k_p", "k_s", "k_e"):
+        assert told[name]["value"] == pytest.approx(truth[name], rel=0.03)
+    shear_n = measure_shear(clay_of_water(48.6), PAPER_PLATE, 0.0, 0.0, 0.03, 0.1)
+    assert truth["k_s"] == pytest.approx(shear_n / (0.03 * 0.03**2 / 2.0), rel=1e-3)
+
+
 def test_a_simulated_experiment_needs_no_questions_and_leaves_a_report(report: dict[str, Any], folder: Path) -> None:
     assert report["experiment"] == "loadcell"
     names = {path.name for path in (folder / "out").iterdir()}

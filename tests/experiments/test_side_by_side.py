@@ -44,3 +44,9 @@ def test_no_trials_have_no_outcomes() -> None:
 def test_a_trials_problem_reaches_whoever_asked() -> None:
     with pytest.raises(ValueError, match="cannot be"):
         side_by_side([partial(broken), partial(late, 0.0)], ignore, processes=1)
+
+
+def test_a_long_trial_is_looked_at_meanwhile() -> None:
+    looks: list[float] = []
+    side_by_side([partial(late, 1.2)], ignore, 1, lambda: looks.append(time.monotonic()))
+    assert len(looks) >= 3  # two while it ran, one at its end
