@@ -31,13 +31,26 @@ class Rail:
         parameters = RailEncoderParameters(device=str(device), metres_per_count=METRES)
         self.encoder = RailEncoder(replace(parameters, **changes))  # type: ignore[arg-type]
         self.now_s = 0.0
+        self.written = self.fetched = 0  # bytes: a pseudo-terminal delivers when it likes
+        self._write, self._fetch = self.counter.write, self.encoder._fetch
+        self.counter.write = self._count_written  # type: ignore[method-assign]
+        self.encoder._fetch = self._count_fetched  # type: ignore[method-assign]
         self.write(b"\n")  # the end of a line that had begun before
+
+    def _count_written(self, data: bytes) -> None:
+        self.written += len(data)
+        self._write(data)
+
+    def _count_fetched(self) -> bytes:
+        data = self._fetch()
+        self.fetched += len(data)
+        return data
 
     def write(self, data: bytes) -> float:
         """x once all of it has been read."""
         if data:
             self.counter.write(data)
-        return self.read_until(lambda: self.encoder._port is None or not self.encoder._port.in_waiting)
+        return self.read_until(lambda: self.encoder._port is None or self.fetched >= self.written)
 
     def send(self, place_m: float) -> float:
         self.counter.send(place_m)
