@@ -60,6 +60,7 @@ class Walked(NamedTuple):
 
 
 Status = dict[str, Any]
+Judge = Callable[[Status], str | None]  # None while a walk is to go on; then why not, or nothing at its proper end
 
 
 def wait_until(robot: BenchRobot, done: Callable[[Status], bool], longest_s: float, what: str) -> Status:
@@ -149,6 +150,23 @@ def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
     if number < strides:
         raise BenchError(f"the walk ended early, after {number} of {strides} strides: it was told to stop")
     return Walked(closed, before["now_s"], after["now_s"])
+
+
+def follow_walk(robot: BenchRobot, begin: Callable[[float], Judge]) -> tuple[str | None, Status]:
+    """Of a walk that was just ordered: what its judge stopped it for, None where it ended by itself; the last status.
+
+    `begin` makes the judge when the walk has begun, by the robot's clock.
+    """
+    status = wait_until(robot, lambda now: now["mode"] != "hold", ARMING_S, "beginning to walk")
+    judge = begin(status["now_s"])
+    while status["mode"] == "walking":
+        end = judge(status)
+        if end is not None:
+            robot.call("stop")
+            return end, status
+        robot.wait(POLL_S)
+        status = robot.call("status")
+    return None, status
 
 
 def strides_since(robot: BenchRobot, number: int) -> list[dict[str, Any]]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,6 +33,7 @@ from experiments.loadcell_trials import TrialBench, TrialPlan, load_all, measure
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, Person
 from experiments.side_by_side import Show
+from firmware_host.reports import known
 
 CALIBRATION = "calibration.json"
 WEIGHING_S = 2.0
@@ -192,8 +192,8 @@ def report_of(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mappi
         "settings": asdict(plan.settings) | {"depth_error_m": plan.depth_error_m},
         "cell": dict(cell),
         "stage": {
-            "speed_m_s": _number(sum(p.speed_m_s for p in paces) / len(paces)) if paces else None,
-            "acceleration_m_s2": _number(sum(p.acceleration_m_s2 for p in paces) / len(paces)) if paces else None,
+            "speed_m_s": known(sum(p.speed_m_s for p in paces) / len(paces)) if paces else None,
+            "acceleration_m_s2": known(sum(p.acceleration_m_s2 for p in paces) / len(paces)) if paces else None,
         },
         "muds": [
             {"mud": mud, **{name: _described(told) for name, told in coefficients.items()}}
@@ -203,7 +203,7 @@ def report_of(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mappi
         "left_out": {key: entry for key, entry in notebook.entries.items() if entry.get("skipped")},
         "remarks": results.remarks,
         "compared": [
-            each._asdict() | {"ratio": _number(each.ratio), "ratio_std_error": _number(each.ratio_std_error)}
+            each._asdict() | {"ratio": known(each.ratio), "ratio_std_error": known(each.ratio_std_error)}
             for each in results.compared
         ],
     }
@@ -211,12 +211,12 @@ def report_of(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mappi
 
 def _described(told: OfMud) -> dict[str, Any]:
     return {
-        "value": _number(told.value),
-        "std_error": _number(told.std_error),
-        "trials_error": _number(told.trials_error),
-        "bench_error": _number(told.bench_error),
-        "repeatability": _number(told.repeatability),
-        "trials": [_number(value) for value in told.trials],
+        "value": known(told.value),
+        "std_error": known(told.std_error),
+        "trials_error": known(told.trials_error),
+        "bench_error": known(told.bench_error),
+        "repeatability": known(told.repeatability),
+        "trials": [known(value) for value in told.trials],
     }
 
 
@@ -224,15 +224,8 @@ def _trial_described(trial: Analysed, entry: Mapping[str, Any]) -> dict[str, Any
     return {
         "key": trial.recorded.key,
         **entry,
-        **{
-            name: {"value": _number(c.value), "std_error": _number(c.std_error)}
-            for name, c in trial.coefficients.items()
-        },
-        "speed_m_s": None if trial.speed_m_s is None else _number(trial.speed_m_s),
+        **{name: {"value": known(c.value), "std_error": known(c.std_error)} for name, c in trial.coefficients.items()},
+        "speed_m_s": None if trial.speed_m_s is None else known(trial.speed_m_s),
         "problem": trial.problem,
         "remark": trial.remark,
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if isfinite(value) else None

@@ -15,7 +15,6 @@ from math import radians, sin
 from typing import Any, Protocol
 
 from experiments.bench_robot import (
-    ARMING_S,
     RAISING_S,
     UNDER_WAY,
     BenchError,
@@ -23,6 +22,7 @@ from experiments.bench_robot import (
     Status,
     arm,
     disarm,
+    follow_walk,
     told_by,
     wait_until,
 )
@@ -34,6 +34,7 @@ from experiments.person import GO_ON, REDO, SKIP, Person
 from experiments.side_by_side import Show
 from experiments.trackway import STUCK_S, paper_report
 from experiments.walk import Walk, WalkedStride, speed_m_s
+from firmware_host.configuration import Configuration
 
 PATIENCE_S = 900.0  # for a whole walk
 UNSEEN_S = 2.0  # without a pose, before a walk or on it: nobody knows where its end is
@@ -164,18 +165,14 @@ def _require_place(robot: BenchRobot) -> Status:
 
 def _follow(robot: BenchRobot, plan: Plan, start_m: float) -> str:
     """Until the walk is over, or has to be stopped: why, where that is no success."""
-    status = wait_until(robot, lambda now: now["mode"] != "hold", ARMING_S, "beginning to walk")
-    gait, geometry = robot.configuration.gait, robot.configuration.geometry
-    reach_m = geometry.flipper_length_m * sin(radians(gait.sweep_angle_deg))
-    progress = Progress(plan, start_m - reach_m, status["now_s"])
-    while status["mode"] == "walking":
-        end = progress.judge(status)
-        if end is not None:
-            robot.call("stop")
-            return end
-        robot.wait(LOOK_S)
-        status = robot.call("status")
-    return told_by(status)
+    zero_m = start_m - reach_of(robot.configuration)
+    end, status = follow_walk(robot, lambda now_s: Progress(plan, zero_m, now_s).judge)
+    return told_by(status) if end is None else end
+
+
+def reach_of(configuration: Configuration) -> float:
+    """How far in front of the body the plates go down."""
+    return configuration.geometry.flipper_length_m * sin(radians(configuration.gait.sweep_angle_deg))
 
 
 class Progress:

@@ -11,15 +11,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from math import ceil, radians, sin
+from math import ceil
 from typing import Any
 
 from experiments.bench_robot import (
-    ARMING_S,
     RAISING_S,
     UNDER_WAY,
     Status,
     arm,
+    follow_walk,
     strides_since,
     told_by,
     wait_until,
@@ -32,9 +32,8 @@ from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError, conduc
 from experiments.notebook import Entry
 from experiments.side_by_side import Show
 from experiments.stride_course import course_of, course_row, thinned
-from experiments.trackway_trials import Mud
+from experiments.trackway_trials import Mud, reach_of
 from experiments.walk_course import walk_course_of, walk_course_row
-from firmware_host.configuration import Configuration
 from firmware_host.log_reader import Log
 
 MUDS = tuple(Mud(name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
@@ -42,7 +41,6 @@ SOFT = ("53.1", "51.2")  # figure 7 has the first, called 53.8 % there; the othe
 SOFT_DEPTHS_M = (0.03, 0.05)
 METHODS = (DEFAULT, PAPER, COMPENSATED)
 BORDER_M = 0.03  # a plate that goes down nearer to a border than this may be in either mud
-LOOK_S = 0.05
 LOST_S = 2.0  # without a pose, in a walk that began with one
 STUCK_S, ADVANCED_M = 60.0, 0.03
 SLIPPING = 4  # times as many strides as a robot needs that never slips
@@ -145,16 +143,9 @@ def _follow(bench: Bench, plan: Plan, start_m: float | None) -> str:
     reach_m = reach_of(robot.configuration)
     strides = ceil(plan.length_m / (2.0 * reach_m))  # without a pose no more: they cannot lead beyond the end
     robot.call("walk", depth_m=plan.depth_m, strides=strides if start_m is None else SLIPPING * strides)
-    status = wait_until(robot, lambda now: now["mode"] != "hold", ARMING_S, "beginning to walk")
-    advance = Advance(start_m, plan.length_m - reach_m, status["now_s"])
-    while status["mode"] == "walking":
-        end = advance.judge(status)
-        if end is not None:
-            robot.call("stop")
-            return end
-        robot.wait(LOOK_S)
-        status = robot.call("status")
-    return ""
+    length_m = plan.length_m - reach_m
+    end, _ = follow_walk(robot, lambda now_s: Advance(start_m, length_m, now_s).judge)
+    return end or ""
 
 
 class Advance:
@@ -194,11 +185,6 @@ def require_mud(strides: Sequence[Mapping[str, Any]], flipper: str) -> None:
         raise SpoiltTrialError(f"the daemon closed no stride of the {flipper} flipper")
     if not any(stride[name]["valid"] for stride in strides for name in COEFFICIENTS):
         raise SpoiltTrialError("no stride met mud: look how high the axes are (geometry.axis_height_m)")
-
-
-def reach_of(configuration: Configuration) -> float:
-    """How far in front of the body the plates go down."""
-    return configuration.geometry.flipper_length_m * sin(radians(configuration.gait.sweep_angle_deg))
 
 
 def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float) -> Entry:

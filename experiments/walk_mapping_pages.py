@@ -12,7 +12,8 @@ from experiments.flipper_report import TRUTHS, doubts
 from experiments.mud_looks import file_name, mud_text
 from experiments.notebook import Entry
 from experiments.report_page import Figure, Section
-from experiments.walk_mapping import SOFT_DEPTHS_M, Plan, reach_of
+from experiments.trackway_trials import reach_of
+from experiments.walk_mapping import SOFT_DEPTHS_M, Plan
 from experiments.walk_mapping_report import placed_strides, soft_walks_of, walks_of
 from firmware_host.configuration import Configuration
 

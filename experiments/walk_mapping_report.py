@@ -22,7 +22,8 @@ from experiments.estimation_methods import method_of
 from experiments.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.notebook import Entry
 from experiments.stride_course import course_of_row
-from experiments.walk_mapping import SOFT_DEPTHS_M, Plan, reach_of, soft_key, soft_name
+from experiments.trackway_trials import reach_of
+from experiments.walk_mapping import SOFT_DEPTHS_M, Plan, soft_key, soft_name
 from firmware_host.configuration import Configuration
 
 Told = Mapping[str, Any]

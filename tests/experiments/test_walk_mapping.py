@@ -19,8 +19,8 @@ from experiments.lockstep_robot import LockstepRobot
 from experiments.mud_trials import Bench, SpoiltTrialError
 from experiments.notebook import Entry, Notebook
 from experiments.simulated_bed import CarriedBed
-from experiments.trackway_trials import Mud
-from experiments.walk_mapping import MUDS, Advance, Plan, measure, reach_of, require_mud
+from experiments.trackway_trials import Mud, reach_of
+from experiments.walk_mapping import MUDS, Advance, Plan, measure, require_mud
 from experiments.walk_mapping_pages import sections_of, text_of
 from experiments.walk_mapping_report import placed_strides, report_of, walks_of
 from experiments.walk_simulation import walking_bench
