@@ -9,7 +9,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-LAYERS = [{"control"}, {"estimation", "drivers"}, {"firmware_host"}, {"simulation"}, {"experiments"}, {"command_line"}]
+LAYERS = [
+    ("control",),
+    ("estimation", "drivers"),
+    ("firmware_host",),
+    ("simulation",),
+    ("experiments",),
+    ("command_line",),
+]
 HEIGHT = {package: height for height, layer in enumerate(LAYERS) for package in layer}
 
 
