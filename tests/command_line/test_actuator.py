@@ -22,7 +22,7 @@ from experiments.actuator import Show
 from experiments.actuator_bench import Readings
 from experiments.actuator_fit import fit_joint
 from experiments.actuator_plan import Plan
-from experiments.actuator_simulation import TRUE_CONSTANT_NM_A
+from experiments.actuator_simulation import COULOMB_NM, TRUE_CONSTANT_NM_A
 from experiments.bench_robot import BenchError
 from experiments.notebook import Notebook
 from experiments.person import Person, Willing
@@ -51,8 +51,12 @@ def test_one_command_calibrates_a_motor_and_changes_a_copy_of_the_configuration(
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "What to set where" in page and "data:image/png;base64" in page
 
-    assert main([*SHORT, "--out", str(tmp_path)]) == exit_codes.OK  # goes on behind what was read: nothing is left
-    assert "right_sweep" in capsys.readouterr().out
+    assert joint["torque_constant_error_nm_a"] > joint["torque_constant_tolerance_nm_a"] > 0.0
+    assert abs(joint["friction_nm"] - COULOMB_NM) < 3.0 * joint["friction_error_nm"]
+
+    coarse = [*SHORT, "--out", str(tmp_path), "--lever-tolerance", "10"]
+    assert main(coarse) == exit_codes.OK  # goes on behind what was read: nothing is left, and the doubt is another
+    assert "0.0719 ± 0.0035" in capsys.readouterr().out
     assert main([*SHORT, "--out", str(tmp_path), "--lever", "10"]) == exit_codes.REFUSED
     assert "lever_m = 0.12" in capsys.readouterr().err
 
@@ -182,7 +186,8 @@ def test_a_doubtful_constant_is_not_written_and_a_good_one_is(tmp_path: Path, ex
     assert "+torque_constant_nm_a = 0.07" in told[-1]
     written = load_configuration(path)
     assert written.drive["right_sweep"].torque_constant_nm_a == pytest.approx(0.0719, abs=0.001)
-    assert written.friction["right_sweep"].coulomb_nm == pytest.approx(good.friction_nm, abs=1e-4)
+    assert written.friction["right_sweep"].coulomb_nm == pytest.approx(good.friction_nm[0], abs=1e-4)
+    assert written.friction["right_sweep"].viscous_nm_s == pytest.approx(good.viscous_nm_s[0], abs=1e-4)
 
 
 def test_what_cannot_be_applied_costs_no_report(tmp_path: Path, example_text: str) -> None:
