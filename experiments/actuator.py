@@ -181,8 +181,7 @@ class Calibration:
         elif step.weight_g:
             self._keep(step, reading)
         else:
-            assert self._held is not None
-            self._keep(step, reading, loops=swing(self._held))
+            self._keep(step, reading, loops=self._swung())
 
     def _settled(self, step: Step) -> Reading | None:
         """None where it is left out."""
@@ -200,6 +199,15 @@ class Calibration:
         self._notebook.write(step.key, {"skipped": trouble})
         self._person.tell(f"{_named(step)} of trial {step.trial} is left out: {trouble}.")
         return None
+
+    def _swung(self) -> Sequence[Loop]:
+        """None where it does not swing freely, which costs friction alone."""
+        assert self._held is not None
+        try:
+            return swing(self._held)
+        except MovedError as problem:
+            self._person.tell(f"friction was not measured this time: {problem}")
+            return ()
 
     def _ask_about(self, doubt: Doubt, step: Step, reading: Reading) -> None:
         """Whoever only ever goes on does not go on for ever: it is kept as doubtful then."""

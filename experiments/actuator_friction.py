@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import hypot, nan, radians, sqrt
+from math import degrees, hypot, nan, radians, sqrt
 from statistics import fmean, variance
 from typing import NamedTuple
 
-from experiments.actuator_reading import QUIET_S, HeldJoint, Sample
+from experiments.actuator_reading import QUIET_S, HeldJoint, MovedError, Sample
 from experiments.student import student_factor
 
 SWING_RAD = radians(5.0)  # to either side: four and a half periods of the R60's cogging, and the arm stays near level
@@ -46,7 +46,7 @@ class Friction(NamedTuple):
 
 
 def swing(held: HeldJoint) -> list[Loop]:
-    """Loops of both speeds about where the joint is held. Raises BenchError, WarmError."""
+    """Loops of both speeds about where the joint is held. Raises MovedError, BenchError, WarmError."""
     middle_rad = held.held_rad
     low_rad, high_rad = middle_rad - SWING_RAD, middle_rad + SWING_RAD
     held.stroke(low_rad, SLOW_STEP_RAD)
@@ -59,8 +59,10 @@ def swing(held: HeldJoint) -> list[Loop]:
 
 
 def loop_of(up: Sequence[Sample], down: Sequence[Sample], quick: bool) -> Loop:
-    """Of a stroke and the one back, each until it rests."""
-    samples = [*up, *down]
+    """Of a stroke and the one back, each until it rests. Raises MovedError where it is hardly one."""
+    samples, stroke_rad = [*up, *down], _end_rad(up) - _end_rad(down)
+    if stroke_rad < SWING_RAD:
+        raise MovedError(f"the empty arm swings by {degrees(stroke_rad):.1f} degrees only: is something in its way?")
     spent_rad_a = sum(
         (a.current_a + b.current_a) / 2.0 * (b.angle_rad - a.angle_rad)
         for a, b in pairwise([*samples, samples[0]])  # closed, as the loop would be if it met its beginning
@@ -68,8 +70,7 @@ def loop_of(up: Sequence[Sample], down: Sequence[Sample], quick: bool) -> Loop:
     brisk_rad2_s = sum(
         (b.angle_rad - a.angle_rad) ** 2 / (b.now_s - a.now_s) for a, b in pairwise(samples) if b.now_s > a.now_s
     )
-    way_rad = 2.0 * (_end_rad(up) - _end_rad(down))
-    return Loop(spent_rad_a / way_rad, brisk_rad2_s / way_rad, quick)
+    return Loop(spent_rad_a / (2.0 * stroke_rad), brisk_rad2_s / (2.0 * stroke_rad), quick)
 
 
 def _end_rad(stroke: Sequence[Sample]) -> float:

@@ -31,21 +31,21 @@ Friction is what the empty arm's current spends on loops of {swing_deg:.0f} degr
 magnets and inertia give back what they took. Slow and quick loops tell dry friction from viscous. Half the difference
 between the two approaches at rest is less ("at rest"): friction of a joint that has stopped need not be borne in full.
 
-± is one standard error; the true value is within two of them in 19 of 20 calibrations. That of k_t is from the
+± is one standard error; the true value is within two of them in at least 19 of 20 calibrations. That of k_t is from the
 scatter of the readings and from what errs alike in all of them: the lever, by at most {lever_mm:g} mm, and the weights,
 by at most {weight_percent:g} % (--lever-tolerance, --weight-tolerance). A millimetre of {lever_cm:g} cm is
-{millimetre_percent:.1f} % of k_t. That of the offset holds the tare's scatter, and what friction may hide at rest."""
+{millimetre_percent:.1f} % of k_t. That of the offset holds the tare's scatter, and what friction at rest may hide."""
 
 DEFINITIONS = """\
-RMSE "as in the paper" is its own: the root mean square of k_t I - m g l over all readings, with the constant as it is
-configured and nothing fitted (section III-A; the unit printed there is N/m). The paper does not tell whether it took
-off what the arm itself weighs; here that is done. "Fitted" is what remains with the fitted constant, each trial judged
-by the constant of the other trials, so that no reading is judged by itself: compare it with the paper's once the fitted
-constant is set.
+RMSE "as in the paper" is by its definition: the root mean square of k_t I - m g l over all readings, with the constant
+as it is configured (the paper's is its manufacturer's) and nothing fitted. It is what stands beside the paper's 0.0134
+and 0.0127, printed there as N/m (section III-A). The paper does not tell whether it took off what the arm itself
+weighs; here that is done. "Fitted" is stricter and has no counterpart in the paper: each trial by the constant that the
+other trials gave. Set that constant, repeat the experiment, and the first will be what the second is.
 
-Repeatability is the paper's too: the standard deviation over the trials of a weight relative to their mean, averaged
-over the weights. It gives one number for both joints. The lightest weights make nearly all of it, as the tables by
-weight show."""
+Repeatability is the paper's as we read it: the standard deviation over the trials of a weight, relative to their mean,
+averaged over the weights. The paper gives one number for both joints. The lightest weights make nearly all of it, as
+the tables by weight show."""
 
 SETTING = """\
 The constant stands in two places, and both must say the same. torque_constant_nm_a of [drive.JOINT] in the
@@ -201,7 +201,16 @@ def _with_error(value: float, error: float, digits: int) -> str:
 
 
 def _weight_rows(fit: JointFit) -> Rows:
-    head = ["weight", "trials", "τ_ext, N·m", "τ_sense configured", "fitted", "its error", "spread, N·m", "of τ_sense"]
+    head = [
+        "weight",
+        "trials",
+        "τ_ext, N·m",
+        "τ_sense, configured",
+        "fitted",
+        "error, mN·m",
+        "spread, mN·m",
+        "of τ_sense",
+    ]
     rows = []
     for weight_g in sorted({load.weight_g for load in fit.loads}):
         loads = [load for load in fit.loads if load.weight_g == weight_g]
@@ -210,8 +219,9 @@ def _weight_rows(fit: JointFit) -> Rows:
         fitted_nm = fmean(fit.fitted_nm(load) for load in loads)
         spread_nm = fit.constant_nm_a * stdev(load.current_a for load in loads) if len(loads) > 1 else nan
         torques = (f"{each:.4f}" for each in (external_nm, configured_nm, fitted_nm))
-        spread = [_with_error(spread_nm, nan, 4), _percent(repeatability(loads))]
-        rows.append([f"{weight_g:g} g", str(len(loads)), *torques, f"{fitted_nm - external_nm:+.4f}", *spread])
+        error_mnm = round(1e3 * (fitted_nm - external_nm), 1) + 0.0  # without a minus before zero
+        spread = [_with_error(1e3 * spread_nm, nan, 1), _percent(repeatability(loads))]
+        rows.append([f"{weight_g:g} g", str(len(loads)), *torques, f"{error_mnm:+.1f}", *spread])
     return [head, *rows]
 
 

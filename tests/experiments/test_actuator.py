@@ -191,6 +191,16 @@ def test_only_the_empty_arm_is_swung_and_not_where_something_may_hang(case: Case
     assert "still hanging" in entries[Step(1, 0.0).key]["doubt"]
 
 
+def test_an_arm_that_does_not_swing_costs_its_friction_alone(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    def blocked(held: object) -> list[Loop]:
+        raise MovedError("the empty arm swings by 1.0 degrees only: is something in its way?")
+
+    monkeypatch.setattr(actuator, "swing", blocked)
+    entries = case.run()
+    assert list(entries) == KEYS and not any("loops" in entry for entry in entries.values())
+    assert sum("friction was not measured" in told for told in case.person.told) == PLAN.trials + 1
+
+
 def test_a_skipped_weight_is_noted_and_not_read(case: Case) -> None:
     case.on(Step(1, 200.0), say(SKIP))
     assert case.run()[Step(1, 200.0).key] == {"skipped": "on request"}

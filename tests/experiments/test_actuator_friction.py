@@ -12,7 +12,7 @@ import pytest
 from experiments import actuator_simulation
 from experiments.actuator_friction import FEWEST, Loop, friction_of, loop_of, swing
 from experiments.actuator_plan import Plan
-from experiments.actuator_reading import HeldJoint, Sample
+from experiments.actuator_reading import HeldJoint, MovedError, Sample
 from experiments.actuator_simulation import TRUE_CONSTANT_NM_A, bench_configuration, simulated_bench
 from experiments.bench_robot import arm
 
@@ -51,6 +51,14 @@ def test_a_loop_that_stops_on_its_way_spends_nothing_there() -> None:
     stops = [sample._replace(current_a=0.6) for sample in up[200:201]] * 300
     stopped = loop_of([*up[:201], *stops, *up[200:]], down, quick=False)
     assert stopped.spent_a == pytest.approx(loop_of(up, down, quick=False).spent_a, rel=1e-6)
+
+
+def test_an_arm_that_is_in_the_way_makes_no_loop() -> None:
+    up, down = (made_stroke(direction, 0.5, lambda *_: 0.6) for direction in (1.0, -1.0))
+    with pytest.raises(MovedError, match=r"swings by 0\.0 degrees only: is something in its way"):
+        loop_of(up, up, quick=True)
+    with pytest.raises(MovedError, match=r"swings by -10\.3 degrees"):
+        loop_of(down, up, quick=True)
 
 
 def made_loops(count: int, speed_rad_s: float, quick: bool, noise_a: float, random: Random) -> list[Loop]:
