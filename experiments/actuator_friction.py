@@ -1,8 +1,10 @@
 """Friction of a joint in motion: what the current spends on swinging the empty arm to and fro.
 
-At rest dry friction carries anything up to its largest value, and a joint that comes to rest goes a little too far: its
-spring then pulls less than friction would bear. So it is measured where it is whole, on the way. Over a loop that ends
-where it began, weight, magnets and inertia give back what they took, whatever they are, and the rest is friction's:
+At rest dry friction carries anything up to its largest value, and the held joint comes to rest before that: its spring
+pulls in steps of one count of the encoder (0.4 mrad of 10 N·m/rad are 4 mN·m), and a step sets the arm free, which then
+goes on a little. What a reading at rest tells of friction is therefore too little, of 13 mN·m simulated 11. So friction
+is measured where it is whole, on the way. Over a loop that ends where it began, weight, magnets and inertia give back
+what they took, whatever they are, and the rest is friction's:
 
     k_t ∮ I dθ = c ∮ |dθ| + d ∮ ω dθ         dry c, viscous d
 

@@ -26,6 +26,8 @@ COLOURS = {"adduction": BLUE, "sweep": RED}
 
 def plot_torques(fits: Sequence[JointFit], path: Path) -> None:
     figure, axes = _panels(len(fits))
+    highest_nm = max(fit.configured_nm_a * load.current_a for fit in fits for load in fit.loads)
+    axes[0].set_ylim(-0.05 * highest_nm, 1.3 * highest_nm)  # of all; room for the legend
     for axis, fit in zip(axes, fits, strict=True):
         external_nm, bound_nm = [load.torque_nm for load in fit.loads], paper_rmse_nm(fit.joint)
         whole_nm = [0.0, 1.08 * max(external_nm)]

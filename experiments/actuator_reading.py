@@ -7,7 +7,8 @@ of the angle is measured.
 
 Dry friction carries part of the load, at rest anything from minus to plus its largest value. So the place is
 approached in small steps of one direction only, from below and then from above: the first current holds the load and
-all of the friction, the second the load without it. Their mean is the load, half their difference the friction.
+nearly all of the friction, the second the load without it. Their mean is the load. Half their difference is what
+friction bears at rest, which is less than it may: actuator_friction.py measures it on the way.
 
 A reading is settled when over its whole time the angle stands still and the current does not drift. The samples are
 those of the daemon's status, which is asked a hundred times a second: 100 of them leave 0.01 A of a noise of 0.1 A,

@@ -28,7 +28,7 @@ the load.
 
 The line is current on torque, since the weights are known better than the currents: k_t is one over its slope.
 Friction is what the empty arm's current spends on loops of {swing_deg:.0f} degrees to either side, in which weight,
-magnets and inertia give back what they took. Slow and quick loops tell dry friction from viscous. Half the difference
+magnets and inertia give back what they took. Slow and quick loops tell dry from viscous. Half the difference
 between the two approaches at rest is less ("at rest"): friction of a joint that has stopped need not be borne in full.
 
 ± is one standard error; the true value is within two of them in at least 19 of 20 calibrations. That of k_t is from the
@@ -37,11 +37,11 @@ by at most {weight_percent:g} % (--lever-tolerance, --weight-tolerance). A milli
 {millimetre_percent:.1f} % of k_t. That of the offset holds the tare's scatter, and what friction at rest may hide."""
 
 DEFINITIONS = """\
-RMSE "as in the paper" is by its definition: the root mean square of k_t I - m g l over all readings, with the constant
+RMSE is by the paper's definition: the root mean square of k_t I - m g l over all readings, with the constant
 as it is configured (the paper's is its manufacturer's) and nothing fitted. It is what stands beside the paper's 0.0134
 and 0.0127, printed there as N/m (section III-A). The paper does not tell whether it took off what the arm itself
-weighs; here that is done. "Fitted" is stricter and has no counterpart in the paper: each trial by the constant that the
-other trials gave. Set that constant, repeat the experiment, and the first will be what the second is.
+weighs; here that is done. "RMSE fitted" is stricter and not in the paper: each trial by the constant that the
+other trials gave (a single trial by its own). Set that constant, repeat the experiment, and the first will be what the second is.
 
 Repeatability is the paper's as we read it: the standard deviation over the trials of a weight, relative to their mean,
 averaged over the weights. The paper gives one number for both joints. The lightest weights make nearly all of it, as
@@ -116,15 +116,11 @@ def paper_rmse_nm(joint: str) -> float:
 
 
 def sections_of(plan: Plan, readings: Mapping[str, Mapping[str, Entry]], fits: Sequence[JointFit]) -> list[Section]:
-    torques, errors, friction = _figures(fits)
-    sections = (
-        [
-            Section("Torque constants", DEFINITIONS, rows=table_of(fits), figures=[torques, errors]),
-            Section("Friction", rows=friction_table_of(fits), figures=[friction]),
-        ]
-        if fits
-        else []
-    )
+    sections = []
+    if fits:
+        sections.append(Section("Torque constants", DEFINITIONS, rows=table_of(fits), figures=_figures(fits)))
+        figures = _friction_figures(fits)
+        sections.append(Section("Friction and offset", rows=friction_table_of(fits), figures=figures))
     sections += [Section(f"Weights on {fit.joint}", rows=_weight_rows(fit)) for fit in fits]
     omitted = left_out(plan, readings)
     if omitted:
@@ -149,10 +145,9 @@ def table_of(fits: Sequence[JointFit]) -> Rows:
         "joint",
         "k_t, N·m/A",
         "configured",
-        "RMSE as in the paper, N·m",
-        "fitted, N·m",
+        "RMSE, N·m",
+        "RMSE fitted, N·m",
         "repeatability",
-        "offset, N·m",
         "readings",
     ]
     rows = [
@@ -163,7 +158,6 @@ def table_of(fits: Sequence[JointFit]) -> Rows:
             f"{fit.rmse_configured_nm:.4f}",
             f"{fit.rmse_fitted_nm:.4f}",
             _percent(fit.repeatability),
-            _with_error(fit.offset_nm, fit.offset_error_nm, 4),
             str(fit.line.readings),
         ]
         for fit in fits
@@ -172,17 +166,18 @@ def table_of(fits: Sequence[JointFit]) -> Rows:
         [f"paper, {kind}", "-", f"{PAPER_CONSTANT_NM_A:g}", f"{rmse_nm:.4f}", "-", f"{100 * PAPER_REPEATABILITY:.1f} %"]
         for kind, rmse_nm in PAPER_RMSE_NM.items()
     ]
-    return [head, *rows, *([*row, "-", "-"] for row in paper)]
+    return [head, *rows, *([*row, "-"] for row in paper)]
 
 
 def friction_table_of(fits: Sequence[JointFit]) -> Rows:
-    head = ["joint", "dry friction, N·m", "viscous, N·m·s", "at rest at least, N·m", "empty arm, N·m"]
+    head = ["joint", "dry friction, N·m", "viscous, N·m·s", "at rest at least", "offset, N·m", "empty arm, N·m"]
     rows = [
         [
             fit.joint,
             _with_error(*fit.friction_nm, 4),
             _with_error(*fit.viscous_nm_s, 4),
             f"{fit.rest_friction_a * fit.constant_nm_a:.4f}",
+            _with_error(fit.offset_nm, fit.offset_error_nm, 4),
             _with_error(fit.tare_nm, fit.tare_spread_nm, 4),
         ]
         for fit in fits
@@ -226,7 +221,7 @@ def _weight_rows(fit: JointFit) -> Rows:
 
 
 def _figures(fits: Sequence[JointFit]) -> list[Figure]:
-    from experiments.actuator_plots import plot_errors, plot_friction, plot_torques  # matplotlib takes its time
+    from experiments.actuator_plots import plot_errors, plot_torques  # matplotlib takes its time
 
     return [
         Figure(
@@ -241,6 +236,16 @@ def _figures(fits: Sequence[JointFit]) -> list[Figure]:
             " mean of the trials. Grey band: the paper's RMSE, which is that of its configured constant.",
             partial(plot_errors, fits),
         ),
+    ]
+
+
+def _friction_figures(fits: Sequence[JointFit]) -> list[Figure]:
+    """None of readings without loops."""
+    if not all(fit.loops for fit in fits):
+        return []
+    from experiments.actuator_plots import plot_friction  # matplotlib takes its time
+
+    return [
         Figure(
             "friction",
             "Torque that the empty arm takes on loops at two speeds, beyond what weight, magnets and inertia give back:"
