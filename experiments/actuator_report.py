@@ -28,8 +28,8 @@ the load.
 
 The line is current on torque, since the weights are known better than the currents: k_t is one over its slope.
 Friction is what the empty arm's current spends on loops of {swing_deg:.0f} degrees to either side, in which weight,
-magnets and inertia give back what they took. Slow and quick loops tell dry from viscous. Half the difference
-between the two approaches at rest is less ("at rest"): friction of a joint that has stopped need not be borne in full.
+magnets and inertia give back what they took. Slow and quick loops tell dry from viscous. Half the difference between
+the two approaches at rest is less ("at rest"): a joint that is held comes to rest before friction bears all it can.
 
 ± is one standard error; the true value is within two of them in at least 19 of 20 calibrations. That of k_t is from the
 scatter of the readings and from what errs alike in all of them: the lever, by at most {lever_mm:g} mm, and the weights,
@@ -37,11 +37,11 @@ by at most {weight_percent:g} % (--lever-tolerance, --weight-tolerance). A milli
 {millimetre_percent:.1f} % of k_t. That of the offset holds the tare's scatter, and what friction at rest may hide."""
 
 DEFINITIONS = """\
-RMSE is by the paper's definition: the root mean square of k_t I - m g l over all readings, with the constant
-as it is configured (the paper's is its manufacturer's) and nothing fitted. It is what stands beside the paper's 0.0134
-and 0.0127, printed there as N/m (section III-A). The paper does not tell whether it took off what the arm itself
-weighs; here that is done. "RMSE fitted" is stricter and not in the paper: each trial by the constant that the
-other trials gave (a single trial by its own). Set that constant, repeat the experiment, and the first will be what the second is.
+RMSE is by the paper's definition: the root mean square of k_t I - m g l over all readings, with the constant as it is
+configured (the paper's is its manufacturer's) and nothing fitted. It is what stands beside the paper's 0.0134 and
+0.0127, printed there as N/m (section III-A). The paper does not tell whether it took off what the arm itself weighs;
+here that is done. "RMSE fitted" is stricter and not in the paper: each trial by the constant that the other trials
+gave (a single trial by its own). Set that constant, repeat the experiment, and the first will be what the second is.
 
 Repeatability is the paper's as we read it: the standard deviation over the trials of a weight, relative to their mean,
 averaged over the weights. The paper gives one number for both joints. The lightest weights make nearly all of it, as
