@@ -31,7 +31,7 @@ Friction is what the empty arm's current spends on loops of {swing_deg:.0f} degr
 magnets and inertia give back what they took. Slow and quick loops tell dry from viscous. Half the difference between
 the two approaches at rest is less ("at rest"): a joint that is held comes to rest before friction bears all it can.
 
-± is one standard error; the true value is within two of them in at least 19 of 20 calibrations. That of k_t is from the
+± is one standard error; the true value is within two of them in about 19 of 20 calibrations. That of k_t is from the
 scatter of the readings and from what errs alike in all of them: the lever, by at most {lever_mm:g} mm, and the weights,
 by at most {weight_percent:g} % (--lever-tolerance, --weight-tolerance). A millimetre of {lever_cm:g} cm is
 {millimetre_percent:.1f} % of k_t. That of the offset holds the tare's scatter, and what friction at rest may hide."""
