@@ -15,7 +15,7 @@ from control.joint_pd import GRAVITY_M_S2
 from experiments.actuator_bench import ActuatorBench, RobotBench, SimulatedBench
 from experiments.actuator_fit import JointFit, fit_joint
 from experiments.actuator_plan import PAPER_WEIGHTS_G, Plan
-from experiments.actuator_report import TITLE, left_out, report_of, sections_of, table_of
+from experiments.actuator_report import TITLE, friction_table_of, left_out, report_of, sections_of, table_of
 from experiments.actuator_simulation import bench_configuration
 from experiments.bench_robot import BenchError
 from experiments.configuration_change import changed_text, difference, replace_file
@@ -49,7 +49,8 @@ def _calibrate(options: argparse.Namespace, desk: Desk) -> Finding:
     ]
     applied = _applied(target, fits, desk) if target else ""
     omitted = len(left_out(plan, readings))
-    text = "\n".join([table(table_of(fits)), *_remarks(plan.joints, fits, omitted), *([applied] if applied else [])])
+    tables = [table(rows) for rows in (table_of(fits), friction_table_of(fits))]
+    text = "\n".join([*tables, *_remarks(plan.joints, fits, omitted), *([applied] if applied else [])])
     report = report_of(plan, readings, fits) | {"applied": applied or None}
     return Finding(report, TITLE, sections_of(plan, readings, fits), text, logs)
 
@@ -68,6 +69,8 @@ def _plan(options: argparse.Namespace, configuration: Configuration) -> Plan:
         options.trials,
         options.lever_m or configuration.geometry.flipper_length_m,
         options.gravity or GRAVITY_M_S2,
+        options.lever_tolerance_mm / 1000.0,
+        options.weight_tolerance_percent / 100.0,
     )
 
 
@@ -111,7 +114,7 @@ def _apply(path: Path, fits: Sequence[JointFit], desk: Desk) -> str:
     changes = {key: value for fit in fits for key, value in changes_of(fit).items()}
     for fit in fits:
         if not changes_of(fit):
-            doubt = 100.0 * fit.line.constant_error_nm_a / fit.line.constant_nm_a
+            doubt = 100.0 * fit.constant_error_nm_a / fit.constant_nm_a
             desk.person.tell(f"{fit.joint}: k_t is known to {doubt:.1f} % only, and is not written.")
     after = changed_text(before, changes)
     if after == before:
@@ -128,12 +131,13 @@ def _apply(path: Path, fits: Sequence[JointFit], desk: Desk) -> str:
 
 def changes_of(fit: JointFit) -> dict[tuple[str, ...], float]:
     """Of the configuration's keys; nothing where the constant is too doubtful."""
-    constant_nm_a, error_nm_a = fit.line.constant_nm_a, fit.line.constant_error_nm_a
+    constant_nm_a, error_nm_a = fit.constant_nm_a, fit.constant_error_nm_a
     if not 0.0 < error_nm_a <= LARGEST_DOUBT * constant_nm_a:
         return {}
     changes: dict[tuple[str, ...], float] = {
         ("drive", fit.joint, "torque_constant_nm_a"): round(constant_nm_a, 5),
     }
-    if fit.friction_nm > 2.0 * fit.friction_error_nm:  # never of what was not measured
-        changes["friction", fit.joint, "coulomb_nm"] = round(fit.friction_nm, 4)
+    for name, (value, error) in (("coulomb_nm", fit.friction_nm), ("viscous_nm_s", fit.viscous_nm_s)):
+        if value > 2.0 * error:  # never of what was not measured
+            changes["friction", fit.joint, name] = round(value, 4)
     return changes

@@ -60,7 +60,23 @@ def _add_actuator(names: Commands) -> None:
     actuator.add_argument(
         "--lever", type=lever_m, metavar="CM", dest="lever_m", help="axle to weight (default: the flipper's length)"
     )
+    actuator.add_argument(
+        "--lever-tolerance",
+        type=between(0.0, 50.0, "mm"),
+        default=1.0,
+        metavar="MM",
+        dest="lever_tolerance_mm",
+        help="by which it may be wrong (default: %(default)g)",
+    )
     actuator.add_argument("--weights", type=weights_g, metavar="G,G,...", help="in grams (default: the paper's)")
+    actuator.add_argument(
+        "--weight-tolerance",
+        type=between(0.0, 10.0, "%"),
+        default=0.1,
+        metavar="PERCENT",
+        dest="weight_tolerance_percent",
+        help="by which they may be wrong (default: %(default)g)",
+    )
     actuator.add_argument("--trials", type=TRIALS, default=5, metavar="N", help="passes through them (default: 5)")
     actuator.add_argument("--gravity", type=GRAVITY_M_S2, metavar="M/S2", help="of this place (default: 9.81)")
     actuator.add_argument(

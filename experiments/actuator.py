@@ -8,13 +8,14 @@ warm as it is, the empty arm waits; and where it gets warm while a weight hangs,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import degrees
 from typing import Any
 
 from experiments.actuator_doubt import Doubt, doubt_of
 from experiments.actuator_fit import current_per_nm
+from experiments.actuator_friction import Loop, swing
 from experiments.actuator_hand import Hand
 from experiments.actuator_plan import COOL_K, READING_S, Plan, Step, largest_current_a, stays_cool, steps_of
 from experiments.actuator_reading import HeldJoint, MovedError, Reading, WarmError
@@ -175,10 +176,12 @@ class Calibration:
         if reading is None:
             return
         doubt = doubt_of(self._plan, self._notebook.entries, step, reading.current_a, self._constant_nm_a)
-        if doubt is None:
+        if doubt is not None:
+            self._ask_about(doubt, step, reading)
+        elif step.weight_g:
             self._keep(step, reading)
         else:
-            self._ask_about(doubt, step, reading)
+            self._keep(step, reading, loops=self._swung())
 
     def _settled(self, step: Step) -> Reading | None:
         """None where it is left out."""
@@ -196,6 +199,15 @@ class Calibration:
         self._notebook.write(step.key, {"skipped": trouble})
         self._person.tell(f"{_named(step)} of trial {step.trial} is left out: {trouble}.")
         return None
+
+    def _swung(self) -> Sequence[Loop]:
+        """None where it does not swing freely, which costs friction alone."""
+        assert self._held is not None
+        try:
+            return swing(self._held)
+        except MovedError as problem:
+            self._person.tell(f"friction was not measured this time: {problem}")
+            return ()
 
     def _ask_about(self, doubt: Doubt, step: Step, reading: Reading) -> None:
         """Whoever only ever goes on does not go on for ever: it is kept as doubtful then."""
@@ -215,8 +227,8 @@ class Calibration:
         else:
             self._keep(step, reading)
 
-    def _keep(self, step: Step, reading: Reading, doubt: str = "") -> None:
-        self._notebook.write(step.key, entry_of(reading, doubt))
+    def _keep(self, step: Step, reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> None:
+        self._notebook.write(step.key, entry_of(reading, doubt, loops))
         held_nm = self._constant_nm_a * reading.current_a
         self._person.tell(
             f"{self._joint}, trial {step.trial}, {_named(step)}: {reading.current_a:+.3f} A, {held_nm:+.4f} N·m by the"
@@ -224,17 +236,18 @@ class Calibration:
         )
 
 
-def entry_of(reading: Reading, doubt: str = "") -> dict[str, Any]:
-    """As the notebook keeps it."""
+def entry_of(reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> dict[str, Any]:
+    """As the notebook keeps it; loops are those of the empty arm."""
     entry = {
         "current_a": reading.current_a,
-        "friction_a": reading.friction_a,
+        "rest_friction_a": reading.rest_friction_a,
         "angle_rad": reading.angle_rad,
         "winding_c": reading.winding_c,
         "at_s": reading.at_s,
         "below": reading.below._asdict(),
         "above": reading.above._asdict(),
     }
+    entry |= {"loops": [loop._asdict() for loop in loops]} if loops else {}
     return entry | ({"doubt": doubt} if doubt else {})
 
 

@@ -23,6 +23,7 @@ from experiments.person import GO_ON, Person, Willing
 from experiments.side_by_side import side_by_side
 from firmware_host.configuration import Configuration, parse_configuration
 
+REVISABLE = ("joints", "lever_tolerance_m", "weight_tolerance")
 Readings = Mapping[str, Mapping[str, Entry]]  # by joint and step
 
 
@@ -122,8 +123,8 @@ def _new_log(folder: Path, joint: str) -> Path:
 
 
 def notes_of(plan: Plan, joint: str) -> dict[str, Any]:
-    """What must be the same when a joint goes on: the other joints need not be."""
-    return {name: value for name, value in asdict(plan).items() if name != "joints"} | {"joint": joint}
+    """What must be the same when a joint goes on: the other joints, and how true the bench is, need not be."""
+    return {name: value for name, value in asdict(plan).items() if name not in REVISABLE} | {"joint": joint}
 
 
 def _unheard(sentence: str) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from math import inf, log
 from typing import Any, NamedTuple
 
-from experiments.actuator_fit import can_fit, direction_of, fit_line, raw_loads, tare_of
+from experiments.actuator_fit import can_fit, direction_of, line_of, raw_loads, tare_of
 from experiments.actuator_plan import Plan, Step
 
 TELLING_NM = 0.05  # what lighter loads say of a constant is friction
@@ -36,7 +36,7 @@ def doubt_of(
     telling = [load for load in raw_loads(plan, entries) if load.torque_nm >= TELLING_NM and not load.doubtful]
     sign = -direction_of(telling) if telling else (1 if current_a >= tare_a else -1)
     fitted = can_fit(telling)
-    constant_nm_a = abs(fit_line(telling).constant_nm_a) if fitted else configured_nm_a
+    constant_nm_a = abs(line_of(telling).constant_nm_a) if fitted else configured_nm_a
     held_g = 1000.0 * sign * (current_a - tare_a) * constant_nm_a / (plan.gravity_m_s2 * plan.lever_m)
     share = FITTED_SHARE if fitted else CONFIGURED_SHARE
     if plan.torque_nm(abs(held_g - step.weight_g)) <= FRICTION_NM + share * plan.torque_nm(step.weight_g):

@@ -6,10 +6,17 @@ On a robot that is a person, who is asked; actuator_simulation.py has the one th
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import degrees
 from typing import Protocol
 
+from experiments.actuator_friction import SWING_RAD
 from experiments.actuator_plan import PERSON_S, Plan, Step
 from experiments.person import GO_ON, REDO, SKIP, Person
+
+EMPTY = (
+    "take everything off the flipper, and let it rest. Keep clear of it: after its reading it swings to and fro by"
+    f" {degrees(SWING_RAD):.0f} degrees for a quarter of a minute."
+)
 
 
 class Hand(Protocol):
@@ -54,7 +61,7 @@ class PersonsHand:
     def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
         trial = f"Trial {max(step.trial, 1)} of {self._plan.trials}"
         what = f"hang {step.weight_g:g} g at {100.0 * self._plan.lever_m:g} cm from the axle, nothing else"
-        question = f"{trial}: {what if step.weight_g else 'take everything off the flipper'}, and let it rest."
+        question = f"{trial}: {what}, and let it rest." if step.weight_g else f"{trial}: {EMPTY}"
         answers = {GO_ON: "it rests", SKIP: "skip it", REDO: "redo the one before"}
         return self._person.ask(question, answers, meanwhile)
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from math import nan
+from math import hypot, nan, sqrt
 from typing import Any
 
 from control.joint_pd import GRAVITY_M_S2
@@ -42,6 +42,13 @@ class Plan:
     trials: int = PAPER_TRIALS
     lever_m: float = 0.12
     gravity_m_s2: float = GRAVITY_M_S2
+    lever_tolerance_m: float = 0.001  # from an axle that is not seen to a hook, by a ruler
+    weight_tolerance: float = 0.001  # of class M3 (OIML R 111) from 50 g on; kitchen weights may err ten times as much
+
+    @property
+    def torque_error(self) -> float:
+        """Standard error of all torques alike, as a share of them: anything within a tolerance is as likely."""
+        return hypot(self.lever_tolerance_m / self.lever_m, self.weight_tolerance) / sqrt(3.0)
 
     def torque_nm(self, weight_g: float) -> float:
         """Of the weight on a level arm."""

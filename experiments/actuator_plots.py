@@ -1,8 +1,12 @@
-"""Figures of the actuator calibration: sensed against external torque, and errors by weight. Readable in print."""
+"""Figures of the actuator calibration: sensed against external torque, errors by weight, friction by speed.
+
+In black and white, joints differ by their markers, and configured from fitted; what is the paper's is grey.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -12,7 +16,8 @@ from matplotlib.figure import Figure
 from experiments.actuator_fit import JointFit
 from experiments.actuator_report import paper_rmse_nm
 
-HEIGHT_IN, WIDTH_IN = 4.2, 4.6
+HEIGHT_IN, WIDTH_IN, DPI = 3.4, 3.6, 200  # two beside each other fill the width of a printed page
+SENSED, EXTERNAL = r"$\tau_\mathrm{sense}$", r"$\tau_\mathrm{ext}$"
 GREY, LIGHT_GREY = "0.45", "0.85"
 BLUE, RED = "#1f5fa8", "#b5322c"
 MARKERS = {"adduction": "o", "sweep": "D"}  # the paper's circles and diamonds
@@ -21,58 +26,100 @@ COLOURS = {"adduction": BLUE, "sweep": RED}
 
 def plot_torques(fits: Sequence[JointFit], path: Path) -> None:
     figure, axes = _panels(len(fits))
+    highest_nm = max(fit.configured_nm_a * load.current_a for fit in fits for load in fit.loads)
+    axes[0].set_ylim(-0.05 * highest_nm, 1.3 * highest_nm)  # of all; room for the legend
     for axis, fit in zip(axes, fits, strict=True):
-        kind = fit.joint.split("_")[1]
-        external_nm = [load.torque_nm for load in fit.loads]
-        largest_nm = 1.08 * max(external_nm)
-        axis.plot([0.0, largest_nm], [0.0, largest_nm], color=GREY, linewidth=1.2, label="equal", zorder=1)
+        external_nm, bound_nm = [load.torque_nm for load in fit.loads], paper_rmse_nm(fit.joint)
+        whole_nm = [0.0, 1.08 * max(external_nm)]
+        label = f"equal ± {bound_nm:g} N·m, the paper's RMSE"
+        around = [each - bound_nm for each in whole_nm], [each + bound_nm for each in whole_nm]
+        axis.fill_between(whole_nm, *around, color=LIGHT_GREY, linewidth=0.0, zorder=0)
+        axis.plot(whole_nm, whole_nm, color=GREY, linewidth=1.2, label=label, zorder=1)
         configured_nm = [fit.configured_nm_a * load.current_a for load in fit.loads]
-        label = f"configured, {fit.configured_nm_a:g} N·m/A"
+        label = f"configured: {fit.configured_nm_a:g} N·m/A"
         axis.plot(external_nm, configured_nm, "x", color="black", markersize=5, label=label, zorder=2)
-        label = f"fitted, {fit.line.constant_nm_a:.4f} ± {fit.line.constant_error_nm_a:.4f} N·m/A"
+        label = f"fitted: {fit.constant_nm_a:.4f} ± {fit.constant_error_nm_a:.4f} N·m/A"
         fitted_nm = [fit.fitted_nm(load) for load in fit.loads]
-        style = {"color": COLOURS[kind], "markersize": 6, "markerfacecolor": "none", "markeredgewidth": 1.2}
-        axis.plot(external_nm, fitted_nm, MARKERS[kind], label=label, zorder=3, linestyle="none", **style)
-        axis.set_title(fit.joint.replace("_", " "), fontsize=11)
-        axis.set_xlabel("external torque τ_ext, N·m")
-        axis.legend(frameon=False, fontsize=8, loc="upper left")
-    axes[0].set_ylabel("sensed torque τ_sense, N·m")
-    figure.savefig(path, dpi=160)
+        axis.plot(external_nm, fitted_nm, label=label, zorder=3, **_style(fit))
+        axis.set_title(_titled(fit))
+        axis.set_xlabel(f"external torque {EXTERNAL}, N·m")
+        axis.legend(loc="upper left", frameon=False, fontsize=8)
+    axes[0].set_ylabel(f"sensed torque {SENSED}, N·m")
+    figure.savefig(path, dpi=DPI)
 
 
 def plot_errors(fits: Sequence[JointFit], path: Path) -> None:
     figure, axes = _panels(len(fits))
+    highest_mnm = 1e3 * max(max(paper_rmse_nm(fit.joint), *map(abs, _errors_nm(fit))) for fit in fits)
+    axes[0].set_ylim(-1.15 * highest_mnm, 1.75 * highest_mnm)  # of all; room for the legend
     for axis, fit in zip(axes, fits, strict=True):
-        kind, bound_nm = fit.joint.split("_")[1], paper_rmse_nm(fit.joint)
+        bound_mnm = 1e3 * paper_rmse_nm(fit.joint)
         weights_g = sorted({load.weight_g for load in fit.loads})
-        label = f"paper's RMSE, ±{bound_nm:g} N·m"
-        axis.axhspan(-1e3 * bound_nm, 1e3 * bound_nm, color=LIGHT_GREY, zorder=0, label=label)
+        label = f"paper's RMSE, ±{bound_mnm:g} mN·m"
+        axis.axhspan(-bound_mnm, bound_mnm, color=LIGHT_GREY, linewidth=0.0, zorder=0, label=label)
         axis.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
         for place, weight_g in enumerate(weights_g):
-            errors_mnm = [
-                1e3 * (fit.fitted_nm(load) - load.torque_nm) for load in fit.loads if load.weight_g == weight_g
-            ]
-            mean_mnm = fmean(errors_mnm)
-            mean_label = "their mean" if place == len(weights_g) - 1 else None
-            axis.plot([place - 0.28, place + 0.28], [mean_mnm] * 2, color="black", linewidth=1.8, label=mean_label)
-            axis.plot(
-                [place] * len(errors_mnm),
-                errors_mnm,
-                MARKERS[kind],
-                color=COLOURS[kind],
-                markersize=5,
-                markerfacecolor="none",
-                zorder=2,
-                label="a trial" if place == 0 else None,
-            )
+            _plot_weight(axis, fit, place, weight_g, last=place == len(weights_g) - 1)
         axis.set_xticks(range(len(weights_g)), [f"{weight_g:g}" for weight_g in weights_g])
-        axis.set_title(f"{fit.joint.replace('_', ' ')}: RMSE {1e3 * fit.rmse_fitted_nm:.1f} mN·m", fontsize=11)
+        axis.set_title(f"{_titled(fit)}: RMSE {1e3 * fit.rmse_fitted_nm:.1f} mN·m")
         axis.set_xlabel("weight, g")
-        axis.legend(frameon=False, fontsize=8, loc="upper left")
-        highest_mnm = max(1e3 * bound_nm, *(abs(value) for value in axis.get_ylim()))
-        axis.set_ylim(-1.15 * highest_mnm, 1.45 * highest_mnm)  # room for the legend
-    axes[0].set_ylabel("τ_sense - τ_ext, mN·m")
-    figure.savefig(path, dpi=160)
+        axis.legend(loc="upper left", frameon=False, fontsize=8)
+    axes[0].set_ylabel(f"{SENSED} $-$ {EXTERNAL}, mN·m")
+    figure.savefig(path, dpi=DPI)
+
+
+def _plot_weight(axis: Any, fit: JointFit, place: int, weight_g: float, last: bool) -> None:
+    errors = zip(fit.loads, _errors_nm(fit), strict=True)
+    errors_mnm = [1e3 * error_nm for load, error_nm in errors if load.weight_g == weight_g]
+    label = "their mean" if last else None
+    axis.plot([place - 0.28, place + 0.28], [fmean(errors_mnm)] * 2, color="black", linewidth=1.8, label=label)
+    label = None if place else "a trial, fitted constant"
+    axis.plot([place] * len(errors_mnm), errors_mnm, zorder=2, label=label, **_style(fit))
+
+
+def _errors_nm(fit: JointFit) -> list[float]:
+    return [fit.fitted_nm(load) - load.torque_nm for load in fit.loads]
+
+
+def plot_friction(fits: Sequence[JointFit], path: Path) -> None:
+    figure, axes = _panels(len(fits))
+    highest_mnm = 1e3 * max(fit.constant_nm_a * max([fit.rest_friction_a, *_spent_a(fit)]) for fit in fits)
+    axes[0].set_ylim(0.0, 1.5 * highest_mnm)  # of all; room for the legend
+    for axis, fit in zip(axes, fits, strict=True):
+        (dry_nm, dry_error_nm), (viscous_nm_s, viscous_error_nm_s) = fit.friction_nm, fit.viscous_nm_s
+        speeds_rad_s = [loop.speed_rad_s for loop in fit.loops]
+        spent_mnm = [1e3 * fit.constant_nm_a * spent_a for spent_a in _spent_a(fit)]
+        rest_mnm = 1e3 * fit.constant_nm_a * fit.rest_friction_a
+        axis.axhline(rest_mnm, color="black", linestyle=":", linewidth=1.2, label=f"at rest: {rest_mnm:.1f} mN·m")
+        axis.plot(speeds_rad_s, spent_mnm, label="a loop", **_style(fit))
+        if isfinite(dry_nm):
+            whole_rad_s = [0.0, 1.1 * max(speeds_rad_s)]
+            slope_nm_s = viscous_nm_s if isfinite(viscous_nm_s) else 0.0
+            label = f"dry {1e3 * dry_nm:.1f} ± {1e3 * dry_error_nm:.1f} mN·m"
+            if isfinite(viscous_nm_s):
+                label += f",\nviscous {1e3 * viscous_nm_s:.1f} ± {1e3 * viscous_error_nm_s:.1f} mN·m·s"
+            line_mnm = [1e3 * (dry_nm + slope_nm_s * speed_rad_s) for speed_rad_s in whole_rad_s]
+            axis.plot(whole_rad_s, line_mnm, color="black", linewidth=1.5, label=label)
+        axis.set_title(_titled(fit))
+        axis.set_xlabel("speed, rad/s")
+        axis.set_xlim(left=0.0)
+        axis.legend(loc="upper left", frameon=False, fontsize=8)
+    axes[0].set_ylabel("torque spent, mN·m")
+    figure.savefig(path, dpi=DPI)
+
+
+def _spent_a(fit: JointFit) -> list[float]:
+    return [loop.spent_a for loop in fit.loops]
+
+
+def _titled(fit: JointFit) -> str:
+    return fit.joint.replace("_", " ")
+
+
+def _style(fit: JointFit) -> dict[str, Any]:
+    kind = fit.joint.split("_")[1]
+    look = {"markersize": 6, "markerfacecolor": "none", "markeredgewidth": 1.2, "linestyle": "none"}
+    return look | {"marker": MARKERS[kind], "color": COLOURS[kind]}
 
 
 def _panels(count: int) -> tuple[Figure, Sequence[Any]]:

@@ -7,7 +7,8 @@ of the angle is measured.
 
 Dry friction carries part of the load, at rest anything from minus to plus its largest value. So the place is
 approached in small steps of one direction only, from below and then from above: the first current holds the load and
-all of the friction, the second the load without it. Their mean is the load, half their difference the friction.
+nearly all of the friction, the second the load without it. Their mean is the load. Half their difference is what
+friction bears at rest, which is less than it may: actuator_friction.py measures it on the way.
 
 A reading is settled when over its whole time the angle stands still and the current does not drift. The samples are
 those of the daemon's status, which is asked a hundred times a second: 100 of them leave 0.01 A of a noise of 0.1 A,
@@ -16,12 +17,13 @@ a twentieth of what the best weight is worth. The log keeps every row for whoeve
 
 from __future__ import annotations
 
-from math import degrees, radians, sqrt
+from collections.abc import Iterator
+from math import ceil, degrees, radians, sqrt
 from statistics import fmean, pstdev
 from typing import Any, NamedTuple
 
 from control.records import JOINTS
-from experiments.bench_robot import BenchRobot, move, require_hold
+from experiments.bench_robot import BenchError, BenchRobot, move, require_hold
 
 OFF_RAD = radians(1.0)  # to the side, before an approach
 STEP_RAD = radians(0.6)  # at most at once: a hanging weight must not be thrown about
@@ -80,8 +82,8 @@ class Reading(NamedTuple):
         return (self.below.current_a + self.above.current_a) / 2.0
 
     @property
-    def friction_a(self) -> float:
-        """Half of what the direction of the approach makes, positive for a friction that resists."""
+    def rest_friction_a(self) -> float:
+        """Half of what the direction of the approach makes: what friction bears at rest, and it may bear more."""
         return (self.below.current_a - self.above.current_a) / 2.0
 
 
@@ -105,12 +107,27 @@ class HeldJoint:
         return Reading(last.now_s, below, above, last.winding_c)
 
     def sample(self) -> Sample:
-        status: dict[str, Any] = self._robot.call("status")
+        return self._sample_of(self._robot.call("status"))
+
+    def _sample_of(self, status: dict[str, Any]) -> Sample:
         require_hold(status)
         drive = status["drives"][self._place]
         if drive["winding_c"] >= self._warm_c:
             raise WarmError(f"the {self._joint} winding has {drive['winding_c']:.0f} degrees C")
         return Sample(status["now_s"], drive["angle_rad"], drive["current_a"], drive["winding_c"])
+
+    def stroke(self, angle_rad: float, step_rad: float) -> list[Sample]:
+        """What is seen on the way to there, in moves of at most this size, until it has come to rest."""
+        samples = []
+        for next_rad in _way_rad(self.held_rad, angle_rad, step_rad):
+            self._robot.call("move", **{f"{self._joint}_rad": next_rad})
+            self.held_rad = next_rad
+            while (status := self._robot.call("status"))["moving"]:
+                samples.append(self._sample_of(status))
+                self._robot.wait(SAMPLE_S)
+            if status["notice"]:
+                raise BenchError(status["notice"])
+        return samples + self._window(QUIET_S)
 
     def _from(self, direction: float) -> Side:
         self._go_off(direction)
@@ -148,16 +165,14 @@ class HeldJoint:
         """In steps that do not throw the weight about."""
         if abs(angle_rad) > HIGHEST_RAD:
             raise MovedError("the motor does not bring the arm level: does too much hang on it, or is it in the way")
-        steps = max(1, round(abs(angle_rad - self.held_rad) / STEP_RAD + 0.5))
-        start_rad = self.held_rad
-        for step in range(1, steps + 1):
-            self.held_rad = start_rad + (angle_rad - start_rad) * step / steps
-            move(self._robot, {self._joint: self.held_rad})
+        for next_rad in _way_rad(self.held_rad, angle_rad, STEP_RAD):
+            self.held_rad = next_rad
+            move(self._robot, {self._joint: next_rad})
 
     def _settled(self) -> Side:
         trouble = ""
         for _ in range(MOST_WINDOWS):
-            samples = self._window()
+            samples = self._window(WINDOW_S)
             trouble = unrest(samples)
             if not trouble:
                 currents_a = [sample.current_a for sample in samples]
@@ -165,12 +180,19 @@ class HeldJoint:
                 return Side(angle_rad, fmean(currents_a), pstdev(currents_a), self.held_rad)
         raise MovedError(trouble)
 
-    def _window(self) -> list[Sample]:
+    def _window(self, duration_s: float) -> list[Sample]:
         samples = [self.sample()]
-        while samples[-1].now_s < samples[0].now_s + WINDOW_S:
+        while samples[-1].now_s < samples[0].now_s + duration_s:
             self._robot.wait(SAMPLE_S)
             samples.append(self.sample())
         return samples
+
+
+def _way_rad(start_rad: float, end_rad: float, step_rad: float) -> Iterator[float]:
+    """In equal steps of at most this size; at least one."""
+    steps = max(1, ceil(abs(end_rad - start_rad) / step_rad))
+    for step in range(1, steps + 1):
+        yield start_rad + (end_rad - start_rad) * step / steps
 
 
 def unrest(samples: list[Sample]) -> str:

@@ -21,8 +21,9 @@ from command_line.main import main
 from experiments.actuator import Show
 from experiments.actuator_bench import Readings
 from experiments.actuator_fit import fit_joint
+from experiments.actuator_friction import QUICK, SLOW
 from experiments.actuator_plan import Plan
-from experiments.actuator_simulation import TRUE_CONSTANT_NM_A
+from experiments.actuator_simulation import COULOMB_NM, TRUE_CONSTANT_NM_A
 from experiments.bench_robot import BenchError
 from experiments.notebook import Notebook
 from experiments.person import Person, Willing
@@ -30,7 +31,17 @@ from firmware_host.configuration import load_configuration, parse_configuration
 from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
 from tests.experiments.test_actuator_fit import made_entries
 
-SHORT = ("experiment", "actuator", "--simulated", "--joint", "right_sweep", "--weights", "100,400,600", "--trials", "1")
+SHORT = (
+    "experiment",
+    "actuator",
+    "--simulated",
+    "--joint",
+    "right_sweep",
+    "--weights",
+    "50,100,200,400,600",
+    "--trials",
+    "1",
+)
 
 
 def test_one_command_calibrates_a_motor_and_changes_a_copy_of_the_configuration(
@@ -51,8 +62,15 @@ def test_one_command_calibrates_a_motor_and_changes_a_copy_of_the_configuration(
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "What to set where" in page and "data:image/png;base64" in page
 
-    assert main([*SHORT, "--out", str(tmp_path)]) == exit_codes.OK  # goes on behind what was read: nothing is left
+    assert joint["torque_constant_error_nm_a"] > joint["torque_constant_tolerance_nm_a"] > 0.0
+    assert abs(joint["friction_nm"] - COULOMB_NM) < 3.0 * joint["friction_error_nm"]
+
+    coarse = [*SHORT, "--out", str(tmp_path), "--lever-tolerance", "10"]
+    assert main(coarse) == exit_codes.OK  # goes on behind what was read: nothing is left, and the doubt is another
     assert "right_sweep" in capsys.readouterr().out
+    (doubtful,) = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["joints"]
+    assert doubtful["torque_constant_tolerance_nm_a"] == pytest.approx(0.048 * TRUE_CONSTANT_NM_A, rel=0.02)
+    assert doubtful["friction_error_nm"] > joint["friction_error_nm"]
     assert main([*SHORT, "--out", str(tmp_path), "--lever", "10"]) == exit_codes.REFUSED
     assert "lever_m = 0.12" in capsys.readouterr().err
 
@@ -84,11 +102,12 @@ def test_without_a_daemon_it_is_told_how_to_start_one(tmp_path: Path, capsys: py
 def test_a_person_at_a_terminal_is_asked_and_may_skip(bench: Bench, tmp_path: Path) -> None:  # noqa: F811
     """In real time, with a daemon, whose simulated robot nobody can hang a weight on: all but the empty arm is left."""
     command = ["experiment", "actuator", "--joint", "right_adduction", "--weights", "10,20", "--trials", "1"]
-    answers = {"hang 10 g": "s", "hang 20 g": "s"}
+    answers = [("take everything off", ""), ("hang 10 g", "s"), ("hang 20 g", "s"), ("take everything off", "s")]
     shown = run_at_terminal(bench, [*command, "--out", str(tmp_path)], answers)
     entries = Notebook(tmp_path / "right_adduction", read_plan(tmp_path / "right_adduction")).entries
     assert entries["trial 1, 10 g"] == {"skipped": "on request"}, shown
     assert abs(entries["trial 0, 0 g"]["angle_rad"]) < 0.01
+    assert [loop["quick"] for loop in entries["trial 0, 0 g"]["loops"]] == [False] * SLOW + [True] * QUICK
     assert "Trial 1 of 1: hang 20 g at 12 cm from the axle, nothing else" in shown
     assert bench.wait_for(lambda status: bool(status["mode"] == "idle"))
 
@@ -100,8 +119,8 @@ def read_plan(folder: Path) -> dict[str, object]:
     return plan
 
 
-def run_at_terminal(bench: Bench, command: list[str], answers: dict[str, str]) -> str:  # noqa: F811
-    """What was shown. Each question is answered by the first of `answers` that it holds."""
+def run_at_terminal(bench: Bench, command: list[str], answers: list[tuple[str, str]]) -> str:  # noqa: F811
+    """What was shown. Each question is answered by the first of `answers` that it holds, once."""
     person, terminal = pty.openpty()
     environment = os.environ | {"MUDSKIPPER_SOCKET": str(bench.socket)}
     process = subprocess.Popen(
@@ -120,8 +139,8 @@ def run_at_terminal(bench: Bench, command: list[str], answers: dict[str, str]) -
             chunk = os.read(person, 4096).decode(errors="replace")
             shown, fresh = shown + chunk, fresh + chunk
             if fresh.rstrip(" ").endswith("]"):
-                asked = [answer for part, answer in answers.items() if part in fresh]
-                os.write(person, f"{asked[0] if asked else ''}\n".encode())
+                place = next((place for place, (part, _) in enumerate(answers) if part in fresh), None)
+                os.write(person, f"{'' if place is None else answers.pop(place)[1]}\n".encode())
                 fresh = ""
     except OSError:  # the other end is closed: it has ended
         pass
@@ -182,7 +201,8 @@ def test_a_doubtful_constant_is_not_written_and_a_good_one_is(tmp_path: Path, ex
     assert "+torque_constant_nm_a = 0.07" in told[-1]
     written = load_configuration(path)
     assert written.drive["right_sweep"].torque_constant_nm_a == pytest.approx(0.0719, abs=0.001)
-    assert written.friction["right_sweep"].coulomb_nm == pytest.approx(good.friction_nm, abs=1e-4)
+    assert written.friction["right_sweep"].coulomb_nm == pytest.approx(good.friction_nm[0], abs=1e-4)
+    assert written.friction["right_sweep"].viscous_nm_s == pytest.approx(good.viscous_nm_s[0], abs=1e-4)
 
 
 def test_what_cannot_be_applied_costs_no_report(tmp_path: Path, example_text: str) -> None:

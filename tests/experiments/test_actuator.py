@@ -11,6 +11,7 @@ import pytest
 from control.records import JOINTS
 from experiments import actuator
 from experiments.actuator import KEEP, OTHER, Calibration
+from experiments.actuator_friction import Loop
 from experiments.actuator_plan import Plan, Step, steps_of
 from experiments.actuator_reading import MovedError, Reading, Side
 from experiments.actuator_simulation import bench_configuration
@@ -117,9 +118,13 @@ class ScriptedJoint:
         return Reading(0.0, side, side, self.robot.winding_c)
 
 
+LOOP = Loop(0.18, 0.2, quick=False)
+
+
 @pytest.fixture(autouse=True)
 def scripted_joint(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(actuator, "HeldJoint", ScriptedJoint)
+    monkeypatch.setattr(actuator, "swing", lambda held: [LOOP])
 
 
 class Case:
@@ -177,6 +182,25 @@ def test_everything_is_read_once_in_its_order(case: Case) -> None:
     assert not case.person.questions
 
 
+def test_only_the_empty_arm_is_swung_and_not_where_something_may_hang(case: Case) -> None:
+    case.person.answers = [KEEP]
+    case.on(Step(1, 0.0), case.hanging(100.0))
+    entries = case.run()
+    assert [key for key, entry in entries.items() if "loops" in entry] == [Step(0, 0.0).key, Step(2, 0.0).key]
+    assert entries[Step(0, 0.0).key]["loops"] == [LOOP._asdict()]
+    assert "still hanging" in entries[Step(1, 0.0).key]["doubt"]
+
+
+def test_an_arm_that_does_not_swing_costs_its_friction_alone(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    def blocked(held: object) -> list[Loop]:
+        raise MovedError("the empty arm swings by 1.0 degrees only: is something in its way?")
+
+    monkeypatch.setattr(actuator, "swing", blocked)
+    entries = case.run()
+    assert list(entries) == KEYS and not any("loops" in entry for entry in entries.values())
+    assert sum("friction was not measured" in told for told in case.person.told) == PLAN.trials + 1
+
+
 def test_a_skipped_weight_is_noted_and_not_read(case: Case) -> None:
     case.on(Step(1, 200.0), say(SKIP))
     assert case.run()[Step(1, 200.0).key] == {"skipped": "on request"}
@@ -218,6 +242,7 @@ def test_a_daemon_that_is_gone_ends_it_and_loses_nothing(case: Case, monkeypatch
         case.run()
     monkeypatch.undo()
     monkeypatch.setattr(actuator, "HeldJoint", ScriptedJoint)
+    monkeypatch.setattr(actuator, "swing", lambda held: [LOOP])
     case.hand.asked.clear()
     case.run()
     assert case.hand.asked == KEYS[2:]

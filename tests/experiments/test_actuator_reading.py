@@ -36,7 +36,7 @@ def test_a_weight_is_read_level_and_without_friction(joint: str, tmp_path: Path)
     assert sensed_nm == pytest.approx(external_nm, abs=0.5 * COULOMB_NM)
     assert abs(degrees(loaded.angle_rad)) < 0.1 and abs(degrees(empty.angle_rad)) < 0.1
     assert abs(degrees(loaded.below.held_rad)) > 2.0  # without that the arm would hang down so far
-    assert 0.4 * COULOMB_NM < empty.friction_a * TRUE_CONSTANT_NM_A < 1.3 * COULOMB_NM
+    assert 0.4 * COULOMB_NM < empty.rest_friction_a * TRUE_CONSTANT_NM_A < 1.3 * COULOMB_NM
 
 
 def test_an_arm_that_never_rests_is_not_read(tmp_path: Path) -> None:
