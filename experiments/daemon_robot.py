@@ -1,7 +1,8 @@
 """The robot that a daemon controls, through the daemon's socket and from the logs that it leaves on this computer.
 
-While torque is on, this program holds a dead man's lease and renews it whenever it waits: where it dies or hangs, the
-daemon stops the robot. The log is read while it is being written; the writer's last rows come half a second late.
+From its first question to its end this program holds a dead man's lease, and renews it whenever it waits: where it
+dies or hangs, the daemon stops the robot, and as long as it is there nobody else arms a robot under the hands of whoever
+levels the mud. The log is read while it is being written; the writer's last rows come half a second late.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any
 
 from experiments.bench_robot import UNDER_WAY, BenchError, cut
 from firmware_host.configuration import Configuration, parse_configuration
+from firmware_host.lease import TAKEN_OVER
 from firmware_host.log_folder import present_path, run_files
 from firmware_host.log_reader import Log, LogError, read_log, read_logs
 from firmware_host.log_recovery import recover_log
@@ -24,7 +26,8 @@ from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPerm
 PROMISE_S = 2.0  # of the lease
 RENEWAL_S = 0.2
 WRITTEN_S = 10.0  # to wait for rows that are on their way to the disk
-OPERATING = ("arm", "walk", "move", "clear", "stop", "disarm")  # refused where another program holds a lease
+OPERATING = ("arm", "walk", "move", "clear", "stop", "disarm")  # not of a robot that another program operates
+MOTIONS = ("arm", "walk", "move")  # that begin under the lease, not before it
 START_IT = "Start it with 'systemctl start mudskipper', or name its socket with --socket."
 
 
@@ -39,10 +42,15 @@ class DaemonRobot:
         except (NoDaemonError, NotPermittedError) as problem:
             raise BenchError(f"{problem}. {START_IT}") from problem
         self._configuration: Configuration | None = None
-        self._renewed_s = 0.0
+        self._renewed_s = -inf
         self._log: Path | None = None  # as last seen
         self._name: str | None = None  # of this program, as the daemon calls who holds a lease
-        self._require_alone()
+        self._ousted = ""  # why it operates the robot no more
+        try:
+            self._renew()
+        except BenchError:
+            self._client.close()
+            raise
 
     @property
     def configuration(self) -> Configuration:
@@ -53,6 +61,8 @@ class DaemonRobot:
         return self._configuration
 
     def call(self, method: str, **params: Any) -> Any:
+        if method in MOTIONS:
+            self._promise()
         if method in OPERATING:
             self._require_alone()
         try:
@@ -67,18 +77,26 @@ class DaemonRobot:
             self._renew()
 
     def _renew(self) -> None:
-        """Refused while torque is off, and where the lease was lost, which the status tells."""
-        now_s = time.monotonic()
-        if now_s - self._renewed_s < RENEWAL_S:
-            return
-        self._renewed_s = now_s
+        if time.monotonic() - self._renewed_s > RENEWAL_S:
+            self._promise()
+
+    def _promise(self) -> None:
+        """Refused where the lease was lost, which the status tells, and where another program operates the robot.
+
+        Raises BenchError for that.
+        """
+        self._renewed_s = time.monotonic()
         try:
             self.call("lease", for_s=PROMISE_S)
             self._name = self._name or self.call("status")["lease"]
-        except CallRefusedError:
+        except CallRefusedError as refusal:
+            if str(refusal).startswith(TAKEN_OVER):
+                self._ousted = str(refusal)
             self._require_alone()
 
     def _require_alone(self) -> None:
+        if self._ousted:
+            raise BenchError(self._ousted)
         holder = self.call("status")["lease"]
         if holder not in (None, self._name):
             raise BenchError(f"{holder} operates the robot: wait until it has ended, then begin again")
