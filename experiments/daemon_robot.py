@@ -1,8 +1,8 @@
 """The robot that a daemon controls, through the daemon's socket and from the logs that it leaves on this computer.
 
 From its first question to its end this program holds a dead man's lease, and renews it whenever it waits: where it
-dies or hangs, the daemon stops the robot, and as long as it is there nobody else arms a robot under the hands of whoever
-levels the mud. The log is read while it is being written; the writer's last rows come half a second late.
+dies or hangs, the daemon stops the robot, and as long as it is there nobody else arms a robot under the hands of
+whoever levels the mud. The log is read while it is being written; the writer's last rows come half a second late.
 """
 
 from __future__ import annotations

@@ -2,9 +2,10 @@
 
 A lease is for a moment. Who holds it renews it; whose connection ends, or who does not renew in time, has lost it, and
 that stays so until the robot has stopped and its torque is off, where the loop resets the lease: a person arms again.
-One program holds it at a time, and as long as it does nobody else moves the robot, so also while torque is off and hands
-are in the mud; stopping is everybody's at any time. Whoever has a reason may take the robot over: who held the lease
-then stays out until it connects anew, since a program that was overruled must not go on as if nothing had happened.
+One program holds it at a time, and as long as it does nobody else moves the robot, so also while torque is off and
+hands are in the mud; stopping is everybody's at any time. Whoever has a reason may take the robot over: who held the
+lease then stays out until it connects anew, since a program that was overruled must not go on as if nothing had
+happened.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class Lease:
             return None
         left_s = self._until_s - now_s
         return (
-            f"{self._holder} holds the lease, for {left_s:.1f} s unless it is renewed: wait for the end of that program,"
+            f"{self._holder} holds the lease, for {left_s:.1f} s unless it is renewed: wait until it has ended,"
             " or overrule it with --take-over; 'mudskipper stop' and 'disarm' are always allowed"
         )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -106,7 +107,8 @@ def test_a_robot_that_was_taken_over_is_left_to_whoever_did(bench: Bench) -> Non
     robot = DaemonRobot(bench.socket)
     arm(robot)
     assert bench.run("move", "--take-over", "left_sweep=3").returncode == exit_codes.OK
-    for operate in (lambda: robot.wait(0.3), lambda: move(robot, {"left_sweep": 0.0}), lambda: disarm(robot)):
+    operations = (partial(robot.wait, 0.3), partial(move, robot, {"left_sweep": 0.0}), partial(disarm, robot))
+    for operate in operations:
         with pytest.raises(BenchError, match="taken over: uid .* wanted the robot; begin again when it is free"):
             operate()
     robot.close()

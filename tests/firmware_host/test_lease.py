@@ -99,7 +99,11 @@ def test_whoever_was_ousted_stays_out_until_it_connects_anew() -> None:
     lease.oust("ben")
     assert not lease.held and not lease.lost(99.0)
     lease.reset()  # the torque went off meanwhile
-    for refused in (lease.refusal("anna", 10.2), lease.refusal("anna", 10.2, take_over=True), lease.renew("anna", 10.2, 1.0)):
+    for refused in (
+        lease.refusal("anna", 10.2),
+        lease.refusal("anna", 10.2, take_over=True),
+        lease.renew("anna", 10.2, 1.0),
+    ):
         assert refused == "taken over: ben wanted the robot; begin again when it is free"
     lease.hang_up("anna")
     assert not lease.lost(99.0) and lease.renew("anna", 99.0, 1.0) is None
