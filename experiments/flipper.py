@@ -88,7 +88,7 @@ def run(bench: Bench, plan: Plan, show: Show) -> None:
 def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     """One trial. Raises SpoiltTrialError, BenchError."""
     robot = bench.robot
-    arm(robot)
+    arm(robot, bench.person)
     before_m = robot.call("status")["body_x_m"]
     walked = walk(robot, plan.depth_m, plan.strides)
     robot.wait(SETTLED_S)

@@ -120,7 +120,7 @@ def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
 
 def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     robot = bench.robot
-    arm(robot)
+    arm(robot, bench.person)
     before: Status = robot.call("status")
     start_m = before["body_x_m"]
     remarks = [] if start_m is not None else ["no pose is told: strides are given to the muds by their order"]
@@ -189,7 +189,7 @@ def require_mud(strides: Sequence[Mapping[str, Any]], flipper: str) -> None:
 
 def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float) -> Entry:
     robot = bench.robot
-    arm(robot)
+    arm(robot, bench.person)
     before: Status = robot.call("status")
     walked = walk(robot, depth_m, plan.soft_strides)
     log = robot.record(walked.from_s, walked.to_s)

@@ -23,6 +23,7 @@ from firmware_host.loop import Loop
 from firmware_host.recorder import Recording
 from firmware_host.reports import belief_report, known, map_report, stride_report
 from firmware_host.status_socket import Methods, RefusedError
+from firmware_host.ticker import PERIOD_S
 
 MOST_STRIDES = 100000  # that a walk may be ordered
 STRIDES_PER_ANSWER = 20  # an answer is made between two ticks
@@ -79,7 +80,7 @@ class OperatorCalls:
             "mode": loop.mode.name.lower(),
             "moving": loop.controller.moving,
             "fault": _fault(loop),
-            "faults": [_fault_report(fault) for fault in loop.faults.standing],
+            "faults": [_fault_report(loop, fault) for fault in loop.faults.standing],
             "forced": loop.forced,
             "notice": loop.notice,
             "untold_requests": loop.requests_told.untold,
@@ -248,16 +249,17 @@ class OperatorCalls:
 def _fault(loop: Loop) -> dict[str, Any] | None:
     """The worst that stands, or what stands against arming."""
     fault = loop.fault or next(iter(loop.faults.blocking()), None)
-    return _fault_report(fault) if fault else None
+    return _fault_report(loop, fault) if fault else None
 
 
-def _fault_report(fault: Fault) -> dict[str, Any]:
+def _fault_report(loop: Loop, fault: Fault) -> dict[str, Any]:
     kind = fault.kind
     return {
         "name": fault.name,
         "subject": fault.subject,
         "sentence": fault.sentence,
         "what_to_do": kind.what_to_do,
+        "for_s": loop.faults.age_ticks(fault) * PERIOD_S,
         "reaction": kind.reaction.name.lower(),
         "blocks_arming": kind.blocks is not Blocks.NO,
     }
