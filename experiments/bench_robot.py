@@ -250,9 +250,13 @@ def cut(log: Log, from_s: float, to_s: float) -> Log:
 
 
 def rest(robot: BenchRobot) -> None:
-    """Flippers out of the mud where they can be, then torque off. Raises BenchError where no answer comes."""
-    if robot.call("status")["mode"] == "walking":
+    """Flippers out of the mud where they can be, then torque off. Raises BenchError where no answer comes.
+
+    A robot that holds its pose is told to stop as well: a fault may have held it in the middle of a stroke.
+    """
+    if robot.call("status")["mode"] in ("hold", *UNDER_WAY):
         robot.call("stop")
+        robot.wait(POLL_S)  # a request waits for its tick
         wait_until(robot, lambda status: status["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     disarm(robot)
 

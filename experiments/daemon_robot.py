@@ -170,8 +170,9 @@ class DaemonRobot:
     def close(self) -> None:
         """A robot that somebody else operates is left to them."""
         with suppress(BenchError, CallRefusedError):
-            if self.call("status")["mode"] == "walking":
+            if self.call("status")["mode"] in ("hold", *UNDER_WAY):
                 self.call("stop")
+                self.wait(RENEWAL_S)  # a request waits for its tick
             self._wait_for_hold()
             self.call("disarm")
             self.call("release")

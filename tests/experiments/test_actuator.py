@@ -41,7 +41,7 @@ class ScriptedRobot:
             self.mode = "idle"
         fault = {"sentence": self.sentence, "what_to_do": "do this", "blocks_arming": False, "for_s": 3.0}
         drives = [{"joint": joint, "winding_c": self.winding_c} for joint in JOINTS]
-        standing = {"mode": self.mode, "fault": fault if self.mode == "fault" else None, "notice": ""}
+        standing: dict[str, Any] = {"mode": self.mode, "fault": fault if self.mode == "fault" else None, "notice": ""}
         standing |= {"now_s": self.now_s}
         return standing | {"drives": drives, "faults": [fault] if self.mode == "fault" else [], "moving": False}
 
