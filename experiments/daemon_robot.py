@@ -23,7 +23,8 @@ from firmware_host.log_reader import Log, LogError, read_log, read_logs
 from firmware_host.log_recovery import recover_log
 from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
-PROMISE_S = 2.0  # of the lease
+PROMISE_S = 2.0  # of the lease, while torque may be on
+RESTING_S = 10.0  # and while it is off: reading a log may take some time, and nothing has to be stopped
 RENEWAL_S = 0.2
 WRITTEN_S = 10.0  # to wait for rows that are on their way to the disk
 OPERATING = ("arm", "walk", "move", "clear", "stop", "disarm")  # not of a robot that another program operates
@@ -45,6 +46,7 @@ class DaemonRobot:
         self._renewed_s = -inf
         self._log: Path | None = None  # as last seen
         self._name: str | None = None  # of this program, as the daemon calls who holds a lease
+        self._may_move = False
         self._ousted = ""  # why it operates the robot no more
         try:
             self._renew()
@@ -62,9 +64,11 @@ class DaemonRobot:
 
     def call(self, method: str, **params: Any) -> Any:
         if method in MOTIONS:
+            self._may_move = True
             self._promise()
         if method in OPERATING:
             self._require_alone()
+        self._may_move = self._may_move and method != "disarm"
         try:
             return self._client.call(method, **params)
         except (NoDaemonError, NotPermittedError) as problem:
@@ -87,7 +91,7 @@ class DaemonRobot:
         """
         self._renewed_s = time.monotonic()
         try:
-            self.call("lease", for_s=PROMISE_S)
+            self.call("lease", for_s=PROMISE_S if self._may_move else RESTING_S)
             self._name = self._name or self.call("status")["lease"]
         except CallRefusedError as refusal:
             if str(refusal).startswith(TAKEN_OVER):

@@ -20,6 +20,7 @@ from experiments.bench_robot import (
     Status,
     arm,
     follow_walk,
+    rest,
     strides_since,
     told_by,
     wait_until,
@@ -203,6 +204,7 @@ def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float)
 def _entry(bench: Bench, plan: Plan, trial: PlannedTrial, log: Log, closed: int) -> Entry:
     """What all walks have. Raises SpoiltTrialError."""
     robot = bench.robot
+    rest(robot)  # what follows takes longer on a slow computer than the robot is left alone
     told = strides_since(robot, closed)
     strides = strides_by_method(told, log, robot.configuration, plan.flipper, METHODS)
     own = strides[method_of(robot.configuration.estimation)]
