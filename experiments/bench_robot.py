@@ -232,9 +232,11 @@ def follow_walk(robot: BenchRobot, begin: Callable[[float], Judge]) -> tuple[str
 
 
 def strides_since(robot: BenchRobot, number: int) -> list[dict[str, Any]]:
-    """All that closed from `number` on."""
+    """All that closed from `number` on. Raises BenchError where the daemon no longer keeps the first of them."""
     found: list[dict[str, Any]] = []
     while fetched := robot.call("strides", since=number + len(found)):
+        if fetched[0]["number"] > number + len(found):
+            raise BenchError("the walk had more strides than the daemon keeps: let the robot walk fewer at once")
         found += fetched
     return found
 

@@ -24,6 +24,7 @@ from experiments.bench_robot import (
     face_faults,
     move,
     require_hold,
+    strides_since,
     told_by,
     walk,
 )
@@ -215,6 +216,20 @@ def test_of_what_is_over_by_itself_nobody_is_asked(robot: LockstepRobot) -> None
     person = Decided(LEAVE)
     arm(robot, person)
     assert person.asked == [] and robot.call("status")["mode"] == "hold"
+
+
+@pytest.mark.parametrize(("kept", "whole"), [(45, True), (44, False), (10, False)])
+def test_strides_that_the_daemon_no_longer_keeps_are_not_passed_over(
+    robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch, kept: int, whole: bool
+) -> None:
+    strides = [{"number": number} for number in range(5, 50)][-kept:]
+    tell = lambda method, since: [stride for stride in strides if stride["number"] >= since][:20]  # noqa: E731
+    monkeypatch.setattr(robot, "call", tell)
+    if whole:
+        assert strides_since(robot, 5) == strides
+    else:
+        with pytest.raises(BenchError, match="more strides than the daemon keeps"):
+            strides_since(robot, 5)
 
 
 def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) -> None:
