@@ -36,7 +36,7 @@ class DaemonRobot:
     """A BenchRobot. Owns the connection."""
 
     def __init__(self, socket: Path) -> None:
-        """Raises BenchError where there is no daemon, or it does not let this user drive."""
+        """Raises BenchError where there is no daemon, it does not let this user drive, or somebody else drives."""
         self._socket = socket
         try:
             self._client = StatusClient(socket)
@@ -49,10 +49,18 @@ class DaemonRobot:
         self._may_move = False
         self._ousted = ""  # why it operates the robot no more
         try:
+            self._require_at_rest()
             self._renew()
         except BenchError:
             self._client.close()
             raise
+
+    def _require_at_rest(self) -> None:
+        """Before the lease: to take it and then go away would stop a walk that somebody has begun without one."""
+        self._require_alone()
+        mode = self.call("status")["mode"]
+        if mode in UNDER_WAY:
+            raise BenchError(f"the robot is {mode}: wait for its end, or 'mudskipper stop' it, then begin again")
 
     @property
     def configuration(self) -> Configuration:

@@ -112,4 +112,7 @@ def test_a_robot_that_was_taken_over_is_left_to_whoever_did(bench: Bench) -> Non
         with pytest.raises(BenchError, match="taken over: uid .* wanted the robot; begin again when it is free"):
             operate()
     robot.close()
-    assert bench.run("move", "left_sweep=0").returncode == exit_codes.OK
+    assert bench.run("walk").returncode == exit_codes.OK
+    with pytest.raises(BenchError, match="the robot is walking: wait for its end, or 'mudskipper stop' it"):
+        DaemonRobot(bench.socket)
+    assert bench.wait_for(lambda status: status["lease"] is None)["mode"] == "walking"
