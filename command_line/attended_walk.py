@@ -21,7 +21,7 @@ UNDER_WAY = ("walking", "stopping", "damping")
 
 def attend(client: StatusClient, params: dict[str, Any]) -> int:
     """Walk, and return when the robot is at rest."""
-    client.call("lease", for_s=PROMISE_S)
+    client.call("lease", for_s=PROMISE_S, take_over=params.get("take_over", False))
     try:
         client.call("walk", **params)
     except CallRefusedError:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from command_line import exit_codes
 from command_line.screen import Progress, complain
 from command_line.terminal_person import AbsentPersonError, TerminalPerson
-from experiments.bench_robot import BenchError
+from experiments.bench_robot import BenchError, EndedError
 from experiments.notebook import NAME, NotebookError
 from experiments.person import Person, Willing
 from experiments.report_page import Section, numbers_told, write_report
@@ -59,7 +59,7 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
     except NotebookError as problem:
         complain(str(problem))
         return exit_codes.REFUSED
-    except (BenchError, CallRefusedError, AbsentPersonError) as problem:
+    except (BenchError, EndedError, CallRefusedError, AbsentPersonError) as problem:
         return _end(folder, str(problem), exit_codes.REFUSED)
     except KeyboardInterrupt:
         return _end(folder, "interrupted", exit_codes.INTERRUPTED)

@@ -66,6 +66,9 @@ def _add_operation(commands: Commands) -> None:
     parsers["walk"].add_argument("--strides", type=COUNT, default=0, metavar="N", help="then stop (default: go on)")
     parsers["walk"].add_argument("--attended", action="store_true", help="stay; the robot stops when this ends")
     parsers["move"].add_argument("angles", type=joint_angle, nargs="+", metavar="JOINT=DEG", help="left_sweep=10 ...")
+    for name in ("arm", "walk", "move"):
+        text = "from a program that holds the robot's lease, which stays out then"
+        parsers[name].add_argument("--take-over", action="store_true", help=text)
     parsers["check"].add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
     _add_installation(commands)
 

@@ -68,11 +68,12 @@ def watch(options: Options) -> int:
 
 
 def arm(options: Options) -> int:
-    return with_daemon(options, lambda client: _request(client, "arm", ("hold",), ARMING_S, force=options.force))
+    params = {"force": options.force, "take_over": options.take_over}
+    return with_daemon(options, lambda client: _request(client, "arm", ("hold",), ARMING_S, **params))
 
 
 def walk(options: Options) -> int:
-    params: dict[str, Any] = {"strides": options.strides}
+    params: dict[str, Any] = {"strides": options.strides, "take_over": options.take_over}
     if options.depth is not None:
         params["depth_m"] = options.depth / 100.0
     if options.attended:
@@ -85,7 +86,8 @@ def move(options: Options) -> int:
 
     def act(client: StatusClient) -> int:
         try:
-            client.call("move", **{f"{joint}_rad": radians(angle_deg) for joint, angle_deg in options.angles})
+            angles_rad = {f"{joint}_rad": radians(angle_deg) for joint, angle_deg in options.angles}
+            client.call("move", take_over=options.take_over, **angles_rad)
             while (report := client.call("status"))["moving"]:
                 time.sleep(0.05)
         except KeyboardInterrupt:
@@ -195,6 +197,8 @@ def status_text(report: dict[str, Any]) -> str:
     if report["mode"] == "boot":
         lines.append(_boot_line(report["drives"]))
     lines += [_fault_line(fault) for fault in report["faults"]]
+    if report["lease"]:
+        lines.append(f"operated by {report['lease']}, which holds the lease")
     notices = [report["notice"]] if report["notice"] else []
     if report["forced"]:
         notices.append("armed by force, against what 'mudskipper check' says")

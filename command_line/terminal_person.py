@@ -1,10 +1,15 @@
-"""The person at the bench, asked on a terminal. While an answer is waited for the robot is looked after."""
+"""The person at the bench, asked on a terminal. While an answer is waited for the robot is looked after.
+
+Only what is typed after a question answers it: an Enter pressed twice would else say that the hands are out of the mud,
+before that was asked. What comes from a file or a pipe was never meant as anything but answers, and all of it counts.
+"""
 
 from __future__ import annotations
 
 import math
 import select
 import sys
+import termios
 from collections.abc import Callable, Mapping
 
 LOOK_S = 0.1
@@ -46,6 +51,8 @@ class TerminalPerson:
 
     def _hear(self, prompt: str, meanwhile: Callable[[], None]) -> str:
         """One line. Raises AbsentPersonError where there will be none."""
+        if sys.stdin.isatty():
+            termios.tcflush(sys.stdin, termios.TCIFLUSH)
         self._make_room()
         print(prompt, end="", file=sys.stderr, flush=True)
         while not select.select([sys.stdin], [], [], LOOK_S)[0]:

@@ -17,6 +17,7 @@ GOOD_TICKS = 50  # without its cause before a fault is over
 
 class Standing(NamedTuple):
     fault: Fault  # as last seen
+    first_tick: int
     last_tick: int
     latched: bool  # torque was on while it was seen, or it is of a kind for which that is all the same
 
@@ -41,6 +42,10 @@ class FaultLatch:
     @property
     def reaction(self) -> Reaction:
         return self.worst.kind.reaction if self.worst else Reaction.NONE
+
+    def age_ticks(self, fault: Fault) -> int:
+        """Since a fault that stands was seen first."""
+        return self._tick - self._standing[fault.name, fault.subject].first_tick
 
     def blocking(self, forced: bool = False) -> list[Fault]:
         """What stands against arming."""
@@ -68,12 +73,13 @@ class FaultLatch:
             self.begun.append(fault)
         self._standing[key] = Standing(
             fault,
+            before.first_tick if before else self._tick,
             self._tick,
             energised or fault.kind.latches_idle or (before is not None and before.latched),
         )
 
     def _is_over(self, standing: Standing, energised: bool, clearing: bool) -> bool:
-        fault, last_tick, latched = standing
+        fault, _, last_tick, latched = standing
         if latched and fault.kind.clears is Clears.BY_RESTART:
             return False
         if latched and clearing:

@@ -19,7 +19,7 @@ from experiments.actuator_friction import Loop, swing
 from experiments.actuator_hand import Hand
 from experiments.actuator_plan import COOL_K, READING_S, Plan, Step, largest_current_a, stays_cool, steps_of
 from experiments.actuator_reading import HeldJoint, MovedError, Reading, WarmError
-from experiments.bench_robot import BenchError, BenchRobot, arm, require_hold
+from experiments.bench_robot import BenchError, BenchRobot, arm, face_faults, require_hold
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP, Person
 from firmware_host.status_client import CallRefusedError
@@ -103,9 +103,10 @@ class Calibration:
         """With torque on, an empty arm, and a winding that bears what comes."""
         if self._held is None or self._robot.call("status")["mode"] != "hold":
             self._held = None
+            face_faults(self._robot, self._person)
             self._hand.hold_level(self._joint, self._watch)
             self._cool(step)
-            arm(self._robot)
+            arm(self._robot, self._person)
             self._hand.let_go(self._watch)
             self._held = HeldJoint(self._robot, self._joint)
         elif not self._is_cool(step):

@@ -15,6 +15,7 @@ from typing import Protocol
 from control.controller import UP_RAD
 from control.records import JOINTS
 from experiments.bench_rig import SimulatedRig
+from experiments.bench_robot import CLEAR, LEAVE
 from experiments.person import GO_ON, Person
 from firmware_host.ticker import PERIOD_S
 from simulation.plant import END_STOPS_RAD
@@ -37,6 +38,9 @@ class Sight(Enum):
 class Attendant(Protocol):
     def consents(self, what: str, meanwhile: Callable[[], None]) -> bool:
         """Before anything moves. `meanwhile` is called again and again, here and below."""
+
+    def clears(self, faults: str, meanwhile: Callable[[], None]) -> bool:
+        """Whether faults that stand before the first torque, such as a drive's last watchdog, are to be cleared."""
 
     def watch(self) -> None:
         """One joint is about to move; then it is at its farthest (`look`), and back (`saw`)."""
@@ -66,6 +70,11 @@ class AskedAttendant:
             self._person.tell(what)
             return True
         return self._person.ask(what, {GO_ON: "go on", "n": "no, end here"}, meanwhile) == GO_ON
+
+    def clears(self, faults: str, meanwhile: Callable[[], None]) -> bool:
+        """Also who is sure that the robot may move did not know of these."""
+        answers = {CLEAR: "clear it and go on", LEAVE: "end here"}
+        return self._person.ask(f"{faults} Is the cause gone?", answers, meanwhile) == CLEAR
 
     def watch(self) -> None: ...
 
@@ -99,6 +108,10 @@ class AbsentAttendant:
     def consents(self, what: str, meanwhile: Callable[[], None]) -> bool:
         return True
 
+    def clears(self, faults: str, meanwhile: Callable[[], None]) -> bool:
+        """Nobody has looked why it stopped: it may be wet, or held by something."""
+        return False
+
     def watch(self) -> None: ...
 
     def look(self) -> None: ...
@@ -129,6 +142,10 @@ class SimulatedAttendant:
 
     def consents(self, what: str, meanwhile: Callable[[], None]) -> bool:
         return True
+
+    def clears(self, faults: str, meanwhile: Callable[[], None]) -> bool:
+        """A simulated robot that begins with a fault is one that a test has made so."""
+        return False
 
     def watch(self) -> None:
         self._from_rad = self._plant.angles_rad

@@ -23,12 +23,19 @@ ARMING_S = 10.0
 MOVING_S = 20.0
 RAISING_S = 10.0
 STRIDE_S = 60.0  # longest, with pauses and recoveries
+GONE_S = 1.5  # in which a fault is over whose cause has gone or was cleared
+MOST_CLEARS = 3  # of a fault that comes back
+CLEAR, LEAVE = "c", ""  # what a person says of a fault: Enter, pressed in haste, clears nothing
 UNDER_WAY = ("walking", "stopping", "damping")
 ENERGISED = ("arming", "hold", *UNDER_WAY)
 
 
 class BenchError(Exception):
     """The experiment cannot go on; the text says why, and what to do."""
+
+
+class EndedError(Exception):
+    """A person ends the experiment; the text says how it goes on."""
 
 
 class BenchRobot(Protocol):
@@ -75,15 +82,70 @@ def wait_until(robot: BenchRobot, done: Callable[[Status], bool], longest_s: flo
     return status
 
 
-def arm(robot: BenchRobot) -> None:
-    """From whatever it does to holding its pose. Raises BenchError with what stands against it."""
+def face_faults(robot: BenchRobot, person: Person) -> None:
+    """What keeps the torque off is told, and cleared where a person says so; nothing where nothing does.
+
+    Someone has to have looked: the drive that a fault stopped may be wet, or a finger be in the flipper. Nobody on a
+    terminal is an error of its own, so the fault stands then. Willing clears: behind it is a simulated robot.
+
+    Raises EndedError where it is to stand, BenchError where it comes back.
+    """
+    for _ in range(MOST_CLEARS):
+        faults = _faults_told(_status_at_rest(robot))
+        if not faults:
+            return
+        question = f"{faults} Torque stays off until this is cleared."
+        if person.ask(question, {CLEAR: "clear it and go on", LEAVE: "stop here"}, lambda: robot.wait(POLL_S)) != CLEAR:
+            raise EndedError(
+                "the fault stands; when its cause is gone, 'mudskipper clear', then the same command again"
+            )
+        robot.call("clear")
+    faults = _faults_told(_status_at_rest(robot))
+    if faults:
+        raise BenchError(f"the fault comes back: {faults}")
+
+
+def _status_at_rest(robot: BenchRobot) -> Status:
+    """When what was about to be over by itself is."""
+    status: Status = robot.call("status")
+    begun_s = status["now_s"]
+    while _faults_told(status) and status["now_s"] - begun_s < GONE_S:
+        robot.wait(POLL_S)
+        status = robot.call("status")
+    return status
+
+
+def _faults_told(status: Status) -> str:
+    """Of a robot whose torque is off; empty where nothing keeps it off."""
+    if status["mode"] not in ("idle", "fault"):
+        return ""
+    faults = [fault for fault in status["faults"] if fault["blocks_arming"]]
+    if status["mode"] == "fault" and not faults:
+        faults = [status["fault"]] if status["fault"] else []
+    told = [f"{fault['sentence']} ({_for(fault['for_s'])}; {fault['what_to_do']})" for fault in faults]
+    if status["mode"] == "fault":
+        return f"The robot is in FAULT: {' '.join(told) or status['notice']}"
+    return f"A fault stands: {' '.join(told)}" if told else ""
+
+
+def _for(duration_s: float) -> str:
+    return f"for {duration_s:.0f} s" if duration_s < 100.0 else f"for {duration_s / 60.0:.0f} min"
+
+
+def arm(robot: BenchRobot, person: Person | None = None) -> None:
+    """From whatever it does to holding its pose. Raises BenchError with what stands against it.
+
+    A fault is for `person` to judge; where nobody is there it stands.
+    """
     status = robot.call("status")
     if status["mode"] in ("arming", *UNDER_WAY):
         status = wait_until(robot, lambda now: now["mode"] in ("hold", "idle", "fault"), ARMING_S, "coming to rest")
     if status["mode"] == "hold":
         return
-    if status["mode"] == "fault":
-        robot.call("clear")
+    if person is not None:
+        face_faults(robot, person)
+    elif status["mode"] == "fault":
+        raise BenchError(f"{_faults_told(status)} 'mudskipper clear' when its cause is gone")
     try:
         wait_until(robot, lambda now: now["mode"] == "idle" and not _blocked(now), ARMING_S, "being ready to arm")
         robot.call("arm")
@@ -170,9 +232,11 @@ def follow_walk(robot: BenchRobot, begin: Callable[[float], Judge]) -> tuple[str
 
 
 def strides_since(robot: BenchRobot, number: int) -> list[dict[str, Any]]:
-    """All that closed from `number` on."""
+    """All that closed from `number` on. Raises BenchError where the daemon no longer keeps the first of them."""
     found: list[dict[str, Any]] = []
     while fetched := robot.call("strides", since=number + len(found)):
+        if fetched[0]["number"] > number + len(found):
+            raise BenchError("the walk had more strides than the daemon keeps: let the robot walk fewer at once")
         found += fetched
     return found
 
@@ -188,9 +252,13 @@ def cut(log: Log, from_s: float, to_s: float) -> Log:
 
 
 def rest(robot: BenchRobot) -> None:
-    """Flippers out of the mud where they can be, then torque off. Raises BenchError where no answer comes."""
-    if robot.call("status")["mode"] == "walking":
+    """Flippers out of the mud where they can be, then torque off. Raises BenchError where no answer comes.
+
+    A robot that holds its pose is told to stop as well: a fault may have held it in the middle of a stroke.
+    """
+    if robot.call("status")["mode"] in ("hold", *UNDER_WAY):
         robot.call("stop")
+        robot.wait(POLL_S)  # a request waits for its tick
         wait_until(robot, lambda status: status["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     disarm(robot)
 

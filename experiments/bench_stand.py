@@ -135,15 +135,29 @@ class Stand:
         self.run_until(lambda sample: sample.mode is Mode.HOLD, ARMING_S, "Closed loop of all drives")
 
     def _wait_until_armable(self) -> None:
-        for _ in range(round(ARMING_S / PERIOD_S)):
-            if self.tick().mode is Mode.IDLE and not self.loop.faults.blocking():
-                return
+        if self._becomes_armable():
+            return
         told = " ".join(f"{fault.sentence} {_capital(fault.kind.what_to_do)}." for fault in self.loop.faults.blocking())
+        if told and self.attendant.clears(told, self._idle_on):
+            self.loop.request(Request.CLEAR, self.rig.now_s)
+            if self._becomes_armable():
+                return
         silent = ", ".join(axis.joint for axis in self.drives.axes if not axis.heard)
         unheard = f"{silent}: nothing is heard; check power, wiring and node ids."
         raise BenchError(
             f"The robot cannot be armed: {told or (unheard if silent else f'it is in {self.loop.mode.name.lower()}.')}"
         )
+
+    def _becomes_armable(self) -> bool:
+        for _ in range(round(ARMING_S / PERIOD_S)):
+            if self.tick().mode is Mode.IDLE and not self.loop.faults.blocking():
+                return True
+        return False
+
+    def _idle_on(self) -> None:
+        """While a person is asked about a fault that stands."""
+        for _ in range(round(LOOK_S / PERIOD_S)):
+            self.tick()
 
     def move(
         self, way_points: Sequence[JointAngles], speed_rad_s: float | None = None, law: Law | None = None

@@ -1,7 +1,8 @@
 """The robot that a daemon controls, through the daemon's socket and from the logs that it leaves on this computer.
 
-While torque is on, this program holds a dead man's lease and renews it whenever it waits: where it dies or hangs, the
-daemon stops the robot. The log is read while it is being written; the writer's last rows come half a second late.
+From its first question to its end this program holds a dead man's lease, and renews it whenever it waits: where it
+dies or hangs, the daemon stops the robot, and as long as it is there nobody else arms a robot under the hands of
+whoever levels the mud. The log is read while it is being written; the writer's last rows come half a second late.
 """
 
 from __future__ import annotations
@@ -16,15 +17,18 @@ from typing import Any
 
 from experiments.bench_robot import UNDER_WAY, BenchError, cut
 from firmware_host.configuration import Configuration, parse_configuration
+from firmware_host.lease import TAKEN_OVER
 from firmware_host.log_folder import present_path, run_files
 from firmware_host.log_reader import Log, LogError, read_log, read_logs
 from firmware_host.log_recovery import recover_log
 from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
-PROMISE_S = 2.0  # of the lease
+PROMISE_S = 2.0  # of the lease, while torque may be on
+RESTING_S = 10.0  # and while it is off: reading a log may take some time, and nothing has to be stopped
 RENEWAL_S = 0.2
 WRITTEN_S = 10.0  # to wait for rows that are on their way to the disk
-OPERATING = ("arm", "walk", "move", "clear", "stop", "disarm")  # refused where another program holds a lease
+OPERATING = ("arm", "walk", "move", "clear", "stop", "disarm")  # not of a robot that another program operates
+MOTIONS = ("arm", "walk", "move")  # that begin under the lease, not before it
 START_IT = "Start it with 'systemctl start mudskipper', or name its socket with --socket."
 
 
@@ -32,17 +36,31 @@ class DaemonRobot:
     """A BenchRobot. Owns the connection."""
 
     def __init__(self, socket: Path) -> None:
-        """Raises BenchError where there is no daemon, or it does not let this user drive."""
+        """Raises BenchError where there is no daemon, it does not let this user drive, or somebody else drives."""
         self._socket = socket
         try:
             self._client = StatusClient(socket)
         except (NoDaemonError, NotPermittedError) as problem:
             raise BenchError(f"{problem}. {START_IT}") from problem
         self._configuration: Configuration | None = None
-        self._renewed_s = 0.0
+        self._renewed_s = -inf
         self._log: Path | None = None  # as last seen
         self._name: str | None = None  # of this program, as the daemon calls who holds a lease
+        self._may_move = False
+        self._ousted = ""  # why it operates the robot no more
+        try:
+            self._require_at_rest()
+            self._renew()
+        except BenchError:
+            self._client.close()
+            raise
+
+    def _require_at_rest(self) -> None:
+        """Before the lease: to take it and then go away would stop a walk that somebody has begun without one."""
         self._require_alone()
+        mode = self.call("status")["mode"]
+        if mode in UNDER_WAY:
+            raise BenchError(f"the robot is {mode}: wait for its end, or 'mudskipper stop' it, then begin again")
 
     @property
     def configuration(self) -> Configuration:
@@ -53,8 +71,12 @@ class DaemonRobot:
         return self._configuration
 
     def call(self, method: str, **params: Any) -> Any:
+        if method in MOTIONS:
+            self._may_move = True
+            self._promise()
         if method in OPERATING:
             self._require_alone()
+        self._may_move = self._may_move and method != "disarm"
         try:
             return self._client.call(method, **params)
         except (NoDaemonError, NotPermittedError) as problem:
@@ -67,18 +89,26 @@ class DaemonRobot:
             self._renew()
 
     def _renew(self) -> None:
-        """Refused while torque is off, and where the lease was lost, which the status tells."""
-        now_s = time.monotonic()
-        if now_s - self._renewed_s < RENEWAL_S:
-            return
-        self._renewed_s = now_s
+        if time.monotonic() - self._renewed_s > RENEWAL_S:
+            self._promise()
+
+    def _promise(self) -> None:
+        """Refused where the lease was lost, which the status tells, and where another program operates the robot.
+
+        Raises BenchError for that.
+        """
+        self._renewed_s = time.monotonic()
         try:
-            self.call("lease", for_s=PROMISE_S)
+            self.call("lease", for_s=PROMISE_S if self._may_move else RESTING_S)
             self._name = self._name or self.call("status")["lease"]
-        except CallRefusedError:
+        except CallRefusedError as refusal:
+            if str(refusal).startswith(TAKEN_OVER):
+                self._ousted = str(refusal)
             self._require_alone()
 
     def _require_alone(self) -> None:
+        if self._ousted:
+            raise BenchError(self._ousted)
         holder = self.call("status")["lease"]
         if holder not in (None, self._name):
             raise BenchError(f"{holder} operates the robot: wait until it has ended, then begin again")
@@ -152,8 +182,9 @@ class DaemonRobot:
     def close(self) -> None:
         """A robot that somebody else operates is left to them."""
         with suppress(BenchError, CallRefusedError):
-            if self.call("status")["mode"] == "walking":
+            if self.call("status")["mode"] in ("hold", *UNDER_WAY):
                 self.call("stop")
+                self.wait(RENEWAL_S)  # a request waits for its tick
             self._wait_for_hold()
             self.call("disarm")
             self.call("release")

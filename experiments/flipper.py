@@ -17,7 +17,7 @@ import numpy as np
 
 from control.records import Phase
 from experiments.base_watch import load_remarks, pose_remarks, surface_remarks
-from experiments.bench_robot import BenchError, arm, walk
+from experiments.bench_robot import BenchError, arm, rest, walk
 from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text
 from experiments.error_table import COEFFICIENTS
 from experiments.estimation_methods import DEFAULT, PAPER, method_of, strides_by_method
@@ -88,12 +88,13 @@ def run(bench: Bench, plan: Plan, show: Show) -> None:
 def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     """One trial. Raises SpoiltTrialError, BenchError."""
     robot = bench.robot
-    arm(robot)
+    arm(robot, bench.person)
     before_m = robot.call("status")["body_x_m"]
     walked = walk(robot, plan.depth_m, plan.strides)
     robot.wait(SETTLED_S)
     after = robot.call("status")
     log = robot.record(walked.from_s, after["now_s"])
+    rest(robot)  # reading it takes longer on a slow computer than the robot is left alone
     strides = strides_by_method(walked.strides, log, robot.configuration, plan.flipper, METHODS)
     told = _told(log, strides[method_of(robot.configuration.estimation)], robot.configuration, plan.flipper)
     told["remarks"] += pose_remarks(before_m, after["body_x_m"])

@@ -9,17 +9,17 @@ the person decides. Torque is off whenever hands may be in the mud.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from functools import partial
 from typing import NamedTuple, Protocol
 
-from experiments.bench_robot import BenchError, BenchRobot, disarm, rest
+from experiments.bench_robot import BenchError, BenchRobot, disarm, face_faults, rest
 from experiments.notebook import Entry, Notebook
 from experiments.person import GO_ON, REDO, SKIP, Person
-from firmware_host.status_client import CallRefusedError
 
 MOST_ATTEMPTS = 3
+LOOK_S = 0.05  # of waiting for a person, in which nobody else arms the robot
 ASKED = {GO_ON: "go on", SKIP: "leave this trial out", REDO: "measure the last one again"}
-SPOILT = {GO_ON: "clear what is wrong, and repeat it", SKIP: "leave it out"}
+SPOILT = {GO_ON: "repeat it", SKIP: "leave it out"}
 DOUBTFUL = {GO_ON: "keep it", REDO: "measure it again", SKIP: "leave it out"}
 
 Truths = dict[int, dict[str, float | None]]  # N/m³ by stride and coefficient
@@ -59,7 +59,8 @@ class PromptedBed:
 
     def prepare(self, trial: PlannedTrial) -> str:
         disarm(self._robot)
-        return self._person.ask(f"{trial}. {self._words(trial)}", ASKED, _nothing)
+        face_faults(self._robot, self._person)
+        return self._person.ask(f"{trial}. {self._words(trial)}", ASKED, partial(self._robot.wait, LOOK_S))
 
     def truths(self, flipper: str) -> Truths:
         return {}
@@ -107,36 +108,24 @@ def _forget_last(bench: Bench, before: Sequence[PlannedTrial]) -> int:
 
 def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) -> bool:
     """Measured, or left out. Raises BenchError after too many attempts."""
+    attend = partial(bench.robot.wait, LOOK_S)
     try:
         entry = measure(trial)
     except (SpoiltTrialError, BenchError) as problem:
         rest(bench.robot)
         if attempt >= MOST_ATTEMPTS:
             raise BenchError(f"{trial} went wrong {attempt} times; the last time: {problem}") from problem
-        answer = bench.person.ask(f"{trial} went wrong: {str(problem).rstrip('.')}.", SPOILT, _nothing)
-        _clear(bench.robot)
-        return answer == SKIP
+        return bench.person.ask(f"{trial} went wrong: {str(problem).rstrip('.')}.", SPOILT, attend) == SKIP
     rest(bench.robot)
     for remark in entry["remarks"]:
         bench.person.tell(f"{trial}: {remark}")
-    answer = bench.person.ask("Is this trial to count?", DOUBTFUL, _nothing) if entry["remarks"] else GO_ON
+    answer = bench.person.ask("Is this trial to count?", DOUBTFUL, attend) if entry["remarks"] else GO_ON
     if answer == GO_ON:
         bench.notebook.write(trial.key, entry)
     return answer != REDO
-
-
-def _clear(robot: BenchRobot) -> None:
-    """Faults that stand against arming, now that a person has seen them. What stays is told by the next attempt."""
-    if any(fault["blocks_arming"] for fault in robot.call("status")["faults"]):
-        with suppress(CallRefusedError):
-            robot.call("clear")
 
 
 def require_some(notebook: Notebook) -> None:
     """Raises BenchError for an experiment that has nothing to report."""
     if not notebook.entries:
         raise BenchError("nothing was measured: every trial was left out")
-
-
-def _nothing() -> None:
-    """Torque is off while a person is asked: nobody has to look after the robot."""

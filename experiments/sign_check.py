@@ -1,9 +1,10 @@
 """Does a tiny torque move the right joint, and the right way?
 
-Each joint in turn gets a torque that grows in small steps until it moves, all others none: so friction and gravity
-need not be known. Drive and encoder must agree: angle, velocity and current all have the torque's sign. A drive agrees
-with itself on whatever joint it sits and whichever way it is mounted, so afterwards the joint is moved a little
-farther, under control, for somebody to see which flipper moves and how.
+Each joint in turn is shaken, so that its encoder is known to live (joint_shake.py). Then it gets a torque that grows in
+small steps until it moves, all others none: so friction and gravity need not be known. Drive and encoder must agree:
+angle, velocity and current all have the torque's sign. A drive agrees with itself on whatever joint it sits and
+whichever way it is mounted, so afterwards the joint is moved a little farther, under control, for somebody to see which
+flipper moves and how.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from control.records import JOINTS, NO_TORQUE, DriveStates, Torques
 from experiments.bench_attendant import WAYS, Sight
 from experiments.bench_reading import Reading, Readings, left_out
 from experiments.bench_stand import Sample, Stand, joint_place
+from experiments.joint_shake import answer, idle, shake
 from firmware_host.ticker import PERIOD_S
 
 STEP_NM = 0.01  # a fifth of what holds an arm of the default mass level
@@ -52,7 +54,12 @@ class Nudge:
 def nudged(stand: Stand, joint: str) -> Readings:
     """Raises BenchError where a fault ends it."""
     place = joint_place(joint)
-    stand.arm(lambda held, states: NO_TORQUE)
+    stand.arm(idle)
+    shaken = shake(stand, joint)
+    yield answer(joint, shaken)
+    if not shaken.answered:
+        stand.let_go()
+        return
     begun = stand.run_for(0.1)[-1].states
     nudge = Nudge(place, begun)
     stand.controller.law = nudge

@@ -22,6 +22,7 @@ from experiments.bench_robot import (
     Status,
     arm,
     disarm,
+    face_faults,
     follow_walk,
     told_by,
     wait_until,
@@ -61,8 +62,10 @@ class AskedTrackway:
         self._person = person
 
     def prepare(self, trial: str) -> BenchRobot:
+        face_faults(self._robot, self._person)
         question = f"{trial}: level the mud, and put the sweep axes over the beginning of the first mud."
         self._person.ask(question, {GO_ON: "the robot may walk"}, self._meanwhile)
+        face_faults(self._robot, self._person)
         return self._robot
 
     def judge(self, told: str) -> str:

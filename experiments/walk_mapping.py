@@ -20,6 +20,7 @@ from experiments.bench_robot import (
     Status,
     arm,
     follow_walk,
+    rest,
     strides_since,
     told_by,
     wait_until,
@@ -120,7 +121,7 @@ def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
 
 def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     robot = bench.robot
-    arm(robot)
+    arm(robot, bench.person)
     before: Status = robot.call("status")
     start_m = before["body_x_m"]
     remarks = [] if start_m is not None else ["no pose is told: strides are given to the muds by their order"]
@@ -189,7 +190,7 @@ def require_mud(strides: Sequence[Mapping[str, Any]], flipper: str) -> None:
 
 def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float) -> Entry:
     robot = bench.robot
-    arm(robot)
+    arm(robot, bench.person)
     before: Status = robot.call("status")
     walked = walk(robot, depth_m, plan.soft_strides)
     log = robot.record(walked.from_s, walked.to_s)
@@ -203,6 +204,7 @@ def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float)
 def _entry(bench: Bench, plan: Plan, trial: PlannedTrial, log: Log, closed: int) -> Entry:
     """What all walks have. Raises SpoiltTrialError."""
     robot = bench.robot
+    rest(robot)  # what follows takes longer on a slow computer than the robot is left alone
     told = strides_since(robot, closed)
     strides = strides_by_method(told, log, robot.configuration, plan.flipper, METHODS)
     own = strides[method_of(robot.configuration.estimation)]

@@ -1,7 +1,7 @@
 """What a person can ask of the running daemon: the methods of the status socket.
 
-Who asks for something to be done is named in the log, where it changes anything. A lease is given while torque is on:
-before, there is nothing that its loss could stop.
+Who asks for something to be done is named in the log, where it changes anything. What sets the robot in motion is for
+the lease's holder, where somebody holds it; what ends a motion is for everybody.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 from control.controller import WalkOrder
 from control.faults import Blocks, Fault
-from control.modes import ENERGISED, Mode, Request
+from control.modes import Mode, Request
 from control.records import JOINTS
 from drivers.odrive_codec import error_text
 from firmware_host.arming_checks import arming_checks
@@ -23,10 +23,13 @@ from firmware_host.loop import Loop
 from firmware_host.recorder import Recording
 from firmware_host.reports import belief_report, known, map_report, stride_report
 from firmware_host.status_socket import Methods, RefusedError
+from firmware_host.ticker import PERIOD_S
 
 MOST_STRIDES = 100000  # that a walk may be ordered
 STRIDES_PER_ANSWER = 20  # an answer is made between two ticks
 LARGEST_NUMBER = 2**63 - 1
+
+Method = Callable[[dict[str, Any], Caller], str]
 
 
 def software_version() -> str:
@@ -37,13 +40,7 @@ def software_version() -> str:
 
 
 class OperatorCalls:
-    def __init__(
-        self,
-        loop: Loop,
-        recorder: Recording,
-        warnings: list[str],
-        clock: Callable[[], float],
-    ) -> None:
+    def __init__(self, loop: Loop, recorder: Recording, warnings: list[str], clock: Callable[[], float]) -> None:
         self._loop = loop
         self._lease = loop.lease
         self._recorder = recorder
@@ -59,9 +56,9 @@ class OperatorCalls:
             "strides": lambda params, caller: self.strides(params),
             "map": lambda params, caller: self.map(params),
             "check": lambda params, caller: self.check(params),
-            "arm": self.arm,
-            "walk": self.walk,
-            "move": self.move,
+            "arm": lambda params, caller: self._as_holder(self.arm, params, caller),
+            "walk": lambda params, caller: self._as_holder(self.walk, params, caller),
+            "move": lambda params, caller: self._as_holder(self.move, params, caller),
             "stop": lambda params, caller: self._request(caller, Request.STOP),
             "disarm": lambda params, caller: self._request(caller, Request.DISARM),
             "clear": lambda params, caller: self._request(caller, Request.CLEAR),
@@ -83,7 +80,7 @@ class OperatorCalls:
             "mode": loop.mode.name.lower(),
             "moving": loop.controller.moving,
             "fault": _fault(loop),
-            "faults": [_fault_report(fault) for fault in loop.faults.standing],
+            "faults": [_fault_report(loop, fault) for fault in loop.faults.standing],
             "forced": loop.forced,
             "notice": loop.notice,
             "untold_requests": loop.requests_told.untold,
@@ -162,10 +159,7 @@ class OperatorCalls:
 
     def arm(self, params: dict[str, Any], caller: Caller) -> str:
         """`force` overrules what is not mandatory."""
-        force = params.get("force", False)
-        if not isinstance(force, bool):
-            raise RefusedError(f"force = {force!r}: must be true or false")
-        return self._request(caller, Request.ARM, forced=force)
+        return self._request(caller, Request.ARM, forced=_flag(params, "force"))
 
     def walk(self, params: dict[str, Any], caller: Caller) -> str:
         """`depth_m` for a fixed depth, else adaptive from the configured start; `strides`, 0 without end."""
@@ -201,16 +195,17 @@ class OperatorCalls:
         return "accepted"
 
     def lease(self, params: dict[str, Any], caller: Caller) -> str:
-        """Promise to renew it within `for_s`, or to be stopped."""
+        """Promise to renew it within `for_s`, or to be stopped. Until then nobody else moves the robot."""
         for_s = params.get("for_s")
         if isinstance(for_s, bool) or not isinstance(for_s, int | float) or not SHORTEST_S <= for_s <= LONGEST_S:
             raise RefusedError(f"for_s = {for_s!r}: must be a number from {SHORTEST_S:g} to {LONGEST_S:g}")
-        if self._loop.mode not in ENERGISED:
-            raise RefusedError("the torque is off, there is nothing to stop: arm first")
+        now_s = self._clock()
+        self._accept(self._lease.refusal(caller, now_s, _flag(params, "take_over")))
         begins = self._lease.holder != caller
-        self._accept(self._lease.renew(caller, self._clock(), for_s))
+        self._oust(caller)
+        self._accept(self._lease.renew(caller, now_s, for_s))
         if begins:
-            self._loop.event(self._clock(), f"lease taken by {caller}")
+            self._loop.event(now_s, f"lease taken by {caller}")
         return "accepted"
 
     def release(self, params: dict[str, Any], caller: Caller) -> str:
@@ -220,6 +215,18 @@ class OperatorCalls:
         if begun:
             self._loop.event(self._clock(), f"lease released by {caller}")
         return "accepted"
+
+    def _as_holder(self, method: Method, params: dict[str, Any], caller: Caller) -> str:
+        """Only who holds the lease, where somebody does; `take_over` ends that of another, once all is accepted."""
+        self._accept(self._lease.refusal(caller, self._clock(), _flag(params, "take_over")))
+        answer = method({name: value for name, value in params.items() if name != "take_over"}, caller)
+        self._oust(caller)
+        return answer
+
+    def _oust(self, caller: Caller) -> None:
+        if self._lease.held and self._lease.holder != caller:
+            self._loop.event(self._clock(), f"lease of {self._lease.holder} taken over by {caller}")
+            self._lease.oust(caller)
 
     def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:
         self._accept(self._loop.request(request, self._clock(), order, forced, str(caller)))
@@ -242,16 +249,17 @@ class OperatorCalls:
 def _fault(loop: Loop) -> dict[str, Any] | None:
     """The worst that stands, or what stands against arming."""
     fault = loop.fault or next(iter(loop.faults.blocking()), None)
-    return _fault_report(fault) if fault else None
+    return _fault_report(loop, fault) if fault else None
 
 
-def _fault_report(fault: Fault) -> dict[str, Any]:
+def _fault_report(loop: Loop, fault: Fault) -> dict[str, Any]:
     kind = fault.kind
     return {
         "name": fault.name,
         "subject": fault.subject,
         "sentence": fault.sentence,
         "what_to_do": kind.what_to_do,
+        "for_s": loop.faults.age_ticks(fault) * PERIOD_S,
         "reaction": kind.reaction.name.lower(),
         "blocks_arming": kind.blocks is not Blocks.NO,
     }
@@ -275,6 +283,13 @@ def _joint_angles(params: dict[str, Any]) -> dict[str, float]:
         if isinstance(angle_rad, bool) or not isinstance(angle_rad, int | float) or not isfinite(angle_rad):
             raise RefusedError(f"{name} = {angle_rad!r}: must be a number")
     return {names[name]: angle_rad for name, angle_rad in params.items()}
+
+
+def _flag(params: dict[str, Any], name: str) -> bool:
+    value = params.get(name, False)
+    if not isinstance(value, bool):
+        raise RefusedError(f"{name} = {value!r}: must be true or false")
+    return value
 
 
 def _integer(params: dict[str, Any], name: str, low: int, high: int) -> int:

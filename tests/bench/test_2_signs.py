@@ -6,7 +6,7 @@ from control.records import JOINTS
 from experiments.sign_check import nudged, shown
 from tests.bench.staged_bench import StagedBench
 
-MOVES = "each joint moves a little, with at most 0.2 N·m, then by 12 degrees; watch which one moves, and how."
+MOVES = "each joint is shaken and moves a little, with at most 0.2 N·m, then by 12 degrees; watch which one, and how."
 
 
 @pytest.mark.parametrize("joint", JOINTS)

@@ -74,7 +74,7 @@ def test_a_walk_that_a_fault_has_ended_is_no_success_and_its_cause_is_told(
 
 def test_it_arms_nothing(bench: Any) -> None:
     ended = bench.run("walk", "--attended")
-    assert ended.returncode == exit_codes.REFUSED and "arm first" in ended.stderr
+    assert ended.returncode == exit_codes.REFUSED and "'mudskipper arm' first" in ended.stderr
 
 
 def test_a_walk_that_is_refused_leaves_no_lease_behind(bench: Any) -> None:

@@ -69,6 +69,22 @@ def test_the_robot_is_looked_after_while_a_person_thinks(monkeypatch: pytest.Mon
     assert len(looks) == 3
 
 
+def test_an_enter_that_was_pressed_before_a_question_does_not_answer_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    keyboard, terminal = os.openpty()
+    os.write(keyboard, b"\n\n")  # in haste, while the robot still walked
+    looks: list[int] = []
+
+    def look() -> None:
+        looks.append(1)
+        os.write(keyboard, b"s\n")
+
+    with open(terminal, encoding="utf-8") as stream:
+        monkeypatch.setattr(sys, "stdin", stream)
+        assert TerminalPerson().ask("Are your hands out of the mud?", ANSWERS, look) == "s"
+    os.close(keyboard)
+    assert looks == [1]
+
+
 def test_where_nobody_can_answer_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     with typed(monkeypatch, ""), pytest.raises(AbsentPersonError, match="run it on a terminal"):
         TerminalPerson().ask("Well?", ANSWERS, nothing)

@@ -41,7 +41,9 @@ class StoppingClient:
 @pytest.fixture
 def options(monkeypatch: pytest.MonkeyPatch) -> Namespace:
     monkeypatch.setattr(operation, "StatusClient", StoppingClient)
-    return Namespace(socket=Path("/none"), json=False, strides=0, depth=None, attended=False, force=False)
+    return Namespace(
+        socket=Path("/none"), json=False, strides=0, depth=None, attended=False, force=False, take_over=False
+    )
 
 
 @pytest.mark.parametrize("command", [operation.stop, operation.disarm])

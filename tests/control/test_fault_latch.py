@@ -31,6 +31,17 @@ def ticks_standing(fault: Fault, energised: bool, energised_after: bool, clearin
     return 1001
 
 
+def test_a_fault_is_as_old_as_its_first_tick_and_one_that_came_back_is_young() -> None:
+    latch = FaultLatch()
+    for _ in range(10):
+        latch.update([LATE], False)
+    latch.update([], False, ticks=5)
+    assert latch.age_ticks(LATE) == 14
+    latch.update([], False, ticks=GOOD_TICKS)
+    latch.update([LATE], False)
+    assert latch.age_ticks(LATE) == 0
+
+
 FOR_EVER, A_WHILE = 1001, GOOD_TICKS + 1
 
 

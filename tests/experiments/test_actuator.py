@@ -15,7 +15,7 @@ from experiments.actuator_friction import Loop
 from experiments.actuator_plan import Plan, Step, steps_of
 from experiments.actuator_reading import MovedError, Reading, Side
 from experiments.actuator_simulation import bench_configuration
-from experiments.bench_robot import BenchError
+from experiments.bench_robot import LEAVE, BenchError, EndedError
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP
 from firmware_host.configuration import Configuration
@@ -33,20 +33,21 @@ class ScriptedRobot:
 
     def __init__(self) -> None:
         self.mode, self.winding_c, self.hanging_g, self.armed = "idle", 30.0, 0.0, 0
-        self.sentence = ""
+        self.sentence, self.now_s = "", 0.0
 
     def call(self, method: str, **params: Any) -> Any:
         if method == "arm":
             self.mode, self.armed = "hold", self.armed + 1
         if method == "clear":
             self.mode = "idle"
-        fault = {"sentence": self.sentence, "what_to_do": "do this", "blocks_arming": False}
+        fault = {"sentence": self.sentence, "what_to_do": "do this", "blocks_arming": False, "for_s": 3.0}
         drives = [{"joint": joint, "winding_c": self.winding_c} for joint in JOINTS]
-        standing = {"mode": self.mode, "fault": fault if self.mode == "fault" else None, "notice": "", "now_s": 0.0}
+        standing: dict[str, Any] = {"mode": self.mode, "fault": fault if self.mode == "fault" else None, "notice": ""}
+        standing |= {"now_s": self.now_s}
         return standing | {"drives": drives, "faults": [fault] if self.mode == "fault" else [], "moving": False}
 
     def wait(self, duration_s: float) -> None:
-        self.winding_c = max(30.0, self.winding_c - duration_s)
+        self.winding_c, self.now_s = max(30.0, self.winding_c - duration_s), self.now_s + duration_s
 
     def record(self, from_s: float, to_s: float) -> Log:
         raise NotImplementedError
@@ -255,6 +256,17 @@ def test_a_robot_that_lets_go_is_told_of_armed_again_and_the_weight_is_read_anew
     assert sorted(entries) == sorted(KEYS) and case.robot.armed == 2
     assert any("400 g was not read" in told and sentence in told for told in case.person.told)
     assert case.hand.asked.count(Step(1, 400.0).key) == 2
+    assert case.person.questions == [
+        f"The robot is in FAULT: {sentence} (for 3 s; do this) Torque stays off until this is cleared."
+    ]
+
+
+def test_a_person_who_leaves_a_fault_as_it_is_ends_the_calibration(case: Case) -> None:
+    case.on(Step(1, 400.0), case.letting_go("The motor is wet."))
+    case.person.answers = [LEAVE]
+    with pytest.raises(EndedError, match="the fault stands"):
+        case.run()
+    assert (case.robot.mode, case.robot.armed) == ("fault", 1)
 
 
 def test_a_robot_that_lets_go_while_a_person_thinks_is_told_at_once(case: Case) -> None:

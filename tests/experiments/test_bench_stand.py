@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from control.records import JOINTS, NO_TORQUE
-from drivers.odrive_codec import AxisState
-from experiments.bench_attendant import AbsentAttendant, SimulatedAttendant
+from drivers.odrive_codec import ERROR_WATCHDOG, AxisState
+from experiments.bench_attendant import AbsentAttendant, AskedAttendant, SimulatedAttendant
 from experiments.bench_reading import Reading, left_out
 from experiments.bench_rig import SimulatedRig
-from experiments.bench_robot import BenchError
+from experiments.bench_robot import CLEAR, LEAVE, BenchError
 from experiments.bench_stand import Stand, first_lasting
 from experiments.joint_zero_check import level_pose, turned
 from experiments.sign_check import MOST_NM, gently, nudged, shown
@@ -21,6 +21,7 @@ from experiments.stroke_tracking import lag_ticks
 from firmware_host.configuration import Configuration
 from tests.bench.bench_table import HEADS, table_lines
 from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, BenchReport, StagedBench, stage_of
+from tests.experiments.test_bench_attendant import Scripted
 
 
 @pytest.fixture
@@ -62,6 +63,39 @@ def test_a_robot_that_is_not_idle_is_not_armed_again(bench: StagedBench) -> None
     bench.stand.arm(lambda held, states: NO_TORQUE)
     with pytest.raises(BenchError, match=r"cannot be armed: it is in hold\."):
         bench.stand.arm()
+
+
+class Asked(AskedAttendant):
+    """With a person who says the same of every fault."""
+
+    def __init__(self, answer: str) -> None:
+        person = Scripted(answer)
+        super().__init__(person, sure=True)
+        self.asked = person.asked
+
+
+@pytest.mark.parametrize("answer", [CLEAR, LEAVE])
+def test_a_fault_of_before_is_cleared_where_a_person_says_so(rig: SimulatedRig, answer: str) -> None:
+    """No daemon may run beside the bench, so 'mudskipper clear' is not to be had."""
+    rig.robot.drives[1].errors = ERROR_WATCHDOG
+    attendant = Asked(answer)
+    stand = Stand(rig, attendant)
+    if answer == CLEAR:
+        stand.arm(lambda held, states: NO_TORQUE)
+        assert axis_states(rig) == {AxisState.CLOSED_LOOP}
+    else:
+        with pytest.raises(BenchError, match="cannot be armed: The left_adduction drive reports error"):
+            stand.arm()
+        assert rig.robot.drives[1].errors == ERROR_WATCHDOG
+    (question,) = attendant.asked
+    assert "The left_adduction drive reports error" in question and question.endswith("Is the cause gone?")
+
+
+def test_where_nobody_is_there_a_fault_of_before_stands(rig: SimulatedRig) -> None:
+    rig.robot.drives[1].errors = ERROR_WATCHDOG
+    with pytest.raises(BenchError, match="cannot be armed: The left_adduction drive reports error"):
+        Stand(rig, AbsentAttendant()).arm()
+    assert rig.robot.drives[1].errors == ERROR_WATCHDOG
 
 
 def test_a_drive_that_does_not_let_go_is_told(bench: StagedBench, rig: SimulatedRig) -> None:

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from command_line import exit_codes
+from control.controller import UP_RAD
+from control.modes import Mode
 from experiments.bench_robot import BenchError, arm, disarm, move, walk
 from experiments.daemon_robot import DaemonRobot
 from firmware_host.log_reader import read_log
@@ -32,12 +38,34 @@ def test_an_experiment_operates_the_daemon_and_reads_its_log(bench: Bench, tmp_p
 
 
 def test_the_robot_stops_where_the_experiment_dies(bench: Bench) -> None:  # noqa: F811
+    """Right behind its arm as well: the lease is older than the torque."""
     robot = DaemonRobot(bench.socket)
     arm(robot)
-    robot.wait(0.3)
     robot._client.close()
-    report = bench.wait_for(lambda status: bool(status["mode"] not in ("hold", "stopping")), 10.0)
+    report = bench.wait_for(lambda status: bool(status["mode"] not in ("arming", "hold", "stopping")), 10.0)
     assert "lease" in report["notice"]
+
+
+def test_an_experiment_that_is_killed_with_its_flippers_in_the_mud_leaves_them_raised_and_without_torque(
+    bench: Bench,  # noqa: F811
+) -> None:
+    program = (
+        "import sys, time\nfrom pathlib import Path\nfrom experiments.bench_robot import arm\n"
+        "from experiments.daemon_robot import DaemonRobot\n"
+        "robot = DaemonRobot(Path(sys.argv[1]))\narm(robot)\nrobot.call('walk', depth_m=0.03)\nrobot.wait(60.0)\n"
+    )
+    experiment = subprocess.Popen([sys.executable, "-c", program, str(bench.socket)])
+    bench.wait_for(lambda status: bool(status["phase"] == "insertion"))
+    experiment.kill()
+    assert experiment.wait(5.0)
+    report = bench.wait_for(lambda status: bool(status["mode"] == "idle"), 10.0)
+    assert "lease_lost" in report["notice"]
+    watcher = DaemonRobot(bench.socket)
+    rows = watcher.record(0.0, report["now_s"]).ticks
+    watcher.close()
+    raised = rows["mode"] == Mode.STOPPING
+    assert raised.any() and abs(rows["angle_rad"][raised][-1, [1, 3]]).max() < UP_RAD
+    assert not rows["torque_command_nm"][rows["mode"] == Mode.IDLE].any()
 
 
 def test_without_a_daemon_it_is_told_how_to_start_one(tmp_path: Path) -> None:
@@ -58,16 +86,33 @@ def test_a_daemon_that_ends_is_told_and_its_log_is_there(bench: Bench, tmp_path:
 
 
 def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> None:  # noqa: F811
-    first, second = DaemonRobot(bench.socket), DaemonRobot(bench.socket)
-    second._name = "somebody else"  # both are this process
+    first = DaemonRobot(bench.socket)
     try:
-        arm(first)
-        first.wait(0.3)
         with pytest.raises(BenchError, match="operates the robot: wait until it has ended"):
-            walk(second, 0.03, 1)
-        second.close()
-        assert first.call("status")["mode"] == "hold"
-        disarm(first)  # its lease is not over yet
-        first.wait(0.3)
+            DaemonRobot(bench.socket)
+        arm(first)
+        for command in (("move", "left_sweep=3"), ("walk",), ("walk", "--attended")):
+            refused = bench.run(*command)
+            assert refused.returncode == exit_codes.REFUSED and "holds the lease, for" in refused.stderr
+        assert "operated by uid" in bench.run("status").stdout
+        move(first, {"right_sweep": 0.05})
+        disarm(first)
+        assert "holds the lease" in bench.run("arm").stderr
     finally:
         first.close()
+    assert bench.run("arm").returncode == exit_codes.OK
+
+
+def test_a_robot_that_was_taken_over_is_left_to_whoever_did(bench: Bench) -> None:  # noqa: F811
+    robot = DaemonRobot(bench.socket)
+    arm(robot)
+    assert bench.run("move", "--take-over", "left_sweep=3").returncode == exit_codes.OK
+    operations = (partial(robot.wait, 0.3), partial(move, robot, {"left_sweep": 0.0}), partial(disarm, robot))
+    for operate in operations:
+        with pytest.raises(BenchError, match="taken over: uid .* wanted the robot; begin again when it is free"):
+            operate()
+    robot.close()
+    assert bench.run("walk").returncode == exit_codes.OK
+    with pytest.raises(BenchError, match="the robot is walking: wait for its end, or 'mudskipper stop' it"):
+        DaemonRobot(bench.socket)
+    assert bench.wait_for(lambda status: status["lease"] is None)["mode"] == "walking"

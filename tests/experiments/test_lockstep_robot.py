@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +14,20 @@ from control.joint_watch import FaultBounds
 from control.modes import Mode
 from control.records import JOINTS
 from drivers.failures import Failures
-from experiments.bench_robot import BenchError, arm, disarm, move, require_hold, told_by, walk
+from experiments.bench_robot import (
+    CLEAR,
+    LEAVE,
+    BenchError,
+    EndedError,
+    arm,
+    disarm,
+    face_faults,
+    move,
+    require_hold,
+    strides_since,
+    told_by,
+    walk,
+)
 from experiments.lockstep_robot import LockstepRobot, simulated_configuration
 from firmware_host.file_recorder import FileRecorder
 from firmware_host.log_reader import read_log
@@ -134,6 +147,89 @@ def test_a_fault_that_ends_a_walk_is_told_in_its_own_words(
     monkeypatch.setattr(robot, "wait", wait)
     with pytest.raises(BenchError, match="the walk ended early: stopped by .*right_sweep"):
         walk(robot, 0.03, 1)
+
+
+class Decided:
+    """A Person who says the same of every fault."""
+
+    def __init__(self, answer: str) -> None:
+        self.answer = answer
+        self.asked: list[str] = []
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        assert set(answers) == {CLEAR, LEAVE} and next(iter(answers)) == CLEAR  # which Willing takes
+        self.asked.append(question)
+        meanwhile()
+        return self.answer
+
+    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
+        raise AssertionError("no number is wanted")
+
+    def tell(self, sentence: str) -> None: ...
+
+
+@pytest.fixture
+def faulty(robot: LockstepRobot) -> LockstepRobot:
+    """In FAULT: a drive was restarted under torque, some seconds ago."""
+    arm(robot)
+    robot.lockstep.robot.restart_drive(JOINTS.index("right_sweep"))
+    robot.wait(3.0)
+    assert robot.call("status")["mode"] == "fault"
+    return robot
+
+
+def test_a_fault_is_cleared_where_a_person_says_so(faulty: LockstepRobot) -> None:
+    person = Decided(CLEAR)
+    arm(faulty, person)
+    assert faulty.call("status")["mode"] == "hold"
+    (question,) = person.asked
+    assert question.startswith("The robot is in FAULT: ") and "right_sweep" in question and "(for 4 s; " in question
+
+
+def test_a_fault_that_a_person_leaves_ends_the_experiment_and_stands(faulty: LockstepRobot) -> None:
+    with pytest.raises(EndedError, match="the fault stands; when its cause is gone, 'mudskipper clear'"):
+        arm(faulty, Decided(LEAVE))
+    assert faulty.call("status")["mode"] == "fault"
+
+
+def test_where_nobody_is_there_a_fault_stands(faulty: LockstepRobot) -> None:
+    with pytest.raises(BenchError, match="The robot is in FAULT: .*right_sweep.* 'mudskipper clear'"):
+        arm(faulty)
+    assert faulty.call("status")["mode"] == "fault"
+
+
+def test_a_fault_that_comes_back_is_cleared_three_times_at_most(
+    faulty: LockstepRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    call, person = faulty.call, Decided(CLEAR)
+    monkeypatch.setattr(faulty, "call", lambda method, **params: None if method == "clear" else call(method, **params))
+    with pytest.raises(BenchError, match="the fault comes back: The robot is in FAULT"):
+        face_faults(faulty, person)
+    assert len(person.asked) == 3
+
+
+def test_of_what_is_over_by_itself_nobody_is_asked(robot: LockstepRobot) -> None:
+    robot.wait(1.0)
+    robot.lockstep.fail("left_sweep.position", "off", 2.0)
+    robot.wait(1.9)
+    assert any(fault["blocks_arming"] for fault in robot.call("status")["faults"])
+    person = Decided(LEAVE)
+    arm(robot, person)
+    assert person.asked == [] and robot.call("status")["mode"] == "hold"
+
+
+@pytest.mark.parametrize(("kept", "whole"), [(45, True), (44, False), (10, False)])
+def test_strides_that_the_daemon_no_longer_keeps_are_not_passed_over(
+    robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch, kept: int, whole: bool
+) -> None:
+    strides = [{"number": number} for number in range(5, 50)][-kept:]
+    tell = lambda method, since: [stride for stride in strides if stride["number"] >= since][:20]  # noqa: E731
+    monkeypatch.setattr(robot, "call", tell)
+    if whole:
+        assert strides_since(robot, 5) == strides
+    else:
+        with pytest.raises(BenchError, match="more strides than the daemon keeps"):
+            strides_since(robot, 5)
 
 
 def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) -> None:

@@ -8,8 +8,16 @@ from typing import Any
 
 import pytest
 
-from experiments.bench_robot import BenchError, leave
-from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError, Truths, conduct_trials, require_some
+from experiments.bench_robot import CLEAR, LEAVE, BenchError, EndedError, leave
+from experiments.mud_trials import (
+    Bench,
+    PlannedTrial,
+    PromptedBed,
+    SpoiltTrialError,
+    Truths,
+    conduct_trials,
+    require_some,
+)
 from experiments.notebook import Entry, Notebook
 from experiments.person import GO_ON, REDO, SKIP
 from firmware_host.log_reader import Log
@@ -26,6 +34,7 @@ class StillRobot:
 
     def __init__(self) -> None:
         self.called: list[str] = []
+        self.now_s = 0.0
         self.mode = "idle"
         self.blocked = False
         self.closed = False
@@ -37,11 +46,13 @@ class StillRobot:
         self.called.append(method)
         if method in ("disarm", "stop"):
             self.mode = "idle"
-        faults = [{"blocks_arming": True}] if self.blocked else []
-        return {"mode": self.mode, "now_s": 0.0, "faults": faults} if method == "status" else "accepted"
+        self.blocked = self.blocked and method != "clear"
+        told = {"sentence": "A drive is silent.", "for_s": 150.0, "what_to_do": "check it", "blocks_arming": True}
+        faults = [told] if self.blocked else []
+        return {"mode": self.mode, "now_s": self.now_s, "faults": faults} if method == "status" else "accepted"
 
     def wait(self, duration_s: float) -> None:
-        raise AssertionError("nothing to wait for")
+        self.now_s += duration_s
 
     def record(self, from_s: float, to_s: float) -> Log:
         raise AssertionError("nothing was recorded")
@@ -157,12 +168,36 @@ def test_a_fault_is_told_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> 
     assert session.bed.prepared == session.measured == [ALL[0], *ALL]
 
 
-def test_a_person_who_repeats_has_seen_the_fault_and_it_is_cleared(tmp_path: Path) -> None:
-    session = Session(tmp_path)
+@pytest.mark.parametrize("answer", [CLEAR, LEAVE])
+def test_before_a_person_levels_mud_they_judge_the_fault_that_stands(tmp_path: Path, answer: str) -> None:
+    robot, person = StillRobot(), ScriptedPerson(answer)
+    robot.blocked = True
+    bed = PromptedBed(robot, person, lambda trial: "Level it")
+    if answer == CLEAR:
+        assert bed.prepare(TRIALS[0]) == GO_ON
+    else:
+        with pytest.raises(EndedError, match="'mudskipper clear', then the same command again"):
+            bed.prepare(TRIALS[0])
+    assert person.asked[0] == (
+        "A fault stands: A drive is silent. (for 2 min; check it) Torque stays off until this is cleared."
+    )
+    assert robot.called.count("clear") == (answer == CLEAR) and len(person.asked) == 1 + (answer == CLEAR)
+
+
+def test_a_trial_that_went_wrong_clears_nothing_by_itself(tmp_path: Path) -> None:
+    session = Session(tmp_path, ScriptedPerson(SKIP))
     session.robot.blocked = True
     session.outcomes = [SpoiltTrialError("no mud")]
     session.conduct()
-    assert session.robot.called.count("clear") == 1
+    assert "clear" not in session.robot.called
+
+
+def test_a_person_who_ends_the_experiment_is_not_asked_whether_to_repeat(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.outcomes = [{"remarks": []}, EndedError("the fault stands")]
+    with pytest.raises(EndedError):
+        session.conduct()
+    assert session.person.asked == [] and list(session.notebook.entries) == ALL[:1]
 
 
 def test_a_spoilt_trial_can_be_left_out(tmp_path: Path) -> None:

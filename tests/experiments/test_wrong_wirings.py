@@ -138,6 +138,13 @@ class Stumbler:
             rig.robot.restart_drive(2)
 
 
+def hung(configuration: Configuration) -> SimulatedRig:
+    """An encoder that tells the same angle for ever, and no speed."""
+    rig = SimulatedRig(configuration)
+    rig.robot.drives[1].measure = lambda angle_rad, velocity_rad_s: None  # type: ignore[method-assign]
+    return rig
+
+
 class Wrong(NamedTuple):
     what: str
     rig: Callable[[Configuration], SimulatedRig]
@@ -167,6 +174,7 @@ WRONG = (
         "signs",
         "drive.left_adduction.sign",
     ),
+    Wrong("hung encoder", hung, "signs", "left_adduction: answer to a shake is 0 rad"),
     Wrong(
         "encoder offset",
         lambda c: with_drive(c, "left_adduction", encoder_offset_rad=0.15),

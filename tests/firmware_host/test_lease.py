@@ -58,7 +58,8 @@ def test_a_holder_that_has_released_it_may_hang_up() -> None:
 def test_a_second_one_is_told_who_holds_it() -> None:
     lease = Lease()
     lease.renew("anna", 10.0, HALF_S)
-    assert lease.renew("ben", 10.1, HALF_S) == lease.release("ben") == "anna holds the lease"
+    assert (lease.renew("ben", 10.1, HALF_S) or "").startswith("anna holds the lease, for 0.4 s unless it is renewed: ")
+    assert lease.release("ben") == "anna holds the lease"
     assert lease.lost(10.51)  # which was not renewed by that
 
 
@@ -78,3 +79,38 @@ def test_reset_forgets_all() -> None:
     assert lease.lost(11.0)
     lease.reset()
     assert not lease.lost(12.0) and lease.holder is None
+
+
+def test_only_its_holder_moves_the_robot_and_where_there_is_none_anybody() -> None:
+    lease = Lease()
+    assert lease.refusal("anna", 10.0) is lease.refusal("ben", 10.0) is None
+    lease.renew("anna", 10.0, HALF_S)
+    assert lease.refusal("anna", 10.1) is None
+    assert "anna holds the lease, for 0.4 s" in (lease.refusal("ben", 10.1) or "")
+    assert "anna has lost the lease" in (lease.refusal("ben", 10.6, take_over=True) or "")  # the robot stops
+    lease.reset()
+    assert lease.refusal("ben", 10.7) is None
+
+
+def test_whoever_was_ousted_stays_out_until_it_connects_anew() -> None:
+    lease = Lease()
+    lease.renew("anna", 10.0, HALF_S)
+    assert lease.refusal("ben", 10.1, take_over=True) is None
+    lease.oust("ben")
+    assert not lease.held and not lease.lost(99.0)
+    lease.reset()  # the torque went off meanwhile
+    for refused in (
+        lease.refusal("anna", 10.2),
+        lease.refusal("anna", 10.2, take_over=True),
+        lease.renew("anna", 10.2, 1.0),
+    ):
+        assert refused == "taken over: ben wanted the robot; begin again when it is free"
+    lease.hang_up("anna")
+    assert not lease.lost(99.0) and lease.renew("anna", 99.0, 1.0) is None
+
+
+def test_nobody_ousts_oneself() -> None:
+    lease = Lease()
+    lease.renew("anna", 10.0, HALF_S)
+    lease.oust("anna")
+    assert lease.held and lease.refusal("anna", 10.1) is None

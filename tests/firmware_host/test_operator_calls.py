@@ -1,4 +1,4 @@
-"""Whoever asks is named in the log, and a lease is given while there is something that its loss can stop."""
+"""Whoever asks is named in the log; under a lease only its holder moves the robot, and everybody stops it."""
 
 from __future__ import annotations
 
@@ -104,11 +104,77 @@ def test_whatever_moves_the_robot_is_for_operators(robot: Robot) -> None:
     assert robot.names - NEEDED.keys() == {"arm", "walk", "move", "clear", "lease", "release", "reset_timing"}
 
 
-def test_there_is_no_lease_while_torque_is_off(robot: Robot) -> None:
-    robot.steps.run_for(0.1)
-    with pytest.raises(RefusedError, match="arm first"):
-        robot.ask("lease", for_s=0.5)
-    assert not robot.lease.held
+def test_under_a_lease_nobody_else_arms_a_robot_that_hands_are_on(robot: Robot) -> None:
+    robot.steps.run_for(1.0)
+    robot.ask("lease", for_s=0.5)
+    with pytest.raises(RefusedError, match=r"^uid 1000 \(process 77\) holds the lease, for 0.5 s unless it is renewed"):
+        robot.ask("arm", BEN)
+    robot.steps.run_for(0.7)  # its holder is silent: with the torque off there is nothing to stop, and it is free
+    assert robot.ask("status")["mode"] == "idle" and not robot.lease.lost(robot.steps.now_s)
+    robot.steps.run_for(0.2)
+    assert robot.ask("arm", BEN) == "accepted"
+
+
+@pytest.mark.parametrize("method", ["hang_up", "silence"])
+def test_whoever_dies_between_lease_and_torque_has_armed_nothing(robot: Robot, method: str) -> None:
+    robot.steps.run_for(1.0)
+    robot.ask("lease", for_s=0.1)
+    robot.steps.run_for(0.1 if method == "silence" else 0.0)
+    robot.ask("arm")
+    if method == "hang_up":
+        robot.lease.hang_up(ANNA)
+    robot.steps.run_for(1.0)
+    assert robot.ask("status")["mode"] == "idle" and robot.steps.loop.sent.torques_nm == (0.0, 0.0, 0.0, 0.0)
+    assert "mode idle to arming" not in robot.events.texts
+
+
+MOTIONS: list[tuple[str, dict[str, Any]]] = [("walk", {"strides": 1}), ("move", {"left_sweep_rad": 0.1})]
+
+
+@pytest.mark.parametrize(("method", "params"), MOTIONS)
+def test_under_a_lease_nobody_else_moves_the_robot(armed: Robot, method: str, params: dict[str, Any]) -> None:
+    armed.ask("lease", for_s=0.5)
+    with pytest.raises(RefusedError, match="holds the lease, for 0.5 s .*or overrule it with --take-over"):
+        armed.ask(method, BEN, **params)
+    armed.steps.run_for(0.1)
+    assert armed.ask("status")["mode"] == "hold" and not armed.ask("status")["moving"]
+    assert armed.ask(method, ANNA, **params) == "accepted"
+
+
+@pytest.mark.parametrize(("method", "mode"), [("stop", "stopping"), ("disarm", "idle")])
+def test_whoever_holds_the_lease_anybody_stops_the_robot(armed: Robot, method: str, mode: str) -> None:
+    armed.ask("lease", for_s=10.0)
+    armed.ask("walk", strides=0)
+    armed.steps.run_for(0.5)
+    assert armed.ask(method, BEN) == "accepted"
+    armed.steps.run_for(0.01)
+    assert armed.ask("status")["mode"] == mode
+
+
+@pytest.mark.parametrize(("method", "params"), [*MOTIONS, ("lease", {"for_s": 0.5})])
+def test_whoever_overrules_a_lease_has_the_robot_and_its_holder_does_not(
+    armed: Robot, method: str, params: dict[str, Any]
+) -> None:
+    armed.ask("lease", for_s=0.5)
+    assert armed.ask(method, BEN, take_over=True, **params) == "accepted"
+    assert armed.events.about("lease of") == ["lease of uid 1000 (process 77) taken over by uid 1001 (process 78)"]
+    for again in ("lease", "walk", "move", "arm"):
+        with pytest.raises(RefusedError, match=r"^taken over: uid 1001 \(process 78\)"):
+            armed.ask(again, ANNA, for_s=0.5)
+    armed.lease.hang_up(ANNA)
+    armed.steps.run_for(0.3)
+    assert armed.ask("status")["notice"] == ""  # nothing was lost
+    assert armed.ask("status")["mode"] in ("hold", "walking")
+
+
+def test_a_take_over_that_is_refused_takes_nothing_over(armed: Robot) -> None:
+    armed.ask("lease", for_s=0.5)
+    for method, params in (("arm", {}), ("move", {"left_sweep_rad": 9.0}), ("walk", {"depth_m": 1.0})):
+        with pytest.raises(RefusedError):
+            armed.ask(method, BEN, take_over=True, **params)
+    with pytest.raises(RefusedError, match="take_over = 1: must be true or false"):
+        armed.ask("walk", BEN, take_over=1)
+    assert armed.ask("lease", ANNA, for_s=0.5) == "accepted"
 
 
 @pytest.mark.parametrize("for_s", [None, True, "0.5", 0, 0.09, 10.1, -1.0, nan, 2**70])
@@ -129,7 +195,7 @@ def test_a_lease_that_is_renewed_is_told_once(armed: Robot) -> None:
 def test_another_operator_is_told_who_holds_it(armed: Robot) -> None:
     armed.ask("lease", for_s=0.5)
     for method, params in (("lease", {"for_s": 0.5}), ("release", {})):
-        with pytest.raises(RefusedError, match=r"^uid 1000 \(process 77\) holds the lease$"):
+        with pytest.raises(RefusedError, match=r"^uid 1000 \(process 77\) holds the lease($|, for 0.5 s )"):
             armed.ask(method, BEN, **params)
 
 

@@ -1,0 +1,111 @@
+"""However an experiment ends, its flippers are out of the mud before the torque is off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from control.controller import UP_RAD
+from control.joint_watch import FaultBounds
+from control.modes import ENERGISED, Mode
+from control.records import Phase
+from drivers.failures import Failures
+from experiments.bench_robot import BenchError, arm, face_faults, leave, move, rest, walk
+from experiments.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.person import Willing
+from firmware_host.file_recorder import FileRecorder
+from firmware_host.log_reader import read_log
+from simulation.clay import MUDS
+from simulation.lockstep import Lockstep
+from simulation.track import Track
+
+PERSON = Willing(lambda sentence: None)
+
+
+class InterruptedRobot(LockstepRobot):
+    """Ctrl-C is pressed in one of the places where an experiment waits."""
+
+    waits_left = -1
+
+    def wait(self, duration_s: float) -> None:
+        self.waits_left -= 1
+        if self.waits_left == 0:
+            raise KeyboardInterrupt
+        super().wait(duration_s)
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Iterator[InterruptedRobot]:
+    configuration = replace(simulated_configuration(), faults=FaultBounds())
+    recorder = FileRecorder(tmp_path / "log.mcap", configuration)
+    track, failures = Track([(5.0, MUDS["48.5"])]), Failures(configuration.bus)
+    made = InterruptedRobot(Lockstep(configuration, track, recorder=recorder, failures=failures), recorder)
+    yield made
+    made.close()
+
+
+def experiment(robot: InterruptedRobot) -> None:
+    arm(robot, PERSON)
+    move(robot, {"left_adduction": 0.1})
+    walk(robot, 0.03, 1)
+
+
+def last_angles_rad(folder: Path) -> np.ndarray:
+    """Of both adduction joints, when the torque went off."""
+    ticks = read_log(folder / "log.mcap").ticks
+    assert Mode(ticks["mode"][-1]) is Mode.IDLE and not ticks["torque_command_nm"][-1].any()
+    energised = np.flatnonzero(np.isin(ticks["mode"], [int(mode) for mode in ENERGISED]))
+    angles: np.ndarray = ticks["angle_rad"][energised[-1], [1, 3]]
+    return angles
+
+
+@pytest.mark.parametrize("place", [2, 17, 40, 51, 68])
+def test_ctrl_c_wherever_an_experiment_waits_ends_it_with_raised_flippers(
+    robot: InterruptedRobot, tmp_path: Path, place: int
+) -> None:
+    robot.waits_left = place
+    with pytest.raises(KeyboardInterrupt):
+        experiment(robot)
+    leave(robot, PERSON, tmp_path)
+    modes = read_log(tmp_path / "log.mcap").ticks["mode"]
+    assert modes[-1] not in ENERGISED
+    if Mode.WALKING in modes:
+        assert np.abs(last_angles_rad(tmp_path)).max() < UP_RAD
+
+
+def hold_in_stance(robot: InterruptedRobot) -> None:
+    """A current that is late for a moment holds the walk where it is, in the mud."""
+    arm(robot, PERSON)
+    robot.call("walk", depth_m=0.03)
+    loop = robot.lockstep.loop
+    assert robot.lockstep.run_until(lambda: loop.target_before.phase is Phase.STANCE, 10.0)
+    robot.wait(0.2)
+    robot.lockstep.fail("left_sweep.current", "off", 0.015)
+    robot.wait(0.3)
+    status = robot.call("status")
+    assert status["mode"] == "hold" and status["drives"][1]["angle_rad"] < -UP_RAD
+
+
+def test_flippers_that_a_fault_holds_in_the_mud_are_raised_before_the_torque_goes_off(
+    robot: InterruptedRobot, tmp_path: Path
+) -> None:
+    hold_in_stance(robot)
+    rest(robot)
+    robot.close()
+    assert np.abs(last_angles_rad(tmp_path)).max() < UP_RAD
+
+
+def test_the_next_trial_begins_after_a_fault_of_the_last_one(robot: InterruptedRobot) -> None:
+    arm(robot, PERSON)
+    robot.lockstep.robot.restart_drive(0)
+    with pytest.raises(BenchError):
+        walk(robot, 0.03, 1)
+    rest(robot)
+    robot.wait(3.0)
+    face_faults(robot, PERSON)
+    arm(robot, PERSON)
+    assert robot.call("status")["mode"] == "hold"
