@@ -23,11 +23,10 @@ from benchmarks.report import Progress, new_parser, print_report, verdict
 from firmware_host.log_file import LogFile
 from firmware_host.log_reader import LogError, log_summary, read_log
 from firmware_host.log_recovery import recover_log
-from firmware_host.log_rows import EVENT, ROW_KINDS, TICK
+from firmware_host.log_rows import EVENT, EVENT_KIND, TICK, TICK_KIND
 
 BAR_S = 2.0  # for one log
 BAR_MEMORY = 40.0  # times the largest log
-TICK_KIND, EVENT_KIND = ROW_KINDS.index(TICK), ROW_KINDS.index(EVENT)
 FAST_FOLDER = Path("/dev/shm")  # nothing here is worth the wear of a disk
 
 

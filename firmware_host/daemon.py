@@ -138,10 +138,10 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock, lease=lease)
         warnings: list[str] = []
         calls = OperatorCalls(loop, recorder, warnings, time.monotonic)
-        status.methods = with_failures(calls.methods, failures, loop.event, time.monotonic)
+        status.methods = with_failures(calls.methods, failures, loop.news.tell, time.monotonic)
         status.on_hang_up = lease.hang_up
         status.spares = lambda caller: caller == lease.holder
-        status.report_bug = lambda sentence: loop.event(time.monotonic(), sentence)
+        status.report_bug = lambda sentence: loop.news.tell(time.monotonic(), sentence)
         notifier = SystemdNotifier()
         stack.callback(notifier.close)
         options = configuration.loop
@@ -160,7 +160,7 @@ def _run_loop(
     notifier: SystemdNotifier,
     shutdown: Shutdown,
 ) -> int:
-    ticker, watchdog = failing_ticker(Ticker(), failures, loop.event), WatchdogFeed(notifier)
+    ticker, watchdog = failing_ticker(Ticker(), failures, loop.news.tell), WatchdogFeed(notifier)
     notifier.send("READY=1", "STATUS=running")
     now_s = time.monotonic()
     try:
@@ -187,13 +187,13 @@ def reopen_buses(loop: Loop, buses: Mapping[str, ReopeningPort], now_s: float) -
         return
     for name, port in buses.items():
         if port.reopen(now_s):
-            loop.event(now_s, f"bus {name} opened again")
+            loop.news.tell(now_s, f"bus {name} opened again")
 
 
 def reopen_pose(loop: Loop, pose: OpenedPose, now_s: float) -> None:
     """The same for a source that was unplugged."""
     if loop.mode not in ENERGISED and pose.reopen(now_s):
-        loop.event(now_s, "the pose's source was opened again; its zero may be another one")
+        loop.news.tell(now_s, "the pose's source was opened again; its zero may be another one")
 
 
 def _end_safely(loop: Loop, problem: Exception) -> int:
@@ -205,7 +205,7 @@ def _end_safely(loop: Loop, problem: Exception) -> int:
     sentence = f"{type(problem).__name__}: {problem} ({Path(place.filename).name}, line {place.lineno})"
     print(f"mudskipperd: stopped by a bug, the drives are idle: {sentence}", file=sys.stderr)
     with suppress(Exception):  # or the log
-        loop.event(time.monotonic(), f"stopped by a bug: {sentence}")
+        loop.news.tell(time.monotonic(), f"stopped by a bug: {sentence}")
     return EXIT_FAILED
 
 

@@ -24,9 +24,9 @@ from mcap.writer import MCAP0_MAGIC
 from firmware_host.log_file import LogFile, lock_file
 from firmware_host.log_folder import BROKEN, PART, finished_path, make_folder, synchronise_folder, unfinished_files
 from firmware_host.log_reader import LogError, Watch, read_log, unwatched
-from firmware_host.log_rows import EVENT
+from firmware_host.log_rows import EVENT, EVENT_KIND
 from firmware_host.log_salvage import Salvage, readable_rows, salvage_rows
-from firmware_host.recorder import EVENT_KIND, STAMP
+from firmware_host.recorder import STAMP
 
 WATCHED_ROWS = 1000  # between two words on how far it is
 

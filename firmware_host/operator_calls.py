@@ -85,8 +85,8 @@ class OperatorCalls:
             "fault": _fault(loop),
             "faults": [_fault_report(fault) for fault in loop.faults.standing],
             "forced": loop.forced,
-            "notice": loop.notice,
-            "untold_requests": loop.requests_told.untold,
+            "notice": loop.news.notice,
+            "untold_requests": loop.news.requests.untold,
             "lease": str(loop.lease.holder) if loop.lease.held else None,
             "phase": loop.target_before.phase.name.lower(),
             "stride": loop.target_before.stride,
@@ -195,8 +195,8 @@ class OperatorCalls:
                 raise RefusedError(f"{joint}_rad = {angle_rad:g}: must be from {low:.3f} to {high:.3f}")
         self._accept(_against_moving(loop))
         way = ", ".join(f"{joint} to {angle_rad:.4f} rad" for joint, angle_rad in angles_rad.items())
-        loop.event(self._clock(), f"move {way} by {caller}")
-        loop.notice = ""
+        loop.news.tell(self._clock(), f"move {way} by {caller}")
+        loop.news.notice = ""
         loop.controller.move([angles_rad.get(joint) for joint in JOINTS])
         return "accepted"
 
@@ -210,7 +210,7 @@ class OperatorCalls:
         begins = self._lease.holder != caller
         self._accept(self._lease.renew(caller, self._clock(), for_s))
         if begins:
-            self._loop.event(self._clock(), f"lease taken by {caller}")
+            self._loop.news.tell(self._clock(), f"lease taken by {caller}")
         return "accepted"
 
     def release(self, params: dict[str, Any], caller: Caller) -> str:
@@ -218,7 +218,7 @@ class OperatorCalls:
         begun = self._lease.holder is not None
         self._accept(self._lease.release(caller))
         if begun:
-            self._loop.event(self._clock(), f"lease released by {caller}")
+            self._loop.news.tell(self._clock(), f"lease released by {caller}")
         return "accepted"
 
     def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:

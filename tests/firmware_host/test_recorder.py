@@ -26,9 +26,8 @@ from rosbags.highlevel import AnyReader
 from firmware_host.log_folder import DONE, first_path, unfinished_files
 from firmware_host.log_parameters import LogParameters
 from firmware_host.log_reader import read_log
-from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK, RowKind
+from firmware_host.log_rows import EVENT, EVENT_KIND, ROW_KINDS, STRIDE, TICK, TICK_KIND, RowKind
 from firmware_host.recorder import (
-    EVENT_KIND,
     HEADER,
     HEALTHY,
     LONGEST_TEXT,
@@ -38,7 +37,6 @@ from firmware_host.recorder import (
     Recording,
 )
 
-TICK_KIND = ROW_KINDS.index(TICK)
 TIMEOUT_S = 10.0
 CONFIGURATION = '[robot]\nname = "Ünïcode"\n'
 NUMBERS = random.Random(1)  # noise does not compress, so a file grows as rows are put
