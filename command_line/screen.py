@@ -92,9 +92,10 @@ def mud_text(name: str) -> str:
     return f"{mud} %{' at ' if place else ''}{place}" if mud[-1:].isdigit() else name
 
 
-def complain(sentence: str) -> None:
+def complain(*sentences: str) -> None:
     """To a person, beside the data."""
-    print(f"mudskipper: {sentence}", file=sys.stderr)
+    for sentence in sentences:
+        print(f"mudskipper: {sentence}", file=sys.stderr)
 
 
 def coefficient(estimate: dict[str, Any]) -> str:

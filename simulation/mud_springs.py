@@ -83,7 +83,7 @@ class Springs(Generic[Share]):
         self.reset()
 
     def reset(self) -> None:
-        self._shares = list(self._unstrained)
+        self._shares: list[Share] = list(self._unstrained)
         self._limits_n = [0.0] * len(self._shares)
 
     def fade(self, left: float) -> None:
