@@ -16,7 +16,8 @@ from typing import Any
 from command_line import exit_codes
 from command_line.demo_summary import summarise, summary_text
 from command_line.demonstration import ENDING_SIGNALS, Demo, DemoError, InterruptedDemoError, running_demo
-from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, mud_text, stride_line
+from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
+from experiments.mud_names import mud_text
 from firmware_host.log_folder import DONE, log_files, present_path
 from firmware_host.log_reader import LogError, read_log
 from firmware_host.status_client import CallRefusedError, NoDaemonError

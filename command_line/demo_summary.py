@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from command_line.demonstration import Demo
-from command_line.screen import mud_text
 from control.modes import Mode
+from experiments.mud_names import mud_text
 from firmware_host.log_reader import Log
 from simulation.track import Track
 

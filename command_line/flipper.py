@@ -9,9 +9,10 @@ from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import refuse
 from command_line.mud_bench import SEED, make_trials, open_bench, text_of_tables, why_not_simulated
 from experiments import flipper
-from experiments.coefficient_table import load_truth, mud_name
+from experiments.coefficient_table import load_truth
 from experiments.flipper_report import sections_of, text_of
 from experiments.flipper_simulation import flipper_bench
+from experiments.mud_names import mud_name
 
 PREPARE = (
     "Torque is off and the flippers have come down. Level the mud to its nominal height and give the flipper a fresh "

@@ -86,12 +86,6 @@ def watched() -> Iterator[Callable[[str, int, int], None]]:
         progress.clear()
 
 
-def mud_text(name: str) -> str:
-    """A mud is named after its water in percent, or by its strength with the unit; some say where it lies."""
-    mud, _, place = name.partition(" at ")
-    return f"{mud} %{' at ' if place else ''}{place}" if mud[-1:].isdigit() else name
-
-
 def complain(*sentences: str) -> None:
     """To a person, beside the data."""
     for sentence in sentences:

@@ -9,7 +9,8 @@ from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import refuse
 from command_line.mud_bench import SEED, make_trials, open_bench, text_of_tables, why_not_simulated
 from experiments import walk_mapping
-from experiments.coefficient_table import load_truth, mud_name
+from experiments.coefficient_table import load_truth
+from experiments.mud_names import mud_name
 from experiments.mud_trials import PlannedTrial
 from experiments.trackway_trials import Mud
 from experiments.walk_mapping_pages import sections_of, text_of

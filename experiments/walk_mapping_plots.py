@@ -16,7 +16,8 @@ from experiments.coefficient_table import PER_CM3
 from experiments.error_table import COEFFICIENTS
 from experiments.estimation_methods import COMPENSATED, DEFAULT, PAPER
 from experiments.known_surface import KNOWN, KNOWN_COMPENSATED
-from experiments.mud_looks import DOTS_PER_INCH, GREY, INK, LABELS, mud_text
+from experiments.mud_looks import DOTS_PER_INCH, GREY, INK, LABELS
+from experiments.mud_names import mud_text
 from experiments.notebook import Entry
 from experiments.stride_course import course_of_row
 from experiments.walk_course import WalkCourse, walk_course_of_row

@@ -15,7 +15,7 @@ import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 
-from experiments.coefficient_table import mud_label  # noqa: E402
+from experiments.mud_names import mud_label  # noqa: E402
 from experiments.paper_table import ADAPTIVE  # noqa: E402
 from experiments.walk import EXTRACTION, SLIPPAGE  # noqa: E402
 

@@ -38,12 +38,13 @@ from firmware_host.failure_calls import failures_of, with_failures
 from firmware_host.lease import Lease
 from firmware_host.log_folder import first_path, new_run_id
 from firmware_host.loop import Loop
-from firmware_host.operator_calls import OperatorCalls, software_version
+from firmware_host.operator_calls import OperatorCalls
 from firmware_host.pose_sources import open_pose
 from firmware_host.realtime import prepare_loop
 from firmware_host.recorder import NullRecorder, Recorder
 from firmware_host.rights import Rights, load_rights
 from firmware_host.sd_notify import SystemdNotifier
+from firmware_host.software_version import software_version
 from firmware_host.status_socket import AlreadyServedError, StatusSocket
 from firmware_host.ticker import RATE_HZ, Beat, Ticker
 

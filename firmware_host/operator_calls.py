@@ -7,7 +7,6 @@ before, there is nothing that its loss could stop.
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import PackageNotFoundError, version
 from math import isfinite
 from typing import Any
 
@@ -22,18 +21,12 @@ from firmware_host.lease import LONGEST_S, SHORTEST_S
 from firmware_host.loop import Loop
 from firmware_host.recorder import Recording
 from firmware_host.reports import belief_report, known, map_report, stride_report
+from firmware_host.software_version import software_version
 from firmware_host.status_socket import Methods, RefusedError
 
 MOST_STRIDES = 100000  # that a walk may be ordered
 STRIDES_PER_ANSWER = 20  # an answer is made between two ticks
 LARGEST_NUMBER = 2**63 - 1
-
-
-def software_version() -> str:
-    try:
-        return version("mudskipper")
-    except PackageNotFoundError:
-        return "not installed"
 
 
 class OperatorCalls:
