@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from benchmarks.report import Progress, new_parser, print_report, verdict
 from firmware_host.log_file import LogFile
-from firmware_host.log_reader import LogError, log_summary, read_log
+from firmware_host.log_reader import Log, LogError, log_summary, read_log
 from firmware_host.log_recovery import recover_log
 from firmware_host.log_rows import EVENT, EVENT_KIND, TICK, TICK_KIND
 
@@ -144,19 +144,20 @@ def try_log(path: Path, sound: SoundLog, contents: bytes, first: int) -> tuple[s
         return f"{outcome}, nothing to recover", "rows lost" if _ticks_before(sound, first) else ""
     if not recovered.path.exists():
         return f"{outcome}, removed", "" if not contents else "a file with contents was removed"
-    log = read_log(recovered.path)
+    return f"{outcome}, recovered", _wrong_with(read_log(recovered.path), sound, first)
+
+
+def _wrong_with(log: Log, sound: SoundLog, first: int) -> str:
+    """What a recovered log should not be, or nothing."""
     stored, size = log.ticks.tobytes(), TICK.layout.size
     ticks = [stored[place : place + size] for place in range(0, len(stored), size)]
-    wrong = ""
     if not log.complete:
-        wrong = "recovered, but not whole"
-    elif len(ticks) != len(set(ticks)):
-        wrong = "a row was doubled"
-    elif not set(ticks) <= sound.rows:
-        wrong = "a row was invented"
-    elif len(ticks) < _ticks_before(sound, first):
-        wrong = "rows before the damage were lost"
-    return f"{outcome}, recovered", wrong
+        return "recovered, but not whole"
+    if len(ticks) != len(set(ticks)):
+        return "a row was doubled"
+    if not set(ticks) <= sound.rows:
+        return "a row was invented"
+    return "rows before the damage were lost" if len(ticks) < _ticks_before(sound, first) else ""
 
 
 def _ticks_before(sound: SoundLog, first: int) -> int:

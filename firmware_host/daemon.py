@@ -30,12 +30,12 @@ from firmware_host.configuration import (
     EXIT_CONFIGURATION,
     Configuration,
     ConfigurationError,
+    LoopParameters,
     load_configuration,
 )
 from firmware_host.failing_recorder import failing_recorder
 from firmware_host.failing_time import failing_clock, failing_ticker
 from firmware_host.failure_calls import failures_of, with_failures
-from firmware_host.lease import Lease
 from firmware_host.log_folder import first_path, new_run_id
 from firmware_host.loop import Loop
 from firmware_host.operator_calls import OperatorCalls
@@ -135,21 +135,30 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         recorder = failing_recorder(open_recorder(configuration), failures)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
         wall_clock = failing_clock(time.time, failures)
-        lease = Lease()
-        loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock, lease=lease)
+        loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock)
         warnings: list[str] = []
         calls = OperatorCalls(loop, recorder, warnings, time.monotonic)
         status.methods = with_failures(calls.methods, failures, loop.news.tell, time.monotonic)
-        status.on_hang_up = lease.hang_up
-        status.spares = lambda caller: caller == lease.holder
-        status.report_bug = lambda sentence: loop.news.tell(time.monotonic(), sentence)
+        _serve_loop(status, loop)
         notifier = SystemdNotifier()
         stack.callback(notifier.close)
-        options = configuration.loop
-        warnings += prepare_loop(options.priority, options.cpu, options.lock_memory)
-        for warning in warnings:
-            print(f"warning: {warning}", file=sys.stderr)
+        warnings += _prepare(configuration.loop)
         return _run_loop(loop, buses, pose, failures, status, notifier, shutdown)
+
+
+def _serve_loop(status: StatusSocket, loop: Loop) -> None:
+    """What the socket needs of the loop beside its methods."""
+    status.on_hang_up = loop.lease.hang_up
+    status.spares = lambda caller: caller == loop.lease.holder
+    status.report_bug = lambda sentence: loop.news.tell(time.monotonic(), sentence)
+
+
+def _prepare(parameters: LoopParameters) -> list[str]:
+    """The process for real time: what could not be had, which is told."""
+    warnings = prepare_loop(parameters.priority, parameters.cpu, parameters.lock_memory)
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    return warnings
 
 
 def _run_loop(

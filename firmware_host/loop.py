@@ -43,13 +43,12 @@ class Loop:
         recorder: Recording,
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
-        lease: Lease | None = None,
     ) -> None:
         self.configuration = configuration
         self.drives = drives
         self.pose = pose
         self.recorder = recorder
-        self.lease = lease or Lease()
+        self.lease = Lease()
         self.news = LoopNews(recorder, configuration.motion.longest_hold_s)
         self.timing = LoopTiming()
         self.learning = MudLearning(configuration)
