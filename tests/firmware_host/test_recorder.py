@@ -36,6 +36,7 @@ from firmware_host.recorder import (
     Recorder,
     Recording,
 )
+from tests.waiting import wait_until
 
 TIMEOUT_S = 10.0
 CONFIGURATION = '[robot]\nname = "Ünïcode"\n'
@@ -71,13 +72,6 @@ def make_row(kind: RowKind, stamp_s: float) -> Row:
 
 def make_tick(stamp_s: float) -> bytes:
     return make_row(TICK, stamp_s).payload
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + TIMEOUT_S
-    while not condition():
-        assert time.monotonic() < deadline_s, "waited in vain"
-        time.sleep(0.005)
 
 
 def fill_pipe(recorder: Recorder) -> int:
