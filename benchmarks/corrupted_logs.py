@@ -168,6 +168,14 @@ def peak_bytes() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
+def _tried(path: Path, sound: SoundLog, contents: bytes, first: int) -> tuple[str, str]:
+    """As `try_log`, whatever comes of it."""
+    try:
+        return try_log(path, sound, contents, first)
+    except Exception:  # noqa: BLE001 - which must not happen is what is looked for
+        return "crashed", traceback.format_exc(limit=-3)
+
+
 def try_many(count: int, seed: int, folder: Path, progress: Progress) -> dict[str, Any]:
     chance = random.Random(seed)
     sound = [make_sound_log(folder / "sound.mcap", chance, finished) for finished in (True, False)]
@@ -180,10 +188,7 @@ def try_many(count: int, seed: int, folder: Path, progress: Progress) -> dict[st
         log = sound[number % 2]
         contents, first, how = corrupt(log, chance)
         started_s = time.perf_counter()
-        try:
-            outcome, complaint = try_log(folder / "active" / f"{number}.mcap", log, contents, first)
-        except Exception:  # noqa: BLE001 - which must not happen is what is looked for
-            outcome, complaint = "crashed", traceback.format_exc(limit=-3)
+        outcome, complaint = _tried(folder / "active" / f"{number}.mcap", log, contents, first)
         slowest_s = max(slowest_s, time.perf_counter() - started_s)
         outcomes[outcome] += 1
         if complaint:

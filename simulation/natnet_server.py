@@ -134,13 +134,8 @@ class NatNetServer:
         name: str = "mudskipper",
         crowded: bool = False,
     ) -> None:
-        self.version, self.latency_s, self.identity, self.name, self.crowded = (
-            version,
-            latency_s,
-            identity,
-            name,
-            crowded,
-        )
+        self.version, self.latency_s, self.crowded = version, latency_s, crowded
+        self.identity, self.name = identity, name
         self.answers = True  # a network may let nothing but frames through
         self._poses = deque(poses)
         self._has_target = target is not None
