@@ -175,6 +175,26 @@ def _stays(robot: Lockstep, mode: Mode, duration_s: float) -> bool:
     return robot.loop.mode is mode
 
 
+def report_of(found: Fuzzing, seed: int) -> dict[str, Any]:
+    clean = not found.bugs
+    return {
+        "benchmark": "configuration_fuzz",
+        "configurations": sum(found.kinds.values()),
+        "seed": seed,
+        "kinds": dict(found.kinds),
+        "accepted": {kind: found.accepted[kind] for kind in found.kinds},
+        "accepted_share": round(sum(found.accepted.values()) / max(1, sum(found.kinds.values())), 3),
+        "tried": dict(found.tried),
+        "longest_ms": round(1e3 * found.longest_s, 1),
+        "longest_kind": found.longest_kind,
+        "most_kib": found.most_kib,
+        "bugs": len(found.bugs),
+        "first_bugs": found.bugs[:20],
+        "reached": clean,
+        "verdict": verdict("refused with sentences or accepted and working, within 1 s and 64 MiB each", clean),
+    }
+
+
 def text_of(report: dict[str, Any]) -> str:
     lines = [
         f"{kind:15} {count:6} files, {report['accepted'][kind]:6} accepted" for kind, count in report["kinds"].items()
@@ -193,24 +213,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory(prefix="mud-") as folder:
         found = fuzz(options.configurations, options.seed, Path(folder), progress)
     progress.clear()
-    clean = not found.bugs
-    said = verdict("refused with sentences or accepted and working, within 1 s and 64 MiB each", clean)
-    report = {
-        "benchmark": "configuration_fuzz",
-        "configurations": sum(found.kinds.values()),
-        "seed": options.seed,
-        "kinds": dict(found.kinds),
-        "accepted": {kind: found.accepted[kind] for kind in found.kinds},
-        "accepted_share": round(sum(found.accepted.values()) / max(1, sum(found.kinds.values())), 3),
-        "tried": dict(found.tried),
-        "longest_ms": round(1e3 * found.longest_s, 1),
-        "longest_kind": found.longest_kind,
-        "most_kib": found.most_kib,
-        "bugs": len(found.bugs),
-        "first_bugs": found.bugs[:20],
-        "reached": clean,
-        "verdict": said,
-    }
+    report = report_of(found, options.seed)
     print_report(report, text_of(report), options.json)
     return 0
 

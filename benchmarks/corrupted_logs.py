@@ -21,13 +21,12 @@ from typing import Any, NamedTuple
 
 from benchmarks.report import Progress, new_parser, print_report, verdict
 from firmware_host.log_file import LogFile
-from firmware_host.log_reader import LogError, log_summary, read_log
+from firmware_host.log_reader import Log, LogError, log_summary, read_log
 from firmware_host.log_recovery import recover_log
-from firmware_host.log_rows import EVENT, ROW_KINDS, TICK
+from firmware_host.log_rows import EVENT, EVENT_KIND, TICK, TICK_KIND
 
 BAR_S = 2.0  # for one log
 BAR_MEMORY = 40.0  # times the largest log
-TICK_KIND, EVENT_KIND = ROW_KINDS.index(TICK), ROW_KINDS.index(EVENT)
 FAST_FOLDER = Path("/dev/shm")  # nothing here is worth the wear of a disk
 
 
@@ -145,19 +144,20 @@ def try_log(path: Path, sound: SoundLog, contents: bytes, first: int) -> tuple[s
         return f"{outcome}, nothing to recover", "rows lost" if _ticks_before(sound, first) else ""
     if not recovered.path.exists():
         return f"{outcome}, removed", "" if not contents else "a file with contents was removed"
-    log = read_log(recovered.path)
+    return f"{outcome}, recovered", _wrong_with(read_log(recovered.path), sound, first)
+
+
+def _wrong_with(log: Log, sound: SoundLog, first: int) -> str:
+    """What a recovered log should not be, or nothing."""
     stored, size = log.ticks.tobytes(), TICK.layout.size
     ticks = [stored[place : place + size] for place in range(0, len(stored), size)]
-    wrong = ""
     if not log.complete:
-        wrong = "recovered, but not whole"
-    elif len(ticks) != len(set(ticks)):
-        wrong = "a row was doubled"
-    elif not set(ticks) <= sound.rows:
-        wrong = "a row was invented"
-    elif len(ticks) < _ticks_before(sound, first):
-        wrong = "rows before the damage were lost"
-    return f"{outcome}, recovered", wrong
+        return "recovered, but not whole"
+    if len(ticks) != len(set(ticks)):
+        return "a row was doubled"
+    if not set(ticks) <= sound.rows:
+        return "a row was invented"
+    return "rows before the damage were lost" if len(ticks) < _ticks_before(sound, first) else ""
 
 
 def _ticks_before(sound: SoundLog, first: int) -> int:
@@ -166,6 +166,14 @@ def _ticks_before(sound: SoundLog, first: int) -> int:
 
 def peak_bytes() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def _tried(path: Path, sound: SoundLog, contents: bytes, first: int) -> tuple[str, str]:
+    """As `try_log`, whatever comes of it."""
+    try:
+        return try_log(path, sound, contents, first)
+    except Exception:  # noqa: BLE001 - which must not happen is what is looked for
+        return "crashed", traceback.format_exc(limit=-3)
 
 
 def try_many(count: int, seed: int, folder: Path, progress: Progress) -> dict[str, Any]:
@@ -180,10 +188,7 @@ def try_many(count: int, seed: int, folder: Path, progress: Progress) -> dict[st
         log = sound[number % 2]
         contents, first, how = corrupt(log, chance)
         started_s = time.perf_counter()
-        try:
-            outcome, complaint = try_log(folder / "active" / f"{number}.mcap", log, contents, first)
-        except Exception:  # noqa: BLE001 - which must not happen is what is looked for
-            outcome, complaint = "crashed", traceback.format_exc(limit=-3)
+        outcome, complaint = _tried(folder / "active" / f"{number}.mcap", log, contents, first)
         slowest_s = max(slowest_s, time.perf_counter() - started_s)
         outcomes[outcome] += 1
         if complaint:

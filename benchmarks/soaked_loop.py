@@ -116,7 +116,7 @@ class SoakedLoop:
         self.lease = Lease()
         calls = OperatorCalls(self.robot.loop, self.recorder, [], self._now_s)
         self.socket = StatusSocket(folder / "s", {}, load_rights(configuration.status))
-        self.socket.methods = with_failures(calls.methods, failures, self.robot.loop.event, self._now_s)
+        self.socket.methods = with_failures(calls.methods, failures, self.robot.loop.news.tell, self._now_s)
         self.bugs: list[str] = []
         self.socket.report_bug = self.bugs.append
         self.visitors: list[Visitor] = []

@@ -195,22 +195,15 @@ class Sender:
 
 def fuzz(streams: int, seed: int, folder: Path, progress: Progress) -> dict[str, Any]:
     bench = Bench(folder, seed)
-    readings: list[dict[str, float]] = []
     freeze_garbage()
-    sent, begin_s = 0, time.monotonic()
+    begin_s = time.monotonic()
     try:
-        while sent < streams:
-            count = min(AT_ONCE, streams - sent)
-            bench.run_batch(count)
-            sent += count
-            if sent >= streams * (len(readings) + 1) / 10:
-                readings.append({"streams": sent, "resident_kib": resident_kib()})
-            progress.show(sent, "streams")
+        readings = _send(bench, streams, progress)
     finally:
         bench.close()
     kept = min(bench.ticks, SAMPLES)
     return {
-        "streams": sent,
+        "streams": streams,
         "seed": seed,
         "seconds": round(time.monotonic() - begin_s, 1),
         "kinds": dict(bench.kinds),
@@ -226,6 +219,19 @@ def fuzz(streams: int, seed: int, folder: Path, progress: Progress) -> dict[str,
         "readings": readings,
         "growth_kib": readings[-1]["resident_kib"] - readings[len(readings) // 2]["resident_kib"],
     }
+
+
+def _send(bench: Bench, streams: int, progress: Progress) -> list[dict[str, float]]:
+    """The memory that the process holds, ten times on the way."""
+    sent, readings = 0, list[dict[str, float]]()
+    while sent < streams:
+        count = min(AT_ONCE, streams - sent)
+        bench.run_batch(count)
+        sent += count
+        if sent >= streams * (len(readings) + 1) / 10:
+            readings.append({"streams": sent, "resident_kib": resident_kib()})
+        progress.show(sent, "streams")
+    return readings
 
 
 def reached(report: dict[str, Any]) -> bool:

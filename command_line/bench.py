@@ -53,8 +53,7 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
         finding = _run(options, folder, what, run)
         written = write_report(folder, finding.report, finding.title, finding.sections, finding.logs)
     except ConfigurationError as problem:
-        for sentence in problem.problems:
-            complain(sentence)
+        complain(*problem.problems)
         return exit_codes.CONFIGURATION
     except NotebookError as problem:
         complain(str(problem))

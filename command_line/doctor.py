@@ -27,8 +27,8 @@ from firmware_host.host_facts import (
     thread_priority,
     unit_limits,
 )
-from firmware_host.operator_calls import software_version
 from firmware_host.rights import load_rights
+from firmware_host.software_version import software_version
 from firmware_host.status_client import CallRefusedError, DroppedError, NoDaemonError, NotPermittedError, StatusClient
 
 ROOT = Path("/")

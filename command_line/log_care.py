@@ -61,8 +61,7 @@ def _configured_folder(path: Path) -> Path | None:
     try:
         return Path(load_configuration(path).log.directory)
     except ConfigurationError as problem:
-        for sentence in problem.problems:
-            complain(sentence)
+        complain(*problem.problems)
         return None
 
 
@@ -129,8 +128,7 @@ def recover(options: Options) -> int:
             print(f"{log.path}: {log.note}")
         if not recovered and not resisted:
             print("nothing to recover")
-    for sentence in resisted:
-        complain(sentence)
+    complain(*resisted)
     return exit_codes.UNHEALTHY if resisted else exit_codes.OK
 
 

@@ -31,8 +31,7 @@ def replay(options: Options) -> int:
         with watched() as watch:
             replayed = replay_files(options.files, configuration, options.method, watch)
     except ConfigurationError as problem:
-        for sentence in problem.problems:
-            complain(sentence)
+        complain(*problem.problems)
         return exit_codes.CONFIGURATION
     except LogError as problem:
         complain(str(problem))

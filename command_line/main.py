@@ -120,6 +120,14 @@ def _add_logs(commands: Commands) -> None:
     replay.add_argument("--json", action="store_true")
     replay.add_argument("--config", type=Path, help="instead of the one in the log")
     replay.add_argument("--method", choices=METHODS, help="of estimation, instead of the configured one")
+    _add_pictures(commands)
+    log = commands.add_parser("log", help="Look into logs, and look after them.")
+    actions = log.add_subparsers(dest="action", required=True, metavar="action")
+    _add_log_folder(actions)
+    _add_log_contents(actions)
+
+
+def _add_pictures(commands: Commands) -> None:
     plot = add(commands, "plot", "logs.plot", "A walk against time: forces, coefficients, depth, place and steps.")
     film = add(commands, "film", "logs.film", "Strides seen from the side: as a strip of pictures, or moving.")
     plot.add_argument("--out", type=picture(".png", ".svg", ".pdf"), metavar="PNG", help="or .svg, .pdf")
@@ -134,9 +142,9 @@ def _add_logs(commands: Commands) -> None:
             help="our log, segments of one run, or the authors' CSV",
         )
         parser.add_argument("--walk", type=COUNT, default=0, metavar="N", help="of the log's walks (default: the last)")
-    log = commands.add_parser("log", help="Look into logs, and look after them.")
-    actions = log.add_subparsers(dest="action", required=True, metavar="action")
-    _add_log_folder(actions)
+
+
+def _add_log_contents(actions: Commands) -> None:
     info = add(actions, "info", "logs.info", "What a log holds.")
     info.add_argument("files", type=Path, nargs="+", metavar="FILE", help="several are segments of one run")
     info.add_argument("--json", action="store_true")

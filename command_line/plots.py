@@ -22,6 +22,7 @@ from command_line.colours import FAINT, FLIPPERS, FORWARD, INK, MUDS, OUTCOMES, 
 from command_line.recorded_walk import RecordedWalk  # noqa: E402
 from command_line.stride_choice import Outcome, outcome_of  # noqa: E402
 from control.records import FLIPPERS as NAMES  # noqa: E402
+from experiments.mud_names import mud_label  # noqa: E402
 from simulation.track import Track  # noqa: E402
 
 WIDTH_IN, PANEL_IN, DOTS_PER_INCH = 10.0, 1.55, 120
@@ -84,17 +85,12 @@ def mud_regions(walk: RecordedWalk, track: Track | None) -> list[MudRegion]:
     else:
         borders_m = [segment.end_m for segment in track.segments[:-1]]
         starts_s = [0.0, *(_arrival_s(walk, border_m) for border_m in borders_m)]
-        names = [_mud_name(segment.clay.name) for segment in track.segments]
+        names = [mud_label(segment.clay.name) for segment in track.segments]
     return [
         (start_s, until_s, name)
         for start_s, until_s, name in zip(starts_s, [*starts_s[1:], end_s], names, strict=True)
         if start_s < until_s
     ]
-
-
-def _mud_name(name: str) -> str:
-    """Most muds are named after their water in percent; others carry a unit of their own."""
-    return f"w = {name} %" if name[-1:].isdigit() else name
 
 
 def _arrival_s(walk: RecordedWalk, place_m: float) -> float:

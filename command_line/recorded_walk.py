@@ -19,7 +19,7 @@ from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import FLIPPERS, FlipperLoad, StrideEstimate
 from estimation.mud import EstimationParameters, MudEstimator
-from firmware_host.configuration import Configuration, ConfigurationError, parse_configuration
+from firmware_host.configuration import Configuration
 from firmware_host.lab_csv import LabLog, read_lab_csv
 from firmware_host.log_reader import (
     Log,
@@ -32,7 +32,7 @@ from firmware_host.log_reader import (
     unwatched,
 )
 from firmware_host.log_rows import STRIDE
-from firmware_host.replay import LAB_DRIVE, NO_VELOCITY, PHASES
+from firmware_host.replay import LAB_DRIVE, NO_VELOCITY, PHASES, configuration_of
 from firmware_host.row_packing import stride_row
 
 Floats = NDArray[np.float64]
@@ -98,10 +98,7 @@ def read_walk(path: Path, number: int = 0, more: Sequence[Path] = (), watch: Wat
 
 
 def _numbered_walk(path: Path, log: Log, number: int) -> RecordedWalk:
-    try:
-        configuration = parse_configuration(log.configuration_text)
-    except ConfigurationError as problem:
-        raise LogError(f"{path}: its configuration is not one of this version: {problem.problems[0]}") from problem
+    configuration = configuration_of(path, log)
     borders = np.flatnonzero(np.diff(log.ticks["mode"] == Mode.WALKING, prepend=False, append=False))
     starts, ends = borders[::2], borders[1::2]
     _refuse_number(path, number, len(starts))

@@ -86,15 +86,10 @@ def watched() -> Iterator[Callable[[str, int, int], None]]:
         progress.clear()
 
 
-def mud_text(name: str) -> str:
-    """A mud is named after its water in percent, or by its strength with the unit; some say where it lies."""
-    mud, _, place = name.partition(" at ")
-    return f"{mud} %{' at ' if place else ''}{place}" if mud[-1:].isdigit() else name
-
-
-def complain(sentence: str) -> None:
+def complain(*sentences: str) -> None:
     """To a person, beside the data."""
-    print(f"mudskipper: {sentence}", file=sys.stderr)
+    for sentence in sentences:
+        print(f"mudskipper: {sentence}", file=sys.stderr)
 
 
 def coefficient(estimate: dict[str, Any]) -> str:

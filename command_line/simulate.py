@@ -27,8 +27,7 @@ def simulate(options: argparse.Namespace) -> int:
             load_world(options.world)  # before anything is written or said; the peer reads it itself
         path = options.config or _local_configuration(options.bus)
     except ConfigurationError as problem:
-        for sentence in problem.problems:
-            complain(sentence)
+        complain(*problem.problems)
         return exit_codes.CONFIGURATION
     except ValueError as problem:
         complain(f"--bus {problem}")

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import refuse
-from command_line.screen import table
+from command_line.mud_bench import SEED, make_trials, open_bench, text_of_tables, why_not_simulated
 from experiments import walk_mapping
-from experiments.bench_robot import leave
-from experiments.coefficient_table import load_truth, mud_name
-from experiments.daemon_robot import DaemonRobot
-from experiments.mud_trials import Bench, PlannedTrial, PromptedBed, require_some
-from experiments.notebook import Notebook
+from experiments.coefficient_table import load_truth
+from experiments.mud_names import mud_name
+from experiments.mud_trials import PlannedTrial
 from experiments.trackway_trials import Mud
 from experiments.walk_mapping_pages import sections_of, text_of
 from experiments.walk_mapping_report import report_of
 from experiments.walk_simulation import walking_bench
-from simulation.clay import clay_of_water
 
-SEED = 1
 TRACKWAY = (
     "Torque is off. Re-mix the surface of all muds and level it to its nominal height, and put the robot so that the "
     "sweep axes are over the beginning of the first mud. Take the hands away: the robot walks next"
@@ -45,35 +42,21 @@ def run_walk(options: argparse.Namespace) -> int:
         flipper=options.flipper,
         simulated=options.simulated,
     )
-    if options.simulated:
-        try:
-            [clay_of_water(float(name)) for name in (*(mud.name for mud in plan.muds), *plan.soft)]
-        except ValueError as problem:
-            return refuse(f"--mud: simulated muds are named after their water in percent: {problem}")
+    names = [*(mud.name for mud in plan.muds), *plan.soft]
+    refused = why_not_simulated(names) if options.simulated else None
+    if refused:
+        return refuse(refused)
     return conduct_bench(options, "trials", lambda desk: _find(options, plan, desk))
 
 
 def _find(options: argparse.Namespace, plan: walk_mapping.Plan, desk: Desk) -> Finding:
     truth = load_truth(options.truth) if options.truth else None
-    notebook = Notebook(desk.folder, plan.kept)
-    bench = _bench(options, plan, desk, notebook)
-    try:
-        configuration = bench.robot.configuration
-        walk_mapping.run(bench, plan, desk.show)
-    finally:
-        logs = leave(bench.robot, desk.person, desk.folder)
-    require_some(notebook)
-    report = report_of(plan, notebook.entries, configuration, truth)
-    sections = sections_of(report, plan, notebook.entries, configuration, truth)
-    text = "\n\n".join(f"{title}\n{table(rows)}" for title, rows in text_of(report))
-    return Finding(report, "The walking robot over several muds", sections, text, logs)
-
-
-def _bench(options: argparse.Namespace, plan: walk_mapping.Plan, desk: Desk, notebook: Notebook) -> Bench:
-    if options.simulated:
-        return Bench(*walking_bench(desk.folder, plan, SEED), desk.person, notebook)
-    robot = DaemonRobot(options.socket)
-    return Bench(robot, PromptedBed(robot, desk.person, _words), desk.person, notebook)
+    bench = open_bench(options, desk, plan.kept, partial(walking_bench, desk.folder, plan, SEED), _words)
+    configuration, logs = make_trials(bench, desk, lambda: walk_mapping.run(bench, plan, desk.show))
+    entries = bench.notebook.entries
+    report = report_of(plan, entries, configuration, truth)
+    sections = sections_of(report, plan, entries, configuration, truth)
+    return Finding(report, "The walking robot over several muds", sections, text_of_tables(text_of(report)), logs)
 
 
 def _words(trial: PlannedTrial) -> str:

@@ -15,9 +15,9 @@ from command_line.conduct import conduct, refuse
 from command_line.screen import number, table
 from experiments import depth_sweep, mud_fit, trackway, trackway_trials
 from experiments.bench_robot import leave
-from experiments.coefficient_table import mud_label, mud_name
 from experiments.daemon_robot import DaemonRobot
 from experiments.mud_fit import cells_beside_paper
+from experiments.mud_names import mud_label, mud_name
 from experiments.notebook import Notebook
 from experiments.paper_table import ADAPTIVE, PAPER_TABLE
 from experiments.report_page import Figure, Section

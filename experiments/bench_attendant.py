@@ -132,7 +132,6 @@ class SimulatedAttendant:
     """Eyes and hands at a simulated robot's mechanics."""
 
     def __init__(self, rig: SimulatedRig) -> None:
-        self._rig = rig
         self._plant = rig.robot.plant
         self._from_rad = self._farthest_rad = self._plant.angles_rad
         self._held_rad: list[float] | None = None

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 from control.records import UNKNOWN, Estimate
 from experiments.bench_robot import BenchError
 from experiments.error_table import COEFFICIENTS, Judged, error_rows
+from experiments.mud_names import mud_name
 
 PER_CM3 = 1e-6  # N/cm³ of a N/m³
 Told = Mapping[str, Any]  # an estimate as reports tell it
@@ -91,16 +92,6 @@ def missing_text(truth: TruthOfMud | None, muds: Iterable[str]) -> str:
     """Of which muds another experiment's truth says nothing; empty where it says something of all, or there is none."""
     missing = [mud for mud in muds if truth is not None and mud not in truth]
     return f"The file given with --truth says nothing of {', '.join(missing)}." if missing else ""
-
-
-def mud_name(name: str) -> str:
-    """However a water content is written: 47.6, w = 47.6 % or 47.6%."""
-    return name.removeprefix("w").replace("=", "").replace("%", "").strip() or name
-
-
-def mud_label(mud: str) -> str:
-    """One that is called after its water, or anything else."""
-    return f"w = {mud} %" if mud[-1:].isdigit() else mud
 
 
 def judged(rows: Iterable[Beside], setup: str) -> list[Judged]:

@@ -18,9 +18,8 @@ from drivers.frames import Frame
 from drivers.odrive_codec import Message, arbitration_id
 from firmware_host.configuration import Configuration
 from firmware_host.daemon import _end_safely as end_safely
-from firmware_host.log_rows import EVENT
-from firmware_host.loop import TICK_KIND
-from firmware_host.recorder import EVENT_KIND, HEALTHY, LogReport, NullRecorder
+from firmware_host.log_rows import EVENT, EVENT_KIND, TICK_KIND
+from firmware_host.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.ticker import PERIOD_S, Beat
 from simulation.lockstep import Lockstep
 from simulation.odrive import SimulatedOdrive
@@ -79,7 +78,7 @@ class FaultBench(Lockstep):
 
     def _tick(self) -> None:
         for failure in self.failures.update(self.now_s):
-            self.loop.event(self.now_s, end_text(failure))
+            self.loop.news.tell(self.now_s, end_text(failure))
         missed, self._missed = self._missed, 0
         self.ticks_made += 1
         try:

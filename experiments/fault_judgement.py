@@ -44,16 +44,7 @@ class Cell:
 def problems(cell: Cell, way: Way) -> Iterator[str]:
     """In words, what should not be."""
     yield from cell.why
-    if way.ends_daemon and not cell.exception:
-        yield "the bug never came"
-    if cell.exception and not way.ends_daemon:
-        yield f"an exception escaped: {cell.exception}"
-    if not cell.disarmed:
-        yield "torque or closed loop came back by itself"
-    if cell.rows_lost > (1 if way.ends_daemon else 0):
-        yield f"{cell.rows_lost} rows are missing in the log"
-    if cell.damping_torque_nm > DAMPING_NM + 1e-6:
-        yield f"{cell.damping_torque_nm:.3f} N·m while damping"
+    yield from _never_right(cell, way)
     if way.fault == "none":
         if cell.told:
             yield f"without a cause it told of {', '.join(cell.told)}"
@@ -68,6 +59,20 @@ def problems(cell: Cell, way: Way) -> Iterator[str]:
         yield f"a warning ended in mode {cell.mode}"
     if way.kind and cell.fault not in cell.told:
         yield "the log holds no word of it"
+
+
+def _never_right(cell: Cell, way: Way) -> Iterator[str]:
+    """Whatever the fault."""
+    if way.ends_daemon and not cell.exception:
+        yield "the bug never came"
+    if cell.exception and not way.ends_daemon:
+        yield f"an exception escaped: {cell.exception}"
+    if not cell.disarmed:
+        yield "torque or closed loop came back by itself"
+    if cell.rows_lost > (1 if way.ends_daemon else 0):
+        yield f"{cell.rows_lost} rows are missing in the log"
+    if cell.damping_torque_nm > DAMPING_NM + 1e-6:
+        yield f"{cell.damping_torque_nm:.3f} N·m while damping"
 
 
 def _late(cell: Cell) -> Iterator[str]:

@@ -27,9 +27,9 @@ from experiments.mud_looks import (
     line_of,
     looks_of,
     mark_of,
-    mud_text,
     waters_of,
 )
+from experiments.mud_names import mud_text
 from experiments.notebook import Entry
 from experiments.stride_course import Floats, StrideCourse, course_of_row
 

@@ -9,7 +9,8 @@ from typing import Any
 from experiments.coefficient_table import error_text_rows, mud_rows
 from experiments.estimation_methods import DEFAULT
 from experiments.flipper import AUTHORS_MUD, AUTHORS_N, Plan, muds_of, trials_of
-from experiments.mud_looks import file_name, mud_text
+from experiments.mud_looks import file_name
+from experiments.mud_names import mud_text
 from experiments.notebook import Entry
 from experiments.report_page import Figure, Section
 from firmware_host.configuration import Configuration

@@ -8,8 +8,8 @@ from math import hypot, isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from experiments.coefficient_table import mud_name
 from experiments.loadcell_fits import OfMud
+from experiments.mud_names import mud_name
 
 
 class Compared(NamedTuple):

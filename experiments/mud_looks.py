@@ -39,11 +39,6 @@ def mark_of(look: dict[str, Any]) -> dict[str, Any]:
     return {"color": look["color"], "marker": look["marker"], "markersize": 7.0, "markeredgecolor": INK}
 
 
-def mud_text(name: str) -> str:
-    """Most muds are named after their water in percent."""
-    return f"{name} %" if name[-1:].isdigit() else name
-
-
 def waters_of(muds: Sequence[str]) -> list[float]:
     """Where each stands on an axis: at its water content, or one after the other."""
     try:

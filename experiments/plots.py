@@ -51,6 +51,10 @@ def _plot_panel(panel: Axes, rows: Sequence[dict[str, Any]]) -> None:
             row["mud"] == mud and row["method"] == "default" and row["bounds"] and not row["strides"] for row in rows
         ):
             panel.text(place, 2.0, "bounds", ha="center", color=COLOURS["default"], fontsize="small")
+    _scale(panel, muds)
+
+
+def _scale(panel: Axes, muds: Sequence[str]) -> None:
     panel.axhline(10.0, color="grey", linewidth=0.8, linestyle=":")
     panel.set_xticks(range(len(muds)), muds)
     panel.set_xlim(-0.5, max(len(muds), 1) - 0.5)

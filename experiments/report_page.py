@@ -11,10 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from html import escape
-from importlib.metadata import PackageNotFoundError, version
 from math import isfinite
 from pathlib import Path
 from typing import Any
+
+from firmware_host.software_version import software_version
 
 PAGE, SUMMARY = "report.html", "summary.json"
 STYLE = """\
@@ -89,20 +90,13 @@ def _page(folder: Path, title: str, sections: Sequence[Section], logs: Sequence[
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>\n'
         f"<style>\n{STYLE}</style></head><body>\n<h1>{escape(title)}</h1>\n"
-        f'<p class="when">{made}, mudskipper {escape(_version())}</p>\n{body}\n'
+        f'<p class="when">{made}, mudskipper {escape(software_version())}</p>\n{body}\n'
         f"<footer>Numbers: {SUMMARY}. {_told_logs(logs)}</footer>\n</body></html>\n"
     )
 
 
 def _told_logs(logs: Sequence[Path]) -> str:
     return f"Logs: {', '.join(escape(log.name) for log in logs)}." if logs else ""
-
-
-def _version() -> str:
-    try:
-        return version("mudskipper")
-    except PackageNotFoundError:
-        return "not installed"
 
 
 def _section(section: Section, folder: Path) -> str:

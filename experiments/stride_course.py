@@ -6,7 +6,7 @@ Rows in which nothing moves are thinned, so that the course of a stride with pau
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,12 +75,20 @@ def thinned(course: StrideCourse) -> StrideCourse:
 
 def course_row(course: StrideCourse) -> dict[str, list[float | None]]:
     """As JSON can hold it."""
-    return {name: [known(value) for value in column.tolist()] for name, column in course._asdict().items()}
+    return row_of_columns(course._asdict())
 
 
 def course_of_row(row: Mapping[str, Any]) -> StrideCourse:
-    columns: dict[str, Any] = {name: np.array(row[name], np.float64) for name in StrideCourse._fields}
-    return StrideCourse(**(columns | {"phase": columns["phase"].astype(np.int64)}))
+    return StrideCourse(**columns_of_row(row, StrideCourse._fields))
+
+
+def row_of_columns(columns: Mapping[str, NDArray[Any]]) -> dict[str, list[float | None]]:
+    return {name: [known(value) for value in column.tolist()] for name, column in columns.items()}
+
+
+def columns_of_row(row: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """Phases are whole numbers, all others are not."""
+    return {name: np.array(row[name], np.int64 if name == "phase" else np.float64) for name in names}
 
 
 def known(value: float) -> float | None:

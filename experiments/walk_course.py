@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from control.modes import Mode
 from control.records import FLIPPERS
-from experiments.stride_course import Floats, known
+from experiments.stride_course import Floats, columns_of_row, row_of_columns
 from firmware_host.log_reader import Log
 
 KEPT = 5  # one row in so many
@@ -40,9 +40,8 @@ def walk_course_of(log: Log, flipper: str) -> WalkCourse:
 
 def walk_course_row(course: WalkCourse) -> dict[str, list[float | None]]:
     """As JSON can hold it."""
-    return {name: [known(value) for value in column.tolist()] for name, column in course._asdict().items()}
+    return row_of_columns(course._asdict())
 
 
 def walk_course_of_row(row: Mapping[str, Any]) -> WalkCourse:
-    columns: dict[str, Any] = {name: np.array(row[name], np.float64) for name in WalkCourse._fields}
-    return WalkCourse(**(columns | {"phase": columns["phase"].astype(np.int64)}))
+    return WalkCourse(**columns_of_row(row, WalkCourse._fields))

@@ -9,7 +9,8 @@ from typing import Any
 from experiments.coefficient_table import TruthOfMud, error_text_rows, mud_rows
 from experiments.estimation_methods import method_of
 from experiments.flipper_report import TRUTHS, doubts
-from experiments.mud_looks import file_name, mud_text
+from experiments.mud_looks import file_name
+from experiments.mud_names import mud_text
 from experiments.notebook import Entry
 from experiments.report_page import Figure, Section
 from experiments.trackway_trials import reach_of

@@ -16,7 +16,8 @@ from experiments.coefficient_table import PER_CM3
 from experiments.error_table import COEFFICIENTS
 from experiments.estimation_methods import COMPENSATED, DEFAULT, PAPER
 from experiments.known_surface import KNOWN, KNOWN_COMPENSATED
-from experiments.mud_looks import DOTS_PER_INCH, GREY, INK, LABELS, mud_text
+from experiments.mud_looks import DOTS_PER_INCH, GREY, INK, LABELS
+from experiments.mud_names import mud_text
 from experiments.notebook import Entry
 from experiments.stride_course import course_of_row
 from experiments.walk_course import WalkCourse, walk_course_of_row
@@ -49,12 +50,12 @@ def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[PlacedStride], rea
     begun_s = float(course.time_s[0])
     borders_s = _borders_s(plan, walk, course, own, reach_m)
     figure, panels = plt.subplots(6, 1, figsize=(9.0, 11.0), sharex=True, constrained_layout=True)
-    _plot_place(panels[0], plan, walk, course, begun_s)
+    _plot_place(panels[0], walk, course, begun_s)
     _plot_force(panels[1], course, course.force_x_n, begun_s, "$f_x$ forward (N)")
     upward_n = np.where(course.phase == Phase.STANCE, np.nan, course.force_z_n)
     _plot_force(panels[2], course, upward_n, begun_s, "$f_z$ up (N)")
     for panel, name in zip(panels[3:], COEFFICIENTS, strict=True):
-        _plot_coefficient(panel, plan, name, own, begun_s, borders_s)
+        _plot_coefficient(panel, plan, name, own, begun_s)
     for letter, panel in zip("ABCDEF", panels, strict=True):
         panel.set_title(letter, loc="left", fontsize="medium", fontweight="bold")
         for border_s in borders_s:
@@ -85,7 +86,7 @@ def _name_muds(panel: Axes, plan: Plan, edges_s: Sequence[float], begun_s: float
         panel.annotate(mud_text(mud.name), (middle_s, 1.02), xycoords=("data", "axes fraction"), ha="center")
 
 
-def _plot_place(panel: Axes, plan: Plan, walk: Entry, course: WalkCourse, begun_s: float) -> None:
+def _plot_place(panel: Axes, walk: Entry, course: WalkCourse, begun_s: float) -> None:
     panel.set_ylabel("body (cm)")
     if walk["start_m"] is None:
         panel.text(0.5, 0.5, "no pose was told", transform=panel.transAxes, ha="center", color=GREY)
@@ -109,9 +110,7 @@ def _plot_force(panel: Axes, course: WalkCourse, force_n: Any, begun_s: float, l
     panel.legend(ncols=3, **LEGEND)
 
 
-def _plot_coefficient(
-    panel: Axes, plan: Plan, name: str, own: Sequence[PlacedStride], begun_s: float, borders_s: Sequence[float]
-) -> None:
+def _plot_coefficient(panel: Axes, plan: Plan, name: str, own: Sequence[PlacedStride], begun_s: float) -> None:
     """Triangles are lower bounds; the dashed lines are the load cell's."""
     methods = [method for method in METHOD_LOOKS if method != COMPENSATED or name == "k_s"]
     told = [each for each in own if each.method in methods and each.stride[name]["valid"]]

@@ -15,7 +15,7 @@ import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 
-from experiments.coefficient_table import mud_label  # noqa: E402
+from experiments.mud_names import mud_label  # noqa: E402
 from experiments.paper_table import ADAPTIVE  # noqa: E402
 from experiments.walk import EXTRACTION, SLIPPAGE  # noqa: E402
 
@@ -38,26 +38,33 @@ def plot_trackway(report: dict[str, Any], path: Path) -> None:
         constrained_layout=True,
     )
     colours = _colours(list(report["table"]))
-    for name, panel, title in (
-        ("step_cm", axes["steps"], "step length (cm)"),
-        ("depth_cm", axes["depths"], "depth (cm)"),
-    ):
-        _shade_muds(panel, report)
-        for rule, colour in colours.items():
-            for walk in report["walks"][rule][:1]:  # none where every trial was left out
-                _plot_walk(panel, walk, name, colour)
-        panel.set_ylabel(title)
-    low, high = axes["steps"].get_ylim()
-    axes["steps"].set_ylim(min(0.0, low), high + 0.1 * (high - low))  # room for the muds' names
-    _name_muds(axes["steps"], report)
-    axes["steps"].set_title("One walk of each gait over the trackway", fontsize="medium")
-    axes["steps"].legend(handles=_legend(colours, report), fontsize="small", loc="lower left", ncols=2, framealpha=0.9)
-    axes["steps"].tick_params(labelbottom=False)
+    _plot_steps(axes["steps"], report, colours)
+    _plot_walks(axes["depths"], report, colours, "depth_cm")
+    axes["depths"].set_ylabel("depth (cm)")
     axes["depths"].invert_yaxis()
     axes["depths"].set_xlabel("place along the track (cm)")
     _plot_speeds(axes["speeds"], report, colours)
     figure.savefig(path, dpi=110)
     plt.close(figure)
+
+
+def _plot_steps(panel: Axes, report: dict[str, Any], colours: Mapping[str, str]) -> None:
+    _plot_walks(panel, report, colours, "step_cm")
+    panel.set_ylabel("step length (cm)")
+    low, high = panel.get_ylim()
+    panel.set_ylim(min(0.0, low), high + 0.1 * (high - low))  # room for the muds' names
+    _name_muds(panel, report)
+    panel.set_title("One walk of each gait over the trackway", fontsize="medium")
+    panel.legend(handles=_legend(colours, report), fontsize="small", loc="lower left", ncols=2, framealpha=0.9)
+    panel.tick_params(labelbottom=False)
+
+
+def _plot_walks(panel: Axes, report: dict[str, Any], colours: Mapping[str, str], figure: str) -> None:
+    """The first of each gait."""
+    _shade_muds(panel, report)
+    for rule, colour in colours.items():
+        for walk in report["walks"][rule][:1]:  # none where every trial was left out
+            _plot_walk(panel, walk, figure, colour)
 
 
 def _colours(rules: Sequence[str]) -> dict[str, str]:
@@ -106,17 +113,9 @@ def _plot_speeds(panel: Axes, report: dict[str, Any], colours: Mapping[str, str]
     muds, width = list(report["settings"]["mud_length_cm"]), 0.8 / len(colours)
     for i, (rule, colour) in enumerate(colours.items()):
         places = [mud + (i - (len(colours) - 1) / 2.0) * width for mud in range(len(muds))]
-        paper = report["paper"].get(rule)
-        told = [(place, paper[mud]) for place, mud in zip(places, muds, strict=True) if paper and mud in paper]
-        if told:
-            panel.bar([place for place, _ in told], [each["mean"] for _, each in told], 0.92 * width,
-                      yerr=[each["sd"] for _, each in told],
-                      color="0.85", edgecolor="0.6", ecolor="0.5", capsize=3)  # fmt: skip
-        cells = [report["table"][rule][mud] for mud in muds]
-        reached = [(place, cell) for place, cell in zip(places, cells, strict=True) if cell["mean"] is not None]
-        panel.errorbar([place for place, _ in reached], [cell["mean"] for _, cell in reached],
-                       yerr=[cell["sd"] or 0.0 for _, cell in reached], fmt="o", color=colour,
-                       markeredgecolor="black", markeredgewidth=0.6, markersize=7, capsize=3)  # fmt: skip
+        paper = report["paper"].get(rule) or {}
+        _plot_paper(panel, places, [paper.get(mud) for mud in muds], 0.92 * width)
+        _plot_ours(panel, places, [report["table"][rule][mud] for mud in muds], colour)
     best_depths = report.get("best_constant_depth", {})
     for mud, best in enumerate(best_depths.values()):
         panel.hlines(best["mean"], mud - 0.42, mud + 0.42, color=TEXT, linewidth=1.0, linestyle=":")
@@ -127,6 +126,21 @@ def _plot_speeds(panel: Axes, report: dict[str, Any], colours: Mapping[str, str]
     if best_depths:
         dots = Line2D([], [], color=TEXT, linestyle=":", label="best constant depth")
         panel.legend(handles=[dots], fontsize="small", loc="upper right")
+
+
+def _plot_paper(panel: Axes, places: Sequence[float], cells: Sequence[Mapping[str, Any] | None], width: float) -> None:
+    told = [(place, cell) for place, cell in zip(places, cells, strict=True) if cell]
+    if told:
+        panel.bar([place for place, _ in told], [cell["mean"] for _, cell in told], width,
+                  yerr=[cell["sd"] for _, cell in told],
+                  color="0.85", edgecolor="0.6", ecolor="0.5", capsize=3)  # fmt: skip
+
+
+def _plot_ours(panel: Axes, places: Sequence[float], cells: Sequence[Mapping[str, Any]], colour: str) -> None:
+    reached = [(place, cell) for place, cell in zip(places, cells, strict=True) if cell["mean"] is not None]
+    panel.errorbar([place for place, _ in reached], [cell["mean"] for _, cell in reached],
+                   yerr=[cell["sd"] or 0.0 for _, cell in reached], fmt="o", color=colour,
+                   markeredgecolor="black", markeredgewidth=0.6, markersize=7, capsize=3)  # fmt: skip
 
 
 def plot_sweep(report: dict[str, Any], path: Path) -> None:

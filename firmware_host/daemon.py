@@ -30,20 +30,21 @@ from firmware_host.configuration import (
     EXIT_CONFIGURATION,
     Configuration,
     ConfigurationError,
+    LoopParameters,
     load_configuration,
 )
 from firmware_host.failing_recorder import failing_recorder
 from firmware_host.failing_time import failing_clock, failing_ticker
 from firmware_host.failure_calls import failures_of, with_failures
-from firmware_host.lease import Lease
 from firmware_host.log_folder import first_path, new_run_id
 from firmware_host.loop import Loop
-from firmware_host.operator_calls import OperatorCalls, software_version
+from firmware_host.operator_calls import OperatorCalls
 from firmware_host.pose_sources import open_pose
 from firmware_host.realtime import prepare_loop
 from firmware_host.recorder import NullRecorder, Recorder
 from firmware_host.rights import Rights, load_rights
 from firmware_host.sd_notify import SystemdNotifier
+from firmware_host.software_version import software_version
 from firmware_host.status_socket import AlreadyServedError, StatusSocket
 from firmware_host.ticker import RATE_HZ, Beat, Ticker
 
@@ -134,21 +135,30 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         recorder = failing_recorder(open_recorder(configuration), failures)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
         wall_clock = failing_clock(time.time, failures)
-        lease = Lease()
-        loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock, lease=lease)
+        loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock)
         warnings: list[str] = []
         calls = OperatorCalls(loop, recorder, warnings, time.monotonic)
-        status.methods = with_failures(calls.methods, failures, loop.event, time.monotonic)
-        status.on_hang_up = lease.hang_up
-        status.spares = lambda caller: caller == lease.holder
-        status.report_bug = lambda sentence: loop.event(time.monotonic(), sentence)
+        status.methods = with_failures(calls.methods, failures, loop.news.tell, time.monotonic)
+        _serve_loop(status, loop)
         notifier = SystemdNotifier()
         stack.callback(notifier.close)
-        options = configuration.loop
-        warnings += prepare_loop(options.priority, options.cpu, options.lock_memory)
-        for warning in warnings:
-            print(f"warning: {warning}", file=sys.stderr)
+        warnings += _prepare(configuration.loop)
         return _run_loop(loop, buses, pose, failures, status, notifier, shutdown)
+
+
+def _serve_loop(status: StatusSocket, loop: Loop) -> None:
+    """What the socket needs of the loop beside its methods."""
+    status.on_hang_up = loop.lease.hang_up
+    status.spares = lambda caller: caller == loop.lease.holder
+    status.report_bug = lambda sentence: loop.news.tell(time.monotonic(), sentence)
+
+
+def _prepare(parameters: LoopParameters) -> list[str]:
+    """The process for real time: what could not be had, which is told."""
+    warnings = prepare_loop(parameters.priority, parameters.cpu, parameters.lock_memory)
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    return warnings
 
 
 def _run_loop(
@@ -160,7 +170,7 @@ def _run_loop(
     notifier: SystemdNotifier,
     shutdown: Shutdown,
 ) -> int:
-    ticker, watchdog = failing_ticker(Ticker(), failures, loop.event), WatchdogFeed(notifier)
+    ticker, watchdog = failing_ticker(Ticker(), failures, loop.news.tell), WatchdogFeed(notifier)
     notifier.send("READY=1", "STATUS=running")
     now_s = time.monotonic()
     try:
@@ -187,13 +197,13 @@ def reopen_buses(loop: Loop, buses: Mapping[str, ReopeningPort], now_s: float) -
         return
     for name, port in buses.items():
         if port.reopen(now_s):
-            loop.event(now_s, f"bus {name} opened again")
+            loop.news.tell(now_s, f"bus {name} opened again")
 
 
 def reopen_pose(loop: Loop, pose: OpenedPose, now_s: float) -> None:
     """The same for a source that was unplugged."""
     if loop.mode not in ENERGISED and pose.reopen(now_s):
-        loop.event(now_s, "the pose's source was opened again; its zero may be another one")
+        loop.news.tell(now_s, "the pose's source was opened again; its zero may be another one")
 
 
 def _end_safely(loop: Loop, problem: Exception) -> int:
@@ -205,7 +215,7 @@ def _end_safely(loop: Loop, problem: Exception) -> int:
     sentence = f"{type(problem).__name__}: {problem} ({Path(place.filename).name}, line {place.lineno})"
     print(f"mudskipperd: stopped by a bug, the drives are idle: {sentence}", file=sys.stderr)
     with suppress(Exception):  # or the log
-        loop.event(time.monotonic(), f"stopped by a bug: {sentence}")
+        loop.news.tell(time.monotonic(), f"stopped by a bug: {sentence}")
     return EXIT_FAILED
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from drivers.failures import FailureKind, Failures
-from firmware_host.log_rows import EVENT
-from firmware_host.recorder import EVENT_KIND, STAMP, LogReport, Recording
+from firmware_host.log_rows import EVENT, EVENT_KIND
+from firmware_host.recorder import STAMP, LogReport, Recording
 
 
 class FailingRecorder:

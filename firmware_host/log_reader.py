@@ -59,20 +59,8 @@ def unwatched(what: str, done: int, total: int) -> None:
 def read_log(path: Path, watch: Watch = unwatched, from_s: float = -inf) -> Log:
     """Of what is before `from_s` only as much as its first chunk holds. Raises LogError."""
     contents = _read_contents(path)
-    stream, found = BytesIO(contents), _Findings(from_s)
-    reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=len(contents))
-    try:
-        for record in reader.records:
-            found.add(record)
-            watch("kB read", stream.tell() // 1000, len(contents) // 1000)
-        complete = True
-    except LayoutError as error:
-        raise LayoutError(f"{path}: {error}; {OTHER_VERSION}") from None
-    except DAMAGE as error:
-        finished = len(contents) > len(MCAP0_MAGIC) and contents.endswith(MCAP0_MAGIC)
-        if finished or not _is_cut(error, stream.tell() == len(contents)):
-            raise LogError(f"{path}: damaged before byte {stream.tell()}: {error}; {ADVICE}") from None
-        complete = False
+    found = _Findings(from_s)
+    complete = _read_records(path, contents, found, watch)
     if complete and from_s == -inf and found.messages != found.messages_promised:
         raise LogError(
             f"{path}: damaged: only {found.messages} of its {found.messages_promised} rows can be found; {ADVICE}"
@@ -85,6 +73,24 @@ def read_log(path: Path, watch: Watch = unwatched, from_s: float = -inf) -> Log:
         _decode_rows(path, EVENT, found.rows[EVENT]),
         complete,
     )
+
+
+def _read_records(path: Path, contents: bytes, found: _Findings, watch: Watch) -> bool:
+    """Whether they go on to the file's end: a log may be cut off. Raises LogError for one that is damaged."""
+    stream = BytesIO(contents)
+    reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=len(contents))
+    try:
+        for record in reader.records:
+            found.add(record)
+            watch("kB read", stream.tell() // 1000, len(contents) // 1000)
+    except LayoutError as error:
+        raise LayoutError(f"{path}: {error}; {OTHER_VERSION}") from None
+    except DAMAGE as error:
+        finished = len(contents) > len(MCAP0_MAGIC) and contents.endswith(MCAP0_MAGIC)
+        if finished or not _is_cut(error, stream.tell() == len(contents)):
+            raise LogError(f"{path}: damaged before byte {stream.tell()}: {error}; {ADVICE}") from None
+        return False
+    return True
 
 
 def read_logs(paths: Sequence[Path], watch: Watch = unwatched, from_s: float = -inf) -> Log:

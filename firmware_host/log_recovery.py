@@ -24,9 +24,9 @@ from mcap.writer import MCAP0_MAGIC
 from firmware_host.log_file import LogFile, lock_file
 from firmware_host.log_folder import BROKEN, PART, finished_path, make_folder, synchronise_folder, unfinished_files
 from firmware_host.log_reader import LogError, Watch, read_log, unwatched
-from firmware_host.log_rows import EVENT
+from firmware_host.log_rows import EVENT, EVENT_KIND
 from firmware_host.log_salvage import Salvage, readable_rows, salvage_rows
-from firmware_host.recorder import EVENT_KIND, STAMP
+from firmware_host.recorder import STAMP
 
 WATCHED_ROWS = 1000  # between two words on how far it is
 
@@ -109,6 +109,17 @@ def _rewrite(path: Path, target: Path, salvage: Salvage, watch: Watch) -> Recove
     part = broken.with_name(target.name + PART)
     part.unlink(missing_ok=True)
     lost, note = salvage.lost + salvage.foreign, _note_of(salvage)
+    _write_part(part, salvage, lost, note, watch)
+    make_folder(target.parent)
+    part.rename(target)
+    for folder in {target.parent, part.parent}:
+        synchronise_folder(folder)
+    broken.unlink()
+    return Recovered(target, len(salvage.rows), lost, note)
+
+
+def _write_part(part: Path, salvage: Salvage, lost: int, note: str, watch: Watch) -> None:
+    """All or nothing. Raises OSError."""
     opening = {
         "configuration_text": salvage.configuration_text,
         "metadata": salvage.metadata | {"recovered": "true", "rows_lost": str(lost)},
@@ -125,12 +136,6 @@ def _rewrite(path: Path, target: Path, salvage: Salvage, watch: Watch) -> Recove
         log.abandon()
         part.unlink(missing_ok=True)
         raise
-    make_folder(target.parent)
-    part.rename(target)
-    for folder in {target.parent, part.parent}:
-        synchronise_folder(folder)
-    broken.unlink()
-    return Recovered(target, len(salvage.rows), lost, note)
 
 
 def _note_of(salvage: Salvage) -> str:

@@ -152,3 +152,4 @@ EVENT = RowKind(
 )
 
 ROW_KINDS = (TICK, STRIDE, EVENT)
+TICK_KIND, STRIDE_KIND, EVENT_KIND = range(len(ROW_KINDS))  # a row's kind on its way into a file

@@ -32,8 +32,8 @@ from firmware_host.log_folder import (
     unfinished_files,
 )
 from firmware_host.log_parameters import LogParameters
-from firmware_host.log_rows import EVENT
-from firmware_host.recorder import EVENT_KIND, STAMP
+from firmware_host.log_rows import EVENT, EVENT_KIND
+from firmware_host.recorder import STAMP
 from firmware_host.rest_thinning import RestThinning
 
 RETRY_S = 3.0  # between two attempts at a disk that refuses

@@ -22,17 +22,16 @@ from drivers.pose_port import PoseSource
 from firmware_host.configuration import Configuration
 from firmware_host.fault_watch import FaultWatch, Situation
 from firmware_host.lease import Lease
-from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK
+from firmware_host.log_rows import STRIDE_KIND, TICK_KIND
+from firmware_host.loop_news import LoopNews, ModeChange
 from firmware_host.mud_learning import MudLearning
 from firmware_host.recorder import Recording
-from firmware_host.requests_told import RequestsTold
 from firmware_host.row_packing import Moment, stride_row, tick_row
 from firmware_host.ticker import PERIOD_S, Beat
 from firmware_host.timing import LoopTiming
 
 CLEARING_S = 0.5  # for the drives to report that their errors are gone
 LONGEST_STEP_TICKS = 3  # what the controller may advance at once: after a longer gap the gait goes on where it was
-TICK_KIND, STRIDE_KIND, EVENT_KIND = ROW_KINDS.index(TICK), ROW_KINDS.index(STRIDE), ROW_KINDS.index(EVENT)
 
 
 class Loop:
@@ -44,13 +43,13 @@ class Loop:
         recorder: Recording,
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
-        lease: Lease | None = None,
     ) -> None:
         self.configuration = configuration
         self.drives = drives
         self.pose = pose
         self.recorder = recorder
-        self.lease = lease or Lease()
+        self.lease = Lease()
+        self.news = LoopNews(recorder, configuration.motion.longest_hold_s)
         self.timing = LoopTiming()
         self.learning = MudLearning(configuration)
         self.controller = controller_of(configuration)
@@ -64,11 +63,9 @@ class Loop:
         self.sent = LimitedTorques(NO_TORQUE, False, True)
         self.health = Health()
         self.missed_ticks = 0  # since the start
-        self.notice = ""  # the last thing that a person should know
         self.ending = False  # the daemon is about to end: nothing is armed any more
         self.forced = False  # armed against what may be overruled
         self.target_before: GaitTarget = RESTING  # commanded while the states of this tick came about
-        self.requests_told = RequestsTold()
         self._request, self._clear_until_s = Request.NONE, NEVER_S
         self._mode_since_s = 0.0
 
@@ -106,7 +103,7 @@ class Loop:
         """Once a stride, in swing, the gait changes; and where an insertion meets firm mud."""
         closed, sentences = self.learning.step(self.controller)
         for sentence in sentences:
-            self.event(now_s, sentence)
+            self.news.tell(now_s, sentence)
         for stride in closed:
             self.recorder.put(STRIDE_KIND, stride_row(now_s, stride.estimate, stride.chosen_depth_m))
 
@@ -117,7 +114,7 @@ class Loop:
             present.append(self.controller.fault)
         clearing = beat.now_s <= self._clear_until_s
         self.faults.update(present, self.mode in ENERGISED, clearing, 1 + beat.missed)
-        self._tell_faults(beat.now_s)
+        self.news.tell_faults(beat.now_s, self.faults.begun, self.faults.over)
         return Health(
             drives_heard=self.mode is not Mode.BOOT or self.drives.heard,
             closed_loop=self._all_in_closed_loop(),
@@ -145,12 +142,6 @@ class Loop:
             self.recorder.report(),
             lost_by,
         )
-
-    def _tell_faults(self, now_s: float) -> None:
-        for fault in self.faults.begun:
-            self.event(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault.sentence}")
-        for fault in self.faults.over:
-            self.event(now_s, f"over: {fault.name} {fault.subject}".rstrip())
 
     def _all_in_closed_loop(self) -> bool:
         """By heartbeats that are younger than the wish, while arming: an older one tells of before."""
@@ -181,20 +172,16 @@ class Loop:
         return None
 
     def _tell_request(self, request: Request, now_s: float, forced: bool, by: str) -> None:
-        """Once, with who asked; but not a stop or disarm that changes nothing: whoever is let in may ask for those."""
+        """A stop or disarm that changes nothing is not told: whoever is let in may ask for those."""
         changes = request not in (Request.STOP, Request.DISARM) or self._next(request) is not self._next(Request.NONE)
-        text = f"request {request.name.lower()}{' by force' if forced else ''}{f' by {by}' if by else ''}"
-        told = self.requests_told.update(text, changes, now_s)
-        if told:
-            self.event(now_s, told)
+        self.news.tell_request(now_s, request, forced, by, changes)
 
     def _next(self, request: Request) -> Mode:
         return next_mode(self.mode, request, self.health)
 
     def _force(self, now_s: float, forced: bool) -> None:
         overruled = self.faults.blocking() if forced else []
-        for fault in overruled:
-            self.event(now_s, f"armed by force despite {fault.name}: {fault.sentence}")
+        self.news.tell_overruled(now_s, overruled)
         self.forced = bool(overruled)
 
     def _refusal(self, request: Request, order: WalkOrder | None, forced: bool) -> str | None:
@@ -218,13 +205,13 @@ class Loop:
         """In hold as in a walk: a fault that asks for a still pose has it, and so has whoever asks to stop."""
         if self.mode is Mode.HOLD:
             self.controller.end_move()
-            self.notice = f"the joints stopped on their way: {why}"
-            self.event(now_s, self.notice)
+            self.news.tell_end_of_move(now_s, why)
 
     def _change_mode(self, mode: Mode, now_s: float) -> None:
         if mode is self.mode:
             return
-        self._tell_change(mode, now_s)
+        change = ModeChange(self.mode, mode, self.fault, self.health.rested, self.controller.is_up(self.states))
+        self.news.tell_change(now_s, change)
         if mode is Mode.WALKING:
             self.learning.reset(self.controller.order.depth_m)
         if mode is Mode.ARMING:
@@ -233,23 +220,6 @@ class Loop:
         elif self.mode in ENERGISED and mode not in ENERGISED:
             self.drives.disarm(now_s, at_once=True)
         self.mode, self._mode_since_s = mode, now_s
-
-    def _tell_change(self, mode: Mode, now_s: float) -> None:
-        fault = self.fault
-        because = f": {fault.sentence}" if fault else ""
-        self.event(now_s, f"mode {self.mode.name.lower()} to {mode.name.lower()}{because}")
-        if mode in (Mode.ARMING, Mode.WALKING):
-            self.notice = ""
-        if fault and self.mode in ENERGISED:
-            to_do = fault.kind.what_to_do
-            self.notice = f"stopped by {fault.name}: {fault.sentence} {to_do[:1].upper()}{to_do[1:]}."
-        if self.mode is Mode.HOLD and mode is Mode.IDLE and self.health.rested:
-            held_s = self.configuration.motion.longest_hold_s
-            self.notice = f"the pose was held for {held_s:g} s without a request: torque went off by itself"
-            self.event(now_s, self.notice)
-        if self.mode is Mode.STOPPING and mode is Mode.HOLD and not self.controller.is_up(self.states):
-            self.notice = "the flippers did not come out of the mud"
-            self.event(now_s, self.notice)
 
     def _trusted(self) -> tuple[bool, ...]:
         return self._fault_watch.trusted if self.mode is Mode.DAMPING else ALL_TRUSTED
@@ -293,12 +263,8 @@ class Loop:
         )
         self.recorder.put(TICK_KIND, tick_row(moment))
         if self.controller.recovery.news:
-            self.event(beat.now_s, self.controller.recovery.news)
+            self.news.tell(beat.now_s, self.controller.recovery.news)
         self.timing.update(beat.now_s, beat.late_s, beat.missed, tick_s)
-
-    def event(self, now_s: float, text: str) -> None:
-        """A sentence into the log."""
-        self.recorder.put(EVENT_KIND, EVENT.encode(now_s, text))
 
 
 def controller_of(configuration: Configuration) -> Controller:

@@ -7,7 +7,6 @@ the lease's holder, where somebody holds it; what ends a motion is for everybody
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import PackageNotFoundError, version
 from math import isfinite
 from typing import Any
 
@@ -22,6 +21,7 @@ from firmware_host.lease import LONGEST_S, SHORTEST_S
 from firmware_host.loop import Loop
 from firmware_host.recorder import Recording
 from firmware_host.reports import belief_report, known, map_report, stride_report
+from firmware_host.software_version import software_version
 from firmware_host.status_socket import Methods, RefusedError
 from firmware_host.ticker import PERIOD_S
 
@@ -30,13 +30,6 @@ STRIDES_PER_ANSWER = 20  # an answer is made between two ticks
 LARGEST_NUMBER = 2**63 - 1
 
 Method = Callable[[dict[str, Any], Caller], str]
-
-
-def software_version() -> str:
-    try:
-        return version("mudskipper")
-    except PackageNotFoundError:
-        return "not installed"
 
 
 class OperatorCalls:
@@ -82,8 +75,8 @@ class OperatorCalls:
             "fault": _fault(loop),
             "faults": [_fault_report(loop, fault) for fault in loop.faults.standing],
             "forced": loop.forced,
-            "notice": loop.notice,
-            "untold_requests": loop.requests_told.untold,
+            "notice": loop.news.notice,
+            "untold_requests": loop.news.requests.untold,
             "lease": str(loop.lease.holder) if loop.lease.held else None,
             "phase": loop.target_before.phase.name.lower(),
             "stride": loop.target_before.stride,
@@ -189,8 +182,8 @@ class OperatorCalls:
                 raise RefusedError(f"{joint}_rad = {angle_rad:g}: must be from {low:.3f} to {high:.3f}")
         self._accept(_against_moving(loop))
         way = ", ".join(f"{joint} to {angle_rad:.4f} rad" for joint, angle_rad in angles_rad.items())
-        loop.event(self._clock(), f"move {way} by {caller}")
-        loop.notice = ""
+        loop.news.tell(self._clock(), f"move {way} by {caller}")
+        loop.news.notice = ""
         loop.controller.move([angles_rad.get(joint) for joint in JOINTS])
         return "accepted"
 
@@ -205,7 +198,7 @@ class OperatorCalls:
         self._oust(caller)
         self._accept(self._lease.renew(caller, now_s, for_s))
         if begins:
-            self._loop.event(now_s, f"lease taken by {caller}")
+            self._loop.news.tell(now_s, f"lease taken by {caller}")
         return "accepted"
 
     def release(self, params: dict[str, Any], caller: Caller) -> str:
@@ -213,7 +206,7 @@ class OperatorCalls:
         begun = self._lease.holder is not None
         self._accept(self._lease.release(caller))
         if begun:
-            self._loop.event(self._clock(), f"lease released by {caller}")
+            self._loop.news.tell(self._clock(), f"lease released by {caller}")
         return "accepted"
 
     def _as_holder(self, method: Method, params: dict[str, Any], caller: Caller) -> str:
@@ -225,7 +218,7 @@ class OperatorCalls:
 
     def _oust(self, caller: Caller) -> None:
         if self._lease.held and self._lease.holder != caller:
-            self._loop.event(self._clock(), f"lease of {self._lease.holder} taken over by {caller}")
+            self._loop.news.tell(self._clock(), f"lease of {self._lease.holder} taken over by {caller}")
             self._lease.oust(caller)
 
     def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple, Protocol
 
 from firmware_host.log_folder import present_path
 from firmware_host.log_parameters import ONE_FILE, LogParameters
-from firmware_host.log_rows import EVENT, ROW_KINDS
+from firmware_host.log_rows import EVENT, EVENT_KIND
 
 PIPE_BYTES = 1 << 20  # 2,560 ticks, ten to a page: almost seven seconds at 380 Hz
 HEADER = struct.Struct("<BI")  # index in ROW_KINDS, length of the payload; the opening comes first, as kind 0
@@ -34,7 +34,6 @@ STAMP = struct.Struct("<4xd")  # every row: four bytes of encapsulation, then it
 REPORT_BYTES = 256  # kept free for the report of a loss, which goes in together with a row
 LARGEST_ROW = select.PIPE_BUF - HEADER.size - REPORT_BYTES
 LONGEST_TEXT = LARGEST_ROW - len(EVENT.encode(0.0, ""))  # bytes
-EVENT_KIND = ROW_KINDS.index(EVENT)
 REPORT_CALLS = 95  # between two looks into the pipe of reports, which brings one a second: four a second at 380 Hz
 REPORT_OVERDUE_S = 3.0  # without a report: the writer waits for its disk
 

@@ -79,15 +79,20 @@ def replay_log(
     watch: Watch = unwatched,
 ) -> Replay:
     """With the configuration that the log carries, unless another one is given."""
-    try:
-        configuration = configuration or parse_configuration(log.configuration_text)
-    except ConfigurationError as problem:
-        raise LogError(f"{path}: its configuration is not one of this version: {problem.problems[0]}") from problem
+    configuration = configuration or configuration_of(path, log)
     parameters = _by_method(configuration.estimation, method)
     drag_n = configuration.adaptation.body_drag_n
     estimator = MudEstimator(configuration.geometry, configuration.flipper_drives, parameters, drag_n)
     strides = list(_strides_of_log(estimator, log, watch))
     return Replay(strides, ("left", "right"), estimator.map.rows(), log.complete, segment_of(log))
+
+
+def configuration_of(path: Path, log: Log) -> Configuration:
+    """That the log carries. Raises LogError."""
+    try:
+        return parse_configuration(log.configuration_text)
+    except ConfigurationError as problem:
+        raise LogError(f"{path}: its configuration is not one of this version: {problem.problems[0]}") from problem
 
 
 def _by_method(parameters: EstimationParameters, method: Method | None) -> EstimationParameters:

@@ -15,10 +15,8 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from control.modes import ENERGISED
-from firmware_host.log_rows import FORMAT_OF, ROW_KINDS, TICK
+from firmware_host.log_rows import FORMAT_OF, TICK, TICK_KIND
 from firmware_host.ticker import RATE_HZ
-
-TICK_KIND = ROW_KINDS.index(TICK)
 
 
 def _place(name: str) -> int:

@@ -16,7 +16,7 @@ from math import cos, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
-from simulation.plate_contact import Attitude, Twist
+from simulation.rigid_plate import Attitude, Twist
 
 LEAST_UPRIGHT = 0.05  # a plate cannot lie flat: its strips would be endless
 Vector = tuple[float, float, float]

@@ -18,7 +18,8 @@ from typing import NamedTuple
 from control.geometry import FlipperGeometry
 from simulation.carriage import Carriage, carried_attitude, carried_twist
 from simulation.clay import Clay
-from simulation.plate_contact import Attitude, PlateContact, PlateSize, Twist, Wrench, lowest_point_m
+from simulation.plate_contact import PlateContact
+from simulation.rigid_plate import Attitude, PlateSize, Twist, Wrench, lowest_point_m
 
 
 class ContactForce(NamedTuple):

@@ -19,7 +19,9 @@ from typing import NamedTuple
 from control.geometry import FlipperGeometry
 from simulation.clay import Clay, rate_factor
 from simulation.flipper_contact import plate_size
-from simulation.plate_contact import SIDEWAYS_YIELD_M, Attitude, PlateContact, Twist, lowest_point_m
+from simulation.mud_springs import SIDEWAYS_YIELD_M
+from simulation.plate_contact import PlateContact
+from simulation.rigid_plate import Attitude, Twist, lowest_point_m
 
 STEP_S = 0.0005
 

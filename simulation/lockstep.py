@@ -112,7 +112,7 @@ class Lockstep:
         self.tick_number += 1 + missed
         self.robot.advance(self.now_s)
         for failure in self.failures.update(self.now_s):
-            self.loop.event(self.now_s, end_text(failure))
+            self.loop.news.tell(self.now_s, end_text(failure))
         self.loop.tick(Beat(self.now_s, missed * PERIOD_S, self.tick_number, missed))
 
     def fail(self, component: str, kind: str, for_s: float = USUAL_S) -> None:
@@ -120,7 +120,7 @@ class Lockstep:
         refused = "no failures were given" if self._sound else self.failures.refusal(component, kind, for_s)
         if refused:
             raise RuntimeError(refused)
-        self.loop.event(self.now_s, begin_text(component, kind, for_s, "lockstep"))
+        self.loop.news.tell(self.now_s, begin_text(component, kind, for_s, "lockstep"))
         self.failures.begin(component, kind, self.now_s, for_s)
 
     def run_for(self, duration_s: float) -> None:

@@ -66,6 +66,15 @@ def encode_frame(
     models_changed: bool = False,
 ) -> bytes:
     """`bodies` as encode_rigid_body makes them; `crowded`: with a skeleton, markers, force plates and devices."""
+    payload = pack("<i", number)
+    for elements in _sections(version, list(bodies), crowded):
+        content = b"".join(elements)
+        payload += pack("<i", len(elements)) + (pack("<i", len(content)) if version >= (4, 1) else b"") + content
+    return encode_message(FRAME, payload + _frame_end(version, times, models_changed))
+
+
+def _sections(version: NatNetVersion, bodies: list[bytes], crowded: bool) -> list[list[bytes]]:
+    """Those that frames of this version have."""
     bone = encode_rigid_body(version, 65537, RecordedPose(0.0, (9.0, 9.0, 9.0)))
     labelled = pack("<i4f", 7, 1.0, 2.0, 3.0, 0.01) + pack("<H", 2) + (pack("<f", 1e-4) if version >= (3, 0) else b"")
     asset = (
@@ -78,19 +87,14 @@ def encode_frame(
     sections: list[tuple[bool, list[bytes]]] = [
         (True, [b"all\0" + pack("<i6f", 2, *[0.25] * 6), b"robot\0" + pack("<i", 0)] if crowded else []),
         (True, [pack("<3f", 1.0, 2.0, 3.0)] * 3 if crowded else []),
-        (True, list(bodies)),
+        (True, bodies),
         (True, [pack("<ii", 1, 2) + 2 * bone] if crowded else []),
         (version >= (4, 1), [asset] if crowded else []),
         (True, [labelled] * 4 if crowded else []),
         (version >= (2, 9), [channels] * 2 if crowded else []),
         (version >= (2, 11), [channels] if crowded else []),
     ]
-    payload = pack("<i", number)
-    for is_there, elements in sections:
-        content = b"".join(elements)
-        if is_there:
-            payload += pack("<i", len(elements)) + (pack("<i", len(content)) if version >= (4, 1) else b"") + content
-    return encode_message(FRAME, payload + _frame_end(version, times, models_changed))
+    return [elements for is_there, elements in sections if is_there]
 
 
 def _frame_end(version: NatNetVersion, times: FrameTimes, models_changed: bool) -> bytes:
@@ -130,13 +134,8 @@ class NatNetServer:
         name: str = "mudskipper",
         crowded: bool = False,
     ) -> None:
-        self.version, self.latency_s, self.identity, self.name, self.crowded = (
-            version,
-            latency_s,
-            identity,
-            name,
-            crowded,
-        )
+        self.version, self.latency_s, self.crowded = version, latency_s, crowded
+        self.identity, self.name = identity, name
         self.answers = True  # a network may let nothing but frames through
         self._poses = deque(poses)
         self._has_target = target is not None

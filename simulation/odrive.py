@@ -14,8 +14,7 @@ Cogging is the slope of an energy that repeats n times a turn, so it takes as mu
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from math import exp, inf, isfinite, pi, radians, sin
@@ -27,15 +26,13 @@ from control.records import NEVER_S
 from drivers import odrive_codec as codec
 from drivers.frames import Frame
 from drivers.odrive_codec import AxisState, GarbledMessageError, Message, arbitration_id
+from simulation.late_messages import LateMessages
 
 TURN_RAD = 2.0 * pi
 SECOND_HARMONIC = 0.25
 REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
 VERSION_FIELDS = (2, 0, 0, 0, 0, 6, 11, 0)  # protocol 2, no real board, firmware 0.6.11
-WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = (
-    1,
-    2,
-)  # of hardware 0.0.0, which no board has: every real build has others
+WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = 1, 2  # of hardware 0.0.0, which no real board has
 BOOT_S = 1.0  # silence of a drive that restarts
 
 
@@ -74,6 +71,7 @@ class SimulatedOdrive:
     def __init__(self, parameters: OdriveParameters, random: Random) -> None:
         self.parameters = parameters
         self._random = random
+        self._late = LateMessages(random)
         self.reset(0.0)
 
     def reset(self, now_s: float) -> None:
@@ -91,7 +89,7 @@ class SimulatedOdrive:
         self._boots_until_s = NEVER_S
         self._initializing = False
         self._told: dict[Message, Frame] = {}
-        self._under_way: deque[tuple[float, Frame]] = deque()  # when it arrives, and what
+        self._late.reset()
         periods = self.parameters
         self._schedule: list[tuple[float, tuple[Message, ...]]] = [
             (periods.encoder_period_s, (codec.GET_ENCODER_ESTIMATES,)),
@@ -229,7 +227,8 @@ class SimulatedOdrive:
     def cyclic_frames(self, now_s: float) -> Iterator[Frame]:
         """The messages that have come due, or what arrives of them."""
         frames = self._due_frames(now_s)
-        return self._delayed(frames, now_s) if self.parameters.message_delay_s else frames
+        longest_s = self.parameters.message_delay_s
+        return self._late.update(frames, now_s, longest_s) if longest_s else frames
 
     def _due_frames(self, now_s: float) -> Iterator[Frame]:
         if now_s < self._boots_until_s:
@@ -251,16 +250,6 @@ class SimulatedOdrive:
             return told._replace(stamp_s=now_s)
         self._told[message] = frame = self._frame(message, now_s)
         return frame
-
-    def _delayed(self, frames: Iterable[Frame], now_s: float) -> Iterator[Frame]:
-        """None overtakes another. Stamps tell when they arrive, as a receiver's do."""
-        for frame in frames:
-            arrival_s = now_s + self.parameters.message_delay_s * self._random.random()
-            if self._under_way:
-                arrival_s = max(arrival_s, self._under_way[-1][0])
-            self._under_way.append((arrival_s, frame))
-        while self._under_way and self._under_way[0][0] <= now_s:
-            yield self._under_way.popleft()[1]._replace(stamp_s=now_s)
 
     def _frame(self, message: Message, stamp_s: float = NEVER_S) -> Frame:
         return Frame(arbitration_id(self.parameters.node_id, message), self._PAYLOADS[message](self), stamp_s=stamp_s)

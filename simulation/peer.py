@@ -80,14 +80,18 @@ def end_with_parent() -> None:
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="simulation.peer", description=__doc__)
     parser.add_argument("--config", type=Path, required=True)
     ground = parser.add_mutually_exclusive_group()
     ground.add_argument("--mud", action="append", choices=sorted(MUDS), help="water content in percent; repeatable")
     ground.add_argument("--world", type=Path, help="file that describes the ground and more")
     parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
+    return parser.parse_args(arguments)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    options = _parse(arguments)
     try:
         configuration = load_configuration(options.config)
         world = load_world(options.world) if options.world else World(track_of(options.mud or list(MUDS)))

@@ -25,7 +25,7 @@ from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
-from simulation.plate_contact import Wrench
+from simulation.rigid_plate import Wrench
 
 STIFFNESS_N_M = 20e3
 DAMPING_N_S_M = 15.0

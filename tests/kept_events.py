@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from firmware_host.log_rows import EVENT
-from firmware_host.loop import EVENT_KIND
+from firmware_host.log_rows import EVENT, EVENT_KIND
 from firmware_host.recorder import NullRecorder
 
 

@@ -29,7 +29,6 @@ GUEST_FILES = Path(__file__).parent / "guest"
 HEADINGS = ("## On the robot", "### Without CAN hardware")  # of the README, whose commands are run
 DONE_ALREADY = ("apt install", "git clone")  # by base_system.py, and by a copy of this working tree
 WANTS_A_RUNNING_ROBOT = ("systemctl status", "mudskipper ")
-ASKS_A_RUNNING_SYSTEM = ("udevadm", "networkctl", "ip")
 DISK_MIB = 1500
 
 

@@ -18,7 +18,8 @@ from benchmarks.can_fuzz import is_forbidden
 from benchmarks.estimator_cost import fit_rows, measure_fits
 from benchmarks.fit_libraries import FITS
 from benchmarks.report import Progress, summary_us, verdict
-from benchmarks.tick_time import STAGES, VARIANTS
+from benchmarks.stage_marks import STAGES
+from benchmarks.wirings import VARIANTS
 from drivers.frames import Frame
 
 ROOT = Path(__file__).parent.parent.parent

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -13,14 +12,11 @@ from typing import Any
 
 import pytest
 
-from control.controller import WalkOrder
-from control.modes import Mode
 from firmware_host.configuration import Configuration
-from firmware_host.recorder import Recorder
 from firmware_host.status_client import NoDaemonError, StatusClient
 from simulation.local_setup import write_local_setup
-from simulation.lockstep import Lockstep
-from simulation.track import paper_track
+from tests.command_line.command_lines import run
+from tests.recorded_walks import record_walks
 
 
 class Bench:
@@ -38,9 +34,7 @@ class Bench:
         return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
 
     def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        environment = os.environ | {"MUDSKIPPER_SOCKET": str(self.socket)}
-        command = [sys.executable, "-m", "command_line.main", *arguments]
-        return subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment, check=False)
+        return run(*arguments, MUDSKIPPER_SOCKET=str(self.socket))
 
     def wait_for(self, done: Callable[[dict[str, Any]], bool], longest_s: float = 60.0) -> dict[str, Any]:
         deadline_s = time.monotonic() + longest_s
@@ -84,11 +78,5 @@ def bench(short_folder: Path, tmp_path: Path) -> Iterator[Bench]:
 def two_walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
     """A log in which the robot walked two strides, held, and walked one more."""
     path = tmp_path_factory.mktemp("logs") / "two.mcap"
-    recorder = Recorder(path, configuration.text, {"robot": "test"})
-    robot = Lockstep(configuration, paper_track(), recorder=recorder)
-    robot.arm()
-    for strides in (2, 1):
-        robot.walk(WalkOrder(0.03, True, strides))
-        robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
-    assert recorder.close(20.0)
+    record_walks(path, configuration, 2, 1)
     return path

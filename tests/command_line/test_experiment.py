@@ -20,6 +20,7 @@ from command_line import exit_codes
 from command_line.main import main
 from experiments.estimation import Plan
 from simulation.clay import MUDS, Clay
+from tests.command_line.command_lines import refusal
 
 COMMAND = ("experiment", "estimation", "--simulated")
 SHORT = (*COMMAND, "--seeds", "1", "--setup", "single", "--mud", "49.5", "--layers", "none")
@@ -38,18 +39,6 @@ def no_trials(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("it must be refused before any trial")
 
     monkeypatch.setattr(command_line.experiment, "judge", judge)
-
-
-def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """The sentence with which a command line is refused as wrong usage."""
-    try:
-        status: object = main(arguments)
-    except SystemExit as ended:  # as argparse does it
-        status = ended.code
-    printed = capsys.readouterr()
-    assert status == exit_codes.USAGE
-    assert printed.out == ""
-    return printed.err.splitlines()[-1]
 
 
 # what is refused

@@ -17,34 +17,21 @@ from mcap.reader import make_reader
 from command_line import exit_codes, screen
 from command_line.main import main
 from command_line.recorded_walk import read_walk
-from control.controller import WalkOrder
-from control.modes import Mode
 from firmware_host.configuration import Configuration
 from firmware_host.log_folder import ACTIVE, DONE, first_path, log_files
 from firmware_host.log_parameters import ONE_FILE
 from firmware_host.log_reader import read_log
 from firmware_host.log_rows import ROW_KINDS
 from firmware_host.log_segments import LogSegments
-from firmware_host.recorder import Recorder
-from simulation.lockstep import Lockstep
-from simulation.track import paper_track
-
-
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "command_line.main", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+from tests.command_line.command_lines import run
+from tests.recorded_walks import record_walks
 
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
     """A recorded walk of two strides."""
     path = tmp_path_factory.mktemp("logs") / "walk.mcap"
-    recorder = Recorder(path, configuration.text, {"robot": "test"})
-    robot = Lockstep(configuration, paper_track(), recorder=recorder)
-    robot.arm()
-    robot.walk(WalkOrder(0.03, True, 2))
-    robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
-    assert recorder.close(20.0)
+    record_walks(path, configuration, 2)
     return path
 
 

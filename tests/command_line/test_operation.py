@@ -20,6 +20,7 @@ from firmware_host.configuration import EXIT_CONFIGURATION, StatusParameters
 from firmware_host.log_reader import read_log
 from firmware_host.replay import replay_file
 from simulation.peer import WATCHDOG_S
+from tests.command_line.command_lines import run
 
 
 def test_a_whole_session(bench: Any) -> None:
@@ -146,7 +147,7 @@ def test_a_second_daemon_on_the_same_socket_is_refused(bench: Any) -> None:
 
 def test_without_a_daemon_there_is_a_sentence_and_a_status(short_folder: Path) -> None:
     for command in ("status", "arm", "walk", "stop", "disarm", "clear", "watch"):
-        ended = _run(command, "--socket", str(short_folder / "none"))
+        ended = run(command, "--socket", str(short_folder / "none"))
         assert ended.returncode == exit_codes.NO_DAEMON, command
         assert ended.stderr.startswith("mudskipper: no daemon answers") and "Traceback" not in ended.stderr
 
@@ -154,7 +155,7 @@ def test_without_a_daemon_there_is_a_sentence_and_a_status(short_folder: Path) -
 def test_check_without_a_daemon_tells_what_is_missing(short_folder: Path, tmp_path: Path, example_text: str) -> None:
     path = tmp_path / "mudskipper.toml"
     path.write_text(example_text.replace('"can0"', '"nocan0"'), encoding="utf-8")
-    ended = _run("check", "--socket", str(short_folder / "none"), "--config", str(path), "--json")
+    ended = run("check", "--socket", str(short_folder / "none"), "--config", str(path), "--json")
     assert ended.returncode == exit_codes.UNHEALTHY
     items = {item["id"]: item for item in json.loads(ended.stdout)}
     assert not items["daemon"]["ok"] and items["configuration"]["ok"]
@@ -173,7 +174,7 @@ def test_status_loads_nothing_heavy() -> None:
 
 @pytest.mark.parametrize("arguments", [(), ("dance",), ("walk", "--depth", "3", "--adaptive"), ("log",)])
 def test_a_wrong_command_line_is_a_usage_error(arguments: tuple[str, ...]) -> None:
-    ended = _run(*arguments)
+    ended = run(*arguments)
     assert ended.returncode == exit_codes.USAGE and "usage:" in ended.stderr
 
 
@@ -189,11 +190,6 @@ def test_a_walk_of_two_strides_ends_by_itself(bench: Any) -> None:
     bench.run("walk", "--strides", "2")
     report = bench.wait_for(lambda report: report["mode"] == "hold" and report["strides_closed"] == 4)
     assert report["fault"] is None
-
-
-def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "command_line.main", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
 
 def test_ctrl_c_ends_a_watch_quietly(bench: Any) -> None:

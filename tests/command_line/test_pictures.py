@@ -30,6 +30,7 @@ from firmware_host.lab_csv import write_lab_csv
 from firmware_host.log_reader import read_log
 from simulation.clay import MUDS, Clay
 from simulation.track import Track
+from tests.command_line.command_lines import failure, refusal
 
 
 def png_size(path: Path) -> tuple[int, int]:
@@ -38,18 +39,6 @@ def png_size(path: Path) -> tuple[int, int]:
         assert picture.format == "PNG"
         picture.load()
         return picture.size
-
-
-def refusal(capsys: pytest.CaptureFixture[str], status: int, *arguments: str) -> str:
-    """The sentence with which a command line is refused."""
-    try:
-        ended: object = main(arguments)
-    except SystemExit as problem:  # as argparse does it
-        ended = problem.code
-    printed = capsys.readouterr()
-    assert (ended, printed.out) == (status, "")
-    assert "Traceback" not in printed.err
-    return printed.err.splitlines()[-1]
 
 
 @pytest.fixture
@@ -259,33 +248,33 @@ def test_what_is_no_log_is_refused_in_a_sentence(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "broken.mcap").write_bytes(b"not a log")
-    assert "broken.mcap: damaged" in refusal(capsys, exit_codes.UNHEALTHY, command, str(tmp_path / "broken.mcap"))
-    assert "No such file" in refusal(capsys, exit_codes.UNHEALTHY, command, str(tmp_path / "none.mcap"))
-    assert "not a log" in refusal(capsys, exit_codes.UNHEALTHY, command, str(tmp_path / "walk.txt"))
+    assert "broken.mcap: damaged" in failure(capsys, command, str(tmp_path / "broken.mcap"))
+    assert "No such file" in failure(capsys, command, str(tmp_path / "none.mcap"))
+    assert "not a log" in failure(capsys, command, str(tmp_path / "walk.txt"))
     assert not list(tmp_path.glob("*.png"))
 
 
 @pytest.mark.parametrize("command", ["plot", "film"])
 def test_a_walk_that_there_is_not_is_refused(command: str, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "no walk 3, only 2" in refusal(capsys, exit_codes.UNHEALTHY, command, str(log), "--walk", "3")
+    assert "no walk 3, only 2" in failure(capsys, command, str(log), "--walk", "3")
 
 
 def test_a_stride_that_there_is_not_is_refused_with_those_there_are(
     log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    sentence = refusal(capsys, exit_codes.USAGE, "film", str(log), "--walk", "1", "--stride", "0", "--stride", "2")
+    sentence = refusal(capsys, "film", str(log), "--walk", "1", "--stride", "0", "--stride", "2")
     assert "--stride 2: this walk has 0 to 1" in sentence
 
 
 @pytest.mark.parametrize(("command", "name"), [("plot", "x.gif"), ("film", "x.mp4"), ("film", "x"), ("plot", "")])
 def test_other_formats_are_refused(command: str, name: str, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "must end with .png" in refusal(capsys, exit_codes.USAGE, command, str(log), "--out", name)
+    assert "must end with .png" in refusal(capsys, command, str(log), "--out", name)
 
 
 @pytest.mark.parametrize("command", ["plot", "film"])
 def test_a_place_that_cannot_be_written_is_named(command: str, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = log.parent / "nowhere" / "x.png"
-    assert f"{out} cannot be written" in refusal(capsys, exit_codes.UNHEALTHY, command, str(log), "--out", str(out))
+    assert f"{out} cannot be written" in failure(capsys, command, str(log), "--out", str(out))
 
 
 @pytest.fixture
@@ -299,7 +288,7 @@ def no_strides(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_strides_there_is_nothing_to_film(
     log: Path, no_strides: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert "no complete stride" in refusal(capsys, exit_codes.UNHEALTHY, "film", str(log), "--walk", "1")
+    assert "no complete stride" in failure(capsys, "film", str(log), "--walk", "1")
 
 
 def test_without_strides_a_plot_shows_the_rest(log: Path, no_strides: None, capsys: pytest.CaptureFixture[str]) -> None:
@@ -314,7 +303,7 @@ def test_a_film_without_end_is_refused(
     monkeypatch.setattr(command_line.logs, "LONGEST_FILM_S", 2.0)
     monkeypatch.setattr(command_line.stride_film, "FRAMES_PER_S", 2)
     out = str(log.with_suffix(".gif"))
-    assert "choose with --stride" in refusal(capsys, exit_codes.USAGE, "film", str(log), "--walk", "1", "--out", out)
+    assert "choose with --stride" in refusal(capsys, "film", str(log), "--walk", "1", "--out", out)
     assert main(["film", str(log), "--walk", "1", "--out", out, "--stride", "1"]) == exit_codes.OK
 
 

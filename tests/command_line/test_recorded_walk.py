@@ -15,7 +15,7 @@ from control.modes import Mode
 from firmware_host.configuration import Configuration
 from firmware_host.lab_csv import read_lab_csv, write_lab_csv
 from firmware_host.log_reader import LogError, read_log
-from firmware_host.log_rows import EVENT, ROW_KINDS
+from firmware_host.log_rows import EVENT, EVENT_KIND
 from firmware_host.recorder import Recorder
 from firmware_host.replay import replay_file
 from simulation.clay import MUDS
@@ -113,7 +113,7 @@ def test_a_log_without_a_walk_says_so(tmp_path: Path, configuration: Configurati
 def test_a_log_of_a_foreign_configuration_says_so(tmp_path: Path) -> None:
     path = tmp_path / "foreign.mcap"
     recorder = Recorder(path, "[robot]\ncolour = 'green'\n", {})
-    recorder.put(ROW_KINDS.index(EVENT), EVENT.encode(0.0, "nothing"))
+    recorder.put(EVENT_KIND, EVENT.encode(0.0, "nothing"))
     assert recorder.close(20.0)
     with pytest.raises(LogError, match="not one of this version"):
         read_walk(path)

@@ -18,6 +18,7 @@ from experiments.one_mud import constant_walks
 from experiments.paper_table import ADAPTIVE
 from experiments.walk import Walk, WalkedStride
 from simulation.clay import MUDS
+from tests.command_line.command_lines import refusal
 
 MODULES = {"trackway": trackway, "sweep": depth_sweep, "mud-fit": mud_fit}
 NAMES = list(MODULES)
@@ -30,18 +31,6 @@ def no_walks(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for module in MODULES.values():
         monkeypatch.setattr(module, "run", run)
-
-
-def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """The sentence with which a command line is refused as wrong usage."""
-    try:
-        status: object = main(["experiment", *arguments])
-    except SystemExit as ended:  # as argparse does it
-        status = ended.code
-    printed = capsys.readouterr()
-    assert status == exit_codes.USAGE
-    assert printed.out == ""
-    return printed.err.splitlines()[-1]
 
 
 # what is refused
@@ -59,19 +48,19 @@ def test_without_a_daemon_nobody_walks_over_a_real_trackway(
 def test_what_a_real_trackway_cannot_have_is_refused(
     arguments: tuple[str, str], capsys: pytest.CaptureFixture[str], no_walks: None
 ) -> None:
-    assert arguments[0] in refusal(capsys, "trackway", *arguments)
+    assert arguments[0] in refusal(capsys, "experiment", "trackway", *arguments)
 
 
 @pytest.mark.parametrize("name", ["sweep", "mud-fit"])
 def test_without_simulation_there_are_no_muds(name: str, capsys: pytest.CaptureFixture[str], no_walks: None) -> None:
-    assert "--simulated" in refusal(capsys, name)
+    assert "--simulated" in refusal(capsys, "experiment", name)
 
 
 @pytest.mark.parametrize("name", ["trackway", "sweep"])
 def test_a_method_that_there_is_not_is_named_with_those_that_there_are(
     name: str, capsys: pytest.CaptureFixture[str], no_walks: None
 ) -> None:
-    sentence = refusal(capsys, name, "--simulated", "--method", "paper", "--method", "fog")
+    sentence = refusal(capsys, "experiment", name, "--simulated", "--method", "paper", "--method", "fog")
     assert "'fog': must be one of default, paper" in sentence
 
 
@@ -89,7 +78,7 @@ def test_a_method_that_there_is_not_is_named_with_those_that_there_are(
 def test_other_nonsense_is_wrong_usage(
     arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str], no_walks: None
 ) -> None:
-    assert arguments[1] in refusal(capsys, *arguments, "--simulated")
+    assert arguments[1] in refusal(capsys, "experiment", *arguments, "--simulated")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -240,4 +229,4 @@ def test_a_person_gets_fitted_beside_present_values(capsys: pytest.CaptureFixtur
 def test_muds_and_their_lengths_are_given_where_they_count(
     arguments: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str], no_walks: None
 ) -> None:
-    assert sentence in refusal(capsys, "trackway", *arguments)
+    assert sentence in refusal(capsys, "experiment", "trackway", *arguments)

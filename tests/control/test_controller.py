@@ -23,6 +23,7 @@ from control.limits import JointRange
 from control.modes import MOVING, Mode
 from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, Phase, Torques
 from control.recovery import Recovery, RecoveryParameters
+from tests.control.made_up_states import states_at
 
 TICK_S = 1.0 / 380.0
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
@@ -33,11 +34,6 @@ SPRING = JointGains(1.0, 0.0, 1.0, 0.0)  # torque = wanted angle - measured angl
 DAMPER = JointGains(0.0, 1.0, 0.0, 1.0)  # torque = wanted velocity - measured velocity
 RANGES = 2 * (JointRange(radians(-60.0), radians(60.0)), JointRange(radians(-75.0), radians(45.0)))
 STILL_MODES = sorted(set(Mode) - MOVING)
-
-
-def states_at(pose: JointAngles) -> DriveStates:
-    a, b, c, d = (DriveState(angle_rad=angle, velocity_rad_s=0.0) for angle in pose)
-    return a, b, c, d
 
 
 def recovery(attempts: int = 0) -> Recovery:

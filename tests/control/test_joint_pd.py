@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from control.joint_path import still
 from control.joint_pd import ArmMass, JointGains, damping_torques_nm, joint_torques_nm, pd_torque_nm
 from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, JointTarget
+from tests.control.made_up_states import states_at
 
 WEIGHTLESS = ArmMass(arm_mass_kg=0.0)
 angles = st.floats(-pi / 2, pi / 2)
@@ -20,11 +21,6 @@ gains_of_any_size = st.builds(JointGains, *[st.floats(0.0, 5.0)] * 4)
 trusts = st.tuples(st.booleans(), st.booleans(), st.booleans(), st.booleans())
 ALL = (True, True, True, True)
 masses = st.builds(ArmMass, arm_mass_kg=st.floats(0.0, 20.0), center_of_mass_m=st.floats(0.0, 1.0))
-
-
-def resting(pose: JointAngles) -> DriveStates:
-    a, b, c, d = (DriveState(angle_rad=angle, velocity_rad_s=0.0) for angle in pose)
-    return a, b, c, d
 
 
 def turning(velocities: tuple[float, ...]) -> DriveStates:
@@ -52,7 +48,7 @@ def test_gravity_torques_are_the_downhill_gradient_of_potential_energy(
 
 @given(masses, poses)
 def test_an_arm_at_its_target_gets_exactly_what_balances_gravity(mass: ArmMass, pose: JointAngles) -> None:
-    torques = joint_torques_nm(still(pose), resting(pose), JointGains(), mass, 1.0)
+    torques = joint_torques_nm(still(pose), states_at(pose), JointGains(), mass, 1.0)
     for flipper in (0, 2):
         gravity = mass.gravity_torques_nm(pose[flipper], pose[flipper + 1])
         assert torques[flipper] + gravity[0] == 0.0
@@ -61,7 +57,7 @@ def test_an_arm_at_its_target_gets_exactly_what_balances_gravity(mass: ArmMass, 
 
 def test_a_level_arm_is_held_up_by_its_weight_times_its_lever() -> None:
     level = (0.0, 0.0, 0.0, 0.0)
-    torques = joint_torques_nm(still(level), resting(level), JointGains(), ArmMass(0.5, 0.1), 1.0)
+    torques = joint_torques_nm(still(level), states_at(level), JointGains(), ArmMass(0.5, 0.1), 1.0)
     assert torques == pytest.approx((0.0, 0.4905, 0.0, 0.4905))
 
 
@@ -71,7 +67,7 @@ def test_each_joint_is_pushed_toward_its_own_target_with_its_own_gains(joint: in
     target = [JointTarget(0.0, 0.0)] * 4
     target[joint] = JointTarget(0.1, 2.0)
     torques = joint_torques_nm(
-        (target[0], target[1], target[2], target[3]), resting((0.0, 0.0, 0.0, 0.0)), gains, WEIGHTLESS, 1.0
+        (target[0], target[1], target[2], target[3]), states_at((0.0, 0.0, 0.0, 0.0)), gains, WEIGHTLESS, 1.0
     )
     expected = [0.0] * 4
     expected[joint] = (0.8 + 0.12) if joint % 2 == 0 else (1.0 + 0.16)
@@ -87,13 +83,13 @@ def test_the_torque_opposes_the_error_in_angle_and_in_velocity() -> None:
 
 @given(masses, poses, poses)
 def test_faded_out_there_is_no_torque_at_all(mass: ArmMass, target: JointAngles, pose: JointAngles) -> None:
-    assert joint_torques_nm(still(target), resting(pose), JointGains(), mass, 0.0) == NO_TORQUE
+    assert joint_torques_nm(still(target), states_at(pose), JointGains(), mass, 0.0) == NO_TORQUE
 
 
 @given(poses, poses, st.floats(0.0, 1.0))
 def test_the_fade_scales_every_torque_alike(target: JointAngles, pose: JointAngles, fade: float) -> None:
-    whole = joint_torques_nm(still(target), resting(pose), JointGains(), ArmMass(), 1.0)
-    faded = joint_torques_nm(still(target), resting(pose), JointGains(), ArmMass(), fade)
+    whole = joint_torques_nm(still(target), states_at(pose), JointGains(), ArmMass(), 1.0)
+    faded = joint_torques_nm(still(target), states_at(pose), JointGains(), ArmMass(), fade)
     assert faded == pytest.approx([fade * torque for torque in whole], abs=1e-12)
 
 
@@ -124,7 +120,7 @@ def test_damping_is_capped_from_both_sides() -> None:
 
 
 def test_a_damped_joint_does_not_feel_where_it_is() -> None:
-    states = resting((1.0, -1.0, 0.5, -0.5))
+    states = states_at((1.0, -1.0, 0.5, -0.5))
     assert damping_torques_nm(states, JointGains(), ALL, 0.4) == NO_TORQUE
 
 

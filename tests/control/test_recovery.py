@@ -21,6 +21,7 @@ from control.limits import JointRange
 from control.modes import Mode
 from control.records import DriveState, DriveStates, GaitTarget, JointTargets, Phase
 from control.recovery import AWAY_SHARE, OUT_M, Gap, Recovery, RecoveryParameters, is_in_mud, lowest_m
+from tests.control.made_up_states import states_at
 
 TICK_S = 1.0 / 380.0
 DEPTH_M = 0.04
@@ -74,8 +75,7 @@ class MadeUpRobot:
 
     @property
     def states(self) -> DriveStates:
-        a, b, c, d = (DriveState(angle_rad=angle_rad, velocity_rad_s=0.0) for angle_rad in self.angles_rad)
-        return a, b, c, d
+        return states_at(self.angles_rad)
 
     def step(self, mode: Mode = Mode.WALKING) -> None:
         before_rad = self.angles_rad

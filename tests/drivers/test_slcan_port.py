@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import given, settings
@@ -17,6 +17,7 @@ from drivers.frames import Frame
 from drivers.mock_bus import MockBus
 from drivers.prompt_serial import PromptSerial
 from simulation.slcan_adapter import SlcanAdapter, decode_line, encode_line
+from tests.waiting import wait_until
 
 FRAMES = [
     Frame(0x009, bytes(range(8))),
@@ -72,12 +73,6 @@ class Bench:
 def stepped(adapter: SlcanAdapter) -> SlcanAdapter:
     adapter.step()
     return adapter
-
-
-def wait_until(done: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + 5.0
-    while not done():
-        assert time.monotonic() < deadline_s
 
 
 @pytest.fixture

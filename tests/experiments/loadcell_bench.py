@@ -17,28 +17,9 @@ from experiments.notebook import Notebook
 from simulation.load_cell_bench import EmulatedBench, Event
 from simulation.load_cell_emulator import AmplifierParameters
 from simulation.plate_stage import CarriedPlate, StageParameters
+from tests.scripted_person import ScriptedPerson
 
 SETTINGS = StageSettings()
-
-
-class Answering:
-    """A Person who answers with what is left of `answers`, then with Enter, and remembers what was told."""
-
-    def __init__(self, *answers: str) -> None:
-        self.answers = list(answers)
-        self.told: list[str] = []
-
-    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
-        meanwhile()
-        answer = self.answers.pop(0) if self.answers else next(iter(answers))
-        assert answer in answers
-        return answer
-
-    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
-        return low
-
-    def tell(self, sentence: str) -> None:
-        self.told.append(sentence)
 
 
 class Laboratory:
@@ -48,7 +29,7 @@ class Laboratory:
         self,
         folder: Path,
         muds: Mapping[str, CarriedPlate],
-        person: Answering,
+        person: ScriptedPerson,
         trials: int = 1,
         baud: int = 115200,
         amplifier: AmplifierParameters | None = None,

@@ -20,6 +20,7 @@ from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP
 from firmware_host.configuration import Configuration
 from firmware_host.log_reader import Log
+from tests.scripted_person import ScriptedPerson
 
 JOINT = "right_adduction"
 PLAN = Plan((JOINT,), weights_g=(100.0, 200.0, 400.0), trials=2)
@@ -84,23 +85,6 @@ class ScriptedHand:
 
     def take_off(self) -> None:
         self.robot.hanging_g = 0.0
-
-
-class ScriptedPerson:
-    def __init__(self, *answers: str) -> None:
-        self.answers, self.told, self.questions = list(answers), list[str](), list[str]()
-
-    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
-        self.questions.append(question)
-        answer = self.answers.pop(0) if self.answers else next(iter(answers))
-        assert answer in answers
-        return answer
-
-    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
-        raise NotImplementedError
-
-    def tell(self, sentence: str) -> None:
-        self.told.append(sentence)
 
 
 class ScriptedJoint:
@@ -180,7 +164,7 @@ def test_everything_is_read_once_in_its_order(case: Case) -> None:
     entries = case.run()
     assert list(entries) == KEYS == case.hand.asked
     assert case.robot.armed == 1 and case.shown[0] == (0, 9) and case.shown[-1] == (9, 9)
-    assert not case.person.questions
+    assert not case.person.asked
 
 
 def test_only_the_empty_arm_is_swung_and_not_where_something_may_hang(case: Case) -> None:
@@ -256,7 +240,7 @@ def test_a_robot_that_lets_go_is_told_of_armed_again_and_the_weight_is_read_anew
     assert sorted(entries) == sorted(KEYS) and case.robot.armed == 2
     assert any("400 g was not read" in told and sentence in told for told in case.person.told)
     assert case.hand.asked.count(Step(1, 400.0).key) == 2
-    assert case.person.questions == [
+    assert case.person.asked == [
         f"The robot is in FAULT: {sentence} (for 3 s; do this) Torque stays off until this is cleared."
     ]
 
@@ -310,7 +294,7 @@ def test_weights_in_the_wrong_order_are_named_and_may_be_swapped(case: Case) -> 
     case.person.answers = [OTHER]
     case.on(Step(1, 200.0), case.hanging(400.0))
     entries = case.run()
-    assert "that is 400 g rather than 200 g" in case.person.questions[0]
+    assert "that is 400 g rather than 200 g" in case.person.asked[0]
     assert case.hand.asked.count(Step(1, 400.0).key) == 0
     assert case.hand.asked.count(Step(1, 200.0).key) == 2
     assert entries[Step(1, 400.0).key]["current_a"] > entries[Step(1, 200.0).key]["current_a"]
@@ -327,7 +311,7 @@ def test_a_reading_that_does_not_fit_is_read_anew_or_kept_as_doubtful(case: Case
     case.person.answers = [GO_ON, KEEP]
     case.on(Step(2, 400.0), case.hanging(0.0), case.hanging(0.0))
     entry = case.run()[Step(2, 400.0).key]
-    assert "slip off" in entry["doubt"] and len(case.person.questions) == 2
+    assert "slip off" in entry["doubt"] and len(case.person.asked) == 2
 
 
 def test_whoever_only_goes_on_comes_to_an_end(case: Case) -> None:
@@ -339,6 +323,6 @@ def test_whoever_only_goes_on_comes_to_an_end(case: Case) -> None:
 def test_a_trial_that_moved_is_told_and_repeated(case: Case) -> None:
     case.on(Step(1, 200.0), case.hanging(-1.0))
     entry = case.run()[Step(1, 200.0).key]
-    assert "200 g did not come to rest: the joint swings by 3.00 degrees" in case.person.questions[0]
+    assert "200 g did not come to rest: the joint swings by 3.00 degrees" in case.person.asked[0]
     assert entry == {"skipped": "the joint swings by 3.00 degrees"}
-    assert len(case.person.questions) == actuator.MOST_REPEATS
+    assert len(case.person.asked) == actuator.MOST_REPEATS

@@ -2,35 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
 import pytest
 
 from control.records import JOINTS
 from experiments.bench_attendant import AskedAttendant, Sight, SimulatedAttendant
 from experiments.bench_rig import SimulatedRig
 from firmware_host.configuration import Configuration
-
-
-class Scripted:
-    """A Person with one answer."""
-
-    def __init__(self, answer: str) -> None:
-        self.answer = answer
-        self.asked: list[str] = []
-        self.told: list[str] = []
-
-    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
-        assert self.answer in answers
-        self.asked.append(question)
-        meanwhile()
-        return self.answer
-
-    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
-        raise AssertionError("the bench asks for no numbers")
-
-    def tell(self, sentence: str) -> None:
-        self.told.append(sentence)
+from tests.scripted_person import ScriptedPerson
 
 
 def nothing() -> None: ...
@@ -38,13 +16,13 @@ def nothing() -> None: ...
 
 @pytest.mark.parametrize(("answer", "consents"), [("", True), ("n", False)])
 def test_nothing_moves_without_a_yes(answer: str, consents: bool) -> None:
-    person = Scripted(answer)
+    person = ScriptedPerson(answer)
     assert AskedAttendant(person, sure=False).consents("It moves.", nothing) is consents
     assert person.asked == ["It moves."]
 
 
 def test_who_has_said_yes_is_told_and_not_asked() -> None:
-    person = Scripted("n")
+    person = ScriptedPerson("n")
     assert AskedAttendant(person, sure=True).consents("It moves.", nothing)
     assert (person.asked, person.told) == ([], ["It moves."])
 
@@ -53,14 +31,14 @@ def test_who_has_said_yes_is_told_and_not_asked() -> None:
     ("answer", "sight"), [("", Sight.RIGHT), ("w", Sight.WRONG_WAY), ("o", Sight.OTHER), ("n", Sight.NOTHING)]
 )
 def test_what_was_seen_is_taken_as_told(answer: str, sight: Sight) -> None:
-    person = Scripted(answer)
+    person = ScriptedPerson(answer)
     assert AskedAttendant(person, sure=True).saw("right_adduction", nothing) is sight
     assert "the right flipper rise" in person.asked[0]
 
 
 @pytest.mark.parametrize(("answer", "done"), [("", True), ("s", False)])
 def test_hands_may_be_refused(answer: str, done: bool) -> None:
-    attendant = AskedAttendant(Scripted(answer), sure=True)
+    attendant = AskedAttendant(ScriptedPerson(answer, answer), sure=True)
     assert attendant.holds_level(nothing) is done
     assert attendant.turns("left_sweep", nothing) is done
 

@@ -21,7 +21,7 @@ from experiments.stroke_tracking import lag_ticks
 from firmware_host.configuration import Configuration
 from tests.bench.bench_table import HEADS, table_lines
 from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, BenchReport, StagedBench, stage_of
-from tests.experiments.test_bench_attendant import Scripted
+from tests.scripted_person import ScriptedPerson
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ class Asked(AskedAttendant):
     """With a person who says the same of every fault."""
 
     def __init__(self, answer: str) -> None:
-        person = Scripted(answer)
+        person = ScriptedPerson(answer)
         super().__init__(person, sure=True)
         self.asked = person.asked
 

@@ -17,9 +17,9 @@ from experiments.coefficient_table import (
     error_text_rows,
     gathered,
     load_truth,
-    mud_name,
     mud_rows,
 )
+from experiments.mud_names import mud_name
 from tests.experiments.made_up_strides import make_estimate, make_stride
 
 

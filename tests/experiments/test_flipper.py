@@ -26,7 +26,7 @@ from experiments.simulated_bed import CarriedBed
 from experiments.stride_course import course_of_row
 from experiments.trial import SINGLE, configuration_of
 from tests.experiments.made_up_strides import make_course, make_estimate, make_stride
-from tests.experiments.test_mud_trials import ScriptedPerson
+from tests.scripted_person import ScriptedPerson
 
 MUD = "51.2"
 SHORT = Plan((MUD,), trials=1, simulated=True)

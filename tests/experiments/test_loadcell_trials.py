@@ -21,8 +21,9 @@ from experiments.loadcell_trials import KEEP, RAW, judge, load_all, measure
 from experiments.person import GO_ON, REDO, SKIP
 from simulation.load_cell_emulator import AmplifierParameters
 from simulation.plate_stage import StageParameters
-from tests.experiments.loadcell_bench import SETTINGS, Answering, Laboratory
+from tests.experiments.loadcell_bench import SETTINGS, Laboratory
 from tests.experiments.made_up_mud import LawfulMud
+from tests.scripted_person import ScriptedPerson
 
 KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
 COUNTS = LoadCellCalibration("counts", 42000.0, 81000.0)
@@ -33,10 +34,10 @@ Make = Callable[..., Laboratory]
 def make(tmp_path: Path) -> Iterator[Make]:
     made: list[Laboratory] = []
 
-    def build(person: Answering | None = None, **options: Any) -> Laboratory:
+    def build(person: ScriptedPerson | None = None, **options: Any) -> Laboratory:
         folder = tmp_path / str(len(made))
         folder.mkdir()
-        laboratory = Laboratory(folder, {"made up": LawfulMud(**KNOWN)}, person or Answering(), **options)
+        laboratory = Laboratory(folder, {"made up": LawfulMud(**KNOWN)}, person or ScriptedPerson(), **options)
         laboratory.port.calibration = COUNTS
         made.append(laboratory)
         return laboratory
@@ -104,7 +105,7 @@ def test_a_trial_in_which_the_cell_is_unplugged_is_repeated_and_both_are_kept(ma
 def test_a_trial_in_doubt_says_why_and_is_left_out_in_the_end(
     make: Make, amplifier: AmplifierParameters, stage: StageParameters | None, kind: str, sentence: str
 ) -> None:
-    laboratory = make(amplifier=amplifier, stage=stage, person=Answering(SKIP))
+    laboratory = make(amplifier=amplifier, stage=stage, person=ScriptedPerson(SKIP))
     assert any(sentence in each for each in try_once(laboratory, kind))
     (entry,) = laboratory.notebook.entries.values()
     assert entry["skipped"] and any(sentence in each for each in entry["why"])
@@ -113,7 +114,7 @@ def test_a_trial_in_doubt_says_why_and_is_left_out_in_the_end(
 
 
 def test_a_stage_that_nobody_starts_is_no_contact(make: Make) -> None:
-    laboratory = make(person=Answering(KEEP))
+    laboratory = make(person=ScriptedPerson(KEEP))
     laboratory.trial_bench.stage.start = lambda trial: None  # type: ignore[method-assign]
     assert any("no contact" in each for each in try_once(laboratory))
     assert "kept_in_spite_of" in laboratory.notebook.entries["made up/insertion/1"]
@@ -184,7 +185,7 @@ def test_a_cell_that_sends_nonsense_is_shown(make: Make) -> None:
 
 
 def test_an_amplifier_too_slow_for_the_stroke_is_told_before_anything_is_measured(make: Make) -> None:
-    laboratory = make(amplifier=AmplifierParameters(rate_hz=10.0), person=Answering("q"))
+    laboratory = make(amplifier=AmplifierParameters(rate_hz=10.0), person=ScriptedPerson("q"))
     with pytest.raises(BenchError, match="too slow"):
         laboratory.measure(CellSettings(scale_n=1.0))
     assert "RATE pin" in laboratory.person.told[1] and "--speed 0.02" in laboratory.person.told[1]
@@ -192,7 +193,7 @@ def test_an_amplifier_too_slow_for_the_stroke_is_told_before_anything_is_measure
 
 
 def test_weights_that_say_nothing_are_asked_for_again(make: Make) -> None:
-    laboratory = make(person=Answering("q"))
+    laboratory = make(person=ScriptedPerson("q"))
     laboratory.trial_bench.stage.weigh = lambda which: 2.0  # type: ignore[method-assign]
     with pytest.raises(BenchError, match="not calibrated"):
         laboratory.measure()
@@ -200,7 +201,7 @@ def test_weights_that_say_nothing_are_asked_for_again(make: Make) -> None:
 
 
 def test_a_weight_that_the_cell_cannot_bear_is_told_as_one(make: Make) -> None:
-    laboratory = make(person=Answering("q"), amplifier=AmplifierParameters(range_n=1.0))
+    laboratory = make(person=ScriptedPerson("q"), amplifier=AmplifierParameters(range_n=1.0))
     with pytest.raises(BenchError, match="not calibrated"):
         laboratory.measure()
     assert "overloaded by this weight" in laboratory.person.told[1]
@@ -237,7 +238,7 @@ def test_a_tare_in_which_the_cell_is_unplugged_is_taken_again(make: Make) -> Non
 
 
 def test_a_person_is_asked_for_everything_that_hands_do() -> None:
-    person = Answering(GO_ON, SKIP)
+    person = ScriptedPerson(GO_ON, SKIP)
     drained: list[int] = []
     stage = AttendedStage(SETTINGS, person, lambda: drained.append(1))
     assert stage.weigh(0) == 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from experiments.notebook import Entry, Notebook
 from experiments.person import GO_ON, REDO, SKIP
 from firmware_host.log_reader import Log
 from tests.experiments.made_up_strides import CONFIGURATION
+from tests.scripted_person import ScriptedPerson
 
 TRIALS = [PlannedTrial(f"47.6/{number}", "47.6", number, 3) for number in (1, 2, 3)]
 PLAN = {"experiment": "made up"}
@@ -62,25 +62,6 @@ class StillRobot:
 
     def close(self) -> None:
         self.closed = True
-
-
-class ScriptedPerson:
-    def __init__(self, *answers: str) -> None:
-        self.answers = list(answers)
-        self.asked: list[str] = []
-        self.told: list[str] = []
-
-    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
-        self.asked.append(question)
-        answer = self.answers.pop(0) if self.answers else GO_ON
-        assert answer in answers
-        return answer
-
-    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
-        return low
-
-    def tell(self, sentence: str) -> None:
-        self.told.append(sentence)
 
 
 class ScriptedBed:

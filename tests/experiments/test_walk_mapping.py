@@ -25,7 +25,7 @@ from experiments.walk_mapping_pages import sections_of, text_of
 from experiments.walk_mapping_report import placed_strides, report_of, walks_of
 from experiments.walk_simulation import walking_bench
 from tests.experiments.made_up_strides import CONFIGURATION, make_estimate, make_stride
-from tests.experiments.test_mud_trials import ScriptedPerson
+from tests.scripted_person import ScriptedPerson
 
 SHORT = Plan((Mud("47.6", 0.3), Mud("51.2", 0.3)), trials=1, soft=("51.2",), soft_strides=2, simulated=True)
 TINY = Plan((Mud("47.6", 0.2),), trials=1, simulated=True)

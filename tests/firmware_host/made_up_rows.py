@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from firmware_host.log_rows import EVENT, ROW_KINDS, TICK, RowKind
+from firmware_host.log_rows import EVENT, EVENT_KIND, TICK, TICK_KIND, RowKind
 
-TICK_KIND, EVENT_KIND = ROW_KINDS.index(TICK), ROW_KINDS.index(EVENT)
 OPENING: dict[str, Any] = {
     "configuration_text": "[robot]\n",
     "metadata": {"robot": "mudskipper-1", "run_id": "run"},

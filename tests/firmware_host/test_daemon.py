@@ -43,7 +43,7 @@ def test_a_shutdown_in_a_walk_raises_the_flippers_and_idles_the_drives(robot: Lo
     shutdown.ask(15, None)
     assert run_shutdown(robot, shutdown)
     assert states_of(robot) == [AxisState.IDLE] * 4
-    assert robot.loop.notice == ""  # it would say if they had stayed in the mud
+    assert robot.loop.news.notice == ""  # it would say if they had stayed in the mud
 
 
 def test_a_shutdown_that_nobody_wants_does_nothing(robot: Lockstep) -> None:

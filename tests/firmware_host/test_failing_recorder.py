@@ -6,8 +6,8 @@ import pytest
 
 from drivers.failures import Failures
 from firmware_host.failing_recorder import FailingRecorder, failing_recorder
-from firmware_host.log_rows import EVENT
-from firmware_host.recorder import EVENT_KIND, NullRecorder
+from firmware_host.log_rows import EVENT, EVENT_KIND
+from firmware_host.recorder import NullRecorder
 
 
 class KeepingRecorder(NullRecorder):

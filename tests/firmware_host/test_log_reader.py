@@ -15,7 +15,7 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from firmware_host.log_file import LogFile
 from firmware_host.log_reader import LayoutError, Log, LogError, log_summary, read_log
-from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK, RowKind
+from firmware_host.log_rows import EVENT, EVENT_KIND, STRIDE, STRIDE_KIND, TICK, TICK_KIND, RowKind
 from tests.firmware_host.made_up_rows import encode_row
 
 WALL_NS = 1_700_000_000_000_000_000  # 2023-11-14 22:13:20 UTC
@@ -41,11 +41,11 @@ def make_tick(number: int) -> bytes:
 
 def make_log(path: Path, ticks: int = TICKS) -> Path:
     """A finished log: ticks, and among them two strides and three events."""
-    rows = [(ROW_KINDS.index(TICK), make_tick(number)) for number in range(ticks)]
+    rows = [(TICK_KIND, make_tick(number)) for number in range(ticks)]
     strides = [encode_row(STRIDE, stamp_s=1.0, index=index, flipper=index) for index in range(2)]
     events = [encode_row(EVENT, stamp_s=1.0, text=text) for text in ("walk", "mud", "stop")]
-    rows[ticks // 2 : ticks // 2] = [(ROW_KINDS.index(STRIDE), row) for row in strides]
-    rows[ticks // 3 : ticks // 3] = [(ROW_KINDS.index(EVENT), row) for row in events]
+    rows[ticks // 2 : ticks // 2] = [(STRIDE_KIND, row) for row in strides]
+    rows[ticks // 3 : ticks // 3] = [(EVENT_KIND, row) for row in events]
     log = LogFile(path, OPENING)
     log.write(rows)
     log.finish()

@@ -84,10 +84,12 @@ def make_old_logs(folder: Path, count: int = 2) -> list[Path]:
     return paths
 
 
-def fill_disk(monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(descriptor: int, piece: bytes) -> int:
-        raise OSError(errno.ENOSPC, "No space left on device")
+def full(descriptor: int, piece: bytes) -> int:
+    """In place of os.write."""
+    raise OSError(errno.ENOSPC, "No space left on device")
 
+
+def fill_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
     monkeypatch.setattr(os, "write", full)
 
@@ -200,10 +202,6 @@ def test_a_full_disk_frees_the_oldest_log_and_counts_what_it_cost(
     log._file.flush()
 
     write = os.write
-
-    def full(descriptor: int, piece: bytes) -> int:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
     monkeypatch.setattr(os, "write", full)
     log.write(make_ticks(10, 200))
     assert log.problem.endswith("run-0000.mcap cannot be written: No space left on device.")

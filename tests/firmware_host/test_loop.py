@@ -14,8 +14,7 @@ from drivers.frames import Frame
 from drivers.mock_bus import MockPort
 from drivers.odrive_codec import ERROR_WATCHDOG, SET_INPUT_TORQUE, AxisState
 from firmware_host.configuration import Configuration, parse_configuration
-from firmware_host.log_rows import EVENT
-from firmware_host.loop import EVENT_KIND, STRIDE_KIND, TICK_KIND
+from firmware_host.log_rows import EVENT, EVENT_KIND, STRIDE_KIND, TICK_KIND
 from firmware_host.operator_calls import OperatorCalls
 from firmware_host.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.ticker import PERIOD_S, Beat
@@ -239,7 +238,7 @@ def test_flippers_that_stay_in_the_mud_are_told(configuration: Configuration) ->
         robot.step()
     robot.loop.request(Request.STOP, robot.now_s)
     assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 5.0)
-    assert robot.loop.notice == "the flippers did not come out of the mud"
+    assert robot.loop.news.notice == "the flippers did not come out of the mud"
 
 
 def test_requests_that_do_not_fit_are_refused_with_what_to_do(robot: Lockstep) -> None:

@@ -233,7 +233,7 @@ def test_a_drive_that_falls_silent_leads_to_damping_and_then_to_idle_drives(
     assert ticks[Mode.DAMPING] < ticks[Mode.FAULT] <= KINDS["drive_silent"].bound_ticks
     assert robot.loop.sent.torques_nm == NO_TORQUE
     assert all(drive.axis_state is AxisState.IDLE for drive in robot.robot.drives)
-    assert JOINTS[joint] in robot.loop.notice and "stopped by drive_silent" in robot.loop.notice
+    assert JOINTS[joint] in robot.loop.news.notice and "stopped by drive_silent" in robot.loop.news.notice
 
 
 def test_a_drive_that_falls_silent_while_arming_ends_it_without_torque(at: Copied) -> None:
@@ -327,7 +327,7 @@ def test_a_fault_that_ends_with_its_cause_ends_by_itself_but_nobody_arms(at: Cop
         assert mode_of(robot) is Mode.IDLE
         assert not any(drive.axis_state is AxisState.CLOSED_LOOP for drive in robot.robot.drives)
     assert robot.loop.fault is None
-    assert "stopped by voltage_under" in robot.loop.notice  # still told
+    assert "stopped by voltage_under" in robot.loop.news.notice  # still told
     assert robot.loop.request(Request.ARM, robot.now_s) is None
 
 

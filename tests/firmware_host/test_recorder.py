@@ -26,9 +26,8 @@ from rosbags.highlevel import AnyReader
 from firmware_host.log_folder import DONE, first_path, unfinished_files
 from firmware_host.log_parameters import LogParameters
 from firmware_host.log_reader import read_log
-from firmware_host.log_rows import EVENT, ROW_KINDS, STRIDE, TICK, RowKind
+from firmware_host.log_rows import EVENT, EVENT_KIND, ROW_KINDS, STRIDE, TICK, TICK_KIND, RowKind
 from firmware_host.recorder import (
-    EVENT_KIND,
     HEADER,
     HEALTHY,
     LONGEST_TEXT,
@@ -37,8 +36,8 @@ from firmware_host.recorder import (
     Recorder,
     Recording,
 )
+from tests.waiting import wait_until
 
-TICK_KIND = ROW_KINDS.index(TICK)
 TIMEOUT_S = 10.0
 CONFIGURATION = '[robot]\nname = "Ünïcode"\n'
 NUMBERS = random.Random(1)  # noise does not compress, so a file grows as rows are put
@@ -73,13 +72,6 @@ def make_row(kind: RowKind, stamp_s: float) -> Row:
 
 def make_tick(stamp_s: float) -> bytes:
     return make_row(TICK, stamp_s).payload
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + TIMEOUT_S
-    while not condition():
-        assert time.monotonic() < deadline_s, "waited in vain"
-        time.sleep(0.005)
 
 
 def fill_pipe(recorder: Recorder) -> int:

@@ -20,6 +20,7 @@ from firmware_host.recorder import Recorder
 from firmware_host.replay import replay_file, replay_files
 from simulation.lockstep import Lockstep
 from simulation.track import paper_track
+from tests.recorded_walks import record_walks
 
 SHARED = Path(os.environ.get("MUDSKIPPER_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
 LAB_LOGS = sorted((SHARED / "flipper_in_mud").glob("*.csv.gz"))
@@ -32,15 +33,7 @@ def same(live: StrideEstimate, replayed: StrideEstimate) -> bool:
 
 def test_a_replayed_walk_gives_the_same_strides_to_the_last_digit(tmp_path: Path, configuration: Configuration) -> None:
     path = tmp_path / "walk.mcap"
-    recorder = Recorder(path, configuration.text, {"robot": "test"})
-    robot = Lockstep(configuration, paper_track(), recorder=recorder)
-    robot.arm()
-    robot.walk(WalkOrder(0.03, True, 4))
-    robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
-    robot.walk(WalkOrder(0.03, True, 2))  # a second walk in one log begins afresh
-    robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
-    assert recorder.dropped == 0
-    assert recorder.close(20.0)
+    robot = record_walks(path, configuration, 4, 2)  # the second walk in one log begins afresh
     live = [stride.estimate for stride in robot.loop.learning.strides]
     replayed = replay_file(path).strides
     assert len(live) == len(replayed) == 12

@@ -19,7 +19,7 @@ from simulation.flipper_contact import (
     plate_size,
     twist_of,
 )
-from simulation.plate_contact import Wrench
+from simulation.rigid_plate import Wrench
 
 GEOMETRY = FlipperGeometry()
 CLAY = MUDS["48.5"]

@@ -29,8 +29,8 @@ from simulation.free_body import (
 )
 from simulation.lockstep import Lockstep, plant_of
 from simulation.plant import STEP_S, Plant, PlantParameters
-from simulation.plate_contact import Wrench
 from simulation.rail_body import DragPad
+from simulation.rigid_plate import Wrench
 from simulation.track import Track
 
 GEOMETRY, SHAPE, MASS_KG = FlipperGeometry(), BodyShape(), 1.02

@@ -9,18 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simulation.clay import MUDS, Clay, Layer, rate_factor
-from simulation.plate_contact import (
-    LENGTHWAYS_YIELD_M,
-    NO_WRENCH,
-    SIDEWAYS_YIELD_M,
-    Attitude,
-    PlateContact,
-    PlateSize,
-    Twist,
-    Wrench,
-    lowest_point_m,
-    wet_edge_m,
-)
+from simulation.mud_springs import LENGTHWAYS_YIELD_M, SIDEWAYS_YIELD_M
+from simulation.plate_contact import PlateContact
+from simulation.rigid_plate import NO_WRENCH, Attitude, PlateSize, Twist, Wrench, lowest_point_m, wet_edge_m
 
 SIZE = PlateSize(0.025, 0.07, 0.004)
 CLAY = MUDS["48.5"]

@@ -5,7 +5,7 @@ python-can, with the daemon's own loop at the other end, in step.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 
@@ -23,6 +23,7 @@ from simulation.clay import MUDS
 from simulation.lockstep import Lockstep
 from simulation.slcan_adapter import SlcanAdapter
 from simulation.track import Track
+from tests.waiting import wait_until
 
 OPENING_LINES = 5  # of python-can: C, S8, an empty one, O, O
 
@@ -62,12 +63,6 @@ class Line:
     def unplug(self) -> None:
         self.adapter.unplug()
         self.plugged = False
-
-
-def wait_until(done: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + 5.0
-    while not done():
-        assert time.monotonic() < deadline_s
 
 
 class SerialWalk(Lockstep):

@@ -1,0 +1,68 @@
+"""A rigid rectangular plate in its own directions: where it is in the mud, how it moves, what force the mud lays on it.
+
+The directions are the normal n, outward r along the lower edge and upward s along the plate's height; the middle of the
+lower edge is the point that everything is counted from.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class PlateSize(NamedTuple):
+    width_m: float
+    height_m: float
+    thickness_m: float
+
+
+class Attitude(NamedTuple):
+    """How deep the plate is: the middle of its lower edge, and how depth changes outward and (as a loss) upward."""
+
+    depth_m: float
+    per_outward: float
+    per_upward: float
+
+
+def lowest_point_m(attitude: Attitude, width_m: float) -> float:
+    """Depth of the lower edge's lower corner."""
+    return attitude.depth_m + abs(attitude.per_outward) * width_m / 2.0
+
+
+def wet_edge_m(attitude: Attitude, width_m: float) -> tuple[float, float]:
+    """Width of the submerged part of the lower edge, which the waterline cuts, and how far outward its middle is."""
+    half_m = width_m / 2.0
+    if attitude.depth_m >= abs(attitude.per_outward) * half_m:
+        return width_m, 0.0
+    waterline_m = -attitude.depth_m / attitude.per_outward
+    if attitude.per_outward > 0.0:
+        return half_m - waterline_m, (half_m + waterline_m) / 2.0
+    return half_m + waterline_m, (waterline_m - half_m) / 2.0
+
+
+class Twist(NamedTuple):
+    """Velocity of the middle of the lower edge along the plate's directions, and how it changes over the plate."""
+
+    normal_m_s: float = 0.0
+    outward_m_s: float = 0.0
+    upward_m_s: float = 0.0
+    normal_per_outward_s: float = 0.0
+    normal_per_upward_s: float = 0.0
+    outward_per_upward_s: float = 0.0
+    upward_per_outward_s: float = 0.0
+
+
+class Wrench(NamedTuple):
+    """Force of the mud on the plate and its moments: `normal_outward_nm` is the sum of normal force times the way
+    outward from the middle of the lower edge, and so on.
+    """
+
+    normal_n: float = 0.0
+    outward_n: float = 0.0
+    upward_n: float = 0.0
+    normal_outward_nm: float = 0.0
+    normal_upward_nm: float = 0.0
+    outward_upward_nm: float = 0.0
+    upward_outward_nm: float = 0.0
+
+
+NO_WRENCH = Wrench()

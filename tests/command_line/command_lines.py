@@ -1,0 +1,42 @@
+"""Command lines as tests give them: in a process of their own, or in this one where they are refused."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+
+import pytest
+
+from command_line import exit_codes
+from command_line.main import main
+
+
+def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """In a process of its own, with these variables besides those that are."""
+    command = [sys.executable, "-m", "command_line.main", *arguments]
+    return subprocess.run(
+        command, capture_output=True, text=True, timeout=60, env=os.environ | environment, check=False
+    )
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """The sentence with which a command line is refused as wrong usage."""
+    return _complaint(capsys, exit_codes.USAGE, arguments)
+
+
+def failure(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """The sentence with which a command says that it cannot do it."""
+    return _complaint(capsys, exit_codes.UNHEALTHY, arguments)
+
+
+def _complaint(capsys: pytest.CaptureFixture[str], status: int, arguments: Sequence[str]) -> str:
+    try:
+        ended: object = main(arguments)
+    except SystemExit as problem:  # as argparse does it
+        ended = problem.code
+    printed = capsys.readouterr()
+    assert (ended, printed.out) == (status, "")
+    assert "Traceback" not in printed.err
+    return printed.err.splitlines()[-1]

@@ -1,0 +1,10 @@
+"""What drives tell of joints at rest."""
+
+from __future__ import annotations
+
+from control.records import DriveState, DriveStates, JointAngles
+
+
+def states_at(pose: JointAngles) -> DriveStates:
+    a, b, c, d = (DriveState(angle_rad=angle, velocity_rad_s=0.0) for angle in pose)
+    return a, b, c, d

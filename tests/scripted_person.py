@@ -1,0 +1,28 @@
+"""The person at the bench, for tests: answers as it was told to, and remembers what it was asked and told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+
+class ScriptedPerson:
+    """A Person who answers with what is left of `answers`, then with the first answer that there is."""
+
+    def __init__(self, *answers: str) -> None:
+        self.answers = list(answers)
+        self.asked: list[str] = []
+        self.told: list[str] = []
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        self.asked.append(question)
+        meanwhile()
+        answer = self.answers.pop(0) if self.answers else next(iter(answers))
+        assert answer in answers
+        return answer
+
+    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
+        self.asked.append(question)
+        return low
+
+    def tell(self, sentence: str) -> None:
+        self.told.append(sentence)

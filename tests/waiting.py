@@ -1,0 +1,15 @@
+"""Waiting for what another process, or the kernel, does in its own time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+LONGEST_S = 10.0
+
+
+def wait_until(done: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + LONGEST_S
+    while not done():
+        assert time.monotonic() < deadline_s, "waited in vain"
+        time.sleep(0.001)
