@@ -14,7 +14,8 @@ from command_line.conduct import refuse
 from command_line.screen import table
 from drivers.load_cell_calibration import LoadCellCalibration
 from drivers.load_cell_lines import AUTO, COUNTS, NUMBER, UNITS, LineFormat
-from drivers.load_cell_port import LoadCellPort, LoadCellPortError
+from drivers.load_cell_port import LoadCellPort
+from drivers.serial_line import SerialLineError
 from experiments.bench_robot import BenchError
 from experiments.estimation import SINGLE_WATERS
 from experiments.loadcell import (
@@ -169,7 +170,7 @@ def _open(path: str, baud: int, cell: CellSettings) -> LoadCellPort:
     line_format = LineFormat(NUMBER if cell.format_name == AUTO else cell.format_name)
     try:
         return LoadCellPort(path, baud, line_format, LoadCellCalibration(cell.unit or COUNTS, 1.0))
-    except LoadCellPortError as problem:
+    except SerialLineError as problem:
         raise BenchError(str(problem)) from problem
 
 

@@ -12,16 +12,12 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from drivers.load_cell_lines import NUMBER, LineFormat, find_format
-from drivers.load_cell_port import COMMON_BAUDS, LoadCellPort, LoadCellPortError, Sample
+from drivers.load_cell_port import LoadCellPort, Sample
 from experiments.bench_robot import BenchError
 from experiments.loadcell_contact import CONTACT_NOISES, LEAST_FORCE_N, LEAST_NOISE_N, QUIET_S
 
 POLL_S = 0.01
-LISTENING_S, STARTING_S = 2.0, 4.0
 TARE_S = 1.0
-PROBE_S = 0.8
-TEXT_SHARE, READABLE_SHARE = 0.8, 0.6  # below it, it is another baud rate; another format
 ABSENCE_S = 300.0  # for which an adapter may be away
 CONTACT_SAMPLES = 3
 FOLLOWING = 0.01  # of a zero that drifts while nobody starts, per sample
@@ -170,78 +166,3 @@ class _Contact:
         if not far:
             self._level_n += FOLLOWING * (sample.force_n - self._level_n)
         return self._away >= CONTACT_SAMPLES
-
-
-def examine_lines(recorder: CellRecorder, name: str) -> str:
-    """Whether what arrives is what was expected: the name of a format that reads it. Raises BenchError with what to do.
-
-    `name`: of the wanted format, or "auto".
-    """
-    port = recorder.port
-    recorder.listen(LISTENING_S)
-    if not port.recent_lines:  # a board that starts anew when its port is opened takes its time
-        recorder.listen(STARTING_S)
-    arrivals, lines = port.arrivals, port.recent_lines
-    if not lines:
-        raise BenchError(
-            f"nothing arrives on {port.path} at {port.baud} baud: check the amplifier's power and cable, that it sends "
-            "by itself and not only when asked, and that this is its port"
-        )
-    if arrivals.text < TEXT_SHARE:
-        raise BenchError(_wrong_baud(recorder))
-    if name == "auto":
-        found = find_format(lines)
-        if found is None:
-            raise BenchError(f"no named format reads these lines: {_shown(lines)}. {_columns_told(lines)}")
-        return found.name
-    if arrivals.readable < READABLE_SHARE:
-        found = find_format(lines)
-        advice = f"--format {found.name} does" if found else _columns_told(lines)
-        raise BenchError(
-            f"the format {name!r} reads {100.0 * arrivals.readable:.0f} % of the lines, such as {_shown(lines)}; "
-            + advice
-        )
-    return name
-
-
-def _shown(lines: Sequence[bytes]) -> str:
-    return " and ".join(repr(line.decode("ascii", "replace").strip()[:60]) for line in lines[-2:])
-
-
-def _columns_told(lines: Sequence[bytes]) -> str:
-    readable = [column for column in range(1, 10) if _reads(f"column{column}", lines)]
-    if readable:
-        names = " or ".join(f"--format column{column}" for column in readable)
-        return f"Choose the column of the load with {names}"
-    return (
-        "Is it a load cell's amplifier? Give --format a regular expression with (?P<value>...) that fits a whole line"
-    )
-
-
-def _reads(name: str, lines: Sequence[bytes]) -> bool:
-    line_format = LineFormat(name)
-    return sum(line_format.decode(line) is not None for line in lines) > 0.8 * len(lines)
-
-
-def _wrong_baud(recorder: CellRecorder) -> str:
-    """With the rate at which it is text, where there is one: every common one is tried."""
-    port = recorder.port
-    recorder.tell(f"what arrives at {port.baud} baud is no text: other rates are tried")
-    path, calibration, open_line = port.path, port.calibration, port.open_line
-    port.close()
-    for baud in COMMON_BAUDS:
-        if baud == port.baud:
-            continue
-        try:
-            tried = LoadCellPort(path, baud, LineFormat(NUMBER), calibration, open_line)
-        except LoadCellPortError:
-            continue
-        CellRecorder(tried, recorder.clock, recorder.tell).listen(PROBE_S)
-        is_text = tried.recent_lines and tried.arrivals.text > TEXT_SHARE
-        tried.close()
-        if is_text:
-            return f"{port.baud} is not the baud rate of {path}: at {baud} it sends text. Use --baud {baud}"
-    return (
-        f"what arrives on {path} is no text at {port.baud} baud, nor at any common rate: is it a load cell's amplifier "
-        "that sends lines of text?"
-    )

@@ -13,9 +13,9 @@ from drivers.load_cell_calibration import LoadCellCalibration
 from drivers.load_cell_port import LoadCellPort
 from experiments.bench_robot import BenchError
 from experiments.loadcell import CellSettings, list_remarks
+from experiments.loadcell_examination import examine_lines
 from experiments.loadcell_fits import INSERTION, SHEAR, Analysed
 from experiments.loadcell_motion import Insertion, Pace
-from experiments.loadcell_recording import examine_lines
 from experiments.loadcell_stage import AttendedStage, Trial
 from experiments.loadcell_trials import KEEP, RAW, judge, load_all, measure
 from experiments.person import GO_ON, REDO, SKIP
