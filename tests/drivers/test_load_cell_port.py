@@ -118,7 +118,7 @@ def test_a_line_that_names_its_unit_is_believed(tmp_path: Path) -> None:
 
 def test_noise_without_an_end_does_not_grow(cable: Cable) -> None:
     for _ in range(100):
-        cable.amplifier._waiting = b"\xff" * 60
-        cable.amplifier._hand_over()
+        cable.amplifier.waiting = b"\xff" * 60
+        cable.amplifier.hand_over()
         cable.port.read(1.0)
     assert cable.port.garbled_lines > 20
