@@ -80,27 +80,29 @@ class HandMotion:
         return self._knots[-1].place_m
 
     def _push(self, random: Random) -> None:
-        """To another speed, some way at it; to a stand where a rest comes or the way is at its end."""
-        hand, left_m = self._hand, self._end_m - self._place_m()
+        """To another speed and some way at it, or all that is left."""
+        hand = self._hand
         speed_m_s = random.uniform(hand.slowest_m_s, hand.fastest_m_s)
         at_it_m = random.uniform(hand.shortest_m, hand.longest_m)
-        rests = random.random() < hand.rest_share
-        before_m_s, a = self._knots[-1].speed_m_s, hand.acceleration_m_s2
-        braking_m = hand.fastest_m_s**2 / (2.0 * a)
-        if left_m < at_it_m + 2.0 * braking_m + abs(speed_m_s**2 - before_m_s**2) / (2.0 * a):
-            # the last push: as fast as still comes to a stand at the end
-            speed_m_s = min(speed_m_s, sqrt(a * left_m + before_m_s**2 / 2.0))
-            self._change(speed_m_s)
-            self._go_on(max(0.0, self._end_m - self._place_m() - speed_m_s**2 / (2.0 * a)))
-            self._change(0.0)
-            self._knots[-1] = self._knots[-1]._replace(place_m=self._end_m)
+        braking_m = hand.fastest_m_s**2 / (2.0 * hand.acceleration_m_s2)
+        if self._end_m - self._place_m() < at_it_m + 3.0 * braking_m:
+            self._finish(speed_m_s)
             return
         self._change(speed_m_s)
         self._go_on(at_it_m)
-        if rests:
+        if random.random() < hand.rest_share:
             self._change(0.0)
             rest_s = random.uniform(hand.shortest_rest_s, hand.longest_rest_s)
             self._knots.append(self._knots[-1]._replace(time_s=self._knots[-1].time_s + rest_s))
+
+    def _finish(self, speed_m_s: float) -> None:
+        """At most as fast as still comes to a stand at the end."""
+        a, before_m_s, left_m = self._hand.acceleration_m_s2, self._knots[-1].speed_m_s, self._end_m - self._place_m()
+        speed_m_s = min(speed_m_s, sqrt(a * left_m + before_m_s**2 / 2.0))
+        self._change(speed_m_s)
+        self._go_on(max(0.0, self._end_m - self._place_m() - speed_m_s**2 / (2.0 * a)))
+        self._change(0.0)
+        self._knots[-1] = self._knots[-1]._replace(place_m=self._end_m)
 
     def _change(self, to_m_s: float) -> None:
         time_s, place_m, speed_m_s, _ = self._knots[-1]
