@@ -25,9 +25,10 @@ from drivers.load_cell_calibration import (
 from drivers.load_cell_lines import COUNTS, LineFormat
 from drivers.load_cell_port import LoadCellPort
 from experiments.bench_robot import BenchError
+from experiments.loadcell_analysis import analyse
 from experiments.loadcell_comparison import Compared, compared_with
 from experiments.loadcell_examination import examine_lines
-from experiments.loadcell_fits import COEFFICIENTS, Analysed, OfMud, analyse, bench_doubt, of_mud, speed_remark
+from experiments.loadcell_fits import COEFFICIENTS, Analysed, OfMud, bench_doubt, of_mud, speed_remark
 from experiments.loadcell_motion import StageSettings
 from experiments.loadcell_recording import CellRecorder
 from experiments.loadcell_trials import TrialBench, TrialPlan, load_all, measure_all

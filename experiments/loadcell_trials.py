@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from drivers.load_cell_port import Sample
+from experiments.loadcell_analysis import analyse_trial
 from experiments.loadcell_fits import (
     INSERTION,
     KINDS,
     SINGLE_SPEED_BOUND,
     Analysed,
     Recorded,
-    analyse_trial,
     speed_remark,
 )
 from experiments.loadcell_motion import Insertion, Shear, StageSettings, wide_pace

@@ -1,0 +1,73 @@
+"""Where the stage was while the load cell converted: places of its encoder, brought to the times of the forces.
+
+Both devices stamp their lines at the computer, at different rates. A force is a mean over the time since the one
+before it, so it belongs to the mean place over that time, of straight lines between the encoder's lines: with an
+acceleration a and lines Δt apart they are within a Δt²/8 of the truth, at 100 lines/s and 2 m/s² 25 µm. How much later
+a force is stamped than its place (adapters, filters) is the `lag`, which the strokes themselves tell. Over a gap
+between lines the place is known where the stage stood, and else it is not: NaN.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from experiments.curve_fit import Array
+from experiments.loadcell_contact import without_spikes
+
+LONGEST_GAP_S = 0.06  # between lines that are joined
+STANDING_M = 2e-4  # between the ends of a gap over which the stage stood
+LEAST_PLACES = 8
+
+
+class Places(NamedTuple):
+    """As the encoder told them."""
+
+    times_s: Array
+    places_m: Array
+
+
+class StageTrack:
+    """Places against time, a first place being zero."""
+
+    def __init__(self, places: Places) -> None:
+        self._times_s, self._places_m = places.times_s, without_spikes(places.places_m - places.places_m[0])
+        steps_s, means_m = np.diff(self._times_s), (self._places_m[1:] + self._places_m[:-1]) / 2.0
+        self._sums = np.concatenate([[0.0], np.cumsum(steps_s * means_m)])  # integral of the place
+        unknown = (steps_s > LONGEST_GAP_S) & (np.abs(np.diff(self._places_m)) > STANDING_M)
+        self._unknown_s = np.concatenate([[0.0], np.cumsum(steps_s * unknown)])
+
+    def turned(self) -> StageTrack:
+        """The same the other way round."""
+        return StageTrack(Places(self._times_s, -self._places_m))
+
+    @property
+    def farthest_m(self) -> float:
+        """From its first place, with its sign."""
+        return float(self._places_m[int(np.argmax(np.abs(self._places_m)))])
+
+    @property
+    def interpolation_error_m(self) -> float:
+        """Bound of what straight lines between places leave, as their bends tell: a Δt²/8."""
+        bends_m = np.abs(np.diff(self._places_m, 2))
+        return float(np.quantile(bends_m, 0.99)) / 8.0 if len(bends_m) else 0.0
+
+    def places_m(self, times_s: Array) -> Array:
+        return np.interp(times_s, self._times_s, self._places_m)
+
+    def mean_places_m(self, until_s: Array, over_s: float) -> Array:
+        """Over as long before each time; NaN where the encoder does not tell."""
+        mean_m = (self._integral(until_s) - self._integral(until_s - over_s)) / over_s
+        gaps_s = np.interp(until_s, self._times_s, self._unknown_s)
+        gaps_s -= np.interp(until_s - over_s, self._times_s, self._unknown_s)
+        told = (until_s - over_s >= self._times_s[0]) & (until_s <= self._times_s[-1]) & (gaps_s <= 0.0)
+        return np.where(told, mean_m, np.nan)
+
+    def speeds_m_s(self, until_s: Array, over_s: float) -> Array:
+        return (self.places_m(until_s) - self.places_m(until_s - over_s)) / over_s
+
+    def _integral(self, times_s: Array) -> Array:
+        place = np.clip(np.searchsorted(self._times_s, times_s) - 1, 0, len(self._times_s) - 2)
+        since_s = times_s - self._times_s[place]
+        return self._sums[place] + since_s * (self._places_m[place] + self.places_m(times_s)) / 2.0
