@@ -41,6 +41,7 @@ class StageEncoder:
         self.line = SerialLine(settings.path, settings.baud, open_device=open_device)
         self.clock = LineClock(settings.baud)
         self.counts = EncoderCounts(settings.metres_per_count, settings.label)
+        self._heard_s: float | None = None
 
     @property
     def is_there(self) -> bool:
@@ -66,15 +67,22 @@ class StageEncoder:
         counts = sum(self.counts.decode(line) is not None for line in lines)
         return Arrivals(len(lines), counts / len(lines) if lines else 0.0, text_share(lines))
 
+    def silent_for_s(self, now_s: float) -> float:
+        """Without any count."""
+        return 0.0 if self._heard_s is None else now_s - self._heard_s
+
     def read(self, now_s: float) -> list[Place]:
-        """All places that have arrived, oldest first."""
+        """All places that have arrived, oldest first; never waits."""
         if self.line.reopen(now_s):
             self.clock.reset()
             self.counts.reset()
         lines = self.line.read(now_s)
         stamps_s = self.clock.stamps_s(len(lines), now_s)
         taken = [(stamp_s, self.counts.take(line, stamp_s)) for line, stamp_s in zip(lines, stamps_s, strict=True)]
-        return [Place(stamp_s, place_m) for stamp_s, place_m in taken if place_m is not None]
+        places = [Place(stamp_s, place_m) for stamp_s, place_m in taken if place_m is not None]
+        if places or self._heard_s is None:
+            self._heard_s = now_s
+        return places
 
     def close(self) -> None:
         self.line.close()

@@ -27,11 +27,12 @@ from drivers.load_cell_port import LoadCellPort
 from experiments.bench_robot import BenchError
 from experiments.loadcell_analysis import analyse
 from experiments.loadcell_comparison import Compared, compared_with
-from experiments.loadcell_examination import examine_lines
+from experiments.loadcell_examination import examine_encoder, examine_lines
 from experiments.loadcell_fits import COEFFICIENTS, Analysed, OfMud, bench_doubt, of_mud, speed_remark
 from experiments.loadcell_motion import StageSettings
+from experiments.loadcell_raw import load_all
 from experiments.loadcell_recording import CellRecorder
-from experiments.loadcell_trials import TrialBench, TrialPlan, load_all, measure_all
+from experiments.loadcell_trials import TrialBench, TrialPlan, measure_all
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, Person
 from experiments.side_by_side import Show
@@ -63,6 +64,7 @@ def measure(bench: TrialBench, plan: TrialPlan, cell: CellSettings) -> None:
     port = bench.recorder.port
     bench.person.tell(f"listening to {port.path} at {port.baud} baud")
     port.line_format = LineFormat(examine_lines(bench.recorder, cell.format_name))
+    examine_encoder(bench.recorder, bench.person, plan.settings)
     port.calibration = settle_calibration(bench, cell)
     heed_rate(bench.recorder, bench.person, plan.settings)
     measure_all(bench, plan)
@@ -164,7 +166,11 @@ def conclude(
     for mud in dict.fromkeys(trial.recorded.mud for trial in trials):
         of_it = [trial for trial in trials if trial.recorded.mud == mud]
         error = max(errors[trial.recorded.key] for trial in of_it)
-        doubts = {name: bench_doubt(name, plan.settings, plan.depth_error_m, error) for name in COEFFICIENTS}
+        measured = all(trial.is_measured for trial in of_it if trial.coefficients)
+        depth_errors_m = dict.fromkeys(COEFFICIENTS, plan.depth_error_m)
+        if measured:  # but for a shear, whose depth is the one that was set
+            depth_errors_m |= {"k_p": 0.0, "k_e": 0.0}
+        doubts = {name: bench_doubt(name, plan.settings, depth_errors_m[name], error) for name in COEFFICIENTS}
         muds[mud] = {name: of_mud(of_it, name, doubt) for name, doubt in doubts.items()}
     return Results(trials, muds, list_remarks(trials, plan.settings), compared_with(compare, muds), compare or {})
 

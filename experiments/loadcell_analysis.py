@@ -17,7 +17,7 @@ from experiments.loadcell_alignment import MEDIAN_ERROR, WIDE, Alignment, common
 from experiments.loadcell_contact import Course, StrokeError, find_contact, without_spikes
 from experiments.loadcell_fits import SHEAR, Analysed, Recorded, analyse_insertion, analyse_shear
 from experiments.loadcell_measured import analyse_measured
-from experiments.loadcell_motion import Pace, StageSettings, wide_pace
+from experiments.loadcell_motion import Insertion, Pace, StageSettings, wide_pace
 from experiments.side_by_side import Show
 
 LEAST_SPEED_DOUBT, LEAST_RAMP_DOUBT = 0.005, 0.1  # of a stage, from trial to trial
@@ -39,7 +39,14 @@ def _again_by_place(first: Sequence[Analysed], settings: StageSettings) -> list[
     aligned = [told.alignment for told in first if told.alignment is not None]
     common = common_alignment(aligned)
     pace = wide_pace(settings)
-    return [analyse_trial(told.recorded, settings, pace, common) if told.is_measured else told for told in first]
+    again = [analyse_trial(told.recorded, settings, pace, common) if told.is_measured else told for told in first]
+    return [replace(told, shared_doubt=_of_lag(told, common, settings)) if told.is_measured else told for told in again]
+
+
+def _of_lag(told: Analysed, common: Alignment, settings: StageSettings) -> float:
+    """What a lag that all trials have wrong alike makes of a depth, as a share of the coefficient."""
+    speed_m_s = told.speed_m_s if isinstance(told.motion, Insertion) else None
+    return 1.5 * (speed_m_s or 0.0) * common.lag_doubt_s / settings.depth_m
 
 
 def _again_by_force(first: list[Analysed], settings: StageSettings) -> list[Analysed]:

@@ -7,11 +7,15 @@ from collections.abc import Sequence
 from drivers.load_cell_lines import LineFormat, find_format, text_share
 from drivers.serial_line import COMMON_BAUDS, SerialLine, SerialLineError
 from experiments.bench_robot import BenchError
+from experiments.loadcell_motion import StageSettings
 from experiments.loadcell_recording import POLL_S, BenchClock, CellRecorder
+from experiments.person import Person
 
 LISTENING_S, STARTING_S = 2.0, 4.0
 PROBE_S = 0.8
 TEXT_SHARE, READABLE_SHARE = 0.8, 0.6  # below it, it is another baud rate; another format
+LEAST_PLACES = 12  # of an insertion
+OR_WITHOUT = "or go on without --position"
 
 
 def examine_lines(recorder: CellRecorder, name: str) -> str:
@@ -44,6 +48,37 @@ def examine_lines(recorder: CellRecorder, name: str) -> str:
             + advice
         )
     return name
+
+
+def examine_encoder(recorder: CellRecorder, person: Person, settings: StageSettings) -> None:
+    """Whether counts arrive, often enough for the stroke. Raises BenchError with what to do."""
+    encoder = recorder.encoder
+    if encoder is None:
+        return
+    if not encoder.line.recent:
+        recorder.listen(STARTING_S)
+    arrivals, path = encoder.arrivals, encoder.settings.path
+    if not arrivals.lines:
+        raise BenchError(
+            f"nothing arrives on {path} at {encoder.settings.baud} baud: check the encoder's power and cable, that it "
+            f"sends by itself, and that this is its port; {OR_WITHOUT}"
+        )
+    if arrivals.text < TEXT_SHARE:
+        sentence = wrong_baud(encoder.line, recorder, "--position-baud", "an encoder's counter")
+        raise BenchError(f"{sentence}; {OR_WITHOUT}")
+    if arrivals.readable < READABLE_SHARE:
+        label = encoder.settings.label
+        told = f"a label {label!r} and a whole number" if label else "a whole number"
+        raise BenchError(
+            f"the lines on {path} are not {told}, but such as {shown(list(encoder.line.recent))}: give what they begin "
+            f"with as --position-label, make the counter send its count alone, {OR_WITHOUT}"
+        )
+    between_m = settings.speed_m_s / (encoder.rate_hz or 1.0)
+    if LEAST_PLACES * between_m > settings.depth_m:
+        person.tell(
+            f"the encoder sends {encoder.rate_hz or 0.0:.0f} lines/s, one in {1000.0 * between_m:.1f} mm of way: what "
+            f"lies between is guessed. For {LEAST_PLACES} in an insertion make it send faster"
+        )
 
 
 def shown(lines: Sequence[bytes]) -> str:

@@ -13,6 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from drivers.load_cell_port import LoadCellPort, Sample
+from drivers.stage_encoder import Place, StageEncoder
 from experiments.bench_robot import BenchError
 from experiments.loadcell_contact import CONTACT_NOISES, LEAST_FORCE_N, LEAST_NOISE_N, QUIET_S
 
@@ -45,6 +46,15 @@ class Tare(NamedTuple):
     samples: int
 
 
+class PlaceStretch(NamedTuple):
+    """What an encoder on the stage told meanwhile."""
+
+    places: list[Place]
+    garbled_lines: int
+    drop_outs: int
+    breaks: int  # unplugged, or begun anew: places before and behind have not the same zero
+
+
 class Stretch(NamedTuple):
     """What was recorded of a stroke, and what became of the lines meanwhile."""
 
@@ -52,6 +62,7 @@ class Stretch(NamedTuple):
     garbled_lines: int
     drop_outs: int
     unpluggings: int
+    position: PlaceStretch | None = None  # where the stage has an encoder
 
     @property
     def overloads(self) -> int:
@@ -59,14 +70,23 @@ class Stretch(NamedTuple):
 
 
 class CellRecorder:
-    """Owns nothing but its port and its clock; `tell` says what a person should know at once."""
+    """Owns the places that came since it was last drained; `tell` says what a person should know at once."""
 
-    def __init__(self, port: LoadCellPort, clock: BenchClock, tell: Callable[[str], None]) -> None:
-        self.port, self.clock, self.tell = port, clock, tell
+    def __init__(
+        self,
+        port: LoadCellPort,
+        clock: BenchClock,
+        tell: Callable[[str], None],
+        encoder: StageEncoder | None = None,
+    ) -> None:
+        """`encoder`: of the stage; nothing waits for it."""
+        self.port, self.clock, self.tell, self.encoder = port, clock, tell, encoder
+        self._places: list[Place] = []
 
     def drain(self) -> None:
         """What comes while nobody wants it."""
-        self.port.read(self.clock.now_s())
+        self._read()
+        self._places = []
 
     def listen(self, duration_s: float) -> list[Sample]:
         self.await_port()
@@ -77,7 +97,13 @@ class CellRecorder:
 
     def poll(self) -> list[Sample]:
         self.clock.pass_time(POLL_S)
-        return self.port.read(self.clock.now_s())
+        return self._read()
+
+    def _read(self) -> list[Sample]:
+        now_s = self.clock.now_s()
+        if self.encoder is not None:
+            self._places += self.encoder.read(now_s)
+        return self.port.read(now_s)
 
     def await_port(self) -> None:
         """An adapter that was pulled out is waited for. Raises BenchError after a while."""
@@ -120,6 +146,7 @@ class CellRecorder:
         self.drain()
         port = self.port
         garbled, drop_outs, unpluggings = port.garbled_lines, port.clock.drop_outs, port.unpluggings
+        before = _counted(self.encoder)
         samples, begin_s = list[Sample](), self.clock.now_s()
         contact = _Contact(noise_n)
         end_s = begin_s + patience_s
@@ -128,10 +155,20 @@ class CellRecorder:
             samples += fresh
             if contact.heed(fresh):
                 end_s = self.clock.now_s() + stroke_s
+        places, after = self._places, _counted(self.encoder)
         self.await_port()
         return Stretch(
-            samples, port.garbled_lines - garbled, port.clock.drop_outs - drop_outs, port.unpluggings - unpluggings
+            samples,
+            port.garbled_lines - garbled,
+            port.clock.drop_outs - drop_outs,
+            port.unpluggings - unpluggings,
+            PlaceStretch(places, *(b - a for a, b in zip(before, after, strict=True))) if self.encoder else None,
         )
+
+
+def _counted(encoder: StageEncoder | None) -> tuple[int, int, int]:
+    """Garbled lines, drop-outs, breaks."""
+    return (0, 0, 0) if encoder is None else (encoder.counts.garbled, encoder.clock.drop_outs, encoder.breaks)
 
 
 class _Contact:

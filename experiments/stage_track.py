@@ -16,7 +16,7 @@ import numpy as np
 from experiments.curve_fit import Array
 from experiments.loadcell_contact import without_spikes
 
-LONGEST_GAP_S = 0.06  # between lines that are joined
+LONGEST_GAP_S, LONGEST_GAP = 0.06, 2.5  # between lines that are joined; in times between lines
 STANDING_M = 2e-4  # between the ends of a gap over which the stage stood
 LEAST_PLACES = 8
 
@@ -35,7 +35,8 @@ class StageTrack:
         self._times_s, self._places_m = places.times_s, without_spikes(places.places_m - places.places_m[0])
         steps_s, means_m = np.diff(self._times_s), (self._places_m[1:] + self._places_m[:-1]) / 2.0
         self._sums = np.concatenate([[0.0], np.cumsum(steps_s * means_m)])  # integral of the place
-        unknown = (steps_s > LONGEST_GAP_S) & (np.abs(np.diff(self._places_m)) > STANDING_M)
+        longest_s = max(LONGEST_GAP_S, LONGEST_GAP * float(np.median(steps_s)))
+        unknown = (steps_s > longest_s) & (np.abs(np.diff(self._places_m)) > STANDING_M)
         self._unknown_s = np.concatenate([[0.0], np.cumsum(steps_s * unknown)])
 
     def turned(self) -> StageTrack:
