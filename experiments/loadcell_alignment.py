@@ -21,7 +21,8 @@ from experiments.loadcell_motion import RATE_EXPONENT, StageSettings
 from experiments.stage_track import StageTrack
 
 RESTING_SHARE = 0.12  # of the set speed, below which the stage rests
-LEAST_LAG_DOUBT_S, LEAST_RATE_DOUBT = 0.5e-3, 0.03  # mud follows the speed a millimetre late
+LEAST_LAG_DOUBT_S = 2e-3  # from trial to trial: lines wait until they are asked for
+LEAST_RATE_DOUBT = 0.03  # mud follows the speed a millimetre late
 MEDIAN_ERROR = 1.25  # times that of a mean
 HANGING_TOGETHER = 2.0  # times the standard error of independent samples
 

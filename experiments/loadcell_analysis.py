@@ -46,7 +46,8 @@ def _again_by_place(first: Sequence[Analysed], settings: StageSettings) -> list[
 def _of_lag(told: Analysed, common: Alignment, settings: StageSettings) -> float:
     """What a lag that all trials have wrong alike makes of a depth, as a share of the coefficient."""
     speed_m_s = told.speed_m_s if isinstance(told.motion, Insertion) else None
-    return 1.5 * (speed_m_s or 0.0) * common.lag_doubt_s / settings.depth_m
+    own_s = told.alignment.lag_doubt_s if told.alignment is not None else 0.0
+    return 1.5 * (speed_m_s or 0.0) * min(common.lag_doubt_s, own_s) / settings.depth_m
 
 
 def _again_by_force(first: list[Analysed], settings: StageSettings) -> list[Analysed]:

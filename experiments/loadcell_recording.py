@@ -17,7 +17,7 @@ from drivers.stage_encoder import Place, StageEncoder
 from experiments.bench_robot import BenchError
 from experiments.loadcell_contact import CONTACT_NOISES, LEAST_FORCE_N, LEAST_NOISE_N, QUIET_S
 
-POLL_S = 0.01
+POLL_S = 0.005
 TARE_S = 1.0
 ABSENCE_S = 300.0  # for which an adapter may be away
 CONTACT_SAMPLES = 3
@@ -156,6 +156,7 @@ class CellRecorder:
             if contact.heed(fresh):
                 end_s = self.clock.now_s() + stroke_s
         places, after = self._places, _counted(self.encoder)
+        self._places = []
         self.await_port()
         return Stretch(
             samples,
