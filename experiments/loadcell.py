@@ -234,6 +234,9 @@ def _trial_described(trial: Analysed, entry: Mapping[str, Any]) -> dict[str, Any
         **entry,
         **{name: {"value": known(c.value), "std_error": known(c.std_error)} for name, c in trial.coefficients.items()},
         "speed_m_s": None if trial.speed_m_s is None else known(trial.speed_m_s),
+        "is_measured": trial.is_measured,
+        "place_error_m": trial.place_error_m if trial.is_measured else None,
+        "alignment": trial.alignment and {name: known(value) for name, value in trial.alignment._asdict().items()},
         "problem": trial.problem,
         "remark": trial.remark,
     }
