@@ -31,8 +31,8 @@ METHOD = (
 MEASURED = (
     "The stage's place came from an encoder. k_p and k_e are fitted against the measured depth, from the surface that "
     "the force tells, over the samples in which the stage moved and had moved for 2 mm since it last rested; k_s to "
-    "the mean over the second half of the measured way, 5 mm behind a rest. Mud bears more the faster it is: how much, the "
-    "drags tell, and the coefficients are those at the speed that was set."
+    "the mean over the second half of the measured way, 5 mm behind a rest. Mud bears more the faster it is: how much, "
+    "the drags tell, and the coefficients are those at the speed that was set."
 )
 LEANING = (
     "A flipper's plate leans in the mud, and in clay no coefficient is the same for another plate or attitude. In the "

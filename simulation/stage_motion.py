@@ -48,9 +48,9 @@ class RampedMotion:
 class HandParameters:
     slowest_m_s: Annotated[float, Bounds(0.001, 1.0)] = 0.05
     fastest_m_s: Annotated[float, Bounds(0.001, 1.0)] = 0.2
-    acceleration_m_s2: Annotated[float, Bounds(0.1, 50.0)] = 2.0
-    shortest_m: Annotated[float, Bounds(0.001, 0.1)] = 0.004  # of one speed
-    longest_m: Annotated[float, Bounds(0.001, 0.1)] = 0.015
+    acceleration_m_s2: Annotated[float, Bounds(0.1, 50.0)] = 4.0
+    shortest_m: Annotated[float, Bounds(0.001, 0.1)] = 0.002  # of one speed
+    longest_m: Annotated[float, Bounds(0.001, 0.1)] = 0.01
     rest_share: Annotated[float, Bounds(0.0, 1.0)] = 0.25  # of the changes of speed, a rest before the next
     shortest_rest_s: Annotated[float, Bounds(0.0, 5.0)] = 0.05
     longest_rest_s: Annotated[float, Bounds(0.0, 5.0)] = 0.5
