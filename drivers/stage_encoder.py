@@ -54,7 +54,7 @@ class StageEncoder:
 
     @property
     def last_problem(self) -> str:
-        return "" if self.line.problem is None else str(self.line.problem)
+        return "" if self.line.problem is None else self.line.problem.why
 
     @property
     def rate_hz(self) -> float | None:

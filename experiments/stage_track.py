@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.curve_fit import Array
-from experiments.loadcell_contact import without_spikes
 
 LONGEST_GAP_S, LONGEST_GAP = 0.06, 2.5  # between lines that are joined; in times between lines
 STANDING_M = 2e-4  # between the ends of a gap over which the stage stood
 LEAST_PLACES = 8
+LEAP_M, LEAP_SHARE = 2e-4, 0.25
 
 
 class Places(NamedTuple):
@@ -32,7 +32,7 @@ class StageTrack:
     """Places against time, a first place being zero."""
 
     def __init__(self, places: Places) -> None:
-        self._times_s, self._places_m = places.times_s, without_spikes(places.places_m - places.places_m[0])
+        self._times_s, self._places_m = places.times_s, without_leaps(places.places_m - places.places_m[0])
         steps_s, means_m = np.diff(self._times_s), (self._places_m[1:] + self._places_m[:-1]) / 2.0
         self._sums = np.concatenate([[0.0], np.cumsum(steps_s * means_m)])  # integral of the place
         longest_s = max(LONGEST_GAP_S, LONGEST_GAP * float(np.median(steps_s)))
@@ -72,3 +72,15 @@ class StageTrack:
         place = np.clip(np.searchsorted(self._times_s, times_s) - 1, 0, len(self._times_s) - 2)
         since_s = times_s - self._times_s[place]
         return self._sums[place] + since_s * (self._places_m[place] + self.places_m(times_s)) / 2.0
+
+
+def without_leaps(places_m: Array) -> Array:
+    """Single places beside a line on which two on each side agree: a digit that was garbled into another."""
+    if len(places_m) < 5:
+        return places_m
+    near_m, far_m = (places_m[1:-3] + places_m[3:-1]) / 2.0, (places_m[:-4] + places_m[4:]) / 2.0
+    apart_m = np.abs(places_m[2:-2] - near_m)
+    leaps = (apart_m > LEAP_M) & (np.abs(near_m - far_m) < LEAP_SHARE * apart_m)
+    mended = places_m.copy()
+    mended[2:-2][leaps] = near_m[leaps]
+    return mended
