@@ -130,6 +130,9 @@ def _found(
     missing = [trial for trial in plan.list_trials() if trial.key not in notebook.entries]
     if notebook.begun:
         desk.person.tell(f"{len(notebook.entries)} trials are in {desk.folder} already, {len(missing)} are left")
+        without = sum("file" in entry and "position" not in entry for entry in notebook.entries.values())
+        if options.position is not None and without:
+            desk.person.tell(f"{without} of them have no position, and keep the depth that the force tells")
     described = {"bench": bench_name, "port": options.port, "baud": options.baud, "format": options.format}
     if missing:
         with ExitStack() as stack:

@@ -101,8 +101,9 @@ def _window(placed: PlacedCourse, lag_s: float) -> _Window:
     bearing = places_m < surface_m + (1.0 - REVERSAL_SHARE) * way_m
     resting_m_s = RESTING_SHARE * placed.settings.speed_m_s
     down, up = above & (order < at_bottom[0]), known & (order > at_bottom[-1])
-    down[down] = moving(places_m[down], speeds_m_s[down], resting_m_s, WAKING_M)
-    up[up] = moving(-places_m[up], -speeds_m_s[up], resting_m_s, WAKING_M)
+    mud = places_m > surface_m - YIELD_M  # air does not relax
+    down[down] = moving(places_m[down], speeds_m_s[down], resting_m_s, WAKING_M, mud[down])
+    up[up] = moving(-places_m[up], -speeds_m_s[up], resting_m_s, WAKING_M, mud[up])
     up &= bearing & above
     if np.count_nonzero(down & (places_m > surface_m)) < LEAST_SAMPLES:
         raise StrokeError(f"fewer than {LEAST_SAMPLES} samples of force and place together on the way down")
@@ -110,11 +111,11 @@ def _window(placed: PlacedCourse, lag_s: float) -> _Window:
     return _Window(down, up, surface_m, deepest_m, has_air)
 
 
-def moving(places_m: Array, speeds_m_s: Array, resting_m_s: float, waking_m: float) -> Mask:
-    """Samples in which the stage goes forward, goes on, and has done so for `waking_m` since it last rested."""
+def moving(places_m: Array, speeds_m_s: Array, resting_m_s: float, waking_m: float, in_mud: Mask | bool = True) -> Mask:
+    """Samples in which the stage goes forward, goes on, and has done so for `waking_m` since it last rested in mud."""
     goes = speeds_m_s > resting_m_s
     goes &= np.append(goes[1:], False)
-    rested_m = np.where(goes, -np.inf, places_m)
+    rested_m = np.where(goes | ~np.asarray(in_mud), -np.inf, places_m)
     return np.asarray(goes & (places_m - np.maximum.accumulate(rested_m) > waking_m))
 
 

@@ -153,6 +153,8 @@ def test_after_a_rest_samples_count_again_two_millimetres_on() -> None:
     places_m = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0, 6.0, 7.0]) / 1000.0
     speeds_m_s = np.array([0.0, 0.1, 0.1, 0.1, 0.0, 0.0, 0.1, 0.1, 0.1, 0.1])
     assert np.flatnonzero(moving(places_m, speeds_m_s, 0.01, 0.002)).tolist() == [8]
+    in_air = np.zeros(10, dtype=bool)
+    assert np.flatnonzero(moving(places_m, speeds_m_s, 0.01, 0.002, in_air)).tolist() == [1, 2, 6, 7, 8]
 
 
 def test_a_slow_encoder_is_doubted_more() -> None:
