@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from experiments.curve_fit import Array, CurveFit, Prior, fit_curve
 from experiments.loadcell_alignment import RESTING_SHARE, Alignment, PlacedCourse
-from experiments.loadcell_contact import StrokeError
+from experiments.loadcell_contact import LEAST_FORCE_N, StrokeError
 from experiments.loadcell_motion import JUMP_PRICE, KNOTS, REVERSAL_SHARE, YIELD_M
 
 Mask = NDArray[np.bool_]
@@ -37,6 +37,7 @@ LEAST_SHARE = 0.3  # of the set depth, that an encoder on this stage must have s
 ROUNDS = 3  # of choosing samples by the lag and fitting the lag to them
 LAG_STARTS_S = (-0.02, 0.0, 0.02)
 NARROW_S = 0.01
+TURNING_S, LARGEST_LAG_S = 0.01, 0.3
 PARTS = 4  # of the time of a conversion, in which a plate may meet the surface
 LAW_SHARE = 0.015  # of the largest force, by which no law is better
 WRONG_AXIS = "is the encoder on the axis that moves, and is --position-step its way per count?"
@@ -77,7 +78,8 @@ class _Window(NamedTuple):
 
 def find_insertion(placed: PlacedCourse, expected: Alignment) -> MeasuredInsertion:
     """Raises StrokeError where the encoder has not seen the stroke."""
-    lag_s, wide = expected.lag_s, expected.lag_doubt_s > NARROW_S
+    wide = expected.lag_doubt_s > NARROW_S
+    lag_s = _rough_lag_s(placed) if wide else expected.lag_s
     for round_ in range(ROUNDS if wide else 1):
         window = _window(placed, lag_s)
         shifts_s = LAG_STARTS_S if wide and round_ == 0 else (0.0,)
@@ -85,6 +87,18 @@ def find_insertion(placed: PlacedCourse, expected: Alignment) -> MeasuredInserti
         fit = _best_fit(placed, expected, window, starts)
         lag_s = float(fit.parameters[1])
     return _insertion(placed, window, fit)
+
+
+def _rough_lag_s(placed: PlacedCourse) -> float:
+    """The force turns round a moment after the stage has left its lowest place; 0 where neither is to be seen."""
+    times_s, forces_n = placed.course.times_s, placed.course.forces_n - placed.course.level_n
+    places_m, lowest = placed.track.places_m(times_s), int(np.argmin(forces_n))
+    at_bottom = np.flatnonzero(places_m > np.max(places_m) - BOTTOM_M)
+    pushed = np.flatnonzero(forces_n[:lowest] > 0.0)
+    if forces_n[lowest] > -LEAST_FORCE_N or not len(pushed):
+        return 0.0
+    lag_s = float(times_s[pushed[-1]] - times_s[at_bottom[-1]]) - TURNING_S
+    return lag_s if abs(lag_s) < LARGEST_LAG_S else 0.0
 
 
 def _window(placed: PlacedCourse, lag_s: float) -> _Window:
