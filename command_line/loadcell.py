@@ -116,6 +116,8 @@ def encoder_of(options: argparse.Namespace, emulated: str) -> StageEncoderSettin
         return None
     if not options.simulated and not options.position:
         raise ValueError("name the serial port of the stage's encoder: --position PATH")
+    if not options.simulated and options.position == options.port:
+        raise ValueError(f"load cell and encoder cannot both be on {options.port}: they are two ports")
     if not options.simulated and options.position_step is None:
         raise ValueError("--position needs --position-step: the stage's way per count of its encoder, in micrometres")
     path, step_um = emulated if options.simulated else options.position, options.position_step or SIMULATED_STEP_UM
