@@ -23,8 +23,8 @@ from experiments.report_page import Figure, Section
 TITLE = "Ground truth of mud from a load cell"
 METHOD = (
     "A plate on a load cell is dragged through the mud, and in other trials let down, held and drawn out (the paper's "
-    "section II-E). k_p and k_e are fitted by F = k V over the way down and over the last three quarters of the way up, "
-    "V being the submerged volume; k_s by F = k ∫ζ dA to the mean over the second half of the drag.\n\n"
+    "section II-E). k_p and k_e are fitted by F = k V over the way down and over the last three quarters of the way "
+    "up, V being the submerged volume; k_s by F = k ∫ζ dA to the mean over the second half of the drag.\n\n"
     "The paper gives its coefficients in figures only, so none of its values stand beside these."
 )
 UNCONNECTED = (
@@ -113,7 +113,7 @@ def sections_of(results: Results, plan: TrialPlan) -> list[Section]:
 
 
 def position_texts(trials: Sequence[Analysed]) -> list[str]:
-    """How the place was measured, and how well a sample's place is known; that it was not, where there was no encoder."""
+    """How the place was measured, and how well a sample's place is known; or that it was not."""
     measured = [trial for trial in trials if trial.is_measured]
     aligned = [trial.alignment for trial in measured if trial.alignment is not None]
     insertions = [trial for trial in measured if isinstance(trial.motion, Insertion)]
