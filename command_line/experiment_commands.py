@@ -151,6 +151,19 @@ def _add_loadcell(names: Commands) -> None:
     loadcell.add_argument(
         "--speed", type=STAGE_SPEED_M_S, default=0.1, metavar="M/S", help="of the stage (default: 0.1)"
     )
+    loadcell.add_argument(
+        "--position", nargs="?", const="", metavar="PATH", help="an encoder of the stage, which a hand may push then"
+    )
+    loadcell.add_argument(
+        "--position-step",
+        type=between(0.01, 10000.0, "um"),
+        metavar="UM",
+        help="way per count, whatever its sign",
+    )
+    loadcell.add_argument(
+        "--position-baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)"
+    )
+    loadcell.add_argument("--position-label", default="", metavar="TEXT", help="that each of its lines begins with")
     loadcell.add_argument("--compare", type=Path, metavar="FILE", help="summary.json of the flipper experiment")
     loadcell.add_argument("--seed", type=int, default=1, metavar="N", help="of the simulation")
 

@@ -6,6 +6,7 @@ import argparse
 import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,9 @@ from command_line.conduct import refuse
 from command_line.screen import table
 from drivers.load_cell_calibration import LoadCellCalibration
 from drivers.load_cell_lines import AUTO, COUNTS, NUMBER, UNITS, LineFormat
-from drivers.load_cell_port import LoadCellPort, LoadCellPortError
+from drivers.load_cell_port import LoadCellPort
+from drivers.serial_line import SerialLineError
+from drivers.stage_encoder import StageEncoder, StageEncoderSettings
 from experiments.bench_robot import BenchError
 from experiments.estimation import SINGLE_WATERS
 from experiments.loadcell import (
@@ -26,7 +29,9 @@ from experiments.loadcell import (
     report_of,
 )
 from experiments.loadcell_comparison import CompareError, load_flipper
+from experiments.loadcell_examination import OR_WITHOUT
 from experiments.loadcell_motion import StageSettings
+from experiments.loadcell_raw import RAW
 from experiments.loadcell_recording import BenchClock, CellRecorder, WallClock
 from experiments.loadcell_report import (
     LEANING_SHORT,
@@ -37,15 +42,19 @@ from experiments.loadcell_report import (
     sections_of,
 )
 from experiments.loadcell_stage import AttendedStage, SimulatedStage, Stage
-from experiments.loadcell_trials import RAW, TrialBench, TrialPlan
+from experiments.loadcell_trials import TrialBench, TrialPlan
 from experiments.loadcell_truth import clay_truth, truth_rows
 from experiments.notebook import Notebook
 from experiments.report_page import Section
-from simulation.load_cell_bench import EmulatedBench, clay_plate
+from simulation.load_cell_bench import EmulatedBench, clay_plate, position_link
 from simulation.load_cell_emulator import AmplifierParameters
+from simulation.plate_stage import StageParameters
+from simulation.stage_encoder_emulator import StageEncoderParameters
+from simulation.stage_motion import HandParameters
 
 TRUTH = "The same plate in even motion, without stage, cell and noise:"
 MIXED = "mud"  # the name of one that nobody named
+SIMULATED_STEP_UM = 10.0
 StageOf = Callable[[CellRecorder], Stage]
 
 
@@ -54,6 +63,7 @@ def loadcell(options: argparse.Namespace) -> int:
         return refuse("name the serial port of the load cell with --port, or use --simulated")
     try:
         plan, cell = plan_of(options), cell_of(options)
+        encoder_of(options, "")
         flipper = None if options.compare is None else load_flipper(options.compare)
     except (ValueError, CompareError) as problem:
         return refuse(str(problem))
@@ -100,6 +110,20 @@ def cell_of(options: argparse.Namespace) -> CellSettings:
     return CellSettings(options.format, options.unit.lower(), options.scale, options.calibration)
 
 
+def encoder_of(options: argparse.Namespace, emulated: str) -> StageEncoderSettings | None:
+    """None where the stage has none; `emulated` is the port of a simulated one. Raises ValueError."""
+    if options.position is None:
+        return None
+    if not options.simulated and not options.position:
+        raise ValueError("name the serial port of the stage's encoder: --position PATH")
+    if not options.simulated and options.position == options.port:
+        raise ValueError(f"load cell and encoder cannot both be on {options.port}: they are two ports")
+    if not options.simulated and options.position_step is None:
+        raise ValueError("--position needs --position-step: the stage's way per count of its encoder, in micrometres")
+    path, step_um = emulated if options.simulated else options.position, options.position_step or SIMULATED_STEP_UM
+    return StageEncoderSettings(path, step_um * 1e-6, options.position_baud, options.position_label)
+
+
 def _found(
     options: argparse.Namespace, desk: Desk, plan: TrialPlan, cell: CellSettings, flipper: dict[str, Any] | None
 ) -> Finding:
@@ -108,6 +132,9 @@ def _found(
     missing = [trial for trial in plan.list_trials() if trial.key not in notebook.entries]
     if notebook.begun:
         desk.person.tell(f"{len(notebook.entries)} trials are in {desk.folder} already, {len(missing)} are left")
+        without = sum("file" in entry and "position" not in entry for entry in notebook.entries.values())
+        if options.position is not None and without:
+            desk.person.tell(f"{without} of them have no position, and keep the depth that the force tells")
     described = {"bench": bench_name, "port": options.port, "baud": options.baud, "format": options.format}
     if missing:
         with ExitStack() as stack:
@@ -133,7 +160,11 @@ def _measured(
     path, clock, stage_of = (_emulated if options.simulated else _real)(options, desk, plan, stack)
     port = _open(path, options.baud, cell)
     stack.callback(port.close)
-    recorder = CellRecorder(port, clock, desk.person.tell)
+    settings = encoder_of(options, str(position_link(Path(path))))
+    encoder = None if settings is None else _open_encoder(settings)
+    if encoder is not None:
+        stack.callback(encoder.close)
+    recorder = CellRecorder(port, clock, desk.person.tell, encoder)
     bench = TrialBench(recorder, stage_of(recorder), desk.person, notebook, desk.folder, desk.show)
     measure(bench, plan, cell)
     return {
@@ -144,7 +175,13 @@ def _measured(
         "garbled_lines": port.garbled_lines,
         "last_garbled": port.last_garbled,
         "calibration": port.calibration._asdict(),
+        "position": None if encoder is None or settings is None else _told_of(encoder, settings),
     }
+
+
+def _told_of(encoder: StageEncoder, settings: StageEncoderSettings) -> dict[str, Any]:
+    counted = {"rate_hz": encoder.rate_hz, "garbled_lines": encoder.counts.garbled, "breaks": encoder.breaks}
+    return asdict(settings) | {"counts": encoder.counts.believed} | counted
 
 
 def _real(
@@ -159,9 +196,16 @@ def _emulated(
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mudskipper-")))
     plates = {mud: clay_plate(_water(mud), plan.settings.plate) for mud in plan.muds}
     amplifier = AmplifierParameters(baud=options.baud)
-    bench = EmulatedBench(next(iter(plates.values())), folder / "load_cell", amplifier, seed=options.seed)
+    settings = encoder_of(options, "")
+    encoder, stage = None, None
+    if settings is not None:  # whoever has an encoder need not have a motor
+        step_m, baud, label = settings.metres_per_count, settings.baud, settings.label
+        encoder = StageEncoderParameters(metres_per_count=step_m, baud=baud, label=label)
+        stage = StageParameters(hand=HandParameters(), seed=options.seed)
+    cell = folder / "load_cell"
+    bench = EmulatedBench(next(iter(plates.values())), cell, amplifier, stage, options.seed, encoder)
     stack.callback(bench.close)
-    return str(folder / "load_cell"), bench, lambda _: SimulatedStage(plan.settings, bench, plates, options.seed)
+    return str(cell), bench, lambda _: SimulatedStage(plan.settings, bench, plates, options.seed)
 
 
 def _open(path: str, baud: int, cell: CellSettings) -> LoadCellPort:
@@ -169,8 +213,15 @@ def _open(path: str, baud: int, cell: CellSettings) -> LoadCellPort:
     line_format = LineFormat(NUMBER if cell.format_name == AUTO else cell.format_name)
     try:
         return LoadCellPort(path, baud, line_format, LoadCellCalibration(cell.unit or COUNTS, 1.0))
-    except LoadCellPortError as problem:
+    except SerialLineError as problem:
         raise BenchError(str(problem)) from problem
+
+
+def _open_encoder(settings: StageEncoderSettings) -> StageEncoder:
+    try:
+        return StageEncoder(settings)
+    except SerialLineError as problem:
+        raise BenchError(f"the stage's encoder: {problem}; {OR_WITHOUT}") from problem
 
 
 def text_of(results: Results, plan: TrialPlan) -> str:

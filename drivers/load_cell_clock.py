@@ -1,10 +1,12 @@
 """When a line was measured, as far as its arrival tells.
 
-An amplifier converts at a steady rate of its own. Its lines then wait: in the adapter (an FTDI chip hands over what it
-has every 16 ms), in the kernel, and until somebody reads. So several come at once, all of them late by different
-times. The stamps here run at the measured period and follow the arrivals slowly; a constant delay remains, which moves
-a whole stroke and nothing within it. A line that comes more than GAP periods late is no late line: others are missing.
-Garbled lines count as well, since each took its time.
+An amplifier converts at a steady rate of its own, and so does the counter of an encoder. Its lines then wait: in the
+adapter (an FTDI chip hands over what it has every 16 ms), in the kernel, and until somebody reads. So several come at
+once, all of them late by different times. The stamps here run at the measured period and follow the arrivals slowly; a
+constant delay remains, which moves a whole stroke and nothing within it. A line that comes more than GAP periods late
+is no late line: others are missing. Garbled lines count as well, since each took its time. A period that was learned
+while a busy computer handed over late what it had would make a gap of every few lines: where one gap follows another
+the period is learned anew.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from collections import deque
 GAIN = 0.05  # of the difference between arrival and expectation
 GAP = 3.0  # periods
 LEAST_GAP_S = 0.06  # bursts of an adapter and a busy computer
-LEARNING_LINES = 16
+LEARNING_LINES, LEARNING_S = 16, 0.5
 REMEMBERED_READS = 512
 BITS_PER_BYTE = 10.0
 LEAST_STEP_S = 1e-6
@@ -35,6 +37,8 @@ class LineClock:
         self._begin()
 
     def _begin(self) -> None:
+        """Learning, and keep the period meanwhile."""
+        self._has_learned = False
         self._reads: deque[tuple[float, int]] = deque(maxlen=REMEMBERED_READS)  # when, and how many lines by then
         self._lines = 0
 
@@ -49,8 +53,8 @@ class LineClock:
 
     def _learn(self) -> None:
         (first_s, first), (last_s, last) = self._reads[0], self._reads[-1]
-        if last - first >= LEARNING_LINES and last_s > first_s:
-            self.period_s = (last_s - first_s) / (last - first)
+        if last - first >= LEARNING_LINES and last_s - first_s >= LEARNING_S:
+            self.period_s, self._has_learned = (last_s - first_s) / (last - first), True
 
     def _next_s(self, now_s: float, behind: int) -> float:
         period_s, before_s = self.period_s, self._stamp_s
@@ -68,6 +72,8 @@ class LineClock:
         late_s = arrived_s - expected_s
         if late_s > max(GAP * period_s, LEAST_GAP_S):
             self.drop_outs += 1
+            if not self._has_learned:
+                self.period_s = None
             self._begin()
             return arrived_s
         return min(expected_s + GAIN * late_s, now_s)

@@ -25,7 +25,6 @@ NEWTONS = {  # per unit of weight or force
 }
 COUNTS, RATIO = "counts", "mv/v"  # say nothing of newtons by themselves
 UNITS = (*NEWTONS, COUNTS, RATIO)
-LONGEST_LINE_BYTES = 200
 CONVERTER_ENDS = (float(2**23 - 1), float(-(2**23)))  # of 24 bits, as nearly all of these amplifiers have
 
 _NUMBER = r"(?P<value>[+-]?[ ]*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"

@@ -25,11 +25,14 @@ from drivers.load_cell_calibration import (
 from drivers.load_cell_lines import COUNTS, LineFormat
 from drivers.load_cell_port import LoadCellPort
 from experiments.bench_robot import BenchError
+from experiments.loadcell_analysis import analyse
 from experiments.loadcell_comparison import Compared, compared_with
-from experiments.loadcell_fits import COEFFICIENTS, Analysed, OfMud, analyse, bench_doubt, of_mud, speed_remark
+from experiments.loadcell_examination import examine_encoder, examine_lines
+from experiments.loadcell_fits import COEFFICIENTS, Analysed, OfMud, bench_doubt, of_mud, speed_remark
 from experiments.loadcell_motion import StageSettings
-from experiments.loadcell_recording import CellRecorder, examine_lines
-from experiments.loadcell_trials import TrialBench, TrialPlan, load_all, measure_all
+from experiments.loadcell_raw import load_all
+from experiments.loadcell_recording import CellRecorder
+from experiments.loadcell_trials import TrialBench, TrialPlan, measure_all
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, Person
 from experiments.side_by_side import Show
@@ -61,6 +64,7 @@ def measure(bench: TrialBench, plan: TrialPlan, cell: CellSettings) -> None:
     port = bench.recorder.port
     bench.person.tell(f"listening to {port.path} at {port.baud} baud")
     port.line_format = LineFormat(examine_lines(bench.recorder, cell.format_name))
+    examine_encoder(bench.recorder, bench.person, plan.settings)
     port.calibration = settle_calibration(bench, cell)
     heed_rate(bench.recorder, bench.person, plan.settings)
     measure_all(bench, plan)
@@ -162,7 +166,11 @@ def conclude(
     for mud in dict.fromkeys(trial.recorded.mud for trial in trials):
         of_it = [trial for trial in trials if trial.recorded.mud == mud]
         error = max(errors[trial.recorded.key] for trial in of_it)
-        doubts = {name: bench_doubt(name, plan.settings, plan.depth_error_m, error) for name in COEFFICIENTS}
+        measured = all(trial.is_measured for trial in of_it if trial.coefficients)
+        depth_errors_m = dict.fromkeys(COEFFICIENTS, plan.depth_error_m)
+        if measured:  # but for a shear, whose depth is the one that was set
+            depth_errors_m |= {"k_p": 0.0, "k_e": 0.0}
+        doubts = {name: bench_doubt(name, plan.settings, depth_errors_m[name], error) for name in COEFFICIENTS}
         muds[mud] = {name: of_mud(of_it, name, doubt) for name, doubt in doubts.items()}
     return Results(trials, muds, list_remarks(trials, plan.settings), compared_with(compare, muds), compare or {})
 
@@ -226,6 +234,9 @@ def _trial_described(trial: Analysed, entry: Mapping[str, Any]) -> dict[str, Any
         **entry,
         **{name: {"value": known(c.value), "std_error": known(c.std_error)} for name, c in trial.coefficients.items()},
         "speed_m_s": None if trial.speed_m_s is None else known(trial.speed_m_s),
+        "is_measured": trial.is_measured,
+        "place_error_m": trial.place_error_m if trial.is_measured else None,
+        "alignment": trial.alignment and {name: known(value) for name, value in trial.alignment._asdict().items()},
         "problem": trial.problem,
         "remark": trial.remark,
     }

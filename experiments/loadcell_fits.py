@@ -7,7 +7,6 @@
 V is the submerged volume of the upright plate and ∫ζ dA the first moment of its face (control/plate.py). What the mud
 bears less while the stage slows down is added back, so a coefficient belongs to the speed of the stage.
 
-A stage moves alike in all trials, so its speed and its ramps are found in each and then fitted again near their median.
 The doubt of one trial holds that of speed, surface and samples, and what the law leaves over. A mud has two: that of
 its trials, which is their scatter or their own doubt where that is more, and that of the bench, which no trial shows.
 """
@@ -15,9 +14,9 @@ its trials, which is their scatter or their own doubt where that is more, and th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import hypot, isfinite, nan, sqrt
-from statistics import fmean, median, stdev
+from statistics import fmean, stdev
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +24,8 @@ import numpy as np
 from control.plate import submerged_part
 from estimation.origin_fit import fit_through_origin
 from experiments.curve_fit import Array
-from experiments.loadcell_contact import Course, StrokeError, find_contact, without_spikes
+from experiments.loadcell_alignment import Alignment
+from experiments.loadcell_contact import Course, StrokeError
 from experiments.loadcell_motion import (
     RATE_EXPONENT,
     REVERSAL_SHARE,
@@ -39,22 +39,16 @@ from experiments.loadcell_motion import (
     find_extraction,
     find_insertion,
     find_shear,
-    wide_pace,
 )
-from experiments.side_by_side import Show
+from experiments.stage_track import Places
 
 SHEAR, INSERTION = "shear", "insertion"
 KINDS = (SHEAR, INSERTION)
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 SPEED_BOUND = 0.05  # from the one that was set, beyond which it is said
 SINGLE_SPEED_BOUND = 0.12  # the same of a single trial, before it is known beside the others
-LEAST_SPEED_DOUBT, LEAST_RAMP_DOUBT = 0.005, 0.1  # of a stage, from trial to trial
-SET_SPEED_DOUBT = 0.01  # of a stage's controller
-MEDIAN_ERROR = 1.25  # times that of a mean
-AGREEING = 3.0  # standard errors
 RESIDUAL_NOISES, RESIDUAL_SHARE = 4.0, 0.03
 BLOCKS = 8  # of a steady shear, whose means tell its scatter
-NORMAL_MAD = 1.4826
 DEPTH_POWERS = {"k_p": 1.0, "k_s": 2.0, "k_e": 1.0}  # with which a depth that was set wrong enters
 CALLIPERS_M = 0.05e-3
 
@@ -78,6 +72,7 @@ class Recorded(NamedTuple):
     times_s: Array
     forces_n: Array
     zero_n: float
+    places: Places | None = None  # of the stage, where an encoder told them throughout
 
 
 @dataclass(frozen=True)
@@ -92,17 +87,25 @@ class Analysed:
     problem: str = ""  # why there is no coefficient
     remark: str = ""
     shared_doubt: float = 0.0  # of the speed, as a share, which all trials of a stage have alike
+    places_m: Array | None = None  # depths of an insertion, ways of a shear, as an encoder measured them
+    place_error_m: float = 0.0  # of them, one standard error
+    alignment: Alignment | None = None  # of an encoder and the cell
+
+    @property
+    def is_measured(self) -> bool:
+        return self.places_m is not None
 
     @property
     def pace(self) -> Pace | None:
-        return self.motion.pace if isinstance(self.motion, Insertion) else None
+        """As the force tells it."""
+        return self.motion.pace if isinstance(self.motion, Insertion) and not self.is_measured else None
 
     @property
     def speed_m_s(self) -> float | None:
-        """Of the stage, as found; a shear tells it roughly, from when the force began and fell."""
+        """Of the stage, as found; without an encoder a shear tells it roughly, from when the force began and fell."""
         if isinstance(self.motion, Shear):
             return self.motion.speed_m_s
-        return None if self.pace is None else self.pace.speed_m_s
+        return None if self.motion is None else self.motion.pace.speed_m_s
 
 
 class OfMud(NamedTuple):
@@ -119,65 +122,13 @@ class OfMud(NamedTuple):
         return hypot(self.trials_error, self.bench_error)
 
 
-def analyse(trials: Sequence[Recorded], settings: StageSettings, show: Show) -> list[Analysed]:
-    """All trials of one stage; the second time near its median pace."""
-    first = []
-    for done, trial in enumerate(trials):
-        show(done, len(trials))
-        first.append(analyse_trial(trial, settings, wide_pace(settings)))
-    paces = [told.pace for told in first if told.pace is not None]
-    if len(paces) < 3:
-        return first
-    common, doubt = common_pace(paces, settings)
-    again = [analyse_trial(told.recorded, settings, common) if told.pace else told for told in first]
-    return [replace(told, shared_doubt=doubt) if told.pace else told for told in again]
-
-
-def common_pace(paces: Sequence[Pace], settings: StageSettings) -> tuple[Pace, float]:
-    """The median of a stage's trials, and what they scatter beyond their own doubts. The speed that was set counts as
-    a measurement of its own, unless the trials say that it was another. And the doubt of that speed, which grows where
-    the two do not agree.
-    """
-    speeds, doubts = [pace.speed_m_s for pace in paces], [pace.speed_doubt for pace in paces]
-    speed, scatter = _common(speeds, doubts)
-    error = MEDIAN_ERROR * max(stdev(speeds) / speed, median(doubts), LEAST_SPEED_DOUBT) / sqrt(len(paces))
-    apart = abs(speed / settings.speed_m_s - 1.0) / hypot(error, SET_SPEED_DOUBT)
-    if apart < AGREEING:
-        told, own = 1.0 / SET_SPEED_DOUBT**2, 1.0 / error**2
-        speed = (told * settings.speed_m_s + own * speed) / (told + own)
-        error = max(1.0, apart) / sqrt(told + own)
-    ramp, ramp_scatter = _common(
-        [pace.acceleration_m_s2 for pace in paces], [pace.acceleration_doubt for pace in paces]
-    )
-    return Pace(speed, ramp, max(LEAST_SPEED_DOUBT, scatter, error), max(LEAST_RAMP_DOUBT, ramp_scatter)), error
-
-
-def _common(values: Sequence[float], doubts: Sequence[float]) -> tuple[float, float]:
-    return median(values), sqrt(max(0.0, _scatter(values) ** 2 - median(doubts) ** 2))
-
-
-def _scatter(values: Sequence[float]) -> float:
-    """As a share, whatever single ones do."""
-    middle = median(values)
-    return NORMAL_MAD * median(abs(value / middle - 1.0) for value in values)
-
-
-def analyse_trial(trial: Recorded, settings: StageSettings, expected: Pace) -> Analysed:
-    try:
-        course = find_contact(trial.times_s, without_spikes(trial.forces_n))
-        analysed = _shear if trial.kind == SHEAR else _insertion
-        return analysed(trial, course, settings, expected)
-    except (StrokeError, np.linalg.LinAlgError) as problem:
-        return Analysed(trial, problem=str(problem))
-
-
 def volume_m3(settings: StageSettings, depths_m: Array) -> Array:
     plate = settings.plate
     areas_m2 = [submerged_part(plate, float(depth_m), 0.0, 1.0).area_m2 for depth_m in depths_m]
     return plate.plate_thickness_m * np.array(areas_m2)
 
 
-def _insertion(trial: Recorded, course: Course, settings: StageSettings, expected: Pace) -> Analysed:
+def analyse_insertion(trial: Recorded, course: Course, settings: StageSettings, expected: Pace) -> Analysed:
     motion = find_insertion(course, settings, expected)
     told = {"k_p": _k_p(course, motion, settings)}
     extraction, remark = None, _course_remark(course, motion)
@@ -208,7 +159,7 @@ def _k_p(course: Course, motion: Insertion, settings: StageSettings) -> Coeffici
     forces_n = course.forces_n - motion.level_n - motion.slowing_n * wet * (1.0 - shares**RATE_EXPONENT)
     ways_m = np.clip(np.gradient(depths_m), 1e-9, None)
     shift = 1.5 * pace.speed_m_s * motion.surface_std_error_s / depth_m
-    return _slope(settings, depths_m[inside], forces_n[inside], ways_m[inside], hypot(shift, pace.speed_doubt))
+    return slope(settings, depths_m[inside], forces_n[inside], ways_m[inside], hypot(shift, pace.speed_doubt))
 
 
 def _k_e(course: Course, motion: Insertion, extraction: Extraction, settings: StageSettings) -> Coefficient:
@@ -218,10 +169,10 @@ def _k_e(course: Course, motion: Insertion, extraction: Extraction, settings: St
     inside = (depths_m > 0.0) & (depths_m <= (1.0 - REVERSAL_SHARE) * settings.depth_m)
     forces_n = extraction.level_n - course.forces_n
     ways_m = np.clip(-np.gradient(depths_m), 1e-9, None)
-    return _slope(settings, depths_m[inside], forces_n[inside], ways_m[inside], pace.speed_doubt)
+    return slope(settings, depths_m[inside], forces_n[inside], ways_m[inside], pace.speed_doubt)
 
 
-def _slope(settings: StageSettings, depths_m: Array, forces_n: Array, ways_m: Array, doubt: float) -> Coefficient:
+def slope(settings: StageSettings, depths_m: Array, forces_n: Array, ways_m: Array, doubt: float) -> Coefficient:
     """k of F = k V, with the doubt of samples that hang together; `doubt` is that of the depths' course."""
     volumes_m3, roots = volume_m3(settings, depths_m), np.sqrt(ways_m)
     square = float(np.sum(ways_m * volumes_m3 * volumes_m3))
@@ -237,7 +188,7 @@ def _slope(settings: StageSettings, depths_m: Array, forces_n: Array, ways_m: Ar
     return Coefficient(value, hypot(fit.std_error, doubt * value))
 
 
-def _shear(trial: Recorded, course: Course, settings: StageSettings, expected: Pace) -> Analysed:
+def analyse_shear(trial: Recorded, course: Course, settings: StageSettings, expected: Pace) -> Analysed:
     zero_n = -trial.zero_n if course.turned else trial.zero_n
     motion = find_shear(course, settings, zero_n)
     steady = (course.times_s >= motion.steady_from_s) & (course.times_s <= motion.steady_to_s)
@@ -278,6 +229,8 @@ def depths_of(trial: Analysed, settings: StageSettings) -> Array | None:
     motion, extraction = trial.motion, trial.extraction
     if trial.course is None or not isinstance(motion, Insertion):
         return None
+    if trial.places_m is not None:
+        return trial.places_m
     times_s, depth_m, pace = trial.course.times_s, settings.depth_m, motion.pace
     down_m, _ = descent(times_s - motion.surface_s, pace.speed_m_s, pace.acceleration_m_s2, depth_m)
     if extraction is None:

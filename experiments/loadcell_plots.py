@@ -14,6 +14,7 @@ import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 
 from control.plate import submerged_part  # noqa: E402
+from experiments.curve_fit import Array  # noqa: E402
 from experiments.loadcell_comparison import Compared  # noqa: E402
 from experiments.loadcell_fits import (  # noqa: E402
     COEFFICIENTS,
@@ -47,11 +48,13 @@ def plot_mud(trials: Sequence[Analysed], told: Mapping[str, OfMud], settings: St
     if strokes:
         _plot_vertical_model(vertical, curve, strokes[-1], told, settings)
     drags = [trial for trial in trials if isinstance(trial.motion, Shear)]
+    over_way = bool(drags) and all(trial.is_measured for trial in drags)
     for i, trial in enumerate(drags):
-        _plot_shear(shear, trial, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
+        _plot_shear(shear, trial, over_way, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
     if drags:
-        _plot_shear_model(shear, drags[-1], told["k_s"], settings)
+        _plot_shear_model(shear, drags[-1], over_way, told["k_s"], settings)
     _name_axes(vertical, shear, depth, curve)
+    _name_places(shear, depth, curve, over_way, {trial.is_measured for trial in strokes})
     figure.savefig(path, dpi=DPI)
     plt.close(figure)
 
@@ -75,47 +78,46 @@ def _plot_insertion(
 def _plot_vertical_model(
     vertical: Axes, curve: Axes, trial: Analysed, told: Mapping[str, OfMud], settings: StageSettings
 ) -> None:
-    motion = trial.motion
-    assert isinstance(motion, Insertion)
-    depths_m = np.linspace(0.0, settings.depth_m, 40)
-    down_n = told["k_p"].value * volume_m3(settings, depths_m)
-    vertical.plot(depths_m / motion.pace.speed_m_s, down_n, label="model", **MODEL)
-    curve.plot(100.0 * depths_m, down_n, **MODEL)
+    """Against time along the depths of the trial."""
+    motion, course, trial_m = trial.motion, trial.course, depths_of(trial, settings)
+    assert isinstance(motion, Insertion) and course is not None and trial_m is not None
+    since_s, even_m = course.times_s - motion.surface_s, np.linspace(0.0, settings.depth_m, 40)
+    strokes = [("k_p", 1.0, 1.0, motion.surface_s, motion.stop_s)]
     if trial.extraction is not None:
-        depths_m = (1.0 - REVERSAL_SHARE) * depths_m
-        up_n = -told["k_e"].value * volume_m3(settings, depths_m)
-        out_s = trial.extraction.out_s - motion.surface_s
-        vertical.plot(out_s - depths_m / motion.pace.speed_m_s, up_n, **MODEL)
-        curve.plot(100.0 * depths_m, up_n, **MODEL)
+        strokes.append(("k_e", -1.0, 1.0 - REVERSAL_SHARE, trial.extraction.lift_s, trial.extraction.out_s))
+    for name, sign, share, from_s, to_s in strokes:
+        per_m3, within = sign * told[name].value, (trial_m >= 0.0) & (trial_m <= share * np.nanmax(trial_m))
+        shown = within & (course.times_s >= from_s) & (course.times_s <= to_s)
+        label = "model" if name == "k_p" else None
+        vertical.plot(since_s[shown], per_m3 * volume_m3(settings, trial_m[shown]), label=label, **MODEL)
+        curve.plot(100.0 * share * even_m, per_m3 * volume_m3(settings, share * even_m), **MODEL)
 
 
-def _plot_shear(panel: Axes, trial: Analysed, colour: str, label: str) -> None:
+def _plot_shear(panel: Axes, trial: Analysed, over_way: bool, colour: str, label: str) -> None:
     motion, course = trial.motion, trial.course
     assert isinstance(motion, Shear) and course is not None
     zero_n = -trial.recorded.zero_n if course.turned else trial.recorded.zero_n
     shown = course.times_s > motion.begin_s - BEFORE_S
-    panel.plot(
-        course.times_s[shown] - motion.begin_s,
-        course.forces_n[shown] - zero_n,
-        color=colour,
-        linewidth=1.0,
-        label=label,
-    )
+    along = _ways_cm(trial) if over_way else course.times_s - motion.begin_s
+    panel.plot(along[shown], course.forces_n[shown] - zero_n, color=colour, linewidth=1.0, label=label)
 
 
-def _plot_shear_model(panel: Axes, trial: Analysed, told: OfMud, settings: StageSettings) -> None:
-    motion = trial.motion
-    assert isinstance(motion, Shear)
+def _ways_cm(trial: Analysed) -> Array:
+    return np.asarray(100.0 * trial.places_m) if trial.places_m is not None else np.empty(0)
+
+
+def _plot_shear_model(panel: Axes, trial: Analysed, over_way: bool, told: OfMud, settings: StageSettings) -> None:
+    motion, course = trial.motion, trial.course
+    assert isinstance(motion, Shear) and course is not None
     moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
-    steady_s = [motion.steady_from_s - motion.begin_s, motion.steady_to_s - motion.begin_s]
-    panel.plot(steady_s, [told.value * moment_m3] * 2, label="model", **MODEL)
+    along = np.array([motion.steady_from_s, motion.steady_to_s])
+    along = np.interp(along, course.times_s, _ways_cm(trial)) if over_way else along - motion.begin_s
+    panel.plot(along, [told.value * moment_m3] * 2, label="model", **MODEL)
 
 
 def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:
     vertical.set_title("insertion, hold, extraction", fontsize="medium")
     shear.set_title("horizontal shear", fontsize="medium")
-    depth.set_title("depth, as found from the force", fontsize="medium")
-    curve.set_title("force over depth", fontsize="medium")
     vertical.set_ylabel("force on the plate (N), up positive")
     shear.set_ylabel("force against the drag (N)")
     depth.set_ylabel("depth (cm)")
@@ -124,10 +126,17 @@ def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:
     curve.set_xlabel("depth (cm)")
     depth.sharex(vertical)
     depth.set_xlabel("time since the surface (s)")
-    shear.set_xlabel("time since the force began (s)")
     for panel in (vertical, shear):
         if panel.get_legend_handles_labels()[0]:
             panel.legend(fontsize="small", loc="upper right" if panel is vertical else "lower center", ncols=2)
+
+
+def _name_places(shear: Axes, depth: Axes, curve: Axes, over_way: bool, measured: set[bool]) -> None:
+    found = "as measured" if measured == {True} else "as found from the force"
+    found = "measured or found from the force" if len(measured) == 2 else found
+    depth.set_title(f"depth, {found}", fontsize="medium")
+    curve.set_title("force over the measured depth" if measured == {True} else "force over depth", fontsize="medium")
+    shear.set_xlabel("measured way of the stage (cm)" if over_way else "time since the force began (s)")
 
 
 def plot_coefficients(muds: Mapping[str, Mapping[str, OfMud]], path: Path) -> None:

@@ -12,16 +12,13 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from drivers.load_cell_lines import NUMBER, LineFormat, find_format
-from drivers.load_cell_port import COMMON_BAUDS, LoadCellPort, LoadCellPortError, Sample
+from drivers.load_cell_port import LoadCellPort, Sample
+from drivers.stage_encoder import Place, StageEncoder
 from experiments.bench_robot import BenchError
 from experiments.loadcell_contact import CONTACT_NOISES, LEAST_FORCE_N, LEAST_NOISE_N, QUIET_S
 
-POLL_S = 0.01
-LISTENING_S, STARTING_S = 2.0, 4.0
+POLL_S = 0.005
 TARE_S = 1.0
-PROBE_S = 0.8
-TEXT_SHARE, READABLE_SHARE = 0.8, 0.6  # below it, it is another baud rate; another format
 ABSENCE_S = 300.0  # for which an adapter may be away
 CONTACT_SAMPLES = 3
 FOLLOWING = 0.01  # of a zero that drifts while nobody starts, per sample
@@ -49,6 +46,15 @@ class Tare(NamedTuple):
     samples: int
 
 
+class PlaceStretch(NamedTuple):
+    """What an encoder on the stage told meanwhile."""
+
+    places: list[Place]
+    garbled_lines: int
+    drop_outs: int
+    breaks: int  # unplugged, or begun anew: places before and behind have not the same zero
+
+
 class Stretch(NamedTuple):
     """What was recorded of a stroke, and what became of the lines meanwhile."""
 
@@ -56,6 +62,7 @@ class Stretch(NamedTuple):
     garbled_lines: int
     drop_outs: int
     unpluggings: int
+    position: PlaceStretch | None = None  # where the stage has an encoder
 
     @property
     def overloads(self) -> int:
@@ -63,14 +70,23 @@ class Stretch(NamedTuple):
 
 
 class CellRecorder:
-    """Owns nothing but its port and its clock; `tell` says what a person should know at once."""
+    """Owns the places that came since it was last drained; `tell` says what a person should know at once."""
 
-    def __init__(self, port: LoadCellPort, clock: BenchClock, tell: Callable[[str], None]) -> None:
-        self.port, self.clock, self.tell = port, clock, tell
+    def __init__(
+        self,
+        port: LoadCellPort,
+        clock: BenchClock,
+        tell: Callable[[str], None],
+        encoder: StageEncoder | None = None,
+    ) -> None:
+        """`encoder`: of the stage; nothing waits for it."""
+        self.port, self.clock, self.tell, self.encoder = port, clock, tell, encoder
+        self._places: list[Place] = []
 
     def drain(self) -> None:
         """What comes while nobody wants it."""
-        self.port.read(self.clock.now_s())
+        self._read()
+        self._places = []
 
     def listen(self, duration_s: float) -> list[Sample]:
         self.await_port()
@@ -81,7 +97,13 @@ class CellRecorder:
 
     def poll(self) -> list[Sample]:
         self.clock.pass_time(POLL_S)
-        return self.port.read(self.clock.now_s())
+        return self._read()
+
+    def _read(self) -> list[Sample]:
+        now_s = self.clock.now_s()
+        if self.encoder is not None:
+            self._places += self.encoder.read(now_s)
+        return self.port.read(now_s)
 
     def await_port(self) -> None:
         """An adapter that was pulled out is waited for. Raises BenchError after a while."""
@@ -124,6 +146,7 @@ class CellRecorder:
         self.drain()
         port = self.port
         garbled, drop_outs, unpluggings = port.garbled_lines, port.clock.drop_outs, port.unpluggings
+        before = _counted(self.encoder)
         samples, begin_s = list[Sample](), self.clock.now_s()
         contact = _Contact(noise_n)
         end_s = begin_s + patience_s
@@ -132,10 +155,21 @@ class CellRecorder:
             samples += fresh
             if contact.heed(fresh):
                 end_s = self.clock.now_s() + stroke_s
+        places, after = self._places, _counted(self.encoder)
+        self._places = []
         self.await_port()
         return Stretch(
-            samples, port.garbled_lines - garbled, port.clock.drop_outs - drop_outs, port.unpluggings - unpluggings
+            samples,
+            port.garbled_lines - garbled,
+            port.clock.drop_outs - drop_outs,
+            port.unpluggings - unpluggings,
+            PlaceStretch(places, *(b - a for a, b in zip(before, after, strict=True))) if self.encoder else None,
         )
+
+
+def _counted(encoder: StageEncoder | None) -> tuple[int, int, int]:
+    """Garbled lines, drop-outs, breaks."""
+    return (0, 0, 0) if encoder is None else (encoder.counts.garbled, encoder.clock.drop_outs, encoder.breaks)
 
 
 class _Contact:
@@ -170,78 +204,3 @@ class _Contact:
         if not far:
             self._level_n += FOLLOWING * (sample.force_n - self._level_n)
         return self._away >= CONTACT_SAMPLES
-
-
-def examine_lines(recorder: CellRecorder, name: str) -> str:
-    """Whether what arrives is what was expected: the name of a format that reads it. Raises BenchError with what to do.
-
-    `name`: of the wanted format, or "auto".
-    """
-    port = recorder.port
-    recorder.listen(LISTENING_S)
-    if not port.recent_lines:  # a board that starts anew when its port is opened takes its time
-        recorder.listen(STARTING_S)
-    arrivals, lines = port.arrivals, port.recent_lines
-    if not lines:
-        raise BenchError(
-            f"nothing arrives on {port.path} at {port.baud} baud: check the amplifier's power and cable, that it sends "
-            "by itself and not only when asked, and that this is its port"
-        )
-    if arrivals.text < TEXT_SHARE:
-        raise BenchError(_wrong_baud(recorder))
-    if name == "auto":
-        found = find_format(lines)
-        if found is None:
-            raise BenchError(f"no named format reads these lines: {_shown(lines)}. {_columns_told(lines)}")
-        return found.name
-    if arrivals.readable < READABLE_SHARE:
-        found = find_format(lines)
-        advice = f"--format {found.name} does" if found else _columns_told(lines)
-        raise BenchError(
-            f"the format {name!r} reads {100.0 * arrivals.readable:.0f} % of the lines, such as {_shown(lines)}; "
-            + advice
-        )
-    return name
-
-
-def _shown(lines: Sequence[bytes]) -> str:
-    return " and ".join(repr(line.decode("ascii", "replace").strip()[:60]) for line in lines[-2:])
-
-
-def _columns_told(lines: Sequence[bytes]) -> str:
-    readable = [column for column in range(1, 10) if _reads(f"column{column}", lines)]
-    if readable:
-        names = " or ".join(f"--format column{column}" for column in readable)
-        return f"Choose the column of the load with {names}"
-    return (
-        "Is it a load cell's amplifier? Give --format a regular expression with (?P<value>...) that fits a whole line"
-    )
-
-
-def _reads(name: str, lines: Sequence[bytes]) -> bool:
-    line_format = LineFormat(name)
-    return sum(line_format.decode(line) is not None for line in lines) > 0.8 * len(lines)
-
-
-def _wrong_baud(recorder: CellRecorder) -> str:
-    """With the rate at which it is text, where there is one: every common one is tried."""
-    port = recorder.port
-    recorder.tell(f"what arrives at {port.baud} baud is no text: other rates are tried")
-    path, calibration, open_line = port.path, port.calibration, port.open_line
-    port.close()
-    for baud in COMMON_BAUDS:
-        if baud == port.baud:
-            continue
-        try:
-            tried = LoadCellPort(path, baud, LineFormat(NUMBER), calibration, open_line)
-        except LoadCellPortError:
-            continue
-        CellRecorder(tried, recorder.clock, recorder.tell).listen(PROBE_S)
-        is_text = tried.recent_lines and tried.arrivals.text > TEXT_SHARE
-        tried.close()
-        if is_text:
-            return f"{port.baud} is not the baud rate of {path}: at {baud} it sends text. Use --baud {baud}"
-    return (
-        f"what arrives on {path} is no text at {port.baud} baud, nor at any common rate: is it a load cell's amplifier "
-        "that sends lines of text?"
-    )

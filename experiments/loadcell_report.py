@@ -10,20 +10,32 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from experiments.loadcell import Results
+from experiments.loadcell_alignment import common_alignment
 from experiments.loadcell_comparison import Compared
 from experiments.loadcell_fits import CALLIPERS_M, COEFFICIENTS, Analysed, OfMud, bench_doubt
-from experiments.loadcell_motion import StageSettings
+from experiments.loadcell_motion import RATE_EXPONENT, Insertion, StageSettings
 from experiments.loadcell_trials import TrialPlan
 from experiments.report_page import Figure, Section
 
 TITLE = "Ground truth of mud from a load cell"
 METHOD = (
     "A plate on a load cell is dragged through the mud, and in other trials let down, held and drawn out (the paper's "
-    "section II-E). The stage is not connected: when it moved, and how fast, is found from the force's own course. "
-    "k_p and k_e are fitted by F = k V over the way down and over the last three quarters of the way up, V being the "
-    "submerged volume; k_s by F = k ∫ζ dA to the mean over the second half of the drag.\n\n"
+    "section II-E). k_p and k_e are fitted by F = k V over the way down and over the last three quarters of the way "
+    "up, V being the submerged volume; k_s by F = k ∫ζ dA to the mean over the second half of the drag.\n\n"
     "The paper gives its coefficients in figures only, so none of its values stand beside these."
+)
+UNCONNECTED = (
+    "The stage is not connected: when it moved, and how fast, is found from the force's own course, as that of a stage "
+    "of one speed."
+)
+MEASURED = (
+    "The stage's place came from an encoder. k_p and k_e are fitted against the measured depth, from the surface that "
+    "the force tells, over the samples in which the stage moved and had moved for 2 mm since it last rested; k_s to "
+    "the mean over the second half of the measured way, 5 mm behind a rest. Mud bears more the faster it is: how much, "
+    "the drags tell, and the coefficients are those at the speed that was set."
 )
 LEANING = (
     "A flipper's plate leans in the mud, and in clay no coefficient is the same for another plate or attitude. In the "
@@ -52,7 +64,7 @@ def errors_text(plan: TrialPlan) -> str:
         "F = k V leaves over, which in clay is most of it. The second ± is what no repetition shows, since all trials "
         f"have it alike: {_depth_text(plan)} and callipers ± {1000.0 * CALLIPERS_M:g} mm on width and thickness, "
         f"together {shares}; and the reading of the calibration. The weights themselves count as exact, and so does an "
-        "amplifier that prints grams or newtons by itself."
+        "amplifier that prints grams or newtons by itself. A depth that an encoder measured has no doubt of a ruler."
     )
 
 
@@ -87,7 +99,8 @@ def _plate_text(told: Mapping[str, Any], before: str, after: str = "_m") -> str:
 
 def sections_of(results: Results, plan: TrialPlan) -> list[Section]:
     rows, figures = coefficient_rows(results.muds), _coefficient_figures(results)
-    sections = [Section("Coefficients", f"{METHOD}\n\n{errors_text(plan)}", rows=rows, figures=figures)]
+    text = "\n\n".join([METHOD, *position_texts(results.trials), errors_text(plan)])
+    sections = [Section("Coefficients", text, rows=rows, figures=figures)]
     if results.compared:
         rows, figures = compared_rows(results.compared), _pairs(results)
         text = comparison_text(results, plan.settings)
@@ -97,6 +110,27 @@ def sections_of(results: Results, plan: TrialPlan) -> list[Section]:
     for mud, told in results.muds.items():
         sections.append(_mud_section(results.trials, mud, told, plan.settings))
     return sections
+
+
+def position_texts(trials: Sequence[Analysed]) -> list[str]:
+    """How the place was measured, and how well a sample's place is known; or that it was not."""
+    measured = [trial for trial in trials if trial.is_measured]
+    aligned = [trial.alignment for trial in measured if trial.alignment is not None]
+    insertions = [trial for trial in measured if isinstance(trial.motion, Insertion)]
+    if not measured:
+        return [UNCONNECTED]
+    if not aligned or not insertions:
+        return [MEASURED]
+    common, worst_m = common_alignment(aligned), max(trial.place_error_m for trial in insertions)
+    without = len(trials) - len(measured)
+    alone = f" {without} trials have no place: theirs is found from the force." if without else ""
+    return [
+        f"{MEASURED}{alone}",
+        f"Forces are stamped {1000.0 * common.lag_s:.1f} ± {1000.0 * common.lag_doubt_s:.1f} ms later than places, as "
+        "the strokes themselves tell; this and straight lines between the encoder's lines leave the depth of a sample "
+        f"known to within ± {1000.0 * worst_m:.2f} mm in the worst trial. Twice as fast, the mud bears "
+        f"{100.0 * common.rate_share * (2.0**RATE_EXPONENT - 1.0):.0f} % more.",
+    ]
 
 
 def _coefficient_figures(results: Results) -> list[Figure]:
@@ -149,15 +183,22 @@ def _cells(told: Mapping[str, OfMud]) -> list[str]:
 
 
 def trial_rows(trials: Sequence[Analysed]) -> list[list[str]]:
-    head = ["trial", *(f"{name} N/cm³" for name in COEFFICIENTS), "speed m/s", "remark"]
+    head = ["trial", *(f"{name} N/cm³" for name in COEFFICIENTS), "speed m/s", "measured cm", "remark"]
     rows = []
     for trial in trials:
         told = [trial.coefficients.get(name) for name in COEFFICIENTS]
         cells = ["" if each is None else _with_error(each.value, each.std_error, 1e6) for each in told]
         speed = "-" if trial.speed_m_s is None or not isfinite(trial.speed_m_s) else f"{trial.speed_m_s:.3f}"
         label = f"{trial.recorded.kind} {trial.recorded.key.rsplit('/', 1)[-1]}"
-        rows.append([label, *cells, speed, trial.problem or trial.remark])
+        rows.append([label, *cells, speed, _farthest(trial), trial.problem or trial.remark])
     return [head, *rows]
+
+
+def _farthest(trial: Analysed) -> str:
+    """Depth of an insertion, way of a shear."""
+    if trial.places_m is None:
+        return "-"
+    return f"{100.0 * float(np.nanmax(trial.places_m)):.2f} ± {100.0 * trial.place_error_m:.3f}"
 
 
 def compared_rows(compared: Sequence[Compared]) -> list[list[str]]:

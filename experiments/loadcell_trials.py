@@ -6,8 +6,6 @@ notebook says which file counts. Whoever starts the same experiment again goes o
 
 from __future__ import annotations
 
-import csv
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import count
@@ -16,33 +14,32 @@ from typing import Any
 
 import numpy as np
 
-from drivers.load_cell_port import Sample
+from experiments.loadcell_analysis import analyse_trial
 from experiments.loadcell_fits import (
     INSERTION,
     KINDS,
     SINGLE_SPEED_BOUND,
     Analysed,
     Recorded,
-    analyse_trial,
     speed_remark,
 )
 from experiments.loadcell_motion import Insertion, Shear, StageSettings, wide_pace
-from experiments.loadcell_recording import CellRecorder, Stretch, Tare
+from experiments.loadcell_raw import load_recorded, raw_name, write_places, write_samples
+from experiments.loadcell_recording import CellRecorder, PlaceStretch, Stretch, Tare
 from experiments.loadcell_stage import Stage, Trial
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP, Person
 from experiments.side_by_side import Show
 
-RAW = "raw"
-COLUMNS = ("t_s", "force_n", "overloaded")
-KEEP = "k"
+KEEP, WITHOUT = "k", "w"
 MOST_ATTEMPTS = 3  # after which Enter means to leave it
 LEAST_DRIFT_N, DRIFT_SHARE = 0.02, 0.03  # of the largest force, by which the zero may move over a trial
 GARBLED_SHARE = 0.05
 MISSING_SHARE = 0.15  # of the samples of a stroke
 FLAT_SAMPLES = 8  # alike at the largest force: a cell that stops there without a word
-SLOW = 1.6  # times the duration of a stroke that is recorded at least
+SLOW, SLOW_BY_HAND = 1.6, 3.0  # times the duration of a stroke that is recorded at least
 RESERVE_S = 1.5
+LOOK_S, SILENT_S = 1.0, 1.0
 
 
 @dataclass(frozen=True)
@@ -115,27 +112,61 @@ def _answers(attempt: int) -> dict[str, str]:
 def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tuple[dict[str, Any], list[str]]:
     """What belongs into the notebook, and what is wrong with it."""
     recorder, stage = bench.recorder, bench.stage
+    heed_encoder(bench)
     before = recorder.tare()
     if trial.kind != INSERTION:
         stage.lower()
     stage.start(trial)
-    stretch = recorder.record(before.noise_n, stage.patience_s, stroke_s(trial.kind, plan.settings))
-    name = f"{RAW}/{_file_name(trial.key)}_{attempt}.csv"
+    stretch = recorder.record(
+        before.noise_n, stage.patience_s, stroke_s(trial.kind, plan.settings, bool(recorder.encoder))
+    )
+    name, place_name = raw_name(trial.key, attempt), raw_name(trial.key, attempt, "_position")
     write_samples(bench.folder / name, stretch.samples)
+    if stretch.position is not None:
+        write_places(bench.folder / place_name, stretch.position.places)
     stage.lift()
     after = recorder.tare()
     entry = _entry(trial, name, recorder, stretch, before, after)
+    if stretch.position is not None:
+        entry["position"] = _position_entry(place_name, recorder, stretch.position)
     recorded = load_recorded(bench.folder, trial.key, entry)
     analysed = analyse_trial(recorded, plan.settings, wide_pace(plan.settings))
     _heed_speed(bench, analysed, plan.settings)
     return entry, judge(analysed, stretch, before, after)
 
 
-def stroke_s(kind: str, settings: StageSettings) -> float:
-    """How long is recorded from the contact on."""
+def stroke_s(kind: str, settings: StageSettings, is_measured: bool = False) -> float:
+    """How long is recorded from the contact on; a stage with an encoder may be pushed by a hand."""
+    slow = SLOW_BY_HAND if is_measured else SLOW
     if kind == INSERTION:
-        return 2.0 * SLOW * settings.depth_m / settings.speed_m_s + settings.hold_s + RESERVE_S
-    return SLOW * settings.shear_way_m / settings.speed_m_s
+        return 2.0 * slow * settings.depth_m / settings.speed_m_s + settings.hold_s + RESERVE_S
+    return slow * settings.shear_way_m / settings.speed_m_s
+
+
+def heed_encoder(bench: TrialBench) -> None:
+    """One that is gone or silent is looked after, or given up: a force says much by itself."""
+    recorder, looks = bench.recorder, 0
+    while recorder.encoder is not None and (trouble := _trouble_of(recorder)):
+        bench.person.tell(trouble)
+        answers = {GO_ON: "look again", WITHOUT: "go on by the force alone"}
+        answer = bench.person.ask("Is it back?", answers, recorder.drain) if looks < MOST_ATTEMPTS else WITHOUT
+        if answer == WITHOUT:
+            recorder.encoder.close()
+            recorder.encoder = None
+            bench.person.tell("going on without the position, until the same command is started again")
+        recorder.listen(LOOK_S)
+        looks += 1
+
+
+def _trouble_of(recorder: CellRecorder) -> str:
+    encoder = recorder.encoder
+    if encoder is None:
+        return ""
+    if not encoder.is_there:
+        return f"the stage's encoder is gone ({encoder.last_problem}): plug {encoder.settings.path} in again"
+    if encoder.silent_for_s(recorder.clock.now_s()) > SILENT_S:
+        return f"no count comes from the stage's encoder on {encoder.settings.path}: check its power and cable"
+    return ""
 
 
 def _heed_speed(bench: TrialBench, analysed: Analysed, settings: StageSettings) -> None:
@@ -166,6 +197,18 @@ def _entry(
     }
 
 
+def _position_entry(name: str, recorder: CellRecorder, told: PlaceStretch) -> dict[str, Any]:
+    encoder = recorder.encoder
+    return {
+        "file": name,
+        "places": len(told.places),
+        "rate_hz": None if encoder is None else encoder.rate_hz,
+        "garbled_lines": told.garbled_lines,
+        "drop_outs": told.drop_outs,
+        "breaks": told.breaks,
+    }
+
+
 def judge(analysed: Analysed, stretch: Stretch, before: Tare, after: Tare) -> list[str]:
     """What a trial should not be kept with."""
     told, recorded = list[str](), analysed.recorded
@@ -180,6 +223,8 @@ def judge(analysed: Analysed, stretch: Stretch, before: Tare, after: Tare) -> li
     if stretch.garbled_lines > GARBLED_SHARE * lines:
         told.append(f"{stretch.garbled_lines} of {lines} lines were garbled: check cable and ground")
     told += [each for each in (analysed.problem, analysed.remark) if each]
+    if stretch.position is not None:
+        told += _judge_position(analysed, stretch.position)
     moved_n, largest_n = abs(after.force_n - before.force_n), _largest_n(recorded)
     if moved_n > max(LEAST_DRIFT_N, DRIFT_SHARE * largest_n):
         told.append(
@@ -190,6 +235,30 @@ def judge(analysed: Analysed, stretch: Stretch, before: Tare, after: Tare) -> li
     if missing > MISSING_SHARE:
         told.append(f"{100.0 * missing:.0f} % of the samples of its strokes are missing: check cable and connectors")
     return told
+
+
+def _judge_position(analysed: Analysed, told: PlaceStretch) -> list[str]:
+    if told.breaks:
+        return ["the stage's encoder was unplugged or began anew in the middle of it: kept, its force counts alone"]
+    if not told.places:
+        return ["the stage's encoder told no place: kept, its force counts alone"]
+    missing = _share_without_place(analysed)
+    if missing > MISSING_SHARE:
+        return [
+            f"for {100.0 * missing:.0f} % of its strokes the stage's place is not known "
+            f"({told.garbled_lines} lines garbled, {told.drop_outs} gaps): check the encoder's cable and connectors"
+        ]
+    return []
+
+
+def _share_without_place(analysed: Analysed) -> float:
+    if analysed.places_m is None or analysed.course is None:
+        return 0.0
+    times_s, shares = analysed.course.times_s, [0.0]
+    for begin_s, end_s in _strokes(analysed):
+        inside = (times_s >= begin_s) & (times_s < end_s)
+        shares.append(float(np.mean(np.isnan(analysed.places_m[inside]))) if np.any(inside) else 0.0)
+    return max(shares)
 
 
 def _largest_n(recorded: Recorded) -> float:
@@ -225,31 +294,3 @@ def _strokes(analysed: Analysed) -> Iterable[tuple[float, float]]:
         yield motion.surface_s, motion.stop_s
     if extraction is not None:
         yield extraction.lift_s, extraction.out_s
-
-
-def _file_name(key: str) -> str:
-    return re.sub(r"[^\w.]+", "_", key)
-
-
-def write_samples(path: Path, samples: Iterable[Sample]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        writer.writerows((f"{s.stamp_s:.6f}", f"{s.force_n:.6f}", int(s.overloaded)) for s in samples)
-
-
-def load_recorded(folder: Path, key: str, entry: dict[str, Any]) -> Recorded:
-    """From the disk. Raises OSError, ValueError where the file is none of these."""
-    with (folder / entry["file"]).open(newline="", encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["overloaded"] == "0"]
-    times_s = np.array([float(row["t_s"]) for row in rows])
-    forces_n = np.array([float(row["force_n"]) for row in rows])
-    zero_n = (entry["zero_before_n"] + entry["zero_after_n"]) / 2.0
-    return Recorded(key, entry["mud"], entry["kind"], times_s, forces_n, zero_n)
-
-
-def load_all(folder: Path, notebook: Notebook) -> list[Recorded]:
-    """The trials that count."""
-    counted = {key: entry for key, entry in notebook.entries.items() if "file" in entry and not entry.get("skipped")}
-    return [load_recorded(folder, key, entry) for key, entry in counted.items()]

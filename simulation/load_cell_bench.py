@@ -1,8 +1,9 @@
 """A bench with a stage, a plate, a load cell and its amplifier, and its own time: all of II-E but the people.
 
 Time passes when it is told to, as fast as the machine can, or with the clock on the wall where this module is run by
-itself: `python -m simulation.load_cell_bench LINK [--mud W]` puts an amplifier at LINK, to be opened as any serial
-port, and obeys words on its standard input: insert, lower, drag, lift, remix [W], turn, hang [G], unplug, plug, quit.
+itself: `python -m simulation.load_cell_bench LINK [--mud W] [--position] [--hand]` puts an amplifier at LINK, to be
+opened as any serial port, and an encoder of the stage at LINK_position; it obeys words on its standard input: insert,
+lower, drag, lift, remix [W], turn, hang [G], unplug, plug, quit.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from simulation.clay import clay_of_water
 from simulation.load_cell import LoadCell
 from simulation.load_cell_emulator import STYLES, AmplifierParameters, EmulatedAmplifier
 from simulation.plate_stage import CarriedPlate, PlateStage, StageParameters
+from simulation.stage_encoder_emulator import EmulatedStageEncoder, StageEncoderParameters
+from simulation.stage_motion import HandParameters
 
 STEP_S = 0.01
 RELAXATION = 0.13  # share of the load that a hold loses, as in the authors' logs
@@ -42,9 +45,14 @@ class EmulatedBench:
         amplifier: AmplifierParameters | None = None,
         stage: StageParameters | None = None,
         seed: int = 1,
+        encoder: StageEncoderParameters | None = None,
     ) -> None:
+        """With an `encoder`, which appears beside `link` as its name and `_position`."""
         self.stage = PlateStage(plate, stage)
         self.amplifier = EmulatedAmplifier(self.stage.mean_force_n, amplifier or AmplifierParameters(), link, seed)
+        self.encoder: EmulatedStageEncoder | None = None
+        if encoder is not None:
+            self.encoder = EmulatedStageEncoder(self.stage.travelled_m, encoder, position_link(link), seed + 1)
         self.events: list[Event] = []
         self._now_s = 0.0
         self.stage.mean_force_n(0.0)
@@ -58,6 +66,8 @@ class EmulatedBench:
             self._now_s = min(self._now_s + STEP_S, end_s)
             self._happen()
             self.amplifier.step(self._now_s)
+            if self.encoder is not None:
+                self.encoder.step(self._now_s)
 
     def _happen(self) -> None:
         for event in [event for event in self.events if event[0] <= self._now_s]:
@@ -66,6 +76,12 @@ class EmulatedBench:
 
     def close(self) -> None:
         self.amplifier.close()
+        if self.encoder is not None:
+            self.encoder.close()
+
+
+def position_link(link: Path) -> Path:
+    return link.with_name(f"{link.name}_position")
 
 
 def obey(bench: EmulatedBench, words: list[str]) -> str:
@@ -83,6 +99,8 @@ def obey(bench: EmulatedBench, words: list[str]) -> str:
         "unplug": bench.amplifier.unplug,
         "plug": bench.amplifier.plug_in,
     }
+    if bench.encoder is not None:
+        orders |= {"unplug-position": bench.encoder.unplug, "plug-position": bench.encoder.plug_in}
     if words[0] not in orders:
         return f"there are {', '.join(orders)} and quit"
     orders[words[0]]()
@@ -96,10 +114,16 @@ def main() -> None:
     parser.add_argument("--style", choices=STYLES, default="counts")
     parser.add_argument("--baud", type=int, default=115200)
     parser.add_argument("--rate", type=float, default=80.0, metavar="HZ")
+    parser.add_argument("--position", action="store_true", help="an encoder beside it, at LINK_position, 10 um a count")
+    parser.add_argument("--hand", action="store_true", help="the stage is pushed by a hand")
     options = parser.parse_args()
     amplifier = AmplifierParameters(rate_hz=options.rate, style=options.style, baud=options.baud)
-    bench = EmulatedBench(clay_plate(options.mud), options.link, amplifier)
+    stage = StageParameters(hand=HandParameters() if options.hand else None)
+    encoder = StageEncoderParameters() if options.position else None
+    bench = EmulatedBench(clay_plate(options.mud), options.link, amplifier, stage, encoder=encoder)
     bench.amplifier.awaits_delivery = False  # somebody else reads at any moment
+    if bench.encoder is not None:
+        bench.encoder.awaits_delivery = False
     begin_s, words = time.monotonic(), [""]
     try:
         while words != ["quit"]:

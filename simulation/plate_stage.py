@@ -1,17 +1,19 @@
 """A plate on a linear stage, with a load cell between them: what a laboratory's reference measurement feels.
 
-The stage runs strokes at one speed with ramps of constant acceleration, started whenever its operator pleases. It
-carries a plate down into the mud and up again, or through it at a depth; the cell feels the mud's force along the
-stroke. Any plate will do that says what acts on it after a step of motion, such as simulation/load_cell.py in clay.
+The stage runs strokes at one speed with ramps of constant acceleration, or is pushed by a hand (stage_motion.py),
+started whenever its operator pleases. It carries a plate down into the mud and up again, or through it at a depth; the
+cell feels the mud's force along the stroke. Any plate will do that says what acts on it after a step of motion, such as
+simulation/load_cell.py in clay.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sqrt
+from random import Random
 from typing import NamedTuple, Protocol
 
 from control.records import NEVER_S
+from simulation.stage_motion import HandMotion, HandParameters, Motion, RampedMotion
 
 MOVING_STEP_S = 0.0005
 RESTING_STEP_S = 0.01  # mud that relaxes takes a fifth of a second
@@ -41,28 +43,8 @@ class Drive(NamedTuple):
 class StageParameters(NamedTuple):
     acceleration_m_s2: float = 2.0
     cell_sign: float = 1.0  # -1: a cell that is mounted the other way round
-
-
-def ramped_way_m(time_s: float, way_m: float, speed_m_s: float, acceleration_m_s2: float) -> float:
-    """Along a trapezoid of speed, or a triangle where the way is short; from 0 to `way_m`."""
-    peak_m_s = min(speed_m_s, sqrt(way_m * acceleration_m_s2))
-    ramp_s = peak_m_s / acceleration_m_s2
-    cruise_s = way_m / peak_m_s - ramp_s
-    if time_s <= 0.0:
-        return 0.0
-    if time_s < ramp_s:
-        return acceleration_m_s2 * time_s * time_s / 2.0
-    if time_s < ramp_s + cruise_s:
-        return peak_m_s * (time_s - ramp_s / 2.0)
-    left_s = max(0.0, 2.0 * ramp_s + cruise_s - time_s)
-    return way_m - acceleration_m_s2 * left_s * left_s / 2.0
-
-
-def ramped_duration_s(way_m: float, speed_m_s: float, acceleration_m_s2: float) -> float:
-    peak_m_s = min(speed_m_s, sqrt(way_m * acceleration_m_s2))
-    if peak_m_s == 0.0:
-        return 0.0
-    return way_m / peak_m_s + peak_m_s / acceleration_m_s2
+    hand: HandParameters | None = None  # that pushes it, in place of the controller; but for lowering and lifting
+    seed: int = 1  # of the hand
 
 
 class PlateStage:
@@ -72,6 +54,9 @@ class PlateStage:
         self.plate = plate
         self.parameters = parameters or StageParameters()
         self.hung_n = 0.0  # a calibration weight on the cell
+        self._random = Random(self.parameters.seed)
+        self._travelled_m = 0.0  # by strokes that are over
+        self._drives: list[tuple[float, Drive, Motion]] = []
         self.reset()
 
     def reset(self) -> None:
@@ -81,7 +66,7 @@ class PlateStage:
         self.force_n = 0.0
         self.along_sideways = False  # what the cell is mounted for
         self._time_s = NEVER_S
-        self._drives: list[tuple[float, Drive]] = []
+        self._forget_drives()
         self._ends_s = NEVER_S
 
     def place_over(self, plate: CarriedPlate, sideways: bool) -> None:
@@ -93,7 +78,7 @@ class PlateStage:
     def insert(self, start_s: float, depth_m: float, speed_m_s: float, hold_s: float) -> None:
         """Down from above the mud, hold, and up again."""
         way_m = LIFTED_M + depth_m
-        self._drive(start_s, [Drive(-way_m, speed_m_s, hold_s), Drive(way_m, speed_m_s)])
+        self._drive(start_s, [Drive(-way_m, speed_m_s, hold_s), Drive(way_m, speed_m_s)], self.parameters.hand)
 
     def lower(self, start_s: float, depth_m: float) -> None:
         self._drive(start_s, [Drive(self.plate.depth_m - depth_m, GUIDE_SPEED_M_S)])
@@ -102,15 +87,30 @@ class PlateStage:
         self._drive(start_s, [Drive(LIFTED_M + self.plate.depth_m, GUIDE_SPEED_M_S)])
 
     def drag(self, start_s: float, way_m: float, speed_m_s: float) -> None:
-        self._drive(start_s, [Drive(-way_m, speed_m_s, sideways=True)])
+        self._drive(start_s, [Drive(-way_m, speed_m_s, sideways=True)], self.parameters.hand)
 
-    def _drive(self, start_s: float, drives: Sequence[Drive]) -> None:
-        acceleration = self.parameters.acceleration_m_s2
-        self._drives = []
+    def _drive(self, start_s: float, drives: Sequence[Drive], hand: HandParameters | None = None) -> None:
+        self._forget_drives()
         for drive in drives:
-            self._drives.append((start_s, drive))
-            start_s += ramped_duration_s(abs(drive.way_m), drive.speed_m_s, acceleration) + drive.pause_s
+            motion = self._motion_of(drive, hand)
+            self._drives.append((start_s, drive, motion))
+            start_s += motion.duration_s + drive.pause_s
         self._ends_s = start_s
+
+    def _motion_of(self, drive: Drive, hand: HandParameters | None) -> Motion:
+        if hand is not None:
+            return HandMotion(abs(drive.way_m), hand, self._random)
+        return RampedMotion(abs(drive.way_m), drive.speed_m_s, self.parameters.acceleration_m_s2)
+
+    def _forget_drives(self) -> None:
+        self._travelled_m += sum(drive.way_m for _, drive, _ in self._drives)
+        self._drives = []
+
+    def travelled_m(self, at_s: float) -> float:
+        """Of the stage along its rail, forward and upward: what an encoder on it counts. `at_s` may lie behind."""
+        return self._travelled_m + sum(
+            _place_m(start_s, drive, motion, at_s) for start_s, drive, motion in self._drives
+        )
 
     @property
     def ends_s(self) -> float:
@@ -135,23 +135,23 @@ class PlateStage:
         dt_s = self._time_s - before_s
         forward_m = upward_m = 0.0
         if drive is not None:
-            start_s, wanted = drive
-            moved_m = self._place_m(start_s, wanted, self._time_s) - self._place_m(start_s, wanted, before_s)
+            wanted = drive[1]
+            moved_m = _place_m(*drive, self._time_s) - _place_m(*drive, before_s)
             forward_m, upward_m = (moved_m, 0.0) if wanted.sideways else (0.0, moved_m)
         forward_n, upward_n = self.plate.step(dt_s, forward_m / dt_s, upward_m / dt_s)
         self.force_n = self.hung_n + (forward_n if self.along_sideways else upward_n)
         return self.force_n * dt_s
 
-    def _drive_at(self, now_s: float) -> tuple[float, Drive] | None:
-        acceleration = self.parameters.acceleration_m_s2
-        for start_s, drive in self._drives:
-            if start_s <= now_s < start_s + ramped_duration_s(abs(drive.way_m), drive.speed_m_s, acceleration):
-                return start_s, drive
+    def _drive_at(self, now_s: float) -> tuple[float, Drive, Motion] | None:
+        for start_s, drive, motion in self._drives:
+            if start_s <= now_s < start_s + motion.duration_s:
+                return start_s, drive, motion
         return None
 
     def _next_start_s(self, now_s: float) -> float:
-        return min((start_s for start_s, _ in self._drives if start_s > now_s), default=float("inf"))
+        return min((start_s for start_s, _, _ in self._drives if start_s > now_s), default=float("inf"))
 
-    def _place_m(self, start_s: float, drive: Drive, now_s: float) -> float:
-        way_m = ramped_way_m(now_s - start_s, abs(drive.way_m), drive.speed_m_s, self.parameters.acceleration_m_s2)
-        return way_m if drive.way_m > 0.0 else -way_m
+
+def _place_m(start_s: float, drive: Drive, motion: Motion, now_s: float) -> float:
+    way_m = motion.way_m(now_s - start_s)
+    return way_m if drive.way_m > 0.0 else -way_m

@@ -17,6 +17,7 @@ from experiments.loadcell_fits import OfMud
 from simulation.clay import clay_of_water
 from simulation.load_cell import measure_shear
 from simulation.load_cell_bench import PAPER_PLATE
+from simulation.load_cell_emulator import AmplifierParameters, EmulatedAmplifier
 
 SHORT = ["experiment", "loadcell", "--simulated", "--json", "--trials", "1", "--mud", "48.6"]
 PLATE = {"width": 0.025, "height": 0.07, "thickness": 0.004}
@@ -130,6 +131,9 @@ def test_another_depth_in_the_same_folder_is_refused(
         (["--simulated", "--depth", "4"], "plate's height"),
         (["--simulated", "--format", "words"], "column1 to column9"),
         (["--simulated", "--unit", "stone"], "must be one of"),
+        (["--port", "/dev/nothing", "--position"], "--position PATH"),
+        (["--port", "/dev/nothing", "--position", "/dev/other"], "--position-step"),
+        (["--port", "/dev/nothing", "--position", "/dev/nothing"], "two ports"),
     ],
 )
 def test_what_cannot_be_is_refused_at_once(
@@ -173,3 +177,28 @@ def test_muds_are_compared_by_what_their_names_mean() -> None:
     assert (row.mud, row.coefficient, row.ratio) == ("48.6", "k_p", 2.0)
     assert row.ratio_std_error == pytest.approx(0.02)
     assert compared_with(None, muds) == []
+
+
+def test_a_simulated_hand_with_an_encoder_finds_the_mud_as_well(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, data, _ = run(capsys, *SHORT, "--position", "--seed", "3", "--out", str(tmp_path / "out"))
+    assert status == exit_codes.OK
+    report = json.loads(data)
+    (told,), truth = report["muds"], report["truth"]["48.6"]
+    for name in ("k_p", "k_s", "k_e"):
+        assert told[name]["value"] == pytest.approx(truth[name], rel=0.03)
+    assert all(trial["is_measured"] and trial["position"]["breaks"] == 0 for trial in report["trials"])
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "place came from an encoder" in page and "known to within" in page
+
+
+def test_an_encoder_s_port_that_there_is_not_ends_with_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell = EmulatedAmplifier(lambda _: 0.0, AmplifierParameters(), tmp_path / "cell")
+    ports = ["--port", str(tmp_path / "cell"), "--position", str(tmp_path / "none"), "--position-step", "10"]
+    status, _, told = run(capsys, "experiment", "loadcell", *ports, "--out", str(tmp_path / "out"))
+    cell.close()
+    assert status == exit_codes.REFUSED
+    assert "the stage's encoder: there is no serial port" in told and "go on without --position" in told

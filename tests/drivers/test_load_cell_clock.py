@@ -42,6 +42,24 @@ def test_a_gap_stays_a_gap_and_is_counted() -> None:
     assert clock.period_s == pytest.approx(PERIOD_S, rel=0.01)
 
 
+def test_lines_that_a_busy_computer_handed_over_late_do_not_spoil_the_period() -> None:
+    """Two hundred milliseconds late, then one line, then the others at once, whenever that happens."""
+    for stalled in (6, 20, 300):
+        clock, stamps_s = LineClock(115200), list[float]()
+        for line in range(800):
+            at_s = line * PERIOD_S
+            if stalled <= line < stalled + 16:
+                continue
+            if line == stalled + 16:
+                stamps_s += clock.stamps_s(1, at_s)
+                stamps_s += clock.stamps_s(16, at_s + 0.001)
+            else:
+                stamps_s += clock.stamps_s(1, at_s)
+        steps_s = [after - before for before, after in pairwise(stamps_s[600:])]
+        assert clock.drop_outs <= 3
+        assert all(step_s == pytest.approx(PERIOD_S, abs=0.001) for step_s in steps_s)
+
+
 def test_no_stamp_lies_in_the_future_or_before_the_last() -> None:
     clock = LineClock(9600)
     last_s = -1.0

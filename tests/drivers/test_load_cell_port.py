@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import pytest
 
 from drivers.load_cell_calibration import LoadCellCalibration
 from drivers.load_cell_lines import LineFormat
-from drivers.load_cell_port import LoadCellPort, LoadCellPortError, Sample, open_serial
+from drivers.load_cell_port import LoadCellPort, Sample
 from simulation.load_cell_emulator import AmplifierParameters, EmulatedAmplifier
 
 FORCE_N = 1.5
@@ -119,34 +118,7 @@ def test_a_line_that_names_its_unit_is_believed(tmp_path: Path) -> None:
 
 def test_noise_without_an_end_does_not_grow(cable: Cable) -> None:
     for _ in range(100):
-        cable.amplifier._waiting = b"\xff" * 60
-        cable.amplifier._hand_over()
+        cable.amplifier.waiting = b"\xff" * 60
+        cable.amplifier.hand_over()
         cable.port.read(1.0)
     assert cable.port.garbled_lines > 20
-
-
-def test_a_port_that_there_is_not_says_which_there_are(tmp_path: Path) -> None:
-    with pytest.raises(LoadCellPortError, match=r"no serial port .*/nothing: (there are|this computer sees none)"):
-        open_serial(str(tmp_path / "nothing"), 9600)
-
-
-def test_a_file_is_no_port(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(LoadCellPortError, match=r"file is no serial port: (there are|this computer)"):
-        open_serial(str(tmp_path / "file"), 9600)
-
-
-def test_a_port_in_use_says_so(cable: Cable) -> None:
-    with pytest.raises(LoadCellPortError, match="another program"):
-        open_serial(cable.path, 115200)
-
-
-def test_without_permission_the_group_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    import serial
-
-    def refuse(*_: object, **__: object) -> None:
-        raise serial.SerialException(errno.EACCES, "could not open port")
-
-    monkeypatch.setattr(serial, "Serial", refuse)
-    with pytest.raises(LoadCellPortError, match="dialout"):
-        open_serial("/dev/ttyUSB0", 9600)

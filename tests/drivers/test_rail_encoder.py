@@ -32,9 +32,9 @@ class Rail:
         self.encoder = RailEncoder(replace(parameters, **changes))  # type: ignore[arg-type]
         self.now_s = 0.0
         self.written = self.fetched = 0  # bytes: a pseudo-terminal delivers when it likes
-        self._write, self._fetch = self.counter.write, self.encoder._fetch
+        self._write, self._fetch = self.counter.write, self.encoder.line._fetch
         self.counter.write = self._count_written  # type: ignore[method-assign]
-        self.encoder._fetch = self._count_fetched  # type: ignore[method-assign]
+        self.encoder.line._fetch = self._count_fetched  # type: ignore[method-assign]
         self.write(b"\n")  # the end of a line that had begun before
 
     def _count_written(self, data: bytes) -> None:
@@ -50,7 +50,7 @@ class Rail:
         """x once all of it has been read."""
         if data:
             self.counter.write(data)
-        return self.read_until(lambda: self.encoder._port is None or self.fetched >= self.written)
+        return self.read_until(lambda: not self.encoder.line.is_there or self.fetched >= self.written)
 
     def send(self, place_m: float) -> float:
         self.counter.send(place_m)
@@ -192,7 +192,7 @@ def test_no_bytes_are_too_wild(tmp_path: Path) -> None:
     def examine(pieces: list[bytes]) -> None:
         path.write_bytes(b"\n".join(pieces))
         with path.open("rb") as file:
-            encoder = RailEncoder(parameters, open_port=lambda parameters: Wire(file.fileno()))
+            encoder = RailEncoder(parameters, open_device=lambda *_: Wire(file.fileno()))
             for tick in range(5):
                 assert abs(encoder.read(0.01 * tick).x_m) < 1e11 or not encoder.poses
             assert encoder.poses + encoder.garbled <= sum(

@@ -8,6 +8,7 @@ from pathlib import Path
 from drivers.load_cell_calibration import LoadCellCalibration
 from drivers.load_cell_lines import LineFormat
 from drivers.load_cell_port import LoadCellPort
+from drivers.stage_encoder import StageEncoder, StageEncoderSettings
 from experiments.loadcell import CellSettings, Results, conclude, measure, plan_of_notebook
 from experiments.loadcell_motion import StageSettings
 from experiments.loadcell_recording import CellRecorder
@@ -17,6 +18,8 @@ from experiments.notebook import Notebook
 from simulation.load_cell_bench import EmulatedBench, Event
 from simulation.load_cell_emulator import AmplifierParameters
 from simulation.plate_stage import CarriedPlate, StageParameters
+from simulation.stage_encoder_emulator import StageEncoderParameters
+from simulation.stage_motion import HandParameters
 from tests.scripted_person import ScriptedPerson
 
 SETTINGS = StageSettings()
@@ -36,13 +39,22 @@ class Laboratory:
         stage: StageParameters | None = None,
         seed: int = 1,
         line_format: str = "number",
+        encoder: StageEncoderParameters | None = None,
+        encoder_baud: int = 115200,
     ) -> None:
+        """With an `encoder` the stage is pushed by a hand."""
         self.folder, self.person = folder, person
-        self.bench = EmulatedBench(next(iter(muds.values())), folder / "cell", amplifier, stage, seed)
+        if encoder is not None:
+            stage = StageParameters(hand=HandParameters(), seed=seed)
+        self.bench = EmulatedBench(next(iter(muds.values())), folder / "cell", amplifier, stage, seed, encoder)
         self.port = LoadCellPort(
             str(folder / "cell"), baud, LineFormat(line_format), LoadCellCalibration("counts", 1.0)
         )
-        self.recorder = CellRecorder(self.port, self.bench, person.tell)
+        self.encoder = None
+        if encoder is not None:
+            settings = StageEncoderSettings(str(folder / "cell_position"), encoder.metres_per_count, encoder_baud)
+            self.encoder = StageEncoder(settings)
+        self.recorder = CellRecorder(self.port, self.bench, person.tell, self.encoder)
         self.plan = TrialPlan(tuple(muds), trials, SETTINGS)
         self.notebook = Notebook(folder, plan_of_notebook(SETTINGS))
         stage_of_it = SimulatedStage(SETTINGS, self.bench, muds, seed)
@@ -62,4 +74,6 @@ class Laboratory:
 
     def close(self) -> None:
         self.port.close()
+        if self.encoder is not None:
+            self.encoder.close()
         self.bench.close()

@@ -8,7 +8,9 @@ import numpy as np
 
 from experiments.curve_fit import Array
 from experiments.loadcell_fits import SHEAR, Recorded
+from experiments.stage_track import Places
 from simulation.plate_stage import CarriedPlate, PlateStage, StageParameters
+from simulation.stage_motion import HandParameters
 
 WIDTH_M, THICKNESS_M = 0.03, 0.004
 
@@ -58,12 +60,49 @@ def feel(
     stage = PlateStage(plate, StageParameters(acceleration_m_s2, cell_sign))
     stage.mean_force_n(0.0)
     stage.place_over(plate, kind == SHEAR)
-    start_s = random.uniform(1.0, 1.3)
+    _start(stage, plate, kind, random.uniform(1.0, 1.3), speed_m_s)
+    return _heard(stage, kind, seed, random, rate_hz, noise_n, drift_n_s)
+
+
+def feel_by_hand(
+    plate: CarriedPlate,
+    kind: str,
+    seed: int,
+    hand: HandParameters | None = None,
+    lag_s: float = 0.012,
+    place_rate_hz: float = 100.0,
+    jitter_s: float = 0.0015,
+    count_m: float = 1e-5,
+) -> Recorded:
+    """One trial of a stage that a hand pushes, with the places of an encoder; forces are stamped later by `lag_s`."""
+    random = Random(seed)
+    stage = PlateStage(plate, StageParameters(hand=hand or HandParameters(), seed=seed))
+    stage.mean_force_n(0.0)
+    stage.place_over(plate, kind == SHEAR)
+    _start(stage, plate, kind, random.uniform(1.0, 1.3), 0.1)
+    felt = _heard(stage, kind, seed, random, 80.0, 0.008, 0.0)
+    times_s = np.arange(0.003, stage.ends_s + 1.05, 1.0 / place_rate_hz)
+    places_m = count_m * np.round([stage.travelled_m(float(t)) / count_m for t in times_s])
+    told = Places(_jittered(times_s, jitter_s, random), places_m)
+    return felt._replace(times_s=_jittered(felt.times_s, jitter_s, random) + lag_s, places=told)
+
+
+def _jittered(times_s: Array, jitter_s: float, random: Random) -> Array:
+    told = [t + random.gauss(0.0, jitter_s) for t in times_s]
+    return np.asarray(np.maximum.accumulate(told) + 1e-9 * np.arange(len(told)))
+
+
+def _start(stage: PlateStage, plate: CarriedPlate, kind: str, start_s: float, speed_m_s: float) -> None:
     if kind == SHEAR:
         plate.depth_m = 0.03
         stage.drag(start_s, 0.2, speed_m_s)
     else:
         stage.insert(start_s, 0.03, speed_m_s, 3.0)
+
+
+def _heard(
+    stage: PlateStage, kind: str, seed: int, random: Random, rate_hz: float, noise_n: float, drift_n_s: float
+) -> Recorded:
     times_s: Array = np.arange(1.0 / rate_hz, stage.ends_s + 1.0, 1.0 / rate_hz)
     forces_n = [stage.mean_force_n(float(t)) + random.gauss(0.0, noise_n) + drift_n_s * t for t in times_s]
     return Recorded(f"made up/{kind}/{seed}", "made up", kind, times_s, np.array(forces_n), 0.0)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from experiments.loadcell_analysis import analyse, analyse_trial, common_pace
 from experiments.loadcell_contact import find_contact, without_spikes
 from experiments.loadcell_fits import (
     COEFFICIENTS,
@@ -14,10 +15,7 @@ from experiments.loadcell_fits import (
     SHEAR,
     Analysed,
     Recorded,
-    analyse,
-    analyse_trial,
     bench_doubt,
-    common_pace,
     depths_of,
     of_mud,
     speed_remark,

@@ -13,11 +13,12 @@ from drivers.load_cell_calibration import LoadCellCalibration
 from drivers.load_cell_port import LoadCellPort
 from experiments.bench_robot import BenchError
 from experiments.loadcell import CellSettings, list_remarks
+from experiments.loadcell_examination import examine_lines
 from experiments.loadcell_fits import INSERTION, SHEAR, Analysed
 from experiments.loadcell_motion import Insertion, Pace
-from experiments.loadcell_recording import examine_lines
+from experiments.loadcell_raw import RAW, load_all
 from experiments.loadcell_stage import AttendedStage, Trial
-from experiments.loadcell_trials import KEEP, RAW, judge, load_all, measure
+from experiments.loadcell_trials import KEEP, judge, measure
 from experiments.person import GO_ON, REDO, SKIP
 from simulation.load_cell_emulator import AmplifierParameters
 from simulation.plate_stage import StageParameters

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from random import Random
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulation.plate_stage import LIFTED_M, PlateStage, StageParameters, ramped_duration_s, ramped_way_m
+from simulation.plate_stage import LIFTED_M, PlateStage, StageParameters
+from simulation.stage_motion import HandMotion, HandParameters, RampedMotion
 
 
 class Air:
@@ -26,13 +30,14 @@ class Air:
 
 @given(st.floats(0.001, 0.5), st.floats(0.005, 0.5), st.floats(0.1, 20.0))
 def test_a_ramped_way_ends_where_and_when_it_should(way_m: float, speed_m_s: float, acceleration: float) -> None:
-    duration_s = ramped_duration_s(way_m, speed_m_s, acceleration)
-    assert ramped_way_m(0.0, way_m, speed_m_s, acceleration) == 0.0
-    assert ramped_way_m(duration_s, way_m, speed_m_s, acceleration) == pytest.approx(way_m)
-    assert ramped_way_m(duration_s / 2.0, way_m, speed_m_s, acceleration) == pytest.approx(way_m / 2.0)
+    motion = RampedMotion(way_m, speed_m_s, acceleration)
+    duration_s = motion.duration_s
+    assert motion.way_m(0.0) == 0.0
+    assert motion.way_m(duration_s) == pytest.approx(way_m)
+    assert motion.way_m(duration_s / 2.0) == pytest.approx(way_m / 2.0)
     step_s = 1e-4 * duration_s
-    steps = [ramped_way_m(i * 100 * step_s + step_s, way_m, speed_m_s, acceleration) for i in range(100)]
-    before = [ramped_way_m(i * 100 * step_s, way_m, speed_m_s, acceleration) for i in range(100)]
+    steps = [motion.way_m(i * 100 * step_s + step_s) for i in range(100)]
+    before = [motion.way_m(i * 100 * step_s) for i in range(100)]
     speeds = [(b - a) / step_s for a, b in zip(before, steps, strict=True)]
     assert min(speeds) >= 0.0 and max(speeds) <= speed_m_s * (1.0 + 1e-6)
 
@@ -76,3 +81,35 @@ def test_the_cell_reads_the_mean_since_the_last_time_and_what_hangs_on_it() -> N
     stage.hung_n = 0.0
     stage.insert(0.5, 0.0, 0.1, 0.0)  # 2 cm down within 0.2 s
     assert stage.mean_force_n(0.7) == pytest.approx(LIFTED_M / 2.0, rel=0.01)
+
+
+@given(st.floats(0.003, 0.3), st.integers(0, 10**6))
+def test_a_hand_goes_all_its_way_forward_and_never_faster_than_it_can(way_m: float, seed: int) -> None:
+    hand = HandParameters()
+    motion = HandMotion(way_m, hand, Random(seed))
+    step_s = motion.duration_s / 500.0
+    places_m = [motion.way_m(i * step_s) for i in range(501)]
+    assert (places_m[0], places_m[-1]) == (0.0, way_m)
+    speeds_m_s = [(after - before) / step_s for before, after in pairwise(places_m)]
+    assert min(speeds_m_s) >= -1e-9 and max(speeds_m_s) <= 1.01 * hand.fastest_m_s
+
+
+def test_a_hand_stutters_and_rests() -> None:
+    motion = HandMotion(0.2, HandParameters(), Random(3))
+    speeds_m_s = [100.0 * (motion.way_m(i / 100.0) - motion.way_m((i - 1) / 100.0)) for i in range(10, 150)]
+    assert sum(speed < 1e-6 for speed in speeds_m_s) > 5
+    assert max(speeds_m_s) > 2.0 * 0.06
+
+
+def test_an_encoder_on_the_stage_counts_every_stroke_and_nothing_else() -> None:
+    stage = PlateStage(Air(), StageParameters(hand=HandParameters()))
+    stage.mean_force_n(0.0)
+    stage.insert(1.0, 0.03, 0.1, 3.0)
+    down_s = stage.ends_s
+    for at_s in (1.3, 1.4, 3.0, down_s):
+        stage.mean_force_n(at_s)
+        assert -stage.travelled_m(at_s) == pytest.approx(stage.plate.depth_m + LIFTED_M, abs=1e-6)
+    stage.place_over(stage.plate, sideways=True)
+    stage.drag(down_s, 0.2, 0.1)
+    assert stage.travelled_m(down_s) == pytest.approx(0.0, abs=1e-9)
+    assert stage.travelled_m(stage.ends_s) == pytest.approx(-0.2)
