@@ -9,9 +9,9 @@ In a quick stroke inertia is larger than the mud's load, so both must be of the 
 acceleration between the moments at which they were measured; the angle is taken half-way, and the current as its mean
 over that time. A drive holds each command until the next, so its current is a stair with a step at each command; where
 the last two samples answer the last two commands, that mean is known. Where messages come more slowly than commands,
-or nothing is known of these, it is taken along the line through both samples. (Across a step the line errs by up to half
-of it: in a walk's quick extraction from soft mud, by a seventh of k_e.) Drives send angle and current separately, and
-slower or faster than the loop ticks, so each has its age.
+or nothing is known of these, it is taken along the line through both samples. (Across a step the line errs by up to
+half of it: in a walk's quick extraction from soft mud, by a seventh of k_e.) Drives send angle and current separately,
+and slower or faster than the loop ticks, so each has its age.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """From currents to joint loads: the balance of torques on an arm that is simulated here, and what is no new sample."""
 
 from math import cos, inf, isfinite, nan, pi, sin
+from typing import Any
 
 import numpy as np
 import pytest
@@ -363,7 +364,8 @@ def test_a_change_of_any_angle_or_current_is_new(place: int, field: str) -> None
     loads = JointLoads(GEOMETRY, DRIVE)
     pair = [sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0)]
     loads.update(*pair)
-    pair[place] = pair[place]._replace(**{field: 0.5})
+    change: dict[str, Any] = {field: 0.5}
+    pair[place] = pair[place]._replace(**change)
     assert loads.update(*pair) is not None
 
 
