@@ -84,12 +84,11 @@ def motion_between(before: JointSample, now: JointSample) -> JointMotion:
     dt_s, change_rad_s = angle_s - angle_before_s, now_rad_s - before_rad_s
     if not (SHORTEST_GAP_S < dt_s < LONGEST_GAP_S and isfinite(change_rad_s)):
         return angle_rad, now_rad_s, 0.0, current_a
-    between_s = current_s - current_before_s
     if earlier_s < current_before_s <= later_s < current_s:
         share = (later_s - angle_before_s) / dt_s
         current_a += (current_before_a - current_a) * (share if 0.0 < share < 1.0 else 1.0 if share > 0.0 else 0.0)
-    elif between_s > 0.0:
-        share = (current_s - angle_s + dt_s / 2.0) / between_s
+    elif current_s > current_before_s:
+        share = (current_s - angle_s + dt_s / 2.0) / (current_s - current_before_s)
         current_a -= (current_a - current_before_a) * (share if -1.0 < share < 2.0 else 2.0 if share > 0.0 else -1.0)
     return (angle_rad + angle_before_rad) / 2.0, before_rad_s + change_rad_s / 2.0, change_rad_s / dt_s, current_a
 
