@@ -85,11 +85,14 @@ class MudEstimator:
     ) -> MudReading:
         """One sample of everything, in the order of JOINTS, with the ages of its messages; what is not known is NaN."""
         commands_s, self._commands_s = self._commands_s, (self._commands_s[1], now_s)
-        a, b, c, d = (
-            JointSample(angle_rad, velocity_rad_s, current_a, now_s - angle_age_s, now_s - current_age_s, commands_s)
-            for angle_rad, velocity_rad_s, current_a, angle_age_s, current_age_s in zip(
-                angles_rad, velocities_rad_s, currents_a, angle_ages_s, current_ages_s, strict=True
-            )
+        a, b, c, d = map(
+            JointSample,
+            angles_rad,
+            velocities_rad_s,
+            currents_a,
+            [now_s - age_s for age_s in angle_ages_s],
+            [now_s - age_s for age_s in current_ages_s],
+            (commands_s, commands_s, commands_s, commands_s),
         )
         left, left_stride = self.left.update(now_s, phase, a, b, body_x_m)
         right, right_stride = self.right.update(now_s, phase, c, d, body_x_m)
