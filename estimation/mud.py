@@ -16,7 +16,7 @@ from control.coefficient import NOTHING_KNOWN, MudBelief
 from control.geometry import FlipperGeometry
 from control.records import FLIPPERS, NO_LOAD, FlipperLoad, JointAngles, Phase, StrideEstimate
 from estimation.flipper import FlipperEstimator
-from estimation.joint_load import FlipperDrive, JointSample
+from estimation.joint_load import NO_COMMANDS, FlipperDrive, JointSample
 from estimation.knowledge import MudKnowledge
 from estimation.mud_map import MudMap
 from estimation.paper import PaperEstimator
@@ -60,6 +60,7 @@ class MudEstimator:
             for flipper, drive in zip(FLIPPERS, drives, strict=True)
         )
         self._knowledge = MudKnowledge()
+        self._commands_s = NO_COMMANDS  # the drives are given new ones after each sample
         self.map = MudMap()
         self.belief: MudBelief = NOTHING_KNOWN
 
@@ -67,6 +68,7 @@ class MudEstimator:
         self.left.reset()
         self.right.reset()
         self._knowledge.reset()
+        self._commands_s = NO_COMMANDS
         self.map.reset()
         self.belief = NOTHING_KNOWN
 
@@ -82,11 +84,15 @@ class MudEstimator:
         current_ages_s: Ages = FRESH,
     ) -> MudReading:
         """One sample of everything, in the order of JOINTS, with the ages of its messages; what is not known is NaN."""
-        a, b, c, d = (
-            JointSample(angle_rad, velocity_rad_s, current_a, now_s - angle_age_s, now_s - current_age_s)
-            for angle_rad, velocity_rad_s, current_a, angle_age_s, current_age_s in zip(
-                angles_rad, velocities_rad_s, currents_a, angle_ages_s, current_ages_s, strict=True
-            )
+        commands_s, self._commands_s = self._commands_s, (self._commands_s[1], now_s)
+        a, b, c, d = map(
+            JointSample,
+            angles_rad,
+            velocities_rad_s,
+            currents_a,
+            [now_s - age_s for age_s in angle_ages_s],
+            [now_s - age_s for age_s in current_ages_s],
+            (commands_s, commands_s, commands_s, commands_s),
         )
         left, left_stride = self.left.update(now_s, phase, a, b, body_x_m)
         right, right_stride = self.right.update(now_s, phase, c, d, body_x_m)

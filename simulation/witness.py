@@ -27,7 +27,7 @@ class StrokeTruth(NamedTuple):
     sweep_rad: float  # mean
     adduction_rad: float  # mean
     deepest_m: float  # below the true surface
-    speed_m_s: float  # mean; in stance backward along the track, over the ticks in which it slips
+    speed_m_s: float  # mean over the way; in stance backward along the track, in the ticks in which it slips
     slip_m: float  # in stance: how far it went back in those ticks; NaN in the other strokes
     mean_depth_m: float
 
@@ -72,8 +72,8 @@ class StrokeSums:
         self.reset()
 
     def reset(self) -> None:
-        self._ticks = self._moving_ticks = 0
-        self._sweep = self._adduction = self._depths_m = self._speeds_m_s = self._way_m = 0.0
+        self._ticks = 0
+        self._sweep = self._adduction = self._depths_m = self._speed_m2_s = self._way_m = 0.0
         self._deepest_m = UNKNOWN
 
     def update(self, dt_s: float, sight: Sight) -> None:
@@ -86,8 +86,7 @@ class StrokeSums:
         self._deepest_m = sight.depth_m if self._ticks == 1 else max(self._deepest_m, sight.depth_m)
         speed_m_s = -sight.forward_m_s if self.phase is Phase.STANCE else sight.speed_m_s
         if self.phase is not Phase.STANCE or speed_m_s > SLIPPING_M_S:
-            self._moving_ticks += 1
-            self._speeds_m_s += speed_m_s
+            self._speed_m2_s += dt_s * speed_m_s * speed_m_s
             self._way_m += dt_s * speed_m_s
 
     def truth(self) -> StrokeTruth:
@@ -97,7 +96,7 @@ class StrokeSums:
             self._sweep / self._ticks,
             self._adduction / self._ticks,
             self._deepest_m,
-            self._speeds_m_s / self._moving_ticks if self._moving_ticks else UNKNOWN,
+            self._speed_m2_s / self._way_m if self._way_m > 0.0 else UNKNOWN,
             self._way_m if self.phase is Phase.STANCE else UNKNOWN,
             self._depths_m / self._ticks,
         )

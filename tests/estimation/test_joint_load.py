@@ -1,6 +1,7 @@
 """From currents to joint loads: the balance of torques on an arm that is simulated here, and what is no new sample."""
 
 from math import cos, inf, isfinite, nan, pi, sin
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from control.joint_friction import JointFriction
 from control.joint_pd import ArmMass
 from estimation.joint_load import (
     LONGEST_GAP_S,
+    NO_COMMANDS,
     SATURATION,
     FlipperDrive,
     JointLoad,
@@ -238,6 +240,86 @@ def test_the_current_is_that_of_the_moment_between_the_angles(stamps_s: tuple[fl
     assert motion_between(before, now)[3] == pytest.approx(current_a)
 
 
+@pytest.mark.parametrize(
+    ("stamps_s", "commands_s", "current_a"),
+    [
+        ((0.999, 1.009), (0.995, 1.002), 3.6),  # two tenths of the time by the earlier one
+        ((0.999, 1.009), (0.990, 0.9995), 4.0),  # all of it by the later one
+        ((1.008, 1.012), (1.000, 1.011), 2.0),  # all of it by the earlier one
+    ],
+)
+def test_the_current_is_that_of_each_of_two_commands_for_its_time(
+    stamps_s: tuple[float, float], commands_s: tuple[float, float], current_a: float
+) -> None:
+    before = JointSample(0.0, 0.0, 2.0, 1.00, stamps_s[0])
+    now = JointSample(0.1, 1.0, 4.0, 1.01, stamps_s[1], commands_s)
+    assert motion_between(before, now)[3] == pytest.approx(current_a)
+
+
+@pytest.mark.parametrize(
+    "commands_s",
+    [
+        (1.000, 1.005),  # the current before answers an older one
+        (0.990, 1.0095),  # the current now does not answer the later one yet
+        (0.990, 0.9985),  # both answer the later one
+        (nan, 1.005),
+    ],
+)
+def test_where_two_currents_do_not_answer_the_last_two_commands_it_is_that_of_the_line(
+    commands_s: tuple[float, float],
+) -> None:
+    before = JointSample(0.0, 0.0, 2.0, 1.00, 0.999)
+    now = JointSample(0.1, 1.0, 4.0, 1.01, 1.009, commands_s)
+    assert motion_between(before, now) == motion_between(before, now._replace(commands_s=NO_COMMANDS))
+
+
+MUD_NM = -0.1
+
+
+def loads_of_a_driven_arm(message_s: float, known: bool) -> list[float]:
+    """Of an adduction joint against mud, without gravity, whose motor gets another torque in every tick, up to
+    0.5 N·m from the one before, as in a walk's extraction. Its motion is exact: from tick to tick it turns evenly
+    faster. `known`: whether the estimator is told when.
+    """
+    torques_nm = np.random.default_rng(1).uniform(-0.25, 0.25, 400)
+    drive = DRIVE._replace(mass=ArmMass(0.0, 0.0, 0.0004, 0.0006))
+    times_s = TICK_S * np.arange(401)
+    speeds_rad_s = np.concatenate([[0.0], np.cumsum(TICK_S * (torques_nm + MUD_NM) / 0.0006)])
+    angles_rad = np.concatenate([[0.0], np.cumsum(TICK_S * (speeds_rad_s[:-1] + speeds_rad_s[1:]) / 2.0)])
+    loads, told = JointLoads(GEOMETRY, drive), list[float]()
+    for tick in range(5, 400):
+        now_s = float(times_s[tick])
+        angle_s, current_s = (now_s - (now_s - shift_s) % message_s for shift_s in (0.0003, 0.0008))
+        place = int(current_s / TICK_S)
+        sample = JointSample(
+            float(np.interp(angle_s, times_s, angles_rad)),
+            float(np.interp(angle_s, times_s, speeds_rad_s)),
+            float(torques_nm[place]) / LIFT_NM_A,
+            angle_s,
+            current_s,
+            (float(times_s[tick - 2]), float(times_s[tick - 1])) if known else NO_COMMANDS,
+        )
+        load = loads.update(JointSample(0.0, 0.0, 0.0, angle_s, current_s), sample)
+        if load is not None and tick > 10:
+            told.append(load.adduction_nm)
+    return told
+
+
+def test_a_load_is_found_beside_torques_that_are_held_from_tick_to_tick() -> None:
+    """Of messages every millisecond all is known; of those every second one, all but what four milliseconds without
+    a message reach back beyond the last two commands: 0.7 ms of a third one's.
+    """
+    assert np.abs(np.array(loads_of_a_driven_arm(0.001, known=True)) - MUD_NM).max() < 1e-9
+    errors_nm = np.array(loads_of_a_driven_arm(0.002, known=True)) - MUD_NM
+    assert np.abs(errors_nm).max() < 0.1
+    assert np.sqrt(np.mean(errors_nm**2)) < 0.03
+
+
+def test_along_a_line_through_currents_half_of_that_load_would_be_lost() -> None:
+    errors_nm = np.array(loads_of_a_driven_arm(0.002, known=False)) - MUD_NM
+    assert np.sqrt(np.mean(errors_nm**2)) > 0.5 * abs(MUD_NM)
+
+
 def test_two_samples_of_one_moment_tell_no_acceleration() -> None:
     for motion in (motion_between, motion_at):
         assert motion(sample(0.1, 1.0, 2.0, 1.0), sample(0.3, 3.0, 4.0, 1.0)) == (0.3, 3.0, 0.0, 4.0)
@@ -282,7 +364,8 @@ def test_a_change_of_any_angle_or_current_is_new(place: int, field: str) -> None
     loads = JointLoads(GEOMETRY, DRIVE)
     pair = [sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0)]
     loads.update(*pair)
-    pair[place] = pair[place]._replace(**{field: 0.5})
+    change: dict[str, Any] = {field: 0.5}
+    pair[place] = pair[place]._replace(**change)
     assert loads.update(*pair) is not None
 
 
@@ -305,7 +388,7 @@ def test_a_reset_forgets_the_sample_before() -> None:
 
 
 anything = st.floats()
-samples = st.builds(JointSample, anything, anything, anything, anything, anything)
+samples = st.builds(JointSample, anything, anything, anything, anything, anything, st.tuples(anything, anything))
 
 
 @given(st.lists(st.tuples(samples, samples), max_size=5))
