@@ -15,7 +15,8 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from experiments.bench_robot import UNDER_WAY, BenchError, cut
+from experiments.bench_errors import BarredError, BenchError, GoneError, OverruledError
+from experiments.bench_robot import UNDER_WAY, cut
 from firmware_host.configuration import Configuration, parse_configuration
 from firmware_host.lease import TAKEN_OVER
 from firmware_host.log_folder import present_path, run_files
@@ -40,8 +41,10 @@ class DaemonRobot:
         self._socket = socket
         try:
             self._client = StatusClient(socket)
-        except (NoDaemonError, NotPermittedError) as problem:
-            raise BenchError(f"{problem}. {START_IT}") from problem
+        except NoDaemonError as problem:
+            raise GoneError(f"{problem}. {START_IT}") from problem
+        except NotPermittedError as problem:
+            raise BarredError(str(problem)) from problem
         self._configuration: Configuration | None = None
         self._renewed_s = -inf
         self._log: Path | None = None  # as last seen
@@ -79,10 +82,14 @@ class DaemonRobot:
         self._may_move = self._may_move and method != "disarm"
         try:
             return self._client.call(method, **params)
-        except (NoDaemonError, NotPermittedError) as problem:
-            raise BenchError(str(problem)) from problem
+        except NoDaemonError as problem:
+            raise GoneError(str(problem)) from problem
+        except NotPermittedError as problem:
+            raise BarredError(str(problem)) from problem
 
     def wait(self, duration_s: float) -> None:
+        if self._ousted:
+            raise OverruledError(self._ousted)
         end_s = time.monotonic() + duration_s
         while (left_s := end_s - time.monotonic()) > 0.0:
             time.sleep(min(left_s, RENEWAL_S))
@@ -108,7 +115,7 @@ class DaemonRobot:
 
     def _require_alone(self) -> None:
         if self._ousted:
-            raise BenchError(self._ousted)
+            raise OverruledError(self._ousted)
         holder = self.call("status")["lease"]
         if holder not in (None, self._name):
             raise BenchError(f"{holder} operates the robot: wait until it has ended, then begin again")

@@ -93,11 +93,11 @@ def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> No
         arm(first)
         for command in (("move", "left_sweep=3"), ("walk",), ("walk", "--attended")):
             refused = bench.run(*command)
-            assert refused.returncode == exit_codes.REFUSED and "holds the lease, for" in refused.stderr
+            assert refused.returncode == exit_codes.REFUSED and "operates the robot" in refused.stderr
         assert "operated by uid" in bench.run("status").stdout
         move(first, {"right_sweep": 0.05})
         disarm(first)
-        assert "holds the lease" in bench.run("arm").stderr
+        assert "operates the robot" in bench.run("arm").stderr
     finally:
         first.close()
     assert bench.run("arm").returncode == exit_codes.OK
