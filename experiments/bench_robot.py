@@ -6,7 +6,7 @@ simulated one; an experiment cannot tell which. Everything that it knows of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -204,10 +204,15 @@ def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
     if after["mode"] != "hold" or after["notice"]:
         raise BenchError(f"the walk ended early: {told_by(after)}")
     closed = strides_since(robot, before["strides_closed"])
-    number = len({stride["index"] for stride in closed})
+    number = strides_made(closed)
     if number < strides:
         raise BenchError(f"the walk ended early, after {number} of {strides} strides: it was told to stop")
     return Walked(closed, before["now_s"], after["now_s"])
+
+
+def strides_made(closed: Sequence[Mapping[str, Any]]) -> int:
+    """Each by both flippers."""
+    return len({stride["index"] for stride in closed})
 
 
 def follow_walk(robot: BenchRobot, begin: Callable[[float], Judge]) -> tuple[str | None, Status]:
