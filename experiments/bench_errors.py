@@ -16,7 +16,7 @@ class BarredError(BenchError):
 
 
 class OverruledError(BenchError):
-    """Somebody has taken the robot over."""
+    """Somebody else operates the robot."""
 
 
 class EndedError(Exception):

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.bench_errors import BarredError, BenchError, GoneError, OverruledError
-from experiments.bench_robot import UNDER_WAY, cut
+from experiments.bench_robot import ENERGISED, UNDER_WAY, Status, cut
 from firmware_host.configuration import Configuration, parse_configuration
 from firmware_host.lease import TAKEN_OVER
 from firmware_host.log_folder import present_path, run_files
@@ -102,9 +102,10 @@ class DaemonRobot:
     def _promise(self) -> None:
         """Refused where the lease was lost, which the status tells, and where another program operates the robot.
 
-        Raises BenchError for that.
+        Raises OverruledError for that.
         """
         self._renewed_s = time.monotonic()
+        self._require_alone()
         try:
             self.call("lease", for_s=PROMISE_S if self._may_move else RESTING_S)
             self._name = self._name or self.call("status")["lease"]
@@ -116,9 +117,12 @@ class DaemonRobot:
     def _require_alone(self) -> None:
         if self._ousted:
             raise OverruledError(self._ousted)
-        holder = self.call("status")["lease"]
-        if holder not in (None, self._name):
-            raise BenchError(f"{holder} operates the robot: wait until it has ended, then begin again")
+        status = self.call("status")
+        if status["lease"] not in (None, self._name):
+            raise OverruledError(f"{status['lease']} operates the robot: wait until it has ended, then begin again")
+        if self._name and status["lease"] is None and status["mode"] in ENERGISED and not _winds_up(status):
+            self._ousted = "somebody has armed the robot while this program slept: begin again when it is free"
+            raise OverruledError(self._ousted)
 
     def record(self, from_s: float, to_s: float) -> Log:
         def written() -> Log | None:
@@ -202,3 +206,8 @@ class DaemonRobot:
         end_s = time.monotonic() + WRITTEN_S
         while self.call("status")["mode"] in UNDER_WAY and time.monotonic() < end_s:
             self.wait(RENEWAL_S)
+
+
+def _winds_up(status: Status) -> bool:
+    """Where a lease was lost under torque, the robot stops and is nobody's until its torque is off."""
+    return any(fault["name"] == "lease_lost" for fault in status["faults"])
