@@ -121,8 +121,17 @@ class DaemonRobot:
         if status["lease"] not in (None, self._name):
             raise OverruledError(f"{status['lease']} operates the robot: wait until it has ended, then begin again")
         if self._name and status["lease"] is None and status["mode"] in ENERGISED and not _winds_up(status):
-            self._ousted = "somebody has armed the robot while this program slept: begin again when it is free"
+            self._ousted = self._why_ousted()
             raise OverruledError(self._ousted)
+
+    def _why_ousted(self) -> str:
+        """A lease that is had for the asking has only lapsed: it is given back at once, the robot left as it is."""
+        try:
+            self.call("lease", for_s=RESTING_S)
+            self.call("release")
+        except CallRefusedError as refusal:
+            return str(refusal)
+        return "somebody has armed the robot while this program slept: begin again when it is free"
 
     def record(self, from_s: float, to_s: float) -> Log:
         def written() -> Log | None:

@@ -113,6 +113,7 @@ def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> No
         assert "operates the robot" in run_beside(first, bench, "arm").stderr
     finally:
         first.close()
+    bench.wait_for(lambda status: not status["faults"])  # the flippers have come down
     assert bench.run("arm").returncode == exit_codes.OK
 
 

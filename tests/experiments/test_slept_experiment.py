@@ -10,6 +10,7 @@ import pytest
 from experiments import daemon_robot
 from experiments.bench_errors import OverruledError
 from experiments.daemon_robot import DaemonRobot
+from firmware_host.status_client import CallRefusedError
 
 ME = "uid 1 (process 2)"
 LOST = {"name": "lease_lost"}
@@ -23,11 +24,14 @@ class ScriptedDaemon:
         self.mode = "idle"
         self.faults: list[dict[str, str]] = []
         self.called: list[str] = []
+        self.overruled = False
 
     def call(self, method: str, **params: Any) -> Any:
         self.called.append(method)
-        if method == "lease":
-            self.lease = ME
+        if method == "lease" and self.overruled:
+            raise CallRefusedError("taken over: uid 3 wanted the robot")
+        if method in ("lease", "release"):
+            self.lease = ME if method == "lease" else None
         return {"lease": self.lease, "mode": self.mode, "faults": self.faults}
 
     def lapse(self, mode: str, faults: list[dict[str, str]]) -> None:
@@ -46,18 +50,23 @@ def daemon(monkeypatch: pytest.MonkeyPatch) -> ScriptedDaemon:
     return made
 
 
+@pytest.mark.parametrize("overruled", [False, True])
 @pytest.mark.parametrize("mode", ["arming", "hold", "walking"])
-def test_a_robot_that_somebody_armed_meanwhile_is_left_to_them(daemon: ScriptedDaemon, mode: str) -> None:
+def test_a_robot_that_somebody_armed_meanwhile_is_left_to_them(
+    daemon: ScriptedDaemon, mode: str, overruled: bool
+) -> None:
     """Hands are in the mud, and the question on the screen says that torque is off."""
     robot = DaemonRobot(Path("x"))
     daemon.lapse(mode, [])
+    daemon.overruled = overruled
+    told = "taken over: uid 3" if overruled else "somebody has armed the robot while this program slept"
     for method in ("arm", "disarm", "stop"):
-        with pytest.raises(OverruledError, match="somebody has armed the robot while this program slept"):
+        with pytest.raises(OverruledError, match=told):
             robot.call(method)
     with pytest.raises(OverruledError):
         robot.wait(0.0)
     robot.close()
-    assert set(daemon.called) == {"status"}
+    assert set(daemon.called) <= {"status", "lease", "release"} and daemon.lease is None
 
 
 @pytest.mark.parametrize(("mode", "faults"), [("idle", []), ("fault", []), ("stopping", [LOST]), ("hold", [LOST])])
