@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 from command_line import exit_codes
 from command_line.screen import Progress, complain
 from command_line.terminal_person import AbsentPersonError, TerminalPerson
-from experiments.bench_robot import BenchError, EndedError
-from experiments.notebook import NAME, NotebookError
+from experiments.bench_errors import BarredError, BenchError, EndedError, GoneError
+from experiments.notebook import NotebookError, anything_measured
 from experiments.person import Person, Willing
 from experiments.report_page import Section, numbers_told, write_report
 from firmware_host.status_client import CallRefusedError
@@ -58,6 +58,10 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
     except NotebookError as problem:
         complain(str(problem))
         return exit_codes.REFUSED
+    except GoneError as problem:
+        return _end(folder, str(problem), exit_codes.NO_DAEMON)
+    except BarredError as problem:
+        return _end(folder, str(problem), exit_codes.NOT_PERMITTED)
     except (BenchError, EndedError, CallRefusedError, AbsentPersonError) as problem:
         return _end(folder, str(problem), exit_codes.REFUSED)
     except KeyboardInterrupt:
@@ -84,6 +88,6 @@ def _run(options: argparse.Namespace, folder: Path, what: str, run: Callable[[De
 
 def _end(folder: Path, sentence: str, status: int) -> int:
     complain(sentence)
-    if any(folder.rglob(NAME)):
+    if anything_measured(folder):
         complain(f"what was measured is in {folder}: the same command goes on from there")
     return status

@@ -163,10 +163,7 @@ class Calibration:
         if status["mode"] == "hold":
             raise problem
         self._count(step, problem)
-        self._person.tell(f"{_named(step)} was not read: {problem}.")
-        what_to_do = {fault["what_to_do"] for fault in status["faults"] if fault["blocks_arming"]}
-        for sentence in sorted(what_to_do):
-            self._person.tell(f"To do: {sentence}.")
+        self._person.tell(f"{_named(step)} was not read: {str(problem).rstrip('.')}.")
         self._hand.take_off()
         self._held = None
 
@@ -198,7 +195,7 @@ class Calibration:
             if self._person.ask(question, answers, self._watch) == SKIP:
                 break
         self._notebook.write(step.key, {"skipped": trouble})
-        self._person.tell(f"{_named(step)} of trial {step.trial} is left out: {trouble}.")
+        self._person.tell(f"{_named(step)} of trial {step.told_trial} is left out: {trouble}.")
         return None
 
     def _swung(self) -> Sequence[Loop]:
@@ -232,8 +229,8 @@ class Calibration:
         self._notebook.write(step.key, entry_of(reading, doubt, loops))
         held_nm = self._constant_nm_a * reading.current_a
         self._person.tell(
-            f"{self._joint}, trial {step.trial}, {_named(step)}: {reading.current_a:+.3f} A, {held_nm:+.4f} N·m by the"
-            f" configured constant, at {degrees(reading.angle_rad):+.2f} degrees"
+            f"{self._joint}, trial {step.told_trial}, {_named(step)}: {reading.current_a:+.3f} A, {held_nm:+.4f} N·m by"
+            f" the configured constant, at {degrees(reading.angle_rad):+.2f} degrees"
         )
 
 

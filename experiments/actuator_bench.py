@@ -17,7 +17,7 @@ from experiments.actuator_fit import Entry
 from experiments.actuator_hand import PersonsHand
 from experiments.actuator_plan import Plan, require_possible, steps_of
 from experiments.actuator_simulation import simulated_bench
-from experiments.bench_robot import BenchRobot, leave
+from experiments.bench_robot import BenchRobot, disarm, leave
 from experiments.notebook import NAME, Notebook
 from experiments.person import GO_ON, Person, Willing
 from experiments.side_by_side import side_by_side
@@ -50,6 +50,7 @@ class RobotBench:
 
     def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
         require_possible(plan, self.configuration)
+        self._let_go("The robot holds its pose", person)
         hand, count = PersonsHand(person, plan), len(steps_of(plan))
         readings: dict[str, Mapping[str, Entry]] = {}
         for number, joint in enumerate(plan.joints):
@@ -61,18 +62,24 @@ class RobotBench:
                 show(before * total + done, len(plan.joints) * total)
 
             readings[joint] = Calibration(self._robot, joint, plan, hand, person, notebook, show_all).run()
-            self._let_go(joint, person)
+            self._let_go(f"{joint} is done", person)
         return readings
 
-    def _let_go(self, joint: str, person: Person) -> None:
-        """The next joint is mounted with torque off."""
+    def _let_go(self, why: str, person: Person) -> None:
+        """A joint is mounted with torque off, and nothing that hangs on it is dropped."""
         if self._robot.call("status")["mode"] == "hold":
-            question = f"{joint} is done. Hold the flipper: torque goes off."
+            question = f"{why}. Take off what hangs and hold the flipper: torque goes off."
             person.ask(question, {GO_ON: "it is held"}, lambda: self._robot.wait(TICK_S))
-            self._robot.call("disarm")
+            disarm(self._robot)
 
     def leave(self, folder: Path, person: Person) -> list[Path]:
-        return leave(self._robot, person, folder)
+        """Ctrl-C in the middle may find a weight on the arm: it is asked for first, unless Ctrl-C comes again."""
+        try:
+            self._robot.wait(TICK_S)  # a robot that somebody has taken over is not let go of
+            self._let_go("It ends here; Ctrl-C again switches the torque off at once", person)
+        finally:
+            logs = leave(self._robot, person, folder)
+        return logs
 
 
 class SimulatedBench:

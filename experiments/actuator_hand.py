@@ -59,7 +59,7 @@ class PersonsHand:
         self._person.ask("The motor holds. Let go of the flipper.", {GO_ON: "done"}, meanwhile)
 
     def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
-        trial = f"Trial {max(step.trial, 1)} of {self._plan.trials}"
+        trial = f"Trial {step.told_trial} of {self._plan.trials}"
         what = f"hang {step.weight_g:g} g at {100.0 * self._plan.lever_m:g} cm from the axle, nothing else"
         question = f"{trial}: {what}, and let it rest." if step.weight_g else f"{trial}: {EMPTY}"
         answers = {GO_ON: "it rests", SKIP: "skip it", REDO: "redo the one before"}

@@ -69,6 +69,11 @@ class Step:
     def key(self) -> str:
         return f"trial {self.trial}, {self.weight_g:g} g"
 
+    @property
+    def told_trial(self) -> int:
+        """As people count: what comes before the first pass is part of it."""
+        return max(self.trial, 1)
+
 
 def steps_of(plan: Plan) -> list[Step]:
     rising_g, mixed_g = sorted(plan.weights_g), in_turn(plan.weights_g)

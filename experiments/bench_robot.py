@@ -6,13 +6,15 @@ simulated one; an experiment cannot tell which. Everything that it knows of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from experiments.bench_errors import BenchError as BenchError  # for whoever operates one
+from experiments.bench_errors import EndedError, GoneError, OverruledError
 from experiments.person import Person
 from firmware_host.configuration import Configuration
 from firmware_host.log_reader import Log
@@ -28,14 +30,10 @@ MOST_CLEARS = 3  # of a fault that comes back
 CLEAR, LEAVE = "c", ""  # what a person says of a fault: Enter, pressed in haste, clears nothing
 UNDER_WAY = ("walking", "stopping", "damping")
 ENERGISED = ("arming", "hold", *UNDER_WAY)
-
-
-class BenchError(Exception):
-    """The experiment cannot go on; the text says why, and what to do."""
-
-
-class EndedError(Exception):
-    """A person ends the experiment; the text says how it goes on."""
+ALONE = (
+    "the robot cannot be told to rest: it stops by itself, and its torque goes off within seconds; look before you"
+    " reach for it"
+)
 
 
 class BenchRobot(Protocol):
@@ -94,7 +92,7 @@ def face_faults(robot: BenchRobot, person: Person) -> None:
         faults = _faults_told(_status_at_rest(robot))
         if not faults:
             return
-        question = f"{faults} Torque stays off until this is cleared."
+        question = f"{faults}\nTorque stays off until this is cleared."
         if person.ask(question, {CLEAR: "clear it and go on", LEAVE: "stop here"}, lambda: robot.wait(POLL_S)) != CLEAR:
             raise EndedError(
                 "the fault stands; when its cause is gone, 'mudskipper clear', then the same command again"
@@ -122,10 +120,10 @@ def _faults_told(status: Status) -> str:
     faults = [fault for fault in status["faults"] if fault["blocks_arming"]]
     if status["mode"] == "fault" and not faults:
         faults = [status["fault"]] if status["fault"] else []
-    told = [f"{fault['sentence']} ({_for(fault['for_s'])}; {fault['what_to_do']})" for fault in faults]
+    told = [f"  {fault['sentence']} ({_for(fault['for_s'])})\n    -> {fault['what_to_do']}" for fault in faults]
     if status["mode"] == "fault":
-        return f"The robot is in FAULT: {' '.join(told) or status['notice']}"
-    return f"A fault stands: {' '.join(told)}" if told else ""
+        return "\n".join(["The robot is in FAULT:", *(told or [f"  {status['notice']}"])])
+    return "\n".join(["A fault stands:", *told]) if told else ""
 
 
 def _for(duration_s: float) -> str:
@@ -145,7 +143,7 @@ def arm(robot: BenchRobot, person: Person | None = None) -> None:
     if person is not None:
         face_faults(robot, person)
     elif status["mode"] == "fault":
-        raise BenchError(f"{_faults_told(status)} 'mudskipper clear' when its cause is gone")
+        raise BenchError(f"{_faults_told(status)}\n'mudskipper clear' when its cause is gone")
     try:
         wait_until(robot, lambda now: now["mode"] == "idle" and not _blocked(now), ARMING_S, "being ready to arm")
         robot.call("arm")
@@ -189,9 +187,7 @@ def told_by(status: Status) -> str:
     """Why a robot is in the mode that it is in."""
     if status["notice"]:
         return str(status["notice"])
-    if (
-        status["mode"] == "idle"
-    ):  # what goes idle by itself leaves a notice; a flipper that falls then is a fault as well
+    if status["mode"] == "idle":  # unasked it leaves a notice; and a flipper that falls then is a fault as well
         return "its torque was switched off"
     if status["fault"]:
         return str(status["fault"]["sentence"])
@@ -208,10 +204,15 @@ def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
     if after["mode"] != "hold" or after["notice"]:
         raise BenchError(f"the walk ended early: {told_by(after)}")
     closed = strides_since(robot, before["strides_closed"])
-    number = len({stride["index"] for stride in closed})
+    number = strides_made(closed)
     if number < strides:
         raise BenchError(f"the walk ended early, after {number} of {strides} strides: it was told to stop")
     return Walked(closed, before["now_s"], after["now_s"])
+
+
+def strides_made(closed: Sequence[Mapping[str, Any]]) -> int:
+    """Each by both flippers."""
+    return len({stride["index"] for stride in closed})
 
 
 def follow_walk(robot: BenchRobot, begin: Callable[[float], Judge]) -> tuple[str | None, Status]:
@@ -277,6 +278,12 @@ def leave(robot: BenchRobot, person: Person, folder: Path) -> list[Path]:
 
 
 def _rest_told(robot: BenchRobot, person: Person) -> None:
-    if robot.call("status")["mode"] == "walking":
-        person.tell("the flippers are raised, then torque goes off")
-    rest(robot)
+    """Why it does not obey was told to whoever called it last; here, what that means for the robot."""
+    try:
+        if robot.call("status")["mode"] == "walking":
+            person.tell("the flippers are raised, then torque goes off")
+        rest(robot)
+    except OverruledError:
+        person.tell("the robot is left as it is to whoever has taken it over")
+    except GoneError:
+        person.tell(ALONE)

@@ -15,7 +15,8 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from experiments.bench_robot import UNDER_WAY, BenchError, cut
+from experiments.bench_errors import BarredError, BenchError, GoneError, OverruledError
+from experiments.bench_robot import ENERGISED, UNDER_WAY, Status, cut
 from firmware_host.configuration import Configuration, parse_configuration
 from firmware_host.lease import TAKEN_OVER
 from firmware_host.log_folder import present_path, run_files
@@ -40,8 +41,10 @@ class DaemonRobot:
         self._socket = socket
         try:
             self._client = StatusClient(socket)
-        except (NoDaemonError, NotPermittedError) as problem:
-            raise BenchError(f"{problem}. {START_IT}") from problem
+        except NoDaemonError as problem:
+            raise GoneError(f"{problem}. {START_IT}") from problem
+        except NotPermittedError as problem:
+            raise BarredError(str(problem)) from problem
         self._configuration: Configuration | None = None
         self._renewed_s = -inf
         self._log: Path | None = None  # as last seen
@@ -79,10 +82,14 @@ class DaemonRobot:
         self._may_move = self._may_move and method != "disarm"
         try:
             return self._client.call(method, **params)
-        except (NoDaemonError, NotPermittedError) as problem:
-            raise BenchError(str(problem)) from problem
+        except NoDaemonError as problem:
+            raise GoneError(str(problem)) from problem
+        except NotPermittedError as problem:
+            raise BarredError(str(problem)) from problem
 
     def wait(self, duration_s: float) -> None:
+        if self._ousted:
+            raise OverruledError(self._ousted)
         end_s = time.monotonic() + duration_s
         while (left_s := end_s - time.monotonic()) > 0.0:
             time.sleep(min(left_s, RENEWAL_S))
@@ -95,9 +102,10 @@ class DaemonRobot:
     def _promise(self) -> None:
         """Refused where the lease was lost, which the status tells, and where another program operates the robot.
 
-        Raises BenchError for that.
+        Raises OverruledError for that.
         """
         self._renewed_s = time.monotonic()
+        self._require_alone()
         try:
             self.call("lease", for_s=PROMISE_S if self._may_move else RESTING_S)
             self._name = self._name or self.call("status")["lease"]
@@ -108,10 +116,22 @@ class DaemonRobot:
 
     def _require_alone(self) -> None:
         if self._ousted:
-            raise BenchError(self._ousted)
-        holder = self.call("status")["lease"]
-        if holder not in (None, self._name):
-            raise BenchError(f"{holder} operates the robot: wait until it has ended, then begin again")
+            raise OverruledError(self._ousted)
+        status = self.call("status")
+        if status["lease"] not in (None, self._name):
+            raise OverruledError(f"{status['lease']} operates the robot: wait until it has ended, then begin again")
+        if self._name and status["lease"] is None and status["mode"] in ENERGISED and not _winds_up(status):
+            self._ousted = self._why_ousted()
+            raise OverruledError(self._ousted)
+
+    def _why_ousted(self) -> str:
+        """A lease that is had for the asking has only lapsed: it is given back at once, the robot left as it is."""
+        try:
+            self.call("lease", for_s=RESTING_S)
+            self.call("release")
+        except CallRefusedError as refusal:
+            return str(refusal)
+        return "somebody has armed the robot while this program slept: begin again when it is free"
 
     def record(self, from_s: float, to_s: float) -> Log:
         def written() -> Log | None:
@@ -195,3 +215,8 @@ class DaemonRobot:
         end_s = time.monotonic() + WRITTEN_S
         while self.call("status")["mode"] in UNDER_WAY and time.monotonic() < end_s:
             self.wait(RENEWAL_S)
+
+
+def _winds_up(status: Status) -> bool:
+    """Where a lease was lost under torque, the robot stops and is nobody's until its torque is off."""
+    return any(fault["name"] == "lease_lost" for fault in status["faults"])

@@ -2,8 +2,8 @@
 wrong.
 
 Each trial is in the notebook before the next begins, so whatever ends an experiment costs the trial under way and no
-other. A trial that a fault ended, or that said nothing, is repeated; one that is only doubtful is kept or repeated as
-the person decides. Torque is off whenever hands may be in the mud.
+other. A trial that a fault ended, or that said nothing, is repeated, after the third time only where a person wants it
+so; one that is only doubtful is kept or repeated as they decide. Torque is off whenever hands may be in the mud.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ MOST_ATTEMPTS = 3
 LOOK_S = 0.05  # of waiting for a person, in which nobody else arms the robot
 ASKED = {GO_ON: "go on", SKIP: "leave this trial out", REDO: "measure the last one again"}
 SPOILT = {GO_ON: "repeat it", SKIP: "leave it out"}
+SPOILT_OFTEN = {GO_ON: "end here", REDO: "repeat it", SKIP: "leave it out"}
 DOUBTFUL = {GO_ON: "keep it", REDO: "measure it again", SKIP: "leave it out"}
 
 Truths = dict[int, dict[str, float | None]]  # N/m³ by stride and coefficient
@@ -113,9 +114,12 @@ def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) 
         entry = measure(trial)
     except (SpoiltTrialError, BenchError) as problem:
         rest(bench.robot)
-        if attempt >= MOST_ATTEMPTS:
-            raise BenchError(f"{trial} went wrong {attempt} times; the last time: {problem}") from problem
-        return bench.person.ask(f"{trial} went wrong: {str(problem).rstrip('.')}.", SPOILT, attend) == SKIP
+        often = attempt >= MOST_ATTEMPTS
+        told = f"{trial} went wrong{f' {attempt} times; the last time' if often else ''}: {str(problem).rstrip('.')}."
+        answer = bench.person.ask(told, SPOILT_OFTEN if often else SPOILT, attend)
+        if often and answer == GO_ON:
+            raise BenchError(told) from problem
+        return answer == SKIP
     rest(bench.robot)
     for remark in entry["remarks"]:
         bench.person.tell(f"{trial}: {remark}")

@@ -82,6 +82,11 @@ class Notebook:
             self.entries.pop(key, None)
 
 
+def anything_measured(folder: Path) -> bool:
+    """In a notebook of the folder or below: behind its plan there is a line."""
+    return any(notebook.read_bytes().count(b"\n") > 1 for notebook in folder.rglob(NAME))
+
+
 def _decode(line: bytes) -> Entry | None:
     """None for one that was cut off."""
     try:

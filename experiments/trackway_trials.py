@@ -62,8 +62,9 @@ class AskedTrackway:
         self._person = person
 
     def prepare(self, trial: str) -> BenchRobot:
+        disarm(self._robot)
         face_faults(self._robot, self._person)
-        question = f"{trial}: level the mud, and put the sweep axes over the beginning of the first mud."
+        question = f"{trial}. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud."
         self._person.ask(question, {GO_ON: "the robot may walk"}, self._meanwhile)
         face_faults(self._robot, self._person)
         return self._robot

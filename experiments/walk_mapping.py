@@ -21,6 +21,7 @@ from experiments.bench_robot import (
     arm,
     follow_walk,
     rest,
+    strides_made,
     strides_since,
     told_by,
     wait_until,
@@ -125,10 +126,13 @@ def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     before: Status = robot.call("status")
     start_m = before["body_x_m"]
     remarks = [] if start_m is not None else ["no pose is told: strides are given to the muds by their order"]
-    end = _follow(bench, plan, start_m)
+    ordered, end = _follow(bench, plan, start_m)
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     if after["mode"] != "hold":
         raise SpoiltTrialError(told_by(after))
+    made = strides_made(strides_since(robot, before["strides_closed"]))
+    if end is None and made < ordered and not after["notice"]:
+        end = f"somebody stopped the walk in stride {made + 1}"
     log = robot.record(before["now_s"], after["now_s"])
     entry = _entry(bench, plan, trial, log, before["strides_closed"])
     return entry | {
@@ -138,15 +142,19 @@ def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     }
 
 
-def _follow(bench: Bench, plan: Plan, start_m: float | None) -> str:
-    """Walk until the plates go down behind the last mud; why it was ended before, or an empty string."""
+def _follow(bench: Bench, plan: Plan, start_m: float | None) -> tuple[int, str | None]:
+    """Walk until the plates go down behind the last mud: how many strides at most, and what it was stopped for.
+
+    Nothing is said of its proper end, and None where it was not stopped from here.
+    """
     robot = bench.robot
     reach_m = reach_of(robot.configuration)
     strides = ceil(plan.length_m / (2.0 * reach_m))  # without a pose no more: they cannot lead beyond the end
-    robot.call("walk", depth_m=plan.depth_m, strides=strides if start_m is None else SLIPPING * strides)
+    ordered = strides if start_m is None else SLIPPING * strides
+    robot.call("walk", depth_m=plan.depth_m, strides=ordered)
     length_m = plan.length_m - reach_m
     end, _ = follow_walk(robot, lambda now_s: Advance(start_m, length_m, now_s).judge)
-    return end or ""
+    return ordered, end
 
 
 class Advance:

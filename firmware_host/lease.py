@@ -54,8 +54,8 @@ class Lease:
             return None
         left_s = self._until_s - now_s
         return (
-            f"{self._holder} holds the lease, for {left_s:.1f} s unless it is renewed: wait until it has ended,"
-            " or overrule it with --take-over; 'mudskipper stop' and 'disarm' are always allowed"
+            f"{self._holder} operates the robot: wait until that program has ended, or has been silent for"
+            f" {left_s:.1f} s, or overrule it with --take-over; 'mudskipper stop' and 'disarm' are always allowed"
         )
 
     def renew(self, holder: Hashable, now_s: float, for_s: float) -> str | None:

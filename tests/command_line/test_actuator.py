@@ -95,7 +95,7 @@ def test_what_makes_no_plan_is_bad_usage(options: list[str], capsys: pytest.Capt
 
 def test_without_a_daemon_it_is_told_how_to_start_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["experiment", "actuator", "--socket", str(tmp_path / "none.sock"), "--out", str(tmp_path)]
-    assert main(command) == exit_codes.REFUSED
+    assert main(command) == exit_codes.NO_DAEMON
     assert "no daemon answers" in capsys.readouterr().err
 
 

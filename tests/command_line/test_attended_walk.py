@@ -127,5 +127,5 @@ def test_a_second_attendant_is_told_of_the_first(bench: Any) -> None:
     with attended(bench) as first:
         second = bench.run("walk", "--attended")
         assert second.returncode == exit_codes.REFUSED
-        assert f"(process {first.pid}) holds the lease" in second.stderr
+        assert f"(process {first.pid}) operates the robot" in second.stderr
         assert bench.wait_for(lambda report: True)["mode"] == "walking"

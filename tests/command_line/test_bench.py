@@ -16,7 +16,7 @@ import pytest
 from command_line import exit_codes
 from command_line.bench import Desk, Finding, conduct_bench
 from command_line.terminal_person import AbsentPersonError, TerminalPerson
-from experiments.bench_robot import BenchError
+from experiments.bench_errors import BarredError, BenchError, GoneError
 from experiments.notebook import Notebook
 from experiments.report_page import Section
 
@@ -121,6 +121,7 @@ def test_without_a_folder_it_makes_one_of_its_name(tmp_path: Path, monkeypatch: 
     ("problem", "status", "sentence"),
     [
         (BenchError("the robot no longer holds"), exit_codes.REFUSED, "the robot no longer holds"),
+        (BarredError("only for members"), exit_codes.NOT_PERMITTED, "only for members"),
         (KeyboardInterrupt(), exit_codes.INTERRUPTED, "interrupted"),
     ],
 )
@@ -135,6 +136,17 @@ def test_what_was_measured_is_kept_whatever_ends_it(
     said = capsys.readouterr().err
     assert sentence in said and "the same command goes on from there" in said
     assert Notebook(tmp_path, {}).begun
+
+
+def test_where_nothing_was_measured_nothing_is_said_to_be_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(desk: Desk) -> Finding:
+        Notebook(desk.folder, {})
+        raise GoneError("no daemon answers")
+
+    assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.NO_DAEMON
+    assert capsys.readouterr().err.strip().endswith("no daemon answers")
 
 
 def test_questions_go_where_data_does_not(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

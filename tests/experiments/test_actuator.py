@@ -15,7 +15,8 @@ from experiments.actuator_friction import Loop
 from experiments.actuator_plan import Plan, Step, steps_of
 from experiments.actuator_reading import MovedError, Reading, Side
 from experiments.actuator_simulation import bench_configuration
-from experiments.bench_robot import LEAVE, BenchError, EndedError
+from experiments.bench_errors import EndedError
+from experiments.bench_robot import LEAVE, BenchError
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP
 from firmware_host.configuration import Configuration
@@ -241,7 +242,7 @@ def test_a_robot_that_lets_go_is_told_of_armed_again_and_the_weight_is_read_anew
     assert any("400 g was not read" in told and sentence in told for told in case.person.told)
     assert case.hand.asked.count(Step(1, 400.0).key) == 2
     assert case.person.asked == [
-        f"The robot is in FAULT: {sentence} (for 3 s; do this) Torque stays off until this is cleared."
+        f"The robot is in FAULT:\n  {sentence} (for 3 s)\n    -> do this\nTorque stays off until this is cleared."
     ]
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -12,10 +14,21 @@ import pytest
 from command_line import exit_codes
 from control.controller import UP_RAD
 from control.modes import Mode
+from experiments.bench_errors import OverruledError
 from experiments.bench_robot import BenchError, arm, disarm, move, walk
 from experiments.daemon_robot import DaemonRobot
 from firmware_host.log_reader import read_log
 from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
+
+
+def run_beside(robot: DaemonRobot, bench: Bench, *arguments: str) -> subprocess.CompletedProcess[str]:  # noqa: F811
+    """A command in another terminal, while the experiment waits and renews its lease."""
+    with ThreadPoolExecutor(1) as terminals:
+        command = terminals.submit(bench.run, *arguments)
+        with suppress(OverruledError):
+            while not command.done():
+                robot.wait(0.05)
+        return command.result()
 
 
 def test_an_experiment_operates_the_daemon_and_reads_its_log(bench: Bench, tmp_path: Path) -> None:  # noqa: F811
@@ -92,21 +105,22 @@ def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> No
             DaemonRobot(bench.socket)
         arm(first)
         for command in (("move", "left_sweep=3"), ("walk",), ("walk", "--attended")):
-            refused = bench.run(*command)
-            assert refused.returncode == exit_codes.REFUSED and "holds the lease, for" in refused.stderr
-        assert "operated by uid" in bench.run("status").stdout
+            refused = run_beside(first, bench, *command)
+            assert refused.returncode == exit_codes.REFUSED and "operates the robot" in refused.stderr
+        assert "operated by uid" in run_beside(first, bench, "status").stdout
         move(first, {"right_sweep": 0.05})
         disarm(first)
-        assert "holds the lease" in bench.run("arm").stderr
+        assert "operates the robot" in run_beside(first, bench, "arm").stderr
     finally:
         first.close()
+    bench.wait_for(lambda status: not status["faults"])  # the flippers have come down
     assert bench.run("arm").returncode == exit_codes.OK
 
 
 def test_a_robot_that_was_taken_over_is_left_to_whoever_did(bench: Bench) -> None:  # noqa: F811
     robot = DaemonRobot(bench.socket)
     arm(robot)
-    assert bench.run("move", "--take-over", "left_sweep=3").returncode == exit_codes.OK
+    assert run_beside(robot, bench, "move", "--take-over", "left_sweep=3").returncode == exit_codes.OK
     operations = (partial(robot.wait, 0.3), partial(move, robot, {"left_sweep": 0.0}), partial(disarm, robot))
     for operate in operations:
         with pytest.raises(BenchError, match="taken over: uid .* wanted the robot; begin again when it is free"):

@@ -14,11 +14,11 @@ from control.joint_watch import FaultBounds
 from control.modes import Mode
 from control.records import JOINTS
 from drivers.failures import Failures
+from experiments.bench_errors import EndedError
 from experiments.bench_robot import (
     CLEAR,
     LEAVE,
     BenchError,
-    EndedError,
     arm,
     disarm,
     face_faults,
@@ -183,7 +183,7 @@ def test_a_fault_is_cleared_where_a_person_says_so(faulty: LockstepRobot) -> Non
     arm(faulty, person)
     assert faulty.call("status")["mode"] == "hold"
     (question,) = person.asked
-    assert question.startswith("The robot is in FAULT: ") and "right_sweep" in question and "(for 4 s; " in question
+    assert question.startswith("The robot is in FAULT:\n") and "right_sweep" in question and "(for 4 s)\n" in question
 
 
 def test_a_fault_that_a_person_leaves_ends_the_experiment_and_stands(faulty: LockstepRobot) -> None:
@@ -193,7 +193,7 @@ def test_a_fault_that_a_person_leaves_ends_the_experiment_and_stands(faulty: Loc
 
 
 def test_where_nobody_is_there_a_fault_stands(faulty: LockstepRobot) -> None:
-    with pytest.raises(BenchError, match="The robot is in FAULT: .*right_sweep.* 'mudskipper clear'"):
+    with pytest.raises(BenchError, match="(?s)The robot is in FAULT:.*right_sweep.*'mudskipper clear'"):
         arm(faulty)
     assert faulty.call("status")["mode"] == "fault"
 

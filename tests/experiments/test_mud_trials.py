@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from experiments.bench_robot import CLEAR, LEAVE, BenchError, EndedError, leave
+from experiments.bench_errors import EndedError
+from experiments.bench_robot import CLEAR, LEAVE, BenchError, leave
 from experiments.mud_trials import (
     Bench,
     PlannedTrial,
@@ -160,7 +161,7 @@ def test_before_a_person_levels_mud_they_judge_the_fault_that_stands(tmp_path: P
         with pytest.raises(EndedError, match="'mudskipper clear', then the same command again"):
             bed.prepare(TRIALS[0])
     assert person.asked[0] == (
-        "A fault stands: A drive is silent. (for 2 min; check it) Torque stays off until this is cleared."
+        "A fault stands:\n  A drive is silent. (for 2 min)\n    -> check it\nTorque stays off until this is cleared."
     )
     assert robot.called.count("clear") == (answer == CLEAR) and len(person.asked) == 1 + (answer == CLEAR)
 
@@ -196,7 +197,16 @@ def test_a_robot_that_walks_on_is_stopped_before_anybody_is_asked(tmp_path: Path
     assert session.robot.called[:2] == ["status", "stop"]
 
 
-def test_what_goes_wrong_three_times_ends_the_experiment_with_the_reason(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("answer", "kept"), [(REDO, ALL), (SKIP, ALL[1:])])
+def test_a_person_may_go_on_also_after_the_third_time(tmp_path: Path, answer: str, kept: list[str]) -> None:
+    session = Session(tmp_path, ScriptedPerson(GO_ON, GO_ON, answer))
+    session.outcomes = [BenchError("it was told to stop") for _ in range(3)]
+    session.conduct()
+    assert "went wrong 3 times; the last time: it was told to stop." in session.person.asked[-1]
+    assert list(session.notebook.entries) == kept
+
+
+def test_what_goes_wrong_three_times_ends_where_nobody_wants_it_repeated(tmp_path: Path) -> None:
     session = Session(tmp_path)
     session.outcomes = [{"remarks": []}, *(SpoiltTrialError("no mud") for _ in range(3))]
     with pytest.raises(BenchError, match="trial 2 of 3 went wrong 3 times; the last time: no mud"):

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from command_line.walking import trackway_text
-from experiments.bench_robot import BenchError
+from experiments.bench_robot import BenchError, arm
 from experiments.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP
-from experiments.trackway_trials import UNSEEN_S, Mud, Plan, report_of, run, walk_over
+from experiments.trackway_trials import UNSEEN_S, AskedTrackway, Mud, Plan, report_of, run, walk_over
 from experiments.walk import StrideRecord, Walk
 from experiments.walk_plots import plot_trackway
 from firmware_host.file_recorder import FileRecorder
@@ -23,6 +23,7 @@ from simulation.clay import MUDS
 from simulation.lockstep import Lockstep
 from simulation.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
 from simulation.track import Track
+from tests.scripted_person import ScriptedPerson
 
 SHORT = Plan((Mud("48.5", 0.3), Mud("53.1", 0.3)), trials=1, depths_m=(0.03,))
 TINY = Plan((Mud("48.5", 0.15),), trials=1, depths_m=(0.03,))
@@ -62,6 +63,29 @@ class WatchedRobot(LockstepRobot):
         for _ in range(round(duration_s / PERIOD_S)):
             self.lockstep.step()
             self._truth.look()
+
+
+class Leveller(ScriptedPerson):
+    """Looks whether the robot could move while hands are in the mud."""
+
+    def __init__(self, robot: LockstepRobot) -> None:
+        super().__init__()
+        self.robot = robot
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        assert self.robot.call("status")["mode"] == "idle"
+        return super().ask(question, answers, meanwhile)
+
+
+def test_torque_is_off_while_a_person_levels_mud_whatever_the_robot_did_before(tmp_path: Path) -> None:
+    robot = SimulatedTrackway(tmp_path, always(GO_ON)).prepare("any")
+    arm(robot)
+    person = Leveller(robot)
+    AskedTrackway(robot, person).prepare("3 cm, trial 1")
+    assert person.asked == [
+        "3 cm, trial 1. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud."
+    ]
+    robot.close()
 
 
 def always(verdict: str) -> Iterator[str]:

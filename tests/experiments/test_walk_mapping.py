@@ -191,6 +191,24 @@ def test_without_a_pose_the_robot_makes_no_more_strides_than_lead_to_the_end(tmp
     assert len(told["muds"][0]["k_p"]["trials"]) == 2
 
 
+class StoppedRobot(LockstepRobot):
+    """Somebody else stops its walk once a stride is over."""
+
+    def call(self, method: str, **params: Any) -> Any:
+        told = super().call(method, **params)
+        if method == "status" and told["mode"] == "walking" and told["strides_closed"]:
+            super().call("stop")
+        return told
+
+
+def test_a_walk_that_somebody_else_stops_is_not_taken_for_a_whole_one(tmp_path: Path) -> None:
+    bench = bench_of(tmp_path, TINY)
+    bench.robot.__class__ = StoppedRobot
+    bench.bed.prepare(TINY.planned[0])
+    entry = measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
+    assert entry["remarks"] == ["somebody stopped the walk in stride 2"]
+
+
 def test_by_their_order_strides_are_spread_over_the_muds_lengths() -> None:
     plan = replace(SHORT, muds=(Mud("a", 0.2), Mud("b", 0.6)))
     entry = {"trial": 1, "start_m": None, "truths": {}, "strides": {DEFAULT: [make_stride(place_m=None)] * 4}}

@@ -58,7 +58,8 @@ def test_a_holder_that_has_released_it_may_hang_up() -> None:
 def test_a_second_one_is_told_who_holds_it() -> None:
     lease = Lease()
     lease.renew("anna", 10.0, HALF_S)
-    assert (lease.renew("ben", 10.1, HALF_S) or "").startswith("anna holds the lease, for 0.4 s unless it is renewed: ")
+    told = lease.renew("ben", 10.1, HALF_S) or ""
+    assert told.startswith("anna operates the robot: wait until that program has ended, or has been silent for 0.4 s, ")
     assert lease.release("ben") == "anna holds the lease"
     assert lease.lost(10.51)  # which was not renewed by that
 
@@ -86,7 +87,7 @@ def test_only_its_holder_moves_the_robot_and_where_there_is_none_anybody() -> No
     assert lease.refusal("anna", 10.0) is lease.refusal("ben", 10.0) is None
     lease.renew("anna", 10.0, HALF_S)
     assert lease.refusal("anna", 10.1) is None
-    assert "anna holds the lease, for 0.4 s" in (lease.refusal("ben", 10.1) or "")
+    assert "anna operates the robot" in (lease.refusal("ben", 10.1) or "")
     assert "anna has lost the lease" in (lease.refusal("ben", 10.6, take_over=True) or "")  # the robot stops
     lease.reset()
     assert lease.refusal("ben", 10.7) is None

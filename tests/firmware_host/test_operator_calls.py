@@ -107,7 +107,9 @@ def test_whatever_moves_the_robot_is_for_operators(robot: Robot) -> None:
 def test_under_a_lease_nobody_else_arms_a_robot_that_hands_are_on(robot: Robot) -> None:
     robot.steps.run_for(1.0)
     robot.ask("lease", for_s=0.5)
-    with pytest.raises(RefusedError, match=r"^uid 1000 \(process 77\) holds the lease, for 0.5 s unless it is renewed"):
+    with pytest.raises(
+        RefusedError, match=r"^uid 1000 \(process 77\) operates the robot: .* has been silent for 0.5 s"
+    ):
         robot.ask("arm", BEN)
     robot.steps.run_for(0.7)  # its holder is silent: with the torque off there is nothing to stop, and it is free
     assert robot.ask("status")["mode"] == "idle" and not robot.lease.lost(robot.steps.now_s)
@@ -134,7 +136,7 @@ MOTIONS: list[tuple[str, dict[str, Any]]] = [("walk", {"strides": 1}), ("move", 
 @pytest.mark.parametrize(("method", "params"), MOTIONS)
 def test_under_a_lease_nobody_else_moves_the_robot(armed: Robot, method: str, params: dict[str, Any]) -> None:
     armed.ask("lease", for_s=0.5)
-    with pytest.raises(RefusedError, match="holds the lease, for 0.5 s .*or overrule it with --take-over"):
+    with pytest.raises(RefusedError, match="operates the robot: .*silent for 0.5 s, or overrule it with --take-over"):
         armed.ask(method, BEN, **params)
     armed.steps.run_for(0.1)
     assert armed.ask("status")["mode"] == "hold" and not armed.ask("status")["moving"]
@@ -195,13 +197,13 @@ def test_a_lease_that_is_renewed_is_told_once(armed: Robot) -> None:
 def test_another_operator_is_told_who_holds_it(armed: Robot) -> None:
     armed.ask("lease", for_s=0.5)
     for method, params in (("lease", {"for_s": 0.5}), ("release", {})):
-        with pytest.raises(RefusedError, match=r"^uid 1000 \(process 77\) holds the lease($|, for 0.5 s )"):
+        with pytest.raises(RefusedError, match=r"^uid 1000 \(process 77\) (operates the robot|holds the lease$)"):
             armed.ask(method, BEN, **params)
 
 
 def test_the_same_user_s_next_connection_is_another_holder(armed: Robot) -> None:
     armed.ask("lease", for_s=0.5)
-    with pytest.raises(RefusedError, match="holds the lease"):
+    with pytest.raises(RefusedError, match="operates the robot"):
         armed.ask("lease", ANNA._replace(connection=3), for_s=0.5)
 
 

@@ -1,0 +1,79 @@
+"""An experiment that was suspended, or whose computer slept, finds its lease gone: what it may do then."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments import daemon_robot
+from experiments.bench_errors import OverruledError
+from experiments.daemon_robot import DaemonRobot
+from firmware_host.status_client import CallRefusedError
+
+ME = "uid 1 (process 2)"
+LOST = {"name": "lease_lost"}
+
+
+class ScriptedDaemon:
+    """A StatusClient whose daemon lets a lease lapse when a test says so."""
+
+    def __init__(self) -> None:
+        self.lease: str | None = None
+        self.mode = "idle"
+        self.faults: list[dict[str, str]] = []
+        self.called: list[str] = []
+        self.overruled = False
+
+    def call(self, method: str, **params: Any) -> Any:
+        self.called.append(method)
+        if method == "lease" and self.overruled:
+            raise CallRefusedError("taken over: uid 3 wanted the robot")
+        if method in ("lease", "release"):
+            self.lease = ME if method == "lease" else None
+        return {"lease": self.lease, "mode": self.mode, "faults": self.faults}
+
+    def lapse(self, mode: str, faults: list[dict[str, str]]) -> None:
+        self.lease, self.mode, self.faults = None, mode, faults
+        self.called.clear()
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture
+def daemon(monkeypatch: pytest.MonkeyPatch) -> ScriptedDaemon:
+    made = ScriptedDaemon()
+    monkeypatch.setattr(daemon_robot, "StatusClient", lambda socket: made)
+    monkeypatch.setattr(daemon_robot, "RENEWAL_S", 0.0)
+    return made
+
+
+@pytest.mark.parametrize("overruled", [False, True])
+@pytest.mark.parametrize("mode", ["arming", "hold", "walking"])
+def test_a_robot_that_somebody_armed_meanwhile_is_left_to_them(
+    daemon: ScriptedDaemon, mode: str, overruled: bool
+) -> None:
+    """Hands are in the mud, and the question on the screen says that torque is off."""
+    robot = DaemonRobot(Path("x"))
+    daemon.lapse(mode, [])
+    daemon.overruled = overruled
+    told = "taken over: uid 3" if overruled else "somebody has armed the robot while this program slept"
+    for method in ("arm", "disarm", "stop"):
+        with pytest.raises(OverruledError, match=told):
+            robot.call(method)
+    with pytest.raises(OverruledError):
+        robot.wait(0.0)
+    robot.close()
+    assert set(daemon.called) <= {"status", "lease", "release"} and daemon.lease is None
+
+
+@pytest.mark.parametrize(("mode", "faults"), [("idle", []), ("fault", []), ("stopping", [LOST]), ("hold", [LOST])])
+def test_a_robot_that_nobody_wanted_meanwhile_is_operated_again(
+    daemon: ScriptedDaemon, mode: str, faults: list[dict[str, str]]
+) -> None:
+    robot = DaemonRobot(Path("x"))
+    daemon.lapse(mode, faults)
+    robot.call("arm")
+    assert daemon.called[-1] == "arm" and daemon.lease == ME
