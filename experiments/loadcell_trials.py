@@ -15,17 +15,10 @@ from typing import Any
 import numpy as np
 
 from experiments.loadcell_analysis import analyse_trial
-from experiments.loadcell_fits import (
-    INSERTION,
-    KINDS,
-    SINGLE_SPEED_BOUND,
-    Analysed,
-    Recorded,
-    speed_remark,
-)
+from experiments.loadcell_fits import INSERTION, KINDS, SINGLE_SPEED_BOUND, Analysed, Recorded, speed_remark
 from experiments.loadcell_motion import Insertion, Shear, StageSettings, wide_pace
 from experiments.loadcell_raw import load_recorded, raw_name, write_places, write_samples
-from experiments.loadcell_recording import CellRecorder, PlaceStretch, Stretch, Tare
+from experiments.loadcell_recording import AVERAGED, CellRecorder, PlaceStretch, Stretch, Tare
 from experiments.loadcell_stage import Stage, Trial
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP, Person
@@ -114,6 +107,8 @@ def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tu
     recorder, stage = bench.recorder, bench.stage
     heed_encoder(bench)
     before = recorder.tare()
+    if before.is_averaged and trial.number == attempt == 1:
+        bench.person.tell(f"{trial.key}: {AVERAGED}")
     if trial.kind != INSERTION:
         stage.lower()
     stage.start(trial)
