@@ -25,6 +25,8 @@ from experiments.person import GO_ON, REDO, SKIP, Person
 from experiments.side_by_side import Show
 
 KEEP, WITHOUT = "k", "w"
+AT_ONE_SPEED = "what follows takes a stage of one speed, and none that a hand pushes"
+ALONE = "its force counts alone, which takes a stage of one speed"
 MOST_ATTEMPTS = 3  # after which Enter means to leave it
 LEAST_DRIFT_N, DRIFT_SHARE = 0.02, 0.03  # of the largest force, by which the zero may move over a trial
 GARBLED_SHARE = 0.05
@@ -148,7 +150,7 @@ def heed_encoder(bench: TrialBench) -> None:
         if answer == WITHOUT:
             recorder.encoder.close()
             recorder.encoder = None
-            bench.person.tell("going on without the position, until the same command is started again")
+            bench.person.tell(f"going on without the position, until the same command is started again: {AT_ONE_SPEED}")
         recorder.listen(LOOK_S)
         looks += 1
 
@@ -234,9 +236,9 @@ def judge(analysed: Analysed, stretch: Stretch, before: Tare, after: Tare) -> li
 
 def _judge_position(analysed: Analysed, told: PlaceStretch) -> list[str]:
     if told.breaks:
-        return ["the stage's encoder was unplugged or began anew in the middle of it: kept, its force counts alone"]
+        return ["the stage's encoder was unplugged or began anew in the middle of it: kept, " + ALONE]
     if not told.places:
-        return ["the stage's encoder told no place: kept, its force counts alone"]
+        return ["the stage's encoder told no place: kept, " + ALONE]
     missing = _share_without_place(analysed)
     if missing > MISSING_SHARE:
         return [
