@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -116,7 +117,7 @@ def encoder_of(options: argparse.Namespace, emulated: str) -> StageEncoderSettin
         return None
     if not options.simulated and not options.position:
         raise ValueError("name the serial port of the stage's encoder: --position PATH")
-    if not options.simulated and options.position == options.port:
+    if not options.simulated and os.path.realpath(options.position) == os.path.realpath(options.port):
         raise ValueError(f"load cell and encoder cannot both be on {options.port}: they are two ports")
     if not options.simulated and options.position_step is None:
         raise ValueError("--position needs --position-step: the stage's way per count of its encoder, in micrometres")

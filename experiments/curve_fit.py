@@ -54,6 +54,11 @@ def fit_curve(
     return CurveFit(place, _std_errors(residuals, place, told), factors, float(samples @ samples))
 
 
+def saved_by(richer: CurveFit, plain: CurveFit, samples: int) -> float:
+    """In logarithms of the number of samples: 1 is the price of a factor by Schwarz's criterion."""
+    return float(samples * np.log(plain.square / richer.square) / np.log(samples))
+
+
 Residuals = Callable[[Array], tuple[Array, Array]]
 
 

@@ -104,7 +104,8 @@ def analyse_trial(trial: Recorded, settings: StageSettings, expected: Pace, alig
 
 def _by_force(trial: Recorded, course: Course, settings: StageSettings, expected: Pace) -> Analysed:
     try:
-        analysed = analyse_shear if trial.kind == SHEAR else analyse_insertion
-        return analysed(trial, course, settings, expected)
+        if trial.kind == SHEAR:
+            return analyse_shear(trial, course, settings)
+        return analyse_insertion(trial, course, settings, expected)
     except (StrokeError, np.linalg.LinAlgError) as problem:
         return Analysed(trial, problem=str(problem))

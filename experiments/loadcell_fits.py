@@ -49,6 +49,7 @@ SPEED_BOUND = 0.05  # from the one that was set, beyond which it is said
 SINGLE_SPEED_BOUND = 0.12  # the same of a single trial, before it is known beside the others
 RESIDUAL_NOISES, RESIDUAL_SHARE = 4.0, 0.03
 BLOCKS = 8  # of a steady shear, whose means tell its scatter
+UNSTEADY = 0.15  # change over a steady shear, from which it is said
 DEPTH_POWERS = {"k_p": 1.0, "k_s": 2.0, "k_e": 1.0}  # with which a depth that was set wrong enters
 CALLIPERS_M = 0.05e-3
 
@@ -188,18 +189,23 @@ def slope(settings: StageSettings, depths_m: Array, forces_n: Array, ways_m: Arr
     return Coefficient(value, hypot(fit.std_error, doubt * value))
 
 
-def analyse_shear(trial: Recorded, course: Course, settings: StageSettings, expected: Pace) -> Analysed:
+def analyse_shear(trial: Recorded, course: Course, settings: StageSettings) -> Analysed:
     zero_n = -trial.zero_n if course.turned else trial.zero_n
     motion = find_shear(course, settings, zero_n)
     steady = (course.times_s >= motion.steady_from_s) & (course.times_s <= motion.steady_to_s)
     forces_n = course.forces_n[steady] - zero_n
     moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
-    blocks_n = [float(np.mean(block)) for block in np.array_split(forces_n, BLOCKS)]
-    error_n = stdev(blocks_n) / sqrt(BLOCKS)
+    error_n, remark = steadiness(forces_n)
     told = Coefficient(float(np.mean(forces_n)) / moment_m3, error_n / moment_m3)
-    tilt = (blocks_n[-1] - blocks_n[0]) / fmean(blocks_n)
-    remark = f"the shear was not steady: it changed by {100.0 * tilt:+.0f} %" if abs(tilt) > 0.15 else ""
     return Analysed(trial, course, motion, None, {"k_s": told}, "", remark)
+
+
+def steadiness(forces_n: Array) -> tuple[float, str]:
+    """Standard error of the mean of a shear's force, by the means of blocks, and what is to be said of it."""
+    blocks_n = [float(np.mean(block)) for block in np.array_split(forces_n, BLOCKS)]
+    tilt = (blocks_n[-1] - blocks_n[0]) / fmean(blocks_n)
+    remark = f"the shear was not steady: it changed by {100.0 * tilt:+.0f} %" if abs(tilt) > UNSTEADY else ""
+    return stdev(blocks_n) / sqrt(BLOCKS), remark
 
 
 def bench_doubt(name: str, settings: StageSettings, depth_error_m: float, calibration_error: float) -> float:

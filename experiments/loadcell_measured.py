@@ -6,8 +6,7 @@ Forces count as at the speed that was set.
 
 from __future__ import annotations
 
-from math import hypot, nan, sqrt
-from statistics import fmean, stdev
+from math import hypot, nan
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from experiments.curve_fit import Array
 from experiments.loadcell_alignment import Alignment, PlacedCourse, rate_of
 from experiments.loadcell_contact import Course, StrokeError
 from experiments.loadcell_fits import (
-    BLOCKS,
     NOT_KNOWN,
     RESIDUAL_NOISES,
     RESIDUAL_SHARE,
@@ -25,6 +23,7 @@ from experiments.loadcell_fits import (
     Coefficient,
     Recorded,
     slope,
+    steadiness,
     volume_m3,
 )
 from experiments.loadcell_motion import REVERSAL_SHARE, Extraction, Insertion, Pace, Shear, StageSettings
@@ -32,7 +31,6 @@ from experiments.loadcell_position import LEAST_SAMPLES, Mask, MeasuredInsertion
 from experiments.stage_track import LEAST_PLACES, StageTrack
 
 DEPTH_BOUND = 0.1  # from the depth that was set, beyond which it is said
-UNSTEADY = 0.15
 EVEN_DEPTHS = 60
 LAST_SHARE = 0.3
 
@@ -127,9 +125,8 @@ def _shear(trial: Recorded, placed: PlacedCourse, expected: Alignment) -> Analys
     mean_n = float(np.average(forces_n, weights=ways_m))
     if mean_n <= 0.0:
         raise StrokeError("the force does not oppose the motion")
-    blocks_n = [float(np.mean(block)) for block in np.array_split(forces_n, BLOCKS)]
     rate_n = mean_n * expected.rate_doubt * float(np.average(quickness, weights=ways_m))
-    tilt = (blocks_n[-1] - blocks_n[0]) / fmean(blocks_n)
+    error_n, remark = steadiness(forces_n)
     moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
     steady_s = course.times_s[motion.steady]
     return Analysed(
@@ -137,8 +134,8 @@ def _shear(trial: Recorded, placed: PlacedCourse, expected: Alignment) -> Analys
         course,
         Shear(motion.begin_s, float(steady_s[0]), float(steady_s[-1]), motion.mean_speed_m_s),
         None,
-        {"k_s": Coefficient(mean_n / moment_m3, hypot(stdev(blocks_n) / sqrt(BLOCKS), rate_n) / moment_m3)},
-        remark=f"the shear was not steady: it changed by {100.0 * tilt:+.0f} %" if abs(tilt) > UNSTEADY else "",
+        {"k_s": Coefficient(mean_n / moment_m3, hypot(error_n, rate_n) / moment_m3)},
+        remark=remark,
         places_m=motion.ways_m,
         place_error_m=placed.track.interpolation_error_m,
         alignment=rate_of(felt_n, quickness),

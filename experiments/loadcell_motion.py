@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
-from experiments.curve_fit import Array, CurveFit, Prior, fit_curve
+from experiments.curve_fit import Array, CurveFit, Prior, fit_curve, saved_by
 from experiments.loadcell_contact import CONTACT_NOISES, CONTACT_SHARE, LEAST_FORCE_N, Course, StrokeError
 
 BEFORE_S, AFTER_S = 0.25, 0.2  # of the fit, around the way down
@@ -117,13 +117,8 @@ def find_insertion(course: Course, settings: StageSettings, expected: Pace) -> I
     if np.count_nonzero((t >= touched_s) & (t <= top_s)) < 6:
         raise StrokeError("fewer than 6 samples on the way down: a faster amplifier or a slower stage is needed")
     kink, jump = (_best_fit(t, y, touched_s, settings, expected, course.noise_n, jumps) for jumps in (False, True))
-    pays = jump.factors[JUMP] > 0.0 and _saved(kink, jump, len(y)) > JUMP_PRICE
+    pays = jump.factors[JUMP] > 0.0 and saved_by(jump, kink, len(y)) > JUMP_PRICE
     return _insertion(jump if pays else kink, depth_m, len(y))
-
-
-def _saved(plain: CurveFit, richer: CurveFit, samples: int) -> float:
-    """By a richer shape, in logarithms of the number of samples: 1 is the price of a factor by Schwarz's criterion."""
-    return float(samples * np.log(plain.square / richer.square) / np.log(samples))
 
 
 def _best_fit(
@@ -131,7 +126,7 @@ def _best_fit(
 ) -> CurveFit:
     """Mud that bears less as the stage slows down looks much like a longer ramp: only where it pays, and never more."""
     plain, slow = (_fit(t, y, touched_s, settings, expected, noise_n, jumps, slows) for slows in (False, True))
-    pays = slow.factors[SLOWING] < 0.0 and _saved(plain, slow, len(y)) > SLOWING_PRICE
+    pays = slow.factors[SLOWING] < 0.0 and saved_by(slow, plain, len(y)) > SLOWING_PRICE
     return slow if pays else plain
 
 

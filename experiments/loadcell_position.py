@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.curve_fit import Array, CurveFit, Prior, fit_curve
+from experiments.curve_fit import Array, CurveFit, Prior, fit_curve, saved_by
 from experiments.loadcell_alignment import RESTING_SHARE, Alignment, PlacedCourse
 from experiments.loadcell_contact import LEAST_FORCE_N, StrokeError
 from experiments.loadcell_motion import JUMP_PRICE, KNOTS, REVERSAL_SHARE, YIELD_M
@@ -144,8 +144,7 @@ def _best_fit(placed: PlacedCourse, expected: Alignment, window: _Window, starts
     kink, jump = (
         fit_curve(partial(_shapes, placed, window, jumps), y, starts, prior, noise_n) for jumps in (False, True)
     )
-    saved = float(len(y) * np.log(kink.square / jump.square) / np.log(len(y)))
-    pays = jump.factors[2] > 0.0 and saved > JUMP_PRICE
+    pays = jump.factors[2] > 0.0 and saved_by(jump, kink, len(y)) > JUMP_PRICE
     return jump if pays else kink
 
 

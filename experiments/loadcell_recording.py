@@ -21,6 +21,12 @@ POLL_S = 0.005
 TARE_S = 1.0
 ABSENCE_S = 300.0  # for which an adapter may be away
 CONTACT_SAMPLES = 3
+AVERAGED_LIKENESS = 0.6  # of a mean over three conversions
+LEAST_TOLD, LEAST_VALUES = 40, 8  # samples, and different ones, of which fewer tell nothing
+AVERAGED = (
+    "the cell's samples at rest hardly differ from one to the next: its amplifier tells means over several "
+    "conversions, which smears the strokes. Set its filter to the fastest, or move the stage more slowly"
+)
 FOLLOWING = 0.01  # of a zero that drifts while nobody starts, per sample
 
 
@@ -44,6 +50,12 @@ class Tare(NamedTuple):
     force_n: float
     noise_n: float
     samples: int
+    likeness: float = 0.0  # of each sample and the next one: 0 where they are independent, 1 where they are the same
+
+    @property
+    def is_averaged(self) -> bool:
+        """By a filter in the amplifier, or what shakes the cell is slow."""
+        return self.samples >= LEAST_TOLD and self.likeness > AVERAGED_LIKENESS
 
 
 class PlaceStretch(NamedTuple):
@@ -126,7 +138,7 @@ class CellRecorder:
             raise BenchError(self._silence())
         middle_n = float(np.median(forces_n))
         noise_n = max(1.4826 * float(np.median(np.abs(np.array(forces_n) - middle_n))), LEAST_NOISE_N)
-        return Tare(float(np.mean(forces_n)), noise_n, len(forces_n))
+        return Tare(float(np.mean(forces_n)), noise_n, len(forces_n), likeness(forces_n))
 
     def _steady_forces_n(self) -> list[float]:
         self.drain()
@@ -165,6 +177,15 @@ class CellRecorder:
             port.unpluggings - unpluggings,
             PlaceStretch(places, *(b - a for a, b in zip(before, after, strict=True))) if self.encoder else None,
         )
+
+
+def likeness(forces_n: Sequence[float]) -> float:
+    """Correlation of each with the next one, beside a drift; 0 where a coarse step hides how they scatter."""
+    if len(set(forces_n)) < LEAST_VALUES:
+        return 0.0
+    order = np.arange(len(forces_n))
+    apart_n = np.asarray(forces_n) - np.polyval(np.polyfit(order, forces_n, 1), order)
+    return float(apart_n[1:] @ apart_n[:-1] / (apart_n @ apart_n))
 
 
 def _counted(encoder: StageEncoder | None) -> tuple[int, int, int]:

@@ -15,7 +15,7 @@ import numpy as np
 from experiments.loadcell import Results
 from experiments.loadcell_alignment import common_alignment
 from experiments.loadcell_comparison import Compared
-from experiments.loadcell_fits import CALLIPERS_M, COEFFICIENTS, Analysed, OfMud, bench_doubt
+from experiments.loadcell_fits import CALLIPERS_M, COEFFICIENTS, Analysed, OfMud
 from experiments.loadcell_motion import RATE_EXPONENT, Insertion, StageSettings
 from experiments.loadcell_trials import TrialPlan
 from experiments.report_page import Figure, Section
@@ -56,17 +56,21 @@ def errors_in_short(plan: TrialPlan) -> str:
     return f"± one standard error of the trials ± one of the bench: {_depth_text(plan)}, plate, calibration"
 
 
-def errors_text(plan: TrialPlan) -> str:
+def errors_text(muds: Mapping[str, Mapping[str, OfMud]], plan: TrialPlan) -> str:
     """What the doubts are that stand behind the values."""
-    doubts = {name: bench_doubt(name, plan.settings, plan.depth_error_m, 0.0) for name in COEFFICIENTS}
-    shares = ", ".join(f"{100.0 * doubt:.1f} % of {name}" for name, doubt in doubts.items())
+    shares = ", ".join(f"{100.0 * _largest_bench_share(muds, name):.1f} % of {name}" for name in COEFFICIENTS)
     return (
         "The first ± is one standard error of the trials: their scatter, the stage's speed, and in k_p and k_e what "
         "F = k V leaves over, which in clay is most of it. The second ± is what no repetition shows, since all trials "
-        f"have it alike: {_depth_text(plan)} and callipers ± {1000.0 * CALLIPERS_M:g} mm on width and thickness, "
-        f"together {shares}; and the reading of the calibration. The weights themselves count as exact, and so does an "
+        f"have it alike: {_depth_text(plan)}, callipers ± {1000.0 * CALLIPERS_M:g} mm on width and thickness, and the "
+        f"reading of the calibration, together at most {shares}. The weights themselves count as exact, and so does an "
         "amplifier that prints grams or newtons by itself. A depth that an encoder measured has no doubt of a ruler."
     )
+
+
+def _largest_bench_share(muds: Mapping[str, Mapping[str, OfMud]], name: str) -> float:
+    coefficients = [told[name] for told in muds.values()]
+    return max((each.bench_error / each.value for each in coefficients if isfinite(each.value)), default=0.0)
 
 
 def _depth_text(plan: TrialPlan) -> str:
@@ -100,7 +104,7 @@ def _plate_text(told: Mapping[str, Any], before: str, after: str = "_m") -> str:
 
 def sections_of(results: Results, plan: TrialPlan) -> list[Section]:
     rows, figures = coefficient_rows(results.muds), _coefficient_figures(results)
-    text = "\n\n".join([METHOD, *position_texts(results.trials), errors_text(plan)])
+    text = "\n\n".join([METHOD, *position_texts(results.trials), errors_text(results.muds, plan)])
     sections = [Section("Coefficients", text, rows=rows, figures=figures)]
     if results.compared:
         rows, figures = compared_rows(results.compared), _pairs(results)

@@ -15,23 +15,18 @@ from typing import Any
 import numpy as np
 
 from experiments.loadcell_analysis import analyse_trial
-from experiments.loadcell_fits import (
-    INSERTION,
-    KINDS,
-    SINGLE_SPEED_BOUND,
-    Analysed,
-    Recorded,
-    speed_remark,
-)
+from experiments.loadcell_fits import INSERTION, KINDS, SINGLE_SPEED_BOUND, Analysed, Recorded, speed_remark
 from experiments.loadcell_motion import Insertion, Shear, StageSettings, wide_pace
 from experiments.loadcell_raw import load_recorded, raw_name, write_places, write_samples
-from experiments.loadcell_recording import CellRecorder, PlaceStretch, Stretch, Tare
+from experiments.loadcell_recording import AVERAGED, CellRecorder, PlaceStretch, Stretch, Tare
 from experiments.loadcell_stage import Stage, Trial
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP, Person
 from experiments.side_by_side import Show
 
 KEEP, WITHOUT = "k", "w"
+AT_ONE_SPEED = "what follows takes a stage of one speed, and none that a hand pushes"
+ALONE = "its force counts alone, which takes a stage of one speed"
 MOST_ATTEMPTS = 3  # after which Enter means to leave it
 LEAST_DRIFT_N, DRIFT_SHARE = 0.02, 0.03  # of the largest force, by which the zero may move over a trial
 GARBLED_SHARE = 0.05
@@ -114,6 +109,8 @@ def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tu
     recorder, stage = bench.recorder, bench.stage
     heed_encoder(bench)
     before = recorder.tare()
+    if before.is_averaged and trial.number == attempt == 1:
+        bench.person.tell(f"{trial.key}: {AVERAGED}")
     if trial.kind != INSERTION:
         stage.lower()
     stage.start(trial)
@@ -153,7 +150,7 @@ def heed_encoder(bench: TrialBench) -> None:
         if answer == WITHOUT:
             recorder.encoder.close()
             recorder.encoder = None
-            bench.person.tell("going on without the position, until the same command is started again")
+            bench.person.tell(f"going on without the position, until the same command is started again: {AT_ONE_SPEED}")
         recorder.listen(LOOK_S)
         looks += 1
 
@@ -239,9 +236,9 @@ def judge(analysed: Analysed, stretch: Stretch, before: Tare, after: Tare) -> li
 
 def _judge_position(analysed: Analysed, told: PlaceStretch) -> list[str]:
     if told.breaks:
-        return ["the stage's encoder was unplugged or began anew in the middle of it: kept, its force counts alone"]
+        return ["the stage's encoder was unplugged or began anew in the middle of it: kept, " + ALONE]
     if not told.places:
-        return ["the stage's encoder told no place: kept, its force counts alone"]
+        return ["the stage's encoder told no place: kept, " + ALONE]
     missing = _share_without_place(analysed)
     if missing > MISSING_SHARE:
         return [

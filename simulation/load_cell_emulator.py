@@ -5,6 +5,7 @@ A converter integrates over its period, adds noise and drift, rounds to a step o
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,7 @@ class AmplifierParameters(TalkerParameters):
     zero_counts: Annotated[float, Bounds(-8e6, 8e6)] = 81000.0
     noise_n: Annotated[float, Bounds(0.0, 1.0)] = 0.008  # of the mounted cell: the stage shakes more than the chip
     drift_n_s: Annotated[float, Bounds(-1.0, 1.0)] = 0.0
+    averaged: Annotated[int, Bounds(1, 64)] = 1  # conversions, of which an indicator's filter tells the mean
     range_n: Annotated[float, Bounds(0.0, 1e4)] = 20.0  # beyond it the cell is overloaded
 
 
@@ -41,6 +43,7 @@ class EmulatedAmplifier(SerialTalker):
         self.amplifier = parameters
         self._noise_of_cell = Random(seed)
         self._started_s: float | None = None
+        self._converted_n: deque[float] = deque(maxlen=parameters.averaged)
         super().__init__(self._convert, parameters, link, Random(seed))
 
     def _convert(self, at_s: float) -> bytes:
@@ -48,7 +51,8 @@ class EmulatedAmplifier(SerialTalker):
             self._started_s = at_s
         force_n = self.mean_force_n(at_s) + self._noise_of_cell.gauss(0.0, self.amplifier.noise_n)
         force_n += self.amplifier.drift_n_s * (at_s - self._started_s)
-        return self._line(force_n, at_s)
+        self._converted_n.append(force_n)
+        return self._line(sum(self._converted_n) / len(self._converted_n), at_s)
 
     def _line(self, force_n: float, at_s: float) -> bytes:
         amplifier = self.amplifier

@@ -134,6 +134,7 @@ def test_another_depth_in_the_same_folder_is_refused(
         (["--port", "/dev/nothing", "--position"], "--position PATH"),
         (["--port", "/dev/nothing", "--position", "/dev/other"], "--position-step"),
         (["--port", "/dev/nothing", "--position", "/dev/nothing"], "two ports"),
+        (["--port", "/dev/nothing", "--position", "/dev/../dev/nothing"], "two ports"),
     ],
 )
 def test_what_cannot_be_is_refused_at_once(

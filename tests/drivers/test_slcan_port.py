@@ -186,9 +186,11 @@ def test_no_noise_on_the_line_raises(noise: bytes) -> None:
 
 
 def test_an_adapter_that_takes_no_more_does_not_hold_the_sender_and_gets_whole_lines(bench: Bench) -> None:
-    sent = [Frame(number % 0x700, number.to_bytes(8, "big")) for number in range(3000)]
-    for frame in sent:
+    taken: list[Frame] = []  # there may be gaps: the kernel hands on what it has while the sender goes on
+    for number in range(3000):
+        frame, failed_before = Frame(number % 0x700, number.to_bytes(8, "big")), bench.port.failed_sends
         bench.port.send(frame)
+        taken += [frame] * (bench.port.failed_sends == failed_before)
     assert bench.port.failed_sends > 0
     assert bench.port.last_send_error == "Transmit buffer full"
     kept: list[Frame] = []
@@ -201,9 +203,8 @@ def test_an_adapter_that_takes_no_more_does_not_hold_the_sender_and_gets_whole_l
         return FRAMES[1] in kept
 
     wait_until(last_arrived)
-    whole = kept[: kept.index(FRAMES[1])]
-    assert len(whole) > 10
-    assert whole == sent[: len(whole)]
+    assert len(taken) > 10
+    assert kept[: kept.index(FRAMES[1])] == taken
 
 
 def test_an_unplugged_adapter_is_told_and_raises_nothing(bench: Bench) -> None:

@@ -81,6 +81,15 @@ def test_pushed_by_a_hand_the_known_coefficients_come_out(make: Make) -> None:
     assert len(list((laboratory.folder / RAW).glob("*_position.csv"))) == 4
 
 
+def test_an_amplifier_that_tells_means_of_two_costs_less_than_three_percent(make: Make) -> None:
+    laboratory = make(trials=2, seed=4, amplifier=AmplifierParameters(averaged=2))
+    laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
+    told = laboratory.conclude().muds["made up"]
+    assert {name: each.value for name, each in told.items()} == {
+        name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
+    }
+
+
 def test_an_encoder_unplugged_in_a_trial_costs_its_places_and_no_force(make: Make) -> None:
     laboratory = make(person=ScriptedPerson(KEEP))
     laboratory.at(4.5, counter_of(laboratory).unplug)

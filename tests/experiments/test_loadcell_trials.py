@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from random import Random
+from statistics import fmean
 from typing import Any
 
 import pytest
@@ -17,8 +19,9 @@ from experiments.loadcell_examination import examine_lines
 from experiments.loadcell_fits import INSERTION, SHEAR, Analysed
 from experiments.loadcell_motion import Insertion, Pace
 from experiments.loadcell_raw import RAW, load_all
+from experiments.loadcell_recording import AVERAGED, likeness
 from experiments.loadcell_stage import AttendedStage, Trial
-from experiments.loadcell_trials import KEEP, judge, measure
+from experiments.loadcell_trials import KEEP, judge, measure, record
 from experiments.person import GO_ON, REDO, SKIP
 from simulation.load_cell_emulator import AmplifierParameters
 from simulation.plate_stage import StageParameters
@@ -48,6 +51,24 @@ def make(tmp_path: Path) -> Iterator[Make]:
         laboratory.close()
 
 
+class Idle:
+    """A Stage that does nothing."""
+
+    patience_s = 0.5
+
+    def weigh(self, which: int) -> float:
+        return 0.0
+
+    def prepare(self, trial: Trial, trials: int) -> str:
+        return GO_ON
+
+    def lower(self) -> None: ...
+
+    def start(self, trial: Trial) -> None: ...
+
+    def lift(self) -> None: ...
+
+
 def try_once(laboratory: Laboratory, kind: str = INSERTION) -> list[str]:
     """One trial, and what was said of it."""
     trial = Trial("made up", kind, 1)
@@ -67,6 +88,25 @@ def test_calibrated_with_two_weights_the_known_coefficients_come_out(make: Make)
     assert [len(each.trials) for each in told.values()] == [3, 3, 3]
     assert laboratory.port.calibration.per_newton == pytest.approx(42000.0, rel=0.002)
     assert len(list((laboratory.folder / RAW).iterdir())) == 6
+
+
+def test_an_amplifier_that_tells_means_of_four_is_told_once_and_one_that_does_not_is_not(make: Make) -> None:
+    smeared, sharp = make(amplifier=AmplifierParameters(averaged=4)), make()
+    for laboratory in (smeared, sharp):
+        bench = replace(laboratory.trial_bench, stage=Idle())
+        for number in (1, 2):
+            record(bench, Trial("made up", INSERTION, number), laboratory.plan, 1)
+    assert [each for each in smeared.person.told if AVERAGED in each] == [f"made up/insertion/1: {AVERAGED}"]
+    assert sharp.person.told == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_samples_are_alike_by_what_averages_them_and_not_by_a_drift_or_a_coarse_step(seed: int) -> None:
+    random = Random(seed)
+    single_n = [random.gauss(0.0, 0.008) for _ in range(80)]
+    assert abs(likeness([force_n + 0.001 * place for place, force_n in enumerate(single_n)])) < 0.4
+    assert 0.5 < likeness([fmean(single_n[place : place + 4]) for place in range(76)]) < 1.0
+    assert likeness([0.1] * 40 + [0.2] * 40) == 0.0
 
 
 def test_what_is_in_the_notebook_is_not_measured_again(make: Make) -> None:
