@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import exp, hypot, inf, sqrt
 from operator import mul
+from statistics import median
 from typing import NamedTuple
 
 from control.records import UNKNOWN
@@ -28,6 +29,9 @@ CLEAR = 12.0  # F of border and line against a level alone, from which there is 
 LIKELY = 4.0  # residual variances that a border may be worse and still be in doubt
 LEAST_VARIANCE_N2 = 1e-12
 SHARPEST_M = 1e-5  # no mud is smoother
+REACH = 2  # batches to either side: one wild sample is in two loads, and so in two batches at most
+WILD = 6.0  # standard deviations
+MAD_TO_SIGMA = 1.4826  # of evenly scattered values
 LARGEST_EXPONENT = 50.0  # exp() of more says no more
 
 
@@ -61,16 +65,30 @@ def find_surface(depths_m: Sequence[float], forces_n: Sequence[float]) -> Surfac
     n = len(depths_m)
     if n < MIN_ABOVE + MIN_BELOW or depths_m[0] >= depths_m[-1]:
         return NO_SURFACE
-    mean_n = sum(forces_n) / n
-    surface = _mud_begins(depths_m, [force_n - mean_n for force_n in forces_n])
+    if not sum([force_n * force_n for force_n in forces_n]) < inf:
+        return NO_SURFACE
+    tame_n = tamed(forces_n)
+    mean_n = sum(tame_n) / n
+    surface = _mud_begins(depths_m, [force_n - mean_n for force_n in tame_n])
     return surface._replace(level_n=surface.level_n + mean_n) if surface.found else surface
+
+
+def tamed(forces_n: Sequence[float]) -> list[float]:
+    """A batch far from the median of its neighbours takes their median (Hampel's filter).
+
+    Borders and lines are their own medians, so nothing is flattened; noise stays as it is, and with it all doubt.
+    """
+    own = list(forces_n)
+    medians_n = own[:REACH] + [median(own[i - REACH : i + REACH + 1]) for i in range(REACH, len(own) - REACH)]
+    medians_n += own[len(own) - REACH :]
+    bends_n = [abs(a - 2.0 * b + c) for a, b, c in zip(own, own[1:], own[2:], strict=False)]  # of noise, √6 of it
+    wild_n = WILD * MAD_TO_SIGMA * median(bends_n) / sqrt(6.0)
+    return [b if abs(a - b) > wild_n else a for a, b in zip(own, medians_n, strict=True)]
 
 
 def _mud_begins(x: Sequence[float], y: Sequence[float]) -> Surface:
     """The mean of `y` is zero."""
     square = sum([force_n * force_n for force_n in y])
-    if not square < inf:
-        return NO_SURFACE
     jumps, kinks, kinks_m = _explained(x, y)
     largest, best = max(jumps), max(kinks)
     variance = max((square - largest) / max(len(x) - 4, 1), LEAST_VARIANCE_N2)

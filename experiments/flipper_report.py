@@ -17,18 +17,18 @@ from firmware_host.configuration import Configuration
 
 STROKES = tuple(AUTHORS_N)
 TRUTHS = {
-    "bed": "The load cell is a virtual one: it repeats the stroke with the flipper's own plate in its mean attitude.",
+    "bed": "The load cell is a virtual one: it repeats each stroke with the flipper's own plate, to the same depth; "
+    "insertion and extraction along the flipper's own arc, and without what the plate's face bears, which is no part "
+    "of k_p and k_e. (A leaning plate pushed straight down would read 4 % more k_p at 3 cm and 31 % at 5 cm.)",
     "file": "The load cell is that of the file given with --truth. Its plate is upright and the flipper's leans, which "
-    "in the simulator's clay alone makes 14 % more k_p, 4 % less k_s and 2 % less k_e.",
+    "at 3 cm in the simulator's clay alone makes 10 to 12 % more k_p, 3 to 5 % less k_s and 1 % more k_e.",
 }
 KNOWN_BIAS = (
-    "k_e by the default method reads more than the load cell: by 6 to 7 % on a simulated fixed base without any "
-    "disturbance, and by -4 to 19 % under a simulated robot that walks, the more the softer the mud. Of the 6 %, 3 are "
-    "no error: a cell goes straight up, where the leaning face, which was strained on the way down, pushes its plate "
-    "upward by 1.4 %; the flipper goes out along its arc, where narrow sides and faces resist by 1.5 % more. One each "
-    "is of the face's load, which is taken off as if its pressure grew from nothing at the surface; of the zero, for "
-    "which the way down counts while the plate's lower corner is in the mud; and of the surface, found 0.2 mm too "
-    "deep. In real mud nobody has measured it."
+    "k_e by the default method reads more than the load cell: by 1 to 5 % on a simulated fixed base without any "
+    "disturbance, and by -8 to 14 % under a simulated robot that walks, the more the softer the mud. On the fixed base "
+    "about 1 % each is of the face's load, which is taken off as if its pressure grew from nothing at the surface; of "
+    "the zero, for which the way down counts while the plate's lower corner is in the mud; and of the surface, found "
+    "0.2 mm too deep. For the same surface k_p reads 0 to 4 % more at 3 to 5 cm. In real mud nobody has measured it."
 )
 WRONG_CONSTANTS = (
     "Each simulated motor's torque constant is another than the configuration has, by a draw of 3.2 %, as the paper's "

@@ -38,17 +38,17 @@ MEASURED = (
     "the drags tell, and the coefficients are those at the speed that was set."
 )
 LEANING = (
-    "A flipper's plate leans in the mud, and in clay no coefficient is the same for another plate or attitude. In the "
-    "simulator's clay of 47.6 to 51.2 % water, where both are known, the flipper's leaning plate (2.5 cm wide, 4 mm "
-    "thick, 3 cm deep) has 1.14 to 1.15 times the k_p, 0.95 to 0.97 times the k_s and 0.98 to 0.99 times the k_e of "
-    "the paper's upright one (3 x 3.5 cm, 4 mm). It is the lean: upright, the flipper's own plate (--plate 2.5x7) "
-    "tells within 2 % what the paper's tells. So a ratio of 1.15 in k_p is no error of the flipper there. In k_e it "
-    "reads 6 to 10 % more than its own leaning plate on a cell: 3 % since it goes out along an arc, 3 % since its edge "
-    "is quicker than 0.1 m/s, and the rest is its error."
+    "A flipper's plate leans in the mud and goes along an arc, and in clay no coefficient is the same for another "
+    "plate, attitude or way. In the simulator's clay of 47.6 to 51.2 % water, where both are known, the flipper's "
+    "plate (2.5 cm wide, 4 mm thick, 3 cm deep) has 1.10 to 1.12 times the k_p, 0.95 to 0.97 times the k_s and 1.01 "
+    "to 1.02 times the k_e of the paper's upright one (3 x 3.5 cm, 4 mm). It is lean and way: upright, the flipper's "
+    "own plate (--plate 2.5x7) tells within 2 % what the paper's tells. So a ratio of 1.1 in k_p is no error of the "
+    "flipper there. What it reads beyond that is: its edge is quicker than 0.1 m/s, which makes 3 % of k_e, and the "
+    "rest is its error."
 )
 LEANING_SHORT = (
-    "a flipper's plate leans: in the simulator's clay that alone makes 1.14 to 1.15 in k_p, 0.95 to 0.97 in k_s and "
-    "0.98 to 0.99 in k_e, whatever the size of the plate (see the report)"
+    "a flipper's plate leans and goes along an arc: in the simulator's clay that alone makes 1.10 to 1.12 in k_p, "
+    "0.95 to 0.97 in k_s and 1.01 to 1.02 in k_e, whatever the size of the plate (see the report)"
 )
 
 

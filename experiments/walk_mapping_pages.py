@@ -21,7 +21,8 @@ from firmware_host.configuration import Configuration
 SIMULATED_DRAG = (
     " The simulated body's drag grows with speed, to two and more times the paper's 2.5 N: so a firmer mud than "
     "the paper's is the one that yields at 3 cm and holds at 5 cm. Part of the difference between these depths is the "
-    "mud's own, whose k_s falls with depth (see the load cell)."
+    "mud's own, whose coefficients fall with depth: at 5 cm the load cell reads 0.6 of the k_s and 0.75 of the k_p "
+    "that it reads at 3 cm. So each stride stands beside a load cell at its own depth."
 )
 SCATTER = "± is the standard error of the mean, and cv the variation, by the scatter of the strides of all walks"
 Tables = list[tuple[str, Sequence[Sequence[str]]]]

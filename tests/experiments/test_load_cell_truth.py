@@ -1,4 +1,4 @@
-"""The truth of a stride against the clay's own numbers, worked out for an upright plate by hand.
+"""The truth of a stride against the clay's own numbers, worked out by hand for an upright plate, and along the arc.
 
 At the depth z, with the edge's area A and the plate's girth G, the rate factor g and the strength s_u,
 
@@ -8,14 +8,14 @@ and sideways N_p s_u on the face. k is the least-squares slope of F against V = 
 """
 
 from dataclasses import replace
-from math import cos, isfinite, nan, radians, sin
+from math import cos, hypot, isfinite, nan, radians, sin
 from typing import Any
 
 import numpy as np
 import pytest
 
 from control.geometry import FlipperGeometry
-from control.plate import submerged_part
+from estimation.mud import EstimationParameters
 from experiments.load_cell_truth import (
     PAPER_SPEED_M_S,
     REVERSAL_SHARE,
@@ -23,8 +23,20 @@ from experiments.load_cell_truth import (
     TrueCoefficients,
     load_cell_truth,
 )
-from simulation.clay import ADHESION, BEARING_FACTOR, DEEP_FACTOR, SUCTION_FADE_M, Clay, clay_of_water, rate_factor
-from simulation.load_cell import measure_insertion
+from experiments.trial import WALKING, run_trial, strides_of
+from simulation.clay import (
+    ADHESION,
+    BEARING_FACTOR,
+    DEEP_FACTOR,
+    MATLOCK_J,
+    SUCTION_FADE_M,
+    UNIT_WEIGHT_N_M3,
+    Clay,
+    clay_of_water,
+    rate_factor,
+)
+from simulation.disturbances import NONE
+from simulation.track import Track
 from simulation.witness import StrideTruth, StrokeTruth
 
 GEOMETRY = FlipperGeometry()
@@ -95,7 +107,7 @@ def test_shear_of_an_upright_plate_is_the_pressure_on_its_face(depth_m: float, c
 
 def test_firmer_mud_is_so_in_proportion_along_the_plate() -> None:
     """Sideways the weight of the mud bears too, whatever its strength."""
-    soft, firm = (truth(stride(Clay("", strength_pa))).leaning for strength_pa in (1000.0, 2000.0))
+    soft, firm = (truth(stride(Clay("", strength_pa))).upright for strength_pa in (1000.0, 2000.0))
     assert firm.k_p == pytest.approx(2.0 * soft.k_p)
     assert firm.k_e == pytest.approx(2.0 * soft.k_e)
     assert 1.5 * soft.k_s < firm.k_s < 2.0 * soft.k_s
@@ -111,35 +123,71 @@ def test_each_coefficient_is_of_its_own_strokes_speed(name: str) -> None:
     assert ratios == [1.0, 1.0]
 
 
-# leaning plates
+# the flipper's own way
+
+
+SWEEP_RAD = radians(30.0)
 
 
 def leaning(depth_m: float = DEPTH_M) -> StrokeTruth:
-    sweep_rad = radians(30.0)
-    return stroke(sweep_rad, GEOMETRY.adduction_rad(sweep_rad, depth_m / 2.0))
+    return stroke(SWEEP_RAD, GEOMETRY.adduction_rad(SWEEP_RAD, depth_m / 2.0), depth_m)
 
 
-def test_a_plate_that_does_not_lean_is_the_upright_one() -> None:
-    told = truth(stride())
-    assert told.leaning == told.upright
+def arc_row(depth_m: float) -> tuple[float, float]:
+    """By hand, each piece by its own way per radian of adduction, (l + u) cos α along the plate and (h - s) cos α
+    outward: the leverage of the submerged volume, and the moment of edge, narrow sides and adhesion.
+    """
+    lift_rad = GEOMETRY.adduction_rad(SWEEP_RAD, depth_m)
+    u, s = np.meshgrid(np.linspace(-0.5, 0.5, 41) * GEOMETRY.plate_width_m, np.linspace(0.0, 0.07, 281))
+    depths_m = depth_m - u * cos(SWEEP_RAD) * sin(lift_rad) - s * cos(lift_rad)
+    piece_m2 = np.where(depths_m > 0.0, (GEOMETRY.plate_width_m / 41) * (0.07 / 281), 0.0)
+    along_m = (GEOMETRY.flipper_length_m + u) * cos(SWEEP_RAD)
+    outward_m = (GEOMETRY.drop_m - s) * cos(SWEEP_RAD)
+    thickness_m = GEOMETRY.plate_thickness_m
+    factor = np.minimum(3.0 + (UNIT_WEIGHT_N_M3 / CLAY.strength_pa + MATLOCK_J / thickness_m) * depths_m, DEEP_FACTOR)
+    rows_m2 = piece_m2 * thickness_m / GEOMETRY.plate_width_m
+    sticking = ADHESION * (2.0 * piece_m2 + rows_m2 * 2.0) * np.hypot(along_m, outward_m)
+    wet_m2 = EDGE_M2 * np.mean(piece_m2[0] > 0.0)
+    bearing = BEARING_FACTOR * wet_m2 * np.mean(along_m[0][piece_m2[0] > 0.0])
+    moment = bearing + np.sum(factor * rows_m2 * np.abs(outward_m)) + np.sum(sticking)
+    area_m2 = np.sum(piece_m2)
+    centre_m = [np.sum(piece_m2 * each) / area_m2 for each in (along_m, outward_m)]
+    return thickness_m * area_m2 * hypot(*centre_m), rate_factor(SPEED_M_S) * CLAY.strength_pa * moment
 
 
-def test_a_leaning_plate_is_that_of_the_load_cell_in_the_same_attitude() -> None:
-    """F = k V over its own volume, by least squares on the cell's own curve; give or take its last step."""
-    attitude = leaning()
-    curve = measure_insertion(CLAY, GEOMETRY, attitude.sweep_rad, attitude.adduction_rad, DEPTH_M, SPEED_M_S).down
-    lean, q = cos(attitude.sweep_rad) * sin(attitude.adduction_rad), cos(attitude.adduction_rad)
-    rows = [(z, f) for z, f in zip(curve.depths_m, curve.forces_n, strict=True) if z > 0.0]
-    volumes = np.array([GEOMETRY.plate_thickness_m * submerged_part(GEOMETRY, z, -lean, q).area_m2 for z, _ in rows])
-    forces_n = np.array([f for _, f in rows])
-    expected = float(volumes @ forces_n / (volumes @ volumes))
-    assert truth(stride(insertion=attitude)).leaning.k_p == pytest.approx(expected, rel=2e-3)
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.045])
+def test_along_the_flippers_arc_penetration_is_of_edge_sides_and_adhesion(depth_m: float) -> None:
+    """To 2 %: mud yields after a millimetre. At no depth is the load of the face in it."""
+    told = truth(stride(insertion=leaning(depth_m))).leaning.k_p
+    moments_m4, moments_nm = np.array([arc_row(z) for z in np.linspace(0.0005, depth_m, 60)]).T
+    assert told == pytest.approx(moments_m4 @ moments_nm / (moments_m4 @ moments_m4), rel=0.02)
 
 
-def test_a_leaning_plate_meets_more_on_its_way_down_than_an_upright_one() -> None:
-    """Its faces are pushed through the mud, not only along it."""
-    told = truth(stride(insertion=leaning()))
-    assert told.leaning.k_p > 1.05 * told.upright.k_p
+@pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(53.1)])
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.04, 0.05])
+def test_at_any_depth_the_flippers_way_and_the_upright_plates_tell_nearly_the_same(depth_m: float, clay: Clay) -> None:
+    """Straight down in the mean attitude the leaning plate's face bears a part: at 5 cm k_p was a third more."""
+    told = truth(stride(clay, insertion=leaning(depth_m), extraction=leaning(depth_m)))
+    assert 1.0 < told.leaning.k_p / told.upright.k_p < 1.07
+    assert 0.95 < told.leaning.k_e / told.upright.k_e < 1.0
+
+
+def test_the_surface_may_lie_below_its_nominal_height() -> None:
+    """The plate leans more there, and nothing else."""
+    told = [truth(stride(insertion=leaning(), surface_m=surface_m)).leaning.k_p for surface_m in (0.0, 0.003)]
+    assert told[1] == pytest.approx(told[0], rel=0.02)
+    assert told[1] != told[0]
+
+
+@pytest.mark.parametrize("depth_m", [0.03, 0.05])
+def test_what_a_walk_says_of_k_p_holds_the_truth_at_any_depth(depth_m: float) -> None:
+    setup = replace(WALKING, row_period_s=0.0, depth_m=depth_m)
+    walk = run_trial(setup, Track([(10.0, clay_of_water(53.1))]), NONE, 2, 1)
+    truths = {(each.flipper, each.index): truth(each).leaning.k_p for each in walk.truths}
+    told = strides_of(walk, EstimationParameters())
+    assert len(told) == 4
+    for each in told:
+        assert abs(each.k_p.value - truths[each.flipper, each.index]) < 1.96 * each.k_p.std_error
 
 
 def test_in_stance_the_plate_is_square_to_its_way() -> None:
