@@ -266,8 +266,8 @@ def test_a_surface_lies_where_the_flipper_was(pairs: list[tuple[float, float]]) 
 
 @pytest.mark.parametrize("wild_n", [-1.5, 1.5])
 def test_a_wild_batch_that_no_neighbour_confirms_moves_no_surface_far(wild_n: float) -> None:
-    """By half a millimetre at most beyond its doubt (untamed, several), wherever on the way it is. (Of two in a row that
-    lack force, just below the surface, nothing tells.)
+    """By half a millimetre at most beyond its doubt, wherever on the way it is. (Of two in a row that lack force, just
+    below the surface, nothing tells.)
     """
     depths_m = depths(1)
     forces_n = 50.0 * np.maximum(depths_m, 0.0) + 0.03 * noise(1, len(depths_m))
