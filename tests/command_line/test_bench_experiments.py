@@ -103,7 +103,7 @@ def test_without_a_daemon_it_is_said_how_to_start_one(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["experiment", name, "--mud", "47.6", "--socket", str(tmp_path / "none.sock")]
-    assert main([*arguments, "--out", str(tmp_path)]) == exit_codes.REFUSED
+    assert main([*arguments, "--out", str(tmp_path)]) == exit_codes.NO_DAEMON
     assert "systemctl start mudskipper" in capsys.readouterr().err
 
 

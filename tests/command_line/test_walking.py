@@ -40,7 +40,7 @@ def test_without_a_daemon_nobody_walks_over_a_real_trackway(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, no_walks: None
 ) -> None:
     status = main(["experiment", "trackway", "--socket", str(tmp_path / "none"), "--out", str(tmp_path)])
-    assert status == exit_codes.REFUSED
+    assert status == exit_codes.NO_DAEMON
     assert "no daemon answers" in capsys.readouterr().err
 
 
