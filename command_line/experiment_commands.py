@@ -119,20 +119,7 @@ def _add_walk(names: Commands) -> None:
 def _add_loadcell(names: Commands) -> None:
     loadcell = add(names, "loadcell", "loadcell.loadcell", "A mud's coefficients from a load cell on a linear stage.")
     _add_report(loadcell, "stage and load cell are emulated", "for report, pictures and samples; goes on where it was")
-    loadcell.add_argument(
-        "--port", metavar="PATH", help="of the cell's amplifier: /dev/serial/by-id/... is the same always"
-    )
-    loadcell.add_argument(
-        "--baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)"
-    )
-    loadcell.add_argument(
-        "--format", default="auto", metavar="NAME", help="of its lines: auto, number, indicator, column2, or a pattern"
-    )
-    loadcell.add_argument(
-        "--unit", default="", metavar="U", help="of its numbers: counts, g, kg, N ... (default: as it says)"
-    )
-    loadcell.add_argument("--scale", type=positive, metavar="X", help="newtons per unit, instead of a calibration")
-    loadcell.add_argument("--calibration", type=Path, metavar="FILE", help="made earlier, instead of two weights")
+    _add_amplifier(loadcell)
     loadcell.add_argument(
         "--mud", action="append", metavar="NAME", help="repeatable; simulated: water content in percent"
     )
@@ -151,6 +138,29 @@ def _add_loadcell(names: Commands) -> None:
     loadcell.add_argument(
         "--speed", type=STAGE_SPEED_M_S, default=0.1, metavar="M/S", help="of the stage (default: 0.1)"
     )
+    _add_stage_encoder(loadcell)
+    loadcell.add_argument("--compare", type=Path, metavar="FILE", help="summary.json of the flipper experiment")
+    loadcell.add_argument("--seed", type=int, default=1, metavar="N", help="of the simulation")
+
+
+def _add_amplifier(loadcell: argparse.ArgumentParser) -> None:
+    loadcell.add_argument(
+        "--port", metavar="PATH", help="of the cell's amplifier: /dev/serial/by-id/... is the same always"
+    )
+    loadcell.add_argument(
+        "--baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)"
+    )
+    loadcell.add_argument(
+        "--format", default="auto", metavar="NAME", help="of its lines: auto, number, indicator, column2, or a pattern"
+    )
+    loadcell.add_argument(
+        "--unit", default="", metavar="U", help="of its numbers: counts, g, kg, N ... (default: as it says)"
+    )
+    loadcell.add_argument("--scale", type=positive, metavar="X", help="newtons per unit, instead of a calibration")
+    loadcell.add_argument("--calibration", type=Path, metavar="FILE", help="made earlier, instead of two weights")
+
+
+def _add_stage_encoder(loadcell: argparse.ArgumentParser) -> None:
     loadcell.add_argument(
         "--position", nargs="?", const="", metavar="PATH", help="an encoder of the stage, which a hand may push then"
     )
@@ -164,8 +174,6 @@ def _add_loadcell(names: Commands) -> None:
         "--position-baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)"
     )
     loadcell.add_argument("--position-label", default="", metavar="TEXT", help="that each of its lines begins with")
-    loadcell.add_argument("--compare", type=Path, metavar="FILE", help="summary.json of the flipper experiment")
-    loadcell.add_argument("--seed", type=int, default=1, metavar="N", help="of the simulation")
 
 
 def _add_trackway(names: Commands) -> None:

@@ -36,6 +36,11 @@ class LineClock:
         self._stamp_s: float | None = None
         self._begin()
 
+    @property
+    def rate_hz(self) -> float | None:
+        """Of the lines, once a few have come."""
+        return None if self.period_s is None else 1.0 / self.period_s
+
     def _begin(self) -> None:
         """Learning, and keep the period meanwhile."""
         self._has_learned = False

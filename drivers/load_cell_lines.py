@@ -9,7 +9,7 @@ range answers with letters or dashes in place of a number, or stays at the last 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import isfinite
 from typing import NamedTuple
 
@@ -123,12 +123,6 @@ def find_format(lines: Sequence[bytes]) -> LineFormat | None:
         if readable > most:
             best, most = line_format, readable
     return best
-
-
-def text_share(lines: Iterable[bytes]) -> float:
-    """How much of what arrives is text at all: at a wrong baud rate little is."""
-    letters = b"".join(lines)
-    return sum(32 <= letter < 127 or letter in b"\t\r\n" for letter in letters) / len(letters) if letters else 0.0
 
 
 def newtons_per(unit: str) -> float | None:

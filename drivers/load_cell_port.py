@@ -11,22 +11,14 @@ from typing import Any, NamedTuple
 
 from drivers.load_cell_calibration import LoadCellCalibration
 from drivers.load_cell_clock import LineClock
-from drivers.load_cell_lines import NEWTONS, LineFormat, Reading, printable, text_share
-from drivers.serial_line import SerialLine
+from drivers.load_cell_lines import NEWTONS, LineFormat, Reading, printable
+from drivers.serial_line import Arrivals, SerialLine
 
 
 class Sample(NamedTuple):
     stamp_s: float
     force_n: float  # NaN where overloaded
     overloaded: bool = False
-
-
-class Arrivals(NamedTuple):
-    """Of the last lines, what share was readable, and what share of their bytes was text."""
-
-    lines: int
-    readable: float
-    text: float
 
 
 class LoadCellPort:
@@ -63,14 +55,11 @@ class LoadCellPort:
 
     @property
     def rate_hz(self) -> float | None:
-        """Of the lines, once a few have come."""
-        return None if self.clock.period_s is None else 1.0 / self.clock.period_s
+        return self.clock.rate_hz
 
     @property
     def arrivals(self) -> Arrivals:
-        lines = self.recent_lines
-        readable = sum(self.line_format.decode(line) is not None for line in lines)
-        return Arrivals(len(lines), readable / len(lines) if lines else 0.0, text_share(lines))
+        return self.line.arrivals(lambda line: self.line_format.decode(line) is not None)
 
     @property
     def recent_lines(self) -> list[bytes]:

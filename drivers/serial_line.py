@@ -14,9 +14,9 @@ import os
 import re
 import select
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
-from typing import Any
+from typing import Any, NamedTuple
 
 from control.records import NEVER_S
 
@@ -27,6 +27,14 @@ KEPT_LINES = 40  # by which it is judged what arrives
 COMMON_BAUDS = (9600, 115200, 57600, 38400, 19200, 4800, 2400, 230400)
 GONE = select.POLLHUP | select.POLLERR | select.POLLNVAL
 LINE_ENDS = re.compile(rb"[\r\n]+")
+
+
+class Arrivals(NamedTuple):
+    """Of the last lines, what share was readable, and what share of their bytes was text."""
+
+    lines: int
+    readable: float
+    text: float
 
 
 class SerialLineError(Exception):
@@ -73,6 +81,11 @@ class SerialLine:
     @property
     def is_there(self) -> bool:
         return self._device is not None
+
+    def arrivals(self, is_readable: Callable[[bytes], bool]) -> Arrivals:
+        lines = list(self.recent)
+        readable = sum(map(is_readable, lines))
+        return Arrivals(len(lines), readable / len(lines) if lines else 0.0, text_share(lines))
 
     def read(self, now_s: float) -> list[bytes]:
         """All lines that have come to their end, without it, oldest first; never waits. None where it is gone."""
@@ -131,6 +144,12 @@ class SerialLine:
         if device is not None:
             with suppress(OSError):  # of a device that is gone already
                 device.close()
+
+
+def text_share(lines: Iterable[bytes]) -> float:
+    """How much of what arrives is text at all: at a wrong baud rate little is."""
+    letters = b"".join(lines)
+    return sum(32 <= letter < 127 or letter in b"\t\r\n" for letter in letters) / len(letters) if letters else 0.0
 
 
 def open_serial(path: str, baud: int) -> Any:

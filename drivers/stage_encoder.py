@@ -14,9 +14,7 @@ from typing import Annotated, Any, NamedTuple
 from control.bounds import Bounds
 from drivers.encoder_counts import EncoderCounts
 from drivers.load_cell_clock import LineClock
-from drivers.load_cell_lines import text_share
-from drivers.load_cell_port import Arrivals
-from drivers.serial_line import SerialLine
+from drivers.serial_line import Arrivals, SerialLine
 
 
 @dataclass(frozen=True)
@@ -58,14 +56,11 @@ class StageEncoder:
 
     @property
     def rate_hz(self) -> float | None:
-        """Of the lines, once a few have come."""
-        return None if self.clock.period_s is None else 1.0 / self.clock.period_s
+        return self.clock.rate_hz
 
     @property
     def arrivals(self) -> Arrivals:
-        lines = list(self.line.recent)
-        counts = sum(self.counts.decode(line) is not None for line in lines)
-        return Arrivals(len(lines), counts / len(lines) if lines else 0.0, text_share(lines))
+        return self.line.arrivals(lambda line: self.counts.decode(line) is not None)
 
     def silent_for_s(self, now_s: float) -> float:
         """Without any count."""

@@ -83,8 +83,16 @@ def _std_error(x: Sequence[float], y: Sequence[float], weights: Sequence[float],
     sums = list(accumulate([0.0] * (LAGS + 1) + scores + [0.0] * LAGS))
     together = sum([(b - a) * (b - a) for a, b in zip(sums, sums[LAGS + 1 :], strict=False)]) / (LAGS + 1)
     apart = square * sum([w * r * r for w, r in zip(weights, residuals, strict=True)])
-    student = STUDENT[n - 2] if n - 2 < len(STUDENT) else 1.0 + 1.3 / (n - 2)
-    return student * sqrt(max(n * together, apart) / (n - 2)) / square
+    return student_factor(n - 2) * sqrt(max(n * together, apart) / (n - 2)) / square
+
+
+def student_factor(freedom: int) -> float:
+    """By how much a standard error from few values is too small for two of it to cover 95 %; infinite where nothing
+    tells the scatter.
+    """
+    if freedom < 1:
+        return inf
+    return STUDENT[freedom] if freedom < len(STUDENT) else 1.0 + 1.3 / freedom
 
 
 def _bend(x: Sequence[float], y: Sequence[float], weights: Sequence[float], slope: float) -> tuple[float, float]:

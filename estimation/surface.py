@@ -18,10 +18,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import exp, hypot, inf, sqrt
 from operator import mul
-from statistics import median
 from typing import NamedTuple
 
 from control.records import UNKNOWN
+from estimation.origin_fit import NORMAL_MAD, median
 
 MIN_ABOVE, MIN_BELOW = 2, 4  # batches
 FREEDOM = 2.0  # residual variances that a jump must save for its one more number, as by Akaike
@@ -31,7 +31,6 @@ LEAST_VARIANCE_N2 = 1e-12
 SHARPEST_M = 1e-5  # no mud is smoother
 REACH = 2  # batches to either side: one wild sample is in two loads, and so in two batches at most
 WILD = 6.0  # standard deviations
-MAD_TO_SIGMA = 1.4826  # of evenly scattered values
 LARGEST_EXPONENT = 50.0  # exp() of more says no more
 
 
@@ -82,7 +81,7 @@ def tamed(forces_n: Sequence[float]) -> list[float]:
     medians_n = own[:REACH] + [median(own[i - REACH : i + REACH + 1]) for i in range(REACH, len(own) - REACH)]
     medians_n += own[len(own) - REACH :]
     bends_n = [abs(a - 2.0 * b + c) for a, b, c in zip(own, own[1:], own[2:], strict=False)]  # of noise, √6 of it
-    wild_n = WILD * MAD_TO_SIGMA * median(bends_n) / sqrt(6.0)
+    wild_n = WILD * NORMAL_MAD * median(bends_n) / sqrt(6.0)
     return [b if abs(a - b) > wild_n else a for a, b in zip(own, medians_n, strict=True)]
 
 

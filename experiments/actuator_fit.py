@@ -27,10 +27,10 @@ from math import cos, hypot, nan, sqrt
 from statistics import fmean, stdev
 from typing import Any, NamedTuple
 
+from estimation.origin_fit import student_factor
 from experiments.actuator_friction import Friction, Loop, friction_of
 from experiments.actuator_line import FEWEST, Line, fit_line
 from experiments.actuator_plan import Plan, Step, steps_of
-from experiments.student import student_factor
 
 LIGHT_NM = 0.15  # what lighter loads say of a constant is friction
 Entry = Mapping[str, Any]

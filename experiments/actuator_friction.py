@@ -20,8 +20,8 @@ from math import degrees, hypot, nan, radians, sqrt
 from statistics import fmean, variance
 from typing import NamedTuple
 
+from estimation.origin_fit import student_factor
 from experiments.actuator_reading import QUIET_S, HeldJoint, MovedError, Sample
-from experiments.student import student_factor
 
 SWING_RAD = radians(5.0)  # to either side: four and a half periods of the R60's cogging, and the arm stays near level
 SLOW_STEP_RAD = radians(0.6)  # of one move, which takes a tenth of a second

@@ -28,8 +28,8 @@ PROMISE_S = 2.0  # of the lease, while torque may be on
 RESTING_S = 10.0  # and while it is off: reading a log may take some time, and nothing has to be stopped
 RENEWAL_S = 0.2
 WRITTEN_S = 10.0  # to wait for rows that are on their way to the disk
-OPERATING = ("arm", "walk", "move", "clear", "stop", "disarm")  # not of a robot that another program operates
 MOTIONS = ("arm", "walk", "move")  # that begin under the lease, not before it
+ENDINGS = ("clear", "stop", "disarm")  # not of a robot that another program operates
 START_IT = "Start it with 'systemctl start mudskipper', or name its socket with --socket."
 
 
@@ -38,7 +38,6 @@ class DaemonRobot:
 
     def __init__(self, socket: Path) -> None:
         """Raises BenchError where there is no daemon, it does not let this user drive, or somebody else drives."""
-        self._socket = socket
         try:
             self._client = StatusClient(socket)
         except NoDaemonError as problem:
@@ -77,7 +76,7 @@ class DaemonRobot:
         if method in MOTIONS:
             self._may_move = True
             self._promise()
-        if method in OPERATING:
+        elif method in ENDINGS:
             self._require_alone()
         self._may_move = self._may_move and method != "disarm"
         try:

@@ -13,6 +13,7 @@ from statistics import median, stdev
 
 import numpy as np
 
+from estimation.origin_fit import NORMAL_MAD
 from experiments.loadcell_alignment import MEDIAN_ERROR, WIDE, Alignment, common_alignment
 from experiments.loadcell_contact import Course, StrokeError, find_contact, without_spikes
 from experiments.loadcell_fits import SHEAR, Analysed, Recorded, analyse_insertion, analyse_shear
@@ -23,7 +24,6 @@ from experiments.side_by_side import Show
 LEAST_SPEED_DOUBT, LEAST_RAMP_DOUBT = 0.005, 0.1  # of a stage, from trial to trial
 SET_SPEED_DOUBT = 0.01  # of a stage's controller
 AGREEING = 3.0  # standard errors
-NORMAL_MAD = 1.4826
 
 
 def analyse(trials: Sequence[Recorded], settings: StageSettings, show: Show) -> list[Analysed]:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimation.origin_fit import NORMAL_MAD
 from experiments.curve_fit import Array
 
 QUIET_S = 0.4  # before a stroke, that tells zero and noise
@@ -31,12 +32,17 @@ class Course(NamedTuple):
     turned: bool
 
 
+def noise_of(forces_n: Array) -> float:
+    """The standard deviation of steady forces, whatever single ones do."""
+    return max(NORMAL_MAD * float(np.median(np.abs(forces_n - np.median(forces_n)))), LEAST_NOISE_N)
+
+
 def find_contact(times_s: Array, forces_n: Array) -> Course:
     """Raises StrokeError where nothing happens, or where it had begun already."""
     if len(times_s) < 8 or times_s[-1] - times_s[0] < 2.0 * QUIET_S:
         raise StrokeError("hardly any sample was recorded")
     quiet_n = forces_n[times_s < times_s[0] + QUIET_S]
-    noise_n = max(1.4826 * float(np.median(np.abs(quiet_n - np.median(quiet_n)))), LEAST_NOISE_N)
+    noise_n = noise_of(quiet_n)
     largest_n = float(np.quantile(np.abs(forces_n - np.median(quiet_n)), 0.995))
     if largest_n < max(CONTACT_NOISES * noise_n, LEAST_FORCE_N):
         raise StrokeError(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivers.load_cell_lines import LineFormat, find_format, text_share
-from drivers.serial_line import COMMON_BAUDS, SerialLine, SerialLineError
+from drivers.load_cell_lines import LineFormat, find_format
+from drivers.serial_line import COMMON_BAUDS, SerialLine, SerialLineError, text_share
 from experiments.bench_robot import BenchError
 from experiments.loadcell_motion import StageSettings
 from experiments.loadcell_recording import POLL_S, BenchClock, CellRecorder

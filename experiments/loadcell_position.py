@@ -175,7 +175,6 @@ def _insertion(placed: PlacedCourse, window: _Window, fit: CurveFit) -> Measured
     wet = np.flatnonzero(depths_m > 0.0)
     bottom = np.flatnonzero(depths_m > np.nanmax(depths_m) - BOTTOM_M)
     down = window.down & (depths_m > 0.0)
-    speeds_m_s = placed.speeds_m_s(lag_s)[down]
     return MeasuredInsertion(
         depths_m=depths_m,
         grips=placed.grips(lag_s, rate_share),
@@ -190,8 +189,13 @@ def _insertion(placed: PlacedCourse, window: _Window, fit: CurveFit) -> Measured
         stop_s=float(times_s[bottom[0]]),
         lift_s=float(times_s[bottom[-1]]),
         out_s=float(times_s[wet[-1]]),
-        mean_speed_m_s=float(np.sum(speeds_m_s**2) / np.sum(speeds_m_s)),
+        mean_speed_m_s=_mean_speed_m_s(placed.speeds_m_s(lag_s)[down]),
     )
+
+
+def _mean_speed_m_s(speeds_m_s: Array) -> float:
+    """Every piece of way alike, however long it took."""
+    return float(np.sum(speeds_m_s**2) / np.sum(speeds_m_s))
 
 
 class MeasuredShear(NamedTuple):
@@ -217,6 +221,5 @@ def find_shear(placed: PlacedCourse, lag_s: float) -> MeasuredShear:
     steady &= (ways_m > whole_m / 2.0) & (ways_m < 0.99 * whole_m)
     if np.count_nonzero(steady) < 8:
         raise StrokeError("fewer than 8 samples of force and place together on the second half of the way")
-    chosen_m_s = speeds_m_s[steady]
-    mean_m_s = float(np.sum(chosen_m_s**2) / np.sum(chosen_m_s))
+    mean_m_s = _mean_speed_m_s(speeds_m_s[steady])
     return MeasuredShear(ways_m, placed.quickness(lag_s), steady, float(placed.course.times_s[begin]), mean_m_s)

@@ -15,7 +15,7 @@ import numpy as np
 from drivers.load_cell_port import LoadCellPort, Sample
 from drivers.stage_encoder import Place, StageEncoder
 from experiments.bench_robot import BenchError
-from experiments.loadcell_contact import CONTACT_NOISES, LEAST_FORCE_N, LEAST_NOISE_N, QUIET_S
+from experiments.loadcell_contact import CONTACT_NOISES, LEAST_FORCE_N, QUIET_S, noise_of
 
 POLL_S = 0.005
 TARE_S = 1.0
@@ -136,9 +136,7 @@ class CellRecorder:
             forces_n = self._steady_forces_n()
         if len(forces_n) < 4:
             raise BenchError(self._silence())
-        middle_n = float(np.median(forces_n))
-        noise_n = max(1.4826 * float(np.median(np.abs(np.array(forces_n) - middle_n))), LEAST_NOISE_N)
-        return Tare(float(np.mean(forces_n)), noise_n, len(forces_n), likeness(forces_n))
+        return Tare(float(np.mean(forces_n)), noise_of(np.array(forces_n)), len(forces_n), likeness(forces_n))
 
     def _steady_forces_n(self) -> list[float]:
         self.drain()

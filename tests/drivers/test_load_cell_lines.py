@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.load_cell_lines import LineFormat, Reading, find_format, newtons_per, text_share
+from drivers.load_cell_lines import LineFormat, Reading, find_format, newtons_per
+from drivers.serial_line import text_share
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from drivers.load_cell_calibration import LoadCellCalibration
 from drivers.load_cell_lines import LineFormat
@@ -20,9 +22,12 @@ from simulation.load_cell_emulator import AmplifierParameters
 from simulation.plate_stage import CarriedPlate, StageParameters
 from simulation.stage_encoder_emulator import StageEncoderParameters
 from simulation.stage_motion import HandParameters
+from tests.experiments.made_up_mud import LawfulMud
 from tests.scripted_person import ScriptedPerson
 
 SETTINGS = StageSettings()
+KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
+COUNTS = LoadCellCalibration("counts", 42000.0, 81000.0)
 
 
 class Laboratory:
@@ -77,3 +82,24 @@ class Laboratory:
         if self.encoder is not None:
             self.encoder.close()
         self.bench.close()
+
+
+Make = Callable[..., Laboratory]
+
+
+@contextmanager
+def laboratories(folder: Path) -> Iterator[Make]:
+    """Makes any number of them, calibrated, over mud that keeps the laws; closed at the end."""
+    made: list[Laboratory] = []
+
+    def build(person: ScriptedPerson | None = None, **options: Any) -> Laboratory:
+        own_folder = folder / str(len(made))
+        own_folder.mkdir()
+        laboratory = Laboratory(own_folder, {"made up": LawfulMud(**KNOWN)}, person or ScriptedPerson(), **options)
+        laboratory.port.calibration = COUNTS
+        made.append(laboratory)
+        return laboratory
+
+    yield build
+    for laboratory in made:
+        laboratory.close()

@@ -20,7 +20,7 @@ from experiments.bench_robot import LEAVE, BenchError
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP
 from firmware_host.configuration import Configuration
-from firmware_host.log_reader import Log
+from tests.experiments.still_robot import StillRobot
 from tests.scripted_person import ScriptedPerson
 
 JOINT = "right_adduction"
@@ -28,14 +28,14 @@ PLAN = Plan((JOINT,), weights_g=(100.0, 200.0, 400.0), trials=2)
 TRUE_NM_A = 0.0719
 
 
-class ScriptedRobot:
+class ScriptedRobot(StillRobot):
     """A BenchRobot whose winding warms by what hangs, and which lets go when it is told to."""
 
     configuration: Configuration = bench_configuration()
 
     def __init__(self) -> None:
-        self.mode, self.winding_c, self.hanging_g, self.armed = "idle", 30.0, 0.0, 0
-        self.sentence, self.now_s = "", 0.0
+        super().__init__("idle")
+        self.winding_c, self.hanging_g, self.armed, self.sentence = 30.0, 0.0, 0, ""
 
     def call(self, method: str, **params: Any) -> Any:
         if method == "arm":
@@ -49,16 +49,8 @@ class ScriptedRobot:
         return standing | {"drives": drives, "faults": [fault] if self.mode == "fault" else [], "moving": False}
 
     def wait(self, duration_s: float) -> None:
-        self.winding_c, self.now_s = max(30.0, self.winding_c - duration_s), self.now_s + duration_s
-
-    def record(self, from_s: float, to_s: float) -> Log:
-        raise NotImplementedError
-
-    def copy_logs(self, folder: Path) -> list[Path]:
-        return []
-
-    def close(self) -> None:
-        pass
+        super().wait(duration_s)
+        self.winding_c = max(30.0, self.winding_c - duration_s)
 
 
 class ScriptedHand:

@@ -12,24 +12,19 @@ from experiments.actuator_bench import RobotBench
 from experiments.actuator_plan import Plan
 from experiments.bench_errors import BenchError, GoneError, OverruledError
 from experiments.bench_robot import ALONE
-from firmware_host.log_reader import Log
-from tests.experiments.made_up_strides import CONFIGURATION
+from tests.experiments.still_robot import StillRobot
 from tests.scripted_person import ScriptedPerson
 
 HOLD_IT = "Take off what hangs and hold the flipper: torque goes off."
 PLAN = Plan(("right_adduction",), weights_g=(50.0,), trials=1)
 
 
-class HoldingRobot:
+class HoldingRobot(StillRobot):
     """A BenchRobot that holds a joint, until it is told to let go."""
 
-    configuration = CONFIGURATION
-
     def __init__(self, trouble: BenchError | None = None) -> None:
-        self.mode = "hold"
+        super().__init__("hold")
         self.trouble = trouble
-        self.closed = False
-        self.now_s = 0.0
 
     def call(self, method: str, **params: Any) -> Any:
         if self.trouble:
@@ -39,18 +34,9 @@ class HoldingRobot:
         return {"mode": self.mode, "faults": [], "now_s": self.now_s}
 
     def wait(self, duration_s: float) -> None:
-        self.now_s += duration_s
+        super().wait(duration_s)
         if self.trouble:
             raise self.trouble
-
-    def record(self, from_s: float, to_s: float) -> Log:
-        raise AssertionError("nothing was recorded")
-
-    def copy_logs(self, folder: Path) -> list[Path]:
-        return []
-
-    def close(self) -> None:
-        self.closed = True
 
 
 class Impatient(ScriptedPerson):

@@ -9,9 +9,9 @@ import pytest
 import statsmodels.api as sm
 from scipy.stats import t as student_t
 
+from estimation.origin_fit import student_factor
 from experiments.actuator_line import fit_line
 from experiments.actuator_plan import PAPER_WEIGHTS_G
-from experiments.student import student_factor
 
 TORQUES_NM = [0.0011772 * weight_g for weight_g in PAPER_WEIGHTS_G]
 SLOPE, INTERCEPT = 13.9, 0.02

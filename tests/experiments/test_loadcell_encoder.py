@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from drivers.load_cell_calibration import LoadCellCalibration
 from experiments.bench_robot import BenchError
 from experiments.loadcell import CellSettings
 from experiments.loadcell_examination import examine_encoder
@@ -19,33 +18,20 @@ from experiments.loadcell_trials import KEEP, WITHOUT, measure
 from experiments.person import GO_ON
 from simulation.load_cell_emulator import AmplifierParameters
 from simulation.stage_encoder_emulator import EmulatedStageEncoder, StageEncoderParameters
-from tests.experiments.loadcell_bench import SETTINGS, Laboratory
-from tests.experiments.made_up_mud import LawfulMud
+from tests.experiments.loadcell_bench import KNOWN, SETTINGS, Laboratory, Make, laboratories
 from tests.scripted_person import ScriptedPerson
-
-KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
-COUNTS = LoadCellCalibration("counts", 42000.0, 81000.0)
-Make = Callable[..., Laboratory]
 
 
 @pytest.fixture
 def make(tmp_path: Path) -> Iterator[Make]:
-    made: list[Laboratory] = []
+    with laboratories(tmp_path) as build:
 
-    def build(person: ScriptedPerson | None = None, **options: Any) -> Laboratory:
-        folder = tmp_path / str(len(made))
-        folder.mkdir()
-        encoder = StageEncoderParameters(**options.pop("encoder", {}))
-        laboratory = Laboratory(
-            folder, {"made up": LawfulMud(**KNOWN)}, person or ScriptedPerson(), encoder=encoder, **options
-        )
-        laboratory.port.calibration = COUNTS
-        made.append(laboratory)
-        return laboratory
+        def with_encoder(
+            person: ScriptedPerson | None = None, encoder: dict[str, Any] | None = None, **options: Any
+        ) -> Laboratory:
+            return build(person, encoder=StageEncoderParameters(**(encoder or {})), **options)
 
-    yield build
-    for laboratory in made:
-        laboratory.close()
+        yield with_encoder
 
 
 def counter_of(laboratory: Laboratory) -> EmulatedStageEncoder:

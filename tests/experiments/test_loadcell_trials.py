@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from random import Random
 from statistics import fmean
-from typing import Any
 
 import pytest
 
-from drivers.load_cell_calibration import LoadCellCalibration
 from drivers.load_cell_port import LoadCellPort
 from experiments.bench_robot import BenchError
 from experiments.loadcell import CellSettings, list_remarks
@@ -25,30 +23,14 @@ from experiments.loadcell_trials import KEEP, judge, measure, record
 from experiments.person import GO_ON, REDO, SKIP
 from simulation.load_cell_emulator import AmplifierParameters
 from simulation.plate_stage import StageParameters
-from tests.experiments.loadcell_bench import SETTINGS, Laboratory
-from tests.experiments.made_up_mud import LawfulMud
+from tests.experiments.loadcell_bench import COUNTS, KNOWN, SETTINGS, Laboratory, Make, laboratories
 from tests.scripted_person import ScriptedPerson
-
-KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
-COUNTS = LoadCellCalibration("counts", 42000.0, 81000.0)
-Make = Callable[..., Laboratory]
 
 
 @pytest.fixture
 def make(tmp_path: Path) -> Iterator[Make]:
-    made: list[Laboratory] = []
-
-    def build(person: ScriptedPerson | None = None, **options: Any) -> Laboratory:
-        folder = tmp_path / str(len(made))
-        folder.mkdir()
-        laboratory = Laboratory(folder, {"made up": LawfulMud(**KNOWN)}, person or ScriptedPerson(), **options)
-        laboratory.port.calibration = COUNTS
-        made.append(laboratory)
-        return laboratory
-
-    yield build
-    for laboratory in made:
-        laboratory.close()
+    with laboratories(tmp_path) as build:
+        yield build
 
 
 class Idle:

@@ -20,25 +20,20 @@ from experiments.mud_trials import (
 )
 from experiments.notebook import Entry, Notebook
 from experiments.person import GO_ON, REDO, SKIP
-from firmware_host.log_reader import Log
-from tests.experiments.made_up_strides import CONFIGURATION
+from tests.experiments.still_robot import StillRobot
 from tests.scripted_person import ScriptedPerson
 
 TRIALS = [PlannedTrial(f"47.6/{number}", "47.6", number, 3) for number in (1, 2, 3)]
 PLAN = {"experiment": "made up"}
 
 
-class StillRobot:
+class AskedRobot(StillRobot):
     """A BenchRobot that does nothing but remember what it was asked for."""
 
-    configuration = CONFIGURATION
-
     def __init__(self) -> None:
+        super().__init__("idle")
         self.called: list[str] = []
-        self.now_s = 0.0
-        self.mode = "idle"
         self.blocked = False
-        self.closed = False
         self.deaf = False
 
     def call(self, method: str, **params: Any) -> Any:
@@ -51,18 +46,6 @@ class StillRobot:
         told = {"sentence": "A drive is silent.", "for_s": 150.0, "what_to_do": "check it", "blocks_arming": True}
         faults = [told] if self.blocked else []
         return {"mode": self.mode, "now_s": self.now_s, "faults": faults} if method == "status" else "accepted"
-
-    def wait(self, duration_s: float) -> None:
-        self.now_s += duration_s
-
-    def record(self, from_s: float, to_s: float) -> Log:
-        raise AssertionError("nothing was recorded")
-
-    def copy_logs(self, folder: Path) -> list[Path]:
-        return []
-
-    def close(self) -> None:
-        self.closed = True
 
 
 class ScriptedBed:
@@ -82,7 +65,7 @@ class Session:
     """A bench of these, and measurements that come as they are told."""
 
     def __init__(self, folder: Path, person: ScriptedPerson | None = None, bed: ScriptedBed | None = None) -> None:
-        self.robot, self.person, self.bed = StillRobot(), person or ScriptedPerson(), bed or ScriptedBed()
+        self.robot, self.person, self.bed = AskedRobot(), person or ScriptedPerson(), bed or ScriptedBed()
         self.notebook = Notebook(folder, PLAN)
         self.bench = Bench(self.robot, self.bed, self.person, self.notebook)
         self.measured: list[str] = []
@@ -152,7 +135,7 @@ def test_a_fault_is_told_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("answer", [CLEAR, LEAVE])
 def test_before_a_person_levels_mud_they_judge_the_fault_that_stands(tmp_path: Path, answer: str) -> None:
-    robot, person = StillRobot(), ScriptedPerson(answer)
+    robot, person = AskedRobot(), ScriptedPerson(answer)
     robot.blocked = True
     bed = PromptedBed(robot, person, lambda trial: "Level it")
     if answer == CLEAR:

@@ -1,0 +1,32 @@
+"""A robot at the bench that is still, for tests: time passes for it, and it records nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from firmware_host.configuration import Configuration
+from firmware_host.log_reader import Log
+from tests.experiments.made_up_strides import CONFIGURATION
+
+
+class StillRobot:
+    """All of a BenchRobot but what it answers, which each test says by a `call` of its own."""
+
+    configuration: Configuration = CONFIGURATION
+
+    def __init__(self, mode: str) -> None:
+        self.mode = mode
+        self.now_s = 0.0
+        self.closed = False
+
+    def wait(self, duration_s: float) -> None:
+        self.now_s += duration_s
+
+    def record(self, from_s: float, to_s: float) -> Log:
+        raise AssertionError("nothing was recorded")
+
+    def copy_logs(self, folder: Path) -> list[Path]:
+        return []
+
+    def close(self) -> None:
+        self.closed = True
