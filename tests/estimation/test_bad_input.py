@@ -11,8 +11,8 @@ from control.gait import Gait, GaitParameters
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.records import NO_LOAD, Estimate, Phase, StrideEstimate
+from estimation.depth_line import COEFFICIENTS_N_M3
 from estimation.joint_load import FlipperDrive
-from estimation.knowledge import COEFFICIENTS_N_M3
 from estimation.mud import EstimationParameters, Method, MudEstimator, MudReading
 
 GEOMETRY = FlipperGeometry()

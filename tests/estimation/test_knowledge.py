@@ -15,21 +15,16 @@ from hypothesis import strategies as st
 
 from control.coefficient import NOTHING_KNOWN, Coefficient, MudBelief
 from control.records import FLIPPERS, Estimate, StrideEstimate
-from estimation.knowledge import (
-    CHANGE,
-    FLIPPER_SPREAD,
-    PAIR_CHANGE,
+from estimation.depth_line import (
     REMEMBERED_STRIDES,
     REPEATABILITY,
-    SHEAR_LAW,
-    STROKE_LAW,
     SURE_EXPONENT,
     DepthLaw,
     Line,
-    MudKnowledge,
     Reading,
     reading_of,
 )
+from estimation.knowledge import CHANGE, FLIPPER_SPREAD, PAIR_CHANGE, SHEAR_LAW, STROKE_LAW, MudKnowledge
 from tests.control import made_up_muds
 
 K_P, K_S, K_E = 1.0e6, 0.6e6, 1.1e6

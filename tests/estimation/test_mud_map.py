@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.records import Estimate, StrideEstimate
-from estimation.knowledge import REPEATABILITY
+from estimation.depth_line import REPEATABILITY
 from estimation.mud_map import MOST_PIECES, PIECE_M, Mapped, MudMap
 from tests.control import made_up_muds
 
