@@ -14,21 +14,13 @@ a long gap or a leap the first is not believed before a second one follows: capt
 
 from __future__ import annotations
 
-import ipaddress
-import os
-import socket
-from dataclasses import dataclass
 from errno import EAFNOSUPPORT
-from struct import pack
-from typing import Annotated
 
-from control.bounds import Bounds
 from control.records import NEVER_S, BodyPose
 from drivers.natnet_codec import (
     CONNECT,
     FRAME,
     KEEP_ALIVE,
-    LONGEST_PACKET,
     MODEL,
     NEWEST,
     OLDEST,
@@ -36,61 +28,35 @@ from drivers.natnet_codec import (
     SERVER_INFO,
     FrameLayout,
     GarbledPacketError,
-    NatNetVersion,
     RigidBody,
     decode_server_info,
-    encode_request,
     message_of,
 )
 from drivers.natnet_models import decode_bodies
+from drivers.natnet_parameters import NatNetParameters, parse_version
+from drivers.natnet_sockets import NatNetSockets
 from drivers.pose_port import STALE_S, PoseReport, PoseSourceError
 from drivers.pose_timing import LeastDelay, PoseForecast
 from drivers.track_axis import Direction
 
-MOST_PACKETS_PER_READ = 16  # of each socket: a hundred bodies at 240 Hz are one in two ticks
 DOUBTED_S = 0.5  # a pose after so long a gap is believed when a second one follows
 REQUEST_S = 1.0  # between requests; Motive forgets a client that is silent for several seconds
 NO_NETWORK = "the service may use no network: add AF_INET to RestrictAddressFamilies= in its unit"
-ANY_ADDRESS = "0.0.0.0"
-
-
-@dataclass(frozen=True)
-class NatNetParameters:
-    server: str = ""  # address of the computer that runs the motion capture; empty: nothing is asked from it
-    interface: str = ""  # on which frames arrive, by name or address; empty: any
-    group: str = "239.255.42.99"  # that the server multicasts to; empty: it sends to this computer alone
-    port: Annotated[int, Bounds(1, 65535)] = 1511  # of the multicast frames
-    command_port: Annotated[int, Bounds(1, 65535)] = 1510  # at which the server takes requests
-    version: str = ""  # of the protocol, such as "4.1"; empty: the server tells it
-    body: str = ""  # name of the rigid body; empty: by its id
-    body_id: Annotated[int, Bounds(0, 2**31 - 1)] = 0  # its streaming id; 0: the first one
-    latency_s: Annotated[float, Bounds(0.0, 0.2)] = 0.0  # of every frame, besides what it tells itself
-
-
-def parse_version(text: str) -> NatNetVersion | None:
-    """None for what is no version that is read here."""
-    major, dot, minor = text.partition(".")
-    if not (dot and major.isdecimal() and minor.isdecimal() and len(text) < 8):
-        return None
-    version = NatNetVersion(int(major), int(minor))
-    return version if OLDEST <= version <= NEWEST else None
 
 
 class NatNetPort:
-    """A PoseSource. Owns the sockets, what the server has told, and the places of late."""
+    """A PoseSource. Owns what the server has told, and the places of late."""
 
     def __init__(self, parameters: NatNetParameters, direction: Direction, origin_m: float = 0.0) -> None:
         """x is the position along `direction`, a unit vector in the cameras' frame. Raises PoseSourceError."""
         self.parameters = parameters
         self._direction, self._origin_m = direction, origin_m
-        self._sockets: list[socket.socket] = []
         self.poses = self.garbled = self.lost = 0
         self._told = self._unseen = ""  # why the server's frames cannot be read; why the last one brought no pose
         self.reset()
         try:
-            self._open()
+            self._sockets = NatNetSockets(parameters)
         except OSError as problem:
-            self.close()
             why = NO_NETWORK if problem.errno == EAFNOSUPPORT else problem.strerror
             raise PoseSourceError(f"NatNet cannot be received {_place(parameters)}: {why}") from None
 
@@ -108,53 +74,33 @@ class NatNetPort:
         self._delay, self._forecast = LeastDelay(), PoseForecast()
         self._stamp_s = NEVER_S
 
-    def _open(self) -> None:
-        parameters = self.parameters
-        if parameters.group:
-            self._sockets.append(_join(parameters))
-        if parameters.server:
-            asking = _udp_socket(parameters.interface)
-            self._sockets.append(asking)
-            asking.bind((_address_of(parameters.interface), 0))
-
     def read(self, now_s: float) -> BodyPose:
         self._now_s = now_s
         if self.parameters.server and now_s - self._asked_s >= REQUEST_S:
             self._asked_s = now_s
             self._ask(now_s)
-        for each in self._sockets:
-            self._drain(each, now_s)
+        for packet, sender in self._sockets.packets():
+            self._judge(packet, sender, now_s)
         if now_s - self._taken_s > STALE_S:
             return BodyPose()
         return BodyPose(self._stamp_s, self._forecast.at(now_s) - self._origin_m)
 
     def _ask(self, now_s: float) -> None:
         silent = now_s - self._heard_s > REQUEST_S
-        self._request(CONNECT if self._version is None or silent else KEEP_ALIVE)
+        self._sockets.request(CONNECT if self._version is None or silent else KEEP_ALIVE)
         if self.parameters.body and (self._models_changed or not self._named):
             self._models_changed = False
-            self._request(REQUEST_MODEL)
+            self._sockets.request(REQUEST_MODEL)
 
-    def _request(self, message: int) -> None:
-        try:
-            self._sockets[-1].sendto(encode_request(message), (self.parameters.server, self.parameters.command_port))
-        except OSError:  # no network for the moment: it is asked again
+    def _judge(self, packet: bytes, sender: str, now_s: float) -> None:
+        if self.parameters.server and sender != self.parameters.server:
+            self.garbled += 1
+            self._strangers_s, self._stranger = now_s, sender
             return
-
-    def _drain(self, arriving: socket.socket, now_s: float) -> None:
-        for _ in range(MOST_PACKETS_PER_READ):
-            try:
-                packet, sender = arriving.recvfrom(LONGEST_PACKET)
-            except OSError:  # there is no more, or the network went down
-                return
-            if self.parameters.server and sender[0] != self.parameters.server:
-                self.garbled += 1
-                self._strangers_s, self._stranger = now_s, str(sender[0])
-                continue
-            try:
-                self._take(packet, now_s)
-            except GarbledPacketError:
-                self.garbled += 1
+        try:
+            self._take(packet, now_s)
+        except GarbledPacketError:
+            self.garbled += 1
 
     def _take(self, packet: bytes, now_s: float) -> None:
         """Raises GarbledPacketError."""
@@ -252,49 +198,9 @@ class NatNetPort:
         return False  # a socket lives on without its network
 
     def close(self) -> None:
-        for each in self._sockets:
-            each.close()
+        self._sockets.close()
 
 
 def _place(parameters: NatNetParameters) -> str:
     by = f"in group {parameters.group}, port {parameters.port}" if parameters.group else f"from {parameters.server}"
     return f"{by} on {parameters.interface}" if parameters.interface else by
-
-
-def _udp_socket(interface: str) -> socket.socket:
-    """Raises OSError."""
-    opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    opened.setblocking(False)
-    if interface and not is_address(interface):
-        opened.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, os.fsencode(interface))
-    return opened
-
-
-def _join(parameters: NatNetParameters) -> socket.socket:
-    """Bound to the group's own address, so that nothing else is heard. Raises OSError."""
-    opened = _udp_socket(parameters.interface)
-    try:
-        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # others on this computer may listen as well
-        opened.bind((parameters.group, parameters.port))
-        address = socket.inet_aton(_address_of(parameters.interface))
-        named = parameters.interface and not is_address(parameters.interface)
-        index = socket.if_nametoindex(parameters.interface) if named else 0
-        membership = pack("4s4si", socket.inet_aton(parameters.group), address, index)
-        opened.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
-    except OSError:
-        opened.close()
-        raise
-    return opened
-
-
-def _address_of(interface: str) -> str:
-    return interface if is_address(interface) else ANY_ADDRESS
-
-
-def is_address(text: str) -> bool:
-    """Of four numbers."""
-    try:
-        ipaddress.IPv4Address(text)
-    except ValueError:
-        return False
-    return True

@@ -25,7 +25,7 @@ from control.records import JOINTS
 from control.recovery import RecoveryParameters
 from control.winding import WindingParameters
 from drivers.failures import FailureParameters
-from drivers.natnet_port import NatNetParameters
+from drivers.natnet_parameters import NatNetParameters
 from drivers.odrive_axis import DriveParameters, WatchdogEndpoints
 from drivers.rail_encoder import RailEncoderParameters
 from estimation.joint_load import FlipperDrive

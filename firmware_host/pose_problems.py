@@ -6,7 +6,8 @@ import ipaddress
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from drivers.natnet_port import is_address, parse_version
+from drivers.natnet_parameters import parse_version
+from drivers.natnet_sockets import is_address
 from drivers.track_axis import parse_axis
 from firmware_host.toml_records import shown
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
-from drivers.natnet_port import parse_version
+from drivers.natnet_parameters import parse_version
 from drivers.pose_port import PoseSender
 from drivers.track_axis import AXES, parse_axis
 from firmware_host.configuration import PoseParameters

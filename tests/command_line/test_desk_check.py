@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from command_line.desk_check import _pose_items
-from drivers.natnet_port import NatNetParameters
+from drivers.natnet_parameters import NatNetParameters
 from drivers.rail_encoder import RailEncoderParameters
 from firmware_host.configuration import Configuration, PoseParameters
 from simulation.natnet_server import LOOPBACK, NatNetServer, RecordedPose

@@ -14,7 +14,9 @@ import pytest
 
 from control.records import BodyPose
 from drivers.natnet_codec import NatNetVersion
-from drivers.natnet_port import MOST_PACKETS_PER_READ, NatNetParameters, NatNetPort
+from drivers.natnet_parameters import NatNetParameters
+from drivers.natnet_port import NatNetPort
+from drivers.natnet_sockets import MOST_PACKETS_PER_READ
 from drivers.pose_port import STALE_S, PoseSourceError
 from drivers.track_axis import Direction
 from simulation.natnet_server import (

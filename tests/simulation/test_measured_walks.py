@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
 from control.records import JointAngles, Phase
-from drivers.natnet_port import NatNetParameters, NatNetPort
+from drivers.natnet_parameters import NatNetParameters
+from drivers.natnet_port import NatNetPort
 from estimation.mud import Currents, EstimationParameters, MudEstimator
 from firmware_host.lab_csv import LabLog, read_lab_csv
 from firmware_host.replay import LAB_DRIVE, NO_VELOCITY

@@ -17,7 +17,8 @@ import pytest
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import BodyPose, StrideEstimate
-from drivers.natnet_port import NatNetParameters, NatNetPort
+from drivers.natnet_parameters import NatNetParameters
+from drivers.natnet_port import NatNetPort
 from drivers.pose_port import PoseReport
 from drivers.rail_encoder import RailEncoderParameters
 from firmware_host.configuration import Configuration, PoseParameters
