@@ -24,7 +24,7 @@ from experiments.side_by_side import side_by_side
 from firmware_host.configuration import Configuration, parse_configuration
 
 FALLS = (
-    "What hangs falls whenever the torque goes off: at a fault, within two seconds after this program has died, when its"
+    "What hangs falls when the torque goes off: at a fault, and within two seconds where this program dies or its"
     " terminal closes. Put something soft right below it, and keep hands and feet from there."
 )
 REVISABLE = ("joints", "lever_tolerance_m", "weight_tolerance")

@@ -3,7 +3,8 @@
 After section III-D of the paper. Each trial begins with the sweep axes over the beginning of the first mud; the body's
 place there is the trackway's zero. The trials of the gaits alternate, so that mud which dries or softens meanwhile
 falls on none of them alone. A walk is stopped where the plates go down behind the last mud, after 90 s in one mud, or
-by a fault. One that somebody or a fault has stopped is no trial, unless a person says so. Its strides are read from the log (log_strides.py), and the table is that of the simulated trackway.
+by a fault. One that somebody or a fault has stopped is no trial, unless a person says so. Its strides are read from the
+log (log_strides.py), and the table is that of the simulated trackway.
 """
 
 from __future__ import annotations
@@ -222,7 +223,9 @@ def told_of(key: str, walk: Walk) -> str:
     speed = f"{100.0 * speed_m_s(seen):.1f} cm/s" if seen else "no stride with a pose"
     number, lost = len(walk.strides), len(walk.strides) - len(seen)
     without = f", {lost} of them without a pose" if lost else ""
-    return f"{key}: {number} stride{'' if number == 1 else 's'}{without}, {speed}{'; ' + walk.fault if walk.fault else ''}"
+    return (
+        f"{key}: {number} stride{'' if number == 1 else 's'}{without}, {speed}{'; ' + walk.fault if walk.fault else ''}"
+    )
 
 
 def report_of(plan: Plan, notebook: Notebook) -> dict[str, Any]:

@@ -97,7 +97,9 @@ def test_a_daemon_that_is_gone_is_told_once_and_what_the_robot_does_then(tmp_pat
     assert person.told == [ALONE] and not person.asked
 
 
-def test_that_what_hangs_may_fall_is_told_before_a_joint_is_mounted_on_which_something_will_hang(tmp_path: Path) -> None:
+def test_that_what_hangs_may_fall_is_told_before_a_joint_is_mounted_on_which_something_will_hang(
+    tmp_path: Path,
+) -> None:
     robot, person = HoldingRobot(), Impatient()
     robot.mode = "idle"
     with pytest.raises(KeyboardInterrupt):
