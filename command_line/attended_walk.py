@@ -20,13 +20,8 @@ UNDER_WAY = ("walking", "stopping", "damping")
 
 
 def attend(client: StatusClient, params: dict[str, Any]) -> int:
-    """Walk, and return when the robot is at rest."""
-    client.call("lease", for_s=PROMISE_S, take_over=params.get("take_over", False))
-    try:
-        client.call("walk", **params)
-    except CallRefusedError:
-        client.call("release")
-        raise
+    """Walk, and return when the robot is at rest. Only a walk that is accepted takes the lease, and with it."""
+    client.call("walk", lease_s=PROMISE_S, **params)
     try:
         report, status = _stay(client), exit_codes.OK
     except KeyboardInterrupt:

@@ -23,6 +23,10 @@ from experiments.person import GO_ON, Person, Willing
 from experiments.side_by_side import side_by_side
 from firmware_host.configuration import Configuration, parse_configuration
 
+FALLS = (
+    "What hangs falls when the torque goes off: at a fault, and within two seconds where this program dies or its"
+    " terminal closes. Put something soft right below it, and keep hands and feet from there."
+)
 REVISABLE = ("joints", "lever_tolerance_m", "weight_tolerance")
 Readings = Mapping[str, Mapping[str, Entry]]  # by joint and step
 
@@ -57,6 +61,8 @@ class RobotBench:
             notebook = Notebook(folder / joint, notes_of(plan, joint))
             if notebook.begun:
                 person.tell(f"{joint}: {len(notebook.entries)} of {count} readings are there already.")
+            if len(notebook.entries) < count:
+                person.tell(FALLS)
 
             def show_all(done: int, total: int, before: int = number) -> None:
                 show(before * total + done, len(plan.joints) * total)

@@ -17,7 +17,7 @@ from typing import Any
 
 from experiments.bench_errors import BarredError, BenchError, GoneError, OverruledError
 from experiments.bench_robot import ENERGISED, UNDER_WAY, Status, cut
-from firmware_host.configuration import Configuration, parse_configuration
+from firmware_host.configuration import Configuration, ConfigurationError, parse_configuration
 from firmware_host.lease import TAKEN_OVER
 from firmware_host.log_folder import present_path, run_files
 from firmware_host.log_reader import Log, LogError, read_log, read_logs
@@ -37,14 +37,16 @@ class DaemonRobot:
     """A BenchRobot. Owns the connection."""
 
     def __init__(self, socket: Path) -> None:
-        """Raises BenchError where there is no daemon, it does not let this user drive, or somebody else drives."""
+        """Raises BenchError where there is no daemon, it does not let this user drive, or somebody else drives.
+
+        So it does where this user may drive and not read the log: before anything moves, not after.
+        """
         try:
             self._client = StatusClient(socket)
         except NoDaemonError as problem:
             raise GoneError(f"{problem}. {START_IT}") from problem
         except NotPermittedError as problem:
             raise BarredError(str(problem)) from problem
-        self._configuration: Configuration | None = None
         self._renewed_s = -inf
         self._log: Path | None = None  # as last seen
         self._name: str | None = None  # of this program, as the daemon calls who holds a lease
@@ -53,7 +55,8 @@ class DaemonRobot:
         try:
             self._require_at_rest()
             self._renew()
-        except BenchError:
+            self.configuration = self._read_configuration()
+        except (BenchError, ConfigurationError):
             self._client.close()
             raise
 
@@ -64,13 +67,10 @@ class DaemonRobot:
         if mode in UNDER_WAY:
             raise BenchError(f"the robot is {mode}: wait for its end, or 'mudskipper stop' it, then begin again")
 
-    @property
-    def configuration(self) -> Configuration:
+    def _read_configuration(self) -> Configuration:
         """As the daemon runs with it, from its log."""
-        if self._configuration is None:
-            log = self._awaited(lambda: self._read(self._segments()[-1:], from_s=inf))
-            self._configuration = parse_configuration(log.configuration_text)
-        return self._configuration
+        log = self._awaited(lambda: self._read(self._segments()[-1:], from_s=inf))
+        return parse_configuration(log.configuration_text)
 
     def call(self, method: str, **params: Any) -> Any:
         if method in MOTIONS:
@@ -171,7 +171,7 @@ class DaemonRobot:
             raise BenchError("the daemon writes no log: set log.enabled = true in its configuration")
         self._log = Path(path)
         end_s = time.monotonic() + WRITTEN_S
-        while not (segments := run_files(Path(path))):  # its writer has only just started
+        while not (segments := _files_of(Path(path))):  # its writer has only just started
             if time.monotonic() > end_s:
                 raise BenchError(f"the daemon's log {path} is not on this computer")
             self.wait(RENEWAL_S)
@@ -214,6 +214,16 @@ class DaemonRobot:
         end_s = time.monotonic() + WRITTEN_S
         while self.call("status")["mode"] in UNDER_WAY and time.monotonic() < end_s:
             self.wait(RENEWAL_S)
+
+
+def _files_of(log: Path) -> list[Path]:
+    try:
+        return run_files(log)
+    except PermissionError as problem:
+        raise BarredError(
+            f"you may operate the robot, but not read its log, which every experiment does: have root add you to the"
+            f" group of {problem.filename}, then log in again"
+        ) from problem
 
 
 def _winds_up(status: Status) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from math import nan
 from typing import Any
 
+from control.modes import Mode, Request
 from control.records import Estimate, StrideEstimate
 from estimation.mud import MudReading
 from experiments.fault_bench import FaultBench
@@ -16,8 +17,10 @@ from experiments.fault_causes import Cause
 
 @contextmanager
 def hung_up(bench: FaultBench, joint: str) -> Iterator[None]:
-    """Who has promised to attend the robot goes away."""
+    """Who has promised to attend the robot goes away; where torque is off, right behind an arm."""
     bench.loop.lease.renew("somebody", bench.now_s, 10.0)
+    if bench.loop.mode is Mode.IDLE:
+        bench.loop.request(Request.ARM, bench.now_s)
     bench.loop.lease.hang_up("somebody")
     yield
 

@@ -3,7 +3,8 @@
 After section III-D of the paper. Each trial begins with the sweep axes over the beginning of the first mud; the body's
 place there is the trackway's zero. The trials of the gaits alternate, so that mud which dries or softens meanwhile
 falls on none of them alone. A walk is stopped where the plates go down behind the last mud, after 90 s in one mud, or
-by a fault. Its strides are read from the log (log_strides.py), and the table is that of the simulated trackway.
+by a fault. One that somebody or a fault has stopped is no trial, unless a person says so. Its strides are read from the
+log (log_strides.py), and the table is that of the simulated trackway.
 """
 
 from __future__ import annotations
@@ -42,6 +43,10 @@ UNSEEN_S = 2.0  # without a pose, before a walk or on it: nobody knows where its
 BACKWARDS_M = 0.2  # behind the start: no mud pushes a body back so far
 LOOK_S = 0.05
 BEHIND = ""  # the last mud
+STUCK = "stuck in "  # a walk that comes to nothing is a result
+KEEP = "k"
+WALKED = {GO_ON: "keep it", REDO: "walk it again", SKIP: "leave it out"}
+STOPPED = {GO_ON: "walk it again", KEEP: "keep it", SKIP: "leave it out"}
 
 
 class Trackway(Protocol):
@@ -50,8 +55,8 @@ class Trackway(Protocol):
     def prepare(self, trial: str) -> BenchRobot:
         """The robot at the start, the mud levelled."""
 
-    def judge(self, told: str) -> str:
-        """GO_ON, SKIP to keep this trial out, or REDO it."""
+    def judge(self, told: str, stopped: bool) -> str:
+        """GO_ON, SKIP to keep this trial out, or REDO it; `stopped` before its end."""
 
 
 class AskedTrackway:
@@ -69,9 +74,9 @@ class AskedTrackway:
         face_faults(self._robot, self._person)
         return self._robot
 
-    def judge(self, told: str) -> str:
-        answers = {GO_ON: "keep it", REDO: "walk it again", SKIP: "leave it out"}
-        return self._person.ask(told, answers, self._meanwhile)
+    def judge(self, told: str, stopped: bool) -> str:
+        answer = self._person.ask(told, STOPPED if stopped else WALKED, self._meanwhile)
+        return {GO_ON: REDO, KEEP: GO_ON}.get(answer, answer) if stopped else answer
 
     def _meanwhile(self) -> None:
         self._robot.wait(LOOK_S)
@@ -130,7 +135,7 @@ def _walk_trial(plan: Plan, key: str, rule: DepthRule, trackway: Trackway, noteb
     robot = trackway.prepare(key)
     arm_m = robot.configuration.geometry.flipper_length_m
     walk = walk_over(robot, plan, rule)
-    verdict = trackway.judge(told_of(key, walk))
+    verdict = trackway.judge(told_of(key, walk), was_stopped(walk))
     if verdict == REDO:
         return
     strides = [stride._asdict() for stride in walk.strides]
@@ -204,16 +209,23 @@ class Progress:
         if plates_m < -BACKWARDS_M:
             return "the body's place falls as the robot walks: turn pose.axis, or the sign of metres_per_count, round"
         stuck = mud != BEHIND and now_s - self._entered_s > STUCK_S or now_s - self._begun_s > PATIENCE_S
-        return f"stuck in {mud or 'the end'}" if stuck else None
+        return f"{STUCK}{mud or 'the end'}" if stuck else None
+
+
+def was_stopped(walk: Walk) -> bool:
+    """By somebody or a fault, not by the trackway."""
+    return bool(walk.fault) and not walk.fault.startswith(STUCK)
 
 
 def told_of(key: str, walk: Walk) -> str:
     """A trial in a line."""
     seen = [stride for stride in walk.strides if stride.step_m == stride.step_m]
     speed = f"{100.0 * speed_m_s(seen):.1f} cm/s" if seen else "no stride with a pose"
-    lost = len(walk.strides) - len(seen)
+    number, lost = len(walk.strides), len(walk.strides) - len(seen)
     without = f", {lost} of them without a pose" if lost else ""
-    return f"{key}: {len(walk.strides)} strides{without}, {speed}{'; ' + walk.fault if walk.fault else ''}"
+    return (
+        f"{key}: {number} stride{'' if number == 1 else 's'}{without}, {speed}{'; ' + walk.fault if walk.fault else ''}"
+    )
 
 
 def report_of(plan: Plan, notebook: Notebook) -> dict[str, Any]:

@@ -146,11 +146,12 @@ _READER = RecordReader(Configuration, without={"text"})
 
 def load_configuration(path: Path) -> Configuration:
     """Raises ConfigurationError, also where the file cannot be read."""
-    return parse_configuration(read_text(path))
+    return parse_configuration(read_text(path), path)
 
 
-def parse_configuration(text: str) -> Configuration:
-    document = parse_document(text)
+def parse_configuration(text: str, file: Path | None = None) -> Configuration:
+    """Raises ConfigurationError."""
+    document = parse_document(text, file)
     _apply_protocol(document)
     configuration = Configuration(**_READER.read(document), text=text)
     problems = list(contradictions(configuration))

@@ -130,7 +130,10 @@ class Loop:
     def _situation(self, now_s: float) -> Situation:
         lost_by = str(self.lease.holder) if self.lease.lost(now_s) else ""
         if lost_by and self.mode not in ENERGISED:  # nothing is left to attend to
+            self.news.tell(now_s, f"lease of {lost_by} is over")
             self.lease.reset()
+            if self._request is not Request.ARM:  # which must not come true for somebody who is gone
+                lost_by = ""
         return Situation(
             self.mode,
             self._mode_since_s,

@@ -28,6 +28,7 @@ from firmware_host.ticker import PERIOD_S
 MOST_STRIDES = 100000  # that a walk may be ordered
 STRIDES_PER_ANSWER = 20  # an answer is made between two ticks
 LARGEST_NUMBER = 2**63 - 1
+AS_HOLDER = ("take_over", "lease_s")  # of whatever sets the robot in motion
 
 Method = Callable[[dict[str, Any], Caller], str]
 
@@ -189,17 +190,14 @@ class OperatorCalls:
 
     def lease(self, params: dict[str, Any], caller: Caller) -> str:
         """Promise to renew it within `for_s`, or to be stopped. Until then nobody else moves the robot."""
-        for_s = params.get("for_s")
-        if isinstance(for_s, bool) or not isinstance(for_s, int | float) or not SHORTEST_S <= for_s <= LONGEST_S:
-            raise RefusedError(f"for_s = {for_s!r}: must be a number from {SHORTEST_S:g} to {LONGEST_S:g}")
-        now_s = self._clock()
-        self._accept(self._lease.refusal(caller, now_s, _flag(params, "take_over")))
-        begins = self._lease.holder != caller
-        self._oust(caller)
+        self._promise(caller, _lease_time(params, "for_s"))
+        return "accepted"
+
+    def _promise(self, caller: Caller, for_s: float) -> None:
+        begins, now_s = self._lease.holder != caller, self._clock()
         self._accept(self._lease.renew(caller, now_s, for_s))
         if begins:
             self._loop.news.tell(now_s, f"lease taken by {caller}")
-        return "accepted"
 
     def release(self, params: dict[str, Any], caller: Caller) -> str:
         """End one's own lease, or whoever's was lost."""
@@ -210,16 +208,19 @@ class OperatorCalls:
         return "accepted"
 
     def _as_holder(self, method: Method, params: dict[str, Any], caller: Caller) -> str:
-        """Only who holds the lease, where somebody does; `take_over` ends that of another, once all is accepted."""
-        self._accept(self._lease.refusal(caller, self._clock(), _flag(params, "take_over")))
-        answer = method({name: value for name, value in params.items() if name != "take_over"}, caller)
-        self._oust(caller)
-        return answer
+        """Only who holds the lease, where somebody does.
 
-    def _oust(self, caller: Caller) -> None:
+        Once the order is accepted `take_over` ends the lease of another, and `lease_s` promises as `lease` does.
+        """
+        self._accept(self._lease.refusal(caller, self._clock(), _flag(params, "take_over")))
+        for_s = _lease_time(params, "lease_s") if "lease_s" in params else None
+        answer = method({name: value for name, value in params.items() if name not in AS_HOLDER}, caller)
         if self._lease.held and self._lease.holder != caller:
             self._loop.news.tell(self._clock(), f"lease of {self._lease.holder} taken over by {caller}")
             self._lease.oust(caller)
+        if for_s is not None:
+            self._promise(caller, for_s)
+        return answer
 
     def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:
         self._accept(self._loop.request(request, self._clock(), order, forced, str(caller)))
@@ -283,6 +284,13 @@ def _flag(params: dict[str, Any], name: str) -> bool:
     if not isinstance(value, bool):
         raise RefusedError(f"{name} = {value!r}: must be true or false")
     return value
+
+
+def _lease_time(params: dict[str, Any], name: str) -> float:
+    for_s = params.get(name)
+    if isinstance(for_s, bool) or not isinstance(for_s, int | float) or not SHORTEST_S <= for_s <= LONGEST_S:
+        raise RefusedError(f"{name} = {for_s!r}: must be a number from {SHORTEST_S:g} to {LONGEST_S:g}")
+    return for_s
 
 
 def _integer(params: dict[str, Any], name: str, low: int, high: int) -> int:

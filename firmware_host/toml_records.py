@@ -62,21 +62,23 @@ def read_text(path: Path) -> str:
     except OSError as problem:
         raise ConfigurationError([f"{path}: {problem.strerror}"]) from problem
     except UnicodeDecodeError as problem:
-        raise ConfigurationError([f"{path}: not UTF-8 text at byte {problem.start}"]) from problem
+        line = data.count(b"\n", 0, problem.start) + 1
+        raise ConfigurationError([f"{path}: not UTF-8 text (at line {line}); save the file as UTF-8"]) from problem
 
 
-def parse_document(text: str) -> dict[str, Any]:
-    """Raises ConfigurationError."""
+def parse_document(text: str, file: Path | None = None) -> dict[str, Any]:
+    """Raises ConfigurationError, which names the file that the text is from."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as problem:
-        raise ConfigurationError([f"not a TOML file: {problem}"]) from problem
-    except RecursionError as problem:
-        raise ConfigurationError(["not a TOML file that can be read: it is nested too deep"]) from problem
-    except ValueError as problem:
-        raise ConfigurationError(
-            ["not a TOML file that can be read: a number or a date is beyond all size"]
-        ) from problem
+        last = text.count("\n", 0, len(text.rstrip())) + 1
+        why = str(problem).replace("at end of document", f"at the end, line {last}")
+        why = f"not a TOML file: {why}; mend it there: key = value, words in quotes, sections in [brackets]"
+    except RecursionError:
+        why = "not a TOML file that can be read: it is nested too deep"
+    except ValueError:
+        why = "not a TOML file that can be read: a number or a date is beyond all size"
+    raise ConfigurationError([f"{file}: {why}" if file else why])
 
 
 class RecordReader:

@@ -91,12 +91,12 @@ _READER = RecordReader(WorldText)
 
 def load_world(path: Path) -> World:
     """Raises ConfigurationError, also where the file cannot be read."""
-    return parse_world(read_text(path))
+    return parse_world(read_text(path), path)
 
 
-def parse_world(text: str) -> World:
+def parse_world(text: str, file: Path | None = None) -> World:
     """Raises ConfigurationError with all that is wrong."""
-    document = parse_document(text)
+    document = parse_document(text, file)
     problems = _READER.problems(document) + list(_contradictions(document))
     if problems:
         raise ConfigurationError(problems)

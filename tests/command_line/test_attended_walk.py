@@ -129,3 +129,13 @@ def test_a_second_attendant_is_told_of_the_first(bench: Any) -> None:
         assert second.returncode == exit_codes.REFUSED
         assert f"(process {first.pid}) operates the robot" in second.stderr
         assert bench.wait_for(lambda report: True)["mode"] == "walking"
+
+
+def test_an_attended_walk_that_is_refused_ousts_nobody(bench: Any) -> None:
+    holder = StatusClient(bench.socket)
+    holder.call("lease", for_s=10.0)
+    for arguments, why in (((), "'mudskipper arm' first"), (("--depth", "6"), "depth_m = 0.06")):
+        refused = bench.run("walk", "--attended", "--take-over", *arguments)
+        assert refused.returncode == exit_codes.REFUSED and why in refused.stderr
+    assert holder.call("lease", for_s=10.0) == "accepted"
+    holder.close()

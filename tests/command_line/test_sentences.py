@@ -9,8 +9,10 @@ from typing import Any
 import pytest
 
 from command_line import exit_codes, operation
+from command_line.main import main
 from command_line.screen import number
 from control.records import JOINTS
+from firmware_host import daemon
 from firmware_host.status_client import DroppedError
 
 NO_SOCKET = Namespace(socket=Path("/none"), json=False, config=Path("/none.toml"))
@@ -50,6 +52,37 @@ def test_a_daemon_that_is_not_there_is_to_be_started(capsys: pytest.CaptureFixtu
 def test_a_check_without_a_daemon_looks_for_itself(capsys: pytest.CaptureFixture[str]) -> None:
     assert operation.check(NO_SOCKET) == exit_codes.UNHEALTHY
     assert "FAIL daemon" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["check", "--socket", "/none", "--config"],
+        ["doctor", "--socket", "/none", "--config"],
+        ["log", "list", "--config"],
+        ["log", "recover", "--config"],
+        ["replay", "/none.mcap", "--config"],
+        ["simulate", "--config"],
+        ["simulate", "--world"],
+        ["demo", "--world"],
+        ["experiment", "actuator", "--simulated", "--config"],
+        ["mudskipperd", "--config"],
+    ],
+    ids=" ".join,
+)
+def test_a_configuration_that_is_no_toml_is_refused_by_file_and_line(
+    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "robot.toml").write_text("[limits]\ntorque_nm 0.8\n", encoding="utf-8")
+    command, *others = arguments
+    program = daemon.main if command == "mudskipperd" else main
+    status = program([*others, "robot.toml"] if command == "mudskipperd" else [*arguments, "robot.toml"])
+    assert status == (exit_codes.UNHEALTHY if command in ("check", "doctor") else exit_codes.CONFIGURATION)
+    printed = capsys.readouterr()
+    told = " ".join((printed.out + printed.err).split())
+    assert "robot.toml: not a TOML file: Expected '=' after a key in a key/value pair (at line 2, column 11)" in told
+    assert "mend it there: " in told
 
 
 def test_a_status_before_all_drives_are_heard_names_those_that_are_not() -> None:

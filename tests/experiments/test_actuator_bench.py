@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from experiments.actuator_bench import RobotBench
+from experiments.actuator_bench import FALLS, RobotBench
 from experiments.actuator_plan import Plan
 from experiments.bench_errors import BenchError, GoneError, OverruledError
 from experiments.bench_robot import ALONE
@@ -95,6 +95,16 @@ def test_a_daemon_that_is_gone_is_told_once_and_what_the_robot_does_then(tmp_pat
     with pytest.raises(GoneError):
         RobotBench(robot).leave(tmp_path, person)
     assert person.told == [ALONE] and not person.asked
+
+
+def test_that_what_hangs_may_fall_is_told_before_a_joint_is_mounted_on_which_something_will_hang(
+    tmp_path: Path,
+) -> None:
+    robot, person = HoldingRobot(), Impatient()
+    robot.mode = "idle"
+    with pytest.raises(KeyboardInterrupt):
+        RobotBench(robot).calibrate(PLAN, tmp_path, person, lambda done, total: None)
+    assert person.told == [FALLS] and "Mount the robot" in person.asked[0]
 
 
 def test_a_robot_that_holds_already_lets_go_before_a_joint_is_mounted(tmp_path: Path) -> None:

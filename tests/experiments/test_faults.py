@@ -170,12 +170,14 @@ def test_a_loop_that_stands_still_misses_those_ticks_and_the_robot_lives_on() ->
     assert bench.robot.now_s == pytest.approx(bench.now_s, abs=0.001)
 
 
-def test_a_lease_that_is_lost_without_torque_still_names_its_holder() -> None:
+def test_a_lease_that_is_lost_right_behind_an_arm_names_its_holder_and_arms_nothing() -> None:
     bench = make_bench()
-    bench.run_until(lambda: bench.loop.mode is Mode.IDLE, 2.0)
+    bench.run_for(1.0)
     bench.loop.lease.renew("alice", bench.now_s, 1.0)
+    assert bench.loop.request(Request.ARM, bench.now_s) is None
     bench.loop.lease.hang_up("alice")
     bench.step()
+    assert bench.loop.mode is Mode.IDLE
     assert [fault.sentence for fault in bench.loop.faults.standing if fault.name == "lease_lost"] == [
         "alice promised to attend the robot and is gone."
     ]

@@ -1,16 +1,18 @@
-"""An experiment that was suspended, or whose computer slept, finds its lease gone: what it may do then."""
+"""An experiment begins where it may, and may find its lease gone, after it was suspended or its computer slept."""
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from experiments import daemon_robot
-from experiments.bench_errors import OverruledError
+from experiments.bench_errors import BarredError, OverruledError
 from experiments.daemon_robot import DaemonRobot
 from firmware_host.status_client import CallRefusedError
+from tests.experiments.made_up_strides import make_log, make_ticks
 
 ME = "uid 1 (process 2)"
 LOST = {"name": "lease_lost"}
@@ -24,7 +26,7 @@ class ScriptedDaemon:
         self.mode = "idle"
         self.faults: list[dict[str, str]] = []
         self.called: list[str] = []
-        self.overruled = False
+        self.overruled = self.closed = False
 
     def call(self, method: str, **params: Any) -> Any:
         self.called.append(method)
@@ -32,14 +34,15 @@ class ScriptedDaemon:
             raise CallRefusedError("taken over: uid 3 wanted the robot")
         if method in ("lease", "release"):
             self.lease = ME if method == "lease" else None
-        return {"lease": self.lease, "mode": self.mode, "faults": self.faults}
+        log = {"path": "/logs/active/run-0000.mcap"}
+        return {"lease": self.lease, "mode": self.mode, "faults": self.faults, "log": log}
 
     def lapse(self, mode: str, faults: list[dict[str, str]]) -> None:
         self.lease, self.mode, self.faults = None, mode, faults
         self.called.clear()
 
     def close(self) -> None:
-        pass
+        self.closed = True
 
 
 @pytest.fixture
@@ -47,7 +50,21 @@ def daemon(monkeypatch: pytest.MonkeyPatch) -> ScriptedDaemon:
     made = ScriptedDaemon()
     monkeypatch.setattr(daemon_robot, "StatusClient", lambda socket: made)
     monkeypatch.setattr(daemon_robot, "RENEWAL_S", 0.0)
+    monkeypatch.setattr(DaemonRobot, "_read", lambda self, segments, from_s: make_log(make_ticks([])))
+    monkeypatch.setattr(daemon_robot, "run_files", lambda path: [path])
     return made
+
+
+def test_who_may_not_read_the_log_is_refused_before_anything_moves(
+    daemon: ScriptedDaemon, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path) -> list[Path]:
+        raise PermissionError(errno.EACCES, "Permission denied", "/logs")
+
+    monkeypatch.setattr(daemon_robot, "run_files", refuse)
+    with pytest.raises(BarredError, match="not read its log, .* have root add you to the group of /logs"):
+        DaemonRobot(Path("x"))
+    assert set(daemon.called) == {"status", "lease"} and daemon.closed
 
 
 @pytest.mark.parametrize("overruled", [False, True])

@@ -14,8 +14,19 @@ from experiments.bench_robot import BenchError, arm
 from experiments.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.notebook import Notebook
 from experiments.person import GO_ON, REDO, SKIP
-from experiments.trackway_trials import UNSEEN_S, AskedTrackway, Mud, Plan, report_of, run, walk_over
-from experiments.walk import StrideRecord, Walk
+from experiments.trackway_trials import (
+    KEEP,
+    UNSEEN_S,
+    AskedTrackway,
+    Mud,
+    Plan,
+    report_of,
+    run,
+    told_of,
+    walk_over,
+    was_stopped,
+)
+from experiments.walk import StrideRecord, Walk, WalkedStride
 from experiments.walk_plots import plot_trackway
 from firmware_host.file_recorder import FileRecorder
 from firmware_host.ticker import PERIOD_S
@@ -47,7 +58,7 @@ class SimulatedTrackway:
         self.truth.append(StrideRecord(lockstep, track))
         return WatchedRobot(lockstep, recorder, self.truth[-1])
 
-    def judge(self, told: str) -> str:
+    def judge(self, told: str, stopped: bool) -> str:
         self.told.append(told)
         return next(self.verdicts)
 
@@ -197,7 +208,27 @@ def test_a_pose_of_the_wrong_sign_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("asked", "told"), [("stop", "told to stop"), ("disarm", "torque was switched off")])
 def test_what_somebody_else_asks_for_is_no_end_of_the_trackway(tmp_path: Path, asked: str, told: str) -> None:
     walk, _ = doubted_walk(tmp_path, lambda now_s, x_m: x_m, (5.0, asked))
-    assert told in walk.fault
+    assert told in walk.fault and was_stopped(walk)
+
+
+@pytest.mark.parametrize(("fault", "stopped"), [("", False), ("stuck in 45.3", False), ("it was told to stop", True)])
+def test_a_walk_that_was_stopped_is_walked_again_unless_a_person_says_otherwise(
+    fault: str, stopped: bool, tmp_path: Path
+) -> None:
+    assert was_stopped(Walk([], fault)) is stopped
+    robot = SimulatedTrackway(tmp_path, always(GO_ON)).prepare("one")
+    verdicts = {
+        answer: AskedTrackway(robot, ScriptedPerson(answer)).judge("one", stopped)
+        for answer in (GO_ON, SKIP, KEEP if stopped else REDO)
+    }
+    robot.close()
+    assert verdicts == ({GO_ON: REDO, SKIP: SKIP, KEEP: GO_ON} if stopped else {GO_ON: GO_ON, SKIP: SKIP, REDO: REDO})
+
+
+def test_a_trial_of_one_stride_is_told_in_the_singular() -> None:
+    stride = WalkedStride("48.5", 0.0, 0.03, 0.1, 2.0, 0.0)
+    assert told_of("3 cm, trial 1", Walk([stride], "")) == "3 cm, trial 1: 1 stride, 5.0 cm/s"
+    assert told_of("3 cm, trial 1", Walk([stride, stride], "")).startswith("3 cm, trial 1: 2 strides, ")
 
 
 def test_a_table_of_which_everything_was_left_out_is_still_one(tmp_path: Path) -> None:

@@ -234,8 +234,8 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.toml"
-    path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ConfigurationError, match="UTF-8"):
+    path.write_bytes(b"a = 1\n# gr\xfc\xdf\n")
+    with pytest.raises(ConfigurationError, match=r"x\.toml: not UTF-8 text \(at line 2\); save the file as UTF-8"):
         load_configuration(path)
 
 

@@ -14,6 +14,7 @@ from firmware_host.connection import Caller
 from firmware_host.operator_calls import OperatorCalls
 from firmware_host.rights import NEEDED, Level, Peer
 from firmware_host.rpc import RefusedError
+from firmware_host.ticker import PERIOD_S
 from simulation.clay import MUDS
 from simulation.lockstep import Lockstep
 from simulation.track import Track
@@ -111,10 +112,20 @@ def test_under_a_lease_nobody_else_arms_a_robot_that_hands_are_on(robot: Robot) 
         RefusedError, match=r"^uid 1000 \(process 77\) operates the robot: .* has been silent for 0.5 s"
     ):
         robot.ask("arm", BEN)
-    robot.steps.run_for(0.7)  # its holder is silent: with the torque off there is nothing to stop, and it is free
-    assert robot.ask("status")["mode"] == "idle" and not robot.lease.lost(robot.steps.now_s)
-    robot.steps.run_for(0.2)
+
+
+@pytest.mark.parametrize("end", ["hang_up", "silence"])
+def test_a_lease_that_ends_while_torque_is_off_keeps_nobody_from_arming(robot: Robot, end: str) -> None:
+    robot.steps.run_for(1.0)
+    robot.ask("lease", for_s=0.5)
+    if end == "hang_up":
+        robot.lease.hang_up(ANNA)
+    robot.steps.run_for(PERIOD_S if end == "hang_up" else 0.5 + 2 * PERIOD_S)
+    assert robot.ask("status")["faults"] == [] and not robot.events.about("lease_lost")
+    assert robot.events.texts[-1] == "lease of uid 1000 (process 77) is over"
     assert robot.ask("arm", BEN) == "accepted"
+    robot.steps.run_for(0.5)
+    assert robot.ask("status")["mode"] == "hold"
 
 
 @pytest.mark.parametrize("method", ["hang_up", "silence"])
@@ -153,7 +164,7 @@ def test_whoever_holds_the_lease_anybody_stops_the_robot(armed: Robot, method: s
     assert armed.ask("status")["mode"] == mode
 
 
-@pytest.mark.parametrize(("method", "params"), [*MOTIONS, ("lease", {"for_s": 0.5})])
+@pytest.mark.parametrize(("method", "params"), [*MOTIONS, ("walk", {"lease_s": 0.5})])
 def test_whoever_overrules_a_lease_has_the_robot_and_its_holder_does_not(
     armed: Robot, method: str, params: dict[str, Any]
 ) -> None:
@@ -171,7 +182,13 @@ def test_whoever_overrules_a_lease_has_the_robot_and_its_holder_does_not(
 
 def test_a_take_over_that_is_refused_takes_nothing_over(armed: Robot) -> None:
     armed.ask("lease", for_s=0.5)
-    for method, params in (("arm", {}), ("move", {"left_sweep_rad": 9.0}), ("walk", {"depth_m": 1.0})):
+    for method, params in (
+        ("arm", {}),
+        ("move", {"left_sweep_rad": 9.0}),
+        ("walk", {"depth_m": 1.0}),
+        ("walk", {"lease_s": 99.0}),
+        ("lease", {"for_s": 0.5}),
+    ):
         with pytest.raises(RefusedError):
             armed.ask(method, BEN, take_over=True, **params)
     with pytest.raises(RefusedError, match="take_over = 1: must be true or false"):
@@ -179,11 +196,29 @@ def test_a_take_over_that_is_refused_takes_nothing_over(armed: Robot) -> None:
     assert armed.ask("lease", ANNA, for_s=0.5) == "accepted"
 
 
+def test_an_order_can_promise_to_attend_what_it_sets_in_motion(armed: Robot) -> None:
+    assert armed.ask("walk", lease_s=0.5) == "accepted"
+    armed.steps.run_for(0.4)
+    with pytest.raises(RefusedError, match="operates the robot"):
+        armed.ask("walk", BEN)
+    assert armed.ask("status")["mode"] == "walking"
+    armed.steps.run_for(0.2)  # in which it was to be renewed
+    assert armed.ask("status")["mode"] == "stopping"
+
+
+def test_an_order_that_is_refused_promises_nothing(armed: Robot) -> None:
+    with pytest.raises(RefusedError):
+        armed.ask("walk", depth_m=1.0, lease_s=0.5)
+    assert not armed.lease.held
+
+
 @pytest.mark.parametrize("for_s", [None, True, "0.5", 0, 0.09, 10.1, -1.0, nan, 2**70])
 def test_a_lease_is_for_a_tenth_of_a_second_to_ten(armed: Robot, for_s: Any) -> None:
-    with pytest.raises(RefusedError, match=r"for_s = .*: must be a number from 0.1 to 10"):
-        armed.ask("lease", for_s=for_s)
-    assert not armed.lease.held
+    for method, name in (("lease", "for_s"), ("walk", "lease_s")):
+        with pytest.raises(RefusedError, match=rf"^{name} = .*: must be a number from 0.1 to 10"):
+            armed.ask(method, **{name: for_s})
+    armed.steps.run_for(0.01)
+    assert not armed.lease.held and armed.ask("status")["mode"] == "hold"
 
 
 def test_a_lease_that_is_renewed_is_told_once(armed: Robot) -> None:

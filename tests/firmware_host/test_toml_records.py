@@ -112,13 +112,15 @@ def test_a_number_of_thousands_of_digits_is_refused_by_its_key() -> None:
     [
         (f"note = {'9' * 5000}", "not a TOML file that can be read: a number or a date is beyond all size"),
         (f"note = {'[' * 20_000}", "not a TOML file that can be read: it is nested too deep"),
-        ("note = ", "not a TOML file: Invalid value (at end of document)"),
+        ("a = 1\nnote = \n\n", "not a TOML file: Invalid value (at line 2, column 8); mend it there: "),
+        ('a = 1\nnote = """\n\n', "not a TOML file: Unterminated string (at the end, line 2); mend it there: "),
     ],
 )
-def test_a_file_that_cannot_be_read_is_refused_in_a_sentence(text: str, told: str) -> None:
+def test_a_file_that_cannot_be_read_is_refused_by_its_name_and_line(text: str, told: str) -> None:
     with pytest.raises(ConfigurationError) as caught:
-        parse_document(text)
-    assert caught.value.problems == [told]
+        parse_document(text, Path("/etc/robot.toml"))
+    (problem,) = caught.value.problems
+    assert problem.startswith(f"/etc/robot.toml: {told}")
 
 
 def test_of_a_long_sentence_the_key_and_the_bound_are_kept() -> None:
