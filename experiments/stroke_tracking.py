@@ -17,6 +17,7 @@ from control.controller import WalkOrder
 from control.gait import stride_duration_s
 from control.modes import Mode, Request
 from control.records import JOINTS, JointAngles
+from experiments.bench_lateness import BUSY
 from experiments.bench_reading import Reading, Readings
 from experiments.bench_robot import BenchError
 from experiments.bench_stand import Sample, Stand
@@ -111,8 +112,7 @@ def strides(stand: Stand) -> Readings:
     walked = [sample for sample in samples if sample.mode is Mode.WALKING]
     yield from _walk_readings(stand, walked)
     share = 100.0 * (stand.loop.missed_ticks - missed) / len(samples)
-    busy = "end what else runs on this computer, and give this program real-time priority (README, 'On the robot')"
-    yield Reading("walk: ticks missed", share, "%", 0.0, 100.0 * MOST_MISSED_SHARE, busy)
+    yield Reading("walk: ticks missed", share, "%", 0.0, 100.0 * MOST_MISSED_SHARE, BUSY)
     told = [fault.sentence for fault in stand.loop.faults.standing]
     yield Reading("walk: faults that stand", len(told), "", 0, 0, " ".join(told))
 
@@ -123,7 +123,7 @@ def _stride_s(stand: Stand) -> float:
 
 def _walk_readings(stand: Stand, walked: Sequence[Sample]) -> Readings:
     limited = 100.0 * sum(sample.limited for sample in walked) / len(walked)
-    narrow = "widen [limits] or slow down the gait: the torque was cut"
+    narrow = "see that nothing meets the flippers; else widen [limits] or slow down the gait: the torque was cut"
     yield Reading("walk: ticks with limited torque", limited, "%", 0.0, 100.0 * MOST_LIMITED_SHARE, narrow)
     most_nm = max(abs(torque_nm) for sample in walked for torque_nm in sample.sent_nm)
     yield Reading("walk: largest torque", most_nm, "N·m", 0.0, stand.configuration.limits.torque_nm, narrow)
