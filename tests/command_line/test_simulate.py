@@ -10,6 +10,7 @@ import pytest
 from command_line import exit_codes
 from command_line.main import main
 from simulation import peer
+from simulation.blocks import LYING_RAD
 from simulation.local_setup import write_local_setup
 from simulation.plant import END_STOPS_RAD
 
@@ -72,6 +73,14 @@ def test_without_a_world_there_are_the_paper_s_muds(
     setup = write_local_setup(short_folder, short_folder)
     assert main(["simulate", "--config", str(setup), *arguments]) == exit_codes.OK
     assert [segment.clay.name for segment in peers[0].robot.plant.track.segments] == names
+
+
+def test_on_blocks_the_flippers_lie_in_reach_of_no_mud(short_folder: Path, peers: list[StillPeer]) -> None:
+    setup = write_local_setup(short_folder, short_folder)
+    assert main(["simulate", "--config", str(setup), "--on-blocks"]) == exit_codes.OK
+    plant = peers[0].robot.plant
+    assert plant.parameters.fixed_base
+    assert plant.angles_rad == pytest.approx((0.0, LYING_RAD, 0.0, LYING_RAD))
 
 
 def test_a_signal_moves_the_flippers_back_by_hand(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
