@@ -6,7 +6,8 @@ walk. Only the pose that is held in HOLD may be replaced: by another path, or by
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import NamedTuple
 
 from control.controller import ALL_TRUSTED, Controller, measured_angles
@@ -196,6 +197,20 @@ class Stand:
         self.run_for(self.configuration.motion.fade_in_s)
         self.move([LEVEL])
         self.run_for(0.3)
+
+    @contextmanager
+    def raised(self) -> Iterator[None]:
+        """Flippers level and held; laid down again where all went well, else without torque at once.
+
+        What is measured meanwhile is reckoned up after it: long sums would be missed ticks, with torque on.
+        """
+        self.rise()
+        try:
+            yield
+        except BaseException:
+            self.let_go()
+            raise
+        self.lie_down()
 
     def hold_here(self) -> None:
         """The pose that the joints have by now, in place of what was held and of any law."""

@@ -44,15 +44,15 @@ COASTING_DEG = 60.0  # no farther than the stops from where it began
 
 
 def soft_stop(stand: Stand) -> Readings:
-    """In hold at the begin and at the end."""
-    stride = WalkOrder(WALK_DEPTH_M, False, 2)
-    refused = stand.loop.request(Request.WALK, stand.rig.now_s, stride)
-    if refused:
-        raise BenchError(f"The robot does not walk: {refused}")
-    stand.run_until(lambda sample: _in_full_stance(stand, sample), 20.0, "The full speed of a stance")
-    begun = measured_angles(stand.loop.states)
-    stand.loop.request(Request.STOP, stand.rig.now_s)
-    samples = stand.run_until(lambda sample: sample.mode is Mode.HOLD, SOFT_STOP_S + 1.0, "The end of a soft stop")
+    """Idle at the begin and at the end, as all of them."""
+    with stand.raised():
+        refused = stand.loop.request(Request.WALK, stand.rig.now_s, WalkOrder(WALK_DEPTH_M, False, 2))
+        if refused:
+            raise BenchError(f"The robot does not walk: {refused}")
+        stand.run_until(lambda sample: _in_full_stance(stand, sample), 20.0, "The full speed of a stance")
+        begun = measured_angles(stand.loop.states)
+        stand.loop.request(Request.STOP, stand.rig.now_s)
+        samples = stand.run_until(lambda sample: sample.mode is Mode.HOLD, SOFT_STOP_S + 1.0, "The end of a soft stop")
     yield from _sweep_readings("soft stop", samples, begun, SOFT_REST_S, SOFT_TRAVEL_DEG)
     whole_s = len(samples) * PERIOD_S
     advice = "something holds the flippers down: see that they hang free"
@@ -66,14 +66,14 @@ def _in_full_stance(stand: Stand, sample: Sample) -> bool:
 
 
 def damping(stand: Stand) -> Readings:
-    """In hold, level, at the begin; in hold wherever it came to rest at the end."""
-    stand.move([_swept(SWING_RAD)])
-    stand.controller.follow([_swept(-SWING_RAD)], FAST_RAD_S)
-    stand.run_until(lambda sample: _is_fast(sample, FULL_SHARE * FAST_RAD_S), 2.0, "The full speed of a sweep")
-    begun = measured_angles(stand.loop.states)
-    stand.controller.law = lambda held, states: _brake(stand, states)
-    samples = stand.run_for(2.0 * DAMPED_REST_S)
-    stand.hold_here()
+    with stand.raised():
+        stand.move([_swept(SWING_RAD)])
+        stand.controller.follow([_swept(-SWING_RAD)], FAST_RAD_S)
+        stand.run_until(lambda sample: _is_fast(sample, FULL_SHARE * FAST_RAD_S), 2.0, "The full speed of a sweep")
+        begun = measured_angles(stand.loop.states)
+        stand.controller.law = lambda held, states: _brake(stand, states)
+        samples = stand.run_for(2.0 * DAMPED_REST_S)
+        stand.hold_here()
     yield from _sweep_readings("damping", samples, begun, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
 
 
@@ -82,7 +82,6 @@ def _brake(stand: Stand, states: DriveStates) -> Torques:
 
 
 def torque_off(stand: Stand) -> Readings:
-    """Idle at the begin and at the end."""
     stand.rise()
     sweep, adduction = STARTING
     stand.move([(sweep, adduction, sweep, adduction)])

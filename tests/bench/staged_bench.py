@@ -167,17 +167,6 @@ class StagedBench:
             raise BenchError(f"{problem} {self.stand.lateness.sentence}".rstrip()) from problem
         return told
 
-    @contextmanager
-    def raised(self) -> Iterator[Stand]:
-        """Flippers level and held; laid down again where all went well, else without torque at once."""
-        self.stand.rise()
-        try:
-            yield self.stand
-        except BaseException:
-            self.stand.let_go()
-            raise
-        self.stand.lie_down()
-
 
 class UncapturedPerson:
     """A person on the terminal, from whom pytest holds neither questions nor answers back."""

@@ -7,13 +7,11 @@ MOVES = "strides are stopped at full speed, softly and by braking; at last torqu
 
 
 def test_a_soft_stop_ends_a_stride_at_once(bench: StagedBench) -> None:
-    with bench.raised():
-        bench.check(soft_stop)
+    bench.check(soft_stop)
 
 
 def test_damping_brakes_a_fast_sweep(bench: StagedBench) -> None:
-    with bench.raised():
-        bench.check(damping)
+    bench.check(damping)
 
 
 def test_no_current_flows_once_torque_is_off(bench: StagedBench) -> None:

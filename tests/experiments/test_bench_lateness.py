@@ -8,6 +8,7 @@ import pytest
 
 from control.modes import Request
 from control.records import DriveState, DriveStates
+from drivers.odrive_codec import AxisState
 from experiments.bench_attendant import SimulatedAttendant
 from experiments.bench_lateness import LATE_S
 from experiments.bench_reading import Reading, Readings
@@ -142,7 +143,6 @@ def test_a_stroke_that_late_messages_spoil_is_measured_anew(bench: StagedBench, 
         spoiled.append(max(reading.value for reading in readings if "largest" in reading.what))
         yield from readings
 
-    bench.stand.rise()
     bench.check(measure)
     assert spoiled[0] > FAST_DEG > spoiled[1]
     kept = readings_kept(bench)
@@ -200,6 +200,12 @@ def test_a_measurement_that_ends_early_says_what_was_late(bench: StagedBench) ->
     with pytest.raises(BenchError, match=r"within 60 s\. Meanwhile this computer missed 2 of 3 ticks"):
         bench.check(measure)
     assert "speed" in readings_kept(bench)
+
+
+def test_sums_are_made_once_torque_is_off(stand: Stand, rig: LateRig) -> None:
+    """They take longer than a tick, and on a slow computer than a drive's watchdog."""
+    for _ in stroke_readings(stand, "fast", FAST_RAD_S, FAST_DEG):
+        assert not any(drive.axis_state is AxisState.CLOSED_LOOP for drive in rig.robot.drives)
 
 
 def test_ticks_without_torque_may_be_late(stand: Stand, rig: LateRig) -> None:

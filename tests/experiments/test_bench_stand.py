@@ -39,7 +39,7 @@ def axis_states(rig: SimulatedRig) -> set[AxisState]:
 
 
 def test_ctrl_c_with_raised_flippers_leaves_the_drives_idle(bench: StagedBench, rig: SimulatedRig) -> None:
-    with pytest.raises(KeyboardInterrupt), bench.raised():
+    with pytest.raises(KeyboardInterrupt), bench.stand.raised():
         assert axis_states(rig) == {AxisState.CLOSED_LOOP}
         raise KeyboardInterrupt
     assert axis_states(rig) == {AxisState.IDLE}
