@@ -170,7 +170,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
         terminalreporter.write_line(line, **({} if good else {"red": True}))
     for warning in report.robot["warnings"]:
         terminalreporter.write_line(f"warning: {warning}")
-    if late := report.robot.get("lateness"):
+    late = report.robot.get("lateness")
+    if late and late["ticks"]:
         seen = f"{late['missed']} of {late['ticks']} ticks missed, messages up to {1e3 * late['oldest_s']:.0f} ms old"
         terminalreporter.write_line(f"with torque on: {seen}")
     if path:
