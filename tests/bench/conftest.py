@@ -139,7 +139,8 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     try:
         return (yield)
     except BenchError as problem:
-        pytest.fail(str(problem), pytrace=False)
+        told = str(problem)
+    pytest.fail(told, pytrace=False)  # out here pytest tells it once
 
 
 @pytest.hookimpl(wrapper=True)

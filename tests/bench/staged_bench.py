@@ -164,7 +164,7 @@ class StagedBench:
         except BenchError as problem:
             for reading in told:
                 self.report.keep(reading)
-            raise BenchError(f"{problem} {self.stand.lateness.sentence}".rstrip()) from problem
+            raise BenchError(f"{problem} {self.stand.lateness.sentence}".rstrip()) from None
         return told
 
 
