@@ -111,6 +111,7 @@ def _add_simulation(commands: Commands) -> None:
     ground = simulate.add_mutually_exclusive_group()
     ground.add_argument("--mud", action="append", metavar="W", help="water content, repeatable: 48.5, 53.1, 45.3")
     ground.add_argument("--world", type=Path, metavar="FILE", help="describes the ground, and more")
+    ground.add_argument("--on-blocks", action="store_true", help="for the bench: without mud, the flippers in air")
     simulate.add_argument("--seed", type=int, default=1)
 
 

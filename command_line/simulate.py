@@ -37,6 +37,8 @@ def simulate(options: argparse.Namespace) -> int:
         arguments += ["--mud", water]
     if options.world:
         arguments += ["--world", str(options.world)]
+    if options.on_blocks:
+        arguments.append("--on-blocks")
     return peer.main(arguments)
 
 

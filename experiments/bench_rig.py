@@ -12,12 +12,9 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from math import radians
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from control.geometry import FlipperGeometry
 from control.records import JOINTS
 from drivers.can_port import CanPort
 from drivers.frames import Frame
@@ -32,16 +29,12 @@ from firmware_host.realtime import prepare_loop
 from firmware_host.recorder import NullRecorder
 from firmware_host.status_client import NoDaemonError, NotPermittedError, StatusClient
 from firmware_host.ticker import PERIOD_S, Beat, Ticker
-from simulation.clay import Clay
-from simulation.lockstep import drives_of, plant_of
+from simulation.blocks import on_blocks
 from simulation.odrive import OdriveParameters
 from simulation.robot import SimulatedRobot
-from simulation.track import Track
 
 LISTENING_S = 1.0  # ten heartbeats
 LOOK_S = 0.001  # between two looks at a bus that is listened to
-LYING_RAD = radians(-30.0)  # adduction of idle flippers: blocks lift the robot above what they lie on
-CUSHION = Track([(1.0, Clay("cushion", 1e3))])  # bears an idle arm, and gives way to one that falls
 
 
 class Overheard(NamedTuple):
@@ -129,11 +122,6 @@ def listen(ports: Mapping[str, CanPort]) -> Overheard:
     return Overheard(now_s - begun_s, frames)
 
 
-def lying_m(geometry: FlipperGeometry) -> float:
-    """How far below its axis an idle flipper's edge should lie on the bench."""
-    return -geometry.edge_position(0.0, LYING_RAD)[2]
-
-
 class SimulatedRig:
     """A robot on blocks, built as `built` says, and a loop that knows of it what `configuration` says.
 
@@ -152,11 +140,11 @@ class SimulatedRig:
         self.configuration = configuration
         built = built or configuration
         self.buses = {name: MockBus() for name in configuration.bus}
-        geometry = replace(built.geometry, axis_height_m=lying_m(built.geometry))
+        world = on_blocks(built)
         self.robot = SimulatedRobot(
-            plant_of(built, fixed_base=True, geometry=geometry, joint_coulomb_nm=0.005),
-            CUSHION,
-            drives or usual_drives(built),
+            world.plant(built),
+            world.track,
+            drives or world.drives(built),
             {joint: built.drive[joint].bus for joint in JOINTS},
             {name: bus.open() for name, bus in self.buses.items()},
             seed,
@@ -196,8 +184,3 @@ class SimulatedRig:
 
     def close(self) -> None:
         self.loop.drives.close()
-
-
-def usual_drives(configuration: Configuration) -> dict[str, OdriveParameters]:
-    """Neither ideal nor odd: some lag, some cogging, messages that come when they come."""
-    return drives_of(configuration, current_lag_s=0.0005, cogging_nm=0.003, message_delay_s=0.0005)

@@ -6,15 +6,17 @@ walk. Only the pose that is held in HOLD may be replaced: by another path, or by
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import NamedTuple
 
 from control.controller import ALL_TRUSTED, Controller, measured_angles
-from control.faults import Reaction
+from control.faults import Fault, Reaction
 from control.joint_path import JointPath, still
 from control.modes import ENERGISED, Mode, Request
 from control.records import JOINTS, DriveStates, JointAngles, JointTargets, Torques
 from experiments.bench_attendant import Attendant
+from experiments.bench_lateness import Lateness
 from experiments.bench_rig import Rig
 from experiments.bench_robot import BenchError
 from firmware_host.ticker import PERIOD_S, Beat
@@ -85,11 +87,14 @@ class Stand:
         self.drives = rig.loop.drives
         self.controller = rig.loop.controller = bench_controller(rig.loop.controller)
         self._rest: JointAngles = LEVEL  # where the flippers lie without torque
+        self.lateness = Lateness()  # of one measurement, while torque is on
+        self.lateness_so_far = Lateness()  # of all
 
     def tick(self) -> Sample:
         aim, loop = self.controller.aim, self.loop
         beat = self.rig.wait()
         loop.tick(beat)
+        self._heed_lateness(beat, loop.states)
         return Sample(beat, loop.mode, loop.states, aim, loop.sent.torques_nm, loop.sent.limited)
 
     def run_for(self, duration_s: float) -> list[Sample]:
@@ -106,7 +111,7 @@ class Stand:
             samples.append(self.tick_soundly())
             if done(samples[-1]):
                 return samples
-        raise BenchError(f"{what} did not come within {longest_s:g} s.")
+        raise BenchError(f"{what} did not come within {longest_s:g} s: the robot is in {self.loop.mode.name.lower()}.")
 
     def look_on(self) -> None:
         """While a person is asked: so that no frame waits for long, and the drives stay idle."""
@@ -116,28 +121,47 @@ class Stand:
         """A tick in which nothing is sent."""
         beat = self.rig.wait()
         states = self.drives.read(beat.now_s)
+        self._heed_lateness(beat, states)
         return Sample(beat, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
+
+    def _heed_lateness(self, beat: Beat, states: DriveStates) -> None:
+        if self.loop.mode in ENERGISED:
+            self.lateness.update(beat, states)
+            self.lateness_so_far.update(beat, states)
 
     def _sound(self, sample: Sample) -> Sample:
         fault = self.loop.faults.worst
         if sample.mode in (*ENERGISED, Mode.FAULT) and fault and fault.kind.reaction >= Reaction.HOLD:
-            raise BenchError(f"{fault.name}: {fault.sentence} {_capital(fault.kind.what_to_do)}.")
+            raise BenchError(f"{fault.name}: {self._told([fault])}")
         return sample
+
+    def _told(self, faults: Sequence[Fault]) -> str:
+        return " ".join(f"{fault.sentence} {_capital(fault.kind.what_to_do)}." for fault in faults)
 
     def arm(self, law: Law | None = None) -> None:
         """Into hold, with a law from the first torque on."""
         self._wait_until_armable()
-        self._rest = measured_angles(self.loop.states)
         self.controller.law = law
+        against: Sequence[Fault] = ()
+        for _ in range(round(ARMING_S / PERIOD_S)):
+            blocking = self.loop.faults.blocking()
+            if self.loop.mode is Mode.IDLE and not blocking:
+                self._ask_for_torque()  # again, where a fault began in the very tick of the wish: a joint that sinks
+            if self.tick_soundly().mode is Mode.HOLD:
+                return
+            against = blocking or against
+        raise BenchError(f"Closed loop of all drives did not come within {ARMING_S:g} s. {self._told(against)}")
+
+    def _ask_for_torque(self) -> None:
+        self._rest = measured_angles(self.loop.states)
         refused = self.loop.request(Request.ARM, self.rig.now_s)
         if refused:
             raise BenchError(f"The robot cannot be armed: {refused}")
-        self.run_until(lambda sample: sample.mode is Mode.HOLD, ARMING_S, "Closed loop of all drives")
 
     def _wait_until_armable(self) -> None:
         if self._becomes_armable():
             return
-        told = " ".join(f"{fault.sentence} {_capital(fault.kind.what_to_do)}." for fault in self.loop.faults.blocking())
+        told = self._told(self.loop.faults.blocking())
         if told and self.attendant.clears(told, self._idle_on):
             self.loop.request(Request.CLEAR, self.rig.now_s)
             if self._becomes_armable():
@@ -173,6 +197,20 @@ class Stand:
         self.run_for(self.configuration.motion.fade_in_s)
         self.move([LEVEL])
         self.run_for(0.3)
+
+    @contextmanager
+    def raised(self) -> Iterator[None]:
+        """Flippers level and held; laid down again where all went well, else without torque at once.
+
+        What is measured meanwhile is reckoned up after it: long sums would be missed ticks, with torque on.
+        """
+        self.rise()
+        try:
+            yield
+        except BaseException:
+            self.let_go()
+            raise
+        self.lie_down()
 
     def hold_here(self) -> None:
         """The pose that the joints have by now, in place of what was held and of any law."""

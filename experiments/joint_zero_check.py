@@ -10,6 +10,7 @@ from control.controller import measured_angles
 from control.records import JOINTS, JointAngles
 from experiments.bench_reading import Reading, Readings, left_out
 from experiments.bench_stand import LOOK_S, Sample, Stand, joint_place
+from experiments.stroke_tracking import WALK_DEPTH_M
 
 LEVEL_DEG = 5.0  # that hands with a spirit level are off: 1 cm at the end of an arm
 LEAST_TURN_DEG = 30.0  # by which a joint is turned by somebody who means it
@@ -20,17 +21,19 @@ ZERO = "set drive.{joint}.zero_turn so that the joint reads 0 with the flipper s
 
 
 def rest_pose(stand: Stand) -> Readings:
-    """Where the flippers lie without torque: within the limits, below level, both as low."""
+    """Where the flippers lie without torque: within the limits, below the strides in air to come, both as low."""
     angles = _mean_angles(stand.run_for(LOOKING_S))
     for joint, angle_rad, span in zip(JOINTS, angles, stand.configuration.joint_ranges, strict=True):
         advice = f"lay the flipper within its limits (on blocks, or a lower stand); else {ZERO.format(joint=joint)}"
         low_deg, high_deg = degrees(span.min_rad), degrees(span.max_rad)
         yield Reading(f"{joint}: at rest", degrees(angle_rad), "deg", low_deg, high_deg, advice)
     geometry = stand.configuration.geometry
+    stride_m = geometry.axis_height_m + WALK_DEPTH_M
     left_m, right_m = (geometry.edge_position(*angles[place : place + 2])[2] for place in (0, 2))
     for side, height_m in (("left", left_m), ("right", right_m)):
-        advice = f"it cannot lie above its axis: {ZERO.format(joint=f'{side}_adduction')}"
-        yield Reading(f"{side} flipper: edge above the axis, at rest", height_m, "m", -inf, 0.0, advice)
+        low = "put the robot on blocks: its strides in air go as low"
+        advice = f"{low}; where the flipper lies low enough, {ZERO.format(joint=f'{side}_adduction')}"
+        yield Reading(f"{side} flipper: edge above the axis, at rest", height_m, "m", -inf, -stride_m, advice)
     advice = "lay both on the same level; else set the zeros of the adduction joints anew"
     yield Reading("left flipper lies above the right one by", left_m - right_m, "m", -LYING_M, LYING_M, advice)
 

@@ -2,23 +2,24 @@
 
 The soft stop is the loop's own, asked for in mid-stance of a walk in air. Damping is the law that follows a fault,
 put in at the fastest moment of a sweep. A joint without torque goes on until friction or a stop ends it, so torque is
-taken off while the joints still speed up: their currents are large then, their ways short. What counts is how soon the
-currents are gone.
+taken off while it still speeds up, and its way stays short. What counts is how soon the current is gone. So one is
+commanded until then that is known, the same in each of a few ticks: a drive that held its last command would go on
+with it, and the current before is seen also where a tick or a message is late.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import degrees, nan, radians
 
 from control.controller import ALL_TRUSTED, DAMPING_NM, RAISING_S, SOFT_STOP_S, WalkOrder, measured_angles
 from control.joint_pd import damping_torques_nm
 from control.modes import Mode, Request
-from control.records import DriveState, DriveStates, JointAngles, Phase, Torques
+from control.records import DriveStates, JointAngles, Phase, Torques
 from drivers.odrive_axis import OdriveAxis
 from experiments.bench_reading import Reading, Readings
 from experiments.bench_robot import BenchError
-from experiments.bench_stand import Sample, Stand, first_lasting
+from experiments.bench_stand import Law, Sample, Stand, first_lasting
 from experiments.stroke_tracking import FAST_RAD_S, WALK_DEPTH_M
 from firmware_host.ticker import PERIOD_S
 
@@ -35,22 +36,23 @@ DAMPED_TRAVEL_DEG = 8.0  # at 4 rad/s with 0.06 N·m s/rad and an arm of 0.0004 
 OFF_TICKS = 4  # of the commands' way, the current's end, and the message that tells it
 QUIET_TICKS = 5  # in a row
 QUIET_A = 0.4  # less than this is noise
-STARTING = tuple(radians(angle_deg) for angle_deg in (20.0, 10.0))  # sweep and adduction, from and to
-CUT_RAD_S = 1.0
+STARTING = tuple(radians(angle_deg) for angle_deg in (-20.0, -10.0))  # sweep and adduction
+PUSH_A = 1.5  # through each motor until torque is off: at 0.083 N·m/A more than twice what an arm weighs
+PUSH_TICKS = 5  # in which a sweep comes to 4 rad/s and goes 2 degrees
 COASTING_S = 1.5
 COASTING_DEG = 60.0  # no farther than the stops from where it began
 
 
 def soft_stop(stand: Stand) -> Readings:
-    """In hold at the begin and at the end."""
-    stride = WalkOrder(WALK_DEPTH_M, False, 2)
-    refused = stand.loop.request(Request.WALK, stand.rig.now_s, stride)
-    if refused:
-        raise BenchError(f"The robot does not walk: {refused}")
-    stand.run_until(lambda sample: _in_full_stance(stand, sample), 20.0, "The full speed of a stance")
-    begun = measured_angles(stand.loop.states)
-    stand.loop.request(Request.STOP, stand.rig.now_s)
-    samples = stand.run_until(lambda sample: sample.mode is Mode.HOLD, SOFT_STOP_S + 1.0, "The end of a soft stop")
+    """Idle at the begin and at the end, as all of them."""
+    with stand.raised():
+        refused = stand.loop.request(Request.WALK, stand.rig.now_s, WalkOrder(WALK_DEPTH_M, False, 2))
+        if refused:
+            raise BenchError(f"The robot does not walk: {refused}")
+        stand.run_until(lambda sample: _in_full_stance(stand, sample), 20.0, "The full speed of a stance")
+        begun = measured_angles(stand.loop.states)
+        stand.loop.request(Request.STOP, stand.rig.now_s)
+        samples = stand.run_until(lambda sample: sample.mode is Mode.HOLD, SOFT_STOP_S + 1.0, "The end of a soft stop")
     yield from _sweep_readings("soft stop", samples, begun, SOFT_REST_S, SOFT_TRAVEL_DEG)
     whole_s = len(samples) * PERIOD_S
     advice = "something holds the flippers down: see that they hang free"
@@ -64,14 +66,14 @@ def _in_full_stance(stand: Stand, sample: Sample) -> bool:
 
 
 def damping(stand: Stand) -> Readings:
-    """In hold, level, at the begin; in hold wherever it came to rest at the end."""
-    stand.move([_swept(SWING_RAD)])
-    stand.controller.follow([_swept(-SWING_RAD)], FAST_RAD_S)
-    stand.run_until(lambda sample: _is_fast(sample, FULL_SHARE * FAST_RAD_S), 2.0, "The full speed of a sweep")
-    begun = measured_angles(stand.loop.states)
-    stand.controller.law = lambda held, states: _brake(stand, states)
-    samples = stand.run_for(2.0 * DAMPED_REST_S)
-    stand.hold_here()
+    with stand.raised():
+        stand.move([_swept(SWING_RAD)])
+        stand.controller.follow([_swept(-SWING_RAD)], FAST_RAD_S)
+        stand.run_until(lambda sample: _is_fast(sample, FULL_SHARE * FAST_RAD_S), 2.0, "The full speed of a sweep")
+        begun = measured_angles(stand.loop.states)
+        stand.controller.law = lambda held, states: _brake(stand, states)
+        samples = stand.run_for(2.0 * DAMPED_REST_S)
+        stand.hold_here()
     yield from _sweep_readings("damping", samples, begun, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
 
 
@@ -80,16 +82,16 @@ def _brake(stand: Stand, states: DriveStates) -> Torques:
 
 
 def torque_off(stand: Stand) -> Readings:
-    """In hold, level, at the begin; idle at the end. Currents are large where all joints speed up."""
+    stand.rise()
     sweep, adduction = STARTING
-    stand.move([(-sweep, -adduction, -sweep, -adduction)])
-    stand.controller.follow([(sweep, adduction, sweep, adduction)], FAST_RAD_S)
-    stand.run_until(lambda sample: _is_fast(sample, CUT_RAD_S, range(4)), 2.0, "A motion of all joints")
+    stand.move([(sweep, adduction, sweep, adduction)])
+    stand.controller.law = push(stand)
+    pushed = stand.run_for(PUSH_TICKS * PERIOD_S)
     begun = stand.loop.states
     stand.loop.request(Request.DISARM, stand.rig.now_s)
     samples = [stand.tick() for _ in range(round(COASTING_S / PERIOD_S))]
     for place, axis in enumerate(stand.drives.axes):
-        yield from _off_readings(axis, begun[place], samples, place)
+        yield from _off_readings(axis, pushed, samples, place)
     rest = rest_tick(samples)
     rest_s = nan if rest is None else PERIOD_S * rest
     yield Reading("torque off: until the sweep rests", rest_s, "s", 0.0, COASTING_S, "see what drives it on")
@@ -100,9 +102,16 @@ def torque_off(stand: Stand) -> Readings:
         )
 
 
-def _off_readings(axis: OdriveAxis, begun: DriveState, samples: Sequence[Sample], place: int) -> Readings:
-    joint, flowed_a = axis.joint, abs(begun.current_a)
-    yield Reading(f"{joint}: torque off, current before", flowed_a, "A", 2.0 * QUIET_A, 100.0, "too little to tell")
+def push(stand: Stand) -> Law:
+    """Forward and up, by the same current in each motor."""
+    a, b, c, d = (PUSH_A * axis.parameters.torque_constant_nm_a for axis in stand.drives.axes)
+    return lambda held, states: (a, b, c, d)
+
+
+def _off_readings(axis: OdriveAxis, pushed: Sequence[Sample], samples: Sequence[Sample], place: int) -> Readings:
+    joint, flowed_a = axis.joint, max(abs(sample.states[place].current_a) for sample in pushed)
+    few = f"{PUSH_A:g} A were commanded: see stage 4"
+    yield Reading(f"{joint}: torque off, current before", flowed_a, "A", 2.0 * QUIET_A, 100.0, few)
     quiet = first_lasting([abs(sample.states[place].current_a) < QUIET_A for sample in samples], QUIET_TICKS)
     advice = "the drive does not obey 'idle': have the power switch at hand, and check its firmware"
     ticks = nan if quiet is None else quiet
@@ -116,8 +125,8 @@ def _swept(sweep_rad: float) -> JointAngles:
     return sweep_rad, 0.0, sweep_rad, 0.0
 
 
-def _is_fast(sample: Sample, speed_rad_s: float, places: Iterable[int] = SWEEPS) -> bool:
-    return all(abs(sample.states[place].velocity_rad_s) > speed_rad_s for place in places)
+def _is_fast(sample: Sample, speed_rad_s: float) -> bool:
+    return all(abs(sample.states[place].velocity_rad_s) > speed_rad_s for place in SWEEPS)
 
 
 def _sweep_readings(

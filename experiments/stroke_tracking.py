@@ -17,6 +17,7 @@ from control.controller import WalkOrder
 from control.gait import stride_duration_s
 from control.modes import Mode, Request
 from control.records import JOINTS, JointAngles
+from experiments.bench_lateness import BUSY
 from experiments.bench_reading import Reading, Readings
 from experiments.bench_robot import BenchError
 from experiments.bench_stand import Sample, Stand
@@ -47,17 +48,18 @@ class Tracking(NamedTuple):
     lag_ms: float
 
 
-def stroke(stand: Stand, speed_rad_s: float) -> dict[str, Tracking]:
-    """All joints to and fro about level, by joint."""
+def stroke(stand: Stand, speed_rad_s: float) -> list[Sample]:
+    """All joints to and fro about level."""
     sweep, adduction = STROKE
     front: JointAngles = (sweep, adduction, sweep, adduction)
     back: JointAngles = (-sweep, -adduction, -sweep, -adduction)
     samples = stand.move([front, back] * STROKES + [(0.0, 0.0, 0.0, 0.0)], speed_rad_s)
     stand.run_for(0.3)
-    return tracking(samples)
+    return samples
 
 
 def tracking(samples: Sequence[Sample]) -> dict[str, Tracking]:
+    """By joint."""
     aimed = [(sample.aim, sample.states) for sample in samples if sample.aim is not None]
     result = {}
     for place, joint in enumerate(JOINTS):
@@ -91,30 +93,36 @@ def _fit(commanded: Vector, measured: Vector, lag: int) -> float:
 
 
 def stroke_readings(stand: Stand, name: str, speed_rad_s: float, most_deg: float) -> Readings:
-    """With the flippers level, in hold."""
+    """Idle at the begin and at the end."""
+    with stand.raised():
+        samples = stroke(stand, speed_rad_s)
     gains = "check stiffness and damping in [gains], the drives' limits, and friction of the joint"
-    for joint, (max_deg, rms_deg, lag_ms) in stroke(stand, speed_rad_s).items():
+    for joint, (max_deg, rms_deg, lag_ms) in tracking(samples).items():
         yield Reading(f"{joint}: {name} stroke, largest error", max_deg, "deg", 0.0, most_deg, gains)
         yield Reading(f"{joint}: {name} stroke, error (RMS)", rms_deg, "deg", 0.0, most_deg / 2.0, gains)
         yield Reading(f"{joint}: {name} stroke, lag", lag_ms, "ms", -LAG_MS, LAG_MS, gains)
 
 
 def strides(stand: Stand) -> Readings:
-    """Ten of them, by the robot's own gait, and back to hold. In hold at the begin."""
-    missed = stand.loop.missed_ticks
+    """Ten of them, by the robot's own gait. Idle at the begin and at the end."""
+    with stand.raised():
+        missed = stand.loop.missed_ticks
+        samples = walk(stand)
+        share = 100.0 * (stand.loop.missed_ticks - missed) / len(samples)
+        told = [fault.sentence for fault in stand.loop.faults.standing]
+    yield from _walk_readings(stand, [sample for sample in samples if sample.mode is Mode.WALKING])
+    yield Reading("walk: ticks missed", share, "%", 0.0, 100.0 * MOST_MISSED_SHARE, BUSY)
+    yield Reading("walk: faults that stand", len(told), "", 0, 0, " ".join(told))
+
+
+def walk(stand: Stand) -> list[Sample]:
+    """And back to hold."""
     refused = stand.loop.request(Request.WALK, stand.rig.now_s, WalkOrder(WALK_DEPTH_M, False, STRIDES))
     if refused:
         raise BenchError(f"The robot does not walk: {refused}")
     longest_s = 2.0 * STRIDES * _stride_s(stand) + 10.0
     stand.run_until(lambda sample: sample.mode is Mode.WALKING, 1.0, "The walk")
-    samples = stand.run_until(lambda sample: sample.mode is Mode.HOLD, longest_s, "The end of the walk")
-    walked = [sample for sample in samples if sample.mode is Mode.WALKING]
-    yield from _walk_readings(stand, walked)
-    share = 100.0 * (stand.loop.missed_ticks - missed) / len(samples)
-    busy = "end what else runs on this computer, and give this program real-time priority (README, 'On the robot')"
-    yield Reading("walk: ticks missed", share, "%", 0.0, 100.0 * MOST_MISSED_SHARE, busy)
-    told = [fault.sentence for fault in stand.loop.faults.standing]
-    yield Reading("walk: faults that stand", len(told), "", 0, 0, " ".join(told))
+    return stand.run_until(lambda sample: sample.mode is Mode.HOLD, longest_s, "The end of the walk")
 
 
 def _stride_s(stand: Stand) -> float:
@@ -123,7 +131,7 @@ def _stride_s(stand: Stand) -> float:
 
 def _walk_readings(stand: Stand, walked: Sequence[Sample]) -> Readings:
     limited = 100.0 * sum(sample.limited for sample in walked) / len(walked)
-    narrow = "widen [limits] or slow down the gait: the torque was cut"
+    narrow = "see that nothing meets the flippers; else widen [limits] or slow down the gait: the torque was cut"
     yield Reading("walk: ticks with limited torque", limited, "%", 0.0, 100.0 * MOST_LIMITED_SHARE, narrow)
     most_nm = max(abs(torque_nm) for sample in walked for torque_nm in sample.sent_nm)
     yield Reading("walk: largest torque", most_nm, "N·m", 0.0, stand.configuration.limits.torque_nm, narrow)

@@ -17,6 +17,7 @@ from drivers.can_port import CanPort
 from drivers.frames import Frame
 from drivers.odrive_axis import DriveParameters, OdriveAxis
 from drivers.odrive_codec import Message, arbitration_id
+from experiments.bench_lateness import BUSY
 from experiments.bench_reading import Reading, Readings
 from experiments.bench_stand import Stand
 from firmware_host.fault_watch import FIRMWARE
@@ -186,8 +187,7 @@ def quiet_buses(stand: Stand) -> Readings:
             f"{codec.error_text(state.error_flags)}: mend the cause, clear it with odrivetool or 'mudskipper clear'"
         )
         yield Reading(f"{joint}: error flags", state.error_flags, "", 0, 0, advice)
-    advice = "end what else runs on this computer, and give this program real-time priority (README, 'On the robot')"
-    yield Reading("ticks missed", 100.0 * missed / len(samples), "%", 0.0, 100.0 * MOST_MISSED_SHARE, advice)
+    yield Reading("ticks missed", 100.0 * missed / len(samples), "%", 0.0, 100.0 * MOST_MISSED_SHARE, BUSY)
 
 
 def _trouble(port: CanPort) -> int:

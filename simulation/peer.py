@@ -20,6 +20,7 @@ from control.records import JOINTS
 from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration import EXIT_CONFIGURATION, Configuration, ConfigurationError, load_configuration
 from firmware_host.ticker import Ticker
+from simulation.blocks import on_blocks
 from simulation.clay import MUDS
 from simulation.pose_broadcast import PoseBroadcast
 from simulation.robot import SimulatedRobot
@@ -29,7 +30,7 @@ from simulation.world import World, load_world
 STEP_S = 0.002  # the period of the drives' fastest messages
 WATCHDOG_S = 0.25  # of the simulated drives, on processors that everything shares
 LONGEST_CATCH_UP_S = 0.02  # a robot that was held up for longer has lost that time: commands waited meanwhile
-NICENESS = -10  # where it is permitted: a real robot does not wait for its computer
+PRIORITY = 1  # of real time, where it is permitted: a real robot does not wait for its computer
 PR_SET_PDEATHSIG = 1
 
 
@@ -86,16 +87,23 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     ground = parser.add_mutually_exclusive_group()
     ground.add_argument("--mud", action="append", choices=sorted(MUDS), help="water content in percent; repeatable")
     ground.add_argument("--world", type=Path, help="file that describes the ground and more")
+    ground.add_argument("--on-blocks", action="store_true", help="for the bench: without mud, the flippers in air")
     parser.add_argument("--seed", type=int, default=1)
     return parser.parse_args(arguments)
+
+
+def _world(options: argparse.Namespace, configuration: Configuration) -> World:
+    """Raises ConfigurationError."""
+    if options.on_blocks:
+        return on_blocks(configuration)
+    return load_world(options.world) if options.world else World(track_of(options.mud or list(MUDS)))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     options = _parse(arguments)
     try:
         configuration = load_configuration(options.config)
-        world = load_world(options.world) if options.world else World(track_of(options.mud or list(MUDS)))
-        peer = Peer(configuration, world, options.seed)
+        peer = Peer(configuration, _world(options, configuration), options.seed)
     except ConfigurationError as problem:
         print("\n".join(problem.problems), file=sys.stderr)
         return EXIT_CONFIGURATION
@@ -109,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
     with suppress(PermissionError):
-        os.nice(NICENESS)
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     peer.run()
     return 0
 

@@ -16,10 +16,11 @@ import pytest
 
 from experiments.bench_attendant import AbsentAttendant, AskedAttendant, Attendant, SimulatedAttendant
 from experiments.bench_channels import on_channels
-from experiments.bench_rig import HardwareRig, Rig, SimulatedRig, lying_m
+from experiments.bench_rig import HardwareRig, Rig, SimulatedRig
 from experiments.bench_robot import BenchError
 from experiments.bench_stand import Stand
 from firmware_host.configuration import Configuration, ConfigurationError, load_configuration
+from simulation.blocks import lying_m
 from tests.bench.staged_bench import SKIPPED, BenchReport, StagedBench, UncapturedPerson, stage_name, stage_of
 
 INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
@@ -60,6 +61,7 @@ def opened(request: pytest.FixtureRequest) -> Iterator[Stand | str]:
     finally:
         stand.end()
         rig.close()
+        robot["lateness"] = vars(stand.lateness_so_far)
 
 
 def configuration_path(simulated: bool) -> Path:
@@ -137,7 +139,8 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     try:
         return (yield)
     except BenchError as problem:
-        pytest.fail(str(problem), pytrace=False)
+        told = str(problem)
+    pytest.fail(told, pytrace=False)  # out here pytest tells it once
 
 
 @pytest.hookimpl(wrapper=True)
@@ -168,6 +171,10 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
         terminalreporter.write_line(line, **({} if good else {"red": True}))
     for warning in report.robot["warnings"]:
         terminalreporter.write_line(f"warning: {warning}")
+    late = report.robot.get("lateness")
+    if late and late["ticks"]:
+        seen = f"{late['missed']} of {late['ticks']} ticks missed, messages up to {1e3 * late['oldest_s']:.0f} ms old"
+        terminalreporter.write_line(f"with torque on: {seen}")
     if path:
         try:
             report.write(Path(path))

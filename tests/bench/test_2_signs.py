@@ -11,9 +11,9 @@ MOVES = "each joint is shaken and moves a little, with at most 0.2 N·m, then by
 
 @pytest.mark.parametrize("joint", JOINTS)
 def test_a_tiny_torque_moves_that_joint_alone_and_its_signs_agree(bench: StagedBench, joint: str) -> None:
-    bench.check(nudged(bench.stand, joint))
+    bench.check(nudged, joint)
 
 
 @pytest.mark.parametrize("joint", JOINTS)
 def test_eyes_see_the_right_flipper_move_the_right_way(bench: StagedBench, joint: str) -> None:
-    bench.check(shown(bench.stand, joint))
+    bench.check(shown, joint)

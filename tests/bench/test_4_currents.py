@@ -11,4 +11,4 @@ MOVES = "the flippers go on lying, and each joint trembles by a few degrees, wit
 
 @pytest.mark.parametrize("joint", JOINTS)
 def test_a_current_answers_its_command_in_time_and_in_full(bench: StagedBench, joint: str) -> None:
-    bench.check(step_response(bench.stand, joint))
+    bench.check(step_response, joint)

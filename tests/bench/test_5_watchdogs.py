@@ -7,4 +7,4 @@ MOVES = "the flippers press down with 0.08 N·m, then commands stop, and every d
 
 
 def test_drives_let_go_when_commands_stop(bench: StagedBench) -> None:
-    bench.check(watchdog_times(bench.stand))
+    bench.check(watchdog_times)

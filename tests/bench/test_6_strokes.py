@@ -7,10 +7,8 @@ MOVES = "all joints go to and fro by 25 and 15 degrees, slowly, then as fast as 
 
 
 def test_joints_follow_a_slow_stroke(bench: StagedBench) -> None:
-    with bench.raised() as stand:
-        bench.check(stroke_readings(stand, "slow", SLOW_RAD_S, SLOW_DEG))
+    bench.check(stroke_readings, "slow", SLOW_RAD_S, SLOW_DEG)
 
 
 def test_joints_follow_a_fast_stroke(bench: StagedBench) -> None:
-    with bench.raised() as stand:
-        bench.check(stroke_readings(stand, "fast", FAST_RAD_S, FAST_DEG))
+    bench.check(stroke_readings, "fast", FAST_RAD_S, FAST_DEG)

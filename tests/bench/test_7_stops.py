@@ -7,15 +7,12 @@ MOVES = "strides are stopped at full speed, softly and by braking; at last torqu
 
 
 def test_a_soft_stop_ends_a_stride_at_once(bench: StagedBench) -> None:
-    with bench.raised() as stand:
-        bench.check(soft_stop(stand))
+    bench.check(soft_stop)
 
 
 def test_damping_brakes_a_fast_sweep(bench: StagedBench) -> None:
-    with bench.raised() as stand:
-        bench.check(damping(stand))
+    bench.check(damping)
 
 
 def test_no_current_flows_once_torque_is_off(bench: StagedBench) -> None:
-    bench.stand.rise()
-    bench.check(torque_off(bench.stand))
+    bench.check(torque_off)

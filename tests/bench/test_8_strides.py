@@ -7,5 +7,4 @@ MOVES = "the robot walks ten strides in air."
 
 
 def test_ten_strides_are_walked_without_fault_or_limit(bench: StagedBench) -> None:
-    with bench.raised() as stand:
-        bench.check(strides(stand))
+    bench.check(strides)

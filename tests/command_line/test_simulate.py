@@ -10,6 +10,7 @@ import pytest
 from command_line import exit_codes
 from command_line.main import main
 from simulation import peer
+from simulation.blocks import LYING_RAD
 from simulation.local_setup import write_local_setup
 from simulation.plant import END_STOPS_RAD
 
@@ -37,7 +38,7 @@ def world(tmp_path: Path) -> Path:
 @pytest.fixture
 def peers(monkeypatch: pytest.MonkeyPatch) -> list[StillPeer]:
     monkeypatch.setattr(peer, "Peer", StillPeer)
-    monkeypatch.setattr("os.nice", lambda _: 0)
+    monkeypatch.setattr("os.sched_setscheduler", lambda *_: None)
     monkeypatch.setattr("signal.signal", lambda *_: None)
     monkeypatch.setattr(StillPeer, "made", [])
     return StillPeer.made
@@ -74,6 +75,14 @@ def test_without_a_world_there_are_the_paper_s_muds(
     assert [segment.clay.name for segment in peers[0].robot.plant.track.segments] == names
 
 
+def test_on_blocks_the_flippers_lie_in_reach_of_no_mud(short_folder: Path, peers: list[StillPeer]) -> None:
+    setup = write_local_setup(short_folder, short_folder)
+    assert main(["simulate", "--config", str(setup), "--on-blocks"]) == exit_codes.OK
+    plant = peers[0].robot.plant
+    assert plant.parameters.fixed_base
+    assert plant.angles_rad == pytest.approx((0.0, LYING_RAD, 0.0, LYING_RAD))
+
+
 def test_a_signal_moves_the_flippers_back_by_hand(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class HandedPeer(peer.Peer):
         """With its joints at their stops, for one step."""
@@ -87,7 +96,7 @@ def test_a_signal_moves_the_flippers_back_by_hand(short_folder: Path, monkeypatc
             lying.extend((arm.sweep_rad, arm.adduction_rad) for arm in self.robot.plant.arms)
 
     lying: list[tuple[float, float]] = []
-    monkeypatch.setattr("os.nice", lambda _: 0)
+    monkeypatch.setattr("os.sched_setscheduler", lambda *_: None)
     monkeypatch.setattr(peer, "Peer", HandedPeer)
     before = {number: signal.getsignal(number) for number in (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT)}
     try:

@@ -84,9 +84,7 @@ def test_a_joint_whose_encoder_counts_backwards_is_never_held(tmp_path: Path) ->
 def local_robot(short_folder: Path, tmp_path: Path) -> Iterator[Configuration]:
     """A simulated robot as a process of its own, in real time, on local buses."""
     path = write_local_setup(short_folder, tmp_path)
-    world = short_folder / "world.toml"
-    world.write_text("[[segment]]\nstart_m = 0.0\nend_m = 1.0\nstrength_pa = 500.0\n", encoding="utf-8")
-    command = [sys.executable, "-m", "simulation.peer", "--config", str(path), "--world", str(world)]
+    command = [sys.executable, "-m", "simulation.peer", "--config", str(path), "--on-blocks"]
     robot = subprocess.Popen(command, cwd=ROOT)
     try:
         yield load_configuration(path)

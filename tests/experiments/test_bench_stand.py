@@ -39,7 +39,7 @@ def axis_states(rig: SimulatedRig) -> set[AxisState]:
 
 
 def test_ctrl_c_with_raised_flippers_leaves_the_drives_idle(bench: StagedBench, rig: SimulatedRig) -> None:
-    with pytest.raises(KeyboardInterrupt), bench.raised():
+    with pytest.raises(KeyboardInterrupt), bench.stand.raised():
         assert axis_states(rig) == {AxisState.CLOSED_LOOP}
         raise KeyboardInterrupt
     assert axis_states(rig) == {AxisState.IDLE}
@@ -173,7 +173,7 @@ def test_a_reading_out_of_its_bounds_fails_with_what_to_do(bench: StagedBench) -
     bench.report.begin(1, "test")
     good, bad = Reading("speed", 1.0, "m/s", 0.0, 2.0), Reading("load", 90.0, "%", 0.0, 80.0, "take strangers off")
     with pytest.raises(pytest.fail.Exception) as failure:
-        bench.check([good, bad])
+        bench.check(lambda stand: iter([good, bad]))
     assert str(failure.value) == "load is 90 %, must be 0 to 80: take strangers off."
     bench.report.end()
     assert bench.report.as_json["tests"][0]["readings"] == [good.as_json, bad.as_json]

@@ -9,13 +9,14 @@ import pytest
 from control.joint_pd import ArmMass
 from control.records import JOINTS, DriveState
 from experiments.bench_attendant import SimulatedAttendant
-from experiments.bench_rig import SimulatedRig, usual_drives
+from experiments.bench_rig import SimulatedRig
 from experiments.bench_robot import BenchError
 from experiments.bench_stand import Stand
 from experiments.joint_shake import FIRST_NM, HALF_TICKS, SHAKE_TICKS, UNSEEN_RAD, Shake, shake
 from experiments.sign_check import nudged
 from firmware_host.configuration import Configuration
 from firmware_host.ticker import PERIOD_S, Beat
+from simulation.blocks import on_blocks
 
 
 class Bench:
@@ -29,7 +30,7 @@ class Bench:
             inertia * arm.sweep_inertia_kg_m2,
             inertia * arm.adduction_inertia_kg_m2,
         )
-        drives = usual_drives(configuration)
+        drives = on_blocks(configuration).drives(configuration)
         drives[joint] = replace(drives[joint], encoder_noise_rad=noise_rad)
         self.rig = SimulatedRig(configuration, replace(configuration, arm=mass), drives)
         self.stand = Stand(self.rig, SimulatedAttendant(self.rig))

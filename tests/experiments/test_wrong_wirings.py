@@ -19,10 +19,11 @@ from drivers import odrive_codec as codec
 from drivers.frames import Frame
 from drivers.odrive_codec import arbitration_id
 from experiments.bench_attendant import SimulatedAttendant
-from experiments.bench_rig import SimulatedRig, usual_drives
+from experiments.bench_rig import SimulatedRig
 from experiments.bench_robot import BenchError
 from experiments.bench_stand import Stand
 from firmware_host.configuration import Configuration
+from simulation.blocks import on_blocks
 from tests.bench import (
     test_1_wiring,
     test_2_signs,
@@ -87,7 +88,7 @@ def swapped(configuration: Configuration, one: str, other: str) -> SimulatedRig:
 
 
 def with_drive(configuration: Configuration, joint: str, **changes: float) -> SimulatedRig:
-    drives = usual_drives(configuration)
+    drives = on_blocks(configuration).drives(configuration)
     drives[joint] = replace(drives[joint], **changes)  # type: ignore[arg-type]
     return SimulatedRig(configuration, drives=drives)
 
