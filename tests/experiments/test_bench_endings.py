@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,6 +31,14 @@ class InterruptedRobot(LockstepRobot):
     """Ctrl-C is pressed in one of the places where an experiment waits."""
 
     waits_left = -1
+    sinks = 0  # times that a flipper begins to sink just when the robot is armed
+
+    def call(self, method: str, **params: Any) -> Any:
+        answer = super().call(method, **params)
+        if method == "arm" and self.sinks:
+            self.sinks -= 1
+            self.lockstep.robot.plant.arms[0].adduction_rad += 0.05
+        return answer
 
     def wait(self, duration_s: float) -> None:
         self.waits_left -= 1
@@ -109,3 +118,16 @@ def test_the_next_trial_begins_after_a_fault_of_the_last_one(robot: InterruptedR
     face_faults(robot, PERSON)
     arm(robot, PERSON)
     assert robot.call("status")["mode"] == "hold"
+
+
+def test_a_flipper_that_sinks_as_the_robot_is_armed_only_delays_it(robot: InterruptedRobot) -> None:
+    robot.sinks = 2
+    arm(robot)
+    assert robot.sinks == 0 and robot.call("status")["mode"] == "hold"
+
+
+def test_a_flipper_that_always_sinks_keeps_the_torque_off(robot: InterruptedRobot) -> None:
+    robot.sinks = 1000
+    with pytest.raises(BenchError, match="the robot is not armed: "):
+        arm(robot)
+    assert robot.call("status")["mode"] == "idle"
