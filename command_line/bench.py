@@ -51,7 +51,9 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
     folder.mkdir(parents=True, exist_ok=True)  # what cannot be is refused before the work
     try:
         finding = _run(options, folder, what, run)
-        written = write_report(folder, finding.report, finding.title, finding.sections, finding.logs)
+        title = f"{finding.title} (simulated)" if options.simulated else finding.title
+        report = finding.report | {"simulated": bool(options.simulated)}
+        written = write_report(folder, report, title, finding.sections, finding.logs)
     except ConfigurationError as problem:
         complain(*problem.problems)
         return exit_codes.CONFIGURATION
@@ -68,7 +70,7 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
         return _end(folder, "interrupted", exit_codes.INTERRUPTED)
     except OSError as problem:  # such as a full disk
         return _end(folder, f"{problem.filename or folder}: {problem.strerror or problem}", exit_codes.UNHEALTHY)
-    print(json.dumps(numbers_told(finding.report), allow_nan=False) if options.json else finding.text)
+    print(json.dumps(numbers_told(report), allow_nan=False) if options.json else finding.text)
     print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
     return exit_codes.OK
 
