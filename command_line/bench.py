@@ -43,6 +43,7 @@ class Finding(NamedTuple):
     sections: Sequence[Section]
     text: str  # for people, on the screen
     logs: Sequence[Path] = ()
+    status: int = exit_codes.OK  # another where something that was asked for was not done
 
 
 def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], Finding]) -> int:
@@ -72,7 +73,7 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
         return _end(folder, f"{problem.filename or folder}: {problem.strerror or problem}", exit_codes.UNHEALTHY)
     print(json.dumps(numbers_told(report), allow_nan=False) if options.json else finding.text)
     print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
-    return exit_codes.OK
+    return finding.status
 
 
 def _run(options: argparse.Namespace, folder: Path, what: str, run: Callable[[Desk], Finding]) -> Finding:
