@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -48,6 +49,8 @@ class Finding(NamedTuple):
 
 def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], Finding]) -> int:
     """`what` there is progress in. Options are `out`, `json` and `simulated`. `run` leaves the robot at rest."""
+    if find_spec("matplotlib") is None:  # before the hours of measuring, not behind them
+        raise ModuleNotFoundError(name="matplotlib")
     folder: Path = options.out or Path(f"mudskipper-{options.name}")
     folder.mkdir(parents=True, exist_ok=True)  # what cannot be is refused before the work
     try:

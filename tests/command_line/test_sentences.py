@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from command_line import exit_codes, operation
+from command_line import bench, exit_codes, operation
 from command_line.screen import number
 from control.records import JOINTS
 from firmware_host.status_client import DroppedError
-from tests.command_line.command_lines import refusal
+from tests.command_line.command_lines import failure, refusal
 
 NO_SOCKET = Namespace(socket=Path("/none"), json=False, config=Path("/none.toml"))
 
@@ -82,3 +82,13 @@ def test_what_is_no_number_or_no_folder_is_refused_in_words(
     arguments: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert said in refusal(capsys, "experiment", *arguments)
+
+
+@pytest.mark.parametrize("experiment", ["actuator", "loadcell", "flipper", "walk", "trackway"])
+def test_where_no_picture_can_be_drawn_nothing_is_measured(
+    experiment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(bench, "find_spec", lambda name: None)
+    arguments = ("experiment", experiment, "--simulated", "--out", str(tmp_path / "none"))
+    assert "extra 'plots'" in failure(capsys, *arguments)
+    assert not (tmp_path / "none").exists()
