@@ -21,9 +21,9 @@ TRUTHS = {
     "insertion and extraction along the flipper's own arc, and without what the plate's face bears, which is no part "
     "of k_p and k_e. (A leaning plate pushed straight down would read 4 % more k_p at 3 cm and 31 % at 5 cm.)",
     "file": "The load cell is that of the file given with --truth. Its plate is upright and goes as deep as it is set; "
-    "the flipper's leans, goes along an arc, its edge half as fast again, and 2 mm less deep in insertion and deeper in "
-    "stance. In the simulator's clay at 3 cm all this makes 10 to 12 % more k_p, 3 to 5 % less k_s and 1 % more k_e; "
-    "lean and arc alone make 6 % more, nothing, and 1 % less.",
+    "the flipper's leans, goes along an arc, its edge half as fast again, and 2 mm less deep in insertion and deeper "
+    "in stance. In the simulator's clay at 3 cm all this makes 10 to 12 % more k_p, 3 to 5 % less k_s and 1 % more "
+    "k_e; lean and arc alone make 6 % more, nothing, and 1 % less.",
 }
 KNOWN_BIAS = (
     "k_e by the default method reads more than the load cell: by 1 to 5 % on a simulated fixed base without any "
