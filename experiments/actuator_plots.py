@@ -61,7 +61,7 @@ def plot_errors(fits: Sequence[JointFit], path: Path) -> None:
         for place, weight_g in enumerate(weights_g):
             _plot_weight(axis, fit, place, weight_g, last=place == len(weights_g) - 1)
         axis.set_xticks(range(len(weights_g)), [f"{weight_g:g}" for weight_g in weights_g])
-        axis.set_title(f"{_titled(fit)}: RMSE fitted {1e3 * fit.rmse_fitted_nm:.1f} mN·m")
+        axis.set_title(f"{_titled(fit)}\nRMSE fitted {1e3 * fit.rmse_fitted_nm:.1f} mN·m")
         axis.set_xlabel("weight, g")
         axis.legend(loc="upper left", frameon=False, fontsize=8)
     axes[0].set_ylabel(f"{SENSED} $-$ {EXTERNAL}, mN·m")
