@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
+from command_line import exit_codes
 from command_line.bench import Desk, Finding, conduct_bench
 from command_line.commands import DEFAULT_CONFIG
 from command_line.screen import table
@@ -16,10 +17,11 @@ from experiments.actuator_bench import ActuatorBench, RobotBench, SimulatedBench
 from experiments.actuator_fit import JointFit, fit_joint
 from experiments.actuator_plan import PAPER_WEIGHTS_G, Plan
 from experiments.actuator_report import TITLE, friction_table_of, left_out, report_of, sections_of, table_of
-from experiments.actuator_simulation import bench_configuration
+from experiments.actuator_simulation import bench_configuration, truth_rows
 from experiments.bench_robot import BenchError
 from experiments.configuration_change import changed_text, difference, replace_file
 from experiments.daemon_robot import DaemonRobot
+from experiments.report_page import Section
 from firmware_host.configuration import Configuration, load_configuration
 from firmware_host.toml_records import read_text
 
@@ -47,12 +49,16 @@ def _calibrate(options: argparse.Namespace, desk: Desk) -> Finding:
         for joint in plan.joints
         if (fit := fit_joint(joint, plan, readings[joint], drives[joint].torque_constant_nm_a)) is not None
     ]
-    applied = _applied(target, fits, desk) if target else ""
+    applied, status = _applied(target, fits, desk) if target else ("", exit_codes.OK)
     omitted = len(left_out(plan, readings))
-    tables = [table(rows) for rows in (table_of(fits), friction_table_of(fits))]
-    text = "\n".join([*tables, *_remarks(plan.joints, fits, omitted), *([applied] if applied else [])])
+    tables, sections = [table_of(fits), friction_table_of(fits)], sections_of(plan, readings, fits)
+    if options.simulated:
+        tables.append(truth_rows(fits))
+        sections.append(Section("The simulated motors themselves", rows=tables[-1]))
+    told = [*_remarks(plan.joints, fits, omitted), *([applied] if applied else [])]
+    text = "\n\n".join([*map(table, tables), *(["\n".join(told)] if told else [])])
     report = report_of(plan, readings, fits) | {"applied": applied or None}
-    return Finding(report, TITLE, sections_of(plan, readings, fits), text, logs)
+    return Finding(report, TITLE, sections, text, logs, status)
 
 
 def _bench(options: argparse.Namespace) -> ActuatorBench:
@@ -101,12 +107,12 @@ def _target(options: argparse.Namespace, desk: Desk, bench: ActuatorBench) -> Pa
     return path
 
 
-def _applied(path: Path, fits: Sequence[JointFit], desk: Desk) -> str:
-    """What was done. A file that cannot be changed costs no report."""
+def _applied(path: Path, fits: Sequence[JointFit], desk: Desk) -> tuple[str, int]:
+    """What was done, and the exit status. A file that cannot be changed costs no report."""
     try:
-        return _apply(path, fits, desk)
+        return _apply(path, fits, desk), exit_codes.OK
     except BenchError as problem:
-        return f"nothing was applied: {problem}"
+        return f"nothing was applied: {problem}", exit_codes.REFUSED
 
 
 def _apply(path: Path, fits: Sequence[JointFit], desk: Desk) -> str:

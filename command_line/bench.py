@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -43,15 +44,20 @@ class Finding(NamedTuple):
     sections: Sequence[Section]
     text: str  # for people, on the screen
     logs: Sequence[Path] = ()
+    status: int = exit_codes.OK  # another where something that was asked for was not done
 
 
 def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], Finding]) -> int:
     """`what` there is progress in. Options are `out`, `json` and `simulated`. `run` leaves the robot at rest."""
+    if find_spec("matplotlib") is None:  # before the hours of measuring, not behind them
+        raise ModuleNotFoundError(name="matplotlib")
     folder: Path = options.out or Path(f"mudskipper-{options.name}")
     folder.mkdir(parents=True, exist_ok=True)  # what cannot be is refused before the work
     try:
         finding = _run(options, folder, what, run)
-        written = write_report(folder, finding.report, finding.title, finding.sections, finding.logs)
+        title = f"{finding.title} (simulated)" if options.simulated else finding.title
+        report = finding.report | {"simulated": bool(options.simulated)}
+        written = write_report(folder, report, title, finding.sections, finding.logs)
     except ConfigurationError as problem:
         complain(*problem.problems)
         return exit_codes.CONFIGURATION
@@ -68,9 +74,9 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
         return _end(folder, "interrupted", exit_codes.INTERRUPTED)
     except OSError as problem:  # such as a full disk
         return _end(folder, f"{problem.filename or folder}: {problem.strerror or problem}", exit_codes.UNHEALTHY)
-    print(json.dumps(numbers_told(finding.report), allow_nan=False) if options.json else finding.text)
+    print(json.dumps(numbers_told(report), allow_nan=False) if options.json else finding.text)
     print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
-    return exit_codes.OK
+    return finding.status
 
 
 def _run(options: argparse.Namespace, folder: Path, what: str, run: Callable[[Desk], Finding]) -> Finding:

@@ -6,7 +6,17 @@ import argparse
 from pathlib import Path
 
 from command_line.commands import DEFAULT_CONFIG, Commands, add, add_socket
-from command_line.option_types import between, depth_cm, lever_m, mud_length, plate_cm, positive, weights_g, whole
+from command_line.option_types import (
+    between,
+    depth_cm,
+    folder,
+    lever_m,
+    mud_length,
+    plate_cm,
+    positive,
+    weights_g,
+    whole,
+)
 from control.records import JOINTS
 
 SEEDS, TRIALS = whole(1, 1000), whole(1, 100)
@@ -41,7 +51,7 @@ def add_experiments(commands: Commands) -> None:
 def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -> None:
     experiment.add_argument("--simulated", action="store_true", help=simulated)
     experiment.add_argument("--json", action="store_true", help="for machines")
-    experiment.add_argument("--out", type=Path, metavar="DIR", help=out)
+    experiment.add_argument("--out", type=folder, metavar="DIR", help=out)
 
 
 def _add_bench(experiment: argparse.ArgumentParser) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from command_line import exit_codes
 from command_line.commands import DEFAULT_CONFIG, Commands, add, add_socket
 from command_line.experiment_commands import add_experiments
-from command_line.option_types import between, depth_cm, finite, joint_angle, picture, whole
+from command_line.option_types import between, depth_cm, finite, folder, joint_angle, picture, whole
 from command_line.screen import complain
 
 METHODS = ("default", "paper")  # of estimation
@@ -101,7 +101,7 @@ def _add_fail(commands: Commands) -> argparse.ArgumentParser:
 def _add_simulation(commands: Commands) -> None:
     demo = add(commands, "demo", "demo.demo", "A simulated robot walks over three muds, in real time.")
     demo.add_argument("--json", type=Path, metavar="PATH", help="write the summary there too")
-    demo.add_argument("--out", type=Path, default=Path("mudskipper-demo"), metavar="DIR", help="for log and plot")
+    demo.add_argument("--out", type=folder, default=Path("mudskipper-demo"), metavar="DIR", help="for log and plot")
     demo.add_argument("--seed", type=int, default=1)
     demo.add_argument("--depth", type=depth_cm, metavar="CM", help="fixed instead of adaptive")
     demo.add_argument("--world", type=Path, metavar="FILE", help="describes the ground, instead of three muds")
@@ -153,7 +153,7 @@ def _add_log_contents(actions: Commands) -> None:
     report.add_argument(
         "files", type=Path, nargs="+", metavar="FILE", help="our log, its segments, or the authors' CSV"
     )
-    report.add_argument("--out", type=Path, metavar="DIR", help="(default: a folder named after the log)")
+    report.add_argument("--out", type=folder, metavar="DIR", help="(default: a folder named after the log)")
     report.add_argument("--json", action="store_true", help="its numbers on standard output")
     export = add(actions, "export", "logs.export", "A log in the columns of the authors' plotter.")
     export.add_argument("file", type=Path)

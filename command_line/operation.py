@@ -187,12 +187,13 @@ def _check_line(item: dict[str, Any]) -> str:
     mark = coloured("ok  ", GREEN) if item["ok"] else coloured("FAIL", RED)
     overruled = "" if item.get("mandatory", True) else "; 'mudskipper arm --force' overrules this"
     fix = f"\n       -> {item['fix']}{overruled}" if item["fix"] and not item["ok"] else ""
-    return f"{mark} {item['id']:22} {item['text']}{fix}"
+    return f"{mark} {item['id']:24} {item['text']}{fix}"
 
 
 def status_text(report: dict[str, Any]) -> str:
     mode = coloured(report["mode"], MODE_COLOURS.get(report["mode"], BOLD))
-    lines = [f"{report['robot']}: {mode}, stride {report['stride']}, {report['phase']}"]
+    stride = "no stride" if report["stride"] < 0 else f"stride {report['stride']}"
+    lines = [f"{report['robot']}: {mode}, {stride}, {report['phase']}"]
     lines[0] += f", depth {100 * report['depth_m']:.1f} cm, body {number(report['body_x_m'])} m"
     if report["mode"] == "boot":
         lines.append(_boot_line(report["drives"]))

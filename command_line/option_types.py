@@ -41,23 +41,23 @@ def _number(text: str) -> float:
 
 
 def finite(text: str) -> float:
-    value = float(text)
+    value = _number(text)
     if not isfinite(value):
         raise argparse.ArgumentTypeError(f"{text}: must be a number")
     return value
 
 
 def positive(text: str) -> float:
-    value = float(text)
+    value = _number(text)
     if not (value > 0.0 and isfinite(value)):
         raise argparse.ArgumentTypeError(f"{text}: must be more than 0")
     return value
 
 
 def depth_cm(text: str) -> float:
-    value = float(text)
+    value = _number(text)
     if not 0.0 < value <= 20.0:
-        raise argparse.ArgumentTypeError(f"{text}: must be more than 0 and at most 20")
+        raise argparse.ArgumentTypeError(f"{text}: must be more than 0 and at most 20 cm")
     return value
 
 
@@ -72,12 +72,9 @@ def joint_angle(text: str) -> tuple[str, float]:
 def mud_length(text: str) -> tuple[str, float]:
     """A mud's name, and its length in cm: the paper's where none is given."""
     name, _, length_cm = text.partition("=")
-    try:
-        value = finite(length_cm or "61")
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text}: must be a mud and its length in cm, as 47.6=61") from None
+    value = _number(length_cm or "61")
     if not (name and 20.0 <= value <= 10000.0):
-        raise argparse.ArgumentTypeError(f"{text}: a mud needs a name, and a length from 20 to 10000 cm")
+        raise argparse.ArgumentTypeError(f"{text}: must be a mud and its length from 20 to 10000 cm, as 47.6=61")
     return name, value
 
 
@@ -86,9 +83,11 @@ def plate_cm(text: str) -> tuple[float, float, float]:
     sides = text.lower().removesuffix("cm").split("x")
     if len(sides) not in (2, 3):
         raise argparse.ArgumentTypeError(f"{text}: must be width x height, or width x height x thickness, in cm")
-    width, height, thickness = (float(side) for side in [*sides, "0.4"][:3])
+    width, height, thickness = (_number(side) for side in [*sides, "0.4"][:3])
     if not (0.2 <= width <= 50.0 and 0.2 <= height <= 50.0 and 0.02 <= thickness <= 10.0):
-        raise argparse.ArgumentTypeError(f"{text}: width and height must be from 0.2 to 50, thickness from 0.02 to 10")
+        raise argparse.ArgumentTypeError(
+            f"{text}: width and height must be from 0.2 to 50, thickness from 0.02 to 10 cm"
+        )
     return width, height, thickness
 
 
@@ -102,6 +101,14 @@ def weights_g(text: str) -> tuple[float, ...]:
     return values
 
 
+def folder(text: str) -> Path:
+    """That there is, or that can be made."""
+    path = Path(text)
+    if path.exists() and not path.is_dir():
+        raise argparse.ArgumentTypeError(f"{text}: is no folder")
+    return path
+
+
 def picture(*endings: str) -> Callable[[str], Path]:
     def path(text: str) -> Path:
         if not text.endswith(endings):
@@ -112,7 +119,7 @@ def picture(*endings: str) -> Callable[[str], Path]:
 
 
 def lever_m(text: str) -> float:
-    value = float(text)
+    value = _number(text)
     if not 1.0 <= value <= 100.0:
         raise argparse.ArgumentTypeError(f"{text}: must be from 1 to 100 cm")
     return value / 100.0

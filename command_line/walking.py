@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any
 
 from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import conduct, refuse
-from command_line.screen import number, table
+from command_line.screen import number, plain, table
 from experiments import depth_sweep, mud_fit, trackway, trackway_trials
 from experiments.bench_robot import leave
 from experiments.daemon_robot import DaemonRobot
@@ -23,6 +23,10 @@ from experiments.paper_table import ADAPTIVE, PAPER_TABLE
 from experiments.report_page import Figure, Section
 from experiments.trackway_trials import AskedTrackway
 
+WALKS_AND_TABLE = (
+    "Left, as in the paper's figure 8: the first walk of each gait. Right: Table I, the paper's three trials as grey "
+    "bars and ours as dots, each with one standard deviation."
+)
 SIMULATED_ONLY = "the muds are those of the simulator: this experiment runs with --simulated only"
 
 
@@ -40,7 +44,7 @@ def run_trackway(options: argparse.Namespace) -> int:
         seeds=options.trials or trackway.Plan.seeds,
         compartment_m=options.compartment or trackway.Plan.compartment_m,
     )
-    return conduct(options, "walks", lambda show: trackway.run(plan, show), trackway_text, _plot_trackway)
+    return conduct_bench(options, "walks", lambda desk: _found(trackway.run(plan, desk.show)))
 
 
 def _walk_at_the_bench(options: argparse.Namespace) -> int:
@@ -64,11 +68,13 @@ def _walked(plan: trackway_trials.Plan, desk: Desk, socket: Path) -> Finding:
         report = trackway_trials.run(plan, AskedTrackway(robot, desk.person), notebook, desk.show)
     finally:
         logs = leave(robot, desk.person, desk.folder)
+    return _found(report, logs)
+
+
+def _found(report: dict[str, Any], logs: Sequence[Path] = ()) -> Finding:
     text = trackway_text(report)
-    figure = Figure(
-        "trackway", "One walk of each gait, and Table I beside the paper's.", partial(_plot_trackway, report)
-    )
-    sections = [Section("Table I", screen=text, figures=[figure])]
+    figure = Figure("trackway", WALKS_AND_TABLE, partial(_plot_trackway, report))
+    sections = [Section("Table I", screen=plain(text), figures=[figure])]
     return Finding(report, "The trackway: Table I of the paper", sections, text, logs)
 
 

@@ -177,7 +177,7 @@ def _refusal(path: str, baud: int, problem: Exception) -> str:
         )
     if number in (errno.EBUSY, errno.EAGAIN) or "lock" in str(problem).lower():
         return f"{path} is in use by another program, such as a serial monitor: close that one"
-    if f"({errno.ENOTTY}," in str(problem):  # pyserial tells it in words only
+    if number == errno.EISDIR or f"({errno.ENOTTY}," in str(problem):  # pyserial tells it in words only
         return f"{path} is no serial port: {_ports_told()}"
     if isinstance(problem, ValueError):
         return f"{path} does not take {baud} baud: {problem}"

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from math import hypot, nan, sqrt
+from math import ceil, hypot, nan, sqrt
 from typing import Any
 
 from control.joint_pd import GRAVITY_M_S2
@@ -113,10 +113,12 @@ def _problems(plan: Plan, configuration: Configuration) -> Iterator[str]:
     if least_nm > limit_nm:
         borne_g = [weight_g for weight_g in plan.weights_g if needed_nm(plan, configuration, weight_g) <= limit_nm]
         lighter = f"hang at most {max(borne_g):g} g of them" if borne_g else "hang lighter ones"
+        least_nm_a = min(drive.torque_constant_nm_a for drive in configuration.drive.values()) / (1.0 + LARGEST_ERROR)
         yield (
             f"limits.torque_nm = {limit_nm:g}: must be at least {least_nm:.2f} for {heaviest_g:g} g at"
-            f" {100.0 * plan.lever_m:g} cm. For this experiment raise it, and the drives' current_limit_a with it, and"
-            f" set recovery.attempts = 0; or {lighter} (--weights), or at a shorter --lever"
+            f" {100.0 * plan.lever_m:g} cm. For this experiment set it to {_up(least_nm, 2):.2f}, current_limit_a of"
+            f" all drives to {_up(_up(least_nm, 2) / least_nm_a, 1):.1f}, in case the torque constant is smaller, and"
+            f" recovery.attempts to 0; or {lighter} (--weights), or at a shorter --lever"
         )
     for joint in plan.joints:
         most_a = largest_current_a(plan, configuration, joint, heaviest_g)
@@ -126,6 +128,11 @@ def _problems(plan: Plan, configuration: Configuration) -> Iterator[str]:
                 f" would warm the winding of {joint} beyond {configuration.limits.temperature_warm_c:g} degrees C in"
                 f" {READING_S:g} s; hang lighter weights (--weights), or at a shorter --lever"
             )
+
+
+def _up(value: float, digits: int) -> float:
+    """Rounded so that a lower bound stays one."""
+    return float(ceil(value * 10.0**digits) / 10.0**digits)
 
 
 def largest_current_a(plan: Plan, configuration: Configuration, joint: str, weight_g: float) -> float:

@@ -61,7 +61,7 @@ def plot_errors(fits: Sequence[JointFit], path: Path) -> None:
         for place, weight_g in enumerate(weights_g):
             _plot_weight(axis, fit, place, weight_g, last=place == len(weights_g) - 1)
         axis.set_xticks(range(len(weights_g)), [f"{weight_g:g}" for weight_g in weights_g])
-        axis.set_title(f"{_titled(fit)}: RMSE {1e3 * fit.rmse_fitted_nm:.1f} mN·m")
+        axis.set_title(f"{_titled(fit)}\nRMSE fitted {1e3 * fit.rmse_fitted_nm:.1f} mN·m")
         axis.set_xlabel("weight, g")
         axis.legend(loc="upper left", frameon=False, fontsize=8)
     axes[0].set_ylabel(f"{SENSED} $-$ {EXTERNAL}, mN·m")
@@ -90,7 +90,9 @@ def plot_friction(fits: Sequence[JointFit], path: Path) -> None:
         speeds_rad_s = [loop.speed_rad_s for loop in fit.loops]
         spent_mnm = [1e3 * fit.constant_nm_a * spent_a for spent_a in _spent_a(fit)]
         rest_mnm = 1e3 * fit.constant_nm_a * fit.rest_friction_a
-        axis.axhline(rest_mnm, color="black", linestyle=":", linewidth=1.2, label=f"at rest: {rest_mnm:.1f} mN·m")
+        axis.axhline(
+            rest_mnm, color="black", linestyle=":", linewidth=1.2, label=f"at rest at least: {rest_mnm:.1f} mN·m"
+        )
         axis.plot(speeds_rad_s, spent_mnm, label="a loop", **_style(fit))
         if isfinite(dry_nm):
             whole_rad_s = [0.0, 1.1 * max(speeds_rad_s)]

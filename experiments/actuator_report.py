@@ -29,7 +29,8 @@ the load.
 The line is current on torque, since the weights are known better than the currents: k_t is one over its slope.
 Friction is what the empty arm's current spends on loops of {swing_deg:.0f} degrees to either side, in which weight,
 magnets and inertia give back what they took. Slow and quick loops tell dry from viscous. Half the difference between
-the two approaches at rest is less ("at rest"): a joint that is held comes to rest before friction bears all it can.
+the two approaches at rest is less ("at rest at least"): a joint that is held comes to rest before friction bears all
+it can.
 
 ± is one standard error; the true value is within two of them in about 19 of 20 calibrations. That of k_t is from the
 scatter of the readings and from what errs alike in all of them: the lever, by at most {lever_mm:g} mm, and the weights,
@@ -144,7 +145,7 @@ def table_of(fits: Sequence[JointFit]) -> Rows:
     head = [
         "joint",
         "k_t, N·m/A",
-        "configured",
+        "configured, N·m/A",
         "RMSE, N·m",
         "RMSE fitted, N·m",
         "repeatability",
@@ -170,7 +171,7 @@ def table_of(fits: Sequence[JointFit]) -> Rows:
 
 
 def friction_table_of(fits: Sequence[JointFit]) -> Rows:
-    head = ["joint", "dry friction, N·m", "viscous, N·m·s", "at rest at least", "offset, N·m", "empty arm, N·m"]
+    head = ["joint", "dry friction, N·m", "viscous, N·m·s", "at rest at least, N·m", "offset, N·m", "empty arm, N·m"]
     rows = [
         [
             fit.joint,
@@ -200,11 +201,11 @@ def _weight_rows(fit: JointFit) -> Rows:
         "weight",
         "trials",
         "τ_ext, N·m",
-        "τ_sense, configured",
-        "fitted",
-        "error, mN·m",
-        "spread, mN·m",
-        "of τ_sense",
+        "τ_sense configured, N·m",
+        "τ_sense fitted, N·m",
+        "error fitted, mN·m",
+        "spread fitted, mN·m",
+        "repeatability",
     ]
     rows = []
     for weight_g in sorted({load.weight_g for load in fit.loads}):

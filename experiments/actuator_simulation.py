@@ -16,11 +16,14 @@ class M1 are truer than all of this.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import chain
+from math import isfinite
 from pathlib import Path
 from random import Random
 
 from control.records import JOINTS
+from experiments.actuator_fit import JointFit
 from experiments.actuator_plan import Plan, Step
 from experiments.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.person import GO_ON
@@ -45,6 +48,22 @@ def bench_configuration() -> Configuration:
     """That of the simulated robot, with the current limit of the authors' drives at their single flipper."""
     sections = f"[limits]\ntorque_nm = {BENCH_TORQUE_NM}\n\n[recovery]\nattempts = 0  # no mud holds a flipper here\n"
     return simulated_configuration(sections, drive=f"current_limit_a = {BENCH_CURRENT_A}")
+
+
+def truth_rows(fits: Sequence[JointFit]) -> list[list[str]]:
+    """A table: what is true of the simulated motors, and by how much the fitted misses it."""
+    rows = [["joint", "true k_t, N·m/A", "k_t misses by", "true dry friction, N·m", "dry friction misses by"]]
+    for fit in fits:
+        told = (fit.constant_nm_a, TRUE_CONSTANT_NM_A), (fit.friction_nm[0], COULOMB_NM)
+        cells = (
+            [f"{true:.{digits}f}", _missed(value, true)] for (value, true), digits in zip(told, (5, 4), strict=True)
+        )
+        rows.append([fit.joint, *chain(*cells)])
+    return rows
+
+
+def _missed(value: float, true: float) -> str:
+    return f"{100.0 * (value / true - 1.0):+.1f} %" if isfinite(value) else "-"
 
 
 def simulated_bench(

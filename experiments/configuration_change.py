@@ -39,7 +39,10 @@ def changed_text(text: str, changes: Changes) -> str:
     except TOMLKitError as problem:
         raise BenchError(f"the configuration cannot be changed: {problem}") from problem
     except ConfigurationError as problem:
-        raise BenchError(f"the configuration stays as it is, since changed it would be wrong: {problem}") from problem
+        raise BenchError(
+            f"the configuration stays as it is, since changed it would be wrong: {problem}. Mend that, restart the "
+            "daemon, and run the same command again: what was measured is kept"
+        ) from problem
     if tomllib.loads(changed) != _expected(text, changes):
         raise BenchError(
             "the configuration stays as it is: its tables are written in a way that cannot be changed here"

@@ -46,7 +46,8 @@ def plot_stride(trial: Entry, geometry: FlipperGeometry, method: str, path: Path
     _plot_angles(panels[1], course)
     _plot_upward(panels[2], course, laws)
     _plot_forward(panels[3], course, laws)
-    for panel in panels:
+    for letter, panel in zip("BCDE", panels, strict=True):  # the paper's A is a drawing
+        panel.text(0.006, 0.94, letter, transform=panel.transAxes, va="top", fontweight="bold")
         _shade(panel, course)
         panel.margins(x=0.0)
     for phase, name in PHASE_NAMES.items():
@@ -73,7 +74,7 @@ def _plot_depths(panel: Axes, course: StrideCourse, surface_m: float) -> None:
     panel.axhline(100.0 * surface_m, color=GREY, linewidth=0.8, linestyle=":", label="surface found")
     panel.invert_yaxis()
     panel.set_ylabel("depth (cm)")
-    panel.legend(fontsize="small", ncols=3, loc="center")
+    panel.legend(fontsize="small", loc="center", bbox_to_anchor=(0.82, 0.62))
 
 
 def _plot_angles(panel: Axes, course: StrideCourse) -> None:

@@ -20,8 +20,10 @@ TRUTHS = {
     "bed": "The load cell is a virtual one: it repeats each stroke with the flipper's own plate, to the same depth; "
     "insertion and extraction along the flipper's own arc, and without what the plate's face bears, which is no part "
     "of k_p and k_e. (A leaning plate pushed straight down would read 4 % more k_p at 3 cm and 31 % at 5 cm.)",
-    "file": "The load cell is that of the file given with --truth. Its plate is upright and the flipper's leans, which "
-    "at 3 cm in the simulator's clay alone makes 10 to 12 % more k_p, 3 to 5 % less k_s and 1 % more k_e.",
+    "file": "The load cell is that of the file given with --truth. Its plate is upright and goes as deep as it is set; "
+    "the flipper's leans, goes along an arc, its edge half as fast again, and 2 mm less deep in insertion and deeper "
+    "in stance. In the simulator's clay at 3 cm all this makes 10 to 12 % more k_p, 3 to 5 % less k_s and 1 % more "
+    "k_e; lean and arc alone make 6 % more, nothing, and 1 % less.",
 }
 KNOWN_BIAS = (
     "k_e by the default method reads more than the load cell: by 1 to 5 % on a simulated fixed base without any "
@@ -34,13 +36,19 @@ WRONG_CONSTANTS = (
     "Each simulated motor's torque constant is another than the configuration has, by a draw of 3.2 %, as the paper's "
     "were. All that a joint tells is off by that in the same way, which the scatter of trials cannot show."
 )
-SCATTER = "Coefficients, ± standard error of the mean by the scatter of trials; of a single trial, what its fit doubts."
-MODELLED = (
-    "Dashed: the forces by the fitted coefficients, where each is fitted. The default method's laws tell a joint's "
-    "torque; it takes the place of the measured one, and goes with the other joint's measured torque through the map "
-    "from torques to forces that the measured force went through."
+SCATTER = (
+    "± is the standard error of the mean, and cv the coefficient of variation, by the scatter of the trials; of a "
+    "single trial ± is what its fit doubts"
 )
-MODELLED_PAPER = "Dashed: the forces by the fitted coefficients and the paper's laws."
+MODELLED = (
+    "B to E as in the paper's figure 4. Dashed: the forces by the fitted coefficients, where each is fitted. The "
+    "default method's laws tell a joint's torque; it takes the place of the measured one, and goes with the other "
+    "joint's measured torque through the map from torques to forces that the measured force went through. f_z is not "
+    "drawn in stance, where two torques do not tell it from the sideways force."
+)
+MODELLED_PAPER = (
+    "B to E as in the paper's figure 4. Dashed: the forces by the fitted coefficients and the paper's laws."
+)
 
 
 def sections_of(
@@ -65,7 +73,7 @@ def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], config
         "over the trials, which are the grey dashes."
     )
     if any(mud["truth"] for mud in report["muds"]):
-        caption += " G to I: beside a load cell's; on the grey line both are equal."
+        caption += " G to I: the same beside a load cell's; on the grey line both are equal."
     draw = partial(plot_coefficients, report["muds"], firsts, configuration.geometry)
     figure = Figure("figure5", caption, draw)
     return Section("Coefficients of the muds", _told(report), rows=mud_rows(report["muds"]), figures=[figure])
@@ -73,7 +81,7 @@ def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], config
 
 def _told(report: Mapping[str, Any]) -> str:
     falls = {name: fell for name, fell in report["falls_with_water"].items() if fell is not None}
-    paragraphs = [report["missing_truth"]] if report["missing_truth"] else []
+    paragraphs = [f"{SCATTER}.", *([report["missing_truth"]] if report["missing_truth"] else [])]
     if falls:
         fell = ", ".join(f"{name} {'yes' if fell else 'no'}" for name, fell in falls.items())
         paragraphs.append(f"Does a coefficient fall with water from mud to mud, as in the paper? {fell}.")
@@ -108,7 +116,7 @@ def force_rows(report: Mapping[str, Any]) -> list[list[str]]:
     rows = [["mud", *(f"{stroke} (N)" for stroke in STROKES)]]
     for mud, forces in report["largest_forces_n"].items():
         misfits = report["misfit_n"][mud]
-        rows.append([mud_text(mud), *(_force_text(forces[stroke], misfits[stroke]) for stroke in STROKES)])
+        rows.append([mud, *(_force_text(forces[stroke], misfits[stroke]) for stroke in STROKES)])
     rows.append(["authors' logs", *(f"{low:g} to {high:g}" for low, high in AUTHORS_N.values())])
     return rows
 
@@ -125,17 +133,17 @@ def _strides(firsts: Mapping[str, Entry], configuration: Configuration, method: 
     figures = [
         Figure(
             f"figure4_{file_name(mud)}",
-            f"Figure 4 of the paper, mud {mud_text(mud)}. {law}",
+            f"Figure 4 of the paper, mud {mud_text(mud)}.",
             partial(plot_stride, trial, configuration.geometry, method),
         )
         for mud, trial in firsts.items()
     ]
-    return Section("Strides", figures=figures)
+    return Section("Strides", law, figures=figures)
 
 
 def text_of(report: Mapping[str, Any]) -> list[tuple[str, Sequence[Sequence[str]]]]:
     """Titles and tables for the screen."""
-    heading = [SCATTER, *doubts(report["settings"])]
+    heading = [f"Coefficients, {SCATTER}.", *doubts(report["settings"])]
     tables: list[tuple[str, Sequence[Sequence[str]]]] = [("\n".join(heading), mud_rows(report["muds"]))]
     if report["errors"]:
         tables.append(

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import re
+
+WATER = re.compile(r"(?:w\s*=?\s*)?(\d+(?:\.\d+)?)\s*%?")  # 47.6, 47.6%, w47.6 or w = 47.6 %
+
 
 def mud_name(name: str) -> str:
-    """However a water content is written: 47.6, w = 47.6 % or 47.6%."""
-    return name.removeprefix("w").replace("=", "").replace("%", "").strip() or name
+    """However a water content is written, its number; any other name as it is."""
+    water = WATER.fullmatch(name.strip())
+    return water[1] if water else name.strip() or name
 
 
 def mud_label(name: str) -> str:
     """For a table's head or an axis."""
-    return f"w = {name} %" if name[-1:].isdigit() else name
+    return f"w = {name} %" if WATER.fullmatch(name) else name
 
 
 def mud_text(name: str) -> str:
     """Within a sentence; some say where they lie."""
     mud, _, place = name.partition(" at ")
-    return f"{mud} %{' at ' if place else ''}{place}" if mud[-1:].isdigit() else name
+    return f"{mud} %{' at ' if place else ''}{place}" if WATER.fullmatch(mud) else name

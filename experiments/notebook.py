@@ -28,10 +28,12 @@ class Notebook:
         self.path = folder / NAME
         self.plan = json.loads(json.dumps(plan))  # as it reads back
         self.entries: dict[str, Entry] = {}
-        if self.path.exists():
-            self._read()
-        else:
+        contents = self.path.read_bytes() if self.path.exists() else b""
+        if _is_unbegun(contents):
+            self.path.write_bytes(b"")
             self._append({"plan": self.plan})
+        else:
+            self._read(contents)
 
     @property
     def begun(self) -> bool:
@@ -53,9 +55,8 @@ class Notebook:
             file.flush()
             os.fsync(file.fileno())
 
-    def _read(self) -> None:
-        contents = self.path.read_bytes()
-        if contents and not contents.endswith(b"\n"):
+    def _read(self, contents: bytes) -> None:
+        if not contents.endswith(b"\n"):
             with self.path.open("ab") as file:
                 file.write(b"\n")  # what comes next begins a line
         lines = [line for line in map(_decode, contents.splitlines()) if line is not None]
@@ -85,6 +86,12 @@ class Notebook:
 def anything_measured(folder: Path) -> bool:
     """In a notebook of the folder or below: behind its plan there is a line."""
     return any(notebook.read_bytes().count(b"\n") > 1 for notebook in folder.rglob(NAME))
+
+
+def _is_unbegun(contents: bytes) -> bool:
+    """No line behind a plan, nor a whole one where the disk was full: it may as well be another plan's."""
+    plan, _, rest = contents.partition(b"\n")
+    return not rest.strip() and (not plan.strip() or plan.startswith(b'{"plan"'))
 
 
 def _decode(line: bytes) -> Entry | None:

@@ -24,7 +24,19 @@ SIMULATED_DRAG = (
     "mud's own, whose coefficients fall with depth: at 5 cm the load cell reads 0.6 of the k_s and 0.75 of the k_p "
     "that it reads at 3 cm. So each stride stands beside a load cell at its own depth."
 )
-SCATTER = "± is the standard error of the mean, and cv the variation, by the scatter of the strides of all walks"
+SCATTER = (
+    "± is the standard error of the mean, and cv the coefficient of variation, by the scatter of the strides of all "
+    "walks"
+)
+FELT = "Where the mud bears more than the body's drag, the flipper feels that drag and not the mud's strength."
+METHODS = (
+    "In brackets the bias, and how many strides told a bound (≥) or nothing. default: the daemon's own. paper: the "
+    "published method, whose surface is where f_z passes 0.5 N; compensated: with half of the body's drag added while "
+    "the body advances. paper's law: the published law of shear below the surface that the default method finds, and "
+    "the same with that drag."
+)
+ERRORS = "Median error of single strides"
+FINDINGS = "The paper's findings, ours by its law below the default method's surface"
 Tables = list[tuple[str, Sequence[Sequence[str]]]]
 
 
@@ -36,9 +48,11 @@ def sections_of(
     truth: TruthOfMud | None,
 ) -> list[Section]:
     sections = [_walk_section(report, plan, entries, configuration, truth)]
-    sections += [_soft_section(soft, plan, entries) for soft in report["soft"] if soft["depths"]]
-    for heading, rows in text_of(report)[1:]:
-        sections.append(Section(heading, rows=rows))
+    walked = [soft for soft in report["soft"] if soft["depths"]]
+    sections += [_soft_section(soft, plan, entries, is_first=soft is walked[0]) for soft in walked]
+    if report["errors"]:
+        sections.append(Section(ERRORS, METHODS, rows=error_text_rows(report["errors"])))
+    sections.append(Section(FINDINGS, rows=paper_rows(report)))
     remarks = "\n\n".join(f"{remark}." for remark in report["remarks"])
     return sections + ([Section("What was remarked", remarks)] if remarks else [])
 
@@ -85,7 +99,8 @@ def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
     return "\n\n".join([*paragraphs, report["missing_truth"]])
 
 
-def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Entry]) -> Section:
+def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Entry], is_first: bool) -> Section:
+    """What all soft muds have in common is said of the first."""
     from experiments.walk_mapping_plots import plot_soft
 
     mud = soft["mud"]
@@ -96,8 +111,7 @@ def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Ent
         "surface of soft mud too deep: the surface is the default method's."
     )
     draw = partial(plot_soft, soft, {depth: told for depth, told in walks.items() if told})
-    text = "Where the mud bears more than the body's drag, the flipper feels that drag and not the mud's strength."
-    text += SIMULATED_DRAG if plan.simulated else ""
+    text = (FELT + SIMULATED_DRAG * plan.simulated) * is_first
     name = f"figure7_{file_name(mud)}"
     return Section(f"Soft mud, {mud_text(mud)}", text, figures=[Figure(name, caption, draw)])
 
@@ -107,13 +121,8 @@ def text_of(report: Mapping[str, Any]) -> Tables:
     heading = "\n".join([f"Coefficients, {SCATTER}.", *doubts(report["settings"])])
     tables: Tables = [(heading, mud_rows(report["muds"]))]
     if report["errors"]:
-        tables.append(
-            (
-                "Median error of single strides (bias); how many told a bound (≥), or nothing",
-                error_text_rows(report["errors"]),
-            )
-        )
-    return [*tables, ("The paper's findings, ours by its law with the surface known", paper_rows(report))]
+        tables.append((f"{ERRORS}. {METHODS}", error_text_rows(report["errors"])))
+    return [*tables, (FINDINGS, paper_rows(report))]
 
 
 def paper_rows(report: Mapping[str, Any]) -> list[list[str]]:

@@ -31,9 +31,9 @@ METHOD_LOOKS: dict[str, dict[str, Any]] = {
     COMPENSATED: {"color": "tab:orange", "marker": "+"},
 }
 BARS = {
-    KNOWN: ("paper's law\nas measured", "tab:red"),
-    KNOWN_COMPENSATED: ("paper's law\ndrag added", "tab:green"),
-    DEFAULT: ("default\nmethod", "tab:blue"),
+    KNOWN: ("paper's law", None),  # in the colour of its depth, as in the paper
+    KNOWN_COMPENSATED: ("paper's law\nwith drag", "tab:green"),
+    DEFAULT: ("default", "tab:purple"),
 }
 LEGEND: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "fontsize": "small", "frameon": False}
 HEADROOM = 2.0  # of the largest true or own value: what lies higher is drawn at the edge
@@ -182,7 +182,8 @@ def _plot_bars(panel: Axes, soft: Mapping[str, Any]) -> None:
     names: list[str] = []
     for method, (words, colour) in BARS.items():
         for each in deepest_first[:1] if method == KNOWN_COMPENSATED else deepest_first:
-            _plot_bar(panel, len(names), each["k_s"].get(method), colour)
+            own = DEPTH_LOOKS.get(each["depth_cm"], {"color": INK})["color"]
+            _plot_bar(panel, len(names), each["k_s"].get(method), colour or own)
             names.append(f"{words}\n{each['depth_cm']:g} cm")
     for each in deepest_first:
         told = None if each["truth"] is None else {"value": each["truth"], "cv": None, "at_least": False}

@@ -181,7 +181,7 @@ def _soft_beside_paper(
     return [
         _finding(f"k_s over the load cell's at 3 cm, {at_3}", "close to 1", _ratio(soft, at_3, cell=cell)),
         _finding(f"k_s over the load cell's at 3 cm, {at_5}", "0.5", _ratio(soft, at_5, cell=cell)),
-        _finding(f"k_s over the load cell's at 3 cm, {at_5}, drag added", "better", added),
+        _finding(f"k_s over the load cell's at 3 cm, {at_5}, with drag", "better", added),
         _finding(f"k_s over the load cell's at 5 cm, {at_5}", "-", _ratio(soft, at_5)),
         _finding(f"thrust of both flippers in stance, {at_5} (N)", f"{PAPER_DRAG_N:g}", thrust_n),
     ]

@@ -21,6 +21,7 @@ from experiments.walk import EXTRACTION, SLIPPAGE  # noqa: E402
 
 COLOURS = {"3 cm": "tab:green", "5 cm": "tab:orange", ADAPTIVE: "tab:blue"}  # as in the paper
 OTHERS = ("tab:red", "tab:purple", "tab:brown")
+LINES, DOTS = ("-", "--", "-.", ":"), ("o", "s", "D", "^", "P", "*")  # of the gaits, for print without colours
 MUD_SHADES = ("#e9dfd0", "#f6f1e8", "#d8c7ad")
 MARKS = {SLIPPAGE: "v", EXTRACTION: "X"}
 METHOD_COLOURS = ("white", "tab:red", "tab:cyan", "tab:pink")
@@ -62,14 +63,22 @@ def _plot_steps(panel: Axes, report: dict[str, Any], colours: Mapping[str, str])
 def _plot_walks(panel: Axes, report: dict[str, Any], colours: Mapping[str, str], figure: str) -> None:
     """The first of each gait."""
     _shade_muds(panel, report)
-    for rule, colour in colours.items():
+    for look, rule in zip(_looks(colours), colours, strict=True):
         for walk in report["walks"][rule][:1]:  # none where every trial was left out
-            _plot_walk(panel, walk, figure, colour)
+            _plot_walk(panel, walk, figure, look)
 
 
 def _colours(rules: Sequence[str]) -> dict[str, str]:
     others = iter(OTHERS * len(rules))
     return {rule: COLOURS[rule] if rule in COLOURS else next(others) for rule in rules}
+
+
+def _looks(colours: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Of each gait's line and dots, in their order."""
+    return [
+        {"color": colour, "linestyle": LINES[i % len(LINES)], "marker": DOTS[i % len(DOTS)], "markersize": 4.0}
+        for i, colour in enumerate(colours.values())
+    ]
 
 
 def _mud_regions(report: dict[str, Any]) -> list[tuple[str, float, float]]:
@@ -92,37 +101,39 @@ def _name_muds(panel: Axes, report: dict[str, Any]) -> None:
         panel.text((begin_cm + end_cm) / 2.0, 0.97, mud_label(mud), transform=high, ha="center", va="top", color=TEXT)
 
 
-def _plot_walk(panel: Axes, strides: Sequence[Mapping[str, Any]], figure: str, colour: str) -> None:
+def _plot_walk(panel: Axes, strides: Sequence[Mapping[str, Any]], figure: str, look: Mapping[str, Any]) -> None:
     places = [stride["place_cm"] for stride in strides]
-    panel.plot(places, [stride[figure] for stride in strides], "-o", color=colour, markersize=3.5, linewidth=1.4)
+    panel.plot(places, [stride[figure] for stride in strides], linewidth=1.4, **look)
     for failure, mark in MARKS.items():
         failed = [stride for stride in strides if stride["failure"] == failure]
         xs, ys = [stride["place_cm"] for stride in failed], [stride[figure] for stride in failed]
-        panel.plot(xs, ys, mark, color=colour, markeredgecolor="black", markeredgewidth=0.6, markersize=7)
+        panel.plot(xs, ys, mark, color=look["color"], markeredgecolor="black", markeredgewidth=0.6, markersize=7)
 
 
 def _legend(colours: Mapping[str, str], report: dict[str, Any]) -> list[Line2D]:
-    handles = [Line2D([], [], color=colour, marker="o", markersize=3.5, label=rule) for rule, colour in colours.items()]
+    handles = [Line2D([], [], label=rule, **look) for rule, look in zip(colours, _looks(colours), strict=True)]
     names = {stride["failure"] for trials in report["walks"].values() for trial in trials[:1] for stride in trial}
-    look: dict[str, Any] = {"color": "lightgrey", "markeredgecolor": "black", "linestyle": ""}
-    return handles + [Line2D([], [], marker=mark, label=name, **look) for name, mark in MARKS.items() if name in names]
+    failed: dict[str, Any] = {"color": "lightgrey", "markeredgecolor": "black", "linestyle": ""}
+    return handles + [
+        Line2D([], [], marker=mark, label=name, **failed) for name, mark in MARKS.items() if name in names
+    ]
 
 
 def _plot_speeds(panel: Axes, report: dict[str, Any], colours: Mapping[str, str]) -> None:
     """Bars are the paper's, dots ours; whiskers one standard deviation of each."""
     muds, width = list(report["settings"]["mud_length_cm"]), 0.8 / len(colours)
-    for i, (rule, colour) in enumerate(colours.items()):
+    for i, (rule, look) in enumerate(zip(colours, _looks(colours), strict=True)):
         places = [mud + (i - (len(colours) - 1) / 2.0) * width for mud in range(len(muds))]
         paper = report["paper"].get(rule) or {}
         _plot_paper(panel, places, [paper.get(mud) for mud in muds], 0.92 * width)
-        _plot_ours(panel, places, [report["table"][rule][mud] for mud in muds], colour)
+        _plot_ours(panel, places, [report["table"][rule][mud] for mud in muds], look)
     best_depths = report.get("best_constant_depth", {})
     for mud, best in enumerate(best_depths.values()):
         panel.hlines(best["mean"], mud - 0.42, mud + 0.42, color=TEXT, linewidth=1.0, linestyle=":")
     panel.set_xticks(range(len(muds)), [mud_label(mud) for mud in muds])
     panel.set_ylim(0.0, max(panel.get_ylim()[1], 9.0))
     panel.set_ylabel("speed (cm/s)")
-    panel.set_title("Table I: the paper's (grey bars), ours (dots)", fontsize="medium")
+    panel.set_title("Table I: the paper's (grey bars), ours (dots), ± sd", fontsize="medium")
     if best_depths:
         dots = Line2D([], [], color=TEXT, linestyle=":", label="best constant depth")
         panel.legend(handles=[dots], fontsize="small", loc="upper right")
@@ -136,10 +147,12 @@ def _plot_paper(panel: Axes, places: Sequence[float], cells: Sequence[Mapping[st
                   color="0.85", edgecolor="0.6", ecolor="0.5", capsize=3)  # fmt: skip
 
 
-def _plot_ours(panel: Axes, places: Sequence[float], cells: Sequence[Mapping[str, Any]], colour: str) -> None:
+def _plot_ours(
+    panel: Axes, places: Sequence[float], cells: Sequence[Mapping[str, Any]], look: Mapping[str, Any]
+) -> None:
     reached = [(place, cell) for place, cell in zip(places, cells, strict=True) if cell["mean"] is not None]
     panel.errorbar([place for place, _ in reached], [cell["mean"] for _, cell in reached],
-                   yerr=[cell["sd"] or 0.0 for _, cell in reached], fmt="o", color=colour,
+                   yerr=[cell["sd"] or 0.0 for _, cell in reached], fmt=look["marker"], color=look["color"],
                    markeredgecolor="black", markeredgewidth=0.6, markersize=7, capsize=3)  # fmt: skip
 
 

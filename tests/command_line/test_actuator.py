@@ -60,6 +60,7 @@ def test_one_command_calibrates_a_motor_and_changes_a_copy_of_the_configuration(
     assert "+torque_constant_nm_a" in said.err
     assert {path.name for path in tmp_path.iterdir()} >= {"report.html", "summary.json", "torques.png", "errors.png"}
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Actuator calibration (simulated)" in page and "true k_t, N·m/A</th>" in page
     assert "What to set where" in page and "data:image/png;base64" in page
 
     assert joint["torque_constant_error_nm_a"] > joint["torque_constant_tolerance_nm_a"] > 0.0
@@ -195,9 +196,9 @@ def test_a_doubtful_constant_is_not_written_and_a_good_one_is(tmp_path: Path, ex
     path.write_text(example_text, encoding="utf-8")
     doubtful, good = (fit_joint("right_sweep", plan, made_entries(plan, noise_a=noise), 0.083) for noise in (3.0, 0.02))
     assert doubtful is not None and good is not None
-    assert "needs no change" in applied(path, [doubtful], made_desk(tmp_path, told))
+    assert "needs no change" in applied(path, [doubtful], made_desk(tmp_path, told))[0]
     assert "is not written" in told[0] and path.read_text(encoding="utf-8") == example_text
-    assert "is changed" in applied(path, [good], made_desk(tmp_path, told))
+    assert "is changed" in applied(path, [good], made_desk(tmp_path, told))[0]
     assert "+torque_constant_nm_a = 0.07" in told[-1]
     written = load_configuration(path)
     assert written.drive["right_sweep"].torque_constant_nm_a == pytest.approx(0.0719, abs=0.001)
@@ -211,5 +212,6 @@ def test_what_cannot_be_applied_costs_no_report(tmp_path: Path, example_text: st
     entries = {key: entry | {"current_a": 2.0 * entry["current_a"]} for key, entry in made_entries(plan).items()}
     fit = fit_joint("right_sweep", plan, entries, 0.083)
     assert fit is not None
-    told = applied(path, [fit], made_desk(tmp_path, []))
+    told, status = applied(path, [fit], made_desk(tmp_path, []))
     assert told.startswith("nothing was applied: the configuration stays as it is") and "current_limit_a" in told
+    assert "run the same command again" in told and status == exit_codes.REFUSED

@@ -108,7 +108,7 @@ def test_it_ends_in_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str])
 
 def test_json_alone_goes_to_standard_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     conduct_bench(options(tmp_path, json=True), "trials", found)
-    assert json.loads(capsys.readouterr().out) == {"experiment": "trial", "value": 1.0}
+    assert json.loads(capsys.readouterr().out) == {"experiment": "trial", "value": 1.0, "simulated": True}
 
 
 def test_without_a_folder_it_makes_one_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -168,7 +168,7 @@ def test_a_disk_that_is_full_is_told_with_how_to_go_on(tmp_path: Path, capsys: p
 
 
 def test_another_plan_is_not_told_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    Notebook(tmp_path, {"depth_m": 0.03})
+    Notebook(tmp_path, {"depth_m": 0.03}).write("one", {})
 
     def run(desk: Desk) -> Finding:
         Notebook(desk.folder, {"depth_m": 0.05})

@@ -8,12 +8,13 @@ from typing import Any
 
 import pytest
 
-from command_line import exit_codes, operation
+from command_line import bench, exit_codes, operation
 from command_line.main import main
 from command_line.screen import number
 from control.records import JOINTS
 from firmware_host import daemon
 from firmware_host.status_client import DroppedError
+from tests.command_line.command_lines import failure, refusal
 
 NO_SOCKET = Namespace(socket=Path("/none"), json=False, config=Path("/none.toml"))
 
@@ -97,3 +98,30 @@ def test_a_status_before_all_drives_are_heard_names_those_that_are_not() -> None
 @pytest.mark.parametrize(("value", "text"), [(-0.0001, "0.000"), (-0.0, "0.000"), (-0.001, "-0.001"), (None, "-")])
 def test_a_zero_has_no_sign(value: float | None, text: str) -> None:
     assert number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("actuator", "--lever", "12cm"), "12cm: must be from 1 to 100 cm"),
+        (("loadcell", "--scale", "many"), "many: must be more than 0"),
+        (("loadcell", "--plate", "3x"), "3x: width and height must be from"),
+        (("flipper", "--depth", "deep"), "deep: must be more than 0 and at most 20 cm"),
+        (("trackway", "--mud", "48.5=long"), "48.5=long: must be a mud and its length"),
+        (("walk", "--out", __file__), "is no folder"),
+    ],
+)
+def test_what_is_no_number_or_no_folder_is_refused_in_words(
+    arguments: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert said in refusal(capsys, "experiment", *arguments)
+
+
+@pytest.mark.parametrize("experiment", ["actuator", "loadcell", "flipper", "walk", "trackway"])
+def test_where_no_picture_can_be_drawn_nothing_is_measured(
+    experiment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(bench, "find_spec", lambda name: None)
+    arguments = ("experiment", experiment, "--simulated", "--out", str(tmp_path / "none"))
+    assert "extra 'plots'" in failure(capsys, *arguments)
+    assert not (tmp_path / "none").exists()

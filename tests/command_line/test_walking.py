@@ -18,7 +18,7 @@ from experiments.one_mud import constant_walks
 from experiments.paper_table import ADAPTIVE
 from experiments.walk import Walk, WalkedStride
 from simulation.clay import MUDS
-from tests.command_line.command_lines import refusal
+from tests.command_line.command_lines import failure, refusal
 
 MODULES = {"trackway": trackway, "sweep": depth_sweep, "mud-fit": mud_fit}
 NAMES = list(MODULES)
@@ -86,8 +86,9 @@ def test_a_place_that_cannot_be_written_is_noticed_before_the_work(
     name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, no_walks: None
 ) -> None:
     (tmp_path / "file").write_text("")
-    assert main(["experiment", name, "--simulated", "--out", str(tmp_path / "file")]) == exit_codes.UNHEALTHY
-    assert "file: File exists" in capsys.readouterr().err
+    assert "file: is no folder" in refusal(capsys, "experiment", name, "--simulated", "--out", str(tmp_path / "file"))
+    below = str(tmp_path / "file" / "below")
+    assert "file/below: Not a directory" in failure(capsys, "experiment", name, "--simulated", "--out", below)
 
 
 # what is planned
@@ -153,7 +154,8 @@ def run_fit(plan: mud_fit.Plan, show: Callable[[int, int], None]) -> dict[str, A
 
 
 @pytest.fixture
-def made_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)  # results go to a folder here unless another is named
     for module, run in ((trackway, run_trackway), (depth_sweep, run_sweep), (mud_fit, run_fit)):
         monkeypatch.setattr(module, "run", run)
 
@@ -175,6 +177,11 @@ def test_json_is_one_object_and_is_written_too(
 def test_the_walks_are_drawn(name: str, tmp_path: Path, made_up: None) -> None:
     assert main(["experiment", name, "--simulated", "--out", str(tmp_path)]) == exit_codes.OK
     assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_simulated_trackway_leaves_a_page_that_says_so_also_where_no_folder_is_named(made_up: None) -> None:
+    assert main(["experiment", "trackway", "--simulated"]) == exit_codes.OK
+    assert "Table I of the paper (simulated)</h1>" in Path("mudskipper-trackway/report.html").read_text("utf-8")
 
 
 def test_the_trackways_json_has_the_promised_keys(capsys: pytest.CaptureFixture[str], made_up: None) -> None:
@@ -223,7 +230,7 @@ def test_a_person_gets_fitted_beside_present_values(capsys: pytest.CaptureFixtur
     [
         (("--compartment", "0.5"), "--compartment is for --simulated"),
         (("--simulated", "--mud", "48.5"), "--mud is for a real trackway"),
-        (("--mud", "48.5=5"), "a length from 20 to 10000 cm"),
+        (("--mud", "48.5=5"), "its length from 20 to 10000 cm"),
     ],
 )
 def test_muds_and_their_lengths_are_given_where_they_count(

@@ -113,3 +113,8 @@ def test_without_permission_the_group_is_named(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(serial, "Serial", refuse)
     with pytest.raises(SerialLineError, match="dialout"):
         open_serial("/dev/ttyUSB0", 9600)
+
+
+def test_a_folder_is_no_serial_port(tmp_path: Path) -> None:
+    with pytest.raises(SerialLineError, match="is no serial port: "):
+        open_serial(str(tmp_path), 9600)

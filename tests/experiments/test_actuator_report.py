@@ -27,7 +27,7 @@ def test_the_paper_s_numbers_stand_below_those_of_its_own_definition() -> None:
 def test_friction_comes_with_its_doubt_and_what_rest_shows_without() -> None:
     head, row = friction_table_of([made_fit(made_entries())])
     assert "±" in row[head.index("dry friction, N·m")] and "±" in row[head.index("viscous, N·m·s")]
-    assert "±" not in row[head.index("at rest at least")] and len(row) == len(head)
+    assert "±" not in row[head.index("at rest at least, N·m")] and len(row) == len(head)
 
 
 def test_it_is_told_how_true_lever_and_weights_were_taken_to_be() -> None:

@@ -49,9 +49,16 @@ def test_a_line_that_was_cut_off_costs_itself_alone(tmp_path: Path, cut: int) ->
     assert set(Notebook(tmp_path, PLAN).entries) == set(again.entries) >= {"10 g", "50 g"}
 
 
-@pytest.mark.parametrize("contents", ["", "\n", "hello\n", "[1]\n", '{"key": "10 g", "entry": {}}\n'])
+@pytest.mark.parametrize("contents", ["hello\n", "\nhello\n", "[1]\n", '{"key": "10 g", "entry": {}}\n'])
 def test_a_file_that_is_no_notebook_is_left_alone(tmp_path: Path, contents: str) -> None:
     (tmp_path / NAME).write_text(contents, encoding="utf-8")
     with pytest.raises(NotebookError, match="no notebook of an experiment; choose another folder"):
         Notebook(tmp_path, PLAN)
     assert (tmp_path / NAME).read_text(encoding="utf-8") == contents
+
+
+@pytest.mark.parametrize("left", ["", "\n", '{"plan": {"wei', '{"plan": {"joint": "left_sweep"}}\n'])
+def test_where_nothing_was_measured_another_plan_may_begin(tmp_path: Path, left: str) -> None:
+    (tmp_path / NAME).write_text(left, encoding="utf-8")
+    Notebook(tmp_path, PLAN).write("10 g", {"torque_nm": 0.1})
+    assert Notebook(tmp_path, PLAN).entries == {"10 g": {"torque_nm": 0.1}}

@@ -1,0 +1,16 @@
+"""A water content is told as one, however it is written; a name that a person gave a mud is left alone."""
+
+from __future__ import annotations
+
+import pytest
+
+from experiments.mud_names import mud_label, mud_name, mud_text
+
+
+@pytest.mark.parametrize("name", ["wet", "w", "bay=3", "watery clay", "kaolin 2", "1500 Pa"])
+def test_a_persons_name_for_a_mud_stays_as_it_is(name: str) -> None:
+    assert mud_name(name) == mud_label(name) == mud_text(name) == name
+
+
+def test_only_a_water_content_gets_a_percent_sign() -> None:
+    assert (mud_label("47.6"), mud_text("47.6"), mud_text("47.6 at 3 cm")) == ("w = 47.6 %", "47.6 %", "47.6 % at 3 cm")
