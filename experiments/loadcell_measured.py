@@ -19,6 +19,7 @@ from experiments.loadcell_fits import (
     RESIDUAL_NOISES,
     RESIDUAL_SHARE,
     SHEAR,
+    SHIFT,
     Analysed,
     Coefficient,
     Recorded,
@@ -52,7 +53,7 @@ def _insertion(trial: Recorded, placed: PlacedCourse, expected: Alignment) -> An
         unsure_m = hypot(unsure_m, motion.mean_speed_m_s * motion.alignment.lag_doubt_s)
         to_m = (1.0 - REVERSAL_SHARE) * motion.deepest_m
         told["k_e"] = _slope(motion, settings, motion.up_level_n - course.forces_n, motion.up, to_m, unsure_m)
-        extraction = Extraction(motion.lift_s, motion.out_s, motion.up_level_n)
+        extraction = Extraction(motion.lift_s, motion.out_s, motion.up_level_n, nan)
     else:
         told["k_e"], remark = NOT_KNOWN, "no extraction: the encoder did not see the plate come up. Was it drawn out?"
     return Analysed(
@@ -74,8 +75,7 @@ def _slope(
     """From the surface to `to_m`, every piece of way alike wherever the hand has rested."""
     order = np.flatnonzero(chosen)[np.argsort(motion.depths_m[chosen], kind="stable")]
     depths_m, told_n = motion.depths_m[order], forces_n[order] / motion.grips[order]
-    ways_m = np.clip(np.gradient(depths_m), 1e-9, None)
-    doubt = slope(settings, depths_m, told_n, ways_m, 1.5 * unsure_m / motion.deepest_m).std_error
+    doubt = slope(settings, depths_m, told_n, to_m, SHIFT * unsure_m / to_m).std_error
     even_m = to_m * (np.arange(EVEN_DEPTHS) + 0.5) / EVEN_DEPTHS
     even_n = np.interp(even_m, np.append(0.0, depths_m), np.append(0.0, told_n))
     last = depths_m > depths_m[-1] - LAST_SHARE * to_m
