@@ -32,9 +32,15 @@ KNOWN_BIAS = (
 )
 WRONG_CONSTANTS = (
     "Each simulated motor's torque constant is another than the configuration has, by a draw of 3.2 %, as the paper's "
-    "were. All that a joint tells is off by that in the same way, which the scatter of trials cannot show."
+    "were. All that a joint tells is off by that in the same way: the second ± holds it, the first cannot show it."
 )
-SCATTER = "Coefficients, ± standard error of the mean by the scatter of trials; of a single trial, what its fit doubts."
+DOUBTS = (
+    "The first ± is one standard error by the scatter of the trials, the second what all of them have alike: torque "
+    "constants to 3.2 %, the face's load, zero and surface, as far as the daemon doubts them. Two of both together hold "
+    "what a load cell reads on the flipper's own way in about 19 of 20 cases; muds of one robot differ beside the first "
+    "alone. Of a single trial there is one ±, of everything."
+)
+SCATTER = f"Coefficients. {DOUBTS}"
 MODELLED = (
     "Dashed: the forces by the fitted coefficients, where each is fitted. The default method's laws tell a joint's "
     "torque; it takes the place of the measured one, and goes with the other joint's measured torque through the map "
@@ -81,7 +87,7 @@ def _told(report: Mapping[str, Any]) -> str:
     for name, shares in later.items():
         strokes = ", ".join(f"{100.0 * share:.0f} %" for share in shares)
         paragraphs.append(f"{name} of later strides in the same hole, of the first one's: {strokes}.")
-    return "\n\n".join([*paragraphs, *doubts(report["settings"])])
+    return "\n\n".join([*paragraphs, DOUBTS, *doubts(report["settings"])])
 
 
 def doubts(settings: Mapping[str, Any]) -> list[str]:

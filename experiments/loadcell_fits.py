@@ -88,7 +88,7 @@ class Analysed:
     coefficients: Mapping[str, Coefficient] = field(default_factory=dict)
     problem: str = ""  # why there is no coefficient
     remark: str = ""
-    shared_doubt: float = 0.0  # of the speed, as a share, which all trials of a stage have alike
+    shared_doubt: float = 0.0  # of speed, lag or rate, as a share, which all trials of a stage have alike
     places_m: Array | None = None  # depths of an insertion, ways of a shear, as an encoder measured them
     place_error_m: float = 0.0  # of them, one standard error
     alignment: Alignment | None = None  # of an encoder and the cell
@@ -241,7 +241,7 @@ def of_mud(trials: Sequence[Analysed], name: str, bench: float) -> OfMud:
     values = [each.value for each in told]
     mean, own = fmean(values), sqrt(fmean([each.std_error**2 for each in told]) / len(told))
     scatter = stdev(values) if len(values) > 1 else nan
-    doubt = max(own, scatter / sqrt(len(values))) if len(values) > 1 else own
+    doubt = max(own, student_factor(len(values) - 1) * scatter / sqrt(len(values))) if len(values) > 1 else own
     return OfMud(mean, hypot(doubt, shared * mean), tuple(values), scatter / mean, bench * mean)
 
 
