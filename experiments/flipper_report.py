@@ -35,10 +35,10 @@ WRONG_CONSTANTS = (
     "were. All that a joint tells is off by that in the same way: the second ± holds it, the first cannot show it."
 )
 DOUBTS = (
-    "The first ± is one standard error by the scatter of the trials, the second what all of them have alike: torque "
-    "constants to 3.2 %, the face's load, zero and surface, as far as the daemon doubts them. Two of both together hold "
-    "what a load cell reads on the flipper's own way in about 19 of 20 cases; muds of one robot differ beside the first "
-    "alone. Of a single trial there is one ±, of everything."
+    "The first ± is one standard error by the scatter of the trials, the second what all of them have alike as far as "
+    "the daemon doubts it: torque constants (3.2 %), the face's load, zero, surface. Two of both together hold what a "
+    "load cell reads on the flipper's own way in 19 of 20 cases or more; beside one another, muds of one robot differ by "
+    "the first alone. A single trial has one ±, of everything."
 )
 SCATTER = f"Coefficients. {DOUBTS}"
 MODELLED = (

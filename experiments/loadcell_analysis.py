@@ -41,7 +41,9 @@ def _again_by_place(first: Sequence[Analysed], settings: StageSettings) -> list[
     pace = wide_pace(settings)
     again = [analyse_trial(told.recorded, settings, pace, common) if told.is_measured else told for told in first]
     return [
-        replace(told, shared_doubt=hypot(told.shared_doubt, _of_lag(told, common, settings))) if told.is_measured else told
+        replace(told, shared_doubt=hypot(told.shared_doubt, _of_lag(told, common, settings)))
+        if told.is_measured
+        else told
         for told in again
     ]
 

@@ -7,8 +7,9 @@
 V is the submerged volume of the upright plate and ∫ζ dA the first moment of its face (control/plate.py). What the mud
 bears less while the stage slows down is added back, so a coefficient belongs to the speed of the stage.
 
-The doubt of one trial holds that of speed, surface and samples, and what the law leaves over. A mud has two: that of
-its trials, which is their scatter or their own doubt where that is more, and that of the bench, which no trial shows.
+The doubt of one trial holds that of speed, surface and samples. What the law leaves over of the mud's course is none:
+another trial leaves the same. A mud has two doubts: that of its trials, which is their scatter or their own doubt where
+that is more, and that of the bench, which no trial shows.
 """
 
 from __future__ import annotations

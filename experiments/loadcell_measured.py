@@ -80,8 +80,8 @@ def _slope(
     unsure_m: float,
     rates: Array,
 ) -> Coefficient:
-    """From the surface to `to_m`, every piece of way alike wherever the hand has rested. `rates`: what the mud's bearing
-    at each sample's speed is in doubt by, as a share.
+    """From the surface to `to_m`, every piece of way alike wherever the hand has rested. `rates`: shares by which it is
+    in doubt what the mud bears at each sample's speed.
     """
     order = np.flatnonzero(chosen)[np.argsort(motion.depths_m[chosen], kind="stable")]
     depths_m, told_n = motion.depths_m[order], forces_n[order] / motion.grips[order]

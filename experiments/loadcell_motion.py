@@ -263,7 +263,9 @@ def _fit_out(left_s: Array, forces_n: Array, pace: Pace, depth_m: float) -> _Out
 def _chain(left_s: Array, pace: Pace, depth_m: float) -> Array:
     """Columns: a level, and one line after the other."""
     wet_m = np.clip(descent(left_s, pace.speed_m_s, pace.acceleration_m_s2, depth_m)[0], 0.0, None)
-    return np.stack([np.ones_like(wet_m), *(np.interp(wet_m, depth_m * KNOTS, unit) for unit in np.eye(len(KNOTS))[1:])], 1)
+    return np.stack(
+        [np.ones_like(wet_m), *(np.interp(wet_m, depth_m * KNOTS, unit) for unit in np.eye(len(KNOTS))[1:])], 1
+    )
 
 
 def find_shear(course: Course, settings: StageSettings, zero_n: float) -> Shear:
