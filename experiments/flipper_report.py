@@ -36,9 +36,9 @@ WRONG_CONSTANTS = (
 )
 DOUBTS = (
     "The first ± is one standard error by the scatter of the trials, the second what all of them have alike as far as "
-    "the daemon doubts it: torque constants (3.2 %), the face's load, zero, surface. Two of both together hold what a "
-    "load cell reads on the flipper's own way in 19 of 20 cases or more; beside one another, muds of one robot differ by "
-    "the first alone. A single trial has one ±, of everything."
+    "the daemon doubts it: torque constants (3.2 %), the face's load, zero, surface. Two of both together hold what "
+    "a load cell reads on the flipper's own way in 19 of 20 cases or more; to tell muds of one robot apart the first "
+    "alone counts. A single trial has one ±, of everything."
 )
 SCATTER = f"Coefficients. {DOUBTS}"
 MODELLED = (

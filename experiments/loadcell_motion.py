@@ -250,22 +250,24 @@ class _OutFit(NamedTuple):
 
 
 def _fit_out(left_s: Array, forces_n: Array, pace: Pace, depth_m: float) -> _OutFit:
-    window = (_chain(left_s, pace, depth_m)[:, -1] < 1.0) & (left_s > -AFTER_OUT_S)
-    y, columns = forces_n[window], _chain(left_s[window], pace, depth_m)
+    depths_m, sooner_m = (
+        descent(each_s, pace.speed_m_s, pace.acceleration_m_s2, depth_m)[0]
+        for each_s in (left_s, left_s + DIFFERENCE_S)
+    )
+    window = (depths_m <= (1.0 - REVERSAL_SHARE) * depth_m) & (left_s > -AFTER_OUT_S)
+    y, columns = forces_n[window], _chain(depths_m[window], depth_m)
     factors = np.linalg.lstsq(columns, y, rcond=None)[0]
     square = float(np.mean((columns @ factors - y) ** 2))
-    later = (_chain(left_s[window] + DIFFERENCE_S, pace, depth_m) - columns) @ factors / DIFFERENCE_S
+    later = (_chain(sooner_m[window], depth_m) - columns) @ factors / DIFFERENCE_S
     slopes = np.column_stack([later, columns])
     variance = square * len(y) / max(len(y) - slopes.shape[1], 1)
     return _OutFit(square, float(factors[0]), float(np.sqrt(variance * np.linalg.pinv(slopes.T @ slopes)[0, 0])))
 
 
-def _chain(left_s: Array, pace: Pace, depth_m: float) -> Array:
+def _chain(depths_m: Array, depth_m: float) -> Array:
     """Columns: a level, and one line after the other."""
-    wet_m = np.clip(descent(left_s, pace.speed_m_s, pace.acceleration_m_s2, depth_m)[0], 0.0, None)
-    return np.stack(
-        [np.ones_like(wet_m), *(np.interp(wet_m, depth_m * KNOTS, unit) for unit in np.eye(len(KNOTS))[1:])], 1
-    )
+    lines = [np.interp(depths_m, depth_m * KNOTS, unit) for unit in np.eye(len(KNOTS))[1:]]
+    return np.stack([np.ones_like(depths_m), *lines], 1)
 
 
 def find_shear(course: Course, settings: StageSettings, zero_n: float) -> Shear:
