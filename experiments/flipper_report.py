@@ -71,7 +71,7 @@ def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], config
         "over the trials, which are the grey dashes."
     )
     if any(mud["truth"] for mud in report["muds"]):
-        caption += " G to I: beside a load cell's; on the grey line both are equal."
+        caption += " G to I: beside a load cell's, with two standard errors; on the grey line both are equal."
     draw = partial(plot_coefficients, report["muds"], firsts, configuration.geometry)
     figure = Figure("figure5", caption, draw)
     return Section("Coefficients of the muds", _told(report), rows=mud_rows(report["muds"]), figures=[figure])
