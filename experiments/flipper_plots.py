@@ -178,16 +178,16 @@ def _plot_by_mud(
 def _plot_beside(
     panel: Axes, muds: Sequence[Mapping[str, Any]], name: str, looks: Mapping[str, dict[str, Any]]
 ) -> None:
-    """Against a load cell's, with the grey line on which both are equal."""
+    """Against a load cell's, with two standard errors, and the grey line on which both are equal."""
     largest = 0.0
     for mud in muds:
         told, truth = mud[name], (mud["truth"] or {}).get(name)
         if told["value"] is None or truth is None:
             continue
-        value, sd = PER_CM3 * told["value"], PER_CM3 * told["value"] * (told["cv"] or 0.0)
-        panel.errorbar(PER_CM3 * truth, value, sd or None, capsize=4, ecolor=INK, linestyle="",
+        value, doubt = PER_CM3 * told["value"], 2.0 * PER_CM3 * (told["std_error"] or 0.0)
+        panel.errorbar(PER_CM3 * truth, value, doubt or None, capsize=4, ecolor=INK, linestyle="",
                        lolims=told["at_least"], **mark_of(looks[mud["mud"]]))  # fmt: skip
-        largest = max(largest, value + sd, PER_CM3 * truth)
+        largest = max(largest, value + doubt, PER_CM3 * truth)
     panel.plot([0.0, 1.1 * largest], [0.0, 1.1 * largest], color=GREY, linewidth=1.0, label="equal")
     panel.set_xlabel(f"{LABELS[name]} by load cell (N/cm³)")
     panel.set_ylabel("by the flipper (N/cm³)")

@@ -34,11 +34,17 @@ KNOWN_BIAS = (
 )
 WRONG_CONSTANTS = (
     "Each simulated motor's torque constant is another than the configuration has, by a draw of 3.2 %, as the paper's "
-    "were. All that a joint tells is off by that in the same way, which the scatter of trials cannot show."
+    "were. All that a joint tells is off by that in the same way: the second ± holds it, the first cannot show it."
 )
-SCATTER = (
-    "± is the standard error of the mean, and cv the coefficient of variation, by the scatter of the trials; of a "
-    "single trial ± is what its fit doubts"
+DOUBTS = (
+    "The first ± is one standard error by the scatter of the trials, the second what all of them have alike as far as "
+    "the daemon doubts it: torque constants (3.2 %), the face's load, zero, surface. Two of both together hold what "
+    "a load cell reads on the flipper's own way in 19 of 20 cases or more; to tell muds of one robot apart the first "
+    "alone counts. A single trial has one ±, of everything. cv is the coefficient of variation over the trials."
+)
+HEADING = (
+    "Coefficients. The first ± is the trials' own, the second what they have in common, one standard error each; cv "
+    "is the variation over the trials. The report says what else is in doubt."
 )
 MODELLED = (
     "B to E as in the paper's figure 4. Dashed: the forces by the fitted coefficients, where each is fitted. The "
@@ -73,7 +79,7 @@ def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], config
         "over the trials, which are the grey dashes."
     )
     if any(mud["truth"] for mud in report["muds"]):
-        caption += " G to I: the same beside a load cell's; on the grey line both are equal."
+        caption += " G to I: beside a load cell's, with two standard errors; on the grey line both are equal."
     draw = partial(plot_coefficients, report["muds"], firsts, configuration.geometry)
     figure = Figure("figure5", caption, draw)
     return Section("Coefficients of the muds", _told(report), rows=mud_rows(report["muds"]), figures=[figure])
@@ -81,7 +87,7 @@ def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], config
 
 def _told(report: Mapping[str, Any]) -> str:
     falls = {name: fell for name, fell in report["falls_with_water"].items() if fell is not None}
-    paragraphs = [f"{SCATTER}.", *([report["missing_truth"]] if report["missing_truth"] else [])]
+    paragraphs = [report["missing_truth"]] if report["missing_truth"] else []
     if falls:
         fell = ", ".join(f"{name} {'yes' if fell else 'no'}" for name, fell in falls.items())
         paragraphs.append(f"Does a coefficient fall with water from mud to mud, as in the paper? {fell}.")
@@ -89,7 +95,7 @@ def _told(report: Mapping[str, Any]) -> str:
     for name, shares in later.items():
         strokes = ", ".join(f"{100.0 * share:.0f} %" for share in shares)
         paragraphs.append(f"{name} of later strides in the same hole, of the first one's: {strokes}.")
-    return "\n\n".join([*paragraphs, *doubts(report["settings"])])
+    return "\n\n".join([*paragraphs, DOUBTS, *doubts(report["settings"])])
 
 
 def doubts(settings: Mapping[str, Any]) -> list[str]:
@@ -143,8 +149,7 @@ def _strides(firsts: Mapping[str, Entry], configuration: Configuration, method: 
 
 def text_of(report: Mapping[str, Any]) -> list[tuple[str, Sequence[Sequence[str]]]]:
     """Titles and tables for the screen."""
-    heading = [f"Coefficients, {SCATTER}.", *doubts(report["settings"])]
-    tables: list[tuple[str, Sequence[Sequence[str]]]] = [("\n".join(heading), mud_rows(report["muds"]))]
+    tables: list[tuple[str, Sequence[Sequence[str]]]] = [(HEADING, mud_rows(report["muds"]))]
     if report["errors"]:
         tables.append(
             (f"Median error (bias). {TRUTHS[report['settings']['truth']]}", error_text_rows(report["errors"]))

@@ -40,7 +40,12 @@ def _again_by_place(first: Sequence[Analysed], settings: StageSettings) -> list[
     common = common_alignment(aligned)
     pace = wide_pace(settings)
     again = [analyse_trial(told.recorded, settings, pace, common) if told.is_measured else told for told in first]
-    return [replace(told, shared_doubt=_of_lag(told, common, settings)) if told.is_measured else told for told in again]
+    return [
+        replace(told, shared_doubt=hypot(told.shared_doubt, _of_lag(told, common, settings)))
+        if told.is_measured
+        else told
+        for told in again
+    ]
 
 
 def _of_lag(told: Analysed, common: Alignment, settings: StageSettings) -> float:

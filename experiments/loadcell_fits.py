@@ -7,8 +7,9 @@
 V is the submerged volume of the upright plate and ∫ζ dA the first moment of its face (control/plate.py). What the mud
 bears less while the stage slows down is added back, so a coefficient belongs to the speed of the stage.
 
-The doubt of one trial holds that of speed, surface and samples, and what the law leaves over. A mud has two: that of
-its trials, which is their scatter or their own doubt where that is more, and that of the bench, which no trial shows.
+The doubt of one trial holds that of speed, surface and samples. What the law leaves over of the mud's course is none:
+another trial leaves the same. A mud has two doubts: that of its trials, which is their scatter or their own doubt where
+that is more, and that of the bench, which no trial shows.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from control.plate import submerged_part
-from estimation.origin_fit import fit_through_origin
+from estimation.origin_fit import MIN_BATCHES, student_factor
 from experiments.curve_fit import Array
 from experiments.loadcell_alignment import Alignment
 from experiments.loadcell_contact import Course, StrokeError
@@ -52,6 +53,7 @@ BLOCKS = 8  # of a steady shear, whose means tell its scatter
 UNSTEADY = 0.15  # change over a steady shear, from which it is said
 DEPTH_POWERS = {"k_p": 1.0, "k_s": 2.0, "k_e": 1.0}  # with which a depth that was set wrong enters
 CALLIPERS_M = 0.05e-3
+SHIFT = 1.5  # of k, for all depths of a stroke that are wrong alike, in shares of the deepest one
 
 
 class Coefficient(NamedTuple):
@@ -87,7 +89,7 @@ class Analysed:
     coefficients: Mapping[str, Coefficient] = field(default_factory=dict)
     problem: str = ""  # why there is no coefficient
     remark: str = ""
-    shared_doubt: float = 0.0  # of the speed, as a share, which all trials of a stage have alike
+    shared_doubt: float = 0.0  # of speed, lag or rate, as a share, which all trials of a stage have alike
     places_m: Array | None = None  # depths of an insertion, ways of a shear, as an encoder measured them
     place_error_m: float = 0.0  # of them, one standard error
     alignment: Alignment | None = None  # of an encoder and the cell
@@ -155,30 +157,32 @@ def _k_p(course: Course, motion: Insertion, settings: StageSettings) -> Coeffici
     since_s = course.times_s - motion.surface_s
     pace, depth_m = motion.pace, settings.depth_m
     depths_m, shares = descent(since_s, pace.speed_m_s, pace.acceleration_m_s2, depth_m)
-    inside = (depths_m > 0.0) & (course.times_s < motion.stop_s)
     wet = np.clip(depths_m / YIELD_M, 0.0, 1.0)
     forces_n = course.forces_n - motion.level_n - motion.slowing_n * wet * (1.0 - shares**RATE_EXPONENT)
-    ways_m = np.clip(np.gradient(depths_m), 1e-9, None)
-    shift = 1.5 * pace.speed_m_s * motion.surface_std_error_s / depth_m
-    return slope(settings, depths_m[inside], forces_n[inside], ways_m[inside], hypot(shift, pace.speed_doubt))
+    shift = SHIFT * pace.speed_m_s * motion.surface_std_error_s / depth_m
+    return slope(settings, depths_m, forces_n, depth_m, hypot(shift, pace.speed_doubt))
 
 
 def _k_e(course: Course, motion: Insertion, extraction: Extraction, settings: StageSettings) -> Coefficient:
     pace = motion.pace
     left_s = extraction.out_s - course.times_s
     depths_m, _ = descent(left_s, pace.speed_m_s, pace.acceleration_m_s2, settings.depth_m)
-    inside = (depths_m > 0.0) & (depths_m <= (1.0 - REVERSAL_SHARE) * settings.depth_m)
-    forces_n = extraction.level_n - course.forces_n
-    ways_m = np.clip(-np.gradient(depths_m), 1e-9, None)
-    return slope(settings, depths_m[inside], forces_n[inside], ways_m[inside], pace.speed_doubt)
+    forces_n, to_m = extraction.level_n - course.forces_n, (1.0 - REVERSAL_SHARE) * settings.depth_m
+    shift = SHIFT * pace.speed_m_s * extraction.out_std_error_s / to_m
+    return slope(settings, depths_m, forces_n, to_m, hypot(shift, pace.speed_doubt))
 
 
-def slope(settings: StageSettings, depths_m: Array, forces_n: Array, ways_m: Array, doubt: float) -> Coefficient:
-    """k of F = k V, with the doubt of samples that hang together; `doubt` is that of the depths' course."""
-    volumes_m3, roots = volume_m3(settings, depths_m), np.sqrt(ways_m)
+def slope(settings: StageSettings, depths_m: Array, forces_n: Array, to_m: float, doubt: float) -> Coefficient:
+    """k of F = k V from the surface to `to_m`, samples meeting half-way. That F is not k V is no doubt: k is what least
+    squares make of the mud's own course. `doubt` is that of the depths.
+    """
+    middles_m = (depths_m[1:] + depths_m[:-1]) / 2.0
+    ways_m = np.abs(np.diff(np.clip(np.concatenate([depths_m[:1], middles_m, depths_m[-1:]]), 0.0, to_m)))
+    inside = ways_m > 0.0
+    depths_m, forces_n, ways_m = depths_m[inside], forces_n[inside], ways_m[inside]
+    volumes_m3 = volume_m3(settings, depths_m)
     square = float(np.sum(ways_m * volumes_m3 * volumes_m3))
-    fit = fit_through_origin((roots * volumes_m3).tolist(), (roots * forces_n).tolist())
-    if fit is None or not square > 0.0:
+    if len(depths_m) < MIN_BATCHES or not square > 0.0:
         raise StrokeError(
             "fewer than 4 samples in the mud: the stage stopped on its way or was moved by hand, or a faster amplifier "
             "or a slower stage is needed"
@@ -186,7 +190,19 @@ def slope(settings: StageSettings, depths_m: Array, forces_n: Array, ways_m: Arr
     value = float(np.sum(ways_m * volumes_m3 * forces_n)) / square
     if value <= 0.0:
         raise StrokeError("the force does not oppose the motion")
-    return Coefficient(value, hypot(fit.std_error, doubt * value))
+    told = noises_n(depths_m, forces_n) * (ways_m * volumes_m3)[1:-1]
+    noise = student_factor(len(told)) * float(np.sqrt(np.sum(told * told) * len(depths_m) / len(told))) / square
+    return Coefficient(value, hypot(noise, doubt * value))
+
+
+def noises_n(depths_m: Array, forces_n: Array) -> Array:
+    """Of all samples but the first and the last: what each is off the line through its neighbours, over the scatter
+    of such a difference of independent ones (Gasser, Sroka and Jennen-Steinmetz 1986).
+    """
+    ways_m = np.abs(np.diff(depths_m))
+    after = ways_m[:-1] / np.clip(ways_m[:-1] + ways_m[1:], 1e-12, None)
+    apart_n = forces_n[1:-1] - (1.0 - after) * forces_n[:-2] - after * forces_n[2:]
+    return np.asarray(apart_n / np.sqrt(1.0 + (1.0 - after) ** 2 + after**2))
 
 
 def analyse_shear(trial: Recorded, course: Course, settings: StageSettings) -> Analysed:
@@ -205,7 +221,7 @@ def steadiness(forces_n: Array) -> tuple[float, str]:
     blocks_n = [float(np.mean(block)) for block in np.array_split(forces_n, BLOCKS)]
     tilt = (blocks_n[-1] - blocks_n[0]) / fmean(blocks_n)
     remark = f"the shear was not steady: it changed by {100.0 * tilt:+.0f} %" if abs(tilt) > UNSTEADY else ""
-    return stdev(blocks_n) / sqrt(BLOCKS), remark
+    return student_factor(BLOCKS - 1) * stdev(blocks_n) / sqrt(BLOCKS), remark
 
 
 def bench_doubt(name: str, settings: StageSettings, depth_error_m: float, calibration_error: float) -> float:
@@ -226,7 +242,7 @@ def of_mud(trials: Sequence[Analysed], name: str, bench: float) -> OfMud:
     values = [each.value for each in told]
     mean, own = fmean(values), sqrt(fmean([each.std_error**2 for each in told]) / len(told))
     scatter = stdev(values) if len(values) > 1 else nan
-    doubt = max(own, scatter / sqrt(len(values))) if len(values) > 1 else own
+    doubt = max(own, student_factor(len(values) - 1) * scatter / sqrt(len(values))) if len(values) > 1 else own
     return OfMud(mean, hypot(doubt, shared * mean), tuple(values), scatter / mean, bench * mean)
 
 

@@ -19,6 +19,7 @@ from experiments.loadcell_fits import (
     RESIDUAL_NOISES,
     RESIDUAL_SHARE,
     SHEAR,
+    SHIFT,
     Analysed,
     Coefficient,
     Recorded,
@@ -46,13 +47,15 @@ def analyse_measured(trial: Recorded, course: Course, settings: StageSettings, e
 def _insertion(trial: Recorded, placed: PlacedCourse, expected: Alignment) -> Analysed:
     motion, course, settings = find_insertion(placed, expected), placed.course, placed.settings
     unsure_m = hypot(motion.surface_std_error_m, placed.track.interpolation_error_m)
-    told = {"k_p": _slope(motion, settings, course.forces_n - motion.level_n, motion.down, motion.deepest_m, unsure_m)}
+    told_n, rates = course.forces_n - motion.level_n, expected.rate_doubt * placed.quickness(motion.alignment.lag_s)
+    told = {"k_p": _slope(motion, settings, told_n, motion.down, motion.deepest_m, unsure_m, rates)}
     extraction, remark = None, _insertion_remark(course, motion, settings)
     if np.count_nonzero(motion.up) >= LEAST_SAMPLES:
         unsure_m = hypot(unsure_m, motion.mean_speed_m_s * motion.alignment.lag_doubt_s)
         to_m = (1.0 - REVERSAL_SHARE) * motion.deepest_m
-        told["k_e"] = _slope(motion, settings, motion.up_level_n - course.forces_n, motion.up, to_m, unsure_m)
-        extraction = Extraction(motion.lift_s, motion.out_s, motion.up_level_n)
+        told_n = motion.up_level_n - course.forces_n
+        told["k_e"] = _slope(motion, settings, told_n, motion.up, to_m, unsure_m, rates)
+        extraction = Extraction(motion.lift_s, motion.out_s, motion.up_level_n, nan)
     else:
         told["k_e"], remark = NOT_KNOWN, "no extraction: the encoder did not see the plate come up. Was it drawn out?"
     return Analysed(
@@ -69,13 +72,21 @@ def _insertion(trial: Recorded, placed: PlacedCourse, expected: Alignment) -> An
 
 
 def _slope(
-    motion: MeasuredInsertion, settings: StageSettings, forces_n: Array, chosen: Mask, to_m: float, unsure_m: float
+    motion: MeasuredInsertion,
+    settings: StageSettings,
+    forces_n: Array,
+    chosen: Mask,
+    to_m: float,
+    unsure_m: float,
+    rates: Array,
 ) -> Coefficient:
-    """From the surface to `to_m`, every piece of way alike wherever the hand has rested."""
+    """From the surface to `to_m`, every piece of way alike wherever the hand has rested. `rates`: shares by which it is
+    in doubt what the mud bears at each sample's speed.
+    """
     order = np.flatnonzero(chosen)[np.argsort(motion.depths_m[chosen], kind="stable")]
     depths_m, told_n = motion.depths_m[order], forces_n[order] / motion.grips[order]
-    ways_m = np.clip(np.gradient(depths_m), 1e-9, None)
-    doubt = slope(settings, depths_m, told_n, ways_m, 1.5 * unsure_m / motion.deepest_m).std_error
+    rate = float(np.average(rates[order], weights=depths_m * np.clip(np.gradient(depths_m), 1e-9, None)))
+    doubt = slope(settings, depths_m, told_n, to_m, hypot(SHIFT * unsure_m / to_m, rate)).std_error
     even_m = to_m * (np.arange(EVEN_DEPTHS) + 0.5) / EVEN_DEPTHS
     even_n = np.interp(even_m, np.append(0.0, depths_m), np.append(0.0, told_n))
     last = depths_m > depths_m[-1] - LAST_SHARE * to_m
@@ -136,6 +147,7 @@ def _shear(trial: Recorded, placed: PlacedCourse, expected: Alignment) -> Analys
         None,
         {"k_s": Coefficient(mean_n / moment_m3, hypot(error_n, rate_n) / moment_m3)},
         remark=remark,
+        shared_doubt=abs(rate_n) / mean_n,
         places_m=motion.ways_m,
         place_error_m=placed.track.interpolation_error_m,
         alignment=rate_of(felt_n, quickness),

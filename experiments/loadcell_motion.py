@@ -38,6 +38,7 @@ STARTS = tuple(
 NARROW = 0.05  # doubt of a speed from which one start is enough
 AFTER_OUT_S = 0.3
 OUT_MARGIN = 1.5  # how much later the end may lie than the last sample that clearly pulls
+DIFFERENCE_S = 1e-4
 OUT_ROUNDS, OUT_PLACES = 3, 13  # of an ever finer search
 VALLEY = 2.0  # times the least square may be that of the first valley
 KNOTS = np.array([0.0, 1 / 6, 1 / 3, 1 / 2, 3 / 4])  # of the chain, in depths
@@ -92,6 +93,7 @@ class Extraction(NamedTuple):
     lift_s: float
     out_s: float
     level_n: float
+    out_std_error_s: float
 
 
 class Shear(NamedTuple):
@@ -228,10 +230,10 @@ def find_extraction(course: Course, insertion: Insertion, settings: StageSetting
     for _ in range(OUT_ROUNDS):
         tried_s = out_s + reach_s * np.linspace(-1.0, 1.0, OUT_PLACES)
         fits = [_fit_out(float(each) - times_s, forces_n, pace, depth_m) for each in tried_s]
-        best = _first_valley([square for square, _ in fits])
-        out_s, level_n, reach_s = float(tried_s[best]), fits[best][1], 2.0 * reach_s / (OUT_PLACES - 1)
+        best = _first_valley([fit.square for fit in fits])
+        out_s, level_n, reach_s = float(tried_s[best]), fits[best].level_n, 2.0 * reach_s / (OUT_PLACES - 1)
     lift_s = out_s - descent_s(pace.speed_m_s, pace.acceleration_m_s2, depth_m)
-    return Extraction(lift_s, out_s, insertion.level_n + level_n)
+    return Extraction(lift_s, out_s, insertion.level_n + level_n, fits[best].std_error_s)
 
 
 def _first_valley(squares: list[float]) -> int:
@@ -241,15 +243,31 @@ def _first_valley(squares: list[float]) -> int:
     return next(i for i in valleys if squares[i] <= VALLEY * min(squares))
 
 
-def _fit_out(left_s: Array, forces_n: Array, pace: Pace, depth_m: float) -> tuple[float, float]:
-    """Mean square of what a chain of lines leaves that ends when no time is left, and the level after it."""
-    depths_m, _ = descent(left_s, pace.speed_m_s, pace.acceleration_m_s2, depth_m)
+class _OutFit(NamedTuple):
+    square: float  # mean of what a chain of lines leaves that ends when no time is left
+    level_n: float  # after it
+    std_error_s: float  # of that moment
+
+
+def _fit_out(left_s: Array, forces_n: Array, pace: Pace, depth_m: float) -> _OutFit:
+    depths_m, sooner_m = (
+        descent(each_s, pace.speed_m_s, pace.acceleration_m_s2, depth_m)[0]
+        for each_s in (left_s, left_s + DIFFERENCE_S)
+    )
     window = (depths_m <= (1.0 - REVERSAL_SHARE) * depth_m) & (left_s > -AFTER_OUT_S)
-    wet_m, y = np.clip(depths_m[window], 0.0, None), forces_n[window]
-    chain = [np.interp(wet_m, depth_m * KNOTS, unit) for unit in np.eye(len(KNOTS))[1:]]
-    columns = np.stack([np.ones_like(wet_m), *chain], 1)
+    y, columns = forces_n[window], _chain(depths_m[window], depth_m)
     factors = np.linalg.lstsq(columns, y, rcond=None)[0]
-    return float(np.mean((columns @ factors - y) ** 2)), float(factors[0])
+    square = float(np.mean((columns @ factors - y) ** 2))
+    later = (_chain(sooner_m[window], depth_m) - columns) @ factors / DIFFERENCE_S
+    slopes = np.column_stack([later, columns])
+    variance = square * len(y) / max(len(y) - slopes.shape[1], 1)
+    return _OutFit(square, float(factors[0]), float(np.sqrt(variance * np.linalg.pinv(slopes.T @ slopes)[0, 0])))
+
+
+def _chain(depths_m: Array, depth_m: float) -> Array:
+    """Columns: a level, and one line after the other."""
+    lines = [np.interp(depths_m, depth_m * KNOTS, unit) for unit in np.eye(len(KNOTS))[1:]]
+    return np.stack([np.ones_like(depths_m), *lines], 1)
 
 
 def find_shear(course: Course, settings: StageSettings, zero_n: float) -> Shear:

@@ -60,8 +60,10 @@ def errors_text(muds: Mapping[str, Mapping[str, OfMud]], plan: TrialPlan) -> str
     """What the doubts are that stand behind the values."""
     shares = ", ".join(f"{100.0 * _largest_bench_share(muds, name):.1f} % of {name}" for name in COEFFICIENTS)
     return (
-        "The first ± is one standard error of the trials: their scatter, the stage's speed, and in k_p and k_e what "
-        "F = k V leaves over, which in clay is most of it. The second ± is what no repetition shows, since all trials "
+        "The first ± is one standard error of the trials: their scatter with Student's factor or what each doubts of "
+        "samples, speed, surface, lag and rate, whichever is more. Two of it hold the truth in 19 of 20 cases or more. "
+        "That the force does not grow as V is no part of it: k is what least squares make of the mud's own course, and "
+        "belongs to its depth. The second ± is what no repetition shows, since all trials "
         f"have it alike: {_depth_text(plan)}, callipers ± {1000.0 * CALLIPERS_M:g} mm on width and thickness, and the "
         f"reading of the calibration, together at most {shares}. The weights themselves count as exact, and so does an "
         "amplifier that prints grams or newtons by itself. A depth that an encoder measured has no doubt of a ruler."

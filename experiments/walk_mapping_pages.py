@@ -8,7 +8,7 @@ from typing import Any
 
 from experiments.coefficient_table import TruthOfMud, error_text_rows, mud_rows
 from experiments.estimation_methods import method_of
-from experiments.flipper_report import TRUTHS, doubts
+from experiments.flipper_report import DOUBTS, HEADING, TRUTHS, doubts
 from experiments.mud_looks import file_name
 from experiments.mud_names import mud_text
 from experiments.notebook import Entry
@@ -24,10 +24,7 @@ SIMULATED_DRAG = (
     "mud's own, whose coefficients fall with depth: at 5 cm the load cell reads 0.6 of the k_s and 0.75 of the k_p "
     "that it reads at 3 cm. So each stride stands beside a load cell at its own depth."
 )
-SCATTER = (
-    "± is the standard error of the mean, and cv the coefficient of variation, by the scatter of the strides of all "
-    "walks"
-)
+TRIALS = "The trials here are the strides of all walks."
 FELT = "Where the mud bears more than the body's drag, the flipper feels that drag and not the mud's strength."
 METHODS = (
     "In brackets the bias, and how many strides told a bound (≥) or nothing. default: the daemon's own. paper: the "
@@ -95,7 +92,7 @@ def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
     ]
     if report["without_pose"]:
         paragraphs.append(f"{report['without_pose']} walks had no pose: strides are given to muds by their order.")
-    paragraphs += [f"{SCATTER}.", *doubts(report["settings"]), TRUTHS[report["settings"]["truth"]]]
+    paragraphs += [f"{TRIALS} {DOUBTS}", *doubts(report["settings"]), TRUTHS[report["settings"]["truth"]]]
     return "\n\n".join([*paragraphs, report["missing_truth"]])
 
 
@@ -118,8 +115,7 @@ def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Ent
 
 def text_of(report: Mapping[str, Any]) -> Tables:
     """Titles and tables for the screen."""
-    heading = "\n".join([f"Coefficients, {SCATTER}.", *doubts(report["settings"])])
-    tables: Tables = [(heading, mud_rows(report["muds"]))]
+    tables: Tables = [(f"{HEADING} {TRIALS}", mud_rows(report["muds"]))]
     if report["errors"]:
         tables.append((f"{ERRORS}. {METHODS}", error_text_rows(report["errors"])))
     return [*tables, (FINDINGS, paper_rows(report))]

@@ -6,7 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import statsmodels.api as sm
 
+from estimation.origin_fit import student_factor
+from experiments.curve_fit import Array
 from experiments.loadcell_analysis import analyse, analyse_trial, common_pace
 from experiments.loadcell_contact import find_contact, without_spikes
 from experiments.loadcell_fits import (
@@ -14,11 +17,15 @@ from experiments.loadcell_fits import (
     INSERTION,
     SHEAR,
     Analysed,
+    Coefficient,
     Recorded,
     bench_doubt,
     depths_of,
+    noises_n,
     of_mud,
+    slope,
     speed_remark,
+    volume_m3,
 )
 from experiments.loadcell_motion import Insertion, Pace, Shear, StageSettings, wide_pace
 from simulation.clay import clay_of_water
@@ -72,17 +79,74 @@ def true_of_clay(water: float) -> dict[str, float]:
     told = measure_insertion(clay, PAPER_PLATE, 0.0, 0.0, 0.03, 0.1, RELAXATION, 3.0)
     shear_n = measure_shear(clay, PAPER_PLATE, 0.0, 0.0, 0.03, 0.1)
     return {
-        "k_p": slope(told.down, 0.03),
+        "k_p": true_slope(told.down, 0.03),
         "k_s": shear_n / (WIDTH_M * 0.03**2 / 2.0),
-        "k_e": -slope(told.up, 0.75 * 0.03),
+        "k_e": -true_slope(told.up, 0.75 * 0.03),
     }
 
 
-def slope(curve: LoadCurve, deepest_m: float) -> float:
+def true_slope(curve: LoadCurve, deepest_m: float) -> float:
     depths_m, forces_n = np.array(curve.depths_m), np.array(curve.forces_n)
     inside = (depths_m > 0.0) & (depths_m <= deepest_m)
     volumes_m3 = WIDTH_M * THICKNESS_M * depths_m[inside]
     return float(volumes_m3 @ forces_n[inside] / (volumes_m3 @ volumes_m3))
+
+
+@pytest.fixture(scope="module")
+def clay_trials() -> list[Analysed]:
+    """Of one stage, started at any moment between two samples."""
+    return analyse([feel(clay_plate(49.5), INSERTION, 40 + i) for i in range(8)], SETTINGS, look)
+
+
+@pytest.mark.parametrize("name", ["k_p", "k_e"])
+def test_a_trial_errs_by_about_as_much_as_it_says_though_clay_does_not_follow_the_law(
+    clay_trials: list[Analysed], name: str
+) -> None:
+    """Whatever moment it began: the ends of a stroke count by their way."""
+    true = true_of_clay(49.5)[name]
+    told = [trial.coefficients[name] for trial in clay_trials]
+    errs = float(np.sqrt(np.mean([(each.value - true) ** 2 for each in told])))
+    says = float(np.sqrt(np.mean([each.std_error**2 for each in told])))
+    assert errs < 0.006 * true
+    assert says / 3.0 < errs < 1.5 * says
+
+
+def test_the_doubt_of_a_slope_is_the_scatter_of_slopes_and_that_of_weighted_least_squares() -> None:
+    """Of a force that bends from the law; an oracle with the bend as a second column."""
+    random, depths_m = np.random.default_rng(1), np.linspace(0.0, 0.03, 25)
+    volumes_m3 = volume_m3(SETTINGS, depths_m)
+    told = [
+        slope(SETTINGS, depths_m, course_n(depths_m) + 0.01 * random.standard_normal(25), 0.03, 0.0) for _ in range(300)
+    ]
+    scatter = float(np.std([each.value for each in told]))
+    assert float(np.mean([each.std_error for each in told])) == pytest.approx(student_factor(23) * scatter, rel=0.1)
+    known = sm.OLS(course_n(depths_m), volumes_m3).fit()
+    assert float(np.mean([each.value for each in told])) == pytest.approx(float(known.params[0]), rel=0.02)
+    assert scatter == pytest.approx(0.01 / float(np.sqrt(volumes_m3 @ volumes_m3)), rel=0.15)
+    assert float(known.bse[0]) > 4.0 * scatter  # which takes the bend for scatter
+
+
+def course_n(depths_m: Array) -> Array:
+    return np.asarray(1.5 + 60.0 * depths_m)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_noises_are_those_of_the_samples_whatever_line_they_lie_on(turned: bool) -> None:
+    random = np.random.default_rng(2)
+    depths_m = np.sort(random.uniform(0.0, 0.03, 4000))[:: -1 if turned else 1]
+    told_n = noises_n(depths_m, course_n(depths_m) + 0.01 * random.standard_normal(4000))
+    assert float(np.std(told_n)) == pytest.approx(0.01, rel=0.05)
+    assert np.max(np.abs(noises_n(depths_m, course_n(depths_m)))) < 1e-9
+
+
+def test_five_trials_that_scatter_are_doubted_with_students_factor() -> None:
+    trials = [Analysed(nowhere(), coefficients={"k_s": Coefficient(value, 1.0)}) for value in (1e6, 2e6, 3e6, 4e6, 5e6)]
+    told = of_mud(trials, "k_s", 0.0)
+    assert told.trials_error == pytest.approx(student_factor(4) * 5e6 / np.sqrt(10.0) / np.sqrt(5.0))
+
+
+def nowhere() -> Recorded:
+    return Recorded("made up/shear/1", "made up", SHEAR, np.empty(0), np.empty(0), 0.0)
 
 
 def one(recorded: Recorded) -> Analysed:

@@ -135,6 +135,20 @@ def test_how_clay_follows_the_speed_is_read_from_the_drags(drag: Recorded) -> No
     assert told.alignment.rate_share == pytest.approx(true, abs=0.05)
 
 
+def test_a_rate_that_is_in_doubt_is_so_for_all_drags_alike(drag: Recorded) -> None:
+    """No number of them takes it away."""
+    told = one(drag)
+    doubted = told.shared_doubt * told.coefficients["k_s"].value
+    assert 0.0 < doubted <= told.coefficients["k_s"].std_error
+    assert of_mud([told] * 100, "k_s", 0.0).trials_error > doubted
+
+
+def test_a_rate_in_doubt_makes_the_doubt_of_an_insertion(insertion: Recorded) -> None:
+    sure, unsure = (one(insertion, Alignment(LAG_S, 0.1, 0.002, doubt)) for doubt in (0.01, 0.3))
+    for name in ("k_p", "k_e"):
+        assert unsure.coefficients[name].std_error > 1.2 * sure.coefficients[name].std_error
+
+
 def test_a_stage_of_one_speed_says_nothing_of_the_rate() -> None:
     told = rate_of(np.full(50, 3.0), np.full(50, 0.01))
     assert (told.rate_share, told.rate_doubt) == pytest.approx((WIDE.rate_share, WIDE.rate_doubt))
