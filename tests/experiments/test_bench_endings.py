@@ -146,4 +146,3 @@ def test_torque_that_somebody_ends_as_it_comes_is_not_asked_for_again(robot: Int
     with pytest.raises(BenchError, match=r"the robot is not armed: its torque was switched off\."):
         arm(robot)
     assert robot.arms == 1 and robot.call("status")["mode"] == "idle"
-
