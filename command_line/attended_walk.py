@@ -17,6 +17,7 @@ from firmware_host.status_client import CallRefusedError, StatusClient
 PROMISE_S = 1.0
 RENEWAL_S = 0.2
 UNDER_WAY = ("walking", "stopping", "damping")
+MILD = ("none", "warn")  # reactions that leave a walk alone
 
 
 def attend(client: StatusClient, params: dict[str, Any]) -> int:
@@ -50,12 +51,12 @@ def _stay(client: StatusClient) -> dict[str, Any]:
 
 
 def _conclude(report: dict[str, Any], status: int) -> int:
-    """It has ended well where the robot holds its pose, and nothing is to be told."""
+    """It has ended well where the robot holds its pose, and nothing is to be told: no fault kept it from walking."""
     print(report["mode"])
-    if report["mode"] == "hold" and not report["notice"]:
+    fault = report["fault"]
+    if report["mode"] == "hold" and not report["notice"] and (not fault or fault["reaction"] in MILD):
         return status
-    fault = report["fault"]["sentence"] if report["fault"] else "the torque was switched off"
-    complain(report["notice"] or fault)
+    complain(report["notice"] or (fault["sentence"] if fault else "the torque was switched off"))
     return exit_codes.REFUSED
 
 

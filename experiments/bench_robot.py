@@ -90,8 +90,7 @@ def face_faults(robot: BenchRobot, person: Person) -> None:
     Raises EndedError where it is to stand, BenchError where it comes back.
     """
     for _ in range(MOST_CLEARS):
-        faults = _faults_told(_status_at_rest(robot))
-        if not faults:
+        if not (faults := _faults_told(_status_at_rest(robot))):
             return
         question = f"{faults}\nTorque stays off until this is cleared."
         if person.ask(question, {CLEAR: "clear it and go on", LEAVE: "stop here"}, lambda: robot.wait(POLL_S)) != CLEAR:
@@ -99,8 +98,7 @@ def face_faults(robot: BenchRobot, person: Person) -> None:
                 "the fault stands; when its cause is gone, 'mudskipper clear', then the same command again"
             )
         robot.call("clear")
-    faults = _faults_told(_status_at_rest(robot))
-    if faults:
+    if faults := _faults_told(_status_at_rest(robot)):
         raise BenchError(f"the fault comes back: {faults}")
 
 
@@ -152,7 +150,7 @@ def arm(robot: BenchRobot, person: Person | None = None) -> None:
 
 
 def _ask_for_torque(robot: BenchRobot) -> None:
-    """Again, where a fault that began in the very tick of the wish took it away: a flipper that still sinks.
+    """Again only where a fault of the wish's own tick took it away, as of a flipper that sinks; not where somebody did.
 
     Raises BenchError, CallRefusedError.
     """
@@ -160,9 +158,11 @@ def _ask_for_torque(robot: BenchRobot) -> None:
         wait_until(robot, lambda now: now["mode"] == "idle" and not _blocked(now), ARMING_S, "being ready to arm")
         robot.call("arm")
         robot.wait(POLL_S)  # longer than a tick: what is idle then has lost the wish
-        if wait_until(robot, lambda now: now["mode"] != "arming", ARMING_S, "arming")["mode"] == "hold":
-            return
-    raise BenchError(f"torque did not come in {MOST_WISHES} attempts")
+        status = wait_until(robot, lambda now: now["mode"] != "arming", ARMING_S, "arming")
+        if status["mode"] != "idle" or not _blocked(status):
+            break
+    if status["mode"] != "hold":
+        raise BenchError(told_by(status))
 
 
 def _blocked(status: Status) -> bool:
@@ -210,15 +210,13 @@ def told_by(status: Status) -> str:
 def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
     """From hold to hold, at a fixed depth, or at chosen ones for None. Raises BenchError where a fault ends it."""
     before = robot.call("status")
-    order = {"strides": strides} | ({} if depth_m is None else {"depth_m": depth_m})
-    robot.call("walk", **order)
+    robot.call("walk", strides=strides, **({} if depth_m is None else {"depth_m": depth_m}))
     wait_until(robot, lambda now: now["mode"] != "hold", ARMING_S, "beginning to walk")  # a request waits for its tick
     after = wait_until(robot, lambda now: now["mode"] not in ("walking", "stopping"), strides * STRIDE_S, "the walk")
     if after["mode"] != "hold" or after["notice"]:
         raise BenchError(f"the walk ended early: {told_by(after)}")
     closed = strides_since(robot, before["strides_closed"])
-    number = strides_made(closed)
-    if number < strides:
+    if (number := strides_made(closed)) < strides:
         raise BenchError(f"the walk ended early, after {number} of {strides} strides: it was told to stop")
     return Walked(closed, before["now_s"], after["now_s"])
 

@@ -150,7 +150,9 @@ class Stand:
             if self.tick_soundly().mode is Mode.HOLD:
                 return
             against = blocking or against
-        raise BenchError(f"Closed loop of all drives did not come within {ARMING_S:g} s. {self._told(against)}")
+        raise BenchError(
+            f"Closed loop of all drives did not come within {ARMING_S:g} s. {self._told(against)}".rstrip()
+        )
 
     def _ask_for_torque(self) -> None:
         self._rest = measured_angles(self.loop.states)

@@ -16,7 +16,7 @@ import numpy as np
 from estimation.origin_fit import NORMAL_MAD
 from experiments.loadcell_alignment import MEDIAN_ERROR, WIDE, Alignment, common_alignment
 from experiments.loadcell_contact import Course, StrokeError, find_contact, without_spikes
-from experiments.loadcell_fits import SHEAR, Analysed, Recorded, analyse_insertion, analyse_shear
+from experiments.loadcell_fits import SHEAR, SHIFT, Analysed, Recorded, analyse_insertion, analyse_shear
 from experiments.loadcell_measured import analyse_measured
 from experiments.loadcell_motion import Insertion, Pace, StageSettings, wide_pace
 from experiments.side_by_side import Show
@@ -52,7 +52,7 @@ def _of_lag(told: Analysed, common: Alignment, settings: StageSettings) -> float
     """What a lag that all trials have wrong alike makes of a depth, as a share of the coefficient."""
     speed_m_s = told.speed_m_s if isinstance(told.motion, Insertion) else None
     own_s = told.alignment.lag_doubt_s if told.alignment is not None else 0.0
-    return 1.5 * (speed_m_s or 0.0) * min(common.lag_doubt_s, own_s) / settings.depth_m
+    return SHIFT * (speed_m_s or 0.0) * min(common.lag_doubt_s, own_s) / settings.depth_m
 
 
 def _again_by_force(first: list[Analysed], settings: StageSettings) -> list[Analysed]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import hypot, nan
 
 import numpy as np
+from numpy.typing import NDArray
 
 from control.plate import submerged_part
 from experiments.curve_fit import Array
@@ -65,10 +66,22 @@ def _insertion(trial: Recorded, placed: PlacedCourse, expected: Alignment) -> An
         extraction,
         told,
         remark=remark,
+        shared_doubt=_rate_doubt(motion, motion.down | motion.up, rates),
         places_m=motion.depths_m,
         place_error_m=unsure_m,
         alignment=motion.alignment,
     )
+
+
+def _by_depth(motion: MeasuredInsertion, chosen: Mask) -> NDArray[np.intp]:
+    return np.flatnonzero(chosen)[np.argsort(motion.depths_m[chosen], kind="stable")]
+
+
+def _rate_doubt(motion: MeasuredInsertion, chosen: Mask, rates: Array) -> float:
+    """Of k. `rates`: shares by which it is in doubt what the mud bears at each sample's speed."""
+    order = _by_depth(motion, chosen)
+    depths_m = motion.depths_m[order]
+    return abs(float(np.average(rates[order], weights=depths_m * np.clip(np.gradient(depths_m), 1e-9, None))))
 
 
 def _slope(
@@ -80,13 +93,11 @@ def _slope(
     unsure_m: float,
     rates: Array,
 ) -> Coefficient:
-    """From the surface to `to_m`, every piece of way alike wherever the hand has rested. `rates`: shares by which it is
-    in doubt what the mud bears at each sample's speed.
-    """
-    order = np.flatnonzero(chosen)[np.argsort(motion.depths_m[chosen], kind="stable")]
+    """From the surface to `to_m`, every piece of way alike wherever the hand has rested."""
+    order = _by_depth(motion, chosen)
     depths_m, told_n = motion.depths_m[order], forces_n[order] / motion.grips[order]
-    rate = float(np.average(rates[order], weights=depths_m * np.clip(np.gradient(depths_m), 1e-9, None)))
-    doubt = slope(settings, depths_m, told_n, to_m, hypot(SHIFT * unsure_m / to_m, rate)).std_error
+    unsure = hypot(SHIFT * unsure_m / to_m, _rate_doubt(motion, chosen, rates))
+    doubt = slope(settings, depths_m, told_n, to_m, unsure).std_error
     even_m = to_m * (np.arange(EVEN_DEPTHS) + 0.5) / EVEN_DEPTHS
     even_n = np.interp(even_m, np.append(0.0, depths_m), np.append(0.0, told_n))
     last = depths_m > depths_m[-1] - LAST_SHARE * to_m

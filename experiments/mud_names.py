@@ -15,10 +15,12 @@ def mud_name(name: str) -> str:
 
 def mud_label(name: str) -> str:
     """For a table's head or an axis."""
-    return f"w = {name} %" if WATER.fullmatch(name) else name
+    water = WATER.fullmatch(name)
+    return f"w = {water[1]} %" if water else name
 
 
 def mud_text(name: str) -> str:
     """Within a sentence; some say where they lie."""
-    mud, _, place = name.partition(" at ")
-    return f"{mud} %{' at ' if place else ''}{place}" if WATER.fullmatch(mud) else name
+    mud, at, place = name.partition(" at ")
+    water = WATER.fullmatch(mud)
+    return f"{water[1]} %{at}{place}" if water else name

@@ -49,12 +49,17 @@ class BenchReport:
 
     def begin(self, stage: int, test: str) -> None:
         names = {"stage": stage, "name": STAGES[stage - 1], "test": test}
-        self._test = names | {"outcome": PASSED, "why": "", "readings": []}
+        self._test = names | {"outcome": PASSED, "why": "", "spoiled": [], "readings": []}
 
     def keep(self, reading: Reading) -> None:
         """Of the test under way."""
         if self._test is not None:
             self._test["readings"].append(reading)
+
+    def spoil(self, why: str) -> None:
+        """What was out of its bounds in the test under way before it was measured anew."""
+        if self._test is not None:
+            self._test["spoiled"].append(why)
 
     def worsen(self, outcome: str, why: str) -> None:
         """What was told first of the test under way remains."""
@@ -113,6 +118,8 @@ class BenchReport:
         for number, name in enumerate(STAGES, 1):
             readings = [reading for test in self.tests if test["stage"] == number for reading in test["readings"]]
             yield from table_lines(f"stage {number}, {name}", [each for each in readings if not (brief and each.good)])
+        for test in self.tests:
+            yield from ((f"{test['test']}, before it was measured anew: {why}", True) for why in test["spoiled"])
         for number, name in enumerate(STAGES, 1):
             outcome = self.outcome_of(number)
             told = self._reason(number) if outcome == SKIPPED else self._omissions(number)
@@ -140,16 +147,16 @@ class StagedBench:
     def check(self, measure: Callable[Concatenate[Stand, P], Readings], *arguments: P.args, **named: P.kwargs) -> None:
         """Keep what it measures, and fail with a sentence for each reading that is out of its bounds.
 
-        What late ticks or messages may have spoiled is measured anew; where they come again, the failure says so.
+        What late ticks or messages may have spoiled is measured anew, and the report keeps what it was; where they come
+        again, the failure says so.
         """
-        for again in range(MOST_MEASURED):
+        for left in reversed(range(MOST_MEASURED)):
             readings = self._readings(measure(self.stand, *arguments, **named))
-            if again:
-                readings.append(Reading("measured anew, for late ticks or messages", again, "times"))
             late = self.stand.lateness.sentence
             wrong = [reading.sentence for reading in readings if not reading.good]
-            if not (wrong and late):
+            if not (wrong and late and left):
                 break
+            self.report.spoil(" ".join([*wrong, late]))
         for reading in readings:
             self.report.keep(reading)
         if wrong:

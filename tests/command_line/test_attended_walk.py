@@ -40,8 +40,8 @@ class EndingWalk(StatusClient):
         return self.reports.pop(0) if method == "status" else "accepted"
 
 
-def report(mode: str, sentence: str = "", notice: str = "") -> dict[str, Any]:
-    fault = {"sentence": sentence} if sentence else None
+def report(mode: str, sentence: str = "", notice: str = "", reaction: str = "hold") -> dict[str, Any]:
+    fault = {"sentence": sentence, "reaction": reaction} if sentence else None
     return {"mode": mode, "fault": fault, "notice": notice, "stride": 0, "phase": "swing", "depth_m": 0, "body_x_m": 0}
 
 
@@ -58,8 +58,11 @@ STOPPED = "stopped by drive_silent: The left_sweep drive is silent. Check it."
         ([report("stopping"), report("idle", notice=STOPPED)], exit_codes.REFUSED, STOPPED),
         ([report("fault", "It is silent.")], exit_codes.REFUSED, "It is silent."),
         ([report("idle")], exit_codes.REFUSED, "the torque was switched off"),
+        ([report("hold", "No current.")], exit_codes.REFUSED, "No current."),
+        ([report("walking"), report("hold", "The disk is full.", reaction="warn")], exit_codes.OK, ""),
     ],
-    ids=["done", "held by a fault", "damped, then a fault", "a fault that is over", "fault without notice", "disarmed"],
+    ids=["done", "held by a fault", "damped, then a fault", "a fault that is over", "fault without notice", "disarmed",
+         "a fault in the tick of the order", "done, with a warning"],
 )  # fmt: skip
 def test_a_walk_that_a_fault_has_ended_is_no_success_and_its_cause_is_told(
     reports: list[dict[str, Any]], status: int, complaint: str, capsys: pytest.CaptureFixture[str],

@@ -25,6 +25,7 @@ from simulation.lockstep import Lockstep
 from simulation.track import Track
 
 PERSON = Willing(lambda sentence: None)
+ARMED_S = 0.01  # and closed loop of all drives not there yet
 
 
 class InterruptedRobot(LockstepRobot):
@@ -32,12 +33,18 @@ class InterruptedRobot(LockstepRobot):
 
     waits_left = -1
     sinks = 0  # times that a flipper begins to sink just when the robot is armed
+    ended_by = ""  # what somebody else asks for as soon as it is
+    arms = 0
 
     def call(self, method: str, **params: Any) -> Any:
         answer = super().call(method, **params)
+        self.arms += method == "arm"
         if method == "arm" and self.sinks:
             self.sinks -= 1
             self.lockstep.robot.plant.arms[0].adduction_rad += 0.05
+        if method == "arm" and self.ended_by:
+            self.lockstep.run_for(ARMED_S)
+            super().call(self.ended_by)
         return answer
 
     def wait(self, duration_s: float) -> None:
@@ -131,3 +138,11 @@ def test_a_flipper_that_always_sinks_keeps_the_torque_off(robot: InterruptedRobo
     with pytest.raises(BenchError, match="the robot is not armed: "):
         arm(robot)
     assert robot.call("status")["mode"] == "idle"
+
+
+@pytest.mark.parametrize("ended_by", ["disarm", "stop"])
+def test_torque_that_somebody_ends_as_it_comes_is_not_asked_for_again(robot: InterruptedRobot, ended_by: str) -> None:
+    robot.ended_by = ended_by
+    with pytest.raises(BenchError, match=r"the robot is not armed: its torque was switched off\."):
+        arm(robot)
+    assert robot.arms == 1 and robot.call("status")["mode"] == "idle"

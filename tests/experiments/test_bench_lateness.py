@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -145,9 +146,24 @@ def test_a_stroke_that_late_messages_spoil_is_measured_anew(bench: StagedBench, 
 
     bench.check(measure)
     assert spoiled[0] > FAST_DEG > spoiled[1]
-    kept = readings_kept(bench)
-    assert kept["measured anew, for late ticks or messages"].value == 1.0
-    assert kept["left_sweep: fast stroke, largest error"].value < FAST_DEG
+    assert readings_kept(bench)["left_sweep: fast stroke, largest error"].value < FAST_DEG
+    assert len(bench.report.tests[-1]["spoiled"]) == 1
+
+
+def test_what_was_out_of_its_bounds_stays_in_the_report_though_it_is_well_when_measured_anew(
+    bench: StagedBench,
+) -> None:
+    values = [7.0, 5.0]
+
+    def measure(stand: Stand) -> Readings:
+        stand.lateness.update(*late(3, 0.0))
+        yield Reading("error", values.pop(0), "deg", 0.0, 6.0, "check the gains")
+
+    bench.check(measure)
+    assert readings_kept(bench)["error"].value == 5.0
+    told = r"test, before it was measured anew: error is 7 deg, must be 0 to 6: check the gains\. Meanwhile .* 3 of 4"
+    assert any(re.match(told, line) for line, good in bench.report.lines(brief=True))
+    assert "error is 7 deg" in bench.report.as_json["tests"][0]["spoiled"][0]
 
 
 @pytest.mark.parametrize(

@@ -12,5 +12,10 @@ def test_a_persons_name_for_a_mud_stays_as_it_is(name: str) -> None:
     assert mud_name(name) == mud_label(name) == mud_text(name) == name
 
 
+@pytest.mark.parametrize("name", ["47.6", "47.6%", "w47.6", "w = 47.6 %"])
+def test_a_water_content_gets_one_percent_sign_however_it_is_written(name: str) -> None:
+    assert (mud_name(name), mud_label(name), mud_text(name)) == ("47.6", "w = 47.6 %", "47.6 %")
+
+
 def test_only_a_water_content_gets_a_percent_sign() -> None:
     assert (mud_label("47.6"), mud_text("47.6"), mud_text("47.6 at 3 cm")) == ("w = 47.6 %", "47.6 %", "47.6 % at 3 cm")
