@@ -26,6 +26,7 @@ from experiments.loadcell_fits import (  # noqa: E402
     volume_m3,
 )
 from experiments.loadcell_motion import REVERSAL_SHARE, Insertion, Shear, StageSettings  # noqa: E402
+from experiments.mud_names import mud_text  # noqa: E402
 
 COLOURS = ("tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:cyan")
 MODEL: dict[str, Any] = {"color": "tab:red", "linestyle": (0, (5, 2)), "linewidth": 1.8, "zorder": 5}
@@ -150,7 +151,7 @@ def plot_coefficients(muds: Mapping[str, Mapping[str, OfMud]], path: Path) -> No
             values = np.array(told.trials) / 1e6
             panel.plot(place + 0.18 + np.zeros(len(values)), values, ".", color="grey", markersize=4)
             panel.errorbar(place, told.value / 1e6, yerr=2e-6 * told.std_error, fmt=marker, color="black", capsize=3)
-        panel.set_xticks(range(len(names)), names)
+        panel.set_xticks(range(len(names)), [mud_text(name) for name in names])
         panel.set_xlim(-0.6, len(names) - 0.4)
         panel.set_ylim(0.0, None)
         panel.set_xlabel("mud")
@@ -190,7 +191,7 @@ def _plot_pair(panel: Axes, row: Compared, place: int) -> None:
         markeredgecolor="black",
         lolims=row.at_least,
         capsize=2,
-        label=row.mud,
+        label=mud_text(row.mud),
     )
 
 

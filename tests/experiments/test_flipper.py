@@ -113,7 +113,7 @@ def test_a_trial_that_a_fault_ended_is_told_and_repeated() -> None:
     entries, asked = measured()
     assert list(entries) == [f"{MUD}/1"]
     assert len(asked) == 1
-    assert asked[0].startswith("51.2, trial 1 of 1 went wrong: the walk ended early")
+    assert asked[0].startswith("51.2 %, trial 1 of 1 went wrong: the walk ended early")
 
 
 # what comes of it
@@ -159,7 +159,7 @@ def test_the_summary_is_json_and_has_what_other_experiments_read() -> None:
     told = json.loads(json.dumps(report()))
     assert told["experiment"] == "flipper"
     for name in ("k_p", "k_s", "k_e"):
-        assert {"value", "std_error", "trials", "cv"} <= set(told["muds"][0][name])
+        assert {"value", "std_error", "trials", "repeatability"} <= set(told["muds"][0][name])
 
 
 def entries_of(**values: list[float]) -> dict[str, Entry]:

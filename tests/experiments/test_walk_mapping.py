@@ -204,8 +204,9 @@ def test_a_walk_that_somebody_else_stops_is_not_taken_for_a_whole_one(tmp_path: 
     bench = bench_of(tmp_path, TINY)
     bench.robot.__class__ = StoppedRobot
     bench.bed.prepare(TINY.planned[0])
-    entry = measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
-    assert entry["remarks"] == ["somebody stopped the walk in stride 2"]
+    with pytest.raises(SpoiltTrialError, match="somebody stopped the walk in stride 2") as spoilt:
+        measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
+    assert spoilt.value.entry is not None and len(spoilt.value.entry["strides"][DEFAULT]) == 2
 
 
 def test_by_their_order_strides_are_spread_over_the_muds_lengths() -> None:
