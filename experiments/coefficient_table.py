@@ -30,7 +30,7 @@ from estimation.stroke_fit import REPEATABILITY
 from experiments.bench_robot import BenchError
 from experiments.error_table import COEFFICIENTS, Judged, error_rows
 from experiments.mud_names import mud_name, mud_text
-from experiments.value_text import N_CM3, share_text, value_text
+from experiments.value_text import N_CM3, repeatability_text, share_text, value_text
 
 PER_CM3 = 1.0 / N_CM3
 Told = Mapping[str, Any]  # an estimate as reports tell it
@@ -150,7 +150,10 @@ def mud_rows(muds: Sequence[Mapping[str, Any]]) -> list[list[str]]:
         cells = [mud_text(mud["mud"])]
         for name in COEFFICIENTS:
             truth = (mud.get("truth") or {}).get(name)
-            cells += [coefficient_text(mud[name]), share_text(mud[name]["repeatability"])]
+            cells += [
+                coefficient_text(mud[name]),
+                repeatability_text(mud[name]["repeatability"], len(mud[name]["trials"])),
+            ]
             cells.append(value_text(truth, per=N_CM3))
         rows.append(cells)
     return rows
@@ -177,7 +180,7 @@ def _error_text(row: Mapping[str, Any]) -> str:
     """A bound is told as one, with its median share of the truth, and how many there were."""
     parts = []
     if row["median"] is not None:
-        parts.append(f"{100.0 * row['median']:.1f} % ({100.0 * row['bias']:+.0f} %)")
+        parts.append(f"{share_text(row['median'])} ({100.0 * row['bias']:+z.0f} %)")
     if row["bounds"]:
         parts.append(f"≥ {100.0 * row['bound_over_truth']:.0f} % of it ({row['bounds']})")
     if row["not_valid"]:

@@ -96,10 +96,10 @@ def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     log = robot.record(walked.from_s, after["now_s"])
     rest(robot)  # reading it takes longer on a slow computer than the robot is left alone
     strides = strides_by_method(walked.strides, log, robot.configuration, plan.flipper, METHODS)
-    told = _told(log, strides[method_of(robot.configuration.estimation)], robot.configuration, plan.flipper)
-    when = {"from_s": walked.from_s, "to_s": after["now_s"]}
     truths = bench.bed.truths(plan.flipper)
-    entry = {"mud": trial.mud, "trial": trial.number, "strides": strides, "truths": truths} | told | when
+    entry: Entry = {"mud": trial.mud, "trial": trial.number, "strides": strides, "truths": truths}
+    entry |= _told(log, strides[method_of(robot.configuration.estimation)], robot.configuration, plan.flipper)
+    entry |= {"from_s": walked.from_s, "to_s": after["now_s"]}
     spoilt = moved_text(before_m, after["body_x_m"], SPOILING_M)
     if spoilt:
         raise SpoiltTrialError(spoilt, entry)

@@ -25,8 +25,8 @@ TRUTHS = {
     "file": f"The load cell is that of the file given with --truth. {OTHER_PLATE}",
 }
 KNOWN_BIAS = (
-    "k_e by the default method reads more than the load cell: by 1 to 5 % on a simulated fixed base without any "
-    "disturbance, and by -8 to 14 % under a simulated robot that walks, the more the softer the mud. On the fixed base "
+    "k_e by the default method reads 1 to 5 % more than the load cell on a simulated fixed base without any "
+    "disturbance, and -8 to +14 % under a simulated robot that walks, the more the softer the mud. On the fixed base "
     "about 1 % each is of the face's load, which is taken off as if its pressure grew from nothing at the surface; of "
     "the zero, for which the way down counts while the plate's lower corner is in the mud; and of the surface, found "
     "0.2 mm too deep. For the same surface k_p reads 0 to 4 % more at 3 to 5 cm. In real mud nobody has measured it."

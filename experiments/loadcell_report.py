@@ -20,7 +20,7 @@ from experiments.loadcell_motion import RATE_EXPONENT, Insertion, StageSettings
 from experiments.loadcell_trials import TrialPlan
 from experiments.mud_names import mud_text
 from experiments.report_page import Figure, Section
-from experiments.value_text import N_CM3, share_text, value_text
+from experiments.value_text import N_CM3, repeatability_text, value_text
 
 TITLE = "Ground truth of mud from a load cell"
 METHOD = (
@@ -48,9 +48,10 @@ def errors_text(muds: Mapping[str, Mapping[str, OfMud]], plan: TrialPlan) -> str
     shares = ", ".join(f"{100.0 * _largest_bench_share(muds, name):.1f} % of {name}" for name in COEFFICIENTS)
     return (
         "The first ± is one standard error of the trials: their scatter with Student's factor or what each doubts of "
-        "samples, speed, surface, lag and rate, whichever is more. Two of it hold the truth in 19 of 20 cases or more. "
-        "That the force does not grow as V is no part of it: k is what least squares make of the mud's own course, and "
-        "belongs to its depth. The second ± is what no repetition shows, since all trials "
+        "samples, speed, surface, lag and rate, whichever is more. Two of it hold the truth in 19 of 20 cases or more, "
+        "but for k_s without an encoder, whose trials agree better than the calibration is known. That the force does "
+        "not grow as V is no part of it: k is what least squares make of the mud's own course, and belongs to its "
+        "depth. The second ± is what no repetition shows, since all trials "
         f"have it alike: {_depth_text(plan)}, callipers ± {1000.0 * CALLIPERS_M:g} mm on width and thickness, and the "
         f"reading of the calibration, together at most {shares}. The weights themselves count as exact, and so does an "
         "amplifier that prints grams or newtons by itself. A depth that an encoder measured has no doubt of a ruler."
@@ -174,7 +175,7 @@ def _cells(told: Mapping[str, OfMud]) -> list[str]:
     for name in COEFFICIENTS:
         each = told[name]
         cells.append(value_text(each.value, each.trials_error, each.shared_error, per=N_CM3))
-        cells.append(f"{share_text(each.repeatability)} of {len(each.trials)}")
+        cells.append(repeatability_text(each.repeatability, len(each.trials)))
     return cells
 
 

@@ -42,6 +42,6 @@ def _true_cells(truth: TrueCoefficients) -> list[str]:
 
 def _missed(told: Mapping[str, OfMud], truth: TrueCoefficients) -> list[str]:
     return [
-        f"{100.0 * (told[name].value / getattr(truth, name) - 1.0):+.1f} %" if name in told else "-"
+        f"{100.0 * (told[name].value / getattr(truth, name) - 1.0):+z.2f} %" if name in told else "-"
         for name in COEFFICIENTS
     ]

@@ -171,6 +171,4 @@ def left_out_of(notebook: Notebook) -> dict[str, Entry]:
 
 
 def left_out_texts(left_out: Mapping[str, Entry]) -> list[str]:
-    return [
-        f"{key} was left out{': ' * bool(entry['why'])}{'; '.join(entry['why'])}" for key, entry in left_out.items()
-    ]
+    return [": ".join([f"{key} was left out", *entry["why"]]) for key, entry in left_out.items()]

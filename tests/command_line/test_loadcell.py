@@ -90,7 +90,7 @@ def test_whoever_reads_the_ratio_reads_of_both_plates_and_depths(report: dict[st
         "3 x 3.5 cm, 4 mm thick, upright",
         "2.5 x 7 cm, 4 mm thick, leaning",
         "went 4 cm deep",
-        "1.10 to 1.12",
+        "8 to 12 % more true k_p",
     ):
         assert told in page
 

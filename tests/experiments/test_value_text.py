@@ -46,5 +46,8 @@ def test_where_there_is_no_value_stands_a_dash(value: float | None) -> None:
     assert value_text(value, 0.1) == share_text(value) == "-"
 
 
-def test_a_share_is_told_in_percent() -> None:
-    assert share_text(0.0321) == "3.2 %"
+@pytest.mark.parametrize(
+    ("share", "text"), [(0.0321, "3.2 %"), (0.000321, "0.032 %"), (0.321, "32 %"), (0.0, "0.0 %"), (1e-16, "0.000 %")]
+)
+def test_a_share_is_told_in_percent_with_two_digits(share: float, text: str) -> None:
+    assert share_text(share) == text
