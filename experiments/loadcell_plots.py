@@ -18,8 +18,6 @@ from experiments.curve_fit import Array  # noqa: E402
 from experiments.loadcell_comparison import Compared  # noqa: E402
 from experiments.loadcell_fits import (  # noqa: E402
     COEFFICIENTS,
-    INSERTION,
-    SHEAR,
     Analysed,
     OfMud,
     depths_of,
@@ -198,11 +196,3 @@ def _plot_pair(panel: Axes, row: Compared, look: dict[str, Any]) -> None:
         label=mud_text(row.mud),
         **mark_of(look),
     )
-
-
-def trials_of(trials: Sequence[Analysed], mud: str) -> list[Analysed]:
-    return [trial for kind in (INSERTION, SHEAR) for trial in trials if _is_of(trial, mud, kind)]
-
-
-def _is_of(trial: Analysed, mud: str, kind: str) -> bool:
-    return trial.recorded.mud == mud and trial.recorded.kind == kind

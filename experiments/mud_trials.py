@@ -108,7 +108,7 @@ def conduct_trials(
 
 
 def _forget_last(bench: Bench, before: Sequence[PlannedTrial]) -> int:
-    """The place of the last one that was measured, which is open again."""
+    """The place of the last one that was measured or left out, which is open again."""
     for place in reversed(range(len(before))):
         if before[place].key in bench.notebook.entries:
             bench.notebook.forget(before[place].key)
