@@ -116,6 +116,27 @@ def test_a_trial_that_a_fault_ended_is_told_and_repeated() -> None:
     assert asked[0].startswith("51.2 %, trial 1 of 1 went wrong: the walk ended early")
 
 
+class SlidingRobot(LockstepRobot):
+    """Its base is 60 mm farther on each time that somebody asks."""
+
+    asked = 0
+
+    def call(self, method: str, **params: Any) -> Any:
+        told = super().call(method, **params)
+        self.asked += method == "status"
+        return told | {"body_x_m": 0.06 * self.asked} if method == "status" else told
+
+
+def test_a_base_that_moved_far_spoils_the_trial_that_can_still_be_kept(tmp_path: Path) -> None:
+    robot, bed = flipper_bench(tmp_path, [MUD], 1)
+    robot.__class__ = SlidingRobot
+    bench = Bench(robot, bed, ScriptedPerson(), Notebook(tmp_path, SHORT.kept))
+    bed.prepare(SHORT.planned[0])
+    with pytest.raises(SpoiltTrialError, match="the base moved by .* mm") as spoilt:
+        flipper.measure(bench, SHORT, SHORT.planned[0])
+    assert spoilt.value.entry is not None and spoilt.value.entry["remarks"] == []
+
+
 # what comes of it
 
 
