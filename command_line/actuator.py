@@ -11,12 +11,12 @@ from pathlib import Path
 from command_line import exit_codes
 from command_line.bench import Desk, Finding, conduct_bench
 from command_line.commands import DEFAULT_CONFIG
-from command_line.screen import table
+from command_line.mud_bench import text_of_tables
 from control.joint_pd import GRAVITY_M_S2
 from experiments.actuator_bench import ActuatorBench, RobotBench, SimulatedBench
 from experiments.actuator_fit import JointFit, fit_joint
 from experiments.actuator_plan import PAPER_WEIGHTS_G, Plan
-from experiments.actuator_report import TITLE, friction_table_of, left_out, report_of, sections_of, table_of
+from experiments.actuator_report import TITLE, left_out, report_of, sections_of, text_of
 from experiments.actuator_simulation import bench_configuration, truth_rows
 from experiments.bench_robot import BenchError
 from experiments.configuration_change import changed_text, difference, replace_file
@@ -28,6 +28,7 @@ from firmware_host.toml_records import read_text
 DEFAULT_JOINTS = ("right_adduction", "right_sweep")
 LARGEST_DOUBT = 0.02  # of a torque constant that is written
 COPY = "mudskipper.toml"
+TRUTH = "The simulated motors themselves"
 WRITE, LEAVE = "y", ""
 
 
@@ -51,12 +52,12 @@ def _calibrate(options: argparse.Namespace, desk: Desk) -> Finding:
     ]
     applied, status = _applied(target, fits, desk) if target else ("", exit_codes.OK)
     omitted = len(left_out(plan, readings))
-    tables, sections = [table_of(fits), friction_table_of(fits)], sections_of(plan, readings, fits)
+    tables, sections = text_of(fits), sections_of(plan, readings, fits)
     if options.simulated:
-        tables.append(truth_rows(fits))
-        sections.append(Section("The simulated motors themselves", rows=tables[-1]))
+        tables.append((TRUTH, truth_rows(fits)))
+        sections.append(Section(TRUTH, rows=truth_rows(fits)))
     told = [*_remarks(plan.joints, fits, omitted), *([applied] if applied else [])]
-    text = "\n\n".join([*map(table, tables), *(["\n".join(told)] if told else [])])
+    text = "\n\n".join([text_of_tables(tables), *(["\n".join(told)] if told else [])])
     report = report_of(plan, readings, fits) | {"applied": applied or None}
     return Finding(report, TITLE, sections, text, logs, status)
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import refuse
-from command_line.screen import table
+from command_line.mud_bench import text_of_tables
 from drivers.load_cell_calibration import LoadCellCalibration
 from drivers.load_cell_lines import AUTO, COUNTS, NUMBER, UNITS, LineFormat
 from drivers.load_cell_port import LoadCellPort
@@ -23,7 +23,6 @@ from experiments.bench_robot import BenchError
 from experiments.estimation import SINGLE_WATERS
 from experiments.loadcell import (
     CellSettings,
-    Results,
     conclude,
     measure,
     plan_of_notebook,
@@ -34,14 +33,7 @@ from experiments.loadcell_examination import OR_WITHOUT
 from experiments.loadcell_motion import StageSettings
 from experiments.loadcell_raw import RAW
 from experiments.loadcell_recording import BenchClock, CellRecorder, WallClock
-from experiments.loadcell_report import (
-    LEANING_SHORT,
-    TITLE,
-    coefficient_rows,
-    compared_rows,
-    errors_in_short,
-    sections_of,
-)
+from experiments.loadcell_report import TITLE, sections_of, text_of
 from experiments.loadcell_stage import AttendedStage, SimulatedStage, Stage
 from experiments.loadcell_trials import TrialBench, TrialPlan
 from experiments.loadcell_truth import clay_truth, truth_rows
@@ -53,7 +45,7 @@ from simulation.plate_stage import StageParameters
 from simulation.stage_encoder_emulator import StageEncoderParameters
 from simulation.stage_motion import HandParameters
 
-TRUTH = "The same plate in even motion, without stage, cell and noise:"
+TRUTH = "The same plate in even motion, without stage, cell and noise"
 MIXED = "mud"  # the name of one that nobody named
 SIMULATED_STEP_UM = 10.0
 StageOf = Callable[[CellRecorder], Stage]
@@ -146,11 +138,12 @@ def _found(
     truths = {mud: clay_truth(_water(mud), plan.settings) for mud in results.muds} if options.simulated else {}
     report = report_of(results, notebook, plan, described)
     report["truth"] = {mud: truth._asdict() for mud, truth in truths.items()}
-    sections, text = sections_of(results, plan), text_of(results, plan)
+    sections, tables = sections_of(results, plan), text_of(results)
     if truths:
         rows = truth_rows(results.muds, truths)
-        sections = [*sections, Section("The simulated muds themselves", TRUTH, rows=rows)]
-        text = f"{text}\n\n{TRUTH}\n{table(rows)}"
+        sections = [*sections, Section("The simulated muds themselves", f"{TRUTH}.", rows=rows)]
+        tables.append((TRUTH, rows))
+    text = "\n\n".join([text_of_tables(tables), *results.remarks])
     return Finding(report, TITLE, sections, text, [desk.folder / RAW])
 
 
@@ -223,10 +216,3 @@ def _open_encoder(settings: StageEncoderSettings) -> StageEncoder:
         return StageEncoder(settings)
     except SerialLineError as problem:
         raise BenchError(f"the stage's encoder: {problem}; {OR_WITHOUT}") from problem
-
-
-def text_of(results: Results, plan: TrialPlan) -> str:
-    parts = [f"{table(coefficient_rows(results.muds))}\n{errors_in_short(plan)}"]
-    if results.compared:
-        parts.append(f"{table(compared_rows(results.compared))}\n{LEANING_SHORT}")
-    return "\n\n".join([*parts, *results.remarks])

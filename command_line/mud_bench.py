@@ -11,7 +11,7 @@ from command_line.bench import Desk
 from command_line.screen import table
 from experiments.bench_robot import BenchRobot, leave
 from experiments.daemon_robot import DaemonRobot
-from experiments.mud_trials import Bench, MudBed, PlannedTrial, PromptedBed, require_some
+from experiments.mud_trials import Bench, MudBed, PlannedTrial, PromptedBed, measured_of
 from experiments.notebook import Notebook
 from firmware_host.configuration import Configuration
 from simulation.clay import clay_of_water
@@ -50,7 +50,7 @@ def make_trials(bench: Bench, desk: Desk, run: Callable[[], None]) -> tuple[Conf
         run()
     finally:
         logs = leave(bench.robot, desk.person, desk.folder)
-    require_some(bench.notebook)
+    measured_of(bench.notebook)
     return configuration, logs
 
 

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from experiments.actuator_fit import JointFit
 from experiments.actuator_report import paper_rmse_nm
+from experiments.value_text import value_text
 
 HEIGHT_IN, WIDTH_IN, DPI = 3.4, 3.6, 200  # two beside each other fill the width of a printed page
 SENSED, EXTERNAL = r"$\tau_\mathrm{sense}$", r"$\tau_\mathrm{ext}$"
@@ -38,13 +39,13 @@ def plot_torques(fits: Sequence[JointFit], path: Path) -> None:
         configured_nm = [fit.configured_nm_a * load.current_a for load in fit.loads]
         label = f"configured: {fit.configured_nm_a:g} N·m/A"
         axis.plot(external_nm, configured_nm, "x", color="black", markersize=5, label=label, zorder=2)
-        label = f"fitted: {fit.constant_nm_a:.4f} ± {fit.constant_error_nm_a:.4f} N·m/A"
+        label = f"fitted: {value_text(fit.constant_nm_a, fit.constant_error_nm_a)} N·m/A"
         fitted_nm = [fit.fitted_nm(load) for load in fit.loads]
         axis.plot(external_nm, fitted_nm, label=label, zorder=3, **_style(fit))
         axis.set_title(_titled(fit))
-        axis.set_xlabel(f"external torque {EXTERNAL}, N·m")
+        axis.set_xlabel(f"external torque {EXTERNAL} (N·m)")
         axis.legend(loc="upper left", frameon=False, fontsize=8)
-    axes[0].set_ylabel(f"sensed torque {SENSED}, N·m")
+    axes[0].set_ylabel(f"sensed torque {SENSED} (N·m)")
     figure.savefig(path, dpi=DPI)
 
 
@@ -62,9 +63,9 @@ def plot_errors(fits: Sequence[JointFit], path: Path) -> None:
             _plot_weight(axis, fit, place, weight_g, last=place == len(weights_g) - 1)
         axis.set_xticks(range(len(weights_g)), [f"{weight_g:g}" for weight_g in weights_g])
         axis.set_title(f"{_titled(fit)}\nRMSE fitted {1e3 * fit.rmse_fitted_nm:.1f} mN·m")
-        axis.set_xlabel("weight, g")
+        axis.set_xlabel("weight (g)")
         axis.legend(loc="upper left", frameon=False, fontsize=8)
-    axes[0].set_ylabel(f"{SENSED} $-$ {EXTERNAL}, mN·m")
+    axes[0].set_ylabel(f"{SENSED} $-$ {EXTERNAL} (mN·m)")
     figure.savefig(path, dpi=DPI)
 
 
@@ -97,16 +98,16 @@ def plot_friction(fits: Sequence[JointFit], path: Path) -> None:
         if isfinite(dry_nm):
             whole_rad_s = [0.0, 1.1 * max(speeds_rad_s)]
             slope_nm_s = viscous_nm_s if isfinite(viscous_nm_s) else 0.0
-            label = f"dry {1e3 * dry_nm:.1f} ± {1e3 * dry_error_nm:.1f} mN·m"
+            label = f"dry {value_text(dry_nm, dry_error_nm, per=1e-3)} mN·m"
             if isfinite(viscous_nm_s):
-                label += f",\nviscous {1e3 * viscous_nm_s:.1f} ± {1e3 * viscous_error_nm_s:.1f} mN·m·s"
+                label += f",\nviscous {value_text(viscous_nm_s, viscous_error_nm_s, per=1e-3)} mN·m·s"
             line_mnm = [1e3 * (dry_nm + slope_nm_s * speed_rad_s) for speed_rad_s in whole_rad_s]
             axis.plot(whole_rad_s, line_mnm, color="black", linewidth=1.5, label=label)
         axis.set_title(_titled(fit))
-        axis.set_xlabel("speed, rad/s")
+        axis.set_xlabel("speed (rad/s)")
         axis.set_xlim(left=0.0)
         axis.legend(loc="upper left", frameon=False, fontsize=8)
-    axes[0].set_ylabel("torque spent, mN·m")
+    axes[0].set_ylabel("torque spent (mN·m)")
     figure.savefig(path, dpi=DPI)
 
 

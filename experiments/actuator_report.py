@@ -12,9 +12,12 @@ from experiments.actuator_fit import Entry, JointFit, repeatability
 from experiments.actuator_friction import SWING_RAD
 from experiments.actuator_plan import Plan, steps_of
 from experiments.report_page import Figure, Rows, Section
+from experiments.value_text import share_text, value_text
 from firmware_host.reports import known
 
 TITLE = "Actuator calibration"
+CONSTANTS = "Torque constants ± one standard error; RMSE and repeatability by the paper's definitions"
+FRICTION = "Friction and offset ± one standard error"
 PAPER_RMSE_NM = {"adduction": 0.0134, "sweep": 0.0127}
 PAPER_REPEATABILITY = 0.032
 PAPER_CONSTANT_NM_A = 0.083
@@ -144,67 +147,64 @@ def table_of(fits: Sequence[JointFit]) -> Rows:
     """A line a joint, the paper's numbers last."""
     head = [
         "joint",
-        "k_t, N·m/A",
-        "configured, N·m/A",
-        "RMSE, N·m",
-        "RMSE fitted, N·m",
+        "k_t (N·m/A)",
+        "configured (N·m/A)",
+        "RMSE (N·m)",
+        "RMSE fitted (N·m)",
         "repeatability",
         "readings",
     ]
     rows = [
         [
             fit.joint,
-            _with_error(fit.constant_nm_a, fit.constant_error_nm_a, 5),
+            value_text(fit.constant_nm_a, fit.constant_error_nm_a),
             f"{fit.configured_nm_a:g}",
             f"{fit.rmse_configured_nm:.4f}",
             f"{fit.rmse_fitted_nm:.4f}",
-            _percent(fit.repeatability),
+            share_text(fit.repeatability),
             str(fit.line.readings),
         ]
         for fit in fits
     ]
     paper = [
-        [f"paper, {kind}", "-", f"{PAPER_CONSTANT_NM_A:g}", f"{rmse_nm:.4f}", "-", f"{100 * PAPER_REPEATABILITY:.1f} %"]
+        [f"paper, {kind}", "-", f"{PAPER_CONSTANT_NM_A:g}", f"{rmse_nm:.4f}", "-", share_text(PAPER_REPEATABILITY)]
         for kind, rmse_nm in PAPER_RMSE_NM.items()
     ]
     return [head, *rows, *([*row, "-"] for row in paper)]
 
 
 def friction_table_of(fits: Sequence[JointFit]) -> Rows:
-    head = ["joint", "dry friction, N·m", "viscous, N·m·s", "at rest at least, N·m", "offset, N·m", "empty arm, N·m"]
+    head = [
+        "joint",
+        "dry friction (N·m)",
+        "viscous (N·m·s)",
+        "at rest at least (N·m)",
+        "offset (N·m)",
+        "empty arm (N·m)",
+    ]
     rows = [
         [
             fit.joint,
-            _with_error(*fit.friction_nm, 4),
-            _with_error(*fit.viscous_nm_s, 4),
+            value_text(*fit.friction_nm),
+            value_text(*fit.viscous_nm_s),
             f"{fit.rest_friction_a * fit.constant_nm_a:.4f}",
-            _with_error(fit.offset_nm, fit.offset_error_nm, 4),
-            _with_error(fit.tare_nm, fit.tare_spread_nm, 4),
+            value_text(fit.offset_nm, fit.offset_error_nm),
+            value_text(fit.tare_nm, fit.tare_spread_nm),
         ]
         for fit in fits
     ]
     return [head, *rows]
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.1f} %" if isfinite(share) else "-"
-
-
-def _with_error(value: float, error: float, digits: int) -> str:
-    if not isfinite(value):
-        return "-"
-    return f"{value:.{digits}f}" + (f" ± {error:.{digits}f}" if isfinite(error) else "")
-
-
 def _weight_rows(fit: JointFit) -> Rows:
     head = [
         "weight",
         "trials",
-        "τ_ext, N·m",
-        "τ_sense configured, N·m",
-        "τ_sense fitted, N·m",
-        "error fitted, mN·m",
-        "spread fitted, mN·m",
+        "τ_ext (N·m)",
+        "τ_sense configured (N·m)",
+        "τ_sense fitted (N·m)",
+        "error fitted (mN·m)",
+        "spread fitted (mN·m)",
         "repeatability",
     ]
     rows = []
@@ -216,7 +216,7 @@ def _weight_rows(fit: JointFit) -> Rows:
         spread_nm = fit.constant_nm_a * stdev(load.current_a for load in loads) if len(loads) > 1 else nan
         torques = (f"{each:.4f}" for each in (external_nm, configured_nm, fitted_nm))
         error_mnm = round(1e3 * (fitted_nm - external_nm), 1) + 0.0  # without a minus before zero
-        spread = [_with_error(1e3 * spread_nm, nan, 1), _percent(repeatability(loads))]
+        spread = [f"{1e3 * spread_nm:.1f}" if isfinite(spread_nm) else "-", share_text(repeatability(loads))]
         rows.append([f"{weight_g:g} g", str(len(loads)), *torques, f"{error_mnm:+.1f}", *spread])
     return [head, *rows]
 
@@ -255,3 +255,8 @@ def _friction_figures(fits: Sequence[JointFit]) -> list[Figure]:
             partial(plot_friction, fits),
         ),
     ]
+
+
+def text_of(fits: Sequence[JointFit]) -> list[tuple[str, Rows]]:
+    """Titles and tables for the screen."""
+    return [(CONSTANTS, table_of(fits)), (FRICTION, friction_table_of(fits))]

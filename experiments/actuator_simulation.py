@@ -52,7 +52,7 @@ def bench_configuration() -> Configuration:
 
 def truth_rows(fits: Sequence[JointFit]) -> list[list[str]]:
     """A table: what is true of the simulated motors, and by how much the fitted misses it."""
-    rows = [["joint", "true k_t, N·m/A", "k_t misses by", "true dry friction, N·m", "dry friction misses by"]]
+    rows = [["joint", "true k_t (N·m/A)", "k_t misses by", "true dry friction (N·m)", "dry friction misses by"]]
     for fit in fits:
         told = (fit.constant_nm_a, TRUE_CONSTANT_NM_A), (fit.friction_nm[0], COULOMB_NM)
         cells = (

@@ -19,6 +19,7 @@ from firmware_host.configuration import Configuration
 from firmware_host.log_reader import Log
 
 POSE_M = 0.002
+SPOILING_M = 0.01  # a tenth of a stance: 10 % of the way and of the speed, which changes what mud bears by 0.6 %
 SWEEP_NM = 0.05  # three times what the paper's motors repeat to at 0.5 N·m
 ADDUCTION_NM = 0.25  # 2 N of clinging mud, twice what the authors' logs show
 SURFACE_M = 0.01
@@ -26,9 +27,15 @@ LOOK_S = 0.1
 
 
 def pose_remarks(before_m: float | None, after_m: float | None) -> list[str]:
-    if before_m is None or after_m is None or abs(after_m - before_m) <= POSE_M:
-        return []
-    return [f"the base moved by {1000.0 * (after_m - before_m):.1f} mm: clamp it, and measure again"]
+    moved = moved_text(before_m, after_m, POSE_M)
+    return [moved] if moved else []
+
+
+def moved_text(before_m: float | None, after_m: float | None, bound_m: float) -> str:
+    """Empty where the base has not moved by more, or where nobody knows."""
+    if before_m is None or after_m is None or abs(after_m - before_m) <= bound_m:
+        return ""
+    return f"the base moved by {1000.0 * (after_m - before_m):.1f} mm: clamp it, and measure again"
 
 
 def load_remarks(log: Log, configuration: Configuration, flipper: str) -> list[str]:

@@ -2,13 +2,13 @@
 
 A summary has `muds`, a list of objects with the name of the mud and for each of k_p, k_s, k_e in N/m³:
 
-    value         mean over the trials that gave a value
-    std_error     of that mean, of everything that is known to err; of a single one, what its estimator doubts
-    trials_error  the part of it that the trials' own scatter tells, with Student's factor; null for a single one
-    shared_error  the part that all trials have alike: what their estimator doubts beyond their scatter, and at the
-                  least that of a torque (the motors' constants); null for a single one
-    trials        their values, one by one
-    cv            their standard deviation over their mean; null for a single one
+    value          mean over the trials that gave a value
+    std_error      of that mean, of everything that is known to err; of a single one, what its estimator doubts
+    trials_error   the part of it that the trials' own scatter tells, with Student's factor; null for a single one
+    shared_error   the part that all trials have alike: what their estimator doubts beyond their scatter, and at the
+                   least that of a torque (the motors' constants); null for a single one
+    trials         their values, one by one
+    repeatability  their standard deviation over their mean; null for a single one
 
 Two standard errors hold the truth in about 19 of 20 cases. Muds of one robot are told apart by the trials' part alone.
 
@@ -29,9 +29,10 @@ from estimation.origin_fit import student_factor
 from estimation.stroke_fit import REPEATABILITY
 from experiments.bench_robot import BenchError
 from experiments.error_table import COEFFICIENTS, Judged, error_rows
-from experiments.mud_names import mud_name
+from experiments.mud_names import mud_name, mud_text
+from experiments.value_text import N_CM3, repeatability_text, share_text, value_text
 
-PER_CM3 = 1e-6  # N/cm³ of a N/m³
+PER_CM3 = 1.0 / N_CM3
 Told = Mapping[str, Any]  # an estimate as reports tell it
 TruthOfMud = dict[str, dict[str, float]]  # N/m³ by mud and coefficient
 
@@ -56,7 +57,7 @@ def gathered(estimates: Iterable[Told]) -> dict[str, Any]:
         "value": (fmean(trials) if values else median(trials)) if trials else None,
         **_errors(values or bounds, spread),
         "trials": trials,
-        "cv": spread / fmean(trials) if spread is not None and fmean(trials) else None,
+        "repeatability": spread / fmean(trials) if spread is not None and fmean(trials) else None,
         "at_least": bool(bounds and not values),
         "bounds": len(bounds),
         "not_valid": [each["reason"] for each in told if not each["valid"]],
@@ -105,7 +106,7 @@ def load_truth(path: Path) -> TruthOfMud:
 def missing_text(truth: TruthOfMud | None, muds: Iterable[str]) -> str:
     """Of which muds another experiment's truth says nothing; empty where it says something of all, or there is none."""
     missing = [mud for mud in muds if truth is not None and mud not in truth]
-    return f"The file given with --truth says nothing of {', '.join(missing)}." if missing else ""
+    return f"The file given with --truth says nothing of {', '.join(map(mud_text, missing))}." if missing else ""
 
 
 def judged(rows: Iterable[Beside], setup: str) -> list[Judged]:
@@ -135,23 +136,25 @@ def coefficient_text(row: Mapping[str, Any]) -> str:
     if row["value"] is None:
         return "-"
     parts = ("std_error",) if row["trials_error"] is None else ("trials_error", "shared_error")
-    doubt = "".join(f" ± {PER_CM3 * row[part]:.3f}" for part in parts if row[part] is not None)
-    return f"{'≥ ' if row['at_least'] else ''}{PER_CM3 * row['value']:.3f}{doubt}"
+    told = value_text(row["value"], *(row[part] for part in parts), per=N_CM3)
+    return f"≥ {told}" if row["at_least"] else told
 
 
 def mud_rows(muds: Sequence[Mapping[str, Any]]) -> list[list[str]]:
     """A table with its head: each mud's coefficients, and the load cell's beside them where there is one."""
     head = ["mud"]
     for name in COEFFICIENTS:
-        head += [f"{name} (N/cm³)", "cv", "load cell"]
+        head += [f"{name} (N/cm³)", "repeatability", "load cell"]
     rows = [head]
     for mud in muds:
-        cells = [mud["mud"]]
+        cells = [mud_text(mud["mud"])]
         for name in COEFFICIENTS:
             truth = (mud.get("truth") or {}).get(name)
-            cv = mud[name]["cv"]
-            cells += [coefficient_text(mud[name]), "-" if cv is None else f"{100.0 * cv:.0f} %"]
-            cells.append("-" if truth is None else f"{PER_CM3 * truth:.3f}")
+            cells += [
+                coefficient_text(mud[name]),
+                repeatability_text(mud[name]["repeatability"], len(mud[name]["trials"])),
+            ]
+            cells.append(value_text(truth, per=N_CM3))
         rows.append(cells)
     return rows
 
@@ -165,7 +168,7 @@ def error_text_rows(errors: Sequence[Mapping[str, Any]]) -> list[list[str]]:
     for key in keys:
         own = {row["coefficient"]: row for row in errors if (row["mud"], row["method"]) == key}
         cells = [_error_text(own[name]) if name in own else "-" for name in COEFFICIENTS]
-        rows.append([*key, *cells, str(max(_strides(row) for row in own.values()))])
+        rows.append([mud_text(key[0]), key[1], *cells, str(max(_strides(row) for row in own.values()))])
     return rows
 
 
@@ -177,7 +180,7 @@ def _error_text(row: Mapping[str, Any]) -> str:
     """A bound is told as one, with its median share of the truth, and how many there were."""
     parts = []
     if row["median"] is not None:
-        parts.append(f"{100.0 * row['median']:.1f} % ({100.0 * row['bias']:+.0f} %)")
+        parts.append(f"{share_text(row['median'])} ({100.0 * row['bias']:+z.0f} %)")
     if row["bounds"]:
         parts.append(f"≥ {100.0 * row['bound_over_truth']:.0f} % of it ({row['bounds']})")
     if row["not_valid"]:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from control.records import Phase
-from experiments.base_watch import load_remarks, pose_remarks, surface_remarks
+from experiments.base_watch import SPOILING_M, load_remarks, moved_text, pose_remarks, surface_remarks
 from experiments.bench_robot import BenchError, arm, rest, walk
 from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text
 from experiments.error_table import COEFFICIENTS
@@ -96,11 +96,15 @@ def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     log = robot.record(walked.from_s, after["now_s"])
     rest(robot)  # reading it takes longer on a slow computer than the robot is left alone
     strides = strides_by_method(walked.strides, log, robot.configuration, plan.flipper, METHODS)
-    told = _told(log, strides[method_of(robot.configuration.estimation)], robot.configuration, plan.flipper)
-    told["remarks"] += pose_remarks(before_m, after["body_x_m"])
-    when = {"from_s": walked.from_s, "to_s": after["now_s"]}
     truths = bench.bed.truths(plan.flipper)
-    return {"mud": trial.mud, "trial": trial.number, "strides": strides, "truths": truths} | told | when
+    entry: Entry = {"mud": trial.mud, "trial": trial.number, "strides": strides, "truths": truths}
+    entry |= _told(log, strides[method_of(robot.configuration.estimation)], robot.configuration, plan.flipper)
+    entry |= {"from_s": walked.from_s, "to_s": after["now_s"]}
+    spoilt = moved_text(before_m, after["body_x_m"], SPOILING_M)
+    if spoilt:
+        raise SpoiltTrialError(spoilt, entry)
+    entry["remarks"] += pose_remarks(before_m, after["body_x_m"])
+    return entry
 
 
 def _told(log: Log, own: Sequence[dict[str, Any]], configuration: Configuration, flipper: str) -> Entry:

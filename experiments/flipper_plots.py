@@ -163,7 +163,7 @@ def _plot_by_mud(
         told, look = mud[name], looks[mud["mud"]]
         if told["value"] is None:
             continue
-        value, sd = PER_CM3 * told["value"], PER_CM3 * told["value"] * (told["cv"] or 0.0)
+        value, sd = PER_CM3 * told["value"], PER_CM3 * told["value"] * (told["repeatability"] or 0.0)
         trials = [PER_CM3 * trial for trial in told["trials"]]
         panel.plot([water] * len(trials), trials, "_", color=GREY, markersize=12)
         panel.errorbar(water, value, sd or None, capsize=4, ecolor=INK, linestyle="", lolims=told["at_least"],

@@ -9,8 +9,10 @@ from typing import Any
 from experiments.coefficient_table import error_text_rows, mud_rows
 from experiments.estimation_methods import DEFAULT
 from experiments.flipper import AUTHORS_MUD, AUTHORS_N, Plan, muds_of, trials_of
+from experiments.loadcell_comparison import OTHER_PLATE
 from experiments.mud_looks import file_name
 from experiments.mud_names import mud_text
+from experiments.mud_trials import left_out_texts
 from experiments.notebook import Entry
 from experiments.report_page import Figure, Section
 from firmware_host.configuration import Configuration
@@ -20,14 +22,11 @@ TRUTHS = {
     "bed": "The load cell is a virtual one: it repeats each stroke with the flipper's own plate, to the same depth; "
     "insertion and extraction along the flipper's own arc, and without what the plate's face bears, which is no part "
     "of k_p and k_e. (A leaning plate pushed straight down would read 4 % more k_p at 3 cm and 31 % at 5 cm.)",
-    "file": "The load cell is that of the file given with --truth. Its plate is upright and goes as deep as it is set; "
-    "the flipper's leans, goes along an arc, its edge half as fast again, and 2 mm less deep in insertion and deeper "
-    "in stance. In the simulator's clay at 3 cm all this makes 10 to 12 % more k_p, 3 to 5 % less k_s and 1 % more "
-    "k_e; lean and arc alone make 6 % more, nothing, and 1 % less.",
+    "file": f"The load cell is that of the file given with --truth. {OTHER_PLATE}",
 }
 KNOWN_BIAS = (
-    "k_e by the default method reads more than the load cell: by 1 to 5 % on a simulated fixed base without any "
-    "disturbance, and by -8 to 14 % under a simulated robot that walks, the more the softer the mud. On the fixed base "
+    "k_e by the default method reads 1 to 5 % more than the load cell on a simulated fixed base without any "
+    "disturbance, and -8 to +14 % under a simulated robot that walks, the more the softer the mud. On the fixed base "
     "about 1 % each is of the face's load, which is taken off as if its pressure grew from nothing at the surface; of "
     "the zero, for which the way down counts while the plate's lower corner is in the mud; and of the surface, found "
     "0.2 mm too deep. For the same surface k_p reads 0 to 4 % more at 3 to 5 cm. In real mud nobody has measured it."
@@ -40,12 +39,14 @@ DOUBTS = (
     "The first ± is one standard error by the scatter of the trials, the second what all of them have alike as far as "
     "the daemon doubts it: torque constants (3.2 %), the face's load, zero, surface. Two of both together hold what "
     "a load cell reads on the flipper's own way in 19 of 20 cases or more; to tell muds of one robot apart the first "
-    "alone counts. A single trial has one ±, of everything. cv is the coefficient of variation over the trials."
+    "alone counts. A single trial has one ±, of everything. Repeatability is the standard deviation of the trials "
+    "over their mean."
 )
 HEADING = (
-    "Coefficients. The first ± is the trials' own, the second what they have in common, one standard error each; cv "
-    "is the variation over the trials. The report says what else is in doubt."
+    "Coefficients ± one standard error of the trials ± one of what all have alike; what each holds: see the report"
 )
+ERRORS = "Median error of single strides beside the load cell, in brackets the bias"
+FORCES = "Largest forces, in brackets what the laws leave over"
 MODELLED = (
     "B to E as in the paper's figure 4. Dashed: the forces by the fitted coefficients, where each is fitted. The "
     "default method's laws tell a joint's torque; it takes the place of the measured one, and goes with the other "
@@ -67,8 +68,10 @@ def sections_of(
         sections.append(_errors(report))
     sections.append(_forces(report))
     sections.append(_strides(firsts, configuration, method))
-    remarks = [f"{mud_text(mud['mud'])}: {remark}." for mud in report["muds"] for remark in mud["remarks"]]
-    return sections + ([Section("What was remarked", "\n\n".join(remarks))] if remarks else [])
+    remarks = [f"{mud_text(mud['mud'])}: {remark}" for mud in report["muds"] for remark in mud["remarks"]]
+    remarks += left_out_texts(report.get("left_out", {}))
+    told = "\n\n".join(f"{remark.rstrip('.')}." for remark in remarks)
+    return sections + ([Section("What was remarked", told)] if remarks else [])
 
 
 def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], configuration: Configuration) -> Section:
@@ -105,7 +108,7 @@ def doubts(settings: Mapping[str, Any]) -> list[str]:
 
 
 def _errors(report: Mapping[str, Any]) -> Section:
-    text = f"Median error of single strides, in brackets the bias. {TRUTHS[report['settings']['truth']]}"
+    text = f"{ERRORS}. {TRUTHS[report['settings']['truth']]}"
     return Section("Beside the load cell", text, rows=error_text_rows(report["errors"]))
 
 
@@ -122,7 +125,7 @@ def force_rows(report: Mapping[str, Any]) -> list[list[str]]:
     rows = [["mud", *(f"{stroke} (N)" for stroke in STROKES)]]
     for mud, forces in report["largest_forces_n"].items():
         misfits = report["misfit_n"][mud]
-        rows.append([mud, *(_force_text(forces[stroke], misfits[stroke]) for stroke in STROKES)])
+        rows.append([mud_text(mud), *(_force_text(forces[stroke], misfits[stroke]) for stroke in STROKES)])
     rows.append(["authors' logs", *(f"{low:g} to {high:g}" for low, high in AUTHORS_N.values())])
     return rows
 
@@ -151,7 +154,5 @@ def text_of(report: Mapping[str, Any]) -> list[tuple[str, Sequence[Sequence[str]
     """Titles and tables for the screen."""
     tables: list[tuple[str, Sequence[Sequence[str]]]] = [(HEADING, mud_rows(report["muds"]))]
     if report["errors"]:
-        tables.append(
-            (f"Median error (bias). {TRUTHS[report['settings']['truth']]}", error_text_rows(report["errors"]))
-        )
-    return [*tables, ("Largest forces, in brackets what the laws leave over", force_rows(report))]
+        tables.append((ERRORS, error_text_rows(report["errors"])))
+    return [*tables, (FORCES, force_rows(report))]

@@ -222,7 +222,7 @@ def _described(told: OfMud) -> dict[str, Any]:
         "value": known(told.value),
         "std_error": known(told.std_error),
         "trials_error": known(told.trials_error),
-        "bench_error": known(told.bench_error),
+        "shared_error": known(told.shared_error),
         "repeatability": known(told.repeatability),
         "trials": [known(value) for value in told.trials],
     }

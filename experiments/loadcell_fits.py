@@ -118,11 +118,11 @@ class OfMud(NamedTuple):
     trials_error: float
     trials: tuple[float, ...]
     repeatability: float  # scatter of the trials over their mean
-    bench_error: float = 0.0
+    shared_error: float = 0.0
 
     @property
     def std_error(self) -> float:
-        return hypot(self.trials_error, self.bench_error)
+        return hypot(self.trials_error, self.shared_error)
 
 
 def volume_m3(settings: StageSettings, depths_m: Array) -> Array:

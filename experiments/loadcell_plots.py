@@ -18,19 +18,18 @@ from experiments.curve_fit import Array  # noqa: E402
 from experiments.loadcell_comparison import Compared  # noqa: E402
 from experiments.loadcell_fits import (  # noqa: E402
     COEFFICIENTS,
-    INSERTION,
-    SHEAR,
     Analysed,
     OfMud,
     depths_of,
     volume_m3,
 )
 from experiments.loadcell_motion import REVERSAL_SHARE, Insertion, Shear, StageSettings  # noqa: E402
+from experiments.mud_looks import INK, LABELS, looks_of, mark_of  # noqa: E402
+from experiments.mud_names import mud_text  # noqa: E402
+from experiments.value_text import N_CM3  # noqa: E402
 
 COLOURS = ("tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:cyan")
 MODEL: dict[str, Any] = {"color": "tab:red", "linestyle": (0, (5, 2)), "linewidth": 1.8, "zorder": 5}
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-NAMES = {"k_p": "$k_p$", "k_s": "$k_s$", "k_e": "$k_e$"}
 BEFORE_S, BEHIND_S = 0.3, 0.4
 SHOWN_ABOVE_M = 0.01  # the mud
 DPI = 110
@@ -142,19 +141,19 @@ def _name_places(shear: Axes, depth: Axes, curve: Axes, over_way: bool, measured
 def plot_coefficients(muds: Mapping[str, Mapping[str, OfMud]], path: Path) -> None:
     """Mean with two standard errors, and every trial beside it."""
     figure, panels = plt.subplots(1, 3, figsize=(11.0, 3.6), constrained_layout=True)
-    names = list(muds)
+    names, looks = list(muds), looks_of(list(muds))
     for panel, name in zip(panels, COEFFICIENTS, strict=True):
         for place, mud in enumerate(names):
             told = muds[mud][name]
-            marker = MARKERS[place % len(MARKERS)]
-            values = np.array(told.trials) / 1e6
+            values = np.array(told.trials) / N_CM3
             panel.plot(place + 0.18 + np.zeros(len(values)), values, ".", color="grey", markersize=4)
-            panel.errorbar(place, told.value / 1e6, yerr=2e-6 * told.std_error, fmt=marker, color="black", capsize=3)
-        panel.set_xticks(range(len(names)), names)
+            doubt = 2.0 * told.std_error / N_CM3
+            panel.errorbar(place, told.value / N_CM3, doubt, linestyle="", ecolor=INK, capsize=3, **mark_of(looks[mud]))
+        panel.set_xticks(range(len(names)), [mud_text(name) for name in names])
         panel.set_xlim(-0.6, len(names) - 0.4)
         panel.set_ylim(0.0, None)
         panel.set_xlabel("mud")
-        panel.set_ylabel(f"{NAMES[name]} (N/cm³)")
+        panel.set_ylabel(f"{LABELS[name]} (N/cm³)")
     figure.savefig(path, dpi=DPI)
     plt.close(figure)
 
@@ -162,41 +161,38 @@ def plot_coefficients(muds: Mapping[str, Mapping[str, OfMud]], path: Path) -> No
 def plot_comparison(rows: Sequence[Compared], path: Path) -> None:
     """As the paper's figure 5 G to I: the flipper's against the load cell's, and the line on which both agree."""
     figure, panels = plt.subplots(1, 3, figsize=(11.0, 3.9), constrained_layout=True)
-    muds = list(dict.fromkeys(row.mud for row in rows))
+    looks = looks_of(list(dict.fromkeys(row.mud for row in rows)))
     for panel, name in zip(panels, COEFFICIENTS, strict=True):
         of_name = [row for row in rows if row.coefficient == name]
-        reach = 1.15 * max([max(row.sensed, row.truth) / 1e6 for row in of_name], default=1.0)
+        reach = 1.05 * max([_farthest(row) / N_CM3 for row in of_name], default=1.0)
         panel.plot([0.0, reach], [0.0, reach], color="grey", linewidth=1.2, zorder=0)
         for row in of_name:
-            _plot_pair(panel, row, muds.index(row.mud))
+            _plot_pair(panel, row, looks[row.mud])
         panel.set_xlim(0.0, reach)
         panel.set_ylim(0.0, reach)
         panel.set_aspect("equal")
-        panel.set_xlabel(f"{NAMES[name]} by the load cell (N/cm³)")
-        panel.set_ylabel(f"{NAMES[name]} by the flipper (N/cm³)")
+        panel.set_xlabel(f"{LABELS[name]} by load cell (N/cm³)")
+        panel.set_ylabel("by the flipper (N/cm³)")
     panels[0].legend(fontsize="small", title="mud", loc="upper left")
     figure.savefig(path, dpi=DPI)
     plt.close(figure)
 
 
-def _plot_pair(panel: Axes, row: Compared, place: int) -> None:
+def _farthest(row: Compared) -> float:
+    """Up or to the right, with its error."""
+    return max(row.sensed + 2.0 * row.sensed_std_error, row.truth + 2.0 * row.truth_std_error)
+
+
+def _plot_pair(panel: Axes, row: Compared, look: dict[str, Any]) -> None:
     panel.errorbar(
-        row.truth / 1e6,
-        row.sensed / 1e6,
-        xerr=2e-6 * row.truth_std_error,
-        yerr=2e-6 * row.sensed_std_error,
-        fmt=MARKERS[place % len(MARKERS)],
-        color=COLOURS[place % len(COLOURS)],
-        markeredgecolor="black",
+        row.truth / N_CM3,
+        row.sensed / N_CM3,
+        xerr=2.0 * row.truth_std_error / N_CM3,
+        yerr=2.0 * row.sensed_std_error / N_CM3,
+        linestyle="",
+        ecolor=INK,
         lolims=row.at_least,
-        capsize=2,
-        label=row.mud,
+        capsize=3,
+        label=mud_text(row.mud),
+        **mark_of(look),
     )
-
-
-def trials_of(trials: Sequence[Analysed], mud: str) -> list[Analysed]:
-    return [trial for kind in (INSERTION, SHEAR) for trial in trials if _is_of(trial, mud, kind)]
-
-
-def _is_of(trial: Analysed, mud: str, kind: str) -> bool:
-    return trial.recorded.mud == mud and trial.recorded.kind == kind

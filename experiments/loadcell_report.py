@@ -14,11 +14,13 @@ import numpy as np
 
 from experiments.loadcell import Results
 from experiments.loadcell_alignment import common_alignment
-from experiments.loadcell_comparison import Compared
+from experiments.loadcell_comparison import OTHER_PLATE, Compared
 from experiments.loadcell_fits import CALLIPERS_M, COEFFICIENTS, Analysed, OfMud
 from experiments.loadcell_motion import RATE_EXPONENT, Insertion, StageSettings
 from experiments.loadcell_trials import TrialPlan
+from experiments.mud_names import mud_text
 from experiments.report_page import Figure, Section
+from experiments.value_text import N_CM3, repeatability_text, value_text
 
 TITLE = "Ground truth of mud from a load cell"
 METHOD = (
@@ -37,23 +39,8 @@ MEASURED = (
     "the mean over the second half of the measured way, 5 mm behind a rest. Mud bears more the faster it is: how much, "
     "the drags tell, and the coefficients are those at the speed that was set."
 )
-LEANING = (
-    "A flipper's plate leans in the mud and goes along an arc, and in clay no coefficient is the same for another "
-    "plate, attitude or way. In the simulator's clay of 47.6 to 51.2 % water, where both are known, the flipper's "
-    "plate (2.5 cm wide, 4 mm thick, 3 cm deep) has 1.10 to 1.12 times the k_p, 0.95 to 0.97 times the k_s and 1.01 "
-    "to 1.02 times the k_e of the paper's upright one (3 x 3.5 cm, 4 mm). It is lean and way: upright, the flipper's "
-    "own plate (--plate 2.5x7) tells within 2 % what the paper's tells. So a ratio of 1.1 in k_p is no error of the "
-    "flipper there. What it reads beyond that is: its edge is quicker than 0.1 m/s, which makes 3 % of k_e, and the "
-    "rest is its error."
-)
-LEANING_SHORT = (
-    "a flipper's plate leans and goes along an arc: in the simulator's clay that alone makes 1.10 to 1.12 in k_p, "
-    "0.95 to 0.97 in k_s and 1.01 to 1.02 in k_e, whatever the size of the plate (see the report)"
-)
-
-
-def errors_in_short(plan: TrialPlan) -> str:
-    return f"± one standard error of the trials ± one of the bench: {_depth_text(plan)}, plate, calibration"
+HEADING = "Coefficients ± one standard error of the trials ± one of the bench; what each holds: see the report"
+COMPARED = "Flipper beside load cell; how far other plates and ways alone tell other coefficients: see the report"
 
 
 def errors_text(muds: Mapping[str, Mapping[str, OfMud]], plan: TrialPlan) -> str:
@@ -61,9 +48,10 @@ def errors_text(muds: Mapping[str, Mapping[str, OfMud]], plan: TrialPlan) -> str
     shares = ", ".join(f"{100.0 * _largest_bench_share(muds, name):.1f} % of {name}" for name in COEFFICIENTS)
     return (
         "The first ± is one standard error of the trials: their scatter with Student's factor or what each doubts of "
-        "samples, speed, surface, lag and rate, whichever is more. Two of it hold the truth in 19 of 20 cases or more. "
-        "That the force does not grow as V is no part of it: k is what least squares make of the mud's own course, and "
-        "belongs to its depth. The second ± is what no repetition shows, since all trials "
+        "samples, speed, surface, lag and rate, whichever is more. Two of it hold the truth in 19 of 20 cases or more, "
+        "but for k_s without an encoder, whose trials agree better than the calibration is known. That the force does "
+        "not grow as V is no part of it: k is what least squares make of the mud's own course, and belongs to its "
+        "depth. The second ± is what no repetition shows, since all trials "
         f"have it alike: {_depth_text(plan)}, callipers ± {1000.0 * CALLIPERS_M:g} mm on width and thickness, and the "
         f"reading of the calibration, together at most {shares}. The weights themselves count as exact, and so does an "
         "amplifier that prints grams or newtons by itself. A depth that an encoder measured has no doubt of a ruler."
@@ -72,7 +60,7 @@ def errors_text(muds: Mapping[str, Mapping[str, OfMud]], plan: TrialPlan) -> str
 
 def _largest_bench_share(muds: Mapping[str, Mapping[str, OfMud]], name: str) -> float:
     coefficients = [told[name] for told in muds.values()]
-    return max((each.bench_error / each.value for each in coefficients if isfinite(each.value)), default=0.0)
+    return max((each.shared_error / each.value for each in coefficients if isfinite(each.value)), default=0.0)
 
 
 def _depth_text(plan: TrialPlan) -> str:
@@ -85,8 +73,8 @@ def comparison_text(results: Results, settings: StageSettings) -> str:
     other = _plate_text(plate, "", "") if isinstance(plate, dict) else "a plate that its summary does not tell"
     told = (
         f"On the grey line the flipper senses what the load cell measures. The load cell carried {own}, upright; the "
+        f"flipper {other}, leaning. {OTHER_PLATE} What is apart beyond that is the flipper's error."
     )
-    told += f"flipper {other}, leaning. {LEANING}"
     depth_m = (flipper.get("settings") or {}).get("depth_m")
     if isinstance(depth_m, int | float) and abs(depth_m - settings.depth_m) > 1e-6:
         told += (
@@ -160,10 +148,13 @@ def _pairs(results: Results) -> list[Figure]:
 
 def _mud_section(trials: Sequence[Analysed], mud: str, told: Mapping[str, OfMud], settings: StageSettings) -> Section:
     of_it = [trial for trial in trials if trial.recorded.mud == mud]
-    caption = f"Mud {mud}: measured (solid, one colour a trial) and modelled with the mud's coefficients (red, dashed)."
+    caption = (
+        f"Mud {mud_text(mud)}: measured (solid, one colour a trial) and modelled with the mud's coefficients (red, "
+        "dashed)."
+    )
     name = re.sub(r"[^\w.]+", "_", f"mud_{mud}")
     figure = Figure(name, caption, partial(_draw_mud, of_it, told, settings))
-    return Section(f"Mud {mud}", rows=trial_rows(of_it), figures=[figure])
+    return Section(f"Mud {mud_text(mud)}", rows=trial_rows(of_it), figures=[figure])
 
 
 def _draw_mud(trials: Sequence[Analysed], told: Mapping[str, OfMud], settings: StageSettings, path: Path) -> None:
@@ -175,26 +166,25 @@ def _draw_mud(trials: Sequence[Analysed], told: Mapping[str, OfMud], settings: S
 def coefficient_rows(muds: Mapping[str, Mapping[str, OfMud]]) -> list[list[str]]:
     head = ["mud"]
     for name in COEFFICIENTS:
-        head += [f"{name} N/cm³ ± trials ± bench", "repeatability"]
-    return [head, *([mud, *_cells(told)] for mud, told in muds.items())]
+        head += [f"{name} (N/cm³)", "repeatability"]
+    return [head, *([mud_text(mud), *_cells(told)] for mud, told in muds.items())]
 
 
 def _cells(told: Mapping[str, OfMud]) -> list[str]:
     cells = []
     for name in COEFFICIENTS:
         each = told[name]
-        bench = f" ± {each.bench_error / 1e6:.3f}" if isfinite(each.value) else ""
-        cells.append(_with_error(each.value, each.trials_error, 1e6) + bench)
-        cells.append(f"{_percent(each.repeatability)} of {len(each.trials)}")
+        cells.append(value_text(each.value, each.trials_error, each.shared_error, per=N_CM3))
+        cells.append(repeatability_text(each.repeatability, len(each.trials)))
     return cells
 
 
 def trial_rows(trials: Sequence[Analysed]) -> list[list[str]]:
-    head = ["trial", *(f"{name} N/cm³" for name in COEFFICIENTS), "speed m/s", "measured cm", "remark"]
+    head = ["trial", *(f"{name} (N/cm³)" for name in COEFFICIENTS), "speed (m/s)", "measured (cm)", "remark"]
     rows = []
     for trial in trials:
         told = [trial.coefficients.get(name) for name in COEFFICIENTS]
-        cells = ["" if each is None else _with_error(each.value, each.std_error, 1e6) for each in told]
+        cells = ["" if each is None else value_text(each.value, each.std_error, per=N_CM3) for each in told]
         speed = "-" if trial.speed_m_s is None or not isfinite(trial.speed_m_s) else f"{trial.speed_m_s:.3f}"
         label = f"{trial.recorded.kind} {trial.recorded.key.rsplit('/', 1)[-1]}"
         rows.append([label, *cells, speed, _farthest(trial), trial.problem or trial.remark])
@@ -205,29 +195,27 @@ def _farthest(trial: Analysed) -> str:
     """Depth of an insertion, way of a shear."""
     if trial.places_m is None:
         return "-"
-    return f"{100.0 * float(np.nanmax(trial.places_m)):.2f} ± {100.0 * trial.place_error_m:.3f}"
+    return value_text(100.0 * float(np.nanmax(trial.places_m)), 100.0 * trial.place_error_m)
 
 
 def compared_rows(compared: Sequence[Compared]) -> list[list[str]]:
-    head = ["mud", "", "flipper N/cm³", "load cell N/cm³", "flipper / load cell"]
+    head = ["mud", "", "flipper (N/cm³)", "load cell (N/cm³)", "flipper / load cell"]
     return [
         head,
         *(
             [
-                row.mud,
+                mud_text(row.mud),
                 row.coefficient,
-                ("≥ " if row.at_least else "") + _with_error(row.sensed, row.sensed_std_error, 1e6),
-                _with_error(row.truth, row.truth_std_error, 1e6),
-                ("≥ " if row.at_least else "") + _with_error(row.ratio, row.ratio_std_error, 1.0),
+                ("≥ " if row.at_least else "") + value_text(row.sensed, row.sensed_std_error, per=N_CM3),
+                value_text(row.truth, row.truth_std_error, per=N_CM3),
+                ("≥ " if row.at_least else "") + value_text(row.ratio, row.ratio_std_error),
             ]
             for row in compared
         ),
     ]
 
 
-def _with_error(value: float, error: float, per: float) -> str:
-    return f"{value / per:.3f} ± {error / per:.3f}" if isfinite(value) else "-"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.1f} %" if isfinite(share) else "-"
+def text_of(results: Results) -> list[tuple[str, Sequence[Sequence[str]]]]:
+    """Titles and tables for the screen."""
+    tables: list[tuple[str, Sequence[Sequence[str]]]] = [(HEADING, coefficient_rows(results.muds))]
+    return tables + [(COMPARED, compared_rows(results.compared))] * bool(results.compared)

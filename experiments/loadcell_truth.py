@@ -8,6 +8,8 @@ from control.records import UNKNOWN
 from experiments.load_cell_truth import TrueCoefficients, true_coefficients
 from experiments.loadcell_fits import COEFFICIENTS, OfMud
 from experiments.loadcell_motion import StageSettings
+from experiments.mud_names import mud_text
+from experiments.value_text import N_CM3, value_text
 from simulation.clay import clay_of_water
 from simulation.load_cell_bench import RELAXATION
 from simulation.witness import StrideTruth, StrokeTruth
@@ -27,16 +29,19 @@ def truth_rows(
     muds: Mapping[str, Mapping[str, OfMud]], truths: Mapping[str, TrueCoefficients]
 ) -> Sequence[Sequence[str]]:
     """A table: the true value, and by how much the measured one misses it."""
-    head = ["mud", *(f"true {name} N/cm³" for name in COEFFICIENTS), *(f"{name} misses by" for name in COEFFICIENTS)]
-    return [head, *([mud, *_true_cells(truths[mud]), *_missed(told, truths[mud])] for mud, told in muds.items())]
+    head = ["mud", *(f"true {name} (N/cm³)" for name in COEFFICIENTS), *(f"{name} misses by" for name in COEFFICIENTS)]
+    return [
+        head,
+        *([mud_text(mud), *_true_cells(truths[mud]), *_missed(told, truths[mud])] for mud, told in muds.items()),
+    ]
 
 
 def _true_cells(truth: TrueCoefficients) -> list[str]:
-    return [f"{getattr(truth, name) / 1e6:.3f}" for name in COEFFICIENTS]
+    return [value_text(getattr(truth, name), per=N_CM3) for name in COEFFICIENTS]
 
 
 def _missed(told: Mapping[str, OfMud], truth: TrueCoefficients) -> list[str]:
     return [
-        f"{100.0 * (told[name].value / getattr(truth, name) - 1.0):+.1f} %" if name in told else "-"
+        f"{100.0 * (told[name].value / getattr(truth, name) - 1.0):+z.2f} %" if name in told else "-"
         for name in COEFFICIENTS
     ]

@@ -2,25 +2,29 @@
 wrong.
 
 Each trial is in the notebook before the next begins, so whatever ends an experiment costs the trial under way and no
-other. A trial that a fault ended, or that said nothing, is repeated, after the third time only where a person wants it
-so; one that is only doubtful is kept or repeated as they decide. Torque is off whenever hands may be in the mud.
+other. A trial that a fault ended, or that is worth nothing, is repeated, after the third time only where a person wants
+it so; one that is only doubtful is kept or repeated as they decide. One that is left out is written down as well, and
+not asked for again. Torque is off whenever hands may be in the mud.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple, Protocol
 
 from experiments.bench_robot import BenchError, BenchRobot, disarm, face_faults, rest
+from experiments.mud_names import mud_text
 from experiments.notebook import Entry, Notebook
 from experiments.person import GO_ON, REDO, SKIP, Person
 
 MOST_ATTEMPTS = 3
+KEEP = "k"
 LOOK_S = 0.05  # of waiting for a person, in which nobody else arms the robot
 ASKED = {GO_ON: "go on", SKIP: "leave this trial out", REDO: "measure the last one again"}
 SPOILT = {GO_ON: "repeat it", SKIP: "leave it out"}
 SPOILT_OFTEN = {GO_ON: "end here", REDO: "repeat it", SKIP: "leave it out"}
+KEPT = {KEEP: "keep it as it is"}
 DOUBTFUL = {GO_ON: "keep it", REDO: "measure it again", SKIP: "leave it out"}
 
 Truths = dict[int, dict[str, float | None]]  # N/m³ by stride and coefficient
@@ -33,11 +37,15 @@ class PlannedTrial(NamedTuple):
     of: int
 
     def __str__(self) -> str:
-        return f"{self.mud}, trial {self.number} of {self.of}"
+        return f"{mud_text(self.mud)}, trial {self.number} of {self.of}"
 
 
 class SpoiltTrialError(Exception):
-    """A trial says nothing; the text says why."""
+    """A trial is worth nothing; the text says why. Where it has an entry, somebody may keep it all the same."""
+
+    def __init__(self, why: str, entry: Entry | None = None) -> None:
+        super().__init__(why)
+        self.entry = entry
 
 
 class MudBed(Protocol):
@@ -87,10 +95,12 @@ def conduct_trials(
     while place < len(planned):
         trial = planned[place]
         show(sum(each.key in entries for each in planned), len(planned))
-        answer = SKIP if trial.key in entries else bench.bed.prepare(trial)
+        answer = GO_ON if trial.key in entries else bench.bed.prepare(trial)
         if answer == REDO:
             place = _forget_last(bench, planned[:place])
-        elif answer == SKIP or _is_done(bench, trial, measure, attempts + 1):
+        elif answer == SKIP:
+            _leave_out(bench, trial)
+        elif trial.key in entries or _is_done(bench, trial, measure, attempts + 1):
             place, attempts = place + 1, 0
         else:
             attempts += 1
@@ -98,7 +108,7 @@ def conduct_trials(
 
 
 def _forget_last(bench: Bench, before: Sequence[PlannedTrial]) -> int:
-    """The place of the last one that was measured, which is open again."""
+    """The place of the last one that was measured or left out, which is open again."""
     for place in reversed(range(len(before))):
         if before[place].key in bench.notebook.entries:
             bench.notebook.forget(before[place].key)
@@ -109,27 +119,56 @@ def _forget_last(bench: Bench, before: Sequence[PlannedTrial]) -> int:
 
 def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) -> bool:
     """Measured, or left out. Raises BenchError after too many attempts."""
-    attend = partial(bench.robot.wait, LOOK_S)
     try:
         entry = measure(trial)
     except (SpoiltTrialError, BenchError) as problem:
         rest(bench.robot)
-        often = attempt >= MOST_ATTEMPTS
-        told = f"{trial} went wrong{f' {attempt} times; the last time' if often else ''}: {str(problem).rstrip('.')}."
-        answer = bench.person.ask(told, SPOILT_OFTEN if often else SPOILT, attend)
-        if often and answer == GO_ON:
-            raise BenchError(told) from problem
-        return answer == SKIP
+        return _is_done_with_spoilt(bench, trial, problem, attempt)
     rest(bench.robot)
     for remark in entry["remarks"]:
         bench.person.tell(f"{trial}: {remark}")
-    answer = bench.person.ask("Is this trial to count?", DOUBTFUL, attend) if entry["remarks"] else GO_ON
+    answer = _ask(bench, "Is this trial to count?", DOUBTFUL) if entry["remarks"] else GO_ON
     if answer == GO_ON:
         bench.notebook.write(trial.key, entry)
+    elif answer == SKIP:
+        _leave_out(bench, trial, entry["remarks"])
     return answer != REDO
 
 
-def require_some(notebook: Notebook) -> None:
-    """Raises BenchError for an experiment that has nothing to report."""
-    if not notebook.entries:
+def _is_done_with_spoilt(bench: Bench, trial: PlannedTrial, problem: Exception, attempt: int) -> bool:
+    """Left out, or kept. Raises BenchError where nobody wants it again after too many attempts."""
+    entry = problem.entry if isinstance(problem, SpoiltTrialError) else None
+    often = attempt >= MOST_ATTEMPTS
+    told = f"{trial} went wrong{f' {attempt} times; the last time' if often else ''}: {str(problem).rstrip('.')}."
+    answer = _ask(bench, told, (SPOILT_OFTEN if often else SPOILT) | ({} if entry is None else KEPT))
+    if often and answer == GO_ON:
+        raise BenchError(told) from problem
+    if answer == SKIP:
+        _leave_out(bench, trial, [str(problem)])
+    elif answer == KEEP and entry is not None:
+        bench.notebook.write(trial.key, entry | {"remarks": [*entry["remarks"], str(problem)]})
+    return answer in (SKIP, KEEP)
+
+
+def _ask(bench: Bench, question: str, answers: Mapping[str, str]) -> str:
+    return bench.person.ask(question, answers, partial(bench.robot.wait, LOOK_S))
+
+
+def _leave_out(bench: Bench, trial: PlannedTrial, why: Sequence[str] = ()) -> None:
+    bench.notebook.write(trial.key, {"skipped": True, "why": list(why)})
+
+
+def measured_of(notebook: Notebook) -> dict[str, Entry]:
+    """The trials that count. Raises BenchError for an experiment that has nothing to report."""
+    measured = {key: entry for key, entry in notebook.entries.items() if not entry.get("skipped")}
+    if not measured:
         raise BenchError("nothing was measured: every trial was left out")
+    return measured
+
+
+def left_out_of(notebook: Notebook) -> dict[str, Entry]:
+    return {key: entry for key, entry in notebook.entries.items() if entry.get("skipped")}
+
+
+def left_out_texts(left_out: Mapping[str, Entry]) -> list[str]:
+    return [": ".join([f"{key} was left out", *entry["why"]]) for key, entry in left_out.items()]

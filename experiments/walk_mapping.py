@@ -131,15 +131,15 @@ def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     if after["mode"] != "hold":
         raise SpoiltTrialError(told_by(after))
     made = strides_made(strides_since(robot, before["strides_closed"]))
-    if end is None and made < ordered and not after["notice"]:
-        end = f"somebody stopped the walk in stride {made + 1}"
     log = robot.record(before["now_s"], after["now_s"])
     entry = _entry(bench, plan, trial, log, before["strides_closed"])
-    return entry | {
-        "start_m": start_m,
-        "course": walk_course_row(walk_course_of(log, plan.flipper)),
-        "remarks": remarks + [told for told in (end, after["notice"]) if told],
-    }
+    course = walk_course_row(walk_course_of(log, plan.flipper))
+    entry |= {"start_m": start_m, "course": course, "remarks": remarks + [end] * bool(end)}
+    if after["notice"]:
+        raise SpoiltTrialError(after["notice"], entry)
+    if end is None and made < ordered:
+        raise SpoiltTrialError(f"somebody stopped the walk in stride {made + 1}", entry)
+    return entry
 
 
 def _follow(bench: Bench, plan: Plan, start_m: float | None) -> tuple[int, str | None]:

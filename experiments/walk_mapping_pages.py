@@ -8,9 +8,10 @@ from typing import Any
 
 from experiments.coefficient_table import TruthOfMud, error_text_rows, mud_rows
 from experiments.estimation_methods import method_of
-from experiments.flipper_report import DOUBTS, HEADING, TRUTHS, doubts
+from experiments.flipper_report import DOUBTS, ERRORS, HEADING, TRUTHS, doubts
 from experiments.mud_looks import file_name
 from experiments.mud_names import mud_text
+from experiments.mud_trials import left_out_texts
 from experiments.notebook import Entry
 from experiments.report_page import Figure, Section
 from experiments.trackway_trials import reach_of
@@ -27,12 +28,11 @@ SIMULATED_DRAG = (
 TRIALS = "The trials here are the strides of all walks."
 FELT = "Where the mud bears more than the body's drag, the flipper feels that drag and not the mud's strength."
 METHODS = (
-    "In brackets the bias, and how many strides told a bound (≥) or nothing. default: the daemon's own. paper: the "
+    "In brackets also how many strides told a bound (≥) or nothing. default: the daemon's own. paper: the "
     "published method, whose surface is where f_z passes 0.5 N; compensated: with half of the body's drag added while "
     "the body advances. paper's law: the published law of shear below the surface that the default method finds, and "
     "the same with that drag."
 )
-ERRORS = "Median error of single strides"
 FINDINGS = "The paper's findings, ours by its law below the default method's surface"
 Tables = list[tuple[str, Sequence[Sequence[str]]]]
 
@@ -50,8 +50,9 @@ def sections_of(
     if report["errors"]:
         sections.append(Section(ERRORS, METHODS, rows=error_text_rows(report["errors"])))
     sections.append(Section(FINDINGS, rows=paper_rows(report)))
-    remarks = "\n\n".join(f"{remark}." for remark in report["remarks"])
-    return sections + ([Section("What was remarked", remarks)] if remarks else [])
+    remarks = [*report["remarks"], *left_out_texts(report.get("left_out", {}))]
+    told = "\n\n".join(f"{remark.rstrip('.')}." for remark in remarks)
+    return sections + ([Section("What was remarked", told)] if remarks else [])
 
 
 def _walk_section(
@@ -115,9 +116,9 @@ def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Ent
 
 def text_of(report: Mapping[str, Any]) -> Tables:
     """Titles and tables for the screen."""
-    tables: Tables = [(f"{HEADING} {TRIALS}", mud_rows(report["muds"]))]
+    tables: Tables = [(HEADING, mud_rows(report["muds"]))]
     if report["errors"]:
-        tables.append((f"{ERRORS}. {METHODS}", error_text_rows(report["errors"])))
+        tables.append((ERRORS, error_text_rows(report["errors"])))
     return [*tables, (FINDINGS, paper_rows(report))]
 
 

@@ -186,7 +186,7 @@ def _plot_bars(panel: Axes, soft: Mapping[str, Any]) -> None:
             _plot_bar(panel, len(names), each["k_s"].get(method), colour or own)
             names.append(f"{words}\n{each['depth_cm']:g} cm")
     for each in deepest_first:
-        told = None if each["truth"] is None else {"value": each["truth"], "cv": None, "at_least": False}
+        told = None if each["truth"] is None else {"value": each["truth"], "repeatability": None, "at_least": False}
         _plot_bar(panel, len(names), told, "#d9d9d9")
         names.append(f"load cell\n{each['depth_cm']:g} cm")
     panel.set_xticks(range(len(names)), names, fontsize="small")
@@ -201,7 +201,7 @@ def _plot_bar(panel: Axes, place: int, told: Mapping[str, Any] | None, colour: s
         panel.text(place, 0.0, "-", ha="center", va="bottom")
         return
     value, bound = PER_CM3 * told["value"], told["at_least"]
-    sd = value * (told["cv"] or 0.0)
+    sd = value * (told["repeatability"] or 0.0)
     panel.bar(place, value, 0.7, color="white" if bound else colour, edgecolor=colour if bound else INK, linewidth=1.0,
               hatch="//" if bound else "")  # fmt: skip
     if sd:

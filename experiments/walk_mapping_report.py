@@ -20,6 +20,7 @@ from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathe
 from experiments.error_table import COEFFICIENTS
 from experiments.estimation_methods import method_of
 from experiments.known_surface import KNOWN, KNOWN_COMPENSATED
+from experiments.mud_names import mud_text
 from experiments.notebook import Entry
 from experiments.stride_course import course_of_row
 from experiments.trackway_trials import reach_of
@@ -164,7 +165,7 @@ def _beside_paper(
 ) -> list[dict[str, Any]]:
     """What the paper tells in words or numbers, and ours by its law with the surface known."""
     rows = [
-        _finding(f"k_s over the load cell's, {mud.name}", "well below 1", _ratio(certain, mud.name))
+        _finding(f"k_s over the load cell's, {mud_text(mud.name)}", "well below 1", _ratio(certain, mud.name))
         for mud in plan.muds
     ]
     return rows + [row for mud in plan.soft for row in _soft_beside_paper(plan, entries, mud, soft)]
@@ -175,15 +176,16 @@ def _soft_beside_paper(
 ) -> list[dict[str, Any]]:
     """The paper's load cell measured at 3 cm."""
     at_3, at_5 = (soft_name(mud, depth_m) for depth_m in SOFT_DEPTHS_M)
+    told_3, told_5 = mud_text(at_3), mud_text(at_5)
     cell = truth_over([row for row in soft if row.mud == at_3]).get("k_s")
     added = _ratio(soft, at_5, KNOWN_COMPENSATED, cell)
     thrust_n = _thrust_n(soft_walks_of(plan, entries, mud, SOFT_DEPTHS_M[1]))
     return [
-        _finding(f"k_s over the load cell's at 3 cm, {at_3}", "close to 1", _ratio(soft, at_3, cell=cell)),
-        _finding(f"k_s over the load cell's at 3 cm, {at_5}", "0.5", _ratio(soft, at_5, cell=cell)),
-        _finding(f"k_s over the load cell's at 3 cm, {at_5}, with drag", "better", added),
-        _finding(f"k_s over the load cell's at 5 cm, {at_5}", "-", _ratio(soft, at_5)),
-        _finding(f"thrust of both flippers in stance, {at_5} (N)", f"{PAPER_DRAG_N:g}", thrust_n),
+        _finding(f"k_s over the load cell's at 3 cm, {told_3}", "close to 1", _ratio(soft, at_3, cell=cell)),
+        _finding(f"k_s over the load cell's at 3 cm, {told_5}", "0.5", _ratio(soft, at_5, cell=cell)),
+        _finding(f"k_s over the load cell's at 3 cm, {told_5}, with drag", "better", added),
+        _finding(f"k_s over the load cell's at 5 cm, {told_5}", "-", _ratio(soft, at_5)),
+        _finding(f"thrust of both flippers in stance, {told_5} (N)", f"{PAPER_DRAG_N:g}", thrust_n),
     ]
 
 

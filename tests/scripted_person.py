@@ -11,10 +11,12 @@ class ScriptedPerson:
     def __init__(self, *answers: str) -> None:
         self.answers = list(answers)
         self.asked: list[str] = []
+        self.offered: list[Mapping[str, str]] = []
         self.told: list[str] = []
 
     def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
         self.asked.append(question)
+        self.offered.append(answers)
         meanwhile()
         answer = self.answers.pop(0) if self.answers else next(iter(answers))
         assert answer in answers

@@ -60,7 +60,7 @@ def test_one_command_calibrates_a_motor_and_changes_a_copy_of_the_configuration(
     assert "+torque_constant_nm_a" in said.err
     assert {path.name for path in tmp_path.iterdir()} >= {"report.html", "summary.json", "torques.png", "errors.png"}
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "Actuator calibration (simulated)" in page and "true k_t, N·m/A</th>" in page
+    assert "Actuator calibration (simulated)" in page and "true k_t (N·m/A)</th>" in page
     assert "What to set where" in page and "data:image/png;base64" in page
 
     assert joint["torque_constant_error_nm_a"] > joint["torque_constant_tolerance_nm_a"] > 0.0

@@ -18,16 +18,16 @@ def made_fit(entries: Entries) -> JointFit:
 def test_the_paper_s_numbers_stand_below_those_of_its_own_definition() -> None:
     fit = made_fit(made_entries())
     head, ours, _, paper = table_of([fit])
-    place = head.index("RMSE, N·m")
+    place = head.index("RMSE (N·m)")
     assert ours[place] == f"{fit.rmse_configured_nm:.4f}" and paper[place] == "0.0127"
-    assert paper[head.index("RMSE fitted, N·m")] == "-" and paper[head.index("repeatability")] == "3.2 %"
+    assert paper[head.index("RMSE fitted (N·m)")] == "-" and paper[head.index("repeatability")] == "3.2 %"
     assert {len(row) for row in table_of([fit])} == {len(head)}
 
 
 def test_friction_comes_with_its_doubt_and_what_rest_shows_without() -> None:
     head, row = friction_table_of([made_fit(made_entries())])
-    assert "±" in row[head.index("dry friction, N·m")] and "±" in row[head.index("viscous, N·m·s")]
-    assert "±" not in row[head.index("at rest at least, N·m")] and len(row) == len(head)
+    assert "±" in row[head.index("dry friction (N·m)")] and "±" in row[head.index("viscous (N·m·s)")]
+    assert "±" not in row[head.index("at rest at least (N·m)")] and len(row) == len(head)
 
 
 def test_it_is_told_how_true_lever_and_weights_were_taken_to_be() -> None:

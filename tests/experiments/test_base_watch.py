@@ -6,7 +6,7 @@ import pytest
 
 from control.modes import Mode
 from control.records import Phase
-from experiments.base_watch import load_remarks, pose_remarks, surface_remarks
+from experiments.base_watch import SPOILING_M, load_remarks, moved_text, pose_remarks, surface_remarks
 from firmware_host.log_reader import Log
 from tests.experiments.made_up_strides import (
     CONFIGURATION,
@@ -50,6 +50,7 @@ def test_a_log_without_an_insertion_says_nothing() -> None:
 
 
 def test_a_pose_that_moved_is_told_of_in_millimetres() -> None:
+    assert moved_text(0.1, 0.0953, SPOILING_M) == "" != moved_text(0.1, 0.0853, SPOILING_M)
     assert pose_remarks(0.1, 0.0953) == ["the base moved by -4.7 mm: clamp it, and measure again"]
 
 

@@ -63,7 +63,7 @@ def test_pushed_by_a_hand_the_known_coefficients_come_out(make: Make) -> None:
     }
     assert all(trial.is_measured for trial in results.trials) and results.remarks == []
     no_ruler = bench_doubt("k_p", SETTINGS, 0.0, 0.0) * told["k_p"].value
-    assert told["k_p"].bench_error == pytest.approx(no_ruler)
+    assert told["k_p"].shared_error == pytest.approx(no_ruler)
     assert len(list((laboratory.folder / RAW).glob("*_position.csv"))) == 4
 
 

@@ -10,13 +10,15 @@ import pytest
 from experiments.bench_errors import EndedError
 from experiments.bench_robot import CLEAR, LEAVE, BenchError, leave
 from experiments.mud_trials import (
+    KEEP,
     Bench,
     PlannedTrial,
     PromptedBed,
     SpoiltTrialError,
     Truths,
     conduct_trials,
-    require_some,
+    left_out_of,
+    measured_of,
 )
 from experiments.notebook import Entry, Notebook
 from experiments.person import GO_ON, REDO, SKIP
@@ -107,10 +109,16 @@ def test_an_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
     assert second.bed.prepared == second.measured == ALL[1:]
 
 
-def test_a_trial_can_be_left_out_and_measured_later(tmp_path: Path) -> None:
+def test_a_trial_that_is_left_out_is_written_down_and_not_asked_for_again(tmp_path: Path) -> None:
     session = Session(tmp_path, bed=ScriptedBed(GO_ON, SKIP)).conduct()
-    assert list(session.notebook.entries) == [ALL[0], ALL[2]]
-    assert Session(tmp_path).conduct().measured == [ALL[1]]
+    assert list(measured_of(session.notebook)) == [ALL[0], ALL[2]]
+    again = Session(tmp_path).conduct()
+    assert again.bed.prepared == [] and left_out_of(again.notebook) == {ALL[1]: {"skipped": True, "why": []}}
+
+
+def test_one_that_was_left_out_by_mistake_is_the_last_one_too(tmp_path: Path) -> None:
+    session = Session(tmp_path, bed=ScriptedBed(SKIP, REDO)).conduct()
+    assert session.measured == ALL and not left_out_of(session.notebook)
 
 
 def test_the_last_trial_can_be_measured_again(tmp_path: Path) -> None:
@@ -129,7 +137,7 @@ def test_a_fault_is_told_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> 
     session = Session(tmp_path)
     session.outcomes = [BenchError("the walk ended early: a drive is silent.")]
     session.conduct()
-    assert session.person.asked == ["47.6, trial 1 of 3 went wrong: the walk ended early: a drive is silent."]
+    assert session.person.asked == ["47.6 %, trial 1 of 3 went wrong: the walk ended early: a drive is silent."]
     assert session.bed.prepared == session.measured == [ALL[0], *ALL]
 
 
@@ -169,7 +177,26 @@ def test_a_spoilt_trial_can_be_left_out(tmp_path: Path) -> None:
     session = Session(tmp_path, ScriptedPerson(SKIP))
     session.outcomes = [SpoiltTrialError("no mud")]
     session.conduct()
-    assert list(session.notebook.entries) == ALL[1:]
+    assert list(measured_of(session.notebook)) == ALL[1:]
+    assert left_out_of(session.notebook)[ALL[0]]["why"] == ["no mud"]
+
+
+@pytest.mark.parametrize(("answer", "measured"), [(GO_ON, [ALL[0], *ALL]), (KEEP, ALL)])
+def test_a_worthless_trial_is_repeated_by_enter_and_kept_by_a_key(
+    tmp_path: Path, answer: str, measured: list[str]
+) -> None:
+    session = Session(tmp_path, ScriptedPerson(answer))
+    session.outcomes = [SpoiltTrialError("the base moved by 113 mm", {"remarks": []})]
+    assert session.conduct().measured == measured
+    kept = ["the base moved by 113 mm"] if answer == KEEP else []
+    assert session.notebook.entries[ALL[0]]["remarks"] == kept
+
+
+def test_a_trial_that_left_nothing_cannot_be_kept(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.outcomes = [SpoiltTrialError("no mud")]
+    session.conduct()
+    assert KEEP not in session.person.offered[0]
 
 
 def test_a_robot_that_walks_on_is_stopped_before_anybody_is_asked(tmp_path: Path) -> None:
@@ -186,7 +213,7 @@ def test_a_person_may_go_on_also_after_the_third_time(tmp_path: Path, answer: st
     session.outcomes = [BenchError("it was told to stop") for _ in range(3)]
     session.conduct()
     assert "went wrong 3 times; the last time: it was told to stop." in session.person.asked[-1]
-    assert list(session.notebook.entries) == kept
+    assert list(measured_of(session.notebook)) == kept
 
 
 def test_what_goes_wrong_three_times_ends_where_nobody_wants_it_repeated(tmp_path: Path) -> None:
@@ -202,8 +229,8 @@ def test_a_doubtful_trial_counts_as_the_person_says(tmp_path: Path, answer: str,
     session = Session(tmp_path, ScriptedPerson(answer))
     session.outcomes = [{"remarks": ["the base moved by 5.0 mm"]}]
     session.conduct()
-    assert session.person.told == ["47.6, trial 1 of 3: the base moved by 5.0 mm"]
-    assert list(session.notebook.entries) == kept
+    assert session.person.told == ["47.6 %, trial 1 of 3: the base moved by 5.0 mm"]
+    assert list(measured_of(session.notebook)) == kept
     assert len(session.measured) == (4 if answer == REDO else 3)
 
 
@@ -218,5 +245,4 @@ def test_a_robot_that_no_longer_answers_is_left_with_a_word(tmp_path: Path) -> N
 
 def test_an_experiment_of_which_nothing_is_left_ends_with_a_word(tmp_path: Path) -> None:
     with pytest.raises(BenchError, match="nothing was measured"):
-        require_some(Session(tmp_path).notebook)
-    require_some(Session(tmp_path).conduct().notebook)
+        measured_of(Session(tmp_path, bed=ScriptedBed(SKIP, SKIP, SKIP)).conduct().notebook)

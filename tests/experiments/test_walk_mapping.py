@@ -127,17 +127,17 @@ def test_the_soft_mud_tells_k_s_at_both_depths_by_every_method() -> None:
 
 def test_the_papers_findings_stand_beside_ours() -> None:
     found = {row["what"]: row for row in report()["beside_paper"]}
-    half = found["k_s over the load cell's at 3 cm, 51.2 at 5 cm"]
+    half = found["k_s over the load cell's at 3 cm, 51.2 % at 5 cm"]
     assert half["paper"] == "0.5"
     assert 0.3 < half["ours"] < 0.8
-    assert found["thrust of both flippers in stance, 51.2 at 5 cm (N)"]["paper"] == "2.5"
+    assert found["thrust of both flippers in stance, 51.2 % at 5 cm (N)"]["paper"] == "2.5"
 
 
 def test_another_load_cells_truth_takes_the_place_of_the_beds() -> None:
     told = report(truth={"47.6": {"k_p": 2e6}})
     assert told["muds"][0]["truth"] == {"k_p": 2e6}
     assert told["muds"][1]["truth"] is None
-    assert told["missing_truth"].endswith("says nothing of 51.2.")
+    assert told["missing_truth"].endswith("says nothing of 51.2 %.")
     assert {(row["mud"], row["coefficient"]) for row in told["errors"]} == {("47.6", "k_p")}
 
 
@@ -204,8 +204,9 @@ def test_a_walk_that_somebody_else_stops_is_not_taken_for_a_whole_one(tmp_path: 
     bench = bench_of(tmp_path, TINY)
     bench.robot.__class__ = StoppedRobot
     bench.bed.prepare(TINY.planned[0])
-    entry = measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
-    assert entry["remarks"] == ["somebody stopped the walk in stride 2"]
+    with pytest.raises(SpoiltTrialError, match="somebody stopped the walk in stride 2") as spoilt:
+        measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
+    assert spoilt.value.entry is not None and len(spoilt.value.entry["strides"][DEFAULT]) == 1
 
 
 def test_by_their_order_strides_are_spread_over_the_muds_lengths() -> None:

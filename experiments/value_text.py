@@ -1,0 +1,41 @@
+"""How reports tell a value with its errors: no digit that the errors do not bear.
+
+Each error has two significant digits, and the value ends where the finest error ends. Without an error a value has
+four significant digits; with errors it never has more than six.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+N_CM3 = 1e6  # N/m³
+OF_ERROR, OF_VALUE, MOST = 2, 4, 6  # significant digits
+FINEST = 3  # places of a percentage
+
+
+def value_text(value: float | None, *errors: float | None, per: float = 1.0) -> str:
+    """In units of `per`; a dash where there is no value. Errors that nobody knows are left out."""
+    if value is None or not isfinite(value):
+        return "-"
+    value, most = value / per, _places(value / per, MOST)
+    doubts = [error / per for error in errors if error is not None and isfinite(error)]
+    places = [min(most, _places(doubt, OF_ERROR)) for doubt in doubts if doubt]
+    ends = max(places, default=_places(value, OF_VALUE))
+    told = [f"{doubt:.{min(most, _places(doubt, OF_ERROR)) if doubt else ends}f}" for doubt in doubts]
+    return " ± ".join([f"{value:.{ends}f}", *told])
+
+
+def share_text(share: float | None) -> str:
+    """In percent, to two significant digits or a thousandth; a dash where there is none."""
+    if share is None or not isfinite(share):
+        return "-"
+    return f"{100.0 * share:.{min(FINEST, _places(100.0 * share, OF_ERROR))}f} %"
+
+
+def repeatability_text(share: float | None, trials: int) -> str:
+    return f"{share_text(share)} of {trials}"
+
+
+def _places(number: float, digits: int) -> int:
+    """Behind the point, of which so many digits count."""
+    return max(0, digits - 1 - int(f"{number:.{digits - 1}e}".partition("e")[2]))
