@@ -96,8 +96,9 @@ def test_a_place_that_cannot_be_written_is_noticed_before_the_work(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, no_trials: None
 ) -> None:
     (tmp_path / "file").write_text("")
-    assert main([*SHORT, "--out", str(tmp_path / "file")]) == exit_codes.UNHEALTHY
-    assert "file: File exists" in capsys.readouterr().err
+    assert main([*SHORT, "--out", str(tmp_path / "file" / "below")]) == exit_codes.UNHEALTHY
+    assert "file/below: Not a directory" in capsys.readouterr().err
+    assert "is no folder" in refusal(capsys, *SHORT, "--out", str(tmp_path / "file"))
 
 
 # what is planned
