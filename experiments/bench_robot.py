@@ -51,7 +51,7 @@ class BenchRobot(Protocol):
         """What the log holds of a time by the robot's clock (`now_s` of its status). Raises BenchError."""
 
     def copy_logs(self, folder: Path) -> list[Path]:
-        """The logs of this run, in a folder. Raises BenchError."""
+        """The logs of what was done, in a folder; none where nothing was. Raises BenchError."""
 
     def close(self) -> None:
         """Torque off, connection closed. Never raises what `call` may raise."""
