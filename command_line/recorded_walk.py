@@ -89,15 +89,16 @@ class RecordedWalk(NamedTuple):
 def read_walk(path: Path, number: int = 0, more: Sequence[Path] = (), watch: Watch = unwatched) -> RecordedWalk:
     """Walk `number` of a log, counted from 1; the last one for 0. With `more` segments of its run. Raises LogError."""
     if more:
-        return _numbered_walk(path, read_logs([path, *more], watch), number)
+        return numbered_walk(path, read_logs([path, *more], watch), number)
     if path.name.endswith((".csv", ".csv.gz")):
         return _only_walk(path, read_lab_csv(path), number)
     if path.suffix == ".mcap":
-        return _numbered_walk(path, read_log(path, watch), number)
+        return numbered_walk(path, read_log(path, watch), number)
     raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
 
 
-def _numbered_walk(path: Path, log: Log, number: int) -> RecordedWalk:
+def numbered_walk(path: Path, log: Log, number: int = 0) -> RecordedWalk:
+    """Of a log that was read already; `path` stands in what is refused. Raises LogError."""
     configuration = configuration_of(path, log)
     borders = np.flatnonzero(np.diff(log.ticks["mode"] == Mode.WALKING, prepend=False, append=False))
     starts, ends = borders[::2], borders[1::2]

@@ -13,6 +13,7 @@ from typing import Any
 from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import conduct, refuse
 from command_line.screen import number, plain, table
+from command_line.walk_figures import walk_figures
 from experiments import depth_sweep, mud_fit, trackway, trackway_trials
 from experiments.bench_robot import leave
 from experiments.daemon_robot import DaemonRobot
@@ -21,7 +22,7 @@ from experiments.mud_names import mud_label, mud_name
 from experiments.notebook import Notebook
 from experiments.paper_table import ADAPTIVE, PAPER_TABLE
 from experiments.report_page import Figure, Section
-from experiments.trackway_trials import AskedTrackway
+from experiments.trackway_trials import AskedTrackway, first_walks
 
 WALKS_AND_TABLE = (
     "Left, as in the paper's figure 8: the first walk of each gait. Right: Table I, the paper's three trials as grey "
@@ -68,13 +69,14 @@ def _walked(plan: trackway_trials.Plan, desk: Desk, socket: Path) -> Finding:
         report = trackway_trials.run(plan, AskedTrackway(robot, desk.person), notebook, desk.show)
     finally:
         logs = leave(robot, desk.person, desk.folder)
-    return _found(report, logs)
+    return _found(report, logs, walk_figures(first_walks(plan, notebook), desk.folder, desk.person))
 
 
-def _found(report: dict[str, Any], logs: Sequence[Path] = ()) -> Finding:
+def _found(report: dict[str, Any], logs: Sequence[Path] = (), walks: Sequence[Figure] = ()) -> Finding:
     text = trackway_text(report)
     figure = Figure("trackway", WALKS_AND_TABLE, partial(_plot_trackway, report))
     sections = [Section("Table I", screen=plain(text), figures=[figure])]
+    sections += [Section("Along the way", "Of each gait the first walk that counts.", figures=walks)] * bool(walks)
     return Finding(report, "The trackway: Table I of the paper", sections, text, logs)
 
 
