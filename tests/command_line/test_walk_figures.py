@@ -14,6 +14,7 @@ from experiments.trackway_trials import LoggedTime
 from firmware_host.configuration import Configuration
 from firmware_host.log_folder import DONE, first_path, log_files
 from firmware_host.log_parameters import LogParameters
+from firmware_host.log_reader import read_log
 from firmware_host.recorder import Recorder
 from simulation.lockstep import Lockstep
 from simulation.track import paper_track
@@ -22,9 +23,9 @@ from tests.scripted_person import ScriptedPerson
 
 @pytest.fixture
 def walks(tmp_path: Path, configuration: Configuration) -> list[LoggedTime]:
-    """Two, of one stride and of two, in segments of which one between them was not copied."""
+    """Two, of one stride and of two, in segments of which those between them were not copied."""
     recorder = Recorder(
-        first_path(tmp_path, "run"),
+        first_path(tmp_path / "logs", "run"),
         configuration.text,
         {"robot": "test", "run_id": "run"},
         LogParameters(directory=str(tmp_path), segment_s=2.0),
@@ -32,16 +33,17 @@ def walks(tmp_path: Path, configuration: Configuration) -> list[LoggedTime]:
     robot, logged = Lockstep(configuration, paper_track(), recorder=recorder), []
     robot.arm()
     for strides in (1, 2):
-        robot.run_for(2.5)
+        robot.run_for(6.0)
         begun_s = robot.now_s
         robot.walk(WalkOrder(0.03, True, strides))
         robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
         logged.append(LoggedTime("run", begun_s, robot.now_s))
     assert recorder.close(20.0)
-    for log in log_files(tmp_path, DONE):
+    stamps_s = {log: read_log(log).ticks["stamp_s"] for log in log_files(tmp_path / "logs", DONE)}
+    copied = [log for log, at_s in stamps_s.items() if at_s[0] < logged[0].to_s or at_s[-1] > logged[1].from_s]
+    assert len(copied) < len(stamps_s)
+    for log in copied:
         log.rename(tmp_path / log.name)
-    between = int(logged[1].from_s / 2.0) - 1
-    (tmp_path / f"run-{between:04d}.mcap").unlink()
     return logged
 
 
