@@ -16,6 +16,7 @@ from command_line.recorded_walk import RecordedWalk, read_walk
 from command_line.screen import coefficient, complain, number, watched
 from command_line.stride_choice import choose_strides
 from experiments.report_page import PAGE, Figure, Section, numbers_told, write_report
+from experiments.whole_files import whole_file
 from firmware_host.log_reader import Log, LogError, Watch, log_summary, read_logs
 from firmware_host.replay import Replay, replay_files
 from firmware_host.reports import map_report, stride_report
@@ -48,7 +49,8 @@ def _beside(log: Path) -> Path:
 def _copy(log: Path, folder: Path) -> Path:
     copy = folder / log.name
     if copy.absolute() != log.absolute():
-        shutil.copyfile(log, copy)
+        with whole_file(copy) as beside:
+            shutil.copyfile(log, beside)
     return copy
 
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 
-from firmware_host.log_folder import PART, present_path
+from experiments.whole_files import whole_file
+from firmware_host.log_folder import present_path
 from firmware_host.log_reader import read_log
 from firmware_host.log_recovery import recover_log
 
@@ -39,15 +39,8 @@ def _ends_before(log: Path, from_s: float) -> bool:
 
 
 def _copy(log: Path, copy: Path) -> Path:
-    """Under its name once it is whole: a full disk leaves none that is cut."""
-    part = copy.with_name(copy.name + PART)
-    try:
-        shutil.copyfile(present_path(log), part)
-        part.replace(copy)
-    except OSError:
-        with suppress(OSError):
-            part.unlink()
-        raise
+    with whole_file(copy) as beside:
+        shutil.copyfile(present_path(log), beside)
     if not read_log(copy).complete:
         recover_log(copy)
     return copy
