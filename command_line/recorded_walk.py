@@ -25,6 +25,7 @@ from firmware_host.log_reader import (
     Log,
     LogError,
     Watch,
+    begin_s,
     log_summary,
     read_log,
     read_logs,
@@ -61,6 +62,7 @@ class RecordedWalk(NamedTuple):
     strides: list[dict[str, Any]]  # rows of log_rows.STRIDE, of both flippers
     noticed_s: list[float]  # when the robot said that it was in another mud
     walks: int = 1  # that the log holds
+    begun_s: float = 0.0  # since the log's begin
     complete: bool = True  # False where the writer of the log was cut off, or still writes
     cut: str = ""  # how the walk may reach beyond this log, in words
 
@@ -107,7 +109,8 @@ def numbered_walk(path: Path, log: Log, number: int = 0) -> RecordedWalk:
     until_s = log.ticks["stamp_s"][starts[chosen + 1]] if chosen + 1 < len(starts) else np.inf
     walk = _walk_of_log(log, configuration, slice(starts[chosen], ends[chosen]), float(until_s))
     cut = _cut_of(log, bool(starts[chosen] == 0), bool(ends[chosen] == len(log.ticks)))
-    return walk._replace(walks=len(starts), complete=log.complete, cut=cut)
+    begun_s = float(log.ticks["stamp_s"][starts[chosen]]) - begin_s(log)
+    return walk._replace(walks=len(starts), begun_s=begun_s, complete=log.complete, cut=cut)
 
 
 def _cut_of(log: Log, from_the_first: bool, to_the_last: bool) -> str:
