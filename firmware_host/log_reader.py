@@ -23,6 +23,7 @@ from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
 from firmware_host.log_chunks import Row, open_chunk, records_of
+from firmware_host.log_folder import why_not_read
 from firmware_host.log_rows import CDR_HEADER, EVENT, FORMAT_OF, ROW_KINDS, STRIDE, TICK, RowKind
 
 DAMAGE = (McapError, ValueError, RuntimeError, OverflowError, MemoryError, struct.error)  # what reading it may raise
@@ -141,7 +142,7 @@ def _read_contents(path: Path) -> bytes:
     try:
         contents = path.read_bytes()
     except OSError as error:
-        raise LogError(f"{path}: {error.strerror}") from None
+        raise LogError(why_not_read(path, error)) from None
     if not contents.startswith(MCAP0_MAGIC):
         raise LogError(f"{path}: damaged at byte 0: this is not how an MCAP file begins")
     return contents
