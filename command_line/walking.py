@@ -14,6 +14,7 @@ from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import conduct, refuse
 from command_line.screen import number, plain, table
 from command_line.walk_figures import walk_figures
+from control.counted_nouns import counted
 from experiments import depth_sweep, mud_fit, trackway, trackway_trials
 from experiments.bench_robot import leave
 from experiments.daemon_robot import DaemonRobot
@@ -134,7 +135,7 @@ def trackway_text(report: dict[str, Any]) -> str:
             f"{report['strides_without_place']}."
         )
     if short:
-        parts.append(f"Fewer than three strides in a mud, all of them counted: {short} times.")
+        parts.append(f"Fewer than three strides in a mud, all of them counted: {counted(short, 'time')}.")
     return "\n\n".join(parts)
 
 
@@ -149,12 +150,8 @@ def _speeds_text(report: dict[str, Any]) -> str:
         if rule in report["paper"]:
             told = fmean(each["mean"] for each in report["paper"][rule].values())
             rows.append(["  paper", *(_paper_text(report, rule, mud) for mud in muds), number(told, 2)])
-    return f"Table I: speed after the second stride in each mud, mean ± sd of {_trials(report)}\n{table(rows)}"
-
-
-def _trials(report: dict[str, Any]) -> str:
-    seeds = report["settings"]["seeds"]
-    return "1 trial" if seeds == 1 else f"{seeds} trials"
+    trials = counted(report["settings"]["seeds"], "trial")
+    return f"Table I: speed after the second stride in each mud, mean ± sd of {trials}\n{table(rows)}"
 
 
 def _plus_minus(cell: Mapping[str, Any], which: str) -> str:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from control.counted_nouns import counted
 from experiments.bench_errors import BenchError as BenchError  # for whoever operates one
 from experiments.bench_errors import EndedError, GoneError, OverruledError
 from experiments.person import Person
@@ -219,7 +220,7 @@ def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
     closed = strides_since(robot, before["strides_closed"])
     number = strides_made(closed)
     if number < strides:
-        raise BenchError(f"the walk ended early, after {number} of {strides} strides: it was told to stop")
+        raise BenchError(f"the walk ended early, after {number} of {counted(strides, 'stride')}: it was told to stop")
     return Walked(closed, before["now_s"], after["now_s"])
 
 

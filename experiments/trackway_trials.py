@@ -15,6 +15,7 @@ from itertools import accumulate
 from math import radians, sin
 from typing import Any, NamedTuple, Protocol
 
+from control.counted_nouns import counted
 from experiments.bench_robot import (
     RAISING_S,
     UNDER_WAY,
@@ -240,11 +241,9 @@ def told_of(key: str, walk: Walk) -> str:
     """A trial in a line."""
     seen = [stride for stride in walk.strides if stride.step_m == stride.step_m]
     speed = f"{100.0 * speed_m_s(seen):.1f} cm/s" if seen else "no stride with a pose"
-    number, lost = len(walk.strides), len(walk.strides) - len(seen)
+    lost = len(walk.strides) - len(seen)
     without = f", {lost} of them without a pose" if lost else ""
-    return (
-        f"{key}: {number} stride{'' if number == 1 else 's'}{without}, {speed}{'; ' + walk.fault if walk.fault else ''}"
-    )
+    return f"{key}: {counted(len(walk.strides), 'stride')}{without}, {speed}{'; ' + walk.fault if walk.fault else ''}"
 
 
 def first_walks(plan: Plan, notebook: Notebook) -> dict[str, LoggedTime]:

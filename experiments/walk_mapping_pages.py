@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from control.counted_nouns import counted
 from experiments.coefficient_table import TruthOfMud, error_text_rows, mud_rows
 from experiments.estimation_methods import method_of
 from experiments.flipper_report import TRUTHS, doubts
@@ -90,11 +91,13 @@ def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
         f"All strides of all trials by method {method_of(configuration.estimation)}, as the daemon told. Its gait: "
         f"insertion at {gait.insertion_speed_m_s:g} m/s, stance at {gait.stance_speed_m_s:g} m/s, pauses of "
         f"{gait.pause_s:g} s.",
-        f"{report['at_a_border']} strides went down too near to a border, or behind the last mud, and are left out of "
-        "tables.",
+        f"Left out of tables, since they went down too near to a border, or behind the last mud: "
+        f"{counted(report['at_a_border'], 'stride')}.",
     ]
     if report["without_pose"]:
-        paragraphs.append(f"{report['without_pose']} walks had no pose: strides are given to muds by their order.")
+        paragraphs.append(
+            f"{counted(report['without_pose'], 'walk')} had no pose: strides are given to muds by their order."
+        )
     paragraphs += [f"{SCATTER}.", *doubts(report["settings"]), TRUTHS[report["settings"]["truth"]]]
     return "\n\n".join([*paragraphs, report["missing_truth"]])
 
