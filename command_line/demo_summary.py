@@ -10,6 +10,7 @@ import numpy as np
 from command_line.demonstration import Demo
 from control.modes import Mode
 from experiments.mud_names import mud_text
+from firmware_host.counted_nouns import counted
 from firmware_host.log_reader import Log
 from simulation.track import Track
 
@@ -74,7 +75,7 @@ def summary_text(summary: dict[str, Any]) -> str:
         f"loop     {summary['rate_hz']:.2f} Hz over {summary['ticks']} ticks, {summary['missed_ticks']} missed",
         f"wake-up  {late['p50']:.0f} us late at the median, {late['p99']:.0f} p99, {late['max']:.0f} worst",
         f"tick     {tick['p50']:.0f} us at the median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst",
-        *([f"lost     {summary['dropped_rows']} rows of the log"] if summary["dropped_rows"] else []),
+        *([f"lost     {counted(summary['dropped_rows'], 'row')} of the log"] if summary["dropped_rows"] else []),
         *(f"warning  {warning}" for warning in summary["warnings"]),
         f"log      {summary['log']}",
     ]

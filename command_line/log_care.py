@@ -25,6 +25,7 @@ from firmware_host.log_folder import (
     preserve,
     stored_files,
     unfinished_files,
+    why_not_moved,
 )
 from firmware_host.log_reader import DAMAGE, LogError
 from firmware_host.log_recovery import Recovered, recover_log
@@ -146,7 +147,7 @@ def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Recovered],
             if path in named:
                 resisted.append(f"{path}: is being written; its writer will finish it")
         except OSError as problem:
-            resisted.append(f"{path}: {problem.strerror or problem}")
+            resisted.append(why_not_moved(path, problem))
     progress.clear()
     return recovered, resisted
 
@@ -161,6 +162,6 @@ def preserve_log(options: Options) -> int:
             complain(str(problem))
             status = exit_codes.REFUSED
         except OSError as problem:
-            complain(f"{path}: {problem.strerror or problem}")
+            complain(why_not_moved(path, problem))
             status = exit_codes.UNHEALTHY
     return status

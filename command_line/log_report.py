@@ -16,11 +16,13 @@ from command_line.recorded_walk import RecordedWalk, read_walk
 from command_line.screen import coefficient, complain, number, watched
 from command_line.stride_choice import choose_strides
 from experiments.report_page import PAGE, Figure, Section, numbers_told, write_report
-from firmware_host.log_reader import Log, LogError, Watch, log_summary, read_logs
+from experiments.whole_files import whole_file
+from firmware_host.log_reader import Log, LogError, Watch, begin_s, log_summary, read_logs
 from firmware_host.replay import Replay, replay_files
 from firmware_host.reports import map_report, stride_report
 
 EVENTS_TOLD = 200  # the last ones
+SINCE = "Times are since the log's begin."
 Report = dict[str, Any]
 
 
@@ -48,7 +50,8 @@ def _beside(log: Path) -> Path:
 def _copy(log: Path, folder: Path) -> Path:
     copy = folder / log.name
     if copy.absolute() != log.absolute():
-        shutil.copyfile(log, copy)
+        with whole_file(copy) as beside:
+            shutil.copyfile(log, beside)
     return copy
 
 
@@ -58,6 +61,8 @@ def _told(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Section]]:
     replayed = replay_files(files, watch=watch)
     report: Report = {
         "log": [path.name for path in files],
+        "clock": "times of strides and events are by the log's own clock; the log begins at begin_s of it",
+        "begin_s": replayed.begin_s,
         "summary": log_summary(ours) if ours else {},
         "strides": [stride_report(stride) for stride in replayed.strides],
         "map": map_report(replayed.map),
@@ -92,12 +97,13 @@ def _walk_sections(files: Sequence[Path], watch: Watch) -> list[Section]:
 def _walk_section(walk: RecordedWalk, count: int) -> Section:
     from command_line.plots import plot_walk  # matplotlib takes its time
 
+    begun = f"It begins {walk.begun_s:.2f} s after the log. Its pictures count from there, as 'mudskipper plot' does."
     missing = f"Not in this log: {', '.join(walk.missing)}." if walk.missing else ""
     cut = f"The walk may have {walk.cut}." if walk.cut else ""
     figures = [Figure(f"walk-{count}", "Forces, coefficients, depth, place and steps.", partial(plot_walk, walk))]
     if walk.own_strides:
         figures.append(Figure(f"strides-{count}", "The clearest stride of each outcome.", partial(_draw_strip, walk)))
-    return Section(f"Walk {count}", "\n\n".join(filter(None, (missing, cut))), figures=figures)
+    return Section(f"Walk {count}", "\n\n".join(filter(None, (begun, missing, cut))), figures=figures)
 
 
 def _draw_strip(walk: RecordedWalk, path: Path) -> None:
@@ -110,18 +116,21 @@ def _strides_section(replayed: Replay) -> Section:
     head = ["flipper", "stride", "from, s", "k_p, N/cm³", "k_s, N/cm³", "k_e, N/cm³", "depth, cm", "step, cm", ""]
     return Section(
         "Strides",
-        "Coefficients with their standard error; after a ≥ where the mud did not yield, in brackets where not valid."
+        f"{SINCE} Coefficients with their standard error; after a ≥ where the mud did not yield, in brackets where not"
+        " valid."
         if replayed.strides
         else "No complete stride.",
-        rows=[head, *(_stride_row(stride_report(stride)) for stride in replayed.strides)] if replayed.strides else (),
+        rows=[head, *(_stride_row(stride_report(stride), replayed.begin_s) for stride in replayed.strides)]
+        if replayed.strides
+        else (),
     )
 
 
-def _stride_row(stride: dict[str, Any]) -> list[str]:
+def _stride_row(stride: dict[str, Any], begin_s: float) -> list[str]:
     return [
         stride["flipper"],
         str(stride["index"]),
-        f"{stride['t_start_s']:.2f}",
+        f"{stride['t_start_s'] - begin_s:.2f}",
         *(coefficient(stride[name]) for name in ("k_p", "k_s", "k_e")),
         _in_cm(stride["depth_m"]),
         _in_cm(stride["step_m"]),
@@ -135,6 +144,6 @@ def _in_cm(value_m: float | None) -> str:
 
 def _events_section(log: Log) -> Section:
     told = log.events[-EVENTS_TOLD:]
-    before = f"The last {len(told)} of {len(log.events)}." if len(told) < len(log.events) else ""
-    rows = [["at, s", ""], *([f"{event['stamp_s']:.2f}", event["text"]] for event in told)]
-    return Section("Events", before, rows=rows)
+    before = f" The last {len(told)} of {len(log.events)}." if len(told) < len(log.events) else ""
+    rows = [["at, s", ""], *([f"{event['stamp_s'] - begin_s(log):.2f}", event["text"]] for event in told)]
+    return Section("Events", SINCE + before, rows=rows)

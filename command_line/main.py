@@ -194,7 +194,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return exit_codes.OK
     except OSError as problem:
-        complain(f"{problem.filename or ''}: {problem.strerror or problem}".lstrip(": "))
+        complain(f"{problem.filename2 or problem.filename or ''}: {problem.strerror or problem}".lstrip(": "))
         return exit_codes.UNHEALTHY
 
 

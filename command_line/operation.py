@@ -12,6 +12,7 @@ from typing import Any
 from command_line import exit_codes
 from command_line.attended_walk import attend
 from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain, number, table
+from firmware_host.counted_nouns import counted
 from firmware_host.rpc import FOR_MEMBERS
 from firmware_host.status_client import (
     CallRefusedError,
@@ -257,6 +258,6 @@ def _loop_text(report: dict[str, Any]) -> str:
             + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")
             + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),
             f"pose   {seen if pose['source'] else 'none'}",
-            f"log    {log['path'] or 'off'}, {log['dropped']} rows dropped",
+            f"log    {log['path'] or 'off'}, {counted(log['dropped'], 'row')} dropped",
         )
     )

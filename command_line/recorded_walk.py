@@ -25,6 +25,7 @@ from firmware_host.log_reader import (
     Log,
     LogError,
     Watch,
+    begin_s,
     log_summary,
     read_log,
     read_logs,
@@ -61,6 +62,7 @@ class RecordedWalk(NamedTuple):
     strides: list[dict[str, Any]]  # rows of log_rows.STRIDE, of both flippers
     noticed_s: list[float]  # when the robot said that it was in another mud
     walks: int = 1  # that the log holds
+    begun_s: float = 0.0  # since the log's begin
     complete: bool = True  # False where the writer of the log was cut off, or still writes
     cut: str = ""  # how the walk may reach beyond this log, in words
 
@@ -89,15 +91,16 @@ class RecordedWalk(NamedTuple):
 def read_walk(path: Path, number: int = 0, more: Sequence[Path] = (), watch: Watch = unwatched) -> RecordedWalk:
     """Walk `number` of a log, counted from 1; the last one for 0. With `more` segments of its run. Raises LogError."""
     if more:
-        return _numbered_walk(path, read_logs([path, *more], watch), number)
+        return numbered_walk(path, read_logs([path, *more], watch), number)
     if path.name.endswith((".csv", ".csv.gz")):
         return _only_walk(path, read_lab_csv(path), number)
     if path.suffix == ".mcap":
-        return _numbered_walk(path, read_log(path, watch), number)
+        return numbered_walk(path, read_log(path, watch), number)
     raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
 
 
-def _numbered_walk(path: Path, log: Log, number: int) -> RecordedWalk:
+def numbered_walk(path: Path, log: Log, number: int = 0) -> RecordedWalk:
+    """Of a log that was read already; `path` stands in what is refused. Raises LogError."""
     configuration = configuration_of(path, log)
     borders = np.flatnonzero(np.diff(log.ticks["mode"] == Mode.WALKING, prepend=False, append=False))
     starts, ends = borders[::2], borders[1::2]
@@ -106,7 +109,8 @@ def _numbered_walk(path: Path, log: Log, number: int) -> RecordedWalk:
     until_s = log.ticks["stamp_s"][starts[chosen + 1]] if chosen + 1 < len(starts) else np.inf
     walk = _walk_of_log(log, configuration, slice(starts[chosen], ends[chosen]), float(until_s))
     cut = _cut_of(log, bool(starts[chosen] == 0), bool(ends[chosen] == len(log.ticks)))
-    return walk._replace(walks=len(starts), complete=log.complete, cut=cut)
+    begun_s = float(log.ticks["stamp_s"][starts[chosen]]) - begin_s(log)
+    return walk._replace(walks=len(starts), begun_s=begun_s, complete=log.complete, cut=cut)
 
 
 def _cut_of(log: Log, from_the_first: bool, to_the_last: bool) -> str:

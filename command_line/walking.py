@@ -13,6 +13,7 @@ from typing import Any
 from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import conduct, refuse
 from command_line.screen import number, plain, table
+from command_line.walk_figures import walk_figures
 from experiments import depth_sweep, mud_fit, trackway, trackway_trials
 from experiments.bench_robot import leave
 from experiments.daemon_robot import DaemonRobot
@@ -21,7 +22,8 @@ from experiments.mud_names import mud_label, mud_name
 from experiments.notebook import Notebook
 from experiments.paper_table import ADAPTIVE, PAPER_TABLE
 from experiments.report_page import Figure, Section
-from experiments.trackway_trials import AskedTrackway
+from experiments.trackway_trials import AskedTrackway, first_walks
+from firmware_host.counted_nouns import counted
 
 WALKS_AND_TABLE = (
     "Left, as in the paper's figure 8: the first walk of each gait. Right: Table I, the paper's three trials as grey "
@@ -68,13 +70,14 @@ def _walked(plan: trackway_trials.Plan, desk: Desk, socket: Path) -> Finding:
         report = trackway_trials.run(plan, AskedTrackway(robot, desk.person), notebook, desk.show)
     finally:
         logs = leave(robot, desk.person, desk.folder)
-    return _found(report, logs)
+    return _found(report, logs, walk_figures(first_walks(plan, notebook), desk.folder, desk.person))
 
 
-def _found(report: dict[str, Any], logs: Sequence[Path] = ()) -> Finding:
+def _found(report: dict[str, Any], logs: Sequence[Path] = (), walks: Sequence[Figure] = ()) -> Finding:
     text = trackway_text(report)
     figure = Figure("trackway", WALKS_AND_TABLE, partial(_plot_trackway, report))
     sections = [Section("Table I", screen=plain(text), figures=[figure])]
+    sections += [Section("Along the way", "Of each gait the first walk that counts.", figures=walks)] * bool(walks)
     return Finding(report, "The trackway: Table I of the paper", sections, text, logs)
 
 
@@ -132,7 +135,7 @@ def trackway_text(report: dict[str, Any]) -> str:
             f"{report['strides_without_place']}."
         )
     if short:
-        parts.append(f"Fewer than three strides in a mud, all of them counted: {short} times.")
+        parts.append(f"Fewer than three strides in a mud, all of them counted: {counted(short, 'time')}.")
     return "\n\n".join(parts)
 
 
@@ -147,12 +150,8 @@ def _speeds_text(report: dict[str, Any]) -> str:
         if rule in report["paper"]:
             told = fmean(each["mean"] for each in report["paper"][rule].values())
             rows.append(["  paper", *(_paper_text(report, rule, mud) for mud in muds), number(told, 2)])
-    return f"Table I: speed after the second stride in each mud, mean ± sd of {_trials(report)}\n{table(rows)}"
-
-
-def _trials(report: dict[str, Any]) -> str:
-    seeds = report["settings"]["seeds"]
-    return "1 trial" if seeds == 1 else f"{seeds} trials"
+    trials = counted(report["settings"]["seeds"], "trial")
+    return f"Table I: speed after the second stride in each mud, mean ± sd of {trials}\n{table(rows)}"
 
 
 def _plus_minus(cell: Mapping[str, Any], which: str) -> str:

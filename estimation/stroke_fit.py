@@ -25,7 +25,7 @@ from estimation.surface import Surface
 REVERSAL_SHARE = 0.25  # of the way up
 SHORTEST_M = 1e-9  # a piece of way that is less is rounding, or none
 MIN_VERTICAL_LEVER_M = 0.03  # under it the adduction joint hardly feels an upward force
-REPEATABILITY = 0.032  # of a torque, as the paper measured it
+TORQUE_REPEATABILITY = 0.032  # of a torque, as the paper measured it
 CROSSING_DOUBT = 0.25  # of what is taken off: its centre of pressure is that of the law, not the mud's
 LARGEST_DOUBT = 0.75  # of a coefficient: from there on even its 80 % interval reaches zero, and it says nothing
 TOO_SHORT = f"fewer than {MIN_BATCHES} pieces of way in the mud"
@@ -55,7 +55,7 @@ def bound_extraction(geometry: FlipperGeometry, batches: Sequence[Batch], surfac
     bound = max(borne, default=0.0)
     if not (bound > 0.0 and isfinite(2.0 * bound)):
         return NOT_THERE._replace(samples=samples)
-    return Estimate(bound, REPEATABILITY * bound, samples, True, NOT_OUT, at_least=True)
+    return Estimate(bound, TORQUE_REPEATABILITY * bound, samples, True, NOT_OUT, at_least=True)
 
 
 def _borne(geometry: FlipperGeometry, batch: Batch, surface: Surface) -> float:
@@ -149,7 +149,7 @@ def _slope_per_surface(
 def judged(fit: OriginFit, systematic: float, samples: int) -> Estimate:
     """A fit as an estimate, with all its doubt, or why it is none."""
     k = fit.slope
-    std_error = hypot(fit.std_error, systematic, REPEATABILITY * k)
+    std_error = hypot(fit.std_error, systematic, TORQUE_REPEATABILITY * k)
     if not isfinite(k + std_error):
         return Estimate(UNKNOWN, UNKNOWN, samples, False, "not finite")
     if k <= 0.0:

@@ -11,12 +11,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-import numpy as np
-
 from experiments.bench_errors import BenchError as BenchError  # for whoever operates one
 from experiments.bench_errors import EndedError, GoneError, OverruledError
 from experiments.person import Person
 from firmware_host.configuration import Configuration
+from firmware_host.counted_nouns import counted
 from firmware_host.log_reader import Log
 from firmware_host.status_client import CallRefusedError
 
@@ -51,7 +50,7 @@ class BenchRobot(Protocol):
         """What the log holds of a time by the robot's clock (`now_s` of its status). Raises BenchError."""
 
     def copy_logs(self, folder: Path) -> list[Path]:
-        """The logs of this run, in a folder. Raises BenchError."""
+        """The logs of what was done, in a folder; none where nothing was. Raises BenchError."""
 
     def close(self) -> None:
         """Torque off, connection closed. Never raises what `call` may raise."""
@@ -217,7 +216,7 @@ def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
         raise BenchError(f"the walk ended early: {told_by(after)}")
     closed = strides_since(robot, before["strides_closed"])
     if (number := strides_made(closed)) < strides:
-        raise BenchError(f"the walk ended early, after {number} of {strides} strides: it was told to stop")
+        raise BenchError(f"the walk ended early, after {number} of {counted(strides, 'stride')}: it was told to stop")
     return Walked(closed, before["now_s"], after["now_s"])
 
 
@@ -251,16 +250,6 @@ def strides_since(robot: BenchRobot, number: int) -> list[dict[str, Any]]:
             raise BenchError("the walk had more strides than the daemon keeps: let the robot walk fewer at once")
         found += fetched
     return found
-
-
-def cut(log: Log, from_s: float, to_s: float) -> Log:
-    """Only the rows between two moments."""
-    stamps_s = log.ticks["stamp_s"]
-    return log._replace(
-        ticks=log.ticks[np.searchsorted(stamps_s, from_s) : np.searchsorted(stamps_s, to_s, side="right")],
-        strides=[row for row in log.strides if from_s <= row["stamp_s"] <= to_s],
-        events=[row for row in log.events if from_s <= row["stamp_s"] <= to_s],
-    )
 
 
 def rest(robot: BenchRobot) -> None:

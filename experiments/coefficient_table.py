@@ -19,14 +19,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from math import hypot, sqrt
+from math import hypot, isfinite, sqrt
 from pathlib import Path
 from statistics import fmean, median, stdev
 from typing import Any, NamedTuple
 
 from control.records import UNKNOWN, Estimate
 from estimation.origin_fit import student_factor
-from estimation.stroke_fit import REPEATABILITY
+from estimation.stroke_fit import TORQUE_REPEATABILITY
 from experiments.bench_robot import BenchError
 from experiments.error_table import COEFFICIENTS, Judged, error_rows
 from experiments.mud_names import mud_name, mud_text
@@ -55,7 +55,7 @@ def gathered(estimates: Iterable[Told]) -> dict[str, Any]:
     spread = stdev(trials) if len(trials) > 1 else None
     return {
         "value": (fmean(trials) if values else median(trials)) if trials else None,
-        **_errors(values or bounds, spread),
+        **_errors(values, spread),
         "trials": trials,
         "repeatability": spread / fmean(trials) if spread is not None and fmean(trials) else None,
         "at_least": bool(bounds and not values),
@@ -65,11 +65,14 @@ def gathered(estimates: Iterable[Told]) -> dict[str, Any]:
 
 
 def _errors(told: Sequence[Told], spread: float | None) -> dict[str, float | None]:
-    if spread is None:
+    """Of values; of bounds there is none. What a trial does not doubt in a number is left to the others."""
+    if spread is None or not told:
         return {"std_error": told[0]["std_error"] if told else None, "trials_error": None, "shared_error": None}
-    doubted = fmean((each["std_error"] or 0.0) ** 2 for each in told)
+    doubts = [doubt for each in told if (doubt := each["std_error"]) is not None and isfinite(doubt)]
+    doubted = fmean(doubt**2 for doubt in doubts) if doubts else 0.0
     trials_error = student_factor(len(told) - 1) * spread / sqrt(len(told))
-    shared_error = max(sqrt(max(0.0, doubted - spread**2)), REPEATABILITY * fmean(each["value"] for each in told))
+    alike = TORQUE_REPEATABILITY * fmean(each["value"] for each in told)
+    shared_error = max(sqrt(max(0.0, doubted - spread**2)), alike)
     return {
         "std_error": hypot(trials_error, shared_error),
         "trials_error": trials_error,

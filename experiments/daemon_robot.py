@@ -7,7 +7,6 @@ whoever levels the mud. The log is read while it is being written; the writer's 
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,12 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from experiments.bench_errors import BarredError, BenchError, GoneError, OverruledError
-from experiments.bench_robot import ENERGISED, UNDER_WAY, Status, cut
+from experiments.bench_robot import ENERGISED, UNDER_WAY, Status
+from experiments.log_copies import copy_since
+from experiments.log_span import cut
 from firmware_host.configuration import Configuration, ConfigurationError, parse_configuration
 from firmware_host.lease import TAKEN_OVER
-from firmware_host.log_folder import present_path, run_files
-from firmware_host.log_reader import Log, LogError, read_log, read_logs
-from firmware_host.log_recovery import recover_log
+from firmware_host.log_folder import run_files
+from firmware_host.log_reader import Log, LogError, read_logs
 from firmware_host.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 PROMISE_S = 2.0  # of the lease, while torque may be on
@@ -48,6 +48,8 @@ class DaemonRobot:
         except NotPermittedError as problem:
             raise BarredError(str(problem)) from problem
         self._renewed_s = -inf
+        self._seen_s = inf  # the robot's clock, as last told
+        self._used_s = inf  # by it, since when this program has moved the robot or read its log
         self._log: Path | None = None  # as last seen
         self._name: str | None = None  # of this program, as the daemon calls who holds a lease
         self._may_move = False
@@ -57,8 +59,15 @@ class DaemonRobot:
             self._renew()
             self.configuration = self._read_configuration()
         except (BenchError, ConfigurationError):
+            self._give_back()
             self._client.close()
             raise
+
+    def _give_back(self) -> None:
+        """The lease, where it has it: whoever's robot was armed meanwhile is left as it is."""
+        if self._name:
+            with suppress(BenchError, CallRefusedError):
+                self.call("release")
 
     def _require_at_rest(self) -> None:
         """Before the lease: to take it and then go away would stop a walk that somebody has begun without one."""
@@ -80,11 +89,14 @@ class DaemonRobot:
             self._require_alone()
         self._may_move = self._may_move and method != "disarm"
         try:
-            return self._client.call(method, **params)
+            answer = self._client.call(method, **params)
         except NoDaemonError as problem:
             raise GoneError(str(problem)) from problem
         except NotPermittedError as problem:
             raise BarredError(str(problem)) from problem
+        if method in MOTIONS:  # and was not refused
+            self._used_s = min(self._used_s, self._seen_s)
+        return answer
 
     def wait(self, duration_s: float) -> None:
         if self._ousted:
@@ -117,6 +129,7 @@ class DaemonRobot:
         if self._ousted:
             raise OverruledError(self._ousted)
         status = self.call("status")
+        self._seen_s = status["now_s"]
         if status["lease"] not in (None, self._name):
             raise OverruledError(f"{status['lease']} operates the robot: wait until it has ended, then begin again")
         if self._name and status["lease"] is None and status["mode"] in ENERGISED and not _winds_up(status):
@@ -137,7 +150,9 @@ class DaemonRobot:
             log = self._read_since(from_s)
             return log if log is not None and len(log.ticks) and log.ticks["stamp_s"][-1] >= to_s else None
 
-        return cut(self._awaited(written), from_s, to_s)
+        log = cut(self._awaited(written), from_s, to_s)
+        self._used_s = min(self._used_s, from_s)
+        return log
 
     def _awaited(self, written: Callable[[], Log | None]) -> Log:
         deadline_s = time.monotonic() + WRITTEN_S
@@ -178,11 +193,18 @@ class DaemonRobot:
         return segments
 
     def copy_logs(self, folder: Path) -> list[Path]:
-        """Those of the daemon's run, even where it has ended meanwhile; the one under way is ended in the copy."""
+        """Of the daemon's run, even where it has ended meanwhile, what holds any time of this program's; else none."""
+        if self._used_s == inf:
+            return []
+        segments = self._segments_at_last()
         try:
-            return [self._copy(log, folder / log.name) for log in self._segments_at_last()]
-        except (OSError, LogError) as problem:
+            return copy_since(segments, self._used_s, folder)
+        except LogError as problem:
             raise BenchError(f"the daemon's log cannot be copied: {problem}") from problem
+        except OSError as problem:
+            why = f"{problem.filename2 or problem.filename or folder}: {problem.strerror or problem}"
+            stays = f"it stays in {segments[-1].parent.parent}, copy it from there"
+            raise BenchError(f"the daemon's log cannot be copied: {why}; {stays}") from problem
 
     def _segments_at_last(self) -> list[Path]:
         try:
@@ -190,13 +212,7 @@ class DaemonRobot:
         except BenchError:
             if self._log is None:
                 raise
-            return run_files(self._log)
-
-    def _copy(self, log: Path, copy: Path) -> Path:
-        shutil.copyfile(present_path(log), copy)
-        if not read_log(copy).complete:
-            recover_log(copy)
-        return copy
+            return _files_of(self._log)
 
     def close(self) -> None:
         """A robot that somebody else operates is left to them."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from control.controller import DAMPING_NM, DAMPING_S, SOFT_STOP_S
 from control.faults import Blocks, FaultKind, Reaction
 from experiments.fault_injection import BRINGS, Way
+from firmware_host.counted_nouns import counted
 
 LONGEST_STOP_S = max(SOFT_STOP_S, DAMPING_S) + 0.2
 GOING_ON = ("arming", "hold", "walking", "stopping")
@@ -70,7 +71,7 @@ def _never_right(cell: Cell, way: Way) -> Iterator[str]:
     if not cell.disarmed:
         yield "torque or closed loop came back by itself"
     if cell.rows_lost > (1 if way.ends_daemon else 0):
-        yield f"{cell.rows_lost} rows are missing in the log"
+        yield f"missing in the log: {counted(cell.rows_lost, 'row')}"
     if cell.damping_torque_nm > DAMPING_NM + 1e-6:
         yield f"{cell.damping_torque_nm:.3f} N·m while damping"
 
@@ -80,9 +81,9 @@ def _late(cell: Cell) -> Iterator[str]:
     if cell.reaction_ticks is None:
         yield "no reaction"
     elif cell.reaction_ticks > bound:
-        yield f"the reaction came after {cell.reaction_ticks} ticks, {bound} are the most"
+        yield f"the reaction came after {counted(cell.reaction_ticks, 'tick')}, {bound} are the most"
     if cell.told_ticks is not None and cell.told_ticks > bound:
-        yield f"told after {cell.told_ticks} ticks, {bound} are the most"
+        yield f"told after {counted(cell.told_ticks, 'tick')}, {bound} are the most"
 
 
 def _not_stopped(cell: Cell) -> Iterator[str]:

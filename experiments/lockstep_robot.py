@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from experiments.bench_robot import cut
+from experiments.log_span import cut
 from firmware_host.configuration import Configuration, parse_configuration
 from firmware_host.connection import Caller
 from firmware_host.file_recorder import FileRecorder

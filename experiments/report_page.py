@@ -15,6 +15,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from experiments.whole_files import whole_file
 from firmware_host.software_version import software_version
 
 PAGE, SUMMARY = "report.html", "summary.json"
@@ -57,12 +58,16 @@ def write_report(
 ) -> list[Path]:
     """Everything that was written. `report` becomes the summary. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
-    summary = folder / SUMMARY
-    summary.write_text(json.dumps(numbers_told(report), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    summary, page = folder / SUMMARY, folder / PAGE
+    _write(summary, json.dumps(numbers_told(report), indent=1, allow_nan=False) + "\n")
     pictures = [_draw(figure, folder) for section in sections for figure in section.figures]
-    page = folder / PAGE
-    page.write_text(_page(folder, title, sections, logs), encoding="utf-8", errors="replace")  # names of any bytes
+    _write(page, _page(folder, title, sections, logs))
     return [page, summary, *pictures, *logs]
+
+
+def _write(path: Path, text: str) -> None:
+    with whole_file(path) as beside:
+        beside.write_text(text, encoding="utf-8", errors="replace")  # names of any bytes
 
 
 def numbers_told(report: Any) -> Any:
@@ -76,7 +81,8 @@ def numbers_told(report: Any) -> Any:
 
 def _draw(figure: Figure, folder: Path) -> Path:
     path = _place(figure, folder)
-    figure.draw(path)
+    with whole_file(path) as beside:
+        figure.draw(beside)
     return path
 
 

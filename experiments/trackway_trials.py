@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from itertools import accumulate
 from math import radians, sin
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from experiments.bench_robot import (
     RAISING_S,
@@ -37,6 +37,7 @@ from experiments.side_by_side import Show
 from experiments.trackway import STUCK_S, paper_report
 from experiments.walk import Walk, WalkedStride, speed_m_s
 from firmware_host.configuration import Configuration
+from firmware_host.counted_nouns import counted
 
 PATIENCE_S = 900.0  # for a whole walk
 UNSEEN_S = 2.0  # without a pose, before a walk or on it: nobody knows where its end is
@@ -69,7 +70,10 @@ class AskedTrackway:
     def prepare(self, trial: str) -> BenchRobot:
         disarm(self._robot)
         face_faults(self._robot, self._person)
-        question = f"{trial}. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud."
+        question = (
+            f"{trial}. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud. Take"
+            " the hands away: the robot walks next"
+        )
         self._person.ask(question, {GO_ON: "the robot may walk"}, self._meanwhile)
         face_faults(self._robot, self._person)
         return self._robot
@@ -86,6 +90,19 @@ class AskedTrackway:
 class Mud:
     name: str
     length_m: float
+
+
+class LoggedTime(NamedTuple):
+    """Where a walk is in the logs."""
+
+    run: str  # of a daemon
+    from_s: float
+    to_s: float
+
+
+@dataclass(frozen=True)
+class LoggedWalk(Walk):
+    logged: LoggedTime
 
 
 @dataclass(frozen=True)
@@ -132,17 +149,19 @@ def run(plan: Plan, trackway: Trackway, notebook: Notebook, show: Show) -> dict[
 
 
 def _walk_trial(plan: Plan, key: str, rule: DepthRule, trackway: Trackway, notebook: Notebook) -> None:
-    robot = trackway.prepare(key)
+    trial = f"{key} of {plan.trials}"
+    robot = trackway.prepare(trial)
     arm_m = robot.configuration.geometry.flipper_length_m
     walk = walk_over(robot, plan, rule)
-    verdict = trackway.judge(told_of(key, walk), was_stopped(walk))
+    verdict = trackway.judge(told_of(trial, walk), was_stopped(walk))
     if verdict == REDO:
         return
     strides = [stride._asdict() for stride in walk.strides]
-    notebook.write(key, {"strides": strides, "fault": walk.fault, "arm_m": arm_m, "skipped": verdict == SKIP})
+    entry = {"strides": strides, "fault": walk.fault, "arm_m": arm_m, "skipped": verdict == SKIP}
+    notebook.write(key, entry | {"logged": walk.logged})
 
 
-def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> Walk:
+def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> LoggedWalk:
     """One trial, from torque on to torque off. Raises BenchError, with torque off where the robot can be reached."""
     _require_place(robot)
     arm(robot)
@@ -155,7 +174,8 @@ def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> Walk:
     disarm(robot)
     log = robot.record(before["now_s"], after["now_s"])
     strides = walked_strides(log, robot.configuration, lambda place_m: plan.mud_at(place_m - start_m))
-    return Walk([stride._replace(place_m=stride.place_m - start_m) for stride in strides], fault)
+    placed = [stride._replace(place_m=stride.place_m - start_m) for stride in strides]
+    return LoggedWalk(placed, fault, LoggedTime(log.metadata["run_id"], before["now_s"], after["now_s"]))
 
 
 def _require_place(robot: BenchRobot) -> Status:
@@ -221,11 +241,19 @@ def told_of(key: str, walk: Walk) -> str:
     """A trial in a line."""
     seen = [stride for stride in walk.strides if stride.step_m == stride.step_m]
     speed = f"{100.0 * speed_m_s(seen):.1f} cm/s" if seen else "no stride with a pose"
-    number, lost = len(walk.strides), len(walk.strides) - len(seen)
+    lost = len(walk.strides) - len(seen)
     without = f", {lost} of them without a pose" if lost else ""
-    return (
-        f"{key}: {number} stride{'' if number == 1 else 's'}{without}, {speed}{'; ' + walk.fault if walk.fault else ''}"
-    )
+    return f"{key}: {counted(len(walk.strides), 'stride')}{without}, {speed}{'; ' + walk.fault if walk.fault else ''}"
+
+
+def first_walks(plan: Plan, notebook: Notebook) -> dict[str, LoggedTime]:
+    """Of each gait the first one that counts, by key in the notebook."""
+    first: dict[str, tuple[str, LoggedTime]] = {}
+    for key, rule in plan.orders():
+        entry = notebook.entries[key]
+        if entry["strides"] and not entry["skipped"] and "logged" in entry:
+            first.setdefault(rule.name, (key, LoggedTime(*entry["logged"])))
+    return dict(first.values())
 
 
 def report_of(plan: Plan, notebook: Notebook) -> dict[str, Any]:

@@ -18,9 +18,10 @@ from experiments.trackway_trials import reach_of
 from experiments.walk_mapping import SOFT_DEPTHS_M, Plan
 from experiments.walk_mapping_report import placed_strides, soft_walks_of, walks_of
 from firmware_host.configuration import Configuration
+from firmware_host.counted_nouns import counted
 
 SIMULATED_DRAG = (
-    " The simulated body's drag grows with speed, to two and more times the paper's 2.5 N: so a firmer mud than "
+    "The simulated body's drag grows with speed, to two and more times the paper's 2.5 N: so a firmer mud than "
     "the paper's is the one that yields at 3 cm and holds at 5 cm. Part of the difference between these depths is the "
     "mud's own, whose coefficients fall with depth: at 5 cm the load cell reads 0.6 of the k_s and 0.75 of the k_p "
     "that it reads at 3 cm. So each stride stands beside a load cell at its own depth."
@@ -88,11 +89,13 @@ def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
         f"All strides of all trials by method {method_of(configuration.estimation)}, as the daemon told. Its gait: "
         f"insertion at {gait.insertion_speed_m_s:g} m/s, stance at {gait.stance_speed_m_s:g} m/s, pauses of "
         f"{gait.pause_s:g} s.",
-        f"{report['at_a_border']} strides went down too near to a border, or behind the last mud, and are left out of "
-        "tables.",
+        f"Left out of tables, since they went down too near to a border, or behind the last mud: "
+        f"{counted(report['at_a_border'], 'stride')}.",
     ]
     if report["without_pose"]:
-        paragraphs.append(f"{report['without_pose']} walks had no pose: strides are given to muds by their order.")
+        paragraphs.append(
+            f"{counted(report['without_pose'], 'walk')} had no pose: strides are given to muds by their order."
+        )
     paragraphs += [f"{TRIALS} {DOUBTS}", *doubts(report["settings"]), TRUTHS[report["settings"]["truth"]]]
     return "\n\n".join([*paragraphs, report["missing_truth"]])
 
@@ -109,7 +112,9 @@ def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Ent
         "surface of soft mud too deep: the surface is the default method's."
     )
     draw = partial(plot_soft, soft, {depth: told for depth, told in walks.items() if told})
-    text = (FELT + SIMULATED_DRAG * plan.simulated) * is_first
+    text = ""
+    if is_first:
+        text = f"{FELT} {SIMULATED_DRAG}" if plan.simulated else FELT
     name = f"figure7_{file_name(mud)}"
     return Section(f"Soft mud, {mud_text(mud)}", text, figures=[Figure(name, caption, draw)])
 

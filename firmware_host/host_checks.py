@@ -16,6 +16,7 @@ from stat import S_IWGRP, S_IWOTH, S_IWUSR
 from typing import NamedTuple
 
 from firmware_host.configuration import LoopParameters
+from firmware_host.counted_nouns import counted
 from firmware_host.findings import Finding, fail, ok, warn
 from firmware_host.host_facts import (
     Limits,
@@ -209,7 +210,7 @@ def examine_unfinished(folder: Path) -> Finding:
         unfinished = 0
     if unfinished == 0:
         return ok("unfinished_logs", "none")
-    text = f"{unfinished} logs were cut off, such as by a power cut"
+    text = f"{counted(unfinished, 'log')} cut off, such as by a power cut"
     return warn("unfinished_logs", text, "'mudskipper log recover'; the daemon does it at its start")
 
 

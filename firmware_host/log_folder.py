@@ -180,6 +180,29 @@ def take_owner(path: Path) -> None:
             os.chown(path, user, group)
 
 
+def why_not_read(path: Path, problem: OSError) -> str:
+    """With what to do, where it is a matter of rights."""
+    if not isinstance(problem, PermissionError):
+        return f"{path}: {problem.strerror or problem}"
+    shown = next((place for place in (path, *path.absolute().parents) if _can_be_seen(place)), path)
+    group = f"the group of {shown}, then log in again"
+    return f"{path}: you may not read it: have root add you to {group}, or do this as root"
+
+
+def why_not_moved(path: Path, problem: OSError) -> str:
+    if not isinstance(problem, PermissionError):
+        return f"{path}: {problem.strerror or problem}"
+    return f"{path}: only the daemon's own user and root may move logs: do this as root"
+
+
+def _can_be_seen(path: Path) -> bool:
+    try:
+        path.stat()
+    except OSError:
+        return False
+    return True
+
+
 def synchronise_folder(folder: Path) -> None:
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:

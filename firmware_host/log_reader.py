@@ -23,6 +23,7 @@ from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
 from firmware_host.log_chunks import Row, open_chunk, records_of
+from firmware_host.log_folder import why_not_read
 from firmware_host.log_rows import CDR_HEADER, EVENT, FORMAT_OF, ROW_KINDS, STRIDE, TICK, RowKind
 
 DAMAGE = (McapError, ValueError, RuntimeError, OverflowError, MemoryError, struct.error)  # what reading it may raise
@@ -141,7 +142,7 @@ def _read_contents(path: Path) -> bytes:
     try:
         contents = path.read_bytes()
     except OSError as error:
-        raise LogError(f"{path}: {error.strerror}") from None
+        raise LogError(why_not_read(path, error)) from None
     if not contents.startswith(MCAP0_MAGIC):
         raise LogError(f"{path}: damaged at byte 0: this is not how an MCAP file begins")
     return contents
@@ -281,13 +282,18 @@ def segment_of(log: Log) -> int:
     return int(number) if number.isdecimal() else 0
 
 
+def begin_s(log: Log) -> float:
+    """When the first row was, by the log's own clock; 0 where there is none."""
+    stamps_s = [*log.ticks["stamp_s"][:1], *(row["stamp_s"] for row in (*log.strides[:1], *log.events[:1]))]
+    return float(min(stamps_s, default=0.0))
+
+
 def _start_time(log: Log) -> str:
     """Universal time of the first row, to the second; empty where there is none."""
-    stamps_s = [*log.ticks["stamp_s"][:1], *(row["stamp_s"] for row in (*log.strides[:1], *log.events[:1]))]
-    if not stamps_s or "wall_minus_monotonic_ns" not in log.metadata:
+    if not (len(log.ticks) or log.strides or log.events) or "wall_minus_monotonic_ns" not in log.metadata:
         return ""
     try:
-        wall_s = min(stamps_s) + int(log.metadata["wall_minus_monotonic_ns"]) / 1e9
+        wall_s = begin_s(log) + int(log.metadata["wall_minus_monotonic_ns"]) / 1e9
         return datetime.fromtimestamp(wall_s, UTC).isoformat(timespec="seconds")
     except (ValueError, OverflowError, OSError):  # no time of this world
         return ""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from control.fault_kinds import make_fault
 from control.faults import Fault
 from control.joint_watch import FaultBounds
+from firmware_host.counted_nouns import counted
 from firmware_host.recorder import LogReport
 
 
@@ -33,6 +34,6 @@ class LogWatch:
         if report.slowest_write_s > self._bounds.disk_slow_s:
             found.append(make_fault("disk_slow", "", f"The log's disk took {report.slowest_write_s:.1f} s to write."))
         if report.alive and report.dropped > self._dropped:
-            found.append(make_fault("rows_lost", "", f"{report.dropped} rows of the log were lost so far."))
+            found.append(make_fault("rows_lost", "", f"The log lost {counted(report.dropped, 'row')} so far."))
         self._dropped = report.dropped
         return found

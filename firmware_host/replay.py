@@ -18,7 +18,7 @@ from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstima
 from estimation.mud_map import MapRow
 from firmware_host.configuration import Configuration, ConfigurationError, parse_configuration
 from firmware_host.lab_csv import LabLog, read_lab_csv
-from firmware_host.log_reader import Log, LogError, Watch, read_log, read_logs, segment_of, unwatched
+from firmware_host.log_reader import Log, LogError, Watch, begin_s, read_log, read_logs, segment_of, unwatched
 
 PAPER_CONSTANT_NM_A = 0.083
 WEIGHTLESS = ArmMass(
@@ -43,6 +43,7 @@ class Replay:
     map: tuple[MapRow, ...] = ()  # of the mud along the way, where there was a pose
     complete: bool = True  # False where the writer of the log was cut off, or still writes
     segment: int = 0  # of the run, where the log begins with a later one
+    begin_s: float = 0.0  # by the log's own clock, which is that of the strides
 
 
 def replay_files(
@@ -84,7 +85,7 @@ def replay_log(
     drag_n = configuration.adaptation.body_drag_n
     estimator = MudEstimator(configuration.geometry, configuration.flipper_drives, parameters, drag_n)
     strides = list(_strides_of_log(estimator, log, watch))
-    return Replay(strides, ("left", "right"), estimator.map.rows(), log.complete, segment_of(log))
+    return Replay(strides, ("left", "right"), estimator.map.rows(), log.complete, segment_of(log), begin_s(log))
 
 
 def configuration_of(path: Path, log: Log) -> Configuration:
@@ -128,7 +129,7 @@ def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: 
     drag_n = configuration.adaptation.body_drag_n if configuration else PAPER_DRAG_N
     estimator = MudEstimator(geometry, (left, right), parameters, drag_n)
     strides = [stride for stride in _strides_of_lab(estimator, lab) if stride.flipper in lab.flippers]
-    return Replay(strides, lab.flippers, estimator.map.rows())
+    return Replay(strides, lab.flippers, estimator.map.rows(), begin_s=float(lab.stamp_s[0]))
 
 
 def _strides_of_lab(estimator: MudEstimator, lab: LabLog) -> Iterator[StrideEstimate]:

@@ -1,8 +1,8 @@
 """The simulated robot as a process of its own, in real time, on the buses that a configuration names.
 
-It reads of the configuration what a real robot's wiring would fix: buses, node ids, signs, geometry. The body's place
-goes where its pose is to come from, at motion-capture rate. SIGUSR1 stands for the person who moves the flippers back
-by hand, where they came to lie at their mechanical stops, beyond the limits: no torque leads back from there.
+It reads of the configuration what a real robot's bench would fix: buses, node ids, signs, geometry, a fixed base. The
+body's place goes where its pose is to come from, at motion-capture rate. SIGUSR1 stands for the person who moves the
+flippers back by hand, where they came to lie at their mechanical stops, beyond the limits: no torque leads back there.
 """
 
 from __future__ import annotations

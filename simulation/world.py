@@ -2,7 +2,7 @@
 
 A world is one TOML file, of which example_world.toml shows every section. Keys are the fields of the parts' own
 records, so what a part can be given is written there, with unit and bounds. Whatever the robot's configuration fixes
-(geometry, arm, wiring) is not in the world: the daemon knows that and does not know the world.
+(geometry, arm, wiring, a base that is fixed) is not in the world: the daemon knows that and does not know the world.
 """
 
 from __future__ import annotations
@@ -41,7 +41,11 @@ class World:
     drive_changes: Mapping[str, Any] = field(default_factory=dict)  # fields of OdriveParameters, the same for all four
 
     def plant(self, configuration: Configuration) -> PlantParameters:
-        return plant_of(configuration, self.disturbances, **self.robot_changes)
+        """Raises ConfigurationError where the ground frees a body whose base the configuration says is fixed."""
+        fixed_base = configuration.estimation.fixed_base
+        if fixed_base and self.robot_changes.get("free_body"):
+            raise ConfigurationError(["robot.free_body = true: the configuration says estimation.fixed_base = true"])
+        return plant_of(configuration, self.disturbances, **({"fixed_base": fixed_base} | dict(self.robot_changes)))
 
     def drives(self, configuration: Configuration, **otherwise: Any) -> dict[str, OdriveParameters]:
         """`otherwise`: what is not as usual where neither disturbances nor the file say anything."""

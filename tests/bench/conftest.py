@@ -21,7 +21,15 @@ from experiments.bench_robot import BenchError
 from experiments.bench_stand import Stand
 from firmware_host.configuration import Configuration, ConfigurationError, load_configuration
 from simulation.blocks import lying_m
-from tests.bench.staged_bench import SKIPPED, BenchReport, StagedBench, UncapturedPerson, stage_name, stage_of
+from tests.bench.staged_bench import (
+    SKIPPED,
+    BenchReport,
+    StagedBench,
+    UncapturedPerson,
+    stage_name,
+    stage_of,
+    told_of_file,
+)
 
 INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
 EXAMPLE = Path(__file__).parent.parent.parent / "systemd" / "mudskipper.toml"
@@ -52,7 +60,7 @@ def opened(request: pytest.FixtureRequest) -> Iterator[Stand | str]:
         configuration = load_configuration(path)
         rig, attendant = open_rig(request.config, on_channels(configuration, options.can or []))
     except (ConfigurationError, BenchError) as problem:
-        yield f"{path}: {problem}" if isinstance(problem, ConfigurationError) else str(problem)
+        yield told_of_file(path, problem.problems) if isinstance(problem, ConfigurationError) else str(problem)
         return
     robot |= {"robot": configuration.robot.name, "warnings": list(rig.warnings)}
     stand = Stand(rig, attendant)

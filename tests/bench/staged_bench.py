@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
@@ -35,6 +35,12 @@ def claim_of(test: str) -> str:
 
 def stage_name(stage: int) -> str:
     return f"stage {stage}, {STAGES[stage - 1]}"
+
+
+def told_of_file(path: Path, problems: Iterable[str]) -> str:
+    """Each behind the file's name, once."""
+    named = f"{path}: "
+    return "\n".join(named + problem.removeprefix(named) for problem in problems)
 
 
 class BenchReport:

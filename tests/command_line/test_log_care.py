@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import sys
 from pathlib import Path
 
@@ -130,6 +132,25 @@ def test_a_preserved_log_moves_to_kept_and_back(folder: Path, capsys: pytest.Cap
     assert main.main(["log", "preserve", str(folder / ACTIVE / "2.mcap")]) == exit_codes.REFUSED
     assert main.main(["log", "preserve", "--undo", str(kept)]) == exit_codes.OK
     assert (folder / DONE / "1.mcap").exists()
+
+
+def test_who_may_not_read_or_move_a_log_is_told_what_to_do(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the kernel refuses it to whoever is not root, as whom tests may run."""
+
+    def refuse(path: Path, *_: object) -> Path:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+
+    log = str(folder / DONE / "1.mcap")
+    for name in ("read_bytes", "rename"):
+        monkeypatch.setattr(Path, name, refuse)
+    assert main.main(["log", "info", log]) == exit_codes.UNHEALTHY
+    assert f"have root add you to the group of {log}, then log in again, or do this as root" in capsys.readouterr().err
+    assert main.main(["log", "preserve", log]) == exit_codes.UNHEALTHY
+    assert capsys.readouterr().err.endswith(
+        "1.mcap: only the daemon's own user and root may move logs: do this as root\n"
+    )
 
 
 def test_a_folder_that_is_not_there_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

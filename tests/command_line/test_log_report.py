@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from command_line import exit_codes
+from command_line import exit_codes, log_report, recorded_walk
 from command_line.main import main
+from experiments.report_page import Section
+from firmware_host import replay
 from firmware_host.configuration import Configuration
 from firmware_host.file_recorder import FileRecorder
-from firmware_host.log_reader import read_log
+from firmware_host.log_reader import Log, read_log
 from simulation.clay import MUDS
 from simulation.lockstep import Lockstep
 from simulation.track import Track
 
+UPTIME_S = 36384.0
 LAB_LOGS = Path(__file__).parents[3] / "shared" / "data" / "flipper_in_mud"
 
 
@@ -33,6 +38,51 @@ def test_the_page_shows_every_walk_stride_and_event(
     assert page.count("data:image/png") == 4 and all((folder / f"walk-{walk}.png").exists() for walk in (1, 2))
     assert all(event["text"] in page.replace("&#x27;", "'") for event in log.events)
     assert (folder / "two.mcap").read_bytes() == two_walks.read_bytes()
+
+
+def told_pages(log: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str, Sequence[Sequence[str]]]]:
+    """What a page would show, without its pictures."""
+    pages: list[Section] = []
+
+    def take(folder: Path, report: dict[str, Any], title: str, sections: list[Section], logs: list[Path]) -> list[Path]:
+        pages.extend(sections)
+        return logs
+
+    monkeypatch.setattr(log_report, "write_report", take)
+    assert main(["log", "report", str(log), "--out", str(log.parent / "report")]) == exit_codes.OK
+    return [(section.heading, section.text, section.rows) for section in pages]
+
+
+def test_people_are_told_times_since_the_log_s_begin_however_long_the_computer_is_up(
+    two_walks: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def read_later(path: Path, *_: object) -> Log:
+        return after(read_log(path), UPTIME_S)
+
+    before = told_pages(two_walks, monkeypatch)
+    capsys.readouterr()
+    assert main(["replay", str(two_walks)]) == exit_codes.OK
+    strides = capsys.readouterr().out
+    for module in (log_report, recorded_walk, replay):
+        monkeypatch.setattr(module, "read_log", read_later, raising=False)
+    monkeypatch.setattr(log_report, "read_logs", lambda paths, watch: read_later(paths[0]))
+    assert told_pages(two_walks, monkeypatch) == before
+    capsys.readouterr()
+    assert main(["replay", str(two_walks)]) == exit_codes.OK
+    assert capsys.readouterr().out == strides
+    (second,) = (text for heading, text, _ in before if heading == "Walk 2")
+    assert "Its pictures count from there" in second and not second.startswith("It begins 0.")
+
+
+def after(log: Log, uptime_s: float) -> Log:
+    """The same, of a computer that has been up for longer."""
+    ticks = log.ticks.copy()
+    ticks["stamp_s"] += uptime_s
+    strides = [row | {name: row[name] + uptime_s for name in ("stamp_s", "t_start_s")} for row in log.strides]
+    events = [row | {"stamp_s": row["stamp_s"] + uptime_s} for row in log.events]
+    booted_ns = int(log.metadata["wall_minus_monotonic_ns"]) - int(1e9 * uptime_s)
+    metadata = log.metadata | {"wall_minus_monotonic_ns": str(booted_ns)}
+    return log._replace(metadata=metadata, ticks=ticks, strides=strides, events=events)
 
 
 def test_a_log_without_a_walk_says_so(

@@ -75,6 +75,15 @@ def test_without_a_world_there_are_the_paper_s_muds(
     assert [segment.clay.name for segment in peers[0].robot.plant.track.segments] == names
 
 
+def test_a_configuration_for_a_single_flipper_gets_a_robot_whose_base_is_fixed(
+    short_folder: Path, peers: list[StillPeer]
+) -> None:
+    setup = write_local_setup(short_folder, short_folder)
+    setup.write_text(setup.read_text(encoding="utf-8") + "[estimation]\nfixed_base = true\n", encoding="utf-8")
+    assert main(["simulate", "--config", str(setup)]) == exit_codes.OK
+    assert peers[0].robot.plant.parameters.fixed_base
+
+
 def test_on_blocks_the_flippers_lie_in_reach_of_no_mud(short_folder: Path, peers: list[StillPeer]) -> None:
     setup = write_local_setup(short_folder, short_folder)
     assert main(["simulate", "--config", str(setup), "--on-blocks"]) == exit_codes.OK

@@ -19,7 +19,7 @@ from estimation.stroke_fit import (
     MIN_VERTICAL_LEVER_M,
     NOT_OUT,
     NOT_THERE,
-    REPEATABILITY,
+    TORQUE_REPEATABILITY,
     UNOBSERVABLE,
     _slope_per_surface,
     bound_extraction,
@@ -243,12 +243,12 @@ def test_the_slope_per_surface_is_three_halves_of_slope_over_depth() -> None:
 def systematic(estimate: Estimate) -> float:
     """What is left of the doubt beside the torque's repeatability, as a share."""
     share = estimate.std_error / estimate.value
-    return float(np.sqrt(share * share - REPEATABILITY * REPEATABILITY))
+    return float(np.sqrt(share * share - TORQUE_REPEATABILITY * TORQUE_REPEATABILITY))
 
 
 def test_without_noise_only_the_torques_repeatability_is_left() -> None:
     for estimate in (insertion(down()), extraction(up())):
-        assert estimate.std_error == pytest.approx(REPEATABILITY * K, rel=1e-6)
+        assert estimate.std_error == pytest.approx(TORQUE_REPEATABILITY * K, rel=1e-6)
 
 
 @pytest.mark.parametrize("error_m", [0.0002, 0.001])
@@ -339,7 +339,7 @@ def test_a_force_along_the_motion_is_no_mud() -> None:
 def test_a_fit_is_judged_with_all_its_doubt() -> None:
     told = judged(OriginFit(K, 0.03 * K), 0.04 * K, 7)
     assert told._replace(std_error=0.0) == Estimate(K, 0.0, 7, True)
-    assert told.std_error == pytest.approx(hypot(0.03, 0.04, REPEATABILITY) * K)
+    assert told.std_error == pytest.approx(hypot(0.03, 0.04, TORQUE_REPEATABILITY) * K)
 
 
 @pytest.mark.parametrize(
@@ -361,7 +361,7 @@ def test_what_is_not_believed_says_why(slope: float, std_error: float, reason: s
 
 
 def test_up_to_half_of_itself_a_doubt_is_borne() -> None:
-    assert judged(OriginFit(K, 0.0), 0.99 * float(np.sqrt(LARGEST_DOUBT**2 - REPEATABILITY**2)) * K, 7).valid
+    assert judged(OriginFit(K, 0.0), 0.99 * float(np.sqrt(LARGEST_DOUBT**2 - TORQUE_REPEATABILITY**2)) * K, 7).valid
 
 
 @example([0.0] * 28, -5e-324, 0.0)  # a piece of way whose half is nothing
@@ -398,7 +398,7 @@ def test_mud_that_held_on_has_borne_at_least_so_much() -> None:
     told = bound_extraction(GEOMETRY, batches, surface_at(0.0))
     assert (told.valid, told.at_least, told.reason) == (True, True, NOT_OUT)
     assert told.value == pytest.approx(K, rel=EXACT)
-    assert told.std_error == pytest.approx(REPEATABILITY * K)
+    assert told.std_error == pytest.approx(TORQUE_REPEATABILITY * K)
     assert told.samples == 4 * SAMPLES
 
 

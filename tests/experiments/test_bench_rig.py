@@ -22,7 +22,9 @@ from experiments.bench_stand import Stand
 from experiments.sign_check import nudged
 from experiments.wiring_check import firmware, ids_heard, strangers, watchdogs
 from firmware_host.configuration import BusParameters, Configuration, StatusParameters, load_configuration
+from firmware_host.toml_records import ConfigurationError
 from simulation.local_setup import write_local_setup
+from tests.bench.staged_bench import told_of_file
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -63,6 +65,17 @@ def test_a_refused_bench_says_why_once_and_reports_it(answering: Path, tmp_path:
     assert ended.stdout.count("systemctl stop mudskipper") == 1
     told = json.loads(report.read_text(encoding="utf-8"))
     assert told["stages"] == {"wiring": "failed"} | dict.fromkeys(list(told["stages"])[1:], "skipped")
+
+
+@pytest.mark.parametrize("text", ["[robot", "[gait]\nsweep_angle_deg = 500\nodd = 1\n"])
+def test_each_problem_of_a_configuration_names_its_file_once(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigurationError) as caught:
+        load_configuration(path)
+    told = told_of_file(path, caught.value.problems).splitlines()
+    assert len(told) == len(caught.value.problems)
+    assert all(line.startswith(f"{path}: ") and line.count("bad.toml") == 1 for line in told)
 
 
 def test_a_joint_whose_encoder_counts_backwards_is_never_held(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from experiments.bench_errors import OverruledError
 from experiments.bench_robot import BenchError, arm, disarm, move, walk
 from experiments.daemon_robot import DaemonRobot
 from firmware_host.log_reader import read_log
+from firmware_host.status_client import CallRefusedError
 from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
 
 
@@ -88,7 +89,7 @@ def test_without_a_daemon_it_is_told_how_to_start_one(tmp_path: Path) -> None:
 
 def test_a_daemon_that_ends_is_told_and_its_log_is_there(bench: Bench, tmp_path: Path) -> None:  # noqa: F811
     robot = DaemonRobot(bench.socket)
-    assert robot.configuration
+    arm(robot)
     bench.daemon.terminate()
     bench.daemon.wait(20)
     with pytest.raises(BenchError, match="the daemon on"):
@@ -96,6 +97,22 @@ def test_a_daemon_that_ends_is_told_and_its_log_is_there(bench: Bench, tmp_path:
     (copy,) = robot.copy_logs(tmp_path)
     assert read_log(copy).complete
     robot.close()
+
+
+def test_no_log_is_copied_before_the_robot_obeys_and_a_copy_that_fails_is_told(
+    bench: Bench,  # noqa: F811
+    tmp_path: Path,
+) -> None:
+    robot = DaemonRobot(bench.socket)
+    try:
+        with pytest.raises(CallRefusedError):
+            robot.call("walk", depth_m=0.03)
+        assert robot.copy_logs(tmp_path) == []
+        arm(robot)
+        with pytest.raises(BenchError, match=r"/gone/.*: No such file or directory; it stays in .*/logs, copy it from"):
+            robot.copy_logs(tmp_path / "gone")
+    finally:
+        robot.close()
 
 
 def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> None:  # noqa: F811

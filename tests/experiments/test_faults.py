@@ -132,7 +132,7 @@ def test_a_good_cell_has_no_problem() -> None:
         ({"told_ticks": 6}, "told after 6"),
         ({"told": []}, "no word"),
         ({"disarmed": False}, "by itself"),
-        ({"rows_lost": 1}, "rows"),
+        ({"rows_lost": 1}, "1 row"),
         ({"damping_torque_nm": 0.41}, "while damping"),
         ({"zero_torque_ticks": None}, "torque in the end"),
         ({"mode": "hold"}, "mode hold"),

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import base64
+import errno
 import json
+import os
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -58,6 +60,31 @@ def test_the_page_holds_its_pictures_and_asks_for_nothing(tmp_path: Path) -> Non
     assert not re.findall(r"(?:src|href)=\"(?!data:)", page)
     assert json.loads(written[1].read_text(encoding="utf-8")) == {"experiment": "x", "value": 1.5}
     assert written[2].read_bytes() == DOT
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_a_disk_that_fills_up_leaves_the_report_that_was_there_and_nothing_cut(
+    place: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Up to numbers, picture or page: what is written is on the disk up to a half."""
+    before = {path: path.read_bytes() for path in write_report(tmp_path, {"k": 1}, "Before", [SECTION])}
+    room, write = [place], Path.write_bytes
+
+    def fill(path: Path, contents: bytes) -> int:
+        room[0] -= 1
+        if room[0] >= 0:
+            return write(path, contents)
+        write(path, contents[: len(contents) // 2])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    monkeypatch.setattr(Path, "write_bytes", fill)
+    monkeypatch.setattr(Path, "write_text", lambda path, text, **_: fill(path, text.encode()))
+    with pytest.raises(OSError, match="No space left"):
+        write_report(tmp_path, {"k": 2}, "After", [SECTION])
+    assert sorted(tmp_path.iterdir()) == sorted(before)
+    assert (tmp_path / "report.html").read_bytes() == before[tmp_path / "report.html"]
+    assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8")) == {"k": 1 if place == 0 else 2}
+    assert (tmp_path / "dots.png").read_bytes() == DOT
 
 
 def test_whatever_is_told_is_shown_as_it_is(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ class ScriptedDaemon:
         if method in ("lease", "release"):
             self.lease = ME if method == "lease" else None
         log = {"path": "/logs/active/run-0000.mcap"}
-        return {"lease": self.lease, "mode": self.mode, "faults": self.faults, "log": log}
+        return {"now_s": 1.0, "lease": self.lease, "mode": self.mode, "faults": self.faults, "log": log}
 
     def lapse(self, mode: str, faults: list[dict[str, str]]) -> None:
         self.lease, self.mode, self.faults = None, mode, faults
@@ -55,16 +55,19 @@ def daemon(monkeypatch: pytest.MonkeyPatch) -> ScriptedDaemon:
     return made
 
 
-def test_who_may_not_read_the_log_is_refused_before_anything_moves(
+def test_who_may_not_read_the_log_is_refused_before_anything_moves_and_leaves_no_lease(
     daemon: ScriptedDaemon, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """One that lapsed would take the torque of whoever holds the robot without a lease."""
+
     def refuse(path: Path) -> list[Path]:
         raise PermissionError(errno.EACCES, "Permission denied", "/logs")
 
     monkeypatch.setattr(daemon_robot, "run_files", refuse)
     with pytest.raises(BarredError, match="not read its log, .* have root add you to the group of /logs"):
         DaemonRobot(Path("x"))
-    assert set(daemon.called) == {"status", "lease"} and daemon.closed
+    assert set(daemon.called) == {"status", "lease", "release"} and daemon.closed
+    assert daemon.lease is None
 
 
 @pytest.mark.parametrize("overruled", [False, True])

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from command_line.walking import trackway_text
+from control.modes import Mode
 from experiments.bench_robot import BenchError, arm
 from experiments.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.notebook import Notebook
@@ -20,6 +21,7 @@ from experiments.trackway_trials import (
     AskedTrackway,
     Mud,
     Plan,
+    first_walks,
     report_of,
     run,
     told_of,
@@ -29,6 +31,7 @@ from experiments.trackway_trials import (
 from experiments.walk import StrideRecord, Walk, WalkedStride
 from experiments.walk_plots import plot_trackway
 from firmware_host.file_recorder import FileRecorder
+from firmware_host.log_reader import read_log
 from firmware_host.ticker import PERIOD_S
 from simulation.clay import MUDS
 from simulation.lockstep import Lockstep
@@ -92,9 +95,10 @@ def test_torque_is_off_while_a_person_levels_mud_whatever_the_robot_did_before(t
     robot = SimulatedTrackway(tmp_path, always(GO_ON)).prepare("any")
     arm(robot)
     person = Leveller(robot)
-    AskedTrackway(robot, person).prepare("3 cm, trial 1")
+    AskedTrackway(robot, person).prepare("3 cm, trial 1 of 3")
     assert person.asked == [
-        "3 cm, trial 1. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud."
+        "3 cm, trial 1 of 3. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud."
+        " Take the hands away: the robot walks next"
     ]
     robot.close()
 
@@ -111,7 +115,8 @@ def unseen(done: int, total: int) -> None:
 def test_the_table_of_the_log_is_that_of_the_plant(tmp_path: Path) -> None:
     trackway = SimulatedTrackway(tmp_path, always(GO_ON))
     report = run(SHORT, trackway, Notebook(tmp_path, {}), unseen)
-    assert trackway.prepared == ["3 cm, trial 1", "adaptive, trial 1"]
+    assert trackway.prepared == ["3 cm, trial 1 of 1", "adaptive, trial 1 of 1"]
+    assert [told.partition(": ")[0] for told in trackway.told] == trackway.prepared
     assert {tuple(ends) for ends in report["ends"].values()} == {("past the end",)}
     for rule, record in zip(("3 cm", "adaptive"), trackway.truth, strict=True):
         told, true = report["walks"][rule][0], [stride for stride in record.strides if stride.place_m < 0.6]
@@ -126,9 +131,14 @@ def test_the_table_of_the_log_is_that_of_the_plant(tmp_path: Path) -> None:
 
 
 def test_a_trial_that_is_redone_counts_once_and_one_that_is_skipped_not_at_all(tmp_path: Path) -> None:
-    trackway = SimulatedTrackway(tmp_path, iter([REDO, GO_ON, SKIP]))
-    report = run(TINY, trackway, Notebook(tmp_path, {}), unseen)
-    assert trackway.prepared == ["3 cm, trial 1", "3 cm, trial 1", "adaptive, trial 1"]
+    trackway, notebook = SimulatedTrackway(tmp_path, iter([REDO, GO_ON, SKIP])), Notebook(tmp_path, {})
+    report = run(TINY, trackway, notebook, unseen)
+    ((key, logged),) = first_walks(TINY, notebook).items()
+    counted = read_log(tmp_path / "2.mcap")
+    assert (key, logged.run) == ("3 cm, trial 1", counted.metadata["run_id"])
+    walked_s = counted.ticks["stamp_s"][counted.ticks["mode"] == Mode.WALKING]
+    assert logged.from_s < walked_s[0] < walked_s[-1] < logged.to_s
+    assert trackway.prepared == ["3 cm, trial 1 of 1", "3 cm, trial 1 of 1", "adaptive, trial 1 of 1"]
     assert len(report["walks"]["3 cm"]) == 1 and report["walks"]["adaptive"] == []
     assert report["table"]["adaptive"]["48.5"]["mean"] is None
 
@@ -139,7 +149,7 @@ def test_what_was_walked_is_not_walked_again(tmp_path: Path) -> None:
         run(TINY, trackway, Notebook(tmp_path, {}), unseen)
     again = SimulatedTrackway(tmp_path / "again", always(GO_ON))
     report = run(TINY, again, Notebook(tmp_path, {}), unseen)
-    assert again.prepared == ["adaptive, trial 1"]
+    assert again.prepared == ["adaptive, trial 1 of 1"]
     assert len(report["walks"]["3 cm"]) == 1
 
 

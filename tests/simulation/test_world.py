@@ -1,6 +1,6 @@
 """A world is taken as it is written or refused as a whole, with everything that is wrong."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -13,6 +13,7 @@ from control.bounds import Bounds
 from control.controller import WalkOrder
 from firmware_host.configuration import Configuration
 from firmware_host.toml_records import ConfigurationError
+from simulation.blocks import on_blocks
 from simulation.clay import MUDS, Clay, Layer, clay_of_water
 from simulation.disturbances import NONE, Disturbances
 from simulation.lockstep import Lockstep
@@ -247,6 +248,17 @@ def test_robot_and_drives_may_be_given_whatever_their_records_hold() -> None:
 def test_what_the_configuration_fixes_is_in_no_world() -> None:
     assert {item.name for item in fields(PlantParameters)} > FIXED_OF_ROBOT
     assert {item.name for item in fields(OdriveParameters)} > FIXED_OF_DRIVE
+
+
+def test_a_base_is_fixed_where_the_configuration_says_so(configuration: Configuration) -> None:
+    on_a_bench = replace(configuration, estimation=replace(configuration.estimation, fixed_base=True))
+    world, free = parse_world(SHORTEST), parse_world(SHORTEST + "[robot]\nfree_body = true\n")
+    assert world.plant(on_a_bench).fixed_base and not world.plant(configuration).fixed_base
+    assert on_blocks(configuration).plant(configuration).fixed_base
+    assert free.plant(configuration).free_body
+    with pytest.raises(ConfigurationError) as caught:
+        free.plant(on_a_bench)
+    assert caught.value.problems == ["robot.free_body = true: the configuration says estimation.fixed_base = true"]
 
 
 def test_a_lockstep_lives_in_a_world(configuration: Configuration) -> None:
