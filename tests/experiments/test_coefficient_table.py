@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from math import sqrt
+from math import nan, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +70,18 @@ def test_bounds_do_not_mix_with_values() -> None:
     bounds = gathered(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
     assert (bounds["value"], bounds["at_least"], bounds["bounds"]) == (2e6, True, 3)
     assert coefficient_text(bounds).startswith("≥ 2.00")
+
+
+def test_a_median_of_bounds_has_no_error() -> None:
+    bounds = gathered(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
+    assert bounds["std_error"] is bounds["trials_error"] is bounds["shared_error"] is None
+    assert coefficient_text(bounds) == "≥ 2.000"
+
+
+def test_a_trial_that_does_not_tell_its_doubt_is_not_taken_for_exact() -> None:
+    doubts = (1e5, nan, 1e5)
+    told = gathered(make_estimate(1e6 + k, std_error=doubt) for k, doubt in enumerate(doubts))
+    assert told["shared_error"] == pytest.approx(1e5, rel=1e-3)
 
 
 def test_what_is_not_valid_counts_for_nothing_but_is_told() -> None:
