@@ -30,7 +30,8 @@ from simulation.world import World, load_world
 STEP_S = 0.002  # the period of the drives' fastest messages
 WATCHDOG_S = 0.25  # of the simulated drives, on processors that everything shares
 LONGEST_CATCH_UP_S = 0.02  # a robot that was held up for longer has lost that time: commands waited meanwhile
-PRIORITY = 1  # of real time, where it is permitted: a real robot does not wait for its computer
+PRIORITY = 1  # of real time
+NICENESS = -10
 PR_SET_PDEATHSIG = 1
 
 
@@ -99,6 +100,18 @@ def _world(options: argparse.Namespace, configuration: Configuration) -> World:
     return load_world(options.world) if options.world else World(track_of(options.mud or list(MUDS)))
 
 
+def take_precedence() -> None:
+    """Where it is permitted: a real robot does not wait for its computer.
+
+    Not in real time on a lone processor: a simulation that cannot keep up would leave it to nobody else.
+    """
+    with suppress(PermissionError):
+        if len(os.sched_getaffinity(0)) > 1:
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        else:
+            os.nice(NICENESS)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     options = _parse(arguments)
     try:
@@ -116,8 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.lend_hand())
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
-    with suppress(PermissionError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    take_precedence()
     peer.run()
     return 0
 

@@ -38,7 +38,7 @@ def world(tmp_path: Path) -> Path:
 @pytest.fixture
 def peers(monkeypatch: pytest.MonkeyPatch) -> list[StillPeer]:
     monkeypatch.setattr(peer, "Peer", StillPeer)
-    monkeypatch.setattr("os.sched_setscheduler", lambda *_: None)
+    monkeypatch.setattr(peer, "take_precedence", lambda: None)
     monkeypatch.setattr("signal.signal", lambda *_: None)
     monkeypatch.setattr(StillPeer, "made", [])
     return StillPeer.made
@@ -105,7 +105,7 @@ def test_a_signal_moves_the_flippers_back_by_hand(short_folder: Path, monkeypatc
             lying.extend((arm.sweep_rad, arm.adduction_rad) for arm in self.robot.plant.arms)
 
     lying: list[tuple[float, float]] = []
-    monkeypatch.setattr("os.sched_setscheduler", lambda *_: None)
+    monkeypatch.setattr(peer, "take_precedence", lambda: None)
     monkeypatch.setattr(peer, "Peer", HandedPeer)
     before = {number: signal.getsignal(number) for number in (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT)}
     try:

@@ -13,7 +13,7 @@ from drivers.odrive_codec import AxisState
 from firmware_host.buses import open_ports
 from firmware_host.configuration import load_configuration
 from simulation.local_setup import write_local_setup
-from simulation.peer import WATCHDOG_S, Peer, track_of
+from simulation.peer import WATCHDOG_S, Peer, take_precedence, track_of
 from simulation.world import World
 
 HELD_UP_S = 4.0 * WATCHDOG_S
@@ -78,3 +78,15 @@ def test_joints_do_not_move_on_in_time_that_the_robot_has_lost(bench: Bench) -> 
     assert bench.peer.robot.plant.angles_rad == before
     bench.step(0.01)
     assert bench.peer.robot.plant.angles_rad != before
+
+
+@pytest.mark.parametrize(("processors", "expected"), [({0}, ["nice"]), ({0, 1}, ["real time"])], ids=["one", "two"])
+def test_a_lone_processor_is_not_taken_in_real_time(
+    monkeypatch: pytest.MonkeyPatch, processors: set[int], expected: list[str]
+) -> None:
+    taken: list[str] = []
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: processors)
+    monkeypatch.setattr("os.sched_setscheduler", lambda *_: taken.append("real time"))
+    monkeypatch.setattr("os.nice", lambda _: taken.append("nice"))
+    take_precedence()
+    assert taken == expected
