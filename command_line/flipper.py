@@ -13,7 +13,7 @@ from experiments.coefficient_table import load_truth
 from experiments.flipper_report import sections_of, text_of
 from experiments.flipper_simulation import flipper_bench
 from experiments.mud_names import mud_name
-from experiments.mud_trials import left_out_of, measured_of
+from experiments.mud_trials import left_out_of
 
 PREPARE = (
     "Torque is off and the flippers have come down. Level the mud to its nominal height and give the flipper a fresh "
@@ -43,8 +43,7 @@ def _find(options: argparse.Namespace, plan: flipper.Plan, desk: Desk) -> Findin
     truth = load_truth(options.truth) if options.truth else None
     simulated = partial(flipper_bench, desk.folder, plan.muds, SEED)
     bench = open_bench(options, desk, plan.kept, simulated, lambda trial: PREPARE)
-    configuration, logs = make_trials(bench, desk, lambda: flipper.run(bench, plan, desk.show))
-    entries = measured_of(bench.notebook)
+    configuration, entries, logs = make_trials(bench, desk, lambda: flipper.run(bench, plan, desk.show))
     report = flipper.report_of(plan, entries, configuration, truth) | {"left_out": left_out_of(bench.notebook)}
     sections = sections_of(report, plan, entries, configuration)
     return Finding(report, "A single flipper through muds", sections, text_of_tables(text_of(report)), logs)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import shutil
 import sys
 from collections.abc import Sequence
 from functools import partial
@@ -16,7 +15,7 @@ from command_line.recorded_walk import RecordedWalk, read_walk
 from command_line.screen import coefficient, complain, number, watched
 from command_line.stride_choice import choose_strides
 from experiments.report_page import PAGE, Figure, Section, numbers_told, write_report
-from experiments.whole_files import whole_file
+from experiments.whole_files import copy_whole
 from firmware_host.log_reader import Log, LogError, Watch, begin_s, log_summary, read_logs
 from firmware_host.replay import Replay, replay_files
 from firmware_host.reports import map_report, stride_report
@@ -50,8 +49,7 @@ def _beside(log: Path) -> Path:
 def _copy(log: Path, folder: Path) -> Path:
     copy = folder / log.name
     if copy.absolute() != log.absolute():
-        with whole_file(copy) as beside:
-            shutil.copyfile(log, beside)
+        copy_whole(log, copy)
     return copy
 
 

@@ -12,7 +12,7 @@ from command_line.screen import table
 from experiments.bench_robot import BenchRobot, leave
 from experiments.daemon_robot import DaemonRobot
 from experiments.mud_trials import Bench, MudBed, PlannedTrial, PromptedBed, measured_of
-from experiments.notebook import Notebook
+from experiments.notebook import Entry, Notebook
 from firmware_host.configuration import Configuration
 from simulation.clay import clay_of_water
 
@@ -43,15 +43,18 @@ def open_bench(
     return Bench(robot, PromptedBed(robot, desk.person, words), desk.person, notebook)
 
 
-def make_trials(bench: Bench, desk: Desk, run: Callable[[], None]) -> tuple[Configuration, list[Path]]:
-    """The configuration they were made with, and the logs. Whatever ends them, the robot is left at rest."""
+def make_trials(
+    bench: Bench, desk: Desk, run: Callable[[], None]
+) -> tuple[Configuration, dict[str, Entry], list[Path]]:
+    """The configuration they were made with, those that count, and the logs. Whatever ends them, the robot is left at
+    rest. Raises BenchError where none counts.
+    """
     try:
         configuration = bench.robot.configuration
         run()
     finally:
         logs = leave(bench.robot, desk.person, desk.folder)
-    measured_of(bench.notebook)
-    return configuration, logs
+    return configuration, measured_of(bench.notebook), logs
 
 
 def text_of_tables(tables: Iterable[tuple[str, Sequence[Sequence[str]]]]) -> str:

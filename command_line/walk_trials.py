@@ -11,7 +11,7 @@ from command_line.mud_bench import SEED, make_trials, open_bench, text_of_tables
 from experiments import walk_mapping
 from experiments.coefficient_table import load_truth
 from experiments.mud_names import mud_name
-from experiments.mud_trials import PlannedTrial, left_out_of, measured_of
+from experiments.mud_trials import PlannedTrial, left_out_of
 from experiments.trackway_trials import Mud
 from experiments.walk_mapping_pages import sections_of, text_of
 from experiments.walk_mapping_report import report_of
@@ -52,8 +52,7 @@ def run_walk(options: argparse.Namespace) -> int:
 def _find(options: argparse.Namespace, plan: walk_mapping.Plan, desk: Desk) -> Finding:
     truth = load_truth(options.truth) if options.truth else None
     bench = open_bench(options, desk, plan.kept, partial(walking_bench, desk.folder, plan, SEED), _words)
-    configuration, logs = make_trials(bench, desk, lambda: walk_mapping.run(bench, plan, desk.show))
-    entries = measured_of(bench.notebook)
+    configuration, entries, logs = make_trials(bench, desk, lambda: walk_mapping.run(bench, plan, desk.show))
     report = report_of(plan, entries, configuration, truth) | {"left_out": left_out_of(bench.notebook)}
     sections = sections_of(report, plan, entries, configuration, truth)
     return Finding(report, "The walking robot over several muds", sections, text_of_tables(text_of(report)), logs)

@@ -17,7 +17,6 @@ class M1 are truer than all of this.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import chain
 from math import isfinite
 from pathlib import Path
 from random import Random
@@ -54,11 +53,8 @@ def truth_rows(fits: Sequence[JointFit]) -> list[list[str]]:
     """A table: what is true of the simulated motors, and by how much the fitted misses it."""
     rows = [["joint", "true k_t (N·m/A)", "k_t misses by", "true dry friction (N·m)", "dry friction misses by"]]
     for fit in fits:
-        told = (fit.constant_nm_a, TRUE_CONSTANT_NM_A), (fit.friction_nm[0], COULOMB_NM)
-        cells = (
-            [f"{true:.{digits}f}", _missed(value, true)] for (value, true), digits in zip(told, (5, 4), strict=True)
-        )
-        rows.append([fit.joint, *chain(*cells)])
+        constant = [f"{TRUE_CONSTANT_NM_A:.5f}", _missed(fit.constant_nm_a, TRUE_CONSTANT_NM_A)]
+        rows.append([fit.joint, *constant, f"{COULOMB_NM:.4f}", _missed(fit.friction_nm[0], COULOMB_NM)])
     return rows
 
 

@@ -132,11 +132,8 @@ class Stand:
     def _sound(self, sample: Sample) -> Sample:
         fault = self.loop.faults.worst
         if sample.mode in (*ENERGISED, Mode.FAULT) and fault and fault.kind.reaction >= Reaction.HOLD:
-            raise BenchError(f"{fault.name}: {self._told([fault])}")
+            raise BenchError(f"{fault.name}: {_told([fault])}")
         return sample
-
-    def _told(self, faults: Sequence[Fault]) -> str:
-        return " ".join(f"{fault.sentence} {_capital(fault.kind.what_to_do)}." for fault in faults)
 
     def arm(self, law: Law | None = None) -> None:
         """Into hold, with a law from the first torque on."""
@@ -150,9 +147,7 @@ class Stand:
             if self.tick_soundly().mode is Mode.HOLD:
                 return
             against = blocking or against
-        raise BenchError(
-            f"Closed loop of all drives did not come within {ARMING_S:g} s. {self._told(against)}".rstrip()
-        )
+        raise BenchError(f"Closed loop of all drives did not come within {ARMING_S:g} s. {_told(against)}".rstrip())
 
     def _ask_for_torque(self) -> None:
         self._rest = measured_angles(self.loop.states)
@@ -163,7 +158,7 @@ class Stand:
     def _wait_until_armable(self) -> None:
         if self._becomes_armable():
             return
-        told = self._told(self.loop.faults.blocking())
+        told = _told(self.loop.faults.blocking())
         if told and self.attendant.clears(told, self._idle_on):
             self.loop.request(Request.CLEAR, self.rig.now_s)
             if self._becomes_armable():
@@ -258,6 +253,10 @@ def first_lasting(flags: Sequence[bool], ticks: int) -> int | None:
 
 def joint_place(joint: str) -> int:
     return JOINTS.index(joint)
+
+
+def _told(faults: Sequence[Fault]) -> str:
+    return " ".join(f"{fault.sentence} {_capital(fault.kind.what_to_do)}." for fault in faults)
 
 
 def _capital(text: str) -> str:

@@ -69,9 +69,13 @@ def sections_of(
     sections.append(_forces(report))
     sections.append(_strides(firsts, configuration, method))
     remarks = [f"{mud_text(mud['mud'])}: {remark}" for mud in report["muds"] for remark in mud["remarks"]]
-    remarks += left_out_texts(report.get("left_out", {}))
+    return sections + remarked([*remarks, *left_out_texts(report.get("left_out", {}))])
+
+
+def remarked(remarks: Sequence[str]) -> list[Section]:
+    """One of sentences, where there are any."""
     told = "\n\n".join(f"{remark.rstrip('.')}." for remark in remarks)
-    return sections + ([Section("What was remarked", told)] if remarks else [])
+    return [Section("What was remarked", told)] * bool(remarks)
 
 
 def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], configuration: Configuration) -> Section:

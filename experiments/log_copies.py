@@ -6,11 +6,10 @@ its number and both clocks, so those that are copied can be read, replayed and r
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from experiments.whole_files import whole_file
+from experiments.whole_files import copy_whole
 from firmware_host.log_folder import present_path
 from firmware_host.log_reader import read_log
 from firmware_host.log_recovery import recover_log
@@ -41,8 +40,7 @@ def _ends_before(log: Path, from_s: float) -> bool:
 
 
 def _copy(log: Path, copy: Path) -> Path:
-    with whole_file(copy) as beside:
-        shutil.copyfile(present_path(log), beside)
+    copy_whole(present_path(log), copy)
     if not read_log(copy).complete:
         recover_log(copy)
     return copy

@@ -12,15 +12,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import degrees, nan, radians
 
-from control.controller import ALL_TRUSTED, DAMPING_NM, RAISING_S, SOFT_STOP_S, WalkOrder, measured_angles
+from control.controller import ALL_TRUSTED, DAMPING_NM, RAISING_S, SOFT_STOP_S, measured_angles
 from control.joint_pd import damping_torques_nm
 from control.modes import Mode, Request
 from control.records import DriveStates, JointAngles, Phase, Torques
 from drivers.odrive_axis import OdriveAxis
 from experiments.bench_reading import Reading, Readings
-from experiments.bench_robot import BenchError
 from experiments.bench_stand import Law, Sample, Stand, first_lasting
-from experiments.stroke_tracking import FAST_RAD_S, WALK_DEPTH_M
+from experiments.stroke_tracking import FAST_RAD_S, order_strides
 from firmware_host.ticker import PERIOD_S
 
 SWEEPS = (0, 2)  # places in JOINTS
@@ -46,9 +45,7 @@ COASTING_DEG = 60.0  # no farther than the stops from where it began
 def soft_stop(stand: Stand) -> Readings:
     """Idle at the begin and at the end, as all of them."""
     with stand.raised():
-        refused = stand.loop.request(Request.WALK, stand.rig.now_s, WalkOrder(WALK_DEPTH_M, False, 2))
-        if refused:
-            raise BenchError(f"The robot does not walk: {refused}")
+        order_strides(stand, 2)
         stand.run_until(lambda sample: _in_full_stance(stand, sample), 20.0, "The full speed of a stance")
         begun = measured_angles(stand.loop.states)
         stand.loop.request(Request.STOP, stand.rig.now_s)

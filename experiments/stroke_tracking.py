@@ -115,11 +115,16 @@ def strides(stand: Stand) -> Readings:
     yield Reading("walk: faults that stand", len(told), "", 0, 0, " ".join(told))
 
 
-def walk(stand: Stand) -> list[Sample]:
-    """And back to hold."""
-    refused = stand.loop.request(Request.WALK, stand.rig.now_s, WalkOrder(WALK_DEPTH_M, False, STRIDES))
+def order_strides(stand: Stand, count: int) -> None:
+    """In air. Raises BenchError."""
+    refused = stand.loop.request(Request.WALK, stand.rig.now_s, WalkOrder(WALK_DEPTH_M, False, count))
     if refused:
         raise BenchError(f"The robot does not walk: {refused}")
+
+
+def walk(stand: Stand) -> list[Sample]:
+    """And back to hold."""
+    order_strides(stand, STRIDES)
     longest_s = 2.0 * STRIDES * _stride_s(stand) + 10.0
     stand.run_until(lambda sample: sample.mode is Mode.WALKING, 1.0, "The walk")
     return stand.run_until(lambda sample: sample.mode is Mode.HOLD, longest_s, "The end of the walk")

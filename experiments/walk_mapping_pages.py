@@ -8,7 +8,7 @@ from typing import Any
 
 from experiments.coefficient_table import TruthOfMud, error_text_rows, mud_rows
 from experiments.estimation_methods import method_of
-from experiments.flipper_report import DOUBTS, ERRORS, HEADING, TRUTHS, doubts
+from experiments.flipper_report import DOUBTS, ERRORS, HEADING, TRUTHS, doubts, remarked
 from experiments.mud_looks import file_name
 from experiments.mud_names import mud_text
 from experiments.mud_trials import left_out_texts
@@ -51,9 +51,7 @@ def sections_of(
     if report["errors"]:
         sections.append(Section(ERRORS, METHODS, rows=error_text_rows(report["errors"])))
     sections.append(Section(FINDINGS, rows=paper_rows(report)))
-    remarks = [*report["remarks"], *left_out_texts(report.get("left_out", {}))]
-    told = "\n\n".join(f"{remark.rstrip('.')}." for remark in remarks)
-    return sections + ([Section("What was remarked", told)] if remarks else [])
+    return sections + remarked([*report["remarks"], *left_out_texts(report.get("left_out", {}))])
 
 
 def _walk_section(

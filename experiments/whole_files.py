@@ -5,6 +5,7 @@ A disk that fills up while a report is made again leaves the one that was there 
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -21,3 +22,9 @@ def whole_file(path: Path) -> Iterator[Path]:
         with suppress(OSError):
             beside.unlink()
         raise
+
+
+def copy_whole(file: Path, copy: Path) -> None:
+    """Raises OSError."""
+    with whole_file(copy) as beside:
+        shutil.copyfile(file, beside)

@@ -16,10 +16,20 @@ def record_walks(path: Path, configuration: Configuration, *strides: int) -> Loc
     """One walk after another of so many strides, with a hold between them. The robot as it is afterwards."""
     recorder = Recorder(path, configuration.text, {"robot": "test"})
     robot = Lockstep(configuration, paper_track(), recorder=recorder)
-    robot.arm()
-    for count in strides:
-        robot.walk(WalkOrder(0.03, True, count))
-        robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
+    walk_and_hold(robot, *strides)
     assert recorder.dropped == 0
     assert recorder.close(20.0)
     return robot
+
+
+def walk_and_hold(robot: Lockstep, *strides: int, rest_s: float = 0.0) -> list[tuple[float, float]]:
+    """Armed, and before each walk at rest for a while. When each began and was over, by the robot's clock."""
+    robot.arm()
+    spans_s = []
+    for count in strides:
+        robot.run_for(rest_s)
+        begun_s = robot.now_s
+        robot.walk(WalkOrder(0.03, True, count))
+        robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
+        spans_s.append((begun_s, robot.now_s))
+    return spans_s

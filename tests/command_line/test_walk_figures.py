@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from command_line.walk_figures import logged_walk, walk_figures
-from control.controller import WalkOrder
-from control.modes import Mode
 from experiments.trackway_trials import LoggedTime
 from firmware_host.configuration import Configuration
 from firmware_host.log_folder import DONE, first_path, log_files
@@ -18,6 +16,7 @@ from firmware_host.log_reader import read_log
 from firmware_host.recorder import Recorder
 from simulation.lockstep import Lockstep
 from simulation.track import paper_track
+from tests.recorded_walks import walk_and_hold
 from tests.scripted_person import ScriptedPerson
 
 
@@ -30,14 +29,8 @@ def walks(tmp_path: Path, configuration: Configuration) -> list[LoggedTime]:
         {"robot": "test", "run_id": "run"},
         LogParameters(directory=str(tmp_path), segment_s=2.0),
     )
-    robot, logged = Lockstep(configuration, paper_track(), recorder=recorder), []
-    robot.arm()
-    for strides in (1, 2):
-        robot.run_for(6.0)
-        begun_s = robot.now_s
-        robot.walk(WalkOrder(0.03, True, strides))
-        robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
-        logged.append(LoggedTime("run", begun_s, robot.now_s))
+    robot = Lockstep(configuration, paper_track(), recorder=recorder)
+    logged = [LoggedTime("run", *span_s) for span_s in walk_and_hold(robot, 1, 2, rest_s=6.0)]
     assert recorder.close(20.0)
     stamps_s = {log: read_log(log).ticks["stamp_s"] for log in log_files(tmp_path / "logs", DONE)}
     copied = [log for log, at_s in stamps_s.items() if at_s[0] < logged[0].to_s or at_s[-1] > logged[1].from_s]

@@ -12,8 +12,6 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from control.controller import WalkOrder
-from control.modes import Mode
 from experiments.log_copies import copy_since
 from firmware_host.configuration import Configuration
 from firmware_host.log_file import LogFile
@@ -25,6 +23,7 @@ from firmware_host.replay import replay_files
 from simulation.lockstep import Lockstep
 from simulation.track import paper_track
 from tests.firmware_host.made_up_rows import OPENING, make_ticks
+from tests.recorded_walks import walk_and_hold
 
 SEGMENT_TICKS = 380
 
@@ -94,12 +93,7 @@ def test_what_is_copied_is_replayed_and_reported_without_the_segments_before_it(
     first = first_path(tmp_path / "logs", "run")
     recorder = Recorder(first, configuration.text, {"robot": "test", "run_id": "run"}, parameters)
     robot = Lockstep(configuration, paper_track(), recorder=recorder)
-    robot.arm()
-    for strides in (1, 2):
-        robot.run_for(4.0)
-        begun_s = robot.now_s
-        robot.walk(WalkOrder(0.03, True, strides))
-        robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
+    _, (begun_s, _) = walk_and_hold(robot, 1, 2, rest_s=4.0)
     assert recorder.close(20.0)
     copies = copy_since(run_files(first), begun_s, tmp_path)
     assert 0 < len(copies) < len(run_files(first)) and copies[0].name != first.name
