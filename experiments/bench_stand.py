@@ -87,7 +87,7 @@ class Stand:
         self.drives = rig.loop.drives
         self.controller = rig.loop.controller = bench_controller(rig.loop.controller)
         self._rest: JointAngles = LEVEL  # where the flippers lie without torque
-        self.lateness = Lateness()  # of one measurement, while torque is on
+        self.lateness = Lateness()  # of one measurement, while a drive tells that torque is on
         self.lateness_so_far = Lateness()  # of all
 
     def tick(self) -> Sample:
@@ -125,7 +125,7 @@ class Stand:
         return Sample(beat, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
 
     def _heed_lateness(self, beat: Beat, states: DriveStates) -> None:
-        if self.loop.mode in ENERGISED:
+        if any(state.closed_loop for state in states):
             self.lateness.update(beat, states)
             self.lateness_so_far.update(beat, states)
 
