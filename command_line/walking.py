@@ -46,7 +46,9 @@ def run_trackway(options: argparse.Namespace) -> int:
         seeds=options.trials or trackway.Plan.seeds,
         compartment_m=options.compartment or trackway.Plan.compartment_m,
     )
-    return conduct_bench(options, "walks", lambda desk: _found(trackway.run(plan, desk.show)))
+    return conduct_bench(
+        options, "walks", lambda desk: _found(trackway.run(plan, Notebook(desk.folder, plan.kept), desk.show))
+    )
 
 
 def _walk_at_the_bench(options: argparse.Namespace) -> int:

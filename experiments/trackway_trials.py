@@ -35,7 +35,7 @@ from experiments.paper_table import ADAPTIVE, FIXED_DEPTHS_M
 from experiments.person import GO_ON, REDO, SKIP, Person
 from experiments.side_by_side import Show
 from experiments.trackway import STUCK_S, paper_report
-from experiments.walk import Walk, WalkedStride, speed_m_s
+from experiments.walk import Walk, speed_m_s, walk_of
 from firmware_host.configuration import Configuration
 from firmware_host.counted_nouns import counted
 
@@ -156,9 +156,7 @@ def _walk_trial(plan: Plan, key: str, rule: DepthRule, trackway: Trackway, noteb
     verdict = trackway.judge(told_of(trial, walk), was_stopped(walk))
     if verdict == REDO:
         return
-    strides = [stride._asdict() for stride in walk.strides]
-    entry = {"strides": strides, "fault": walk.fault, "arm_m": arm_m, "skipped": verdict == SKIP}
-    notebook.write(key, entry | {"logged": walk.logged})
+    notebook.write(key, walk.entry | {"arm_m": arm_m, "skipped": verdict == SKIP, "logged": walk.logged})
 
 
 def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> LoggedWalk:
@@ -266,11 +264,11 @@ def report_of(plan: Plan, notebook: Notebook) -> dict[str, Any]:
         if entry["skipped"]:
             left_out += 1
             continue
-        strides = [WalkedStride(**stride) for stride in entry["strides"]]
-        seen = [stride for stride in strides if stride.step_m == stride.step_m]
-        unseen, arm_m = unseen + len(strides) - len(seen), entry["arm_m"]
-        walks[rule.name].append(Walk([stride for stride in seen if stride.mud != BEHIND], entry["fault"]))
-        end = entry["fault"] or "past the end"
+        walk = walk_of(entry)
+        seen = [stride for stride in walk.strides if stride.step_m == stride.step_m]
+        unseen, arm_m = unseen + len(walk.strides) - len(seen), entry["arm_m"]
+        walks[rule.name].append(Walk([stride for stride in seen if stride.mud != BEHIND], walk.fault))
+        end = walk.fault or "past the end"
         ends[rule.name][end] = ends[rule.name].get(end, 0) + 1
     return paper_report(walks, [mud.name for mud in plan.muds], arm_m) | {
         "ends": ends,

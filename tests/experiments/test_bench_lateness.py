@@ -121,14 +121,14 @@ def test_a_drive_is_too_slow_to_let_go_also_where_ticks_are_missed_meanwhile(
     stand: Stand, rig: LateRig, briefly: None
 ) -> None:
     """Six ticks too late, of which this computer sees three."""
-    drive = rig.robot.drives[2]
+    drive, late = rig.robot.drives[2], rig
     asked: list[int] = []
 
     def dawdle(rig: SimulatedRig) -> None:
         if rig.loop._request is Request.DISARM:
             asked.append(rig._tick_number)
             drive.receive = lambda frame, now_s: []  # type: ignore[method-assign]
-            rig.begin(1.0, 0.0, 1, 1)
+            late.begin(1.0, 0.0, 1, 1)
         elif asked and rig._tick_number >= asked[0] + 6:
             drive.axis_state = AxisState.IDLE
 
