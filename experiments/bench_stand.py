@@ -256,8 +256,4 @@ def joint_place(joint: str) -> int:
 
 
 def _told(faults: Sequence[Fault]) -> str:
-    return " ".join(f"{fault.sentence} {_capital(fault.kind.what_to_do)}." for fault in faults)
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+    return " ".join(fault.advice for fault in faults)
