@@ -5,7 +5,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
 # Tests in real time, or whose order counts: one after the other, and beside nothing else.
-IN_PEACE := bench benchmarks command_line firmware_host
+IN_PEACE := bench benchmarks command_line firmware_host experiments/test_bench_rig.py experiments/test_daemon_robot.py
 
 .PHONY: help setup demo test test-vm mutants lint clean
 

@@ -92,9 +92,10 @@ class Stand:
 
     def tick(self) -> Sample:
         aim, loop = self.controller.aim, self.loop
-        beat = self.rig.wait()
+        beat, energised = self.rig.wait(), loop.mode in ENERGISED  # before a fault of this tick
         loop.tick(beat)
-        self._heed_lateness(beat, loop.states)
+        if energised:
+            self._heed_lateness(beat, loop.states)
         return Sample(beat, loop.mode, loop.states, aim, loop.sent.torques_nm, loop.sent.limited)
 
     def run_for(self, duration_s: float) -> list[Sample]:
@@ -121,13 +122,13 @@ class Stand:
         """A tick in which nothing is sent."""
         beat = self.rig.wait()
         states = self.drives.read(beat.now_s)
-        self._heed_lateness(beat, states)
+        if self.loop.mode in ENERGISED:
+            self._heed_lateness(beat, states)
         return Sample(beat, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
 
     def _heed_lateness(self, beat: Beat, states: DriveStates) -> None:
-        if self.loop.mode in ENERGISED:
-            self.lateness.update(beat, states)
-            self.lateness_so_far.update(beat, states)
+        self.lateness.update(beat, states)
+        self.lateness_so_far.update(beat, states)
 
     def _sound(self, sample: Sample) -> Sample:
         fault = self.loop.faults.worst
