@@ -26,6 +26,7 @@ from firmware_host.configuration import BusParameters, Configuration, StatusPara
 from firmware_host.toml_records import ConfigurationError
 from simulation.local_setup import write_local_setup
 from tests.bench.staged_bench import told_of_file
+from tests.waiting import LONGEST_S
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -104,7 +105,7 @@ def local_robot(short_folder: Path, tmp_path: Path) -> Iterator[Configuration]:
         yield load_configuration(path)
     finally:
         robot.send_signal(signal.SIGTERM)
-        robot.wait(20)
+        robot.wait(LONGEST_S)
 
 
 @pytest.fixture
