@@ -4,8 +4,9 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-# Tests in real time, or whose order counts: one after the other, and beside nothing else.
-IN_PEACE := bench benchmarks command_line firmware_host experiments/test_bench_rig.py experiments/test_daemon_robot.py
+# Tests of a robot in real time, or whose order counts: one after the other, and beside nothing else.
+REAL_TIME := actuator attended_walk demo doctor failing operation permission
+IN_PEACE := bench benchmarks $(REAL_TIME:%=command_line/test_%.py) $(addprefix experiments/,test_bench_rig.py test_daemon_robot.py)
 
 # A test that hangs is ended, and told with the place where it hung.
 ENDED_HUNG := -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
