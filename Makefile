@@ -4,8 +4,12 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-# Tests in real time, or whose order counts: one after the other, and beside nothing else.
-IN_PEACE := bench benchmarks command_line firmware_host
+# Tests of a robot in real time, or whose order counts: one after the other, and beside nothing else.
+REAL_TIME := actuator attended_walk demo doctor failing operation permission
+IN_PEACE := bench benchmarks $(REAL_TIME:%=command_line/test_%.py) $(addprefix experiments/,test_bench_rig.py test_daemon_robot.py)
+
+# A test that hangs is ended, and told with the place where it hung.
+ENDED_HUNG := -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
 
 .PHONY: help setup demo test test-vm mutants lint clean
 
@@ -18,8 +22,8 @@ demo: .venv/setup  ## a simulated robot walks over three muds, in real time
 	@$(BIN)/mudskipper demo $(ARGS)
 
 test: .venv/test  ## every test, without network
-	$(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile $(addprefix --ignore=tests/,$(IN_PEACE)) $(ARGS)
-	$(BIN)/python -m pytest -q --simulated $(addprefix tests/,$(IN_PEACE)) $(ARGS)
+	$(BIN)/python -m pytest -q $(ENDED_HUNG) --numprocesses 2 --dist loadfile $(addprefix --ignore=tests/,$(IN_PEACE)) $(ARGS)
+	$(BIN)/python -m pytest -q $(ENDED_HUNG) --simulated $(addprefix tests/,$(IN_PEACE)) $(ARGS)
 
 test-vm: .venv/test  ## the daemon under systemd on a real kernel, in a virtual machine
 	@$(BIN)/python -m virtual_machine.installed_robot

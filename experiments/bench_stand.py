@@ -92,9 +92,10 @@ class Stand:
 
     def tick(self) -> Sample:
         aim, loop = self.controller.aim, self.loop
-        beat = self.rig.wait()
+        beat, torque_on = self.rig.wait(), self._torque_on()
         loop.tick(beat)
-        self._heed_lateness(beat, loop.states)
+        if torque_on:
+            self._heed_lateness(beat, loop.states)
         return Sample(beat, loop.mode, loop.states, aim, loop.sent.torques_nm, loop.sent.limited)
 
     def run_for(self, duration_s: float) -> list[Sample]:
@@ -121,13 +122,17 @@ class Stand:
         """A tick in which nothing is sent."""
         beat = self.rig.wait()
         states = self.drives.read(beat.now_s)
-        self._heed_lateness(beat, states)
+        if self._torque_on():
+            self._heed_lateness(beat, states)
         return Sample(beat, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
 
+    def _torque_on(self) -> bool:
+        """As a drive told before this tick: it may have a fault, and a drive that is told to go idle need not obey."""
+        return any(state.closed_loop for state in self.loop.states)
+
     def _heed_lateness(self, beat: Beat, states: DriveStates) -> None:
-        if any(state.closed_loop for state in states):
-            self.lateness.update(beat, states)
-            self.lateness_so_far.update(beat, states)
+        self.lateness.update(beat, states)
+        self.lateness_so_far.update(beat, states)
 
     def _sound(self, sample: Sample) -> Sample:
         fault = self.loop.faults.worst

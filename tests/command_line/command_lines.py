@@ -11,13 +11,14 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
+from tests.waiting import LONGEST_S
 
 
 def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """In a process of its own, with these variables besides those that are."""
     command = [sys.executable, "-m", "command_line.main", *arguments]
     return subprocess.run(
-        command, capture_output=True, text=True, timeout=60, env=os.environ | environment, check=False
+        command, capture_output=True, text=True, timeout=LONGEST_S, env=os.environ | environment, check=False
     )
 
 

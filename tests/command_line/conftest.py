@@ -17,6 +17,7 @@ from firmware_host.status_client import NoDaemonError, StatusClient
 from simulation.local_setup import write_local_setup
 from tests.command_line.command_lines import run
 from tests.recorded_walks import record_walks
+from tests.waiting import LONGEST_S
 
 
 class Bench:
@@ -36,7 +37,7 @@ class Bench:
     def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         return run(*arguments, MUDSKIPPER_SOCKET=str(self.socket))
 
-    def wait_for(self, done: Callable[[dict[str, Any]], bool], longest_s: float = 60.0) -> dict[str, Any]:
+    def wait_for(self, done: Callable[[dict[str, Any]], bool], longest_s: float = LONGEST_S) -> dict[str, Any]:
         deadline_s = time.monotonic() + longest_s
         report: dict[str, Any] = {}
         while time.monotonic() < deadline_s:
@@ -59,7 +60,7 @@ class Bench:
         for process in (self.daemon, self.robot):
             if process.poll() is None:
                 process.send_signal(signal.SIGTERM)
-                process.wait(20)
+                process.wait(LONGEST_S)
             assert process.stderr is not None
             process.stderr.close()
 

@@ -30,6 +30,7 @@ from experiments.person import Person, Willing
 from firmware_host.configuration import load_configuration, parse_configuration
 from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
 from tests.experiments.test_actuator_fit import made_entries
+from tests.waiting import LONGEST_S
 
 SHORT = (
     "experiment",
@@ -146,7 +147,7 @@ def run_at_terminal(bench: Bench, command: list[str], answers: list[tuple[str, s
     except OSError:  # the other end is closed: it has ended
         pass
     finally:
-        process.wait(100)
+        process.wait(LONGEST_S)
         killer.cancel()
         os.close(person)
     return shown

@@ -14,6 +14,7 @@ import pytest
 
 from command_line import attended_walk, exit_codes
 from firmware_host.status_client import StatusClient
+from tests.waiting import LONGEST_S
 
 
 @contextmanager
@@ -103,7 +104,7 @@ def test_ctrl_c_stops_the_robot_and_waits_for_it(bench: Any) -> None:
     with attended(bench) as attendant:
         bench.wait_for(lambda report: report["phase"] == "stance")
         attendant.send_signal(signal.SIGINT)
-        said, complained = attendant.communicate(timeout=20)
+        said, complained = attendant.communicate(timeout=LONGEST_S)
     assert attendant.returncode == exit_codes.INTERRUPTED
     assert said.splitlines()[-1] == "hold" and "Traceback" not in complained
     assert bench.wait_for(lambda report: True)["mode"] == "hold"
@@ -113,7 +114,7 @@ def test_a_stop_from_elsewhere_ends_it(bench: Any) -> None:
     bench.run("arm")
     with attended(bench) as attendant:
         assert bench.run("stop").stdout == "hold\n"
-        said, _ = attendant.communicate(timeout=20)
+        said, _ = attendant.communicate(timeout=LONGEST_S)
     assert attendant.returncode == exit_codes.OK and said.splitlines()[-1] == "hold"
 
 
@@ -122,7 +123,7 @@ def test_a_robot_whose_attendant_dies_or_hangs_stops(bench: Any, number: signal.
     bench.run("arm")
     with attended(bench) as attendant:
         attendant.send_signal(number)
-        bench.wait_for(lambda report: report["mode"] not in ("walking", "stopping"), 5.0)
+        bench.wait_for(lambda report: report["mode"] not in ("walking", "stopping"))
 
 
 def test_a_second_attendant_is_told_of_the_first(bench: Any) -> None:

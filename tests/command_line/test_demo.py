@@ -13,6 +13,7 @@ import pytest
 
 from command_line import exit_codes
 from firmware_host.log_reader import read_log
+from tests.waiting import LONGEST_S
 
 
 def start_demo(out: Path, *arguments: str) -> subprocess.Popen[str]:
@@ -36,7 +37,7 @@ def children_of(out: Path) -> list[str]:
 
 def test_the_demo_walks_three_muds_and_sums_up(tmp_path: Path) -> None:
     with start_demo(tmp_path / "out", "--json", str(tmp_path / "demo.json")) as demo:
-        printed, complaints = demo.communicate(timeout=120)
+        printed, complaints = demo.communicate(timeout=LONGEST_S)
     assert (demo.returncode, complaints) == (exit_codes.OK, "")
     summary = json.loads((tmp_path / "demo.json").read_text(encoding="utf-8"))
     assert set(summary) >= {
@@ -66,7 +67,7 @@ def test_the_demo_walks_the_ground_that_a_file_describes(tmp_path: Path) -> None
         encoding="utf-8",
     )
     with start_demo(tmp_path / "out", "--world", str(world), "--json", str(tmp_path / "demo.json")) as demo:
-        printed, complaints = demo.communicate(timeout=60)
+        printed, complaints = demo.communicate(timeout=LONGEST_S)
     assert (demo.returncode, complaints) == (exit_codes.OK, "")
     assert "Walking 0.30 m over mud with 48.5 %, 1500 Pa, 48.5 % water." in printed
     summary = json.loads((tmp_path / "demo.json").read_text(encoding="utf-8"))
@@ -83,7 +84,7 @@ def test_ctrl_c_ends_the_demo_cleanly(tmp_path: Path) -> None:
             if line.startswith("left "):
                 break
         demo.send_signal(signal.SIGINT)
-        printed, complaints = demo.communicate(timeout=60)
+        printed, complaints = demo.communicate(timeout=LONGEST_S)
     assert demo.returncode == exit_codes.INTERRUPTED
     assert "torque is off" in complaints and "Traceback" not in complaints
     (path,) = (out / "done").glob("*.mcap")
@@ -99,7 +100,7 @@ def test_an_early_ctrl_c_says_that_nothing_moved(tmp_path: Path) -> None:
         assert demo.stdout is not None
         demo.stdout.readline()
         demo.send_signal(signal.SIGINT)
-        _, complaints = demo.communicate(timeout=60)
+        _, complaints = demo.communicate(timeout=LONGEST_S)
     assert demo.returncode == exit_codes.INTERRUPTED
     assert "stopped" in complaints and "Traceback" not in complaints
     assert children_of(tmp_path / "out") == []
@@ -112,7 +113,7 @@ def test_sigterm_ends_the_demo_as_ctrl_c_does(tmp_path: Path) -> None:
             if line.startswith("Arming"):
                 break
         demo.send_signal(signal.SIGTERM)
-        _, complaints = demo.communicate(timeout=60)
+        _, complaints = demo.communicate(timeout=LONGEST_S)
     assert demo.returncode == exit_codes.INTERRUPTED and "Traceback" not in complaints
     assert children_of(tmp_path / "out") == []
 
@@ -120,6 +121,6 @@ def test_sigterm_ends_the_demo_as_ctrl_c_does(tmp_path: Path) -> None:
 @pytest.mark.parametrize("arguments", [("--depth", "nan"), ("--depth", "-1"), ("--json", "/nonexistent/x.json")])
 def test_what_cannot_work_is_told_before_anything_starts(tmp_path: Path, arguments: tuple[str, str]) -> None:
     with start_demo(tmp_path / "out", *arguments) as demo:
-        printed, complaints = demo.communicate(timeout=60)
+        printed, complaints = demo.communicate(timeout=LONGEST_S)
     assert demo.returncode in (exit_codes.USAGE, exit_codes.UNHEALTHY)
     assert printed == "" and complaints and "Traceback" not in complaints

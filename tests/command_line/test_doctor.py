@@ -19,6 +19,7 @@ from firmware_host.configuration import Configuration, load_configuration
 from firmware_host.findings import Level, fail, ok, warn
 from simulation.local_setup import write_local_setup
 from tests.command_line.conftest import Bench
+from tests.waiting import LONGEST_S
 
 LINES = {"configuration", "kernel", "governor", "processors", "interrupts", "disk", "log", "clock", "daemon"}
 
@@ -93,4 +94,4 @@ def test_a_running_daemon_tells_its_process_its_drives_and_its_limits(bench: Ben
 
 def test_the_command_starts_without_the_libraries_of_other_commands() -> None:
     code = "import sys, command_line.main; assert not {'can', 'pydantic', 'numpy'} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=30)
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=LONGEST_S)

@@ -21,6 +21,7 @@ from command_line.main import main
 from experiments.estimation import Plan
 from simulation.clay import MUDS, Clay
 from tests.command_line.command_lines import refusal
+from tests.waiting import LONGEST_S
 
 COMMAND = ("experiment", "estimation", "--simulated")
 SHORT = (*COMMAND, "--seeds", "1", "--setup", "single", "--mud", "49.5", "--layers", "none")
@@ -198,7 +199,7 @@ def test_ctrl_c_ends_it_at_once_and_in_silence(seeds: str) -> None:
     try:
         wait_for_workers(run.pid)
         os.killpg(run.pid, signal.SIGINT)
-        printed, complaints = run.communicate(timeout=20.0)
+        printed, complaints = run.communicate(timeout=LONGEST_S)
     finally:
         with suppress(ProcessLookupError):
             os.killpg(run.pid, signal.SIGKILL)
@@ -207,7 +208,7 @@ def test_ctrl_c_ends_it_at_once_and_in_silence(seeds: str) -> None:
 
 
 def wait_for_workers(pid: int) -> None:
-    children, deadline_s = Path(f"/proc/{pid}/task/{pid}/children"), time.monotonic() + 30.0
+    children, deadline_s = Path(f"/proc/{pid}/task/{pid}/children"), time.monotonic() + LONGEST_S
     while not children.read_text().split() and time.monotonic() < deadline_s:
         time.sleep(0.05)
     time.sleep(0.3)  # a trial has begun

@@ -9,6 +9,7 @@ from typing import Any
 from command_line import exit_codes
 from drivers.failures import Failures
 from firmware_host.log_reader import read_log
+from tests.waiting import LONGEST_S
 
 
 def test_a_failing_drive_is_shown_stops_the_robot_and_stands_in_the_log(bench: Any) -> None:
@@ -28,7 +29,7 @@ def test_a_failing_drive_is_shown_stops_the_robot_and_stands_in_the_log(bench: A
     assert bench.run("fail", "all", "ok").stdout == "nothing fails on purpose\n"
     bench.wait_for(lambda report: report["failing"] == [] and report["drives"][0]["angle_age_s"] < 0.1)
     bench.daemon.send_signal(signal.SIGTERM)
-    assert bench.daemon.wait(20) == 0
+    assert bench.daemon.wait(LONGEST_S) == 0
     (path,) = bench.logs.glob("**/*.mcap")
     texts = [event["text"] for event in read_log(path).events]
     (begin,) = [text for text in texts if text.startswith("failing on purpose")]
@@ -53,7 +54,7 @@ def test_a_robot_that_may_not_fail_says_which_key_would_allow_it(bench: Any) -> 
     text = bench.configuration.read_text(encoding="utf-8")
     bench.configuration.write_text(text.replace("allowed = true", "allowed = false"), encoding="utf-8")
     bench.daemon.send_signal(signal.SIGTERM)
-    bench.daemon.wait(20)
+    bench.daemon.wait(LONGEST_S)
     bench.daemon.stderr.close()
     bench.daemon = bench.start("firmware_host.daemon")
     bench.wait_until_ready()

@@ -25,6 +25,7 @@ from firmware_host.log_rows import ROW_KINDS
 from firmware_host.log_segments import LogSegments
 from tests.command_line.command_lines import run
 from tests.recorded_walks import record_walks
+from tests.waiting import LONGEST_S
 
 
 @pytest.fixture(scope="module")
@@ -173,7 +174,9 @@ def test_a_reader_that_stops_reading_is_no_error(walk: Path) -> None:
     command = (
         f"{shlex.quote(sys.executable)} -m command_line.main log export {shlex.quote(str(walk))} --csv | head -n 3"
     )
-    ended = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=60, check=False, env=os.environ)
+    ended = subprocess.run(
+        command, shell=True, capture_output=True, text=True, timeout=LONGEST_S, check=False, env=os.environ
+    )
     assert len(ended.stdout.splitlines()) == 3 and ended.stderr == ""
 
 
@@ -187,7 +190,7 @@ def test_an_export_never_overwrites_its_own_log(walk: Path) -> None:
 def test_a_terminal_without_unicode_gets_question_marks(walk: Path) -> None:
     environment = os.environ | {"PYTHONUTF8": "0", "LC_ALL": "C", "PYTHONIOENCODING": "ascii"}
     command = [sys.executable, "-m", "command_line.main", "replay", str(walk)]
-    ended = subprocess.run(command, capture_output=True, timeout=60, check=False, env=environment)
+    ended = subprocess.run(command, capture_output=True, timeout=LONGEST_S, check=False, env=environment)
     assert ended.returncode == exit_codes.OK and b"N/cm?" in ended.stdout and ended.stderr == b""
 
 

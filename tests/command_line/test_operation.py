@@ -21,6 +21,7 @@ from firmware_host.log_reader import read_log
 from firmware_host.replay import replay_file
 from simulation.peer import WATCHDOG_S
 from tests.command_line.command_lines import run
+from tests.waiting import LONGEST_S
 
 
 def test_a_whole_session(bench: Any) -> None:
@@ -42,7 +43,7 @@ def test_a_whole_session(bench: Any) -> None:
     assert bench.run("stop").stdout == "hold\n"
     assert bench.run("disarm").stdout == "idle\n"
     bench.daemon.send_signal(signal.SIGTERM)
-    assert bench.daemon.wait(20) == 0
+    assert bench.daemon.wait(LONGEST_S) == 0
     (path,) = (bench.logs / "done").glob("*.mcap")
     assert read_log(path).complete
     assert len(replay_file(path).strides) >= 2
@@ -60,7 +61,7 @@ def test_sigterm_in_a_walk_finishes_safely(bench: Any) -> None:
     bench.run("walk")
     bench.wait_for(lambda report: report["phase"] == "stance")
     bench.daemon.send_signal(signal.SIGTERM)
-    assert bench.daemon.wait(20) == 0
+    assert bench.daemon.wait(LONGEST_S) == 0
     (path,) = (bench.logs / "done").glob("*.mcap")
     log = read_log(path)
     texts = [event["text"] for event in log.events]
@@ -77,7 +78,7 @@ def test_sigterm_in_a_walk_finishes_safely(bench: Any) -> None:
 def kill_daemon(bench: Any) -> None:
     """And start another one, once only the drives can have acted."""
     bench.daemon.kill()
-    bench.daemon.wait(5)
+    bench.daemon.wait(LONGEST_S)
     bench.daemon.stderr.close()
     time.sleep(2.0 * WATCHDOG_S)
     bench.daemon = bench.start("firmware_host.daemon")
@@ -120,7 +121,7 @@ def test_after_a_kill_a_person_clears_and_arms_again(bench: Any) -> None:
 def test_a_robot_that_vanishes_is_a_fault_with_a_sentence(bench: Any) -> None:
     bench.run("arm")
     bench.robot.kill()
-    bench.wait_for(lambda report: report["mode"] == "fault", 5.0)
+    bench.wait_for(lambda report: report["mode"] == "fault")
     status = bench.run("status")
     assert status.returncode == exit_codes.UNHEALTHY and "drive" in status.stdout
     check = bench.run("check")
@@ -132,7 +133,7 @@ def test_garbled_requests_cost_no_tick(bench: Any) -> None:
     for garbage in (b"\xc1\xc1\xc1", b"\x00" * 5000, msgpack.packb([0, 1, "no such", {}]), b"GET /\n"):
         with socket.socket(socket.AF_UNIX) as client:
             client.connect(str(bench.socket))
-            client.settimeout(5.0)
+            client.settimeout(LONGEST_S)
             client.sendall(garbage)
             assert client.recv(4096)
     assert bench.wait_for(lambda report: True)["mode"] == "idle"
@@ -140,7 +141,7 @@ def test_garbled_requests_cost_no_tick(bench: Any) -> None:
 
 def test_a_second_daemon_on_the_same_socket_is_refused(bench: Any) -> None:
     second = bench.start("firmware_host.daemon")
-    _, said = second.communicate(timeout=20)
+    _, said = second.communicate(timeout=LONGEST_S)
     assert second.returncode == 1
     assert "already running" in said and "Traceback" not in said
 
@@ -168,7 +169,9 @@ def test_status_loads_nothing_heavy() -> None:
         "import sys; from command_line.main import main; main(['status', '--socket', '/none']);"
         "print([name for name in ('numpy', 'can', 'pydantic', 'matplotlib', 'mcap') if name in sys.modules])"
     )
-    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=20, check=True)
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=LONGEST_S, check=True
+    )
     assert ended.stdout == "[]\n"
 
 
@@ -199,7 +202,7 @@ def test_ctrl_c_ends_a_watch_quietly(bench: Any) -> None:
         watch.stdout.readline()
         time.sleep(0.1)
         watch.send_signal(signal.SIGINT)
-        assert watch.wait(10) == exit_codes.INTERRUPTED
+        assert watch.wait(LONGEST_S) == exit_codes.INTERRUPTED
         assert watch.stderr.read() == ""
 
 

@@ -31,6 +31,7 @@ from firmware_host.log_reader import read_log
 from simulation.clay import MUDS, Clay
 from simulation.track import Track
 from tests.command_line.command_lines import failure, refusal
+from tests.waiting import LONGEST_S
 
 
 def png_size(path: Path) -> tuple[int, int]:
@@ -314,7 +315,7 @@ def test_without_matplotlib_a_sentence_says_what_to_install(command: tuple[str, 
         [sys.executable, "-c", program, command[0], str(log), *command[1:]],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=LONGEST_S,
         check=False,
         cwd=log.parent,
     )

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from drivers.pose_port import STALE_S, PoseSourceError
 from drivers.rail_encoder import LONGEST_LINE_BYTES, RETRY_S, RailEncoder, RailEncoderParameters
 from simulation.rail_encoder_emulator import RailEncoderEmulator
+from tests.waiting import LONGEST_S
 
 pytest.importorskip("serial", reason="pyserial is not installed")
 
 METRES = 1e-5
-LONGEST_S = 2.0  # for a pseudo-terminal to deliver
 
 
 class Rail:

@@ -12,10 +12,9 @@ from pathlib import Path
 import pytest
 
 from drivers.serial_line import RETRY_S, SerialLine, SerialLineError, open_serial
+from tests.waiting import LONGEST_S
 
 pytest.importorskip("serial", reason="pyserial is not installed")
-
-LONGEST_S = 2.0  # for a pseudo-terminal to deliver
 
 
 class Cable:

@@ -254,6 +254,14 @@ def test_ticks_without_torque_may_be_late(stand: Stand, rig: LateRig) -> None:
     assert stand.loop.missed_ticks > 20
 
 
+def test_a_pause_that_trips_the_drives_watchdogs_is_told_with_the_fault(stand: Stand, rig: LateRig) -> None:
+    stand.arm()
+    rig.begin(1.0, 0.0, 400, 1)
+    with pytest.raises(BenchError, match="watchdog"):
+        stand.run_for(1.0)
+    assert re.search(r"this computer missed \d+ of \d+ ticks", stand.lateness.sentence)
+
+
 def test_a_robot_that_stands_in_mud_is_sent_onto_blocks(
     patient: Configuration, monkeypatch: pytest.MonkeyPatch
 ) -> None:

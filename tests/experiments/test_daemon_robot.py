@@ -20,6 +20,7 @@ from experiments.daemon_robot import DaemonRobot
 from firmware_host.log_reader import read_log
 from firmware_host.status_client import CallRefusedError
 from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
+from tests.waiting import LONGEST_S
 
 
 def run_beside(robot: DaemonRobot, bench: Bench, *arguments: str) -> subprocess.CompletedProcess[str]:  # noqa: F811
@@ -56,7 +57,7 @@ def test_the_robot_stops_where_the_experiment_dies(bench: Bench) -> None:  # noq
     robot = DaemonRobot(bench.socket)
     arm(robot)
     robot._client.close()
-    report = bench.wait_for(lambda status: bool(status["mode"] not in ("arming", "hold", "stopping")), 10.0)
+    report = bench.wait_for(lambda status: bool(status["mode"] not in ("arming", "hold", "stopping")))
     assert "lease" in report["notice"]
 
 
@@ -71,8 +72,8 @@ def test_an_experiment_that_is_killed_with_its_flippers_in_the_mud_leaves_them_r
     experiment = subprocess.Popen([sys.executable, "-c", program, str(bench.socket)])
     bench.wait_for(lambda status: bool(status["phase"] == "insertion"))
     experiment.kill()
-    assert experiment.wait(5.0)
-    report = bench.wait_for(lambda status: bool(status["mode"] == "idle"), 10.0)
+    assert experiment.wait(LONGEST_S)
+    report = bench.wait_for(lambda status: bool(status["mode"] == "idle"))
     assert "lease_lost" in report["notice"]
     watcher = DaemonRobot(bench.socket)
     rows = watcher.record(0.0, report["now_s"]).ticks
@@ -91,7 +92,7 @@ def test_a_daemon_that_ends_is_told_and_its_log_is_there(bench: Bench, tmp_path:
     robot = DaemonRobot(bench.socket)
     arm(robot)
     bench.daemon.terminate()
-    bench.daemon.wait(20)
+    bench.daemon.wait(LONGEST_S)
     with pytest.raises(BenchError, match="the daemon on"):
         robot.call("status")
     (copy,) = robot.copy_logs(tmp_path)

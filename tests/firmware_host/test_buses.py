@@ -26,6 +26,7 @@ from simulation.clay import MUDS
 from simulation.local_setup import write_local_setup
 from simulation.lockstep import Lockstep
 from simulation.track import Track
+from tests.waiting import LONGEST_S
 
 CAN0 = BusParameters("socketcan", "can0")
 TICKS_A_SECOND = 380
@@ -207,7 +208,7 @@ def test_a_daemon_without_its_bus_waits_where_it_is_told_to_and_else_ends_with_s
         if wait:
             report = wait_for_status(short_folder / "mudskipper.sock", daemon)
             daemon.send_signal(signal.SIGTERM)
-        _, said = daemon.communicate(timeout=20)
+        _, said = daemon.communicate(timeout=LONGEST_S)
     assert "Traceback" not in said
     if wait:
         assert report["mode"] == "boot"

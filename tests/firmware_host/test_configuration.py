@@ -22,6 +22,7 @@ from firmware_host.configuration import (
     load_configuration,
     parse_configuration,
 )
+from tests.waiting import LONGEST_S
 
 
 def problems_of(text: str) -> list[str]:
@@ -281,7 +282,7 @@ def test_the_daemon_refuses_with_status_78_and_no_traceback(tmp_path: Path, exam
     path = tmp_path / "mudskipper.toml"
     path.write_text(changed(example_text, "torque_nm", "99"), encoding="utf-8")
     command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(path)]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=False)
     assert ended.returncode == EXIT_CONFIGURATION == 78
     assert ended.stderr == "mudskipperd: limits.torque_nm = 99: must be at most 5.0\n"
 
@@ -295,7 +296,7 @@ def test_a_group_that_does_not_exist_is_refused_before_anything_is_made(
     text = text.replace("[status]", '[status]\nread_group = "no such"\n')
     (short_folder / "mudskipper.toml").write_text(text, encoding="utf-8")
     command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(short_folder / "mudskipper.toml"), *option]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=False)
     assert ended.returncode == EXIT_CONFIGURATION
     assert ended.stderr.startswith("mudskipperd: status.read_group = 'no such': there is no such group")
     assert ended.stderr.count("\n") == 1 and not socket.parent.exists()

@@ -21,6 +21,7 @@ from firmware_host.log_reader import LayoutError, LogError, read_log
 from firmware_host.log_recovery import recover_all, recover_log
 from firmware_host.log_rows import TICK
 from tests.firmware_host.made_up_rows import OPENING, make_event, make_ticks
+from tests.waiting import LONGEST_S
 
 CHUNK = 100  # ticks
 
@@ -166,7 +167,7 @@ def test_a_disk_without_room_keeps_the_broken_one(tmp_path: Path, monkeypatch: p
 def test_the_program_recovers_a_folder(tmp_path: Path) -> None:
     make_cut_log(tmp_path)
     command = [sys.executable, "-m", "firmware_host.log_recovery", str(tmp_path)]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=30, check=True)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=True)
     assert "recovered: 500 rows kept" in ended.stderr and ended.stdout == ""
     assert unfinished_files(tmp_path) == []
 

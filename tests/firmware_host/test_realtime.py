@@ -14,6 +14,8 @@ from typing import Any
 
 import pytest
 
+from tests.waiting import LONGEST_S
+
 ROOT = Path(__file__).resolve().parents[2]
 
 IMPORTS = "import ctypes, gc, json, os, resource, subprocess, sys; from firmware_host.realtime import prepare_loop\n"
@@ -31,7 +33,7 @@ if os.geteuid() == 0:
 def in_child(code: str) -> Any:
     """What `code` leaves in `answer`."""
     program = f"{IMPORTS}{code}\nprint(json.dumps(answer))"
-    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=30.0)
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=LONGEST_S)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import socket
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -102,10 +101,8 @@ def test_a_full_queue_loses_the_notice_instead_of_the_deadline(
     address = str(short_folder / "notify")
     systemd = listen(address)
     sender = notifier(address)
-    started_s = time.monotonic()
     for _ in range(5000):
-        sender.send("WATCHDOG=1")
-    assert time.monotonic() - started_s < 2.0
+        sender.send("WATCHDOG=1")  # would wait for ever
     arrived = 0
     while True:
         try:

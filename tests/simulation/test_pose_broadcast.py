@@ -30,6 +30,7 @@ from simulation.natnet_server import LOOPBACK, NatNetServer, RecordedPose
 from simulation.plant import Plant
 from simulation.pose_broadcast import PoseBroadcast
 from simulation.track import Track
+from tests.waiting import LONGEST_S
 
 STEP_S = 0.002
 
@@ -76,7 +77,7 @@ def test_counts_arrive_from_the_device_of_the_configuration(short_folder: Path) 
         broadcast.line.send(CameraFrame(0.0, 0.0))  # of which the robot cannot know that it is whole
         for step in range(1, 20):
             broadcast.line.send(CameraFrame(0.01 * step, 0.001 * step))
-            deadline_s = time.monotonic() + 2.0
+            deadline_s = time.monotonic() + LONGEST_S
             while port.report().poses < step and time.monotonic() < deadline_s:
                 body = port.read(0.01 * step)
             assert body.x_m == pytest.approx(0.001 * step)

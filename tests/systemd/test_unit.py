@@ -19,6 +19,7 @@ from drivers.odrive_drives import OdriveDrives
 from firmware_host import daemon
 from firmware_host.configuration import EXIT_CONFIGURATION, Configuration, ConfigurationError, StatusParameters
 from firmware_host.ticker import RATE_HZ
+from tests.waiting import LONGEST_S
 
 ROOT = Path(__file__).resolve().parents[2]
 SYSTEMD = ROOT / "systemd"
@@ -58,7 +59,7 @@ def interfaces(configuration: Configuration) -> set[str]:
 def systemd_analyze(*arguments: str) -> subprocess.CompletedProcess[str]:
     if shutil.which("systemd-analyze") is None:
         pytest.skip("systemd-analyze is not installed")
-    return subprocess.run(["systemd-analyze", *arguments], capture_output=True, text=True, timeout=30.0)
+    return subprocess.run(["systemd-analyze", *arguments], capture_output=True, text=True, timeout=LONGEST_S)
 
 
 def test_the_unit_starts_the_daemon_that_this_project_installs(unit: Settings) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from firmware_host.configuration import load_configuration
+from tests.waiting import LONGEST_S
 from virtual_machine.installed_robot import installation
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,7 +28,7 @@ def edited(tmp_path: Path) -> Path:
     for path in paths:
         copy = tmp_path / Path(path).name
         copy.write_text((SYSTEMD / copy.name).read_text(encoding="utf-8"), encoding="utf-8")
-        subprocess.run([program, in_place, expression, str(copy)], check=True, timeout=10.0)
+        subprocess.run([program, in_place, expression, str(copy)], check=True, timeout=LONGEST_S)
     return tmp_path
 
 
