@@ -91,7 +91,7 @@ def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
         f"All strides of all trials by method {method_of(configuration.estimation)}, as the daemon told. Its gait: "
         f"insertion at {gait.insertion_speed_m_s:g} m/s, stance at {gait.stance_speed_m_s:g} m/s, pauses of "
         f"{gait.pause_s:g} s.",
-        f"Left out of tables, since they went down too near to a border, or behind the last mud: "
+        f"Left out of tables, since their plate came too near to a border, or went down behind the last mud: "
         f"{counted(report['at_a_border'], 'stride')}.",
     ]
     if report["without_pose"]:

@@ -71,7 +71,7 @@ def _placed(
             plates_m = plan.length_m * (number + 0.5) / len(strides)
         else:
             plates_m = place_m - start_m + reach_m
-        mud = plan.mud_at(plates_m)
+        mud = plan.mud_at(plates_m, stride.get("slip_m", 0.0))
         told = truth_in(truth, mud) if truth else walk["truths"].get(str(stride["index"]), {})
         yield PlacedStride(walk["trial"], method, mud, plates_m, stride, told)
 
