@@ -29,7 +29,7 @@ SIMULATED_DRAG = (
 TRIALS = (
     "The trials here are the strides of all walks. Where more of them tell a lower bound than a value, the mud has a "
     "bound as well, the middle one of all: the few that slip in mud that mostly holds met less of it, or pushed "
-    "harder, than is known, and tell too little (11 % in simulated mud)."
+    "harder, than is known, and tell too little (12 % in simulated mud)."
 )
 FELT = "Where the mud bears more than the body's drag, the flipper feels that drag and not the mud's strength."
 METHODS = (
