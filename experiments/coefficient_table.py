@@ -84,11 +84,15 @@ def _errors(told: Sequence[Told], spread: float | None) -> dict[str, float | Non
 
 
 def truth_of(muds: Sequence[Mapping[str, Any]]) -> TruthOfMud:
-    """The values of a summary's muds."""
+    """The values of a summary's muds. A bound is no truth."""
     return {
-        mud_key(mud["mud"]): {name: mud[name]["value"] for name in COEFFICIENTS if (mud.get(name) or {}).get("value")}
+        mud_key(mud["mud"]): {name: mud[name]["value"] for name in COEFFICIENTS if _is_known(mud.get(name))}
         for mud in muds
     }
+
+
+def _is_known(told: Told | None) -> bool:
+    return bool(told and told.get("value") and not told.get("at_least"))
 
 
 def load_truth(path: Path) -> TruthOfMud:

@@ -146,8 +146,9 @@ def test_a_mud_is_found_however_its_name_is_written(tmp_path: Path) -> None:
     assert missing_text(truth, ["48.6", "pond", "48.61"]).endswith("says nothing of 48.61 %.")
 
 
-def test_a_summary_is_read_by_mud_and_coefficient(tmp_path: Path) -> None:
-    muds = [{"mud": "47.6 %", "k_p": {"value": 1e6}, "k_s": {"value": None}}, {"mud": "soft", "k_e": {"value": 2e6}}]
+def test_a_summary_is_read_by_mud_and_coefficient_but_for_bounds(tmp_path: Path) -> None:
+    firm = {"mud": "47.6 %", "k_p": {"value": 1e6}, "k_s": {"value": None}, "k_e": {"value": 3e6, "at_least": True}}
+    muds = [firm, {"mud": "soft", "k_e": {"value": 2e6, "at_least": False}}]
     assert load_truth(write_truth(tmp_path, {"muds": muds})) == {"47.6": {"k_p": 1e6}, "soft": {"k_e": 2e6}}
     assert load_truth(tmp_path) == load_truth(tmp_path / "summary.json")
 
