@@ -12,7 +12,8 @@ A summary has `muds`, a list of objects with the name of the mud and for each of
 
 Two standard errors hold the truth in about 19 of 20 cases. Muds of one robot are told apart by the trials' part alone.
 
-Where the mud held whatever was done (`at_least`), the value is the middle one of the trials' lower bounds.
+Where more trials tell a lower bound than a value the mud's is a bound as well (`at_least`), the middle one of all: the
+few in which mud gave way that mostly holds are those that met less of it, or pushed harder, than anybody knows.
 """
 
 from __future__ import annotations
@@ -29,12 +30,12 @@ from estimation.origin_fit import student_factor
 from estimation.stroke_fit import TORQUE_REPEATABILITY
 from experiments.bench_robot import BenchError
 from experiments.error_table import COEFFICIENTS, Judged, error_rows
-from experiments.mud_names import mud_name, mud_text
+from experiments.mud_names import mud_key, mud_text
 from experiments.value_text import N_CM3, repeatability_text, share_text, value_text
 
 PER_CM3 = 1.0 / N_CM3
 Told = Mapping[str, Any]  # an estimate as reports tell it
-TruthOfMud = dict[str, dict[str, float]]  # N/m³ by mud and coefficient
+TruthOfMud = dict[str, dict[str, float]]  # N/m³ by the mud's key and coefficient
 
 
 class Beside(NamedTuple):
@@ -49,17 +50,19 @@ class Beside(NamedTuple):
 def gathered(estimates: Iterable[Told]) -> dict[str, Any]:
     """Of one coefficient in one mud, over its trials."""
     told = list(estimates)
-    values = [each for each in told if each["valid"] and not each["at_least"]]
-    bounds = [each for each in told if each["valid"] and each["at_least"]]
-    trials = [each["value"] for each in values or bounds]
+    valid = [each for each in told if each["valid"]]
+    bounds = sum(each["at_least"] for each in valid)
+    held = 2 * bounds > len(valid)
+    values = [] if held else [each for each in valid if not each["at_least"]]
+    trials = [each["value"] for each in values or valid]
     spread = stdev(trials) if len(trials) > 1 else None
     return {
-        "value": (fmean(trials) if values else median(trials)) if trials else None,
+        "value": (median(trials) if held else fmean(trials)) if trials else None,
         **_errors(values, spread),
         "trials": trials,
         "repeatability": spread / fmean(trials) if spread is not None and fmean(trials) else None,
-        "at_least": bool(bounds and not values),
-        "bounds": len(bounds),
+        "at_least": held,
+        "bounds": bounds,
         "not_valid": [each["reason"] for each in told if not each["valid"]],
     }
 
@@ -81,11 +84,15 @@ def _errors(told: Sequence[Told], spread: float | None) -> dict[str, float | Non
 
 
 def truth_of(muds: Sequence[Mapping[str, Any]]) -> TruthOfMud:
-    """The values of a summary's muds."""
+    """The values of a summary's muds. A bound is no truth."""
     return {
-        mud["mud"]: {name: mud[name]["value"] for name in COEFFICIENTS if (mud.get(name) or {}).get("value")}
+        mud_key(mud["mud"]): {name: mud[name]["value"] for name in COEFFICIENTS if _is_known(mud.get(name))}
         for mud in muds
     }
+
+
+def _is_known(told: Told | None) -> bool:
+    return bool(told and told.get("value") and not told.get("at_least"))
 
 
 def load_truth(path: Path) -> TruthOfMud:
@@ -103,12 +110,17 @@ def load_truth(path: Path) -> TruthOfMud:
             f"--truth {path} is no summary with coefficients of muds ({problem}): "
             "give the summary.json of 'mudskipper experiment loadcell'"
         ) from problem
-    return {mud_name(mud): coefficients for mud, coefficients in truth.items()}
+    return truth
+
+
+def truth_in(truth: TruthOfMud, mud: str) -> dict[str, float]:
+    """Of one mud, however its name is written; empty where there is none."""
+    return truth.get(mud_key(mud), {})
 
 
 def missing_text(truth: TruthOfMud | None, muds: Iterable[str]) -> str:
     """Of which muds another experiment's truth says nothing; empty where it says something of all, or there is none."""
-    missing = [mud for mud in muds if truth is not None and mud not in truth]
+    missing = [mud for mud in muds if truth is not None and mud_key(mud) not in truth]
     return f"The file given with --truth says nothing of {', '.join(map(mud_text, missing))}." if missing else ""
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from control.records import Phase
 from experiments.base_watch import SPOILING_M, load_remarks, moved_text, pose_remarks, surface_remarks
 from experiments.bench_robot import BenchError, arm, rest, walk
-from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text
+from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text, truth_in
 from experiments.error_table import COEFFICIENTS
 from experiments.estimation_methods import DEFAULT, PAPER, method_of, strides_by_method
 from experiments.modelled_force import misfit_n, modelled_forces
@@ -175,7 +175,7 @@ def trials_of(mud: str, entries: Mapping[str, Entry]) -> list[Entry]:
 
 def _beside(by_mud: Mapping[str, Sequence[Entry]], truth: TruthOfMud | None) -> list[Beside]:
     return [
-        Beside(mud, method, strides[0], truth.get(mud, {}) if truth else trial["truths"].get("0", {}))
+        Beside(mud, method, strides[0], truth_in(truth, mud) if truth else trial["truths"].get("0", {}))
         for mud, trials in by_mud.items()
         for trial in trials
         for method, strides in trial["strides"].items()

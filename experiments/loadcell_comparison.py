@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from experiments.loadcell_fits import OfMud
-from experiments.mud_names import mud_name
+from experiments.mud_names import mud_key
 
 OTHER_PLATE = (
     "A load cell's plate is upright and goes down straight; a flipper's leans and goes along an arc, and in clay a "
@@ -58,25 +58,16 @@ def compared_with(flipper: Mapping[str, Any] | None, muds: Mapping[str, Mapping[
     """Muds of the same name."""
     if flipper is None:
         return []
-    sensed = {_mud_key(row.get("mud")): row for row in flipper["muds"] if isinstance(row, dict)}
+    sensed = {mud_key(str(row.get("mud"))): row for row in flipper["muds"] if isinstance(row, dict)}
     rows = []
     for mud, coefficients in muds.items():
         for name, truth in coefficients.items():
-            told = sensed.get(_mud_key(mud), {}).get(name)
+            told = sensed.get(mud_key(mud), {}).get(name)
             value, error = _sensed(told)
             if isfinite(value) and isfinite(truth.value):
                 at_least = isinstance(told, dict) and bool(told.get("at_least"))
                 rows.append(Compared(mud, name, value, error, truth.value, truth.std_error, at_least))
     return rows
-
-
-def _mud_key(name: Any) -> str:
-    """48.60 and "w = 48.6 %" are one mud."""
-    text = mud_name(str(name))
-    try:
-        return f"{float(text):g}"
-    except ValueError:
-        return text.lower()
 
 
 def _sensed(told: Any) -> tuple[float, float]:

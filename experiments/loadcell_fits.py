@@ -233,12 +233,13 @@ def bench_doubt(name: str, settings: StageSettings, depth_error_m: float, calibr
 
 
 def of_mud(trials: Sequence[Analysed], name: str, bench: float) -> OfMud:
-    """`bench`: the doubt of the bench as a share."""
-    shared = max((trial.shared_doubt for trial in trials if name in trial.coefficients), default=0.0)
-    told = [trial.coefficients[name] for trial in trials if name in trial.coefficients]
-    told = [each for each in told if isfinite(each.value)]
-    if not told:
+    """`bench`: the doubt of the bench as a share. What trials have alike does not average out, but moves their mean by
+    no more than the mean of what it moves each of them.
+    """
+    valid = [trial for trial in trials if isfinite(trial.coefficients.get(name, NOT_KNOWN).value)]
+    if not valid:
         return OfMud(nan, nan, (), nan)
+    told, shared = [trial.coefficients[name] for trial in valid], fmean(trial.shared_doubt for trial in valid)
     values = [each.value for each in told]
     mean, own = fmean(values), sqrt(fmean([each.std_error**2 for each in told]) / len(told))
     scatter = stdev(values) if len(values) > 1 else nan

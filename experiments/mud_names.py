@@ -13,6 +13,12 @@ def mud_name(name: str) -> str:
     return water[1] if water else name.strip() or name
 
 
+def mud_key(name: str) -> str:
+    """By what one mud is found in two files: 48.60 and "w = 48.6 %" are one, and so are Pond and pond."""
+    water = WATER.fullmatch(name.strip())
+    return f"{float(water[1]):g}" if water else name.strip().casefold()
+
+
 def mud_label(name: str) -> str:
     """For a table's head or an axis."""
     water = WATER.fullmatch(name)

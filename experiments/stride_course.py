@@ -65,6 +65,13 @@ def course_of(log: Log, flipper: str, start_s: float) -> StrideCourse:
     )
 
 
+def slip_m(course: StrideCourse, arm_m: float) -> float:
+    """How far back through the mud the plate came in its stance; 0 where no pose tells the body's place."""
+    places_m = (course.body_m + arm_m * np.sin(course.sweep_rad))[course.during(Phase.STANCE)]
+    seen_m = places_m[np.isfinite(places_m)]
+    return float(seen_m[0] - seen_m.min()) if len(seen_m) else 0.0
+
+
 def thinned(course: StrideCourse) -> StrideCourse:
     """With fewer rows, but the first of every phase."""
     phases, numbers = course.phase, np.arange(len(course.phase))

@@ -1,16 +1,16 @@
 """The robot walks over several muds and maps their coefficients, after the paper's sections II-D and III-C.
 
-Each trial is one walk at a fixed depth over all the muds, each stride beside the mud in which its plate went down: by
-the body's place since the start of the trial, or, where no pose is told, by the order of strides. Then, where there
-is a soft mud, short walks in it at 3 and 5 cm: there the paper shows that what a flipper feels while the body moves
-is the body's drag and not the mud's strength. Every method of estimation sees the same log.
+Each trial is one walk at a fixed depth over all the muds, each stride beside the mud in which its plate went down and
+slipped: by the body's place since the start of the trial, or, where no pose is told, by the order of strides. Then,
+where there is a soft mud, short walks in it at 3 and 5 cm: there the paper shows that what a flipper feels while the
+body moves is the body's drag and not the mud's strength. Every method of estimation sees the same log.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, chain
 from math import ceil
 from typing import Any
 
@@ -33,7 +33,7 @@ from experiments.known_surface import strides_with_known_surface
 from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError, conduct_trials
 from experiments.notebook import Entry
 from experiments.side_by_side import Show
-from experiments.stride_course import course_of, course_row, thinned
+from experiments.stride_course import course_of, course_row, slip_m, thinned
 from experiments.trackway_trials import Mud, reach_of
 from experiments.walk_course import walk_course_of, walk_course_row
 from firmware_host.log_reader import Log
@@ -42,7 +42,7 @@ MUDS = tuple(Mud(name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 o
 SOFT = ("53.1", "51.2")  # figure 7 has the first, called 53.8 % there; the other yields at 3 cm and holds at 5 cm here
 SOFT_DEPTHS_M = (0.03, 0.05)
 METHODS = (DEFAULT, PAPER, COMPENSATED)
-BORDER_M = 0.03  # a plate that goes down nearer to a border than this may be in either mud
+BORDER_M = 0.03  # a plate that comes nearer to a border than this may be in either mud
 LOST_S = 2.0  # without a pose, in a walk that began with one
 STUCK_S, ADVANCED_M = 60.0, 0.03
 SLIPPING = 4  # times as many strides as a robot needs that never slips
@@ -92,9 +92,10 @@ class Plan:
         """The ends of all muds but the last."""
         return list(accumulate(mud.length_m for mud in self.muds))[:-1]
 
-    def mud_at(self, plates_m: float) -> str:
-        """Where a plate goes down; empty behind the last mud, and too near to a border."""
-        if plates_m >= self.length_m or any(abs(plates_m - border_m) < BORDER_M for border_m in self.borders_m):
+    def mud_at(self, plates_m: float, slip_m: float = 0.0) -> str:
+        """Where a plate goes down and slips back; empty behind the last mud, and too near to a border."""
+        rear_m, front_m = plates_m - slip_m - BORDER_M, plates_m + BORDER_M
+        if plates_m >= self.length_m or any(rear_m < border_m < front_m for border_m in self.borders_m):
             return ""
         return self.muds[sum(plates_m >= border_m for border_m in self.borders_m)].name
 
@@ -135,6 +136,9 @@ def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     entry = _entry(bench, plan, trial, log, before["strides_closed"])
     course = walk_course_row(walk_course_of(log, plan.flipper))
     entry |= {"start_m": start_m, "course": course, "remarks": remarks + [end] * bool(end)}
+    arm_m = robot.configuration.geometry.flipper_length_m
+    for stride in chain.from_iterable(entry["strides"].values()):
+        stride["slip_m"] = slip_m(course_of(log, plan.flipper, stride["t_start_s"]), arm_m)
     if after["notice"]:
         raise SpoiltTrialError(after["notice"], entry)
     if end is None and made < ordered:

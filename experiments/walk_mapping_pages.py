@@ -26,7 +26,11 @@ SIMULATED_DRAG = (
     "mud's own, whose coefficients fall with depth: at 5 cm the load cell reads 0.6 of the k_s and 0.75 of the k_p "
     "that it reads at 3 cm. So each stride stands beside a load cell at its own depth."
 )
-TRIALS = "The trials here are the strides of all walks."
+TRIALS = (
+    "The trials here are the strides of all walks. Where more of them tell a lower bound than a value, the mud has a "
+    "bound as well, the middle one of all: the few that slip in mud that mostly holds met less of it, or pushed "
+    "harder, than is known, and tell too little (12 % in simulated mud)."
+)
 FELT = "Where the mud bears more than the body's drag, the flipper feels that drag and not the mud's strength."
 METHODS = (
     "In brackets also how many strides told a bound (≥) or nothing. default: the daemon's own. paper: the "
@@ -87,7 +91,7 @@ def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
         f"All strides of all trials by method {method_of(configuration.estimation)}, as the daemon told. Its gait: "
         f"insertion at {gait.insertion_speed_m_s:g} m/s, stance at {gait.stance_speed_m_s:g} m/s, pauses of "
         f"{gait.pause_s:g} s.",
-        f"Left out of tables, since they went down too near to a border, or behind the last mud: "
+        f"Left out of tables, since their plate came too near to a border, or went down behind the last mud: "
         f"{counted(report['at_a_border'], 'stride')}.",
     ]
     if report["without_pose"]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
-from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text
+from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text, truth_in
 from experiments.error_table import COEFFICIENTS
 from experiments.estimation_methods import method_of
 from experiments.known_surface import KNOWN, KNOWN_COMPENSATED
@@ -71,8 +71,8 @@ def _placed(
             plates_m = plan.length_m * (number + 0.5) / len(strides)
         else:
             plates_m = place_m - start_m + reach_m
-        mud = plan.mud_at(plates_m)
-        told = truth.get(mud, {}) if truth else walk["truths"].get(str(stride["index"]), {})
+        mud = plan.mud_at(plates_m, stride.get("slip_m", 0.0))
+        told = truth_in(truth, mud) if truth else walk["truths"].get(str(stride["index"]), {})
         yield PlacedStride(walk["trial"], method, mud, plates_m, stride, told)
 
 
@@ -90,7 +90,7 @@ def soft_strides(plan: Plan, entries: Mapping[str, Entry], truth: TruthOfMud | N
 
 def _soft_truth(mud: str, walk: Entry, stride: Told, truth: TruthOfMud | None) -> Mapping[str, float | None]:
     if truth:
-        return truth.get(mud, {})
+        return truth_in(truth, mud)
     told: Mapping[str, float | None] = walk["truths"].get(str(stride["index"]), {})
     return told
 

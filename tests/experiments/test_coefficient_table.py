@@ -19,7 +19,9 @@ from experiments.coefficient_table import (
     error_text_rows,
     gathered,
     load_truth,
+    missing_text,
     mud_rows,
+    truth_in,
 )
 from experiments.mud_names import mud_name
 from tests.experiments.made_up_strides import make_estimate, make_stride
@@ -72,6 +74,31 @@ def test_bounds_do_not_mix_with_values() -> None:
     assert coefficient_text(bounds).startswith("≥ 2.00")
 
 
+def strides_in_mud_that_gives_way_at(limit: float) -> list[dict[str, Any]]:
+    """Of 1e6 in truth, each told wrong by 5 %: where it resists more than `limit` a stride tells no more than that."""
+    errors = 0.05 * np.random.default_rng(1).standard_normal(200)
+    return [
+        make_estimate(1e6 * (1.0 + error)) if 1e6 * (1.0 + error) < limit else make_estimate(limit, at_least=True)
+        for error in errors.tolist()
+    ]
+
+
+def test_a_few_strides_in_which_mud_gave_way_that_mostly_holds_do_not_speak_for_it() -> None:
+    """Alone they would tell 7 % too little, and their scatter would not show it."""
+    strides = strides_in_mud_that_gives_way_at(0.95e6)
+    alone = gathered(each for each in strides if not each["at_least"])
+    assert alone["value"] + 2.0 * alone["trials_error"] < 1e6
+    told = gathered(strides)
+    assert (told["value"], told["at_least"], told["std_error"]) == (0.95e6, True, None)
+
+
+def test_mud_that_gives_way_in_most_strides_is_known_by_them() -> None:
+    told = gathered(strides_in_mud_that_gives_way_at(1.05e6))
+    assert not told["at_least"]
+    assert told["bounds"] > 10
+    assert abs(told["value"] - 1e6) < 2.0 * told["std_error"]
+
+
 def test_a_median_of_bounds_has_no_error() -> None:
     bounds = gathered(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
     assert bounds["std_error"] is bounds["trials_error"] is bounds["shared_error"] is None
@@ -110,8 +137,18 @@ def write_truth(folder: Path, contents: Any) -> Path:
     return path
 
 
-def test_a_summary_is_read_by_mud_and_coefficient(tmp_path: Path) -> None:
-    muds = [{"mud": "47.6 %", "k_p": {"value": 1e6}, "k_s": {"value": None}}, {"mud": "soft", "k_e": {"value": 2e6}}]
+def test_a_mud_is_found_however_its_name_is_written(tmp_path: Path) -> None:
+    muds = [{"mud": "48.60", "k_p": {"value": 1e6}}, {"mud": "Pond", "k_p": {"value": 2e6}}]
+    truth = load_truth(write_truth(tmp_path, {"muds": muds}))
+    assert truth_in(truth, "48.6") == truth_in(truth, "w = 48.600 %") == {"k_p": 1e6}
+    assert truth_in(truth, "pond") == {"k_p": 2e6}
+    assert truth_in(truth, "48.61") == {}
+    assert missing_text(truth, ["48.6", "pond", "48.61"]).endswith("says nothing of 48.61 %.")
+
+
+def test_a_summary_is_read_by_mud_and_coefficient_but_for_bounds(tmp_path: Path) -> None:
+    firm = {"mud": "47.6 %", "k_p": {"value": 1e6}, "k_s": {"value": None}, "k_e": {"value": 3e6, "at_least": True}}
+    muds = [firm, {"mud": "soft", "k_e": {"value": 2e6, "at_least": False}}]
     assert load_truth(write_truth(tmp_path, {"muds": muds})) == {"47.6": {"k_p": 1e6}, "soft": {"k_e": 2e6}}
     assert load_truth(tmp_path) == load_truth(tmp_path / "summary.json")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import hypot
 
 import numpy as np
 import pytest
@@ -265,6 +266,22 @@ def test_the_doubt_of_a_mud_holds_scatter_calibration_and_the_speed_that_all_sha
     everything = of_mud(told, "k_p", 0.03)
     assert everything.std_error**2 == pytest.approx(plain.std_error**2 + (0.02**2 + 0.03**2) * plain.value**2)
     assert of_mud([], "k_p", 0.0).trials == ()
+
+
+def test_a_mean_is_doubted_for_what_its_trials_share_and_not_for_what_the_worst_of_them_does() -> None:
+    """Made-up trials, one pushed far quicker than the others: a rate that is wrong moves each by its own share."""
+    random, moves, errors, doubts = np.random.default_rng(1), np.array([0.004, 0.004, 0.004, 0.004, 0.03]), [], []
+    for _ in range(500):
+        values = 1.0 + moves * random.standard_normal() + 0.004 * random.standard_normal(5)
+        trials = [
+            Analysed(nowhere(), coefficients={"k_p": Coefficient(value, hypot(move, 0.004))}, shared_doubt=move)
+            for value, move in zip(values.tolist(), moves.tolist(), strict=True)
+        ]
+        told = of_mud(trials, "k_p", 0.0)
+        errors.append(told.value - 1.0)
+        doubts.append(told.trials_error)
+    assert np.mean(np.abs(errors) < 2.0 * np.array(doubts)) > 0.95
+    assert np.linalg.norm(doubts) < 1.5 * np.linalg.norm(errors)
 
 
 def test_a_stage_that_stutters_is_doubted(insertion: Recorded) -> None:

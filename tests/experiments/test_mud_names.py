@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.mud_names import mud_label, mud_name, mud_text
+from experiments.mud_names import mud_key, mud_label, mud_name, mud_text
 
 
 @pytest.mark.parametrize("name", ["wet", "w", "bay=3", "watery clay", "kaolin 2", "1500 Pa"])
@@ -19,3 +19,13 @@ def test_a_water_content_gets_one_percent_sign_however_it_is_written(name: str) 
 
 def test_only_a_water_content_gets_a_percent_sign() -> None:
     assert (mud_label("47.6"), mud_text("47.6"), mud_text("47.6 at 3 cm")) == ("w = 47.6 %", "47.6 %", "47.6 % at 3 cm")
+
+
+@pytest.mark.parametrize("name", ["48.6", "48.60", "48.600 %", "w = 48.6 %", " 048.6% "])
+def test_one_water_content_is_one_mud(name: str) -> None:
+    assert mud_key(name) == "48.6"
+
+
+def test_names_that_differ_in_more_than_capitals_are_different_muds() -> None:
+    assert mud_key("Pond ") == mud_key("pond") != mud_key("pond 2")
+    assert mud_key("48.6") != mud_key("48.61")

@@ -1,14 +1,16 @@
 """One stride out of a log: that stride, that flipper, and little enough of it."""
 
 import json
+from math import nan
 
 import numpy as np
+import pytest
 
 from control.modes import Mode
 from control.records import Phase
-from experiments.stride_course import course_of, course_of_row, course_row, thinned
+from experiments.stride_course import course_of, course_of_row, course_row, slip_m, thinned
 from experiments.walk_course import KEPT, walk_course_of, walk_course_of_row, walk_course_row
-from tests.experiments.made_up_strides import make_log, make_ticks
+from tests.experiments.made_up_strides import make_course, make_log, make_ticks
 
 STROKE = [Phase.INSERTION] * 30 + [Phase.PAUSE] * 100 + [Phase.STANCE] * 30
 
@@ -39,6 +41,15 @@ def test_rows_outside_of_a_stride_are_none_of_its_course() -> None:
 
 def test_after_the_last_stride_there_is_no_course() -> None:
     assert len(course_of(make_log(make_ticks(STROKE)), "left", 99.0).time_s) == 0
+
+
+def test_a_plate_s_slip_is_its_way_back_in_the_world_and_not_on_the_robot() -> None:
+    """It sweeps back by 6 cm of 12 while the body comes on by 2, then rests on a body that goes on."""
+    swept = make_course(Phase.STANCE, [30.0, 0.0, 0.0], [0.03] * 3, body_m=[1.0, 1.02, 1.05])
+    assert slip_m(swept, 0.12) == pytest.approx(0.04)
+    assert slip_m(swept._replace(body_m=np.array([nan, 1.0, 1.02])), 0.12) == 0.0
+    assert slip_m(swept._replace(body_m=np.full(3, nan)), 0.12) == 0.0
+    assert slip_m(swept._replace(phase=np.full(3, int(Phase.SWING))), 0.12) == 0.0
 
 
 def test_pauses_are_thinned_more_than_strokes_and_no_phase_is_lost() -> None:

@@ -71,6 +71,12 @@ def test_a_plate_is_in_the_mud_that_it_went_down_in_or_in_none_for_certain(plate
     assert Plan().mud_at(plates_m) == mud
 
 
+@pytest.mark.parametrize(("slip_m", "mud"), [(0.0, "49.5"), (0.01, "49.5"), (0.03, ""), (0.07, ""), (0.6, "")])
+def test_a_plate_that_slips_back_to_a_border_or_across_it_is_in_no_mud_for_certain(slip_m: float, mud: str) -> None:
+    """It went down 5 cm behind the border at 61 cm."""
+    assert Plan().mud_at(0.66, slip_m) == mud
+
+
 def test_a_walk_that_told_nothing_is_spoilt() -> None:
     nothing = make_estimate(None)
     with pytest.raises(SpoiltTrialError, match="no stride of the left flipper"):
@@ -98,6 +104,15 @@ def test_the_robot_stops_behind_the_last_mud() -> None:
     assert 0.0 < places_m[0] < 0.1
     assert SHORT.length_m - 0.13 < places_m[-1] < SHORT.length_m
     assert {"47.6", "51.2"} <= {each.mud for each in placed}
+
+
+def test_in_soft_mud_a_plate_slips_back_by_half_of_its_stance_and_more() -> None:
+    """A stance is 12 cm long. In the strides that belong to a mud the plate was there with all of its slip."""
+    placed = [each for each in placed_strides(SHORT, measured(), CONFIGURATION, None) if each.method == DEFAULT]
+    for each in placed:
+        slip_m = each.stride["slip_m"]
+        assert (0.055 < slip_m < 0.09) if each.mud == "51.2" else slip_m < 0.055
+        assert each.mud in ("", SHORT.mud_at(each.plates_m - slip_m))
 
 
 def test_the_coefficients_are_those_of_the_load_cell_or_bounds_below_it() -> None:
