@@ -21,6 +21,7 @@ from experiments.bench_errors import BarredError, BenchError, EndedError, GoneEr
 from experiments.notebook import NotebookError, anything_measured
 from experiments.person import Person, Willing
 from experiments.report_page import Section, numbers_told, write_report
+from firmware_host.file_problems import why_not
 from firmware_host.status_client import CallRefusedError
 from firmware_host.toml_records import ConfigurationError
 
@@ -73,7 +74,7 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
     except KeyboardInterrupt:
         return _end(folder, "interrupted", exit_codes.INTERRUPTED)
     except OSError as problem:  # such as a full disk
-        return _end(folder, f"{problem.filename or folder}: {problem.strerror or problem}", exit_codes.UNHEALTHY)
+        return _end(folder, why_not(problem, folder), exit_codes.UNHEALTHY)
     print(json.dumps(numbers_told(report), allow_nan=False) if options.json else finding.text)
     print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
     return finding.status

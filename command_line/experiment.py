@@ -19,6 +19,7 @@ from experiments.estimation import (
     report_of,
     with_layers,
 )
+from experiments.mud_names import mud_text
 from simulation.clay import Clay, clay_of_water
 
 
@@ -58,7 +59,7 @@ def text_of(report: dict[str, Any]) -> str:
     rows = [
         [
             row["setup"],
-            row["mud"],
+            mud_text(row["mud"]),
             row["coefficient"],
             row["method"],
             *(_percent(row[name]) for name in ("median", "p95", "bias", "coverage")),
@@ -77,7 +78,7 @@ def _plates_text(plates: Sequence[dict[str, Any]]) -> str:
     rows = [
         [
             row["setup"],
-            row["mud"],
+            mud_text(row["mud"]),
             row["coefficient"],
             number(row["upright_over_leaning"]),
             number(row["estimate_over_upright"]),
@@ -93,7 +94,13 @@ def _boundaries_text(boundaries: Sequence[dict[str, Any]]) -> str:
         return "Boundaries: none walked over"
     head = ["from", "to", "crossings", "followed within two strides", "most strides"]
     rows = [
-        [row["from"], row["to"], str(row["crossings"]), _percent(row["within_two"]), str(row["most_strides"])]
+        [
+            mud_text(row["from"]),
+            mud_text(row["to"]),
+            str(row["crossings"]),
+            _percent(row["within_two"]),
+            str(row["most_strides"]),
+        ]
         for row in boundaries
     ]
     return "Mud boundaries\n" + table([head, *rows])

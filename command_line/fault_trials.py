@@ -44,7 +44,7 @@ def _plot(report: dict[str, Any], path: Path) -> None:
 
 
 def faults_text(report: dict[str, Any]) -> str:
-    head = ["fault", "reaction", "ok", "slowest, ticks", "bound", "peak torque, N·m", "travel, rad"]
+    head = ["fault", "reaction", "ok", "slowest (ticks)", "bound (ticks)", "peak torque (N·m)", "travel (rad)"]
     rows = [
         [
             row["way"],

@@ -103,7 +103,7 @@ def _summary_of(path: Path) -> tuple[dict[str, str], float | None]:
 
 
 def _listing(report: dict[str, Any]) -> str:
-    rows, odd = [["log", "place", "MB", "s", ""]], False
+    rows, odd = [["log", "place", "size (MB)", "length (s)", ""]], False
     for log in report["logs"]:
         odd = odd or log["state"] != "whole"
         marks = "recovered" if log["recovered"] else log["state"].removeprefix("whole")

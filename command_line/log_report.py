@@ -111,7 +111,7 @@ def _draw_strip(walk: RecordedWalk, path: Path) -> None:
 
 
 def _strides_section(replayed: Replay) -> Section:
-    head = ["flipper", "stride", "from, s", "k_p, N/cm³", "k_s, N/cm³", "k_e, N/cm³", "depth, cm", "step, cm", ""]
+    head = ["flipper", "stride", "from (s)", "k_p (N/cm³)", "k_s (N/cm³)", "k_e (N/cm³)", "depth (cm)", "step (cm)", ""]
     return Section(
         "Strides",
         f"{SINCE} Coefficients with their standard error; after a ≥ where the mud did not yield, in brackets where not"
@@ -143,5 +143,5 @@ def _in_cm(value_m: float | None) -> str:
 def _events_section(log: Log) -> Section:
     told = log.events[-EVENTS_TOLD:]
     before = f" The last {len(told)} of {len(log.events)}." if len(told) < len(log.events) else ""
-    rows = [["at, s", ""], *([f"{event['stamp_s'] - begin_s(log):.2f}", event["text"]] for event in told)]
+    rows = [["at (s)", ""], *([f"{event['stamp_s'] - begin_s(log):.2f}", event["text"]] for event in told)]
     return Section("Events", SINCE + before, rows=rows)

@@ -46,7 +46,7 @@ def _show_replay(replayed: Replay, as_json: bool) -> None:
         report = {"strides": strides, "map": map_report(replayed.map), "flippers": replayed.flippers}
         print(json.dumps(report | {"complete": replayed.complete}))
         return
-    print(f"{STRIDE_HEAD}  {'f_z in':>7} {'f_x':>6} {'f_z out':>7}\n{STRIDE_UNITS}  {'N':>7} {'N':>6} {'N':>7}")
+    print(f"{STRIDE_HEAD}  {'f_z in':>7} {'f_x':>6} {'f_z out':>7}\n{STRIDE_UNITS}  {'(N)':>7} {'(N)':>6} {'(N)':>7}")
     for report, stride in zip(strides, replayed.strides, strict=True):
         forces = f"{stride.insertion_force_n:7.1f} {stride.stance_force_n:6.1f} {stride.extraction_force_n:7.1f}"
         print(f"{stride_line(report, replayed.begin_s)}  {forces}")

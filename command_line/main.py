@@ -17,6 +17,7 @@ from command_line.commands import DEFAULT_CONFIG, Commands, add, add_socket
 from command_line.experiment_commands import add_experiments
 from command_line.option_types import between, depth_cm, finite, folder, joint_angle, picture, whole
 from command_line.screen import complain
+from firmware_host.file_problems import why_not
 
 METHODS = ("default", "paper")  # of estimation
 PICTURE_MODULES = ("matplotlib", "PIL")  # an extra of this package
@@ -194,7 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return exit_codes.OK
     except OSError as problem:
-        complain(f"{problem.filename2 or problem.filename or ''}: {problem.strerror or problem}".lstrip(": "))
+        complain(why_not(problem))
         return exit_codes.UNHEALTHY
 
 

@@ -225,7 +225,9 @@ def _fault_line(fault: dict[str, Any]) -> str:
 
 
 def _drives_table(drives: list[dict[str, Any]]) -> str:
-    rows = [("joint", "angle deg", "current A", "torque N·m", "motor C", "bus V", "age ms", "torque", "errors")]
+    rows = [
+        ("joint", "angle (°)", "current (A)", "torque (N·m)", "motor (°C)", "bus (V)", "age (ms)", "torque", "errors")
+    ]
     for drive in drives:
         angle_rad, age_s = drive["angle_rad"], drive["angle_age_s"]
         rows.append(

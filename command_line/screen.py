@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from math import isfinite
 from typing import Any
 
+from experiments.value_text import N_CM3, value_text
+
 RED, GREEN, YELLOW, BOLD, PLAIN = "\033[31m", "\033[32m", "\033[33m", "\033[1m", "\033[0m"
 PATIENCE_S = 2.0  # of a person who sees nothing
 SOON_S = 0.1
@@ -96,18 +98,18 @@ def coefficient(estimate: dict[str, Any]) -> str:
     """In N/cm³ with its standard error; after a ≥ where it is a lower bound, in brackets where it is not valid."""
     if estimate["value"] is None or estimate["std_error"] is None:
         return "-"
-    text = f"{estimate['value'] / 1e6:.2f}±{estimate['std_error'] / 1e6:.2f}"
-    text = f"≥{text}" if estimate["at_least"] else text
+    text = value_text(estimate["value"], estimate["std_error"], per=N_CM3)
+    text = f"≥ {text}" if estimate["at_least"] else text
     return text if estimate["valid"] else f"({text})"
 
 
 STRIDE_HEAD = (
-    f"{'flipper':7} {'no':>3} {'at s':>7} {'insert':>6} {'stance':>6} {'extract':>7} "
-    f"{'k_p':>13} {'k_s':>13} {'k_e':>13} {'depth':>6} {'next':>5} {'step':>6}"
+    f"{'flipper':7} {'no':>3} {'at':>7} {'insert':>6} {'stance':>6} {'extract':>7} "
+    f"{'k_p':>17} {'k_s':>17} {'k_e':>17} {'depth':>6} {'next':>5} {'step':>6}"
 )
 STRIDE_UNITS = (
-    f"{'':7} {'':3} {'':7} {'s':>6} {'s':>6} {'s':>7} "
-    f"{'N/cm³':>13} {'N/cm³':>13} {'N/cm³':>13} {'cm':>6} {'cm':>5} {'cm':>6}"
+    f"{'':7} {'':3} {'(s)':>7} {'(s)':>6} {'(s)':>6} {'(s)':>7} "
+    f"{'(N/cm³)':>17} {'(N/cm³)':>17} {'(N/cm³)':>17} {'(cm)':>6} {'(cm)':>5} {'(cm)':>6}"
 )
 
 
@@ -117,7 +119,7 @@ def stride_line(stride: dict[str, Any], start_s: float = 0.0) -> str:
     return (
         f"{stride['flipper']:7} {stride['index']:3d} {stride['t_end_s'] - start_s:7.2f} "
         f"{stride['insertion_s']:6.2f} {stride['stance_s']:6.2f} {stride['extraction_s']:7.2f} "
-        f"{coefficient(stride['k_p']):>13} {coefficient(stride['k_s']):>13} {coefficient(stride['k_e']):>13} "
+        f"{coefficient(stride['k_p']):>17} {coefficient(stride['k_s']):>17} {coefficient(stride['k_e']):>17} "
         f"{number(_in_cm(stride['depth_m']), 1):>6} {number(_in_cm(chosen_m), 2):>5} "
         f"{number(_in_cm(stride['step_m']), 1):>6}{'' if stride['released'] else '  stuck'}"
     )

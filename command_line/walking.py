@@ -46,7 +46,9 @@ def run_trackway(options: argparse.Namespace) -> int:
         seeds=options.trials or trackway.Plan.seeds,
         compartment_m=options.compartment or trackway.Plan.compartment_m,
     )
-    return conduct_bench(options, "walks", lambda desk: _found(trackway.run(plan, desk.show)))
+    return conduct_bench(
+        options, "walks", lambda desk: _found(trackway.run(plan, Notebook(desk.folder, plan.kept), desk.show))
+    )
 
 
 def _walk_at_the_bench(options: argparse.Namespace) -> int:
@@ -141,7 +143,7 @@ def trackway_text(report: dict[str, Any]) -> str:
 
 def _speeds_text(report: dict[str, Any]) -> str:
     muds = list(report["settings"]["mud_length_cm"])
-    head = ["cm/s", *map(mud_label, muds), "all muds"]
+    head = ["speed (cm/s)", *map(mud_label, muds), "all muds"]
     rows = [head]
     for rule, row in report["table"].items():
         over = report["mean_over_muds"][rule]
@@ -185,7 +187,7 @@ def _failed(cell: Mapping[str, Any]) -> str:
 
 def _best_text(report: dict[str, Any]) -> str:
     best = report["best_constant_depth"]
-    rows = [["", *(f"w = {mud} %" for mud in best), "all muds"]]
+    rows = [["", *map(mud_label, best), "all muds"]]
     rows.append(["depth", *(f"{each['depth_cm']:g} cm" for each in best.values()), ""])
     means = [f"{each['mean']:.2f} cm/s" for each in best.values()]
     rows.append(["speed", *means, f"{report['best_constant_mean_over_muds']:.2f} cm/s"])
@@ -199,7 +201,7 @@ def _best_text(report: dict[str, Any]) -> str:
 
 def sweep_text(report: dict[str, Any]) -> str:
     methods = report["settings"]["methods"]
-    rows = [["strength", "best depth", "cm/s", *(_sweep_head(method) for method in methods)]]
+    rows = [["strength", "best depth", "speed (cm/s)", *(_sweep_head(method) for method in methods)]]
     for row in report["strengths"]:
         cells = [_sweep_cell(row["methods"][method]) for method in methods]
         rows.append(
@@ -210,7 +212,7 @@ def sweep_text(report: dict[str, Any]) -> str:
 
 
 def _sweep_head(method: str) -> str:
-    return f"{method}: depth, cm/s, share of best, failed"
+    return f"{method}: depth, speed (cm/s), share of best, failed"
 
 
 def _sweep_cell(settled: Mapping[str, Any]) -> str:
@@ -237,7 +239,7 @@ def _values_text(report: dict[str, Any]) -> str:
         low, high = fitted["strength_range_pa"][mud]
         rows.append(
             [
-                f"w = {mud} %",
+                mud_label(mud),
                 f"{strength_pa:.0f} Pa",
                 f"{low:.0f} to {high:.0f} Pa",
                 f"{present['strength_pa'][mud]:.0f} Pa",
@@ -250,15 +252,15 @@ def _values_text(report: dict[str, Any]) -> str:
 
 
 def _cells_text(report: dict[str, Any]) -> str:
-    rows = [["cm/s", "mud", "paper", "fitted", "present"]]
+    rows = [["speed (cm/s)", "mud", "paper", "fitted", "present"]]
     for (rule, mud, speed, paper), (_, _, today, _) in zip(
         cells_beside_paper(report["fitted"]), cells_beside_paper(report["present"]), strict=True
     ):
-        rows.append([rule, f"w = {mud} %", f"{paper.mean:.1f} ± {paper.sd:.1f}", f"{speed:.2f}", f"{today:.2f}"])
+        rows.append([rule, mud_label(mud), f"{paper.mean:.1f} ± {paper.sd:.1f}", f"{speed:.2f}", f"{today:.2f}"])
     return table(rows)
 
 
 def _damping_text(report: dict[str, Any]) -> str:
-    rows = [["rail damping, N·s/m", "least chi²"]]
+    rows = [["rail damping (N·s/m)", "least chi²"]]
     rows += [[damping, f"{chi2:.2f}"] for damping, chi2 in report["chi2_of_damping"].items()]
     return table(rows)

@@ -61,6 +61,12 @@ class Fault(NamedTuple):
         return self.kind.name
 
     @property
+    def advice(self) -> str:
+        """What happened, and what to do."""
+        to_do = self.kind.what_to_do
+        return f"{self.sentence} {to_do[:1].upper()}{to_do[1:]}."
+
+    @property
     def check(self) -> str:
         """Identity of its line in `mudskipper check`."""
         return f"{self.kind.check}.{self.subject}" if self.subject else self.kind.check

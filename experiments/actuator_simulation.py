@@ -17,7 +17,6 @@ class M1 are truer than all of this.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import isfinite
 from pathlib import Path
 from random import Random
 
@@ -27,6 +26,7 @@ from experiments.actuator_plan import Plan, Step
 from experiments.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.person import GO_ON
 from experiments.trial import BENCH_CURRENT_A
+from experiments.value_text import miss_text
 from firmware_host.configuration import Configuration
 from firmware_host.file_recorder import FileRecorder
 from simulation.bench_mount import BenchMount
@@ -53,13 +53,9 @@ def truth_rows(fits: Sequence[JointFit]) -> list[list[str]]:
     """A table: what is true of the simulated motors, and by how much the fitted misses it."""
     rows = [["joint", "true k_t (N·m/A)", "k_t misses by", "true dry friction (N·m)", "dry friction misses by"]]
     for fit in fits:
-        constant = [f"{TRUE_CONSTANT_NM_A:.5f}", _missed(fit.constant_nm_a, TRUE_CONSTANT_NM_A)]
-        rows.append([fit.joint, *constant, f"{COULOMB_NM:.4f}", _missed(fit.friction_nm[0], COULOMB_NM)])
+        constant = [f"{TRUE_CONSTANT_NM_A:.5f}", miss_text(fit.constant_nm_a, TRUE_CONSTANT_NM_A)]
+        rows.append([fit.joint, *constant, f"{COULOMB_NM:.4f}", miss_text(fit.friction_nm[0], COULOMB_NM)])
     return rows
-
-
-def _missed(value: float, true: float) -> str:
-    return f"{100.0 * (value / true - 1.0):+.1f} %" if isfinite(value) else "-"
 
 
 def simulated_bench(

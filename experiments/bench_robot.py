@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from experiments.bench_errors import BenchError as BenchError  # for whoever operates one
 from experiments.bench_errors import EndedError, GoneError, OverruledError
@@ -65,7 +65,8 @@ class Walked(NamedTuple):
 
 
 Status = dict[str, Any]
-Judge = Callable[[Status], str | None]  # None while a walk is to go on; then why not, or nothing at its proper end
+End = TypeVar("End")
+Judge = Callable[[Status], End | None]  # None while a walk is to go on; then how it ends
 
 
 def wait_until(robot: BenchRobot, done: Callable[[Status], bool], longest_s: float, what: str) -> Status:
@@ -225,8 +226,8 @@ def strides_made(closed: Sequence[Mapping[str, Any]]) -> int:
     return len({stride["index"] for stride in closed})
 
 
-def follow_walk(robot: BenchRobot, begin: Callable[[float], Judge]) -> tuple[str | None, Status]:
-    """Of a walk that was just ordered: what its judge stopped it for, None where it ended by itself; the last status.
+def follow_walk(robot: BenchRobot, begin: Callable[[float], Judge[End]]) -> tuple[End | None, Status]:
+    """Of a walk that was just ordered: how its judge ended it, None where it ended by itself; the last status.
 
     `begin` makes the judge when the walk has begun, by the robot's clock.
     """

@@ -87,14 +87,14 @@ class Stand:
         self.drives = rig.loop.drives
         self.controller = rig.loop.controller = bench_controller(rig.loop.controller)
         self._rest: JointAngles = LEVEL  # where the flippers lie without torque
-        self.lateness = Lateness()  # of one measurement, while torque is on
+        self.lateness = Lateness()  # of one measurement, while a drive tells that torque is on
         self.lateness_so_far = Lateness()  # of all
 
     def tick(self) -> Sample:
         aim, loop = self.controller.aim, self.loop
-        beat, energised = self.rig.wait(), loop.mode in ENERGISED  # before a fault of this tick
+        beat, torque_on = self.rig.wait(), self._torque_on()
         loop.tick(beat)
-        if energised:
+        if torque_on:
             self._heed_lateness(beat, loop.states)
         return Sample(beat, loop.mode, loop.states, aim, loop.sent.torques_nm, loop.sent.limited)
 
@@ -122,9 +122,13 @@ class Stand:
         """A tick in which nothing is sent."""
         beat = self.rig.wait()
         states = self.drives.read(beat.now_s)
-        if self.loop.mode in ENERGISED:
+        if self._torque_on():
             self._heed_lateness(beat, states)
         return Sample(beat, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
+
+    def _torque_on(self) -> bool:
+        """As a drive told before this tick: it may have a fault, and a drive that is told to go idle need not obey."""
+        return any(state.closed_loop for state in self.loop.states)
 
     def _heed_lateness(self, beat: Beat, states: DriveStates) -> None:
         self.lateness.update(beat, states)
@@ -257,8 +261,4 @@ def joint_place(joint: str) -> int:
 
 
 def _told(faults: Sequence[Fault]) -> str:
-    return " ".join(f"{fault.sentence} {_capital(fault.kind.what_to_do)}." for fault in faults)
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+    return " ".join(fault.advice for fault in faults)

@@ -22,6 +22,7 @@ from tomlkit.items import Table
 
 from experiments.bench_robot import BenchError
 from firmware_host.configuration import parse_configuration
+from firmware_host.file_problems import why_not
 from firmware_host.toml_records import ConfigurationError, read_text
 
 Changes = Mapping[tuple[str, ...], float]  # the key's path, and its new value
@@ -91,8 +92,8 @@ def replace_file(path: Path, before: str, after: str) -> Path:
         _write(path, after, path)
     except OSError as problem:
         raise BenchError(
-            f"{problem.filename or path}: {problem.strerror}; nothing was changed. Run the same command as somebody who"
-            " may write it, such as root: what was measured is kept"
+            f"{why_not(problem, path)}; nothing was changed. Run the same command as somebody who may write it, such as"
+            " root: what was measured is kept"
         ) from problem
     return backup
 

@@ -19,6 +19,7 @@ from experiments.bench_robot import ENERGISED, UNDER_WAY, Status
 from experiments.log_copies import copy_since
 from experiments.log_span import cut
 from firmware_host.configuration import Configuration, ConfigurationError, parse_configuration
+from firmware_host.file_problems import why_not
 from firmware_host.lease import TAKEN_OVER
 from firmware_host.log_folder import run_files
 from firmware_host.log_reader import Log, LogError, read_logs
@@ -202,9 +203,8 @@ class DaemonRobot:
         except LogError as problem:
             raise BenchError(f"the daemon's log cannot be copied: {problem}") from problem
         except OSError as problem:
-            why = f"{problem.filename2 or problem.filename or folder}: {problem.strerror or problem}"
             stays = f"it stays in {segments[-1].parent.parent}, copy it from there"
-            raise BenchError(f"the daemon's log cannot be copied: {why}; {stays}") from problem
+            raise BenchError(f"the daemon's log cannot be copied: {why_not(problem, folder)}; {stays}") from problem
 
     def _segments_at_last(self) -> list[Path]:
         try:

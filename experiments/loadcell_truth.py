@@ -9,7 +9,7 @@ from experiments.load_cell_truth import TrueCoefficients, true_coefficients
 from experiments.loadcell_fits import COEFFICIENTS, OfMud
 from experiments.loadcell_motion import StageSettings
 from experiments.mud_names import mud_text
-from experiments.value_text import N_CM3, value_text
+from experiments.value_text import N_CM3, miss_text, value_text
 from simulation.clay import clay_of_water
 from simulation.load_cell_bench import RELAXATION
 from simulation.witness import StrideTruth, StrokeTruth
@@ -41,7 +41,4 @@ def _true_cells(truth: TrueCoefficients) -> list[str]:
 
 
 def _missed(told: Mapping[str, OfMud], truth: TrueCoefficients) -> list[str]:
-    return [
-        f"{100.0 * (told[name].value / getattr(truth, name) - 1.0):+z.2f} %" if name in told else "-"
-        for name in COEFFICIENTS
-    ]
+    return [miss_text(told[name].value, getattr(truth, name)) if name in told else "-" for name in COEFFICIENTS]

@@ -20,10 +20,12 @@ def side_by_side(
     show: Show,
     processes: int | None = None,
     meanwhile: Callable[[], None] = lambda: None,
+    keep: Callable[[int, Outcome], None] = lambda place, outcome: None,
 ) -> list[Outcome]:
     """What each trial returned, in their order. Trials cross a process border: `functools.partial` does, lambda not.
 
-    `meanwhile` is called twice a second, for progress within long trials.
+    `meanwhile` is called twice a second, for progress within long trials; `keep` with each outcome as it comes, and its
+    trial's place among them.
     """
     outcomes: dict[int, Outcome] = {}
     with _workers(processes or os.cpu_count()) as pool:
@@ -33,6 +35,7 @@ def side_by_side(
             finished, pending = wait(pending, LOOK_S, FIRST_COMPLETED)
             for future in finished:
                 outcomes[places[future]] = future.result()
+                keep(places[future], future.result())
                 show(len(outcomes), len(trials))
             meanwhile()
     return [outcomes[place] for place in range(len(trials))]

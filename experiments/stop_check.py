@@ -4,7 +4,8 @@ The soft stop is the loop's own, asked for in mid-stance of a walk in air. Dampi
 put in at the fastest moment of a sweep. A joint without torque goes on until friction or a stop ends it, so torque is
 taken off while it still speeds up, and its way stays short. What counts is how soon the current is gone. So one is
 commanded until then that is known, the same in each of a few ticks: a drive that held its last command would go on
-with it, and the current before is seen also where a tick or a message is late.
+with it, and the current before is seen also where a tick or a message is late. Time is reckoned by the numbers of the
+ticks, from the last one before the wish: torque stays as it is in a tick that is missed.
 """
 
 from __future__ import annotations
@@ -46,12 +47,12 @@ def soft_stop(stand: Stand) -> Readings:
     """Idle at the begin and at the end, as all of them."""
     with stand.raised():
         order_strides(stand, 2)
-        stand.run_until(lambda sample: _in_full_stance(stand, sample), 20.0, "The full speed of a stance")
+        last = stand.run_until(lambda sample: _in_full_stance(stand, sample), 20.0, "The full speed of a stance")[-1]
         begun = measured_angles(stand.loop.states)
         stand.loop.request(Request.STOP, stand.rig.now_s)
         samples = stand.run_until(lambda sample: sample.mode is Mode.HOLD, SOFT_STOP_S + 1.0, "The end of a soft stop")
-    yield from _sweep_readings("soft stop", samples, begun, SOFT_REST_S, SOFT_TRAVEL_DEG)
-    whole_s = len(samples) * PERIOD_S
+    yield from _sweep_readings("soft stop", last, samples, begun, SOFT_REST_S, SOFT_TRAVEL_DEG)
+    whole_s = PERIOD_S * ticks_until(samples[-1], last)
     advice = "something holds the flippers down: see that they hang free"
     yield Reading("soft stop: until the flippers are up", whole_s, "s", 0.0, SOFT_WHOLE_S, advice)
 
@@ -66,12 +67,14 @@ def damping(stand: Stand) -> Readings:
     with stand.raised():
         stand.move([_swept(SWING_RAD)])
         stand.controller.follow([_swept(-SWING_RAD)], FAST_RAD_S)
-        stand.run_until(lambda sample: _is_fast(sample, FULL_SHARE * FAST_RAD_S), 2.0, "The full speed of a sweep")
+        last = stand.run_until(
+            lambda sample: _is_fast(sample, FULL_SHARE * FAST_RAD_S), 2.0, "The full speed of a sweep"
+        )
         begun = measured_angles(stand.loop.states)
         stand.controller.law = lambda held, states: _brake(stand, states)
         samples = stand.run_for(2.0 * DAMPED_REST_S)
         stand.hold_here()
-    yield from _sweep_readings("damping", samples, begun, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
+    yield from _sweep_readings("damping", last[-1], samples, begun, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
 
 
 def _brake(stand: Stand, states: DriveStates) -> Torques:
@@ -89,8 +92,7 @@ def torque_off(stand: Stand) -> Readings:
     samples = [stand.tick() for _ in range(round(COASTING_S / PERIOD_S))]
     for place, axis in enumerate(stand.drives.axes):
         yield from _off_readings(axis, pushed, samples, place)
-    rest = rest_tick(samples)
-    rest_s = nan if rest is None else PERIOD_S * rest
+    rest_s = PERIOD_S * ticks_until(first_slow(samples), pushed[-1])
     yield Reading("torque off: until the sweep rests", rest_s, "s", 0.0, COASTING_S, "see what drives it on")
     for place, side in zip(SWEEPS, ("left", "right"), strict=True):
         way_deg = degrees(max(abs(sample.states[place].angle_rad - begun[place].angle_rad) for sample in samples))
@@ -111,9 +113,10 @@ def _off_readings(axis: OdriveAxis, pushed: Sequence[Sample], samples: Sequence[
     yield Reading(f"{joint}: torque off, current before", flowed_a, "A", 2.0 * QUIET_A, 100.0, few)
     quiet = first_lasting([abs(sample.states[place].current_a) < QUIET_A for sample in samples], QUIET_TICKS)
     advice = "the drive does not obey 'idle': have the power switch at hand, and check its firmware"
-    ticks = nan if quiet is None else quiet
+    ticks = ticks_until(None if quiet is None else samples[quiet], pushed[-1]) - 1  # 'idle' leaves in the next one
     yield Reading(f"{joint}: torque off, until no current flows", ticks, "ticks", 0, OFF_TICKS, advice)
-    idle_s = next((PERIOD_S * n for n, s in enumerate(samples, 1) if not s.states[place].closed_loop), nan)
+    idle = next((sample for sample in samples if not sample.states[place].closed_loop), None)
+    idle_s = PERIOD_S * ticks_until(idle, pushed[-1])
     latest_s = axis.parameters.heartbeat_period_s + OFF_TICKS * PERIOD_S
     yield Reading(f"{joint}: torque off, until it says so", idle_s, "s", 0.0, latest_s, advice)
 
@@ -127,10 +130,9 @@ def _is_fast(sample: Sample, speed_rad_s: float) -> bool:
 
 
 def _sweep_readings(
-    name: str, samples: Sequence[Sample], begun: JointAngles, longest_s: float, farthest_deg: float
+    name: str, last: Sample, samples: Sequence[Sample], begun: JointAngles, longest_s: float, farthest_deg: float
 ) -> Readings:
-    rest = rest_tick(samples)
-    rest_s = PERIOD_S * rest if rest is not None else nan
+    rest_s = PERIOD_S * ticks_until(first_slow(samples), last)
     brakes = "raise the damping in [gains], and see what drives the joints on"
     yield Reading(f"{name}: until the sweep rests", rest_s, "s", 0.0, longest_s, brakes)
     for place, side in zip(SWEEPS, ("left", "right"), strict=True):
@@ -138,7 +140,13 @@ def _sweep_readings(
         yield Reading(f"{name}: way of the {side} sweep", way_deg, "deg", 0.0, farthest_deg, brakes)
 
 
-def rest_tick(samples: Sequence[Sample]) -> int | None:
-    """From which tick on all sweeps are slow, for a while."""
+def first_slow(samples: Sequence[Sample]) -> Sample | None:
+    """From which on all sweeps are slow, for a while."""
     slow = [all(abs(sample.states[place].velocity_rad_s) < REST_RAD_S for place in SWEEPS) for sample in samples]
-    return first_lasting(slow, REST_TICKS)
+    first = first_lasting(slow, REST_TICKS)
+    return None if first is None else samples[first]
+
+
+def ticks_until(sample: Sample | None, last: Sample) -> float:
+    """From the last one before a wish, missed ones included; NaN where it never came to that."""
+    return nan if sample is None else sample.beat.number - last.beat.number

@@ -9,12 +9,13 @@ mud alone, on a long track.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
 from experiments.depth_rule import DepthRule, chosen_by, configuration_for, constant_depth, walk_by
+from experiments.notebook import Notebook
 from experiments.one_mud import (
     CONSTANT_STRIDES,
     MudWalk,
@@ -27,7 +28,7 @@ from experiments.one_mud import (
 from experiments.paper_table import ADAPTIVE, FIXED_DEPTHS_M, PAPER_TABLE
 from experiments.side_by_side import Show, side_by_side
 from experiments.speed_table import cell, mean_over_muds, within_one_sd
-from experiments.walk import Walk, WalkedStride
+from experiments.walk import Walk, WalkedStride, walk_of
 from simulation.clay import MUDS, Clay
 from simulation.disturbances import LAB
 from simulation.track import COMPARTMENT_M, Track
@@ -46,8 +47,28 @@ class Plan:
     constant_seeds: int = 1
 
     @property
-    def seed_range(self) -> range:
-        return range(1, self.seeds + 1)
+    def kept(self) -> dict[str, Any]:
+        """What may not change where an experiment goes on."""
+        return {
+            "experiment": "trackway",
+            "simulated": True,
+            "methods": [rule.method for rule in self.rules if rule.method],
+            "muds": [[clay.name, clay.strength_pa] for clay in self.muds],
+            "compartment_m": self.compartment_m,
+        }
+
+    def walks(self) -> dict[str, Callable[[], Walk]]:
+        """By key in the notebook; the longest begin first, so that the last ones end together."""
+        long = {
+            f"{rule.name}, trial {seed}": partial(walk_trackway, rule, self.muds, self.compartment_m, seed)
+            for rule in self.rules
+            for seed in range(1, self.seeds + 1)
+        }
+        constant = {
+            f"{order.clay.name}, {order.rule.name}, seed {order.seed}": partial(run_mud_walk, order)
+            for order in self.constant_walks()
+        }
+        return {**long, **constant}
 
     def constant_walks(self) -> list[MudWalk]:
         return constant_walks(self.muds, self.constant_depths_m, self.constant_seeds)
@@ -78,17 +99,20 @@ def is_stuck(strides: Sequence[WalkedStride]) -> bool:
     return sum(stride.duration_s for stride in strides if stride.mud == mud) >= STUCK_S
 
 
-def run(plan: Plan, show: Show, processes: int | None = None) -> dict[str, Any]:
-    """The report. The longest walks begin first, so that the last ones end together."""
-    long = [
-        partial(walk_trackway, rule, plan.muds, plan.compartment_m, seed)
-        for rule in plan.rules
-        for seed in plan.seed_range
-    ]
-    constant = plan.constant_walks()
-    walks = side_by_side([*long, *(partial(run_mud_walk, order) for order in constant)], show, processes)
+def run(plan: Plan, notebook: Notebook, show: Show, processes: int | None = None) -> dict[str, Any]:
+    """The report; what was walked is in the notebook."""
+    orders = plan.walks()
+    left = [key for key in orders if key not in notebook.entries]
+    walked = len(orders) - len(left)
+    side_by_side(
+        [orders[key] for key in left],
+        lambda done, _: show(walked + done, len(orders)),
+        processes,
+        keep=lambda place, walk: notebook.write(left[place], walk.entry),
+    )
+    walks = [walk_of(notebook.entries[key]) for key in orders]
     by_rule = {rule.name: walks[i * plan.seeds : (i + 1) * plan.seeds] for i, rule in enumerate(plan.rules)}
-    return report_of(plan, by_rule, mean_speeds_cm_s(constant, walks[len(long) :]))
+    return report_of(plan, by_rule, mean_speeds_cm_s(plan.constant_walks(), walks[len(plan.rules) * plan.seeds :]))
 
 
 def report_of(plan: Plan, walks: dict[str, list[Walk]], constant_cm_s: dict[str, dict[float, float]]) -> dict[str, Any]:

@@ -35,7 +35,7 @@ from experiments.paper_table import ADAPTIVE, FIXED_DEPTHS_M
 from experiments.person import GO_ON, REDO, SKIP, Person
 from experiments.side_by_side import Show
 from experiments.trackway import STUCK_S, paper_report
-from experiments.walk import Walk, WalkedStride, speed_m_s
+from experiments.walk import Walk, speed_m_s, walk_of
 from firmware_host.configuration import Configuration
 from firmware_host.counted_nouns import counted
 
@@ -44,7 +44,8 @@ UNSEEN_S = 2.0  # without a pose, before a walk or on it: nobody knows where its
 BACKWARDS_M = 0.2  # behind the start: no mud pushes a body back so far
 LOOK_S = 0.05
 BEHIND = ""  # the last mud
-STUCK = "stuck in "  # a walk that comes to nothing is a result
+UNSEEN = "the body's place is not told any more: see that the robot is seen"
+BACKWARDS = "the body's place falls as the robot walks: turn pose.axis, or the sign of metres_per_count, round"
 KEEP = "k"
 WALKED = {GO_ON: "keep it", REDO: "walk it again", SKIP: "leave it out"}
 STOPPED = {GO_ON: "walk it again", KEEP: "keep it", SKIP: "leave it out"}
@@ -100,8 +101,14 @@ class LoggedTime(NamedTuple):
     to_s: float
 
 
+class End(NamedTuple):
+    why: str = ""  # nothing at the proper end
+    stopped: bool = False  # by somebody or a fault: a walk that comes to nothing is a result
+
+
 @dataclass(frozen=True)
 class LoggedWalk(Walk):
+    stopped: bool
     logged: LoggedTime
 
 
@@ -153,12 +160,10 @@ def _walk_trial(plan: Plan, key: str, rule: DepthRule, trackway: Trackway, noteb
     robot = trackway.prepare(trial)
     arm_m = robot.configuration.geometry.flipper_length_m
     walk = walk_over(robot, plan, rule)
-    verdict = trackway.judge(told_of(trial, walk), was_stopped(walk))
+    verdict = trackway.judge(told_of(trial, walk), walk.stopped)
     if verdict == REDO:
         return
-    strides = [stride._asdict() for stride in walk.strides]
-    entry = {"strides": strides, "fault": walk.fault, "arm_m": arm_m, "skipped": verdict == SKIP}
-    notebook.write(key, entry | {"logged": walk.logged})
+    notebook.write(key, walk.entry | {"arm_m": arm_m, "skipped": verdict == SKIP, "logged": walk.logged})
 
 
 def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> LoggedWalk:
@@ -170,12 +175,14 @@ def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> LoggedWalk:
     robot.call("walk", **({} if rule.method else {"depth_m": rule.depth_m}))
     end = _follow(robot, plan, start_m)
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
-    fault = end or ("" if after["mode"] == "hold" else told_by(after))
+    if not end.why and after["mode"] != "hold":
+        end = End(told_by(after), stopped=True)
     disarm(robot)
     log = robot.record(before["now_s"], after["now_s"])
     strides = walked_strides(log, robot.configuration, lambda place_m: plan.mud_at(place_m - start_m))
     placed = [stride._replace(place_m=stride.place_m - start_m) for stride in strides]
-    return LoggedWalk(placed, fault, LoggedTime(log.metadata["run_id"], before["now_s"], after["now_s"]))
+    logged = LoggedTime(log.metadata["run_id"], before["now_s"], after["now_s"])
+    return LoggedWalk(placed, end.why, end.stopped, logged)
 
 
 def _require_place(robot: BenchRobot) -> Status:
@@ -192,11 +199,11 @@ def _require_place(robot: BenchRobot) -> Status:
     return status
 
 
-def _follow(robot: BenchRobot, plan: Plan, start_m: float) -> str:
-    """Until the walk is over, or has to be stopped: why, where that is no success."""
+def _follow(robot: BenchRobot, plan: Plan, start_m: float) -> End:
+    """Until the walk is over, or has to be stopped."""
     zero_m = start_m - reach_of(robot.configuration)
     end, status = follow_walk(robot, lambda now_s: Progress(plan, zero_m, now_s).judge)
-    return told_by(status) if end is None else end
+    return End(told_by(status), stopped=True) if end is None else end
 
 
 def reach_of(configuration: Configuration) -> float:
@@ -213,28 +220,22 @@ class Progress:
         self._mud = plan.muds[0].name
         self._begun_s = self._entered_s = self._seen_s = now_s
 
-    def judge(self, status: Status) -> str | None:
-        """None while the walk is to go on; then what is wrong, or nothing at its proper end."""
+    def judge(self, status: Status) -> End | None:
+        """None while the walk is to go on."""
         now_s, body_m = status["now_s"], status["body_x_m"]
         if body_m is None:
-            unseen = now_s - self._seen_s > UNSEEN_S
-            return "the body's place is not told any more: see that the robot is seen" if unseen else None
+            return End(UNSEEN, stopped=True) if now_s - self._seen_s > UNSEEN_S else None
         self._seen_s = now_s
         plates_m = body_m - self._zero_m
         mud = self._plan.mud_at(plates_m)
         if mud != self._mud:
             self._mud, self._entered_s = mud, now_s
         if mud == BEHIND and status["phase"] == "insertion":
-            return ""
+            return End()
         if plates_m < -BACKWARDS_M:
-            return "the body's place falls as the robot walks: turn pose.axis, or the sign of metres_per_count, round"
+            return End(BACKWARDS, stopped=True)
         stuck = mud != BEHIND and now_s - self._entered_s > STUCK_S or now_s - self._begun_s > PATIENCE_S
-        return f"{STUCK}{mud or 'the end'}" if stuck else None
-
-
-def was_stopped(walk: Walk) -> bool:
-    """By somebody or a fault, not by the trackway."""
-    return bool(walk.fault) and not walk.fault.startswith(STUCK)
+        return End(f"stuck in {mud or 'the end'}") if stuck else None
 
 
 def told_of(key: str, walk: Walk) -> str:
@@ -266,11 +267,11 @@ def report_of(plan: Plan, notebook: Notebook) -> dict[str, Any]:
         if entry["skipped"]:
             left_out += 1
             continue
-        strides = [WalkedStride(**stride) for stride in entry["strides"]]
-        seen = [stride for stride in strides if stride.step_m == stride.step_m]
-        unseen, arm_m = unseen + len(strides) - len(seen), entry["arm_m"]
-        walks[rule.name].append(Walk([stride for stride in seen if stride.mud != BEHIND], entry["fault"]))
-        end = entry["fault"] or "past the end"
+        walk = walk_of(entry)
+        seen = [stride for stride in walk.strides if stride.step_m == stride.step_m]
+        unseen, arm_m = unseen + len(walk.strides) - len(seen), entry["arm_m"]
+        walks[rule.name].append(Walk([stride for stride in seen if stride.mud != BEHIND], walk.fault))
+        end = walk.fault or "past the end"
         ends[rule.name][end] = ends[rule.name].get(end, 0) + 1
     return paper_report(walks, [mud.name for mud in plan.muds], arm_m) | {
         "ends": ends,

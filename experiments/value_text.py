@@ -32,6 +32,11 @@ def share_text(share: float | None) -> str:
     return f"{100.0 * share:.{min(FINEST, _places(100.0 * share, OF_ERROR))}f} %"
 
 
+def miss_text(value: float, true: float) -> str:
+    """By how much of the true one it is more; a dash where there is no value."""
+    return f"{100.0 * (value / true - 1.0):+z.2f} %" if isfinite(value) else "-"
+
+
 def repeatability_text(share: float | None, trials: int) -> str:
     return f"{share_text(share)} of {trials}"
 

@@ -8,10 +8,10 @@ body is pushed back after the extraction, since the plates are still in the mud 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from control.controller import WalkOrder
 from control.modes import Mode
@@ -53,6 +53,15 @@ class Walk:
 
     def in_mud(self, mud: str) -> list[WalkedStride]:
         return [stride for stride in self.strides if stride.mud == mud]
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """For a notebook."""
+        return {"strides": [stride._asdict() for stride in self.strides], "fault": self.fault}
+
+
+def walk_of(entry: Mapping[str, Any]) -> Walk:
+    return Walk([WalkedStride(**stride) for stride in entry["strides"]], entry["fault"])
 
 
 def speed_m_s(strides: Sequence[WalkedStride]) -> float:

@@ -74,8 +74,7 @@ class LoopNews:
         if after in (Mode.ARMING, Mode.WALKING):
             self.notice = ""
         if fault and before in ENERGISED:
-            to_do = fault.kind.what_to_do
-            self.notice = f"stopped by {fault.name}: {fault.sentence} {to_do[:1].upper()}{to_do[1:]}."
+            self.notice = f"stopped by {fault.name}: {fault.advice}"
         if before is Mode.HOLD and after is Mode.IDLE and change.rested:
             held_s = self._longest_hold_s
             self._notify(now_s, f"the pose was held for {held_s:g} s without a request: torque went off by itself")

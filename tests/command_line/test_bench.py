@@ -107,8 +107,16 @@ def test_it_ends_in_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str])
 
 
 def test_json_alone_goes_to_standard_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    conduct_bench(options(tmp_path, json=True), "trials", found)
-    assert json.loads(capsys.readouterr().out) == {"experiment": "trial", "value": 1.0, "simulated": True}
+    def run(desk: Desk) -> Finding:
+        desk.show(1, 2)
+        desk.person.tell("half of it")
+        return found(desk)
+
+    conduct_bench(options(tmp_path, json=True), "trials", run)
+    said = capsys.readouterr()
+    assert json.loads(said.out) == {"experiment": "trial", "value": 1.0, "simulated": True}
+    assert said.err.splitlines()[0] == "half of it"  # no bar of progress either, where nobody watches
+    assert not {"\033", "\r"} & set(said.err)
 
 
 def test_without_a_folder_it_makes_one_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -165,7 +165,7 @@ def test_a_person_gets_a_table_of_errors_plates_and_boundaries(capsys: pytest.Ca
     head, *rows = errors.splitlines()
     assert head.split()[:3] == ["setup", "mud", "method"]
     assert len(rows) == 6
-    assert all(row.startswith("single flipper  49.5") and row.count("%") >= 4 for row in rows)
+    assert all(row.startswith("single flipper  49.5 %") and row.count("%") >= 5 for row in rows)
     assert plates.startswith("The paper's upright plate")
     assert boundaries.strip() == "Boundaries: none walked over"
 
@@ -180,9 +180,9 @@ def test_dashes_stand_where_nothing_was_told() -> None:
     errors, plates, boundaries = command_line.experiment.text_of(
         {"errors": [row], "plates": [plate], "boundaries": [border]}
     ).split("\n\n")
-    assert errors.splitlines()[1].split()[4:] == ["-", "-", "-", "-", "0", "4", "100.0", "%", "0"]
-    assert plates.splitlines()[2].split()[3:] == ["0.900", "-", "-"]
-    assert boundaries.splitlines()[2].split() == ["49.5", "51.2", "2", "50.0", "%", "never"]
+    assert errors.splitlines()[1].split()[5:] == ["-", "-", "-", "-", "0", "4", "100.0", "%", "0"]
+    assert plates.splitlines()[2].split()[4:] == ["0.900", "-", "-"]
+    assert boundaries.splitlines()[2].split() == ["49.5", "%", "51.2", "%", "2", "50.0", "%", "never"]
 
 
 # Ctrl-C

@@ -10,7 +10,7 @@ import pytest
 
 from command_line import bench, exit_codes, operation
 from command_line.main import main
-from command_line.screen import number
+from command_line.screen import coefficient, number
 from control.records import JOINTS
 from firmware_host import daemon
 from firmware_host.status_client import DroppedError
@@ -98,6 +98,16 @@ def test_a_status_before_all_drives_are_heard_names_those_that_are_not() -> None
 @pytest.mark.parametrize(("value", "text"), [(-0.0001, "0.000"), (-0.0, "0.000"), (-0.001, "-0.001"), (None, "-")])
 def test_a_zero_has_no_sign(value: float | None, text: str) -> None:
     assert number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("valid", "at_least", "text"),
+    [(True, False, "1.235 ± 0.046"), (True, True, "≥ 1.235 ± 0.046"), (False, True, "(≥ 1.235 ± 0.046)")],
+)
+def test_an_estimate_is_told_with_its_doubt_and_what_is_wrong_with_it(valid: bool, at_least: bool, text: str) -> None:
+    told = {"value": 1.23456e6, "std_error": 4.56e4, "valid": valid, "at_least": at_least}
+    assert coefficient(told) == text
+    assert coefficient(told | {"value": None}) == "-"
 
 
 @pytest.mark.parametrize(

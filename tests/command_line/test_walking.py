@@ -14,6 +14,7 @@ from command_line import exit_codes
 from command_line.main import main
 from experiments import depth_sweep, mud_fit, trackway
 from experiments.depth_rule import METHODS
+from experiments.notebook import Notebook
 from experiments.one_mud import constant_walks
 from experiments.paper_table import ADAPTIVE
 from experiments.walk import Walk, WalkedStride
@@ -22,6 +23,12 @@ from tests.command_line.command_lines import failure, refusal
 
 MODULES = {"trackway": trackway, "sweep": depth_sweep, "mud-fit": mud_fit}
 NAMES = list(MODULES)
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where results go that nobody named a place for."""
+    monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture
@@ -133,7 +140,7 @@ def stride(mud: str, step_m: float = 0.12) -> WalkedStride:
     return WalkedStride(mud, 1.8, 0.03, step_m, 2.0, 0.0)
 
 
-def run_trackway(plan: trackway.Plan, show: Callable[[int, int], None]) -> dict[str, Any]:
+def run_trackway(plan: trackway.Plan, notebook: Notebook, show: Callable[[int, int], None]) -> dict[str, Any]:
     """6 cm/s everywhere; one trial slips in the second stride of the second mud, and never sees the third."""
     whole = Walk([stride(mud) for mud in MUDS for _ in range(4)], "")
     short = Walk([stride("48.5")] * 4 + [stride("53.1"), stride("53.1", 0.02)], "")

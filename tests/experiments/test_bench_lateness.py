@@ -117,6 +117,29 @@ def test_a_drive_that_keeps_its_last_torque_is_found_by_its_current(stand: Stand
     assert len(ends) == 3 and all(reading.value <= OFF_TICKS for reading in ends.values())
 
 
+def test_a_drive_is_too_slow_to_let_go_also_where_ticks_are_missed_meanwhile(
+    stand: Stand, rig: LateRig, briefly: None
+) -> None:
+    """Six ticks too late, of which this computer sees three."""
+    drive, late = rig.robot.drives[2], rig
+    asked: list[int] = []
+
+    def dawdle(rig: SimulatedRig) -> None:
+        if rig.loop._request is Request.DISARM:
+            asked.append(rig._tick_number)
+            drive.receive = lambda frame, now_s: []  # type: ignore[method-assign]
+            late.begin(1.0, 0.0, 1, 1)
+        elif asked and rig._tick_number >= asked[0] + 6:
+            drive.axis_state = AxisState.IDLE
+
+    rig.others.append(dawdle)
+    told = by_name(torque_off(stand))
+    ends = {what.split(":")[0]: each for what, each in told.items() if what.endswith("until no current flows")}
+    assert ends.pop("right_sweep").value >= 6 > OFF_TICKS
+    assert all(reading.good for reading in ends.values())
+    assert stand.lateness.missed  # so the bench measures anew
+
+
 @pytest.fixture
 def briefly(monkeypatch: pytest.MonkeyPatch) -> None:
     """Joints are watched for a moment once torque is off."""

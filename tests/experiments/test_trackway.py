@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
 
+from experiments.notebook import Notebook
 from experiments.paper_table import ADAPTIVE, PAPER_TABLE
 from experiments.trackway import FIXED, Plan, end_of, is_over, report_of, rules_of, run
 from experiments.walk import Walk, WalkedStride
@@ -131,14 +135,52 @@ def test_a_gait_that_got_stuck_has_no_speed_further_on() -> None:
     assert report["ends"] == {"3 cm": {"stuck in 53.1": 1}}
 
 
+# an interrupted one
+
+
+class Quick(Plan):
+    """Nothing is simulated."""
+
+    def walks(self) -> dict[str, Callable[[], Walk]]:
+        return dict.fromkeys(super().walks(), quick)
+
+
+def quick() -> Walk:
+    return Walk([stride(mud, 1.8) for mud in NAMES for _ in range(3)], "")
+
+
+def test_what_was_walked_before_an_interruption_is_not_walked_again(tmp_path: Path) -> None:
+    plan = Quick(seeds=1, constant_depths_m=(0.03,))
+
+    def interrupt(done: int, total: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(plan, Notebook(tmp_path, plan.kept), interrupt, processes=1)
+    again, shown = Notebook(tmp_path, plan.kept), list[tuple[int, int]]()
+    assert len(again.entries) == 2
+    report = run(plan, again, lambda done, total: shown.append((done, total)), processes=1)
+    assert shown == [(3, 6), (4, 6), (5, 6), (6, 6)]
+    assert report == run(plan, Notebook(tmp_path / "other", plan.kept), lambda done, total: None, processes=1)
+
+
+def test_every_walk_has_a_key_of_its_own() -> None:
+    plan = Plan(rules=rules_of(["default", "paper"]), seeds=2, constant_seeds=2)
+    assert len(plan.walks()) == 4 * 2 + len(plan.constant_walks()) == 4 * 2 + 3 * 15 * 2
+
+
 # for real
+
+
+SHORT = Plan(compartment_m=0.2, seeds=1, constant_depths_m=(0.03,), constant_seeds=1)
 
 
 @cache
 def short() -> dict[str, Any]:
     """Compartments of less than two steps, one seed, one constant depth."""
-    plan = Plan(compartment_m=0.2, seeds=1, constant_depths_m=(0.03,), constant_seeds=1)
-    return run(plan, lambda done, total: None)
+    with TemporaryDirectory() as folder:
+        return run(SHORT, Notebook(Path(folder), SHORT.kept), lambda done, total: None)
 
 
 def test_a_short_trackway_is_walked_from_mud_to_mud_past_its_end() -> None:

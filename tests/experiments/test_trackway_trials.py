@@ -19,14 +19,15 @@ from experiments.trackway_trials import (
     KEEP,
     UNSEEN_S,
     AskedTrackway,
+    LoggedWalk,
     Mud,
     Plan,
+    Progress,
     first_walks,
     report_of,
     run,
     told_of,
     walk_over,
-    was_stopped,
 )
 from experiments.walk import StrideRecord, Walk, WalkedStride
 from experiments.walk_plots import plot_trackway
@@ -192,7 +193,7 @@ class DoubtedRobot(WatchedRobot):
 
 def doubted_walk(
     folder: Path, place: Callable[[float, float | None], float | None], asked: tuple[float, str] = (0.0, "")
-) -> tuple[Walk, float]:
+) -> tuple[LoggedWalk, float]:
     """A trial, and when it was over."""
     robot = SimulatedTrackway(folder, always(GO_ON)).prepare("one")
     robot.__class__ = DoubtedRobot
@@ -218,14 +219,27 @@ def test_a_pose_of_the_wrong_sign_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("asked", "told"), [("stop", "told to stop"), ("disarm", "torque was switched off")])
 def test_what_somebody_else_asks_for_is_no_end_of_the_trackway(tmp_path: Path, asked: str, told: str) -> None:
     walk, _ = doubted_walk(tmp_path, lambda now_s, x_m: x_m, (5.0, asked))
-    assert told in walk.fault and was_stopped(walk)
+    assert told in walk.fault and walk.stopped
 
 
-@pytest.mark.parametrize(("fault", "stopped"), [("", False), ("stuck in 45.3", False), ("it was told to stop", True)])
-def test_a_walk_that_was_stopped_is_walked_again_unless_a_person_says_otherwise(
-    fault: str, stopped: bool, tmp_path: Path
+@pytest.mark.parametrize(
+    ("now_s", "body_m", "why", "stopped"),
+    [
+        (91.0, 0.1, "stuck in 48.5", False),
+        (60.0, 0.6, "", False),
+        (60.0, -0.3, "the body's place falls", True),
+        (60.0, None, "the body's place is not told", True),
+    ],
+)
+def test_only_what_ends_by_itself_or_comes_to_nothing_is_not_stopped(
+    now_s: float, body_m: float | None, why: str, stopped: bool
 ) -> None:
-    assert was_stopped(Walk([], fault)) is stopped
+    end = Progress(SHORT, 0.0, 0.0).judge({"now_s": now_s, "body_x_m": body_m, "phase": "insertion"})
+    assert end and end.why.startswith(why) and end.stopped is stopped
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_a_walk_that_was_stopped_is_walked_again_unless_a_person_says_otherwise(stopped: bool, tmp_path: Path) -> None:
     robot = SimulatedTrackway(tmp_path, always(GO_ON)).prepare("one")
     verdicts = {
         answer: AskedTrackway(robot, ScriptedPerson(answer)).judge("one", stopped)
