@@ -19,7 +19,7 @@ from experiments.boundaries import Crossing, boundary_rows, crossings_of
 from experiments.error_table import COEFFICIENTS, Judged, error_rows, plate_rows
 from experiments.load_cell_truth import LoadCellTruth, load_cell_truth
 from experiments.side_by_side import Show, side_by_side
-from experiments.trial import SINGLE, WALKING, Setup, Trial, run_trial, strides_of
+from experiments.trial import SINGLE, TORQUE_ERROR, WALKING, Setup, Trial, run_trial, strides_of
 from simulation.clay import Clay, clay_of_water
 from simulation.disturbances import LAB, NONE, Disturbances
 from simulation.track import Track
@@ -29,7 +29,6 @@ WALKING_WATERS = (47.6, 49.5, 51.2)  # figure 6
 ENDLESS_M = 100.0
 COMPARTMENT_M = 0.5
 REPEATS, TORQUE = "repeats", "torque"
-TORQUE_ERROR = 0.032  # of a motor's constant: the paper's repeatability
 LAYERS = ("clinging", "remoulding", "relaxation", "surface", "noise", "saturation", REPEATS, TORQUE)
 FIELD_OF_LAYER = {
     "clinging": "clinging_n",

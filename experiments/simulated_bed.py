@@ -15,11 +15,11 @@ from typing import Any
 
 from control.modes import Mode
 from experiments.bench_robot import disarm
-from experiments.estimation import TORQUE_ERROR
 from experiments.load_cell_truth import true_coefficients
 from experiments.lockstep_robot import LockstepRobot
 from experiments.mud_trials import PlannedTrial, Truths
 from experiments.person import GO_ON
+from experiments.trial import TORQUE_ERROR
 from firmware_host.configuration import Configuration
 from firmware_host.file_recorder import FileRecorder
 from firmware_host.ticker import PERIOD_S

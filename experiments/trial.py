@@ -27,6 +27,7 @@ from simulation.witness import StrideTruth, StrokeWitness
 
 BENCH_TORQUE_NM, BENCH_CURRENT_A = 1.65, 20.0  # the authors' drives in their trials with a single flipper
 LONGEST_STRIDE_S = 40.0
+TORQUE_ERROR = 0.032  # of a motor's constant: the paper's repeatability
 
 
 class Sample(NamedTuple):

@@ -16,7 +16,6 @@ from experiments.estimation import (
     LAYERS,
     REPEATS,
     TORQUE,
-    TORQUE_ERROR,
     Outcome,
     Part,
     Plan,
@@ -26,7 +25,7 @@ from experiments.estimation import (
     run_part,
     with_layers,
 )
-from experiments.trial import SINGLE, WALKING, Setup
+from experiments.trial import SINGLE, TORQUE_ERROR, WALKING, Setup
 from simulation.clay import clay_of_water
 from simulation.disturbances import LAB, NONE, Disturbances
 from simulation.track import Track
