@@ -13,13 +13,13 @@ from command_line.bench import Desk, Finding, conduct_bench
 from command_line.commands import DEFAULT_CONFIG
 from command_line.mud_bench import text_of_tables
 from control.joint_pd import GRAVITY_M_S2
-from experiments.actuator_bench import ActuatorBench, RobotBench, SimulatedBench
-from experiments.actuator_fit import JointFit, fit_joint
-from experiments.actuator_plan import PAPER_WEIGHTS_G, Plan
-from experiments.actuator_report import TITLE, left_out, report_of, sections_of, text_of
-from experiments.actuator_simulation import bench_configuration, truth_rows
+from experiments.actuator.bench import ActuatorBench, RobotBench, SimulatedBench
+from experiments.actuator.configuration_change import changed_text, difference, replace_file
+from experiments.actuator.fit import JointFit, fit_joint
+from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan
+from experiments.actuator.report import TITLE, left_out, report_of, sections_of, text_of
+from experiments.actuator.simulation import bench_configuration, truth_rows
 from experiments.bench_robot import BenchError
-from experiments.configuration_change import changed_text, difference, replace_file
 from experiments.daemon_robot import DaemonRobot
 from experiments.report_page import Section
 from firmware_host.configuration import Configuration, load_configuration

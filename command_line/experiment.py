@@ -10,7 +10,7 @@ from typing import Any
 
 from command_line.conduct import conduct, refuse
 from command_line.screen import number, table
-from experiments.estimation import (
+from experiments.estimation.judgement import (
     LAYERS,
     SINGLE_WATERS,
     WALKING_WATERS,
@@ -34,7 +34,7 @@ def estimation(options: argparse.Namespace) -> int:
 
 
 def _plot(report: dict[str, Any], path: Path) -> None:
-    from experiments.plots import plot_errors  # matplotlib takes its time
+    from experiments.estimation.plots import plot_errors  # matplotlib takes its time
 
     plot_errors(report, path)
 

@@ -9,8 +9,8 @@ from typing import Any
 from command_line import exit_codes
 from command_line.conduct import conduct, refuse
 from command_line.screen import GREEN, RED, coloured, number, table
-from experiments import faults
-from experiments.fault_phases import PHASES
+from experiments.faults import matrix as faults
+from experiments.faults.phases import PHASES
 from experiments.side_by_side import Show
 
 
@@ -38,7 +38,7 @@ def run_faults(options: argparse.Namespace) -> int:
 
 
 def _plot(report: dict[str, Any], path: Path) -> None:
-    from experiments.fault_plots import plot_faults  # matplotlib takes its time
+    from experiments.faults.plots import plot_faults  # matplotlib takes its time
 
     plot_faults(report, path)
 

@@ -8,10 +8,10 @@ from functools import partial
 from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import refuse
 from command_line.mud_bench import SEED, make_trials, open_bench, text_of_tables, why_not_simulated
-from experiments import flipper
 from experiments.coefficient_table import load_truth
-from experiments.flipper_report import sections_of, text_of
-from experiments.flipper_simulation import flipper_bench
+from experiments.flipper import measurement as flipper
+from experiments.flipper.report import sections_of, text_of
+from experiments.flipper.simulation import flipper_bench
 from experiments.mud_names import mud_name
 from experiments.mud_trials import left_out_of
 

@@ -20,23 +20,23 @@ from drivers.load_cell_port import LoadCellPort
 from drivers.serial_line import SerialLineError
 from drivers.stage_encoder import StageEncoder, StageEncoderSettings
 from experiments.bench_robot import BenchError
-from experiments.estimation import SINGLE_WATERS
-from experiments.loadcell import (
+from experiments.estimation.judgement import SINGLE_WATERS
+from experiments.loadcell.comparison import CompareError, load_flipper
+from experiments.loadcell.examination import OR_WITHOUT
+from experiments.loadcell.measurement import (
     CellSettings,
     conclude,
     measure,
     plan_of_notebook,
     report_of,
 )
-from experiments.loadcell_comparison import CompareError, load_flipper
-from experiments.loadcell_examination import OR_WITHOUT
-from experiments.loadcell_motion import StageSettings
-from experiments.loadcell_raw import RAW
-from experiments.loadcell_recording import BenchClock, CellRecorder, WallClock
-from experiments.loadcell_report import TITLE, sections_of, text_of
-from experiments.loadcell_stage import AttendedStage, SimulatedStage, Stage
-from experiments.loadcell_trials import TrialBench, TrialPlan
-from experiments.loadcell_truth import clay_truth, truth_rows
+from experiments.loadcell.motion import StageSettings
+from experiments.loadcell.raw import RAW
+from experiments.loadcell.recording import BenchClock, CellRecorder, WallClock
+from experiments.loadcell.report import TITLE, sections_of, text_of
+from experiments.loadcell.stage import AttendedStage, SimulatedStage, Stage
+from experiments.loadcell.trials import TrialBench, TrialPlan
+from experiments.loadcell.truth import clay_truth, truth_rows
 from experiments.notebook import Notebook
 from experiments.report_page import Section
 from simulation.load_cell_bench import EmulatedBench, clay_plate, position_link

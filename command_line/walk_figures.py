@@ -11,7 +11,7 @@ from experiments.log_span import cut
 from experiments.mud_looks import file_name
 from experiments.person import Person
 from experiments.report_page import Figure
-from experiments.trackway_trials import LoggedTime
+from experiments.trackway.trials import LoggedTime
 from firmware_host.log_folder import first_path, run_files
 from firmware_host.log_reader import LogError, read_log, read_logs
 

@@ -8,14 +8,14 @@ from functools import partial
 from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import refuse
 from command_line.mud_bench import SEED, make_trials, open_bench, text_of_tables, why_not_simulated
-from experiments import walk_mapping
 from experiments.coefficient_table import load_truth
 from experiments.mud_names import mud_name
 from experiments.mud_trials import PlannedTrial, left_out_of
-from experiments.trackway_trials import Mud
-from experiments.walk_mapping_pages import sections_of, text_of
-from experiments.walk_mapping_report import report_of
-from experiments.walk_simulation import walking_bench
+from experiments.trackway.trials import Mud
+from experiments.walk import measurement as walk_mapping
+from experiments.walk.pages import sections_of, text_of
+from experiments.walk.report import report_of
+from experiments.walk.simulation import walking_bench
 
 TRACKWAY = (
     "Torque is off. Re-mix the surface of all muds and level it to its nominal height, and put the robot so that the "

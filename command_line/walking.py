@@ -14,15 +14,17 @@ from command_line.bench import Desk, Finding, conduct_bench
 from command_line.conduct import conduct, refuse
 from command_line.screen import number, plain, table
 from command_line.walk_figures import walk_figures
-from experiments import depth_sweep, mud_fit, trackway, trackway_trials
 from experiments.bench_robot import leave
 from experiments.daemon_robot import DaemonRobot
-from experiments.mud_fit import cells_beside_paper
 from experiments.mud_names import mud_label, mud_name
 from experiments.notebook import Notebook
-from experiments.paper_table import ADAPTIVE, PAPER_TABLE
 from experiments.report_page import Figure, Section
-from experiments.trackway_trials import AskedTrackway, first_walks
+from experiments.trackway import comparison as trackway
+from experiments.trackway import depth_sweep, mud_fit
+from experiments.trackway import trials as trackway_trials
+from experiments.trackway.mud_fit import cells_beside_paper
+from experiments.trackway.paper_table import ADAPTIVE, PAPER_TABLE
+from experiments.trackway.trials import AskedTrackway, first_walks
 from firmware_host.counted_nouns import counted
 
 WALKS_AND_TABLE = (
@@ -110,13 +112,13 @@ def _unique(names: list[str] | None) -> list[str]:
 
 
 def _plot_trackway(report: dict[str, Any], path: Path) -> None:
-    from experiments.walk_plots import plot_trackway  # matplotlib takes its time
+    from experiments.trackway.plots import plot_trackway  # matplotlib takes its time
 
     plot_trackway(report, path)
 
 
 def _plot_sweep(report: dict[str, Any], path: Path) -> None:
-    from experiments.walk_plots import plot_sweep  # matplotlib takes its time
+    from experiments.trackway.plots import plot_sweep  # matplotlib takes its time
 
     plot_sweep(report, path)
 

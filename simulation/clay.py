@@ -16,9 +16,9 @@ a tenth more strength, as clay practice has it. (So a held insertion in the simu
 and reaches 2.7 N at 3 cm; the logs of the mud that they call 12.5N have 2.5 to 2.8 N.)
 
 The three strengths are fitted to the six fixed-depth speeds of the paper's Table I, together with the damping of the
-body's rail, by experiments/mud_fit.py, which anyone can run again; the adaptive speeds are not used. Four numbers for
-six show that such mud suffices, not that it is the only one: 45.3 % comes out hardly firmer than 48.5 %, which the
-water would not suggest, since a motor that just fails at 5 cm tells no more.
+body's rail, by experiments/trackway/mud_fit.py, which anyone can run again; the adaptive speeds are not used. Four
+numbers for six show that such mud suffices, not that it is the only one: 45.3 % comes out hardly firmer than 48.5 %,
+which the water would not suggest, since a motor that just fails at 5 cm tells no more.
 
 A mud may have layers, crusts or weak ones, in which s_u is another at another depth: the laws then hold with the
 strength where the piece of the body is, and the weight of what lies above it stays the same.

@@ -49,7 +49,21 @@ def modules() -> Iterator[tuple[str, Path]]:
 
 def test_every_installed_package_has_its_layer() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert set(project["tool"]["setuptools"]["packages"]) == set(HEIGHT)
+    included = project["tool"]["setuptools"]["packages"]["find"]["include"]
+    assert {pattern.removesuffix("*") for pattern in included} == set(HEIGHT)
+    assert all((path.parent / "__init__.py").exists() for _, path in modules())
+
+
+def test_what_experiments_share_knows_none_of_them() -> None:
+    shared = {path.stem for path in (ROOT / "experiments").glob("*.py")}
+    wrong = {
+        f"{path.name} imports {node.module}"
+        for path in (ROOT / "experiments").glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("experiments.")
+        if (node.module or "").split(".")[1] not in shared
+    }
+    assert not wrong
 
 
 @pytest.mark.parametrize("package", HEIGHT)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from control.records import JOINTS
-from experiments.bench_reading import Reading
+from experiments.bench.reading import Reading
 
 ROBOT = "robot"  # what is about no joint
 HEADS = {ROBOT: ROBOT} | {joint: f"{joint[0]}. {joint.split('_')[1].replace('duction', 'd.')}" for joint in JOINTS}

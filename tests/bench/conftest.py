@@ -14,11 +14,11 @@ from pathlib import Path
 
 import pytest
 
-from experiments.bench_attendant import AbsentAttendant, AskedAttendant, Attendant, SimulatedAttendant
-from experiments.bench_channels import on_channels
-from experiments.bench_rig import HardwareRig, Rig, SimulatedRig
+from experiments.bench.attendant import AbsentAttendant, AskedAttendant, Attendant, SimulatedAttendant
+from experiments.bench.channels import on_channels
+from experiments.bench.rig import HardwareRig, Rig, SimulatedRig
+from experiments.bench.stand import Stand
 from experiments.bench_robot import BenchError
-from experiments.bench_stand import Stand
 from firmware_host.configuration import Configuration, ConfigurationError, load_configuration
 from simulation.blocks import lying_m
 from tests.bench.staged_bench import (

@@ -11,9 +11,9 @@ from typing import Any, Concatenate, ParamSpec
 import pytest
 
 from command_line.terminal_person import AbsentPersonError, TerminalPerson
-from experiments.bench_reading import Reading, Readings
+from experiments.bench.reading import Reading, Readings
+from experiments.bench.stand import Stand
 from experiments.bench_robot import BenchError
-from experiments.bench_stand import Stand
 from tests.bench.bench_table import table_lines
 
 STAGES = ("wiring", "signs", "zeros", "currents", "watchdogs", "strokes", "stops", "strides")

@@ -1,6 +1,6 @@
 """Stage 1: nothing moves, nothing is armed."""
 
-from experiments import wiring_check
+from experiments.bench import wiring_check
 from tests.bench.staged_bench import StagedBench
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from control.records import JOINTS
-from experiments.sign_check import nudged, shown
+from experiments.bench.sign_check import nudged, shown
 from tests.bench.staged_bench import StagedBench
 
 MOVES = "each joint is shaken and moves a little, with at most 0.2 N·m, then by 12 degrees; watch which one, and how."

@@ -3,7 +3,7 @@
 import pytest
 
 from control.records import JOINTS
-from experiments.joint_zero_check import level_pose, rest_pose, turned
+from experiments.bench.joint_zero_check import level_pose, rest_pose, turned
 from tests.bench.staged_bench import StagedBench
 
 

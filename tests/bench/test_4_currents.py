@@ -3,7 +3,7 @@
 import pytest
 
 from control.records import JOINTS
-from experiments.step_response import step_response
+from experiments.bench.step_response import step_response
 from tests.bench.staged_bench import StagedBench
 
 MOVES = "the flippers go on lying, and each joint trembles by a few degrees, with 0.08 N·m."

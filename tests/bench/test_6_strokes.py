@@ -1,6 +1,6 @@
 """Stage 6: strokes in air."""
 
-from experiments.stroke_tracking import FAST_DEG, FAST_RAD_S, SLOW_DEG, SLOW_RAD_S, stroke_readings
+from experiments.bench.stroke_tracking import FAST_DEG, FAST_RAD_S, SLOW_DEG, SLOW_RAD_S, stroke_readings
 from tests.bench.staged_bench import StagedBench
 
 MOVES = "all joints go to and fro by 25 and 15 degrees, slowly, then as fast as in a walk."

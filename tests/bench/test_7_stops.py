@@ -1,6 +1,6 @@
 """Stage 7: stops from full speed."""
 
-from experiments.stop_check import damping, soft_stop, torque_off
+from experiments.bench.stop_check import damping, soft_stop, torque_off
 from tests.bench.staged_bench import StagedBench
 
 MOVES = "strides are stopped at full speed, softly and by braking; at last torque goes off and the flippers fall."

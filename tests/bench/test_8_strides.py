@@ -1,6 +1,6 @@
 """Stage 8: a walk in air."""
 
-from experiments.stroke_tracking import strides
+from experiments.bench.stroke_tracking import strides
 from tests.bench.staged_bench import StagedBench
 
 MOVES = "the robot walks ten strides in air."

@@ -18,18 +18,18 @@ from command_line.actuator import _applied as applied
 from command_line.actuator import _target as target_of
 from command_line.bench import Desk
 from command_line.main import main
-from experiments.actuator import Show
-from experiments.actuator_bench import Readings
-from experiments.actuator_fit import fit_joint
-from experiments.actuator_friction import QUICK, SLOW
-from experiments.actuator_plan import Plan
-from experiments.actuator_simulation import COULOMB_NM, TRUE_CONSTANT_NM_A
+from experiments.actuator.bench import Readings
+from experiments.actuator.calibration import Show
+from experiments.actuator.fit import fit_joint
+from experiments.actuator.friction import QUICK, SLOW
+from experiments.actuator.plan import Plan
+from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A
 from experiments.bench_robot import BenchError
 from experiments.notebook import Notebook
 from experiments.person import Person, Willing
 from firmware_host.configuration import load_configuration, parse_configuration
 from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
-from tests.experiments.test_actuator_fit import made_entries
+from tests.experiments.actuator.test_fit import made_entries
 from tests.waiting import LONGEST_S
 
 SHORT = (

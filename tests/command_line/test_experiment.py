@@ -18,7 +18,7 @@ import pytest
 import command_line.experiment
 from command_line import exit_codes
 from command_line.main import main
-from experiments.estimation import Plan
+from experiments.estimation.judgement import Plan
 from simulation.clay import MUDS, Clay
 from tests.command_line.command_lines import refusal
 from tests.waiting import LONGEST_S

@@ -10,8 +10,8 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments import faults
-from experiments.faults import Plan, report_of
+from experiments.faults import matrix as faults
+from experiments.faults.matrix import Plan, report_of
 
 CELL: dict[str, Any] = {
     "fault": "drive_quiet", "way": "drive_quiet", "phase": "hold", "seed": 1, "reaction": "damping", "ok": True,

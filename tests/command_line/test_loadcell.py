@@ -12,8 +12,8 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.loadcell_comparison import CompareError, compared_with, load_flipper
-from experiments.loadcell_fits import OfMud
+from experiments.loadcell.comparison import CompareError, compared_with, load_flipper
+from experiments.loadcell.fits import OfMud
 from simulation.clay import clay_of_water
 from simulation.load_cell import measure_shear
 from simulation.load_cell_bench import PAPER_PLATE

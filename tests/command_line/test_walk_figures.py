@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from command_line.walk_figures import logged_walk, walk_figures
-from experiments.trackway_trials import LoggedTime
+from experiments.trackway.trials import LoggedTime
 from firmware_host.configuration import Configuration
 from firmware_host.log_folder import DONE, first_path, log_files
 from firmware_host.log_parameters import LogParameters

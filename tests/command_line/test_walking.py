@@ -12,12 +12,13 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments import depth_sweep, mud_fit, trackway
-from experiments.depth_rule import METHODS
 from experiments.notebook import Notebook
-from experiments.one_mud import constant_walks
-from experiments.paper_table import ADAPTIVE
-from experiments.walk import Walk, WalkedStride
+from experiments.trackway import comparison as trackway
+from experiments.trackway import depth_sweep, mud_fit
+from experiments.trackway.depth_rule import METHODS
+from experiments.trackway.one_mud import constant_walks
+from experiments.trackway.paper_table import ADAPTIVE
+from experiments.trackway.walk import Walk, WalkedStride
 from simulation.clay import MUDS
 from tests.command_line.command_lines import failure, refusal
 

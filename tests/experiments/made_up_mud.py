@@ -6,9 +6,9 @@ from random import Random
 
 import numpy as np
 
-from experiments.curve_fit import Array
-from experiments.loadcell_fits import SHEAR, Recorded
-from experiments.stage_track import Places
+from experiments.loadcell.curve_fit import Array
+from experiments.loadcell.fits import SHEAR, Recorded
+from experiments.loadcell.stage_track import Places
 from simulation.plate_stage import CarriedPlate, PlateStage, StageParameters
 from simulation.stage_motion import HandParameters
 

@@ -9,7 +9,7 @@ import pytest
 from control.modes import Mode
 from control.records import Phase
 from experiments.stride_course import course_of, course_of_row, course_row, slip_m, thinned
-from experiments.walk_course import KEPT, walk_course_of, walk_course_of_row, walk_course_row
+from experiments.walk.walk_course import KEPT, walk_course_of, walk_course_of_row, walk_course_row
 from tests.experiments.made_up_strides import make_course, make_log, make_ticks
 
 STROKE = [Phase.INSERTION] * 30 + [Phase.PAUSE] * 100 + [Phase.STANCE] * 30

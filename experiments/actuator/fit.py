@@ -1,0 +1,215 @@
+"""What the readings of one joint say about its motor: torque constant, offset, friction, and how true its torque is.
+
+Every reading is the mean current I of two approaches, less the tare I₀ of its pass (the mean of the empty arm's before
+and after), and the weight's torque is τ_ext = m g l cos θ at the measured angle. The weights are known better than the
+currents, so the line is fitted as
+
+    I - I₀ = s (τ_ext / k + offset / k)          k_t = 1 / slope, its standard error by the delta method
+
+s = ±1 is the side to which the weights pull. Readings scatter around it; what errs alike in all of them does not show
+there, and is added in squares:
+
+    k_t         the tolerances of lever and weights
+    offset      the tare's own scatter; and what friction bears at rest, which goes out where it is alike from both
+                sides, or with and without a weight: by as much as it is not, it may hide either way
+    friction    is a current, and takes the doubt of k_t with it
+
+RMSE and repeatability are the paper's. Its τ_sense is k_t I with the constant as it is configured, and its RMSE that
+of all readings; what the arm itself weighs is taken off here, which the paper does not tell of. With the fitted
+constant every trial is judged by that of the other trials: so the error is that of a torque never seen. Repeatability
+is the standard deviation over the trials of one weight, relative to its mean, averaged over the weights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from math import cos, hypot, nan, sqrt
+from statistics import fmean, stdev
+from typing import Any, NamedTuple
+
+from estimation.origin_fit import student_factor
+from experiments.actuator.friction import Friction, Loop, friction_of
+from experiments.actuator.line import FEWEST, Line, fit_line
+from experiments.actuator.plan import Plan, Step, steps_of
+
+LIGHT_NM = 0.15  # what lighter loads say of a constant is friction
+Entry = Mapping[str, Any]
+
+
+class Load(NamedTuple):
+    """One weight in one trial."""
+
+    trial: int
+    weight_g: float
+    torque_nm: float  # of the weight at the measured angle
+    current_a: float  # without the tare
+    rest_friction_a: float
+    doubtful: bool  # kept although it did not fit
+
+
+class JointFit(NamedTuple):
+    joint: str
+    loads: tuple[Load, ...]
+    line: Line
+    torque_error: float  # of all torques alike, as a share
+    configured_nm_a: float
+    direction: int  # of the weights' pull: -1 as on a level arm
+    rmse_configured_nm: float
+    rmse_fitted_nm: float  # each trial by the others' constant
+    repeatability: float
+    loops: tuple[Loop, ...]
+    rest_friction_a: float  # of the empty arm
+    tares_a: tuple[float, ...]  # what the empty arm takes
+
+    @property
+    def friction(self) -> Friction:
+        return friction_of(self.loops)
+
+    @property
+    def constant_nm_a(self) -> float:
+        return self.line.constant_nm_a
+
+    @property
+    def constant_error_nm_a(self) -> float:
+        return hypot(self.line.constant_error_nm_a, self.torque_error * self.constant_nm_a)
+
+    @property
+    def offset_nm(self) -> float:
+        return self.line.intercept_a * self.constant_nm_a
+
+    @property
+    def offset_error_nm(self) -> float:
+        tare_error_a = student_factor(len(self.tares_a) - 1) * self._tare_spread_a / sqrt(len(self.tares_a))
+        unlike_a = fmean(load.rest_friction_a for load in self.loads) - self.rest_friction_a
+        return hypot(self.line.intercept_error, tare_error_a, unlike_a / sqrt(3.0)) * self.constant_nm_a
+
+    @property
+    def friction_nm(self) -> tuple[float, float]:
+        """Dry, with its standard error."""
+        return self._in_nm(self.friction.dry_a, self.friction.dry_error_a)
+
+    @property
+    def viscous_nm_s(self) -> tuple[float, float]:
+        return self._in_nm(self.friction.viscous_a_s, self.friction.viscous_error_a_s)
+
+    def _in_nm(self, current_a: float, error_a: float) -> tuple[float, float]:
+        constant_nm_a, constant_error_nm_a = self.constant_nm_a, self.constant_error_nm_a
+        return constant_nm_a * current_a, hypot(constant_nm_a * error_a, constant_error_nm_a * current_a)
+
+    @property
+    def tare_nm(self) -> float:
+        return fmean(self.tares_a) * self.constant_nm_a
+
+    @property
+    def tare_spread_nm(self) -> float:
+        return self._tare_spread_a * self.constant_nm_a
+
+    @property
+    def _tare_spread_a(self) -> float:
+        return stdev(self.tares_a) if len(self.tares_a) > 1 else nan
+
+    def fitted_nm(self, load: Load) -> float:
+        """By the other trials."""
+        return load.current_a * self.constant_without(load.trial)
+
+    def constant_without(self, trial: int) -> float:
+        others = [load for load in self.loads if load.trial != trial]
+        return line_of(others).constant_nm_a if can_fit(others) else self.line.constant_nm_a
+
+
+def loads_of(plan: Plan, entries: Mapping[str, Entry]) -> list[Load]:
+    """Of all weights whose trial has a tare, positive where the motor holds the weight."""
+    raw = raw_loads(plan, entries)
+    sign = -direction_of(raw)
+    return [load._replace(current_a=sign * load.current_a) for load in raw]
+
+
+def raw_loads(plan: Plan, entries: Mapping[str, Entry]) -> list[Load]:
+    """With the joint's own sign of the current."""
+    found = []
+    for step in steps_of(plan):
+        entry, tare_a = entries.get(step.key), tare_of(entries, step.trial)
+        if step.weight_g and entry and "current_a" in entry and tare_a is not None:
+            torque_nm = plan.torque_nm(step.weight_g) * cos(entry["angle_rad"])
+            current_a, doubtful = entry["current_a"] - tare_a, bool(entry.get("doubt"))
+            found.append(Load(step.trial, step.weight_g, torque_nm, current_a, entry["rest_friction_a"], doubtful))
+    return found
+
+
+def tare_of(entries: Mapping[str, Entry], trial: int) -> float | None:
+    """The current of the empty arm: the mean of before and after, or the nearest there is."""
+    beside = [current_a for number in (trial - 1, trial) if (current_a := _tare_a(entries, number)) is not None]
+    if beside:
+        return fmean(beside)
+    earlier = (_tare_a(entries, number) for number in range(trial - 2, -1, -1))
+    return next((current_a for current_a in earlier if current_a is not None), None)
+
+
+def _tare_a(entries: Mapping[str, Entry], trial: int) -> float | None:
+    """None where it was not read, or something may have hung."""
+    entry = entries.get(Step(trial, 0.0).key, {})
+    return None if entry.get("doubt") else entry.get("current_a")
+
+
+def direction_of(loads: Sequence[Load]) -> int:
+    """-1 where weights pull the joint to negative angles, so that the motor's current is positive."""
+    return -1 if sum(load.torque_nm * load.current_a for load in loads) >= 0.0 else 1
+
+
+def current_per_nm(plan: Plan, entries: Mapping[str, Entry]) -> float | None:
+    """Of the heavier weights so far; None where there were none."""
+    loads = [load for load in raw_loads(plan, entries) if load.torque_nm >= LIGHT_NM and not load.doubtful]
+    total_nm = sum(load.torque_nm for load in loads)
+    return abs(sum(load.current_a for load in loads)) / total_nm if loads else None
+
+
+def can_fit(loads: Sequence[Load]) -> bool:
+    return len(loads) >= FEWEST and len({load.weight_g for load in loads}) > 1
+
+
+def line_of(loads: Sequence[Load]) -> Line:
+    """Current on torque. Needs what `can_fit` asks."""
+    return fit_line([load.torque_nm for load in loads], [load.current_a for load in loads])
+
+
+def fit_joint(joint: str, plan: Plan, entries: Mapping[str, Entry], configured_nm_a: float) -> JointFit | None:
+    """None where too little was measured for a line."""
+    loads = [load for load in loads_of(plan, entries) if not load.doubtful]
+    if not can_fit(loads):
+        return None
+    empty = _of_empty_arm(plan, entries)
+    fit = JointFit(
+        joint,
+        tuple(loads),
+        line_of(loads),
+        plan.torque_error,
+        configured_nm_a,
+        direction_of(raw_loads(plan, entries)),
+        _rmse(loads, lambda load: configured_nm_a * load.current_a),
+        nan,
+        repeatability(loads),
+        tuple(Loop(**loop) for entry in empty for loop in entry.get("loops", ())),
+        fmean(entry["rest_friction_a"] for entry in empty),
+        tuple(entry["current_a"] for entry in empty),
+    )
+    constants = {trial: fit.constant_without(trial) for trial in {load.trial for load in loads}}
+    return fit._replace(rmse_fitted_nm=_rmse(loads, lambda load: constants[load.trial] * load.current_a))
+
+
+def _of_empty_arm(plan: Plan, entries: Mapping[str, Entry]) -> list[Entry]:
+    """What counts as tare; at least one entry where there are loads."""
+    empty = (step for step in steps_of(plan) if not step.weight_g)
+    return [entries[step.key] for step in empty if _tare_a(entries, step.trial) is not None]
+
+
+def _rmse(loads: Sequence[Load], sensed_nm: Callable[[Load], float]) -> float:
+    return sqrt(fmean((sensed_nm(load) - load.torque_nm) ** 2 for load in loads))
+
+
+def repeatability(loads: Sequence[Load]) -> float:
+    """See the module; NaN where no weight was read twice. The constant does not matter."""
+    by_weight: dict[float, list[float]] = {}
+    for load in loads:
+        by_weight.setdefault(load.weight_g, []).append(load.current_a)
+    shares = [stdev(currents) / abs(fmean(currents)) for currents in by_weight.values() if len(currents) > 1]
+    return fmean(shares) if shares else nan

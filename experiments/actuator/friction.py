@@ -1,0 +1,106 @@
+"""Friction of a joint in motion: what the current spends on swinging the empty arm to and fro.
+
+At rest dry friction carries anything up to its largest value, and the held joint comes to rest before that: its spring
+pulls in steps of one count of the encoder (0.4 mrad of 10 N·m/rad are 4 mN·m), and a step sets the arm free, which then
+goes on a little. What a reading at rest tells of friction is therefore too little, of 13 mN·m simulated 11. So friction
+is measured where it is whole, on the way. Over a loop that ends where it began, weight, magnets and inertia give back
+what they took, whatever they are, and the rest is friction's:
+
+    k_t ∮ I dθ = c ∮ |dθ| + d ∮ ω dθ         dry c, viscous d
+
+Loops at two speeds tell one from the other: slow ones in short moves, quick ones in a single move each way. A joint
+that stops between two short moves spends nothing meanwhile, so the stops do not count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from math import degrees, hypot, nan, radians, sqrt
+from statistics import fmean, variance
+from typing import NamedTuple
+
+from estimation.origin_fit import student_factor
+from experiments.actuator.reading import QUIET_S, HeldJoint, MovedError, Sample
+
+SWING_RAD = radians(5.0)  # to either side: four and a half periods of the R60's cogging, and the arm stays near level
+SLOW_STEP_RAD = radians(0.6)  # of one move, which takes a tenth of a second
+SLOW, QUICK = 2, 4  # loops of each kind
+TELLING = 3.0  # times the slow loops' speed, from which on the quick ones tell viscous friction
+FEWEST = 3  # loops of a kind that tell how true they are
+
+
+class Loop(NamedTuple):
+    """There and back, once."""
+
+    spent_a: float  # mean over the way
+    speed_rad_s: float  # the same mean, so that it belongs to the current
+    quick: bool
+
+
+class Friction(NamedTuple):
+    """NaN where it was not measured. Errors are those of the loops' scatter, widened where they are few."""
+
+    dry_a: float = nan
+    dry_error_a: float = nan
+    viscous_a_s: float = nan
+    viscous_error_a_s: float = nan
+
+
+def swing(held: HeldJoint) -> list[Loop]:
+    """Loops of both speeds about where the joint is held. Raises MovedError, BenchError, WarmError."""
+    middle_rad = held.held_rad
+    low_rad, high_rad = middle_rad - SWING_RAD, middle_rad + SWING_RAD
+    held.stroke(low_rad, SLOW_STEP_RAD)
+    loops = []
+    for quick in [False] * SLOW + [True] * QUICK:
+        step_rad = 2.0 * SWING_RAD if quick else SLOW_STEP_RAD
+        loops.append(loop_of(held.stroke(high_rad, step_rad), held.stroke(low_rad, step_rad), quick))
+    held.stroke(middle_rad, SLOW_STEP_RAD)
+    return loops
+
+
+def loop_of(up: Sequence[Sample], down: Sequence[Sample], quick: bool) -> Loop:
+    """Of a stroke and the one back, each until it rests. Raises MovedError where it is hardly one."""
+    samples, stroke_rad = [*up, *down], _end_rad(up) - _end_rad(down)
+    if stroke_rad < SWING_RAD:
+        raise MovedError(f"the empty arm swings by {degrees(stroke_rad):.1f} degrees only: is something in its way?")
+    spent_rad_a = sum(
+        (a.current_a + b.current_a) / 2.0 * (b.angle_rad - a.angle_rad)
+        for a, b in pairwise([*samples, samples[0]])  # closed, as the loop would be if it met its beginning
+    )
+    brisk_rad2_s = sum(
+        (b.angle_rad - a.angle_rad) ** 2 / (b.now_s - a.now_s) for a, b in pairwise(samples) if b.now_s > a.now_s
+    )
+    return Loop(spent_rad_a / (2.0 * stroke_rad), brisk_rad2_s / (2.0 * stroke_rad), quick)
+
+
+def _end_rad(stroke: Sequence[Sample]) -> float:
+    """Where it came to rest."""
+    from_s = stroke[-1].now_s - QUIET_S
+    return fmean(sample.angle_rad for sample in stroke if sample.now_s >= from_s)
+
+
+def friction_of(loops: Sequence[Loop]) -> Friction:
+    """Where the quick loops are hardly quicker, all of it counts as dry."""
+    slow, quick = ([loop for loop in loops if loop.quick == kind] for kind in (False, True))
+    if len(slow) < FEWEST:
+        return Friction()
+    slow_a, slow_error_a, slow_rad_s = _mean(slow)
+    if len(quick) < FEWEST:
+        return Friction(slow_a, slow_error_a)
+    quick_a, quick_error_a, quick_rad_s = _mean(quick)
+    if quick_rad_s < TELLING * slow_rad_s:
+        return Friction(slow_a, slow_error_a)
+    between_rad_s = quick_rad_s - slow_rad_s
+    viscous_a_s = (quick_a - slow_a) / between_rad_s
+    dry_error_a = hypot(quick_rad_s * slow_error_a, slow_rad_s * quick_error_a) / between_rad_s
+    viscous_error_a_s = hypot(slow_error_a, quick_error_a) / between_rad_s
+    return Friction(slow_a - viscous_a_s * slow_rad_s, dry_error_a, viscous_a_s, viscous_error_a_s)
+
+
+def _mean(loops: Sequence[Loop]) -> tuple[float, float, float]:
+    """Current, its standard error, and the speed."""
+    currents_a = [loop.spent_a for loop in loops]
+    error_a = student_factor(len(loops) - 1) * sqrt(variance(currents_a) / len(loops))
+    return fmean(currents_a), error_a, fmean(loop.speed_rad_s for loop in loops)

@@ -1,0 +1,262 @@
+"""The report of the actuator calibration: the paper's figure 3 and its numbers beside ours, and what to set where."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from math import degrees, isfinite, nan
+from statistics import fmean, stdev
+from typing import Any
+
+from experiments.actuator.fit import Entry, JointFit, repeatability
+from experiments.actuator.friction import SWING_RAD
+from experiments.actuator.plan import Plan, steps_of
+from experiments.report_page import Figure, Rows, Section
+from experiments.value_text import share_text, value_text
+from firmware_host.reports import known
+
+TITLE = "Actuator calibration"
+CONSTANTS = "Torque constants ± one standard error; RMSE and repeatability by the paper's definitions"
+FRICTION = "Friction and offset ± one standard error"
+PAPER_RMSE_NM = {"adduction": 0.0134, "sweep": 0.0127}
+PAPER_REPEATABILITY = 0.032
+PAPER_CONSTANT_NM_A = 0.083
+
+METHOD = """\
+A motor holds the flipper level while calibration weights hang on it (the paper's section II-B). A trial is one pass
+through all weights, each hung anew; the empty arm is read before and after each pass, and what it takes is taken off.
+The held angle is raised until the loaded arm itself is level, so that every weight has the same lever and meets the
+magnets' cogging in the same place. The place is approached from below and from above: the mean of the two currents is
+the load.
+
+The line is current on torque, since the weights are known better than the currents: k_t is one over its slope.
+Friction is what the empty arm's current spends on loops of {swing_deg:.0f} degrees to either side, in which weight,
+magnets and inertia give back what they took. Slow and quick loops tell dry from viscous. Half the difference between
+the two approaches at rest is less ("at rest at least"): a joint that is held comes to rest before friction bears all
+it can.
+
+± is one standard error; the true value is within two of them in about 19 of 20 calibrations. That of k_t is from the
+scatter of the readings and from what errs alike in all of them: the lever, by at most {lever_mm:g} mm, and the weights,
+by at most {weight_percent:g} % (--lever-tolerance, --weight-tolerance). A millimetre of {lever_cm:g} cm is
+{millimetre_percent:.1f} % of k_t. That of the offset holds the tare's scatter, and what friction at rest may hide."""
+
+DEFINITIONS = """\
+RMSE is by the paper's definition: the root mean square of k_t I - m g l over all readings, with the constant as it is
+configured (the paper's is its manufacturer's) and nothing fitted. It is what stands beside the paper's 0.0134 and
+0.0127, printed there as N/m (section III-A). The paper does not tell whether it took off what the arm itself weighs;
+here that is done. "RMSE fitted" is stricter and not in the paper: each trial by the constant that the other trials
+gave (a single trial by its own). Set that constant, repeat the experiment, and the first will be what the second is.
+
+Repeatability is the paper's as we read it: the standard deviation over the trials of a weight, relative to their mean,
+averaged over the weights. The paper gives one number for both joints. The lightest weights make nearly all of it, as
+the tables by weight show."""
+
+SETTING = """\
+The constant stands in two places, and both must say the same. torque_constant_nm_a of [drive.JOINT] in the
+configuration turns the current that the drive reports into torque: every force and coefficient is proportional to it.
+odrv0.axis0.config.motor.torque_constant in the drive (over USB with odrivetool, then save_configuration) turns the
+torque that is commanded into current. The reported current itself does not depend on either. While only one of them
+is set, the robot feels forces rightly and pushes wrongly, or the other way round.
+
+60/(2π KV) = 0.083 N·m/A for 115 rpm/V is the constant of a motor whose current is counted as direct current. ODrive
+counts the peak of the phase current, for which the same motor gives 8.27/KV = 0.0719. Which holds for these drives is
+what this experiment tells."""
+
+
+def report_of(plan: Plan, readings: Mapping[str, Mapping[str, Entry]], fits: Sequence[JointFit]) -> dict[str, Any]:
+    return {
+        "experiment": "actuator",
+        "plan": plan.notes(),
+        "joints": [_joint_report(fit) for fit in fits],
+        "not_fitted": [joint for joint in plan.joints if joint not in {fit.joint for fit in fits}],
+        "left_out": left_out(plan, readings),
+        "readings": {joint: dict(entries) for joint, entries in readings.items()},
+        "paper": {
+            "rmse_nm": PAPER_RMSE_NM,
+            "repeatability": PAPER_REPEATABILITY,
+            "torque_constant_nm_a": PAPER_CONSTANT_NM_A,
+        },
+    }
+
+
+def _joint_report(fit: JointFit) -> dict[str, Any]:
+    (friction_nm, friction_error_nm), (viscous_nm_s, viscous_error_nm_s) = fit.friction_nm, fit.viscous_nm_s
+    values = {
+        "torque_constant_nm_a": fit.constant_nm_a,
+        "torque_constant_error_nm_a": fit.constant_error_nm_a,
+        "torque_constant_scatter_nm_a": fit.line.constant_error_nm_a,
+        "torque_constant_tolerance_nm_a": fit.torque_error * fit.constant_nm_a,
+        "configured_nm_a": fit.configured_nm_a,
+        "rmse_configured_nm": fit.rmse_configured_nm,
+        "rmse_fitted_nm": fit.rmse_fitted_nm,
+        "paper_rmse_nm": paper_rmse_nm(fit.joint),
+        "repeatability": fit.repeatability,
+        "offset_nm": fit.offset_nm,
+        "offset_error_nm": fit.offset_error_nm,
+        "friction_nm": friction_nm,
+        "friction_error_nm": friction_error_nm,
+        "viscous_nm_s": viscous_nm_s,
+        "viscous_error_nm_s": viscous_error_nm_s,
+        "rest_friction_nm": fit.rest_friction_a * fit.constant_nm_a,
+        "tare_nm": fit.tare_nm,
+        "tare_spread_nm": fit.tare_spread_nm,
+    }
+    told = {name: known(value) for name, value in values.items()}
+    return {"joint": fit.joint, "readings": fit.line.readings, "direction": fit.direction} | told
+
+
+def left_out(plan: Plan, readings: Mapping[str, Mapping[str, Entry]]) -> list[dict[str, Any]]:
+    """What was skipped, or kept with a doubt and not fitted, and why."""
+    return [
+        {"joint": joint, "trial": step.trial, "weight_g": step.weight_g, "why": why}
+        for joint, entries in readings.items()
+        for step in steps_of(plan)
+        if (why := entries.get(step.key, {}).get("skipped") or entries.get(step.key, {}).get("doubt"))
+    ]
+
+
+def paper_rmse_nm(joint: str) -> float:
+    return PAPER_RMSE_NM[joint.split("_")[1]]
+
+
+def sections_of(plan: Plan, readings: Mapping[str, Mapping[str, Entry]], fits: Sequence[JointFit]) -> list[Section]:
+    sections = []
+    if fits:
+        sections.append(Section("Torque constants", DEFINITIONS, rows=table_of(fits), figures=_figures(fits)))
+        figures = _friction_figures(fits)
+        sections.append(Section("Friction and offset", rows=friction_table_of(fits), figures=figures))
+    sections += [Section(f"Weights on {fit.joint}", rows=_weight_rows(fit)) for fit in fits]
+    omitted = left_out(plan, readings)
+    if omitted:
+        rows = [[row["joint"], str(row["trial"]), f"{row['weight_g']:g} g", row["why"]] for row in omitted]
+        sections.append(Section("Left out", rows=[["joint", "trial", "weight", "why"], *rows]))
+    return [*sections, Section("What to set where", SETTING), Section("How it was measured", _method(plan))]
+
+
+def _method(plan: Plan) -> str:
+    return METHOD.format(
+        swing_deg=degrees(SWING_RAD),
+        lever_mm=1000.0 * plan.lever_tolerance_m,
+        weight_percent=100.0 * plan.weight_tolerance,
+        lever_cm=100.0 * plan.lever_m,
+        millimetre_percent=0.1 / plan.lever_m,
+    )
+
+
+def table_of(fits: Sequence[JointFit]) -> Rows:
+    """A line a joint, the paper's numbers last."""
+    head = [
+        "joint",
+        "k_t (N·m/A)",
+        "configured (N·m/A)",
+        "RMSE (N·m)",
+        "RMSE fitted (N·m)",
+        "repeatability",
+        "readings",
+    ]
+    rows = [
+        [
+            fit.joint,
+            value_text(fit.constant_nm_a, fit.constant_error_nm_a),
+            f"{fit.configured_nm_a:g}",
+            f"{fit.rmse_configured_nm:.4f}",
+            f"{fit.rmse_fitted_nm:.4f}",
+            share_text(fit.repeatability),
+            str(fit.line.readings),
+        ]
+        for fit in fits
+    ]
+    paper = [
+        [f"paper, {kind}", "-", f"{PAPER_CONSTANT_NM_A:g}", f"{rmse_nm:.4f}", "-", share_text(PAPER_REPEATABILITY)]
+        for kind, rmse_nm in PAPER_RMSE_NM.items()
+    ]
+    return [head, *rows, *([*row, "-"] for row in paper)]
+
+
+def friction_table_of(fits: Sequence[JointFit]) -> Rows:
+    head = [
+        "joint",
+        "dry friction (N·m)",
+        "viscous (N·m·s)",
+        "at rest at least (N·m)",
+        "offset (N·m)",
+        "empty arm (N·m)",
+    ]
+    rows = [
+        [
+            fit.joint,
+            value_text(*fit.friction_nm),
+            value_text(*fit.viscous_nm_s),
+            f"{fit.rest_friction_a * fit.constant_nm_a:.4f}",
+            value_text(fit.offset_nm, fit.offset_error_nm),
+            value_text(fit.tare_nm, fit.tare_spread_nm),
+        ]
+        for fit in fits
+    ]
+    return [head, *rows]
+
+
+def _weight_rows(fit: JointFit) -> Rows:
+    head = [
+        "weight",
+        "trials",
+        "τ_ext (N·m)",
+        "τ_sense configured (N·m)",
+        "τ_sense fitted (N·m)",
+        "error fitted (mN·m)",
+        "spread fitted (mN·m)",
+        "repeatability",
+    ]
+    rows = []
+    for weight_g in sorted({load.weight_g for load in fit.loads}):
+        loads = [load for load in fit.loads if load.weight_g == weight_g]
+        external_nm = fmean(load.torque_nm for load in loads)
+        configured_nm = fit.configured_nm_a * fmean(load.current_a for load in loads)
+        fitted_nm = fmean(fit.fitted_nm(load) for load in loads)
+        spread_nm = fit.constant_nm_a * stdev(load.current_a for load in loads) if len(loads) > 1 else nan
+        torques = (f"{each:.4f}" for each in (external_nm, configured_nm, fitted_nm))
+        error_mnm = round(1e3 * (fitted_nm - external_nm), 1) + 0.0  # without a minus before zero
+        spread = [f"{1e3 * spread_nm:.1f}" if isfinite(spread_nm) else "-", share_text(repeatability(loads))]
+        rows.append([f"{weight_g:g} g", str(len(loads)), *torques, f"{error_mnm:+.1f}", *spread])
+    return [head, *rows]
+
+
+def _figures(fits: Sequence[JointFit]) -> list[Figure]:
+    from experiments.actuator.plots import plot_errors, plot_torques  # matplotlib takes its time
+
+    return [
+        Figure(
+            "torques",
+            "Torque by the motor's current against the weights' own, as in the paper's figure 3: with the configured"
+            " and with the fitted constant. Grey: where both are equal, give or take the paper's RMSE.",
+            partial(plot_torques, fits),
+        ),
+        Figure(
+            "errors",
+            "What the torque by the fitted constant misses, each trial by the constant of the others; the bar is the"
+            " mean of the trials. Grey band: the paper's RMSE, which is that of its configured constant.",
+            partial(plot_errors, fits),
+        ),
+    ]
+
+
+def _friction_figures(fits: Sequence[JointFit]) -> list[Figure]:
+    """None of readings without loops."""
+    if not all(fit.loops for fit in fits):
+        return []
+    from experiments.actuator.plots import plot_friction  # matplotlib takes its time
+
+    return [
+        Figure(
+            "friction",
+            "Torque that the empty arm takes on loops at two speeds, beyond what weight, magnets and inertia give back:"
+            " each loop, and the line whose height at zero is dry friction and whose slope is viscous. Dotted: what"
+            " is borne at rest. The paper leaves friction out.",
+            partial(plot_friction, fits),
+        ),
+    ]
+
+
+def text_of(fits: Sequence[JointFit]) -> list[tuple[str, Rows]]:
+    """Titles and tables for the screen."""
+    return [(CONSTANTS, table_of(fits)), (FRICTION, friction_table_of(fits))]

@@ -1,0 +1,125 @@
+"""The simulated bench of the actuator calibration: a flipper over its edge, motors as imperfect as real ones, a hand.
+
+The motor's true constant is 8.27/KV of the R60, while the configuration has the paper's 60/(2π KV); the calibration
+must find that. Its imperfections are those of direct-drive motors of this size, as far as they are public:
+
+    cogging     0.026 N·m from peak to peak of a gimbal-class motor without current, measured with a torque transducer
+                (J. Pieper, "Measuring torque ripple", jpieper.com/tag/torque), 168 periods a turn by the R60's 24 slots
+                and 28 magnets (motor_config_R60.h on os.mbed.com, users/adimmit)
+    friction    no figure is public; the paper neglects it, so it is set to as much as the cogging's amplitude
+    current     noise of 0.1 to 0.3 A in the authors' logs (simulation/disturbances.py)
+    encoder     14 bits, as of the R60's public ODrive settings (YaelBenShalom/Motorized-Prosthetic-Arm)
+
+A hook is never twice in quite the same place of the arm. How far it misses is an estimate, and calibration weights of
+class M1 are truer than all of this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from random import Random
+
+from control.records import JOINTS
+from experiments.actuator.fit import JointFit
+from experiments.actuator.plan import Plan, Step
+from experiments.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.person import GO_ON
+from experiments.trial import BENCH_CURRENT_A
+from experiments.value_text import miss_text
+from firmware_host.configuration import Configuration
+from firmware_host.file_recorder import FileRecorder
+from simulation.bench_mount import BenchMount
+from simulation.lockstep import Lockstep, drives_of, plant_of
+from simulation.track import paper_track
+
+TRUE_CONSTANT_NM_A = 8.27 / 115.0
+COGGING_NM, COGGING_PER_TURN = 0.013, 168
+COULOMB_NM = 0.013
+CURRENT_NOISE_A = 0.2
+ENCODER_NOISE_RAD = 1e-4  # a quarter of a count
+BENCH_TORQUE_NM = 1.4  # what BENCH_CURRENT_A give by either constant
+HANGING_S, HANGING_PARTS = 1.0, 20  # until a weight hangs quietly, and in how many steps it comes down
+LEVER_SD_M = 0.0003
+
+
+def bench_configuration() -> Configuration:
+    """That of the simulated robot, with the current limit of the authors' drives at their single flipper."""
+    sections = f"[limits]\ntorque_nm = {BENCH_TORQUE_NM}\n\n[recovery]\nattempts = 0  # no mud holds a flipper here\n"
+    return simulated_configuration(sections, drive=f"current_limit_a = {BENCH_CURRENT_A}")
+
+
+def truth_rows(fits: Sequence[JointFit]) -> list[list[str]]:
+    """A table: what is true of the simulated motors, and by how much the fitted misses it."""
+    rows = [["joint", "true k_t (N·m/A)", "k_t misses by", "true dry friction (N·m)", "dry friction misses by"]]
+    for fit in fits:
+        constant = [f"{TRUE_CONSTANT_NM_A:.5f}", miss_text(fit.constant_nm_a, TRUE_CONSTANT_NM_A)]
+        rows.append([fit.joint, *constant, f"{COULOMB_NM:.4f}", miss_text(fit.friction_nm[0], COULOMB_NM)])
+    return rows
+
+
+def simulated_bench(
+    configuration: Configuration, joint: str, plan: Plan, seed: int, log: Path
+) -> tuple[LockstepRobot, SimulatedHand]:
+    """A robot with a flipper over the bench's edge, and the hand beside it. `log` must be new."""
+    random = Random(f"bench {seed} {joint}")
+    recorder = FileRecorder(log, configuration)
+    plant = plant_of(configuration, fixed_base=True, joint_coulomb_nm=COULOMB_NM)
+    drives = {
+        name: drives_of(
+            configuration,
+            torque_constant_error=TRUE_CONSTANT_NM_A / drive.torque_constant_nm_a - 1.0,
+            cogging_nm=COGGING_NM,
+            cogging_per_turn=COGGING_PER_TURN,
+            cogging_phase_deg=random.uniform(-180.0, 180.0),
+            current_noise_a=CURRENT_NOISE_A,
+            encoder_noise_rad=ENCODER_NOISE_RAD,
+        )[name]
+        for name, drive in configuration.drive.items()
+    }
+    lockstep = Lockstep(configuration, paper_track(), seed, recorder, plant=plant, drives=drives)
+    return LockstepRobot(lockstep, recorder), SimulatedHand(lockstep, joint, plan, seed)
+
+
+class SimulatedHand:
+    """A Hand. Owns what the simulated arms are mounted on."""
+
+    lingers_s = 0.0
+
+    def __init__(self, lockstep: Lockstep, joint: str, plan: Plan, seed: int) -> None:
+        self._lockstep = lockstep
+        self._plan = plan
+        self._random = Random(f"hand {seed}")
+        self._arms = lockstep.robot.plant.arms
+        for arm in self._arms:
+            arm.mount = BenchMount(on_side=joint.endswith("sweep"), held=True)
+            arm.put_back()
+        mount = self._arms[JOINTS.index(joint) // 2].mount
+        assert mount is not None
+        self.mount = mount
+
+    def hold_level(self, joint: str, meanwhile: Callable[[], None]) -> None:
+        self.mount.take_off()
+        for arm in self._arms:
+            arm.put_back()
+        self._hold(True)
+
+    def let_go(self, meanwhile: Callable[[], None]) -> None:
+        self._hold(False)
+
+    def _hold(self, held: bool) -> None:
+        for arm in self._arms:
+            assert arm.mount is not None
+            arm.mount.held = held
+
+    def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
+        """Gently: what is dropped on the arm swings it down to its end."""
+        before_kg, lever_m = self.mount.mass_kg, self._plan.lever_m + self._random.gauss(0.0, LEVER_SD_M)
+        for part in range(1, HANGING_PARTS + 1):
+            more_kg = (step.weight_g / 1000.0 - before_kg) * part / HANGING_PARTS
+            self.mount.hang(before_kg + more_kg, lever_m)
+            self._lockstep.run_for(HANGING_S / HANGING_PARTS)
+        return GO_ON
+
+    def take_off(self) -> None:
+        self.mount.take_off()

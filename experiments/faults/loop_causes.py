@@ -1,0 +1,141 @@
+"""What goes wrong in the loop itself and beside it: heat that it reckons, bugs, stalls, the log, the daemon."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from math import nan
+from typing import Any
+
+from control.modes import Mode, Request
+from control.records import Estimate, StrideEstimate
+from estimation.mud import MudReading
+from experiments.faults.bench import FaultBench
+from experiments.faults.causes import Cause
+
+
+@contextmanager
+def hung_up(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Who has promised to attend the robot goes away; where torque is off, right behind an arm."""
+    bench.loop.lease.renew("somebody", bench.now_s, 10.0)
+    if bench.loop.mode is Mode.IDLE:
+        bench.loop.request(Request.ARM, bench.now_s)
+    bench.loop.lease.hang_up("somebody")
+    yield
+
+
+def writer_tells(**changes: Any) -> Cause:
+    @contextmanager
+    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
+        before = bench.rows.told
+        bench.rows.told = before._replace(**changes)
+        yield
+        bench.rows.told = before
+
+    return cause
+
+
+@contextmanager
+def writer_lost_rows(bench: FaultBench, joint: str) -> Iterator[None]:
+    bench.rows.dropped += 3
+    yield
+
+
+@contextmanager
+def port_lost_frames(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Of the port behind the one that may fail on purpose."""
+    port = bench.loop.drives.ports[bench.loop.configuration.drive[joint].bus]
+    vars(port).get("_port", port).lost_frames += 3
+    yield
+
+
+def heated(temperature_c: float) -> Cause:
+    """It cools as slowly as it is reckoned to."""
+
+    @contextmanager
+    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
+        bench.winding(joint).temperature_c = temperature_c
+        yield
+
+    return cause
+
+
+@contextmanager
+def gains_of_nan(bench: FaultBench, joint: str) -> Iterator[None]:
+    controller = bench.loop.controller
+    before = controller.gains
+    controller.gains = replace(before, sweep_stiffness_nm_rad=nan, adduction_damping_nm_s_rad=nan)
+    yield
+    controller.gains = before
+
+
+@contextmanager
+def five_newton_metres(bench: FaultBench, joint: str) -> Iterator[None]:
+    """A bug that goes past every limit, to the wire."""
+    next(axis for axis in bench.loop.drives.axes if axis.joint == joint).send_torque(5.0)
+    yield
+
+
+def stands(ticks: int) -> Cause:
+    @contextmanager
+    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
+        bench.stands_still = ticks
+        yield
+
+    return cause
+
+
+@contextmanager
+def wild_stride(bench: FaultBench, joint: str) -> Iterator[None]:
+    """The next sample closes a stride with a coefficient of 10²⁰ N/m³."""
+    estimator = bench.loop.learning.estimator
+    true_update = estimator.update
+    wild = Estimate(1e20, 1.0, 100, True)
+    stride = StrideEstimate(
+        "left", 0, 0.0, 1.0, 0.4, 0.3, 0.1, wild, wild, wild, 0.0, 0.03, True, 1.0, 1.0, -1.0, 0.1
+    )  # fmt: skip
+
+    def update(*arguments: Any) -> MudReading:
+        del estimator.__dict__["update"]  # once
+        return true_update(*arguments)._replace(strides=(stride,))
+
+    estimator.__dict__["update"] = update
+    yield
+
+
+# the daemon
+
+
+@contextmanager
+def killed(bench: FaultBench, joint: str) -> Iterator[None]:
+    bench.dead = True
+    yield
+
+
+@contextmanager
+def nothing(bench: FaultBench, joint: str) -> Iterator[None]:
+    yield
+
+
+class DeliberateBugError(Exception):
+    pass
+
+
+def bug_in(path: str) -> Cause:
+    """The next call of what `path` names in the loop raises."""
+
+    @contextmanager
+    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
+        *owners, method = path.split(".")
+        part: Any = bench.loop
+        for owner in owners:
+            part = getattr(part, owner)
+
+        def broken(*arguments: Any, **options: Any) -> Any:
+            raise DeliberateBugError(path)
+
+        setattr(part, method, broken)
+        yield
+
+    return cause

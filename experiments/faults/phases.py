@@ -1,0 +1,128 @@
+"""Where in its work a robot is when something is made to fail: at rest, arming, in every phase of a stride, stopping.
+
+Each phase brings a robot from power-on to a moment within it, later by a random number of ticks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from random import Random
+
+from control.controller import WalkOrder
+from control.joint_watch import FaultBounds
+from control.modes import Mode, Request
+from control.records import Phase
+from control.recovery import RecoveryParameters
+from experiments.faults.bench import FaultBench
+from experiments.trial import WALKING, configuration_of
+from firmware_host.configuration import Configuration
+from simulation.clay import MUDS, Clay
+from simulation.track import Track
+
+LENGTH_M = 5.0
+HOLDING_CLAY = Clay("9 kPa", 9000.0)  # in which an insertion of 5 cm leaves the flippers stuck
+DEEP = WalkOrder(0.05, adaptive=False)
+FIRST_DEPTH_M = 0.03
+LONGEST_WAY_S = 8.0
+STRIDE_TICKS = {  # of the random delay into a phase of the gait: at most about two thirds of it
+    Phase.INSERTION: 100,
+    Phase.STANCE: 60,
+    Phase.EXTRACTION: 20,
+    Phase.SWING: 200,
+}
+SHORT_RECOVERY = RecoveryParameters(attempts=1, grace_s=0.05, pause_s=0.05, attempt_s=0.2)
+
+GAIT = ("insertion", "stance", "extraction", "swing")
+AWAKE = ("arming", "hold", *GAIT, "stopping")
+EVERYWHERE = ("idle", *AWAKE)
+PHASES = (*EVERYWHERE, "recovery")
+
+
+def bench_for(phase: str, random: Random, hopeless: bool = False) -> FaultBench:
+    """From power-on. In recovery the flippers are stuck; if `hopeless`, the robot soon gives them up."""
+    clay = HOLDING_CLAY if phase == "recovery" else random.choice(list(MUDS.values()))
+    configuration = _configuration(hopeless)
+    return FaultBench(configuration, Track([(LENGTH_M, clay)]), random.getrandbits(31))
+
+
+def _configuration(hopeless: bool) -> Configuration:
+    """With the bounds of a real robot: those of simulations in real time leave a busy machine its pauses."""
+    configuration = replace(configuration_of(WALKING), faults=FaultBounds())
+    return replace(configuration, recovery=SHORT_RECOVERY) if hopeless else configuration
+
+
+def bring(bench: FaultBench, phase: str, random: Random) -> None:
+    """Raises RuntimeError where it does not come to that."""
+    _WAYS[phase](bench, random)
+
+
+def _to_idle(bench: FaultBench, random: Random) -> None:
+    loop = bench.loop
+    _reach(bench, "idle", lambda: loop.mode is Mode.IDLE and not loop.faults.blocking())
+    _wait(bench, random, 100)
+
+
+def _to_arming(bench: FaultBench, random: Random) -> None:
+    """From the tick on before the drives are asked into closed loop: some take one tick, none more than 38."""
+    _to_idle(bench, random)
+    bench.loop.request(Request.ARM, bench.now_s)
+    for _ in range(random.randint(0, 8)):
+        if bench.loop.mode is not Mode.HOLD:
+            bench.step()
+
+
+def _to_hold(bench: FaultBench, random: Random) -> None:
+    bench.arm()
+    _wait(bench, random, 250)
+
+
+def _to_walk(bench: FaultBench, random: Random) -> None:
+    bench.arm()
+    bench.walk(WalkOrder(FIRST_DEPTH_M))
+
+
+def _to_phase_of_gait(phase: Phase) -> Callable[[FaultBench, Random], None]:
+    def way(bench: FaultBench, random: Random) -> None:
+        _to_walk(bench, random)
+        _reach(bench, phase.name.lower(), lambda: bench.loop.controller.target.phase is phase)
+        delay = random.randint(0, STRIDE_TICKS[phase])
+        for _ in range(delay):
+            bench.step()
+
+    return way
+
+
+def _to_stopping(bench: FaultBench, random: Random) -> None:
+    _to_phase_of_gait(random.choice((Phase.INSERTION, Phase.STANCE)))(bench, random)
+    bench.loop.request(Request.STOP, bench.now_s)
+    bench.step()
+    _wait(bench, random, 60)
+
+
+def _to_recovery(bench: FaultBench, random: Random) -> None:
+    bench.arm()
+    bench.walk(DEEP)
+    _reach(bench, "recovery", lambda: bench.loop.controller.target.phase is Phase.RECOVERY)
+    if bench.loop.configuration.recovery != SHORT_RECOVERY:
+        _wait(bench, random, 400)
+
+
+def _reach(bench: FaultBench, phase: str, there: Callable[[], bool]) -> None:
+    if not bench.run_until(there, LONGEST_WAY_S):
+        raise RuntimeError(f"never came to {phase}: {bench.loop.mode.name}, {bench.loop.fault}")
+
+
+def _wait(bench: FaultBench, random: Random, most_ticks: int) -> None:
+    for _ in range(random.randint(0, most_ticks)):
+        bench.step()
+
+
+_WAYS: dict[str, Callable[[FaultBench, Random], None]] = {
+    "idle": _to_idle,
+    "arming": _to_arming,
+    "hold": _to_hold,
+    **{phase.name.lower(): _to_phase_of_gait(phase) for phase in STRIDE_TICKS},
+    "stopping": _to_stopping,
+    "recovery": _to_recovery,
+}

@@ -1,0 +1,165 @@
+"""The coefficients of trials whose place was measured, by the same words as those of experiments/loadcell/fits.py.
+
+Depths are the encoder's, from the surface that the force tells; the depth that was set is believed only of a shear.
+Forces count as at the speed that was set.
+"""
+
+from __future__ import annotations
+
+from math import hypot, nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from control.plate import submerged_part
+from experiments.loadcell.alignment import Alignment, PlacedCourse, rate_of
+from experiments.loadcell.contact import Course, StrokeError
+from experiments.loadcell.curve_fit import Array
+from experiments.loadcell.fits import (
+    NOT_KNOWN,
+    RESIDUAL_NOISES,
+    RESIDUAL_SHARE,
+    SHEAR,
+    SHIFT,
+    Analysed,
+    Coefficient,
+    Recorded,
+    slope,
+    steadiness,
+    volume_m3,
+)
+from experiments.loadcell.motion import REVERSAL_SHARE, Extraction, Insertion, Pace, Shear, StageSettings
+from experiments.loadcell.position import LEAST_SAMPLES, Mask, MeasuredInsertion, find_insertion, find_shear
+from experiments.loadcell.stage_track import LEAST_PLACES, StageTrack
+
+DEPTH_BOUND = 0.1  # from the depth that was set, beyond which it is said
+EVEN_DEPTHS = 60
+LAST_SHARE = 0.3
+
+
+def analyse_measured(trial: Recorded, course: Course, settings: StageSettings, expected: Alignment) -> Analysed:
+    """Raises StrokeError where the place does not tell."""
+    if trial.places is None or len(trial.places.times_s) < LEAST_PLACES:
+        raise StrokeError("the encoder told hardly any place")
+    placed = PlacedCourse(course, StageTrack(trial.places), settings)
+    return (_shear if trial.kind == SHEAR else _insertion)(trial, placed, expected)
+
+
+def _insertion(trial: Recorded, placed: PlacedCourse, expected: Alignment) -> Analysed:
+    motion, course, settings = find_insertion(placed, expected), placed.course, placed.settings
+    unsure_m = hypot(motion.surface_std_error_m, placed.track.interpolation_error_m)
+    told_n, rates = course.forces_n - motion.level_n, expected.rate_doubt * placed.quickness(motion.alignment.lag_s)
+    told = {"k_p": _slope(motion, settings, told_n, motion.down, motion.deepest_m, unsure_m, rates)}
+    extraction, remark = None, _insertion_remark(course, motion, settings)
+    if np.count_nonzero(motion.up) >= LEAST_SAMPLES:
+        unsure_m = hypot(unsure_m, motion.mean_speed_m_s * motion.alignment.lag_doubt_s)
+        to_m = (1.0 - REVERSAL_SHARE) * motion.deepest_m
+        told_n = motion.up_level_n - course.forces_n
+        told["k_e"] = _slope(motion, settings, told_n, motion.up, to_m, unsure_m, rates)
+        extraction = Extraction(motion.lift_s, motion.out_s, motion.up_level_n, nan)
+    else:
+        told["k_e"], remark = NOT_KNOWN, "no extraction: the encoder did not see the plate come up. Was it drawn out?"
+    return Analysed(
+        trial,
+        course,
+        _as_insertion(motion),
+        extraction,
+        told,
+        remark=remark,
+        shared_doubt=_rate_doubt(motion, motion.down | motion.up, rates),
+        places_m=motion.depths_m,
+        place_error_m=unsure_m,
+        alignment=motion.alignment,
+    )
+
+
+def _by_depth(motion: MeasuredInsertion, chosen: Mask) -> NDArray[np.intp]:
+    return np.flatnonzero(chosen)[np.argsort(motion.depths_m[chosen], kind="stable")]
+
+
+def _rate_doubt(motion: MeasuredInsertion, chosen: Mask, rates: Array) -> float:
+    """Of k. `rates`: shares by which it is in doubt what the mud bears at each sample's speed."""
+    order = _by_depth(motion, chosen)
+    depths_m = motion.depths_m[order]
+    return abs(float(np.average(rates[order], weights=depths_m * np.clip(np.gradient(depths_m), 1e-9, None))))
+
+
+def _slope(
+    motion: MeasuredInsertion,
+    settings: StageSettings,
+    forces_n: Array,
+    chosen: Mask,
+    to_m: float,
+    unsure_m: float,
+    rates: Array,
+) -> Coefficient:
+    """From the surface to `to_m`, every piece of way alike wherever the hand has rested."""
+    order = _by_depth(motion, chosen)
+    depths_m, told_n = motion.depths_m[order], forces_n[order] / motion.grips[order]
+    unsure = hypot(SHIFT * unsure_m / to_m, _rate_doubt(motion, chosen, rates))
+    doubt = slope(settings, depths_m, told_n, to_m, unsure).std_error
+    even_m = to_m * (np.arange(EVEN_DEPTHS) + 0.5) / EVEN_DEPTHS
+    even_n = np.interp(even_m, np.append(0.0, depths_m), np.append(0.0, told_n))
+    last = depths_m > depths_m[-1] - LAST_SHARE * to_m
+    if np.count_nonzero(last) > 2:  # down to where the stage stopped, by the line of the last piece
+        line = np.polyfit(depths_m[last], told_n[last], 1)
+        even_n = np.where(even_m > depths_m[-1], np.polyval(line, even_m), even_n)
+    volumes_m3 = volume_m3(settings, even_m)
+    return Coefficient(float(volumes_m3 @ even_n / (volumes_m3 @ volumes_m3)), doubt)
+
+
+def _insertion_remark(course: Course, motion: MeasuredInsertion, settings: StageSettings) -> str:
+    largest_n = float(np.max(np.abs(course.forces_n[motion.down] - motion.level_n)))
+    if abs(motion.deepest_m / settings.depth_m - 1.0) > DEPTH_BOUND:
+        return (
+            f"the plate went {100.0 * motion.deepest_m:.1f} cm deep by the encoder, and {100.0 * settings.depth_m:g} "
+            "cm was set: coefficients of one mud differ with the depth, or --position-step is not its way per count"
+        )
+    if motion.residual_n > max(RESIDUAL_NOISES * course.noise_n, RESIDUAL_SHARE * largest_n):
+        return (
+            f"the force is {motion.residual_n:.3f} N off one that grows with the measured depth: the mud has lumps, or "
+            "the encoder slips"
+        )
+    return ""
+
+
+def _as_insertion(motion: MeasuredInsertion) -> Insertion:
+    """As the force alone would have told it; a hand has no ramp."""
+    return Insertion(
+        surface_s=motion.surface_s,
+        surface_std_error_s=motion.surface_std_error_m / motion.mean_speed_m_s,
+        stop_s=motion.stop_s,
+        pace=Pace(motion.mean_speed_m_s, nan, nan, nan),
+        level_n=motion.level_n,
+        jump_n=nan,
+        rise_n=nan,
+        slowing_n=nan,
+        residual_n=motion.residual_n,
+    )
+
+
+def _shear(trial: Recorded, placed: PlacedCourse, expected: Alignment) -> Analysed:
+    motion, course, settings = find_shear(placed, expected.lag_s), placed.course, placed.settings
+    zero_n = -trial.zero_n if course.turned else trial.zero_n
+    felt_n, quickness = (course.forces_n - zero_n)[motion.steady], motion.quickness[motion.steady]
+    ways_m = np.clip(np.gradient(motion.ways_m[motion.steady]), 1e-9, None)
+    forces_n = felt_n / (1.0 + expected.rate_share * quickness)
+    mean_n = float(np.average(forces_n, weights=ways_m))
+    if mean_n <= 0.0:
+        raise StrokeError("the force does not oppose the motion")
+    rate_n = mean_n * expected.rate_doubt * float(np.average(quickness, weights=ways_m))
+    error_n, remark = steadiness(forces_n)
+    moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
+    steady_s = course.times_s[motion.steady]
+    return Analysed(
+        trial,
+        course,
+        Shear(motion.begin_s, float(steady_s[0]), float(steady_s[-1]), motion.mean_speed_m_s),
+        None,
+        {"k_s": Coefficient(mean_n / moment_m3, hypot(error_n, rate_n) / moment_m3)},
+        remark=remark,
+        shared_doubt=abs(rate_n) / mean_n,
+        places_m=motion.ways_m,
+        place_error_m=placed.track.interpolation_error_m,
+        alignment=rate_of(felt_n, quickness),
+    )

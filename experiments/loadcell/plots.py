@@ -1,0 +1,198 @@
+"""The load cell's trials as pictures: force and depth against time with the fits, coefficients, and the flipper's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
+import numpy as np  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
+
+from control.plate import submerged_part  # noqa: E402
+from experiments.loadcell.comparison import Compared  # noqa: E402
+from experiments.loadcell.curve_fit import Array  # noqa: E402
+from experiments.loadcell.fits import (  # noqa: E402
+    COEFFICIENTS,
+    Analysed,
+    OfMud,
+    depths_of,
+    volume_m3,
+)
+from experiments.loadcell.motion import REVERSAL_SHARE, Insertion, Shear, StageSettings  # noqa: E402
+from experiments.mud_looks import INK, LABELS, looks_of, mark_of  # noqa: E402
+from experiments.mud_names import mud_text  # noqa: E402
+from experiments.value_text import N_CM3  # noqa: E402
+
+COLOURS = ("tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:cyan")
+MODEL: dict[str, Any] = {"color": "tab:red", "linestyle": (0, (5, 2)), "linewidth": 1.8, "zorder": 5}
+BEFORE_S, BEHIND_S = 0.3, 0.4
+SHOWN_ABOVE_M = 0.01  # the mud
+DPI = 110
+
+
+def plot_mud(trials: Sequence[Analysed], told: Mapping[str, OfMud], settings: StageSettings, path: Path) -> None:
+    """All trials of one mud, each from its own beginning on; the model is that of the mud's coefficients."""
+    figure, axes = plt.subplots(2, 2, figsize=(12.0, 7.2), constrained_layout=True, height_ratios=(1.5, 1.0))
+    (vertical, shear), (depth, curve) = axes
+    for panel in (vertical, shear, curve):
+        panel.axhline(0.0, color="grey", linewidth=0.6)
+    strokes = [trial for trial in trials if isinstance(trial.motion, Insertion)]
+    for i, trial in enumerate(strokes):
+        _plot_insertion(vertical, depth, curve, trial, settings, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
+    if strokes:
+        _plot_vertical_model(vertical, curve, strokes[-1], told, settings)
+    drags = [trial for trial in trials if isinstance(trial.motion, Shear)]
+    over_way = bool(drags) and all(trial.is_measured for trial in drags)
+    for i, trial in enumerate(drags):
+        _plot_shear(shear, trial, over_way, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
+    if drags:
+        _plot_shear_model(shear, drags[-1], over_way, told["k_s"], settings)
+    _name_axes(vertical, shear, depth, curve)
+    _name_places(shear, depth, curve, over_way, {trial.is_measured for trial in strokes})
+    figure.savefig(path, dpi=DPI)
+    plt.close(figure)
+
+
+def _plot_insertion(
+    vertical: Axes, depth: Axes, curve: Axes, trial: Analysed, settings: StageSettings, colour: str, label: str
+) -> None:
+    motion, course, depths_m = trial.motion, trial.course, depths_of(trial, settings)
+    assert isinstance(motion, Insertion) and course is not None and depths_m is not None
+    end_s = course.times_s[-1] if trial.extraction is None else trial.extraction.out_s
+    shown = (course.times_s > motion.surface_s - BEFORE_S) & (course.times_s < end_s + BEHIND_S)
+    since_s, forces_n = course.times_s[shown] - motion.surface_s, course.forces_n[shown] - motion.level_n
+    depths_cm = 100.0 * np.where(depths_m[shown] < -SHOWN_ABOVE_M, np.nan, depths_m[shown])
+    look: dict[str, Any] = {"color": colour, "linewidth": 1.0}
+    vertical.plot(since_s, forces_n, label=label, **look)
+    depth.plot(since_s, depths_cm, **look)
+    wet = depths_cm >= -0.2
+    curve.plot(depths_cm[wet], forces_n[wet], **look)
+
+
+def _plot_vertical_model(
+    vertical: Axes, curve: Axes, trial: Analysed, told: Mapping[str, OfMud], settings: StageSettings
+) -> None:
+    """Against time along the depths of the trial."""
+    motion, course, trial_m = trial.motion, trial.course, depths_of(trial, settings)
+    assert isinstance(motion, Insertion) and course is not None and trial_m is not None
+    since_s, even_m = course.times_s - motion.surface_s, np.linspace(0.0, settings.depth_m, 40)
+    strokes = [("k_p", 1.0, 1.0, motion.surface_s, motion.stop_s)]
+    if trial.extraction is not None:
+        strokes.append(("k_e", -1.0, 1.0 - REVERSAL_SHARE, trial.extraction.lift_s, trial.extraction.out_s))
+    for name, sign, share, from_s, to_s in strokes:
+        per_m3, within = sign * told[name].value, (trial_m >= 0.0) & (trial_m <= share * np.nanmax(trial_m))
+        shown = within & (course.times_s >= from_s) & (course.times_s <= to_s)
+        label = "model" if name == "k_p" else None
+        vertical.plot(since_s[shown], per_m3 * volume_m3(settings, trial_m[shown]), label=label, **MODEL)
+        curve.plot(100.0 * share * even_m, per_m3 * volume_m3(settings, share * even_m), **MODEL)
+
+
+def _plot_shear(panel: Axes, trial: Analysed, over_way: bool, colour: str, label: str) -> None:
+    motion, course = trial.motion, trial.course
+    assert isinstance(motion, Shear) and course is not None
+    zero_n = -trial.recorded.zero_n if course.turned else trial.recorded.zero_n
+    shown = course.times_s > motion.begin_s - BEFORE_S
+    along = _ways_cm(trial) if over_way else course.times_s - motion.begin_s
+    panel.plot(along[shown], course.forces_n[shown] - zero_n, color=colour, linewidth=1.0, label=label)
+
+
+def _ways_cm(trial: Analysed) -> Array:
+    return np.asarray(100.0 * trial.places_m) if trial.places_m is not None else np.empty(0)
+
+
+def _plot_shear_model(panel: Axes, trial: Analysed, over_way: bool, told: OfMud, settings: StageSettings) -> None:
+    motion, course = trial.motion, trial.course
+    assert isinstance(motion, Shear) and course is not None
+    moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
+    along = np.array([motion.steady_from_s, motion.steady_to_s])
+    along = np.interp(along, course.times_s, _ways_cm(trial)) if over_way else along - motion.begin_s
+    panel.plot(along, [told.value * moment_m3] * 2, label="model", **MODEL)
+
+
+def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:
+    vertical.set_title("insertion, hold, extraction", fontsize="medium")
+    shear.set_title("horizontal shear", fontsize="medium")
+    vertical.set_ylabel("force on the plate (N), up positive")
+    shear.set_ylabel("force against the drag (N)")
+    depth.set_ylabel("depth (cm)")
+    depth.invert_yaxis()
+    curve.set_ylabel("force (N)")
+    curve.set_xlabel("depth (cm)")
+    depth.sharex(vertical)
+    depth.set_xlabel("time since the surface (s)")
+    for panel in (vertical, shear):
+        if panel.get_legend_handles_labels()[0]:
+            panel.legend(fontsize="small", loc="upper right" if panel is vertical else "lower center", ncols=2)
+
+
+def _name_places(shear: Axes, depth: Axes, curve: Axes, over_way: bool, measured: set[bool]) -> None:
+    found = "as measured" if measured == {True} else "as found from the force"
+    found = "measured or found from the force" if len(measured) == 2 else found
+    depth.set_title(f"depth, {found}", fontsize="medium")
+    curve.set_title("force over the measured depth" if measured == {True} else "force over depth", fontsize="medium")
+    shear.set_xlabel("measured way of the stage (cm)" if over_way else "time since the force began (s)")
+
+
+def plot_coefficients(muds: Mapping[str, Mapping[str, OfMud]], path: Path) -> None:
+    """Mean with two standard errors, and every trial beside it."""
+    figure, panels = plt.subplots(1, 3, figsize=(11.0, 3.6), constrained_layout=True)
+    names, looks = list(muds), looks_of(list(muds))
+    for panel, name in zip(panels, COEFFICIENTS, strict=True):
+        for place, mud in enumerate(names):
+            told = muds[mud][name]
+            values = np.array(told.trials) / N_CM3
+            panel.plot(place + 0.18 + np.zeros(len(values)), values, ".", color="grey", markersize=4)
+            doubt = 2.0 * told.std_error / N_CM3
+            panel.errorbar(place, told.value / N_CM3, doubt, linestyle="", ecolor=INK, capsize=3, **mark_of(looks[mud]))
+        panel.set_xticks(range(len(names)), [mud_text(name) for name in names])
+        panel.set_xlim(-0.6, len(names) - 0.4)
+        panel.set_ylim(0.0, None)
+        panel.set_xlabel("mud")
+        panel.set_ylabel(f"{LABELS[name]} (N/cm³)")
+    figure.savefig(path, dpi=DPI)
+    plt.close(figure)
+
+
+def plot_comparison(rows: Sequence[Compared], path: Path) -> None:
+    """As the paper's figure 5 G to I: the flipper's against the load cell's, and the line on which both agree."""
+    figure, panels = plt.subplots(1, 3, figsize=(11.0, 3.9), constrained_layout=True)
+    looks = looks_of(list(dict.fromkeys(row.mud for row in rows)))
+    for panel, name in zip(panels, COEFFICIENTS, strict=True):
+        of_name = [row for row in rows if row.coefficient == name]
+        reach = 1.05 * max([_farthest(row) / N_CM3 for row in of_name], default=1.0)
+        panel.plot([0.0, reach], [0.0, reach], color="grey", linewidth=1.2, zorder=0)
+        for row in of_name:
+            _plot_pair(panel, row, looks[row.mud])
+        panel.set_xlim(0.0, reach)
+        panel.set_ylim(0.0, reach)
+        panel.set_aspect("equal")
+        panel.set_xlabel(f"{LABELS[name]} by load cell (N/cm³)")
+        panel.set_ylabel("by the flipper (N/cm³)")
+    panels[0].legend(fontsize="small", title="mud", loc="upper left")
+    figure.savefig(path, dpi=DPI)
+    plt.close(figure)
+
+
+def _farthest(row: Compared) -> float:
+    """Up or to the right, with its error."""
+    return max(row.sensed + 2.0 * row.sensed_std_error, row.truth + 2.0 * row.truth_std_error)
+
+
+def _plot_pair(panel: Axes, row: Compared, look: dict[str, Any]) -> None:
+    panel.errorbar(
+        row.truth / N_CM3,
+        row.sensed / N_CM3,
+        xerr=2.0 * row.truth_std_error / N_CM3,
+        yerr=2.0 * row.sensed_std_error / N_CM3,
+        linestyle="",
+        ecolor=INK,
+        lolims=row.at_least,
+        capsize=3,
+        label=mud_text(row.mud),
+        **mark_of(look),
+    )

@@ -1,0 +1,67 @@
+"""How a walking robot comes to its insertion depth: one for all strides, or chosen by a method of adaptation.
+
+A constant depth and the method "paper" are the paper's robot, the latter with the paper's estimator. Every other
+method is this project's robot, with all that it has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple, cast, get_args
+
+from control.adaptation import Method
+from control.controller import WalkOrder
+from control.recovery import RecoveryParameters
+from experiments.trackway.walk import Walk, WalkedStride, walk
+from experiments.trial import WALKING, configuration_of
+from firmware_host.configuration import Configuration
+from simulation.disturbances import LAB
+from simulation.track import Track
+
+METHODS: tuple[str, ...] = get_args(Method)
+PAPER = "paper"
+
+
+class DepthRule(NamedTuple):
+    name: str
+    depth_m: float  # of every stride; of the first one where a method chooses
+    method: str = ""  # empty: constant
+
+    @property
+    def order(self) -> WalkOrder:
+        return WalkOrder(self.depth_m, adaptive=bool(self.method))
+
+
+def constant_depth(depth_m: float) -> DepthRule:
+    return DepthRule(f"{100.0 * depth_m:g} cm", depth_m)
+
+
+def chosen_by(method: str, name: str = "") -> DepthRule:
+    """Raises ValueError for a method that there is not."""
+    if method not in METHODS:
+        raise ValueError(f"method {method!r}: must be one of {', '.join(METHODS)}")
+    return DepthRule(name or method, configuration_of(WALKING).adaptation.initial_depth_m, method)
+
+
+def configuration_for(rule: DepthRule) -> Configuration:
+    configuration = configuration_of(WALKING)
+    if not rule.method:
+        return _papers_robot(configuration)
+    adaptation = replace(configuration.adaptation, method=cast(Method, rule.method))
+    configuration = replace(configuration, adaptation=adaptation)
+    return _papers_robot(configuration) if rule.method == PAPER else configuration
+
+
+def _papers_robot(configuration: Configuration) -> Configuration:
+    """Its estimator; its gait does not wait for a flipper that the mud holds."""
+    return replace(
+        configuration,
+        estimation=replace(configuration.estimation, method="paper"),
+        recovery=RecoveryParameters(attempts=0),
+    )
+
+
+def walk_by(rule: DepthRule, track: Track, seed: int, done: Callable[[Sequence[WalkedStride]], bool]) -> Walk:
+    """In the mud and with the drives of the authors' logs."""
+    return walk(configuration_for(rule), track, rule.order, seed, done, LAB)

@@ -1,0 +1,225 @@
+"""The robot walks over several muds and maps their coefficients, after the paper's sections II-D and III-C.
+
+Each trial is one walk at a fixed depth over all the muds, each stride beside the mud in which its plate went down and
+slipped: by the body's place since the start of the trial, or, where no pose is told, by the order of strides. Then,
+where there is a soft mud, short walks in it at 3 and 5 cm: there the paper shows that what a flipper feels while the
+body moves is the body's drag and not the mud's strength. Every method of estimation sees the same log.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import accumulate, chain
+from math import ceil
+from typing import Any
+
+from experiments.bench_robot import (
+    RAISING_S,
+    UNDER_WAY,
+    Status,
+    arm,
+    follow_walk,
+    rest,
+    strides_made,
+    strides_since,
+    told_by,
+    wait_until,
+    walk,
+)
+from experiments.error_table import COEFFICIENTS
+from experiments.estimation_methods import COMPENSATED, DEFAULT, PAPER, method_of, strides_by_method
+from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError, conduct_trials
+from experiments.notebook import Entry
+from experiments.side_by_side import Show
+from experiments.stride_course import course_of, course_row, slip_m, thinned
+from experiments.trackway.trials import Mud, reach_of
+from experiments.walk.known_surface import strides_with_known_surface
+from experiments.walk.walk_course import walk_course_of, walk_course_row
+from firmware_host.log_reader import Log
+
+MUDS = tuple(Mud(name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
+SOFT = ("53.1", "51.2")  # figure 7 has the first, called 53.8 % there; the other yields at 3 cm and holds at 5 cm here
+SOFT_DEPTHS_M = (0.03, 0.05)
+METHODS = (DEFAULT, PAPER, COMPENSATED)
+BORDER_M = 0.03  # a plate that comes nearer to a border than this may be in either mud
+LOST_S = 2.0  # without a pose, in a walk that began with one
+STUCK_S, ADVANCED_M = 60.0, 0.03
+SLIPPING = 4  # times as many strides as a robot needs that never slips
+SHOWN_STRIDE = 2  # of a walk in soft mud, counted from 0: the first ones start from a standing body
+
+
+@dataclass(frozen=True)
+class Plan:
+    muds: tuple[Mud, ...] = MUDS
+    trials: int = 3  # as the paper
+    depth_m: float = 0.03
+    soft: tuple[str, ...] = ()  # muds in which to walk at SOFT_DEPTHS_M
+    soft_strides: int = 4
+    flipper: str = "right"
+    simulated: bool = False
+
+    @property
+    def kept(self) -> dict[str, Any]:
+        """What may not change where an experiment goes on."""
+        return {
+            "experiment": "walk",
+            "muds": [[mud.name, mud.length_m] for mud in self.muds],
+            "depth_m": self.depth_m,
+            "soft": list(self.soft),
+            "soft_strides": self.soft_strides,
+            "flipper": self.flipper,
+            "simulated": self.simulated,
+        }
+
+    @property
+    def planned(self) -> list[PlannedTrial]:
+        over = " ".join(mud.name for mud in self.muds)
+        walks = [PlannedTrial(f"walk/{number}", over, number, self.trials) for number in range(1, self.trials + 1)]
+        return walks + [
+            PlannedTrial(soft_key(mud, depth_m, number), soft_name(mud, depth_m), number, self.trials)
+            for mud in self.soft
+            for depth_m in SOFT_DEPTHS_M
+            for number in range(1, self.trials + 1)
+        ]
+
+    @property
+    def length_m(self) -> float:
+        return sum(mud.length_m for mud in self.muds)
+
+    @property
+    def borders_m(self) -> list[float]:
+        """The ends of all muds but the last."""
+        return list(accumulate(mud.length_m for mud in self.muds))[:-1]
+
+    def mud_at(self, plates_m: float, slip_m: float = 0.0) -> str:
+        """Where a plate goes down and slips back; empty behind the last mud, and too near to a border."""
+        rear_m, front_m = plates_m - slip_m - BORDER_M, plates_m + BORDER_M
+        if plates_m >= self.length_m or any(rear_m < border_m < front_m for border_m in self.borders_m):
+            return ""
+        return self.muds[sum(plates_m >= border_m for border_m in self.borders_m)].name
+
+
+def soft_name(mud: str, depth_m: float) -> str:
+    return f"{mud} at {100.0 * depth_m:g} cm"
+
+
+def soft_key(mud: str, depth_m: float, number: int) -> str:
+    return f"soft {soft_name(mud, depth_m)}/{number}"
+
+
+def run(bench: Bench, plan: Plan, show: Show) -> None:
+    """Every trial that is not in the notebook. Raises BenchError."""
+    conduct_trials(bench, plan.planned, lambda trial: measure(bench, plan, trial), show)
+
+
+def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
+    """One walk. Raises SpoiltTrialError, BenchError."""
+    depths = {soft_key(mud, depth_m, trial.number): depth_m for mud in plan.soft for depth_m in SOFT_DEPTHS_M}
+    if trial.key in depths:
+        return _walk_in_soft(bench, plan, trial, depths[trial.key])
+    return _walk_over(bench, plan, trial)
+
+
+def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
+    robot = bench.robot
+    arm(robot, bench.person)
+    before: Status = robot.call("status")
+    start_m = before["body_x_m"]
+    remarks = [] if start_m is not None else ["no pose is told: strides are given to the muds by their order"]
+    ordered, end = _follow(bench, plan, start_m)
+    after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
+    if after["mode"] != "hold":
+        raise SpoiltTrialError(told_by(after))
+    made = strides_made(strides_since(robot, before["strides_closed"]))
+    log = robot.record(before["now_s"], after["now_s"])
+    entry = _entry(bench, plan, trial, log, before["strides_closed"])
+    course = walk_course_row(walk_course_of(log, plan.flipper))
+    entry |= {"start_m": start_m, "course": course, "remarks": remarks + [end] * bool(end)}
+    arm_m = robot.configuration.geometry.flipper_length_m
+    for stride in chain.from_iterable(entry["strides"].values()):
+        stride["slip_m"] = slip_m(course_of(log, plan.flipper, stride["t_start_s"]), arm_m)
+    if after["notice"]:
+        raise SpoiltTrialError(after["notice"], entry)
+    if end is None and made < ordered:
+        raise SpoiltTrialError(f"somebody stopped the walk in stride {made + 1}", entry)
+    return entry
+
+
+def _follow(bench: Bench, plan: Plan, start_m: float | None) -> tuple[int, str | None]:
+    """Walk until the plates go down behind the last mud: how many strides at most, and what it was stopped for.
+
+    Nothing is said of its proper end, and None where it was not stopped from here.
+    """
+    robot = bench.robot
+    reach_m = reach_of(robot.configuration)
+    strides = ceil(plan.length_m / (2.0 * reach_m))  # without a pose no more: they cannot lead beyond the end
+    ordered = strides if start_m is None else SLIPPING * strides
+    robot.call("walk", depth_m=plan.depth_m, strides=ordered)
+    length_m = plan.length_m - reach_m
+    end, _ = follow_walk(robot, lambda now_s: Advance(start_m, length_m, now_s).judge)
+    return ordered, end
+
+
+class Advance:
+    """Owns how far a walk has come. Without a place to begin with, it goes on until its strides are done."""
+
+    def __init__(self, start_m: float | None, length_m: float, now_s: float) -> None:
+        self._start_m = start_m
+        self._length_m = length_m
+        self._farthest_m = start_m or 0.0
+        self._seen_s = self._advanced_s = now_s
+
+    def judge(self, status: Status) -> str | None:
+        """None while the walk is to go on; then why it ends, or nothing at its proper end. Raises SpoiltTrialError."""
+        now_s, body_m = status["now_s"], status["body_x_m"]
+        if self._start_m is None:
+            return None
+        if body_m is None:
+            self._miss(now_s)
+            return None
+        self._seen_s = now_s
+        if body_m > self._farthest_m + ADVANCED_M:
+            self._farthest_m, self._advanced_s = body_m, now_s
+        if body_m - self._start_m >= self._length_m and status["phase"] == "insertion":
+            return ""
+        if now_s - self._advanced_s > STUCK_S:
+            return f"the robot came no farther than {100.0 * (self._farthest_m - self._start_m):.0f} cm"
+        return None
+
+    def _miss(self, now_s: float) -> None:
+        if now_s - self._seen_s > LOST_S:
+            raise SpoiltTrialError("the body's place is not told any more: see that motion capture sees the robot")
+
+
+def require_mud(strides: Sequence[Mapping[str, Any]], flipper: str) -> None:
+    """Raises SpoiltTrialError where no stride told of any."""
+    if not strides:
+        raise SpoiltTrialError(f"the daemon closed no stride of the {flipper} flipper")
+    if not any(stride[name]["valid"] for stride in strides for name in COEFFICIENTS):
+        raise SpoiltTrialError("no stride met mud: look how high the axes are (geometry.axis_height_m)")
+
+
+def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float) -> Entry:
+    robot = bench.robot
+    arm(robot, bench.person)
+    before: Status = robot.call("status")
+    walked = walk(robot, depth_m, plan.soft_strides)
+    log = robot.record(walked.from_s, walked.to_s)
+    entry = _entry(bench, plan, trial, log, before["strides_closed"])
+    own = entry["strides"][method_of(robot.configuration.estimation)]
+    shown = own[min(SHOWN_STRIDE, len(own) - 1)]
+    course = thinned(course_of(log, plan.flipper, shown["t_start_s"]))
+    return entry | {"depth_m": depth_m, "course": course_row(course), "remarks": []}
+
+
+def _entry(bench: Bench, plan: Plan, trial: PlannedTrial, log: Log, closed: int) -> Entry:
+    """What all walks have. Raises SpoiltTrialError."""
+    robot = bench.robot
+    rest(robot)  # what follows takes longer on a slow computer than the robot is left alone
+    told = strides_since(robot, closed)
+    strides = strides_by_method(told, log, robot.configuration, plan.flipper, METHODS)
+    own = strides[method_of(robot.configuration.estimation)]
+    require_mud(own, plan.flipper)
+    strides |= strides_with_known_surface(strides[DEFAULT], log, robot.configuration, plan.flipper)
+    return {"trial": trial.number, "strides": strides, "truths": bench.bed.truths(plan.flipper)}

@@ -1,0 +1,210 @@
+"""The walks over several muds as pictures, after the paper's figures 6 and 7."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+
+from control.records import Phase
+from estimation.mud import PAPER_DRAG_N
+from experiments.coefficient_table import PER_CM3
+from experiments.error_table import COEFFICIENTS
+from experiments.estimation_methods import COMPENSATED, DEFAULT, PAPER
+from experiments.mud_looks import DOTS_PER_INCH, GREY, INK, LABELS
+from experiments.mud_names import mud_text
+from experiments.notebook import Entry
+from experiments.stride_course import course_of_row
+from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
+from experiments.walk.measurement import Plan
+from experiments.walk.report import PlacedStride
+from experiments.walk.walk_course import WalkCourse, walk_course_of_row
+
+THIN: dict[str, Any] = {"linewidth": 0.8}
+METHOD_LOOKS: dict[str, dict[str, Any]] = {
+    DEFAULT: {"color": "tab:blue", "marker": "o"},
+    PAPER: {"color": "tab:red", "marker": "x"},
+    COMPENSATED: {"color": "tab:orange", "marker": "+"},
+}
+BARS = {
+    KNOWN: ("paper's law", None),  # in the colour of its depth, as in the paper
+    KNOWN_COMPENSATED: ("paper's law\nwith drag", "tab:green"),
+    DEFAULT: ("default", "tab:purple"),
+}
+LEGEND: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "fontsize": "small", "frameon": False}
+HEADROOM = 2.0  # of the largest true or own value: what lies higher is drawn at the edge
+DEPTH_LOOKS: dict[float, dict[str, Any]] = {
+    3.0: {"color": "tab:orange", "linestyle": "--"},  # as in the paper
+    5.0: {"color": "tab:blue", "linestyle": "-"},
+}
+
+
+def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[PlacedStride], reach_m: float, path: Path) -> None:
+    """Place, forces and coefficients of one walk against time: figure 6."""
+    course = walk_course_of_row(walk["course"])
+    own = [each for each in strides if each.trial == walk["trial"]]
+    begun_s = float(course.time_s[0])
+    borders_s = _borders_s(plan, walk, course, own, reach_m)
+    figure, panels = plt.subplots(6, 1, figsize=(9.0, 11.0), sharex=True, constrained_layout=True)
+    _plot_place(panels[0], walk, course, begun_s)
+    _plot_force(panels[1], course, course.force_x_n, begun_s, "$f_x$ forward (N)")
+    upward_n = np.where(course.phase == Phase.STANCE, np.nan, course.force_z_n)
+    _plot_force(panels[2], course, upward_n, begun_s, "$f_z$ up (N)")
+    for panel, name in zip(panels[3:], COEFFICIENTS, strict=True):
+        _plot_coefficient(panel, plan, name, own, begun_s)
+    for letter, panel in zip("ABCDEF", panels, strict=True):
+        panel.set_title(letter, loc="left", fontsize="medium", fontweight="bold")
+        for border_s in borders_s:
+            panel.axvline(border_s - begun_s, color=INK, linewidth=1.0)
+    _name_muds(panels[0], plan, [begun_s, *borders_s, float(course.time_s[-1])], begun_s)
+    panels[0].set_xlim(0.0, float(course.time_s[-1]) - begun_s)
+    panels[-1].set_xlabel("time (s)")
+    figure.savefig(path, dpi=DOTS_PER_INCH)
+    plt.close(figure)
+
+
+def _borders_s(plan: Plan, walk: Entry, course: WalkCourse, own: Sequence[PlacedStride], reach_m: float) -> list[float]:
+    """When the plates first went down behind each border; by the strides' order where there is no pose."""
+    found = []
+    for border_m in plan.borders_m:
+        if walk["start_m"] is None:
+            beyond = [each.stride["t_start_s"] for each in own if each.plates_m >= border_m]
+        else:
+            there = np.flatnonzero(course.body_m - walk["start_m"] + reach_m >= border_m)
+            beyond = [float(course.time_s[there[0]])] if len(there) else []
+        found += beyond[:1]
+    return found
+
+
+def _name_muds(panel: Axes, plan: Plan, edges_s: Sequence[float], begun_s: float) -> None:
+    for mud, start_s, end_s in zip(plan.muds, edges_s, edges_s[1:], strict=False):
+        middle_s = (start_s + end_s) / 2.0 - begun_s
+        panel.annotate(mud_text(mud.name), (middle_s, 1.02), xycoords=("data", "axes fraction"), ha="center")
+
+
+def _plot_place(panel: Axes, walk: Entry, course: WalkCourse, begun_s: float) -> None:
+    panel.set_ylabel("body (cm)")
+    if walk["start_m"] is None:
+        panel.text(0.5, 0.5, "no pose was told", transform=panel.transAxes, ha="center", color=GREY)
+        return
+    panel.plot(course.time_s - begun_s, 100.0 * (course.body_m - walk["start_m"]), color=INK, linewidth=1.2)
+
+
+def _plot_force(panel: Axes, course: WalkCourse, force_n: Any, begun_s: float, label: str) -> None:
+    """Coloured by phase, as in the paper: the line is grey outside of the strokes."""
+    time_s = course.time_s - begun_s
+    panel.plot(time_s, force_n, color="#bbbbbb", **THIN)
+    for phase, colour, style in (
+        (Phase.INSERTION, "tab:blue", "-"),
+        (Phase.STANCE, "tab:green", "--"),
+        (Phase.EXTRACTION, "tab:orange", "-."),
+    ):
+        told = np.where(course.phase == phase, force_n, np.nan)
+        if np.isfinite(told).any():
+            panel.plot(time_s, told, style, color=colour, linewidth=1.3, label=phase.name.lower())
+    panel.set_ylabel(label)
+    panel.legend(ncols=3, **LEGEND)
+
+
+def _plot_coefficient(panel: Axes, plan: Plan, name: str, own: Sequence[PlacedStride], begun_s: float) -> None:
+    """Triangles are lower bounds; the dashed lines are the load cell's."""
+    methods = [method for method in METHOD_LOOKS if method != COMPENSATED or name == "k_s"]
+    told = [each for each in own if each.method in methods and each.stride[name]["valid"]]
+    truths = [each.truth.get(name) for each in own]
+    tallest = max([t for t in truths if t] or [each.stride[name]["value"] for each in told] or [1.0])
+    top = HEADROOM * PER_CM3 * tallest
+    for each in told:
+        estimate, look = each.stride[name], METHOD_LOOKS[each.method]
+        value = PER_CM3 * estimate["value"]
+        doubt = 2.0 * PER_CM3 * estimate["std_error"] if each.method == DEFAULT else None
+        marker = "^" if estimate["at_least"] else ("$\\uparrow$" if value > top else look["marker"])
+        panel.errorbar(each.stride["t_end_s"] - begun_s, min(value, 0.97 * top), doubt, linestyle="",
+                       color=look["color"], marker=marker, markersize=6.0, linewidth=1.0)  # fmt: skip
+    _plot_truth(panel, plan, name, own, begun_s)
+    for method in methods:
+        look = METHOD_LOOKS[method]
+        panel.plot([], [], color=look["color"], marker=look["marker"], linestyle="", label=method)
+    if any(each.stride[name]["at_least"] for each in told):
+        panel.plot([], [], color=METHOD_LOOKS[DEFAULT]["color"], marker="^", linestyle="", label="at least")
+    panel.set_ylim(0.0, top)
+    panel.set_ylabel(f"{LABELS[name]}\n(N/cm³)")
+    panel.legend(ncols=5, **LEGEND)
+
+
+def _plot_truth(panel: Axes, plan: Plan, name: str, own: Sequence[PlacedStride], begun_s: float) -> None:
+    """Over each mud, from its first stride to its last."""
+    label = "load cell"
+    for mud in plan.muds:
+        there = [each for each in own if each.mud == mud.name and each.truth.get(name)]
+        if there:
+            level = PER_CM3 * float(np.median([each.truth[name] for each in there]))
+            start_s = min(each.stride["t_start_s"] for each in there) - begun_s
+            end_s = max(each.stride["t_end_s"] for each in there) - begun_s
+            panel.plot([start_s, end_s], [level, level], "--", color=GREY, linewidth=1.8, label=label)
+            label = "_"
+
+
+# figure 7
+
+
+def plot_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]], path: Path) -> None:
+    """f_x in one stance at each depth, and k_s by method beside the load cell's: figure 7."""
+    figure, (forces, bars) = plt.subplots(1, 2, figsize=(11.0, 4.2), width_ratios=(1.0, 1.5), constrained_layout=True)
+    for depth_cm, trials in walks.items():
+        _plot_stance(forces, depth_cm, trials[0])
+    forces.axhline(PAPER_DRAG_N / 2.0, color=GREY, linewidth=1.2, linestyle=":",
+                   label=f"half of the paper's {PAPER_DRAG_N:g} N of body drag")  # fmt: skip
+    forces.set_xlabel("time in stance (s)")
+    forces.set_ylabel("$f_x$ of one flipper (N)")
+    forces.set_ylim(bottom=0.0)
+    forces.legend(fontsize="small", loc="lower right")
+    forces.set_title(f"A   mud {mud_text(soft['mud'])}", loc="left", fontsize="medium")
+    _plot_bars(bars, soft)
+    figure.savefig(path, dpi=DOTS_PER_INCH)
+    plt.close(figure)
+
+
+def _plot_stance(panel: Axes, depth_cm: float, trial: Entry) -> None:
+    course = course_of_row(trial["course"])
+    stance = course.during(Phase.STANCE)
+    time_s = course.time_s[stance]
+    look = DEPTH_LOOKS.get(depth_cm, {"color": INK})
+    panel.plot(time_s - time_s[0], course.force_x_n[stance], linewidth=1.4, label=f"z = {depth_cm:g} cm", **look)
+
+
+def _plot_bars(panel: Axes, soft: Mapping[str, Any]) -> None:
+    """The paper's bars, the default method's and the load cell's; a bound is hatched."""
+    deepest_first = sorted(soft["depths"], key=lambda each: -each["depth_cm"])
+    names: list[str] = []
+    for method, (words, colour) in BARS.items():
+        for each in deepest_first[:1] if method == KNOWN_COMPENSATED else deepest_first:
+            own = DEPTH_LOOKS.get(each["depth_cm"], {"color": INK})["color"]
+            _plot_bar(panel, len(names), each["k_s"].get(method), colour or own)
+            names.append(f"{words}\n{each['depth_cm']:g} cm")
+    for each in deepest_first:
+        told = None if each["truth"] is None else {"value": each["truth"], "repeatability": None, "at_least": False}
+        _plot_bar(panel, len(names), told, "#d9d9d9")
+        names.append(f"load cell\n{each['depth_cm']:g} cm")
+    panel.set_xticks(range(len(names)), names, fontsize="small")
+    panel.set_ylabel("$k_s$ (N/cm³)")
+    panel.margins(y=0.12)
+    panel.set_ylim(bottom=0.0)
+    panel.set_title("B   $k_s$ by method", loc="left", fontsize="medium")
+
+
+def _plot_bar(panel: Axes, place: int, told: Mapping[str, Any] | None, colour: str) -> None:
+    if told is None or told["value"] is None:
+        panel.text(place, 0.0, "-", ha="center", va="bottom")
+        return
+    value, bound = PER_CM3 * told["value"], told["at_least"]
+    sd = value * (told["repeatability"] or 0.0)
+    panel.bar(place, value, 0.7, color="white" if bound else colour, edgecolor=colour if bound else INK, linewidth=1.0,
+              hatch="//" if bound else "")  # fmt: skip
+    if sd:
+        panel.errorbar(place, value, sd, color=INK, capsize=4, linestyle="")
+    text = f"{'≥ ' if bound else ''}{value:.3f}"
+    panel.text(place, value + sd, text, ha="center", va="bottom", fontsize="small")

@@ -1,0 +1,46 @@
+"""The walking robot's trackway in the simulator: fresh copies of it along one track, and behind them the soft muds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from experiments.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.mud_trials import MOST_ATTEMPTS, PlannedTrial
+from experiments.simulated_bed import CarriedBed, simulated_bench
+from experiments.walk.measurement import Plan
+from simulation.clay import clay_of_water
+from simulation.disturbances import LAB, Disturbances
+from simulation.motion_capture import OF_THE_PAPER
+from simulation.track import Track
+
+BEHIND_M = 0.5  # the last mud goes on behind its end, so that no stride meets the next copy
+PLACE_M, STRIP_M = 2.0, 1000.0  # of a walk in soft mud, of each such mud
+SECTIONS = f"[estimation]\nsurface_error_m = {LAB.surface_sd_m}  # as an operator would see it\n"
+
+
+def walking_bench(
+    folder: Path, plan: Plan, seed: int, disturbances: Disturbances = LAB
+) -> tuple[LockstepRobot, CarriedBed]:
+    """Over the plan's muds, named after their water. Raises ValueError for one that there is not."""
+    lengths_m = [mud.length_m for mud in plan.muds]
+    lengths_m[-1] += BEHIND_M
+    trackway = [(length_m, clay_of_water(float(mud.name))) for length_m, mud in zip(lengths_m, plan.muds, strict=True)]
+    copies = MOST_ATTEMPTS * plan.trials
+    soft = [(STRIP_M, clay_of_water(float(mud))) for mud in plan.soft]
+    robot, lockstep = simulated_bench(
+        folder,
+        simulated_configuration(SECTIONS),
+        Track(trackway * copies + soft),
+        seed,
+        fixed_base=False,
+        disturbances=disturbances,
+        motion_capture=OF_THE_PAPER,
+    )
+
+    def place_m(trial: PlannedTrial, prepared: int) -> float:
+        if trial.key.startswith("walk/"):
+            return prepared * sum(lengths_m)
+        strip = next(i for i, mud in enumerate(plan.soft) if trial.key.startswith(f"soft {mud} "))
+        return copies * sum(lengths_m) + STRIP_M * strip + PLACE_M * (prepared + 1)
+
+    return robot, CarriedBed(robot, lockstep, place_m)

@@ -1,0 +1,114 @@
+"""A weight on an arm that a motor holds: however a calibration ends, it is asked for before the torque goes off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.actuator.bench import FALLS, RobotBench
+from experiments.actuator.plan import Plan
+from experiments.bench_errors import BenchError, GoneError, OverruledError
+from experiments.bench_robot import ALONE
+from tests.experiments.still_robot import StillRobot
+from tests.scripted_person import ScriptedPerson
+
+HOLD_IT = "Take off what hangs and hold the flipper: torque goes off."
+PLAN = Plan(("right_adduction",), weights_g=(50.0,), trials=1)
+
+
+class HoldingRobot(StillRobot):
+    """A BenchRobot that holds a joint, until it is told to let go."""
+
+    def __init__(self, trouble: BenchError | None = None) -> None:
+        super().__init__("hold")
+        self.trouble = trouble
+
+    def call(self, method: str, **params: Any) -> Any:
+        if self.trouble:
+            raise self.trouble
+        if method == "disarm":
+            self.mode = "idle"
+        return {"mode": self.mode, "faults": [], "now_s": self.now_s}
+
+    def wait(self, duration_s: float) -> None:
+        super().wait(duration_s)
+        if self.trouble:
+            raise self.trouble
+
+
+class Impatient(ScriptedPerson):
+    """Presses Ctrl-C where a question stands."""
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        self.asked.append(question)
+        raise KeyboardInterrupt
+
+
+class Holding(ScriptedPerson):
+    """Sees that the motor holds until they do."""
+
+    def __init__(self, robot: HoldingRobot) -> None:
+        super().__init__()
+        self.robot = robot
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        assert self.robot.mode == "hold"
+        return super().ask(question, answers, meanwhile)
+
+
+def test_what_hangs_is_taken_off_before_an_interrupted_calibration_lets_go(tmp_path: Path) -> None:
+    robot = HoldingRobot()
+    person = Holding(robot)
+    RobotBench(robot).leave(tmp_path, person)
+    assert len(person.asked) == 1 and person.asked[0].endswith(HOLD_IT)
+    assert robot.mode == "idle" and robot.closed
+
+
+def test_who_presses_ctrl_c_again_has_the_torque_off_at_once(tmp_path: Path) -> None:
+    robot, person = HoldingRobot(), Impatient()
+    with pytest.raises(KeyboardInterrupt):
+        RobotBench(robot).leave(tmp_path, person)
+    assert len(person.asked) == 1
+    assert robot.mode == "idle" and robot.closed
+
+
+def test_of_a_robot_that_holds_nothing_nobody_is_asked(tmp_path: Path) -> None:
+    robot, person = HoldingRobot(), ScriptedPerson()
+    robot.mode = "idle"
+    RobotBench(robot).leave(tmp_path, person)
+    assert not person.asked and robot.closed
+
+
+def test_a_robot_that_somebody_has_taken_over_is_not_let_go_of(tmp_path: Path) -> None:
+    robot, person = HoldingRobot(OverruledError("taken over: uid 1")), ScriptedPerson()
+    with pytest.raises(OverruledError):
+        RobotBench(robot).leave(tmp_path, person)
+    assert not person.asked and robot.mode == "hold" and robot.closed
+    assert person.told == ["the robot is left as it is to whoever has taken it over"]
+
+
+def test_a_daemon_that_is_gone_is_told_once_and_what_the_robot_does_then(tmp_path: Path) -> None:
+    robot, person = HoldingRobot(GoneError("the daemon is gone")), ScriptedPerson()
+    with pytest.raises(GoneError):
+        RobotBench(robot).leave(tmp_path, person)
+    assert person.told == [ALONE] and not person.asked
+
+
+def test_that_what_hangs_may_fall_is_told_before_a_joint_is_mounted_on_which_something_will_hang(
+    tmp_path: Path,
+) -> None:
+    robot, person = HoldingRobot(), Impatient()
+    robot.mode = "idle"
+    with pytest.raises(KeyboardInterrupt):
+        RobotBench(robot).calibrate(PLAN, tmp_path, person, lambda done, total: None)
+    assert person.told == [FALLS] and "Mount the robot" in person.asked[0]
+
+
+def test_a_robot_that_holds_already_lets_go_before_a_joint_is_mounted(tmp_path: Path) -> None:
+    robot, person = HoldingRobot(), Impatient()
+    with pytest.raises(KeyboardInterrupt):
+        RobotBench(robot).calibrate(PLAN, tmp_path, person, lambda done, total: None)
+    assert person.asked == [f"The robot holds its pose. {HOLD_IT}"]

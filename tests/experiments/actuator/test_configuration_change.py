@@ -1,0 +1,108 @@
+"""A configuration file is changed in place: only what was asked for, at once, never to something wrong."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from experiments.actuator.configuration_change import changed_text, difference, replace_file
+from experiments.bench_robot import BenchError
+from firmware_host.configuration import parse_configuration
+from simulation.local_setup import CONFIGURATION
+
+LOCAL = CONFIGURATION.format(left='"l"', right='"r"', logs='"logs"', status='"s"', pose='""')
+CONSTANT = ("drive", "right_sweep", "torque_constant_nm_a")
+FRICTION = ("friction", "right_sweep", "coulomb_nm")
+
+
+def test_a_value_is_changed_and_nothing_else(example_text: str) -> None:
+    after = changed_text(example_text, {CONSTANT: 0.0721})
+    changed = [pair for pair in zip(example_text.splitlines(), after.splitlines(), strict=True) if pair[0] != pair[1]]
+    assert changed == [("torque_constant_nm_a = 0.083", "torque_constant_nm_a = 0.0721")]
+    assert parse_configuration(after).drive["right_sweep"].torque_constant_nm_a == 0.0721
+
+
+def test_a_new_key_stands_with_its_own_table_above_what_is_said_of_the_next_one() -> None:
+    lines = changed_text(LOCAL, {("drive", "right_adduction", "torque_constant_nm_a"): 0.072}).splitlines()
+    place = lines.index("torque_constant_nm_a = 0.072")
+    assert lines[place - 1] == "sign = 1" and lines[place + 1 : place + 3] == [
+        "", "# As a calibration of these joints would show.",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", [LOCAL, "example"])
+def test_a_new_table_is_made_where_there_is_none(text: str, example_text: str) -> None:
+    before = example_text if text == "example" else text.replace("[friction.right_sweep]\nviscous_nm_s = 0.002\n", "")
+    after = changed_text(before, {CONSTANT: 0.0721, FRICTION: 0.012})
+    assert parse_configuration(after).friction["right_sweep"].coulomb_nm == 0.012
+    kept = [line for line in before.splitlines() if line and line not in after.splitlines()]
+    assert kept == []
+    comments = [line for line in before.splitlines() if line.startswith("#")]
+    assert [line for line in after.splitlines() if line.startswith("#")] == comments
+
+
+def test_tables_may_be_written_in_any_way() -> None:
+    inline = LOCAL.replace('[drive.right_sweep]\nbus = "right"\nnode_id = 3\nsign = -1\n', "")
+    inline = 'drive.right_sweep = { bus = "right", node_id = 3, sign = -1 }\n' + inline.replace("[robot]", "\n[robot]")
+    after = changed_text(inline, {CONSTANT: 0.0721})
+    assert parse_configuration(after).drive["right_sweep"].torque_constant_nm_a == 0.0721
+
+
+def test_a_change_that_would_be_wrong_is_refused_with_key_value_and_bound(example_text: str) -> None:
+    with pytest.raises(BenchError, match=r"stays as it is.*drive.right_sweep.torque_constant_nm_a = 99.0: must be"):
+        changed_text(example_text, {CONSTANT: 99.0})
+    with pytest.raises(BenchError, match=r"drive.right_sweep.current_limit_a = 12.0: must be at least 18.75"):
+        changed_text(example_text, {CONSTANT: 0.04})
+
+
+def test_what_is_no_toml_is_refused() -> None:
+    with pytest.raises(BenchError, match="cannot be changed"):
+        changed_text("[drive", {CONSTANT: 0.07})
+
+
+def test_the_difference_shows_old_and_new(example_text: str) -> None:
+    shown = difference(example_text, changed_text(example_text, {CONSTANT: 0.0721}), "mudskipper.toml")
+    assert "-torque_constant_nm_a = 0.083\n+torque_constant_nm_a = 0.0721" in shown
+    assert shown.startswith("--- mudskipper.toml\n+++ mudskipper.toml, changed")
+
+
+def test_a_file_is_replaced_with_its_rights_and_the_old_one_is_kept(tmp_path: Path, example_text: str) -> None:
+    path = tmp_path / "mudskipper.toml"
+    path.write_text(example_text, encoding="utf-8")
+    path.chmod(0o640)
+    link = tmp_path / "link.toml"
+    link.symlink_to(path)
+    after = changed_text(example_text, {CONSTANT: 0.0721})
+    backup = replace_file(link, example_text, after)
+    assert path.read_text(encoding="utf-8") == after and link.is_symlink()
+    assert backup == tmp_path / "mudskipper.toml.before" and backup.read_text(encoding="utf-8") == example_text
+    assert path.stat().st_mode & 0o777 == 0o640
+    assert sorted(each.name for each in tmp_path.iterdir()) == [
+        "link.toml",
+        "mudskipper.toml",
+        "mudskipper.toml.before",
+    ]
+
+
+def test_what_somebody_else_changed_meanwhile_is_not_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "mudskipper.toml"
+    path.write_text("theirs = 1\n", encoding="utf-8")
+    with pytest.raises(BenchError, match="changed by somebody else"):
+        replace_file(path, "mine = 1\n", "mine = 2\n")
+    assert path.read_text(encoding="utf-8") == "theirs = 1\n"
+
+
+def test_a_file_that_cannot_be_written_stays_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "mudskipper.toml"
+    path.write_text("a = 1\n", encoding="utf-8")
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(BenchError, match=r"mudskipper.toml: Permission denied; nothing was changed. Run the same"):
+        replace_file(path, "a = 1\n", "a = 2\n")
+    assert path.read_text(encoding="utf-8") == "a = 1\n"
+    assert [each.name for each in tmp_path.iterdir()] == ["mudskipper.toml"]

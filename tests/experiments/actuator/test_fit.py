@@ -1,0 +1,173 @@
+"""What readings say of a motor, against numpy's line through the same points, and how often its errors hold true."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, isnan, nan
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.actuator.fit import fit_joint, loads_of, repeatability
+from experiments.actuator.plan import Plan, Step, steps_of
+
+PLAN = Plan(("right_sweep",), trials=4)
+TRUE_NM_A, TARE_A = 0.0719, 0.65
+DRY_A, VISCOUS_A_S, REST_A, LESS_A = 0.18, 0.03, 0.15, 0.02
+Entries = dict[str, dict[str, Any]]
+
+
+def made_entries(
+    plan: Plan = PLAN,
+    sign: float = 1.0,
+    noise_a: float = 0.02,
+    seed: int = 1,
+    truth: float = 1.0,
+    hidden: float = 0.0,
+) -> Entries:
+    """`truth`: of the weights' torques, as a share of what they are thought to be. `hidden`: by friction at rest, as a
+    share of what it bears less with a weight than without."""
+    random, entries = Random(seed), Entries()
+    for step in steps_of(plan):
+        angle_rad = random.gauss(0.0, 0.003)
+        held_a = truth * plan.torque_nm(step.weight_g) * cos(angle_rad) / TRUE_NM_A + TARE_A
+        held_a += hidden * LESS_A if step.weight_g else 0.0
+        entries[step.key] = {
+            "current_a": sign * held_a + random.gauss(0.0, noise_a),
+            "rest_friction_a": REST_A - (LESS_A if step.weight_g else 0.0) + random.gauss(0.0, 0.01),
+            "angle_rad": angle_rad,
+        }
+        if not step.weight_g:
+            entries[step.key]["loops"] = [made_loop(random, quick) for quick in (False, False, True, True)]
+    return entries
+
+
+def made_loop(random: Random, quick: bool) -> dict[str, Any]:
+    speed_rad_s = 1.33 if quick else 0.19
+    spent_a = DRY_A + VISCOUS_A_S * speed_rad_s + random.gauss(0.0, 0.02)
+    return {"spent_a": spent_a, "speed_rad_s": speed_rad_s, "quick": quick}
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_line_is_that_of_an_independent_fit(sign: float) -> None:
+    entries = made_entries(sign=sign)
+    fit = fit_joint("right_sweep", PLAN, entries, 0.083)
+    assert fit is not None and fit.direction == -sign
+    x = np.array([load.torque_nm for load in fit.loads])
+    y = np.array([load.current_a for load in fit.loads])
+    assert (fit.line.slope_a_nm, fit.line.intercept_a) == pytest.approx(tuple(np.polyfit(x, y, 1)), rel=1e-9)
+    assert fit.line.constant_nm_a == pytest.approx(TRUE_NM_A, rel=0.01)
+
+
+def within_two(told: list[tuple[float, float]]) -> float:
+    """The share of errors that are at most two of those that are told."""
+    return sum(abs(wrong) <= 2.0 * error for wrong, error in told) / len(told)
+
+
+def test_the_told_errors_hold_what_scatter_lever_weights_and_friction_at_rest_do() -> None:
+    """Each of 400 benches has a lever and weights that are anywhere within their tolerances, and a friction at rest
+    that hides anything of what it bears less with a weight."""
+    random, plan = Random(4), replace(PLAN, lever_tolerance_m=0.002, weight_tolerance=0.005)
+    constants, offsets, dry, viscous = (list[tuple[float, float]]() for _ in range(4))
+    for seed in range(400):
+        lever = 1.0 + random.uniform(-1.0, 1.0) * plan.lever_tolerance_m / plan.lever_m
+        truth = lever * (1.0 + random.uniform(-1.0, 1.0) * plan.weight_tolerance)
+        entries = made_entries(plan, seed=seed, truth=truth, hidden=random.uniform(-1.0, 1.0))
+        fit = fit_joint("right_sweep", plan, entries, 0.083)
+        assert fit is not None
+        constants.append((fit.constant_nm_a - TRUE_NM_A, fit.constant_error_nm_a))
+        offsets.append((fit.offset_nm, fit.offset_error_nm))
+        dry.append((fit.friction_nm[0] - DRY_A * TRUE_NM_A, fit.friction_nm[1]))
+        viscous.append((fit.viscous_nm_s[0] - VISCOUS_A_S * TRUE_NM_A, fit.viscous_nm_s[1]))
+    assert 0.93 < within_two(constants) <= 1.0
+    assert 0.93 < within_two(offsets) <= 1.0
+    assert 0.93 < within_two(dry) < 0.98 and 0.93 < within_two(viscous) < 0.98
+
+
+def test_a_millimetre_of_lever_is_in_the_error_of_the_constant() -> None:
+    fits = [
+        fit_joint("right_sweep", replace(PLAN, lever_tolerance_m=lever_m, weight_tolerance=0.0), made_entries(), 0.083)
+        for lever_m in (0.0, 0.001)
+    ]
+    exact, coarse = (fit.constant_error_nm_a / fit.constant_nm_a for fit in fits if fit)
+    assert fits[0] is not None and exact == pytest.approx(fits[0].line.constant_error_nm_a / fits[0].constant_nm_a)
+    assert coarse**2 - exact**2 == pytest.approx((0.001 / 0.12) ** 2 / 3.0)
+
+
+def test_a_wrong_constant_shows_in_the_error_and_the_fitted_one_does_not() -> None:
+    fit = fit_joint("right_sweep", PLAN, made_entries(noise_a=0.0), 0.083)
+    assert fit is not None
+    x = np.array([load.torque_nm for load in fit.loads])
+    assert fit.rmse_configured_nm == pytest.approx(
+        float(np.sqrt(np.mean((x * (0.083 / TRUE_NM_A - 1)) ** 2))), rel=1e-6
+    )
+    assert fit.rmse_fitted_nm < 1e-9
+    assert fit.offset_nm == pytest.approx(0.0, abs=1e-9)
+    assert fit.tare_nm == pytest.approx(TARE_A * TRUE_NM_A, rel=1e-6)
+
+
+def test_the_tare_of_a_pass_is_the_mean_of_before_and_after() -> None:
+    entries = made_entries(noise_a=0.0)
+    entries[Step(0, 0.0).key]["current_a"] += 0.2
+    first, later = (load for load in loads_of(PLAN, entries) if load.weight_g == 100.0 and load.trial in (1, 2))
+    assert later.current_a - first.current_a == pytest.approx(0.1, abs=1e-4)
+
+
+def test_a_trial_without_any_tare_before_it_is_not_used() -> None:
+    entries = made_entries()
+    for trial in (0, 1):
+        entries[Step(trial, 0.0).key] = {"skipped": "on request"}
+    assert {load.trial for load in loads_of(PLAN, entries)} == {2, 3, 4}
+
+
+def test_an_arm_that_may_not_have_been_empty_is_no_tare() -> None:
+    entries = made_entries(noise_a=0.0)
+    before = loads_of(PLAN, entries)
+    entries[Step(1, 0.0).key] |= {"current_a": 3.0, "doubt": "the motor holds 100 g although the arm should be empty"}
+    after = loads_of(PLAN, entries)
+    assert [load.current_a for load in after] == pytest.approx([load.current_a for load in before])
+    fit = fit_joint("right_sweep", PLAN, entries, 0.083)
+    assert fit is not None and len(fit.tares_a) == PLAN.trials
+
+
+def test_repeatability_is_the_mean_relative_deviation_over_the_trials() -> None:
+    loads = loads_of(PLAN, made_entries())
+    table = np.array([[load.current_a for load in loads if load.weight_g == w] for w in PLAN.weights_g])
+    assert repeatability(loads) == pytest.approx(float(np.mean(np.std(table, axis=1, ddof=1) / np.mean(table, axis=1))))
+    assert isnan(repeatability(loads[:3]))
+
+
+def test_friction_is_that_of_the_loops_and_carries_the_doubt_of_the_constant() -> None:
+    fit = fit_joint("right_sweep", PLAN, made_entries(), 0.083)
+    assert fit is not None and len(fit.loops) == 4 * (PLAN.trials + 1)
+    dry_nm, error_nm = fit.friction_nm
+    assert dry_nm == pytest.approx(fit.friction.dry_a * fit.constant_nm_a)
+    of_constant_nm = fit.friction.dry_a * fit.constant_error_nm_a
+    assert error_nm**2 == pytest.approx((fit.friction.dry_error_a * fit.constant_nm_a) ** 2 + of_constant_nm**2)
+    assert fit.rest_friction_a == pytest.approx(REST_A, abs=0.02)
+
+
+def test_without_loops_there_is_no_friction() -> None:
+    entries = made_entries()
+    for entry in entries.values():
+        entry.pop("loops", None)
+    fit = fit_joint("right_sweep", PLAN, entries, 0.083)
+    assert fit is not None and isnan(fit.friction_nm[0]) and isnan(fit.viscous_nm_s[0])
+    assert fit.offset_error_nm > 0.0
+
+
+def test_what_was_kept_with_a_doubt_is_not_fitted() -> None:
+    entries = made_entries(noise_a=0.0)
+    entries[Step(1, 800.0).key] |= {"current_a": 3.0, "doubt": "the motor holds 180 g"}
+    fit = fit_joint("right_sweep", PLAN, entries, 0.083)
+    assert fit is not None and fit.line.readings == 31
+    assert fit.line.constant_nm_a == pytest.approx(TRUE_NM_A, rel=1e-6)
+
+
+def test_one_weight_makes_no_line() -> None:
+    entries = made_entries()
+    kept = {key: entry for key, entry in entries.items() if key.endswith((", 0 g", ", 100 g"))}
+    assert fit_joint("right_sweep", PLAN, kept, 0.083) is None
+    assert fit_joint("right_sweep", PLAN, {}, nan) is None

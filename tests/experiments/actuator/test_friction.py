@@ -1,0 +1,107 @@
+"""Friction out of loops: against motions whose friction is chosen, and on a simulated joint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import copysign, cos, isnan, pi, sin
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from experiments.actuator import simulation as actuator_simulation
+from experiments.actuator.friction import FEWEST, Loop, friction_of, loop_of, swing
+from experiments.actuator.plan import Plan
+from experiments.actuator.reading import HeldJoint, MovedError, Sample
+from experiments.actuator.simulation import TRUE_CONSTANT_NM_A, bench_configuration, simulated_bench
+from experiments.bench_robot import arm
+
+HALF_RAD, DRY_A, VISCOUS_A_S = 0.09, 0.18, 0.03
+
+
+def made_stroke(direction: float, duration_s: float, taken_a: Callable[[float, float], float]) -> list[Sample]:
+    """From rest to rest, half a cosine; `taken_a` is what angle and acceleration take besides friction."""
+    samples, rate = [], pi / duration_s
+    for number in range(501):
+        now_s = duration_s * number / 500
+        angle_rad = -direction * HALF_RAD * cos(rate * now_s)
+        velocity_rad_s = direction * HALF_RAD * rate * sin(rate * now_s)
+        friction_a = copysign(DRY_A, direction) + VISCOUS_A_S * velocity_rad_s
+        load_a = taken_a(angle_rad, -(rate**2) * angle_rad)
+        samples.append(Sample(now_s, angle_rad, load_a + friction_a, 30.0))
+    rest = Sample(2.0 * duration_s, direction * HALF_RAD, load_a, 30.0)
+    return [*samples, *[rest._replace(now_s=rest.now_s + 0.01 * number) for number in range(60)]]
+
+
+def weight_magnets_and_inertia(angle_rad: float, acceleration_rad_s2: float) -> float:
+    return 0.6 * cos(angle_rad) + 0.18 * sin(168.0 * angle_rad + 1.0) + 0.008 * acceleration_rad_s2
+
+
+@pytest.mark.parametrize("duration_s", [0.3, 2.0])
+def test_a_loop_tells_friction_and_not_what_is_given_back(duration_s: float) -> None:
+    up, down = (made_stroke(direction, duration_s, weight_magnets_and_inertia) for direction in (1.0, -1.0))
+    loop = loop_of(up, down, quick=False)
+    speed_rad_s = pi / 4.0 * HALF_RAD * pi / duration_s  # mean over the way, of half a cosine
+    assert loop.speed_rad_s == pytest.approx(speed_rad_s, rel=1e-3)
+    assert loop.spent_a == pytest.approx(DRY_A + VISCOUS_A_S * speed_rad_s, rel=1e-3)
+
+
+def test_a_loop_that_stops_on_its_way_spends_nothing_there() -> None:
+    up, down = (made_stroke(direction, 0.5, lambda *_: 0.6) for direction in (1.0, -1.0))
+    stops = [sample._replace(current_a=0.6) for sample in up[200:201]] * 300
+    stopped = loop_of([*up[:201], *stops, *up[200:]], down, quick=False)
+    assert stopped.spent_a == pytest.approx(loop_of(up, down, quick=False).spent_a, rel=1e-6)
+
+
+def test_an_arm_that_is_in_the_way_makes_no_loop() -> None:
+    up, down = (made_stroke(direction, 0.5, lambda *_: 0.6) for direction in (1.0, -1.0))
+    with pytest.raises(MovedError, match=r"swings by 0\.0 degrees only: is something in its way"):
+        loop_of(up, up, quick=True)
+    with pytest.raises(MovedError, match=r"swings by -10\.3 degrees"):
+        loop_of(down, up, quick=True)
+
+
+def made_loops(count: int, speed_rad_s: float, quick: bool, noise_a: float, random: Random) -> list[Loop]:
+    spent_a = DRY_A + VISCOUS_A_S * speed_rad_s
+    return [Loop(spent_a + random.gauss(0.0, noise_a), speed_rad_s, quick) for _ in range(count)]
+
+
+@pytest.mark.parametrize("trials", [1, 5])
+def test_the_truth_is_within_two_errors_in_nineteen_of_twenty(trials: int) -> None:
+    random, dry, viscous = Random(3), [], []
+    for _ in range(1000):
+        slow = made_loops(2 * (trials + 1), 0.19, False, 0.018, random)
+        friction = friction_of(slow + made_loops(4 * (trials + 1), 1.33, True, 0.036, random))
+        dry.append(abs(friction.dry_a - DRY_A) < 2.0 * friction.dry_error_a)
+        viscous.append(abs(friction.viscous_a_s - VISCOUS_A_S) < 2.0 * friction.viscous_error_a_s)
+    assert 0.935 < sum(dry) / len(dry) < 0.975
+    assert 0.935 < sum(viscous) / len(viscous) < 0.98
+
+
+def test_what_cannot_be_told_is_no_number() -> None:
+    random = Random(1)
+    slow, quick = (made_loops(FEWEST, speed_rad_s, speed_rad_s > 1.0, 0.01, random) for speed_rad_s in (0.19, 1.33))
+    assert all(isnan(value) for value in friction_of([*slow[1:], *quick]))
+    alone = friction_of(slow)
+    assert alone.dry_a > 0.0 and isnan(alone.viscous_a_s)
+    assert friction_of([*slow, *[loop._replace(speed_rad_s=0.3) for loop in quick]]) == alone
+
+
+def test_a_simulated_joint_has_the_friction_that_it_was_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(actuator_simulation, "COULOMB_NM", 0.03)
+    joint = "right_sweep"
+    robot, hand = simulated_bench(bench_configuration(), joint, Plan((joint,)), 6, tmp_path / "log.mcap")
+    try:
+        hand.hold_level(joint, lambda: None)
+        arm(robot)
+        hand.let_go(lambda: None)
+        held = HeldJoint(robot, joint)
+        middle_rad = held.held_rad
+        friction = friction_of(swing(held) + swing(held))
+        assert held.held_rad == pytest.approx(middle_rad)
+        viscous_nm_s = robot.lockstep.robot.plant.parameters.joint_friction_nm_s
+    finally:
+        robot.close()
+    assert friction.dry_error_a * TRUE_CONSTANT_NM_A < 0.0015
+    assert abs(friction.dry_a - 0.03 / TRUE_CONSTANT_NM_A) < 2.0 * friction.dry_error_a
+    assert abs(friction.viscous_a_s - viscous_nm_s / TRUE_CONSTANT_NM_A) < 2.0 * friction.viscous_error_a_s

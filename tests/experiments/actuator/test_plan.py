@@ -1,0 +1,61 @@
+"""What is decided before a weight is hung."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan, Step, in_turn, require_possible, stays_cool, steps_of
+from experiments.actuator.simulation import bench_configuration
+from experiments.bench_robot import BenchError
+from firmware_host.configuration import Configuration
+
+
+def test_passes_lie_between_readings_of_the_empty_arm_and_only_the_first_rises() -> None:
+    steps = steps_of(Plan(("left_sweep",), weights_g=(400.0, 10.0, 50.0), trials=3))
+    assert [(step.trial, step.weight_g) for step in steps] == [
+        (0, 0.0),
+        (1, 10.0), (1, 50.0), (1, 400.0), (1, 0.0),
+        (2, 400.0), (2, 10.0), (2, 50.0), (2, 0.0),
+        (3, 400.0), (3, 10.0), (3, 50.0), (3, 0.0),
+    ]  # fmt: skip
+    assert len({step.key for step in steps}) == len(steps)
+
+
+def test_heavy_and_light_come_in_turn() -> None:
+    assert in_turn(PAPER_WEIGHTS_G) == [800.0, 10.0, 600.0, 20.0, 400.0, 50.0, 200.0, 100.0]
+
+
+def test_the_torque_is_that_of_the_lever() -> None:
+    assert Plan((), lever_m=0.115).torque_nm(800.0) == pytest.approx(0.9025, abs=1e-4)
+    assert Step(3, 0.0).key == "trial 3, 0 g"
+
+
+def test_the_bench_of_the_simulation_bears_the_paper_s_weights() -> None:
+    require_possible(Plan(("right_sweep", "right_adduction")), bench_configuration())
+
+
+def test_a_weight_beyond_the_torque_limit_is_refused_with_key_value_and_bound(configuration: Configuration) -> None:
+    with pytest.raises(BenchError) as refused:
+        require_possible(Plan(("right_sweep",)), configuration)
+    sentence = str(refused.value)
+    assert "limits.torque_nm = 0.75: must be at least 1.25 for 800 g at 12 cm" in sentence
+    assert "set it to 1.25, current_limit_a of all drives to 18.1" in sentence  # what k_t = 0.0719 wants is 17.4
+    assert "at most 400 g of them" in sentence
+    require_possible(Plan(("right_sweep",), weights_g=(100.0, 400.0)), configuration)
+
+
+def test_a_weight_that_the_winding_does_not_bear_is_refused() -> None:
+    configuration = bench_configuration()
+    hot = replace(configuration, winding=replace(configuration.winding, thermal_resistance_k_w=4.0))
+    with pytest.raises(BenchError, match=r"winding.thermal_resistance_k_w = 4: 800 g would warm the winding of left_"):
+        require_possible(Plan(("left_sweep",)), hot)
+
+
+def test_a_warm_winding_bears_less_than_a_cool_one() -> None:
+    configuration = bench_configuration()
+    assert stays_cool(configuration, 13.0, 35.0, 10.0)
+    assert not stays_cool(configuration, 13.0, 35.0, 20.0)
+    assert not stays_cool(configuration, 13.0, 60.0, 10.0)
+    assert stays_cool(configuration, 5.0, 60.0, 10.0)

@@ -1,0 +1,116 @@
+"""A simulated joint is read as a real one would be: level, from both sides, settled."""
+
+from __future__ import annotations
+
+from math import degrees
+from pathlib import Path
+
+import pytest
+
+from experiments.actuator.plan import Plan, Step
+from experiments.actuator.reading import SAMPLE_S, HeldJoint, MovedError, Sample, Side, unrest
+from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A, bench_configuration, simulated_bench
+from experiments.bench_robot import BenchError, arm
+
+
+def nothing() -> None:
+    pass
+
+
+@pytest.mark.parametrize("joint", ["left_sweep", "right_adduction"])
+def test_a_weight_is_read_level_and_without_friction(joint: str, tmp_path: Path) -> None:
+    plan = Plan((joint,))
+    robot, hand = simulated_bench(bench_configuration(), joint, plan, 2, tmp_path / "log.mcap")
+    try:
+        hand.hold_level(joint, nothing)
+        arm(robot)
+        hand.let_go(nothing)
+        held = HeldJoint(robot, joint)
+        empty = held.read()
+        hand.hang(Step(1, 400.0), nothing)
+        loaded = held.read()
+    finally:
+        robot.close()
+    external_nm = 0.4 * plan.gravity_m_s2 * hand.mount.lever_m
+    sensed_nm = abs(loaded.current_a - empty.current_a) * TRUE_CONSTANT_NM_A
+    assert sensed_nm == pytest.approx(external_nm, abs=0.5 * COULOMB_NM)
+    assert abs(degrees(loaded.angle_rad)) < 0.1 and abs(degrees(empty.angle_rad)) < 0.1
+    assert abs(degrees(loaded.below.held_rad)) > 2.0  # without that the arm would hang down so far
+    assert 0.4 * COULOMB_NM < empty.rest_friction_a * TRUE_CONSTANT_NM_A < 1.3 * COULOMB_NM
+
+
+def test_an_arm_that_never_rests_is_not_read(tmp_path: Path) -> None:
+    joint, plan = "right_adduction", Plan(("right_adduction",))
+    robot, hand = simulated_bench(bench_configuration(), joint, plan, 3, tmp_path / "log.mcap")
+    try:
+        hand.hold_level(joint, nothing)
+        arm(robot)
+        hand.let_go(nothing)
+        held, plain_wait = HeldJoint(robot, joint), robot.wait
+
+        def shaken(duration_s: float) -> None:
+            hand.mount.hang(0.1 if int(robot.lockstep.now_s * 4.0) % 2 else 0.3, plan.lever_m)
+            plain_wait(duration_s)
+
+        robot.wait = shaken  # type: ignore[method-assign]
+        with pytest.raises(MovedError, match="swings|drifts"):
+            held.read()
+        robot.call("disarm")
+        plain_wait(0.1)
+        with pytest.raises(BenchError, match="no longer holds its pose"):
+            held.read()
+    finally:
+        robot.close()
+
+
+def test_a_load_that_the_motor_does_not_lift_is_told(tmp_path: Path) -> None:
+    joint, plan = "right_adduction", Plan(("right_adduction",))
+    robot, hand = simulated_bench(bench_configuration(), joint, plan, 4, tmp_path / "log.mcap")
+    try:
+        hand.hold_level(joint, nothing)
+        arm(robot)
+        held = HeldJoint(robot, joint)
+        with pytest.raises(MovedError, match="does not bring the arm level"):  # a hand holds it 30 degrees down
+            robot.lockstep.robot.plant.arms[1].adduction_rad = -0.55
+            held.read()
+    finally:
+        robot.close()
+
+
+def test_a_weight_that_slips_off_between_the_approaches_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    joint, plan = "left_adduction", Plan(("left_adduction",))
+    robot, hand = simulated_bench(bench_configuration(), joint, plan, 5, tmp_path / "log.mcap")
+    try:
+        hand.hold_level(joint, nothing)
+        arm(robot)
+        hand.let_go(nothing)
+        hand.hang(Step(1, 200.0), nothing)
+        held = HeldJoint(robot, joint)
+        settled = HeldJoint._settled
+
+        def slipping(self: HeldJoint) -> Side:
+            side = settled(self)
+            hand.take_off()
+            return side
+
+        monkeypatch.setattr(HeldJoint, "_settled", slipping)
+        with pytest.raises(MovedError, match=r"differ by \+3\.[0-9] A, as if the load had changed"):
+            held.read()
+    finally:
+        robot.close()
+
+
+def samples(angle_slope: float = 0.0, current_slope: float = 0.0, noise_a: float = 0.2) -> list[Sample]:
+    return [
+        Sample(SAMPLE_S * n, angle_slope * SAMPLE_S * n, 3.0 + current_slope * SAMPLE_S * n + noise_a * (-1) ** n, 30.0)
+        for n in range(100)
+    ]
+
+
+def test_rest_is_an_angle_that_stands_and_a_current_that_does_not_drift() -> None:
+    assert unrest(samples()) == ""
+    assert unrest(samples(angle_slope=0.01)) == "the joint swings by 0.57 degrees"
+    assert unrest(samples(current_slope=1.0)) == "the current drifts by 0.50 A"
+    assert unrest(samples(current_slope=0.05)) == ""

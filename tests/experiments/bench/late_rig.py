@@ -1,0 +1,39 @@
+"""A simulated robot on a computer with too much to do: ticks are missed, or emulated drives come late, by chance of a
+seed. A drive that comes late obeys what has waited for it, the newest command last, and then lives through the time
+that it has missed: so it is with the process that emulates drives in real time.
+"""
+
+from __future__ import annotations
+
+from random import Random
+
+from experiments.bench.rig import SimulatedRig
+from firmware_host.configuration import Configuration
+from firmware_host.ticker import PERIOD_S, Beat
+
+
+class LateRig(SimulatedRig):
+    """Punctual until `begin`."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        self._missing_share = self._waiting_share = 0.0  # of ticks with which it begins
+        self._longest = self._waits = 0  # ticks
+        self._random = Random()
+        super().__init__(configuration)
+
+    def begin(self, missing_share: float, waiting_share: float, longest: int, seed: int) -> None:
+        self._missing_share, self._waiting_share, self._longest = missing_share, waiting_share, longest
+        self._random.seed(seed)
+
+    def wait(self) -> Beat:
+        missed = self._some(self._missing_share)
+        self._tick_number += 1 + missed
+        for other in self.others:
+            other(self)
+        self._waits = self._waits - 1 if self._waits > 0 else self._some(self._waiting_share)
+        if not self._waits:
+            self.robot.advance(self.now_s)
+        return Beat(self.now_s, missed * PERIOD_S, self._tick_number, missed)
+
+    def _some(self, share: float) -> int:
+        return self._random.randint(1, self._longest) if self._random.random() < share else 0

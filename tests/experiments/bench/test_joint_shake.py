@@ -1,0 +1,132 @@
+"""A joint whose encoder tells nothing is found out before it has gone anywhere; one that lives is not accused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from control.joint_pd import ArmMass
+from control.records import JOINTS, DriveState
+from experiments.bench.attendant import SimulatedAttendant
+from experiments.bench.joint_shake import FIRST_NM, HALF_TICKS, SHAKE_TICKS, UNSEEN_RAD, Shake, shake
+from experiments.bench.rig import SimulatedRig
+from experiments.bench.sign_check import nudged
+from experiments.bench.stand import Stand
+from experiments.bench_robot import BenchError
+from firmware_host.configuration import Configuration
+from firmware_host.ticker import PERIOD_S, Beat
+from simulation.blocks import on_blocks
+
+
+class Bench:
+    """A simulated robot, and how far one of its joints has truly been from where it was."""
+
+    def __init__(self, configuration: Configuration, joint: str, inertia: float = 1.0, noise_rad: float = 0.0) -> None:
+        place, arm = JOINTS.index(joint), configuration.arm
+        mass = ArmMass(
+            arm.arm_mass_kg,
+            arm.center_of_mass_m,
+            inertia * arm.sweep_inertia_kg_m2,
+            inertia * arm.adduction_inertia_kg_m2,
+        )
+        drives = on_blocks(configuration).drives(configuration)
+        drives[joint] = replace(drives[joint], encoder_noise_rad=noise_rad)
+        self.rig = SimulatedRig(configuration, replace(configuration, arm=mass), drives)
+        self.stand = Stand(self.rig, SimulatedAttendant(self.rig))
+        self.drive = self.rig.robot.drives[place]
+        self.farthest_rad = 0.0
+        before_rad = self.rig.robot.plant.angles_rad[place]
+
+        def look(rig: SimulatedRig) -> None:
+            self.farthest_rad = max(self.farthest_rad, abs(rig.robot.plant.angles_rad[place] - before_rad))
+
+        self.rig.others.append(look)
+
+    def hang(self) -> None:
+        """Its encoder tells the same angle and a speed of exactly zero, from the start."""
+        self.drive.measure(self.rig.robot.plant.angles_rad[self.rig.robot.drives.index(self.drive)], 0.0)
+        self.drive.measure = lambda angle_rad, velocity_rad_s: None  # type: ignore[method-assign]
+
+    def without_friction(self) -> None:
+        for arm in self.rig.robot.plant.arms:
+            arm.parameters = replace(arm.parameters, joint_coulomb_nm=0.0)
+
+
+@pytest.mark.parametrize(("joint", "farthest_rad"), [("left_sweep", 0.02), ("right_adduction", 0.08)])
+def test_a_joint_whose_encoder_hangs_goes_nowhere_and_is_told(
+    configuration: Configuration, joint: str, farthest_rad: float
+) -> None:
+    bench = Bench(configuration, joint)
+    bench.hang()
+    readings = list(nudged(bench.stand, joint))
+    assert bench.farthest_rad < farthest_rad < UNSEEN_RAD
+    (reading,) = readings  # nothing more is tried on it
+    assert not reading.good and f"{joint}: answer to a shake is 0 rad" in reading.sentence
+    assert "turn it by hand while its torque is off" in reading.sentence
+    assert not any(drive.torque_nm(bench.rig.now_s) > 0.01 for drive in bench.rig.robot.drives)
+
+
+@pytest.mark.parametrize("joint", ["right_sweep", "left_adduction"])
+def test_nor_does_one_of_half_the_inertia_and_without_friction(configuration: Configuration, joint: str) -> None:
+    bench = Bench(configuration, joint, inertia=0.5)
+    bench.without_friction()
+    bench.hang()
+    assert not shake_of(bench, joint).answered
+    bench.stand.run_for(0.3)  # nothing is left of its speed
+    assert bench.farthest_rad < UNSEEN_RAD
+
+
+def shake_of(bench: Bench, joint: str) -> Shake:
+    bench.stand.arm()
+    return shake(bench.stand, joint)
+
+
+def test_noise_is_no_answer(configuration: Configuration) -> None:
+    """Of an encoder whose magnet has come off."""
+    bench = Bench(configuration, "left_sweep", noise_rad=0.002)
+    bench.hang()
+    law = shake_of(bench, "left_sweep")
+    assert law.answer_rad > 0.003 and not law.answered
+
+
+def test_an_encoder_that_lives_answers_a_weak_shake(configuration: Configuration) -> None:
+    bench = Bench(configuration, "left_sweep", noise_rad=0.0004)
+    assert shake_of(bench, "left_sweep").answered
+    assert bench.farthest_rad < 0.01
+
+
+def test_a_late_tick_ends_a_shake_and_it_begins_anew(
+    configuration: Configuration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(configuration, "left_sweep")
+    bench.stand.arm()
+    wait, ticks = bench.rig.wait, [0]
+
+    def late_at(*missing: int) -> None:
+        def tick() -> Beat:
+            ticks[0] += 1
+            return wait()._replace(missed=1) if ticks[0] in missing else wait()
+
+        ticks[0] = 0
+        monkeypatch.setattr(bench.rig, "wait", tick)
+
+    late_at(45)  # in the first shake
+    assert shake(bench.stand, "left_sweep").answered
+    late_at(45, 90, 135)
+    with pytest.raises(BenchError, match="Ticks are missed while a joint is shaken: end other programs"):
+        shake(bench.stand, "left_sweep")
+
+
+def test_a_shake_leaves_a_free_joint_at_rest_where_it_was() -> None:
+    law, given_nm_s = Shake(0, 1, 0.003), []
+    states = (DriveState(angle_rad=0.0),) * 4
+    while not law.done:
+        given_nm_s.append(law((0.0,) * 4, states)[0] * PERIOD_S)
+    assert sum(given_nm_s) == pytest.approx(0.0, abs=1e-12)
+    assert max(given_nm_s) == pytest.approx(FIRST_NM * PERIOD_S) and len(given_nm_s) > SHAKE_TICKS == 4 * HALF_TICKS
+    way = speed = 0.0
+    for impulse in given_nm_s:
+        speed += impulse
+        way += speed
+    assert way == pytest.approx(0.0, abs=1e-12)

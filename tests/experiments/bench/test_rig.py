@@ -1,0 +1,180 @@
+"""The rigs of the bench: real buses in real time, and nobody else who commands them."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from control.records import JOINTS
+from experiments.bench.attendant import AbsentAttendant
+from experiments.bench.channels import on_channels
+from experiments.bench.reading import Reading
+from experiments.bench.rig import HardwareRig, SimulatedRig, refuse_beside_daemon
+from experiments.bench.sign_check import nudged
+from experiments.bench.stand import Stand
+from experiments.bench.wiring_check import firmware, ids_heard, strangers, watchdogs
+from experiments.bench_robot import BenchError
+from firmware_host.configuration import BusParameters, Configuration, StatusParameters, load_configuration
+from firmware_host.toml_records import ConfigurationError
+from simulation.local_setup import write_local_setup
+from tests.bench.staged_bench import told_of_file
+from tests.waiting import LONGEST_S
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture
+def answering(short_folder: Path) -> Iterator[Path]:
+    """A socket on which somebody answers."""
+    path = short_folder / "mudskipper.sock"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
+        listener.bind(str(path))
+        listener.listen()
+        yield path
+
+
+def test_beside_a_daemon_the_bench_does_not_open(configuration: Configuration, answering: Path) -> None:
+    with pytest.raises(BenchError, match="'systemctl stop mudskipper' first"):
+        HardwareRig(replace(configuration, status=StatusParameters(str(answering))))
+
+
+def test_a_socket_that_nobody_answers_on_is_no_daemon(short_folder: Path) -> None:
+    refuse_beside_daemon(short_folder / "mudskipper.sock")
+
+
+def test_a_bus_that_does_not_open_is_told_in_a_sentence(configuration: Configuration, short_folder: Path) -> None:
+    changed = replace(on_channels(configuration, ["nocan9"]), status=StatusParameters(str(short_folder / "s")))
+    with pytest.raises(BenchError, match=r"bus.left \(socketcan nocan9\) does not open: .*\."):
+        HardwareRig(changed)
+
+
+def test_a_refused_bench_says_why_once_and_reports_it(answering: Path, tmp_path: Path) -> None:
+    path = write_local_setup(answering.parent, tmp_path)
+    report = tmp_path / "report.json"
+    # -rN: the short summary would say it again, whole where the environment has CI=, cut to the terminal elsewhere.
+    arguments = ["tests/bench", "-q", "-rN", "--config", str(path), "--yes", "--bench-report", str(report)]
+    command = [sys.executable, "-m", "pytest", *arguments]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
+    assert ended.returncode == 1
+    assert ended.stdout.count("systemctl stop mudskipper") == 1
+    told = json.loads(report.read_text(encoding="utf-8"))
+    assert told["stages"] == {"wiring": "failed"} | dict.fromkeys(list(told["stages"])[1:], "skipped")
+
+
+@pytest.mark.parametrize("text", ["[robot", "[gait]\nsweep_angle_deg = 500\nodd = 1\n"])
+def test_each_problem_of_a_configuration_names_its_file_once(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigurationError) as caught:
+        load_configuration(path)
+    told = told_of_file(path, caught.value.problems).splitlines()
+    assert len(told) == len(caught.value.problems)
+    assert all(line.startswith(f"{path}: ") and line.count("bad.toml") == 1 for line in told)
+
+
+def test_a_joint_whose_encoder_counts_backwards_is_never_held(tmp_path: Path) -> None:
+    """It would run away. All joints are still nudged, and nothing moves after that."""
+    report = tmp_path / "report.json"
+    flipped = ["-p", "tests.experiments.bench.flipped_encoder"]
+    command = [sys.executable, "-m", "pytest", "tests/bench", *flipped, "--simulated", "--bench-report", str(report)]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
+    told = json.loads(report.read_text(encoding="utf-8"))
+    assert [test["outcome"] for test in told["tests"] if test["name"] == "signs"] == [
+        *("passed", "passed", "failed", "passed"),
+        *4 * ["skipped"],
+    ]
+    assert set(list(told["stages"].values())[2:]) == {"skipped"}
+    assert float(ended.stdout.partition("fastest: ")[2].split()[0]) < 2.0
+
+
+@pytest.fixture
+def local_robot(short_folder: Path, tmp_path: Path) -> Iterator[Configuration]:
+    """A simulated robot as a process of its own, in real time, on local buses."""
+    path = write_local_setup(short_folder, tmp_path)
+    command = [sys.executable, "-m", "simulation.peer", "--config", str(path), "--on-blocks"]
+    robot = subprocess.Popen(command, cwd=ROOT)
+    try:
+        yield load_configuration(path)
+    finally:
+        robot.send_signal(signal.SIGTERM)
+        robot.wait(LONGEST_S)
+
+
+@pytest.fixture
+def stand(local_robot: Configuration) -> Iterator[Stand]:
+    rig = HardwareRig(local_robot)
+    while not any(rig.overheard.frames.values()):
+        rig.close()
+        rig = HardwareRig(local_robot)
+    rig.close()  # it may have heard no more than the robot's start
+    made = Stand(rig := HardwareRig(local_robot), AbsentAttendant())
+    yield made
+    made.end()
+    rig.close()
+
+
+def bad(readings: Iterable[Reading]) -> list[str]:
+    return [reading.sentence for reading in readings if not reading.good]
+
+
+def test_on_real_buses_in_real_time_every_drive_is_heard(stand: Stand) -> None:
+    """What a busy computer cannot spoil: rates and delays are for one that has nothing else to do."""
+    readings = [reading for check in (ids_heard, strangers, firmware, watchdogs) for reading in check(stand)]
+    assert len(readings) > 3 * len(JOINTS)
+    assert bad(readings) == []
+
+
+def test_on_real_buses_in_real_time_a_joint_is_nudged_or_the_computer_was_late_and_that_is_told(stand: Stand) -> None:
+    """A torque that comes late proves nothing, so a busy computer ends the nudge, and with a sentence."""
+    problems = []
+    try:
+        readings = list(nudged(stand, "left_sweep"))
+        problems = bad(readings)
+        assert problems or len(readings) == 4 + len(JOINTS)
+    except BenchError as problem:
+        problems = [str(problem)]
+    assert problems == [] or stand.lateness_so_far.sentence
+
+
+def test_one_channel_for_all_makes_one_bus(configuration: Configuration) -> None:
+    changed = on_channels(configuration, ["can3"])
+    assert changed.bus == {"left": BusParameters("socketcan", "can3")}
+    assert {drive.bus for drive in changed.drive.values()} == {"left"}
+
+
+def test_channels_by_name_replace_those_of_the_configuration(configuration: Configuration) -> None:
+    changed = on_channels(configuration, ["right=can7"])
+    assert changed.bus["right"].channel == "can7"
+    assert changed.bus["left"] == configuration.bus["left"]
+    assert changed.drive == configuration.drive
+    assert on_channels(configuration, []) == configuration
+
+
+def test_drives_with_the_same_id_do_not_share_a_channel(configuration: Configuration) -> None:
+    drive = configuration.drive | {"right_sweep": replace(configuration.drive["right_sweep"], node_id=0)}
+    with pytest.raises(BenchError, match="2 drives have the node id 0 on can0"):
+        on_channels(replace(configuration, drive=drive), ["can0"])
+
+
+@pytest.mark.parametrize("word", ["middle=can0", "left=", ""])
+def test_a_channel_that_fits_no_bus_is_refused(configuration: Configuration, word: str) -> None:
+    with pytest.raises(BenchError, match="--can"):
+        on_channels(configuration, [word])
+
+
+def test_idle_flippers_of_the_simulated_bench_stay_where_they_lie(configuration: Configuration) -> None:
+    rig = SimulatedRig(configuration)
+    before = rig.robot.plant.angles_rad
+    for _ in range(380):
+        rig.loop.tick(rig.wait())
+    assert rig.robot.plant.angles_rad == pytest.approx(before, abs=0.05)
+    low, high = configuration.joint_ranges[1]
+    assert low < before[1] < high

@@ -1,0 +1,245 @@
+"""Robots that are built wrong, each noticed by the right stage of the bench, with a sentence that says what to do.
+
+The stages are the very tests of tests/bench, called one after the other until one of them fails.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import pytest
+
+from control.modes import Mode
+from control.records import JOINTS
+from drivers import odrive_codec as codec
+from drivers.frames import Frame
+from drivers.odrive_codec import arbitration_id
+from experiments.bench.attendant import SimulatedAttendant
+from experiments.bench.rig import SimulatedRig
+from experiments.bench.stand import Stand
+from experiments.bench_robot import BenchError
+from firmware_host.configuration import Configuration
+from simulation.blocks import on_blocks
+from tests.bench import (
+    test_1_wiring,
+    test_2_signs,
+    test_3_zeros,
+    test_4_currents,
+    test_5_watchdogs,
+    test_6_strokes,
+    test_7_stops,
+    test_8_strides,
+)
+from tests.bench.staged_bench import STAGES, BenchReport, StagedBench
+
+MODULES = (
+    test_1_wiring,
+    test_2_signs,
+    test_3_zeros,
+    test_4_currents,
+    test_5_watchdogs,
+    test_6_strokes,
+    test_7_stops,
+    test_8_strides,
+)
+
+
+def claims() -> Iterator[tuple[str, Callable[[StagedBench], None]]]:
+    """Of all stages, as pytest runs them: the name of the stage, and what to call."""
+    for name, module in zip(STAGES, MODULES, strict=True):
+        for title, test in vars(module).items():
+            if not title.startswith("test_"):
+                continue
+            if "joint" in inspect.signature(test).parameters:
+                for joint in JOINTS:
+                    yield name, partial(test, joint=joint)
+            else:
+                yield name, test
+
+
+def first_complaint(rig: SimulatedRig, begin: str) -> tuple[str, str]:
+    """The stage and its sentence, from a stage on."""
+    bench = StagedBench(Stand(rig, SimulatedAttendant(rig)), BenchReport())
+    for name, claim in claims():
+        if STAGES.index(name) < STAGES.index(begin):
+            continue
+        try:
+            claim(bench)
+        except (pytest.fail.Exception, BenchError) as complaint:
+            return name, str(complaint)
+        bench.stand.let_go()
+    return "", ""
+
+
+def built(configuration: Configuration, **drives: dict[str, Any]) -> Configuration:
+    """With changes of some drives."""
+    changed = {joint: replace(configuration.drive[joint], **changes) for joint, changes in drives.items()}
+    return replace(configuration, drive=configuration.drive | changed)
+
+
+def swapped(configuration: Configuration, one: str, other: str) -> SimulatedRig:
+    """The two motors are where the configuration has the other one."""
+    drive = configuration.drive | {one: configuration.drive[other], other: configuration.drive[one]}
+    return SimulatedRig(configuration, replace(configuration, drive=drive))
+
+
+def with_drive(configuration: Configuration, joint: str, **changes: float) -> SimulatedRig:
+    drives = on_blocks(configuration).drives(configuration)
+    drives[joint] = replace(drives[joint], **changes)  # type: ignore[arg-type]
+    return SimulatedRig(configuration, drives=drives)
+
+
+def babble(rig: SimulatedRig) -> None:
+    """Of somebody with the node id 40, ten frames in each tick."""
+    for _ in range(10):
+        for port in rig.buses["left"].ports:
+            port.queue.append(Frame(40 << 5 | 0x15, bytes(8)))
+
+
+def command(rig: SimulatedRig) -> None:
+    """Of another program."""
+    for port in rig.buses["right"].ports:
+        port.queue.append(Frame(arbitration_id(3, codec.SET_INPUT_TORQUE), bytes(4)))
+
+
+class Repeater:
+    """What sends the last torque again and again, and so feeds the drive's watchdog."""
+
+    def __init__(self) -> None:
+        self._last: Frame | None = None
+
+    def __call__(self, rig: SimulatedRig) -> None:
+        for frame in rig.buses["left"].ports[0].queue:
+            if frame.arbitration_id == arbitration_id(0, codec.SET_INPUT_TORQUE):
+                self._last = frame
+        if self._last is not None:
+            rig.buses["left"].ports[0].queue.appendleft(self._last)
+
+
+def hold_down(rig: SimulatedRig) -> None:
+    """A hand, while the robot raises its flippers at the end of a walk."""
+    if hasattr(rig, "loop") and rig.loop.mode is Mode.STOPPING:
+        rig.robot.plant.arms[0].adduction_rad = -0.4
+
+
+class Stumbler:
+    """A drive that starts anew in the third stride."""
+
+    def __init__(self) -> None:
+        self.done = False
+
+    def __call__(self, rig: SimulatedRig) -> None:
+        walking = hasattr(rig, "loop") and rig.loop.mode is Mode.WALKING
+        if walking and rig.loop.target_before.stride == 2 and not self.done:
+            self.done = True
+            rig.robot.restart_drive(2)
+
+
+def hung(configuration: Configuration) -> SimulatedRig:
+    """An encoder that tells the same angle for ever, and no speed."""
+    rig = SimulatedRig(configuration)
+    rig.robot.drives[1].measure = lambda angle_rad, velocity_rad_s: None  # type: ignore[method-assign]
+    return rig
+
+
+class Wrong(NamedTuple):
+    what: str
+    rig: Callable[[Configuration], SimulatedRig]
+    stage: str
+    advice: str
+    begin: str = "wiring"  # what costs too much time to come to begins there, with a robot that is well until then
+
+
+SILENT = {"encoder_period_s": 1e9, "current_period_s": 1e9, "heartbeat_period_s": 1e9, "slow_period_s": 1e9}
+
+WRONG = (
+    Wrong("buses", lambda c: swapped_buses(c), "wiring", "exchange the buses' channels"),
+    Wrong("missing drive", lambda c: with_drive(c, "left_adduction", **SILENT), "wiring", "check its power, wiring"),
+    Wrong("stranger", lambda c: SimulatedRig(c, others=[babble]), "wiring", "node 40: take it off the bus"),
+    Wrong("second program", lambda c: SimulatedRig(c, others=[command]), "wiring", "commands to node 3 from another"),
+    Wrong("rare messages", lambda c: with_drive(c, "left_sweep", current_period_s=0.01), "wiring", "message period"),
+    Wrong("watchdog off", lambda c: with_drive(c, "right_sweep", watchdog_s=0.0), "wiring", "enable_watchdog"),
+    Wrong("slow watchdog", lambda c: with_drive(c, "right_sweep", watchdog_s=0.5), "wiring", "watchdog_timeout = 0.1"),
+    Wrong("node ids", lambda c: swapped(c, "left_sweep", "left_adduction"), "signs", "exchange the node ids"),
+    Wrong("sweeps", lambda c: swapped(c, "left_sweep", "right_sweep"), "signs", "exchange the node ids"),
+    Wrong(
+        "sweep's sign", lambda c: SimulatedRig(c, built(c, left_sweep={"sign": -1})), "signs", "drive.left_sweep.sign"
+    ),
+    Wrong(
+        "adduction's sign",
+        lambda c: SimulatedRig(c, built(c, left_adduction={"sign": 1})),
+        "signs",
+        "drive.left_adduction.sign",
+    ),
+    Wrong("hung encoder", hung, "signs", "left_adduction: answer to a shake is 0 rad"),
+    Wrong(
+        "encoder offset",
+        lambda c: with_drive(c, "left_adduction", encoder_offset_rad=0.15),
+        "zeros",
+        "set drive.left_adduction.zero_turn",
+    ),
+    Wrong(
+        "limits",
+        lambda c: SimulatedRig(replace(c, limits=replace(c.limits, sweep_max_deg=110.0))),
+        "zeros",
+        "narrow [limits]",
+        "zeros",
+    ),
+    Wrong(
+        "torque constant",
+        lambda c: SimulatedRig(c, built(c, right_sweep={"torque_constant_nm_a": 1.2 * 0.083})),
+        "currents",
+        "drive.right_sweep.torque_constant_nm_a",
+    ),
+    Wrong(
+        "slow drive",
+        lambda c: with_drive(c, "left_sweep", current_lag_s=0.006),
+        "currents",
+        "slow current loop",
+        "currents",
+    ),
+    Wrong(
+        "repeater",
+        lambda c: SimulatedRig(c, others=[Repeater()]),
+        "watchdogs",
+        "another program that feeds it",
+        "watchdogs",
+    ),
+    Wrong(
+        "soft gains",
+        lambda c: SimulatedRig(
+            replace(c, gains=replace(c.gains, sweep_stiffness_nm_rad=0.5, sweep_damping_nm_s_rad=0.01))
+        ),
+        "strokes",
+        "[gains]",
+        "strokes",
+    ),
+    Wrong(
+        "held down",
+        lambda c: SimulatedRig(c, others=[hold_down]),
+        "stops",
+        "something holds the flippers down",
+        "stops",
+    ),
+    Wrong("a drive starts anew", lambda c: SimulatedRig(c, others=[Stumbler()]), "strides", "right_sweep", "strides"),
+)
+
+
+def swapped_buses(configuration: Configuration) -> SimulatedRig:
+    other = {"left": "right", "right": "left"}
+    drive = {joint: replace(each, bus=other[each.bus]) for joint, each in configuration.drive.items()}
+    return SimulatedRig(configuration, replace(configuration, drive=drive))
+
+
+@pytest.mark.parametrize("wrong", WRONG, ids=[wrong.what for wrong in WRONG])
+def test_what_is_built_wrong_is_noticed_by_the_right_stage(configuration: Configuration, wrong: Wrong) -> None:
+    stage, sentence = first_complaint(wrong.rig(configuration), wrong.begin)
+    assert (stage, wrong.advice in sentence) == (wrong.stage, True), f"{stage}: {sentence}"
+
+
+def test_every_stage_notices_something(configuration: Configuration) -> None:
+    assert {wrong.stage for wrong in WRONG} == set(STAGES)

@@ -1,0 +1,105 @@
+"""An emulated bench with everything that an experiment with a load cell needs, and a person who answers as told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from drivers.load_cell_calibration import LoadCellCalibration
+from drivers.load_cell_lines import LineFormat
+from drivers.load_cell_port import LoadCellPort
+from drivers.stage_encoder import StageEncoder, StageEncoderSettings
+from experiments.loadcell.measurement import CellSettings, Results, conclude, measure, plan_of_notebook
+from experiments.loadcell.motion import StageSettings
+from experiments.loadcell.recording import CellRecorder
+from experiments.loadcell.stage import SimulatedStage
+from experiments.loadcell.trials import TrialBench, TrialPlan
+from experiments.notebook import Notebook
+from simulation.load_cell_bench import EmulatedBench, Event
+from simulation.load_cell_emulator import AmplifierParameters
+from simulation.plate_stage import CarriedPlate, StageParameters
+from simulation.stage_encoder_emulator import StageEncoderParameters
+from simulation.stage_motion import HandParameters
+from tests.experiments.made_up_mud import LawfulMud
+from tests.scripted_person import ScriptedPerson
+
+SETTINGS = StageSettings()
+KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
+COUNTS = LoadCellCalibration("counts", 42000.0, 81000.0)
+
+
+class Laboratory:
+    """Owns an emulated bench, the port to it and a notebook in a folder."""
+
+    def __init__(
+        self,
+        folder: Path,
+        muds: Mapping[str, CarriedPlate],
+        person: ScriptedPerson,
+        trials: int = 1,
+        baud: int = 115200,
+        amplifier: AmplifierParameters | None = None,
+        stage: StageParameters | None = None,
+        seed: int = 1,
+        line_format: str = "number",
+        encoder: StageEncoderParameters | None = None,
+        encoder_baud: int = 115200,
+    ) -> None:
+        """With an `encoder` the stage is pushed by a hand."""
+        self.folder, self.person = folder, person
+        if encoder is not None:
+            stage = StageParameters(hand=HandParameters(), seed=seed)
+        self.bench = EmulatedBench(next(iter(muds.values())), folder / "cell", amplifier, stage, seed, encoder)
+        self.port = LoadCellPort(
+            str(folder / "cell"), baud, LineFormat(line_format), LoadCellCalibration("counts", 1.0)
+        )
+        self.encoder = None
+        if encoder is not None:
+            settings = StageEncoderSettings(str(folder / "cell_position"), encoder.metres_per_count, encoder_baud)
+            self.encoder = StageEncoder(settings)
+        self.recorder = CellRecorder(self.port, self.bench, person.tell, self.encoder)
+        self.plan = TrialPlan(tuple(muds), trials, SETTINGS)
+        self.notebook = Notebook(folder, plan_of_notebook(SETTINGS))
+        stage_of_it = SimulatedStage(SETTINGS, self.bench, muds, seed)
+        self.trial_bench = TrialBench(
+            self.recorder, stage_of_it, person, self.notebook, folder, lambda done, total: None
+        )
+
+    def at(self, after_s: float, happen: Callable[[], None]) -> None:
+        event: Event = (self.bench.now_s() + after_s, happen)
+        self.bench.events.append(event)
+
+    def measure(self, cell: CellSettings | None = None) -> None:
+        measure(self.trial_bench, self.plan, cell or CellSettings())
+
+    def conclude(self) -> Results:
+        return conclude(self.folder, self.notebook, self.plan, None, lambda done, total: None)
+
+    def close(self) -> None:
+        self.port.close()
+        if self.encoder is not None:
+            self.encoder.close()
+        self.bench.close()
+
+
+Make = Callable[..., Laboratory]
+
+
+@contextmanager
+def laboratories(folder: Path) -> Iterator[Make]:
+    """Makes any number of them, calibrated, over mud that keeps the laws; closed at the end."""
+    made: list[Laboratory] = []
+
+    def build(person: ScriptedPerson | None = None, **options: Any) -> Laboratory:
+        own_folder = folder / str(len(made))
+        own_folder.mkdir()
+        laboratory = Laboratory(own_folder, {"made up": LawfulMud(**KNOWN)}, person or ScriptedPerson(), **options)
+        laboratory.port.calibration = COUNTS
+        made.append(laboratory)
+        return laboratory
+
+    yield build
+    for laboratory in made:
+        laboratory.close()

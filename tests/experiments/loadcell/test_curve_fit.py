@@ -1,0 +1,39 @@
+"""Variable projection, against a curve whose numbers are known."""
+
+import numpy as np
+import pytest
+
+from experiments.loadcell.curve_fit import Array, Prior, fit_curve
+
+T = np.linspace(0.0, 4.0, 80)
+NOTHING_KNOWN = Prior(np.zeros(1), np.array([np.inf]))
+
+
+def fading(parameters: Array) -> Array:
+    return np.stack([np.ones_like(T), np.exp(-np.exp(parameters[0]) * T)], 1)
+
+
+def test_rate_and_factors_of_a_decay_come_out() -> None:
+    y = 2.0 + 3.0 * np.exp(-1.5 * T)
+    fit = fit_curve(fading, y, [np.array([2.0]), np.array([-2.0])], NOTHING_KNOWN, 0.01)
+    assert np.exp(fit.parameters[0]) == pytest.approx(1.5, rel=1e-3)
+    assert fit.factors == pytest.approx([2.0, 3.0], rel=1e-3)
+
+
+def test_the_standard_error_is_the_scatter_over_many_tries() -> None:
+    random = np.random.default_rng(1)
+    fits = [
+        fit_curve(
+            fading, 2.0 + 3.0 * np.exp(-1.5 * T) + random.normal(0.0, 0.05, len(T)), [np.zeros(1)], NOTHING_KNOWN, 0.05
+        )
+        for _ in range(60)
+    ]
+    scatter = float(np.std([fit.parameters[0] for fit in fits]))
+    assert np.mean([fit.std_errors[0] for fit in fits]) == pytest.approx(scatter, rel=0.3)
+
+
+def test_a_sharp_prior_wins_over_few_and_noisy_samples() -> None:
+    y = 2.0 + 3.0 * np.exp(-1.5 * T) + np.random.default_rng(2).normal(0.0, 0.5, len(T))
+    told = Prior(np.log(np.array([1.2])), np.array([1e-3]))
+    fit = fit_curve(fading, y, [np.zeros(1)], told, 0.5)
+    assert np.exp(fit.parameters[0]) == pytest.approx(1.2, rel=1e-3)

@@ -1,0 +1,152 @@
+"""An encoder of the stage beside the load cell, over both ttys: what is measured, what is doubted, what goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.bench_robot import BenchError
+from experiments.loadcell.examination import examine_encoder
+from experiments.loadcell.fits import INSERTION, bench_doubt
+from experiments.loadcell.measurement import CellSettings
+from experiments.loadcell.raw import RAW, load_all
+from experiments.loadcell.stage import Trial
+from experiments.loadcell.trials import KEEP, WITHOUT, measure
+from experiments.person import GO_ON
+from simulation.load_cell_emulator import AmplifierParameters
+from simulation.stage_encoder_emulator import EmulatedStageEncoder, StageEncoderParameters
+from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Laboratory, Make, laboratories
+from tests.scripted_person import ScriptedPerson
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Iterator[Make]:
+    with laboratories(tmp_path) as build:
+
+        def with_encoder(
+            person: ScriptedPerson | None = None, encoder: dict[str, Any] | None = None, **options: Any
+        ) -> Laboratory:
+            return build(person, encoder=StageEncoderParameters(**(encoder or {})), **options)
+
+        yield with_encoder
+
+
+def counter_of(laboratory: Laboratory) -> EmulatedStageEncoder:
+    assert laboratory.bench.encoder is not None
+    return laboratory.bench.encoder
+
+
+def try_once(laboratory: Laboratory) -> list[str]:
+    """One insertion, and what was said of it."""
+    trial = Trial("made up", INSERTION, 1)
+    laboratory.recorder.listen(1.0)
+    laboratory.trial_bench.stage.prepare(trial, 1)
+    measure(laboratory.trial_bench, trial, laboratory.plan)
+    return laboratory.person.told
+
+
+def examine(laboratory: Laboratory) -> None:
+    laboratory.recorder.listen(2.0)
+    examine_encoder(laboratory.recorder, laboratory.person, SETTINGS)
+
+
+def test_pushed_by_a_hand_the_known_coefficients_come_out(make: Make) -> None:
+    laboratory = make(trials=2, seed=4)
+    laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
+    results = laboratory.conclude()
+    told = results.muds["made up"]
+    assert {name: each.value for name, each in told.items()} == {
+        name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
+    }
+    assert all(trial.is_measured for trial in results.trials) and results.remarks == []
+    no_ruler = bench_doubt("k_p", SETTINGS, 0.0, 0.0) * told["k_p"].value
+    assert told["k_p"].shared_error == pytest.approx(no_ruler)
+    assert len(list((laboratory.folder / RAW).glob("*_position.csv"))) == 4
+
+
+def test_an_amplifier_that_tells_means_of_two_costs_less_than_three_percent(make: Make) -> None:
+    laboratory = make(trials=2, seed=4, amplifier=AmplifierParameters(averaged=2))
+    laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
+    told = laboratory.conclude().muds["made up"]
+    assert {name: each.value for name, each in told.items()} == {
+        name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
+    }
+
+
+def test_an_encoder_unplugged_in_a_trial_costs_its_places_and_no_force(make: Make) -> None:
+    laboratory = make(person=ScriptedPerson(KEEP))
+    laboratory.at(4.5, counter_of(laboratory).unplug)
+    laboratory.at(6.0, counter_of(laboratory).plug_in)
+    assert any("encoder was unplugged or began anew" in each for each in try_once(laboratory))
+    (recorded,) = load_all(laboratory.folder, laboratory.notebook)
+    assert recorded.places is None and len(recorded.forces_n) > 400
+    assert (laboratory.folder / laboratory.notebook.entries[recorded.key]["position"]["file"]).exists()
+    assert laboratory.encoder is not None and laboratory.encoder.is_there
+
+
+def test_one_that_is_gone_is_asked_for_and_then_done_without(make: Make) -> None:
+    laboratory = make(person=ScriptedPerson(GO_ON, WITHOUT, KEEP))
+    counter_of(laboratory).unplug()
+    told = try_once(laboratory)
+    assert [("encoder is gone" in each, "plug" in each) for each in told[:2]] == [(True, True)] * 2
+    assert told[2].startswith("going on without the position")
+    assert "position" not in laboratory.notebook.entries["made up/insertion/1"]
+
+
+def test_one_that_is_plugged_in_when_asked_for_goes_on(make: Make) -> None:
+    laboratory = make()
+    counter_of(laboratory).unplug()
+    laboratory.at(1.5, counter_of(laboratory).plug_in)
+    told = try_once(laboratory)
+    assert len(told) == 1 and "encoder is gone" in told[0]
+    (recorded,) = load_all(laboratory.folder, laboratory.notebook)
+    assert recorded.places is not None
+
+
+def test_a_drop_out_in_the_stroke_is_told(make: Make) -> None:
+    laboratory = make(person=ScriptedPerson(KEEP))
+    laboratory.at(3.9, lambda: setattr(counter_of(laboratory), "line_at", lambda at_s: b""))
+    told = try_once(laboratory)
+    assert any("place is not known" in each or "the place is not used" in each for each in told)
+
+
+def test_some_garbage_matters_to_nobody(make: Make) -> None:
+    laboratory = make(encoder={"garbled_share": 0.05})
+    assert try_once(laboratory) == []
+    assert laboratory.notebook.entries["made up/insertion/1"]["position"]["garbled_lines"] > 5
+
+
+def test_the_right_baud_rate_is_found_and_told(make: Make) -> None:
+    with pytest.raises(BenchError, match="Use --position-baud 57600; or go on without --position"):
+        examine(make(encoder={"baud": 57600}))
+
+
+def test_one_that_sends_nothing_says_what_to_check(make: Make) -> None:
+    with pytest.raises(BenchError, match="nothing arrives.*or go on without --position"):
+        examine(make(encoder={"drop_out_rate_hz": 10.0, "rate_hz": 10.0, "drop_out_s": 10.0}))
+
+
+def test_lines_that_are_no_counts_are_shown(make: Make) -> None:
+    laboratory = make()
+    counter_of(laboratory).line_at = lambda at_s: b"12.5 mm\r\n"
+    with pytest.raises(BenchError, match=r"12.5 mm.*--position-label"):
+        examine(laboratory)
+
+
+def test_one_too_slow_for_the_stroke_is_told(make: Make) -> None:
+    laboratory = make(encoder={"rate_hz": 20.0})
+    examine(laboratory)
+    assert "20 lines/s, one in 5.0 mm" in laboratory.person.told[0]
+
+
+def test_a_cell_that_is_unplugged_does_not_cost_the_places(make: Make) -> None:
+    laboratory = make(amplifier=AmplifierParameters())
+    laboratory.at(4.5, laboratory.bench.amplifier.unplug)
+    laboratory.at(6.5, laboratory.bench.amplifier.plug_in)
+    assert any("is back" in each for each in try_once(laboratory))
+    assert laboratory.encoder is not None and laboratory.encoder.breaks == 0
+    (recorded,) = load_all(laboratory.folder, laboratory.notebook)
+    assert recorded.places is not None

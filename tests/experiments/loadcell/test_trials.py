@@ -1,0 +1,282 @@
+"""The trials over an emulated amplifier's tty: what is measured, what is doubted, what is never lost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+from statistics import fmean
+
+import pytest
+
+from drivers.load_cell_port import LoadCellPort
+from experiments.bench_robot import BenchError
+from experiments.loadcell.examination import examine_lines
+from experiments.loadcell.fits import INSERTION, SHEAR, Analysed
+from experiments.loadcell.measurement import CellSettings, list_remarks
+from experiments.loadcell.motion import Insertion, Pace
+from experiments.loadcell.raw import RAW, load_all
+from experiments.loadcell.recording import AVERAGED, likeness
+from experiments.loadcell.stage import AttendedStage, Trial
+from experiments.loadcell.trials import KEEP, judge, measure, record
+from experiments.person import GO_ON, REDO, SKIP
+from simulation.load_cell_emulator import AmplifierParameters
+from simulation.plate_stage import StageParameters
+from tests.experiments.loadcell.loadcell_bench import COUNTS, KNOWN, SETTINGS, Laboratory, Make, laboratories
+from tests.scripted_person import ScriptedPerson
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Iterator[Make]:
+    with laboratories(tmp_path) as build:
+        yield build
+
+
+class Idle:
+    """A Stage that does nothing."""
+
+    patience_s = 0.5
+
+    def weigh(self, which: int) -> float:
+        return 0.0
+
+    def prepare(self, trial: Trial, trials: int) -> str:
+        return GO_ON
+
+    def lower(self) -> None: ...
+
+    def start(self, trial: Trial) -> None: ...
+
+    def lift(self) -> None: ...
+
+
+def try_once(laboratory: Laboratory, kind: str = INSERTION) -> list[str]:
+    """One trial, and what was said of it."""
+    trial = Trial("made up", kind, 1)
+    laboratory.recorder.listen(1.0)
+    laboratory.trial_bench.stage.prepare(trial, 1)
+    measure(laboratory.trial_bench, trial, laboratory.plan)
+    return laboratory.person.told
+
+
+def test_calibrated_with_two_weights_the_known_coefficients_come_out(make: Make) -> None:
+    laboratory = make(trials=3, seed=4)
+    laboratory.measure()
+    told = laboratory.conclude().muds["made up"]
+    assert {name: each.value for name, each in told.items()} == {
+        name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
+    }
+    assert [len(each.trials) for each in told.values()] == [3, 3, 3]
+    assert laboratory.port.calibration.per_newton == pytest.approx(42000.0, rel=0.002)
+    assert len(list((laboratory.folder / RAW).iterdir())) == 6
+
+
+def test_an_amplifier_that_tells_means_of_four_is_told_once_and_one_that_does_not_is_not(make: Make) -> None:
+    smeared, sharp = make(amplifier=AmplifierParameters(averaged=4)), make()
+    for laboratory in (smeared, sharp):
+        bench = replace(laboratory.trial_bench, stage=Idle())
+        for number in (1, 2):
+            record(bench, Trial("made up", INSERTION, number), laboratory.plan, 1)
+    assert [each for each in smeared.person.told if AVERAGED in each] == [f"made up/insertion/1: {AVERAGED}"]
+    assert sharp.person.told == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_samples_are_alike_by_what_averages_them_and_not_by_a_drift_or_a_coarse_step(seed: int) -> None:
+    random = Random(seed)
+    single_n = [random.gauss(0.0, 0.008) for _ in range(80)]
+    assert abs(likeness([force_n + 0.001 * place for place, force_n in enumerate(single_n)])) < 0.4
+    assert 0.5 < likeness([fmean(single_n[place : place + 4]) for place in range(76)]) < 1.0
+    assert likeness([0.1] * 40 + [0.2] * 40) == 0.0
+
+
+def test_what_is_in_the_notebook_is_not_measured_again(make: Make) -> None:
+    laboratory = make()
+    laboratory.measure()
+    before = dict(laboratory.notebook.entries)
+    lines = laboratory.port.lines
+    laboratory.measure()
+    assert laboratory.notebook.entries == before
+    assert laboratory.port.lines < lines + 400  # it listened, and no more
+    assert "calibration from" in laboratory.person.told[-1]
+
+
+def test_a_trial_in_which_the_cell_is_unplugged_is_repeated_and_both_are_kept(make: Make) -> None:
+    laboratory = make()
+    laboratory.at(4.5, laboratory.bench.amplifier.unplug)
+    laboratory.at(6.5, laboratory.bench.amplifier.plug_in)
+    told = try_once(laboratory)
+    assert any("plug" in each and "in again" in each for each in told)
+    assert any("is back" in each for each in told)
+    assert any("unplugged in the middle" in each for each in told)
+    assert laboratory.notebook.entries["made up/insertion/1"]["file"].endswith("_2.csv")
+    assert len(list((laboratory.folder / RAW).iterdir())) == 2
+    assert len(load_all(laboratory.folder, laboratory.notebook)) == 1
+
+
+@pytest.mark.parametrize(
+    ("amplifier", "stage", "kind", "sentence"),
+    [
+        (AmplifierParameters(drift_n_s=0.03), None, INSERTION, "the zero moved by"),
+        (AmplifierParameters(range_n=2.0), None, INSERTION, "at its limit"),
+        (AmplifierParameters(garbled_share=0.2), None, SHEAR, "lines were garbled"),
+        (AmplifierParameters(drop_out_rate_hz=2.0, drop_out_s=0.3), None, SHEAR, "are missing"),
+        (AmplifierParameters(rate_hz=10.0), None, INSERTION, "fewer than 6 samples"),
+    ],
+)
+def test_a_trial_in_doubt_says_why_and_is_left_out_in_the_end(
+    make: Make, amplifier: AmplifierParameters, stage: StageParameters | None, kind: str, sentence: str
+) -> None:
+    laboratory = make(amplifier=amplifier, stage=stage, person=ScriptedPerson(SKIP))
+    assert any(sentence in each for each in try_once(laboratory, kind))
+    (entry,) = laboratory.notebook.entries.values()
+    assert entry["skipped"] and any(sentence in each for each in entry["why"])
+    assert (laboratory.folder / entry["file"]).exists()
+    assert load_all(laboratory.folder, laboratory.notebook) == []
+
+
+def test_a_stage_that_nobody_starts_is_no_contact(make: Make) -> None:
+    laboratory = make(person=ScriptedPerson(KEEP))
+    laboratory.trial_bench.stage.start = lambda trial: None  # type: ignore[method-assign]
+    assert any("no contact" in each for each in try_once(laboratory))
+    assert "kept_in_spite_of" in laboratory.notebook.entries["made up/insertion/1"]
+
+
+def test_enter_repeats_a_doubtful_trial_twice_and_then_leaves_it(make: Make) -> None:
+    laboratory = make(amplifier=AmplifierParameters(range_n=2.0))
+    try_once(laboratory)
+    assert laboratory.notebook.entries["made up/insertion/1"]["file"].endswith("_3.csv")
+
+
+def test_a_cell_that_stays_at_its_largest_force_is_at_its_limit(make: Make) -> None:
+    laboratory = make()
+    try_once(laboratory)
+    (recorded,) = load_all(laboratory.folder, laboratory.notebook)
+    clipped = recorded._replace(forces_n=recorded.forces_n.clip(-1.0, 1.0))
+    tare = laboratory.recorder.tare()
+    stretch = laboratory.recorder.record(0.01, 0.1, 0.1)
+    assert any("at its limit" in each for each in judge(Analysed(clipped), stretch, tare, tare))
+    assert judge(Analysed(recorded), stretch, tare, tare) == []
+
+
+def test_a_person_skips_one_trial_and_repeats_the_one_before(make: Make) -> None:
+    laboratory = make(trials=2)
+    stage, asked = laboratory.trial_bench.stage, list[str]()
+    answers = [GO_ON, REDO, GO_ON, SKIP, GO_ON, GO_ON]
+    prepare = stage.prepare
+
+    def answer(trial: Trial, trials: int) -> str:
+        asked.append(trial.key)
+        prepare(trial, trials)
+        return answers.pop(0)
+
+    stage.prepare = answer  # type: ignore[method-assign]
+    laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
+    first, second, third, fourth = (trial.key for trial in laboratory.plan.list_trials())
+    assert asked == [first, second, first, second, third, fourth]
+    assert laboratory.notebook.entries[second] == {"skipped": True}
+
+
+def test_the_lines_are_examined_first(make: Make) -> None:
+    assert examine_lines(make().recorder, "auto") == "number"
+    indicator = make(amplifier=AmplifierParameters(style="indicator"))
+    assert examine_lines(indicator.recorder, "auto") == "indicator"
+    with pytest.raises(BenchError, match="--format indicator"):
+        examine_lines(indicator.recorder, "number")
+    with pytest.raises(BenchError, match="--format column1 or --format column2"):
+        examine_lines(make(amplifier=AmplifierParameters(style="columns")).recorder, "auto")
+
+
+def test_the_right_baud_rate_is_found_and_told(make: Make) -> None:
+    laboratory = make(amplifier=AmplifierParameters(baud=57600))
+    with pytest.raises(BenchError, match="Use --baud 57600"):
+        laboratory.measure()
+
+
+def test_a_cell_that_sends_nothing_says_what_to_check(make: Make) -> None:
+    laboratory = make(amplifier=AmplifierParameters(drop_out_rate_hz=10.0, rate_hz=10.0, drop_out_s=10.0))
+    with pytest.raises(BenchError, match="nothing arrives"):
+        laboratory.measure()
+
+
+def test_a_cell_that_sends_nonsense_is_shown(make: Make) -> None:
+    laboratory = make()
+    laboratory.bench.amplifier._line = lambda force_n, at_s: b"hello world\r\n"  # type: ignore[method-assign]
+    with pytest.raises(BenchError, match="hello world"):
+        laboratory.measure()
+
+
+def test_an_amplifier_too_slow_for_the_stroke_is_told_before_anything_is_measured(make: Make) -> None:
+    laboratory = make(amplifier=AmplifierParameters(rate_hz=10.0), person=ScriptedPerson("q"))
+    with pytest.raises(BenchError, match="too slow"):
+        laboratory.measure(CellSettings(scale_n=1.0))
+    assert "RATE pin" in laboratory.person.told[1] and "--speed 0.02" in laboratory.person.told[1]
+    assert not laboratory.notebook.begun
+
+
+def test_weights_that_say_nothing_are_asked_for_again(make: Make) -> None:
+    laboratory = make(person=ScriptedPerson("q"))
+    laboratory.trial_bench.stage.weigh = lambda which: 2.0  # type: ignore[method-assign]
+    with pytest.raises(BenchError, match="not calibrated"):
+        laboratory.measure()
+    assert "both weights are" in laboratory.person.told[1]
+
+
+def test_a_weight_that_the_cell_cannot_bear_is_told_as_one(make: Make) -> None:
+    laboratory = make(person=ScriptedPerson("q"), amplifier=AmplifierParameters(range_n=1.0))
+    with pytest.raises(BenchError, match="not calibrated"):
+        laboratory.measure()
+    assert "overloaded by this weight" in laboratory.person.told[1]
+
+
+def test_a_stage_at_another_speed_is_remarked_for_every_trial(make: Make) -> None:
+    laboratory = make(trials=2)
+    laboratory.measure()
+    pace = Pace(0.05, 2.0, 0.01, 0.1)
+    trials = [
+        replace(trial, motion=trial.motion._replace(pace=pace))
+        for trial in laboratory.conclude().trials
+        if isinstance(trial.motion, Insertion)
+    ]
+    told = list_remarks(trials, SETTINGS)
+    assert [remark.split(":")[0] for remark in told] == ["made up/insertion/1", "made up/insertion/2"]
+
+
+def test_a_cell_that_stays_away_ends_it_with_a_sentence(make: Make) -> None:
+    laboratory = make()
+    laboratory.recorder.listen(0.5)
+    laboratory.bench.amplifier.unplug()
+    with pytest.raises(BenchError, match="did not come back"):
+        laboratory.recorder.tare()
+
+
+def test_a_tare_in_which_the_cell_is_unplugged_is_taken_again(make: Make) -> None:
+    laboratory = make()
+    laboratory.recorder.listen(0.5)
+    laboratory.at(0.02, laboratory.bench.amplifier.unplug)
+    laboratory.at(3.0, laboratory.bench.amplifier.plug_in)
+    assert laboratory.recorder.tare().samples > 60
+    assert laboratory.port.unpluggings == 1
+
+
+def test_a_person_is_asked_for_everything_that_hands_do() -> None:
+    person = ScriptedPerson(GO_ON, SKIP)
+    drained: list[int] = []
+    stage = AttendedStage(SETTINGS, person, lambda: drained.append(1))
+    assert stage.weigh(0) == 0.0
+    assert stage.prepare(Trial("a", SHEAR, 1), 5) == GO_ON
+    assert stage.prepare(Trial("a", INSERTION, 1), 5) == SKIP
+    stage.lower()
+    stage.lift()
+    stage.start(Trial("a", INSERTION, 1))
+    assert "down to 3 cm, hold 3 s" in person.told[0]
+    assert len(drained) == 4
+
+
+def test_a_port_is_closed_while_other_rates_are_tried(make: Make) -> None:
+    laboratory = make(amplifier=AmplifierParameters(baud=57600))
+    with pytest.raises(BenchError):
+        examine_lines(laboratory.recorder, "auto")
+    again = LoadCellPort(laboratory.port.path, 57600, laboratory.port.line_format, COUNTS)
+    again.close()

@@ -1,0 +1,210 @@
+"""The plan of the trackway, its report of made-up walks, and a short one done for real."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+
+from experiments.notebook import Notebook
+from experiments.trackway.comparison import FIXED, Plan, end_of, is_over, report_of, rules_of, run
+from experiments.trackway.paper_table import ADAPTIVE, PAPER_TABLE
+from experiments.trackway.walk import Walk, WalkedStride
+from simulation.clay import MUDS
+from simulation.track import paper_track
+
+NAMES = list(MUDS)
+
+
+def stride(mud: str, place_m: float = 0.0, step_m: float = 0.12, duration_s: float = 2.0) -> WalkedStride:
+    return WalkedStride(mud, place_m, 0.03, step_m, duration_s, 0.0)
+
+
+# the plan
+
+
+def test_by_default_it_is_the_papers_trackway() -> None:
+    plan = Plan()
+    assert [rule.name for rule in plan.rules] == ["3 cm", "5 cm", ADAPTIVE]
+    assert [rule.depth_m for rule in plan.rules[:2]] == [0.03, 0.05]
+    assert (plan.rules[2].method, plan.seeds) == ("default", 3)
+    segments = paper_track().segments
+    assert [segment.clay for segment in segments] == list(plan.muds)
+    assert [segment.end_m for segment in segments] == pytest.approx([plan.compartment_m * n for n in (1, 2, 3)])
+
+
+def test_the_first_method_is_the_adaptive_row_and_others_have_their_names() -> None:
+    assert rules_of(["paper"])[2:] == (rules_of(["default"])[2]._replace(method="paper"),)
+    assert [(rule.name, rule.method) for rule in rules_of(["default", "paper"])[2:]] == [
+        ("adaptive", "default"),
+        ("adaptive, paper", "paper"),
+    ]
+    assert rules_of(["default"])[:2] == FIXED
+
+
+def test_a_method_that_there_is_not_is_named() -> None:
+    with pytest.raises(ValueError, match="'fog'"):
+        rules_of(["default", "fog"])
+
+
+def test_constant_depths_are_walked_in_each_mud_alone_in_steps_of_2_5_mm() -> None:
+    orders = Plan().constant_walks()
+    assert {order.clay for order in orders} == set(MUDS.values())
+    assert len(orders) == 3 * 15
+
+
+# the end of a walk
+
+
+def test_a_walk_that_has_not_begun_is_not_over() -> None:
+    assert not is_over(1.83, [])
+
+
+@pytest.mark.parametrize(("step_m", "over"), [(0.12, False), (0.14, True), (0.13, True)])
+def test_it_is_over_when_the_plates_would_go_down_past_the_end(step_m: float, over: bool) -> None:
+    assert is_over(1.75, [stride("45.3", 1.62, step_m)]) is over
+
+
+def test_it_is_over_after_90_s_in_one_mud_not_in_all() -> None:
+    slow = [stride("a", 0.1, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0)]
+    assert not is_over(1.83, slow)
+    assert is_over(1.83, [*slow, stride("b", 0.7, 0.0, 2.0)])
+
+
+def test_how_a_walk_ended_is_said() -> None:
+    plan = Plan()
+    assert end_of(plan, Walk([stride("45.3", 1.80)], "")) == "past the end"
+    assert end_of(plan, Walk([stride("53.1", 0.80)], "")) == "stuck in 53.1"
+    assert end_of(plan, Walk([], "a drive is silent")) == "a drive is silent"
+
+
+# the report
+
+
+def made_up(**changes: Any) -> dict[str, Any]:
+    """Every gait makes 6 cm/s in each mud, the best constant depth 8."""
+    plan = replace(Plan(rules=rules_of(["default", "paper"]), seeds=2), **changes)
+    walks = [Walk([stride(mud, 1.8) for mud in NAMES for _ in range(3)], "")] * plan.seeds
+    constant = {mud: {0.02: 7.0, 0.0275: 8.0} for mud in NAMES}
+    return report_of(plan, {rule.name: list(walks) for rule in plan.rules}, constant)
+
+
+def test_the_table_has_a_row_for_each_gait_and_a_cell_for_each_mud() -> None:
+    report = made_up()
+    assert list(report["table"]) == ["3 cm", "5 cm", "adaptive", "adaptive, paper"]
+    for row in report["table"].values():
+        assert list(row) == NAMES
+        for cell in row.values():
+            assert set(cell) >= {"mean", "sd", "mean_all", "failures", "failures_after_second"}
+            assert (cell["mean"], cell["mean_all"], cell["sd"]) == (6.0, 6.0, 0.0)
+    assert report["mean_over_muds"]["adaptive"] == {"mean": 6.0, "mean_all": 6.0}
+    json.dumps(report, allow_nan=False)
+
+
+def test_the_best_constant_depth_stands_beside_it_with_the_share_of_it() -> None:
+    report = made_up()
+    assert report["best_constant_depth"] == {mud: {"depth_cm": 2.75, "mean": 8.0} for mud in NAMES}
+    assert report["best_constant_mean_over_muds"] == 8.0
+    assert report["over_best"]["adaptive"] == dict.fromkeys(NAMES, 0.75)
+
+
+def test_only_fixed_depths_are_judged_by_the_papers_sd() -> None:
+    report = made_up()
+    assert report["within_one_sd"] == {
+        rule: {mud: abs(6.0 - told.mean) <= told.sd for mud, told in PAPER_TABLE[rule].items()}
+        for rule in ("3 cm", "5 cm")
+    }
+    assert report["within_one_sd"]["5 cm"] == {"48.5": False, "53.1": True, "45.3": False}
+    assert report["paper"]["adaptive"]["53.1"] == {"mean": 5.1, "sd": 0.3}
+
+
+def test_a_gait_that_got_stuck_has_no_speed_further_on() -> None:
+    plan = Plan(rules=FIXED[:1], seeds=1)
+    stuck = Walk([stride("48.5")] * 3 + [stride("53.1", 0.7, 0.001)] * 3, "")
+    report = report_of(plan, {"3 cm": [stuck]}, {mud: {0.02: 7.0} for mud in NAMES})
+    assert report["table"]["3 cm"]["45.3"]["mean"] is None
+    assert report["within_one_sd"]["3 cm"]["45.3"] is None
+    assert report["mean_over_muds"]["3 cm"]["mean"] is None
+    assert report["over_best"]["3 cm"]["45.3"] is None
+    assert report["ends"] == {"3 cm": {"stuck in 53.1": 1}}
+
+
+# an interrupted one
+
+
+class Quick(Plan):
+    """Nothing is simulated."""
+
+    def walks(self) -> dict[str, Callable[[], Walk]]:
+        return dict.fromkeys(super().walks(), quick)
+
+
+def quick() -> Walk:
+    return Walk([stride(mud, 1.8) for mud in NAMES for _ in range(3)], "")
+
+
+def test_what_was_walked_before_an_interruption_is_not_walked_again(tmp_path: Path) -> None:
+    plan = Quick(seeds=1, constant_depths_m=(0.03,))
+
+    def interrupt(done: int, total: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(plan, Notebook(tmp_path, plan.kept), interrupt, processes=1)
+    again, shown = Notebook(tmp_path, plan.kept), list[tuple[int, int]]()
+    assert len(again.entries) == 2
+    report = run(plan, again, lambda done, total: shown.append((done, total)), processes=1)
+    assert shown == [(3, 6), (4, 6), (5, 6), (6, 6)]
+    assert report == run(plan, Notebook(tmp_path / "other", plan.kept), lambda done, total: None, processes=1)
+
+
+def test_every_walk_has_a_key_of_its_own() -> None:
+    plan = Plan(rules=rules_of(["default", "paper"]), seeds=2, constant_seeds=2)
+    assert len(plan.walks()) == 4 * 2 + len(plan.constant_walks()) == 4 * 2 + 3 * 15 * 2
+
+
+# for real
+
+
+SHORT = Plan(compartment_m=0.2, seeds=1, constant_depths_m=(0.03,), constant_seeds=1)
+
+
+@cache
+def short() -> dict[str, Any]:
+    """Compartments of less than two steps, one seed, one constant depth."""
+    with TemporaryDirectory() as folder:
+        return run(SHORT, Notebook(Path(folder), SHORT.kept), lambda done, total: None)
+
+
+def test_a_short_trackway_is_walked_from_mud_to_mud_past_its_end() -> None:
+    for trials in short()["walks"].values():
+        (strides,) = trials
+        assert list(dict.fromkeys(each["mud"] for each in strides)) == NAMES
+        assert strides[-1]["place_cm"] + strides[-1]["step_cm"] >= 60.0
+    assert all(ends == {"past the end": 1} for ends in short()["ends"].values())
+
+
+def test_fixed_gaits_keep_their_depth_and_the_adaptive_one_does_not() -> None:
+    depths = {rule: {each["depth_cm"] for each in trials[0]} for rule, trials in short()["walks"].items()}
+    assert (depths["3 cm"], depths["5 cm"]) == ({3.0}, {5.0})
+    assert len(depths["adaptive"]) > 1
+
+
+def test_three_centimetres_slip_in_the_soft_mud_and_five_do_not() -> None:
+    table = short()["table"]
+    assert table["3 cm"]["53.1"]["failures"].get("slippage", 0) > 0
+    assert table["5 cm"]["53.1"]["failures"] == {}
+    assert table["5 cm"]["53.1"]["mean"] > 2.0 * table["3 cm"]["53.1"]["mean"]
+
+
+def test_five_centimetres_are_held_in_the_firmest_mud_and_three_are_not() -> None:
+    table = short()["table"]
+    assert "extraction" in table["5 cm"]["45.3"]["failures"]
+    assert "extraction" not in table["3 cm"]["45.3"]["failures"]

@@ -1,0 +1,153 @@
+"""The strides of a walk, read back from its log, against what the plant did."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isnan, nan
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from control.controller import WalkOrder
+from control.modes import Mode
+from control.records import Phase
+from experiments.trackway.log_strides import walked_strides
+from experiments.trackway.walk import EXTRACTION, RECOVERED, StrideRecord, WalkedStride
+from firmware_host.configuration import Configuration
+from firmware_host.log_reader import Log, read_log, tick_type
+from firmware_host.recorder import Recorder
+from simulation.clay import Clay
+from simulation.lockstep import Lockstep
+from simulation.motion_capture import MotionCaptureParameters
+from simulation.track import Track
+
+TRACK = Track([(0.55, Clay("soft", 1000.0)), (1.0, Clay("firm", 5000.0))])
+ARM_M = 0.12
+DEPTHS_M = (0.03, 0.05)  # of two walks
+
+
+class LoggedWalks(NamedTuple):
+    log: Log
+    truth: Sequence[WalkedStride]
+    configuration: Configuration
+
+
+def mud_at(place_m: float) -> str:
+    return TRACK.clay_at(place_m).name
+
+
+@pytest.fixture(scope="module")
+def walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> LoggedWalks:
+    """Two walks one after the other, in one log; in the second flippers are held, and no swing waits for it."""
+    path = tmp_path_factory.mktemp("log") / "walks.mcap"
+    held = replace(configuration, recovery=replace(configuration.recovery, attempts=0))
+    recorder = Recorder(path, held.text, {"robot": "test"})
+    lockstep = Lockstep(held, TRACK, recorder=recorder, motion_capture=MotionCaptureParameters(noise_m=0.0))
+    lockstep.arm()
+    truth: list[WalkedStride] = []
+    for depth_m in DEPTHS_M:
+        lockstep.walk(WalkOrder(depth_m, adaptive=False, strides=5))
+        record = StrideRecord(lockstep, TRACK)
+        while lockstep.loop.mode is Mode.WALKING:
+            lockstep.step()
+            record.look()
+        truth += record.strides[:5]  # the sixth is the tick in which the walk ended
+        lockstep.run_until(lambda: lockstep.loop.mode is Mode.HOLD, 5.0)
+    assert recorder.close(20.0) and recorder.dropped == 0
+    return LoggedWalks(read_log(path), truth, held)
+
+
+def test_the_log_tells_the_strides_that_the_plant_made(walks: LoggedWalks) -> None:
+    told = walked_strides(walks.log, walks.configuration, mud_at)
+    assert len(told) == len(walks.truth) == 10
+    for stride, true in zip(told, walks.truth, strict=True):
+        assert (stride.mud, stride.depth_m, stride.recovered) == (true.mud, true.depth_m, true.recovered)
+        assert stride.step_m == pytest.approx(true.step_m, abs=1e-9)
+        assert stride.duration_s == pytest.approx(true.duration_s, abs=1e-9)
+        assert stride.place_m == pytest.approx(true.place_m, abs=1e-3)  # a joint angle is 1 ms old
+        assert stride.pushed_back_m == pytest.approx(true.pushed_back_m, abs=1e-9)
+        assert stride.failure(ARM_M) == true.failure(ARM_M)
+
+
+def test_the_walks_hold_what_is_to_be_told(walks: LoggedWalks) -> None:
+    """Or the comparison says nothing."""
+    assert {stride.mud for stride in walks.truth} == {"soft", "firm"}
+    assert EXTRACTION in {stride.failure(ARM_M) for stride in walks.truth}
+    assert {stride.depth_m for stride in walks.truth} == set(DEPTHS_M)
+
+
+def made_log(strides: Sequence[int], phases: Sequence[Phase], body_m: Sequence[float], mode: Mode) -> Log:
+    """A tick every 0.1 s; `strides` and `phases` as rows of the log hold them: of the tick before."""
+    ticks = np.zeros(len(strides), dtype=tick_type())
+    ticks["stamp_s"], ticks["mode"] = 0.1 * np.arange(len(strides)), mode
+    ticks["stride"], ticks["phase"], ticks["body_x_m"], ticks["stride_depth_m"] = strides, phases, body_m, 0.03
+    return Log({}, "", ticks, [], [], True)
+
+
+PHASES = (Phase.REST, Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING, Phase.INSERTION, Phase.STANCE)
+STRIDES = (-1, 0, 0, 0, 0, 1, 1)
+PLACES_M = (0.00, 0.02, 0.11, 0.08, 0.10, 0.11, 0.15)  # of the same ticks
+
+
+def one_stride(configuration: Configuration, body_m: Sequence[float], mode: Mode = Mode.WALKING) -> WalkedStride:
+    (stride,) = walked_strides(made_log(STRIDES, PHASES, body_m, mode), configuration, lambda place_m: "mud")
+    return stride
+
+
+def test_a_stride_goes_from_one_insertion_to_the_next(configuration: Configuration) -> None:
+    """A row names the target of the tick before it: the insertions begin in the first and in the fifth row."""
+    stride = one_stride(configuration, PLACES_M)
+    assert (stride.mud, stride.place_m, stride.depth_m, stride.recovered) == ("mud", 0.0, 0.03, False)
+    assert (stride.step_m, stride.duration_s, stride.pushed_back_m) == pytest.approx((0.10, 0.4, 0.03))
+
+
+def test_a_stride_whose_ends_were_not_seen_has_no_length_and_no_mud(configuration: Configuration) -> None:
+    unseen = one_stride(configuration, (nan, *PLACES_M[1:]))
+    assert isnan(unseen.step_m) and isnan(unseen.place_m) and unseen.mud == ""
+    assert unseen.pushed_back_m == pytest.approx(0.03)
+    unseen = one_stride(configuration, (*PLACES_M[:4], nan, *PLACES_M[5:]))
+    assert isnan(unseen.step_m) and unseen.mud == "mud"
+
+
+def test_a_way_back_that_may_have_been_missed_is_not_known(configuration: Configuration) -> None:
+    unseen = one_stride(configuration, (*PLACES_M[:3], nan, *PLACES_M[4:]))
+    assert isnan(unseen.pushed_back_m) and unseen.step_m == pytest.approx(0.10)
+
+
+def test_where_nobody_walks_there_are_no_strides(configuration: Configuration) -> None:
+    assert walked_strides(made_log(STRIDES, PHASES, PLACES_M, Mode.HOLD), configuration, mud_at) == []
+    assert walked_strides(made_log((), (), (), Mode.HOLD), configuration, mud_at) == []
+
+
+def test_a_stride_of_which_the_end_was_lost_is_not_told(configuration: Configuration) -> None:
+    log = made_log((-1, 0, 0, 0, 0, 2, 2), PHASES, PLACES_M, Mode.WALKING)
+    assert walked_strides(log, configuration, mud_at) == []
+
+
+def test_a_recovery_is_told(configuration: Configuration) -> None:
+    phases = (*PHASES[:4], Phase.RECOVERY, *PHASES[5:])
+    (stride,) = walked_strides(made_log(STRIDES, phases, PLACES_M, Mode.WALKING), configuration, mud_at)
+    assert stride.recovered and stride.failure(ARM_M) in (RECOVERED, EXTRACTION)
+
+
+def test_drop_outs_of_motion_capture_cost_strides_but_never_invent_one(
+    tmp_path: Path, configuration: Configuration
+) -> None:
+    recorder = Recorder(tmp_path / "walk.mcap", configuration.text, {"robot": "test"})
+    capture = MotionCaptureParameters(rate_hz=120.0, noise_m=0.0, dropouts_per_s=0.5, dropout_s=0.5)
+    lockstep = Lockstep(configuration, TRACK, recorder=recorder, motion_capture=capture)
+    lockstep.arm()
+    lockstep.walk(WalkOrder(0.03, adaptive=False, strides=8))
+    record = StrideRecord(lockstep, TRACK)
+    while lockstep.loop.mode is Mode.WALKING:
+        lockstep.step()
+        record.look()
+    assert recorder.close(20.0)
+    told = walked_strides(read_log(tmp_path / "walk.mcap"), configuration, mud_at)
+    assert len(told) == 8
+    known = [(each, true) for each, true in zip(told, record.strides, strict=False) if not isnan(each.step_m)]
+    assert 2 <= len(known) <= 7
+    assert all(abs(each.step_m - true.step_m) < 0.003 for each, true in known)

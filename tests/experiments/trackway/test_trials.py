@@ -1,0 +1,266 @@
+"""Table I walked through the daemon's calls: every trial counts once, is stopped where it should be, and is kept."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line.walking import trackway_text
+from control.modes import Mode
+from experiments.bench_robot import BenchError, arm
+from experiments.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.notebook import Notebook
+from experiments.person import GO_ON, REDO, SKIP
+from experiments.trackway.plots import plot_trackway
+from experiments.trackway.trials import (
+    KEEP,
+    UNSEEN_S,
+    AskedTrackway,
+    LoggedWalk,
+    Mud,
+    Plan,
+    Progress,
+    first_walks,
+    report_of,
+    run,
+    told_of,
+    walk_over,
+)
+from experiments.trackway.walk import StrideRecord, Walk, WalkedStride
+from firmware_host.file_recorder import FileRecorder
+from firmware_host.log_reader import read_log
+from firmware_host.ticker import PERIOD_S
+from simulation.clay import MUDS
+from simulation.lockstep import Lockstep
+from simulation.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
+from simulation.track import Track
+from tests.scripted_person import ScriptedPerson
+
+SHORT = Plan((Mud("48.5", 0.3), Mud("53.1", 0.3)), trials=1, depths_m=(0.03,))
+TINY = Plan((Mud("48.5", 0.15),), trials=1, depths_m=(0.03,))
+
+
+class SimulatedTrackway:
+    """A robot of its own for each trial, and a person who says what the test tells them to."""
+
+    def __init__(self, folder: Path, verdicts: Iterator[str], capture: MotionCaptureParameters = AT_EVERY_TICK) -> None:
+        self.folder, self.verdicts, self.capture = folder, verdicts, capture
+        self.prepared: list[str] = []
+        self.told: list[str] = []
+        self.truth: list[StrideRecord] = []
+
+    def prepare(self, trial: str) -> LockstepRobot:
+        self.prepared.append(trial)
+        configuration = simulated_configuration()
+        recorder = FileRecorder(self.folder / f"{len(self.prepared)}.mcap", configuration)
+        track = Track([(mud.length_m, MUDS[mud.name]) for mud in SHORT.muds])
+        lockstep = Lockstep(configuration, track, recorder=recorder, motion_capture=self.capture)
+        self.truth.append(StrideRecord(lockstep, track))
+        return WatchedRobot(lockstep, recorder, self.truth[-1])
+
+    def judge(self, told: str, stopped: bool) -> str:
+        self.told.append(told)
+        return next(self.verdicts)
+
+
+class WatchedRobot(LockstepRobot):
+    """The plant's truth is looked at once a tick."""
+
+    def __init__(self, lockstep: Lockstep, recorder: FileRecorder, truth: StrideRecord) -> None:
+        super().__init__(lockstep, recorder)
+        self._truth = truth
+
+    def wait(self, duration_s: float) -> None:
+        for _ in range(round(duration_s / PERIOD_S)):
+            self.lockstep.step()
+            self._truth.look()
+
+
+class Leveller(ScriptedPerson):
+    """Looks whether the robot could move while hands are in the mud."""
+
+    def __init__(self, robot: LockstepRobot) -> None:
+        super().__init__()
+        self.robot = robot
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        assert self.robot.call("status")["mode"] == "idle"
+        return super().ask(question, answers, meanwhile)
+
+
+def test_torque_is_off_while_a_person_levels_mud_whatever_the_robot_did_before(tmp_path: Path) -> None:
+    robot = SimulatedTrackway(tmp_path, always(GO_ON)).prepare("any")
+    arm(robot)
+    person = Leveller(robot)
+    AskedTrackway(robot, person).prepare("3 cm, trial 1 of 3")
+    assert person.asked == [
+        "3 cm, trial 1 of 3. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud."
+        " Take the hands away: the robot walks next"
+    ]
+    robot.close()
+
+
+def always(verdict: str) -> Iterator[str]:
+    while True:
+        yield verdict
+
+
+def unseen(done: int, total: int) -> None:
+    """Nobody waits."""
+
+
+def test_the_table_of_the_log_is_that_of_the_plant(tmp_path: Path) -> None:
+    trackway = SimulatedTrackway(tmp_path, always(GO_ON))
+    report = run(SHORT, trackway, Notebook(tmp_path, {}), unseen)
+    assert trackway.prepared == ["3 cm, trial 1 of 1", "adaptive, trial 1 of 1"]
+    assert [told.partition(": ")[0] for told in trackway.told] == trackway.prepared
+    assert {tuple(ends) for ends in report["ends"].values()} == {("past the end",)}
+    for rule, record in zip(("3 cm", "adaptive"), trackway.truth, strict=True):
+        told, true = report["walks"][rule][0], [stride for stride in record.strides if stride.place_m < 0.6]
+        assert len(told) == len(true) >= 5
+        for stride, truth in zip(told, true, strict=True):
+            assert stride["mud"] == truth.mud
+            assert stride["step_cm"] == pytest.approx(100.0 * truth.step_m, abs=0.05)
+            assert stride["duration_s"] == pytest.approx(truth.duration_s, abs=0.01)
+    json.dumps(report, allow_nan=False)
+    plot_trackway(report, tmp_path / "trackway.png")
+    assert "Table I" in trackway_text(report)
+
+
+def test_a_trial_that_is_redone_counts_once_and_one_that_is_skipped_not_at_all(tmp_path: Path) -> None:
+    trackway, notebook = SimulatedTrackway(tmp_path, iter([REDO, GO_ON, SKIP])), Notebook(tmp_path, {})
+    report = run(TINY, trackway, notebook, unseen)
+    ((key, logged),) = first_walks(TINY, notebook).items()
+    counted = read_log(tmp_path / "2.mcap")
+    assert (key, logged.run) == ("3 cm, trial 1", counted.metadata["run_id"])
+    walked_s = counted.ticks["stamp_s"][counted.ticks["mode"] == Mode.WALKING]
+    assert logged.from_s < walked_s[0] < walked_s[-1] < logged.to_s
+    assert trackway.prepared == ["3 cm, trial 1 of 1", "3 cm, trial 1 of 1", "adaptive, trial 1 of 1"]
+    assert len(report["walks"]["3 cm"]) == 1 and report["walks"]["adaptive"] == []
+    assert report["table"]["adaptive"]["48.5"]["mean"] is None
+
+
+def test_what_was_walked_is_not_walked_again(tmp_path: Path) -> None:
+    trackway = SimulatedTrackway(tmp_path, iter([GO_ON]))
+    with pytest.raises(StopIteration):  # the person has gone
+        run(TINY, trackway, Notebook(tmp_path, {}), unseen)
+    again = SimulatedTrackway(tmp_path / "again", always(GO_ON))
+    report = run(TINY, again, Notebook(tmp_path, {}), unseen)
+    assert again.prepared == ["adaptive, trial 1 of 1"]
+    assert len(report["walks"]["3 cm"]) == 1
+
+
+def test_without_a_pose_nobody_walks(tmp_path: Path) -> None:
+    trackway = SimulatedTrackway(tmp_path, always(GO_ON), MotionCaptureParameters(rate_hz=0.001))
+    with pytest.raises(BenchError, match="the body's place is not known"):
+        run(TINY, trackway, Notebook(tmp_path, {}), unseen)
+
+
+def test_strides_of_which_the_pose_was_lost_are_told_and_not_counted(tmp_path: Path) -> None:
+    capture = MotionCaptureParameters(rate_hz=120.0, dropouts_per_s=1.0, dropout_s=0.4)
+    trackway = SimulatedTrackway(tmp_path, always(GO_ON), capture)
+    report = run(TINY, trackway, Notebook(tmp_path, {}), unseen)
+    assert report["strides_without_place"] > 0
+    json.dumps(report, allow_nan=False)
+
+
+@pytest.mark.parametrize(
+    ("place_m", "mud"), [(-0.1, "48.5"), (0.0, "48.5"), (0.299, "48.5"), (0.3, "53.1"), (0.6, ""), (9.0, "")]
+)
+def test_a_mud_reaches_from_its_border_to_the_next(place_m: float, mud: str) -> None:
+    assert SHORT.mud_at(place_m) == mud
+
+
+class DoubtedRobot(WatchedRobot):
+    """What its status tells of the body's place is altered, and it is asked for something else meanwhile."""
+
+    place: Callable[[float, float | None], float | None]
+    asked: tuple[float, str]
+
+    def call(self, method: str, **params: Any) -> Any:
+        answer = super().call(method, **params)
+        if method != "status":
+            return answer
+        if self.asked[1] and answer["mode"] == "walking" and answer["now_s"] > self.asked[0]:
+            super().call(self.asked[1])
+            self.asked = (0.0, "")
+        return answer | {"body_x_m": self.place(answer["now_s"], answer["body_x_m"])}
+
+
+def doubted_walk(
+    folder: Path, place: Callable[[float, float | None], float | None], asked: tuple[float, str] = (0.0, "")
+) -> tuple[LoggedWalk, float]:
+    """A trial, and when it was over."""
+    robot = SimulatedTrackway(folder, always(GO_ON)).prepare("one")
+    robot.__class__ = DoubtedRobot
+    assert isinstance(robot, DoubtedRobot)
+    robot.place, robot.asked = place, asked
+    walk = walk_over(robot, SHORT, SHORT.rules[0])
+    assert robot.call("status")["mode"] in ("idle", "fault")
+    return walk, robot.lockstep.now_s
+
+
+def test_a_robot_that_is_not_seen_any_more_does_not_walk_on(tmp_path: Path) -> None:
+    walk, over_s = doubted_walk(tmp_path, lambda now_s, x_m: x_m if now_s < 6.0 else None)
+    assert "not told any more" in walk.fault
+    assert over_s < 6.0 + UNSEEN_S + 5.0
+    assert walk.strides  # which its log tells
+
+
+def test_a_pose_of_the_wrong_sign_is_told(tmp_path: Path) -> None:
+    walk, _ = doubted_walk(tmp_path, lambda now_s, x_m: x_m and -x_m)
+    assert "turn pose.axis" in walk.fault
+
+
+@pytest.mark.parametrize(("asked", "told"), [("stop", "told to stop"), ("disarm", "torque was switched off")])
+def test_what_somebody_else_asks_for_is_no_end_of_the_trackway(tmp_path: Path, asked: str, told: str) -> None:
+    walk, _ = doubted_walk(tmp_path, lambda now_s, x_m: x_m, (5.0, asked))
+    assert told in walk.fault and walk.stopped
+
+
+@pytest.mark.parametrize(
+    ("now_s", "body_m", "why", "stopped"),
+    [
+        (91.0, 0.1, "stuck in 48.5", False),
+        (60.0, 0.6, "", False),
+        (60.0, -0.3, "the body's place falls", True),
+        (60.0, None, "the body's place is not told", True),
+    ],
+)
+def test_only_what_ends_by_itself_or_comes_to_nothing_is_not_stopped(
+    now_s: float, body_m: float | None, why: str, stopped: bool
+) -> None:
+    end = Progress(SHORT, 0.0, 0.0).judge({"now_s": now_s, "body_x_m": body_m, "phase": "insertion"})
+    assert end and end.why.startswith(why) and end.stopped is stopped
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_a_walk_that_was_stopped_is_walked_again_unless_a_person_says_otherwise(stopped: bool, tmp_path: Path) -> None:
+    robot = SimulatedTrackway(tmp_path, always(GO_ON)).prepare("one")
+    verdicts = {
+        answer: AskedTrackway(robot, ScriptedPerson(answer)).judge("one", stopped)
+        for answer in (GO_ON, SKIP, KEEP if stopped else REDO)
+    }
+    robot.close()
+    assert verdicts == ({GO_ON: REDO, SKIP: SKIP, KEEP: GO_ON} if stopped else {GO_ON: GO_ON, SKIP: SKIP, REDO: REDO})
+
+
+def test_a_trial_of_one_stride_is_told_in_the_singular() -> None:
+    stride = WalkedStride("48.5", 0.0, 0.03, 0.1, 2.0, 0.0)
+    assert told_of("3 cm, trial 1", Walk([stride], "")) == "3 cm, trial 1: 1 stride, 5.0 cm/s"
+    assert told_of("3 cm, trial 1", Walk([stride, stride], "")).startswith("3 cm, trial 1: 2 strides, ")
+
+
+def test_a_table_of_which_everything_was_left_out_is_still_one(tmp_path: Path) -> None:
+    left_out = {"strides": [], "fault": "", "arm_m": 0.12, "skipped": True}
+    notebook = Notebook(tmp_path, {})
+    for key, _ in TINY.orders():
+        notebook.write(key, left_out)
+    report = report_of(TINY, notebook)
+    assert "Trials left out: 2." in trackway_text(report)
+    plot_trackway(report, tmp_path / "trackway.png")
+    assert (tmp_path / "trackway.png").stat().st_size > 0

@@ -1,0 +1,268 @@
+"""Walks over several muds: each stride beside its mud, with a pose or without, and the paper's findings beside ours."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+
+from experiments.estimation_methods import COMPENSATED, DEFAULT, PAPER
+from experiments.flipper.report import KNOWN_BIAS, WRONG_CONSTANTS
+from experiments.lockstep_robot import LockstepRobot
+from experiments.mud_trials import Bench, SpoiltTrialError
+from experiments.notebook import Entry, Notebook
+from experiments.simulated_bed import CarriedBed
+from experiments.trackway.trials import Mud, reach_of
+from experiments.walk import measurement as walk_mapping
+from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
+from experiments.walk.measurement import MUDS, Advance, Plan, measure, require_mud
+from experiments.walk.pages import sections_of, text_of
+from experiments.walk.report import placed_strides, report_of, walks_of
+from experiments.walk.simulation import walking_bench
+from tests.experiments.made_up_strides import CONFIGURATION, make_estimate, make_stride
+from tests.scripted_person import ScriptedPerson
+
+SHORT = Plan((Mud("47.6", 0.3), Mud("51.2", 0.3)), trials=1, soft=("51.2",), soft_strides=2, simulated=True)
+TINY = Plan((Mud("47.6", 0.2),), trials=1, simulated=True)
+
+
+@cache
+def measured() -> dict[str, Entry]:
+    with TemporaryDirectory() as name:
+        bench = bench_of(Path(name), SHORT)
+        walk_mapping.run(bench, SHORT, lambda done, of: None)
+        bench.robot.close()
+    return bench.notebook.entries
+
+
+def bench_of(folder: Path, plan: Plan) -> Bench:
+    return Bench(*walking_bench(folder, plan, 1), ScriptedPerson(), Notebook(folder, plan.kept))
+
+
+def report(plan: Plan = SHORT, truth: dict[str, dict[str, float]] | None = None) -> dict[str, Any]:
+    return report_of(plan, measured(), CONFIGURATION, truth)
+
+
+# the plan
+
+
+def test_three_walks_over_the_papers_muds() -> None:
+    plan = Plan()
+    assert [trial.key for trial in plan.planned] == ["walk/1", "walk/2", "walk/3"]
+    assert plan.length_m == pytest.approx(1.83)
+    assert plan.borders_m == pytest.approx([0.61, 1.22])
+
+
+def test_then_walks_at_both_depths_in_each_soft_mud() -> None:
+    keys = [trial.key for trial in Plan(trials=1, soft=("53.1", "51.2")).planned][1:]
+    assert keys == ["soft 53.1 at 3 cm/1", "soft 53.1 at 5 cm/1", "soft 51.2 at 3 cm/1", "soft 51.2 at 5 cm/1"]
+
+
+@pytest.mark.parametrize(
+    ("plates_m", "mud"),
+    [(0.06, "47.6"), (0.57, "47.6"), (0.59, ""), (0.63, ""), (0.65, "49.5"), (1.5, "51.2"), (1.83, ""), (9.0, "")],
+)
+def test_a_plate_is_in_the_mud_that_it_went_down_in_or_in_none_for_certain(plates_m: float, mud: str) -> None:
+    assert Plan().mud_at(plates_m) == mud
+
+
+@pytest.mark.parametrize(("slip_m", "mud"), [(0.0, "49.5"), (0.01, "49.5"), (0.03, ""), (0.07, ""), (0.6, "")])
+def test_a_plate_that_slips_back_to_a_border_or_across_it_is_in_no_mud_for_certain(slip_m: float, mud: str) -> None:
+    """It went down 5 cm behind the border at 61 cm."""
+    assert Plan().mud_at(0.66, slip_m) == mud
+
+
+def test_a_walk_that_told_nothing_is_spoilt() -> None:
+    nothing = make_estimate(None)
+    with pytest.raises(SpoiltTrialError, match="no stride of the left flipper"):
+        require_mud([], "left")
+    with pytest.raises(SpoiltTrialError, match="no stride met mud"):
+        require_mud([make_stride(k_p=nothing, k_s=nothing, k_e=nothing)] * 2, "left")
+    require_mud([make_stride(k_p=nothing, k_s=nothing)], "left")
+
+
+# a short one, for real
+
+
+def test_every_walk_is_kept_with_all_methods() -> None:
+    assert list(measured()) == ["walk/1", "soft 51.2 at 3 cm/1", "soft 51.2 at 5 cm/1"]
+    for entry in measured().values():
+        assert list(entry["strides"]) == [DEFAULT, PAPER, COMPENSATED, KNOWN, KNOWN_COMPENSATED]
+        assert len({len(strides) for strides in entry["strides"].values()}) == 1
+
+
+def test_the_robot_stops_behind_the_last_mud() -> None:
+    """Its plates were in both muds, and no stride went down more than a step behind the end."""
+    placed = [each for each in placed_strides(SHORT, measured(), CONFIGURATION, None) if each.method == DEFAULT]
+    places_m = [each.plates_m for each in placed]
+    assert places_m == sorted(places_m)
+    assert 0.0 < places_m[0] < 0.1
+    assert SHORT.length_m - 0.13 < places_m[-1] < SHORT.length_m
+    assert {"47.6", "51.2"} <= {each.mud for each in placed}
+
+
+def test_in_soft_mud_a_plate_slips_back_by_half_of_its_stance_and_more() -> None:
+    """A stance is 12 cm long. In the strides that belong to a mud the plate was there with all of its slip."""
+    placed = [each for each in placed_strides(SHORT, measured(), CONFIGURATION, None) if each.method == DEFAULT]
+    for each in placed:
+        slip_m = each.stride["slip_m"]
+        assert (0.055 < slip_m < 0.09) if each.mud == "51.2" else slip_m < 0.055
+        assert each.mud in ("", SHORT.mud_at(each.plates_m - slip_m))
+
+
+def test_the_coefficients_are_those_of_the_load_cell_or_bounds_below_it() -> None:
+    strong, soft = report()["muds"]
+    for mud in (strong, soft):
+        assert mud["k_p"]["value"] == pytest.approx(mud["truth"]["k_p"], rel=0.12)
+    assert strong["k_s"]["at_least"]
+    assert strong["k_s"]["value"] < strong["truth"]["k_s"]
+
+
+def test_without_compensation_firm_mud_seems_softer_and_less_so_with_it() -> None:
+    """As the paper found."""
+    rows = [row for row in report()["errors"] if (row["mud"], row["coefficient"]) == ("47.6", "k_s")]
+    biases = {row["method"]: row["bias"] for row in rows}
+    assert biases[KNOWN] < biases[KNOWN_COMPENSATED] < 0.0
+    assert biases[PAPER] < biases[COMPENSATED] < 0.0
+
+
+def test_the_soft_mud_tells_k_s_at_both_depths_by_every_method() -> None:
+    (soft,) = report()["soft"]
+    assert (soft["mud"], [each["depth_cm"] for each in soft["depths"]]) == ("51.2", [3.0, 5.0])
+    for each in soft["depths"]:
+        assert set(each["k_s"]) == {DEFAULT, PAPER, COMPENSATED, KNOWN, KNOWN_COMPENSATED}
+        assert each["truth"] > 0.0
+        assert 2.5 < each["thrust_n"] < 20.0
+
+
+def test_the_papers_findings_stand_beside_ours() -> None:
+    found = {row["what"]: row for row in report()["beside_paper"]}
+    half = found["k_s over the load cell's at 3 cm, 51.2 % at 5 cm"]
+    assert half["paper"] == "0.5"
+    assert 0.3 < half["ours"] < 0.8
+    assert found["thrust of both flippers in stance, 51.2 % at 5 cm (N)"]["paper"] == "2.5"
+
+
+def test_another_load_cells_truth_takes_the_place_of_the_beds() -> None:
+    told = report(truth={"47.6": {"k_p": 2e6}})
+    assert told["muds"][0]["truth"] == {"k_p": 2e6}
+    assert told["muds"][1]["truth"] is None
+    assert told["missing_truth"].endswith("says nothing of 51.2 %.")
+    assert {(row["mud"], row["coefficient"]) for row in told["errors"]} == {("47.6", "k_p")}
+
+
+def test_the_report_is_json_with_a_table_and_a_picture_of_everything() -> None:
+    told = json.loads(json.dumps(report()))
+    assert told["experiment"] == "walk"
+    sections = sections_of(told, SHORT, measured(), CONFIGURATION, None)
+    assert [f.name for section in sections for f in section.figures] == ["figure6_trial1", "figure7_51.2"]
+    title, rows = text_of(told)[0]
+    assert title.startswith("Coefficients")
+    assert rows[0][0] == "mud"
+    for doubt in (KNOWN_BIAS, WRONG_CONSTANTS):
+        assert doubt in sections[0].text
+
+
+# without a pose
+
+
+class BlindRobot(LockstepRobot):
+    """Its status tells no place from a moment on."""
+
+    blind_from_s = 0.0
+
+    def call(self, method: str, **params: Any) -> Any:
+        told = super().call(method, **params)
+        if method == "status" and told["now_s"] >= self.blind_from_s:
+            return told | {"body_x_m": None}
+        return told
+
+
+def blind(folder: Path, from_s: float) -> Bench:
+    bench = bench_of(folder, TINY)
+    robot = bench.robot
+    assert isinstance(robot, LockstepRobot) and isinstance(bench.bed, CarriedBed)
+    robot.__class__ = BlindRobot
+    assert isinstance(robot, BlindRobot)
+    robot.blind_from_s = from_s
+    return bench
+
+
+def test_without_a_pose_the_robot_makes_no_more_strides_than_lead_to_the_end(tmp_path: Path) -> None:
+    """20 cm with steps of 12 cm at most; the strides are given to the muds by their order."""
+    bench = blind(tmp_path, 0.0)
+    bench.bed.prepare(TINY.planned[0])
+    entry = measure(bench, TINY, TINY.planned[0])
+    assert [remark for remark in entry["remarks"] if "no pose is told" in remark]
+    assert len(entry["strides"][DEFAULT]) == 2
+    told = report_of(TINY, {"walk/1": json.loads(json.dumps(entry))}, CONFIGURATION, None)
+    assert told["without_pose"] == 1
+    assert len(told["muds"][0]["k_p"]["trials"]) == 2
+
+
+class StoppedRobot(LockstepRobot):
+    """Somebody else stops its walk once a stride is over."""
+
+    def call(self, method: str, **params: Any) -> Any:
+        told = super().call(method, **params)
+        if method == "status" and told["mode"] == "walking" and told["strides_closed"]:
+            super().call("stop")
+        return told
+
+
+def test_a_walk_that_somebody_else_stops_is_not_taken_for_a_whole_one(tmp_path: Path) -> None:
+    bench = bench_of(tmp_path, TINY)
+    bench.robot.__class__ = StoppedRobot
+    bench.bed.prepare(TINY.planned[0])
+    with pytest.raises(SpoiltTrialError, match="somebody stopped the walk in stride 2") as spoilt:
+        measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
+    assert spoilt.value.entry is not None and len(spoilt.value.entry["strides"][DEFAULT]) == 1
+
+
+def test_by_their_order_strides_are_spread_over_the_muds_lengths() -> None:
+    plan = replace(SHORT, muds=(Mud("a", 0.2), Mud("b", 0.6)))
+    entry = {"trial": 1, "start_m": None, "truths": {}, "strides": {DEFAULT: [make_stride(place_m=None)] * 4}}
+    placed = placed_strides(plan, {"walk/1": entry}, CONFIGURATION, None)
+    assert [each.mud for each in placed] == ["a", "b", "b", "b"]
+    assert walks_of(plan, {"walk/1": entry, "walk/2": entry}) == [entry]
+
+
+def test_a_pose_that_is_lost_on_the_way_spoils_the_walk(tmp_path: Path) -> None:
+    bench = blind(tmp_path, 4.0)
+    bench.bed.prepare(TINY.planned[0])
+    with pytest.raises(SpoiltTrialError, match="not told any more"):
+        measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
+
+
+def test_plates_go_down_half_an_arm_in_front() -> None:
+    assert reach_of(CONFIGURATION) == pytest.approx(0.06)
+
+
+# how far a walk has come
+
+
+def looks(*seen: tuple[float, float | None, str]) -> list[str | None]:
+    """What is judged of a walk of 50 cm that began at 1 m."""
+    advance = Advance(1.0, 0.5, 0.0)
+    return [advance.judge({"now_s": now_s, "body_x_m": body_m, "phase": phase}) for now_s, body_m, phase in seen]
+
+
+def test_a_walk_ends_with_the_insertion_behind_the_last_mud() -> None:
+    told = looks((1.0, 1.4, "insertion"), (2.0, 1.51, "stance"), (3.0, 1.51, "insertion"))
+    assert told == [None, None, ""]
+
+
+def test_a_robot_that_does_not_come_on_is_stopped_and_told_where() -> None:
+    told = looks((1.0, 1.2, "stance"), (60.0, 1.22, "swing"), (61.5, 1.22, "swing"))
+    assert told == [None, None, "the robot came no farther than 20 cm"]
+
+
+def test_a_place_that_is_missed_for_a_moment_is_waited_for() -> None:
+    assert looks((1.0, 1.2, "stance"), (2.9, None, "stance"), (3.0, 1.3, "swing")) == [None, None, None]
+    with pytest.raises(SpoiltTrialError, match="not told any more"):
+        looks((1.0, 1.2, "stance"), (3.1, None, "stance"))
