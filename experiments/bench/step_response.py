@@ -84,13 +84,13 @@ def step_response(stand: Stand, joint: str, seed: int = 1) -> Readings:
 
 
 def delay_ticks(samples: list[Sample], place: int, step: int, constant_nm_a: float) -> float:
-    """Of the step that was sent in sample `step`: until the current has gone half of its way."""
+    """Of the step that was sent in sample `step`: until the current has gone half of its way, missed ticks included."""
     before_nm, after_nm = (samples[tick].sent_nm[place] for tick in (step - 1, step))
     half_nm, upward = (before_nm + after_nm) / 2.0, after_nm > before_nm
-    for delay in range(1, LONGEST_TICKS):
-        given_nm = samples[step + delay].states[place].current_a * constant_nm_a
+    for sample in samples[step + 1 : step + LONGEST_TICKS]:
+        given_nm = sample.states[place].current_a * constant_nm_a
         if (given_nm > half_nm) == upward:
-            return delay
+            return min(sample.beat.number - samples[step].beat.number, LONGEST_TICKS)
     return LONGEST_TICKS
 
 
