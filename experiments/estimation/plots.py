@@ -1,4 +1,4 @@
-"""The experiments as pictures."""
+"""The errors of the coefficients as a picture."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
 from matplotlib.axes import Axes  # noqa: E402
+
+from experiments.mud_names import mud_text  # noqa: E402
 
 COLOURS = {"default": "tab:blue", "paper": "tab:red", "paper compensated": "tab:orange"}
 COEFFICIENTS = ("k_p", "k_s", "k_e")
@@ -56,7 +58,7 @@ def _plot_panel(panel: Axes, rows: Sequence[dict[str, Any]]) -> None:
 
 def _scale(panel: Axes, muds: Sequence[str]) -> None:
     panel.axhline(10.0, color="grey", linewidth=0.8, linestyle=":")
-    panel.set_xticks(range(len(muds)), muds)
+    panel.set_xticks(range(len(muds)), list(map(mud_text, muds)))
     panel.set_xlim(-0.5, max(len(muds), 1) - 0.5)
     panel.set_ylim(0.0, HIGHEST_PERCENT)
     panel.set_yscale("symlog", linthresh=20.0)
