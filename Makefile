@@ -6,7 +6,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
 # Tests of a robot in real time, or whose order counts: one after the other, and beside nothing else.
 REAL_TIME := actuator attended_walk demo doctor failing operation permission
-IN_PEACE := bench benchmarks $(REAL_TIME:%=command_line/test_%.py) $(addprefix experiments/,bench/test_rig.py test_daemon_robot.py)
+IN_PEACE := bench $(REAL_TIME:%=command_line/test_%.py) $(addprefix experiments/,bench/test_rig.py test_daemon_robot.py)
 
 # A test that hangs is ended, and told with the place where it hung.
 ENDED_HUNG := -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
