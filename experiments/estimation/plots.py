@@ -30,7 +30,10 @@ def plot_errors(report: dict[str, Any], path: Path) -> None:
             told = [each for each in errors if (each["setup"], each["coefficient"]) == (setup, name)]
             _plot_panel(panels[row][column], told)
             panels[row][column].set_title(f"{setup}: ${name}$", fontsize="medium")
-    panels[0][0].legend(fontsize="small")
+    methods = {
+        name: line for panel in panels.flat for line, name in zip(*panel.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(methods.values(), methods.keys(), loc="outside upper center", ncols=len(COLOURS), fontsize="small")
     for panel in panels[:, 0]:
         panel.set_ylabel("error (%)")
     figure.savefig(path, dpi=110)
