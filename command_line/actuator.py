@@ -54,8 +54,9 @@ def _calibrate(options: argparse.Namespace, desk: Desk) -> Finding:
     omitted = len(left_out(plan, readings))
     tables, sections = text_of(fits), sections_of(plan, readings, fits)
     if options.simulated:
-        tables.append((TRUTH, truth_rows(fits)))
-        sections.append(Section(TRUTH, rows=truth_rows(fits)))
+        rows = truth_rows(fits)
+        tables.append((TRUTH, rows))
+        sections.append(Section(TRUTH, rows=rows))
     told = [*_remarks(plan.joints, fits, omitted), *([applied] if applied else [])]
     text = "\n\n".join([text_of_tables(tables), *(["\n".join(told)] if told else [])])
     report = report_of(plan, readings, fits) | {"applied": applied or None}

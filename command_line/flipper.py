@@ -13,7 +13,6 @@ from experiments.flipper import measurement as flipper
 from experiments.flipper.report import sections_of, text_of
 from experiments.flipper.simulation import flipper_bench
 from experiments.mud_names import mud_name
-from experiments.mud_trials import left_out_of
 
 PREPARE = (
     "Torque is off and the flippers have come down. Level the mud to its nominal height and give the flipper a fresh "
@@ -44,6 +43,6 @@ def _find(options: argparse.Namespace, plan: flipper.Plan, desk: Desk) -> Findin
     simulated = partial(flipper_bench, desk.folder, plan.muds, SEED)
     bench = open_bench(options, desk, plan.kept, simulated, lambda trial: PREPARE)
     configuration, entries, logs = make_trials(bench, desk, lambda: flipper.run(bench, plan, desk.show))
-    report = flipper.report_of(plan, entries, configuration, truth) | {"left_out": left_out_of(bench.notebook)}
+    report = flipper.report_of(plan, entries, configuration, truth) | {"left_out": bench.notebook.left_out}
     sections = sections_of(report, plan, entries, configuration)
     return Finding(report, "A single flipper through muds", sections, text_of_tables(text_of(report)), logs)

@@ -10,7 +10,7 @@ from math import degrees, radians
 from typing import Any
 
 from command_line import exit_codes
-from command_line.attended_walk import attend
+from command_line.attended_walk import MILD, attend
 from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain, number, table
 from firmware_host.counted_nouns import counted
 from firmware_host.rpc import FOR_MEMBERS
@@ -131,7 +131,7 @@ def clear(options: Options) -> int:
 
 def stopping_faults(report: dict[str, Any]) -> list[dict[str, Any]]:
     """Of a status: the faults that stand and are more than a warning."""
-    return [fault for fault in report["faults"] if fault["reaction"] not in ("none", "warn")]
+    return [fault for fault in report["faults"] if fault["reaction"] not in MILD]
 
 
 def _request(client: StatusClient, method: str, modes: tuple[str, ...], longest_s: float, **params: Any) -> int:
@@ -218,7 +218,7 @@ def _boot_line(drives: list[dict[str, Any]]) -> str:
 
 
 def _fault_line(fault: dict[str, Any]) -> str:
-    colour = YELLOW if fault["reaction"] in ("none", "warn") else RED
+    colour = YELLOW if fault["reaction"] in MILD else RED
     against = ", against arming" if fault["blocks_arming"] else ""
     reaction = fault["reaction"].replace("_", " ")
     return coloured(f"{fault['name']} ({reaction}{against}): {fault['sentence']}\n    -> {fault['what_to_do']}", colour)

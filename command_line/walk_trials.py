@@ -10,7 +10,7 @@ from command_line.conduct import refuse
 from command_line.mud_bench import SEED, make_trials, open_bench, text_of_tables, why_not_simulated
 from experiments.coefficient_table import load_truth
 from experiments.mud_names import mud_name
-from experiments.mud_trials import PlannedTrial, left_out_of
+from experiments.mud_trials import PlannedTrial
 from experiments.trackway.trials import Mud
 from experiments.walk import measurement as walk_mapping
 from experiments.walk.pages import sections_of, text_of
@@ -53,7 +53,7 @@ def _find(options: argparse.Namespace, plan: walk_mapping.Plan, desk: Desk) -> F
     truth = load_truth(options.truth) if options.truth else None
     bench = open_bench(options, desk, plan.kept, partial(walking_bench, desk.folder, plan, SEED), _words)
     configuration, entries, logs = make_trials(bench, desk, lambda: walk_mapping.run(bench, plan, desk.show))
-    report = report_of(plan, entries, configuration, truth) | {"left_out": left_out_of(bench.notebook)}
+    report = report_of(plan, entries, configuration, truth) | {"left_out": bench.notebook.left_out}
     sections = sections_of(report, plan, entries, configuration, truth)
     return Finding(report, "The walking robot over several muds", sections, text_of_tables(text_of(report)), logs)
 

@@ -160,14 +160,11 @@ def _leave_out(bench: Bench, trial: PlannedTrial, why: Sequence[str] = ()) -> No
 
 def measured_of(notebook: Notebook) -> dict[str, Entry]:
     """The trials that count. Raises BenchError for an experiment that has nothing to report."""
-    measured = {key: entry for key, entry in notebook.entries.items() if not entry.get("skipped")}
+    left_out = notebook.left_out
+    measured = {key: entry for key, entry in notebook.entries.items() if key not in left_out}
     if not measured:
         raise BenchError("nothing was measured: every trial was left out")
     return measured
-
-
-def left_out_of(notebook: Notebook) -> dict[str, Entry]:
-    return {key: entry for key, entry in notebook.entries.items() if entry.get("skipped")}
 
 
 def left_out_texts(left_out: Mapping[str, Entry]) -> list[str]:

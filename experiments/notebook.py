@@ -40,6 +40,11 @@ class Notebook:
         """Something was measured already."""
         return bool(self.entries)
 
+    @property
+    def left_out(self) -> dict[str, Entry]:
+        """What somebody did not want, or did not want to count."""
+        return {key: entry for key, entry in self.entries.items() if entry.get("skipped")}
+
     def write(self, key: str, entry: Entry) -> None:
         self._append({"key": key, "entry": entry})
         self.entries[key] = json.loads(json.dumps(entry))

@@ -69,12 +69,12 @@ def damping(stand: Stand) -> Readings:
         stand.controller.follow([_swept(-SWING_RAD)], FAST_RAD_S)
         last = stand.run_until(
             lambda sample: _is_fast(sample, FULL_SHARE * FAST_RAD_S), 2.0, "The full speed of a sweep"
-        )
+        )[-1]
         begun = measured_angles(stand.loop.states)
         stand.controller.law = lambda held, states: _brake(stand, states)
         samples = stand.run_for(2.0 * DAMPED_REST_S)
         stand.hold_here()
-    yield from _sweep_readings("damping", last[-1], samples, begun, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
+    yield from _sweep_readings("damping", last, samples, begun, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
 
 
 def _brake(stand: Stand, states: DriveStates) -> Torques:

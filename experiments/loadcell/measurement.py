@@ -208,7 +208,7 @@ def report_of(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mappi
             for mud, coefficients in results.muds.items()
         ],
         "trials": [_trial_described(trial, notebook.entries[trial.recorded.key]) for trial in results.trials],
-        "left_out": {key: entry for key, entry in notebook.entries.items() if entry.get("skipped")},
+        "left_out": notebook.left_out,
         "remarks": results.remarks,
         "compared": [
             each._asdict() | {"ratio": known(each.ratio), "ratio_std_error": known(each.ratio_std_error)}

@@ -136,14 +136,21 @@ def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     entry = _entry(bench, plan, trial, log, before["strides_closed"])
     course = walk_course_row(walk_course_of(log, plan.flipper))
     entry |= {"start_m": start_m, "course": course, "remarks": remarks + [end] * bool(end)}
-    arm_m = robot.configuration.geometry.flipper_length_m
-    for stride in chain.from_iterable(entry["strides"].values()):
-        stride["slip_m"] = slip_m(course_of(log, plan.flipper, stride["t_start_s"]), arm_m)
+    _note_slips(entry, log, plan.flipper, robot.configuration.geometry.flipper_length_m)
     if after["notice"]:
         raise SpoiltTrialError(after["notice"], entry)
     if end is None and made < ordered:
         raise SpoiltTrialError(f"somebody stopped the walk in stride {made + 1}", entry)
     return entry
+
+
+def _note_slips(entry: Entry, log: Log, flipper: str, arm_m: float) -> None:
+    """Into the strides of all methods, which begin at the same moments."""
+    strides = list(chain.from_iterable(entry["strides"].values()))
+    starts_s = {stride["t_start_s"] for stride in strides}
+    slips_m = {start_s: slip_m(course_of(log, flipper, start_s), arm_m) for start_s in starts_s}
+    for stride in strides:
+        stride["slip_m"] = slips_m[stride["t_start_s"]]
 
 
 def _follow(bench: Bench, plan: Plan, start_m: float | None) -> tuple[int, str | None]:

@@ -17,7 +17,6 @@ from experiments.mud_trials import (
     SpoiltTrialError,
     Truths,
     conduct_trials,
-    left_out_of,
     measured_of,
 )
 from experiments.notebook import Entry, Notebook
@@ -113,12 +112,12 @@ def test_a_trial_that_is_left_out_is_written_down_and_not_asked_for_again(tmp_pa
     session = Session(tmp_path, bed=ScriptedBed(GO_ON, SKIP)).conduct()
     assert list(measured_of(session.notebook)) == [ALL[0], ALL[2]]
     again = Session(tmp_path).conduct()
-    assert again.bed.prepared == [] and left_out_of(again.notebook) == {ALL[1]: {"skipped": True, "why": []}}
+    assert again.bed.prepared == [] and again.notebook.left_out == {ALL[1]: {"skipped": True, "why": []}}
 
 
 def test_one_that_was_left_out_by_mistake_is_the_last_one_too(tmp_path: Path) -> None:
     session = Session(tmp_path, bed=ScriptedBed(SKIP, REDO)).conduct()
-    assert session.measured == ALL and not left_out_of(session.notebook)
+    assert session.measured == ALL and not session.notebook.left_out
 
 
 def test_the_last_trial_can_be_measured_again(tmp_path: Path) -> None:
@@ -178,7 +177,7 @@ def test_a_spoilt_trial_can_be_left_out(tmp_path: Path) -> None:
     session.outcomes = [SpoiltTrialError("no mud")]
     session.conduct()
     assert list(measured_of(session.notebook)) == ALL[1:]
-    assert left_out_of(session.notebook)[ALL[0]]["why"] == ["no mud"]
+    assert session.notebook.left_out[ALL[0]]["why"] == ["no mud"]
 
 
 @pytest.mark.parametrize(("answer", "measured"), [(GO_ON, [ALL[0], *ALL]), (KEEP, ALL)])
