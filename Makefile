@@ -5,8 +5,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
 # Tests of a robot in real time, or whose order counts: one after the other, and beside nothing else.
-REAL_TIME := actuator attended_walk demo doctor failing operation permission
-IN_PEACE := bench $(REAL_TIME:%=command_line/test_%.py) $(addprefix experiments/,bench/test_rig.py test_daemon_robot.py)
+IN_PEACE := bench $(addprefix command_line/,experiments/test_actuator.py operation/test_attended_walk.py demo/test_demo.py doctor/test_doctor.py operation/test_failing.py operation/test_operation.py test_permission.py) $(addprefix experiments/,bench/test_rig.py robot/test_daemon_robot.py)
 
 # A test that hangs is ended, and told with the place where it hung.
 ENDED_HUNG := -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
@@ -30,7 +29,7 @@ test-vm: .venv/test  ## the daemon under systemd on a real kernel, in a virtual 
 	$(BIN)/python -m pytest -v virtual_machine $(ARGS)
 
 mutants: .venv/test  ## change the transmit gate in 204 places; its tests must notice each
-	$(BIN)/python -m tests.drivers.gate_mutants
+	$(BIN)/python -m tests.drivers.odrive.gate_mutants
 
 lint: .venv/test  ## ruff and mypy --strict
 	$(BIN)/ruff check .

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from firmware_host.configuration import Configuration, load_configuration
+from firmware_host.configuration.configuration import Configuration, load_configuration
 
 
 def load_example() -> Configuration:

@@ -14,10 +14,10 @@ from pathlib import Path
 
 from command_line import exit_codes
 from command_line.commands import DEFAULT_CONFIG, Commands, add, add_socket
-from command_line.experiment_commands import add_experiments
+from command_line.experiments.experiment_commands import add_experiments
 from command_line.option_types import between, depth_cm, finite, folder, joint_angle, picture, whole
 from command_line.screen import complain
-from firmware_host.file_problems import why_not
+from firmware_host.configuration.file_problems import why_not
 
 METHODS = ("default", "paper")  # of estimation
 PICTURE_MODULES = ("matplotlib", "PIL")  # an extra of this package
@@ -51,7 +51,7 @@ def _add_operation(commands: Commands) -> None:
         "clear": "Clear a fault and the drives' errors.",
         "check": "What stands between this robot and a walk.",
     }
-    parsers = {name: add(commands, name, f"operation.{name}", text) for name, text in described.items()}
+    parsers = {name: add(commands, name, f"operation.operation.{name}", text) for name, text in described.items()}
     parsers["fail"] = _add_fail(commands)
     for parser in parsers.values():
         add_socket(parser)
@@ -75,13 +75,19 @@ def _add_operation(commands: Commands) -> None:
 
 
 def _add_installation(commands: Commands) -> None:
-    doctor = add(commands, "doctor", "doctor.doctor", "The computer and its buses, line by line, with what to do.")
+    doctor = add(
+        commands, "doctor", "doctor.doctor.doctor", "The computer and its buses, line by line, with what to do."
+    )
     doctor.add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
     doctor.add_argument("--json", action="store_true", help="for machines")
     socket = os.environ.get("MUDSKIPPER_SOCKET")
     doctor.add_argument("--socket", type=Path, default=Path(socket) if socket else None, help="of the daemon")
-    install = add(commands, "install", "installation.install", "Set up this computer's service, network and users.")
-    uninstall = add(commands, "uninstall", "installation.uninstall", "Take that back; configuration and logs stay.")
+    install = add(
+        commands, "install", "install.installation.install", "Set up this computer's service, network and users."
+    )
+    uninstall = add(
+        commands, "uninstall", "install.installation.uninstall", "Take that back; configuration and logs stay."
+    )
     uninstall.add_argument("--purge", action="store_true", help="remove configuration, logs and user too")
     for parser in (install, uninstall):
         parser.add_argument("--dry-run", action="store_true", help="only show what would be done")
@@ -89,7 +95,9 @@ def _add_installation(commands: Commands) -> None:
 
 
 def _add_fail(commands: Commands) -> argparse.ArgumentParser:
-    fail = add(commands, "fail", "failing.fail", "Make a part of the robot fail on purpose, where that is allowed.")
+    fail = add(
+        commands, "fail", "operation.failing.fail", "Make a part of the robot fail on purpose, where that is allowed."
+    )
     fail.add_argument("component", nargs="?", help="what fails, such as left_sweep, bus.left, pose; or all")
     fail.add_argument("kind", nargs="?", help="off, stuck, garbage, slow, intermittent ..., or ok to end it")
     fail.add_argument("--for", type=finite, default=2.0, metavar="S", dest="seconds", help="then it ends by itself")
@@ -100,7 +108,7 @@ def _add_fail(commands: Commands) -> argparse.ArgumentParser:
 
 
 def _add_simulation(commands: Commands) -> None:
-    demo = add(commands, "demo", "demo.demo", "A simulated robot walks over three muds, in real time.")
+    demo = add(commands, "demo", "demo.demo.demo", "A simulated robot walks over three muds, in real time.")
     demo.add_argument("--json", type=Path, metavar="PATH", help="write the summary there too")
     demo.add_argument("--out", type=folder, default=Path("mudskipper-demo"), metavar="DIR", help="for log and plot")
     demo.add_argument("--seed", type=int, default=1)
@@ -117,7 +125,9 @@ def _add_simulation(commands: Commands) -> None:
 
 
 def _add_logs(commands: Commands) -> None:
-    replay = add(commands, "replay", "logs.replay", "The estimator over a recorded log: ours, or the authors' CSV.")
+    replay = add(
+        commands, "replay", "logs.log_commands.replay", "The estimator over a recorded log: ours, or the authors' CSV."
+    )
     replay.add_argument("files", type=Path, nargs="+", metavar="FILE", help="several are segments of one run")
     replay.add_argument("--json", action="store_true")
     replay.add_argument("--config", type=Path, help="instead of the one in the log")
@@ -130,8 +140,12 @@ def _add_logs(commands: Commands) -> None:
 
 
 def _add_pictures(commands: Commands) -> None:
-    plot = add(commands, "plot", "logs.plot", "A walk against time: forces, coefficients, depth, place and steps.")
-    film = add(commands, "film", "logs.film", "Strides seen from the side: as a strip of pictures, or moving.")
+    plot = add(
+        commands, "plot", "logs.log_commands.plot", "A walk against time: forces, coefficients, depth, place and steps."
+    )
+    film = add(
+        commands, "film", "logs.log_commands.film", "Strides seen from the side: as a strip of pictures, or moving."
+    )
     plot.add_argument("--out", type=picture(".png", ".svg", ".pdf"), metavar="PNG", help="or .svg, .pdf")
     film.add_argument("--out", type=picture(".png", ".gif"), metavar="FILE", help=".png for a strip, .gif for a film")
     film.add_argument("--stride", action="append", type=COUNT, metavar="N", help="as replay counts them, repeatable")
@@ -147,30 +161,34 @@ def _add_pictures(commands: Commands) -> None:
 
 
 def _add_log_contents(actions: Commands) -> None:
-    info = add(actions, "info", "logs.info", "What a log holds.")
+    info = add(actions, "info", "logs.log_commands.info", "What a log holds.")
     info.add_argument("files", type=Path, nargs="+", metavar="FILE", help="several are segments of one run")
     info.add_argument("--json", action="store_true")
-    report = add(actions, "report", "log_report.log_report", "What a log tells, as one page with its pictures.")
+    report = add(actions, "report", "logs.log_report.log_report", "What a log tells, as one page with its pictures.")
     report.add_argument(
         "files", type=Path, nargs="+", metavar="FILE", help="our log, its segments, or the authors' CSV"
     )
     report.add_argument("--out", type=folder, metavar="DIR", help="(default: a folder named after the log)")
     report.add_argument("--json", action="store_true", help="its numbers on standard output")
-    export = add(actions, "export", "logs.export", "A log in the columns of the authors' plotter.")
+    export = add(actions, "export", "logs.log_commands.export", "A log in the columns of the authors' plotter.")
     export.add_argument("file", type=Path)
     export.add_argument("--csv", action="store_true", required=True, help="the format; there is one so far")
     export.add_argument("--out", type=Path, help="file to write (default: standard output)")
 
 
 def _add_log_folder(actions: Commands) -> None:
-    listing = add(actions, "list", "log_care.list_logs", "The logs, and what room is left.")
+    listing = add(actions, "list", "logs.log_folder_commands.list_logs", "The logs, and what room is left.")
     listing.add_argument("folder", type=Path, nargs="?", help="of the logs (default: the configured one)")
-    recover = add(actions, "recover", "log_care.recover", "Logs whose writer was cut off, put in order.")
+    recover = add(
+        actions, "recover", "logs.log_folder_commands.recover", "Logs whose writer was cut off, put in order."
+    )
     recover.add_argument("places", type=Path, nargs="*", metavar="FILE|DIR", help="(default: the configured folder)")
     for parser in (listing, recover):
         parser.add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG), help="names the folder")
         parser.add_argument("--json", action="store_true", help="for machines")
-    preserve = add(actions, "preserve", "log_care.preserve_log", "Keep a log when older ones are freed.")
+    preserve = add(
+        actions, "preserve", "logs.log_folder_commands.preserve_log", "Keep a log when older ones are freed."
+    )
     preserve.add_argument("files", type=Path, nargs="+", metavar="FILE")
     preserve.add_argument("--undo", action="store_true", help="let it be freed again")
 
@@ -181,7 +199,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # a terminal that knows no ± or ³ shows a question mark
     try:
         options = build_parser().parse_args(arguments)
-        module, function = options.place.split(".")
+        module, function = options.place.rsplit(".", 1)
         run: Callable[[argparse.Namespace], int] = getattr(import_module(f"command_line.{module}"), function)
         return run(options)
     except KeyboardInterrupt:

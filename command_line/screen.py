@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from math import isfinite
 from typing import Any
 
-from experiments.value_text import N_CM3, value_text
+from experiments.reports.value_text import N_CM3, value_text
 
 RED, GREEN, YELLOW, BOLD, PLAIN = "\033[31m", "\033[32m", "\033[33m", "\033[1m", "\033[0m"
 PATIENCE_S = 2.0  # of a person who sees nothing

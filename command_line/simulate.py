@@ -9,11 +9,11 @@ from pathlib import Path
 
 from command_line import exit_codes
 from command_line.screen import complain
-from firmware_host.toml_records import ConfigurationError
-from simulation import peer
-from simulation.clay import MUDS
-from simulation.local_setup import named_folder, write_local_setup
-from simulation.world import load_world
+from firmware_host.configuration.toml_records import ConfigurationError
+from simulation.harness import peer
+from simulation.harness.local_setup import named_folder, write_local_setup
+from simulation.harness.world import load_world
+from simulation.mud.clay import MUDS
 
 
 def simulate(options: argparse.Namespace) -> int:

@@ -14,11 +14,13 @@ from typing import Annotated, NamedTuple
 from control.bounds import Bounds
 from control.fault_kinds import make_fault
 from control.faults import Fault
-from control.gait import Gait, GaitParameters
+from control.gait.gait import Gait, GaitParameters
+from control.gait.joint_path import JointPath, still
+from control.gait.recovery import Recovery
 from control.geometry import FlipperGeometry
-from control.joint_path import JointPath, still
 from control.joint_pd import ArmMass, JointGains, damping_torques_nm, joint_torques_nm
 from control.modes import MOVING, Mode
+from control.monitors.stillness import Stillness
 from control.records import (
     NO_TORQUE,
     DriveStates,
@@ -29,8 +31,6 @@ from control.records import (
     Phase,
     Torques,
 )
-from control.recovery import Recovery
-from control.stillness import Stillness
 
 
 @dataclass(frozen=True)

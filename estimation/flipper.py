@@ -11,17 +11,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import cos, hypot, isfinite, sin
 
+from control.gait.recovery import is_in_mud
 from control.geometry import FlipperGeometry
 from control.records import NO_LOAD, UNKNOWN, Estimate, FlipperLoad, Phase, StrideEstimate
-from control.recovery import is_in_mud
 from estimation.force_map import smallest_force_n
 from estimation.joint_load import FlipperDrive, JointLoad, JointLoads, JointSample
-from estimation.shear import Base, Shear, find_shear
 from estimation.stride_clock import StrideClock
-from estimation.stroke import Batch, Stroke
-from estimation.stroke_fit import NOT_THERE, bound_extraction, fit_extraction, fit_insertion, judged, level_free
-from estimation.surface import NO_SURFACE, combined, find_surface
-from estimation.tare import Tare
+from estimation.strokes.shear import Base, Shear, find_shear
+from estimation.strokes.stroke import Batch, Stroke
+from estimation.strokes.stroke_fit import NOT_THERE, bound_extraction, fit_extraction, fit_insertion, judged, level_free
+from estimation.strokes.surface import NO_SURFACE, combined, find_surface
+from estimation.strokes.tare import Tare
 
 STEPS_M = {Phase.INSERTION: 0.0015, Phase.STANCE: 0.006, Phase.EXTRACTION: 0.002}
 OWN_ERROR_M = 0.002  # by which a stroke's own force may seem to begin elsewhere than at the mud's surface

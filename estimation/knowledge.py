@@ -33,9 +33,9 @@ from collections.abc import Sequence
 from math import exp, log, sqrt
 from typing import NamedTuple
 
-from control.coefficient import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
 from control.records import FLIPPERS, StrideEstimate
-from estimation.depth_line import REMEMBERED_STRIDES, DepthLaw, Line, Reading, reading_of
+from estimation.strokes.depth_line import REMEMBERED_STRIDES, DepthLaw, Line, Reading, reading_of
 
 CHANGE = 2.6  # standard deviations of a stride that are not chance
 PAIR_CHANGE = 2.8  # of two strides: asked for as often as the other, they may not tell as much by chance as well

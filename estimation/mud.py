@@ -12,15 +12,15 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 
 from control.bounds import Bounds
-from control.coefficient import NOTHING_KNOWN, MudBelief
 from control.geometry import FlipperGeometry
+from control.mud_estimate import NOTHING_KNOWN, MudBelief
 from control.records import FLIPPERS, NO_LOAD, FlipperLoad, JointAngles, Phase, StrideEstimate
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import NO_COMMANDS, FlipperDrive, JointSample
 from estimation.knowledge import MudKnowledge
 from estimation.mud_map import MudMap
 from estimation.paper import PaperEstimator
-from estimation.shear import Base
+from estimation.strokes.shear import Base
 
 JointVelocities = tuple[float, float, float, float]  # rad/s, in the order of JOINTS
 Currents = tuple[float, float, float, float]  # A, in the order of JOINTS

@@ -14,7 +14,7 @@ from math import exp, floor, isfinite, sqrt
 from typing import NamedTuple
 
 from control.records import StrideEstimate
-from estimation.depth_line import Reading, reading_of
+from estimation.strokes.depth_line import Reading, reading_of
 
 PIECE_M = 0.05
 MOST_PIECES = 400  # 20 m

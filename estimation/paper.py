@@ -15,13 +15,13 @@ from __future__ import annotations
 
 from math import inf, isfinite
 
+from control.gait.recovery import is_in_mud
 from control.geometry import FlipperGeometry
 from control.records import NO_LOAD, UNKNOWN, FlipperLoad, Phase, StrideEstimate
-from control.recovery import is_in_mud
 from estimation.force_map import paper_force_n
 from estimation.joint_load import FlipperDrive, JointLoads, JointSample, motion_at
-from estimation.line_fit import LineFit
 from estimation.stride_clock import StrideClock
+from estimation.strokes.line_fit import LineFit
 
 SURFACE_FORCE_N = 0.5  # the paper's trigger, chosen above its noise
 STEADY_SHARE = 0.6  # of the sweep's half range around the middle: the force has reached its plateau by then

@@ -9,9 +9,9 @@ from typing import TypeVar
 
 import can
 
-from drivers.can_port import CanPort, open_port
-from drivers.reopening_port import NotOpenError, ReopeningPort
-from firmware_host.configuration import BusParameters
+from drivers.can.can_port import CanPort, open_port
+from drivers.can.reopening_port import NotOpenError, ReopeningPort
+from firmware_host.configuration.configuration import BusParameters
 
 Port = TypeVar("Port", bound=CanPort)
 WORDS = {

@@ -19,33 +19,33 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from control.modes import ENERGISED, Mode, Request
-from drivers.failing_port import failing_ports
-from drivers.failing_pose import failing_pose
-from drivers.failures import Failures
-from drivers.odrive_drives import OdriveDrives
-from drivers.pose_port import OpenedPose, PoseSourceError
-from drivers.reopening_port import ReopeningPort
+from drivers.can.reopening_port import ReopeningPort
+from drivers.fault_injection.failing_port import failing_ports
+from drivers.fault_injection.failing_pose import failing_pose
+from drivers.fault_injection.failures import Failures
+from drivers.odrive.drives import OdriveDrives
+from drivers.pose.pose_port import OpenedPose, PoseSourceError
 from firmware_host.buses import BusError, reopening_ports
-from firmware_host.configuration import (
+from firmware_host.computer.realtime import prepare_loop
+from firmware_host.computer.sd_notify import SystemdNotifier
+from firmware_host.configuration.configuration import (
     EXIT_CONFIGURATION,
     Configuration,
     ConfigurationError,
     LoopParameters,
     load_configuration,
 )
-from firmware_host.failing_recorder import failing_recorder
-from firmware_host.failing_time import failing_clock, failing_ticker
-from firmware_host.failure_calls import failures_of, with_failures
-from firmware_host.log_folder import first_path, new_run_id
+from firmware_host.fault_injection.failing_recorder import failing_recorder
+from firmware_host.fault_injection.failing_time import failing_clock, failing_ticker
+from firmware_host.fault_injection.failure_calls import failures_of, with_failures
+from firmware_host.log.log_folder import first_path, new_run_id
+from firmware_host.log.recorder import NullRecorder, Recorder
 from firmware_host.loop import Loop
-from firmware_host.operator_calls import OperatorCalls
+from firmware_host.operator.operator_calls import OperatorCalls
+from firmware_host.operator.rights import Rights, load_rights
+from firmware_host.operator.status_socket import AlreadyServedError, StatusSocket
 from firmware_host.pose_sources import open_pose
-from firmware_host.realtime import prepare_loop
-from firmware_host.recorder import NullRecorder, Recorder
-from firmware_host.rights import Rights, load_rights
-from firmware_host.sd_notify import SystemdNotifier
 from firmware_host.software_version import software_version
-from firmware_host.status_socket import AlreadyServedError, StatusSocket
 from firmware_host.ticker import RATE_HZ, Beat, Ticker
 
 EXIT_FAILED = 1

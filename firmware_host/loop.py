@@ -10,25 +10,25 @@ import time
 from collections.abc import Callable
 
 from control.controller import ALL_TRUSTED, RESTING, Controller, WalkOrder
+from control.depth.gait_choice import quickest
 from control.fault_latch import FaultLatch
 from control.faults import Fault, Reaction
-from control.gait_adaptation import quickest
+from control.gait.recovery import Recovery
 from control.limits import LimitedTorques, apply_limits
 from control.modes import ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
 from control.records import NEVER_S, NO_TORQUE, BodyPose, DriveState, DriveStates, GaitTarget, Torques
-from control.recovery import Recovery
-from drivers.odrive_drives import OdriveDrives
-from drivers.pose_port import PoseSource
-from firmware_host.configuration import Configuration
-from firmware_host.fault_watch import FaultWatch, Situation
-from firmware_host.lease import Lease
-from firmware_host.log_rows import STRIDE_KIND, TICK_KIND
-from firmware_host.loop_news import LoopNews, ModeChange
+from drivers.odrive.drives import OdriveDrives
+from drivers.pose.pose_port import PoseSource
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.fault_monitor import FaultWatch, Situation
+from firmware_host.log.recorder import Recording
+from firmware_host.log.row_packing import Moment, stride_row, tick_row
+from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
+from firmware_host.loop_events import LoopNews, ModeChange
+from firmware_host.loop_timing import LoopTiming
 from firmware_host.mud_learning import MudLearning
-from firmware_host.recorder import Recording
-from firmware_host.row_packing import Moment, stride_row, tick_row
+from firmware_host.operator.lease import Lease
 from firmware_host.ticker import PERIOD_S, Beat
-from firmware_host.timing import LoopTiming
 
 CLEARING_S = 0.5  # for the drives to report that their errors are gone
 LONGEST_STEP_TICKS = 3  # what the controller may advance at once: after a longer gap the gait goes on where it was

@@ -13,8 +13,8 @@ from control.fault_kinds import make_fault
 from control.faults import Fault
 from control.records import BodyPose, DriveStates, Estimate, Phase, StrideEstimate
 from estimation.mud import MudEstimator, MudReading
-from firmware_host.adaptation_methods import adaptation_of, choice_text
-from firmware_host.configuration import Configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.depth_methods import adaptation_of, choice_text
 
 FIRM_TICKS = 3  # of a load that ends an insertion: one odd sample says nothing
 KEPT_STRIDES = 200  # for clients that ask what happened

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from drivers.natnet_port import NatNetPort
-from drivers.pose_port import NoPose, OpenedPose, PosePort
-from drivers.rail_encoder import RailEncoder
-from drivers.track_axis import AXES, parse_axis
-from firmware_host.configuration import PoseParameters
+from drivers.pose.natnet_port import NatNetPort
+from drivers.pose.pose_port import NoPose, OpenedPose, PosePort
+from drivers.pose.rail_encoder import RailEncoder
+from drivers.pose.track_axis import AXES, parse_axis
+from firmware_host.configuration.configuration import PoseParameters
 
 
 def open_pose(pose: PoseParameters) -> OpenedPose:

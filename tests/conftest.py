@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from firmware_host.configuration import Configuration, load_configuration
+from firmware_host.configuration.configuration import Configuration, load_configuration
+from tests.folders import ROOT
 
 # A busy machine is not wrong, and a commit gets the same verdict every time; `--hypothesis-profile search` looks on.
 settings.register_profile("search", deadline=None)
@@ -18,8 +19,6 @@ settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job starts with it ignored, and so its children
-
-ROOT = Path(__file__).parent.parent
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from firmware_host.log_rows import EVENT, EVENT_KIND
-from firmware_host.recorder import NullRecorder
+from firmware_host.log.recorder import NullRecorder
+from firmware_host.log.rows import EVENT, EVENT_KIND
 
 
 class EventRecorder(NullRecorder):

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from control.controller import WalkOrder
 from control.modes import Mode
-from firmware_host.configuration import Configuration
-from firmware_host.recorder import Recorder
-from simulation.lockstep import Lockstep
-from simulation.track import paper_track
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.recorder import Recorder
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.track import paper_track
 
 
 def record_walks(path: Path, configuration: Configuration, *strides: int) -> Lockstep:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+from tests.folders import ROOT
+
 NAMES = ["control", "estimation", "drivers", "firmware_host", "simulation", "command_line"]
 
 

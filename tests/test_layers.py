@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+from tests.folders import ROOT
+
 LAYERS = [
     ("control",),
     ("estimation", "drivers"),
@@ -83,11 +84,11 @@ def test_imports_only_point_down(package: str) -> None:
     ("package", "line"),
     [
         ("control", "import numpy as np"),
-        ("control", "from drivers.frames import Frame"),
-        ("estimation", "import drivers.frames"),
+        ("control", "from drivers.can.frames import Frame"),
+        ("estimation", "import drivers.can.frames"),
         ("drivers", "from estimation import mud"),
         ("drivers", "def late() -> None:\n    import firmware_host"),
-        ("firmware_host", "from simulation.robot import SimulatedRobot"),
+        ("firmware_host", "from simulation.harness.robot import SimulatedRobot"),
         ("firmware_host", "import command_line.main"),
         ("simulation", "import json, estimation.mud"),
         ("simulation", "import command_line"),

@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from drivers.odrive_codec import GET_ENCODER_ESTIMATES, GET_IQ, HEARTBEAT, SET_INPUT_TORQUE
+from drivers.odrive.codec import GET_ENCODER_ESTIMATES, GET_IQ, HEARTBEAT, SET_INPUT_TORQUE
 from firmware_host.ticker import RATE_HZ
 from virtual_machine.robot import Robot
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from firmware_host.configuration import EXIT_CONFIGURATION
+from firmware_host.configuration.configuration import EXIT_CONFIGURATION
 from virtual_machine.robot import CONFIGURATION, Robot
 
 

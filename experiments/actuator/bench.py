@@ -14,14 +14,14 @@ from typing import Any, Protocol
 
 from experiments.actuator.calibration import TICK_S, Calibration, Show
 from experiments.actuator.fit import Entry
-from experiments.actuator.hand import PersonsHand
 from experiments.actuator.plan import Plan, require_possible, steps_of
 from experiments.actuator.simulation import simulated_bench
-from experiments.bench_robot import BenchRobot, disarm, leave
-from experiments.notebook import NAME, Notebook
-from experiments.person import GO_ON, Person, Willing
-from experiments.side_by_side import side_by_side
-from firmware_host.configuration import Configuration, parse_configuration
+from experiments.actuator.weight_handling import PersonsHand
+from experiments.reports.side_by_side import side_by_side
+from experiments.robot.bench_robot import BenchRobot, disarm, leave
+from experiments.robot.prompt import GO_ON, Person, Willing
+from experiments.trials.notebook import NAME, Notebook
+from firmware_host.configuration.configuration import Configuration, parse_configuration
 
 FALLS = (
     "What hangs falls when the torque goes off: at a fault, and within two seconds where this program dies or its"

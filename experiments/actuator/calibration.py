@@ -13,16 +13,16 @@ from dataclasses import replace
 from math import degrees
 from typing import Any
 
-from experiments.actuator.doubt import Doubt, doubt_of
 from experiments.actuator.fit import current_per_nm
 from experiments.actuator.friction import Loop, swing
-from experiments.actuator.hand import Hand
 from experiments.actuator.plan import COOL_K, READING_S, Plan, Step, largest_current_a, stays_cool, steps_of
 from experiments.actuator.reading import HeldJoint, MovedError, Reading, WarmError
-from experiments.bench_robot import BenchError, BenchRobot, arm, face_faults, require_hold
-from experiments.notebook import Notebook
-from experiments.person import GO_ON, REDO, SKIP, Person
-from firmware_host.status_client import CallRefusedError
+from experiments.actuator.uncertainty import Doubt, doubt_of
+from experiments.actuator.weight_handling import Hand
+from experiments.robot.bench_robot import BenchError, BenchRobot, arm, face_faults, require_hold
+from experiments.robot.prompt import GO_ON, REDO, SKIP, Person
+from experiments.trials.notebook import Notebook
+from firmware_host.operator.status_client import CallRefusedError
 
 KEEP, OTHER = "k", "o"
 MOST_FAULTS = 5  # of one weight

@@ -20,10 +20,10 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Table
 
-from experiments.bench_robot import BenchError
-from firmware_host.configuration import parse_configuration
-from firmware_host.file_problems import why_not
-from firmware_host.toml_records import ConfigurationError, read_text
+from experiments.robot.bench_robot import BenchError
+from firmware_host.configuration.configuration import parse_configuration
+from firmware_host.configuration.file_problems import why_not
+from firmware_host.configuration.toml_records import ConfigurationError, read_text
 
 Changes = Mapping[tuple[str, ...], float]  # the key's path, and its new value
 BACKUP = ".before"

@@ -27,7 +27,7 @@ from math import cos, hypot, nan, sqrt
 from statistics import fmean, stdev
 from typing import Any, NamedTuple
 
-from estimation.origin_fit import student_factor
+from estimation.strokes.origin_fit import student_factor
 from experiments.actuator.friction import Friction, Loop, friction_of
 from experiments.actuator.line import FEWEST, Line, fit_line
 from experiments.actuator.plan import Plan, Step, steps_of

@@ -20,7 +20,7 @@ from math import degrees, hypot, nan, radians, sqrt
 from statistics import fmean, variance
 from typing import NamedTuple
 
-from estimation.origin_fit import student_factor
+from estimation.strokes.origin_fit import student_factor
 from experiments.actuator.reading import QUIET_S, HeldJoint, MovedError, Sample
 
 SWING_RAD = radians(5.0)  # to either side: four and a half periods of the R60's cogging, and the arm stays near level

@@ -13,7 +13,7 @@ from math import sqrt
 from statistics import fmean
 from typing import NamedTuple
 
-from estimation.origin_fit import student_factor
+from estimation.strokes.origin_fit import student_factor
 
 FEWEST = 3  # readings of a line
 

@@ -20,10 +20,10 @@ from math import ceil, hypot, nan, sqrt
 from typing import Any
 
 from control.joint_pd import GRAVITY_M_S2
-from control.joint_watch import SATURATED_SHARE
-from control.winding import Winding
-from experiments.bench_robot import BenchError
-from firmware_host.configuration import Configuration
+from control.monitors.joint_monitor import SATURATED_SHARE
+from control.monitors.winding import Winding
+from experiments.robot.bench_robot import BenchError
+from firmware_host.configuration.configuration import Configuration
 
 PAPER_WEIGHTS_G = (10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 600.0, 800.0)
 PAPER_TRIALS = 5

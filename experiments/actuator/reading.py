@@ -23,7 +23,7 @@ from statistics import fmean, pstdev
 from typing import Any, NamedTuple
 
 from control.records import JOINTS
-from experiments.bench_robot import BenchError, BenchRobot, move, require_hold
+from experiments.robot.bench_robot import BenchError, BenchRobot, move, require_hold
 
 OFF_RAD = radians(1.0)  # to the side, before an approach
 STEP_RAD = radians(0.6)  # at most at once: a hanging weight must not be thrown about

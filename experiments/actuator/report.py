@@ -11,9 +11,9 @@ from typing import Any
 from experiments.actuator.fit import Entry, JointFit, repeatability
 from experiments.actuator.friction import SWING_RAD
 from experiments.actuator.plan import Plan, steps_of
-from experiments.report_page import Figure, Rows, Section
-from experiments.value_text import share_text, value_text
-from firmware_host.reports import known
+from experiments.reports.report_page import Figure, Rows, Section
+from experiments.reports.value_text import share_text, value_text
+from firmware_host.operator.reports import known
 
 TITLE = "Actuator calibration"
 CONSTANTS = "Torque constants ± one standard error; RMSE and repeatability by the paper's definitions"

@@ -7,7 +7,7 @@ must find that. Its imperfections are those of direct-drive motors of this size,
                 (J. Pieper, "Measuring torque ripple", jpieper.com/tag/torque), 168 periods a turn by the R60's 24 slots
                 and 28 magnets (motor_config_R60.h on os.mbed.com, users/adimmit)
     friction    no figure is public; the paper neglects it, so it is set to as much as the cogging's amplitude
-    current     noise of 0.1 to 0.3 A in the authors' logs (simulation/disturbances.py)
+    current     noise of 0.1 to 0.3 A in the authors' logs (simulation/mud/disturbances.py)
     encoder     14 bits, as of the R60's public ODrive settings (YaelBenShalom/Motorized-Prosthetic-Arm)
 
 A hook is never twice in quite the same place of the arm. How far it misses is an estimate, and calibration weights of
@@ -23,15 +23,15 @@ from random import Random
 from control.records import JOINTS
 from experiments.actuator.fit import JointFit
 from experiments.actuator.plan import Plan, Step
-from experiments.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.person import GO_ON
-from experiments.trial import BENCH_CURRENT_A
-from experiments.value_text import miss_text
-from firmware_host.configuration import Configuration
-from firmware_host.file_recorder import FileRecorder
-from simulation.bench_mount import BenchMount
-from simulation.lockstep import Lockstep, drives_of, plant_of
-from simulation.track import paper_track
+from experiments.reports.value_text import miss_text
+from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.robot.prompt import GO_ON
+from experiments.trials.trial import BENCH_CURRENT_A
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.file_recorder import FileRecorder
+from simulation.body.bench_mount import BenchMount
+from simulation.harness.lockstep import Lockstep, drives_of, plant_of
+from simulation.mud.track import paper_track
 
 TRUE_CONSTANT_NM_A = 8.27 / 115.0
 COGGING_NM, COGGING_PER_TURN = 0.013, 168

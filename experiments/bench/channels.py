@@ -9,8 +9,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-from experiments.bench_robot import BenchError
-from firmware_host.configuration import BusParameters, Configuration
+from experiments.robot.bench_robot import BenchError
+from firmware_host.configuration.configuration import BusParameters, Configuration
 
 INTERFACE = "socketcan"
 

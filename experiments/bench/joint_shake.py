@@ -19,8 +19,8 @@ from math import nan
 
 from control.records import NO_TORQUE, DriveStates, Torques
 from experiments.bench.reading import Reading
-from experiments.bench.stand import Stand, joint_place
-from experiments.bench_robot import BenchError
+from experiments.bench.test_rig import Stand, joint_place
+from experiments.robot.bench_robot import BenchError
 from firmware_host.ticker import PERIOD_S
 
 FIRST_NM, GROWTH = 0.02, 1.5

@@ -9,8 +9,8 @@ from math import degrees, inf
 from control.controller import measured_angles
 from control.records import JOINTS, JointAngles
 from experiments.bench.reading import Reading, Readings, left_out
-from experiments.bench.stand import LOOK_S, Sample, Stand, joint_place
 from experiments.bench.stroke_tracking import WALK_DEPTH_M
+from experiments.bench.test_rig import LOOK_S, Sample, Stand, joint_place
 
 LEVEL_DEG = 5.0  # that hands with a spirit level are off: 1 cm at the end of an arm
 LEAST_TURN_DEG = 30.0  # by which a joint is turned by somebody who means it

@@ -16,22 +16,22 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from control.records import JOINTS
-from drivers.can_port import CanPort
-from drivers.frames import Frame
-from drivers.mock_bus import MockBus, MockPort
-from drivers.odrive_drives import OdriveDrives
-from drivers.pose_port import NoPose
-from experiments.bench_robot import BenchError
+from drivers.can.can_port import CanPort
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockBus, MockPort
+from drivers.odrive.drives import OdriveDrives
+from drivers.pose.pose_port import NoPose
+from experiments.robot.bench_robot import BenchError
 from firmware_host.buses import BusError, open_ports
-from firmware_host.configuration import Configuration
+from firmware_host.computer.realtime import prepare_loop
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import Loop
-from firmware_host.realtime import prepare_loop
-from firmware_host.recorder import NullRecorder
-from firmware_host.status_client import NoDaemonError, NotPermittedError, StatusClient
+from firmware_host.operator.status_client import NoDaemonError, NotPermittedError, StatusClient
 from firmware_host.ticker import PERIOD_S, Beat, Ticker
-from simulation.blocks import on_blocks
-from simulation.odrive import OdriveParameters
-from simulation.robot import SimulatedRobot
+from simulation.body.blocks import on_blocks
+from simulation.devices.odrive import OdriveParameters
+from simulation.harness.robot import SimulatedRobot
 
 LISTENING_S = 1.0  # ten heartbeats
 LOOK_S = 0.001  # between two looks at a bus that is listened to

@@ -13,10 +13,10 @@ from math import nan, radians
 
 from control.controller import measured_angles
 from control.records import JOINTS, NO_TORQUE, DriveStates, Torques
-from experiments.bench.attendant import WAYS, Sight
 from experiments.bench.joint_shake import answer, idle, shake
+from experiments.bench.operator import WAYS, Sight
 from experiments.bench.reading import Reading, Readings, left_out
-from experiments.bench.stand import Sample, Stand, joint_place
+from experiments.bench.test_rig import Sample, Stand, joint_place
 from firmware_host.ticker import PERIOD_S
 
 STEP_NM = 0.01  # a fifth of what holds an arm of the default mass level

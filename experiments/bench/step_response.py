@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from control.records import NO_TORQUE, DriveStates, Torques
 from experiments.bench.reading import Reading, Readings
-from experiments.bench.stand import Sample, Stand, joint_place
+from experiments.bench.test_rig import Sample, Stand, joint_place
 
 PULSE_NM = 0.08  # a tenth of what the motors may do: some ten times a current's noise
 QUARTER_TICKS = 4  # 11 ms: the joint comes to 2 rad/s and moves by 2 degrees

@@ -17,10 +17,10 @@ from control.controller import ALL_TRUSTED, DAMPING_NM, RAISING_S, SOFT_STOP_S, 
 from control.joint_pd import damping_torques_nm
 from control.modes import Mode, Request
 from control.records import DriveStates, JointAngles, Phase, Torques
-from drivers.odrive_axis import OdriveAxis
+from drivers.odrive.axis import OdriveAxis
 from experiments.bench.reading import Reading, Readings
-from experiments.bench.stand import Law, Sample, Stand, first_lasting
 from experiments.bench.stroke_tracking import FAST_RAD_S, order_strides
+from experiments.bench.test_rig import Law, Sample, Stand, first_lasting
 from firmware_host.ticker import PERIOD_S
 
 SWEEPS = (0, 2)  # places in JOINTS

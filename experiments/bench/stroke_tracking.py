@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.controller import WalkOrder
-from control.gait import stride_duration_s
+from control.gait.gait import stride_duration_s
 from control.modes import Mode, Request
 from control.records import JOINTS, JointAngles
 from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings
-from experiments.bench.stand import Sample, Stand
-from experiments.bench_robot import BenchError
+from experiments.bench.test_rig import Sample, Stand
+from experiments.robot.bench_robot import BenchError
 from firmware_host.ticker import PERIOD_S
 
 Vector = NDArray[np.float64]

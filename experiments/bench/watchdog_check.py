@@ -9,9 +9,9 @@ from __future__ import annotations
 from math import nan
 
 from control.records import JOINTS, DriveStates, Torques
-from drivers import odrive_codec as codec
+from drivers.odrive import codec
 from experiments.bench.reading import Reading, Readings
-from experiments.bench.stand import Sample, Stand, first_lasting
+from experiments.bench.test_rig import Sample, Stand, first_lasting
 from firmware_host.ticker import PERIOD_S
 
 PRESSING_NM = 0.08  # down: what an arm weighs twice more; a sweep joint gets none, nothing would hold it

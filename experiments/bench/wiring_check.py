@@ -11,16 +11,16 @@ from collections.abc import Callable, Mapping
 from math import inf, isfinite, nan
 
 from control.records import JOINTS
-from drivers import odrive_codec as codec
-from drivers.bus_load import COMMAND_HZ, MOST_SHARE, SLOW_HZ, TORQUE_BYTES, bus_load, frame_bits
-from drivers.can_port import CanPort
-from drivers.frames import Frame
-from drivers.odrive_axis import DriveParameters, OdriveAxis
-from drivers.odrive_codec import Message, arbitration_id
+from drivers.can.bus_load import COMMAND_HZ, MOST_SHARE, SLOW_HZ, TORQUE_BYTES, bus_load, frame_bits
+from drivers.can.can_port import CanPort
+from drivers.can.frames import Frame
+from drivers.odrive import codec
+from drivers.odrive.axis import DriveParameters, OdriveAxis
+from drivers.odrive.codec import Message, arbitration_id
 from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings
-from experiments.bench.stand import Stand
-from firmware_host.fault_watch import FIRMWARE
+from experiments.bench.test_rig import Stand
+from firmware_host.fault_monitor import FIRMWARE
 from firmware_host.ticker import PERIOD_S, RATE_HZ
 
 ASKING_S = 3.0  # longest, for versions and then for watchdogs: asked every 0.5 s

@@ -11,9 +11,9 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 from control.records import FLIPPERS
-from experiments.load_cell_truth import LoadCellTruth
-from experiments.trial import Trial, beliefs_of
-from simulation.witness import StrideTruth
+from experiments.trials.load_cell_truth import LoadCellTruth
+from experiments.trials.trial import Trial, beliefs_of
+from simulation.body.reference_sensor import StrideTruth
 
 FOLLOWED = 0.2  # of the truth: half of the smallest step between the muds
 

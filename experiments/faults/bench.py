@@ -11,20 +11,20 @@ from contextlib import contextmanager, redirect_stderr
 from io import StringIO
 from random import Random
 
+from control.monitors.winding import Winding
 from control.records import JOINTS
-from control.winding import Winding
-from drivers.failures import Failures, end_text
-from drivers.frames import Frame
-from drivers.odrive_codec import Message, arbitration_id
-from firmware_host.configuration import Configuration
+from drivers.can.frames import Frame
+from drivers.fault_injection.failures import Failures, end_text
+from drivers.odrive.codec import Message, arbitration_id
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import _end_safely as end_safely
-from firmware_host.log_rows import EVENT, EVENT_KIND, TICK_KIND
-from firmware_host.recorder import HEALTHY, LogReport, NullRecorder
+from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
+from firmware_host.log.rows import EVENT, EVENT_KIND, TICK_KIND
 from firmware_host.ticker import PERIOD_S, Beat
-from simulation.lockstep import Lockstep
-from simulation.odrive import SimulatedOdrive
-from simulation.plant import Arm
-from simulation.track import Track
+from simulation.body.plant import Arm
+from simulation.devices.odrive import SimulatedOdrive
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.track import Track
 
 Act = Callable[[], None]
 

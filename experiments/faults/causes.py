@@ -13,10 +13,10 @@ from math import copysign
 from typing import Any
 
 from control.records import JOINTS
-from drivers import odrive_codec as codec
-from drivers.odrive_codec import AxisState
+from drivers.odrive import codec
+from drivers.odrive.codec import AxisState
 from experiments.faults.bench import FaultBench
-from simulation.odrive import ENABLE_WATCHDOG_ENDPOINT
+from simulation.devices.odrive import ENABLE_WATCHDOG_ENDPOINT
 
 LONGEST_S = 60.0
 OVERCURRENT = 0x400  # of the drive's supply

@@ -13,12 +13,12 @@ from random import Random
 from typing import Any
 
 from control.faults import Blocks, FaultKind, Reaction
-from control.joint_watch import REST_S, STILL_RAD
 from control.modes import ENERGISED, Mode, Request
-from drivers.odrive_codec import AxisState
+from control.monitors.joint_monitor import REST_S, STILL_RAD
+from drivers.odrive.codec import AxisState
 from experiments.faults.bench import FaultBench
+from experiments.faults.evaluation import LONGEST_STOP_S, Cell, problems
 from experiments.faults.injection import BY_NAME, TOLD_S, Way
-from experiments.faults.judgement import LONGEST_STOP_S, Cell, problems
 from experiments.faults.phases import bench_for, bring
 from firmware_host.ticker import PERIOD_S
 

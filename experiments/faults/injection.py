@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from control.fault_kinds import KINDS
 from control.faults import FaultKind
 from control.records import JOINTS
-from drivers import odrive_codec as codec
+from drivers.odrive import codec
 from experiments.faults.causes import (
     Cause,
     always_said,

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from experiments.faults.cell import run_cell
 from experiments.faults.injection import BY_NAME, WAYS
 from experiments.faults.phases import PHASES
-from experiments.side_by_side import Show, side_by_side
+from experiments.reports.side_by_side import Show, side_by_side
 
 FAULTS = tuple(dict.fromkeys(way.fault for way in WAYS))
 

@@ -10,15 +10,15 @@ from dataclasses import replace
 from random import Random
 
 from control.controller import WalkOrder
-from control.joint_watch import FaultBounds
+from control.gait.recovery import RecoveryParameters
 from control.modes import Mode, Request
+from control.monitors.joint_monitor import FaultBounds
 from control.records import Phase
-from control.recovery import RecoveryParameters
 from experiments.faults.bench import FaultBench
-from experiments.trial import WALKING, configuration_of
-from firmware_host.configuration import Configuration
-from simulation.clay import MUDS, Clay
-from simulation.track import Track
+from experiments.trials.trial import WALKING, configuration_of
+from firmware_host.configuration.configuration import Configuration
+from simulation.mud.clay import MUDS, Clay
+from simulation.mud.track import Track
 
 LENGTH_M = 5.0
 HOLDING_CLAY = Clay("9 kPa", 9000.0)  # in which an insertion of 5 cm leaves the flippers stuck

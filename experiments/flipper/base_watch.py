@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from control.modes import Mode
 from control.records import FLIPPERS, JOINTS, Phase
-from firmware_host.configuration import Configuration
-from firmware_host.log_reader import Log
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log_reading.log_reader import Log
 
 POSE_M = 0.002
 SPOILING_M = 0.01  # a tenth of a stance: 10 % of the way and of the speed, which changes what mud bears by 0.6 %

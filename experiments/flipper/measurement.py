@@ -16,18 +16,18 @@ from typing import Any
 import numpy as np
 
 from control.records import Phase
-from experiments.bench_robot import BenchError, arm, rest, walk
-from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text, truth_in
-from experiments.error_table import COEFFICIENTS
-from experiments.estimation_methods import DEFAULT, PAPER, method_of, strides_by_method
 from experiments.flipper.base_watch import SPOILING_M, load_remarks, moved_text, pose_remarks, surface_remarks
 from experiments.flipper.modelled_force import misfit_n, modelled_forces
-from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError, conduct_trials
-from experiments.notebook import Entry
-from experiments.side_by_side import Show
-from experiments.stride_course import StrideCourse, course_of, course_of_row, course_row, thinned
-from firmware_host.configuration import Configuration
-from firmware_host.log_reader import Log
+from experiments.reports.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text, truth_in
+from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.side_by_side import Show
+from experiments.robot.bench_robot import BenchError, arm, rest, walk
+from experiments.trials.estimation_methods import DEFAULT, PAPER, method_of, strides_by_method
+from experiments.trials.mud_trials import Bench, PlannedTrial, SpoiltTrialError, conduct_trials
+from experiments.trials.notebook import Entry
+from experiments.trials.stride_profile import StrideCourse, course_of, course_of_row, course_row, thinned
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log_reading.log_reader import Log
 
 MUDS = ("47.6", "48.6", "49.5", "50.3", "51.2")  # the paper's, by their water in percent
 METHODS = (DEFAULT, PAPER)

@@ -20,9 +20,9 @@ from control.geometry import FlipperGeometry
 from control.plate import crossing, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import Phase
 from estimation.force_map import smallest_force_n
-from estimation.shear import MOBILISED_M
-from estimation.stroke_fit import REVERSAL_SHARE
-from experiments.stride_course import Floats, StrideCourse
+from estimation.strokes.shear import MOBILISED_M
+from estimation.strokes.stroke_fit import REVERSAL_SHARE
+from experiments.trials.stride_profile import Floats, StrideCourse
 
 COEFFICIENT_OF = {Phase.INSERTION: "k_p", Phase.STANCE: "k_s", Phase.EXTRACTION: "k_e"}
 

@@ -12,11 +12,11 @@ from matplotlib.axes import Axes
 
 from control.geometry import FlipperGeometry
 from control.records import Phase
-from experiments.coefficient_table import PER_CM3
-from experiments.error_table import COEFFICIENTS
 from experiments.flipper.measurement import drawn_coefficients
 from experiments.flipper.modelled_force import ModelledForces, modelled_forces
-from experiments.mud_looks import (
+from experiments.reports.coefficient_table import PER_CM3
+from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.mud_styles import (
     DOTS_PER_INCH,
     GREY,
     INK,
@@ -29,9 +29,9 @@ from experiments.mud_looks import (
     mark_of,
     waters_of,
 )
-from experiments.mud_names import mud_text
-from experiments.notebook import Entry
-from experiments.stride_course import Floats, StrideCourse, course_of_row
+from experiments.trials.mud_names import mud_text
+from experiments.trials.notebook import Entry
+from experiments.trials.stride_profile import Floats, StrideCourse, course_of_row
 
 THIN: dict[str, Any] = {"linewidth": 1.1}
 MODELLED: dict[str, Any] = {"linewidth": 2.0, "linestyle": (0, (3, 1.5))}

@@ -6,16 +6,16 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from experiments.coefficient_table import error_text_rows, mud_rows
-from experiments.estimation_methods import DEFAULT
 from experiments.flipper.measurement import AUTHORS_MUD, AUTHORS_N, Plan, muds_of, trials_of
 from experiments.loadcell.comparison import OTHER_PLATE
-from experiments.mud_looks import file_name
-from experiments.mud_names import mud_text
-from experiments.mud_trials import left_out_texts
-from experiments.notebook import Entry
-from experiments.report_page import Figure, Section
-from firmware_host.configuration import Configuration
+from experiments.reports.coefficient_table import error_text_rows, mud_rows
+from experiments.reports.mud_styles import file_name
+from experiments.reports.report_page import Figure, Section
+from experiments.trials.estimation_methods import DEFAULT
+from experiments.trials.mud_names import mud_text
+from experiments.trials.mud_trials import left_out_texts
+from experiments.trials.notebook import Entry
+from firmware_host.configuration.configuration import Configuration
 
 STROKES = tuple(AUTHORS_N)
 TRUTHS = {

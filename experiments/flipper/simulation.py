@@ -7,14 +7,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from experiments.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.mud_trials import PlannedTrial
-from experiments.simulated_bed import CarriedBed, simulated_bench
-from experiments.trial import BENCH_CURRENT_A, BENCH_TORQUE_NM
-from firmware_host.configuration import Configuration
-from simulation.clay import clay_of_water
-from simulation.disturbances import LAB, Disturbances
-from simulation.track import Track
+from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.trials.mud_trials import PlannedTrial
+from experiments.trials.simulated_bed import CarriedBed, simulated_bench
+from experiments.trials.trial import BENCH_CURRENT_A, BENCH_TORQUE_NM
+from firmware_host.configuration.configuration import Configuration
+from simulation.mud.clay import clay_of_water
+from simulation.mud.disturbances import LAB, Disturbances
+from simulation.mud.track import Track
 
 PLACE_M = 0.2  # a trial's share of the mud: no stroke finds what another left
 STRIP_M = 100.0  # of each mud

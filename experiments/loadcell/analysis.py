@@ -13,13 +13,13 @@ from statistics import median, stdev
 
 import numpy as np
 
-from estimation.origin_fit import NORMAL_MAD
+from estimation.strokes.origin_fit import NORMAL_MAD
 from experiments.loadcell.alignment import MEDIAN_ERROR, WIDE, Alignment, common_alignment
 from experiments.loadcell.contact import Course, StrokeError, find_contact, without_spikes
 from experiments.loadcell.fits import SHEAR, SHIFT, Analysed, Recorded, analyse_insertion, analyse_shear
 from experiments.loadcell.measured import analyse_measured
 from experiments.loadcell.motion import Insertion, Pace, StageSettings, wide_pace
-from experiments.side_by_side import Show
+from experiments.reports.side_by_side import Show
 
 LEAST_SPEED_DOUBT, LEAST_RAMP_DOUBT = 0.005, 0.1  # of a stage, from trial to trial
 SET_SPEED_DOUBT = 0.01  # of a stage's controller

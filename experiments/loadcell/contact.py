@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimation.origin_fit import NORMAL_MAD
+from estimation.strokes.origin_fit import NORMAL_MAD
 from experiments.loadcell.curve_fit import Array
 
 QUIET_S = 0.4  # before a stroke, that tells zero and noise

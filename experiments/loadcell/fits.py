@@ -1,4 +1,4 @@
-"""The coefficients of a mud from the trials of a load cell, by the words of experiments/load_cell_truth.py.
+"""The coefficients of a mud from the trials of a load cell, by the words of experiments/trials/load_cell_truth.py.
 
     k_p    F = k V(z) by least squares over the way down, every piece of way alike
     k_e    the same for the last three quarters of the way up, with the force downward
@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from control.plate import submerged_part
-from estimation.origin_fit import MIN_BATCHES, student_factor
+from estimation.strokes.origin_fit import MIN_BATCHES, student_factor
 from experiments.loadcell.alignment import Alignment
 from experiments.loadcell.contact import Course, StrokeError
 from experiments.loadcell.curve_fit import Array

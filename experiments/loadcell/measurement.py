@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from drivers.load_cell_calibration import (
+from drivers.load_cell.calibration import (
     CalibrationError,
     LoadCellCalibration,
     calibrate,
@@ -22,21 +22,21 @@ from drivers.load_cell_calibration import (
     weigh,
     write_calibration,
 )
-from drivers.load_cell_lines import COUNTS, LineFormat
-from drivers.load_cell_port import LoadCellPort
-from experiments.bench_robot import BenchError
+from drivers.load_cell.line_formats import COUNTS, LineFormat
+from drivers.load_cell.load_cell_port import LoadCellPort
 from experiments.loadcell.analysis import analyse
 from experiments.loadcell.comparison import Compared, compared_with
-from experiments.loadcell.examination import examine_encoder, examine_lines
 from experiments.loadcell.fits import COEFFICIENTS, Analysed, OfMud, bench_doubt, of_mud, speed_remark
 from experiments.loadcell.motion import StageSettings
 from experiments.loadcell.raw import load_all
 from experiments.loadcell.recording import CellRecorder
+from experiments.loadcell.trial_checks import examine_encoder, examine_lines
 from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
-from experiments.notebook import Notebook
-from experiments.person import GO_ON, Person
-from experiments.side_by_side import Show
-from firmware_host.reports import known
+from experiments.reports.side_by_side import Show
+from experiments.robot.bench_robot import BenchError
+from experiments.robot.prompt import GO_ON, Person
+from experiments.trials.notebook import Notebook
+from firmware_host.operator.reports import known
 
 CALIBRATION = "calibration.json"
 WEIGHING_S = 2.0

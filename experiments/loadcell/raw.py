@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from drivers.load_cell_port import Sample
-from drivers.stage_encoder import Place
+from drivers.load_cell.load_cell_port import Sample
+from drivers.load_cell.stage_encoder import Place
 from experiments.loadcell.fits import Recorded
 from experiments.loadcell.stage_track import Places
-from experiments.notebook import Notebook
+from experiments.trials.notebook import Notebook
 
 RAW = "raw"
 COLUMNS, PLACE_COLUMNS = ("t_s", "force_n", "overloaded"), ("t_s", "place_m")

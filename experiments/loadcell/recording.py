@@ -12,10 +12,10 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from drivers.load_cell_port import LoadCellPort, Sample
-from drivers.stage_encoder import Place, StageEncoder
-from experiments.bench_robot import BenchError
+from drivers.load_cell.load_cell_port import LoadCellPort, Sample
+from drivers.load_cell.stage_encoder import Place, StageEncoder
 from experiments.loadcell.contact import CONTACT_NOISES, LEAST_FORCE_N, QUIET_S, noise_of
+from experiments.robot.bench_robot import BenchError
 
 POLL_S = 0.005
 TARE_S = 1.0

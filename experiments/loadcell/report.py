@@ -18,9 +18,9 @@ from experiments.loadcell.fits import CALLIPERS_M, COEFFICIENTS, Analysed, OfMud
 from experiments.loadcell.measurement import Results
 from experiments.loadcell.motion import RATE_EXPONENT, Insertion, StageSettings
 from experiments.loadcell.trials import TrialPlan
-from experiments.mud_names import mud_text
-from experiments.report_page import Figure, Section
-from experiments.value_text import N_CM3, repeatability_text, value_text
+from experiments.reports.report_page import Figure, Section
+from experiments.reports.value_text import N_CM3, repeatability_text, value_text
+from experiments.trials.mud_names import mud_text
 
 TITLE = "Ground truth of mud from a load cell"
 METHOD = (

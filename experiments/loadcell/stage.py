@@ -10,12 +10,12 @@ from collections.abc import Callable, Mapping
 from random import Random
 from typing import NamedTuple, Protocol
 
-from drivers.load_cell_lines import GRAVITY_M_S2
+from drivers.load_cell.line_formats import GRAVITY_M_S2
 from experiments.loadcell.fits import INSERTION, SHEAR
 from experiments.loadcell.motion import StageSettings
-from experiments.person import GO_ON, REDO, SKIP, Person
-from simulation.load_cell_bench import EmulatedBench
-from simulation.plate_stage import CarriedPlate
+from experiments.robot.prompt import GO_ON, REDO, SKIP, Person
+from simulation.test_rig.load_cell_bench import EmulatedBench
+from simulation.test_rig.plate_stage import CarriedPlate
 
 HEAVIEST_G = 50000.0
 ATTENDED_PATIENCE_S, SIMULATED_PATIENCE_S = 60.0, 5.0

@@ -20,9 +20,9 @@ from experiments.loadcell.motion import Insertion, Shear, StageSettings, wide_pa
 from experiments.loadcell.raw import load_recorded, raw_name, write_places, write_samples
 from experiments.loadcell.recording import AVERAGED, CellRecorder, PlaceStretch, Stretch, Tare
 from experiments.loadcell.stage import Stage, Trial
-from experiments.notebook import Notebook
-from experiments.person import GO_ON, REDO, SKIP, Person
-from experiments.side_by_side import Show
+from experiments.reports.side_by_side import Show
+from experiments.robot.prompt import GO_ON, REDO, SKIP, Person
+from experiments.trials.notebook import Notebook
 
 KEEP, WITHOUT = "k", "w"
 AT_ONE_SPEED = "what follows takes a stage of one speed, and none that a hand pushes"

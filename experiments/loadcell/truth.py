@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from control.records import UNKNOWN
-from experiments.load_cell_truth import TrueCoefficients, true_coefficients
 from experiments.loadcell.fits import COEFFICIENTS, OfMud
 from experiments.loadcell.motion import StageSettings
-from experiments.mud_names import mud_text
-from experiments.value_text import N_CM3, miss_text, value_text
-from simulation.clay import clay_of_water
-from simulation.load_cell_bench import RELAXATION
-from simulation.witness import StrideTruth, StrokeTruth
+from experiments.reports.value_text import N_CM3, miss_text, value_text
+from experiments.trials.load_cell_truth import TrueCoefficients, true_coefficients
+from experiments.trials.mud_names import mud_text
+from simulation.body.reference_sensor import StrideTruth, StrokeTruth
+from simulation.mud.clay import clay_of_water
+from simulation.test_rig.load_cell_bench import RELAXATION
 
 HOLD_S = 3.0  # the paper's
 

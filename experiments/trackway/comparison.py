@@ -14,8 +14,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
-from experiments.notebook import Notebook
-from experiments.side_by_side import Show, side_by_side
+from experiments.reports.side_by_side import Show, side_by_side
 from experiments.trackway.depth_rule import DepthRule, chosen_by, configuration_for, constant_depth, walk_by
 from experiments.trackway.one_mud import (
     CONSTANT_STRIDES,
@@ -29,9 +28,10 @@ from experiments.trackway.one_mud import (
 from experiments.trackway.paper_table import ADAPTIVE, FIXED_DEPTHS_M, PAPER_TABLE
 from experiments.trackway.speed_table import cell, mean_over_muds, within_one_sd
 from experiments.trackway.walk import Walk, WalkedStride, walk_of
-from simulation.clay import MUDS, Clay
-from simulation.disturbances import LAB
-from simulation.track import COMPARTMENT_M, Track
+from experiments.trials.notebook import Notebook
+from simulation.mud.clay import MUDS, Clay
+from simulation.mud.disturbances import LAB
+from simulation.mud.track import COMPARTMENT_M, Track
 
 STUCK_S = 90.0  # of walking in one mud
 FIXED = tuple(constant_depth(depth_m) for depth_m in FIXED_DEPTHS_M.values())

@@ -10,14 +10,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple, cast, get_args
 
-from control.adaptation import Method
 from control.controller import WalkOrder
-from control.recovery import RecoveryParameters
+from control.depth.depth_choice import Method
+from control.gait.recovery import RecoveryParameters
 from experiments.trackway.walk import Walk, WalkedStride, walk
-from experiments.trial import WALKING, configuration_of
-from firmware_host.configuration import Configuration
-from simulation.disturbances import LAB
-from simulation.track import Track
+from experiments.trials.trial import WALKING, configuration_of
+from firmware_host.configuration.configuration import Configuration
+from simulation.mud.disturbances import LAB
+from simulation.mud.track import Track
 
 METHODS: tuple[str, ...] = get_args(Method)
 PAPER = "paper"

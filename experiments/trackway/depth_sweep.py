@@ -12,7 +12,7 @@ from functools import partial
 from statistics import fmean, median
 from typing import Any
 
-from experiments.side_by_side import Show, side_by_side
+from experiments.reports.side_by_side import Show, side_by_side
 from experiments.trackway.depth_rule import METHODS, chosen_by, configuration_for
 from experiments.trackway.one_mud import (
     CONSTANT_STRIDES,
@@ -28,8 +28,8 @@ from experiments.trackway.one_mud import (
 )
 from experiments.trackway.speed_table import failures
 from experiments.trackway.walk import Walk
-from simulation.clay import Clay
-from simulation.disturbances import LAB
+from simulation.mud.clay import Clay
+from simulation.mud.disturbances import LAB
 
 STRENGTHS_PA = (300.0, 400.0, 500.0, 680.0, 1000.0, 1500.0, 2000.0, 2800.0, 3250.0, 4000.0, 5000.0, 6000.0)
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from control.modes import Mode
 from control.records import UNKNOWN, Phase
 from experiments.trackway.walk import AFTER_STANCE, WalkedStride
-from firmware_host.configuration import Configuration
-from firmware_host.log_reader import Log
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log_reading.log_reader import Log
 
 NO_MUD = ""  # of a stride whose place is not known
 LEFT_SWEEP, RIGHT_SWEEP = 0, 2  # in the order of JOINTS

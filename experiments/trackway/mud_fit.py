@@ -1,7 +1,7 @@
 """What the simulator's muds and rail are fitted to: the six fixed-depth speeds of the paper's Table I.
 
-Four numbers are fitted, each mud's strength (simulation/clay.py) and how the rail's drag grows with speed
-(simulation/plant.py), so that
+Four numbers are fitted, each mud's strength (simulation/mud/clay.py) and how the rail's drag grows with speed
+(simulation/body/plant.py), so that
 
     chi² = Σ ((v - v_paper) / sd_paper)²      over two depths in three muds
 
@@ -25,16 +25,16 @@ from functools import partial
 from statistics import fmean
 from typing import Any, NamedTuple
 
-from experiments.side_by_side import Show, side_by_side
+from experiments.reports.side_by_side import Show, side_by_side
 from experiments.trackway.depth_rule import configuration_for, constant_depth
 from experiments.trackway.one_mud import CONSTANT_STRIDES, ENDLESS_M, has, speed_cm_s
 from experiments.trackway.paper_table import FIXED_DEPTHS_M, PAPER_TABLE, Speed
 from experiments.trackway.walk import walk_in
-from simulation.clay import MUDS, Clay
-from simulation.disturbances import LAB
-from simulation.lockstep import Lockstep, plant_of
-from simulation.plant import PlantParameters
-from simulation.track import Track
+from simulation.body.plant import PlantParameters
+from simulation.harness.lockstep import Lockstep, plant_of
+from simulation.mud.clay import MUDS, Clay
+from simulation.mud.disturbances import LAB
+from simulation.mud.track import Track
 
 Targets = Mapping[str, Mapping[float, Speed]]  # by mud and depth in metres
 TARGETS: Targets = {mud: {depth_m: PAPER_TABLE[rule][mud] for rule, depth_m in FIXED_DEPTHS_M.items()} for mud in MUDS}

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 from experiments.trackway.depth_rule import DepthRule, constant_depth, walk_by
 from experiments.trackway.walk import Walk, WalkedStride, speed_m_s
-from simulation.clay import Clay
-from simulation.track import Track
+from simulation.mud.clay import Clay
+from simulation.mud.track import Track
 
 ENDLESS_M = 100.0
 CONSTANT_STRIDES = 7

@@ -15,7 +15,8 @@ from itertools import accumulate
 from math import radians, sin
 from typing import Any, NamedTuple, Protocol
 
-from experiments.bench_robot import (
+from experiments.reports.side_by_side import Show
+from experiments.robot.bench_robot import (
     RAISING_S,
     UNDER_WAY,
     BenchError,
@@ -28,16 +29,15 @@ from experiments.bench_robot import (
     told_by,
     wait_until,
 )
-from experiments.notebook import Notebook
-from experiments.person import GO_ON, REDO, SKIP, Person
-from experiments.side_by_side import Show
+from experiments.robot.prompt import GO_ON, REDO, SKIP, Person
 from experiments.trackway.comparison import STUCK_S, paper_report
 from experiments.trackway.depth_rule import DepthRule
 from experiments.trackway.log_strides import walked_strides
 from experiments.trackway.paper_table import ADAPTIVE, FIXED_DEPTHS_M
 from experiments.trackway.walk import Walk, speed_m_s, walk_of
-from firmware_host.configuration import Configuration
-from firmware_host.counted_nouns import counted
+from experiments.trials.notebook import Notebook
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.operator.counted_nouns import counted
 
 PATIENCE_S = 900.0  # for a whole walk
 UNSEEN_S = 2.0  # without a pose, before a walk or on it: nobody knows where its end is

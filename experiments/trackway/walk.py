@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import Phase
-from firmware_host.configuration import Configuration
-from simulation.disturbances import NONE, Disturbances
-from simulation.lockstep import Lockstep
-from simulation.track import Track
+from firmware_host.configuration.configuration import Configuration
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.disturbances import NONE, Disturbances
+from simulation.mud.track import Track
 
 SLIPPAGE, EXTRACTION, RECOVERED = "slippage", "extraction", "recovered"
 PUSHED_BACK_M = 0.01  # more than a flipper that comes out moves the body

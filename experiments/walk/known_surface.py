@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from control.records import Phase
-from estimation.line_fit import LineFit
 from estimation.paper import ADVANCED_M, STEADY_SHARE
-from experiments.stride_course import StrideCourse, course_of
-from firmware_host.configuration import Configuration
-from firmware_host.log_reader import Log
-from firmware_host.reports import estimate_report
+from estimation.strokes.line_fit import LineFit
+from experiments.trials.stride_profile import StrideCourse, course_of
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log_reading.log_reader import Log
+from firmware_host.operator.reports import estimate_report
 
 KNOWN, KNOWN_COMPENSATED = "paper's law", "paper's law with drag"
 

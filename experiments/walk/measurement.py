@@ -14,7 +14,9 @@ from itertools import accumulate, chain
 from math import ceil
 from typing import Any
 
-from experiments.bench_robot import (
+from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.side_by_side import Show
+from experiments.robot.bench_robot import (
     RAISING_S,
     UNDER_WAY,
     Status,
@@ -27,16 +29,14 @@ from experiments.bench_robot import (
     wait_until,
     walk,
 )
-from experiments.error_table import COEFFICIENTS
-from experiments.estimation_methods import COMPENSATED, DEFAULT, PAPER, method_of, strides_by_method
-from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError, conduct_trials
-from experiments.notebook import Entry
-from experiments.side_by_side import Show
-from experiments.stride_course import course_of, course_row, slip_m, thinned
 from experiments.trackway.trials import Mud, reach_of
+from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, method_of, strides_by_method
+from experiments.trials.mud_trials import Bench, PlannedTrial, SpoiltTrialError, conduct_trials
+from experiments.trials.notebook import Entry
+from experiments.trials.stride_profile import course_of, course_row, slip_m, thinned
 from experiments.walk.known_surface import strides_with_known_surface
-from experiments.walk.walk_course import walk_course_of, walk_course_row
-from firmware_host.log_reader import Log
+from experiments.walk.walk_profile import walk_course_of, walk_course_row
+from firmware_host.log_reading.log_reader import Log
 
 MUDS = tuple(Mud(name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
 SOFT = ("53.1", "51.2")  # figure 7 has the first, called 53.8 % there; the other yields at 3 cm and holds at 5 cm here

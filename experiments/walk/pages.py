@@ -6,19 +6,19 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from experiments.coefficient_table import TruthOfMud, error_text_rows, mud_rows
-from experiments.estimation_methods import method_of
 from experiments.flipper.report import DOUBTS, ERRORS, HEADING, TRUTHS, doubts, remarked
-from experiments.mud_looks import file_name
-from experiments.mud_names import mud_text
-from experiments.mud_trials import left_out_texts
-from experiments.notebook import Entry
-from experiments.report_page import Figure, Section
+from experiments.reports.coefficient_table import TruthOfMud, error_text_rows, mud_rows
+from experiments.reports.mud_styles import file_name
+from experiments.reports.report_page import Figure, Section
 from experiments.trackway.trials import reach_of
+from experiments.trials.estimation_methods import method_of
+from experiments.trials.mud_names import mud_text
+from experiments.trials.mud_trials import left_out_texts
+from experiments.trials.notebook import Entry
 from experiments.walk.measurement import SOFT_DEPTHS_M, Plan
 from experiments.walk.report import placed_strides, soft_walks_of, walks_of
-from firmware_host.configuration import Configuration
-from firmware_host.counted_nouns import counted
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.operator.counted_nouns import counted
 
 SIMULATED_DRAG = (
     "The simulated body's drag grows with speed, to two and more times the paper's 2.5 N: so a firmer mud than "

@@ -12,17 +12,17 @@ from matplotlib.axes import Axes
 
 from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
-from experiments.coefficient_table import PER_CM3
-from experiments.error_table import COEFFICIENTS
-from experiments.estimation_methods import COMPENSATED, DEFAULT, PAPER
-from experiments.mud_looks import DOTS_PER_INCH, GREY, INK, LABELS
-from experiments.mud_names import mud_text
-from experiments.notebook import Entry
-from experiments.stride_course import course_of_row
+from experiments.reports.coefficient_table import PER_CM3
+from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.mud_styles import DOTS_PER_INCH, GREY, INK, LABELS
+from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
+from experiments.trials.mud_names import mud_text
+from experiments.trials.notebook import Entry
+from experiments.trials.stride_profile import course_of_row
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import Plan
 from experiments.walk.report import PlacedStride
-from experiments.walk.walk_course import WalkCourse, walk_course_of_row
+from experiments.walk.walk_profile import WalkCourse, walk_course_of_row
 
 THIN: dict[str, Any] = {"linewidth": 0.8}
 METHOD_LOOKS: dict[str, dict[str, Any]] = {

@@ -16,16 +16,16 @@ import numpy as np
 
 from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
-from experiments.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text, truth_in
-from experiments.error_table import COEFFICIENTS
-from experiments.estimation_methods import method_of
-from experiments.mud_names import mud_text
-from experiments.notebook import Entry
-from experiments.stride_course import course_of_row
+from experiments.reports.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text, truth_in
+from experiments.reports.error_table import COEFFICIENTS
 from experiments.trackway.trials import reach_of
+from experiments.trials.estimation_methods import method_of
+from experiments.trials.mud_names import mud_text
+from experiments.trials.notebook import Entry
+from experiments.trials.stride_profile import course_of_row
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import SOFT_DEPTHS_M, Plan, soft_key, soft_name
-from firmware_host.configuration import Configuration
+from firmware_host.configuration.configuration import Configuration
 
 Told = Mapping[str, Any]
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from experiments.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.mud_trials import MOST_ATTEMPTS, PlannedTrial
-from experiments.simulated_bed import CarriedBed, simulated_bench
+from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.trials.mud_trials import MOST_ATTEMPTS, PlannedTrial
+from experiments.trials.simulated_bed import CarriedBed, simulated_bench
 from experiments.walk.measurement import Plan
-from simulation.clay import clay_of_water
-from simulation.disturbances import LAB, Disturbances
-from simulation.motion_capture import OF_THE_PAPER
-from simulation.track import Track
+from simulation.devices.motion_capture import OF_THE_PAPER
+from simulation.mud.clay import clay_of_water
+from simulation.mud.disturbances import LAB, Disturbances
+from simulation.mud.track import Track
 
 BEHIND_M = 0.5  # the last mud goes on behind its end, so that no stride meets the next copy
 PLACE_M, STRIP_M = 2.0, 1000.0  # of a walk in soft mud, of each such mud

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from experiments.bench.attendant import AbsentAttendant, AskedAttendant, Attendant, SimulatedAttendant
 from experiments.bench.channels import on_channels
+from experiments.bench.operator import AbsentAttendant, AskedAttendant, Attendant, SimulatedAttendant
 from experiments.bench.rig import HardwareRig, Rig, SimulatedRig
-from experiments.bench.stand import Stand
-from experiments.bench_robot import BenchError
-from firmware_host.configuration import Configuration, ConfigurationError, load_configuration
-from simulation.blocks import lying_m
+from experiments.bench.test_rig import Stand
+from experiments.robot.bench_robot import BenchError
+from firmware_host.configuration.configuration import Configuration, ConfigurationError, load_configuration
+from simulation.body.blocks import lying_m
 from tests.bench.staged_bench import (
     SKIPPED,
     BenchReport,
@@ -30,9 +30,10 @@ from tests.bench.staged_bench import (
     stage_of,
     told_of_file,
 )
+from tests.folders import EXAMPLE_CONFIGURATION
 
 INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
-EXAMPLE = Path(__file__).parent.parent.parent / "systemd" / "mudskipper.toml"
+EXAMPLE = EXAMPLE_CONFIGURATION
 REPORT = pytest.StashKey[BenchReport]()
 NOT_ASKED_FOR = "needs a robot (--can CHANNEL, or --config FILE) or --simulated"
 

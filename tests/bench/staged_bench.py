@@ -10,10 +10,10 @@ from typing import Any, Concatenate, ParamSpec
 
 import pytest
 
-from command_line.terminal_person import AbsentPersonError, TerminalPerson
+from command_line.experiments.terminal_prompt import AbsentPersonError, TerminalPerson
 from experiments.bench.reading import Reading, Readings
-from experiments.bench.stand import Stand
-from experiments.bench_robot import BenchError
+from experiments.bench.test_rig import Stand
+from experiments.robot.bench_robot import BenchError
 from tests.bench.bench_table import table_lines
 
 STAGES = ("wiring", "signs", "zeros", "currents", "watchdogs", "strokes", "stops", "strides")

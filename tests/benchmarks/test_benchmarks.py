@@ -8,21 +8,20 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from benchmarks import can_fuzz, log_kills, socket_fuzz
-from benchmarks.can_fuzz import is_forbidden
-from benchmarks.estimator_cost import fit_rows, measure_fits
-from benchmarks.fit_libraries import FITS
 from benchmarks.report import Progress, summary_us, verdict
-from benchmarks.stage_marks import STAGES
-from benchmarks.wirings import VARIANTS
-from drivers.frames import Frame
+from benchmarks.speed.estimator_cost import fit_rows, measure_fits
+from benchmarks.speed.fit_libraries import FITS
+from benchmarks.speed.stage_marks import STAGES
+from benchmarks.speed.wirings import VARIANTS
+from benchmarks.stress import can_fuzz, log_kills, socket_fuzz
+from benchmarks.stress.can_fuzz import is_forbidden
+from drivers.can.frames import Frame
+from tests.folders import ROOT
 
-ROOT = Path(__file__).parent.parent.parent
 TIMEOUT_S = 240.0  # on a machine that others keep busy
 ALWAYS = {"benchmark", "reached", "verdict"}
 BENCHMARKS = (

@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from firmware_host.configuration import Configuration
-from firmware_host.status_client import NoDaemonError, StatusClient
-from simulation.local_setup import write_local_setup
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.operator.status_client import NoDaemonError, StatusClient
+from simulation.harness.local_setup import write_local_setup
 from tests.command_line.command_lines import run
 from tests.recorded_walks import record_walks
 from tests.waiting import LONGEST_S
@@ -27,7 +27,7 @@ class Bench:
         self.folder, self.logs = folder, logs
         self.socket = folder / "mudskipper.sock"
         self.configuration = write_local_setup(folder, logs)
-        self.robot = self.start("simulation.peer")
+        self.robot = self.start("simulation.harness.peer")
         self.daemon = self.start("firmware_host.daemon")
 
     def start(self, module: str) -> subprocess.Popen[str]:

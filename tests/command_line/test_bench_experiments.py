@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
+from command_line.experiments.terminal_prompt import TerminalPerson
 from command_line.main import main
-from command_line.terminal_person import TerminalPerson
 
 FLIPPER = ["experiment", "flipper", "--simulated", "--mud", "49.5", "--trials", "1"]
 WALK = [

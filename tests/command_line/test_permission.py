@@ -13,11 +13,12 @@ from typing import Any
 
 import pytest
 
-from command_line import exit_codes, operation
-from firmware_host.configuration import StatusParameters
-from firmware_host.rights import load_rights
-from firmware_host.status_client import NotPermittedError, StatusClient
-from firmware_host.status_socket import Methods, StatusSocket
+from command_line import exit_codes
+from command_line.operation import operation
+from firmware_host.configuration.configuration import StatusParameters
+from firmware_host.operator.rights import load_rights
+from firmware_host.operator.status_client import NotPermittedError, StatusClient
+from firmware_host.operator.status_socket import Methods, StatusSocket
 
 NOBODY = 65534
 REFUSAL = "status is for members of the group mudskipper. Have root run 'adduser YOU mudskipper', then log in again"

@@ -17,19 +17,19 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from PIL import Image
 
-import command_line.logs
-import command_line.stride_film
+import command_line.logs.log_commands
+import command_line.pictures.stride_film
 from command_line import exit_codes
-from command_line.colours import OUTCOMES
+from command_line.logs.recorded_walk import RecordedWalk, read_walk
 from command_line.main import main
-from command_line.plots import mud_regions, plot_walk
-from command_line.recorded_walk import RecordedWalk, read_walk
-from command_line.stride_choice import Outcome, duration_s, rows_of
-from command_line.stride_film import FRAMES_PER_S, film_frames
-from firmware_host.lab_csv import write_lab_csv
-from firmware_host.log_reader import read_log
-from simulation.clay import MUDS, Clay
-from simulation.track import Track
+from command_line.pictures.colours import OUTCOMES
+from command_line.pictures.stride_choice import Outcome, duration_s, rows_of
+from command_line.pictures.stride_film import FRAMES_PER_S, film_frames
+from command_line.pictures.walk_plot import mud_regions, plot_walk
+from firmware_host.log_reading.lab_csv import write_lab_csv
+from firmware_host.log_reading.log_reader import read_log
+from simulation.mud.clay import MUDS, Clay
+from simulation.mud.track import Track
 from tests.command_line.command_lines import failure, refusal
 from tests.waiting import LONGEST_S
 
@@ -283,7 +283,7 @@ def no_strides(monkeypatch: pytest.MonkeyPatch) -> None:
     def read(path: Path, number: int, *_: object) -> RecordedWalk:
         return read_walk(path, number)._replace(strides=[])
 
-    monkeypatch.setattr(command_line.logs, "read_walk", read)
+    monkeypatch.setattr(command_line.logs.log_commands, "read_walk", read)
 
 
 def test_without_strides_there_is_nothing_to_film(
@@ -301,8 +301,8 @@ def test_without_strides_a_plot_shows_the_rest(log: Path, no_strides: None, caps
 def test_a_film_without_end_is_refused(
     log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(command_line.logs, "LONGEST_FILM_S", 2.0)
-    monkeypatch.setattr(command_line.stride_film, "FRAMES_PER_S", 2)
+    monkeypatch.setattr(command_line.logs.log_commands, "LONGEST_FILM_S", 2.0)
+    monkeypatch.setattr(command_line.pictures.stride_film, "FRAMES_PER_S", 2)
     out = str(log.with_suffix(".gif"))
     assert "choose with --stride" in refusal(capsys, "film", str(log), "--walk", "1", "--out", out)
     assert main(["film", str(log), "--walk", "1", "--out", out, "--stride", "1"]) == exit_codes.OK
@@ -328,7 +328,7 @@ def test_without_matplotlib_a_sentence_says_what_to_install(command: tuple[str, 
 
 
 def test_another_missing_module_is_no_matter_of_pictures(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "command_line.plots", raising=False)
-    monkeypatch.setitem(sys.modules, "simulation.track", None)
+    monkeypatch.delitem(sys.modules, "command_line.pictures.walk_plot", raising=False)
+    monkeypatch.setitem(sys.modules, "simulation.mud.track", None)
     with pytest.raises(ModuleNotFoundError):
         main(["plot", str(log)])

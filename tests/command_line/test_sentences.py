@@ -8,12 +8,14 @@ from typing import Any
 
 import pytest
 
-from command_line import bench, exit_codes, operation
+from command_line import exit_codes
+from command_line.experiments import conduct_bench as bench
 from command_line.main import main
+from command_line.operation import operation
 from command_line.screen import coefficient, number
 from control.records import JOINTS
 from firmware_host import daemon
-from firmware_host.status_client import DroppedError
+from firmware_host.operator.status_client import DroppedError
 from tests.command_line.command_lines import failure, refusal
 
 NO_SOCKET = Namespace(socket=Path("/none"), json=False, config=Path("/none.toml"))

@@ -9,10 +9,10 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from simulation import peer
-from simulation.blocks import LYING_RAD
-from simulation.local_setup import write_local_setup
-from simulation.plant import END_STOPS_RAD
+from simulation.body.blocks import LYING_RAD
+from simulation.body.plant import END_STOPS_RAD
+from simulation.harness import peer
+from simulation.harness.local_setup import write_local_setup
 
 WORLD = "[[segment]]\nstart_m = 0\nend_m = 1\nstrength_pa = 2000\n"
 

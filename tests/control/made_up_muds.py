@@ -7,10 +7,10 @@ from math import nan
 
 import numpy as np
 
-from control.adaptation import AdaptationParameters
-from control.coefficient import Coefficient, FlipperBelief, MudBelief
-from control.gait import GaitParameters
+from control.depth.depth_choice import AdaptationParameters
+from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
+from control.mud_estimate import Coefficient, FlipperBelief, MudBelief
 from control.records import FLIPPERS, Estimate, StrideEstimate
 
 GEOMETRY, GAIT, PARAMETERS = FlipperGeometry(), GaitParameters(), AdaptationParameters()

@@ -16,13 +16,13 @@ from control.controller import (
     MotionParameters,
     WalkOrder,
 )
-from control.gait import GaitParameters, stride_duration_s
+from control.gait.gait import GaitParameters, stride_duration_s
+from control.gait.recovery import Recovery, RecoveryParameters
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains
 from control.limits import JointRange
 from control.modes import MOVING, Mode
 from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, Phase, Torques
-from control.recovery import Recovery, RecoveryParameters
 from tests.control.made_up_states import states_at
 
 TICK_S = 1.0 / 380.0

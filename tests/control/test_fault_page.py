@@ -1,12 +1,11 @@
 """The page about faults says what the robot does."""
 
-from pathlib import Path
-
 from control.fault_kinds import KINDS
 from control.fault_page import fault_page
 from control.modes import TRANSITIONS, Mode
+from tests.folders import ROOT
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "faults.md"
+PAGE = ROOT / "docs" / "faults.md"
 
 
 def test_the_page_is_written_from_the_tables() -> None:

@@ -1,7 +1,6 @@
 """The table of all faults: what a person reads of it, and that its columns do not contradict each other or the code."""
 
 import ast
-from pathlib import Path
 from string import ascii_lowercase
 
 import pytest
@@ -9,8 +8,8 @@ import pytest
 from control.fault_kinds import KINDS, make_fault
 from control.faults import Blocks, Clears, FaultKind, Reaction
 from control.modes import Health, Mode, Request, next_mode
+from tests.folders import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("control", "drivers", "estimation", "firmware_host")
 CHECKS = {
     "drive", "watchdog", "bus", "joint", "flipper", "loop", "clock", "estimator", "pose", "lease", "log",

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.joint_path import still
+from control.gait.joint_path import still
 from control.joint_pd import ArmMass, JointGains, damping_torques_nm, joint_torques_nm, pd_torque_nm
 from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, JointTarget
 from tests.control.made_up_states import states_at

@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from control.records import NEVER_S
-from drivers.can_port import CanPort, SlcanPort, open_port
-from drivers.error_frames import BusState
-from drivers.frames import Frame
-from drivers.mock_bus import MockBus
-from drivers.prompt_serial import PromptSerial
-from simulation.slcan_adapter import SlcanAdapter, decode_line, encode_line
+from drivers.can.can_port import CanPort, SlcanPort, open_port
+from drivers.can.error_frames import BusState
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockBus
+from drivers.can.slcan_bus import PromptSerial
+from simulation.devices.slcan_adapter import SlcanAdapter, decode_line, encode_line
 from tests.waiting import wait_until
 
 FRAMES = [

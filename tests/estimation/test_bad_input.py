@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.gait import Gait, GaitParameters
+from control.gait.gait import Gait, GaitParameters
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.records import NO_LOAD, Estimate, Phase, StrideEstimate
-from estimation.depth_line import COEFFICIENTS_N_M3
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters, Method, MudEstimator, MudReading
+from estimation.strokes.depth_line import COEFFICIENTS_N_M3
 
 GEOMETRY = FlipperGeometry()
 DRIVE = FlipperDrive(ArmMass(0.0, 0.0, 0.0, 0.0), 0.083, 0.083, current_limit_a=10.0)

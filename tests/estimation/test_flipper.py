@@ -16,18 +16,18 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from control.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_duration_s
+from control.gait.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_duration_s
+from control.gait.recovery import OUT_M, is_in_mud, lowest_m
 from control.geometry import FlipperGeometry
 from control.joint_friction import JointFriction
 from control.joint_pd import ArmMass
 from control.plate import crossing, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import NO_LOAD, Estimate, GaitTarget, Phase, StrideEstimate
-from control.recovery import OUT_M, is_in_mud, lowest_m
 from estimation.flipper import CLINGING_M, FlipperEstimator
 from estimation.force_map import smallest_force_n
 from estimation.joint_load import FlipperDrive, JointSample
-from estimation.shear import Base
-from estimation.stroke_fit import MIN_VERTICAL_LEVER_M, NOT_OUT
+from estimation.strokes.shear import Base
+from estimation.strokes.stroke_fit import MIN_VERTICAL_LEVER_M, NOT_OUT
 
 RATE_HZ = 380.0
 INSTANT_S = 1e-5  # over which accelerations are taken: none of the gait's changes within it

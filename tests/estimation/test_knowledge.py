@@ -13,9 +13,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.coefficient import NOTHING_KNOWN, Coefficient, MudBelief
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudBelief
 from control.records import FLIPPERS, Estimate, StrideEstimate
-from estimation.depth_line import (
+from estimation.knowledge import CHANGE, FLIPPER_SPREAD, PAIR_CHANGE, SHEAR_LAW, STROKE_LAW, MudKnowledge
+from estimation.strokes.depth_line import (
     REMEMBERED_STRIDES,
     REPEATABILITY,
     SURE_EXPONENT,
@@ -24,7 +25,6 @@ from estimation.depth_line import (
     Reading,
     reading_of,
 )
-from estimation.knowledge import CHANGE, FLIPPER_SPREAD, PAIR_CHANGE, SHEAR_LAW, STROKE_LAW, MudKnowledge
 from tests.control import made_up_muds
 
 K_P, K_S, K_E = 1.0e6, 0.6e6, 1.1e6

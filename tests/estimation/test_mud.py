@@ -9,16 +9,16 @@ from math import isfinite, nan, pi, sin
 
 import pytest
 
-from benchmarks.made_up_walk import DRIVE, GEOMETRY, K_P, Sample, later, stride_samples
-from control.coefficient import NOTHING_KNOWN
+from benchmarks.speed.synthetic_walk import DRIVE, GEOMETRY, K_P, Sample, later, stride_samples
 from control.joint_pd import ArmMass
+from control.mud_estimate import NOTHING_KNOWN
 from control.records import FLIPPERS, NO_LOAD, Phase, StrideEstimate
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import FlipperDrive
 from estimation.mud import FRESH, PAPER_DRAG_N, Ages, EstimationParameters, Method, MudEstimator, MudReading
 from estimation.mud_map import PIECE_M
 from estimation.paper import PaperEstimator
-from estimation.shear import Base
+from estimation.strokes.shear import Base
 from firmware_host.ticker import PERIOD_S
 
 STRIDES, PERIOD_OF_STRIDE_S = 3, 2.0

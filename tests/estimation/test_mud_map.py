@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.records import Estimate, StrideEstimate
-from estimation.depth_line import REPEATABILITY
 from estimation.mud_map import MOST_PIECES, PIECE_M, Mapped, MudMap
+from estimation.strokes.depth_line import REPEATABILITY
 from tests.control import made_up_muds
 
 NOT_TOLD = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")

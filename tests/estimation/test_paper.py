@@ -12,11 +12,11 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 import pytest
 
-from control.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_duration_s
+from control.gait.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_duration_s
+from control.gait.recovery import OUT_M, lowest_m
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.records import NO_LOAD, FlipperLoad, Phase, StrideEstimate
-from control.recovery import OUT_M, lowest_m
 from estimation.joint_load import FlipperDrive, JointSample
 from estimation.mud import EstimationParameters, MudEstimator
 from estimation.paper import MOBILISED_M, STEADY_SHARE, SURFACE_FORCE_N, PaperEstimator

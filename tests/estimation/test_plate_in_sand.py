@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.line_fit import LineFit
+from estimation.strokes.line_fit import LineFit
+from tests.folders import SHARED_DATA
 
-FOLDER = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "plate_in_sand"
+FOLDER = SHARED_DATA / "plate_in_sand"
 RUNS = sorted(FOLDER.glob("*.csv.gz"))
 DEEPEST_M = 0.03
 pytestmark = pytest.mark.skipif(not RUNS, reason="the shared measurements are not beside the repository")

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.gait import SINGLE_FLIPPER, Gait, GaitParameters
+from control.gait.gait import SINGLE_FLIPPER, Gait, GaitParameters
 from control.geometry import FlipperGeometry
 from control.records import Phase
 from estimation.stride_clock import BORDERS, STROKES, Change, StrideClock

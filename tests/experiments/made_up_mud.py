@@ -9,8 +9,8 @@ import numpy as np
 from experiments.loadcell.curve_fit import Array
 from experiments.loadcell.fits import SHEAR, Recorded
 from experiments.loadcell.stage_track import Places
-from simulation.plate_stage import CarriedPlate, PlateStage, StageParameters
-from simulation.stage_motion import HandParameters
+from simulation.test_rig.plate_stage import CarriedPlate, PlateStage, StageParameters
+from simulation.test_rig.stage_motion import HandParameters
 
 WIDTH_M, THICKNESS_M = 0.03, 0.004
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from control.modes import Mode
 from control.records import Phase
-from experiments.lockstep_robot import simulated_configuration
-from experiments.stride_course import StrideCourse
-from firmware_host.log_reader import Log, tick_type
+from experiments.robot.lockstep_robot import simulated_configuration
+from experiments.trials.stride_profile import StrideCourse
+from firmware_host.log_reading.log_reader import Log, tick_type
 
 CONFIGURATION = simulated_configuration()
 GEOMETRY = CONFIGURATION.geometry

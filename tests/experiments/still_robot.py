@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from firmware_host.configuration import Configuration
-from firmware_host.log_reader import Log
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log_reading.log_reader import Log
 from tests.experiments.made_up_strides import CONFIGURATION
 
 

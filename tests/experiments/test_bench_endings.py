@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from control.controller import UP_RAD
-from control.joint_watch import FaultBounds
 from control.modes import ENERGISED, Mode
+from control.monitors.joint_monitor import FaultBounds
 from control.records import Phase
-from drivers.failures import Failures
-from experiments.bench_robot import BenchError, arm, face_faults, leave, move, rest, walk
-from experiments.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.person import Willing
-from firmware_host.file_recorder import FileRecorder
-from firmware_host.log_reader import read_log
-from simulation.clay import MUDS
-from simulation.lockstep import Lockstep
-from simulation.track import Track
+from drivers.fault_injection.failures import Failures
+from experiments.robot.bench_robot import BenchError, arm, face_faults, leave, move, rest, walk
+from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.robot.prompt import Willing
+from firmware_host.log.file_recorder import FileRecorder
+from firmware_host.log_reading.log_reader import read_log
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
 
 PERSON = Willing(lambda sentence: None)
 ARMED_S = 0.01  # and closed loop of all drives not there yet

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from experiments import daemon_robot
-from experiments.bench_errors import BarredError, OverruledError
-from experiments.daemon_robot import DaemonRobot
-from firmware_host.status_client import CallRefusedError
+from experiments.robot import daemon_robot
+from experiments.robot.bench_errors import BarredError, OverruledError
+from experiments.robot.daemon_robot import DaemonRobot
+from firmware_host.operator.status_client import CallRefusedError
 from tests.experiments.made_up_strides import make_log, make_ticks
 
 ME = "uid 1 (process 2)"

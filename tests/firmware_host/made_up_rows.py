@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from firmware_host.log_rows import EVENT, EVENT_KIND, TICK, TICK_KIND, RowKind
+from firmware_host.log.rows import EVENT, EVENT_KIND, TICK, TICK_KIND, RowKind
 
 OPENING: dict[str, Any] = {
     "configuration_text": "[robot]\n",

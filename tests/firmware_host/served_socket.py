@@ -9,9 +9,9 @@ from typing import Any
 
 import msgpack
 
-from firmware_host.connection import Caller
-from firmware_host.rights import Group, Peer, Rights
-from firmware_host.status_socket import RefusedError, StatusSocket
+from firmware_host.operator.connection import Caller
+from firmware_host.operator.rights import Group, Peer, Rights
+from firmware_host.operator.status_socket import RefusedError, StatusSocket
 from firmware_host.ticker import PERIOD_S
 
 

@@ -13,19 +13,19 @@ import can
 import pytest
 
 from control.modes import Mode, Request
-from drivers.can_port import BusState
-from drivers.frames import Frame
-from drivers.mock_bus import MockPort
-from drivers.reopening_port import RETRY_S, NotOpenError, ReopeningPort
+from drivers.can.can_port import BusState
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockPort
+from drivers.can.reopening_port import RETRY_S, NotOpenError, ReopeningPort
 from firmware_host import buses
 from firmware_host.buses import BusError, open_bus, open_ports, reopening_ports
-from firmware_host.configuration import BusParameters, Configuration
+from firmware_host.configuration.configuration import BusParameters, Configuration
 from firmware_host.daemon import reopen_buses
-from firmware_host.status_client import NoDaemonError, StatusClient
-from simulation.clay import MUDS
-from simulation.local_setup import write_local_setup
-from simulation.lockstep import Lockstep
-from simulation.track import Track
+from firmware_host.operator.status_client import NoDaemonError, StatusClient
+from simulation.harness.local_setup import write_local_setup
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
 from tests.waiting import LONGEST_S
 
 CAN0 = BusParameters("socketcan", "can0")

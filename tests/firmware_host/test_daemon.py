@@ -6,16 +6,16 @@ import pytest
 
 from control.controller import WalkOrder
 from control.modes import Mode, Request
-from drivers.frames import Frame
-from drivers.mock_bus import MockPort
-from drivers.odrive_codec import SET_AXIS_STATE, AxisState
-from firmware_host.configuration import Configuration
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockPort
+from drivers.odrive.codec import SET_AXIS_STATE, AxisState
+from firmware_host.computer.sd_notify import SystemdNotifier
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, _end_safely
-from firmware_host.sd_notify import SystemdNotifier
 from firmware_host.ticker import Beat
-from simulation.clay import MUDS
-from simulation.lockstep import Lockstep
-from simulation.track import Track
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
 
 FIRM = Track([(5.0, MUDS["48.5"])])
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import pytest
 
-from control.adaptation import AdaptationParameters, Method
 from control.controller import WalkOrder
+from control.depth.depth_choice import AdaptationParameters, Method
 from control.geometry import FlipperGeometry
 from control.records import GaitTarget, Phase
-from firmware_host.configuration import Configuration, ConfigurationError, parse_configuration
-from simulation.clay import Clay
-from simulation.disturbances import LAB
-from simulation.lockstep import Lockstep
-from simulation.track import Track
+from firmware_host.configuration.configuration import Configuration, ConfigurationError, parse_configuration
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import Clay
+from simulation.mud.disturbances import LAB
+from simulation.mud.track import Track
 
 
 def problems_of(text: str, **sections: str) -> list[str]:

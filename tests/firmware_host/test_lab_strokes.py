@@ -6,15 +6,14 @@ N/m³ at twice the depth cannot be above the values of the others, so the compar
 in force at equal depth.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from control.records import StrideEstimate
-from firmware_host.replay import replay_file
+from firmware_host.log_reading.replay import replay_file
+from tests.folders import SHARED_DATA
 
-FOLDER = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "flipper_in_mud"
+FOLDER = SHARED_DATA / "flipper_in_mud"
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="the shared measurements are not beside the repository")
 
 

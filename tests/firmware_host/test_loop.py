@@ -10,18 +10,18 @@ import pytest
 from control.controller import WalkOrder
 from control.modes import Mode, Request
 from control.records import NO_TORQUE, Phase
-from drivers.frames import Frame
-from drivers.mock_bus import MockPort
-from drivers.odrive_codec import ERROR_WATCHDOG, SET_INPUT_TORQUE, AxisState
-from firmware_host.configuration import Configuration, parse_configuration
-from firmware_host.log_rows import EVENT, EVENT_KIND, STRIDE_KIND, TICK_KIND
-from firmware_host.operator_calls import OperatorCalls
-from firmware_host.recorder import HEALTHY, LogReport, NullRecorder
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockPort
+from drivers.odrive.codec import ERROR_WATCHDOG, SET_INPUT_TORQUE, AxisState
+from firmware_host.configuration.configuration import Configuration, parse_configuration
+from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
+from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE_KIND, TICK_KIND
+from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.ticker import PERIOD_S, Beat
-from simulation.clay import MUDS, Clay
-from simulation.lockstep import Lockstep
-from simulation.odrive import SimulatedOdrive
-from simulation.track import Track
+from simulation.devices.odrive import SimulatedOdrive
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS, Clay
+from simulation.mud.track import Track
 
 FIRM = Track([(5.0, MUDS["48.5"])])
 Make = Callable[..., Lockstep]
@@ -309,7 +309,7 @@ def test_a_torque_that_is_no_number_never_leaves(robot: Lockstep) -> None:
 
 
 def test_firmware_of_another_family_is_not_armed(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("simulation.odrive.VERSION_FIELDS", (2, 3, 6, 56, 0, 5, 6, 0))
+    monkeypatch.setattr("simulation.devices.odrive.VERSION_FIELDS", (2, 3, 6, 56, 0, 5, 6, 0))
     robot = Lockstep(configuration, FIRM)
     robot.run_for(1.0)
     refused = robot.loop.request(Request.ARM, robot.now_s)

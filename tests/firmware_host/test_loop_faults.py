@@ -16,17 +16,17 @@ from control.fault_kinds import KINDS
 from control.faults import Clears, Reaction
 from control.modes import ENERGISED, HELD, Mode, Request
 from control.records import JOINTS, NO_TORQUE, Phase
-from drivers import odrive_codec as codec
-from drivers.can_port import BusState
-from drivers.mock_bus import MockPort
-from drivers.odrive_codec import AxisState, Message
-from firmware_host.configuration import Configuration
+from drivers.can.can_port import BusState
+from drivers.can.mock_bus import MockPort
+from drivers.odrive import codec
+from drivers.odrive.codec import AxisState, Message
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import PERIOD_S
-from simulation.clay import MUDS, Clay
-from simulation.disturbances import LAB
-from simulation.lockstep import Lockstep
-from simulation.motion_capture import SimulatedPose
-from simulation.track import Track
+from simulation.devices.motion_capture import SimulatedPose
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS, Clay
+from simulation.mud.disturbances import LAB
+from simulation.mud.track import Track
 from tests.kept_events import EventRecorder
 
 WALK = WalkOrder(0.03, adaptive=False)

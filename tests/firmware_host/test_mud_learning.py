@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from control.controller import WalkOrder
-from control.gait import GaitParameters
+from control.gait.gait import GaitParameters
 from control.records import NO_LOAD, Estimate, GaitTarget, Phase, StrideEstimate
 from estimation.mud import MudReading
-from firmware_host.configuration import Configuration
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.mud_learning import FIRM_TICKS, KEPT_STRIDES, LARGEST_N_M3, MudLearning
 
 GOOD = Estimate(2e6, 1e5, 100, True)

@@ -9,7 +9,7 @@ from typing import Any
 import msgpack
 import pytest
 
-from firmware_host.rpc import LONGEST_REQUEST, MOST_PARAMS
+from firmware_host.operator.rpc import LONGEST_REQUEST, MOST_PARAMS
 from tests.firmware_host.served_socket import Served, ask, connect, is_open, serve
 
 NESTED: Any = []

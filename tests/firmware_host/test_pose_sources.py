@@ -12,12 +12,11 @@ import pytest
 
 from control.modes import Mode
 from control.records import BodyPose
-from drivers.natnet_port import NatNetPort
-from drivers.pose_port import NoPose, PosePort, PoseReport, PoseSender, PoseSourceError
-from drivers.rail_encoder import RailEncoder
-from drivers.track_axis import parse_axis
-from firmware_host.arming_checks import arming_checks
-from firmware_host.configuration import (
+from drivers.pose.natnet_port import NatNetPort
+from drivers.pose.pose_port import NoPose, PosePort, PoseReport, PoseSender, PoseSourceError
+from drivers.pose.rail_encoder import RailEncoder
+from drivers.pose.track_axis import parse_axis
+from firmware_host.configuration.configuration import (
     EXIT_CONFIGURATION,
     Configuration,
     ConfigurationError,
@@ -25,13 +24,14 @@ from firmware_host.configuration import (
     parse_configuration,
 )
 from firmware_host.daemon import EXIT_FAILED, main, reopen_pose
+from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.pose_sources import open_pose
-from simulation.clay import MUDS
-from simulation.local_setup import write_local_setup
-from simulation.lockstep import Lockstep
-from simulation.natnet_server import NatNetServer, RecordedPose
-from simulation.rail_encoder_emulator import RailEncoderEmulator
-from simulation.track import Track
+from simulation.devices.natnet_server import NatNetServer, RecordedPose
+from simulation.devices.rail_encoder_emulator import RailEncoderEmulator
+from simulation.harness.local_setup import write_local_setup
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
 
 NATNET = 'source = "natnet"\n'
 ENCODER = 'source = "rail_encoder"\n[pose.rail_encoder]\n'

@@ -9,10 +9,10 @@ from pathlib import Path
 import msgpack
 import pytest
 
-from firmware_host.connection import BURST, LONGEST_SENDING_S, REQUESTS_PER_S, Caller
-from firmware_host.rights import NEEDED, Peer
-from firmware_host.rpc import NOT_PERMITTED
-from firmware_host.status_socket import MOST_CLIENTS
+from firmware_host.operator.connection import BURST, LONGEST_SENDING_S, REQUESTS_PER_S, Caller
+from firmware_host.operator.rights import NEEDED, Peer
+from firmware_host.operator.rpc import NOT_PERMITTED
+from firmware_host.operator.status_socket import MOST_CLIENTS
 from tests.firmware_host.served_socket import (
     METHODS,
     OPERATOR,

@@ -10,11 +10,11 @@ import pytest
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import Phase
-from firmware_host.configuration import Configuration
-from simulation.clay import Clay
-from simulation.disturbances import LAB
-from simulation.lockstep import Lockstep
-from simulation.track import Track
+from firmware_host.configuration.configuration import Configuration
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import Clay
+from simulation.mud.disturbances import LAB
+from simulation.mud.track import Track
 from tests.kept_events import EventRecorder
 
 SOFT_M = 0.35

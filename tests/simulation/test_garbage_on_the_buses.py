@@ -1,6 +1,7 @@
 """Garbage on the buses of a whole loop that is not armed: it goes on, and no drive gets torque or is asked for it.
 
-`python -m benchmarks.can_fuzz` does the same with a million frames; here hypothesis looks for the one that matters.
+`python -m benchmarks.stress.can_fuzz` does the same with a million frames; here hypothesis looks for the one that
+matters.
 """
 
 from struct import pack
@@ -11,11 +12,11 @@ from hypothesis import strategies as st
 
 from benchmarks.example_robot import load_example
 from control.modes import Mode
-from drivers.frames import Frame
-from drivers.mock_bus import MockPort
-from simulation.clay import MUDS
-from simulation.lockstep import Lockstep
-from simulation.track import Track
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockPort
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
 
 ANY_ID = st.integers(0, 0x7FF) | st.integers(0, 0x07F)
 ANY_DATA = st.binary(max_size=8) | st.tuples(st.floats(width=32), st.floats(width=32)).map(

@@ -7,14 +7,14 @@ import pytest
 
 from control.controller import WalkOrder
 from control.records import NO_TORQUE
-from firmware_host.configuration import Configuration
-from simulation.clay import MUDS, Clay, Layer
-from simulation.disturbances import Disturbances
-from simulation.flipper_contact import ContactForce, lowest_m
-from simulation.lockstep import Lockstep
-from simulation.plant import STEP_S, Arm, Plant, PlantParameters
-from simulation.stones import Stone
-from simulation.track import LEVEL, RandomStrength, Ridges, Track
+from firmware_host.configuration.configuration import Configuration
+from simulation.body.plant import STEP_S, Arm, Plant, PlantParameters
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS, Clay, Layer
+from simulation.mud.disturbances import Disturbances
+from simulation.mud.flipper_contact import ContactForce, lowest_m
+from simulation.mud.stones import Stone
+from simulation.mud.track import LEVEL, RandomStrength, Ridges, Track
 
 
 def press(plant: Plant, lift_nm: float) -> Plant:

@@ -7,13 +7,13 @@ import pytest
 from control.controller import WalkOrder
 from control.modes import ENERGISED, Mode, Request
 from control.records import NO_TORQUE, Phase
-from drivers.failures import Failures
-from firmware_host.configuration import Configuration
-from firmware_host.recorder import NullRecorder
-from simulation.clay import MUDS
-from simulation.lockstep import Lockstep
-from simulation.plant import END_STOPS_RAD
-from simulation.track import Track
+from drivers.fault_injection.failures import Failures
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.recorder import NullRecorder
+from simulation.body.plant import END_STOPS_RAD
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
 from tests.kept_events import EventRecorder
 
 TRACK = Track([(2.0, MUDS["48.5"])])

@@ -7,7 +7,6 @@ What the capture says is worked out here, from the log's own columns.
 from __future__ import annotations
 
 import gzip
-import os
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
@@ -20,15 +19,16 @@ from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
 from control.records import JointAngles, Phase
-from drivers.natnet_parameters import NatNetParameters
-from drivers.natnet_port import NatNetPort
+from drivers.pose.natnet_parameters import NatNetParameters
+from drivers.pose.natnet_port import NatNetPort
 from estimation.mud import Currents, EstimationParameters, MudEstimator
-from firmware_host.lab_csv import LabLog, read_lab_csv
-from firmware_host.replay import LAB_DRIVE, NO_VELOCITY
-from simulation.natnet_server import LOOPBACK, NatNetServer, RecordedPose
+from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
+from firmware_host.log_reading.replay import LAB_DRIVE, NO_VELOCITY
+from simulation.devices.natnet_server import LOOPBACK, NatNetServer, RecordedPose
+from tests.folders import SHARED_DATA
 
 Floats = NDArray[np.float64]
-SHARED = Path(os.environ.get("MUDSKIPPER_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
+SHARED = SHARED_DATA
 WALKS = sorted((SHARED / "flipper_in_mud").glob("walk_*.csv.gz"))
 PHASES = tuple(Phase)
 INSERTION, STANCE = 2, 3  # of turtle_state

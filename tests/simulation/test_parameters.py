@@ -6,11 +6,11 @@ from typing import Annotated, get_args, get_origin, get_type_hints
 import pytest
 
 from control.bounds import Bounds
-from simulation.free_body import BodyShape
-from simulation.imu import ImuParameters
-from simulation.motion_capture import MotionCaptureParameters
-from simulation.odrive import OdriveParameters
-from simulation.plant import PlantParameters
+from simulation.body.free_body import BodyShape
+from simulation.body.plant import PlantParameters
+from simulation.devices.imu import ImuParameters
+from simulation.devices.motion_capture import MotionCaptureParameters
+from simulation.devices.odrive import OdriveParameters
 
 RECORDS = [BodyShape, ImuParameters, MotionCaptureParameters, OdriveParameters, PlantParameters]
 

@@ -6,9 +6,9 @@ import pytest
 
 from benchmarks.example_robot import load_example
 from control.modes import Mode
-from simulation.clay import MUDS
-from simulation.lockstep import Lockstep, drives_of
-from simulation.track import Track
+from simulation.harness.lockstep import Lockstep, drives_of
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
 
 
 def make_walk(**changes: float) -> Lockstep:

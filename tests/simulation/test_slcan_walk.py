@@ -11,18 +11,18 @@ import pytest
 
 from control.controller import WalkOrder
 from control.modes import Mode
-from drivers.can_port import CanPort, open_port
-from drivers.frames import Frame
-from drivers.mock_bus import MockPort
-from drivers.odrive_drives import OdriveDrives
-from firmware_host.configuration import Configuration
+from drivers.can.can_port import CanPort, open_port
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockPort
+from drivers.odrive.drives import OdriveDrives
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import Loop
-from firmware_host.recorder import NullRecorder
 from firmware_host.ticker import Beat
-from simulation.clay import MUDS
-from simulation.lockstep import Lockstep
-from simulation.slcan_adapter import SlcanAdapter
-from simulation.track import Track
+from simulation.devices.slcan_adapter import SlcanAdapter
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
 from tests.waiting import wait_until
 
 OPENING_LINES = 5  # of python-can: C, S8, an empty one, O, O

@@ -9,19 +9,19 @@ from pathlib import Path
 import pytest
 
 from control.controller import DAMPING_S, WalkOrder
-from control.gait import stride_duration_s
+from control.gait.gait import stride_duration_s
+from control.gait.recovery import RecoveryParameters
 from control.modes import Mode, Request
 from control.records import NO_TORQUE, Phase
-from control.recovery import RecoveryParameters
-from drivers.frames import Frame
-from drivers.odrive_codec import AxisState
-from firmware_host.configuration import Configuration
-from firmware_host.recorder import Recorder
-from firmware_host.replay import replay_file
+from drivers.can.frames import Frame
+from drivers.odrive.codec import AxisState
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.recorder import Recorder
+from firmware_host.log_reading.replay import replay_file
 from firmware_host.ticker import PERIOD_S
-from simulation.clay import Clay
-from simulation.lockstep import Lockstep
-from simulation.track import Track
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import Clay
+from simulation.mud.track import Track
 from tests.kept_events import EventRecorder
 
 PARAMETERS = RecoveryParameters()

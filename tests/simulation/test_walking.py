@@ -10,12 +10,12 @@ from math import isfinite
 import pytest
 
 from control.controller import WalkOrder
+from control.gait.recovery import RecoveryParameters
 from control.modes import Mode
-from control.recovery import RecoveryParameters
-from firmware_host.configuration import Configuration
-from simulation.clay import MUDS, Clay
-from simulation.lockstep import Lockstep
-from simulation.track import COMPARTMENT_M, Track, paper_track
+from firmware_host.configuration.configuration import Configuration
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS, Clay
+from simulation.mud.track import COMPARTMENT_M, Track, paper_track
 
 STRIDES = 5
 

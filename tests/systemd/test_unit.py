@@ -13,15 +13,20 @@ from pathlib import Path
 import pytest
 
 from control.records import JOINTS
-from drivers.can_port import BusState
-from drivers.frames import Frame
-from drivers.odrive_drives import OdriveDrives
+from drivers.can.can_port import BusState
+from drivers.can.frames import Frame
+from drivers.odrive.drives import OdriveDrives
 from firmware_host import daemon
-from firmware_host.configuration import EXIT_CONFIGURATION, Configuration, ConfigurationError, StatusParameters
+from firmware_host.configuration.configuration import (
+    EXIT_CONFIGURATION,
+    Configuration,
+    ConfigurationError,
+    StatusParameters,
+)
 from firmware_host.ticker import RATE_HZ
+from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 
-ROOT = Path(__file__).resolve().parents[2]
 SYSTEMD = ROOT / "systemd"
 LINUX_QUEUE_LENGTH = 10  # of a CAN interface that nobody configured
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from firmware_host.configuration import load_configuration
+from firmware_host.configuration.configuration import load_configuration
+from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 from virtual_machine.installed_robot import installation
 
-ROOT = Path(__file__).resolve().parents[2]
 SYSTEMD = ROOT / "systemd"
 BUSES = {"vcan0", "vcan1"}
 

@@ -10,8 +10,8 @@ import pytest
 
 from experiments.actuator.bench import FALLS, RobotBench
 from experiments.actuator.plan import Plan
-from experiments.bench_errors import BenchError, GoneError, OverruledError
-from experiments.bench_robot import ALONE
+from experiments.robot.bench_errors import BenchError, GoneError, OverruledError
+from experiments.robot.bench_robot import ALONE
 from tests.experiments.still_robot import StillRobot
 from tests.scripted_person import ScriptedPerson
 

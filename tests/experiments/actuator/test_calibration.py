@@ -15,11 +15,11 @@ from experiments.actuator.friction import Loop
 from experiments.actuator.plan import Plan, Step, steps_of
 from experiments.actuator.reading import MovedError, Reading, Side
 from experiments.actuator.simulation import bench_configuration
-from experiments.bench_errors import EndedError
-from experiments.bench_robot import LEAVE, BenchError
-from experiments.notebook import Notebook
-from experiments.person import GO_ON, REDO, SKIP
-from firmware_host.configuration import Configuration
+from experiments.robot.bench_errors import EndedError
+from experiments.robot.bench_robot import LEAVE, BenchError
+from experiments.robot.prompt import GO_ON, REDO, SKIP
+from experiments.trials.notebook import Notebook
+from firmware_host.configuration.configuration import Configuration
 from tests.experiments.still_robot import StillRobot
 from tests.scripted_person import ScriptedPerson
 

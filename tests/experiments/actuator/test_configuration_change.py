@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from experiments.actuator.configuration_change import changed_text, difference, replace_file
-from experiments.bench_robot import BenchError
-from firmware_host.configuration import parse_configuration
-from simulation.local_setup import CONFIGURATION
+from experiments.robot.bench_robot import BenchError
+from firmware_host.configuration.configuration import parse_configuration
+from simulation.harness.local_setup import CONFIGURATION
 
 LOCAL = CONFIGURATION.format(left='"l"', right='"r"', logs='"logs"', status='"s"', pose='""')
 CONSTANT = ("drive", "right_sweep", "torque_constant_nm_a")

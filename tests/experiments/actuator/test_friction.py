@@ -14,7 +14,7 @@ from experiments.actuator.friction import FEWEST, Loop, friction_of, loop_of, sw
 from experiments.actuator.plan import Plan
 from experiments.actuator.reading import HeldJoint, MovedError, Sample
 from experiments.actuator.simulation import TRUE_CONSTANT_NM_A, bench_configuration, simulated_bench
-from experiments.bench_robot import arm
+from experiments.robot.bench_robot import arm
 
 HALF_RAD, DRY_A, VISCOUS_A_S = 0.09, 0.18, 0.03
 

@@ -9,7 +9,7 @@ import pytest
 import statsmodels.api as sm
 from scipy.stats import t as student_t
 
-from estimation.origin_fit import student_factor
+from estimation.strokes.origin_fit import student_factor
 from experiments.actuator.line import fit_line
 from experiments.actuator.plan import PAPER_WEIGHTS_G
 

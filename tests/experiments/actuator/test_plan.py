@@ -8,8 +8,8 @@ import pytest
 
 from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan, Step, in_turn, require_possible, stays_cool, steps_of
 from experiments.actuator.simulation import bench_configuration
-from experiments.bench_robot import BenchError
-from firmware_host.configuration import Configuration
+from experiments.robot.bench_robot import BenchError
+from firmware_host.configuration.configuration import Configuration
 
 
 def test_passes_lie_between_readings_of_the_empty_arm_and_only_the_first_rises() -> None:

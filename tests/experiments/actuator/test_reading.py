@@ -10,7 +10,7 @@ import pytest
 from experiments.actuator.plan import Plan, Step
 from experiments.actuator.reading import SAMPLE_S, HeldJoint, MovedError, Sample, Side, unrest
 from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A, bench_configuration, simulated_bench
-from experiments.bench_robot import BenchError, arm
+from experiments.robot.bench_robot import BenchError, arm
 
 
 def nothing() -> None:

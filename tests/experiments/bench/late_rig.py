@@ -8,7 +8,7 @@ from __future__ import annotations
 from random import Random
 
 from experiments.bench.rig import SimulatedRig
-from firmware_host.configuration import Configuration
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import PERIOD_S, Beat
 
 

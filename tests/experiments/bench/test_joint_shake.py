@@ -8,15 +8,15 @@ import pytest
 
 from control.joint_pd import ArmMass
 from control.records import JOINTS, DriveState
-from experiments.bench.attendant import SimulatedAttendant
 from experiments.bench.joint_shake import FIRST_NM, HALF_TICKS, SHAKE_TICKS, UNSEEN_RAD, Shake, shake
+from experiments.bench.operator import SimulatedAttendant
 from experiments.bench.rig import SimulatedRig
 from experiments.bench.sign_check import nudged
-from experiments.bench.stand import Stand
-from experiments.bench_robot import BenchError
-from firmware_host.configuration import Configuration
+from experiments.bench.test_rig import Stand
+from experiments.robot.bench_robot import BenchError
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import PERIOD_S, Beat
-from simulation.blocks import on_blocks
+from simulation.body.blocks import on_blocks
 
 
 class Bench:

@@ -9,21 +9,21 @@ import pytest
 
 from control.modes import Request
 from control.records import DriveState, DriveStates
-from drivers.odrive_codec import AxisState
-from experiments.bench.attendant import SimulatedAttendant
+from drivers.odrive.codec import AxisState
 from experiments.bench.joint_zero_check import rest_pose
 from experiments.bench.lateness import LATE_S
+from experiments.bench.operator import SimulatedAttendant
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.rig import SimulatedRig
-from experiments.bench.stand import Stand
 from experiments.bench.stop_check import OFF_TICKS, QUIET_A, torque_off
 from experiments.bench.stroke_tracking import FAST_DEG, FAST_RAD_S, stroke_readings
-from experiments.bench_robot import BenchError
-from firmware_host.configuration import Configuration
+from experiments.bench.test_rig import Stand
+from experiments.robot.bench_robot import BenchError
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Beat
-from simulation.blocks import on_blocks
-from simulation.peer import track_of
-from simulation.world import World
+from simulation.body.blocks import on_blocks
+from simulation.harness.peer import track_of
+from simulation.harness.world import World
 from tests.bench.staged_bench import MOST_MEASURED, BenchReport, StagedBench
 from tests.experiments.bench.late_rig import LateRig
 
@@ -82,7 +82,7 @@ def test_a_flipper_that_sinks_as_the_robot_is_armed_only_delays_it(configuration
 
 def test_what_stands_against_arming_is_told(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
     stand = sinking_stand(configuration, Sinking(1000))
-    monkeypatch.setattr("experiments.bench.stand.ARMING_S", 1.0)
+    monkeypatch.setattr("experiments.bench.test_rig.ARMING_S", 1.0)
     with pytest.raises(BenchError, match=r"Closed loop .* within 1 s\. The left_adduction joint moves\. Wait until"):
         stand.arm()
 

@@ -14,21 +14,20 @@ from pathlib import Path
 import pytest
 
 from control.records import JOINTS
-from experiments.bench.attendant import AbsentAttendant
 from experiments.bench.channels import on_channels
+from experiments.bench.operator import AbsentAttendant
 from experiments.bench.reading import Reading
 from experiments.bench.rig import HardwareRig, SimulatedRig, refuse_beside_daemon
 from experiments.bench.sign_check import nudged
-from experiments.bench.stand import Stand
+from experiments.bench.test_rig import Stand
 from experiments.bench.wiring_check import firmware, ids_heard, strangers, watchdogs
-from experiments.bench_robot import BenchError
-from firmware_host.configuration import BusParameters, Configuration, StatusParameters, load_configuration
-from firmware_host.toml_records import ConfigurationError
-from simulation.local_setup import write_local_setup
+from experiments.robot.bench_robot import BenchError
+from firmware_host.configuration.configuration import BusParameters, Configuration, StatusParameters, load_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
+from simulation.harness.local_setup import write_local_setup
 from tests.bench.staged_bench import told_of_file
+from tests.folders import ROOT
 from tests.waiting import LONGEST_S
-
-ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -99,7 +98,7 @@ def test_a_joint_whose_encoder_counts_backwards_is_never_held(tmp_path: Path) ->
 def local_robot(short_folder: Path, tmp_path: Path) -> Iterator[Configuration]:
     """A simulated robot as a process of its own, in real time, on local buses."""
     path = write_local_setup(short_folder, tmp_path)
-    command = [sys.executable, "-m", "simulation.peer", "--config", str(path), "--on-blocks"]
+    command = [sys.executable, "-m", "simulation.harness.peer", "--config", str(path), "--on-blocks"]
     robot = subprocess.Popen(command, cwd=ROOT)
     try:
         yield load_configuration(path)

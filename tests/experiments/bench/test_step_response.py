@@ -6,8 +6,8 @@ import pytest
 
 from control.modes import Mode
 from control.records import NO_TORQUE, DriveState, Torques
-from experiments.bench.stand import Sample
 from experiments.bench.step_response import LONGEST_TICKS, PULSE_NM, delay_ticks
+from experiments.bench.test_rig import Sample
 from firmware_host.ticker import PERIOD_S, Beat
 
 CONSTANT_NM_A = 0.083

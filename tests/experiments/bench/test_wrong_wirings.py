@@ -15,15 +15,15 @@ import pytest
 
 from control.modes import Mode
 from control.records import JOINTS
-from drivers import odrive_codec as codec
-from drivers.frames import Frame
-from drivers.odrive_codec import arbitration_id
-from experiments.bench.attendant import SimulatedAttendant
+from drivers.can.frames import Frame
+from drivers.odrive import codec
+from drivers.odrive.codec import arbitration_id
+from experiments.bench.operator import SimulatedAttendant
 from experiments.bench.rig import SimulatedRig
-from experiments.bench.stand import Stand
-from experiments.bench_robot import BenchError
-from firmware_host.configuration import Configuration
-from simulation.blocks import on_blocks
+from experiments.bench.test_rig import Stand
+from experiments.robot.bench_robot import BenchError
+from firmware_host.configuration.configuration import Configuration
+from simulation.body.blocks import on_blocks
 from tests.bench import (
     test_1_wiring,
     test_2_signs,

@@ -7,13 +7,13 @@ from typing import Any, cast
 import pytest
 
 import experiments.estimation.boundaries
-from control.coefficient import Coefficient, FlipperBelief, MudBelief
+from control.mud_estimate import Coefficient, FlipperBelief, MudBelief
 from control.records import FLIPPERS
 from experiments.estimation.boundaries import Crossing, boundary_rows, crossings_of
-from experiments.load_cell_truth import LoadCellTruth, TrueCoefficients
-from experiments.trial import SINGLE, Trial, configuration_of
-from simulation.clay import Clay
-from simulation.witness import StrideTruth, StrokeTruth
+from experiments.trials.load_cell_truth import LoadCellTruth, TrueCoefficients
+from experiments.trials.trial import SINGLE, Trial, configuration_of
+from simulation.body.reference_sensor import StrideTruth, StrokeTruth
+from simulation.mud.clay import Clay
 
 DEPTH_M = 0.03
 K_P = {"soft": 1e6, "firm": 2e6}

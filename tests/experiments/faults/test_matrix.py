@@ -16,12 +16,12 @@ from control.fault_kinds import KINDS
 from control.modes import Mode, Request
 from experiments.faults.bench import FaultBench
 from experiments.faults.cell import run_cell
+from experiments.faults.evaluation import Cell, problems
 from experiments.faults.injection import BY_NAME, WAYS, Way
-from experiments.faults.judgement import Cell, problems
 from experiments.faults.loop_causes import bug_in, nothing
 from experiments.faults.matrix import FAULTS, Place, Plan, report_of
 from experiments.faults.phases import PHASES, bench_for
-from experiments.side_by_side import side_by_side
+from experiments.reports.side_by_side import side_by_side
 
 
 def one_place_of_each_fault() -> list[Place]:

@@ -13,18 +13,18 @@ import numpy as np
 import pytest
 
 from control.records import Phase
-from experiments.bench_robot import BenchError, leave
-from experiments.estimation_methods import DEFAULT, PAPER
 from experiments.flipper import measurement as flipper
 from experiments.flipper.measurement import Plan, report_of, require_fixed_base, require_mud
 from experiments.flipper.report import KNOWN_BIAS, WRONG_CONSTANTS, force_rows, sections_of, text_of
 from experiments.flipper.simulation import DRIVE, SECTIONS, bench_configuration, flipper_bench
-from experiments.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.mud_trials import Bench, PlannedTrial, SpoiltTrialError
-from experiments.notebook import Entry, Notebook
-from experiments.simulated_bed import CarriedBed
-from experiments.stride_course import course_of_row
-from experiments.trial import SINGLE, configuration_of
+from experiments.robot.bench_robot import BenchError, leave
+from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.trials.estimation_methods import DEFAULT, PAPER
+from experiments.trials.mud_trials import Bench, PlannedTrial, SpoiltTrialError
+from experiments.trials.notebook import Entry, Notebook
+from experiments.trials.simulated_bed import CarriedBed
+from experiments.trials.stride_profile import course_of_row
+from experiments.trials.trial import SINGLE, configuration_of
 from tests.experiments.made_up_strides import make_course, make_estimate, make_stride
 from tests.scripted_person import ScriptedPerson
 

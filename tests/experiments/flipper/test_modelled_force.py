@@ -9,7 +9,7 @@ from control.plate import crossing, stance_moment_m4, stroke_moment_m4, submerge
 from control.records import Phase
 from estimation.force_map import smallest_force_n
 from experiments.flipper.modelled_force import misfit_n, modelled_forces
-from experiments.stride_course import StrideCourse
+from experiments.trials.stride_profile import StrideCourse
 from tests.experiments.made_up_strides import GEOMETRY, make_course
 
 K = {"k_p": 1.1e6, "k_s": 0.4e6, "k_e": 1.9e6}

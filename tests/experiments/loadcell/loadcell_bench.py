@@ -7,21 +7,21 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from drivers.load_cell_calibration import LoadCellCalibration
-from drivers.load_cell_lines import LineFormat
-from drivers.load_cell_port import LoadCellPort
-from drivers.stage_encoder import StageEncoder, StageEncoderSettings
+from drivers.load_cell.calibration import LoadCellCalibration
+from drivers.load_cell.line_formats import LineFormat
+from drivers.load_cell.load_cell_port import LoadCellPort
+from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings
 from experiments.loadcell.measurement import CellSettings, Results, conclude, measure, plan_of_notebook
 from experiments.loadcell.motion import StageSettings
 from experiments.loadcell.recording import CellRecorder
 from experiments.loadcell.stage import SimulatedStage
 from experiments.loadcell.trials import TrialBench, TrialPlan
-from experiments.notebook import Notebook
-from simulation.load_cell_bench import EmulatedBench, Event
-from simulation.load_cell_emulator import AmplifierParameters
-from simulation.plate_stage import CarriedPlate, StageParameters
-from simulation.stage_encoder_emulator import StageEncoderParameters
-from simulation.stage_motion import HandParameters
+from experiments.trials.notebook import Notebook
+from simulation.test_rig.load_cell_bench import EmulatedBench, Event
+from simulation.test_rig.load_cell_emulator import AmplifierParameters
+from simulation.test_rig.plate_stage import CarriedPlate, StageParameters
+from simulation.test_rig.stage_encoder_emulator import StageEncoderParameters
+from simulation.test_rig.stage_motion import HandParameters
 from tests.experiments.made_up_mud import LawfulMud
 from tests.scripted_person import ScriptedPerson
 

@@ -8,16 +8,16 @@ from typing import Any
 
 import pytest
 
-from experiments.bench_robot import BenchError
-from experiments.loadcell.examination import examine_encoder
 from experiments.loadcell.fits import INSERTION, bench_doubt
 from experiments.loadcell.measurement import CellSettings
 from experiments.loadcell.raw import RAW, load_all
 from experiments.loadcell.stage import Trial
+from experiments.loadcell.trial_checks import examine_encoder
 from experiments.loadcell.trials import KEEP, WITHOUT, measure
-from experiments.person import GO_ON
-from simulation.load_cell_emulator import AmplifierParameters
-from simulation.stage_encoder_emulator import EmulatedStageEncoder, StageEncoderParameters
+from experiments.robot.bench_robot import BenchError
+from experiments.robot.prompt import GO_ON
+from simulation.test_rig.load_cell_emulator import AmplifierParameters
+from simulation.test_rig.stage_encoder_emulator import EmulatedStageEncoder, StageEncoderParameters
 from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Laboratory, Make, laboratories
 from tests.scripted_person import ScriptedPerson
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 
-from estimation.origin_fit import student_factor
+from estimation.strokes.origin_fit import student_factor
 from experiments.loadcell.analysis import analyse, analyse_trial, common_pace
 from experiments.loadcell.contact import find_contact, without_spikes
 from experiments.loadcell.curve_fit import Array
@@ -29,9 +29,9 @@ from experiments.loadcell.fits import (
     volume_m3,
 )
 from experiments.loadcell.motion import Insertion, Pace, Shear, StageSettings, wide_pace
-from simulation.clay import clay_of_water
-from simulation.load_cell import LoadCurve, measure_insertion, measure_shear
-from simulation.load_cell_bench import PAPER_PLATE, RELAXATION, clay_plate
+from simulation.mud.clay import clay_of_water
+from simulation.test_rig.load_cell import LoadCurve, measure_insertion, measure_shear
+from simulation.test_rig.load_cell_bench import PAPER_PLATE, RELAXATION, clay_plate
 from tests.experiments.made_up_mud import THICKNESS_M, WIDTH_M, LawfulMud, feel
 
 SETTINGS = StageSettings()

@@ -14,9 +14,9 @@ from experiments.loadcell.fits import COEFFICIENTS, INSERTION, SHEAR, Analysed, 
 from experiments.loadcell.motion import StageSettings, wide_pace
 from experiments.loadcell.position import moving
 from experiments.loadcell.stage_track import Places
-from simulation.clay import RATE_COEFFICIENT
-from simulation.load_cell_bench import clay_plate
-from simulation.stage_motion import HandParameters
+from simulation.mud.clay import RATE_COEFFICIENT
+from simulation.test_rig.load_cell_bench import clay_plate
+from simulation.test_rig.stage_motion import HandParameters
 from tests.experiments.loadcell.test_fits import true_of_clay
 from tests.experiments.made_up_mud import LawfulMud, feel_by_hand
 

@@ -10,19 +10,19 @@ from statistics import fmean
 
 import pytest
 
-from drivers.load_cell_port import LoadCellPort
-from experiments.bench_robot import BenchError
-from experiments.loadcell.examination import examine_lines
+from drivers.load_cell.load_cell_port import LoadCellPort
 from experiments.loadcell.fits import INSERTION, SHEAR, Analysed
 from experiments.loadcell.measurement import CellSettings, list_remarks
 from experiments.loadcell.motion import Insertion, Pace
 from experiments.loadcell.raw import RAW, load_all
 from experiments.loadcell.recording import AVERAGED, likeness
 from experiments.loadcell.stage import AttendedStage, Trial
+from experiments.loadcell.trial_checks import examine_lines
 from experiments.loadcell.trials import KEEP, judge, measure, record
-from experiments.person import GO_ON, REDO, SKIP
-from simulation.load_cell_emulator import AmplifierParameters
-from simulation.plate_stage import StageParameters
+from experiments.robot.bench_robot import BenchError
+from experiments.robot.prompt import GO_ON, REDO, SKIP
+from simulation.test_rig.load_cell_emulator import AmplifierParameters
+from simulation.test_rig.plate_stage import StageParameters
 from tests.experiments.loadcell.loadcell_bench import COUNTS, KNOWN, SETTINGS, Laboratory, Make, laboratories
 from tests.scripted_person import ScriptedPerson
 

@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from experiments.notebook import Notebook
 from experiments.trackway.comparison import FIXED, Plan, end_of, is_over, report_of, rules_of, run
 from experiments.trackway.paper_table import ADAPTIVE, PAPER_TABLE
 from experiments.trackway.walk import Walk, WalkedStride
-from simulation.clay import MUDS
-from simulation.track import paper_track
+from experiments.trials.notebook import Notebook
+from simulation.mud.clay import MUDS
+from simulation.mud.track import paper_track
 
 NAMES = list(MUDS)
 

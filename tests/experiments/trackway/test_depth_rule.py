@@ -4,9 +4,9 @@ from typing import get_args
 
 import pytest
 
-from control.adaptation import AdaptationParameters, Method
+from control.depth.depth_choice import AdaptationParameters, Method
 from experiments.trackway.depth_rule import METHODS, chosen_by, configuration_for, constant_depth
-from experiments.trial import WALKING, configuration_of
+from experiments.trials.trial import WALKING, configuration_of
 
 
 def test_a_constant_depth_is_ordered_and_not_adapted() -> None:

@@ -16,13 +16,13 @@ from control.modes import Mode
 from control.records import Phase
 from experiments.trackway.log_strides import walked_strides
 from experiments.trackway.walk import EXTRACTION, RECOVERED, StrideRecord, WalkedStride
-from firmware_host.configuration import Configuration
-from firmware_host.log_reader import Log, read_log, tick_type
-from firmware_host.recorder import Recorder
-from simulation.clay import Clay
-from simulation.lockstep import Lockstep
-from simulation.motion_capture import MotionCaptureParameters
-from simulation.track import Track
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.recorder import Recorder
+from firmware_host.log_reading.log_reader import Log, read_log, tick_type
+from simulation.devices.motion_capture import MotionCaptureParameters
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import Clay
+from simulation.mud.track import Track
 
 TRACK = Track([(0.55, Clay("soft", 1000.0)), (1.0, Clay("firm", 5000.0))])
 ARM_M = 0.12

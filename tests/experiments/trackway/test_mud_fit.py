@@ -25,8 +25,8 @@ from experiments.trackway.mud_fit import (
     walk_on,
 )
 from experiments.trackway.paper_table import PAPER_TABLE, Speed
-from simulation.clay import MUDS
-from simulation.plant import PlantParameters
+from simulation.body.plant import PlantParameters
+from simulation.mud.clay import MUDS
 
 TRUTH = {"48.5": 2000.0, "53.1": 600.0, "45.3": 3500.0}
 TRUE_DAMPING = 5.6

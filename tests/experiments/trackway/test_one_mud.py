@@ -15,7 +15,7 @@ from experiments.trackway.one_mud import (
     speed_cm_s,
 )
 from experiments.trackway.walk import Walk, WalkedStride
-from simulation.clay import Clay
+from simulation.mud.clay import Clay
 
 FIRM, SOFT = Clay("firm", 3000.0), Clay("soft", 700.0)
 

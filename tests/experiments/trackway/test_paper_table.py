@@ -5,7 +5,7 @@ from statistics import fmean
 import pytest
 
 from experiments.trackway.paper_table import ADAPTIVE, FIXED_DEPTHS_M, PAPER_TABLE, Speed
-from simulation.clay import MUDS
+from simulation.mud.clay import MUDS
 
 
 def test_table_one_is_the_papers() -> None:

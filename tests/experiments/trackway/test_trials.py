@@ -9,12 +9,11 @@ from typing import Any
 
 import pytest
 
-from command_line.walking import trackway_text
+from command_line.experiments.trackway import trackway_text
 from control.modes import Mode
-from experiments.bench_robot import BenchError, arm
-from experiments.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.notebook import Notebook
-from experiments.person import GO_ON, REDO, SKIP
+from experiments.robot.bench_robot import BenchError, arm
+from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.robot.prompt import GO_ON, REDO, SKIP
 from experiments.trackway.plots import plot_trackway
 from experiments.trackway.trials import (
     KEEP,
@@ -31,13 +30,14 @@ from experiments.trackway.trials import (
     walk_over,
 )
 from experiments.trackway.walk import StrideRecord, Walk, WalkedStride
-from firmware_host.file_recorder import FileRecorder
-from firmware_host.log_reader import read_log
+from experiments.trials.notebook import Notebook
+from firmware_host.log.file_recorder import FileRecorder
+from firmware_host.log_reading.log_reader import read_log
 from firmware_host.ticker import PERIOD_S
-from simulation.clay import MUDS
-from simulation.lockstep import Lockstep
-from simulation.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
-from simulation.track import Track
+from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
 from tests.scripted_person import ScriptedPerson
 
 SHORT = Plan((Mud("48.5", 0.3), Mud("53.1", 0.3)), trials=1, depths_m=(0.03,))

@@ -12,8 +12,8 @@ import pytest
 from control.records import Phase
 from experiments.trackway.depth_rule import configuration_for, constant_depth
 from experiments.trackway.walk import EXTRACTION, RECOVERED, SLIPPAGE, StrideRecord, Walk, WalkedStride, speed_m_s, walk
-from simulation.clay import Clay
-from simulation.track import Track
+from simulation.mud.clay import Clay
+from simulation.mud.track import Track
 
 ARM_M = 0.12
 FIRM, SOFT = Clay("firm", 3000.0), Clay("soft", 700.0)

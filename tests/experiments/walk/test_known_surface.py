@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from control.records import Phase
-from experiments.stride_course import StrideCourse
+from experiments.trials.stride_profile import StrideCourse
 from experiments.walk.known_surface import k_s_of
 from tests.experiments.made_up_strides import CONFIGURATION, GEOMETRY, make_course, make_stride
 

@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
-from experiments.estimation_methods import COMPENSATED, DEFAULT, PAPER
 from experiments.flipper.report import KNOWN_BIAS, WRONG_CONSTANTS
-from experiments.lockstep_robot import LockstepRobot
-from experiments.mud_trials import Bench, SpoiltTrialError
-from experiments.notebook import Entry, Notebook
-from experiments.simulated_bed import CarriedBed
+from experiments.robot.lockstep_robot import LockstepRobot
 from experiments.trackway.trials import Mud, reach_of
+from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
+from experiments.trials.mud_trials import Bench, SpoiltTrialError
+from experiments.trials.notebook import Entry, Notebook
+from experiments.trials.simulated_bed import CarriedBed
 from experiments.walk import measurement as walk_mapping
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import MUDS, Advance, Plan, measure, require_mud

@@ -1,0 +1,274 @@
+"""How punctually the daemon's loop wakes up, beside the most punctual loop that the same machine allows.
+
+The loop is the daemon's own body: ticker, whole tick over two local buses, recorder and status socket, while it
+walks a simulated robot that lives in a process of its own. The bare loop only calls the C library's clock_nanosleep
+with absolute deadlines. Both run at 380 Hz in this process, under the scheduling that the daemon asks for, in turns
+of a few seconds, so both see the same machine; the simulated robot goes on living beside either. Lateness counts
+from the first deadline that was due, so a missed deadline shows as more than a period. Before each turn of the loop
+the robot is armed and led to its first stride, outside of every figure.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+from benchmarks.report import Progress, new_parser, print_report, verdict
+from command_line.screen import table
+from control.controller import WalkOrder
+from control.modes import Mode, Request
+from drivers.odrive.drives import OdriveDrives
+from drivers.pose.pose_port import PosePort
+from firmware_host.buses import open_ports
+from firmware_host.computer.realtime import SWITCH_INTERVAL_S, prepare_loop
+from firmware_host.computer.sd_notify import SystemdNotifier
+from firmware_host.configuration.configuration import Configuration, load_configuration
+from firmware_host.daemon import Shutdown, WatchdogFeed
+from firmware_host.log.recorder import Recorder
+from firmware_host.loop import Loop
+from firmware_host.loop_timing import Histogram
+from firmware_host.operator.operator_calls import OperatorCalls
+from firmware_host.operator.status_socket import StatusSocket
+from firmware_host.ticker import PERIOD_S, Beat, Ticker
+from simulation.harness.local_setup import write_local_setup
+from simulation.harness.peer import end_with_parent
+
+BAR_RATIO = 2.0
+TURN_S = 5.0
+SETTLING_S = 2.0  # of walking, until the first stride has begun
+LONGEST_STEP_S = 15.0  # for the robot's process to start, or for a mode to come about
+TIMER_ABSTIME = 1
+PYTHON_SWITCH_INTERVAL_S = 0.005  # Python's own
+SHARES = {"p50": 0.50, "p99": 0.99, "p99.9": 0.999}
+
+
+class Timespec(ctypes.Structure):
+    _fields_ = [("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long)]
+
+
+class Punctuality:
+    """Owns what was seen of one loop in all its turns."""
+
+    def __init__(self) -> None:
+        self.late, self.work = Histogram(), Histogram()
+        self.missed = 0
+
+    def add(self, late_s: float, missed: int, work_s: float = 0.0) -> None:
+        self.late.add(late_s)
+        self.work.add(work_s)
+        self.missed += missed
+
+    def report(self) -> dict[str, Any]:
+        return {
+            "beats": self.late.count,
+            "missed": self.missed,
+            "late_us": {name: self.late.percentile_us(share) for name, share in SHARES.items()}
+            | {"max": round(self.late.max_us, 1)},
+        }
+
+
+class BareLoop:
+    """Nothing but deadlines."""
+
+    def __init__(self) -> None:
+        self._sleep = ctypes.CDLL(None).clock_nanosleep
+        self._until = Timespec()
+
+    def run(self, seconds: float, punctuality: Punctuality) -> None:
+        start_s, number, last = time.monotonic(), 0, round(seconds / PERIOD_S)
+        while number < last:
+            number += 1
+            deadline_s = start_s + number * PERIOD_S
+            self._sleep_until(deadline_s)
+            late_s = time.monotonic() - deadline_s
+            missed = int(late_s / PERIOD_S)
+            number += missed
+            punctuality.add(late_s, missed)
+
+    def _sleep_until(self, deadline_s: float) -> None:
+        self._until.seconds = int(deadline_s)
+        self._until.nanoseconds = int(deadline_s % 1.0 * 1e9)
+        self._sleep(time.CLOCK_MONOTONIC, TIMER_ABSTIME, ctypes.byref(self._until), None)
+
+
+class DaemonLoop:
+    """The daemon's parts and its loop's body; what it opens is closed with `stack`."""
+
+    def __init__(self, configuration: Configuration, folder: Path, stack: ExitStack) -> None:
+        drives = OdriveDrives(
+            configuration.drive, open_ports(configuration.bus), configuration.limits, configuration.watchdog_endpoints
+        )
+        stack.callback(drives.close)
+        pose = PosePort(Path(configuration.pose.socket))
+        stack.callback(pose.close)
+        self.recorder = Recorder(folder / "jitter.mcap", configuration.text, {})
+        stack.callback(self.recorder.close, timeout_s=10.0)
+        self.loop = Loop(configuration, drives, pose, self.recorder)
+        calls = OperatorCalls(self.loop, self.recorder, [], time.monotonic)
+        self._status = StatusSocket(Path(configuration.status.socket), calls.methods)
+        stack.callback(self._status.close)
+        self._watchdog, self._shutdown = WatchdogFeed(SystemdNotifier("")), Shutdown()
+        self.faults = 0
+
+    def beat(self, ticker: Ticker) -> Beat:
+        """As in firmware_host.daemon."""
+        beat = ticker.wait()
+        self.loop.tick(beat)
+        self._status.serve(beat.now_s)
+        self._watchdog.update(beat, self.loop.mode)
+        self._shutdown.step(self.loop, beat.now_s)
+        return beat
+
+    def run(self, seconds: float, punctuality: Punctuality) -> None:
+        """Raises RuntimeError where the robot does not arm."""
+        self._begin_walk()
+        ticker, end_s = Ticker(), time.monotonic() + seconds
+        beat = self.beat(ticker)
+        while beat.now_s < end_s:
+            beat = self.beat(ticker)
+            punctuality.add(beat.late_s, beat.missed, time.monotonic() - beat.now_s)
+        self.faults += self.loop.mode is not Mode.WALKING
+        self.loop.request(Request.DISARM, time.monotonic())
+        self._run_until(lambda: not any(state.closed_loop for state in self.loop.states))
+
+    def _begin_walk(self) -> None:
+        """From whatever was before: nobody drained the buses while the bare loop ran."""
+        self._run_until(lambda: self.loop.mode in (Mode.IDLE, Mode.FAULT))
+        self.loop.request(Request.CLEAR, time.monotonic())
+        self._run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking())
+        self.loop.request(Request.ARM, time.monotonic())
+        self._run_until(lambda: self.loop.mode is Mode.HOLD)
+        order = WalkOrder(self.loop.configuration.adaptation.initial_depth_m)
+        self.loop.request(Request.WALK, time.monotonic(), order)
+        settled_s = time.monotonic() + SETTLING_S
+        self._run_until(lambda: time.monotonic() > settled_s)
+
+    def _run_until(self, done: Callable[[], bool]) -> None:
+        ticker, deadline_s = Ticker(), time.monotonic() + LONGEST_STEP_S
+        while not done():
+            if self.beat(ticker).now_s > deadline_s:
+                raise RuntimeError(f"the simulated robot is {self.loop.mode.name.lower()}: {self.loop.fault}")
+
+
+@contextmanager
+def simulated_robot(configuration_path: Path) -> Iterator[None]:
+    command = [sys.executable, "-m", "simulation.harness.peer", "--config", str(configuration_path)]
+    robot = subprocess.Popen(command, preexec_fn=end_with_parent)  # noqa: PLW1509 - no threads here
+    try:
+        yield
+    finally:
+        robot.terminate()
+        robot.wait()
+
+
+@contextmanager
+def busy_thread() -> Iterator[None]:
+    """Python code that never ends."""
+    ended = Event()
+
+    def count() -> None:
+        number = 0
+        while not ended.is_set():
+            number += 1
+
+    thread = Thread(target=count)
+    thread.start()
+    yield
+    ended.set()
+    thread.join()
+
+
+def measure_gil(seconds: float) -> dict[str, Any]:
+    """The bare loop beside a second thread, at Python's switch interval and at ours."""
+    report: dict[str, Any] = {}
+    for name, interval_s in (("5 ms", PYTHON_SWITCH_INTERVAL_S), ("0.1 ms", SWITCH_INTERVAL_S)):
+        sys.setswitchinterval(interval_s)
+        punctuality = Punctuality()
+        with busy_thread():
+            BareLoop().run(seconds, punctuality)
+        report[name] = punctuality.report()
+    return report
+
+
+def measure(seconds: float) -> dict[str, Any]:
+    real, bare, turn_s = Punctuality(), Punctuality(), min(TURN_S, seconds)
+    rounds = max(1, round(seconds / turn_s))
+    progress = Progress(rounds)
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mudskipper-")))
+        path = write_local_setup(folder, folder)
+        configuration = load_configuration(path)
+        stack.enter_context(simulated_robot(path))
+        daemon, bare_loop = DaemonLoop(configuration, folder, stack), BareLoop()
+        options = configuration.loop
+        warnings = prepare_loop(options.priority, options.cpu, options.lock_memory)
+        for number in range(rounds):
+            progress.show(number, "the daemon's loop")
+            daemon.run(turn_s, real)
+            progress.show(number + 0.7, "the bare loop")
+            bare_loop.run(turn_s, bare)
+    progress.clear()
+    seen = {"faults": daemon.faults, "dropped_rows": daemon.recorder.dropped, "warnings": warnings}
+    loop = real.report() | {"work_us": real.work.summary()}
+    return {"rounds": rounds, "turn_s": turn_s, "loop": loop, "bare": bare.report()} | seen
+
+
+def ratios(real: dict[str, Any], bare: dict[str, Any]) -> dict[str, float]:
+    return {share: round(real["late_us"][share] / max(1.0, bare["late_us"][share]), 2) for share in ("p50", "p99")}
+
+
+def text_of(report: dict[str, Any]) -> str:
+    rows = [["late by us", "p50", "p99", "p99.9", "max", "beats", "missed"]]
+    rows += [_row("the daemon's loop", report["loop"]), _row("bare clock_nanosleep", report["bare"])]
+    rows += [_row(f"  and a busy thread, {name}", turn) for name, turn in report.get("gil", {}).items()]
+    work, over = report["loop"]["work_us"], report["ratios"]
+    return "\n".join(
+        [
+            table(rows),
+            "",
+            f"loop over bare: {over['p50']:.2f} at the median, {over['p99']:.2f} at p99",
+            f"a beat's work after a sleep: p50 {work['p50']:.0f}, p99 {work['p99']:.0f}, max {work['max']:.0f} us",
+            f"{report['faults']} turns ended in a fault; {report['dropped_rows']} rows dropped",
+            *(f"warning: {warning}" for warning in report["warnings"]),
+            report["verdict"],
+        ]
+    )
+
+
+def _row(name: str, figures: dict[str, Any]) -> list[str]:
+    late = figures["late_us"]
+    return [name, *(f"{late[key]:.0f}" for key in (*SHARES, "max")), str(figures["beats"]), str(figures["missed"])]
+
+
+def new_options(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = new_parser("loop_jitter", __doc__)
+    parser.add_argument("--seconds", type=float, default=30.0, help=f"of each loop, in turns of {TURN_S:g} s")
+    parser.add_argument("--show-gil", action="store_true", help="also the bare loop beside a second, busy thread")
+    return parser.parse_args(arguments)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    options = new_options(arguments)
+    report: dict[str, Any] = {"benchmark": "loop_jitter", "seconds": options.seconds}
+    if options.show_gil:
+        report["gil"] = measure_gil(min(TURN_S, options.seconds))
+    report |= measure(options.seconds)
+    report["ratios"] = ratios(report["loop"], report["bare"])
+    reached = report["ratios"]["p50"] <= BAR_RATIO
+    bar = f"median lateness at most {BAR_RATIO:g} times the bare loop's"
+    report |= {"bar_ratio": BAR_RATIO, "reached": reached, "verdict": verdict(bar, reached)}
+    print_report(report, text_of(report), options.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

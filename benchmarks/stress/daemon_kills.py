@@ -1,0 +1,209 @@
+"""How long motors push on after the daemon was killed or stopped: by SIGKILL and SIGSTOP, in each phase of the gait.
+
+Daemon and simulated robot are processes on local buses, on which a third node listens. The drives tell their currents
+every 2 ms of their own time, so the messages that still tell one after the kill are the time to zero torque, whatever
+else this machine does meanwhile. Nothing but the drives' watchdogs can end it. A daemon that was stopped is then woken,
+and must not move the robot again; that is listened to as well.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.stress.log_kills import start
+from command_line.screen import table
+from control.records import JOINTS
+from drivers.odrive import codec
+from firmware_host.buses import open_ports
+from firmware_host.configuration.configuration import load_configuration
+from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
+from simulation.devices.odrive import OdriveParameters
+from simulation.harness.local_setup import write_local_setup
+from simulation.harness.peer import WATCHDOG_S
+
+TOLD_S = OdriveParameters(0).current_period_s
+TOLERANCE_S = 0.01  # between the kill and the robot's reading of what was sent before it
+WINDOW_S = 4.0 * WATCHDOG_S  # of listening
+PHASES = ("insertion", "stance", "extraction", "swing", "hold")
+SIGNALS = (signal.SIGKILL, signal.SIGSTOP)
+LONGEST_WAIT_S = 60.0
+ATTEMPTS = 5  # at a walk, which a busy machine may spoil
+
+
+class Listener:
+    """Owns a node on each bus, and how long each drive has told of a current."""
+
+    def __init__(self, configuration_path: Path) -> None:
+        configuration = load_configuration(configuration_path)
+        self._ports = open_ports(configuration.bus)
+        self._joints = {(configuration.drive[joint].bus, configuration.drive[joint].node_id): joint for joint in JOINTS}
+        self.reset()
+
+    def reset(self) -> None:
+        self.told = dict.fromkeys(JOINTS, 0)  # messages of current
+        self.pushed = dict.fromkeys(JOINTS, 0)  # of these, until the last one that was not of zero
+        self.closed_loop = dict.fromkeys(JOINTS, True)
+
+    def listen(self) -> None:
+        for bus, port in self._ports.items():
+            for frame in port.receive():
+                joint = self._joints.get((bus, frame.arbitration_id >> 5))
+                if joint is not None and not frame.is_remote:
+                    self._heed(joint, frame.arbitration_id & 0x1F, frame.data)
+
+    def _heed(self, joint: str, command: int, data: bytes) -> None:
+        if command == codec.GET_IQ.command:
+            self.told[joint] += 1
+            if codec.GET_IQ.decode(data)[0] != 0.0:
+                self.pushed[joint] = self.told[joint]
+        elif command == codec.HEARTBEAT.command:
+            self.closed_loop[joint] = codec.HEARTBEAT.decode(data)[1] == codec.AxisState.CLOSED_LOOP
+
+    def listen_for(self, drive_time_s: float) -> None:
+        """By the drives' own messages."""
+        deadline_s = time.monotonic() + LONGEST_WAIT_S
+        end = max(self.told.values()) + round(drive_time_s / TOLD_S)
+        while min(self.told.values()) < end and time.monotonic() < deadline_s:
+            self.listen()
+            time.sleep(0.005)
+
+    def close(self) -> None:
+        for port in self._ports.values():
+            port.close()
+
+
+class Session:
+    """Owns a robot, its daemon and who listens."""
+
+    def __init__(self, folder: Path) -> None:
+        self._socket = folder / "mudskipper.sock"
+        configuration = write_local_setup(folder, folder / "logs")
+        self._robot = start("simulation.harness.peer", configuration)
+        self.daemon = start("firmware_host.daemon", configuration)
+        self.listener = Listener(configuration)
+
+    def call(self, method: str, **params: Any) -> Any:
+        client = StatusClient(self._socket)
+        try:
+            return client.call(method, **params)
+        finally:
+            client.close()
+
+    def wait_for(self, *modes_or_phases: str) -> bool:
+        """Whether it came to one of them before there was a fault."""
+        deadline_s = time.monotonic() + LONGEST_WAIT_S
+        while time.monotonic() < deadline_s:
+            self.listener.listen()
+            with suppress(NoDaemonError, OSError):
+                report = self.call("status")
+                ready = report["mode"] != "idle" or report["fault"] is None
+                if ready and {report["mode"], report["phase"]} & set(modes_or_phases):
+                    return True
+                if report["mode"] in ("fault", "damping"):
+                    return False
+            time.sleep(0.002)
+        return False
+
+    def walk_until(self, phase: str) -> bool:
+        if not self.wait_for("idle"):
+            return False
+        with suppress(CallRefusedError):
+            self.call("arm")
+            if self.wait_for("hold") and phase != "hold":
+                self.call("walk", depth_m=0.03)
+        return self.wait_for(phase)
+
+    def end(self) -> None:
+        self.listener.close()
+        for process in (self.daemon, self._robot):
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+def kill_once(folder: Path, number: signal.Signals, phase: str) -> dict[str, Any] | None:
+    """None where the robot did not come into that phase."""
+    session = Session(folder)
+    listener = session.listener
+    try:
+        if not session.walk_until(phase):
+            return None
+        listener.listen()
+        listener.reset()
+        session.daemon.send_signal(number)
+        listener.listen_for(WINDOW_S)
+        pushed_s = TOLD_S * max(listener.pushed.values())
+        idle = not any(listener.closed_loop.values())
+        woken = number is signal.SIGSTOP and _moves_when_woken(session.daemon, listener)
+    finally:
+        session.end()
+    return {"signal": number.name, "phase": phase, "pushed_s": round(pushed_s, 4), "idle": idle, "moved_again": woken}
+
+
+def _moves_when_woken(daemon: subprocess.Popen[bytes], listener: Listener) -> bool:
+    listener.reset()
+    daemon.send_signal(signal.SIGCONT)
+    listener.listen_for(WINDOW_S)
+    return any(listener.pushed.values()) or any(listener.closed_loop.values())
+
+
+def kill_many(count: int, folder: Path, progress: Progress) -> tuple[list[dict[str, Any]], int]:
+    """And how many walks were spoiled."""
+    rounds: list[dict[str, Any]] = []
+    spoiled = 0
+    while len(rounds) < count and spoiled < ATTEMPTS * count:
+        progress.show(len(rounds), "kills")
+        number, phase = SIGNALS[len(rounds) % 2], PHASES[len(rounds) // 2 % len(PHASES)]
+        place = folder / str(len(rounds) + spoiled)
+        place.mkdir()
+        made = kill_once(place, number, phase)
+        if made is None:
+            spoiled += 1
+        else:
+            rounds.append(made)
+    return rounds, spoiled
+
+
+def text_of(report: dict[str, Any]) -> str:
+    rows = [
+        [made["signal"], made["phase"], f"{1e3 * made['pushed_s']:.0f}", "yes" if made["idle"] else "no"]
+        for made in report["rounds"]
+    ]
+    again = sum(made["moved_again"] for made in report["rounds"])
+    lines = [table([["signal", "phase", "ms to zero torque", "idle"], *rows]), ""]
+    return "\n".join([*lines, f"{again} moved again when woken; {report['spoiled']} walks spoiled", report["verdict"]])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = new_parser("daemon_kills", __doc__)
+    parser.add_argument("--kills", type=int, default=40)
+    options = parser.parse_args(arguments)
+    progress = Progress(options.kills)
+    with tempfile.TemporaryDirectory(prefix="mud-") as folder:
+        rounds, spoiled = kill_many(options.kills, Path(folder), progress)
+    progress.clear()
+    longest_s = max((made["pushed_s"] for made in rounds), default=0.0)
+    reached = (
+        len(rounds) == options.kills
+        and longest_s <= WATCHDOG_S + TOLERANCE_S
+        and all(made["idle"] and not made["moved_again"] for made in rounds)
+    )
+    bar = f"zero torque within the watchdogs' {1e3 * WATCHDOG_S:g} ms and {1e3 * TOLERANCE_S:g} on the way, for good"
+    report = {"benchmark": "daemon_kills", "rounds": rounds, "spoiled": spoiled, "longest_s": longest_s}
+    report |= {"watchdog_s": WATCHDOG_S, "reached": reached, "verdict": verdict(bar, reached)}
+    print_report(report, text_of(report), options.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

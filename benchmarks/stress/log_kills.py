@@ -1,0 +1,210 @@
+"""What a log loses when its writer, the daemon, or everything is killed: SIGKILL at random moments, then recovery.
+
+A real daemon records a simulated robot with short segments, every tick of it. After each kill the folder is recovered
+by the next daemon's own recovery or by the command's, and every log of the run is opened by three readers that share
+no code: ours, rosbags and mcap-ros2-support. Ticks are numbered and count the missed ones, so a row that is missing
+inside or doubled shows; the monotonic stamp of the last row says what is missing at the end.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.stress.resources import children_of
+from firmware_host.log.log_folder import ACTIVE, DONE, log_files, unfinished_files
+from firmware_host.log_reading.log_reader import Log, read_log
+from firmware_host.log_reading.recovery import recover_all
+from firmware_host.operator.status_client import NoDaemonError, StatusClient
+from simulation.harness.local_setup import write_local_setup
+
+BAR_S = 1.0  # of rows at a log's end
+LONGEST_WAIT_S = 30.0
+VICTIMS = ("daemon", "writer", "both", "all")  # all: the whole session, with a recovery that may be under way
+
+
+def write_setup(folder: Path) -> Path:
+    path = write_local_setup(folder, folder / "logs")
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("[log]\n", "[log]\nsegment_s = 1.5\nrest_hz = 0.0\n"), encoding="utf-8")
+    return path
+
+
+def start(module: str, configuration: Path) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", module, "--config", str(configuration)]
+    quiet = subprocess.DEVNULL
+    return subprocess.Popen(command, start_new_session=True, stdout=quiet, stderr=quiet)
+
+
+def wait_for_log(folder: Path, known: set[str]) -> None:
+    """Until the daemon answers and a file of its run is there."""
+    deadline_s = time.monotonic() + LONGEST_WAIT_S
+    while time.monotonic() < deadline_s:
+        with suppress(NoDaemonError, OSError):
+            StatusClient(folder / "mudskipper.sock").close()
+            if {path.name for path in log_files(folder / "logs", ACTIVE)} - known:
+                return
+        time.sleep(0.02)
+    raise RuntimeError("the daemon did not start")
+
+
+def kill(victim: str, daemon: subprocess.Popen[bytes]) -> float:
+    """When it happened, on the monotonic clock."""
+    writers = children_of(daemon.pid)
+    killed_s = time.monotonic()
+    if victim in ("writer", "both"):
+        for writer in writers:
+            os.kill(writer, signal.SIGKILL)
+    if victim in ("daemon", "both"):
+        daemon.kill()
+    if victim == "all":
+        os.killpg(daemon.pid, signal.SIGKILL)
+    if victim == "writer":
+        time.sleep(0.2)
+        daemon.send_signal(signal.SIGTERM)  # which it must still obey
+    daemon.wait(LONGEST_WAIT_S)
+    for writer in writers:
+        _wait_for_end(writer)
+    return killed_s
+
+
+def _wait_for_end(process: int) -> None:
+    deadline_s = time.monotonic() + LONGEST_WAIT_S
+    while time.monotonic() < deadline_s and Path(f"/proc/{process}").exists():
+        with suppress(OSError):
+            if ") Z" in Path(f"/proc/{process}/stat").read_text(encoding="utf-8"):
+                return
+        time.sleep(0.02)
+
+
+def examine(paths: Sequence[Path], seen_s: float, killed_s: float) -> dict[str, Any]:
+    """What the logs of one run hold, and what is wrong with that. Of a log without a tick, all since it was seen is
+    missing.
+    """
+    logs = [read_log(path) for path in paths]
+    problems = [f"{path.name} is not whole" for path, log in zip(paths, logs, strict=True) if not log.complete]
+    problems += [complaint for path, log in zip(paths, logs, strict=True) if (complaint := _by_others(path, log))]
+    numbers = np.concatenate([log.ticks["tick"].astype(np.int64) for log in logs] or [np.zeros(0, np.int64)])
+    missed = np.concatenate([log.ticks["missed_ticks"].astype(np.int64) for log in logs] or [np.zeros(0, np.int64)])
+    gaps = np.diff(numbers) - 1 - np.diff(missed)
+    stamps_s = [float(log.ticks["stamp_s"][-1]) for log in logs if len(log.ticks)]
+    return {
+        "segments": len(logs),
+        "ticks": len(numbers),
+        "missing_inside": int(gaps[gaps > 0].sum()),
+        "doubled": int(len(numbers) - len(np.unique(numbers))),
+        "missing_at_end_s": round(killed_s - max(stamps_s, default=seen_s), 3),
+        "recovered": sum(log.metadata.get("recovered") == "true" for log in logs),
+        "problems": problems,
+    }
+
+
+def _by_others(path: Path, log: Log) -> str:
+    """What two readers of others say of a log, where it differs from ours."""
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+    from rosbags.highlevel import AnyReader
+
+    rows = len(log.ticks) + len(log.strides) + len(log.events)
+    try:
+        with AnyReader([path]) as bag:
+            by_rosbags = sum(1 for _ in bag.messages())
+        with path.open("rb") as file:
+            reader = make_reader(file, decoder_factories=[DecoderFactory()])
+            by_mcap_ros2 = sum(1 for _ in reader.iter_decoded_messages())
+    except Exception as problem:  # noqa: BLE001 - whatever they raise, they did not open it
+        return f"{path.name} is refused: {type(problem).__name__}: {problem}"
+    return "" if rows == by_rosbags == by_mcap_ros2 else f"{path.name}: {rows}, {by_rosbags}, {by_mcap_ros2} rows"
+
+
+def kill_once(folder: Path, configuration: Path, victim: str, after_s: float) -> dict[str, Any]:
+    logs = folder / "logs"
+    known = {path.name for path in log_files(logs, ACTIVE, DONE)}
+    known |= {path.name for path in unfinished_files(logs)}
+    daemon = start("firmware_host.daemon", configuration)
+    try:
+        wait_for_log(folder, known)
+        seen_s = time.monotonic()
+        time.sleep(after_s)
+        killed_s = kill(victim, daemon)
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(daemon.pid, signal.SIGKILL)
+    complaints: list[str] = []
+    recover_all(logs, complaints.append)
+    paths = [path for path in log_files(logs, DONE) if path.name not in known]
+    left = [f"{path.name} was left in {ACTIVE}" for path in unfinished_files(logs)]
+    found = examine(paths, seen_s, killed_s)
+    found["problems"] += complaints + left
+    for path in paths:
+        path.unlink()
+    return {"victim": victim, "after_s": round(after_s, 3)} | found
+
+
+def kill_many(count: int, seed: int, folder: Path, progress: Progress) -> list[dict[str, Any]]:
+    chance = random.Random(seed)
+    configuration = write_setup(folder)
+    robot = start("simulation.harness.peer", configuration)
+    kills = []
+    try:
+        for number in range(count):
+            victim = VICTIMS[number % len(VICTIMS)]
+            progress.show(number, f"kills, now the {victim}")
+            kills.append(kill_once(folder, configuration, victim, chance.uniform(0.0, 4.0)))
+    finally:
+        robot.kill()
+        robot.wait()
+    return kills
+
+
+def sums_of(kills: list[dict[str, Any]]) -> dict[str, Any]:
+    return {
+        "worst_end_s": max(kill["missing_at_end_s"] for kill in kills),
+        "without_a_tick": sum(kill["ticks"] == 0 for kill in kills),
+        "missing_inside": sum(kill["missing_inside"] for kill in kills),
+        "doubled": sum(kill["doubled"] for kill in kills),
+        "unsound": sum(bool(kill["problems"]) for kill in kills),
+        "recovered": sum(kill["recovered"] for kill in kills),
+        "segments": sum(kill["segments"] for kill in kills),
+        "ticks": sum(kill["ticks"] for kill in kills),
+    }
+
+
+def text_of(report: dict[str, Any]) -> str:
+    lines = [f"{name:16} {value}" for name, value in report["sums"].items()]
+    lines += [f"{kill['victim']}: {problem}" for kill in report["rounds"] for problem in kill["problems"]]
+    return "\n".join([*lines, report["verdict"]])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = new_parser("log_kills", __doc__)
+    parser.add_argument("--kills", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args(arguments)
+    progress = Progress(options.kills)
+    with tempfile.TemporaryDirectory(prefix="mud-") as name:
+        rounds = kill_many(options.kills, options.seed, Path(name), progress)
+    progress.clear()
+    sums = sums_of(rounds)
+    reached = not (sums["missing_inside"] or sums["doubled"] or sums["unsound"]) and sums["worst_end_s"] <= BAR_S
+    bar = f"every log opens, at most {BAR_S:g} s missing at its end, nothing else"
+    report = {"benchmark": "log_kills", "kills": len(rounds), "seed": options.seed, "sums": sums, "rounds": rounds}
+    report |= {"reached": reached, "verdict": verdict(bar, reached)}
+    print_report(report, text_of(report), options.json)
+    return 0 if reached else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

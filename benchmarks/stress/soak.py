@@ -1,0 +1,81 @@
+"""Whether anything grows in a long operation: an hour in accelerated lockstep, and minutes of the daemon in real time.
+
+A robot is operated by chance, fails by chance, and clients come and go; see soaked_loop.py and soaked_daemon.py. After
+the warm-up (the loop keeps its last 200 strides, Python its free lists, up to bounds of their own) resident memory
+must not grow by more than the bar, no descriptor and no thread may be left behind, the logs stay within quota and the
+file that is being written, and of the files that the quota has left no tick is missing. Nothing traces allocations;
+what cyclic garbage has come together is told by a collection at the end.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.stress.soaked_daemon import soak_daemon
+from benchmarks.stress.soaked_loop import soak_loop
+from command_line.screen import table
+
+BAR_KIB = 1024.0
+WARM_UP_SHARE = 0.2  # of the readings
+SHOWN = 12  # readings in the table
+
+
+def judged(part: dict[str, Any]) -> dict[str, Any]:
+    """With what grew after the warm-up, and whether the part is sound."""
+    after = part["readings"][int(WARM_UP_SHARE * len(part["readings"])) :]
+    growth_kib = after[-1]["resident_kib"] - after[0]["resident_kib"]
+    left = {name: after[-1][name] - after[0][name] for name in ("descriptors", "threads", "writer_descriptors")}
+    largest_log = max(reading["log_bytes"] for reading in part["readings"])
+    sound = not (part["bugs"] or part["dropped"] or part["ticks_missing"] or part["files_not_whole"])
+    sound = sound and growth_kib < BAR_KIB and max(left.values()) <= 0 and largest_log <= part["quota_bytes"]
+    return part | {"growth_kib": growth_kib, "left": left, "largest_log_bytes": largest_log, "sound": sound}
+
+
+def text_of(name: str, part: dict[str, Any]) -> str:
+    every = max(1, len(part["readings"]) // SHOWN)
+    keys = ("at_s", "resident_kib", "descriptors", "threads", "writer_kib", "writer_descriptors", "log_bytes")
+    rows = [[f"{reading[key]:.0f}" for key in keys] for reading in part["readings"][::every]]
+    asked = sum(part["asked"].values())
+    lines = [
+        table([[key.replace("_", " ") for key in keys], *rows]),
+        f"{name}: {part['strides']} strides, {sum(part['faults'].values())} faults of {len(part['faults'])} kinds, "
+        f"{asked} requests, {part['refused']} refused",
+        f"grew by {part['growth_kib']:.0f} KiB after the warm-up; left behind: {part['left']}",
+        f"{part['dropped']} rows dropped, {part['ticks_missing']} ticks missing in {part['files']} files of "
+        f"{part['ticks_in_files']} ticks; {len(part['bugs'])} bugs",
+    ]
+    return "\n".join([*lines, *part["bugs"]])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = new_parser("soak", __doc__)
+    parser.add_argument("--hours", type=float, default=1.0, help="simulated, in lockstep; 0: none")
+    parser.add_argument("--real-time-minutes", type=float, default=0.0, metavar="MINUTES", help="of the daemon")
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args(arguments)
+    parts: dict[str, dict[str, Any]] = {}
+    with tempfile.TemporaryDirectory(prefix="mud-") as folder:
+        for name, seconds, soak in (
+            ("real_time", 60.0 * options.real_time_minutes, soak_daemon),
+            ("lockstep", 3600.0 * options.hours, soak_loop),
+        ):
+            if seconds > 0.0:
+                progress, place = Progress(seconds), Path(folder) / name
+                place.mkdir()
+                parts[name] = judged(soak(seconds, options.seed, place, progress))
+                progress.clear()
+    reached = all(part["sound"] for part in parts.values())
+    bar = f"growth below {BAR_KIB:.0f} KiB, nothing left behind, no row lost, logs within their quota"
+    report = {"benchmark": "soak", "seed": options.seed, "bar_kib": BAR_KIB} | parts
+    report |= {"reached": reached, "verdict": verdict(bar, reached)}
+    print_report(report, "\n\n".join([*map(text_of, parts, parts.values()), report["verdict"]]), options.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

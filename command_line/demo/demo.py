@@ -1,0 +1,104 @@
+"""`mudskipper demo`: a simulated robot as a process of its own, the real daemon against it, and a walk over three muds.
+
+Everything happens in real time and through the interfaces that a person or a program would use. It ends with a
+summary, a plot and the log.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+from command_line import exit_codes
+from command_line.demo.demo_summary import summarise, summary_text
+from command_line.demo.demonstration import ENDING_SIGNALS, Demo, DemoError, InterruptedDemoError, running_demo
+from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
+from experiments.trials.mud_names import mud_text
+from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.log.log_folder import DONE, log_files, present_path
+from firmware_host.log_reading.log_reader import LogError, read_log
+from firmware_host.operator.status_client import CallRefusedError, NoDaemonError
+from simulation.harness.world import load_world
+
+
+def demo(options: argparse.Namespace) -> int:
+    _heed_signals()
+    refused = _refuse(options)
+    if refused is not None:
+        return refused
+    before = set(log_files(options.out, DONE))
+    try:
+        report, demonstration = _perform(options)
+        _conclude(options, report, demonstration)
+    except (DemoError, CallRefusedError, NoDaemonError, LogError) as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
+    except (InterruptedDemoError, KeyboardInterrupt) as problem:
+        for path in sorted(set(log_files(options.out, DONE)) - before):
+            print(f"\nlog      {path}")
+        complain(str(problem) or "stopped")
+        return exit_codes.INTERRUPTED
+    return exit_codes.OK
+
+
+def _heed_signals() -> None:
+    """They all end the demo as Ctrl-C does."""
+    for number in ENDING_SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup wants it
+            signal.signal(number, signal.default_int_handler)
+
+
+def _refuse(options: argparse.Namespace) -> int | None:
+    """What cannot be is refused before anything starts: the exit status, or None."""
+    try:
+        if options.world:
+            load_world(options.world)
+    except ConfigurationError as problem:
+        complain(*problem.problems)
+        return exit_codes.CONFIGURATION
+    options.out.mkdir(parents=True, exist_ok=True)
+    if options.json and not os.access(options.json if options.json.exists() else options.json.parent, os.W_OK):
+        complain(f"{options.json} cannot be written")
+        return exit_codes.UNHEALTHY
+    return None
+
+
+def _perform(options: argparse.Namespace) -> tuple[dict[str, Any], Demo]:
+    print("Starting a simulated robot and the daemon ...", flush=True)
+    with running_demo(options.out, options.seed, options.world) as demonstration:
+        os.nice(5)  # whoever watches gives way to those who work
+        demonstration.connect()
+        print("Arming ...", flush=True)
+        demonstration.arm()
+        muds = ", ".join(mud_text(segment.clay.name) for segment in demonstration.track.segments)
+        water = " water" if muds.endswith("%") else ""
+        print(f"Walking {demonstration.track.length_m:.2f} m over mud with {muds}{water}.\n")
+        print(f"{STRIDE_HEAD}\n{STRIDE_UNITS}", flush=True)
+
+        def show(stride: dict[str, Any]) -> None:
+            print(stride_line(stride, demonstration.walk_start_s), flush=True)
+
+        demonstration.walk(options.depth, show)
+        report = demonstration.stop()
+        demonstration.fetch_strides(show)
+        return report, demonstration
+
+
+def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration: Demo) -> None:
+    """Summary, plot, and the JSON if wanted."""
+    log_path = present_path(Path(report["log"]["path"]))
+    log = read_log(log_path)
+    plot_path = options.out / log_path.with_suffix(".png").name
+    summary = summarise(report, demonstration, log, log_path, plot_path)
+    print(f"\n{summary_text(summary)}\nDrawing ...", flush=True)
+    from command_line.logs.recorded_walk import read_walk
+    from command_line.pictures.walk_plot import plot_walk  # matplotlib takes its time; the walk must not wait for it
+
+    plot_walk(read_walk(log_path), plot_path, demonstration.track)
+    print(f"plot     {plot_path}")
+    if options.json:
+        options.json.write_text(json.dumps(summary, indent=1) + os.linesep, encoding="utf-8")

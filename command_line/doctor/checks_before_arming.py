@@ -1,0 +1,82 @@
+"""`mudskipper check` where no daemon runs: would one start here, and are the drives there?
+
+Listens only; nothing is transmitted on a bus.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from drivers.odrive.drives import OdriveDrives
+from drivers.pose.pose_port import PoseSourceError
+from firmware_host.buses import BusError, open_ports
+from firmware_host.computer.can_links import examine_bus, read_links
+from firmware_host.computer.host_checks import Account, examine_folder, examine_limits
+from firmware_host.computer.host_facts import process_limits
+from firmware_host.configuration.configuration import Configuration, ConfigurationError, load_configuration
+from firmware_host.operator.reports import check_item
+from firmware_host.pose_sources import open_pose
+
+LISTENING_S = 0.6  # six heartbeats
+
+
+def desk_check(path: Path, why_no_daemon: str) -> list[dict[str, Any]]:
+    fix = "start it ('systemctl start mudskipper'), name its socket with --socket, or join the group that owns it"
+    items = [check_item("daemon", False, why_no_daemon, fix)]
+    try:
+        configuration = load_configuration(path)
+    except ConfigurationError as problem:
+        return items + [check_item("configuration", False, sentence, f"edit {path}") for sentence in problem.problems]
+    items.append(check_item("configuration", True, str(path), ""))
+    return items + _drive_items(configuration) + _pose_items(configuration) + _host_items(configuration)
+
+
+def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
+    try:
+        ports = open_ports(configuration.bus)
+    except BusError as problem:
+        return [check_item("bus", False, str(problem), "bring the interface up: README, 'On the robot'")]
+    drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
+    deadline_s = time.monotonic() + LISTENING_S
+    while not drives.heard and time.monotonic() < deadline_s:
+        drives.read(time.monotonic())
+        time.sleep(0.01)
+    fix = "check its power, wiring, node id and cyclic message periods"
+    items = [
+        check_item(f"drive.{axis.joint}", axis.heard, "heard" if axis.heard else "not heard", fix)
+        for axis in drives.axes
+    ]
+    drives.close()
+    return items
+
+
+def _pose_items(configuration: Configuration) -> list[dict[str, Any]]:
+    """Of a source at the other end of a wire. Without a pose a robot walks, but its daemon wants the source to open."""
+    if configuration.pose.chosen not in ("natnet", "rail_encoder"):
+        return []
+    try:
+        pose = open_pose(configuration.pose)
+    except PoseSourceError as problem:
+        return [check_item("pose", False, str(problem), "plug it in, or correct [pose] in the configuration")]
+    deadline_s = time.monotonic() + LISTENING_S
+    while not isfinite(pose.read(time.monotonic()).x_m) and time.monotonic() < deadline_s:
+        time.sleep(0.01)
+    pose.close()
+    return [check_item("pose", True, pose.report().sentence, "")]
+
+
+def _host_items(configuration: Configuration) -> list[dict[str, Any]]:
+    findings = []
+    if configuration.log.enabled:
+        you = Account("you", os.geteuid(), frozenset({os.getegid(), *os.getgroups()}))
+        findings.append(examine_folder(Path(configuration.log.directory), you))
+    findings += examine_limits(configuration.loop, process_limits(Path("/"), None))
+    links = read_links()
+    for name, bus in configuration.bus.items():
+        drives = sum(drive.bus == name for drive in configuration.drive.values())
+        findings += examine_bus(name, bus, drives, links)[1:]  # whether it opens was said
+    return [finding.as_check_item for finding in findings]

@@ -1,0 +1,165 @@
+"""`mudskipper doctor`: the computer and its buses, line by line, with what to do. Looks only; transmits nothing."""
+
+from __future__ import annotations
+
+import argparse
+import grp
+import json
+import os
+import pwd
+from collections.abc import Iterator
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from command_line import exit_codes
+from command_line.screen import GREEN, RED, YELLOW, coloured
+from firmware_host.computer.can_links import CanLink, examine_bus, read_links
+from firmware_host.computer.findings import Finding, Level, fail, ok, warn
+from firmware_host.computer.host_checks import OURS, Account, examine_clock, examine_host, examine_storage, this_python
+from firmware_host.computer.host_facts import (
+    UNIT,
+    clock_is_synchronised,
+    has_clock_chip,
+    process_limits,
+    thread_priority,
+    unit_limits,
+)
+from firmware_host.configuration.configuration import Configuration, ConfigurationError, load_configuration
+from firmware_host.operator.rights import load_rights
+from firmware_host.operator.status_client import (
+    CallRefusedError,
+    DroppedError,
+    NoDaemonError,
+    NotPermittedError,
+    StatusClient,
+)
+from firmware_host.software_version import software_version
+
+ROOT = Path("/")
+MARKS = {Level.OK: ("ok  ", GREEN), Level.WARN: ("warn", YELLOW), Level.FAIL: ("FAIL", RED)}
+START = "'systemctl start mudskipper', then 'systemctl status mudskipper'"
+
+
+def doctor(options: argparse.Namespace) -> int:
+    try:
+        configuration = load_configuration(options.config)
+    except ConfigurationError as problem:
+        sentences = [fail("configuration", sentence, f"edit {options.config}") for sentence in problem.problems]
+        return _show([*sentences, *this_python(), _clock()], options.json)
+    socket = options.socket or Path(configuration.status.socket)
+    findings = [ok("configuration", str(options.config)), *examine_all(configuration, socket, read_links(ROOT))]
+    return _show(findings, options.json)
+
+
+def examine_all(configuration: Configuration, socket: Path, links: dict[str, CanLink]) -> Iterator[Finding]:
+    pid, daemon = _ask_daemon(socket, configuration.faults.longest_watchdog_s)
+    limits = process_limits(ROOT, pid) if pid else unit_limits(ROOT) or process_limits(ROOT, None)
+    priority = thread_priority(ROOT, pid) if pid else None
+    yield from examine_host(ROOT, configuration.loop, limits, priority)
+    for name, bus in configuration.bus.items():
+        drives = sum(drive.bus == name for drive in configuration.drive.values())
+        yield from examine_bus(name, bus, drives, links)
+    yield from examine_storage(ROOT, configuration.log, _writer(), pid is not None)
+    yield _clock()
+    yield from daemon
+    yield from _groups(configuration, socket)
+    yield from this_python()
+
+
+def _clock() -> Finding:
+    return examine_clock(datetime.now(UTC), clock_is_synchronised(), has_clock_chip(ROOT))
+
+
+def _ask_daemon(socket: Path, longest_watchdog_s: float) -> tuple[int | None, list[Finding]]:
+    """Its process id, and what it tells of itself and of its drives."""
+    pid = None
+    try:
+        client = StatusClient(socket)
+        try:
+            pid = client.daemon_pid
+            return pid, list(examine_daemon(client.call("status"), software_version(), longest_watchdog_s))
+        finally:
+            client.close()
+    except NotPermittedError as problem:
+        return pid, [warn("daemon", str(problem), "or run this with sudo")]
+    except DroppedError as problem:
+        return pid, [warn("daemon", str(problem), "try again")]
+    except NoDaemonError as problem:
+        return pid, [warn("daemon", f"{problem}: drives and their watchdogs are not known", START)]
+    except CallRefusedError as problem:
+        return pid, [fail("daemon", str(problem), START)]
+
+
+def examine_daemon(status: dict[str, Any], version: str, longest_watchdog_s: float) -> Iterator[Finding]:
+    """Of a status."""
+    text = f"runs, version {status['version']}, {status['mode']}"
+    if status["version"] == version:
+        yield ok("daemon", text)
+    else:
+        fix = "'systemctl restart mudskipper', with the robot disarmed"
+        yield warn("daemon", f"{text}; this command is version {version}", fix)
+    for drive in status["drives"]:
+        yield _examine_watchdog(f"watchdog.{drive['joint']}", drive["watchdog_s"], longest_watchdog_s)
+
+
+def _examine_watchdog(identity: str, watchdog_s: float | None, longest_s: float) -> Finding:
+    setting = "README, 'Setting up the drives'"
+    if watchdog_s is None:
+        return warn(identity, "not read back: the drive is silent, or its firmware's numbers are not known", setting)
+    if watchdog_s == 0.0:
+        return fail(identity, "off: nothing stops this motor when the computer dies", setting)
+    if watchdog_s > longest_s:
+        return fail(identity, f"{watchdog_s:g} s is slower than faults.longest_watchdog_s = {longest_s:g}", setting)
+    return ok(identity, f"{watchdog_s:g} s")
+
+
+def _writer() -> Account:
+    """The daemon's user where the service is installed, else this one."""
+    with suppress(KeyError):
+        if (ROOT / UNIT).exists():
+            user = pwd.getpwnam(OURS)
+            return Account(OURS, user.pw_uid, frozenset(os.getgrouplist(OURS, user.pw_gid)))
+    return Account("you", os.geteuid(), frozenset({os.getegid(), *os.getgroups()}))
+
+
+def _groups(configuration: Configuration, socket: Path) -> Iterator[Finding]:
+    """Who may use the socket."""
+    with suppress(OSError):
+        status = socket.stat()
+        yield ok("socket", f"{socket}, mode {status.st_mode & 0o777:o}, group {_group_name(status.st_gid)}")
+    try:
+        load_rights(configuration.status)
+    except ConfigurationError as problem:
+        yield from (fail("groups", sentence, "make the group, or leave the key out") for sentence in problem.problems)
+        return
+    name = configuration.status.drive_group or OURS
+    try:
+        members = grp.getgrnam(name).gr_mem
+    except KeyError:
+        yield warn("groups", f"there is no group {name}", "'mudskipper install' makes it")
+        return
+    text = f"operators are the members of {name}: {', '.join(members) or 'nobody but root'}"
+    yield ok("groups", text) if members else warn("groups", text, f"'adduser YOU {name}', then log in again")
+
+
+def _group_name(gid: int) -> str:
+    with suppress(KeyError):
+        return grp.getgrgid(gid).gr_name
+    return str(gid)
+
+
+def _show(findings: list[Finding], as_json: bool) -> int:
+    if as_json:
+        print(json.dumps([finding._asdict() for finding in findings]))
+    else:
+        for finding in findings:
+            print(_line(finding))
+    failed = any(finding.level is Level.FAIL for finding in findings)
+    return exit_codes.UNHEALTHY if failed else exit_codes.OK
+
+
+def _line(finding: Finding) -> str:
+    fix = f"\n       -> {finding.fix}" if finding.fix else ""
+    return f"{coloured(*MARKS[finding.level])} {finding.id:22} {finding.text}{fix}"

@@ -1,0 +1,241 @@
+"""The parsers of `mudskipper experiment NAME`: what each can be told."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from command_line.commands import DEFAULT_CONFIG, Commands, add, add_socket
+from command_line.option_types import (
+    between,
+    depth_cm,
+    folder,
+    lever_m,
+    mud_length,
+    plate_cm,
+    positive,
+    weights_g,
+    whole,
+)
+from control.records import JOINTS
+
+SEEDS, TRIALS = whole(1, 1000), whole(1, 100)
+STRENGTH_PA = between(50.0, 50000.0, "Pa")
+STAGE_SPEED_M_S = between(0.001, 1.0, "m/s")
+GRAVITY_M_S2 = between(9.7, 9.9, "m/s²")  # anywhere on Earth
+
+
+def add_experiments(commands: Commands) -> None:
+    experiment = commands.add_parser("experiment", help="The paper's experiments.")
+    names = experiment.add_subparsers(dest="name", required=True, metavar="name")
+    estimation = add(
+        names, "estimation", "experiments.estimation.estimation", "Estimated coefficients against a load cell."
+    )
+    _add_report(estimation, "the load cell is a virtual one", "write JSON and picture there")
+    estimation.add_argument("--setup", choices=("single", "walking", "both"), default="both")
+    estimation.add_argument("--seeds", type=SEEDS, default=10, metavar="N", help="trials of each mud (default: 10)")
+    muds = estimation.add_mutually_exclusive_group()
+    muds.add_argument("--mud", action="append", type=float, metavar="W", help="water content in percent, repeatable")
+    muds.add_argument("--strength", action="append", type=STRENGTH_PA, metavar="PA", help="instead, repeatable")
+    estimation.add_argument("--layers", metavar="A,B", help="disturbances, separated by commas, or none (default: all)")
+    _add_actuator(names)
+    _add_trackway(names)
+    _add_sweep(names)
+    _add_faults(names)
+    _add_flipper(names)
+    _add_walk(names)
+    _add_loadcell(names)
+    fit = add(
+        names,
+        "mud-fit",
+        "experiments.trackway.run_mud_fit",
+        "The simulator's muds, fitted to the paper's fixed depths.",
+    )
+    _add_report(fit, "the muds are the simulator's", "write JSON there")
+    fit.add_argument("--seeds", type=SEEDS, default=2, metavar="N", help="walks of each point (default: 2)")
+
+
+def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -> None:
+    experiment.add_argument("--simulated", action="store_true", help=simulated)
+    experiment.add_argument("--json", action="store_true", help="for machines")
+    experiment.add_argument("--out", type=folder, metavar="DIR", help=out)
+
+
+def _add_bench(experiment: argparse.ArgumentParser) -> None:
+    """Options of an experiment that a person makes at a robot, or nobody at a simulated one."""
+    _add_report(experiment, "robot and muds are simulated, nothing is asked", "for report, logs and what was measured")
+    add_socket(experiment)
+
+
+def _add_actuator(names: Commands) -> None:
+    actuator = add(
+        names, "actuator", "experiments.actuator.run_actuator", "Weights on a joint: torque constants and friction."
+    )
+    _add_report(actuator, "a simulated motor holds the weights, and nobody is asked", "for report, pictures and log")
+    add_socket(actuator)
+    actuator.add_argument(
+        "--joint", action="append", choices=JOINTS, help="repeatable (default: right_adduction, right_sweep)"
+    )
+    actuator.add_argument(
+        "--lever", type=lever_m, metavar="CM", dest="lever_m", help="axle to weight (default: the flipper's length)"
+    )
+    actuator.add_argument(
+        "--lever-tolerance",
+        type=between(0.0, 50.0, "mm"),
+        default=1.0,
+        metavar="MM",
+        dest="lever_tolerance_mm",
+        help="by which it may be wrong (default: %(default)g)",
+    )
+    actuator.add_argument("--weights", type=weights_g, metavar="G,G,...", help="in grams (default: the paper's)")
+    actuator.add_argument(
+        "--weight-tolerance",
+        type=between(0.0, 10.0, "%"),
+        default=0.1,
+        metavar="PERCENT",
+        dest="weight_tolerance_percent",
+        help="by which they may be wrong (default: %(default)g)",
+    )
+    actuator.add_argument("--trials", type=TRIALS, default=5, metavar="N", help="passes through them (default: 5)")
+    actuator.add_argument("--gravity", type=GRAVITY_M_S2, metavar="M/S2", help="of this place (default: 9.81)")
+    actuator.add_argument(
+        "--apply", action="store_true", help="write what was fitted to the configuration, if you agree"
+    )
+    actuator.add_argument("--config", type=Path, metavar="FILE", help=f"to change (default: {DEFAULT_CONFIG})")
+    actuator.add_argument("--seed", type=int, default=1, help="of the simulated motor")
+
+
+def _add_flipper(names: Commands) -> None:
+    flipper = add(
+        names, "flipper", "experiments.flipper.run_flipper", "A single flipper on a fixed base: coefficients of muds."
+    )
+    _add_bench(flipper)
+    flipper.add_argument("--mud", action="append", metavar="NAME", help="as its water in percent, repeatable")
+    flipper.add_argument("--trials", type=TRIALS, default=3, metavar="N", help="of each mud (default: 3)")
+    flipper.add_argument("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: 3)")
+    flipper.add_argument("--strides", type=TRIALS, default=1, metavar="N", help="of each trial (default: 1)")
+    flipper.add_argument("--flipper", choices=("left", "right"), default="right", help="in the mud (default: right)")
+    flipper.add_argument("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
+
+
+def _add_walk(names: Commands) -> None:
+    walk = add(
+        names, "walk", "experiments.walk.run_walk", "The walking robot over several muds: coefficients on the way."
+    )
+    _add_bench(walk)
+    walk.add_argument(
+        "--mud",
+        type=mud_length,
+        action="append",
+        metavar="NAME[=CM]",
+        help="as its water in percent, and its length (default: 61), one after the other along the way",
+    )
+    walk.add_argument("--trials", type=TRIALS, default=3, metavar="N", help="over the muds (default: 3)")
+    walk.add_argument("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: 3)")
+    walk.add_argument(
+        "--soft", action="append", metavar="NAME", help="mud in which to walk at 3 and at 5 cm besides, repeatable"
+    )
+    walk.add_argument("--flipper", choices=("left", "right"), default="right", help="to look at (default: right)")
+    walk.add_argument("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
+
+
+def _add_loadcell(names: Commands) -> None:
+    loadcell = add(
+        names, "loadcell", "experiments.loadcell.loadcell", "A mud's coefficients from a load cell on a linear stage."
+    )
+    _add_report(loadcell, "stage and load cell are emulated", "for report, pictures and samples; goes on where it was")
+    _add_amplifier(loadcell)
+    loadcell.add_argument(
+        "--mud", action="append", metavar="NAME", help="repeatable; simulated: water content in percent"
+    )
+    loadcell.add_argument("--trials", type=SEEDS, default=5, metavar="N", help="of shear and of insertion (default: 5)")
+    loadcell.add_argument("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: %(default)s)")
+    loadcell.add_argument(
+        "--depth-error",
+        type=between(0.0, 20.0, "mm"),
+        default=0.5,
+        metavar="MM",
+        help="one standard error of the depth that was set (default: %(default)s)",
+    )
+    loadcell.add_argument(
+        "--plate", type=plate_cm, default=(3.0, 3.5, 0.4), metavar="WxH", help="or WxHxT, in cm (default: 3x3.5x0.4)"
+    )
+    loadcell.add_argument(
+        "--speed", type=STAGE_SPEED_M_S, default=0.1, metavar="M/S", help="of the stage (default: 0.1)"
+    )
+    _add_stage_encoder(loadcell)
+    loadcell.add_argument("--compare", type=Path, metavar="FILE", help="summary.json of the flipper experiment")
+    loadcell.add_argument("--seed", type=int, default=1, metavar="N", help="of the simulation")
+
+
+def _add_amplifier(loadcell: argparse.ArgumentParser) -> None:
+    loadcell.add_argument(
+        "--port", metavar="PATH", help="of the cell's amplifier: /dev/serial/by-id/... is the same always"
+    )
+    loadcell.add_argument(
+        "--baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)"
+    )
+    loadcell.add_argument(
+        "--format", default="auto", metavar="NAME", help="of its lines: auto, number, indicator, column2, or a pattern"
+    )
+    loadcell.add_argument(
+        "--unit", default="", metavar="U", help="of its numbers: counts, g, kg, N ... (default: as it says)"
+    )
+    loadcell.add_argument("--scale", type=positive, metavar="X", help="newtons per unit, instead of a calibration")
+    loadcell.add_argument("--calibration", type=Path, metavar="FILE", help="made earlier, instead of two weights")
+
+
+def _add_stage_encoder(loadcell: argparse.ArgumentParser) -> None:
+    loadcell.add_argument(
+        "--position", nargs="?", const="", metavar="PATH", help="an encoder of the stage, which a hand may push then"
+    )
+    loadcell.add_argument(
+        "--position-step",
+        type=between(0.01, 10000.0, "um"),
+        metavar="UM",
+        help="way per count, whatever its sign",
+    )
+    loadcell.add_argument(
+        "--position-baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)"
+    )
+    loadcell.add_argument("--position-label", default="", metavar="TEXT", help="that each of its lines begins with")
+
+
+def _add_trackway(names: Commands) -> None:
+    trackway = add(
+        names, "trackway", "experiments.trackway.run_trackway", "Three muds in a row, at fixed and at chosen depths."
+    )
+    _add_report(trackway, "robot and muds are simulated; else a daemon's robot walks", "for report, pictures and log")
+    add_socket(trackway)
+    trackway.add_argument(
+        "--trials", "--seeds", type=SEEDS, metavar="N", help="of each gait (default: 3, as the paper)"
+    )
+    trackway.add_argument(
+        "--method", action="append", metavar="NAME", help="of adaptation, repeatable to compare (default: default)"
+    )
+    trackway.add_argument(
+        "--compartment", type=between(0.2, 100.0), metavar="M", help="length of each simulated mud (default: 0.61)"
+    )
+    trackway.add_argument(
+        "--mud",
+        type=mud_length,
+        action="append",
+        metavar="NAME[=CM]",
+        help="of a real trackway, and its length (default: 61), one after the other (default: the paper's)",
+    )
+
+
+def _add_sweep(names: Commands) -> None:
+    sweep = add(names, "sweep", "experiments.trackway.run_sweep", "Speed against depth in muds of any strength.")
+    _add_report(sweep, "robot and muds are simulated", "write JSON and picture there")
+    sweep.add_argument("--strength", action="append", type=STRENGTH_PA, metavar="PA", help="repeatable (default: 12)")
+    sweep.add_argument("--method", action="append", metavar="NAME", help="of adaptation, repeatable (default: all)")
+    sweep.add_argument("--seeds", type=SEEDS, default=2, metavar="N", help="walks of each point (default: 2)")
+
+
+def _add_faults(names: Commands) -> None:
+    faults = add(names, "faults", "experiments.faults.run_faults", "Every fault in every phase, against its bounds.")
+    _add_report(faults, "what fails is a simulated robot", "write JSON and picture there")
+    faults.add_argument("--seeds", type=SEEDS, default=1, metavar="N", help="cells of each pair (default: 1)")
+    faults.add_argument("--fault", action="append", metavar="NAME", help="repeatable (default: all)")
+    faults.add_argument("--phase", action="append", metavar="NAME", help="repeatable (default: all)")

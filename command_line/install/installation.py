@@ -1,0 +1,97 @@
+"""`mudskipper install` and `uninstall`: show what will be done to this computer, do it, and say how far it came."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from command_line import exit_codes
+from command_line.install.service_plan import CONFIGURATION, Plan, System, plan_installation, plan_removal
+from command_line.install.service_steps import Command, Run, StepError, WriteFile, perform, run_command
+from command_line.screen import complain
+
+HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # from the service: ProtectHome= and PrivateTmp=
+Find = Callable[[str], str | None]  # where a program is
+NEXT = """\
+Next: edit {root}etc/mudskipper/mudskipper.toml (your geometry, your drives), then
+  adduser YOU mudskipper             an operator; takes effect at the next login
+  systemctl start mudskipper
+  mudskipper doctor; mudskipper check"""
+
+
+def install(options: argparse.Namespace, run: Run = run_command, find: Find = shutil.which) -> int:
+    system = _system(options, run)
+    refusal = problem_with_place((system.prefix, Path(__file__).resolve().parent)) if system.live else ""
+    if refusal:
+        complain(refusal)
+        return exit_codes.REFUSED
+    plan = plan_installation(system)
+    status = _carry_out(options, system, plan, find)
+    is_new = any(isinstance(step, WriteFile) and step.path == system.root / CONFIGURATION for step in plan.steps)
+    if is_new and status == exit_codes.OK and not options.dry_run:
+        print(NEXT.format(root=str(system.root).rstrip("/") + "/"))
+    return status
+
+
+def uninstall(options: argparse.Namespace, run: Run = run_command, find: Find = shutil.which) -> int:
+    system = _system(options, run)
+    return _carry_out(options, system, plan_removal(system, options.purge), find)
+
+
+def _system(options: argparse.Namespace, run: Run) -> System:
+    root, prefix = options.root.resolve(), Path(sys.prefix)
+    if prefix.is_relative_to(root):
+        prefix = Path("/") / prefix.relative_to(root)
+    return System(root, prefix, run, live=root == Path("/"))
+
+
+def problem_with_place(places: Sequence[Path]) -> str:
+    """Why the service could not be started out of these; empty where it could."""
+    for place in places:
+        if any(place.is_relative_to(hidden) for hidden in HIDDEN):
+            return f"{place} is hidden from the service; install into an environment below /opt: README, 'On the robot'"
+    if not (places[0] / "bin" / "mudskipperd").exists():
+        return f"there is no mudskipperd in {places[0]}/bin: install the package there with pip first"
+    return ""
+
+
+def _carry_out(options: argparse.Namespace, system: System, plan: Plan, find: Find) -> int:
+    if system.live and os.geteuid() != 0 and not options.dry_run:
+        complain("this changes the system: run it with sudo, or look at it with --dry-run")
+        return exit_codes.NOT_PERMITTED
+    for note in plan.notes:
+        print(f"note: {note}")
+    if not plan.steps:
+        print("nothing to do")
+        return exit_codes.OK
+    if options.dry_run:
+        print("\n".join(("would:", *(f"  {step}" for step in plan.steps))))
+        return exit_codes.OK
+    missing = _missing_programs(plan, find)
+    if missing:
+        complain(f"{', '.join(missing)}: not installed. This needs systemd with udev and systemd-networkd")
+        return exit_codes.UNHEALTHY
+    print("\n".join(("will:", *(f"  {step}" for step in plan.steps))), flush=True)
+    return _perform_all(plan, system.run)
+
+
+def _missing_programs(plan: Plan, find: Find) -> list[str]:
+    programs = {step.words[0]: None for step in plan.steps if isinstance(step, Command)}
+    return [program for program in programs if find(program) is None]
+
+
+def _perform_all(plan: Plan, run: Run) -> int:
+    os.umask(0o022)  # what is written is for everybody to read
+    for number, step in enumerate(plan.steps):
+        try:
+            perform(step, run)
+        except StepError as problem:
+            complain(f"could not {step}: {problem}")
+            complain(f"done before that: {number} of {len(plan.steps)} steps. Mend it and run this again")
+            return exit_codes.UNHEALTHY
+    print("done")
+    return exit_codes.OK

@@ -1,0 +1,189 @@
+"""Commands that read logs: replay, plot, film, info, export."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+
+from command_line import exit_codes
+from command_line.logs.recorded_walk import RecordedWalk, read_walk
+from command_line.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of
+from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line, watched
+from firmware_host.configuration.configuration import ConfigurationError, load_configuration
+from firmware_host.log.log_folder import ACTIVE, DONE
+from firmware_host.log_reading.lab_csv import write_lab_csv
+from firmware_host.log_reading.log_reader import LogError, log_summary, read_log, read_logs
+from firmware_host.log_reading.replay import Replay, replay_files
+from firmware_host.operator.reports import map_report, stride_report
+
+Options = argparse.Namespace
+
+LONGEST_FILM_S = 60.0
+CUT_OFF = "the log is not finished: it is still being written, or was cut off; everything up to there was read"
+
+
+def replay(options: Options) -> int:
+    try:
+        configuration = load_configuration(options.config) if options.config else None
+        with watched() as watch:
+            replayed = replay_files(options.files, configuration, options.method, watch)
+    except ConfigurationError as problem:
+        complain(*problem.problems)
+        return exit_codes.CONFIGURATION
+    except LogError as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
+    _show_replay(replayed, options.json)
+    return exit_codes.OK
+
+
+def _show_replay(replayed: Replay, as_json: bool) -> None:
+    strides = [stride_report(stride) for stride in replayed.strides]
+    if as_json:
+        report = {"strides": strides, "map": map_report(replayed.map), "flippers": replayed.flippers}
+        print(json.dumps(report | {"complete": replayed.complete}))
+        return
+    print(f"{STRIDE_HEAD}  {'f_z in':>7} {'f_x':>6} {'f_z out':>7}\n{STRIDE_UNITS}  {'(N)':>7} {'(N)':>6} {'(N)':>7}")
+    for report, stride in zip(strides, replayed.strides, strict=True):
+        forces = f"{stride.insertion_force_n:7.1f} {stride.stance_force_n:6.1f} {stride.extraction_force_n:7.1f}"
+        print(f"{stride_line(report, replayed.begin_s)}  {forces}")
+    if not strides:
+        complain("no complete stride in this log")
+    if replayed.segment:
+        complain(
+            f"the run's segments before {replayed.segment} are not given: "
+            "the first strides can differ from those computed live"
+        )
+    if not replayed.complete:
+        complain(CUT_OFF)
+
+
+def plot(options: Options) -> int:
+    path = options.out or _beside(options.files[0], ".png")
+    try:
+        walk = _walk_for_picture(options, path)
+    except LogError as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
+    if not walk.strides:
+        complain("no complete stride in this log")
+    from command_line.pictures.walk_plot import plot_walk  # matplotlib takes its time
+
+    plot_walk(walk, path)
+    print(f"written  {path}")
+    return exit_codes.OK
+
+
+def film(options: Options) -> int:
+    path = options.out or _beside(options.files[0], "-strides.png")
+    moving = path.suffix == ".gif"
+    try:
+        walk = _walk_for_picture(options, path)
+        strides = _chosen_strides(options, walk, moving)
+    except LogError as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
+    except ValueError as problem:
+        complain(str(problem))
+        return exit_codes.USAGE
+    if moving:
+        _draw_film(walk, strides, path)
+    else:
+        from command_line.pictures.stride_strip import draw_strip
+
+        draw_strip(walk, strides, path)
+    names = [f"{outcome_of(stride, walk.geometric_step_m)} {stride['index']}" for stride in strides]
+    print(f"strides  {', '.join(names)}\nwritten  {path}")
+    return exit_codes.OK
+
+
+def _beside(log: Path, ending: str) -> Path:
+    """The log's name with another ending. A log that is being written leaves its folder, a picture would not."""
+    name = log.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap") + ending
+    if log.absolute().parent.name != ACTIVE:
+        return log.with_name(name)
+    done = log.absolute().parent.parent / DONE
+    return done / name if os.access(done, os.W_OK) else Path(name)
+
+
+def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
+    """With what is to be said of it. Raises LogError, also for a picture that nobody could write."""
+    with watched() as watch:
+        walk = read_walk(options.files[0], options.walk, options.files[1:], watch)
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise LogError(f"{path} cannot be written; choose another place with --out")
+    if walk.walks > 1 and not options.walk:
+        complain(f"the last of {walk.walks} walks in this log; --walk N takes another")
+    if walk.missing:
+        complain(f"not in this log: {', '.join(walk.missing)}")
+    if walk.cut:
+        complain(f"the walk may have {walk.cut}; give those files too")
+    if not walk.complete:
+        complain(CUT_OFF)
+    return walk
+
+
+def _chosen_strides(options: Options, walk: RecordedWalk, moving: bool) -> list[Stride]:
+    """Those asked for, or all for a film, or the clearest of each kind. Raises LogError, and ValueError for a wish that
+    cannot be fulfilled.
+    """
+    by_number = {stride["index"]: stride for stride in walk.own_strides}
+    if not by_number:
+        raise LogError(f"{options.files[0]}: no complete stride in this log")
+    for number in options.stride or ():
+        if number not in by_number:
+            raise ValueError(f"--stride {number}: this walk has {min(by_number)} to {max(by_number)}")
+    if options.stride:
+        strides = [by_number[number] for number in options.stride]
+    else:
+        strides = walk.own_strides if moving else choose_strides(walk)
+    length_s = sum(duration_s(walk, stride) for stride in strides)
+    if moving and length_s > LONGEST_FILM_S:
+        raise ValueError(f"{length_s:.0f} s of film are more than {LONGEST_FILM_S:.0f} s; choose with --stride")
+    return strides
+
+
+def _draw_film(walk: RecordedWalk, strides: list[Stride], path: Path) -> None:
+    from command_line.pictures.stride_film import draw_film
+
+    progress = Progress("frames")
+    try:
+        draw_film(walk, strides, path, progress.show)
+    finally:
+        progress.clear()
+
+
+def info(options: Options) -> int:
+    try:
+        with watched() as watch:
+            summary = log_summary(read_logs(options.files, watch))
+    except LogError as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
+    if options.json:
+        print(json.dumps(summary))
+    else:
+        for name, value in summary.items():
+            print(f"{name:16} {value}")
+    return exit_codes.OK
+
+
+def export(options: Options) -> int:
+    try:
+        with watched() as watch:
+            log = read_log(options.file, watch)
+    except LogError as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
+    if options.out is None:
+        write_lab_csv(log, sys.stdout)
+        return exit_codes.OK
+    if options.out.exists() and options.out.samefile(options.file):
+        complain(f"{options.out} is the log itself; name another file")
+        return exit_codes.USAGE
+    with Path(options.out).open("w", encoding="utf-8") as out, watched() as watch:
+        write_lab_csv(log, out, watch)
+    return exit_codes.OK

@@ -1,0 +1,147 @@
+"""`mudskipper log report`: what a log tells, as one page with its pictures, its numbers and the log itself."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from command_line import exit_codes
+from command_line.logs.recorded_walk import RecordedWalk, read_walk
+from command_line.pictures.stride_choice import choose_strides
+from command_line.screen import coefficient, complain, number, watched
+from experiments.reports.report_page import PAGE, Figure, Section, numbers_told, write_report
+from experiments.trials.whole_files import copy_whole
+from firmware_host.log_reading.log_reader import Log, LogError, Watch, begin_s, log_summary, read_logs
+from firmware_host.log_reading.replay import Replay, replay_files
+from firmware_host.operator.reports import map_report, stride_report
+
+EVENTS_TOLD = 200  # the last ones
+SINCE = "Times are since the log's begin."
+Report = dict[str, Any]
+
+
+def log_report(options: argparse.Namespace) -> int:
+    folder: Path = options.out or _beside(options.files[0])
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with watched() as watch:
+            report, sections = _told(options.files, watch)
+    except LogError as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
+    logs = [_copy(path, folder) for path in options.files]
+    written = write_report(folder, report, f"Log {options.files[0].name}", sections, logs)
+    print(json.dumps(numbers_told(report), allow_nan=False) if options.json else folder / PAGE)
+    print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
+    return exit_codes.OK
+
+
+def _beside(log: Path) -> Path:
+    """In the present folder: where logs lie there may be no permission to write."""
+    return Path(f"{log.name.removesuffix('.gz').removesuffix('.csv').removesuffix('.mcap')}-report")
+
+
+def _copy(log: Path, folder: Path) -> Path:
+    copy = folder / log.name
+    if copy.absolute() != log.absolute():
+        copy_whole(log, copy)
+    return copy
+
+
+def _told(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Section]]:
+    """Raises LogError."""
+    ours = read_logs(files, watch) if files[0].suffix == ".mcap" else None
+    replayed = replay_files(files, watch=watch)
+    report: Report = {
+        "log": [path.name for path in files],
+        "clock": "times of strides and events are by the log's own clock; the log begins at begin_s of it",
+        "begin_s": replayed.begin_s,
+        "summary": log_summary(ours) if ours else {},
+        "strides": [stride_report(stride) for stride in replayed.strides],
+        "map": map_report(replayed.map),
+        "events": ours.events if ours else [],
+    }
+    sections = [*_walk_sections(files, watch), _strides_section(replayed)]
+    return report, ([_summary_section(ours), *sections, _events_section(ours)] if ours else sections)
+
+
+def _summary_section(log: Log) -> Section:
+    unfinished = "" if log.complete else "The log was not finished: everything up to where it ends was read."
+    rows = [["", ""], *([name, _shown(value)] for name, value in log_summary(log).items())]
+    return Section("What the log holds", unfinished, rows=rows)
+
+
+def _shown(value: str | int | float | bool) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.2f}" if isinstance(value, float) else str(value)
+
+
+def _walk_sections(files: Sequence[Path], watch: Watch) -> list[Section]:
+    """One of each walk; none where the robot did not walk."""
+    try:
+        last = read_walk(files[0], 0, files[1:], watch)
+    except LogError as problem:
+        return [Section("Walks", f"{problem}.")]
+    walks = [read_walk(files[0], count, files[1:], watch) for count in range(1, last.walks)] + [last]
+    return [_walk_section(walk, count) for count, walk in enumerate(walks, 1)]
+
+
+def _walk_section(walk: RecordedWalk, count: int) -> Section:
+    from command_line.pictures.walk_plot import plot_walk  # matplotlib takes its time
+
+    begun = f"It begins {walk.begun_s:.2f} s after the log. Its pictures count from there, as 'mudskipper plot' does."
+    missing = f"Not in this log: {', '.join(walk.missing)}." if walk.missing else ""
+    cut = f"The walk may have {walk.cut}." if walk.cut else ""
+    figures = [Figure(f"walk-{count}", "Forces, coefficients, depth, place and steps.", partial(plot_walk, walk))]
+    if walk.own_strides:
+        figures.append(Figure(f"strides-{count}", "The clearest stride of each outcome.", partial(_draw_strip, walk)))
+    return Section(f"Walk {count}", "\n\n".join(filter(None, (begun, missing, cut))), figures=figures)
+
+
+def _draw_strip(walk: RecordedWalk, path: Path) -> None:
+    from command_line.pictures.stride_strip import draw_strip
+
+    draw_strip(walk, choose_strides(walk), path)
+
+
+def _strides_section(replayed: Replay) -> Section:
+    head = ["flipper", "stride", "from (s)", "k_p (N/cm³)", "k_s (N/cm³)", "k_e (N/cm³)", "depth (cm)", "step (cm)", ""]
+    return Section(
+        "Strides",
+        f"{SINCE} Coefficients with their standard error; after a ≥ where the mud did not yield, in brackets where not"
+        " valid."
+        if replayed.strides
+        else "No complete stride.",
+        rows=[head, *(_stride_row(stride_report(stride), replayed.begin_s) for stride in replayed.strides)]
+        if replayed.strides
+        else (),
+    )
+
+
+def _stride_row(stride: dict[str, Any], begin_s: float) -> list[str]:
+    return [
+        stride["flipper"],
+        str(stride["index"]),
+        f"{stride['t_start_s'] - begin_s:.2f}",
+        *(coefficient(stride[name]) for name in ("k_p", "k_s", "k_e")),
+        _in_cm(stride["depth_m"]),
+        _in_cm(stride["step_m"]),
+        "" if stride["released"] else "stuck",
+    ]
+
+
+def _in_cm(value_m: float | None) -> str:
+    return number(None if value_m is None else 100.0 * value_m, 1)
+
+
+def _events_section(log: Log) -> Section:
+    told = log.events[-EVENTS_TOLD:]
+    before = f" The last {len(told)} of {len(log.events)}." if len(told) < len(log.events) else ""
+    rows = [["at (s)", ""], *([f"{event['stamp_s'] - begin_s(log):.2f}", event["text"]] for event in told)]
+    return Section("Events", SINCE + before, rows=rows)

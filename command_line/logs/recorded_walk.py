@@ -1,0 +1,206 @@
+"""One walk out of a log as the pictures need it: the course of one flipper, and what both learned stride by stride.
+
+A log of ours holds all of it, for as many walks as there were while the daemon ran. The authors' CSV holds angles,
+currents and the body's place; forces and strides are what the estimator makes of them, as in `mudskipper replay`. What
+a log does not hold is NaN here, and named in `missing`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan, radians, sin
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from control.geometry import FlipperGeometry
+from control.modes import Mode
+from control.records import FLIPPERS, FlipperLoad, StrideEstimate
+from estimation.mud import EstimationParameters, MudEstimator
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.row_packing import stride_row
+from firmware_host.log.rows import STRIDE
+from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
+from firmware_host.log_reading.log_reader import (
+    Log,
+    LogError,
+    Watch,
+    begin_s,
+    log_summary,
+    read_log,
+    read_logs,
+    segment_of,
+    unwatched,
+)
+from firmware_host.log_reading.replay import LAB_DRIVE, NO_VELOCITY, PHASES, configuration_of
+
+Floats = NDArray[np.float64]
+Truths = NDArray[np.bool_]
+
+ANOTHER_MUD = "another mud"  # the loop's event after a stride that did not fit what was known
+WORDS = {"body_x_m": "the body's place, so no steps", "depth_command_m": "the commanded depth", "force_z_n": "forces"}
+
+
+class RecordedWalk(NamedTuple):
+    """Times are seconds since the walk began. Arrays have a value a row; those of joints belong to `flipper`."""
+
+    title: str
+    geometry: FlipperGeometry
+    sweep_rad: float  # commanded, in front and behind
+    flipper: str
+    time_s: Floats
+    phase: NDArray[np.int64]  # commanded
+    sweep_angle_rad: Floats
+    adduction_angle_rad: Floats
+    depth_m: Floats  # measured, below the nominal surface
+    depth_command_m: Floats
+    force_x_n: Floats
+    force_z_n: Floats
+    body_x_m: Floats
+    strides: list[dict[str, Any]]  # rows of log_rows.STRIDE, of both flippers
+    noticed_s: list[float]  # when the robot said that it was in another mud
+    walks: int = 1  # that the log holds
+    begun_s: float = 0.0  # since the log's begin
+    complete: bool = True  # False where the writer of the log was cut off, or still writes
+    cut: str = ""  # how the walk may reach beyond this log, in words
+
+    @property
+    def geometric_step_m(self) -> float:
+        """That of a plate which stands still in the mud while it sweeps: 2 l sin α."""
+        return 2.0 * self.geometry.flipper_length_m * sin(self.sweep_rad)
+
+    @property
+    def own_strides(self) -> list[dict[str, Any]]:
+        """Those of `flipper`."""
+        return [stride for stride in self.strides if FLIPPERS[stride["flipper"]] == self.flipper]
+
+    @property
+    def mud_starts_s(self) -> list[float]:
+        """Where each mud after the first began: with the stride that told of it."""
+        begun_s = [(stride["stamp_s"], stride["t_start_s"]) for stride in self.own_strides]
+        return [max((start for close, start in begun_s if close <= now), default=now) for now in self.noticed_s]
+
+    @property
+    def missing(self) -> list[str]:
+        """What the log does not hold, in words."""
+        return [words for name, words in WORDS.items() if not np.any(np.isfinite(getattr(self, name)))]
+
+
+def read_walk(path: Path, number: int = 0, more: Sequence[Path] = (), watch: Watch = unwatched) -> RecordedWalk:
+    """Walk `number` of a log, counted from 1; the last one for 0. With `more` segments of its run. Raises LogError."""
+    if more:
+        return numbered_walk(path, read_logs([path, *more], watch), number)
+    if path.name.endswith((".csv", ".csv.gz")):
+        return _only_walk(path, read_lab_csv(path), number)
+    if path.suffix == ".mcap":
+        return numbered_walk(path, read_log(path, watch), number)
+    raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
+
+
+def numbered_walk(path: Path, log: Log, number: int = 0) -> RecordedWalk:
+    """Of a log that was read already; `path` stands in what is refused. Raises LogError."""
+    configuration = configuration_of(path, log)
+    borders = np.flatnonzero(np.diff(log.ticks["mode"] == Mode.WALKING, prepend=False, append=False))
+    starts, ends = borders[::2], borders[1::2]
+    _refuse_number(path, number, len(starts))
+    chosen = number - 1 if number else len(starts) - 1
+    until_s = log.ticks["stamp_s"][starts[chosen + 1]] if chosen + 1 < len(starts) else np.inf
+    walk = _walk_of_log(log, configuration, slice(starts[chosen], ends[chosen]), float(until_s))
+    cut = _cut_of(log, bool(starts[chosen] == 0), bool(ends[chosen] == len(log.ticks)))
+    begun_s = float(log.ticks["stamp_s"][starts[chosen]]) - begin_s(log)
+    return walk._replace(walks=len(starts), begun_s=begun_s, complete=log.complete, cut=cut)
+
+
+def _cut_of(log: Log, from_the_first: bool, to_the_last: bool) -> str:
+    """A run is cut into segments wherever the robot is."""
+    number = segment_of(log)
+    before = [f"begun before segment {number}"] * (from_the_first and number > 0)
+    after = ["gone on in the next segment"] * (to_the_last and log.complete and "segment" in log.metadata)
+    return " and ".join(before + after)
+
+
+def _refuse_number(path: Path, number: int, walks: int) -> None:
+    if not walks:
+        raise LogError(f"{path}: nobody walked in this log")
+    if number > walks:
+        raise LogError(f"{path}: it has no walk {number}, only {walks}")
+
+
+def _walk_of_log(log: Log, configuration: Configuration, rows: slice, until_s: float) -> RecordedWalk:
+    """Strides and events count up to the walk after, at `until_s`."""
+    ticks, place = log.ticks[rows], len(FLIPPERS) - 1
+    start_s = float(ticks["stamp_s"][0])
+    told = [stride for stride in log.strides if start_s <= stride["stamp_s"] < until_s]
+    events = [event for event in log.events if start_s <= event["stamp_s"] < until_s]
+    summary = log_summary(log)
+    return RecordedWalk(
+        title=f"{summary['robot']}  {summary['started']}",
+        geometry=configuration.geometry,
+        sweep_rad=radians(configuration.gait.sweep_angle_deg),
+        flipper=FLIPPERS[place],
+        time_s=ticks["stamp_s"] - start_s,
+        phase=ticks["phase"].astype(np.int64),
+        sweep_angle_rad=ticks["angle_rad"][:, 2 * place],
+        adduction_angle_rad=ticks["angle_rad"][:, 2 * place + 1],
+        depth_m=ticks["depth_m"][:, place],
+        depth_command_m=ticks["depth_command_m"],
+        force_x_n=ticks["force_x_n"][:, place],
+        force_z_n=ticks["force_z_n"][:, place],
+        body_x_m=ticks["body_x_m"],
+        strides=[_since(start_s, stride) for stride in told],
+        noticed_s=[event["stamp_s"] - start_s for event in events if event["text"] == ANOTHER_MUD],
+    )
+
+
+def _since(start_s: float, stride: dict[str, Any]) -> dict[str, Any]:
+    return stride | {name: stride[name] - start_s for name in ("stamp_s", "t_start_s")}
+
+
+class _LabReading(NamedTuple):
+    """What the estimator says of one of the authors' runs."""
+
+    loads: list[FlipperLoad]  # of the flipper shown, a row each
+    strides: list[StrideEstimate]
+    noticed_s: list[float]
+
+
+def _read_lab(lab: LabLog, flipper: str) -> _LabReading:
+    """With what `replay_lab` assumes of a robot of which nothing else is known."""
+    drive = LAB_DRIVE._replace(current_limit_a=lab.current_limit_a)
+    parameters = EstimationParameters(fixed_base=len(lab.flippers) == 1)
+    estimator, reading = MudEstimator(FlipperGeometry(), (drive, drive), parameters), _LabReading([], [], [])
+    columns = (lab.stamp_s, lab.phase, lab.angle_rad, lab.current_a, lab.body_x_m)
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    for now_s, phase, angles_rad, currents_a, body_x_m in rows:
+        told = estimator.update(now_s, PHASES[phase], angles_rad, NO_VELOCITY, currents_a, body_x_m)
+        reading.loads.append(told.left if flipper == FLIPPERS[0] else told.right)
+        reading.strides.extend(stride for stride in told.strides if stride.flipper in lab.flippers)
+        if told.strides and estimator.belief.boundary:
+            reading.noticed_s.append(now_s)
+    return reading
+
+
+def _only_walk(path: Path, lab: LabLog, number: int) -> RecordedWalk:
+    _refuse_number(path, number, 1 if lab.flippers else 0)
+    flipper, start_s = lab.flippers[-1], float(lab.stamp_s[0])
+    place, reading = FLIPPERS.index(flipper), _read_lab(lab, flipper)
+    rows = [STRIDE.decode(stride_row(stride.t_end_s, stride, nan)) for stride in reading.strides]
+    return RecordedWalk(
+        title=path.name,
+        geometry=FlipperGeometry(),
+        sweep_rad=lab.gait.get("lateral_angle_range", radians(lab.gait.get("sweep_angle_deg", nan))),
+        flipper=flipper,
+        time_s=lab.stamp_s - start_s,
+        phase=lab.phase,
+        sweep_angle_rad=lab.angle_rad[:, 2 * place],
+        adduction_angle_rad=lab.angle_rad[:, 2 * place + 1],
+        depth_m=np.array([load.depth_m for load in reading.loads]),
+        depth_command_m=np.full(len(lab.stamp_s), lab.gait.get("insertion_angle", nan)),
+        force_x_n=np.array([load.force_x_n for load in reading.loads]),
+        force_z_n=np.array([load.force_z_n for load in reading.loads]),
+        body_x_m=lab.body_x_m,
+        strides=[_since(start_s, row) for row in rows],
+        noticed_s=[now_s - start_s for now_s in reading.noticed_s],
+    )

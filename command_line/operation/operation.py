@@ -1,0 +1,267 @@
+"""Commands to the running daemon. Standard library and msgpack only, so they start in a blink."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable
+from math import degrees, radians
+from typing import Any
+
+from command_line import exit_codes
+from command_line.operation.attended_walk import MILD, attend
+from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain, number, table
+from firmware_host.operator.counted_nouns import counted
+from firmware_host.operator.rpc import FOR_MEMBERS
+from firmware_host.operator.status_client import (
+    CallRefusedError,
+    DroppedError,
+    NoDaemonError,
+    NotPermittedError,
+    StatusClient,
+)
+
+Options = argparse.Namespace
+ARMING_S = 5.0
+STOPPING_S = 10.0
+CLEARING_S = 1.5
+MODE_COLOURS = {"fault": RED, "damping": RED, "walking": GREEN, "hold": GREEN, "stopping": YELLOW, "arming": YELLOW}
+
+
+def with_daemon(options: Options, act: Callable[[StatusClient], int]) -> int:
+    try:
+        client = StatusClient(options.socket)
+        try:
+            return act(client)
+        finally:
+            client.close()
+    except DroppedError as problem:
+        complain(str(problem))
+        return exit_codes.NO_DAEMON
+    except NoDaemonError as problem:
+        complain(f"{problem}. Start it with 'systemctl start mudskipper', or name its socket with --socket.")
+        return exit_codes.NO_DAEMON
+    except NotPermittedError as problem:
+        complain(str(problem))
+        return exit_codes.NOT_PERMITTED
+    except CallRefusedError as problem:
+        complain(str(problem))
+        return exit_codes.REFUSED
+
+
+def status(options: Options) -> int:
+    def show(client: StatusClient) -> int:
+        report = client.call("status")
+        print(json.dumps(report) if options.json else status_text(report))
+        return exit_codes.UNHEALTHY if report["mode"] in ("fault", "damping") else exit_codes.OK
+
+    return with_daemon(options, show)
+
+
+def watch(options: Options) -> int:
+    def show(client: StatusClient) -> int:
+        while True:
+            print("\033[H\033[J" + status_text(client.call("status")), flush=True)
+            time.sleep(options.period)
+
+    return with_daemon(options, show)
+
+
+def arm(options: Options) -> int:
+    params = {"force": options.force, "take_over": options.take_over}
+    return with_daemon(options, lambda client: _request(client, "arm", ("hold",), ARMING_S, **params))
+
+
+def walk(options: Options) -> int:
+    params: dict[str, Any] = {"strides": options.strides, "take_over": options.take_over}
+    if options.depth is not None:
+        params["depth_m"] = options.depth / 100.0
+    if options.attended:
+        return with_daemon(options, lambda client: attend(client, params))
+    return with_daemon(options, lambda client: _request(client, "walk", ("walking",), ARMING_S, **params))
+
+
+def move(options: Options) -> int:
+    """Until the joints are there; Ctrl-C stops them on their way."""
+
+    def act(client: StatusClient) -> int:
+        try:
+            angles_rad = {f"{joint}_rad": radians(angle_deg) for joint, angle_deg in options.angles}
+            client.call("move", take_over=options.take_over, **angles_rad)
+            while (report := client.call("status"))["moving"]:
+                time.sleep(0.05)
+        except KeyboardInterrupt:
+            client.call("stop")
+            raise
+        print(report["mode"])
+        if report["mode"] == "hold" and not report["notice"]:
+            return exit_codes.OK
+        complain(report["notice"] or f"the robot is in {report['mode']}")
+        return exit_codes.REFUSED
+
+    return with_daemon(options, act)
+
+
+def stop(options: Options) -> int:
+    at_rest = ("hold", "idle", "boot", "fault")
+    return with_daemon(options, lambda client: _request(client, "stop", at_rest, STOPPING_S))
+
+
+def disarm(options: Options) -> int:
+    return with_daemon(options, lambda client: _request(client, "disarm", ("idle", "boot", "fault"), ARMING_S))
+
+
+def clear(options: Options) -> int:
+    def act(client: StatusClient) -> int:
+        client.call("clear")
+        deadline_s = time.monotonic() + CLEARING_S
+        while time.monotonic() < deadline_s:
+            report = client.call("status")
+            if report["mode"] in ("idle", "boot") and not stopping_faults(report):
+                print(report["mode"])
+                return exit_codes.OK
+            time.sleep(0.05)
+        sentences = [fault["sentence"] for fault in stopping_faults(report)]
+        complain(f"the cause persists: {' '.join(sentences) or report['mode']}")
+        return exit_codes.REFUSED
+
+    return with_daemon(options, act)
+
+
+def stopping_faults(report: dict[str, Any]) -> list[dict[str, Any]]:
+    """Of a status: the faults that stand and are more than a warning."""
+    return [fault for fault in report["faults"] if fault["reaction"] not in MILD]
+
+
+def _request(client: StatusClient, method: str, modes: tuple[str, ...], longest_s: float, **params: Any) -> int:
+    """Ask, then wait until the robot is in one of `modes`. Whoever may stop it need not be allowed to see that."""
+    accepted = client.call(method, **params)
+    try:
+        return _await(client, modes, longest_s)
+    except NotPermittedError as problem:
+        group = str(problem).partition(FOR_MEMBERS)[2].partition(". ")[0]
+        print(f"{accepted}; whether the robot has stopped is shown to members of {group}")
+        return exit_codes.OK
+
+
+def _await(client: StatusClient, modes: tuple[str, ...], longest_s: float) -> int:
+    deadline_s = time.monotonic() + longest_s
+    while time.monotonic() < deadline_s:
+        report = client.call("status")
+        if report["mode"] in modes:
+            print(report["mode"])
+            if report["notice"]:
+                complain(report["notice"])
+            return exit_codes.OK
+        if report["mode"] == "fault":
+            complain(report["fault"]["sentence"] if report["fault"] else report["notice"])
+            return exit_codes.REFUSED
+        time.sleep(0.05)
+    complain(f"still {report['mode']} after {longest_s:g} s")
+    return exit_codes.TIMED_OUT
+
+
+def check(options: Options) -> int:
+    """Ask the daemon; where none runs, try what it would need."""
+    try:
+        StatusClient(options.socket).close()
+    except NoDaemonError as problem:
+        from command_line.doctor.checks_before_arming import (
+            desk_check,  # brings python-can and pydantic, which `status` must not load
+        )
+
+        return _show_items(options, desk_check(options.config, str(problem)))
+    except NotPermittedError:
+        pass  # as with_daemon tells it
+    return with_daemon(options, lambda client: _show_items(options, client.call("check")))
+
+
+def _show_items(options: Options, items: list[dict[str, Any]]) -> int:
+    if options.json:
+        print(json.dumps(items))
+    else:
+        for item in items:
+            print(_check_line(item))
+    return exit_codes.OK if all(item["ok"] for item in items) else exit_codes.UNHEALTHY
+
+
+def _check_line(item: dict[str, Any]) -> str:
+    mark = coloured("ok  ", GREEN) if item["ok"] else coloured("FAIL", RED)
+    overruled = "" if item.get("mandatory", True) else "; 'mudskipper arm --force' overrules this"
+    fix = f"\n       -> {item['fix']}{overruled}" if item["fix"] and not item["ok"] else ""
+    return f"{mark} {item['id']:24} {item['text']}{fix}"
+
+
+def status_text(report: dict[str, Any]) -> str:
+    mode = coloured(report["mode"], MODE_COLOURS.get(report["mode"], BOLD))
+    stride = "no stride" if report["stride"] < 0 else f"stride {report['stride']}"
+    lines = [f"{report['robot']}: {mode}, {stride}, {report['phase']}"]
+    lines[0] += f", depth {100 * report['depth_m']:.1f} cm, body {number(report['body_x_m'])} m"
+    if report["mode"] == "boot":
+        lines.append(_boot_line(report["drives"]))
+    lines += [_fault_line(fault) for fault in report["faults"]]
+    if report["lease"]:
+        lines.append(f"operated by {report['lease']}, which holds the lease")
+    notices = [report["notice"]] if report["notice"] else []
+    if report["forced"]:
+        notices.append("armed by force, against what 'mudskipper check' says")
+    if report["pose"]["trouble"]:
+        notices.append(f"{report['pose']['trouble']} 'mudskipper check' says what to do")
+    lines += [coloured(f"warning: {warning}", YELLOW) for warning in notices + report["warnings"]]
+    lines += ["", _drives_table(report["drives"]), "", _loop_text(report)]
+    return "\n".join(lines)
+
+
+def _boot_line(drives: list[dict[str, Any]]) -> str:
+    signals = ("angle_age_s", "current_age_s", "heartbeat_age_s")
+    unheard = [drive["joint"] for drive in drives if any(drive[signal] is None for signal in signals)]
+    return coloured(f"not heard yet: {', '.join(unheard) or 'none'}; 'mudskipper check' says what to do", YELLOW)
+
+
+def _fault_line(fault: dict[str, Any]) -> str:
+    colour = YELLOW if fault["reaction"] in MILD else RED
+    against = ", against arming" if fault["blocks_arming"] else ""
+    reaction = fault["reaction"].replace("_", " ")
+    return coloured(f"{fault['name']} ({reaction}{against}): {fault['sentence']}\n    -> {fault['what_to_do']}", colour)
+
+
+def _drives_table(drives: list[dict[str, Any]]) -> str:
+    rows = [
+        ("joint", "angle (°)", "current (A)", "torque (N·m)", "motor (°C)", "bus (V)", "age (ms)", "torque", "errors")
+    ]
+    for drive in drives:
+        angle_rad, age_s = drive["angle_rad"], drive["angle_age_s"]
+        rows.append(
+            (
+                drive["joint"],
+                number(None if angle_rad is None else degrees(angle_rad), 1),
+                number(drive["current_a"], 2),
+                number(drive["torque_command_nm"], 3),
+                number(drive["temperature_c"], 0),
+                number(drive["bus_voltage_v"], 1),
+                number(None if age_s is None else 1e3 * age_s, 1),
+                "on" if drive["closed_loop"] else "off",
+                drive["errors"] or "-",
+            )
+        )
+    return table(rows)
+
+
+def _loop_text(report: dict[str, Any]) -> str:
+    loop, bus, log = report["loop"], report["bus"], report["log"]
+    late, tick, pose = loop["wake_late_us"], loop["tick_us"], report["pose"]
+    seen = f"{pose['source']}: {pose['poses']} poses, {pose['garbled']} garbled, {pose['lost']} without the body"
+    return "\n".join(
+        (
+            f"loop   {loop['rate_hz']:.2f} Hz, {loop['ticks']} ticks, {loop['missed_ticks']} missed",
+            f"late   {late['p50']:.0f} us median, {late['p99']:.0f} p99, {late['max']:.0f} worst",
+            f"tick   {tick['p50']:.0f} us median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst",
+            f"bus    {bus['unknown_frames']} unknown, {bus['garbled_frames']} garbled,"
+            f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends"
+            + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")
+            + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),
+            f"pose   {seen if pose['source'] else 'none'}",
+            f"log    {log['path'] or 'off'}, {counted(log['dropped'], 'row')} dropped",
+        )
+    )

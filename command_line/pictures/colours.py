@@ -1,0 +1,20 @@
+"""The colours of all pictures of a walk: the same thing has the same one everywhere."""
+
+from __future__ import annotations
+
+from command_line.pictures.stride_choice import Outcome
+
+INK = "#33302c"
+FAINT = "#8c867d"  # what only helps the eye
+MUDS = ("#f1e8da", "#dfcfb6", "#c9b290")  # one after another along the way
+MUD, SURFACE = "#cdb48f", "#8a6d45"  # seen from the side
+BODY = "#ece8e1"
+FLIPPERS = {"left": "#8fbfd2", "right": "#1f6f8b"}
+TRAIL = "#b5462f"
+FORWARD, UP, FORCE = "#7a5195", "#2f6db5", "#8e24aa"
+OUTCOMES = {
+    Outcome.GOOD: "#2f7d4f",
+    Outcome.SLIPPING: "#e0970c",
+    Outcome.STUCK: "#c0392b",
+    Outcome.UNKNOWN: INK,
+}

@@ -1,0 +1,72 @@
+"""The robot from the side at one moment of a walk: body, arm and plate, where joints and body were measured to be."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Rectangle
+
+from command_line.logs.recorded_walk import RecordedWalk
+from command_line.pictures.colours import BODY, FAINT, FLIPPERS, INK, MUD, SURFACE, TRAIL
+from command_line.pictures.side_view import SideView, view_from_side
+
+BODY_LENGTH_M, BODY_HEIGHT_M, CORNER_M = 0.13, 0.052, 0.018  # no log knows the body
+EYE_M = 0.0045
+VEIL = 0.45  # how much of the mud lies over what is in it
+
+
+def prepare(panel: Axes, left_m: float, right_m: float, deepest_m: float, highest_m: float) -> None:
+    """Mud with its surface, and air."""
+    panel.set(xlim=(left_m, right_m), ylim=(-deepest_m, highest_m), aspect="equal")
+    panel.axis("off")
+    panel.add_patch(Rectangle((left_m, -deepest_m), right_m - left_m, deepest_m, color=MUD, linewidth=0))
+    panel.plot([left_m, right_m], [0.0, 0.0], color=SURFACE, linewidth=1.4)
+
+
+def body_place_m(walk: RecordedWalk, row: int) -> float:
+    """On the line between two known places where it was not measured, and zero where it never was."""
+    if np.isfinite(walk.body_x_m[row]):
+        return float(walk.body_x_m[row])
+    known = np.flatnonzero(np.isfinite(walk.body_x_m))
+    return float(np.interp(row, known, walk.body_x_m[known])) if len(known) else 0.0
+
+
+def view_of(walk: RecordedWalk, row: int, origin_m: float) -> SideView:
+    """`origin_m`: where the beginning of the track is drawn."""
+    sweep_rad, adduction_rad = float(walk.sweep_angle_rad[row]), float(walk.adduction_angle_rad[row])
+    return view_from_side(walk.geometry, sweep_rad, adduction_rad, body_place_m(walk, row) + origin_m)
+
+
+def draw_robot(panel: Axes, walk: RecordedWalk, row: int, origin_m: float) -> None:
+    view, colour = view_of(walk, row, origin_m), FLIPPERS[walk.flipper]
+    _draw_body(panel, *view.shoulder)
+    panel.add_patch(Polygon(view.plate, facecolor=colour, edgecolor=colour, linewidth=1.0, joinstyle="round"))
+    panel.plot(*zip(view.shoulder, view.hand, strict=True), color=INK, linewidth=3.0, solid_capstyle="round")
+    panel.plot(*view.shoulder, "o", color=INK, markersize=6)
+    veil = Polygon(view.plate, facecolor=MUD, alpha=VEIL, linewidth=0, zorder=3)
+    panel.add_patch(veil)
+    (left_m, right_m), (low_m, _) = panel.get_xlim(), panel.get_ylim()
+    veil.set_clip_path(Rectangle((left_m, low_m), right_m - left_m, -low_m, transform=panel.transData))
+
+
+def _draw_body(panel: Axes, x_m: float, z_m: float) -> None:
+    """Around its shoulder, with an eye in front."""
+    left_m, low_m = x_m - BODY_LENGTH_M / 2.0, z_m - BODY_HEIGHT_M / 2.0
+    outline = FancyBboxPatch(
+        (left_m + CORNER_M, low_m + CORNER_M),
+        BODY_LENGTH_M - 2.0 * CORNER_M,
+        BODY_HEIGHT_M - 2.0 * CORNER_M,
+        boxstyle=f"round,pad={CORNER_M}",
+        facecolor=BODY,
+        edgecolor=FAINT,
+        linewidth=1.2,
+    )
+    panel.add_patch(outline)
+    eye = (x_m + BODY_LENGTH_M / 2.0 - CORNER_M, z_m + BODY_HEIGHT_M / 2.0 - 0.75 * CORNER_M)
+    panel.add_patch(Circle(eye, EYE_M, color=INK))
+
+
+def draw_trail(panel: Axes, walk: RecordedWalk, rows: range, origin_m: float) -> None:
+    """The way of the plate's lower edge."""
+    edges = [view_of(walk, row, origin_m).edge for row in rows]
+    panel.plot(*zip(*edges, strict=True), color=TRAIL, linewidth=1.3, zorder=4)

@@ -1,0 +1,92 @@
+"""Which strides of a walk are worth a picture, and which moments of them.
+
+A stride fails in one of the paper's two ways (section III-A): the mud gives way and the body stays behind, or the
+flipper does not come out of the mud.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from command_line.logs.recorded_walk import RecordedWalk
+from control.records import Phase
+
+Stride = dict[str, Any]  # a row of log_rows.STRIDE
+
+FULL_SHARE = 0.5  # of the geometric step; below it a stride slips
+MOMENTS = (  # worth a picture: how they are called, the phase, and the share of it that has passed
+    ("insertion", Phase.INSERTION, 0.0),
+    ("insertion ends", Phase.INSERTION, 1.0),
+    ("stance", Phase.STANCE, 0.5),
+    ("stance ends", Phase.STANCE, 1.0),
+    ("extraction ends", Phase.EXTRACTION, 1.0),
+    ("recovery", Phase.RECOVERY, 0.5),
+    ("swing", Phase.SWING, 0.5),
+    ("swing ends", Phase.SWING, 1.0),
+)
+
+
+class Outcome(StrEnum):
+    SLIPPING = "slipping"
+    STUCK = "stuck"
+    GOOD = "good"
+    UNKNOWN = "unknown"  # without a pose nobody knows how far it went
+
+
+class Moment(NamedTuple):
+    caption: str
+    row: int
+
+
+def outcome_of(stride: Stride, geometric_step_m: float) -> Outcome:
+    if not stride["released"]:
+        return Outcome.STUCK
+    if np.isnan(stride["step_m"] - geometric_step_m):
+        return Outcome.UNKNOWN
+    return Outcome.SLIPPING if stride["step_m"] < FULL_SHARE * geometric_step_m else Outcome.GOOD
+
+
+def choose_strides(walk: RecordedWalk) -> list[Stride]:
+    """The clearest one of each outcome that there is."""
+    chosen = []
+    for outcome in Outcome:
+        strides = [stride for stride in walk.own_strides if outcome_of(stride, walk.geometric_step_m) is outcome]
+        ranks = [_rank(walk, stride, outcome) for stride in strides]
+        if strides:
+            chosen.append(strides[ranks.index(min(ranks))])
+    return chosen
+
+
+def _rank(walk: RecordedWalk, stride: Stride, outcome: Outcome) -> tuple[bool, float]:
+    """Lowest for the longest of the good ones and the shortest failure; one that begins above the mud comes before one
+    that was stuck already.
+    """
+    step_m = float(np.nan_to_num(stride["step_m"]))
+    began_in_mud = bool(walk.depth_m[rows_of(walk, stride).start] > 0.0)
+    return began_in_mud, -step_m if outcome is Outcome.GOOD else step_m
+
+
+def rows_of(walk: RecordedWalk, stride: Stride) -> range:
+    """From the start of its insertion to the end of the swing after it."""
+    first, close = (int(np.searchsorted(walk.time_s, stride[name])) for name in ("t_start_s", "stamp_s"))
+    beyond = close + np.flatnonzero(np.isin(walk.phase[close:], (Phase.INSERTION, Phase.REST)))
+    return range(first, int(beyond[0]) if len(beyond) else len(walk.time_s))
+
+
+def duration_s(walk: RecordedWalk, stride: Stride) -> float:
+    rows = rows_of(walk, stride)
+    return float(walk.time_s[rows.stop - 1] - walk.time_s[rows.start])
+
+
+def moments_of(walk: RecordedWalk, stride: Stride) -> list[Moment]:
+    """Those of MOMENTS that the stride has: a log may break off before the swing has ended."""
+    rows = rows_of(walk, stride)
+    phase, moments = walk.phase[rows.start : rows.stop], []
+    for caption, wanted, share in MOMENTS:
+        inside = np.flatnonzero(phase == wanted)
+        if len(inside):
+            moments.append(Moment(caption, rows.start + int(inside[round(share * (len(inside) - 1))])))
+    return moments

@@ -1,0 +1,145 @@
+"""A walk as a moving picture, seen from the side in real time. The camera goes along with the body; the scale stands
+still in the mud.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from io import BytesIO
+from math import ceil, floor, hypot
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
+import numpy as np  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
+from PIL import Image  # noqa: E402 - comes with matplotlib
+
+from command_line.logs.recorded_walk import RecordedWalk  # noqa: E402
+from command_line.pictures.colours import FORCE, INK, OUTCOMES, SURFACE  # noqa: E402
+from command_line.pictures.robot_sketch import body_place_m, draw_robot, draw_trail, prepare, view_of  # noqa: E402
+from command_line.pictures.stride_choice import Outcome, Stride, outcome_of, rows_of  # noqa: E402
+from control.records import Phase  # noqa: E402
+
+FRAMES_PER_S = 20  # GIF counts in hundredths of a second
+DEEPEST_M, HIGHEST_M, HALF_WIDTH_M = 0.085, 0.135, 0.25
+WIDTH_IN, DOTS_PER_INCH = 7.2, 100
+MARK_M = 0.1  # between marks in the mud
+FORCE_M_N = 0.008  # length of an arrow per newton
+LEAST_FORCE_N = 0.4
+COLOURS = 256  # all that a GIF can have
+ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": FORCE, "shrinkA": 0.0, "shrinkB": 0.0, "linewidth": 2.4}
+
+Show = Callable[[int, int], None]  # frames done and to do
+
+
+Frame = tuple[Stride, int]  # a row of the walk, with the stride that it belongs to
+
+
+def film_frames(walk: RecordedWalk, strides: Sequence[Stride]) -> list[Frame]:
+    """In real time, one stride after another."""
+    frames: list[Frame] = []
+    for stride in strides:
+        rows = rows_of(walk, stride)
+        stamps_s = np.arange(walk.time_s[rows.start], walk.time_s[rows.stop - 1], 1.0 / FRAMES_PER_S)
+        frames += [(stride, int(row)) for row in np.searchsorted(walk.time_s, stamps_s)]
+    return frames
+
+
+class Camera:
+    """Owns the figure on which one frame after another is drawn."""
+
+    def __init__(self, walk: RecordedWalk) -> None:
+        self.walk = walk
+        height_in = WIDTH_IN * (DEEPEST_M + HIGHEST_M) / (2.0 * HALF_WIDTH_M)
+        self._figure, self._panel = plt.subplots(figsize=(WIDTH_IN, height_in), dpi=DOTS_PER_INCH)
+        self._figure.subplots_adjust(0.0, 0.0, 1.0, 1.0)
+
+    def picture(self, frame: Frame) -> Image.Image:
+        self._panel.clear()
+        _draw_frame(self._panel, self.walk, *frame)
+        canvas: Any = self._figure.canvas
+        canvas.draw()
+        return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+
+    def close(self) -> None:
+        plt.close(self._figure)
+
+
+def draw_film(walk: RecordedWalk, strides: Sequence[Stride], path: Path, show: Show) -> None:
+    """A GIF that begins again when it has ended."""
+    frames, camera, film = film_frames(walk, strides), Camera(walk), BytesIO()
+    palette = _palette([camera.picture(frame) for frame in _fullest_frames(walk, strides)])
+
+    def pictures() -> Iterator[Image.Image]:
+        for number, frame in enumerate(frames, 1):
+            yield camera.picture(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+            show(number, len(frames))
+
+    rest = pictures()
+    next(rest).save(film, "GIF", save_all=True, append_images=rest, duration=1000 // FRAMES_PER_S, loop=0)
+    camera.close()
+    path.write_bytes(film.getvalue())
+
+
+def _fullest_frames(walk: RecordedWalk, strides: Sequence[Stride]) -> list[Frame]:
+    """One of each outcome, with its greatest force: together they have all colours of the film."""
+    one_of_each = {outcome_of(stride, walk.geometric_step_m): stride for stride in strides}.values()
+    return [(stride, max(rows_of(walk, stride), key=lambda row: hypot(*_force_n(walk, row)))) for stride in one_of_each]
+
+
+def _palette(pictures: Sequence[Image.Image]) -> Image.Image:
+    """The same for the whole film, so that nothing flickers."""
+    beside = Image.fromarray(np.hstack([np.asarray(picture) for picture in pictures]))
+    return beside.quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+
+
+def _force_n(walk: RecordedWalk, row: int) -> tuple[float, float]:
+    """Forward and up; zero where it is not known, as upward in stance."""
+    return float(np.nan_to_num(walk.force_x_n[row])), float(np.nan_to_num(walk.force_z_n[row]))
+
+
+def _draw_frame(panel: Axes, walk: RecordedWalk, stride: Stride, row: int) -> None:
+    place_m = body_place_m(walk, row)
+    prepare(panel, place_m - HALF_WIDTH_M, place_m + HALF_WIDTH_M, DEEPEST_M, HIGHEST_M)
+    _draw_marks(panel, place_m)
+    draw_robot(panel, walk, row, 0.0)
+    draw_trail(panel, walk, range(rows_of(walk, stride).start, row + 1), 0.0)
+    _draw_force(panel, walk, row)
+    _draw_words(panel, walk, stride, row)
+
+
+def _draw_marks(panel: Axes, place_m: float) -> None:
+    first, last = ceil((place_m - HALF_WIDTH_M) / MARK_M), floor((place_m + HALF_WIDTH_M) / MARK_M)
+    for number in range(first, last + 1):
+        panel.plot([number * MARK_M] * 2, [-DEEPEST_M, 0.012 - DEEPEST_M], color=SURFACE, linewidth=1.2)
+        place = (number * MARK_M + 0.004, 0.003 - DEEPEST_M)
+        panel.text(*place, f"{100.0 * number * MARK_M:.0f} cm", size=9, color=SURFACE, clip_on=True)
+
+
+def _draw_force(panel: Axes, walk: RecordedWalk, row: int) -> None:
+    """Of the mud on the flipper, drawn at its lower edge."""
+    force_n = _force_n(walk, row)
+    if not (walk.depth_m[row] > 0.0 and hypot(*force_n) > LEAST_FORCE_N):
+        return
+    x_m, z_m = view_of(walk, row, 0.0).edge
+    tip = (x_m + FORCE_M_N * force_n[0], z_m + FORCE_M_N * force_n[1])
+    panel.annotate("", tip, (x_m, z_m), arrowprops=ARROW, zorder=5)
+
+
+def _draw_words(panel: Axes, walk: RecordedWalk, stride: Stride, row: int) -> None:
+    outcome = outcome_of(stride, walk.geometric_step_m)
+    name = "stride" if outcome is Outcome.UNKNOWN else f"{outcome} stride"
+    phase = Phase(int(walk.phase[row])).name.lower()
+    words = {
+        0.02: (f"{name} {stride['index']}", OUTCOMES[outcome]),
+        0.30: (phase, INK),
+        0.48: (f"depth {100.0 * walk.depth_m[row]:.1f} cm", INK),
+        0.70: (f"force {hypot(*_force_n(walk, row)):.1f} N", FORCE),
+        0.88: (f"{walk.time_s[row]:.1f} s", INK),
+    }
+    for place, (text, colour) in words.items():
+        panel.text(place, 0.93, text, size=11, color=colour, transform=panel.transAxes, va="center")

@@ -1,0 +1,94 @@
+"""Strides side by side as strips of pictures: how the flipper stands in the mud from insertion to the next one, and how
+far the body has come.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
+import numpy as np  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
+
+from command_line.logs.recorded_walk import RecordedWalk  # noqa: E402
+from command_line.pictures.colours import INK, OUTCOMES  # noqa: E402
+from command_line.pictures.robot_sketch import body_place_m, draw_robot, draw_trail, prepare  # noqa: E402
+from command_line.pictures.stride_choice import MOMENTS, Outcome, Stride, moments_of, outcome_of, rows_of  # noqa: E402
+
+DEEPEST_M, HIGHEST_M = 0.106, 0.146  # of what a row shows, below and above the surface
+APART_M = 0.235  # from one moment to the next
+MARGIN_M = 0.09
+LEAST_ARROW_M = 0.015
+WIDTH_IN, HEAD_IN, FOOT_IN, DOTS_PER_INCH = 12.0, 0.36, 0.34, 150
+ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": INK, "shrinkA": 0.0, "shrinkB": 0.0, "linewidth": 1.2}
+WITH_PLACE = "Arrow: how far the body has come since the insertion began.  Red line: the way of the plate's lower edge."
+WITHOUT_PLACE = "Red line: the way of the plate's lower edge.  Where the body was is not in this log."
+
+
+def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> None:
+    """A row a stride, each a series of moments."""
+    shown = {moment.caption for stride in strides for moment in moments_of(walk, stride)}
+    captions = [caption for caption, *_ in MOMENTS if caption in shown]
+    farthest_m = max(_farthest_m(walk, stride) for stride in strides)
+    width_m = 2.0 * MARGIN_M + APART_M * (len(captions) - 1) + farthest_m
+    height_in = WIDTH_IN * (DEEPEST_M + HIGHEST_M) / width_m * len(strides) + HEAD_IN + FOOT_IN
+    figure, panels = plt.subplots(len(strides), 1, figsize=(WIDTH_IN, height_in), squeeze=False)
+    figure.subplots_adjust(0.0, FOOT_IN / height_in, 1.0, 1.0 - HEAD_IN / height_in, hspace=0.0)
+    for panel, stride in zip(panels[:, 0], strides, strict=True):
+        prepare(panel, -MARGIN_M, width_m - MARGIN_M, DEEPEST_M, HIGHEST_M)
+        _draw_row(panel, walk, stride, captions)
+    _write_captions(figure, captions, width_m, height_in)
+    legend = WITH_PLACE if np.any(np.isfinite(walk.body_x_m)) else WITHOUT_PLACE
+    figure.text(0.012, 0.45 * FOOT_IN / height_in, legend, size=12, va="center", color=INK)
+    figure.savefig(path, dpi=DOTS_PER_INCH)
+    plt.close(figure)
+
+
+def _write_captions(figure: Figure, captions: Sequence[str], width_m: float, height_in: float) -> None:
+    for column, caption in enumerate(captions):
+        place = (MARGIN_M + column * APART_M) / width_m, 1.0 - 0.65 * HEAD_IN / height_in
+        figure.text(*place, caption, size=13, ha="center", va="center", color=INK)
+
+
+def _farthest_m(walk: RecordedWalk, stride: Stride) -> float:
+    """That the body gets in a stride."""
+    rows = rows_of(walk, stride)
+    return max(body_place_m(walk, row) for row in rows) - body_place_m(walk, rows.start)
+
+
+def _draw_row(panel: Axes, walk: RecordedWalk, stride: Stride, captions: Sequence[str]) -> None:
+    """Each moment under its caption."""
+    first = rows_of(walk, stride).start
+    start_m = body_place_m(walk, first)
+    _draw_title(panel, walk, stride)
+    for caption, row in moments_of(walk, stride):
+        begin_m = captions.index(caption) * APART_M
+        draw_robot(panel, walk, row, begin_m - start_m)
+        draw_trail(panel, walk, range(first, row + 1), begin_m - start_m)
+        if np.all(np.isfinite(walk.body_x_m[[first, row]])):
+            _draw_advance(panel, begin_m, body_place_m(walk, row) - start_m)
+
+
+def _draw_title(panel: Axes, walk: RecordedWalk, stride: Stride) -> None:
+    outcome, place = outcome_of(stride, walk.geometric_step_m), (0.018 - MARGIN_M, HIGHEST_M - 0.03)
+    name = "stride" if outcome is Outcome.UNKNOWN else f"{outcome} stride"
+    told = f"number {stride['index']}, {100.0 * stride['depth_m']:.1f} cm deep, at {stride['t_start_s']:.1f} s"
+    title = panel.annotate(name, place, weight="bold", size=15, color=OUTCOMES[outcome])
+    after: dict[str, Any] = {"xycoords": (title, "data"), "xytext": (10, 0), "textcoords": "offset points"}
+    panel.annotate(told, (1, place[1]), size=12, color=INK, **after)
+
+
+def _draw_advance(panel: Axes, start_m: float, advance_m: float) -> None:
+    z_m = 0.033 - DEEPEST_M
+    panel.plot([start_m, start_m], [z_m - 0.006, z_m + 0.006], color=INK, linewidth=1.2)
+    if abs(advance_m) > LEAST_ARROW_M:
+        panel.annotate("", (start_m + advance_m, z_m), (start_m, z_m), arrowprops=ARROW)
+    text = f"{100.0 * advance_m:+.1f} cm"
+    text = "0 cm" if text in ("+0.0 cm", "-0.0 cm") else text
+    panel.text(start_m - 0.003, z_m - 0.009, text, size=12, va="top", color=INK)

@@ -1,0 +1,197 @@
+"""A walk against time, after the paper's figure 8: forces, coefficients, depth, place and steps, muds shaded.
+
+The paper's own figure shades the muds that the experimenters had laid; so does the demo, which knows its track. From a
+log alone a mud begins with the stride after which the robot said so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
+import numpy as np  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
+
+from command_line.logs.recorded_walk import RecordedWalk  # noqa: E402
+from command_line.pictures.colours import FAINT, FLIPPERS, FORWARD, INK, MUDS, OUTCOMES, SURFACE, UP  # noqa: E402
+from command_line.pictures.stride_choice import Outcome, outcome_of  # noqa: E402
+from control.records import FLIPPERS as NAMES  # noqa: E402
+from experiments.trials.mud_names import mud_label  # noqa: E402
+from simulation.mud.track import Track  # noqa: E402
+
+WIDTH_IN, PANEL_IN, DOTS_PER_INCH = 10.0, 1.55, 120
+COEFFICIENTS = ("k_p", "k_s", "k_e")
+NOTICED = (0, (2, 2))  # dashes
+SHORTEST_S = 0.1
+FULL_VIEW = 1.6  # of the largest value: error bars may reach beyond what is shown
+LEGEND: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.97), "fontsize": "small", "frameon": False}
+STYLE: dict[Any, Any] = {
+    "axes.edgecolor": FAINT,
+    "axes.labelcolor": INK,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+}
+MudRegion = tuple[float, float, str]  # from, to in s, and its name
+
+
+Draw = Callable[[Axes, RecordedWalk], None]
+
+
+def plot_walk(walk: RecordedWalk, path: Path, track: Track | None = None) -> None:
+    """`track`: the muds that were really there."""
+    wanted, regions = _panels(walk), mud_regions(walk, track)
+    size = (WIDTH_IN, PANEL_IN * len(wanted) + 0.4)
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(len(wanted), 1, figsize=size, sharex=True, squeeze=False, layout="constrained")
+        panels = axes[:, 0]
+        for panel, (label, draw) in zip(panels, wanted, strict=True):
+            draw(panel, walk)
+            panel.set_ylabel(label)
+            _shade(panel, regions, walk.noticed_s)
+        _name_muds(panels[0], regions)
+        panels[0].set_xlim(0.0, max(float(walk.time_s[-1]), SHORTEST_S))
+        panels[-1].set_xlabel("time (s)")
+        panels[-1].set_title(f"{walk.flipper} flipper, {walk.title}", y=-0.42, loc="right", size=8, color=FAINT)
+        figure.align_ylabels()
+        figure.savefig(path, dpi=DOTS_PER_INCH)
+        plt.close(figure)
+
+
+def _panels(walk: RecordedWalk) -> list[tuple[str, Draw]]:
+    """Those of which the log holds anything."""
+    panels: list[tuple[str, Draw]] = [("force (N)", _plot_forces)]
+    panels += [(f"${name}$ (N/cm³)", partial(_plot_coefficient, name=name)) for name in COEFFICIENTS]
+    panels.append(("depth (cm)", _plot_depth))
+    if np.any(np.isfinite(walk.body_x_m)):
+        panels += [("body (m)", _plot_place), ("step (cm)", _plot_steps)]
+    return panels
+
+
+def mud_regions(walk: RecordedWalk, track: Track | None) -> list[MudRegion]:
+    """Along the time axis: from the first arrival of the body in one mud to that in the next, or as the robot said."""
+    end_s = float(walk.time_s[-1])
+    if track is None:
+        starts_s = [0.0, *walk.mud_starts_s]
+        names = [f"mud {number}" for number in range(1, len(starts_s) + 1)]
+    else:
+        borders_m = [segment.end_m for segment in track.segments[:-1]]
+        starts_s = [0.0, *(_arrival_s(walk, border_m) for border_m in borders_m)]
+        names = [mud_label(segment.clay.name) for segment in track.segments]
+    return [
+        (start_s, until_s, name)
+        for start_s, until_s, name in zip(starts_s, [*starts_s[1:], end_s], names, strict=True)
+        if start_s < until_s
+    ]
+
+
+def _arrival_s(walk: RecordedWalk, place_m: float) -> float:
+    """At the end of the walk where it never came so far."""
+    beyond = np.flatnonzero(walk.body_x_m >= place_m)
+    return float(walk.time_s[beyond[0] if len(beyond) else -1])
+
+
+def _shade(panel: Axes, regions: list[MudRegion], noticed_s: list[float]) -> None:
+    for number, (start_s, end_s, _) in enumerate(regions):
+        panel.axvspan(start_s, end_s, color=MUDS[number % len(MUDS)], linewidth=0, zorder=0)
+    for at_s in noticed_s:
+        panel.axvline(at_s, color=INK, linewidth=1.0, linestyle=NOTICED)
+
+
+def _name_muds(panel: Axes, regions: list[MudRegion]) -> None:
+    """Above the panel's legend."""
+    above: dict[str, Any] = {
+        "xycoords": ("data", "axes fraction"),
+        "xytext": (0.0, 18.0),
+        "textcoords": "offset points",
+    }
+    for start_s, end_s, name in regions:
+        panel.annotate(name, ((start_s + end_s) / 2.0, 1.0), ha="center", weight="bold", annotation_clip=False, **above)
+
+
+def _plot_forces(panel: Axes, walk: RecordedWalk) -> None:
+    panel.plot(walk.time_s, walk.force_x_n, color=FORWARD, linewidth=0.8, label="$f_x$ forward")
+    panel.plot(walk.time_s, walk.force_z_n, color=UP, linewidth=0.8, label="$f_z$ up")
+    panel.legend(ncols=2, **LEGEND)
+
+
+def _explain_coefficients(panel: Axes, walk: RecordedWalk) -> None:
+    """What the marks in all panels of coefficients mean, as far as they occur."""
+    for flipper in dict.fromkeys(NAMES[stride["flipper"]] for stride in walk.strides):
+        panel.plot([], [], "o", color=FLIPPERS[flipper], label=flipper)
+    if any(stride[f"{name}_at_least"] for name in COEFFICIENTS for stride in walk.strides):
+        panel.plot([], [], "^", color=FAINT, label="lower bound")
+    if any(not stride[f"{name}_valid"] for name in COEFFICIENTS for stride in walk.strides):
+        panel.plot([], [], "o", color=FAINT, markerfacecolor="white", label="not valid")
+    if walk.noticed_s:
+        panel.plot([], [], color=INK, linewidth=1.0, linestyle=NOTICED, label="another mud noticed")
+    if panel.get_legend_handles_labels()[0]:
+        panel.legend(ncols=5, **LEGEND)
+
+
+def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
+    """Full dots are values, triangles lower bounds, hollow ones not valid; bars are two standard errors."""
+    told = [stride for stride in walk.strides if np.isfinite(stride[name])]
+    for stride in told:
+        colour = FLIPPERS[NAMES[stride["flipper"]]]
+        panel.errorbar(
+            stride["stamp_s"],
+            stride[name] / 1e6,
+            2.0 * stride[f"{name}_std_error"] / 1e6,
+            fmt="^" if stride[f"{name}_at_least"] else "o",
+            markersize=5,
+            linewidth=1.2,
+            color=colour,
+            markerfacecolor=colour if stride[f"{name}_valid"] else "white",
+            label="_",
+        )
+    largest = max((stride[name] / 1e6 for stride in told), default=0.0)
+    panel.set_ylim(0.0, FULL_VIEW * largest if largest > 0.0 else 1.0)
+    if name == COEFFICIENTS[0]:
+        _explain_coefficients(panel, walk)
+
+
+def _plot_depth(panel: Axes, walk: RecordedWalk) -> None:
+    panel.plot(walk.time_s, 100.0 * walk.depth_m, color=FLIPPERS[walk.flipper], linewidth=1.0, label="measured")
+    panel.plot(walk.time_s, 100.0 * walk.depth_command_m, color=INK, linewidth=0.8, label="commanded")
+    chosen_m = {s["stamp_s"]: s["chosen_depth_m"] for s in walk.own_strides if np.isfinite(s["chosen_depth_m"])}
+    if chosen_m:
+        chosen_cm = [100.0 * depth_m for depth_m in chosen_m.values()]
+        panel.plot(list(chosen_m), chosen_cm, "v", color=INK, label="chosen for the next stride")
+    stuck_s = [stride["stamp_s"] for stride in walk.own_strides if not stride["released"]]
+    if stuck_s:
+        stuck_cm = 100.0 * np.interp(stuck_s, walk.time_s, walk.depth_m)
+        panel.plot(stuck_s, stuck_cm, "x", color=OUTCOMES[Outcome.STUCK], markeredgewidth=2.0, label="stuck")
+    panel.axhline(0.0, color=SURFACE, linewidth=1.0)
+    panel.invert_yaxis()
+    panel.legend(ncols=4, **LEGEND)
+
+
+def _plot_place(panel: Axes, walk: RecordedWalk) -> None:
+    panel.plot(walk.time_s, walk.body_x_m, color=INK, linewidth=1.2)
+
+
+def _plot_steps(panel: Axes, walk: RecordedWalk) -> None:
+    """A bar from the start of a stride to its close, in the colour of how it went."""
+    known = [stride for stride in walk.own_strides if np.isfinite(stride["step_m"])]
+    for outcome in Outcome:
+        went = [stride for stride in known if outcome_of(stride, walk.geometric_step_m) is outcome]
+        starts_s = [stride["t_start_s"] for stride in went]
+        lengths_s = [stride["stamp_s"] - stride["t_start_s"] for stride in went]
+        steps_cm = [100.0 * stride["step_m"] for stride in went]
+        if went:
+            panel.bar(starts_s, steps_cm, lengths_s, align="edge", color=OUTCOMES[outcome], label=str(outcome))
+    panel.axhline(0.0, color=FAINT, linewidth=0.8)
+    if np.isfinite(walk.geometric_step_m):
+        step_cm = 100.0 * walk.geometric_step_m
+        panel.axhline(step_cm, color=INK, linewidth=0.8, linestyle=":", label="$2l\\,\\sin\\alpha$")
+    if panel.get_legend_handles_labels()[0]:
+        panel.legend(ncols=4, **LEGEND)

@@ -1,0 +1,208 @@
+"""What a stride at another depth would find: the flippers' thrust and the torque that pulls them out, on the safe side.
+
+Thrust of one flipper, straight out, is f_x = k_s(z) ∫ζ dA (control/plate.py), and no more than its motor can push. A
+mud that yielded told its k_s. One that did not told only that it bears so much, but the insertion told its k_p, and
+both come from the one strength of the mud: k_s = ρ k_p. ρ is 0.69 in the authors' log whose insertion can be read
+(their 12.5N mud, 1.8 cm), and 0.43 to 0.63 by the clay practice of Matlock and Prandtl from 0.5 to 4.5 kPa and 1.8 to
+3 cm. So it starts between, is corrected wherever k_s and k_p are both known, and is never trusted to better than a
+fifth. The larger one of both tellings holds, since each is on the safe side.
+
+The torque of an extraction is k_e(z) Φ in the pose at the rear end of the sweep, times the share of it that is felt
+at most at one moment: k_e is that of a whole stroke, and mud's force grows more slowly with depth than the law, so the
+hardest moment falls short of k_e Φ at the deepest point. The share is learned from the hardest moment of every
+extraction, and from 1, which is safe. Where k_e is not known, k_p Φ stands for that torque: k_e is 1.3 to 1.8 times
+k_p by clay practice (0.8 in the log above) and the share about a half. A flipper that came out proves what it took, in
+every shallower place too, and no more than in proportion to Φ in a deeper one, since k_e falls with depth. One that
+stuck proves τ_e ≥ τ_m there, whatever was believed, and elsewhere in proportion to depth (Φ k_e is near that); this is
+remembered until it comes out of there, or the mud changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import exp, inf, isfinite, log, radians
+
+from control.gait.gait import GaitParameters
+from control.geometry import FlipperGeometry
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudBelief
+from control.plate import stroke_moment_m4, submerged_plate
+from control.records import StrideEstimate
+
+SHEAR_RATIO = 0.55  # k_s over k_p before any mud told both
+RATIO_DOUBT = 0.2
+SUCTION_RATIO = 1.0  # of the hardest moment's torque over k_p Φ, where k_e is not known
+LEARNING = 0.25  # weight of a new stride in what is learned from many
+SHARES = (0.2, 1.5)  # bounds of what can be learned of each
+RATIOS = (0.2, 1.5)
+THRUST_DOUBT, SUCTION_DOUBT = 1.0, 2.0  # standard errors: a slip costs half a step, a stuck flipper the walk
+SAG_SHARE = 0.25  # of the deepest moment's, on average over the stance
+GRID_M = 0.0025  # depths that are told apart; the joints do not follow more finely in mud
+
+
+class DepthForecast:
+    """Owns what outlives a belief: ratio, share, and how deep each flipper was in this mud when it stuck.
+
+    `gait` is that of the strides that are told of and asked about. A method that varies it sets it before either.
+    """
+
+    def __init__(self, geometry: FlipperGeometry, gait: GaitParameters, motor_force_n: float) -> None:
+        self.geometry = geometry
+        self.gait = gait
+        self.motor_force_n = motor_force_n
+        self.reset()
+
+    def reset(self) -> None:
+        self.shear_ratio, self.felt_share = SHEAR_RATIO, 1.0
+        self._shares_told = 0
+        self._belief = NOTHING_KNOWN
+        self._strides: Sequence[StrideEstimate] = ()
+        self._stuck_m: dict[str, float] = {}
+        self._sag_m = 0.0
+        self._walked_m4: dict[str, float] = {}  # Φ of each flipper's last stride
+
+    def update(self, belief: MudBelief, strides: Sequence[StrideEstimate], walked_m: float) -> None:
+        """The strides that just closed, one of each flipper, the depth they were told, and the belief after them."""
+        self._belief, self._strides = belief, strides
+        sags_m = [stride.depth_m + stride.surface_m - walked_m for stride in strides]
+        self._sag_m = SAG_SHARE * max(0.0, min([sag_m for sag_m in sags_m if isfinite(sag_m)], default=0.0))
+        if belief.boundary:
+            self._stuck_m.clear()
+        for stride in strides:
+            surface_m = _known(stride.surface_m)
+            self._walked_m4[stride.flipper] = self._lift_moment_m4(_known(stride.depth_m) + surface_m, surface_m)
+            self._remember(stride)
+            self._learn_share(stride)
+        self._learn_ratio(belief)
+
+    def _remember(self, stride: StrideEstimate) -> None:
+        reached_m = max(_known(stride.depth_m), GRID_M)
+        stuck_m = self._stuck_m.get(stride.flipper, inf)
+        if not stride.released:
+            self._stuck_m[stride.flipper] = min(reached_m, stuck_m)
+        elif reached_m > stuck_m - GRID_M / 2.0:
+            del self._stuck_m[stride.flipper]
+
+    def _learn_share(self, stride: StrideEstimate) -> None:
+        """From an extraction that told k_e and was not held: there the motor's limit, not the mud, sets the torque."""
+        told = stride.k_e.valid and not stride.k_e.at_least and isfinite(stride.surface_m)
+        if not (stride.released and told and stride.depth_m > 0.0):
+            return
+        whole_nm = stride.k_e.value * self._walked_m4[stride.flipper]
+        if whole_nm > 0.0 and stride.extraction_torque_nm > 0.0:
+            self._shares_told += 1
+            weight = max(LEARNING, 1.0 / self._shares_told)
+            share = stride.extraction_torque_nm / whole_nm
+            self.felt_share = _within(self.felt_share * (share / self.felt_share) ** weight, SHARES)
+
+    def _learn_ratio(self, belief: MudBelief) -> None:
+        k_s, k_p = belief.k_s, belief.k_p
+        if k_s is None or k_p is None or k_s.at_least or k_p.at_least:
+            return
+        pressed = k_p.at(k_s.depth_m)[0]
+        ratio = k_s.value / pressed if pressed > 0.0 else 0.0
+        if ratio > 0.0 and isfinite(ratio):
+            self.shear_ratio = _within(exp(log(self.shear_ratio) + LEARNING * log(ratio / self.shear_ratio)), RATIOS)
+
+    def reached_m(self, commanded_m: float) -> float:
+        """Under load the flippers go deeper than they are told, as deep as they can."""
+        return min(commanded_m + self._sag_m, self.geometry.deepest_m(self.gait.sweep_angle_deg))
+
+    def thrust_n(self, commanded_m: float) -> float | None:
+        """Of both flippers; None where nothing is known of what the mud bears."""
+        depth_m = self.reached_m(commanded_m)
+        told = [self._thrust_n(stride, depth_m) for stride in self._strides]
+        known = [thrust_n for thrust_n in told if thrust_n is not None]
+        return 2.0 * sum(known) / len(known) if known else None
+
+    def _thrust_n(self, stride: StrideEstimate, depth_m: float) -> float | None:
+        surface_m = _known(stride.surface_m)
+        if depth_m <= surface_m or not self.geometry.is_reachable(0.0, depth_m):
+            return 0.0
+        k_s = self._shear(stride.flipper, depth_m - surface_m)
+        if k_s is None:
+            return None
+        plate = submerged_plate(self.geometry, 0.0, self.geometry.adduction_rad(0.0, depth_m), surface_m)
+        return min(k_s * plate.depth_moment_m3, self.motor_force_n)
+
+    def _shear(self, flipper: str, submerged_m: float) -> float | None:
+        """k_s, less its doubt."""
+        belief = self._belief
+        k_s, k_p = belief.k_s or belief.of(flipper).k_s, belief.k_p or belief.of(flipper).k_p
+        told = None if k_s is None else _less(k_s, submerged_m)
+        if k_p is None or (k_s is not None and not k_s.at_least):
+            return told
+        felt = (1.0 - THRUST_DOUBT * RATIO_DOUBT) * self.shear_ratio * _less(k_p, submerged_m)
+        return felt if told is None else max(felt, told)
+
+    def shear_at(self, depth_m: float) -> float:
+        """k_s of the body's own pad, as the mean of the flippers; 0 where it is not known."""
+        told = [self._shear(stride.flipper, depth_m) or 0.0 for stride in self._strides]
+        return sum(told) / len(told) if told and depth_m > 0.0 else 0.0
+
+    def extraction_nm(self, commanded_m: float) -> float:
+        """For the flipper that the mud holds harder."""
+        depth_m = self.reached_m(commanded_m)
+        return max((self._extraction_nm(stride, depth_m) for stride in self._strides), default=0.0)
+
+    def _extraction_nm(self, stride: StrideEstimate, depth_m: float) -> float:
+        surface_m = _known(stride.surface_m)
+        submerged_m = depth_m - surface_m
+        if submerged_m <= 0.0:
+            return 0.0
+        moment_m4 = self._lift_moment_m4(depth_m, surface_m)
+        told_nm = self._told_nm(stride, submerged_m, moment_m4)
+        if stride.released and stride.extraction_torque_nm > 0.0 and stride.depth_m > 0.0:
+            told_nm = min(told_nm, self._proven_nm(stride, moment_m4))
+        held_nm = self.lifting_torque_nm * submerged_m / self._stuck_m.get(stride.flipper, inf)
+        return max(told_nm, held_nm)
+
+    def _proven_nm(self, stride: StrideEstimate, moment_m4: float) -> float:
+        """What it took, or would take deeper if k_e did not fall with depth, as it does."""
+        walked_m4 = self._walked_m4[stride.flipper]
+        return stride.extraction_torque_nm * max(1.0, moment_m4 / walked_m4) if walked_m4 > 0.0 else inf
+
+    def _told_nm(self, stride: StrideEstimate, submerged_m: float, moment_m4: float) -> float:
+        """By k_e, or by k_p where that is not known; by neither, all that there is below where the flipper has been."""
+        flipper = self._belief.of(stride.flipper)
+        k_e, k_p = self._belief.k_e or flipper.k_e, self._belief.k_p or flipper.k_p
+        told_nm = self.felt_share * _more(k_e, submerged_m) * moment_m4 if k_e is not None else 0.0
+        if k_e is not None and not k_e.at_least:
+            return told_nm
+        if k_p is not None:
+            return max(told_nm, SUCTION_RATIO * _more(k_p, submerged_m) * moment_m4)
+        return self.lifting_torque_nm if submerged_m > _known(stride.depth_m) + GRID_M else told_nm
+
+    def _lift_moment_m4(self, depth_m: float, surface_m: float) -> float:
+        """Φ in the pose in which the flipper is pulled out; 0 where a fitted surface puts that out of reach."""
+        reached_m = min(depth_m, self.geometry.deepest_m(self.gait.sweep_angle_deg))
+        if not self.geometry.is_reachable(self.rear_rad, reached_m):
+            return 0.0
+        adduction_rad = self.geometry.adduction_rad(self.rear_rad, reached_m)
+        plate = submerged_plate(self.geometry, self.rear_rad, adduction_rad, surface_m)
+        return stroke_moment_m4(self.geometry, plate, self.rear_rad)
+
+    @property
+    def lifting_torque_nm(self) -> float:
+        return self.motor_force_n * self.geometry.flipper_length_m
+
+    @property
+    def rear_rad(self) -> float:
+        return -radians(self.gait.sweep_angle_deg)
+
+
+def _less(k: Coefficient, depth_m: float) -> float:
+    value, std_error = k.at(depth_m)
+    return max(0.0, value - THRUST_DOUBT * std_error)
+
+
+def _more(k: Coefficient, depth_m: float) -> float:
+    value, std_error = k.at(depth_m)
+    return max(0.0, value) + SUCTION_DOUBT * std_error
+
+
+def _within(value: float, bounds: tuple[float, float]) -> float:
+    return min(max(value, bounds[0]), bounds[1])
+
+
+def _known(length_m: float) -> float:
+    return length_m if isfinite(length_m) else 0.0

@@ -1,0 +1,52 @@
+"""A slow, smooth way from the pose a robot is found in to another one, joint by joint through way-points.
+
+Used to come to the start of a stride and to raise the flippers when a walk ends; no geometry, so it works from any
+pose that the joints can have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from control.gait.gait import smooth_progress
+from control.records import JointAngles, JointTarget, JointTargets
+
+SHORTEST_LEG_S = 0.1
+
+
+class JointPath:
+    """All joints of a leg start and arrive together; the one with the longest way moves at `speed_rad_s` on average."""
+
+    def __init__(self, start: JointAngles, way_points: Sequence[JointAngles], speed_rad_s: float) -> None:
+        self._points = [start, *way_points]
+        self._durations_s = [
+            max(SHORTEST_LEG_S, max(abs(b - a) for a, b in zip(start, end, strict=True)) / speed_rad_s)
+            for start, end in zip(self._points, self._points[1:], strict=False)
+        ]
+        self._leg = 0
+        self._time_s = 0.0
+
+    @property
+    def finished(self) -> bool:
+        return self._leg == len(self._durations_s)
+
+    def step(self, dt_s: float) -> JointTargets:
+        self._time_s += dt_s
+        while not self.finished and self._time_s >= self._durations_s[self._leg]:
+            self._time_s -= self._durations_s[self._leg]
+            self._leg += 1
+        if self.finished:
+            return still(self._points[-1])
+        fraction, rate = smooth_progress(self._time_s, self._durations_s[self._leg])
+        start, end = self._points[self._leg], self._points[self._leg + 1]
+        a, b, c, d = (
+            JointTarget(from_rad + (to_rad - from_rad) * fraction, (to_rad - from_rad) * rate)
+            for from_rad, to_rad in zip(start, end, strict=True)
+        )
+        return a, b, c, d
+
+
+def still(angles: JointAngles) -> JointTargets:
+    """Targets that hold a pose."""
+    a, b, c, d = angles
+    return JointTarget(a, 0.0), JointTarget(b, 0.0), JointTarget(c, 0.0), JointTarget(d, 0.0)

@@ -1,0 +1,206 @@
+"""Freeing a flipper that the mud still holds when its extraction is over.
+
+A stride goes on to swing when the lower edges of both plates are out, by the measured joint angles. One that is late
+gets a short grace under full torque; then it is recovered, or swing would push the body back with the plate in the
+mud (the paper's extraction failure). Each attempt first lets go, so that the mud relaxes, and then lifts from where
+the flipper is while the sweep rocks: at full torque, most of each round one way and the rest of it back.
+
+A steady pull at full torque comes to rest where mud, joints and body balance. A torque that is suddenly reversed throws
+the plate against the mud's spring by half beyond that balance, and off the middle (by the sine of the sweep angle) what
+presses on its face lifts as well. Each such peak lifts the plate a little; for it to sink as much again, the mud would
+have to yield the other way. The first attempt goes to the rear, as the stance did, and takes the body along. The later
+ones go away from the middle on the side where the flipper is; there the lever l cos α of what sticks to the plate is
+shorter, too.
+
+In simulated clay of up to 9 kPa, commanded to between 3 and 5 cm, all came out within 12 s; the body went 8 to 11 cm
+forward meanwhile, and never more than 4 mm back. A steady pull freed nothing from 6 kPa and 5 cm on; rocking at half
+the rate, or as long back as forth, did not free 9 kPa, and with bodies of half or three times the mass some of 7.5 kPa
+and more stayed in. Real mud may differ: nobody has tried it there.
+
+A rocked joint's target stands still before it, so that a plate that comes free is braked. The lift's target leads by no
+more, so that it does not fly. Swing begins where the recovery leaves off, and what separates the two fades out without
+a jump of position or speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import copysign, cos, radians, sin
+from typing import Annotated, NamedTuple
+
+from control.bounds import Bounds
+from control.gait.gait import RAMP_S, GaitParameters, swing_duration_s
+from control.gait.joint_path import still
+from control.geometry import FlipperGeometry
+from control.limits import JointRange
+from control.records import FLIPPERS, DriveStates, JointTarget, JointTargets
+
+OUT_M = 0.003  # depth of the plate's lowest point up to which a flipper counts as out of the mud
+RISE_S = 0.2  # to reach the height of the swing
+AWAY_SHARE = 0.8  # of each rocking; the rest is back
+
+
+@dataclass(frozen=True)
+class RecoveryParameters:
+    attempts: Annotated[int, Bounds(0, 20)] = 3  # 0: the stride does not wait, as on the paper's robot
+    grace_s: Annotated[float, Bounds(0.0, 5.0)] = (
+        0.3  # at full torque, for joints that follow late: by up to 0.2 s in simulated clay
+    )
+    pause_s: Annotated[float, Bounds(0.0, 30.0)] = 0.3  # without pull, before each attempt
+    attempt_s: Annotated[float, Bounds(0.1, 30.0)] = 4.0
+    lift_rad_s: Annotated[float, Bounds(0.05, 5.0)] = 1.0
+    rock_s: Annotated[float, Bounds(0.02, 2.0)] = 0.1  # to and fro with the sweep
+    lead_deg: Annotated[float, Bounds(0.5, 45.0)] = 8.0  # of targets: times the stiffness, the full torque
+
+
+def lowest_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> float:
+    """Depth of the plate's lower corner below the nominal surface."""
+    slope = cos(sweep_rad) * sin(adduction_rad)
+    return geometry.depth_m(sweep_rad, adduction_rad) + abs(slope) * geometry.plate_width_m / 2.0
+
+
+def is_in_mud(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> bool:
+    return lowest_m(geometry, sweep_rad, adduction_rad) > OUT_M
+
+
+class Gap(NamedTuple):
+    """What separates two targets at one moment, and how long it takes to fade."""
+
+    angle_rad: float
+    velocity_rad_s: float
+    duration_s: float
+
+    def after(self, time_s: float) -> JointTarget:
+        """The cubic e(s) = (1 - s)² (e₀ (1 + 2s) + T e₀' s) with s = t/T: at its end there is no gap and no speed."""
+        if time_s >= self.duration_s:
+            return JointTarget(0.0, 0.0)
+        s, run_rad = time_s / self.duration_s, self.velocity_rad_s * self.duration_s
+        angle_rad = (1.0 - s) ** 2 * (self.angle_rad * (1.0 + 2.0 * s) + run_rad * s)
+        rate_rad = (1.0 - s) * (run_rad * (1.0 - 3.0 * s) - 6.0 * self.angle_rad * s)
+        return JointTarget(angle_rad, rate_rad / self.duration_s)
+
+
+class Recovery:
+    """Owns the attempts of the stride under way, and what is left of them in its swing."""
+
+    def __init__(
+        self,
+        parameters: RecoveryParameters,
+        geometry: FlipperGeometry,
+        gait: GaitParameters,
+        ranges: tuple[JointRange, JointRange, JointRange, JointRange],
+    ) -> None:
+        self.parameters = parameters
+        self.geometry = geometry
+        self._ranges = ranges
+        swing_s = swing_duration_s(gait, geometry)
+        self._fade_s = (swing_s, min(RISE_S, swing_s), swing_s, min(RISE_S, swing_s))
+        self.reset()
+
+    def reset(self) -> None:
+        self.attempt = 0  # under way; 0: none
+        self.given_up: Sequence[str] = ()  # flippers that the last attempt has not freed
+        self.news = ""  # of this step, for the log
+        self._waits = False
+        self._time_s = 0.0  # since the wait, the attempt or the swing after it began
+        self._targets: JointTargets = still((0.0, 0.0, 0.0, 0.0))
+        self._way = -1.0  # the way of the sweep: 1 forward, -1 to the rear
+        self._gaps: tuple[Gap, ...] = ()
+
+    def stuck(self, states: DriveStates) -> tuple[str, ...]:
+        """The flippers in the mud, or none where the gait does not wait for them."""
+        if not self.parameters.attempts:
+            return ()
+        pairs = zip(FLIPPERS, states[::2], states[1::2], strict=True)
+        return tuple(name for name, sweep, lift in pairs if is_in_mud(self.geometry, sweep.angle_rad, lift.angle_rad))
+
+    def step(self, dt_s: float, stuck: Sequence[str], states: DriveStates, wanted: JointTargets) -> JointTargets:
+        """The gait's targets, or others while it waits for the flippers that are `stuck`."""
+        self.news = ""
+        if self._waits is not bool(stuck):
+            self._waits, self._time_s = bool(stuck), 0.0
+            if self.attempt:
+                self._leave(wanted)
+        self._time_s += dt_s
+        if not stuck:
+            return self._faded(wanted)
+        if self._time_s > self._allowed_s:
+            self._begin(stuck, states)
+        return self._pull(dt_s, stuck, states) if self.attempt else wanted
+
+    @property
+    def _allowed_s(self) -> float:
+        return self.parameters.pause_s + self.parameters.attempt_s if self.attempt else self.parameters.grace_s
+
+    def _begin(self, stuck: Sequence[str], states: DriveStates) -> None:
+        """The next attempt, from where the flippers are; after the last one, nothing."""
+        if self.attempt == self.parameters.attempts:
+            self.given_up = stuck
+            return
+        self.attempt += 1
+        self._time_s = 0.0
+        a, b, c, d = (state.angle_rad for state in states)
+        self._targets = still((a, b, c, d))
+        places_rad = dict(zip(FLIPPERS, (a, c), strict=True))
+        self._way = -1.0 if self.attempt == 1 else copysign(1.0, sum(places_rad[name] for name in stuck))
+        self.news = f"{_are_stuck(stuck)}, attempt {self.attempt} of {self.parameters.attempts}"
+
+    def _pull(self, dt_s: float, stuck: Sequence[str], states: DriveStates) -> JointTargets:
+        """Lift all flippers and rock the stuck ones, the same way, so that the body is not turned."""
+        pulled_s = self._time_s - self.parameters.pause_s
+        if pulled_s < 0.0:
+            return self._targets
+        way = self._way if pulled_s / self.parameters.rock_s % 1.0 < AWAY_SHARE else -self._way
+        speed_rad_s = min(pulled_s / RAMP_S, 1.0) * self.parameters.lift_rad_s
+        pairs = zip(FLIPPERS, self._targets[::2], self._targets[1::2], states[::2], states[1::2], strict=True)
+        (a, b), (c, d) = (
+            (
+                self._before(way, sweep.angle_rad) if name in stuck else sweep_target,
+                self._raised(dt_s * speed_rad_s, dt_s, lift_target, lift.angle_rad),
+            )
+            for name, sweep_target, lift_target, sweep, lift in pairs
+        )
+        self._targets = a, b, c, d
+        return self._targets
+
+    def _before(self, way: float, here_rad: float) -> JointTarget:
+        """Full torque, up to the joint's limit."""
+        return JointTarget(_within(here_rad + way * radians(self.parameters.lead_deg), *self._ranges[0]), 0.0)
+
+    def _raised(self, step_rad: float, dt_s: float, target: JointTarget, here_rad: float) -> JointTarget:
+        """One step on the way to a level arm, close to where the joint is and within its limits."""
+        lead_rad = radians(self.parameters.lead_deg)
+        angle_rad = _within(0.0, target.angle_rad - step_rad, target.angle_rad + step_rad)
+        angle_rad = _within(_within(angle_rad, here_rad - lead_rad, here_rad + lead_rad), *self._ranges[1])
+        return JointTarget(angle_rad, _within((angle_rad - target.angle_rad) / dt_s, -step_rad / dt_s, step_rad / dt_s))
+
+    def _leave(self, wanted: JointTargets) -> None:
+        """All flippers are out."""
+        self.news = f"the flippers came out after {self.attempt} attempt{'s' if self.attempt > 1 else ''}"
+        self.attempt = 0
+        self._gaps = tuple(
+            Gap(target.angle_rad - gait.angle_rad, target.velocity_rad_s - gait.velocity_rad_s, duration_s)
+            for target, gait, duration_s in zip(self._targets, wanted, self._fade_s, strict=True)
+        )
+
+    def _faded(self, wanted: JointTargets) -> JointTargets:
+        """The gait's targets with what is left of the gaps."""
+        if not self._gaps:
+            return wanted
+        rests = [gap.after(self._time_s) for gap in self._gaps]
+        if self._time_s >= max(self._fade_s):
+            self._gaps = ()
+        a, b, c, d = (
+            JointTarget(_within(gait.angle_rad + rest.angle_rad, *span), gait.velocity_rad_s + rest.velocity_rad_s)
+            for gait, rest, span in zip(wanted, rests, self._ranges, strict=True)
+        )
+        return a, b, c, d
+
+
+def _within(value: float, low: float, high: float) -> float:
+    return min(max(value, low), high)
+
+
+def _are_stuck(flippers: Sequence[str]) -> str:
+    return f"the {flippers[0]} flipper is stuck" if len(flippers) == 1 else "both flippers are stuck"

@@ -1,0 +1,246 @@
+"""What one joint's signals say against having torque on it: silence, errors, positions, speeds, currents and heat.
+
+`JointWatch.update` runs every tick for each joint and gives all faults that it sees. It owns the few counts that a
+single sample cannot tell. Bounds that depend on the machine are in FaultBounds, the others stand here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import degrees, isfinite, radians
+from typing import Annotated, NamedTuple
+
+from control.bounds import Bounds
+from control.fault_kinds import make_fault
+from control.faults import Fault
+from control.limits import JointLimits, JointRange
+from control.monitors.encoder_monitor import EncoderWatch
+from control.monitors.stillness import Stillness
+from control.monitors.winding import Winding, WindingParameters
+from control.records import UNKNOWN, DriveState
+
+MOST_SEEN_S = 0.03  # that one tick adds to any duration: a loop that stood still for longer did not look
+MISSING_HEARTBEATS = 5  # in a row
+SLOW_SILENCE_S = 1.0  # of temperature and bus voltage, once they were told
+ENERGISED_S = 0.2  # two heartbeats, in which a drive that was told to go idle may say that it has not yet
+FAST_SHARE = 1.25  # of the velocity limit, above which no torque of ours drives a joint
+CURRENT_SHARE = 1.25  # of the drive's current limit
+CURRENT_TICKS = 3
+STILL_RAD = 0.03
+REST_S = 0.1  # within STILL_RAD, and a joint is at rest
+SATURATED_SHARE = 0.95  # of the torque limit
+STALLED_S = 2.0  # longer than an insertion, a stance or an extraction of the paper's gait takes
+MISSING_SHARE = 0.3  # of the torque limit, by which the current differs from the torque that was sent
+MISSING_S = 0.1
+TWO_MESSAGES_S = 0.15  # of those that come every 0.1 s: a single odd one proves nothing
+
+
+@dataclass(frozen=True)
+class FaultBounds:
+    """Where a fault begins that depends on the machine. T is the loop's period of 2.63 ms."""
+
+    late_s: Annotated[float, Bounds(0.003, 2.0)] = 0.0053  # 2 T without position or current: told
+    quiet_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0079  # 3 T: damping
+    silence_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0263  # 10 T: drives idle; of the loop itself: damping
+    jump_rad: Annotated[float, Bounds(0.01, 10.0)] = 0.05  # beyond what a joint can do: noise, late stamps
+    fast_s: Annotated[float, Bounds(0.003, 2.0)] = 0.0079  # 3 T faster than the velocity limit allows
+    lag_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0131  # 5 T missed in a row: soft stop
+    crawl_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0105  # 4 T, the mean of five ticks: too seldom to brake a joint
+    lag_share: Annotated[float, Bounds(0.01, 10.0)] = 0.1  # by which 100 ticks take longer than they should
+    longest_watchdog_s: Annotated[float, Bounds(0.01, 10.0)] = 0.3  # that a drive may have
+    voltage_low_v: Annotated[float, Bounds(0.0, 100.0)] = 20.0  # told; 0: never
+    voltage_min_v: Annotated[float, Bounds(0.0, 100.0)] = 18.0  # soft stop
+    disk_free_share: Annotated[float, Bounds(0.0, 0.9)] = 0.05  # of the log's disk, below which nothing is armed
+    disk_slow_s: Annotated[float, Bounds(0.05, 60.0)] = 2.0  # for one write
+
+
+class JointFacts(NamedTuple):
+    """What the loop knows of the moment."""
+
+    now_s: float
+    dt_s: float
+    energised: bool  # torque is or may be on
+    moving: bool  # closed loop is expected of the drive
+    torque_nm: float  # sent in the tick before
+    may_stand_still: bool  # whatever the torque: no stiffness, or a recovery that pulls on purpose
+
+
+class JointWatch:
+    def __init__(
+        self,
+        joint: str,
+        limits: JointLimits,
+        span: JointRange,
+        bounds: FaultBounds,
+        winding: WindingParameters,
+        current_limit_a: float,
+        torque_constant_nm_a: float,
+        heartbeat_period_s: float = 0.1,
+    ) -> None:
+        self.joint = joint
+        self.winding = Winding(winding)
+        self._limits = limits
+        self._bounds = bounds
+        self._low_rad = span.min_rad - radians(limits.position_margin_deg)
+        self._high_rad = span.max_rad + radians(limits.position_margin_deg)
+        self._fast_rad_s = FAST_SHARE * limits.velocity_rad_s
+        self._encoder = EncoderWatch(bounds.jump_rad)
+        self._stillness = Stillness(STILL_RAD)
+        self._most_a = CURRENT_SHARE * current_limit_a
+        self._constant_nm_a = torque_constant_nm_a
+        self._heartbeat_silence_s = MISSING_HEARTBEATS * heartbeat_period_s
+        self._missing_nm = MISSING_SHARE * limits.torque_nm
+        self._saturated_nm = SATURATED_SHARE * limits.torque_nm
+        self._nearly_hot_c = (limits.temperature_warm_c + limits.temperature_hot_c) / 2.0  # half of the torque is left
+        self.reset()
+
+    def reset(self) -> None:
+        """But not the winding: it stays as warm as it is."""
+        self._current_ticks = 0
+        self._fast_s = self._stalled_s = self._energised_s = self._missing_s = 0.0
+        self._low_s = self._under_s = self._hot_s = 0.0
+        self._encoder.reset()
+        self._stillness.reset()
+
+    def update(self, facts: JointFacts, state: DriveState) -> list[Fault]:
+        found: list[Fault] = []
+        # One sample after a gap says nothing of what was in the gap.
+        seen = facts if facts.dt_s <= MOST_SEEN_S else facts._replace(dt_s=MOST_SEEN_S)
+        self._watch_signals(found, facts, state)
+        self._watch_drive(found, seen, state)
+        self._watch_motion(found, seen, state)
+        self._watch_load(found, seen, state)
+        self._watch_heat(found, facts, state)
+        return found
+
+    def _fault(self, name: str, sentence: str) -> Fault:
+        return make_fault(name, self.joint, sentence)
+
+    # signals
+
+    def _watch_signals(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        bounds, now_s = self._bounds, facts.now_s
+        position_s, current_s = now_s - state.angle_stamp_s, now_s - state.current_stamp_s
+        if position_s > bounds.late_s or current_s > bounds.late_s:
+            found.append(self._late(position_s, current_s))
+            if current_s > bounds.silence_s and found[-1].name in ("drive_quiet", "position_stale"):
+                found.append(self._silence("current_silent", "current", current_s))
+        if now_s - state.heartbeat_stamp_s > self._heartbeat_silence_s:
+            found.append(self._silence("heartbeat_silent", "heartbeat", now_s - state.heartbeat_stamp_s))
+        if isfinite(state.temperature_stamp_s) and now_s - state.temperature_stamp_s > SLOW_SILENCE_S:
+            found.append(self._silence("temperature_silent", "temperature", now_s - state.temperature_stamp_s))
+        if isfinite(state.bus_voltage_stamp_s) and now_s - state.bus_voltage_stamp_s > SLOW_SILENCE_S:
+            found.append(self._silence("voltage_silent", "bus voltage", now_s - state.bus_voltage_stamp_s))
+
+    def _late(self, position_s: float, current_s: float) -> Fault:
+        """The hardest of what two ages say: both signals gone, one of them, or a frame that is late."""
+        bounds = self._bounds
+        both_s = min(position_s, current_s)
+        if both_s > bounds.silence_s:
+            return self._silence("drive_silent", "message", both_s)
+        if position_s > bounds.silence_s:
+            return self._silence("position_silent", "position", position_s)
+        if both_s > bounds.quiet_s:
+            return self._silence("drive_quiet", "message", both_s)
+        if position_s > bounds.quiet_s:
+            return self._silence("position_stale", "position", position_s)
+        if current_s > bounds.silence_s:
+            return self._silence("current_silent", "current", current_s)
+        if current_s > bounds.quiet_s:
+            return self._silence("current_stale", "current", current_s)
+        return self._silence(
+            "drive_late", "position" if position_s > current_s else "current", max(position_s, current_s)
+        )
+
+    def _silence(self, name: str, signal: str, age_s: float) -> Fault:
+        ago = f"for {age_s * 1e3:.0f} ms" if isfinite(age_s) else "at all"
+        return self._fault(name, f"No {signal} came from the {self.joint} drive {ago}.")
+
+    # the drive's own state
+
+    def _watch_drive(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        if state.error_flags:
+            found.append(self._fault("drive_error", f"The {self.joint} drive reports error 0x{state.error_flags:x}."))
+        if facts.moving and not state.closed_loop:
+            found.append(self._fault("drive_disarmed", f"The {self.joint} drive left closed loop by itself."))
+        self._energised_s = self._energised_s + facts.dt_s if state.closed_loop and not facts.energised else 0.0
+        if self._energised_s > ENERGISED_S:
+            found.append(self._fault("drive_energised", f"The {self.joint} drive is in closed loop, unasked."))
+        if state.bus_voltage_v < self._bounds.voltage_low_v or self._low_s:
+            self._watch_voltage(found, facts, state.bus_voltage_v)
+
+    def _watch_voltage(self, found: list[Fault], facts: JointFacts, voltage_v: float) -> None:
+        bounds = self._bounds
+        self._low_s = self._low_s + facts.dt_s if voltage_v < bounds.voltage_low_v else 0.0
+        self._under_s = self._under_s + facts.dt_s if voltage_v < bounds.voltage_min_v else 0.0
+        if self._under_s > TWO_MESSAGES_S:
+            text = f"The {self.joint} drive has {voltage_v:.1f} V; {bounds.voltage_min_v:g} V are the least."
+            found.append(self._fault("voltage_under", text))
+        elif self._low_s > TWO_MESSAGES_S:
+            found.append(self._fault("voltage_low", f"The {self.joint} drive has only {voltage_v:.1f} V."))
+
+    # motion
+
+    def _watch_motion(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        angle_rad, velocity_rad_s = state.angle_rad, abs(state.velocity_rad_s)
+        if not self._low_rad <= angle_rad <= self._high_rad:
+            found.append(self._out_of_range(angle_rad))
+        self._fast_s = self._fast_s + facts.dt_s if velocity_rad_s > self._fast_rad_s else 0.0
+        if self._fast_s > max(self._bounds.fast_s - facts.dt_s / 2.0, 0.0):
+            text = f"The {self.joint} joint turns at {velocity_rad_s:.0f} rad/s."
+            found.append(self._fault("joint_velocity", text))
+        if not self._stillness.update(angle_rad, facts.dt_s):
+            self._stalled_s = 0.0
+        if self._stillness.still_s < REST_S and not facts.energised:
+            found.append(self._fault("joint_moving", f"The {self.joint} joint moves."))
+        problem = self._encoder.update(state, facts.dt_s)
+        if problem:
+            found.append(self._fault(problem, f"The {self.joint} {self._encoder.sentence}"))
+
+    def _out_of_range(self, angle_rad: float) -> Fault:
+        low, high = degrees(self._low_rad), degrees(self._high_rad)
+        text = f"The {self.joint} joint is at {degrees(angle_rad):.1f} degrees, outside of {low:.0f} to {high:.0f}."
+        return self._fault("joint_position", text)
+
+    # load
+
+    def _watch_load(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        self._current_ticks = self._current_ticks + 1 if abs(state.current_a) > self._most_a else 0
+        if self._current_ticks >= CURRENT_TICKS:
+            text = f"The {self.joint} motor takes {abs(state.current_a):.1f} A."
+            found.append(self._fault("joint_current", text))
+        self._watch_torque(found, facts, state)
+        pushed = abs(facts.torque_nm) >= self._saturated_nm > 0.0 and not facts.may_stand_still
+        self._stalled_s = self._stalled_s + facts.dt_s if pushed else 0.0
+        if self._stalled_s > STALLED_S:
+            text = f"The {self.joint} joint stands still at full torque for {self._stalled_s:.1f} s."
+            found.append(self._fault("joint_not_following", text))
+
+    def _watch_torque(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        """A drive that is told to exert a torque and does not: a frozen current, lost commands, a silent clamp."""
+        differs = abs(facts.torque_nm - state.current_a * self._constant_nm_a) > self._missing_nm
+        self._missing_s = self._missing_s + facts.dt_s if differs and facts.moving else 0.0
+        if self._missing_s > MISSING_S:
+            given_nm = state.current_a * self._constant_nm_a
+            text = f"The {self.joint} motor gives {given_nm:.2f} N·m in place of {facts.torque_nm:.2f}."
+            found.append(self._fault("torque_missing", text))
+
+    # heat
+
+    def _watch_heat(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+        measured_c = state.temperature_c
+        self._hot_s = self._hot_s + facts.dt_s if self._nearly_hot_c <= measured_c else 0.0
+        if not measured_c < self._nearly_hot_c and not self._hot_s > TWO_MESSAGES_S:
+            measured_c = UNKNOWN
+        current_a = state.current_a if abs(state.current_a) < 2.0 * self._most_a else UNKNOWN  # no motor takes more
+        if facts.now_s - state.current_stamp_s > self._bounds.silence_s:  # an old one does not warm for ever
+            current_a = facts.torque_nm / self._constant_nm_a
+        winding_c = self.winding.update(facts.dt_s, current_a, measured_c)
+        if winding_c < self._nearly_hot_c:
+            return
+        hot = winding_c >= self._limits.temperature_hot_c
+        by_sensor = measured_c >= (self._limits.temperature_hot_c if hot else self._nearly_hot_c)
+        what, how = ("motor", "") if by_sensor else ("winding", ", by its currents")
+        temperature_c = measured_c if by_sensor else winding_c
+        text = f"The {self.joint} motor has {temperature_c:.0f} degrees C{how}."
+        found.append(self._fault(f"{what}_hot" if hot else f"{what}_overheating", text))

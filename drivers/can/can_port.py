@@ -1,0 +1,144 @@
+"""One CAN bus as the drives see it: frames in, frames out, losses counted.
+
+python-can opens the interface (`socketcan` on the robot, `slcan` for a serial adapter, `virtual` in tests,
+`mudskipper_local` between processes without CAN) and carries the frames, except on socketcan: see socketcan_port.py.
+Its Message objects stay on this side. Its `Bus.state` always says active on socketcan, so the state comes from error
+frames. Frames are sent one by one, never by the kernel's repetition (BCM), which would feed the drives' watchdogs with
+an old command after this process has died.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from typing import Any, Protocol
+
+import can
+from can.interfaces.socketcan import SocketcanBus
+
+from drivers.can.error_frames import BusState as BusState  # for whoever looks at a port
+from drivers.can.frames import Frame
+from drivers.can.port_health import MOST_FRAMES_PER_READ as MOST_FRAMES_PER_READ
+from drivers.can.port_health import PortHealth
+from drivers.can.slcan_bus import PromptSerial
+from drivers.can.socketcan_port import SocketcanPort
+
+# slcan: an unplugged adapter, a garbled line. socketcan asserts that a frame has a time stamp.
+PORT_ERRORS = (can.CanError, OSError, ValueError, IndexError, AssertionError)
+MOST_FAILURES_PER_READ = 32
+
+
+class CanPort(Protocol):
+    """What the drives need of a bus. `failed_sends`, `error_frames` and `lost_frames` only grow."""
+
+    state: BusState
+    failed_sends: int
+    error_frames: int  # and reads that failed
+    lost_frames: int  # that arrived and found no room, where the port is told
+    last_error: str  # of receiving
+    last_send_error: str
+
+    def listen_to(self, ids: Iterable[int]) -> None:
+        """Nothing else is wanted of the bus; a port that can keeps it away."""
+
+    def receive(self) -> Sequence[Frame]:
+        """All data frames that have arrived, oldest first; never waits."""
+
+    def send(self, frame: Frame) -> None:
+        """Does not wait for room; a frame that cannot be queued is dropped and counted, the next tick brings a newer
+        one.
+        """
+
+    def close(self) -> None: ...
+
+
+class PythonCanPort(PortHealth):
+    """A CanPort over any python-can interface."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        super().__init__()
+        self._bus = bus
+
+    def listen_to(self, ids: Iterable[int]) -> None:
+        """Not here: python-can would make a Message first and compare it then."""
+
+    def receive(self) -> list[Frame]:
+        frames: list[Frame] = []
+        failures = 0
+        clock_s = time.monotonic() - time.time()  # python-can stamps with the clock on the wall
+        for _ in range(MOST_FRAMES_PER_READ):
+            try:
+                message = self._bus.recv(0.0)
+                if message is None:
+                    if self._drained():
+                        break
+                    continue
+            except PORT_ERRORS as problem:  # garbage, with good frames behind it; or an interface that is down
+                failures += 1
+                if self.heed_failed_read(problem) or failures == MOST_FAILURES_PER_READ:
+                    break
+                continue
+            if message.is_error_frame:  # first: its class bits look like a drive's id
+                self.heed_error_frame(message.arbitration_id, bytes(message.data))
+            else:
+                frames.append(_as_frame(message, clock_s))
+                if self.state is BusState.OFF:
+                    self.heed_frame(message.is_rx)
+        return frames
+
+    def _drained(self) -> bool:
+        """Whether `recv` that gave no frame means that there is none."""
+        return True
+
+    def send(self, frame: Frame) -> None:
+        message = can.Message(
+            arbitration_id=frame.arbitration_id,
+            data=frame.data,
+            is_extended_id=frame.is_extended,
+            is_remote_frame=frame.is_remote,
+        )
+        try:
+            self._bus.send(message, 0.0)
+        except PORT_ERRORS as problem:  # a full transmit queue (ENOBUFS) or an interface that is gone
+            self.heed_failed_send(problem)
+
+    def close(self) -> None:
+        with suppress(*PORT_ERRORS):  # of an adapter that is unplugged already
+            self._bus.shutdown()
+
+
+class SlcanPort(PythonCanPort):
+    """A CanPort over a serial adapter that speaks the LAWICEL protocol, as python-can's slcan interface does."""
+
+    def __init__(self, bus: Any) -> None:  # slcanBus; its module complains where pyserial is missing
+        super().__init__(bus)
+        self._serial = bus.serialPortOrig = PromptSerial(bus.serialPortOrig)
+        self._refusals = 0
+
+    def receive(self) -> list[Frame]:
+        frames = super().receive()
+        if self._serial.refusals != self._refusals:
+            self.failed_sends += self._serial.refusals - self._refusals
+            self._refusals = self._serial.refusals
+            self.last_send_error = "the adapter refused a frame"
+        return frames
+
+    def _drained(self) -> bool:
+        """The adapter answers every frame that it is given, and python-can makes None of an answer."""
+        return self._serial.in_waiting == 0
+
+
+def _as_frame(message: can.Message, clock_s: float) -> Frame:
+    data, is_remote, is_extended = bytes(message.data), message.is_remote_frame, message.is_extended_id
+    return Frame(message.arbitration_id, data, is_remote, False, is_extended, message.timestamp + clock_s)
+
+
+def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool]) -> CanPort:
+    """Raises what python-can raises where the interface does not open: see firmware_host/buses.py."""
+    logging.getLogger("can").setLevel(logging.WARNING)  # at level debug it would format every frame it sends
+    bus = can.Bus(interface=interface, channel=channel, **options)  # type: ignore[arg-type]
+    if isinstance(bus, SocketcanBus):
+        return SocketcanPort(bus)
+    return SlcanPort(bus) if interface == "slcan" else PythonCanPort(bus)

@@ -1,0 +1,72 @@
+"""What every kind of CAN port knows of its own health: the bus's state, and what went wrong.
+
+A bus that was off is active again once a frame of a peer arrives: a controller that is off receives none. An interface
+that was gone is back with any frame, also one of a process beside us, which is all that a virtual one carries. Whoever
+receives frames has to call `heed_frame`; the rest is here.
+"""
+
+from __future__ import annotations
+
+import errno
+
+from drivers.can.error_frames import BusState, decode_error_frame, next_state
+
+MOST_FRAMES_PER_READ = 4096  # half a second of a full bus; a babbling node must not hold the loop for ever
+# The interface is down, or unplugged; EIO is how a serial adapter ends.
+GONE = frozenset({errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.EIO})
+
+
+class PortHealth:
+    """Counters only grow."""
+
+    def __init__(self) -> None:
+        self.state = BusState.ACTIVE
+        self._gone = False  # why it is off
+        self.failed_sends = 0
+        self.error_frames = 0
+        self.lost_frames = 0
+        self.last_error = ""
+        self.last_send_error = ""
+
+    def heed_error_frame(self, class_bits: int, data: bytes) -> None:
+        self.error_frames += 1
+        error = decode_error_frame(class_bits, data)
+        self.last_error = error.text
+        self.state = next_state(self.state, class_bits, error.state)
+
+    def heed_frame(self, from_peer: bool) -> None:
+        """Of a port that is off."""
+        if from_peer or self._gone:
+            self.state, self._gone = BusState.ACTIVE, False
+
+    def heed_failed_read(self, problem: Exception) -> bool:
+        """Whether the interface is gone."""
+        self.error_frames += 1
+        self.last_error = _text_of(problem)
+        return self._heed_gone(problem)
+
+    def heed_failed_send(self, problem: Exception) -> None:
+        self.failed_sends += 1
+        self.last_send_error = _text_of(problem)
+        self._heed_gone(problem)
+
+    def _heed_gone(self, problem: Exception) -> bool:
+        gone = _error_number(problem) in GONE
+        if gone:
+            self.state, self._gone = BusState.OFF, True
+        return gone
+
+
+def _error_number(problem: BaseException | None) -> int | None:
+    """python-can's own errors have it as `error_code`, or were raised from the error that has it."""
+    if problem is None:
+        return None
+    number: int | None = getattr(problem, "errno", None) or getattr(problem, "error_code", None)
+    return number or _error_number(problem.__cause__)
+
+
+def _text_of(problem: Exception) -> str:
+    if isinstance(problem.__cause__ or problem, BlockingIOError):
+        return "Transmit buffer full"  # as python-can says it; a read that would block is none that failed
+    words = getattr(problem, "strerror", None) or str(problem)
+    return f"{words}: {problem.__cause__}" if problem.__cause__ else words

@@ -1,0 +1,116 @@
+"""The fast path on the robot: frames as 16 bytes on the socket that python-can has opened and configured.
+
+python-can makes a Message of every frame, and asks by `select` before each call; here a frame is one `recvmsg` or one
+`send` that does not wait. Of the calls that read, only `recvmsg` tells more than the bytes: the kernel's time stamp
+(SO_TIMESTAMPNS, which python-can has asked for; a tenth of the call's cost, for ages that are true to some µs where
+the reading time errs by up to a tick), how many frames found the queue full (SO_RXQ_OVFL), and whether a process
+beside us has sent the frame (MSG_DONTROUTE). Layouts: linux/can.h, linux/can/raw.h, socket(7).
+
+The kernel passes on what the drives send and we listen to, and all error frames, which filters do not touch. Anything
+else on the bus is neither heard nor counted: `candump` shows it.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from collections.abc import Iterable
+
+from can.interfaces.socketcan import SocketcanBus
+
+from control.records import NEVER_S
+from drivers.can.error_frames import BusState
+from drivers.can.frames import (
+    DATA_MAX_BYTES,
+    ERROR_FLAG,
+    EXTENDED_FLAG,
+    EXTENDED_MASK,
+    FRAME_LAYOUT,
+    REMOTE_FLAG,
+    STANDARD_MASK,
+    Frame,
+    encode_frame,
+)
+from drivers.can.port_health import MOST_FRAMES_PER_READ, PortHealth
+
+SO_TIMESTAMPNS, SO_RXQ_OVFL = 35, 40  # asm-generic/socket.h
+STAMP, COUNT = struct.Struct("@ll"), struct.Struct("@I")  # as this machine lays them out: struct timespec, __u32
+COUNT_RANGE = 1 << 32
+ANCILLARY_BYTES = socket.CMSG_SPACE(STAMP.size) + socket.CMSG_SPACE(COUNT.size)
+FRAME_BYTES, LENGTH_BYTE = FRAME_LAYOUT.size, 4
+READ_BYTES = FRAME_BYTES + 1  # so that a longer one (CAN FD) shows
+FLAGS = EXTENDED_FLAG | REMOTE_FLAG | ERROR_FLAG
+ALL_BITS = STANDARD_MASK | REMOTE_FLAG  # of a filter; with these the kernel looks an id up instead of comparing
+
+
+class SocketcanPort(PortHealth):
+    """A CanPort. Owns the socket's mode, and how much of the kernel's count of lost frames was heeded."""
+
+    def __init__(self, bus: SocketcanBus) -> None:
+        super().__init__()
+        self._bus = bus
+        self._socket = bus.socket
+        self._socket.setblocking(False)
+        self._socket.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
+        self._heeded = 0
+
+    def listen_to(self, ids: Iterable[int]) -> None:
+        """If the kernel refuses, python-can says so in the log, and strangers are heard."""
+        self._bus.set_filters([{"can_id": each, "can_mask": ALL_BITS, "extended": False} for each in ids])
+
+    def receive(self) -> list[Frame]:
+        frames: list[Frame] = []
+        read = self._socket.recvmsg
+        clock_s = time.monotonic() - time.time()  # the kernel stamps with the clock on the wall
+        for _ in range(MOST_FRAMES_PER_READ):
+            try:
+                encoded, ancillary, marks, _ = read(READ_BYTES, ANCILLARY_BYTES)
+            except BlockingIOError:
+                break
+            except OSError as problem:  # what is behind it the next read takes
+                self.heed_failed_read(problem)
+                break
+            frame = self._heed_frame(encoded, ancillary, clock_s)
+            if frame is not None:
+                frames.append(frame)
+                if self.state is BusState.OFF:
+                    self.heed_frame(not marks & socket.MSG_DONTROUTE)  # which marks what a process beside us has sent
+        return frames
+
+    def _heed_frame(self, encoded: bytes, ancillary: list[tuple[int, int, bytes]], clock_s: float) -> Frame | None:
+        """The frame as our drives' code takes it; None where it tells of the bus, or of nothing."""
+        stamp_s = NEVER_S
+        for _, kind, value in ancillary:
+            if kind == SO_TIMESTAMPNS:
+                seconds, nanoseconds = STAMP.unpack(value)
+                stamp_s = seconds + 1e-9 * nanoseconds + clock_s
+            elif kind == SO_RXQ_OVFL:
+                self._heed_overflow(value)
+        if len(encoded) != FRAME_BYTES or encoded[LENGTH_BYTE] > DATA_MAX_BYTES:
+            self.heed_failed_read(ValueError("a frame of another length than CAN 2.0 has"))
+            return None
+        word, length, payload = FRAME_LAYOUT.unpack(encoded)
+        if not word & FLAGS:
+            return Frame(word & STANDARD_MASK, payload[:length], False, False, False, stamp_s)
+        if word & ERROR_FLAG:  # first: its class bits look like a drive's id
+            self.heed_error_frame(word & EXTENDED_MASK, payload[:length])
+            return None
+        is_remote, is_extended = word & REMOTE_FLAG != 0, word & EXTENDED_FLAG != 0
+        identifier = word & (EXTENDED_MASK if is_extended else STANDARD_MASK)
+        return Frame(identifier, b"" if is_remote else payload[:length], is_remote, False, is_extended, stamp_s)
+
+    def _heed_overflow(self, value: bytes) -> None:
+        """The kernel counts from the socket's opening, modulo 2³²."""
+        (count,) = COUNT.unpack(value)
+        self.lost_frames += (count - self._heeded) % COUNT_RANGE
+        self._heeded = count
+
+    def send(self, frame: Frame) -> None:
+        try:
+            self._socket.send(encode_frame(frame))
+        except (OSError, ValueError) as problem:  # a full transmit queue (ENOBUFS) or an interface that is gone
+            self.heed_failed_send(problem)
+
+    def close(self) -> None:
+        self._bus.shutdown()

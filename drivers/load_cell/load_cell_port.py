@@ -1,0 +1,111 @@
+"""A load cell's amplifier on a serial port: samples of force, whatever becomes of the cable.
+
+The amplifier talks whenever it likes, in lines of text. Reading never waits. A line that cannot be read is counted and
+kept to be shown, and an adapter that was pulled out is opened again as soon as it is back (serial_line.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from drivers.load_cell.calibration import LoadCellCalibration
+from drivers.load_cell.line_formats import NEWTONS, LineFormat, Reading, printable
+from drivers.load_cell.sample_clock import LineClock
+from drivers.serial.serial_line import Arrivals, SerialLine
+
+
+class Sample(NamedTuple):
+    stamp_s: float
+    force_n: float  # NaN where overloaded
+    overloaded: bool = False
+
+
+class LoadCellPort:
+    """Owns its serial line, its clock and the counters, which only grow."""
+
+    def __init__(
+        self,
+        path: str,
+        baud: int,
+        line_format: LineFormat,
+        calibration: LoadCellCalibration,
+        open_device: Callable[[str, int], Any] | None = None,
+    ) -> None:
+        """Raises SerialLineError where it does not open."""
+        self.path, self.baud = path, baud
+        self.line_format, self.calibration = line_format, calibration
+        self.lines = self.garbled_lines = self.overloads = 0
+        self.last_garbled = ""
+        self.clock = LineClock(baud)
+        self.line = SerialLine(path, baud, open_device=open_device)
+        self._heard_s: float | None = None
+
+    @property
+    def is_there(self) -> bool:
+        return self.line.is_there
+
+    @property
+    def unpluggings(self) -> int:
+        return self.line.unpluggings
+
+    @property
+    def last_problem(self) -> str:
+        return "" if self.line.problem is None else str(self.line.problem)
+
+    @property
+    def rate_hz(self) -> float | None:
+        return self.clock.rate_hz
+
+    @property
+    def arrivals(self) -> Arrivals:
+        return self.line.arrivals(lambda line: self.line_format.decode(line) is not None)
+
+    @property
+    def recent_lines(self) -> list[bytes]:
+        return list(self.line.recent)
+
+    def silent_for_s(self, now_s: float) -> float:
+        return 0.0 if self._heard_s is None else now_s - self._heard_s
+
+    def read(self, now_s: float) -> list[Sample]:
+        """All samples that have arrived, oldest first; never waits."""
+        if self._heard_s is None:
+            self._heard_s = now_s
+        if self.line.reopen(now_s):
+            self.clock.reset()
+        return self._take(self.line.read(now_s), now_s)
+
+    def _take(self, lines: list[bytes], now_s: float) -> list[Sample]:
+        if not lines:
+            return []
+        self._heard_s = now_s
+        samples = []
+        for line, stamp_s in zip(lines, self.clock.stamps_s(len(lines), now_s), strict=True):
+            reading = self.line_format.decode(line)
+            self._count(line, reading)
+            if reading is not None:
+                samples.append(self._sample(stamp_s, reading))
+        return samples
+
+    def _count(self, line: bytes, reading: Reading | None) -> None:
+        self.lines += 1
+        if reading is None:
+            self.garbled_lines += 1
+            self.last_garbled = printable(line[:60]) or repr(line[:30])[2:-1]
+
+    def _sample(self, stamp_s: float, reading: Reading) -> Sample:
+        if reading.overloaded:
+            self.overloads += 1
+            return Sample(stamp_s, float("nan"), True)
+        return Sample(stamp_s, self.calibration.force_n(self._in_unit(reading)))
+
+    def _in_unit(self, reading: Reading) -> float:
+        """A line that names its unit is believed."""
+        own, wanted = reading.unit, self.calibration.unit.lower()
+        if own == wanted or own not in NEWTONS or wanted not in NEWTONS:
+            return reading.value
+        return reading.value * NEWTONS[own] / NEWTONS[wanted]
+
+    def close(self) -> None:
+        self.line.close()

@@ -1,0 +1,83 @@
+"""The place of a linear stage from an encoder on it: a serial port on which a counter sends its count, a line each.
+
+What a line may look like, and which count is believed, says encoder_counts.py. The counter sends by itself at a steady
+rate, so a line's stamp is as even as that (load_cell_clock.py); what of its way to this computer is constant stays in
+it. Reading never waits, and a device that was pulled out is opened again as soon as it is back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any, NamedTuple
+
+from control.bounds import Bounds
+from drivers.load_cell.sample_clock import LineClock
+from drivers.serial.encoder_counts import EncoderCounts
+from drivers.serial.serial_line import Arrivals, SerialLine
+
+
+@dataclass(frozen=True)
+class StageEncoderSettings:
+    path: str
+    metres_per_count: Annotated[float, Bounds(1e-8, 0.01)]  # which way it counts is found from the stroke
+    baud: Annotated[int, Bounds(300, 4_000_000)] = 115_200
+    label: str = ""  # that a line begins with
+
+
+class Place(NamedTuple):
+    stamp_s: float
+    place_m: float
+
+
+class StageEncoder:
+    """Owns its serial line, its clock and its counts."""
+
+    def __init__(self, settings: StageEncoderSettings, open_device: Callable[[str, int], Any] | None = None) -> None:
+        """Raises SerialLineError where it does not open."""
+        self.settings = settings
+        self.line = SerialLine(settings.path, settings.baud, open_device=open_device)
+        self.clock = LineClock(settings.baud)
+        self.counts = EncoderCounts(settings.metres_per_count, settings.label)
+        self._heard_s: float | None = None
+
+    @property
+    def is_there(self) -> bool:
+        return self.line.is_there
+
+    @property
+    def breaks(self) -> int:
+        """How often places before and behind had not the same zero."""
+        return self.line.unpluggings + self.counts.leaps
+
+    @property
+    def last_problem(self) -> str:
+        return "" if self.line.problem is None else self.line.problem.why
+
+    @property
+    def rate_hz(self) -> float | None:
+        return self.clock.rate_hz
+
+    @property
+    def arrivals(self) -> Arrivals:
+        return self.line.arrivals(lambda line: self.counts.decode(line) is not None)
+
+    def silent_for_s(self, now_s: float) -> float:
+        """Without any count."""
+        return 0.0 if self._heard_s is None else now_s - self._heard_s
+
+    def read(self, now_s: float) -> list[Place]:
+        """All places that have arrived, oldest first; never waits."""
+        if self.line.reopen(now_s):
+            self.clock.reset()
+            self.counts.reset()
+        lines = self.line.read(now_s)
+        stamps_s = self.clock.stamps_s(len(lines), now_s)
+        taken = [(stamp_s, self.counts.take(line, stamp_s)) for line, stamp_s in zip(lines, stamps_s, strict=True)]
+        places = [Place(stamp_s, place_m) for stamp_s, place_m in taken if place_m is not None]
+        if places or self._heard_s is None:
+            self._heard_s = now_s
+        return places
+
+    def close(self) -> None:
+        self.line.close()

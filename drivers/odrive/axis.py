@@ -1,0 +1,290 @@
+"""One ODrive as one joint: what it told last, whether it was restarted, and the frames that command it.
+
+A joint's sign turns a mirrored motor round in angle, velocity, current and torque alike. A drive counts as restarted
+when it is heard again after a silence of RESTART_SILENCE_S, or tells that it initialises, or that its axis has no
+state yet; what it forgets in that, version and watchdog settings, is unknown again. What is read in one tick arrived
+since the tick before, which is how a silence of the drive is told from a stall of ours.
+
+The drive's watchdog is read back by parameter number (SDO). ODrive numbers its parameters anew with every build, for
+each kind of board, and publishes the numbers as flat_endpoints.json beside the firmware; without those of this very
+build the watchdog stays unknown, since a number of another build reads some other parameter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite, isnan, nan, pi
+from typing import Annotated, NamedTuple, Protocol
+
+from control.bounds import Bounds
+from control.records import NEVER_S, UNKNOWN, DriveState
+from drivers.can.frames import Frame
+from drivers.odrive import codec
+from drivers.odrive.codec import AxisState, GarbledMessageError, Message, arbitration_id
+from drivers.odrive.duplicate_node_monitor import TwinWatch
+
+RESTART_SILENCE_S = 0.3  # three heartbeats
+LONGEST_WATCHDOG_S = 3600.0  # a number beyond is no time-out
+LARGEST_FLOAT = 3.4e38  # of binary32
+TURN_RAD = 2.0 * pi
+QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)
+
+
+@dataclass(frozen=True)
+class DriveParameters:
+    bus: str
+    node_id: Annotated[int, Bounds(0, 62)]
+    sign: Annotated[int, Bounds(-1, 1)] = 1  # -1 for a mirrored motor; 0 is refused
+    zero_turn: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0  # encoder reading at joint angle zero
+    torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0)] = 0.083  # 60 / (2π · 115 rpm/V), as in the paper
+    velocity_limit_turn_s: Annotated[float, Bounds(0.1, 200.0)] = 4.0  # also bounds torque: see `prepare`
+    velocity_gain_nm_s_turn: Annotated[float, Bounds(0.01, 20.0)] = 0.5
+    current_limit_a: Annotated[float, Bounds(0.1, 200.0)] = 12.0
+    heartbeat_period_s: Annotated[float, Bounds(0.01, 1.0)] = 0.1  # as set on the drive, of which this is the default
+
+
+@dataclass(frozen=True)
+class WatchdogEndpoints:
+    """Numbers of two parameters in one build of ODrive's firmware, out of its flat_endpoints.json."""
+
+    firmware: str  # "0.6.11"
+    hardware: str  # "4.4.58": product line, version and variant
+    enable: Annotated[int, Bounds(1, 65535)]  # of axis0.config.enable_watchdog
+    timeout: Annotated[int, Bounds(1, 65535)]  # of axis0.config.watchdog_timeout
+
+
+class Version(NamedTuple):
+    major: int
+    minor: int
+    revision: int
+
+
+class Outlet(Protocol):
+    """Where an axis puts its frames."""
+
+    def send(self, frame: Frame) -> None: ...
+
+
+class OdriveAxis:
+    """Owns what is known of one drive; every field is the newest that arrived."""
+
+    def __init__(
+        self, joint: str, parameters: DriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints] = ()
+    ) -> None:
+        self.joint = joint
+        self.parameters = parameters
+        self._outlet = outlet
+        self._endpoints = tuple(endpoints)
+        self._rad_per_turn = parameters.sign * TURN_RAD
+        self._torque_id = arbitration_id(parameters.node_id, codec.SET_INPUT_TORQUE)
+        self._twin_watch = TwinWatch(parameters.heartbeat_period_s)
+        self.reset()
+
+    def reset(self) -> None:
+        self._angle_rad = self._velocity_rad_s = self._current_a = UNKNOWN
+        self._angle_stamp_s = self._current_stamp_s = self._heartbeat_stamp_s = NEVER_S
+        self._temperature_c = self._bus_voltage_v = UNKNOWN
+        self._temperature_stamp_s = self._bus_voltage_stamp_s = NEVER_S
+        self._read_s = self._read_before_s = NEVER_S
+        self.closed_loop = False
+        self.busy_state = 0  # of a drive that calibrates, homes or does whatever else nobody here has asked for
+        self._error_flags = 0
+        self.disarm_reason = 0
+        self.restarts = 0
+        self._starting = True  # until it was heard with a state
+        self._twin_watch.reset()
+        self._forget_settings()
+
+    def _forget_settings(self) -> None:
+        self.version: Version | None = None
+        self.hardware = ""
+        self._watchdog_enabled: bool | None = None
+        self._watchdog_timeout_s = UNKNOWN
+
+    def begin_read(self, now_s: float) -> None:
+        """What arrives until the next call came between the one before and `now_s`."""
+        self._read_before_s, self._read_s = self._read_s, now_s
+
+    @property
+    def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
+        """What to do with the payload of each arbitration id that this drive sends."""
+        table: dict[Message, Callable[[bytes, float], None]] = {
+            codec.GET_ENCODER_ESTIMATES: self._receive_encoder,
+            codec.GET_IQ: self._receive_current,
+            codec.HEARTBEAT: self._receive_heartbeat,
+            codec.GET_ERROR: self._receive_error,
+            codec.GET_TEMPERATURE: self._receive_temperature,
+            codec.GET_BUS_VOLTAGE_CURRENT: self._receive_bus_voltage,
+            codec.GET_VERSION: self._receive_version,
+            codec.TX_SDO: self._receive_setting,
+        }
+        return {arbitration_id(self.parameters.node_id, message): receive for message, receive in table.items()}
+
+    def _receive_encoder(self, data: bytes, now_s: float) -> None:
+        turns, turns_s = codec.GET_ENCODER_ESTIMATES.decode(data)
+        _require_finite(turns + turns_s)
+        if now_s - self._angle_stamp_s > RESTART_SILENCE_S:
+            self._heed_silence()
+        self._twin_watch.heed_reading(turns, self._read_s)
+        self._angle_rad = (turns - self.parameters.zero_turn) * self._rad_per_turn
+        self._velocity_rad_s = turns_s * self._rad_per_turn
+        self._angle_stamp_s = now_s
+
+    def _receive_current(self, data: bytes, now_s: float) -> None:
+        _, measured_a = codec.GET_IQ.decode(data)
+        if isnan(measured_a) and not self.closed_loop:  # nothing is measured where nothing flows
+            measured_a = 0.0
+        _require_finite(measured_a)
+        if now_s - self._current_stamp_s > RESTART_SILENCE_S:
+            self._heed_silence()
+        self._current_a = self.parameters.sign * measured_a
+        self._current_stamp_s = now_s
+
+    def _receive_heartbeat(self, data: bytes, now_s: float) -> None:
+        self._error_flags, state, _, _ = codec.HEARTBEAT.decode(data)
+        if now_s - self._heartbeat_stamp_s > RESTART_SILENCE_S:
+            self._heed_silence()
+        if state == AxisState.UNDEFINED or self._error_flags & codec.ERROR_INITIALIZING:
+            self._heed_restart()
+        else:
+            self._starting = False
+        self._twin_watch.heed_heartbeat(self._read_s, self._read_before_s)
+        self.closed_loop = state == AxisState.CLOSED_LOOP
+        self.busy_state = 0 if state in QUIET_STATES else state
+        self._heartbeat_stamp_s = now_s
+
+    def _heed_silence(self) -> None:
+        """Of one message. Only if all others were missing as long was the drive away, not if we did not listen."""
+        heard_s = max(self._angle_stamp_s, self._current_stamp_s, self._heartbeat_stamp_s)
+        if isfinite(heard_s) and self._read_before_s - heard_s > RESTART_SILENCE_S:
+            self._heed_restart()
+
+    def _heed_restart(self) -> None:
+        if not self._starting:
+            self.restarts += 1
+        self._starting = True
+        self._forget_settings()
+
+    def _receive_error(self, data: bytes, now_s: float) -> None:
+        self._error_flags, self.disarm_reason = codec.GET_ERROR.decode(data)
+
+    def _receive_temperature(self, data: bytes, now_s: float) -> None:
+        _, self._temperature_c = codec.GET_TEMPERATURE.decode(data)
+        self._temperature_stamp_s = now_s
+
+    def _receive_bus_voltage(self, data: bytes, now_s: float) -> None:
+        self._bus_voltage_v, _ = codec.GET_BUS_VOLTAGE_CURRENT.decode(data)
+        self._bus_voltage_stamp_s = now_s
+
+    def _receive_version(self, data: bytes, now_s: float) -> None:
+        fields = codec.GET_VERSION.decode(data)
+        self.version = Version(*fields[4:7])
+        self.hardware = ".".join(str(field) for field in fields[1:4])
+
+    def _receive_setting(self, data: bytes, now_s: float) -> None:
+        endpoint, value = codec.decode_sdo(data)
+        endpoints = self._watchdog_endpoints
+        if endpoints is None:  # another program asks this drive
+            return
+        if endpoint == endpoints.enable:
+            self._watchdog_enabled = codec.decode_sdo_flag(value)
+        elif endpoint == endpoints.timeout:
+            timeout_s = codec.decode_sdo_float(value)
+            if not 0.0 <= timeout_s <= LONGEST_WATCHDOG_S:
+                raise GarbledMessageError("no time")
+            self._watchdog_timeout_s = timeout_s
+
+    @property
+    def _watchdog_endpoints(self) -> WatchdogEndpoints | None:
+        """Those of the drive's own build, once its version is known."""
+        if self.version is None:
+            return None
+        build = (".".join(str(part) for part in self.version), self.hardware)
+        return next((each for each in self._endpoints if (each.firmware, each.hardware) == build), None)
+
+    @property
+    def watchdog_s(self) -> float:
+        """Its time-out as the drive has it: NaN while it was not read back, 0 where it is switched off."""
+        if self._watchdog_enabled is None:
+            return nan
+        return self._watchdog_timeout_s if self._watchdog_enabled else 0.0
+
+    @property
+    def twins(self) -> bool:
+        """Two drives seem to share this id: see drivers/odrive/duplicate_node_monitor.py."""
+        return self._twin_watch.seen
+
+    @property
+    def state(self) -> DriveState:
+        return DriveState(
+            self._angle_rad,
+            self._velocity_rad_s,
+            self._angle_stamp_s,
+            self._current_a,
+            self._current_stamp_s,
+            self.closed_loop,
+            self._error_flags,
+            self._heartbeat_stamp_s,
+            self._temperature_c,
+            self._temperature_stamp_s,
+            self._bus_voltage_v,
+            self._bus_voltage_stamp_s,
+        )
+
+    @property
+    def heard(self) -> bool:
+        """Every signal that control depends on has come at least once."""
+        return isfinite(self._angle_stamp_s + self._current_stamp_s + self._heartbeat_stamp_s)
+
+    def send_torque(self, torque_nm: float) -> None:
+        if not -LARGEST_FLOAT < torque_nm < LARGEST_FLOAT:  # no bytes could hold it; the gate refuses it as NaN
+            torque_nm = nan
+        data = codec.SET_INPUT_TORQUE.encode(self.parameters.sign * torque_nm)
+        self._outlet.send(Frame(self._torque_id, data))
+
+    def prepare(self) -> None:
+        """Torque mode, limits, velocity gain, zero torque.
+
+        In torque mode ODrive clamps torque to (velocity limit - velocity) times its velocity gain, silently. Both are
+        set so that the clamp lies above every torque that we command of a joint within its own velocity limit, and
+        takes the torque of a faster one, also when this program is dead and its last command still holds.
+        """
+        parameters = self.parameters
+        self._transmit(codec.SET_CONTROLLER_MODE, codec.TORQUE_CONTROL, codec.PASSTHROUGH)
+        self._transmit(codec.SET_LIMITS, parameters.velocity_limit_turn_s, parameters.current_limit_a)
+        self._transmit(codec.SET_VEL_GAINS, parameters.velocity_gain_nm_s_turn, 0.0)
+        self._transmit(codec.SET_INPUT_TORQUE, 0.0)
+
+    def close_loop(self) -> None:
+        self._transmit(codec.SET_AXIS_STATE, AxisState.CLOSED_LOOP)
+
+    def disarm(self) -> None:
+        self._transmit(codec.SET_INPUT_TORQUE, 0.0)
+        self._transmit(codec.SET_AXIS_STATE, AxisState.IDLE)
+
+    def clear_errors(self) -> None:
+        self._transmit(codec.CLEAR_ERRORS, 0)
+
+    def request_version(self) -> None:
+        self._request(codec.GET_VERSION)
+
+    def request_watchdog(self) -> None:
+        """Where the numbers of the drive's build are known."""
+        endpoints = self._watchdog_endpoints
+        if endpoints is None:
+            return
+        for endpoint in (endpoints.enable, endpoints.timeout):
+            self._transmit(codec.RX_SDO, codec.SDO_READ, endpoint, 0)
+
+    def _request(self, message: Message) -> None:
+        """By a remote frame."""
+        self._outlet.send(Frame(arbitration_id(self.parameters.node_id, message), is_remote=True))
+
+    def _transmit(self, message: Message, *values: float) -> None:
+        self._outlet.send(Frame(arbitration_id(self.parameters.node_id, message), message.encode(*values)))
+
+
+def _require_finite(value: float) -> None:
+    if not isfinite(value):
+        raise GarbledMessageError("not a finite number")

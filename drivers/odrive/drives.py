@@ -1,0 +1,164 @@
+"""The robot's four ODrives over one or two CAN ports, as joints.
+
+`read` drains the ports and keeps the newest of every signal with the time it arrived; `send` commands torque, through
+the gate (drivers/odrive/transmit_gate.py) as everything that leaves. Nothing is transmitted here unless the caller
+asks for
+it, and the frames of strangers, garbled ones included, are counted and ignored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
+
+from control.limits import JointLimits
+from control.records import JOINTS, NEVER_S, DriveStates, Torques
+from drivers.can.can_port import CanPort
+from drivers.can.frames import Frame
+from drivers.odrive.axis import DriveParameters as DriveParameters  # for whoever configures drives
+from drivers.odrive.axis import OdriveAxis, WatchdogEndpoints
+from drivers.odrive.codec import GarbledMessageError
+from drivers.odrive.transmit_gate import TransmitGate
+
+REPEAT_S = 0.1  # between two requests to change the axis state, of which the heartbeat tells the result
+LONGEST_IN_QUEUE_S = 2.0  # a stamp older than that is of another clock
+VERSION_REPEAT_S = 0.5  # between two questions for the same that was not answered
+REFRESH_S = 2.0  # between two questions for what was answered: somebody may change a drive over USB
+TICK_S = 1.0 / 380.0  # of the loop
+
+
+class OdriveDrives:
+    """All four, in the order of JOINTS. `limits` are what the gate lets pass, `endpoints` more builds of firmware."""
+
+    def __init__(
+        self,
+        parameters: Mapping[str, DriveParameters],
+        ports: Mapping[str, CanPort],
+        limits: JointLimits | None = None,
+        endpoints: Sequence[WatchdogEndpoints] = (),
+    ) -> None:
+        self.ports = dict(ports)
+        self.gate = TransmitGate(limits or JointLimits())
+        outlets = {
+            name: self.gate.outlet(port, [parameters[joint] for joint in JOINTS if parameters[joint].bus == name])
+            for name, port in self.ports.items()
+        }
+        self.axes = tuple(
+            OdriveAxis(joint, parameters[joint], outlets[parameters[joint].bus], endpoints) for joint in JOINTS
+        )
+        self._receivers = [(port, self._receivers_on(name)) for name, port in self.ports.items()]
+        for port, receivers in self._receivers:
+            port.listen_to(receivers)
+        self.reset()
+
+    def reset(self) -> None:
+        for axis in self.axes:
+            axis.reset()
+        self.gate.close()
+        self.unknown_frames = 0  # of other ids, remote or extended, where the port does not keep them away
+        self.garbled_frames = 0  # of a drive of ours, with a payload that makes no sense
+        self._armed_s = self._disarmed_s = self._version_asked_s = self._watchdog_asked_s = NEVER_S
+
+    def read(self, now_s: float) -> DriveStates:
+        """The newest of every signal after draining the ports, with the stamp of its frame."""
+        for axis in self.axes:
+            axis.begin_read(now_s)
+        for port, receivers in self._receivers:
+            for frame in port.receive():
+                receive = None if frame.is_remote or frame.is_extended else receivers.get(frame.arbitration_id)
+                if receive is None or frame.is_error:
+                    self.unknown_frames += 1
+                    continue
+                try:
+                    receive(frame.data, _stamp_s(frame, now_s))
+                except GarbledMessageError:
+                    self.garbled_frames += 1
+        a, b, c, d = self.axes
+        return a.state, b.state, c.state, d.state
+
+    def _receivers_on(self, bus: str) -> dict[int, Callable[[bytes, float], None]]:
+        table: dict[int, Callable[[bytes, float], None]] = {}
+        for axis in self.axes:
+            if axis.parameters.bus == bus:
+                table.update(axis.receivers)
+        return table
+
+    @property
+    def _lost(self) -> int:
+        return sum(port.failed_sends for port in self.ports.values())
+
+    @property
+    def heard(self) -> bool:
+        return all(axis.heard for axis in self.axes)
+
+    def send(self, torques_nm: Torques, elapsed_s: float = TICK_S) -> None:
+        """To all four, `elapsed_s` after the torques before, which bounds by how much they may differ."""
+        self.gate.allow_step(elapsed_s)
+        for axis, torque_nm in zip(self.axes, torques_nm, strict=True):
+            axis.send_torque(torque_nm)
+
+    def arm(self, now_s: float, at_once: bool = False) -> None:
+        """Open the gate and prepare all drives `at_once`; else ask those not in it yet for closed loop, every REPEAT_S.
+
+        A drive is prepared again before it is asked, and nothing is asked for while frames are lost on the way.
+        """
+        self.gate.open()
+        if not at_once and now_s - self._armed_s < REPEAT_S:
+            return
+        self._armed_s = NEVER_S if at_once else now_s
+        lost_before = self._lost
+        late = [axis for axis in self.axes if at_once or not axis.closed_loop]
+        for axis in late:
+            axis.prepare()
+        if at_once or self._lost > lost_before:
+            return
+        for axis in late:
+            axis.close_loop()
+
+    def disarm(self, now_s: float, at_once: bool = False) -> None:
+        """Close the gate; zero torque and idle for all `at_once`, else every REPEAT_S for those in closed loop."""
+        self.gate.close()
+        if not at_once and now_s - self._disarmed_s < REPEAT_S:
+            return
+        for axis in self.axes:
+            if at_once or axis.closed_loop:
+                self._disarmed_s = now_s
+                axis.disarm()
+
+    def clear_errors(self) -> None:
+        for axis in self.axes:
+            axis.clear_errors()
+
+    def request_versions(self, now_s: float) -> None:
+        """Every VERSION_REPEAT_S of drives that did not tell theirs yet, every REFRESH_S of all."""
+        known = all(axis.version is not None for axis in self.axes)
+        if now_s - self._version_asked_s < _repeat_s(known):
+            return
+        self._version_asked_s = now_s
+        for axis in self.axes:
+            if known or axis.version is None:
+                axis.request_version()
+
+    def request_watchdogs(self, now_s: float) -> None:
+        """The same of the watchdogs of those whose version is known."""
+        known = all(isfinite(axis.watchdog_s) for axis in self.axes)
+        if now_s - self._watchdog_asked_s < _repeat_s(known):
+            return
+        self._watchdog_asked_s = now_s
+        for axis in self.axes:
+            if known or not isfinite(axis.watchdog_s):
+                axis.request_watchdog()
+
+    def close(self) -> None:
+        for port in self.ports.values():
+            port.close()
+
+
+def _repeat_s(known: bool) -> float:
+    """Between two questions."""
+    return REFRESH_S if known else VERSION_REPEAT_S
+
+
+def _stamp_s(frame: Frame, now_s: float) -> float:
+    """When a frame was on the bus, or now, where its port does not know or its clock is another one."""
+    return frame.stamp_s if 0.0 <= now_s - frame.stamp_s < LONGEST_IN_QUEUE_S else now_s

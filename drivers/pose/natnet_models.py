@@ -1,0 +1,77 @@
+"""NatNet's description of all that is tracked: the streaming ids of rigid bodies by their names.
+
+Layout of message 5 (see natnet_codec.py): i32 descriptions, each i32 kind, from 4.1 on i32 bytes of what follows, then
+
+    marker set (0)   its name and a zero byte, i32 markers, each a name and a zero byte
+    rigid body (1)   its name and a zero byte, i32 id, i32 parent, f32 x y z; from 3.0 on
+                     i32 markers, 12 bytes of a place each, 4 of a label each, from 4.0 on a name and a zero byte each
+
+Other kinds are passed over by their size. Before 4.1 they do not tell it, so there what stands behind the first of
+them is not read; Motive tells marker sets and rigid bodies first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from drivers.pose.natnet_codec import (
+    GARBLED,
+    HEADER,
+    INTEGER,
+    TWO_INTEGERS,
+    VECTOR_BYTES,
+    GarbledPacketError,
+    NatNetVersion,
+)
+
+MARKER_SET, RIGID_BODY = 0, 1
+
+
+def decode_bodies(packet: bytes, version: NatNetVersion) -> dict[str, int]:
+    """Streaming ids by name. Raises GarbledPacketError."""
+    try:
+        return dict(_bodies(packet, version))
+    except GARBLED as problem:
+        raise GarbledPacketError(str(problem)) from None
+
+
+def _bodies(packet: bytes, version: NatNetVersion) -> Iterator[tuple[str, int]]:
+    has_sizes = version >= (4, 1)
+    count, place = _count(packet, HEADER.size)
+    for _ in range(count):
+        (kind,) = INTEGER.unpack_from(packet, place)
+        place += INTEGER.size
+        size, place = _count(packet, place) if has_sizes else (0, place)
+        if kind == RIGID_BODY:
+            yield _name(packet, place)
+        elif not has_sizes and kind != MARKER_SET:
+            return
+        place = place + size if has_sizes else _behind(packet, place, kind, version)
+
+
+def _count(packet: bytes, place: int) -> tuple[int, int]:
+    (count,) = INTEGER.unpack_from(packet, place)
+    if count < 0:
+        raise GarbledPacketError("a negative count")
+    return count, place + INTEGER.size
+
+
+def _name(packet: bytes, place: int) -> tuple[str, int]:
+    end = packet.index(0, place)
+    (identity,) = INTEGER.unpack_from(packet, end + 1)
+    return packet[place:end].decode(errors="replace"), identity
+
+
+def _behind(packet: bytes, place: int, kind: int, version: NatNetVersion) -> int:
+    """The end of a description that does not tell its size."""
+    place = packet.index(0, place) + 1
+    if kind == RIGID_BODY:
+        place += TWO_INTEGERS.size + VECTOR_BYTES
+        if version < (3, 0):
+            return place
+    markers, place = _count(packet, place)
+    if kind == RIGID_BODY:
+        place += (VECTOR_BYTES + INTEGER.size) * markers
+    for _ in range(markers if kind == MARKER_SET or version >= (4, 0) else 0):
+        place = packet.index(0, place) + 1
+    return place

@@ -1,0 +1,206 @@
+"""The body's pose from OptiTrack's motion capture: NatNet frames over UDP, multicast or to this computer alone.
+
+A server that multicasts sends its frames to a group that this port joins on one interface; one that does not sends
+them to whoever asked to connect and keeps saying that it is there. Which version of the protocol it speaks is asked
+from it, or configured where requests do not get through. Nothing here waits: requests are sent once a second by the
+reading itself, until they are answered.
+
+A place is stamped with the moment of its exposure, as far as that can be known: from version 3.0 on the frames tell how
+long ago their cameras' shutters were open when they were sent, and the quickest frame of late tells the difference
+of the clocks. What always passes on top of it, between sending and arriving or in a program that tells nothing, is
+`latency_s`. A frame in which the body is not tracked, or holds every digit of the one before, is no new pose; and after
+a long gap or a leap the first is not believed before a second one follows: capture that is lost shows old places.
+"""
+
+from __future__ import annotations
+
+from errno import EAFNOSUPPORT
+
+from control.records import NEVER_S, BodyPose
+from drivers.pose.natnet_codec import (
+    CONNECT,
+    FRAME,
+    KEEP_ALIVE,
+    MODEL,
+    NEWEST,
+    OLDEST,
+    REQUEST_MODEL,
+    SERVER_INFO,
+    FrameLayout,
+    GarbledPacketError,
+    RigidBody,
+    decode_server_info,
+    message_of,
+)
+from drivers.pose.natnet_models import decode_bodies
+from drivers.pose.natnet_parameters import NatNetParameters, parse_version
+from drivers.pose.natnet_sockets import NatNetSockets
+from drivers.pose.pose_port import STALE_S, PoseReport, PoseSourceError
+from drivers.pose.pose_timing import LeastDelay, PoseForecast
+from drivers.pose.track_axis import Direction
+
+DOUBTED_S = 0.5  # a pose after so long a gap is believed when a second one follows
+REQUEST_S = 1.0  # between requests; Motive forgets a client that is silent for several seconds
+NO_NETWORK = "the service may use no network: add AF_INET to RestrictAddressFamilies= in its unit"
+
+
+class NatNetPort:
+    """A PoseSource. Owns what the server has told, and the places of late."""
+
+    def __init__(self, parameters: NatNetParameters, direction: Direction, origin_m: float = 0.0) -> None:
+        """x is the position along `direction`, a unit vector in the cameras' frame. Raises PoseSourceError."""
+        self.parameters = parameters
+        self._direction, self._origin_m = direction, origin_m
+        self.poses = self.garbled = self.lost = 0
+        self._told = self._unseen = ""  # why the server's frames cannot be read; why the last one brought no pose
+        self.reset()
+        try:
+            self._sockets = NatNetSockets(parameters)
+        except OSError as problem:
+            why = NO_NETWORK if problem.errno == EAFNOSUPPORT else problem.strerror
+            raise PoseSourceError(f"NatNet cannot be received {_place(parameters)}: {why}") from None
+
+    def reset(self) -> None:
+        configured = parse_version(self.parameters.version)
+        self._layout = FrameLayout(configured) if configured else None
+        self._version = configured
+        self._ticks_per_s = 0
+        self._identity = self.parameters.body_id
+        self._named = not self.parameters.body  # whether the id is known
+        self._models_changed = False
+        self._now_s = self._asked_s = self._heard_s = self._seen_s = self._taken_s = NEVER_S
+        self._strangers_s, self._stranger = NEVER_S, ""  # who sends and is not the server
+        self._body: RigidBody | None = None
+        self._delay, self._forecast = LeastDelay(), PoseForecast()
+        self._stamp_s = NEVER_S
+
+    def read(self, now_s: float) -> BodyPose:
+        self._now_s = now_s
+        if self.parameters.server and now_s - self._asked_s >= REQUEST_S:
+            self._asked_s = now_s
+            self._ask(now_s)
+        for packet, sender in self._sockets.packets():
+            self._judge(packet, sender, now_s)
+        if now_s - self._taken_s > STALE_S:
+            return BodyPose()
+        return BodyPose(self._stamp_s, self._forecast.at(now_s) - self._origin_m)
+
+    def _ask(self, now_s: float) -> None:
+        silent = now_s - self._heard_s > REQUEST_S
+        self._sockets.request(CONNECT if self._version is None or silent else KEEP_ALIVE)
+        if self.parameters.body and (self._models_changed or not self._named):
+            self._models_changed = False
+            self._sockets.request(REQUEST_MODEL)
+
+    def _judge(self, packet: bytes, sender: str, now_s: float) -> None:
+        if self.parameters.server and sender != self.parameters.server:
+            self.garbled += 1
+            self._strangers_s, self._stranger = now_s, sender
+            return
+        try:
+            self._take(packet, now_s)
+        except GarbledPacketError:
+            self.garbled += 1
+
+    def _take(self, packet: bytes, now_s: float) -> None:
+        """Raises GarbledPacketError."""
+        message = message_of(packet)
+        if message == FRAME:
+            self._heard_s = now_s
+            if self._layout is not None and self._named:
+                self._take_frame(packet, now_s, self._layout)
+        elif message == SERVER_INFO:
+            self._take_server_info(packet)
+        elif message == MODEL and self._version is not None:
+            bodies = decode_bodies(packet, self._version)
+            self._named = not self.parameters.body or self.parameters.body in bodies
+            self._identity = bodies.get(self.parameters.body, self.parameters.body_id)
+
+    def _take_server_info(self, packet: bytes) -> None:
+        told = decode_server_info(packet)
+        self._ticks_per_s = told.ticks_per_s
+        if self.parameters.version:
+            return
+        readable = OLDEST <= told.version <= NEWEST
+        self._told = "" if readable else f"{told.name or 'the server'} speaks NatNet {told.version}"
+        if told.version != self._version:
+            self._version = told.version
+            self._layout = FrameLayout(told.version) if readable else None
+            self._delay.reset()
+
+    def _take_frame(self, packet: bytes, now_s: float, layout: FrameLayout) -> None:
+        frame = layout.decode_frame(packet, self._identity)
+        self._models_changed = self._models_changed or frame.models_changed
+        body = frame.body
+        if body is None or not body.tracked:
+            self.lost += 1
+            self._unseen = "motion capture does not see the body."
+        elif self._body is not None and body[1:3] == self._body[1:3]:
+            self.lost += 1
+            self._unseen = "motion capture sends the same pose again and again: it is frozen."
+        else:
+            self._body = body
+            exposed_s = sent_s = frame.software_s
+            if frame.sent_ticks and self._ticks_per_s:
+                exposed_s, sent_s = frame.exposed_ticks / self._ticks_per_s, frame.sent_ticks / self._ticks_per_s
+            self._take_pose(body, exposed_s, sent_s, now_s)
+
+    def _take_pose(self, body: RigidBody, exposed_s: float, sent_s: float, now_s: float) -> None:
+        (x_m, y_m, z_m), (a, b, c) = body.position_m, self._direction
+        place_m = a * x_m + b * y_m + c * z_m
+        self._stamp_s = min(exposed_s + self._delay.update(now_s, sent_s) - self.parameters.latency_s, now_s)
+        follows = self._forecast.add(self._stamp_s, place_m) and now_s - self._seen_s <= DOUBTED_S
+        self._seen_s = now_s
+        self._taken_s = now_s if follows else NEVER_S
+        self.poses += follows
+        if not follows:
+            self.lost += 1
+            self._unseen = "motion capture's poses leap, or come seconds apart."
+
+    def report(self) -> PoseReport:
+        version = f" {self._version}" if self._version else ""
+        report = PoseReport(f"NatNet{version} {_place(self.parameters)}", self.poses, self.garbled, self.lost)
+        if self._now_s - self._taken_s <= STALE_S:
+            return report
+        trouble, what_to_do = self._trouble()
+        return report._replace(trouble=trouble, what_to_do=what_to_do)
+
+    def _trouble(self) -> tuple[str, str]:
+        """Why no pose comes, and what to do about it."""
+        parameters = self.parameters
+        if self._told:
+            return (
+                f"{self._told}; 2.6 to 4 are read here.",
+                "choose an older version in its streaming settings, and set pose.natnet.version to that",
+            )
+        if self._now_s - self._heard_s > STALE_S:
+            if self._now_s - self._strangers_s <= STALE_S:
+                return (
+                    f"packets come from {self._stranger}, and none from {parameters.server}.",
+                    "set pose.natnet.server to the address that motion capture sends from (its local interface)",
+                )
+            return (
+                f"no NatNet frame comes {_place(parameters)}.",
+                "check that motion capture streams to here, and no firewall or IPAddressDeny= is between",
+            )
+        if self._layout is None:
+            return (
+                f"frames come, but {parameters.server} does not tell their version.",
+                "check pose.natnet.server and command_port, or set pose.natnet.version",
+            )
+        if not self._named:
+            return f"there is no rigid body named {parameters.body!r}.", "check pose.natnet.body against its name there"
+        if self._unseen:
+            return self._unseen, "check its markers, the cameras' view, and pose.natnet.body or body_id"
+        return "all NatNet frames are garbled.", "check pose.natnet.version against the version that is streamed"
+
+    def reopen(self, now_s: float) -> bool:
+        return False  # a socket lives on without its network
+
+    def close(self) -> None:
+        self._sockets.close()
+
+
+def _place(parameters: NatNetParameters) -> str:
+    by = f"in group {parameters.group}, port {parameters.port}" if parameters.group else f"from {parameters.server}"
+    return f"{by} on {parameters.interface}" if parameters.interface else by

@@ -1,0 +1,96 @@
+"""The body's place from an encoder on its rail: a serial port on which a counter sends its count, a line each.
+
+What a line may look like, and which count is believed, says encoder_counts.py; how the port is opened, read and found
+again after it was unplugged, serial_line.py. It is opened again between two ticks and only while nothing moves, since
+that may take milliseconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from control.bounds import Bounds
+from control.records import NEVER_S, BodyPose
+from drivers.pose.pose_port import STALE_S, PoseReport, PoseSourceError
+from drivers.serial.encoder_counts import EncoderCounts
+from drivers.serial.serial_line import SerialLine, SerialLineError
+
+LONGEST_LINE_BYTES = 64
+RETRY_S = 1.0  # between tries to open a device that is gone
+
+
+@dataclass(frozen=True)
+class RailEncoderParameters:
+    device: str = ""  # such as /dev/serial/by-id/..., which stays the same wherever it is plugged in
+    bit_rate: Annotated[int, Bounds(300, 4_000_000)] = 115_200
+    metres_per_count: Annotated[float, Bounds(-1.0, 1.0)] = 0.0  # negative where counts fall on the way ahead
+    label: str = ""  # that a line begins with
+
+
+class RailEncoder:
+    """A PoseSource. Owns its serial line, its counts, and the newest pose."""
+
+    def __init__(
+        self,
+        parameters: RailEncoderParameters,
+        origin_m: float = 0.0,
+        open_device: Callable[[str, int], Any] | None = None,
+    ) -> None:
+        """`origin_m`: the counter's place where x is zero. Raises PoseSourceError."""
+        self.parameters = parameters
+        device = parameters.device
+        try:
+            self.line = SerialLine(device, parameters.bit_rate, LONGEST_LINE_BYTES, RETRY_S, open_device)
+        except SerialLineError as problem:
+            raise PoseSourceError(f"the rail encoder {device} does not open: {problem.why}") from None
+        self._counts = EncoderCounts(parameters.metres_per_count, parameters.label, origin_m)
+        self._now_s = NEVER_S
+        self.reset()
+
+    def reset(self) -> None:
+        """As after opening."""
+        self._pose = BodyPose()
+        self._counts.reset()
+        self.line.reset()
+
+    @property
+    def poses(self) -> int:
+        return self._counts.believed
+
+    @property
+    def garbled(self) -> int:
+        return self._counts.garbled
+
+    def read(self, now_s: float) -> BodyPose:
+        self._now_s, was_there = now_s, self.line.is_there
+        for line in self.line.read(now_s):
+            x_m = self._counts.take(line, now_s)
+            if x_m is not None:
+                self._pose = BodyPose(now_s, x_m)
+        if was_there and not self.line.is_there:
+            self.reset()
+        return self._pose if now_s - self._pose.stamp_s <= STALE_S else BodyPose()
+
+    def reopen(self, now_s: float) -> bool:
+        """Where it was lost, try again once in RETRY_S; whether it was opened anew."""
+        return self.line.reopen(now_s)
+
+    def report(self) -> PoseReport:
+        device = self.parameters.device
+        report = PoseReport(f"rail encoder {device}", self.poses, self.garbled)
+        if self.line.problem is not None and not self.line.is_there:
+            return report._replace(
+                trouble=f"the rail encoder is gone: {self.line.problem.why}.",
+                what_to_do="plug it in; it is opened again while the torque is off",
+            )
+        if self._now_s - self._pose.stamp_s <= STALE_S:
+            return report
+        return report._replace(
+            trouble=f"no count comes from {device}.",
+            what_to_do="check its power and pose.rail_encoder.bit_rate and label",
+        )
+
+    def close(self) -> None:
+        self.line.close()

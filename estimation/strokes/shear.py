@@ -1,0 +1,128 @@
+"""What a stance says about the mud's shear strength: the value k_s, or only that it is at least so much.
+
+The plate's pressure is k_s ζ only where the mud yields. A body that the flippers can move makes three cases (section
+III-C of the paper), told apart batch by batch from the plate's slip, its way back through the mud in the world's frame:
+
+    yield   the body stands, the plate shears through the mud: τ₁ = k_s Ψ
+    body    the body advances and the mud holds: the force is the body's drag, and k_s at least what it bore
+    mixed   the plate slips while the body advances: k_s from where it slips
+
+A batch counts as yielding once the plate has slipped MOBILISED_M since the stance began and still slips. A base that is
+fixed makes all travel slip. Without a pose, the force's own size decides: as long as both flippers together stay
+under the body's drag the body cannot have moved; otherwise the largest force held is a bound. A motor at its limit
+bounds k_s in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+from math import cos, hypot, isfinite, sin
+from typing import NamedTuple
+
+from control.geometry import FlipperGeometry
+from control.plate import stance_moment_m4, submerged_plate
+from control.records import UNKNOWN
+from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin, median
+from estimation.strokes.stroke import Batch
+
+MOBILISED_M = 0.025  # in the authors' logs the force is on its plateau after 2 to 3 cm
+SLIPPING = 0.2  # of the flipper's own travel, from which a batch still slips
+QUICK_DOUBT = 0.05  # of a bound: it was borne in a quick push, and mud bears a tenth more at twice the speed
+STANDS = 0.8  # of the body's drag, under which the body certainly stands
+HELD = (3, 5)  # batches in a row that must have borne a bound: at most 3 cm, less where the stance is shorter
+
+
+class Base(Enum):
+    """What carries the flippers."""
+
+    FIXED = "fixed"
+    FREE = "free"
+
+
+class Shear(NamedTuple):
+    fit: OriginFit | None
+    at_least: bool
+    case: str  # "yield", "body", "mixed", "unknown", "saturated"
+    samples: int
+    reason: str = ""
+
+
+def find_shear(
+    geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, base: Base, body_drag_n: float
+) -> Shear:
+    """From the batches of one stance."""
+    moments = [_moment_m4(geometry, batch, surface_m) for batch in batches]
+    if not any(moment > 0.0 for moment in moments):
+        return Shear(None, False, "unknown", 0, "no depth in any batch")
+    slips = slips_m(geometry, batches, base)
+    if slips is None:
+        return _without_pose(geometry, batches, moments, body_drag_n)
+    steady = _yielding(geometry, batches, slips)
+    if len(steady) >= MIN_BATCHES:
+        return _value(_case(geometry, batches, slips), steady, batches, moments)
+    if any(batch.saturated for batch in batches):
+        return _bound("saturated", "a motor at its limit", batches, moments)
+    return _bound("body", "the mud held: the body moved", batches, moments)
+
+
+def _moment_m4(geometry: FlipperGeometry, batch: Batch, surface_m: float) -> float:
+    """Ψ."""
+    plate = submerged_plate(geometry, batch.sweep_rad, batch.adduction_rad, surface_m)
+    return stance_moment_m4(geometry, plate)
+
+
+def _value(case: str, steady: Sequence[int], batches: Sequence[Batch], moments: Sequence[float]) -> Shear:
+    fit = fit_through_origin([moments[i] for i in steady], [batches[i].sweep_nm for i in steady])
+    return Shear(fit, False, case, sum(batches[i].samples for i in steady))
+
+
+def slips_m(geometry: FlipperGeometry, batches: Sequence[Batch], base: Base) -> list[float] | None:
+    """Way of the plate back through the mud from batch to batch; None where the body's place is not known."""
+    fixed = base is Base.FIXED
+    if not fixed and not all(isfinite(b.body_m) for b in batches):
+        return None
+    places_m = [geometry.flipper_length_m * sin(b.sweep_rad) + (0.0 if fixed else b.body_m) for b in batches]
+    return [before_m - after_m for before_m, after_m in zip(places_m, places_m[1:], strict=False)]
+
+
+def _yielding(geometry: FlipperGeometry, batches: Sequence[Batch], slips: list[float] | None) -> list[int]:
+    """The batches before whose end the mud was mobilised, and in which the plate slips."""
+    steady, slipped_m = [], 0.0
+    for i, slip_m in enumerate(slips or ()):
+        slipped_m += slip_m
+        travel_m = geometry.flipper_length_m * (sin(batches[i].sweep_rad) - sin(batches[i + 1].sweep_rad))
+        if slipped_m >= MOBILISED_M and slip_m > SLIPPING * travel_m > 0.0:
+            steady.append(i + 1)
+    return steady
+
+
+def _case(geometry: FlipperGeometry, batches: Sequence[Batch], slips: Sequence[float]) -> str:
+    travel_m = geometry.flipper_length_m * (sin(batches[0].sweep_rad) - sin(batches[-1].sweep_rad))
+    return "yield" if sum(slips) > 0.8 * travel_m else "mixed"
+
+
+def _without_pose(
+    geometry: FlipperGeometry, batches: Sequence[Batch], moments: Sequence[float], drag_n: float
+) -> Shear:
+    """Two flippers that together push less than the body's drag cannot have moved it."""
+    thrusts_n = [2.0 * cos(b.sweep_rad) * b.sweep_nm / geometry.flipper_length_m for b in batches]
+    if len(batches) > HELD[0] and sorted(thrusts_n)[-HELD[0]] < STANDS * drag_n:
+        steady = _yielding(geometry, batches, slips_m(geometry, batches, Base.FIXED))
+        if len(steady) >= MIN_BATCHES:
+            return _value("yield", steady, batches, moments)
+    return _bound("unknown", "no pose: the body may have moved", batches, moments)
+
+
+def _bound(case: str, reason: str, batches: Sequence[Batch], moments: Sequence[float]) -> Shear:
+    """The largest k_s that HELD batches in a row have borne: a first quick push is borne better than what follows."""
+    borne = [b.sweep_nm / moment if moment > 0.0 else UNKNOWN for b, moment in zip(batches, moments, strict=True)]
+    run = min(max(len(borne) // 3, HELD[0]), HELD[1])
+    runs = [borne[i : i + run] for i in range(len(borne) - run + 1)]
+    held = [(median(each), max(each) - min(each)) for each in runs if all(isfinite(k) for k in each)]
+    samples = sum(batch.samples for batch in batches)
+    if not held:
+        return Shear(None, True, case, samples, reason)
+    largest, spread = max(held)
+    scatter = spread / 4.0  # of the median of five, whose range is 2.3 times their scatter
+    return Shear(OriginFit(largest, hypot(scatter, QUICK_DOUBT * largest)), True, case, samples, reason)

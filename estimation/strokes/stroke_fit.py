@@ -1,0 +1,164 @@
+"""Insertion and extraction: from the batches of one stroke to k_p or k_e, with what is known of their doubt.
+
+    insertion     τ₂ - crossing =  k_p Φ        from the surface down
+    extraction    τ₂ - crossing = -k_e Φ        over the last three quarters of the way up
+
+Φ is the leverage of the submerged volume in each pose (control/plate.py); the crossing is what the plate's face bears
+across its motion, which the sweep joint has felt. Every piece of way counts by its length within these limits, where
+the adduction joint feels an upward force at all. On the first quarter of the way up, mud that held the flipper up
+turns to hold it down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, hypot, inf, isfinite, sqrt
+from typing import NamedTuple
+
+from control.geometry import FlipperGeometry
+from control.plate import crossing, stroke_moment_m4, submerged_plate
+from control.records import UNKNOWN, Estimate
+from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin
+from estimation.strokes.stroke import Batch
+from estimation.strokes.surface import Surface
+
+REVERSAL_SHARE = 0.25  # of the way up
+SHORTEST_M = 1e-9  # a piece of way that is less is rounding, or none
+MIN_VERTICAL_LEVER_M = 0.03  # under it the adduction joint hardly feels an upward force
+TORQUE_REPEATABILITY = 0.032  # of a torque, as the paper measured it
+CROSSING_DOUBT = 0.25  # of what is taken off: its centre of pressure is that of the law, not the mud's
+LARGEST_DOUBT = 0.75  # of a coefficient: from there on even its 80 % interval reaches zero, and it says nothing
+TOO_SHORT = f"fewer than {MIN_BATCHES} pieces of way in the mud"
+NOT_THERE = Estimate(UNKNOWN, UNKNOWN, 0, False, TOO_SHORT)
+NOT_OUT = "the flipper did not come out"
+UNOBSERVABLE = f"vertical lever under {100.0 * MIN_VERTICAL_LEVER_M:g} cm: not observable in this pose"
+
+
+def fit_insertion(
+    geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, zero_error_n: float
+) -> Estimate:
+    return _fit(geometry, batches, surface, zero_error_n, 1.0, inf)
+
+
+def fit_extraction(
+    geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, zero_error_n: float, start_m: float
+) -> Estimate:
+    """`start_m`: depth from which the flipper rose."""
+    deepest_m = surface.depth_m + (1.0 - REVERSAL_SHARE) * (start_m - surface.depth_m)
+    return _fit(geometry, batches, surface, zero_error_n, -1.0, deepest_m)
+
+
+def bound_extraction(geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface) -> Estimate:
+    """Of a flipper that did not come out: the largest k_e that the mud has borne."""
+    borne = [_borne(geometry, batch, surface) for batch in batches]
+    samples = sum(batch.samples for batch in batches)
+    bound = max(borne, default=0.0)
+    if not (bound > 0.0 and isfinite(2.0 * bound)):
+        return NOT_THERE._replace(samples=samples)
+    return Estimate(bound, TORQUE_REPEATABILITY * bound, samples, True, NOT_OUT, at_least=True)
+
+
+def _borne(geometry: FlipperGeometry, batch: Batch, surface: Surface) -> float:
+    plate = submerged_plate(geometry, batch.sweep_rad, batch.adduction_rad, surface.depth_m)
+    moment_m4 = stroke_moment_m4(geometry, plate, batch.sweep_rad)
+    across_nm = crossing(geometry, plate, batch.sweep_rad) * batch.sweep_nm
+    return (across_nm - batch.adduction_nm) / moment_m4 if moment_m4 > 0.0 else 0.0
+
+
+class _Pieces(NamedTuple):
+    """Of one stroke, each times the root of its way: least squares then counts each square by its way."""
+
+    moments: list[float]  # Φ
+    torques: list[float]  # that resisted the stroke
+    crossed_nm: list[float]  # taken off
+    depths_m: list[float]
+    samples: int
+    lever_m: float  # the shortest vertical one of the whole stroke
+
+
+def _fit(
+    geometry: FlipperGeometry,
+    batches: Sequence[Batch],
+    surface: Surface,
+    zero_error_n: float,
+    sign: float,
+    deepest_m: float,
+) -> Estimate:
+    pieces = _pieces(geometry, batches, surface, sign, deepest_m)
+    fit = fit_through_origin(pieces.moments, pieces.torques)
+    if fit is None:
+        hidden = pieces.lever_m < MIN_VERTICAL_LEVER_M
+        return NOT_THERE._replace(samples=pieces.samples, reason=UNOBSERVABLE if hidden else TOO_SHORT)
+    edge_m2 = geometry.plate_width_m * geometry.plate_thickness_m
+    systematic = hypot(
+        CROSSING_DOUBT * _slope(pieces.moments, pieces.crossed_nm),
+        _slope_per_surface(fit, pieces.moments, pieces.torques, pieces.depths_m) * surface.std_error_m,
+        1.5 * zero_error_n / (edge_m2 * max(pieces.depths_m)),
+    )
+    return judged(fit, systematic, pieces.samples)
+
+
+def _pieces(
+    geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, sign: float, deepest_m: float
+) -> _Pieces:
+    moments, torques, crossed_nm, depths_m, samples, lever_m = [], [], [], [], 0, inf
+    for batch, way_m in zip(batches, ways_m(batches, surface.depth_m, deepest_m), strict=True):
+        vertical_m = geometry.vertical_lever_m(batch.sweep_rad, batch.adduction_rad)
+        lever_m = min(lever_m, vertical_m)
+        if way_m < SHORTEST_M or vertical_m < MIN_VERTICAL_LEVER_M:
+            continue
+        plate = submerged_plate(geometry, batch.sweep_rad, batch.adduction_rad, surface.depth_m)
+        across_nm = crossing(geometry, plate, batch.sweep_rad) * batch.sweep_nm
+        root = sqrt(way_m)
+        moments.append(root * stroke_moment_m4(geometry, plate, batch.sweep_rad))
+        torques.append(root * sign * (batch.adduction_nm - across_nm))
+        crossed_nm.append(root * across_nm)
+        depths_m.append(max(batch.travel_m - surface.depth_m, way_m / 2.0))
+        samples += batch.samples
+    return _Pieces(moments, torques, crossed_nm, depths_m, samples, lever_m)
+
+
+def ways_m(batches: Sequence[Batch], shallowest_m: float, deepest_m: float) -> list[float]:
+    """How much of each batch's way lies between two depths; batches meet half-way between their means."""
+    depths_m = [batch.travel_m for batch in batches]
+    if len(depths_m) < 2:
+        return [0.0] * len(depths_m)
+    middles_m = [(a + b) / 2.0 for a, b in zip(depths_m, depths_m[1:], strict=False)]
+    ends_m = [2.0 * depths_m[0] - middles_m[0], *middles_m, 2.0 * depths_m[-1] - middles_m[-1]]
+    return [min(max(a, b), deepest_m) - max(min(a, b), shallowest_m) for a, b in zip(ends_m, ends_m[1:], strict=False)]
+
+
+def _slope(x: Sequence[float], y: Sequence[float]) -> float:
+    return sum([a * b for a, b in zip(x, y, strict=True)]) / sum([a * a for a in x])
+
+
+def _slope_per_surface(
+    fit: OriginFit, moments: Sequence[float], torques: Sequence[float], depths_m: Sequence[float]
+) -> float:
+    """dk/dδ for a surface that is deeper by dδ: Φ falls by about Φ dδ / z, so with k = Σ τΦ / ΣΦ²
+
+    dk/dδ = (2 k Σ Φ²/z - Σ τΦ/z) / ΣΦ², which is 3/2 k/z where τ = k Φ.
+    """
+    squares = [moment * moment for moment in moments]
+    weighted = sum([square / depth_m for square, depth_m in zip(squares, depths_m, strict=True)])
+    products = [torque * moment for torque, moment in zip(torques, moments, strict=True)]
+    told = sum([product / depth_m for product, depth_m in zip(products, depths_m, strict=True)])
+    return (2.0 * fit.slope * weighted - told) / sum(squares)
+
+
+def judged(fit: OriginFit, systematic: float, samples: int) -> Estimate:
+    """A fit as an estimate, with all its doubt, or why it is none."""
+    k = fit.slope
+    std_error = hypot(fit.std_error, systematic, TORQUE_REPEATABILITY * k)
+    if not isfinite(k + std_error):
+        return Estimate(UNKNOWN, UNKNOWN, samples, False, "not finite")
+    if k <= 0.0:
+        return Estimate(k, std_error, samples, False, "the force does not oppose the motion")
+    if std_error > LARGEST_DOUBT * k:
+        return Estimate(k, std_error, samples, False, "the samples do not follow the law")
+    return Estimate(k, std_error, samples, True)
+
+
+def level_free(batches: Sequence[Batch], level_nm: float) -> list[Batch]:
+    """With a level taken off that stands on a straight arm; it shrinks with its reach forward, cos α."""
+    return [b._replace(adduction_nm=b.adduction_nm - level_nm * cos(b.sweep_rad)) for b in batches]

@@ -1,0 +1,69 @@
+"""The hand at the actuator's bench: it holds the flipper level, lets go of it, and hangs weights on it.
+
+On a robot that is a person, who is asked; simulation.py has the one that acts on a simulated joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import degrees
+from typing import Protocol
+
+from experiments.actuator.friction import SWING_RAD
+from experiments.actuator.plan import PERSON_S, Plan, Step
+from experiments.robot.prompt import GO_ON, REDO, SKIP, Person
+
+EMPTY = (
+    "take everything off the flipper, and let it rest. Keep clear of it: after its reading it swings to and fro by"
+    f" {degrees(SWING_RAD):.0f} degrees for a quarter of a minute."
+)
+
+
+class Hand(Protocol):
+    @property
+    def lingers_s(self) -> float:
+        """That a weight hangs beyond its reading."""
+
+    def hold_level(self, joint: str, meanwhile: Callable[[], None]) -> None:
+        """Nothing hangs, and all flippers are held near level while torque is off."""
+
+    def let_go(self, meanwhile: Callable[[], None]) -> None: ...
+
+    def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
+        """GO_ON when it hangs, SKIP to leave it out, REDO to go back to the one before."""
+
+    def take_off(self) -> None:
+        """At once: what hangs is too much for the motor."""
+
+
+class PersonsHand:
+    """A Hand."""
+
+    lingers_s = PERSON_S
+
+    def __init__(self, person: Person, plan: Plan) -> None:
+        self._person = person
+        self._plan = plan
+
+    def hold_level(self, joint: str, meanwhile: Callable[[], None]) -> None:
+        axle = "sweep" if joint.endswith("sweep") else "adduction"
+        self._person.ask(
+            f"Mount the robot with the {axle} axle of the {joint.split('_')[0]} flipper horizontal and the flipper out"
+            " over the edge, the other joints propped within their range. Take every weight off and hold the flipper"
+            " level: all four motors will hold.",
+            {GO_ON: "it is held"},
+            meanwhile,
+        )
+
+    def let_go(self, meanwhile: Callable[[], None]) -> None:
+        self._person.ask("The motor holds. Let go of the flipper.", {GO_ON: "done"}, meanwhile)
+
+    def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
+        trial = f"Trial {step.told_trial} of {self._plan.trials}"
+        what = f"hang {step.weight_g:g} g at {100.0 * self._plan.lever_m:g} cm from the axle, nothing else"
+        question = f"{trial}: {what}, and let it rest." if step.weight_g else f"{trial}: {EMPTY}"
+        answers = {GO_ON: "it rests", SKIP: "skip it", REDO: "redo the one before"}
+        return self._person.ask(question, answers, meanwhile)
+
+    def take_off(self) -> None:
+        self._person.tell("Take the weight off the flipper now.")

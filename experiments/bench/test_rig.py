@@ -1,0 +1,264 @@
+"""A rig under the hands of the bench: armed, moved, made idle, and every tick of it looked at.
+
+Torque comes from the daemon's own loop in its own modes, so limits, gate and faults guard the bench as they guard a
+walk. Only the pose that is held in HOLD may be replaced: by another path, or by a law of the bench.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import NamedTuple
+
+from control.controller import ALL_TRUSTED, Controller, measured_angles
+from control.faults import Fault, Reaction
+from control.gait.joint_path import JointPath, still
+from control.modes import ENERGISED, Mode, Request
+from control.records import JOINTS, DriveStates, JointAngles, JointTargets, Torques
+from experiments.bench.lateness import Lateness
+from experiments.bench.operator import Attendant
+from experiments.bench.rig import Rig
+from experiments.robot.bench_robot import BenchError
+from firmware_host.ticker import PERIOD_S, Beat
+
+ARMING_S = 5.0  # for faults of before to be over, and for the drives to go into closed loop
+IDLING_S = 2.0
+LOOK_S = 0.1  # while a person does something
+GOODBYE_FRAMES = 5  # to each drive, where nothing else helps
+LEVEL: JointAngles = (0.0, 0.0, 0.0, 0.0)
+
+Law = Callable[[Torques, DriveStates], Torques]  # from what holds the pose to what is wanted in its place
+
+
+class Sample(NamedTuple):
+    """One tick."""
+
+    beat: Beat
+    mode: Mode
+    states: DriveStates
+    aim: JointTargets | None  # commanded while the states came about
+    sent_nm: Torques
+    limited: bool
+
+
+class BenchController(Controller):
+    """The robot's own, but for what it does in hold."""
+
+    law: Law | None = None
+    aim: JointTargets | None = None
+
+    def follow(self, way_points: Sequence[JointAngles], speed_rad_s: float) -> None:
+        """In hold, from the pose that is held through others."""
+        a, b, c, d = (target.angle_rad for target in self._pose)
+        self._move = JointPath((a, b, c, d), way_points, speed_rad_s)
+
+    def hold(self, angles: JointAngles) -> None:
+        self._move, self._pose = None, still(angles)
+
+    def step(
+        self,
+        dt_s: float,
+        mode: Mode,
+        states: DriveStates,
+        trusted: tuple[bool, ...] = ALL_TRUSTED,
+        elapsed_s: float = 0.0,
+    ) -> Torques:
+        torques_nm = super().step(dt_s, mode, states, trusted, elapsed_s)
+        return self.law(torques_nm, states) if self.law and mode is Mode.HOLD else torques_nm
+
+    def _targets(self, dt_s: float, mode: Mode, states: DriveStates) -> JointTargets:
+        self.aim = super()._targets(dt_s, mode, states)
+        return self.aim
+
+
+def bench_controller(controller: Controller) -> BenchController:
+    parts = (controller.gait.parameters, controller.geometry, controller.gains, controller.mass, controller.motion)
+    return BenchController(*parts, controller.recovery)
+
+
+class Stand:
+    """Owns the rig and whether it is energised."""
+
+    def __init__(self, rig: Rig, attendant: Attendant) -> None:
+        self.rig = rig
+        self.attendant = attendant
+        self.configuration = rig.configuration
+        self.loop = rig.loop
+        self.drives = rig.loop.drives
+        self.controller = rig.loop.controller = bench_controller(rig.loop.controller)
+        self._rest: JointAngles = LEVEL  # where the flippers lie without torque
+        self.lateness = Lateness()  # of one measurement, while a drive tells that torque is on
+        self.lateness_so_far = Lateness()  # of all
+
+    def tick(self) -> Sample:
+        aim, loop = self.controller.aim, self.loop
+        beat, torque_on = self.rig.wait(), self._torque_on()
+        loop.tick(beat)
+        if torque_on:
+            self._heed_lateness(beat, loop.states)
+        return Sample(beat, loop.mode, loop.states, aim, loop.sent.torques_nm, loop.sent.limited)
+
+    def run_for(self, duration_s: float) -> list[Sample]:
+        """Raises BenchError where a fault takes or hinders the torque."""
+        return [self.tick_soundly() for _ in range(round(duration_s / PERIOD_S))]
+
+    def tick_soundly(self) -> Sample:
+        return self._sound(self.tick())
+
+    def run_until(self, done: Callable[[Sample], bool], longest_s: float, what: str) -> list[Sample]:
+        """Raises BenchError as well where it does not come to that."""
+        samples: list[Sample] = []
+        for _ in range(round(longest_s / PERIOD_S)):
+            samples.append(self.tick_soundly())
+            if done(samples[-1]):
+                return samples
+        raise BenchError(f"{what} did not come within {longest_s:g} s: the robot is in {self.loop.mode.name.lower()}.")
+
+    def look_on(self) -> None:
+        """While a person is asked: so that no frame waits for long, and the drives stay idle."""
+        self.run_for(LOOK_S)
+
+    def listen(self) -> Sample:
+        """A tick in which nothing is sent."""
+        beat = self.rig.wait()
+        states = self.drives.read(beat.now_s)
+        if self._torque_on():
+            self._heed_lateness(beat, states)
+        return Sample(beat, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
+
+    def _torque_on(self) -> bool:
+        """As a drive told before this tick: it may have a fault, and a drive that is told to go idle need not obey."""
+        return any(state.closed_loop for state in self.loop.states)
+
+    def _heed_lateness(self, beat: Beat, states: DriveStates) -> None:
+        self.lateness.update(beat, states)
+        self.lateness_so_far.update(beat, states)
+
+    def _sound(self, sample: Sample) -> Sample:
+        fault = self.loop.faults.worst
+        if sample.mode in (*ENERGISED, Mode.FAULT) and fault and fault.kind.reaction >= Reaction.HOLD:
+            raise BenchError(f"{fault.name}: {_told([fault])}")
+        return sample
+
+    def arm(self, law: Law | None = None) -> None:
+        """Into hold, with a law from the first torque on."""
+        self._wait_until_armable()
+        self.controller.law = law
+        against: Sequence[Fault] = ()
+        for _ in range(round(ARMING_S / PERIOD_S)):
+            blocking = self.loop.faults.blocking()
+            if self.loop.mode is Mode.IDLE and not blocking:
+                self._ask_for_torque()  # again, where a fault began in the very tick of the wish: a joint that sinks
+            if self.tick_soundly().mode is Mode.HOLD:
+                return
+            against = blocking or against
+        raise BenchError(f"Closed loop of all drives did not come within {ARMING_S:g} s. {_told(against)}".rstrip())
+
+    def _ask_for_torque(self) -> None:
+        self._rest = measured_angles(self.loop.states)
+        refused = self.loop.request(Request.ARM, self.rig.now_s)
+        if refused:
+            raise BenchError(f"The robot cannot be armed: {refused}")
+
+    def _wait_until_armable(self) -> None:
+        if self._becomes_armable():
+            return
+        told = _told(self.loop.faults.blocking())
+        if told and self.attendant.clears(told, self._idle_on):
+            self.loop.request(Request.CLEAR, self.rig.now_s)
+            if self._becomes_armable():
+                return
+        silent = ", ".join(axis.joint for axis in self.drives.axes if not axis.heard)
+        unheard = f"{silent}: nothing is heard; check power, wiring and node ids."
+        raise BenchError(
+            f"The robot cannot be armed: {told or (unheard if silent else f'it is in {self.loop.mode.name.lower()}.')}"
+        )
+
+    def _becomes_armable(self) -> bool:
+        for _ in range(round(ARMING_S / PERIOD_S)):
+            if self.tick().mode is Mode.IDLE and not self.loop.faults.blocking():
+                return True
+        return False
+
+    def _idle_on(self) -> None:
+        """While a person is asked about a fault that stands."""
+        for _ in range(round(LOOK_S / PERIOD_S)):
+            self.tick()
+
+    def move(
+        self, way_points: Sequence[JointAngles], speed_rad_s: float | None = None, law: Law | None = None
+    ) -> list[Sample]:
+        """In hold, along a smooth path, until its end."""
+        self.controller.law = law
+        self.controller.follow(way_points, speed_rad_s or self.configuration.motion.path_speed_rad_s)
+        return self.run_until(lambda sample: not self.controller.moving, 60.0, "The end of a path")
+
+    def rise(self) -> None:
+        """From rest to flippers level and straight out."""
+        self.arm()
+        self.run_for(self.configuration.motion.fade_in_s)
+        self.move([LEVEL])
+        self.run_for(0.3)
+
+    @contextmanager
+    def raised(self) -> Iterator[None]:
+        """Flippers level and held; laid down again where all went well, else without torque at once.
+
+        What is measured meanwhile is reckoned up after it: long sums would be missed ticks, with torque on.
+        """
+        self.rise()
+        try:
+            yield
+        except BaseException:
+            self.let_go()
+            raise
+        self.lie_down()
+
+    def hold_here(self) -> None:
+        """The pose that the joints have by now, in place of what was held and of any law."""
+        self.controller.hold(measured_angles(self.loop.states))
+        self.controller.law = None
+
+    def lower(self) -> None:
+        """Flippers back to where they lay."""
+        self.move([LEVEL, self._rest])
+
+    def lie_down(self) -> None:
+        self.lower()
+        self.let_go()
+
+    def let_go(self) -> None:
+        """Torque off at once, and wait until every drive says so. Raises BenchError where one does not."""
+        self.controller.law = None
+        self.loop.request(Request.DISARM, self.rig.now_s)
+        for _ in range(round(IDLING_S / PERIOD_S)):
+            sample = self.tick()
+            if sample.mode not in ENERGISED and not any(state.closed_loop for state in sample.states):
+                return
+        busy = ", ".join(axis.joint for axis in self.drives.axes if axis.closed_loop)
+        raise BenchError(f"{busy}: still in closed loop {IDLING_S:g} s after it was told to go idle: cut the power.")
+
+    def clear(self) -> None:
+        """After a fault that was made on purpose."""
+        self.loop.request(Request.CLEAR, self.rig.now_s)
+        self._wait_until_armable()
+
+    def end(self) -> None:
+        """However things stand: drives idle. Never raises, and needs nothing but the axes."""
+        self.controller.law = None
+        self.drives.gate.close()
+        for axis in self.drives.axes * GOODBYE_FRAMES:
+            axis.disarm()
+
+
+def first_lasting(flags: Sequence[bool], ticks: int) -> int | None:
+    """From which tick on so many in a row are true: a single one may be noise, or a turning point."""
+    return next((first for first in range(len(flags) - ticks + 1) if all(flags[first : first + ticks])), None)
+
+
+def joint_place(joint: str) -> int:
+    return JOINTS.index(joint)
+
+
+def _told(faults: Sequence[Fault]) -> str:
+    return " ".join(fault.advice for fault in faults)

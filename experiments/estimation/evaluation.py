@@ -1,0 +1,165 @@
+"""How far the mud coefficients can be believed: estimates against a virtual load cell, over muds, trials and methods.
+
+After the paper's sections III-B and III-C: a single flipper on a fixed base through five muds, the walking robot
+through three, and across their borders, in the clay of the simulator with the disturbances of the authors' logs. Each
+trial is simulated once; every method estimates from the same samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from math import isfinite
+from typing import Any, NamedTuple
+
+from control.records import StrideEstimate
+from estimation.mud import EstimationParameters
+from experiments.estimation.boundaries import Crossing, boundary_rows, crossings_of
+from experiments.reports.error_table import COEFFICIENTS, Judged, error_rows, plate_rows
+from experiments.reports.side_by_side import Show, side_by_side
+from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
+from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING, Setup, Trial, run_trial, strides_of
+from simulation.mud.clay import Clay, clay_of_water
+from simulation.mud.disturbances import LAB, NONE, Disturbances
+from simulation.mud.track import Track
+
+SINGLE_WATERS = (47.6, 48.6, 49.5, 50.3, 51.2)  # figure 5 of the paper
+WALKING_WATERS = (47.6, 49.5, 51.2)  # figure 6
+ENDLESS_M = 100.0
+COMPARTMENT_M = 0.5
+REPEATS, TORQUE = "repeats", "torque"
+LAYERS = ("clinging", "remoulding", "relaxation", "surface", "noise", "saturation", REPEATS, TORQUE)
+FIELD_OF_LAYER = {
+    "clinging": "clinging_n",
+    "remoulding": "remoulding",
+    "relaxation": "relaxation",
+    "surface": "surface_sd_m",
+    "noise": "current_noise_a",
+    "saturation": "current_limit_a",
+}
+
+
+class Method(NamedTuple):
+    name: str
+    setup: str  # as the table calls it
+    with_pose: bool
+    parameters: EstimationParameters
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to run; `repeats` are rows that come more often than new samples, `torque` constants not quite known."""
+
+    single: tuple[Clay, ...] = tuple(clay_of_water(water) for water in SINGLE_WATERS)
+    walking: tuple[Clay, ...] = tuple(clay_of_water(water) for water in WALKING_WATERS)
+    seeds: int = 10
+    single_strides: int = 2
+    walking_strides: int = 8
+    crossing_strides: int = 24
+    disturbances: Disturbances = LAB
+    repeats: bool = True
+    torque: bool = True
+
+    def parts(self) -> list[Part]:
+        """Trials, the longest first, so that the last ones end together."""
+        seeds = range(1, self.seeds + 1)
+        orders = (self.walking, self.walking[::-1])
+        crossing = [Part(WALKING, orders[seed % 2], self.crossing_strides, seed) for seed in seeds]
+        single = [Part(SINGLE, (clay,), self.single_strides, seed) for clay in self.single for seed in seeds]
+        walking = [Part(WALKING, (clay,), self.walking_strides, seed) for clay in self.walking for seed in seeds]
+        return (crossing if len(self.walking) > 1 else []) + single + walking
+
+
+class Part(NamedTuple):
+    """One trial of a plan: over one mud, or across several."""
+
+    setup: Setup
+    muds: tuple[Clay, ...]
+    strides: int
+    seed: int
+
+
+class Outcome(NamedTuple):
+    judged: list[Judged]
+    crossings: list[Crossing]
+
+
+def with_layers(plan: Plan, layers: Sequence[str]) -> Plan:
+    """Only these disturbances. Raises ValueError for one that there is not."""
+    unknown = [layer for layer in layers if layer not in LAYERS]
+    if unknown:
+        raise ValueError(f"layer {unknown[0]!r}: must be one of {', '.join(LAYERS)}, or none")
+    fields = {field: getattr(LAB, field) for layer, field in FIELD_OF_LAYER.items() if layer in layers}
+    return replace(plan, disturbances=replace(NONE, **fields), repeats=REPEATS in layers, torque=TORQUE in layers)
+
+
+def methods_of(setup: Setup) -> tuple[Method, ...]:
+    """All are told how uneven the mud is, as an operator would see."""
+    default = EstimationParameters(fixed_base=setup.fixed_base, surface_error_m=LAB.surface_sd_m)
+    paper = replace(default, method="paper")
+    both = (Method("default", setup.name, True, default), Method("paper", setup.name, True, paper))
+    if setup.fixed_base:
+        return both
+    compensated = Method("paper compensated", setup.name, True, replace(paper, paper_compensation=True))
+    return *both, compensated, Method("default", f"{setup.name} without pose", False, default)
+
+
+def judge(plan: Plan, show: Show, processes: int | None = None) -> Outcome:
+    """All trials of a plan, side by side."""
+    outcomes = side_by_side([partial(run_part, part, plan) for part in plan.parts()], show, processes)
+    return Outcome(
+        [each for outcome in outcomes for each in outcome.judged],
+        [each for outcome in outcomes for each in outcome.crossings],
+    )
+
+
+def run_part(part: Part, plan: Plan) -> Outcome:
+    """Simulate one trial and judge every method on it, or follow it across the muds' borders."""
+    length_m = ENDLESS_M if len(part.muds) == 1 else COMPARTMENT_M
+    track = Track([(length_m, clay) for clay in part.muds])
+    setup = part.setup if plan.repeats else replace(part.setup, row_period_s=0.0)
+    torque_error = TORQUE_ERROR if plan.torque else 0.0
+    trial = run_trial(setup, track, plan.disturbances, part.strides, part.seed, torque_error)
+    truths = {
+        (truth.flipper, truth.index): load_cell_truth(
+            truth, trial.configuration.geometry, plan.disturbances.relaxation, setup.gait.pause_s
+        )
+        for truth in trial.truths
+    }
+    if len(part.muds) > 1:
+        return Outcome([], crossings_of(trial, truths))
+    (clay,) = part.muds
+    return Outcome([each for method in methods_of(setup) for each in _judged(method, clay.name, trial, truths)], [])
+
+
+def _judged(method: Method, mud: str, trial: Trial, truths: dict[tuple[str, int], LoadCellTruth]) -> Iterator[Judged]:
+    for stride in strides_of(trial, method.parameters, method.with_pose):
+        truth = truths.get((stride.flipper, stride.index))
+        if truth is not None:
+            yield from _beside(method, mud, stride, truth)
+
+
+def _beside(method: Method, mud: str, stride: StrideEstimate, truth: LoadCellTruth) -> Iterator[Judged]:
+    for name in COEFFICIENTS:
+        estimate, true = getattr(stride, name), getattr(truth.leaning, name)
+        if isfinite(true):
+            upright = getattr(truth.upright, name)
+            yield Judged(method.setup, mud, name, method.name, estimate, true, upright)
+
+
+def report_of(plan: Plan, outcome: Outcome) -> dict[str, Any]:
+    return {
+        "experiment": "estimation",
+        "errors": error_rows(outcome.judged),
+        "plates": plate_rows(outcome.judged),
+        "boundaries": boundary_rows(outcome.crossings),
+        "settings": {
+            "seeds": plan.seeds,
+            "single_strength_pa": {clay.name: round(clay.strength_pa, 1) for clay in plan.single},
+            "walking_strength_pa": {clay.name: round(clay.strength_pa, 1) for clay in plan.walking},
+            "disturbances": asdict(plan.disturbances),
+            "repeats": plan.repeats,
+            "torque_error": TORQUE_ERROR if plan.torque else 0.0,
+        },
+    }

@@ -1,0 +1,77 @@
+"""A simulated robot behind the daemon's calls, in step with the daemon's own loop: as fast as it computes."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+from experiments.trials.log_span import cut
+from firmware_host.configuration.configuration import Configuration, parse_configuration
+from firmware_host.log.file_recorder import FileRecorder
+from firmware_host.log_reading.log_reader import Log, read_log
+from firmware_host.operator.connection import Caller
+from firmware_host.operator.operator_calls import OperatorCalls
+from firmware_host.operator.rights import Level, Peer
+from firmware_host.operator.rpc import RefusedError
+from firmware_host.operator.status_client import CallRefusedError
+from simulation.harness.local_setup import CONFIGURATION
+from simulation.harness.lockstep import Lockstep
+
+ASKER = Caller(1, Peer(os.getpid(), os.geteuid(), frozenset()), Level.DRIVE)
+
+
+def simulated_configuration(sections: str = "", drive: str = "") -> Configuration:
+    """That of the simulated robot, with further sections, and lines for each of its drives, as TOML.
+
+    Made from text, so that the log carries what the robot did. Raises ConfigurationError.
+    """
+    text = CONFIGURATION.format(left='"left"', right='"right"', logs='"logs"', status='"s"', pose='""')
+    lines = [f"{line}\n{drive}" if drive and line.startswith("[drive.") else line for line in text.splitlines()]
+    return parse_configuration("\n".join([*lines, "", sections]))
+
+
+class LockstepRobot:
+    """A BenchRobot. `lockstep` is for whoever does things to the simulated robot that a person would do by hand."""
+
+    def __init__(self, lockstep: Lockstep, recorder: FileRecorder) -> None:
+        """`recorder` is the one that the lockstep was made with."""
+        self.lockstep = lockstep
+        self._recorder = recorder
+        self._methods = OperatorCalls(lockstep.loop, recorder, [], lambda: lockstep.now_s).methods
+        self._log = recorder.path
+
+    @property
+    def configuration(self) -> Configuration:
+        return self.lockstep.loop.configuration
+
+    def call(self, method: str, **params: Any) -> Any:
+        try:
+            return self._methods[method](params, ASKER)
+        except RefusedError as problem:
+            raise CallRefusedError(str(problem)) from problem
+
+    def wait(self, duration_s: float) -> None:
+        self.lockstep.run_for(duration_s)
+
+    def record(self, from_s: float, to_s: float) -> Log:
+        assert self._log is not None
+        if self._recorder.writer_alive:
+            self._recorder.flush()
+        return cut(read_log(self._log), from_s, to_s)
+
+    def copy_logs(self, folder: Path) -> list[Path]:
+        """Ends the log, which otherwise `close` does."""
+        self._recorder.close()
+        assert self._log is not None
+        copy = folder / self._log.name
+        if copy.absolute() != self._log.absolute():
+            shutil.copyfile(self._log, copy)
+        return [copy]
+
+    def close(self) -> None:
+        if self._recorder.writer_alive:
+            self._methods["disarm"]({}, ASKER)
+            self.lockstep.run_for(0.1)
+            self._recorder.close()

@@ -1,0 +1,51 @@
+"""The same strides by several methods of estimation: the daemon's own, and others over the log that it left.
+
+default             in torque space, with bounds where the mud holds (estimation/flipper.py)
+paper               the published one, without compensation (estimation/paper.py)
+paper compensated   the same, with half of the body's drag added to the thrust while the body advances
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from estimation.mud import EstimationParameters
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log_reading.log_reader import Log
+from firmware_host.log_reading.replay import replay_log
+from firmware_host.operator.reports import stride_report
+
+DEFAULT, PAPER, COMPENSATED = "default", "paper", "paper compensated"
+Strides = list[dict[str, Any]]
+
+
+def method_of(parameters: EstimationParameters) -> str:
+    """The name of what a configuration asks for."""
+    compensated = parameters.method == "paper" and parameters.paper_compensation
+    return COMPENSATED if compensated else parameters.method
+
+
+def parameters_of(parameters: EstimationParameters, method: str) -> EstimationParameters:
+    """By another method, all else as it was."""
+    if method == DEFAULT:
+        return replace(parameters, method="default")
+    return replace(parameters, method="paper", paper_compensation=method == COMPENSATED)
+
+
+def strides_by_method(
+    own: Strides, log: Log, configuration: Configuration, flipper: str, methods: Sequence[str]
+) -> dict[str, Strides]:
+    """Of one walk and one flipper; `own` are the daemon's, of which the configured method's are taken as they are."""
+    configured = method_of(configuration.estimation)
+    told = {configured: own} | {
+        method: _replayed(log, configuration, method) for method in methods if method != configured
+    }
+    return {method: [stride for stride in strides if stride["flipper"] == flipper] for method, strides in told.items()}
+
+
+def _replayed(log: Log, configuration: Configuration, method: str) -> Strides:
+    other = replace(configuration, estimation=parameters_of(configuration.estimation, method))
+    return [stride_report(stride) for stride in replay_log(Path("log"), log, other).strides]

@@ -1,0 +1,46 @@
+"""The logs of a daemon's run, copied beside what was measured: those segments that hold any of the experiment's time.
+
+A daemon runs for weeks, and at rest its log grows by ten megabytes an hour. Every segment carries the configuration,
+its number and both clocks, so those that are copied can be read, replayed and reported without those before them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from experiments.trials.whole_files import copy_whole
+from firmware_host.log.log_folder import present_path
+from firmware_host.log_reading.log_reader import read_log
+from firmware_host.log_reading.recovery import recover_log
+
+
+def copy_since(segments: Sequence[Path], from_s: float, folder: Path) -> list[Path]:
+    """Those that do not end before `from_s`; the one under way is ended in the copy. Raises LogError, OSError."""
+    return [_copy(log, folder / log.name) for log in _held_since(segments, from_s)]
+
+
+def _held_since(segments: Sequence[Path], from_s: float) -> list[Path]:
+    """Looked for from the last one: of what may be a thousand before them one is opened."""
+    held: list[Path] = []
+    for log in reversed(segments):
+        if _ends_before(log, from_s):
+            break
+        held.insert(0, log)
+    return held
+
+
+def _ends_before(log: Path, from_s: float) -> bool:
+    """One without a row ends nowhere; nor does one under way, whose last rows its writer still has."""
+    rows = read_log(present_path(log), from_s=from_s)
+    if not rows.complete:
+        return False
+    last_s = [*rows.ticks["stamp_s"][-1:], *(row["stamp_s"] for row in (*rows.strides[-1:], *rows.events[-1:]))]
+    return bool(last_s) and max(last_s) < from_s
+
+
+def _copy(log: Path, copy: Path) -> Path:
+    copy_whole(present_path(log), copy)
+    if not read_log(copy).complete:
+        recover_log(copy)
+    return copy

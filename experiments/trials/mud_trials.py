@@ -1,0 +1,171 @@
+"""Trials in mud, one after another: the bed is prepared, the robot strides, and a person says what to do where it went
+wrong.
+
+Each trial is in the notebook before the next begins, so whatever ends an experiment costs the trial under way and no
+other. A trial that a fault ended, or that is worth nothing, is repeated, after the third time only where a person wants
+it so; one that is only doubtful is kept or repeated as they decide. One that is left out is written down as well, and
+not asked for again. Torque is off whenever hands may be in the mud.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import NamedTuple, Protocol
+
+from experiments.robot.bench_robot import BenchError, BenchRobot, disarm, face_faults, rest
+from experiments.robot.prompt import GO_ON, REDO, SKIP, Person
+from experiments.trials.mud_names import mud_text
+from experiments.trials.notebook import Entry, Notebook
+
+MOST_ATTEMPTS = 3
+KEEP = "k"
+LOOK_S = 0.05  # of waiting for a person, in which nobody else arms the robot
+ASKED = {GO_ON: "go on", SKIP: "leave this trial out", REDO: "measure the last one again"}
+SPOILT = {GO_ON: "repeat it", SKIP: "leave it out"}
+SPOILT_OFTEN = {GO_ON: "end here", REDO: "repeat it", SKIP: "leave it out"}
+KEPT = {KEEP: "keep it as it is"}
+DOUBTFUL = {GO_ON: "keep it", REDO: "measure it again", SKIP: "leave it out"}
+
+Truths = dict[int, dict[str, float | None]]  # N/m³ by stride and coefficient
+
+
+class PlannedTrial(NamedTuple):
+    key: str  # in the notebook
+    mud: str
+    number: int  # from 1
+    of: int
+
+    def __str__(self) -> str:
+        return f"{mud_text(self.mud)}, trial {self.number} of {self.of}"
+
+
+class SpoiltTrialError(Exception):
+    """A trial is worth nothing; the text says why. Where it has an entry, somebody may keep it all the same."""
+
+    def __init__(self, why: str, entry: Entry | None = None) -> None:
+        super().__init__(why)
+        self.entry = entry
+
+
+class MudBed(Protocol):
+    """The mud under the robot."""
+
+    def prepare(self, trial: PlannedTrial) -> str:
+        """Fresh mud in front of the robot: GO_ON, SKIP this trial, or REDO the one before."""
+
+    def truths(self, flipper: str) -> Truths:
+        """What a load cell reads in the strides of the last walk; empty where there is none."""
+
+
+class PromptedBed:
+    """A person's: asked for each trial, with torque off."""
+
+    def __init__(self, robot: BenchRobot, person: Person, words: Callable[[PlannedTrial], str]) -> None:
+        self._robot = robot
+        self._person = person
+        self._words = words
+
+    def prepare(self, trial: PlannedTrial) -> str:
+        disarm(self._robot)
+        face_faults(self._robot, self._person)
+        return self._person.ask(f"{trial}. {self._words(trial)}", ASKED, partial(self._robot.wait, LOOK_S))
+
+    def truths(self, flipper: str) -> Truths:
+        return {}
+
+
+class Bench(NamedTuple):
+    """Where trials are made, and where they are written down."""
+
+    robot: BenchRobot
+    bed: MudBed
+    person: Person
+    notebook: Notebook
+
+
+Measure = Callable[[PlannedTrial], Entry]  # raises SpoiltTrialError, BenchError; an entry has "remarks"
+
+
+def conduct_trials(
+    bench: Bench, planned: Sequence[PlannedTrial], measure: Measure, show: Callable[[int, int], None]
+) -> None:
+    """All that are not in the notebook yet. Raises BenchError where one cannot be measured."""
+    entries, place, attempts = bench.notebook.entries, 0, 0
+    while place < len(planned):
+        trial = planned[place]
+        show(sum(each.key in entries for each in planned), len(planned))
+        answer = GO_ON if trial.key in entries else bench.bed.prepare(trial)
+        if answer == REDO:
+            place = _forget_last(bench, planned[:place])
+        elif answer == SKIP:
+            _leave_out(bench, trial)
+        elif trial.key in entries or _is_done(bench, trial, measure, attempts + 1):
+            place, attempts = place + 1, 0
+        else:
+            attempts += 1
+    show(len(planned), len(planned))
+
+
+def _forget_last(bench: Bench, before: Sequence[PlannedTrial]) -> int:
+    """The place of the last one that was measured or left out, which is open again."""
+    for place in reversed(range(len(before))):
+        if before[place].key in bench.notebook.entries:
+            bench.notebook.forget(before[place].key)
+            return place
+    bench.person.tell("nothing was measured before this one")
+    return len(before)
+
+
+def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) -> bool:
+    """Measured, or left out. Raises BenchError after too many attempts."""
+    try:
+        entry = measure(trial)
+    except (SpoiltTrialError, BenchError) as problem:
+        rest(bench.robot)
+        return _is_done_with_spoilt(bench, trial, problem, attempt)
+    rest(bench.robot)
+    for remark in entry["remarks"]:
+        bench.person.tell(f"{trial}: {remark}")
+    answer = _ask(bench, "Is this trial to count?", DOUBTFUL) if entry["remarks"] else GO_ON
+    if answer == GO_ON:
+        bench.notebook.write(trial.key, entry)
+    elif answer == SKIP:
+        _leave_out(bench, trial, entry["remarks"])
+    return answer != REDO
+
+
+def _is_done_with_spoilt(bench: Bench, trial: PlannedTrial, problem: Exception, attempt: int) -> bool:
+    """Left out, or kept. Raises BenchError where nobody wants it again after too many attempts."""
+    entry = problem.entry if isinstance(problem, SpoiltTrialError) else None
+    often = attempt >= MOST_ATTEMPTS
+    told = f"{trial} went wrong{f' {attempt} times; the last time' if often else ''}: {str(problem).rstrip('.')}."
+    answer = _ask(bench, told, (SPOILT_OFTEN if often else SPOILT) | ({} if entry is None else KEPT))
+    if often and answer == GO_ON:
+        raise BenchError(told) from problem
+    if answer == SKIP:
+        _leave_out(bench, trial, [str(problem)])
+    elif answer == KEEP and entry is not None:
+        bench.notebook.write(trial.key, entry | {"remarks": [*entry["remarks"], str(problem)]})
+    return answer in (SKIP, KEEP)
+
+
+def _ask(bench: Bench, question: str, answers: Mapping[str, str]) -> str:
+    return bench.person.ask(question, answers, partial(bench.robot.wait, LOOK_S))
+
+
+def _leave_out(bench: Bench, trial: PlannedTrial, why: Sequence[str] = ()) -> None:
+    bench.notebook.write(trial.key, {"skipped": True, "why": list(why)})
+
+
+def measured_of(notebook: Notebook) -> dict[str, Entry]:
+    """The trials that count. Raises BenchError for an experiment that has nothing to report."""
+    left_out = notebook.left_out
+    measured = {key: entry for key, entry in notebook.entries.items() if key not in left_out}
+    if not measured:
+        raise BenchError("nothing was measured: every trial was left out")
+    return measured
+
+
+def left_out_texts(left_out: Mapping[str, Entry]) -> list[str]:
+    return [": ".join([f"{key} was left out", *entry["why"]]) for key, entry in left_out.items()]

@@ -1,0 +1,126 @@
+"""Mud under a simulated robot, prepared as a person would do it, and a virtual load cell in every stride.
+
+A fresh place is another place along a track that is long enough: the robot, with torque off, is carried there and its
+flippers are laid on the mud. What earlier strokes left stays where it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import isfinite
+from pathlib import Path
+from random import Random
+from typing import Any
+
+from control.modes import Mode
+from experiments.robot.bench_robot import disarm
+from experiments.robot.lockstep_robot import LockstepRobot
+from experiments.robot.prompt import GO_ON
+from experiments.trials.load_cell_truth import true_coefficients
+from experiments.trials.mud_trials import PlannedTrial, Truths
+from experiments.trials.trial import TORQUE_ERROR
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.file_recorder import FileRecorder
+from firmware_host.ticker import PERIOD_S
+from simulation.body.reference_sensor import StrideTruth, StrokeWitness
+from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
+from simulation.devices.odrive import OdriveParameters
+from simulation.harness.lockstep import Lockstep, drives_of
+from simulation.mud.disturbances import LAB, Disturbances, drive_changes
+from simulation.mud.track import Track
+
+
+class WitnessedLockstep(Lockstep):
+    """Owns what the flippers truly did since the last walk began."""
+
+    def __init__(self, configuration: Configuration, track: Track, seed: int, **rest: Any) -> None:
+        super().__init__(configuration, track, seed, **rest)
+        self._witness = StrokeWitness()
+        self._walked = False
+        self.truths: list[StrideTruth] = []
+
+    def step(self) -> None:
+        super().step()
+        walks = self.loop.mode is Mode.WALKING
+        if walks and not self._walked:
+            self._witness.reset()
+            self.truths = []
+        self._walked = walks
+        self.truths += self._witness.step(PERIOD_S, self.robot.plant, self.loop.target_before.phase)
+
+
+def simulated_bench(
+    folder: Path,
+    configuration: Configuration,
+    track: Track,
+    seed: int,
+    fixed_base: bool,
+    disturbances: Disturbances,
+    motion_capture: MotionCaptureParameters = AT_EVERY_TICK,
+) -> tuple[LockstepRobot, WitnessedLockstep]:
+    """A robot with its log in `folder`, which may hold those of earlier ones."""
+    recorder = FileRecorder(_new_log(folder), configuration)
+    drives = drives_with_errors(configuration, disturbances, seed)
+    lockstep = WitnessedLockstep(
+        configuration,
+        track,
+        seed,
+        recorder=recorder,
+        disturbances=disturbances,
+        fixed_base=fixed_base,
+        drives=drives,
+        motion_capture=motion_capture,
+    )
+    return LockstepRobot(lockstep, recorder), lockstep
+
+
+def _new_log(folder: Path) -> Path:
+    paths = (folder / f"simulated-{number:03d}.mcap" for number in range(1, 1000))
+    return next(path for path in paths if not path.exists())
+
+
+def drives_with_errors(
+    configuration: Configuration, disturbances: Disturbances, seed: int
+) -> dict[str, OdriveParameters]:
+    """Motors whose constants are known as wrongly as the paper's were."""
+    random = Random(f"drives {seed}")
+    drives = drives_of(configuration, **drive_changes(disturbances))
+    share = TORQUE_ERROR if disturbances == LAB else 0.0
+    return {
+        joint: replace(drive, torque_constant_error=random.gauss(0.0, share)) if share else drive
+        for joint, drive in drives.items()
+    }
+
+
+class CarriedBed:
+    """A MudBed: the robot is carried to the place along the track that each trial has."""
+
+    def __init__(
+        self, robot: LockstepRobot, lockstep: WitnessedLockstep, place_m: Callable[[PlannedTrial, int], float]
+    ) -> None:
+        """`place_m` of a trial, and of how many were prepared before it."""
+        self._robot = robot
+        self._lockstep = lockstep
+        self._place_m = place_m
+        self._prepared = 0
+
+    def prepare(self, trial: PlannedTrial) -> str:
+        disarm(self._robot)
+        plant = self._lockstep.robot.plant
+        plant.body.forward_m = self._place_m(trial, self._prepared)
+        self._lockstep.robot.lend_hand()
+        self._prepared += 1
+        self._robot.wait(PERIOD_S)
+        return GO_ON
+
+    def truths(self, flipper: str) -> Truths:
+        own = [stride for stride in self._lockstep.truths if stride.flipper == flipper]
+        return {stride.index: self._truth(stride) for stride in own}
+
+    def _truth(self, stride: StrideTruth) -> dict[str, float | None]:
+        """By the plate as the flipper carried it."""
+        configuration, plant = self._robot.configuration, self._lockstep.robot.plant
+        relaxation, pause_s = plant.parameters.disturbances.relaxation, configuration.gait.pause_s
+        truth = true_coefficients(stride, configuration.geometry, relaxation, pause_s, upright=False)
+        return {name: value if isfinite(value) else None for name, value in truth._asdict().items()}

@@ -1,0 +1,148 @@
+"""One simulated trial as an estimator would have met it: every tick's samples, and the truth about every stride.
+
+The robot, its drives and its mud run in lockstep with the daemon's own loop, frames and all; the samples are those
+that the loop's estimator got. So any number of methods can be judged on the same trial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from random import Random
+from typing import NamedTuple
+
+from control.controller import WalkOrder
+from control.gait.gait import SINGLE_FLIPPER, GaitParameters
+from control.mud_estimate import MudBelief
+from control.records import UNKNOWN, JointAngles, Phase, StrideEstimate
+from estimation.joint_load import FlipperDrive
+from estimation.mud import Ages, Currents, EstimationParameters, JointVelocities, MudEstimator
+from firmware_host.configuration.configuration import Configuration, parse_configuration
+from firmware_host.ticker import PERIOD_S
+from simulation.body.reference_sensor import StrideTruth, StrokeWitness
+from simulation.harness.local_setup import CONFIGURATION
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.disturbances import Disturbances
+from simulation.mud.track import Track
+
+BENCH_TORQUE_NM, BENCH_CURRENT_A = 1.65, 20.0  # the authors' drives in their trials with a single flipper
+LONGEST_STRIDE_S = 40.0
+TORQUE_ERROR = 0.032  # of a motor's constant: the paper's repeatability
+
+
+class Sample(NamedTuple):
+    """What the estimator got in one tick."""
+
+    now_s: float
+    phase: Phase
+    angles_rad: JointAngles
+    velocities_rad_s: JointVelocities
+    currents_a: Currents
+    body_x_m: float
+    angle_ages_s: Ages
+    current_ages_s: Ages
+
+
+@dataclass(frozen=True)
+class Setup:
+    """One way to meet mud."""
+
+    name: str
+    gait: GaitParameters
+    fixed_base: bool
+    row_period_s: float  # rows between two new samples repeat the last one; 0: every row is new
+    depth_m: float = 0.03
+
+
+# The authors' logs hold 50 to 110 distinct states a second of a single flipper, up to 210 of the walking robot.
+SINGLE = Setup("single flipper", SINGLE_FLIPPER, fixed_base=True, row_period_s=1.0 / 100.0)
+WALKING = Setup("walking", GaitParameters(), fixed_base=False, row_period_s=1.0 / 200.0)
+
+
+@dataclass(frozen=True)
+class Trial:
+    configuration: Configuration
+    drives: tuple[FlipperDrive, FlipperDrive]  # as the estimator knows them
+    samples: Sequence[Sample]
+    truths: Sequence[StrideTruth]
+
+
+def configuration_of(setup: Setup) -> Configuration:
+    """That of the simulated robot, with this setup's gait and base."""
+    text = CONFIGURATION.format(left='"left"', right='"right"', logs='"logs"', status='"s"', pose='""')
+    configuration = parse_configuration(text)
+    estimation = EstimationParameters(fixed_base=setup.fixed_base)
+    configuration = replace(configuration, gait=setup.gait, estimation=estimation)
+    return _with_bench_drives(configuration) if setup.fixed_base else configuration
+
+
+def _with_bench_drives(configuration: Configuration) -> Configuration:
+    drive = {joint: replace(each, current_limit_a=BENCH_CURRENT_A) for joint, each in configuration.drive.items()}
+    return replace(configuration, drive=drive, limits=replace(configuration.limits, torque_nm=BENCH_TORQUE_NM))
+
+
+def run_trial(
+    setup: Setup, track: Track, disturbances: Disturbances, strides: int, seed: int, torque_error: float = 0.0
+) -> Trial:
+    """`torque_error`: share by which each motor's constant is known wrongly, one standard deviation."""
+    configuration = configuration_of(setup)
+    lockstep = Lockstep(configuration, track, seed, disturbances=disturbances, fixed_base=setup.fixed_base)
+    lockstep.arm()
+    lockstep.walk(WalkOrder(setup.depth_m, adaptive=False))
+    witness, samples, truths = StrokeWitness(), list[Sample](), list[StrideTruth]()
+    held, end_s = _sample_of(lockstep), lockstep.now_s + strides * LONGEST_STRIDE_S
+    while len(truths) < 2 * strides and lockstep.now_s < end_s:
+        lockstep.step()
+        phase = lockstep.loop.target_before.phase
+        if lockstep.now_s >= held.now_s + setup.row_period_s:
+            held = _sample_of(lockstep)
+        samples.append(held._replace(now_s=lockstep.now_s, phase=phase))
+        truths += witness.step(PERIOD_S, lockstep.robot.plant, phase)
+    return Trial(configuration, _known_drives(configuration, torque_error, seed), samples, truths)
+
+
+def _known_drives(configuration: Configuration, torque_error: float, seed: int) -> tuple[FlipperDrive, FlipperDrive]:
+    random = Random(seed)
+    left, right = (
+        drive._replace(
+            sweep_constant_nm_a=drive.sweep_constant_nm_a * (1.0 + random.gauss(0.0, torque_error)),
+            adduction_constant_nm_a=drive.adduction_constant_nm_a * (1.0 + random.gauss(0.0, torque_error)),
+        )
+        for drive in configuration.flipper_drives
+    )
+    return left, right
+
+
+def _sample_of(lockstep: Lockstep) -> Sample:
+    a, b, c, d = lockstep.loop.states
+    now_s = lockstep.now_s
+    return Sample(
+        now_s,
+        lockstep.loop.target_before.phase,
+        (a.angle_rad, b.angle_rad, c.angle_rad, d.angle_rad),
+        (a.velocity_rad_s, b.velocity_rad_s, c.velocity_rad_s, d.velocity_rad_s),
+        (a.current_a, b.current_a, c.current_a, d.current_a),
+        lockstep.loop.body.x_m,
+        tuple(now_s - state.angle_stamp_s for state in lockstep.loop.states),  # type: ignore[arg-type]
+        tuple(now_s - state.current_stamp_s for state in lockstep.loop.states),  # type: ignore[arg-type]
+    )
+
+
+def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool = True) -> list[StrideEstimate]:
+    """What an estimator says about the trial."""
+    estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters)
+    strides: list[StrideEstimate] = []
+    for sample in trial.samples:
+        seen = sample if with_pose else sample._replace(body_x_m=UNKNOWN)
+        strides += estimator.update(*seen).strides
+    return strides
+
+
+def beliefs_of(trial: Trial, parameters: EstimationParameters) -> dict[int, MudBelief]:
+    """What was believed after each stride, by its index."""
+    estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters)
+    beliefs: dict[int, MudBelief] = {}
+    for sample in trial.samples:
+        for stride in estimator.update(*sample).strides:
+            beliefs[stride.index] = estimator.belief
+    return beliefs

@@ -1,0 +1,37 @@
+"""One line of `mudskipper doctor`: what was found, how good that is, and what to do."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+from firmware_host.operator.reports import check_item
+
+
+class Level(StrEnum):
+    OK = "ok"
+    WARN = "warn"
+    FAIL = "fail"
+
+
+class Finding(NamedTuple):
+    id: str
+    level: Level
+    text: str
+    fix: str = ""
+
+    @property
+    def as_check_item(self) -> dict[str, Any]:
+        return check_item(self.id, self.level is not Level.FAIL, self.text, self.fix)
+
+
+def ok(identity: str, text: str) -> Finding:
+    return Finding(identity, Level.OK, text)
+
+
+def warn(identity: str, text: str, fix: str) -> Finding:
+    return Finding(identity, Level.WARN, text, fix)
+
+
+def fail(identity: str, text: str, fix: str) -> Finding:
+    return Finding(identity, Level.FAIL, text, fix)

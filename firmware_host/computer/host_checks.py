@@ -1,0 +1,248 @@
+"""What the facts of the computer mean for the robot: one finding each, with what to do.
+
+Only what keeps the robot from working, or its torque from being watched, fails; what makes it late or forgetful warns.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from datetime import datetime
+from importlib.metadata import packages_distributions
+from math import inf
+from pathlib import Path
+from stat import S_IWGRP, S_IWOTH, S_IWUSR
+from typing import NamedTuple
+
+from firmware_host.computer.findings import Finding, fail, ok, warn
+from firmware_host.computer.host_facts import (
+    Limits,
+    Mount,
+    Thread,
+    can_interrupts,
+    governors,
+    is_realtime,
+    isolated_processors,
+    kernel_text,
+    mount_of,
+    processors,
+)
+from firmware_host.configuration.configuration import LoopParameters
+from firmware_host.log.log_folder import FreeSpace, free_space, unfinished_files
+from firmware_host.log.log_parameters import LogParameters
+from firmware_host.operator.counted_nouns import counted
+
+ENOUGH_MEMLOCK_BYTES = 2**30  # the loop's process maps less
+OLDEST_PYTHON = (3, 11)
+EARLIEST_YEAR = 2024  # a clock before that was never set
+VOLATILE = frozenset({"tmpfs", "ramfs", "overlay"})  # gone at power-off, or likely
+UNSYNCED = frozenset({"vfat", "exfat", "msdos", "nfs", "nfs4", "cifs", "fuse"})
+OURS = "mudskipper"
+STATE_FOLDER = ("var", "lib", OURS)  # StateDirectory= of the unit
+PACKAGES = ("control", "drivers", "estimation", "simulation")
+
+
+class Account(NamedTuple):
+    """Who will write."""
+
+    name: str
+    uid: int
+    groups: frozenset[int]
+
+
+def examine_host(root: Path, loop: LoopParameters, limits: Limits | None, priority: int | None) -> Iterator[Finding]:
+    """`priority` is what the running loop has; None: none runs."""
+    yield examine_kernel(is_realtime(root), kernel_text(root))
+    yield from examine_limits(loop, limits)
+    if priority is not None:
+        yield examine_priority(loop.priority, priority)
+    yield examine_governor(governors(root))
+    yield examine_processor(loop.cpu, isolated_processors(root), processors(root))
+    yield examine_interrupts(priority or loop.priority, can_interrupts(root))
+
+
+def examine_kernel(realtime: bool, release: str) -> Finding:
+    if realtime:
+        return ok("kernel", f"{release}, real-time")
+    return warn(
+        "kernel",
+        f"{release} is no real-time kernel: ticks may be late",
+        "a kernel with PREEMPT_RT, such as Debian's linux-image-rt-amd64 or -arm64",
+    )
+
+
+def examine_limits(loop: LoopParameters, limits: Limits | None) -> Iterator[Finding]:
+    if limits is None:
+        yield warn("limits", "the limits of processes cannot be read", "look into /proc/self/limits")
+        return
+    if loop.priority:
+        permitted = "permitted" if limits.rtprio >= loop.priority else "not permitted: the loop may be late"
+        text = f"real-time priority {loop.priority} is {permitted} (limit {_number(limits.rtprio)} {limits.whose})"
+        fix = "raise the rtprio limit (LimitRTPRIO= in the unit)"
+        yield ok("realtime", text) if limits.rtprio >= loop.priority else fail("realtime", text, fix)
+    if loop.lock_memory:
+        enough = limits.memlock_bytes >= ENOUGH_MEMLOCK_BYTES
+        text = f"{_number(limits.memlock_bytes)} bytes may be locked in memory ({limits.whose})"
+        fix = "raise the memlock limit (LimitMEMLOCK=infinity in the unit)"
+        yield ok("memlock", text) if enough else warn("memlock", text, fix)
+
+
+def _number(value: float) -> str:
+    return "unlimited" if value == inf else f"{value:.0f}"
+
+
+def examine_priority(wanted: int, has: int) -> Finding:
+    text = f"the running loop has real-time priority {has}"
+    if has >= wanted:
+        return ok("loop.priority", text)
+    return fail("loop.priority", f"{text} instead of {wanted}", "raise the rtprio limit, then restart the daemon")
+
+
+def examine_governor(names: set[str]) -> Finding:
+    if not names:
+        return ok("governor", "the processors' clock is not scaled by this kernel")
+    text = ", ".join(sorted(names))
+    if names == {"performance"}:
+        return ok("governor", text)
+    fix = "'cpupower frequency-set --governor performance', or cpufreq.default_governor=performance for the kernel"
+    return warn("governor", f"{text}: the loop wakes late where the clock is slow", fix)
+
+
+def examine_processor(cpu: int, isolated: set[int], present: int) -> Finding:
+    told = f"isolated: {', '.join(map(str, sorted(isolated))) or 'none'}"
+    if cpu < 0:
+        return ok("processors", f"{present}, the loop runs on any; {told}")
+    if cpu >= present > 0:
+        return fail("processors", f"loop.cpu = {cpu}, but there are {present}", "correct loop.cpu")
+    if cpu in isolated:
+        return ok("processors", f"the loop has {cpu} for itself; {told}")
+    return warn("processors", f"the loop shares {cpu} with everything; {told}", f"isolcpus={cpu} for the kernel")
+
+
+def examine_interrupts(priority: int, threads: list[Thread]) -> Finding:
+    """A loop above the thread that brings its frames starves itself of them."""
+    if not threads:
+        return ok("interrupts", "no interrupt thread of a CAN adapter")
+    text = ", ".join(f"{thread.name} {thread.priority}" for thread in threads)
+    if all(thread.priority > priority for thread in threads):
+        return ok("interrupts", f"the loop's {priority} is below {text}")
+    lowest = min(thread.priority for thread in threads)
+    fix = f"set loop.priority to less than {lowest}, or raise those with chrt"
+    return warn("interrupts", f"the loop's {priority} is not below all of {text}", fix)
+
+
+def examine_storage(root: Path, log: LogParameters, writer: Account, daemon_runs: bool) -> Iterator[Finding]:
+    """Where the logs go."""
+    if not log.enabled:
+        yield warn("log", "no log is written", "set log.enabled = true")
+        return
+    folder = Path(log.directory)
+    mount = mount_of(root, folder)
+    if mount is not None:
+        yield examine_mount(mount)
+    place = root / folder.absolute().relative_to("/")
+    try:
+        yield examine_space(free_space(place), log.min_free_share)
+    except OSError as problem:
+        yield fail("disk", f"{folder}: {problem.strerror}", "mount it")
+    yield examine_folder(place, writer)
+    if not daemon_runs:
+        yield examine_unfinished(place)
+
+
+def examine_mount(mount: Mount) -> Finding:
+    text = f"{mount.place} is {mount.kind}"
+    if mount.read_only:
+        return fail(
+            "file_system", f"{text}, read-only", f"'mount -o remount,rw {mount.place}'; look for errors of the disk"
+        )
+    if mount.kind in VOLATILE:
+        return warn("file_system", f"{text}: logs may be gone after power-off", "set log.directory to a disk")
+    if mount.kind in UNSYNCED:
+        return warn("file_system", f"{text}: it may lose whole logs in a power cut", "use ext4, xfs, btrfs or f2fs")
+    return ok("file_system", text)
+
+
+def examine_space(space: FreeSpace, least_share: float) -> Finding:
+    text = f"{space.free_bytes / 1e9:.1f} GB free, {100.0 * space.free_share:.0f} %"
+    if space.free_bytes == 0:
+        return fail("disk", "the disk is full", "free some of it")
+    if space.free_share < least_share:
+        fix = "free some of it, or lower log.min_free_share"
+        return warn("disk", f"{text}: less than log.min_free_share, so old logs are removed", fix)
+    return ok("disk", text)
+
+
+def examine_folder(folder: Path, writer: Account) -> Finding:
+    """The folder, or the nearest that is there: the daemon makes the rest."""
+    nearest = folder
+    try:
+        while not nearest.exists():
+            nearest = nearest.parent
+        writable = may_write(nearest.stat(), writer)
+    except PermissionError:
+        return warn("log", f"{folder} cannot be looked into", "run this with sudo")
+    if writer.name == OURS and not writable and nearest == folder_of_systemd(folder):
+        return ok("log", f"{folder}: made when the service starts")
+    text = f"{folder}: {'' if writable else 'not '}writable for {writer.name}"
+    fix = f"'install -d -o {writer.uid} {folder}', or change log.directory"
+    return ok("log", text) if writable else fail("log", text, fix)
+
+
+def folder_of_systemd(folder: Path) -> Path | None:
+    """Where systemd will make the service's StateDirectory, if the folder is to be in that."""
+    return next((place.parent for place in (folder, *folder.parents) if place.parts[-3:] == STATE_FOLDER), None)
+
+
+def may_write(status: os.stat_result, writer: Account) -> bool:
+    if writer.uid == 0:
+        return True
+    if status.st_uid == writer.uid:
+        return bool(status.st_mode & S_IWUSR)
+    return bool(status.st_mode & (S_IWGRP if status.st_gid in writer.groups else S_IWOTH))
+
+
+def examine_unfinished(folder: Path) -> Finding:
+    try:
+        unfinished = len(unfinished_files(folder))
+    except OSError:
+        unfinished = 0
+    if unfinished == 0:
+        return ok("unfinished_logs", "none")
+    text = f"{counted(unfinished, 'log')} cut off, such as by a power cut"
+    return warn("unfinished_logs", text, "'mudskipper log recover'; the daemon does it at its start")
+
+
+def examine_clock(now: datetime, synchronised: bool, chip: bool) -> Finding:
+    """Logs are named after it, and the oldest are freed first."""
+    fix = "'timedatectl set-ntp true', or set it by hand with 'date --set'"
+    if now.year < EARLIEST_YEAR:
+        return fail("clock", f"it says {now:%Y-%m-%d}: it was never set", fix)
+    text = f"{now:%Y-%m-%d %H:%M} UTC, {'synchronised' if synchronised else 'not synchronised'}"
+    if synchronised and chip:
+        return ok("clock", text)
+    if not chip:
+        text += ", and no clock chip keeps it without power"
+        return warn("clock", text, "fit one, or wait for the network before a run")
+    return warn("clock", text, fix)
+
+
+def examine_python(version: tuple[int, ...], owners: dict[str, list[str]]) -> Iterator[Finding]:
+    """`owners` are the distributions of each top-level package."""
+    text = ".".join(map(str, version[:3]))
+    if version[:2] >= OLDEST_PYTHON:
+        yield ok("python", text)
+    else:
+        yield fail("python", f"{text} is too old", "install Python 3.11 or newer")
+    strangers = {name: sorted(set(owners.get(name, [])) - {OURS}) for name in PACKAGES}
+    found = [f"{name} of {', '.join(others)}" for name, others in strangers.items() if others]
+    if found:
+        fix = "give the daemon an environment of its own: README, 'On the robot'"
+        yield fail("packages", f"other software brings packages of the same name: {'; '.join(found)}", fix)
+    else:
+        yield ok("packages", "no other software has packages of the same name")
+
+
+def this_python() -> Iterator[Finding]:
+    yield from examine_python(tuple(sys.version_info[:3]), {k: list(v) for k, v in packages_distributions().items()})

@@ -1,0 +1,218 @@
+"""What only a whole configuration can show: values that are each within their bounds and do not go together.
+
+That the gait is within reach of the geometry and of the joint limits, that drives and buses are told apart, that faults
+begin in an order in which they can be told from each other: each contradiction is one sentence.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from math import ceil, degrees, floor, radians
+from typing import TYPE_CHECKING
+
+from control.depth.gait_choice import candidates
+from control.records import JOINTS
+from firmware_host.configuration.pose_consistency import pose_problems
+
+if TYPE_CHECKING:
+    from firmware_host.configuration.configuration import Configuration
+
+LONGEST_SOCKET_PATH = 107  # sun_path of unix(7) has 108 bytes with its final zero
+ROUNDING = 1e-6  # of numbers that a file gives with few digits
+
+
+def contradictions(configuration: Configuration) -> Iterator[str]:
+    """Each with key, value and bound."""
+    yield from _text_problems(configuration)
+    yield from pose_problems(configuration.pose)
+    yield from _drive_problems(configuration)
+    yield from _friction_problems(configuration)
+    yield from _motor_force_problems(configuration)
+    yield from _depth_problems(configuration)
+    yield from _range_problems(configuration)
+    if configuration.adaptation.method == "gait":
+        yield from _sweep_problems(configuration)
+    yield from _torque_problems(configuration)
+    yield from _lead_problems(configuration)
+    yield from _fault_problems(configuration)
+
+
+def _text_problems(configuration: Configuration) -> Iterator[str]:
+    name, status, pose = configuration.robot.name, configuration.status.socket, configuration.pose.socket
+    if not re.fullmatch(r"[\w.-]{1,64}", name, re.ASCII) or name.startswith("."):
+        yield f"robot.name = {name!r}: must be 1 to 64 letters, digits, dots, dashes or underscores"
+    for key, path in (("status.socket", status), ("pose.socket", pose)):
+        if "\0" in path or len(path.encode()) > LONGEST_SOCKET_PATH:
+            yield f"{key} = {path!r}: must be at most {LONGEST_SOCKET_PATH} bytes long, without a zero byte"
+    if not status:
+        yield "status.socket = '': must name a socket"
+    if pose and pose == status:
+        yield f"pose.socket = {pose!r}: must not be status.socket"
+    for key in ("read_group", "drive_group"):
+        if "\0" in getattr(configuration.status, key):
+            yield f"status.{key}: must be without a zero byte"
+    if "\0" in configuration.log.directory:
+        yield f"log.directory = {configuration.log.directory!r}: must be without a zero byte"
+
+
+def _drive_problems(configuration: Configuration) -> Iterator[str]:
+    places: dict[tuple[str, int], str] = {}
+    for joint in JOINTS:
+        if joint not in configuration.drive:
+            yield f"drive.{joint} is missing: all of {', '.join(JOINTS)} are needed"
+    for joint, drive in configuration.drive.items():
+        if joint not in JOINTS:
+            yield f"drive.{joint}: there is no such joint; the joints are {', '.join(JOINTS)}"
+        if drive.bus not in configuration.bus:
+            known = ", ".join(configuration.bus) or "none"
+            yield f"drive.{joint}.bus = {drive.bus!r}: no such bus; there is {known}"
+        if drive.sign == 0:
+            yield f"drive.{joint}.sign = 0: must be 1 or -1"
+        twin = places.setdefault((drive.bus, drive.node_id), joint)
+        if twin != joint:
+            yield f"drive.{joint}.node_id = {drive.node_id}: {twin} has the same on bus {drive.bus!r}"
+
+
+def _friction_problems(configuration: Configuration) -> Iterator[str]:
+    for joint in configuration.friction:
+        if joint not in JOINTS:
+            yield f"friction.{joint}: there is no such joint; the joints are {', '.join(JOINTS)}"
+
+
+def _torque_problems(configuration: Configuration) -> Iterator[str]:
+    """A drive must be able to give what the limits allow, or it clamps torque without a word."""
+    torque_nm = configuration.limits.torque_nm
+    for joint, drive in configuration.drive.items():
+        clamp_nm = drive.velocity_limit_turn_s * drive.velocity_gain_nm_s_turn
+        if clamp_nm < torque_nm:
+            yield (
+                f"drive.{joint}.velocity_gain_nm_s_turn = {drive.velocity_gain_nm_s_turn}: must be at least"
+                f" {ceil(100.0 * torque_nm / drive.velocity_limit_turn_s) / 100.0:.2f}, or with velocity_limit_turn_s ="
+                f" {drive.velocity_limit_turn_s} the drive gives less than limits.torque_nm = {torque_nm}"
+            )
+        needed_a = ceil(100.0 * torque_nm / drive.torque_constant_nm_a) / 100.0
+        if drive.current_limit_a < torque_nm / drive.torque_constant_nm_a:
+            yield (
+                f"drive.{joint}.current_limit_a = {drive.current_limit_a}: must be at least"
+                f" {needed_a:.2f} for limits.torque_nm = {torque_nm}"
+            )
+
+
+def _lead_problems(configuration: Configuration) -> Iterator[str]:
+    """A recovery's targets must lead far enough for the full torque, or the last attempt is a weak one."""
+    gains, lead_deg, torque_nm = configuration.gains, configuration.recovery.lead_deg, configuration.limits.torque_nm
+    needed_nm_rad = torque_nm / radians(lead_deg)
+    for key in ("sweep_stiffness_nm_rad", "adduction_stiffness_nm_rad"):
+        if configuration.recovery.attempts and getattr(gains, key) < needed_nm_rad:
+            yield (
+                f"gains.{key} = {getattr(gains, key)}: must be at least {ceil(100.0 * needed_nm_rad) / 100.0:.2f},"
+                f" or a recovery.lead_deg = {lead_deg:g} does not reach limits.torque_nm = {torque_nm}"
+            )
+
+
+def _fault_problems(configuration: Configuration) -> Iterator[str]:
+    """Milder reactions come first."""
+    bounds = configuration.faults
+    for milder, harder in (("late_s", "quiet_s"), ("quiet_s", "silence_s"), ("lag_s", "silence_s")):
+        low, high = getattr(bounds, milder), getattr(bounds, harder)
+        if low > high:
+            yield f"faults.{milder} = {low}: must be at most faults.{harder} = {high}"
+    room_c, limits = configuration.winding.room_c, configuration.limits
+    nearly_hot_c = (limits.temperature_warm_c + limits.temperature_hot_c) / 2.0
+    if room_c >= nearly_hot_c:
+        yield (
+            f"winding.room_c = {room_c}: must be less than {nearly_hot_c:g}, the middle of limits.temperature_warm_c"
+            " and temperature_hot_c, or a resting motor counts as too hot"
+        )
+    if bounds.voltage_min_v > bounds.voltage_low_v:
+        yield (
+            f"faults.voltage_min_v = {bounds.voltage_min_v}: must be at most"
+            f" faults.voltage_low_v = {bounds.voltage_low_v}"
+        )
+
+
+def _motor_force_problems(configuration: Configuration) -> Iterator[str]:
+    """What is predicted of an extraction must be within what the limits let the motors do."""
+    length_m, force_n = configuration.geometry.flipper_length_m, configuration.adaptation.motor_force_n
+    largest_n = configuration.limits.torque_nm / length_m
+    if force_n > largest_n * (1.0 + ROUNDING):
+        yield (
+            f"adaptation.motor_force_n = {force_n}: must be at most {floor(100.0 * largest_n) / 100.0:.2f}"
+            f" for limits.torque_nm = {configuration.limits.torque_nm}"
+            f" and geometry.flipper_length_m = {length_m}"
+        )
+
+
+def _depth_problems(configuration: Configuration) -> Iterator[str]:
+    geometry, gait, adaptation = configuration.geometry, configuration.gait, configuration.adaptation
+    if geometry.clearance_m <= 0.0:
+        yield (
+            f"geometry.axis_height_m = {geometry.axis_height_m}: must be more than geometry.drop_m = {geometry.drop_m},"
+            " or the raised flipper stays in the mud"
+        )
+    deepest_m = geometry.deepest_m(gait.sweep_angle_deg)
+    if adaptation.max_depth_m > deepest_m:
+        yield (
+            f"adaptation.max_depth_m = {adaptation.max_depth_m}: out of reach, must be at most {deepest_m:.4f}"
+            f" for this geometry and a sweep of ±{gait.sweep_angle_deg:g} degrees"
+        )
+    if adaptation.min_depth_m > adaptation.max_depth_m:
+        yield (
+            f"adaptation.min_depth_m = {adaptation.min_depth_m}: must be at most"
+            f" adaptation.max_depth_m = {adaptation.max_depth_m}"
+        )
+    if not adaptation.min_depth_m <= adaptation.initial_depth_m <= adaptation.max_depth_m:
+        yield (
+            f"adaptation.initial_depth_m = {adaptation.initial_depth_m}: must be from {adaptation.min_depth_m}"
+            f" to {adaptation.max_depth_m}, adaptation.min_depth_m and max_depth_m"
+        )
+
+
+def _range_problems(configuration: Configuration) -> Iterator[str]:
+    limits, sweep_deg = configuration.limits, configuration.gait.sweep_angle_deg
+    if limits.sweep_min_deg > -sweep_deg:
+        yield f"limits.sweep_min_deg = {limits.sweep_min_deg}: must be at most {-sweep_deg:g} for gait.sweep_angle_deg"
+    if limits.sweep_max_deg < sweep_deg:
+        yield f"limits.sweep_max_deg = {limits.sweep_max_deg}: must be at least {sweep_deg:g} for gait.sweep_angle_deg"
+    if limits.temperature_hot_c < limits.temperature_warm_c:
+        yield (
+            f"limits.temperature_hot_c = {limits.temperature_hot_c}: must be at least"
+            f" limits.temperature_warm_c = {limits.temperature_warm_c}"
+        )
+    if limits.adduction_max_deg < 0.0:
+        yield f"limits.adduction_max_deg = {limits.adduction_max_deg}: must be at least 0, the raised arm"
+    depth_m = configuration.adaptation.max_depth_m
+    if depth_m > configuration.geometry.deepest_m(sweep_deg):
+        return  # said already
+    lowest_deg = degrees(configuration.geometry.adduction_rad(radians(sweep_deg), depth_m))
+    if limits.adduction_min_deg > lowest_deg:
+        yield (
+            f"limits.adduction_min_deg = {limits.adduction_min_deg}: must be at most {lowest_deg:.1f}"
+            f" to reach adaptation.max_depth_m = {depth_m}"
+        )
+
+
+def _sweep_problems(configuration: Configuration) -> Iterator[str]:
+    """Of the sweeps among which the method "gait" chooses; wide ones go less deep, as far as they reach."""
+    geometry, limits, adaptation = configuration.geometry, configuration.limits, configuration.adaptation
+    widest_deg, widest = adaptation.max_sweep_deg, f"adaptation.max_sweep_deg = {adaptation.max_sweep_deg}"
+    within_deg = min(-limits.sweep_min_deg, limits.sweep_max_deg)
+    reached_m = geometry.deepest_m(widest_deg)
+    if adaptation.min_sweep_deg > widest_deg:
+        yield f"adaptation.min_sweep_deg = {adaptation.min_sweep_deg}: must be at most {widest}"
+    if widest_deg > within_deg:
+        yield f"{widest}: must be at most {within_deg:g} for limits.sweep_min_deg and sweep_max_deg"
+    if adaptation.min_depth_m > reached_m:
+        yield f"{widest}: reaches {reached_m:.4f} m, less than adaptation.min_depth_m = {adaptation.min_depth_m}"
+        return
+    poses = [
+        geometry.adduction_rad(radians(each.gait.sweep_angle_deg), each.depth_m)
+        for each in candidates(adaptation, geometry, configuration.gait)
+    ]
+    lowest_deg = degrees(min(poses))
+    if limits.adduction_min_deg > lowest_deg:
+        yield (
+            f"limits.adduction_min_deg = {limits.adduction_min_deg}: must be at most {lowest_deg:.1f}"
+            " for adaptation.min_sweep_deg to max_sweep_deg"
+        )

@@ -1,0 +1,94 @@
+"""A beat that stalls and a clock on the wall that steps, both on purpose.
+
+The stall comes where a tick's work would overrun: after it, before the wait for the next deadline.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+from drivers.fault_injection.failures import Failure, FailureKind, Failures, end_text
+from firmware_host.ticker import Beat
+
+STALL_S = 0.03  # eleven ticks: longer than a drive may be silent
+SLOW_TICK_S = 0.004  # one and a half ticks
+CLOCK_STEP_S = 3600.0
+
+
+class Beats(Protocol):
+    def wait(self) -> Beat: ...
+
+
+class Stalls:
+    """Owns whether the one long stall of a failure has been."""
+
+    def __init__(self, failures: Failures) -> None:
+        self._failures = failures
+        self._stalled: Failure | None = None
+
+    def next_s(self) -> float:
+        """How long the loop stands still before its next tick."""
+        failure = self._failures.of("loop")
+        if failure is None or failure is self._stalled:
+            return 0.0
+        if failure.kind is FailureKind.SLOW:
+            return SLOW_TICK_S
+        self._stalled = failure
+        return STALL_S
+
+
+class FailingTicker:
+    """Tells the failures what time it is, once a tick, and the log which of them have ended."""
+
+    def __init__(
+        self,
+        ticker: Beats,
+        failures: Failures,
+        tell: Callable[[float, str], None],
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._ticker = ticker
+        self._failures = failures
+        self._stalls = Stalls(failures)
+        self._tell = tell
+        self._sleep = sleep
+
+    def wait(self) -> Beat:
+        stall_s = self._stalls.next_s()
+        if stall_s:
+            self._sleep(stall_s)
+        beat = self._ticker.wait()
+        for failure in self._failures.update(beat.now_s):
+            self._tell(beat.now_s, end_text(failure))
+        return beat
+
+
+def failing_ticker(ticker: Beats, failures: Failures | None, tell: Callable[[float, str], None]) -> Beats:
+    """The ticker as it is, where nothing may fail."""
+    return ticker if failures is None else FailingTicker(ticker, failures, tell)
+
+
+class FailingClock:
+    """The clock on the wall."""
+
+    def __init__(self, clock: Callable[[], float], failures: Failures) -> None:
+        self._clock = clock
+        self._failures = failures
+        self._since: Failure | None = None
+
+    def __call__(self) -> float:
+        now_s, failure = self._clock(), self._failures.of("clock")
+        if failure is None:
+            return now_s
+        if failure.kind is FailureKind.GARBAGE:
+            return now_s + CLOCK_STEP_S
+        if self._since is not failure:
+            self._since, self._stands_at_s = failure, now_s
+        return self._stands_at_s
+
+
+def failing_clock(clock: Callable[[], float], failures: Failures | None) -> Callable[[], float]:
+    """The clock as it is, where nothing may fail."""
+    return clock if failures is None else FailingClock(clock, failures)

@@ -1,0 +1,131 @@
+"""What a person can ask of the failures: the methods `fail` and `failures` of the status socket.
+
+Each failure stands in the log when it begins, with who asked for it, and when it ends; the status says what fails on
+purpose; and `disarm` ends every failure first, so that it reaches the drives whatever was made to fail.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+from typing import Any
+
+from drivers.fault_injection.failures import EFFECTS, USUAL_S, Failure, Failures, begin_text, end_text
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.operator.connection import Caller
+from firmware_host.operator.status_socket import Methods, RefusedError
+
+LONGEST_NAME = 64
+FORBIDDEN = "nothing may fail on purpose here: set failures.allowed = true in the configuration, and start again"
+OK, ALL = "ok", "all"
+
+Tell = Callable[[float, str], None]
+Method = Callable[[dict[str, Any], Caller], Any]
+
+
+def failures_of(configuration: Configuration) -> Failures | None:
+    """None where the configuration does not allow any."""
+    return Failures(configuration.bus) if configuration.failures.allowed else None
+
+
+def with_failures(methods: Methods, failures: Failures | None, tell: Tell, clock: Callable[[], float]) -> Methods:
+    """The methods of a daemon, and those that make it fail; the others as they are where nothing may."""
+    if failures is None:
+        return {
+            **methods,
+            "fail": _refuse,
+            "failures": lambda params, caller: {"allowed": False, "failing": [], "table": []},
+        }
+    calls = FailureCalls(failures, tell, clock)
+    added: Methods = {"fail": calls.fail, "failures": lambda params, caller: calls.failures()}
+    changed: Methods = {
+        "status": lambda params, caller: calls.in_status(methods["status"](params, caller)),
+        "disarm": calls.ending_all_before(methods["disarm"]),
+    }
+    return {**methods, **added, **changed}
+
+
+def _refuse(params: dict[str, Any], caller: Caller) -> Any:
+    raise RefusedError(FORBIDDEN)
+
+
+class FailureCalls:
+    def __init__(self, failures: Failures, tell: Tell, clock: Callable[[], float]) -> None:
+        self._failures = failures
+        self._tell = tell
+        self._clock = clock
+
+    def fail(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
+        """Make `component` fail as `kind` says for `for_s`; kind "ok" ends it, also for "all". What fails then."""
+        component, kind = _text(params, "component"), _text(params, "kind")
+        if kind == OK:
+            self._end(component)
+        else:
+            self._begin(component, kind, _seconds(params), str(caller))
+        return self._failing()
+
+    def _begin(self, component: str, kind: str, for_s: float, who: str) -> None:
+        refused = self._failures.refusal(component, kind, for_s)
+        if refused:
+            raise RefusedError(refused)
+        now_s = self._clock()
+        self._tell(now_s, begin_text(component, kind, for_s, who))  # first: it may be the log that fails
+        self._failures.begin(component, kind, now_s, for_s)
+
+    def _end(self, component: str) -> None:
+        if component != ALL and component not in self._failures.families:
+            raise RefusedError(self._failures.refusal(component, OK))
+        failure = self._failures.end(component)
+        for each in self._failures.end_all() if component == ALL else [failure] if failure else []:
+            self._tell(self._clock(), end_text(each))
+
+    def failures(self) -> dict[str, Any]:
+        """What fails, and all that could."""
+        families = self._failures.families
+        table = [
+            {"component": name, "family": families[name], "kind": kind, "does": does}
+            for name, kind, does in self._failures.table()
+        ]
+        return {"allowed": True, "failing": self._failing(), "table": table}
+
+    def _failing(self) -> list[dict[str, Any]]:
+        return [self._report(failure) for failure in self._failures.active]
+
+    def _report(self, failure: Failure) -> dict[str, Any]:
+        return {
+            "component": failure.component,
+            "kind": str(failure.kind),
+            "remaining_s": max(0.0, failure.until_s - self._clock()),
+            "does": EFFECTS[self._failures.families[failure.component]][failure.kind],
+        }
+
+    def in_status(self, report: dict[str, Any]) -> dict[str, Any]:
+        """The status with what fails, and a warning for whoever reads only those."""
+        failing = self._failing()
+        warnings = [failing_text(each) for each in failing]
+        return report | {"failing": failing, "warnings": report["warnings"] + warnings}
+
+    def ending_all_before(self, method: Method) -> Method:
+        def ended_first(params: dict[str, Any], caller: Caller) -> Any:
+            self._end(ALL)
+            return method(params, caller)
+
+        return ended_first
+
+
+def failing_text(failing: dict[str, Any]) -> str:
+    return f"failing on purpose: {failing['component']} {failing['kind']}, {failing['remaining_s']:.1f} s more"
+
+
+def _text(params: dict[str, Any], name: str) -> str:
+    value = params.get(name, "")
+    if not isinstance(value, str) or len(value) > LONGEST_NAME or not value.isprintable():
+        raise RefusedError(f"{name}: must be at most {LONGEST_NAME} printable characters")
+    return value
+
+
+def _seconds(params: dict[str, Any]) -> float:
+    value = params.get("for_s", USUAL_S)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        raise RefusedError(f"for_s = {value!r}: must be a number")
+    return float(value)

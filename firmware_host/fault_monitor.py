@@ -1,0 +1,234 @@
+"""All faults that a tick can show: those of the joints and their drives, of the buses, of the loop, of what it writes.
+
+Each is data. What comes of them is decided by the latch, which knows how long they stand, and by the modes.
+"""
+
+from __future__ import annotations
+
+from math import isnan
+from typing import NamedTuple
+
+from control.controller import ALL_TRUSTED
+from control.fault_kinds import make_fault
+from control.faults import Fault
+from control.limits import LimitedTorques
+from control.modes import ENERGISED, HELD, MOVING, Mode
+from control.monitors.joint_monitor import JointFacts, JointWatch
+from control.records import JOINTS, NEVER_S, BodyPose, DriveStates
+from drivers.can.can_port import BusState
+from drivers.odrive.axis import OdriveAxis
+from drivers.odrive.codec import error_text
+from drivers.odrive.drives import OdriveDrives
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.log_monitor import LogWatch
+from firmware_host.log.recorder import LogReport
+from firmware_host.loop_monitor import LoopWatch
+from firmware_host.ticker import PERIOD_S, Beat
+
+ARMING_S = 2.0  # a drive that takes longer to go into closed loop does not mean to
+REFUSED_TICKS = 3  # in a row, in each of which one bus lost a command
+FIRMWARE = (0, 6)  # major and minor version whose messages the codec knows
+BUS_TROUBLE_S = 2.0  # after the last error frame
+POSE_FORGOTTEN_S = 10.0  # a motion capture that was switched off on purpose
+BROKEN = frozenset({"encoder_jump", "encoder_stuck"})  # told in some ticks, true in all of them
+BLIND = frozenset({"position_stale", "position_silent", "drive_quiet", "drive_silent"})
+EXPLAINED = frozenset({"drive_error", "drive_disarmed"})  # by the drive's own words
+
+
+BUS_FAULTS = {
+    BusState.WARNING: ("bus_warning", "meets many errors"),
+    BusState.PASSIVE: ("bus_passive", "meets so many errors that its controller is passive"),
+    BusState.OFF: ("bus_off", "is off"),
+}
+
+
+class Situation(NamedTuple):
+    """What the loop knows of the moment, before the mode changes."""
+
+    mode: Mode
+    mode_since_s: float
+    states: DriveStates
+    body: BodyPose
+    sent: LimitedTorques  # in the tick before
+    freeing: bool  # a recovery pulls at full torque on purpose
+    wall_minus_monotonic_s: float
+    log: LogReport
+    lease_holder: str  # who has lost it; empty: nobody
+
+
+class FaultWatch:
+    """Owns the watches of the joints and of the loop, and what is counted over ticks."""
+
+    def __init__(self, configuration: Configuration, drives: OdriveDrives) -> None:
+        self._drives = drives
+        self.joints = tuple(
+            JointWatch(
+                joint,
+                configuration.limits,
+                span,
+                configuration.faults,
+                configuration.winding,
+                configuration.drive[joint].current_limit_a,
+                configuration.drive[joint].torque_constant_nm_a,
+                configuration.drive[joint].heartbeat_period_s,
+            )
+            for joint, span in zip(JOINTS, configuration.joint_ranges, strict=True)
+        )
+        self._loop = LoopWatch(configuration.faults)
+        self._log = LogWatch(configuration.faults)
+        self._longest_watchdog_s = configuration.faults.longest_watchdog_s
+        self._warm_c = configuration.limits.temperature_warm_c
+        self.reset()
+
+    def reset(self) -> None:
+        for joint in self.joints:
+            joint.reset()
+        self._loop.reset()
+        self._log.reset()
+        self._failed_sends = {name: port.failed_sends for name, port in self._drives.ports.items()}
+        self._bus_news = {name: (0, BusState.ACTIVE) for name in self._drives.ports}
+        self._error_s = dict.fromkeys(self._drives.ports, NEVER_S)
+        self._lost_frames = {name: port.lost_frames for name, port in self._drives.ports.items()}
+        self._refused_ticks = dict.fromkeys(self._drives.ports, 0)
+        self._restarts = {axis.joint: axis.restarts for axis in self._drives.axes}
+        self._refused_commands = self._drives.gate.refused
+        self._pose_stamp_s: float | None = None
+        self._broken: set[str] = set()  # encoders, until torque is off
+        self.trusted: tuple[bool, ...] = ALL_TRUSTED  # of the joints' encoders
+
+    def with_winding_heat(self, states: DriveStates) -> DriveStates:
+        """With the temperatures that the watches believe, where one is warm enough for the limits to heed it."""
+        if all(joint.winding.temperature_c <= self._warm_c for joint in self.joints) and not any(
+            state.temperature_c > self._warm_c for state in states
+        ):
+            return states
+        a, b, c, d = (
+            state._replace(temperature_c=joint.winding.temperature_c)
+            for joint, state in zip(self.joints, states, strict=True)
+        )
+        return a, b, c, d
+
+    def update(self, beat: Beat, situation: Situation) -> list[Fault]:
+        """Everything that is wrong in this tick."""
+        found = self._loop.update(beat, situation.wall_minus_monotonic_s)
+        found += self._log.update(situation.log)
+        self._watch_buses(found, beat.now_s)
+        if situation.lease_holder:
+            text = f"{situation.lease_holder} promised to attend the robot and is gone."
+            found.append(make_fault("lease_lost", "", text))
+        if situation.mode is Mode.BOOT and not self._drives.heard:
+            return found
+        self._watch_joints(found, beat, situation)
+        self._watch_trust(found, situation.mode)
+        if not situation.sent.finite:
+            found.append(make_fault("torque_not_finite", "", "A torque was not a finite number."))
+        if situation.mode is Mode.ARMING and beat.now_s - situation.mode_since_s > ARMING_S:
+            self._watch_arming(found, situation.states)
+        self._watch_gate(found)
+        for axis in self._drives.axes:
+            self._watch_axis(found, axis)
+            if axis.busy_state and situation.mode not in ENERGISED:
+                text = f"The {axis.joint} drive does something of its own: axis state {axis.busy_state}."
+                found.append(make_fault("drive_energised", axis.joint, text))
+        self._watch_pose(found, beat.now_s, situation.body)
+        return found
+
+    def _watch_buses(self, found: list[Fault], now_s: float) -> None:
+        """A warning ends with the error frames: not every CAN driver tells that its controller has recovered."""
+        for name, port in self._drives.ports.items():
+            if (port.error_frames, port.state) != self._bus_news[name]:
+                self._bus_news[name], self._error_s[name] = (port.error_frames, port.state), now_s
+            if port.state is BusState.OFF or (port.state and now_s - self._error_s[name] < BUS_TROUBLE_S):
+                kind, text = BUS_FAULTS[port.state]
+                found.append(make_fault(kind, name, f"The {name} bus {text}: {port.last_error or 'no word why'}."))
+            lost_frames = port.lost_frames - self._lost_frames[name]
+            if lost_frames:
+                self._lost_frames[name] = port.lost_frames
+                text = f"{lost_frames} frames of the {name} bus were lost: they came faster than they were read."
+                found.append(make_fault("frames_lost", name, text))
+            lost = port.failed_sends > self._failed_sends[name]
+            self._refused_ticks[name] = self._refused_ticks[name] + 1 if lost else 0
+            self._failed_sends[name] = port.failed_sends
+            if self._refused_ticks[name] >= REFUSED_TICKS:
+                ticks, why = self._refused_ticks[name], port.last_send_error
+                text = f"The {name} bus lost commands in {ticks} ticks in a row: {why}."
+                found.append(make_fault("bus_refuses", name, text))
+
+    def _watch_joints(self, found: list[Fault], beat: Beat, situation: Situation) -> None:
+        mode, sent_nm = situation.mode, situation.sent.torques_nm
+        dt_s = (1 + beat.missed) * PERIOD_S
+        for joint, axis, state, torque_nm in zip(
+            self.joints, self._drives.axes, situation.states, sent_nm, strict=True
+        ):
+            facts = JointFacts(
+                beat.now_s, dt_s, mode in ENERGISED, mode in MOVING, torque_nm, situation.freeing or mode not in HELD
+            )
+            found += [_explained(fault, axis) for fault in joint.update(facts, state)]
+
+    def _watch_trust(self, found: list[Fault], mode: Mode) -> None:
+        """What breaks an encoder shows in some ticks only, silence in all of its own."""
+        if mode not in ENERGISED:
+            self._broken.clear()
+        self._broken.update(fault.subject for fault in found if fault.name in BROKEN)
+        blind = self._broken.union(fault.subject for fault in found if fault.name in BLIND)
+        self.trusted = tuple(joint not in blind for joint in JOINTS) if blind else ALL_TRUSTED
+
+    def _watch_arming(self, found: list[Fault], states: DriveStates) -> None:
+        for joint, state in zip(JOINTS, states, strict=True):
+            if not state.closed_loop:
+                text = f"The {joint} drive did not go into closed loop within {ARMING_S:g} s."
+                found.append(make_fault("arming_failed", joint, text))
+
+    def _watch_gate(self, found: list[Fault]) -> None:
+        gate = self._drives.gate
+        if gate.refused > self._refused_commands:
+            self._refused_commands = gate.refused
+            found.append(make_fault("command_refused", "", gate.last_refusal))
+
+    def _watch_axis(self, found: list[Fault], axis: OdriveAxis) -> None:
+        """What a drive tells of itself beside its signals."""
+        joint = axis.joint
+        if axis.restarts != self._restarts[joint]:
+            self._restarts[joint] = axis.restarts
+            found.append(make_fault("drive_restarted", joint, f"The {joint} drive started anew."))
+        if axis.twins:
+            found.append(make_fault("drive_twins", joint, f"Two drives send as the {joint} drive."))
+        if axis.version is None:
+            text = f"The {joint} drive did not tell its firmware version yet."
+            found.append(make_fault("drive_version", joint, text))
+        elif (axis.version.major, axis.version.minor) != FIRMWARE:
+            version = ".".join(map(str, axis.version))
+            text = f"The {joint} drive runs firmware {version}; 0.6 is supported."
+            found.append(make_fault("drive_version", joint, text))
+        self._watch_watchdog(found, joint, axis.watchdog_s)
+
+    def _watch_watchdog(self, found: list[Fault], joint: str, watchdog_s: float) -> None:
+        """It alone acts when this program dies."""
+        if 0.0 < watchdog_s <= self._longest_watchdog_s:
+            return
+        if isnan(watchdog_s):
+            text = f"The {joint} drive's watchdog was not read back."
+            found.append(make_fault("watchdog_unknown", joint, text))
+        elif watchdog_s == 0.0:
+            found.append(make_fault("watchdog_off", joint, f"The {joint} drive's watchdog is off."))
+        else:
+            text = (
+                f"The {joint} drive's watchdog waits for {watchdog_s:g} s; {self._longest_watchdog_s:g} s is the most."
+            )
+            found.append(make_fault("watchdog_off", joint, text))
+
+    def _watch_pose(self, found: list[Fault], now_s: float, body: BodyPose) -> None:
+        if body.stamp_s > float("-inf"):
+            self._pose_stamp_s = now_s
+        elif self._pose_stamp_s is not None:
+            found.append(make_fault("pose_lost", "", "The body's place is not told any more."))
+            if now_s - self._pose_stamp_s > POSE_FORGOTTEN_S:
+                self._pose_stamp_s = None
+
+
+def _explained(fault: Fault, axis: OdriveAxis) -> Fault:
+    """With the drive's own words for its errors."""
+    flags = axis.state.error_flags | axis.disarm_reason
+    if fault.name not in EXPLAINED or not flags:
+        return fault
+    return fault._replace(sentence=f"{fault.sentence} ({error_text(flags)})")

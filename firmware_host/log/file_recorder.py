@@ -1,0 +1,61 @@
+"""A log that is written where its rows come about, without a writer of its own: for a loop that may wait for the disk.
+
+That is a simulated one in step with its robot, which has no clock. A daemon uses the recorder.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.log_file import LogFile
+from firmware_host.log.log_folder import new_run_id
+from firmware_host.log.recorder import HEALTHY, LogReport
+
+ROWS_AT_ONCE = 1000
+
+
+class FileRecorder:
+    """A Recording. Owns the file and the rows that are not in it yet. Every method may raise OSError."""
+
+    def __init__(self, path: Path, configuration: Configuration, metadata: dict[str, str] | None = None) -> None:
+        """`path` must be new."""
+        robot = configuration.robot.name
+        known = {"robot": robot, "run_id": new_run_id(robot), "segment": "0"} | (metadata or {})
+        opening = {
+            "wall_minus_monotonic_ns": time.time_ns(),  # its loop's clock begins at zero
+            "configuration_text": configuration.text,
+            "metadata": known,
+        }
+        self.path: Path | None = path
+        self.dropped = 0
+        self.writer_alive = True
+        self._file = LogFile(path, opening)
+        self._rows: list[tuple[int, bytes]] = []
+
+    def put(self, kind_index: int, payload: bytes) -> bool:
+        self._rows.append((kind_index, payload))
+        if len(self._rows) >= ROWS_AT_ONCE:
+            self._write()
+        return True
+
+    def _write(self) -> None:
+        self._file.write(self._rows)
+        self._rows = []
+
+    def flush(self) -> None:
+        """Everything so far can be read from then on."""
+        self._write()
+        self._file.flush()
+
+    def report(self) -> LogReport:
+        return HEALTHY
+
+    def close(self, timeout_s: float = 0.0) -> bool:
+        """Once; it takes the time that it needs."""
+        if self.writer_alive:
+            self._write()
+            self.path = self._file.finish()
+            self.writer_alive = False
+        return True

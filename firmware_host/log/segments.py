@@ -1,0 +1,228 @@
+"""The files of one run, one after the other: rotation, a disk that refuses, and room for the next one.
+
+Every file of a run carries the run's id, its own number, the configuration, who wrote it where, and both clocks,
+measured again for each, so each can be read alone. A row goes into exactly one file. When the disk refuses (full,
+read-only, gone) the file is cut back to what is known to be on it and left for recovery, rows are counted instead of
+written, and every few seconds a new file is tried; it begins with the number of rows that are missing.
+"""
+
+from __future__ import annotations
+
+import errno
+import platform
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from datetime import UTC, datetime
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from firmware_host.log.log_file import LogFile, Rows
+from firmware_host.log.log_folder import (
+    ACTIVE,
+    FreedLog,
+    finished_path,
+    free_logs,
+    free_space,
+    removable_logs,
+    remove_log,
+    segment_path,
+    unfinished_files,
+)
+from firmware_host.log.log_parameters import LogParameters
+from firmware_host.log.recorder import STAMP
+from firmware_host.log.rest_thinning import RestThinning
+from firmware_host.log.rows import EVENT, EVENT_KIND
+
+RETRY_S = 3.0  # between two attempts at a disk that refuses
+FREEING_INTERVAL_S = 10.0
+
+
+class LogSegments:
+    """Owns the file that is being written. No method raises OSError; `problem` says what is wrong."""
+
+    def __init__(self, first: Path, opening: dict[str, Any], parameters: LogParameters) -> None:
+        self.problem = self._reason = ""
+        self.dropped = 0
+        self.path = first
+        self.slowest_s = 0.0  # write since somebody set this to zero
+        self._first, self._opening, self._parameters = first, opening, parameters
+        self._folder = first.parent.parent if first.parent.name == ACTIVE else None
+        self._thinning = RestThinning(parameters.rest_hz, parameters.rest_full_s)
+        self._file: LogFile | None = None
+        self._segment = 0
+        self._missing = 0  # rows that the next file has to report
+        self._full = False  # the disk was, when it refused
+        self._freeing_helps = True
+        self._freed: list[str] = []  # what the next file has to tell of
+        self._latest_stamp_s = 0.0
+        self._first_stamp_s: float | None = None  # of the ticks in this file
+        self._retry_s = self._freeing_s = 0.0
+        self._recovery: subprocess.Popen[bytes] | None = None
+        self._tried: set[Path] = set()  # to recover, once a run: what resists would be tried at every file
+        self._open()
+
+    def write(self, rows: Rows) -> None:
+        """Also without rows, from time to time: a file is flushed by time."""
+        for _, payload in rows[-1:]:
+            (self._latest_stamp_s,) = STAMP.unpack_from(payload)
+        thinned = self._thinning.thin(rows)
+        wanted = [*thinned.rows, self._event(thinned.notice)] if thinned.notice else thinned.rows
+        if self._file is None and time.monotonic() >= self._retry_s:
+            self._open()
+        self._rotate(wanted)
+        self._write(wanted)
+        self._free_room()
+
+    def _write(self, rows: Rows) -> None:
+        if self._file is None:
+            self._drop(len(rows))
+            return
+        before = self._file.rows
+        try:
+            self._file.write(rows)
+        except OSError as error:
+            self._give_up(error, unwritten=len(rows) - (self._file.rows - before))
+        else:
+            self._heed_slowness(self._file)
+
+    def _event(self, text: str) -> tuple[int, bytes]:
+        return EVENT_KIND, EVENT.encode(self._latest_stamp_s, text)
+
+    def _drop(self, count: int) -> None:
+        self.dropped += count
+        self._missing += count
+
+    def _open(self) -> None:
+        self.path = segment_path(self._first, self._segment)
+        try:
+            self._make_room()
+            if finished_path(self.path).exists():
+                raise FileExistsError(errno.EEXIST, "File exists")
+            self._file = LogFile(self.path, self._opening_of(self._segment))
+            self._segment += 1
+            self._first_stamp_s = None
+            self._report_gap(self._file)
+        except OSError as error:
+            self._segment += isinstance(error, FileExistsError)
+            self._give_up(error)
+            return
+        self.problem = self._reason = ""
+        self._freeing_helps = True
+        self._start_recovery()
+
+    def _report_gap(self, file: LogFile) -> None:
+        """What is missing before this file, and what was freed for it."""
+        texts = list(self._freed)
+        if self._missing:
+            texts.append(f"rows missing here: {self._missing}, the log could not be written: {self._reason}")
+        if texts:
+            file.write([self._event(text) for text in texts])
+            file.flush()
+            self._missing = 0
+            self._freed.clear()
+
+    def _opening_of(self, segment: int) -> dict[str, Any]:
+        text = self._opening["configuration_text"]
+        metadata = {
+            "segment": str(segment),
+            "configuration_sha256": sha256(text.encode()).hexdigest(),
+            "host": platform.node(),
+            "kernel": f"{platform.release()} {platform.version()}",
+            "started": datetime.now(UTC).isoformat(),
+            "rest_hz": f"{self._parameters.rest_hz:g}",
+            "rest_full_s": f"{self._parameters.rest_full_s:g}",
+        }
+        return {
+            "configuration_text": text,
+            "metadata": self._opening["metadata"] | metadata,
+            "wall_minus_monotonic_ns": time.time_ns() - time.monotonic_ns(),
+        }
+
+    def _give_up(self, error: OSError, unwritten: int = 0) -> None:
+        """This file, not the log."""
+        if self._file is not None:
+            self._drop(self._file.rows - self._file.safe_rows + unwritten)
+            self._segment -= self._file.safe_rows == 0  # such a file is removed
+            self._file.abandon()
+            self._file = None
+        reason = error.strerror or str(error)
+        self.problem = f"The log {self.path} cannot be written: {reason}."
+        if reason != self._reason:
+            with suppress(OSError):  # standard error may be a file on the same disk
+                print(self.problem, file=sys.stderr, flush=True)
+        self._reason = reason
+        self._full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        self._retry_s = time.monotonic() + RETRY_S
+
+    def _heed_slowness(self, file: LogFile) -> None:
+        self.slowest_s, file.slowest_s = max(self.slowest_s, file.slowest_s), 0.0
+
+    def _rotate(self, rows: Rows) -> None:
+        """Before these rows, by their own time and by the size so far."""
+        if self._file is None or not rows:
+            return
+        if self._first_stamp_s is None:
+            (self._first_stamp_s,) = STAMP.unpack_from(rows[0][1])
+        long = self._latest_stamp_s - self._first_stamp_s >= self._parameters.segment_s
+        if long or self._file.length >= self._parameters.segment_bytes:
+            self._finish()
+            if not self.problem:
+                self._freeing_s = 0.0
+                self._open()
+
+    def _finish(self) -> None:
+        if self._file is None:
+            return
+        try:
+            self.path = self._file.finish()
+            self._heed_slowness(self._file)
+            self._file = None
+        except OSError as error:
+            self._give_up(error)
+
+    def close(self) -> bool:
+        """Whether everything that came is on the disk, or said to be missing there."""
+        if self._file is None:
+            self._open()
+        self._write(self._thinning.release())
+        self._finish()
+        return not self.problem
+
+    def _make_room(self) -> None:
+        """On a disk that was full: the oldest log gives way at once, where logs may be freed, as long as that helps."""
+        may_free = self._parameters.quota_bytes > 0 or self._parameters.min_free_share > 0.0
+        if self._full and self._folder is not None and may_free and self._freeing_helps:
+            for oldest in removable_logs(self._folder)[:1]:
+                before = free_space(self._folder).free_bytes
+                freed = remove_log(oldest)
+                self._freed.append(_told_of(freed))
+                self._freeing_helps = free_space(self._folder).free_bytes > before
+        self._full = False
+
+    def _free_room(self) -> None:
+        if self._folder is None or time.monotonic() < self._freeing_s:
+            return
+        self._freeing_s = time.monotonic() + FREEING_INTERVAL_S
+        quota_bytes, share = self._parameters.quota_bytes, self._parameters.min_free_share
+        with suppress(OSError):  # what cannot be freed shows as a disk without room
+            for freed in free_logs(self._folder, quota_bytes, share):
+                self._write([self._event(_told_of(freed))])
+
+    def _start_recovery(self) -> None:
+        """Of what others, or this run before its disk failed, have left: in a process of its own."""
+        if self._folder is None or (self._recovery is not None and self._recovery.poll() is None):
+            return
+        found = set(unfinished_files(self._folder)) - {self.path}
+        if found <= self._tried:
+            return
+        self._tried |= found
+        command = [sys.executable, "-P", "-m", "firmware_host.log_reading.recovery", str(self._folder)]
+        with suppress(OSError):  # the next start finds them too
+            self._recovery = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+
+
+def _told_of(freed: FreedLog) -> str:
+    return f"room for logs: {freed.name} was freed, {freed.size} bytes"

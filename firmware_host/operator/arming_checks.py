@@ -1,0 +1,87 @@
+"""What stands between this robot and torque, line by line: the list of `mudskipper check` and of a refused `arm`.
+
+A line fails where a fault stands that blocks arming; the faults' own sentences and advice are shown. Lines that are
+`mandatory` hold also when a person arms by force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees, isfinite
+from typing import Any
+
+from control.faults import Blocks, Fault
+from control.records import DriveState
+from drivers.odrive.axis import OdriveAxis
+from firmware_host.loop import Loop
+from firmware_host.operator.reports import check_item
+
+HEARING = "check its power, wiring, node id and cyclic message periods (README, 'Setting up the drives')"
+SIGNALS = ("position", "current", "heartbeat")
+
+
+def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[dict[str, Any]]:
+    """All lines, the good ones too."""
+    lines = {"configuration": f"accepted for {loop.configuration.robot.name}"}
+    for axis, state in zip(loop.drives.axes, loop.states, strict=True):
+        lines |= _axis_lines(axis, state)
+    for name, port in loop.drives.ports.items():
+        lost = f", {port.lost_frames} frames lost" if port.lost_frames else ""
+        lines[f"bus.{name}"] = f"{port.error_frames} error frames, {port.failed_sends} failed sends{lost}"
+    lines["loop"] = f"{loop.timing.rate_hz:.1f} Hz, {loop.missed_ticks} ticks missed since the start"
+    lines["log"] = log_text
+    pose = loop.pose.report()
+    if pose.source:
+        lines["pose"] = pose.sentence
+    faults = [fault for fault in loop.faults.standing if fault.check != "pose" or not pose.trouble]  # which says more
+    for fault in faults:
+        lines.setdefault(fault.check, "")
+    unheard = {f"drive.{axis.joint}" for axis in loop.drives.axes if not axis.heard}
+    items = [
+        _line(identity, text, [fault for fault in faults if fault.check == identity], identity in unheard)
+        for identity, text in lines.items()
+    ]
+    return items + [check_item("realtime", True, f"warning: {warning}", "") for warning in warnings]
+
+
+def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> dict[str, Any]:
+    if unheard:
+        told_as_well = (fault.sentence for fault in faults)
+        return check_item(identity, False, "; ".join([text, *told_as_well]), HEARING) | {"mandatory": True}
+    blocking = [fault for fault in faults if fault.kind.blocks is not Blocks.NO]
+    told = blocking or list(faults)
+    sentences = " ".join(fault.sentence for fault in told)
+    fixes = "; ".join(dict.fromkeys(fault.kind.what_to_do for fault in told))
+    text = sentences if blocking else f"warning: {sentences}" if told else text
+    item = check_item(identity, not blocking, text, fixes)
+    return item | {"mandatory": any(fault.kind.blocks is Blocks.ALWAYS for fault in blocking)}
+
+
+def _axis_lines(axis: OdriveAxis, state: DriveState) -> dict[str, str]:
+    """What is known of a drive, its joint and its watchdog."""
+    if not axis.heard:
+        return {f"drive.{axis.joint}": _unheard_text(axis)}
+    lines = {f"drive.{axis.joint}": _drive_text(axis, state), f"joint.{axis.joint}": _joint_text(state)}
+    if isfinite(axis.watchdog_s):
+        text = f"trips after {axis.watchdog_s:g} s" if axis.watchdog_s else "off"
+        lines[f"watchdog.{axis.joint}"] = text
+    return lines
+
+
+def _drive_text(axis: OdriveAxis, state: DriveState) -> str:
+    version = f"firmware {'.'.join(map(str, axis.version))}" if axis.version else "firmware unknown"
+    unwatched = (
+        "" if isfinite(state.temperature_stamp_s) else ", but never its temperature: the currents alone guard it"
+    )
+    return f"heard, {version}{unwatched}"
+
+
+def _joint_text(state: DriveState) -> str:
+    heat = f", {state.temperature_c:.0f} degrees C" if isfinite(state.temperature_c) else ""
+    return f"at {degrees(state.angle_rad):.1f} degrees{heat}"
+
+
+def _unheard_text(axis: OdriveAxis) -> str:
+    stamps_s = (axis.state.angle_stamp_s, axis.state.current_stamp_s, axis.state.heartbeat_stamp_s)
+    missing = [signal for signal, stamp_s in zip(SIGNALS, stamps_s, strict=True) if not isfinite(stamp_s)]
+    return f"not heard: no {', '.join(missing)} yet"

@@ -1,0 +1,104 @@
+"""One client of the status socket: what it has sent and not yet fetched, how fast it may ask, how long it may take."""
+
+from __future__ import annotations
+
+import socket
+from math import inf
+from typing import Any, NamedTuple
+
+import msgpack
+
+from firmware_host.operator.rights import Level, Peer
+from firmware_host.operator.rpc import LONGEST_REQUEST, SHAPE, TOO_LONG, GarbledError, make_unpacker
+
+READ_BYTES = LONGEST_REQUEST
+WRITE_BYTES = 64 * 1024  # at once
+LONGEST_BACKLOG = 1024 * 1024  # bytes of answers that a client has not fetched
+REQUESTS_PER_S, BURST = 200.0, 50.0  # of one client
+LONGEST_SENDING_S = 5.0  # of one request
+
+NOTHING = object()
+
+
+class Caller(NamedTuple):
+    """Who asks: connections are numbered from the start on, since descriptors are used again."""
+
+    connection: int
+    peer: Peer
+    level: Level
+
+    def __str__(self) -> str:
+        return f"uid {self.peer.uid} (process {self.peer.pid})"
+
+
+class RequestBudget:
+    """A token bucket: BURST requests at once, REQUESTS_PER_S in the long run."""
+
+    def __init__(self) -> None:
+        self._requests, self._at_s = BURST, -inf
+
+    def allows(self, now_s: float) -> bool:
+        self._requests = min(BURST, self._requests + REQUESTS_PER_S * max(0.0, now_s - self._at_s))
+        self._at_s = now_s
+        return self._requests >= 1.0
+
+    def spend(self) -> None:
+        self._requests -= 1.0
+
+
+class Client:
+    """Owns one connection and its buffers."""
+
+    def __init__(self, connection: socket.socket, caller: Caller) -> None:
+        self.connection = connection
+        self.caller = caller
+        self.budget = RequestBudget()
+        self.outgoing = bytearray()
+        self.closing = False  # told off: no more is read or answered
+        self.ended = False  # it has hung up: what it asked before still counts
+        self.watched = 0  # what epoll looks for
+        self._unpacker = make_unpacker(READ_BYTES)
+        self._received = self._read = 0  # bytes: all, and those of whole messages
+        self._begun_s = inf  # when the rest of a request began to be waited for
+
+    def receive(self) -> None:
+        """Raises OSError, or GarbledError for a request that is too long."""
+        data = self.connection.recv(READ_BYTES)
+        self.ended = not data
+        self._received += len(data)
+        try:
+            self._unpacker.feed(data)
+        except msgpack.BufferFull:
+            raise GarbledError(TOO_LONG) from None
+
+    def next_message(self, now_s: float) -> Any:
+        """Or NOTHING. Raises GarbledError for what is too long or no MessagePack."""
+        try:
+            message = next(self._unpacker, NOTHING)
+        except (ValueError, msgpack.UnpackException, RecursionError):
+            raise GarbledError(SHAPE) from None
+        end = self._received if message is NOTHING else self._unpacker.tell()
+        if end - self._read > LONGEST_REQUEST:  # of many short parts: the unpacker bounds but the parts
+            raise GarbledError(TOO_LONG)
+        if message is not NOTHING:
+            self._read, self._begun_s = end, inf
+        elif end > self._read:
+            self._begun_s = min(self._begun_s, now_s)
+        return message
+
+    def is_tardy(self, now_s: float) -> bool:
+        """Half a request has waited too long for its other half."""
+        return now_s - self._begun_s > LONGEST_SENDING_S
+
+    def send(self, message: list[Any]) -> None:
+        self.outgoing += msgpack.packb(message)
+
+    def flush(self) -> None:
+        """As much as goes at once. Raises OSError where the client is gone."""
+        if not self.outgoing:
+            return
+        try:
+            sent = self.connection.send(self.outgoing[:WRITE_BYTES])
+        except BlockingIOError:
+            return
+        del self.outgoing[:sent]

@@ -1,0 +1,71 @@
+"""What the program knows, as plain dicts of numbers and strings for JSON and MessagePack: units in the names, None for
+a number that is not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from math import isfinite
+from typing import Any
+
+from control.mud_estimate import Coefficient, MudBelief
+from control.records import FLIPPERS, Estimate, StrideEstimate
+from estimation.mud_map import Mapped, MapRow
+
+COEFFICIENTS = ("k_p", "k_s", "k_e")
+
+
+def known(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def estimate_report(estimate: Estimate) -> dict[str, Any]:
+    return {
+        "value": known(estimate.value),
+        "std_error": known(estimate.std_error),
+        "samples": estimate.samples,
+        "valid": estimate.valid,
+        "reason": estimate.reason,
+        "at_least": estimate.at_least,
+    }
+
+
+def stride_report(stride: StrideEstimate) -> dict[str, Any]:
+    """A stride as `replay --json` and the status socket tell it; k in N/m³."""
+    report = {
+        name: known(value) if isinstance(value, float) else value
+        for name, value in asdict(stride).items()
+        if name not in COEFFICIENTS
+    }
+    return report | {name: estimate_report(getattr(stride, name)) for name in COEFFICIENTS}
+
+
+def coefficient_report(coefficient: Coefficient | Mapped | None) -> dict[str, Any] | None:
+    """What is believed of one coefficient; k in N/m³ at `depth_m`."""
+    if coefficient is None:
+        return None
+    return {name: known(value) if isinstance(value, float) else value for name, value in coefficient._asdict().items()}
+
+
+def belief_report(belief: MudBelief) -> dict[str, Any]:
+    """Both flippers together, and each apart."""
+    together = {name: coefficient_report(getattr(belief, name)) for name in COEFFICIENTS}
+    apart = {
+        flipper: {name: coefficient_report(getattr(belief.of(flipper), name)) for name in COEFFICIENTS}
+        for flipper in FLIPPERS
+    }
+    return together | apart | {"boundary": belief.boundary}
+
+
+def map_report(rows: Sequence[MapRow]) -> list[dict[str, Any]]:
+    """Along the track, one row for each piece of it that a stride told of."""
+    return [
+        {"place_m": row.place_m} | {name: coefficient_report(getattr(row, name)) for name in COEFFICIENTS}
+        for row in rows
+    ]
+
+
+def check_item(identity: str, ok: bool, text: str, fix: str) -> dict[str, Any]:
+    """One line of `mudskipper check`: fine, or what to do."""
+    return {"id": identity, "ok": ok, "text": text, "fix": "" if ok else fix}

@@ -1,0 +1,137 @@
+"""Who may ask the daemon for what, by what the kernel says of a connection.
+
+SO_PEERCRED and SO_PEERGROUPS (unix(7), Linux 4.13) tell user, process and groups of the other end as they were when it
+connected; nobody can make them up. Three levels: whoever is let in may stop the robot, readers see how it is, operators
+move it. Operators also read; root and the daemon's own user may do everything. The socket's file is open to everybody,
+since one group cannot own it for readers and operators: strangers who may not even stop are turned away here. Names of
+groups are looked up once, at the start: a name service may take its time, and a tick has none.
+"""
+
+from __future__ import annotations
+
+import grp
+import os
+import socket
+import struct
+from enum import IntEnum
+from typing import NamedTuple
+
+from firmware_host.configuration.configuration import ConfigurationError, StatusParameters
+from firmware_host.operator.rpc import FOR_MEMBERS, NOT_PERMITTED
+
+CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid
+SO_PEERGROUPS = 59  # asm-generic/socket.h; Python has no name for it
+GROUP_BYTES, LONGEST_ANSWER = 4, 1024  # as much as Python's getsockopt fetches: 256 groups
+
+
+class Level(IntEnum):
+    ANYONE = 0
+    READ = 1
+    DRIVE = 2
+
+
+# What is not named here is for operators.
+NEEDED = {
+    "hello": Level.ANYONE,
+    "stop": Level.ANYONE,
+    "disarm": Level.ANYONE,
+    "status": Level.READ,
+    "strides": Level.READ,
+    "map": Level.READ,
+    "check": Level.READ,
+    "failures": Level.READ,
+}
+
+
+class Peer(NamedTuple):
+    """The process at the other end of a connection."""
+
+    pid: int
+    uid: int
+    groups: frozenset[int]
+
+
+class Group(NamedTuple):
+    name: str
+    gid: int
+
+
+class Rights(NamedTuple):
+    readers: Group
+    operators: Group
+    own_uid: int
+    anyone_may_stop: bool = True
+
+    def level(self, peer: Peer) -> Level:
+        if peer.uid in (0, self.own_uid) or self.operators.gid in peer.groups:
+            return Level.DRIVE
+        return Level.READ if self.readers.gid in peer.groups else Level.ANYONE
+
+    def refusal(self, method: str, level: Level) -> str | None:
+        needed = NEEDED.get(method, Level.DRIVE)
+        if level >= needed:
+            return None
+        return _for_members(method, self.operators if needed is Level.DRIVE else self.readers)
+
+    def refusal_to_connect(self, level: Level) -> str | None:
+        if self.anyone_may_stop or level > Level.ANYONE:
+            return None
+        return _for_members("this robot", self.readers)
+
+
+def _for_members(what: str, group: Group) -> str:
+    return (
+        f"{NOT_PERMITTED}{what} is {FOR_MEMBERS}{group.name}."
+        f" Have root run 'adduser YOU {group.name}', then log in again"
+    )
+
+
+def load_rights(parameters: StatusParameters) -> Rights:
+    """Raises ConfigurationError for a group that does not exist: to find nobody permitted in the field is worse."""
+    named = {"read_group": parameters.read_group, "drive_group": parameters.drive_group}
+    problems = [
+        f"status.{key} = {name!r}: there is no such group; make it with 'groupadd {name}', or leave the key out"
+        for key, name in named.items()
+        if name and not _exists(name)
+    ]
+    if problems:
+        raise ConfigurationError(problems)
+    readers, operators = (_find_group(name) for name in named.values())
+    return Rights(readers, operators, os.geteuid(), parameters.anyone_may_stop)
+
+
+def _exists(name: str) -> bool:
+    try:
+        grp.getgrnam(name)
+    except KeyError:
+        return False
+    return True
+
+
+def _find_group(name: str) -> Group:
+    """Without a name, the daemon's own."""
+    if name:
+        return Group(name, grp.getgrnam(name).gr_gid)
+    own = os.getegid()
+    try:
+        return Group(grp.getgrgid(own).gr_name, own)
+    except KeyError:
+        return Group(str(own), own)
+
+
+def read_peer(connection: socket.socket) -> Peer:
+    """Raises OSError."""
+    pid, uid, gid = CREDENTIALS.unpack(connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size))
+    return Peer(pid, uid, frozenset((gid, *_supplementary_groups(connection))))
+
+
+def _supplementary_groups(connection: socket.socket) -> tuple[int, ...]:
+    """None where there are more than fit, or an old kernel: such a peer is known by its primary group.
+
+    Asking a name service instead could hold a tick for seconds.
+    """
+    try:
+        answer = connection.getsockopt(socket.SOL_SOCKET, SO_PEERGROUPS, LONGEST_ANSWER)
+    except OSError:
+        return ()
+    return struct.unpack(f"{len(answer) // GROUP_BYTES}I", answer)

@@ -1,0 +1,95 @@
+"""The other end of the status socket, for the command line: standard library and msgpack only, so it starts at once."""
+
+from __future__ import annotations
+
+import socket
+import struct
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import msgpack
+
+from firmware_host.operator.rpc import NOT_PERMITTED, REQUEST
+
+ANSWER_S = 5.0
+CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid
+CLOSED = "it is ending, or made room for somebody else; try again"
+SILENT = "'systemctl status mudskipper' tells more"
+TIMEVAL = struct.Struct("ll")  # seconds and microseconds
+
+
+class NoDaemonError(Exception):
+    """Nobody answers on the socket."""
+
+
+class DroppedError(NoDaemonError):
+    """A daemon is there, but gives no answer; the text says how that looks."""
+
+
+class NotPermittedError(Exception):
+    """The socket may not be used, or not for this; the text says what to do."""
+
+
+class CallRefusedError(Exception):
+    """The daemon will not do it; the text says why."""
+
+
+class StatusClient:
+    def __init__(self, path: Path, timeout_s: float = ANSWER_S) -> None:
+        self._path = path
+        self._number = 0
+        self._unpacker = msgpack.Unpacker(raw=False)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        patience = TIMEVAL.pack(*divmod(int(1e6 * timeout_s), 10**6))
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, patience)
+        try:
+            self._socket.connect(str(path))  # blocking: with Python's own timeout a full queue is an error at once
+        except PermissionError as problem:
+            raise NotPermittedError(f"no permission to use {path}: its folder lets only its owner in") from problem
+        except OSError as problem:
+            raise NoDaemonError(f"no daemon answers on {path}") from problem
+        self._socket.settimeout(timeout_s)
+
+    @property
+    def daemon_pid(self) -> int:
+        """By the kernel's word on who made the socket."""
+        size = CREDENTIALS.size
+        return int(CREDENTIALS.unpack(self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, size))[0])
+
+    def call(self, method: str, **params: Any) -> Any:
+        """The result.
+
+        Raises CallRefusedError or NotPermittedError with the daemon's sentence, or NoDaemonError where none comes.
+        """
+        self._number += 1
+        try:
+            with suppress(ConnectionError):  # what it said before it closed the connection can still be read
+                self._socket.sendall(msgpack.packb([REQUEST, self._number, method, params]))
+            problem, result = self._receive()
+        except ConnectionError as problem_reading:
+            raise DroppedError(f"the daemon on {self._path} closed the connection: {CLOSED}") from problem_reading
+        except OSError as problem_reading:
+            raise DroppedError(f"the daemon on {self._path} does not answer: {SILENT}") from problem_reading
+        except (ValueError, TypeError, KeyError, msgpack.UnpackException) as problem_reading:
+            raise NoDaemonError(f"what answers on {self._path} is no mudskipper daemon") from problem_reading
+        if problem is not None and str(problem).startswith(NOT_PERMITTED):
+            raise NotPermittedError(str(problem).removeprefix(NOT_PERMITTED))
+        if problem is not None:
+            raise CallRefusedError(problem)
+        return result
+
+    def _receive(self) -> tuple[Any, Any]:
+        """Problem and result. An answer that a Ctrl-C kept from being read belongs to an earlier request."""
+        while True:
+            for message in self._unpacker:
+                _, number, problem, result = message
+                if number in (self._number, None):
+                    return problem, result
+            data = self._socket.recv(65536)
+            if not data:
+                raise ConnectionResetError
+            self._unpacker.feed(data)
+
+    def close(self) -> None:
+        self._socket.close()

@@ -1,0 +1,223 @@
+"""MessagePack-RPC over a Unix stream socket, served between two ticks.
+
+The loop calls `serve` once a tick: it never waits, answers at most one request, clients in turn, and gives every client
+bounded buffers, a bounded rate and a bounded time to send a request. Whoever asks faster waits: the kernel keeps the
+rest. Whoever sends something else is told so and disconnected. When there is no room, the user with the most
+connections makes some, so nobody can keep another one out; but never the one who has promised to attend. A method that
+fails answers so and is reported: no report stops a robot.
+"""
+
+from __future__ import annotations
+
+import select
+import socket
+from collections import Counter
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import msgpack
+
+from firmware_host.configuration.configuration import StatusParameters
+from firmware_host.operator.connection import LONGEST_BACKLOG, NOTHING, Caller, Client
+from firmware_host.operator.rights import Peer, Rights, load_rights, read_peer
+from firmware_host.operator.rpc import RESPONSE, GarbledError, read_params, read_shape
+from firmware_host.operator.rpc import RefusedError as RefusedError  # for whoever writes a method
+from firmware_host.operator.socket_file import AlreadyServedError as AlreadyServedError  # for whoever opens one
+from firmware_host.operator.socket_file import SocketFile
+
+MOST_CLIENTS = 16
+
+Methods = Mapping[str, Callable[[dict[str, Any], Caller], Any]]
+
+
+class StatusSocket:
+    """Bound and listening from the start on; `methods`, once set, take the params of a request and who asks."""
+
+    def __init__(
+        self,
+        path: Path,
+        methods: Methods,
+        rights: Rights | None = None,
+        peer_of: Callable[[socket.socket], Peer] = read_peer,
+    ) -> None:
+        """Raises AlreadyServedError, or OSError where the path cannot be bound."""
+        self.path = path
+        self.methods = methods
+        self.report_bug: Callable[[str], None] = lambda sentence: None
+        self.on_hang_up: Callable[[Caller], None] = lambda caller: None  # may come twice
+        self.spares: Callable[[Caller], bool] = lambda caller: False  # whose end would stop the robot
+        self._rights = rights or load_rights(StatusParameters())
+        self._peer_of = peer_of
+        self._file = SocketFile(path, MOST_CLIENTS)
+        self._listener = self._file.listener
+        self._poll = select.epoll()
+        self._poll.register(self._listener.fileno(), select.EPOLLIN)
+        self._clients: dict[int, Client] = {}  # the one that has been still for longest comes first
+        self._waiting: dict[int, None] = {}  # in turn: clients that may have a request not yet answered
+        self._accepted = self._garbled = self._not_permitted = self._too_slow = self._made_room = 0
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """All since the start, but for the clients that are there at the moment."""
+        return {
+            "clients": len(self._clients),
+            "accepted_clients": self._accepted,
+            "garbled_requests": self._garbled,
+            "not_permitted": self._not_permitted,
+            "dropped_slow_clients": self._too_slow,
+            "dropped_for_others": self._made_room,
+        }
+
+    def serve(self, now_s: float) -> None:
+        for descriptor, events in self._poll.poll(0.0):
+            if descriptor == self._listener.fileno():
+                self._accept()
+            elif descriptor in self._clients:
+                self._attend(descriptor, events)
+        self._answer_next(now_s)
+        self._drop_tardy(now_s)
+
+    def _accept(self) -> None:
+        try:
+            connection, _ = self._listener.accept()
+        except OSError:  # the client left again before it was let in
+            return None
+        try:
+            peer = self._peer_of(connection)
+        except OSError:
+            return connection.close()
+        level = self._rights.level(peer)
+        refused = self._rights.refusal_to_connect(level)
+        if refused:
+            return self._turn_away(connection, refused)
+        self._accepted += 1
+        if len(self._clients) >= MOST_CLIENTS:
+            self._make_room(peer)
+        connection.setblocking(False)
+        caller = Caller(self._accepted, peer, level)
+        client = self._clients[connection.fileno()] = Client(connection, caller)
+        client.watched = select.EPOLLIN
+        return self._poll.register(connection.fileno(), client.watched)
+
+    def _turn_away(self, connection: socket.socket, sentence: str) -> None:
+        self._not_permitted += 1
+        connection.setblocking(False)
+        with connection, suppress(OSError):  # it may be gone already
+            connection.send(msgpack.packb([RESPONSE, None, sentence, None]))
+
+    def _make_room(self, newcomer: Peer) -> None:
+        """The user with the most connections loses the one that is still for longest; among equals the less trusted."""
+        connections = Counter(client.caller.peer.uid for client in self._clients.values())
+        connections[newcomer.uid] += 1
+
+        def claim(descriptor: int) -> tuple[int, int, bool]:
+            caller = self._clients[descriptor].caller
+            return connections[caller.peer.uid], -caller.level, descriptor not in self._waiting
+
+        candidates = [each for each, client in self._clients.items() if not self.spares(client.caller)]
+        self._made_room += 1
+        self._drop(max(candidates or self._clients, key=claim))  # the first of equals
+
+    def _attend(self, descriptor: int, events: int) -> None:
+        """Read, unless something of this client still waits for its turn: the kernel keeps the rest."""
+        client = self._clients[descriptor]
+        if events & select.EPOLLHUP:
+            self.on_hang_up(client.caller)
+        if events & (select.EPOLLIN | select.EPOLLHUP) and descriptor not in self._waiting and not client.ended:
+            self._clients[descriptor] = self._clients.pop(descriptor)  # to the end of the order
+            try:
+                client.receive()
+                self._waiting[descriptor] = None
+            except GarbledError as problem:
+                self._reject(client, str(problem))
+            except OSError:
+                return self._drop(descriptor)
+        return self._settle(descriptor)
+
+    def _answer_next(self, now_s: float) -> None:
+        """Of the first client in turn that has not spent its rate."""
+        for descriptor in self._waiting:
+            if self._clients[descriptor].budget.allows(now_s):
+                del self._waiting[descriptor]
+                return self._answer_one(descriptor, now_s)
+        return None
+
+    def _answer_one(self, descriptor: int, now_s: float) -> None:
+        client = self._clients[descriptor]
+        try:
+            message = client.next_message(now_s)
+            request = None if message is NOTHING else read_shape(message)
+        except GarbledError as problem:
+            self._reject(client, str(problem))
+        else:
+            if request is not None:
+                client.budget.spend()
+                self._waiting[descriptor] = None  # there may be another one behind it
+                self._answer(client, *request)
+        self._settle(descriptor)
+
+    def _answer(self, client: Client, number: int, method: str, params: Any) -> None:
+        if method not in self.methods:
+            known = ", ".join(sorted(self.methods))
+            return client.send([RESPONSE, number, f"no method {method!r}; there are {known}", None])
+        refused = self._rights.refusal(method, client.caller.level)
+        if refused:
+            self._not_permitted += 1
+            return client.send([RESPONSE, number, refused, None])
+        try:
+            return client.send([RESPONSE, number, None, self.methods[method](read_params(params), client.caller)])
+        except RefusedError as refusal:
+            return client.send([RESPONSE, number, str(refusal), None])
+        except Exception as problem:  # noqa: BLE001 - the robot walks on while a report fails
+            self.report_bug(f"{method} failed: {type(problem).__name__}: {problem}")
+            return client.send([RESPONSE, number, f"{method} failed: this is a bug, the log says more", None])
+
+    def _reject(self, client: Client, sentence: str) -> None:
+        self._garbled += 1
+        client.send([RESPONSE, None, sentence, None])
+        client.closing = True
+
+    def _settle(self, descriptor: int) -> None:
+        """Send what can be sent; drop a client that is told off, does not fetch its answers, or is done with."""
+        client = self._clients[descriptor]
+        try:
+            client.flush()
+        except OSError:  # nobody fetches the answers any more; what was asked before still counts
+            client.ended = True
+            client.outgoing.clear()
+            self._waiting.setdefault(descriptor)
+        slow = len(client.outgoing) > LONGEST_BACKLOG
+        self._too_slow += slow
+        done = client.ended and descriptor not in self._waiting and not client.outgoing
+        if done or slow or client.closing:
+            self._drop(descriptor)
+        else:
+            self._watch(client, descriptor in self._waiting)
+
+    def _watch(self, client: Client, waits: bool) -> None:
+        wanted = 0 if client.ended or waits else select.EPOLLIN
+        wanted |= select.EPOLLOUT if client.outgoing else 0
+        if wanted != client.watched:
+            client.watched = wanted
+            self._poll.modify(client.connection.fileno(), wanted)
+
+    def _drop_tardy(self, now_s: float) -> None:
+        tardy = [descriptor for descriptor, client in self._clients.items() if client.is_tardy(now_s)]
+        for descriptor in tardy:
+            self._too_slow += 1
+            self._drop(descriptor)
+
+    def _drop(self, descriptor: int) -> None:
+        client = self._clients.pop(descriptor)
+        self._poll.unregister(descriptor)
+        client.connection.close()
+        self._waiting.pop(descriptor, None)
+        self.on_hang_up(client.caller)
+
+    def close(self) -> None:
+        for descriptor in list(self._clients):
+            self._drop(descriptor)
+        self._poll.close()
+        self._file.close()

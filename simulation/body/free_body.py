@@ -1,0 +1,262 @@
+"""The body without its rail: a rigid box that lies on the mud with its belly, rises, rolls and pitches.
+
+Its coordinates are the place x along the track and the height of its centre of mass, which lies between the joints'
+axes, and roll φ and pitch θ about it, turned in this order. The rows of the rotation matrix are the world's directions
+in the body's axes (x forward, y to the left, z up):
+
+    forward = (cos θ, sin θ sin φ, sin θ cos φ)   across = (0, cos φ, -sin φ)   up = (-sin θ, cos θ sin φ, cos θ cos φ)
+
+A point P of the body stands at x + forward·P and height + up·P, and since ∂up/∂θ = -forward, ∂up/∂φ = cos θ across,
+∂forward/∂θ = up and ∂forward/∂φ = sin θ across, every force acts on all four coordinates by the work that it does:
+
+    Q_q = F_x ∂x_P/∂q + F_z ∂z_P/∂q        m x'' = Q_x    m z'' = Q_z - m g    I_φ φ'' = Q_φ    I_θ θ'' = Q_θ
+
+with constant inertias: the box's gyroscopic terms and the joints' throwing it about are left out. It does not turn
+about the vertical nor drift sideways, as if the track led it.
+
+The belly presses on the mud at the four corners of its rectangle, each for a quarter of its area A (so it tips over
+its edges, as it should, and resists small turns three times too stiffly), as an anchored elastic-plastic contact like
+the plate's:
+
+    pressure up    g(v) N_c s_u + γ d at the depth d        Prandtl's strip, and the weight of the mud beside it
+    drag           g(v) a s_u A of what is pressed on       adhesion, held elastically until it yields
+
+It yields YIELD_M deep, or deeper where the body is so light that it would ring too quickly for the steps. It leaves a
+print that bears nothing until the belly is back in it or has been clear of the mud. The print goes along with the
+body: mud that it slides on to is as pressed as the mud that it comes from. There is no suction under the belly (air
+gets under it) and no mud ploughed up before it. The drag pad goes as much deeper as the belly does, and pulls at the
+belly. Nothing keeps the body from rearing or tipping over: flippers that push down with more than its weight lift it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import cos, hypot, sin, sqrt
+from typing import Annotated, NamedTuple
+
+from control.bounds import Bounds
+from control.joint_pd import GRAVITY_M_S2
+from simulation.body.carriage import Carriage, Vector, cross, dot, plate_directions
+from simulation.body.rail_body import BodyMotion, DragPad, DryDrag, Pusher
+from simulation.mud.clay import ADHESION, BEARING_FACTOR, UNIT_WEIGHT_N_M3, Clay, rate_factor
+from simulation.mud.flipper_contact import NO_CONTACT
+from simulation.mud.track import Track
+
+YIELD_M = 0.003  # a twentieth of a belly's width, after which footings on soft clay have failed
+LARGEST_RAD_S = 600.0  # at which the body may ring on its belly: steps of 1 ms follow that
+SIDES = (1.0, -1.0)  # fore, aft; left, right
+
+
+@dataclass(frozen=True)
+class BodyShape:
+    """Of a free body: a box, with the centre of mass at the height of the joints' axes."""
+
+    length_m: Annotated[float, Bounds(0.02, 2.0)] = 0.20
+    width_m: Annotated[float, Bounds(0.02, 2.0)] = 0.06  # the joints stand at its sides
+    axis_above_belly_m: Annotated[float, Bounds(0.0, 1.0)] = 0.0645
+    axis_forward_m: Annotated[float, Bounds(-1.0, 1.0)] = 0.0  # of the centre of mass
+    roll_inertia_kg_m2: Annotated[float, Bounds(1e-4, 100.0)] = 0.0014
+    pitch_inertia_kg_m2: Annotated[float, Bounds(1e-4, 100.0)] = 0.0039  # of a box 8 cm high
+
+
+class Axes(NamedTuple):
+    """The world's directions in the body's axes."""
+
+    forward: Vector
+    across: Vector
+    up: Vector
+
+
+def axes_of(roll_rad: float, pitch_rad: float) -> Axes:
+    sr, cr, sp, cp = sin(roll_rad), cos(roll_rad), sin(pitch_rad), cos(pitch_rad)
+    return Axes((cp, sp * sr, sp * cr), (0.0, cr, -sr), (-sp, cp * sr, cp * cr))
+
+
+def mirrored(axes: Axes) -> Axes:
+    """In the axes of the right flipper, whose y points to the right."""
+    (fx, fy, fz), (_, ay, az), (ux, uy, uz) = axes
+    return Axes((fx, -fy, fz), (0.0, ay, -az), (ux, -uy, uz))
+
+
+def in_world(axes: Axes, place: Vector) -> Vector:
+    """(ahead, across, above) of the centre of mass."""
+    return dot(axes.forward, place), dot(axes.across, place), dot(axes.up, place)
+
+
+class BodyLoad(NamedTuple):
+    """Work done per unit of each coordinate."""
+
+    forward_n: float
+    upward_n: float
+    roll_nm: float
+    pitch_nm: float
+
+
+def load_at(axes: Axes, lever_m: Vector, forward_n: float, upward_n: float) -> BodyLoad:
+    """Of a force in the world, `lever_m` from the centre of mass in the world."""
+    ahead_m, across_m, above_m = lever_m
+    roll_nm = (axes.forward[0] * upward_n - axes.up[0] * forward_n) * across_m
+    return BodyLoad(forward_n, upward_n, roll_nm, above_m * forward_n - ahead_m * upward_n)
+
+
+def load_of_flipper(axes: Axes, joint: Vector, flipper: Pusher, side: float) -> BodyLoad:
+    """Of the mud through a flipper, in whose own axes everything stands; `side`: 1 on the left, -1 on the right.
+
+    Moments about the axes that tilt with adduction are turned upright, and moved from the joints to the middle.
+    """
+    force = flipper.force
+    n, r, s = plate_directions(flipper.sweep_rad, flipper.adduction_rad)
+    f_n, f_r, f_s = force.normal_n, force.outward_n, force.upward_n
+    push_n = (f_n * n[0] + f_r * r[0], f_n * n[1] + f_r * r[1] + f_s * s[1], f_n * n[2] + f_r * r[2] + f_s * s[2])
+    sb, cb = -s[1], s[2]
+    levered = cross(joint, push_n)
+    moment_nm = (
+        levered[0] + force.adduction_nm,
+        levered[1] + cb * force.tilting_nm + sb * force.sweep_nm,
+        levered[2] + sb * force.tilting_nm - cb * force.sweep_nm,
+    )
+    pitch_nm = dot(axes.across, moment_nm)
+    return BodyLoad(dot(axes.forward, push_n), dot(axes.up, push_n), side * moment_nm[0], pitch_nm)
+
+
+class BellyQuarter:
+    """Owns the print of a quarter of the belly."""
+
+    def __init__(self, area_m2: float, mass_kg: float) -> None:
+        """`mass_kg`: that a push on its corner moves."""
+        self.area_m2 = area_m2
+        self.mass_kg = mass_kg
+        self.reset()
+
+    def reset(self) -> None:
+        self._print_m = self._stiffness_n_m = 0.0
+        self.pressed = False
+
+    def step(self, clay: Clay, grip: float, depth_m: float, sinking_m_s: float) -> float:
+        """Force up. The damping is half of critical."""
+        if depth_m <= 0.0:
+            self.reset()
+            return 0.0
+        slow_n = BEARING_FACTOR * clay.strength_at_pa(depth_m) * self.area_m2
+        stiffness_n_m = min(slow_n / YIELD_M, self.mass_kg * LARGEST_RAD_S**2)
+        elastic_n = min(stiffness_n_m * self._strain_m(stiffness_n_m, depth_m), grip * slow_n)
+        floating_n = UNIT_WEIGHT_N_M3 * self.area_m2 * depth_m
+        self.pressed = elastic_n > 0.0
+        if not self.pressed:
+            return floating_n
+        self._print_m = depth_m - elastic_n / stiffness_n_m
+        damping_n = sqrt(stiffness_n_m * self.mass_kg) * sinking_m_s
+        return floating_n + min(max(elastic_n + damping_n, 0.0), grip * slow_n)
+
+    def _strain_m(self, stiffness_n_m: float, depth_m: float) -> float:
+        """Of the mud above its print. Where the mud becomes stiffer the force stays, as it does along a plate."""
+        strain_m = depth_m - self._print_m
+        if strain_m > 0.0 and 0.0 < self._stiffness_n_m < stiffness_n_m:
+            strain_m *= self._stiffness_n_m / stiffness_n_m
+        self._stiffness_n_m = stiffness_n_m
+        return strain_m
+
+
+class FreeBody:
+    """Owns the body's place and turn, and the mud's memory of its belly."""
+
+    def __init__(self, mass_kg: float, shape: BodyShape, pad: DragPad, track: Track) -> None:
+        self.mass_kg = mass_kg
+        self.shape = shape
+        self.pad = pad
+        self.track = track
+        ahead_m, aside_m, area_m2 = shape.length_m / 2.0, shape.width_m / 2.0, shape.length_m * shape.width_m
+        below_m = -shape.axis_above_belly_m
+        self._belly = (0.0, 0.0, below_m)
+        self._corners = tuple((way * ahead_m, side * aside_m, below_m) for way in SIDES for side in SIDES)
+        pitched_kg = shape.pitch_inertia_kg_m2 / shape.length_m**2
+        rolled_kg = shape.roll_inertia_kg_m2 / shape.width_m**2
+        moved_kg = min(mass_kg / 4.0, pitched_kg, rolled_kg)  # of the four corners together, the lightest motion
+        self._quarters = tuple(BellyQuarter(area_m2 / 4.0, moved_kg) for _ in self._corners)
+        self._joint = (shape.axis_forward_m, shape.width_m / 2.0, 0.0)  # of either flipper, in its own axes
+        self._drag = DryDrag()
+        self.reset()
+
+    def reset(self) -> None:
+        """Level, with the belly on the mud's surface."""
+        self.forward_m = self.forward_m_s = 0.0
+        self.height_m = self.shape.axis_above_belly_m  # of the centre of mass above the mud's nominal surface
+        self.upward_m_s = 0.0
+        self.roll_rad = self.pitch_rad = self.roll_rad_s = self.pitch_rad_s = 0.0
+        for quarter in self._quarters:
+            quarter.reset()
+        self._drag.reset()
+
+    @property
+    def motion(self) -> BodyMotion:
+        return BodyMotion(
+            (self.forward_m_s, 0.0, self.upward_m_s), self.roll_rad, self.pitch_rad, self.roll_rad_s, self.pitch_rad_s
+        )
+
+    @property
+    def carriages(self) -> tuple[Carriage, Carriage]:
+        axes = axes_of(self.roll_rad, self.pitch_rad)
+        return self._carriage(axes, self.roll_rad_s), self._carriage(mirrored(axes), -self.roll_rad_s)
+
+    def _carriage(self, axes: Axes, roll_rad_s: float) -> Carriage:
+        """In the flipper's own axes: on the right a roll is the other way round."""
+        (fx, fy, fz), (_, ay, az), (ux, uy, uz) = axes
+        turning = (roll_rad_s, ay * self.pitch_rad_s, az * self.pitch_rad_s)
+        levered = cross(turning, self._joint)
+        ahead_m_s, up_m_s = self.forward_m_s, self.upward_m_s
+        velocity_m_s = (
+            fx * ahead_m_s + ux * up_m_s + levered[0],
+            fy * ahead_m_s + uy * up_m_s + levered[1],
+            fz * ahead_m_s + uz * up_m_s + levered[2],
+        )
+        return Carriage(self.height_m + dot(axes.up, self._joint), axes.up, velocity_m_s, turning)
+
+    def step(self, dt_s: float, left: Pusher, right: Pusher) -> None:
+        axes = axes_of(self.roll_rad, self.pitch_rad)
+        forward_n = upward_n = roll_nm = pitch_nm = 0.0
+        for load in (*self.flipper_loads(axes, left, right), *self._belly_loads(dt_s, axes)):
+            forward_n += load.forward_n
+            upward_n += load.upward_n
+            roll_nm += load.roll_nm
+            pitch_nm += load.pitch_nm
+        self.forward_m_s += dt_s * forward_n / self.mass_kg
+        self.upward_m_s += dt_s * (upward_n / self.mass_kg - GRAVITY_M_S2)
+        self.roll_rad_s += dt_s * roll_nm / self.shape.roll_inertia_kg_m2
+        self.pitch_rad_s += dt_s * pitch_nm / self.shape.pitch_inertia_kg_m2
+        self.forward_m += dt_s * self.forward_m_s
+        self.height_m += dt_s * self.upward_m_s
+        self.roll_rad += dt_s * self.roll_rad_s
+        self.pitch_rad += dt_s * self.pitch_rad_s
+
+    def flipper_loads(self, axes: Axes, left: Pusher, right: Pusher) -> Iterator[BodyLoad]:
+        """Of those flippers that the mud touches."""
+        for flipper, own_axes, side in ((left, axes, 1.0), (right, mirrored(axes), -1.0)):
+            if flipper.force is not NO_CONTACT:
+                yield load_of_flipper(own_axes, self._joint, flipper, side)
+
+    def _belly_loads(self, dt_s: float, axes: Axes) -> Iterator[BodyLoad]:
+        lever_m = in_world(axes, self._belly)
+        sliding_m_s, _ = self._speeds_m_s(axes, lever_m)
+        sticking_n = 0.0
+        for quarter, corner in zip(self._quarters, self._corners, strict=True):
+            corner_m = in_world(axes, corner)
+            clay = self.track.clay_at(self.forward_m + corner_m[0])
+            _, rising_m_s = self._speeds_m_s(axes, corner_m)
+            grip = rate_factor(hypot(sliding_m_s, rising_m_s))
+            upward_n = quarter.step(clay, grip, -self.height_m - corner_m[2], -rising_m_s)
+            yield load_at(axes, corner_m, 0.0, upward_n)
+            if quarter.pressed:
+                sticking_n += ADHESION * clay.strength_pa * quarter.area_m2
+        pad_n = self.pad.yield_n(self.track.clay_at(self.forward_m), -self.height_m - lever_m[2])
+        largest_n = rate_factor(abs(sliding_m_s)) * (sticking_n + pad_n)
+        yield load_at(axes, lever_m, self._drag.step(dt_s, sliding_m_s, largest_n), 0.0)
+
+    def _speeds_m_s(self, axes: Axes, lever_m: Vector) -> tuple[float, float]:
+        """(forward, up) in the world, of a place on the body that far from the centre of mass in the world."""
+        ahead_m, across_m, above_m = lever_m
+        rolling_m_s = across_m * self.roll_rad_s
+        return (
+            self.forward_m_s + above_m * self.pitch_rad_s - axes.up[0] * rolling_m_s,
+            self.upward_m_s - ahead_m * self.pitch_rad_s + axes.forward[0] * rolling_m_s,
+        )

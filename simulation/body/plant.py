@@ -1,0 +1,266 @@
+"""The robot's mechanics: two arms with two joints each, and a body on a rail, on a fixed base or free.
+
+Arms have a constant inertia about each joint, the gravity of a level body and friction; their mass is small beside
+the body's, so they do not throw it about. Viscous friction grows with speed; Coulomb's, off at 0, takes a constant
+torque as long as a joint turns and holds it where less than that would turn it. It is solved for the velocity at the
+end of a step, which it brings to zero but never turns round, so a joint sticks and steps of any length are stable.
+What earlier strokes left behind is each arm's own history, off by default. Semi-implicit Euler at STEP_S: the
+stiffest spring, mud along a plate 5 cm deep in the stiffest of the paper's muds, makes the arm swing at about
+400 rad/s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import copysign, radians, sin
+from operator import add
+from random import Random
+from typing import Annotated
+
+from control.bounds import Bounds
+from control.geometry import FlipperGeometry
+from control.joint_pd import ArmMass
+from control.records import JointAngles, Torques
+from simulation.body.bench_mount import BenchMount
+from simulation.body.carriage import Carriage
+from simulation.body.free_body import BodyShape, FreeBody
+from simulation.body.rail_body import Body, BodyMotion, DragPad, RailBody
+from simulation.mud.clay import Clay
+from simulation.mud.disturbances import NONE, Disturbances, StrokeHistory, clinging_torques_nm
+from simulation.mud.flipper_contact import NO_CONTACT, ContactForce, FlipperContact, contact_force, lowest_m
+from simulation.mud.stones import NO_PUSH, StoneContact, push_wrench
+from simulation.mud.track import Track
+
+STEP_S = 0.001
+END_STOPS_RAD = (radians(100.0), radians(85.0))  # sweep, adduction: the arm meets the body
+
+
+@dataclass(frozen=True)
+class PlantParameters:
+    geometry: FlipperGeometry = FlipperGeometry()
+    arm_mass: ArmMass = ArmMass()
+    joint_friction_nm_s: Annotated[float, Bounds(0.0, 0.1)] = 0.002
+    joint_coulomb_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
+    body_mass_kg: Annotated[float, Bounds(0.05, 100.0)] = 1.0
+    rail_drag_n: Annotated[float, Bounds(0.0, 100.0)] = 2.5  # the paper's, without the pad
+    rail_damping_n_s_m: Annotated[float, Bounds(0.0, 1000.0)] = 6.0  # how that grows with speed: fitted to Table I
+    pad_width_m: Annotated[float, Bounds(0.0, 0.5)] = 0.015
+    pad_depth_m: Annotated[float, Bounds(0.0, 0.5)] = 0.02
+    disturbances: Disturbances = NONE
+    fixed_base: bool = False  # the body never moves, as in the paper's trials of a single flipper
+    free_body: bool = False  # without a rail, of this shape
+    body: BodyShape = BodyShape()
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for what cannot be."""
+        if self.fixed_base and self.free_body:
+            raise ValueError("a body on a fixed base cannot be free")
+
+
+class Arm:
+    """Owns the motion of one flipper arm."""
+
+    def __init__(self, parameters: PlantParameters, track: Track, seed: int) -> None:
+        self.parameters = parameters
+        self.track = track
+        self.contact = FlipperContact(parameters.geometry, parameters.disturbances.relaxation)
+        self.history = StrokeHistory(parameters.disturbances, seed)
+        self.stones = StoneContact(track.stones) if track.stones else None
+        self._disturbed = parameters.disturbances != NONE
+        self.mount: BenchMount | None = None  # over the edge of a bench, in place of the mud
+        self.reset()
+
+    def reset(self) -> None:
+        """At rest with the plate's edge on the mud, as a robot lies when its motors are off."""
+        self.history.reset()
+        self.relief_m = self.track.surface_m(0.0)
+        self.put_back()
+        self.carriage: Carriage | None = None
+        self.force = NO_CONTACT
+        self.clay = self.track.clay_at(0.0)
+
+    def put_back(self) -> None:
+        """As a person does it by hand: straight out, the plate's edge on the mud; level on a bench.
+
+        The mud remembers its strokes.
+        """
+        self.sweep_rad = self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = self.adduction_rad = 0.0
+        if not self.mount:
+            self.adduction_rad = self.parameters.geometry.adduction_rad(0.0, self.surface_m)
+        self.contact.reset()
+        if self.stones:
+            self.stones.reset()
+
+    @property
+    def surface_m(self) -> float:
+        """How far the mud that this flipper meets lies below its nominal height."""
+        return self.relief_m + self.history.surface_m
+
+    def step(
+        self,
+        dt_s: float,
+        body_m: float,
+        body_m_s: float,
+        sweep_nm: float,
+        lift_nm: float,
+        carriage: Carriage | None = None,
+    ) -> None:
+        """`carriage`: how a free body carries this arm."""
+        if self.mount:
+            self._step_on_bench(self.mount, dt_s, sweep_nm, lift_nm)
+            return
+        self.carriage = carriage
+        self._look_at_mud(body_m)
+        self.force = self.contact.step(
+            dt_s,
+            self.clay,
+            self.sweep_rad,
+            self.adduction_rad,
+            self.sweep_velocity_rad_s,
+            self.adduction_velocity_rad_s,
+            body_m_s,
+            self.surface_m,
+            carriage,
+        )
+        if self.stones:
+            self._meet_stones(self.stones, dt_s, body_m)
+        load_sweep_nm, load_lift_nm = self._load_nm()
+        mass = self.parameters.arm_mass
+        self._move(
+            dt_s,
+            sweep_nm + load_sweep_nm,
+            lift_nm + load_lift_nm,
+            mass.sweep_inertia_kg_m2,
+            mass.adduction_inertia_kg_m2,
+        )
+
+    def _step_on_bench(self, mount: BenchMount, dt_s: float, sweep_nm: float, lift_nm: float) -> None:
+        if mount.held:
+            self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = 0.0
+            return
+        mass, friction_nm_s = self.parameters.arm_mass, self.parameters.joint_friction_nm_s
+        gravity_sweep_nm, gravity_lift_nm = mount.gravity_torques_nm(mass, self.sweep_rad, self.adduction_rad)
+        sweep_nm += gravity_sweep_nm - friction_nm_s * self.sweep_velocity_rad_s
+        lift_nm += gravity_lift_nm - friction_nm_s * self.adduction_velocity_rad_s
+        self._move(dt_s, sweep_nm, lift_nm, *mount.inertias_kg_m2(mass))
+
+    def _look_at_mud(self, body_m: float) -> None:
+        """Which clay is under the flipper, as firm as earlier strokes have left it, and how high."""
+        geometry = self.parameters.geometry
+        edge_m = body_m + geometry.flipper_length_m * sin(self.sweep_rad)
+        self.relief_m = self.track.surface_m(edge_m)
+        if self._disturbed:
+            deepest_m = lowest_m(geometry, self.sweep_rad, self.adduction_rad, self.carriage)
+            self.history.step(deepest_m - self.relief_m, edge_m)
+        clay, firmness = self.track.clay_at(edge_m), self.history.firmness
+        self.clay = clay if firmness == 1.0 else Clay(clay.name, firmness * clay.strength_pa, clay.layers)
+
+    def _meet_stones(self, stones: StoneContact, dt_s: float, body_m: float) -> None:
+        geometry, sweep_rad, adduction_rad = self.parameters.geometry, self.sweep_rad, self.adduction_rad
+        edge_m = body_m + geometry.flipper_length_m * sin(sweep_rad)
+        push = stones.step(dt_s, edge_m, lowest_m(geometry, sweep_rad, adduction_rad, self.carriage))
+        if push is not NO_PUSH:
+            pushed = contact_force(geometry, sweep_rad, push_wrench(geometry, sweep_rad, adduction_rad, push))
+            self.force = ContactForce(*map(add, self.force, pushed))
+
+    def _load_nm(self) -> tuple[float, float]:
+        """Of mud, clinging mud, gravity and friction on (sweep, adduction)."""
+        parameters = self.parameters
+        sweep_nm, lift_nm = parameters.arm_mass.gravity_torques_nm(self.sweep_rad, self.adduction_rad)
+        sweep_nm += self.force.sweep_nm - parameters.joint_friction_nm_s * self.sweep_velocity_rad_s
+        lift_nm += self.force.adduction_nm - parameters.joint_friction_nm_s * self.adduction_velocity_rad_s
+        weight_n = self.history.clinging_n
+        if weight_n:
+            hanging = clinging_torques_nm(parameters.geometry, self.sweep_rad, self.adduction_rad, weight_n)
+            sweep_nm, lift_nm = sweep_nm + hanging[0], lift_nm + hanging[1]
+        return sweep_nm, lift_nm
+
+    def _move(
+        self, dt_s: float, sweep_nm: float, lift_nm: float, sweep_inertia_kg_m2: float, lift_inertia_kg_m2: float
+    ) -> None:
+        coulomb_nm = self.parameters.joint_coulomb_nm
+        self.sweep_velocity_rad_s += dt_s * sweep_nm / sweep_inertia_kg_m2
+        self.adduction_velocity_rad_s += dt_s * lift_nm / lift_inertia_kg_m2
+        if coulomb_nm:
+            impulse_nm_s = dt_s * coulomb_nm
+            self.sweep_velocity_rad_s = _slowed(self.sweep_velocity_rad_s, impulse_nm_s / sweep_inertia_kg_m2)
+            self.adduction_velocity_rad_s = _slowed(self.adduction_velocity_rad_s, impulse_nm_s / lift_inertia_kg_m2)
+        self.sweep_rad, self.sweep_velocity_rad_s = _moved(
+            self.sweep_rad, self.sweep_velocity_rad_s, dt_s, END_STOPS_RAD[0]
+        )
+        self.adduction_rad, self.adduction_velocity_rad_s = _moved(
+            self.adduction_rad, self.adduction_velocity_rad_s, dt_s, END_STOPS_RAD[1]
+        )
+
+
+def _slowed(velocity_rad_s: float, loss_rad_s: float) -> float:
+    """By dry friction, at most to a halt."""
+    return copysign(max(abs(velocity_rad_s) - loss_rad_s, 0.0), velocity_rad_s)
+
+
+def _moved(angle_rad: float, velocity_rad_s: float, dt_s: float, stop_rad: float) -> tuple[float, float]:
+    angle_rad += velocity_rad_s * dt_s
+    if -stop_rad < angle_rad < stop_rad:
+        return angle_rad, velocity_rad_s
+    return min(max(angle_rad, -stop_rad), stop_rad), 0.0
+
+
+def body_of(parameters: PlantParameters, track: Track) -> Body:
+    mass_kg, pad = parameters.body_mass_kg, DragPad(parameters.pad_width_m, parameters.pad_depth_m)
+    if parameters.free_body:
+        return FreeBody(mass_kg, parameters.body, pad, track)
+    return RailBody(mass_kg, parameters.rail_drag_n, parameters.rail_damping_n_s_m, pad, track)
+
+
+class Plant:
+    """Owns the mechanical state of the robot on its track. `random` gives each flipper's history its seed."""
+
+    def __init__(self, parameters: PlantParameters, track: Track, random: Random | None = None) -> None:
+        self.parameters = parameters
+        self.track = track
+        random = random or Random(1)
+        left, right = (Arm(parameters, track, random.getrandbits(32)) for _ in range(2))
+        self.arms = (left, right)
+        self.body = body_of(parameters, track)
+        self.reset()
+
+    def reset(self) -> None:
+        for arm in self.arms:
+            arm.reset()
+        self.body.reset()
+
+    @property
+    def body_m(self) -> float:
+        """The body's place along the track."""
+        return self.body.forward_m
+
+    @property
+    def body_m_s(self) -> float:
+        return self.body.forward_m_s
+
+    @property
+    def motion(self) -> BodyMotion:
+        return self.body.motion
+
+    @property
+    def angles_rad(self) -> JointAngles:
+        left, right = self.arms
+        return left.sweep_rad, left.adduction_rad, right.sweep_rad, right.adduction_rad
+
+    @property
+    def velocities_rad_s(self) -> JointAngles:
+        left, right = self.arms
+        return (
+            left.sweep_velocity_rad_s,
+            left.adduction_velocity_rad_s,
+            right.sweep_velocity_rad_s,
+            right.adduction_velocity_rad_s,
+        )
+
+    def step(self, dt_s: float, torques_nm: Torques) -> None:
+        (left, right), body = self.arms, self.body
+        left_carriage, right_carriage = body.carriages
+        left.step(dt_s, body.forward_m, body.forward_m_s, torques_nm[0], torques_nm[1], left_carriage)
+        right.step(dt_s, body.forward_m, body.forward_m_s, torques_nm[2], torques_nm[3], right_carriage)
+        if not self.parameters.fixed_base:
+            body.step(dt_s, left, right)

@@ -1,0 +1,299 @@
+"""A motor drive as the bus sees it: ODrive CANSimple 0.6, byte for byte.
+
+Axis state machine (idle, closed loop), error word with disarm reason, watchdog, torque mode with the velocity-limit
+clamp and the current limits, cyclic messages, requests by remote frame. What no drive tells stands between it and the
+joint, each off at 0. The motor's true constant differs from the one that the drive reckons with; current follows its
+command with a first-order lag; magnets pull towards detents at any current. The encoder has steps, noise and an
+offset, the current noise. Messages arrive late by evenly drawn times, though in order, and some tell their old values
+again.
+
+Cogging is the slope of an energy that repeats n times a turn, so it takes as much as it gives, and no pure sine:
+
+    τ = -A [sin(n θ + φ) + 0.25 sin(2 (n θ + φ))]         the second harmonic is made up, the first is what is stated
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from math import exp, inf, isfinite, pi, radians, sin
+from random import Random
+from typing import Annotated
+
+from control.bounds import Bounds
+from control.records import NEVER_S
+from drivers.can.frames import Frame
+from drivers.odrive import codec
+from drivers.odrive.codec import AxisState, GarbledMessageError, Message, arbitration_id
+from simulation.devices.late_messages import LateMessages
+
+TURN_RAD = 2.0 * pi
+SECOND_HARMONIC = 0.25
+REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
+VERSION_FIELDS = (2, 0, 0, 0, 0, 6, 11, 0)  # protocol 2, no real board, firmware 0.6.11
+WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = 1, 2  # of hardware 0.0.0, which no real board has
+BOOT_S = 1.0  # silence of a drive that restarts
+
+
+@dataclass(frozen=True)
+class OdriveParameters:
+    node_id: Annotated[int, Bounds(0, 62)]
+    sign: Annotated[int, Bounds(-1, 1)] = 1
+    zero_turn: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0
+    torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0)] = 0.083  # that the drive reckons with
+    torque_constant_error: Annotated[float, Bounds(-0.5, 0.5)] = 0.0  # share by which the true one is larger
+    cogging_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
+    cogging_per_turn: Annotated[int, Bounds(1, 1000)] = 84  # 12 slots and 14 magnets, as many small motors have
+    cogging_phase_deg: Annotated[float, Bounds(-360.0, 360.0)] = 0.0
+    current_lag_s: Annotated[float, Bounds(0.0, 0.1)] = 0.0  # time constant
+    current_noise_a: Annotated[float, Bounds(0.0, 10.0)] = 0.1
+    encoder_counts: Annotated[int, Bounds(16, 16777216)] = 16384
+    encoder_offset_rad: Annotated[float, Bounds(-pi, pi)] = 0.0  # what the joint is read to be beyond where it is
+    encoder_noise_rad: Annotated[float, Bounds(0.0, 0.1)] = 0.0
+    watchdog_s: Annotated[float, Bounds(0.0, 60.0)] = 0.1  # 0: off, as ODrives are delivered
+    encoder_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
+    current_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
+    heartbeat_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.1
+    slow_period_s: Annotated[float, Bounds(0.001, 10.0)] = 0.1  # error, temperature, bus voltage
+    message_delay_s: Annotated[float, Bounds(0.0, 0.05)] = 0.0  # longest
+    repeated_share: Annotated[float, Bounds(0.0, 0.99)] = 0.0  # of the messages of angle, and of current
+    velocity_gain_nm_s_turn: Annotated[float, Bounds(0.0, 100.0)] = 1.0 / 6.0  # ODrive's default vel_gain, in the clamp
+    velocity_noise_rad_s: Annotated[float, Bounds(0.0, 5.0)] = 0.0  # of the drive's estimate
+    temperature_c: Annotated[float, Bounds(-50.0, 200.0)] = 30.0
+    bus_voltage_v: Annotated[float, Bounds(0.0, 100.0)] = 24.0
+    motor_current_limit_a: Annotated[float, Bounds(0.0, inf)] = inf  # the motor's own clip, whatever limit the bus sets
+
+
+class SimulatedOdrive:
+    """Owns one drive's state. Angles and torques at this border are the joint's; turns and signs stay inside."""
+
+    def __init__(self, parameters: OdriveParameters, random: Random) -> None:
+        self.parameters = parameters
+        self._random = random
+        self._late = LateMessages(random)
+        self.reset(0.0)
+
+    def reset(self, now_s: float) -> None:
+        """As after power-on."""
+        self.axis_state = AxisState.IDLE
+        self.errors = self.disarm_reason = 0
+        self._setpoint_nm = 0.0  # at the motor
+        self._modes = (0, 0)
+        self._velocity_limit_turn_s, self._current_limit_a = 2.0, 10.0  # ODrive's defaults
+        self._velocity_gain_nm_s_turn = self.parameters.velocity_gain_nm_s_turn
+        self._fed_s = now_s
+        self._current_a = 0.0
+        self._stepped_s = now_s
+        self._turns = self._turns_s = 0.0
+        self._boots_until_s = NEVER_S
+        self._initializing = False
+        self._told: dict[Message, Frame] = {}
+        self._late.reset()
+        periods = self.parameters
+        self._schedule: list[tuple[float, tuple[Message, ...]]] = [
+            (periods.encoder_period_s, (codec.GET_ENCODER_ESTIMATES,)),
+            (periods.current_period_s, (codec.GET_IQ,)),
+            (periods.heartbeat_period_s, (codec.HEARTBEAT,)),
+            (periods.slow_period_s, (codec.GET_ERROR, codec.GET_TEMPERATURE, codec.GET_BUS_VOLTAGE_CURRENT)),
+        ]
+        # Boards are switched on at different moments: their messages do not come all at once.
+        self._due_s = [now_s + period_s * self._random.random() for period_s, _ in self._schedule]
+
+    def restart(self, now_s: float) -> None:
+        """As by a dip in its supply: it is deaf and silent for BOOT_S, then tells once that it initialises."""
+        turns, turns_s = self._turns, self._turns_s
+        self.reset(now_s + BOOT_S)
+        self._turns, self._turns_s = turns, turns_s
+        self._stepped_s = now_s
+        self._boots_until_s = now_s + BOOT_S
+        self._initializing = True
+
+    def receive(self, frame: Frame, now_s: float) -> list[Frame]:
+        """Obey one frame of the bus; the answers it calls for."""
+        node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & 0x1F
+        if frame.is_extended or node_id != self.parameters.node_id or now_s < self._boots_until_s:
+            return []
+        if frame.is_remote:
+            return [self._frame(message) for message in self._PAYLOADS if message.command == command]
+        if command == codec.RX_SDO.command:
+            return self._read_parameter(frame.data)
+        with suppress(GarbledMessageError):  # a drive ignores what it cannot read
+            self._obey(command, frame.data, now_s)
+        return []
+
+    def _obey(self, command: int, data: bytes, now_s: float) -> None:
+        if command == codec.SET_INPUT_TORQUE.command:
+            (torque_nm,) = codec.SET_INPUT_TORQUE.decode(data)
+            self._set_torque(torque_nm, now_s)
+        elif command == codec.SET_AXIS_STATE.command:
+            self._change_state(codec.SET_AXIS_STATE.decode(data)[0], now_s)
+        elif command == codec.SET_CONTROLLER_MODE.command:
+            self._modes = codec.SET_CONTROLLER_MODE.decode(data)
+        elif command == codec.SET_LIMITS.command:
+            self._set_limits(*codec.SET_LIMITS.decode(data))
+        elif command == codec.SET_VEL_GAINS.command:
+            self._set_gain(codec.SET_VEL_GAINS.decode(data)[0])
+        elif command == codec.CLEAR_ERRORS.command:
+            self.errors = 0
+        elif command == codec.ESTOP.command:
+            self._disarm(codec.ERROR_ESTOP)
+
+    def _read_parameter(self, data: bytes) -> list[Frame]:
+        """The watchdog's settings are the only parameters here, and none can be written."""
+        try:
+            opcode, endpoint, _ = codec.RX_SDO.decode(data)
+        except GarbledMessageError:
+            return []
+        values = {
+            ENABLE_WATCHDOG_ENDPOINT: bytes([self.parameters.watchdog_s > 0.0]),
+            WATCHDOG_TIMEOUT_ENDPOINT: codec.SDO_FLOAT.pack(self.parameters.watchdog_s),
+        }
+        if opcode != codec.SDO_READ or endpoint not in values:
+            return []
+        answer = codec.TX_SDO.encode(0, endpoint, 0) + values[endpoint]
+        return [Frame(arbitration_id(self.parameters.node_id, codec.TX_SDO), answer)]
+
+    def _set_torque(self, torque_nm: float, now_s: float) -> None:
+        if not isfinite(torque_nm):
+            raise GarbledMessageError("not a finite number")
+        self._setpoint_nm = torque_nm
+        self._fed_s = now_s
+
+    def _set_gain(self, velocity_gain_nm_s_turn: float) -> None:
+        if not isfinite(velocity_gain_nm_s_turn):
+            raise GarbledMessageError("not a finite number")
+        self._velocity_gain_nm_s_turn = velocity_gain_nm_s_turn
+
+    def _set_limits(self, velocity_turn_s: float, current_a: float) -> None:
+        if not isfinite(velocity_turn_s + current_a):
+            raise GarbledMessageError("not a finite number")
+        self._velocity_limit_turn_s, self._current_limit_a = velocity_turn_s, current_a
+
+    def _change_state(self, state: int, now_s: float) -> None:
+        if state == AxisState.CLOSED_LOOP and not self.errors:
+            self.axis_state = AxisState.CLOSED_LOOP
+            self.disarm_reason = 0
+            self._fed_s = now_s
+        elif state == AxisState.IDLE:
+            self.axis_state = AxisState.IDLE
+
+    def _disarm(self, reason: int) -> None:
+        self.axis_state = AxisState.IDLE
+        self.errors |= reason
+        self.disarm_reason = reason
+
+    def torque_nm(self, now_s: float) -> float:
+        """At the joint, as the motor exerts it now."""
+        parameters = self.parameters
+        if self.axis_state is AxisState.CLOSED_LOOP and 0.0 < parameters.watchdog_s < now_s - self._fed_s:
+            self._disarm(codec.ERROR_WATCHDOG)
+        torque_nm = 0.0
+        if self.axis_state is AxisState.CLOSED_LOOP and self._modes == (codec.TORQUE_CONTROL, codec.PASSTHROUGH):
+            torque_nm = self._reckoned_nm(now_s) * (1.0 + parameters.torque_constant_error)
+        else:
+            self._current_a = 0.0
+        self._stepped_s = now_s
+        if parameters.cogging_nm:
+            torque_nm += self._cogging_nm()
+        return parameters.sign * torque_nm
+
+    def _reckoned_nm(self, now_s: float) -> float:
+        """What the drive believes to exert: clamped as it clamps, and as far as the current has come."""
+        parameters = self.parameters
+        gain, limit = self._velocity_gain_nm_s_turn, self._velocity_limit_turn_s
+        torque_nm = min(max(self._setpoint_nm, (-limit - self._turns_s) * gain), (limit - self._turns_s) * gain)
+        largest_a = min(self._current_limit_a, parameters.motor_current_limit_a)
+        largest_nm = largest_a * parameters.torque_constant_nm_a
+        torque_nm = min(max(torque_nm, -largest_nm), largest_nm)
+        if parameters.current_lag_s:
+            before_nm = self._current_a * parameters.torque_constant_nm_a
+            torque_nm += (before_nm - torque_nm) * exp((self._stepped_s - now_s) / parameters.current_lag_s)
+        self._current_a = torque_nm / parameters.torque_constant_nm_a
+        return torque_nm
+
+    def _cogging_nm(self) -> float:
+        """At the motor, by its true angle."""
+        parameters = self.parameters
+        angle = parameters.cogging_per_turn * TURN_RAD * self._turns + radians(parameters.cogging_phase_deg)
+        return -parameters.cogging_nm * (sin(angle) + SECOND_HARMONIC * sin(2.0 * angle))
+
+    def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
+        """Take in where the joint is."""
+        parameters = self.parameters
+        self._turns = parameters.sign * angle_rad / TURN_RAD + parameters.zero_turn
+        self._turns_s = parameters.sign * velocity_rad_s / TURN_RAD
+
+    def cyclic_frames(self, now_s: float) -> Iterator[Frame]:
+        """The messages that have come due, or what arrives of them."""
+        frames = self._due_frames(now_s)
+        longest_s = self.parameters.message_delay_s
+        return self._late.update(frames, now_s, longest_s) if longest_s else frames
+
+    def _due_frames(self, now_s: float) -> Iterator[Frame]:
+        if now_s < self._boots_until_s:
+            return
+        for place, (period_s, messages) in enumerate(self._schedule):
+            if now_s < self._due_s[place]:
+                continue
+            self._due_s[place] += period_s
+            if self._due_s[place] <= now_s:  # held up for longer than a period: the lost ones are not made up for
+                self._due_s[place] = now_s + period_s
+            for message in messages:
+                repeating = self.parameters.repeated_share and message in REPEATED
+                yield self._perhaps_old(message, now_s) if repeating else self._frame(message, now_s)
+
+    def _perhaps_old(self, message: Message, now_s: float) -> Frame:
+        """What the frame before told once more, where the drive has nothing else to tell."""
+        told = self._told.get(message)
+        if told is not None and self._random.random() < self.parameters.repeated_share:
+            return told._replace(stamp_s=now_s)
+        self._told[message] = frame = self._frame(message, now_s)
+        return frame
+
+    def _frame(self, message: Message, stamp_s: float = NEVER_S) -> Frame:
+        return Frame(arbitration_id(self.parameters.node_id, message), self._PAYLOADS[message](self), stamp_s=stamp_s)
+
+    def _encoder(self) -> bytes:
+        parameters = self.parameters
+        wrong_rad = parameters.encoder_offset_rad
+        if parameters.encoder_noise_rad:
+            wrong_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
+        turns = self._turns + parameters.sign * wrong_rad / TURN_RAD
+        told_turns = round(turns * parameters.encoder_counts) / parameters.encoder_counts
+        turns_s = self._turns_s
+        if parameters.velocity_noise_rad_s:
+            turns_s += self._random.gauss(0.0, parameters.velocity_noise_rad_s) / TURN_RAD
+        return codec.GET_ENCODER_ESTIMATES.encode(told_turns, turns_s)
+
+    def _iq(self) -> bytes:
+        noise_a = self.parameters.current_noise_a
+        measured_a = self._current_a + (self._random.gauss(0.0, noise_a) if noise_a else 0.0)
+        return codec.GET_IQ.encode(self._current_a, measured_a)
+
+    def _heartbeat(self) -> bytes:
+        errors = self.errors | codec.ERROR_INITIALIZING if self._initializing else self.errors
+        self._initializing = False
+        return codec.HEARTBEAT.encode(errors, self.axis_state, 0, 0)
+
+    def _error(self) -> bytes:
+        return codec.GET_ERROR.encode(self.errors, self.disarm_reason)
+
+    def _temperature(self) -> bytes:
+        return codec.GET_TEMPERATURE.encode(self.parameters.temperature_c, self.parameters.temperature_c)
+
+    def _bus_voltage(self) -> bytes:
+        return codec.GET_BUS_VOLTAGE_CURRENT.encode(self.parameters.bus_voltage_v, abs(self._current_a) * 0.1)
+
+    def _version(self) -> bytes:
+        return codec.GET_VERSION.encode(*VERSION_FIELDS)
+
+    _PAYLOADS = {
+        codec.GET_ENCODER_ESTIMATES: _encoder,
+        codec.GET_IQ: _iq,
+        codec.HEARTBEAT: _heartbeat,
+        codec.GET_ERROR: _error,
+        codec.GET_TEMPERATURE: _temperature,
+        codec.GET_BUS_VOLTAGE_CURRENT: _bus_voltage,
+        codec.GET_VERSION: _version,
+    }

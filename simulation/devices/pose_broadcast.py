@@ -1,0 +1,123 @@
+"""The body's place as a simulated laboratory tells it: by the way that the robot's configuration listens to.
+
+Motion capture's frames leave through the pose socket, as NatNet packets from the address at which the robot looks for
+its server, or as counts of a rail encoder that appears where the robot looks for its device.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+from drivers.pose.natnet_parameters import parse_version
+from drivers.pose.pose_port import PoseSender
+from drivers.pose.track_axis import AXES, parse_axis
+from firmware_host.configuration.configuration import PoseParameters
+from simulation.body.plant import Plant
+from simulation.devices.motion_capture import OF_THE_PAPER, CameraFrame, MotionCapture
+from simulation.devices.natnet_server import LOOPBACK, NEWEST_VERSION, NatNetServer, RecordedPose
+from simulation.devices.rail_encoder_emulator import RailEncoderEmulator
+
+
+class PoseLine(Protocol):
+    """One way to a robot."""
+
+    def send(self, frame: CameraFrame) -> None: ...
+
+    def step(self, now_s: float) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class NoLine:
+    def send(self, frame: CameraFrame) -> None:
+        return
+
+    def step(self, now_s: float) -> None:
+        return
+
+    def close(self) -> None:
+        return
+
+
+class SocketLine(NoLine):
+    def __init__(self, path: Path) -> None:
+        self._sender = PoseSender(path)
+
+    def send(self, frame: CameraFrame) -> None:
+        self._sender.send(*frame)
+
+    def close(self) -> None:
+        self._sender.close()
+
+
+class NatNetLine:
+    """A server on this computer."""
+
+    def __init__(self, pose: PoseParameters) -> None:
+        """Raises OSError where its address is not one of this computer."""
+        natnet = pose.natnet
+        self._direction = parse_axis(pose.axis) or AXES["x"]
+        self._origin_m = pose.origin_m
+        self.server = NatNetServer(
+            version=parse_version(natnet.version) or NEWEST_VERSION,
+            target=(natnet.group, natnet.port) if natnet.group else None,
+            address=(natnet.server or LOOPBACK, natnet.command_port),
+            identity=natnet.body_id or 1,
+            name=natnet.body or "mudskipper",
+        )
+
+    def send(self, frame: CameraFrame) -> None:
+        a, b, c = self._direction
+        place_m = frame.x_m + self._origin_m
+        self.server.add(RecordedPose(frame.exposed_s, (a * place_m, b * place_m, c * place_m)))
+
+    def step(self, now_s: float) -> None:
+        self.server.step(now_s)
+
+    def close(self) -> None:
+        self.server.close()
+
+
+class RailEncoderLine(NoLine):
+    """On a pseudo-terminal, behind a link with the device's name."""
+
+    def __init__(self, pose: PoseParameters) -> None:
+        """Raises OSError where there is something of that name."""
+        encoder = pose.rail_encoder
+        self._origin_m = pose.origin_m
+        self.counter = RailEncoderEmulator(Path(encoder.device), encoder.metres_per_count, encoder.label)
+
+    def send(self, frame: CameraFrame) -> None:
+        self.counter.send(frame.x_m + self._origin_m)
+
+    def close(self) -> None:
+        self.counter.unplug()
+
+
+class PoseBroadcast:
+    """Sends the body's place as motion capture sees it."""
+
+    def __init__(self, pose: PoseParameters, seed: int) -> None:
+        """Raises OSError where that cannot be done from this computer."""
+        self.line = _line(pose)
+        self._capture = MotionCapture(OF_THE_PAPER, seed)
+
+    def step(self, now_s: float, plant: Plant) -> None:
+        for frame in self._capture.step(now_s, plant):
+            self.line.send(frame)
+        self.line.step(now_s)
+
+    def close(self) -> None:
+        self.line.close()
+
+
+def _line(pose: PoseParameters) -> PoseLine:
+    match pose.chosen:
+        case "socket":
+            return SocketLine(Path(pose.socket))
+        case "natnet":
+            return NatNetLine(pose)
+        case "rail_encoder":
+            return RailEncoderLine(pose)
+    return NoLine()

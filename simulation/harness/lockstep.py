@@ -1,0 +1,150 @@
+"""The simulated robot and the daemon's own loop in one process, in step: as fast as they compute, without a clock.
+
+Every tick the robot lives on until the tick's moment, then the loop runs exactly as in the daemon. All frames are
+encoded and decoded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from control.controller import WalkOrder
+from control.modes import Mode, Request
+from control.records import JOINTS
+from drivers.can.mock_bus import MockBus
+from drivers.fault_injection.failing_port import failing_ports
+from drivers.fault_injection.failing_pose import failing_pose
+from drivers.fault_injection.failures import USUAL_S, Failures, begin_text, end_text
+from drivers.odrive.drives import OdriveDrives
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.fault_injection.failing_recorder import failing_recorder
+from firmware_host.fault_injection.failing_time import Stalls, failing_clock
+from firmware_host.log.recorder import NullRecorder, Recording
+from firmware_host.loop import Loop
+from firmware_host.ticker import PERIOD_S, Beat
+from simulation.body.free_body import BodyShape
+from simulation.body.plant import PlantParameters
+from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters, SimulatedPose
+from simulation.devices.odrive import OdriveParameters
+from simulation.harness.robot import SimulatedRobot
+from simulation.mud.disturbances import NONE, Disturbances, drive_changes
+from simulation.mud.track import Track
+
+
+def drives_of(configuration: Configuration, **changes: Any) -> dict[str, OdriveParameters]:
+    """Simulated drives that fit a configuration's bus: ids, signs, zeros and torque constants."""
+    return {
+        joint: OdriveParameters(
+            node_id=drive.node_id,
+            sign=drive.sign,
+            zero_turn=drive.zero_turn,
+            torque_constant_nm_a=drive.torque_constant_nm_a,
+            **changes,
+        )
+        for joint, drive in configuration.drive.items()
+    }
+
+
+def plant_of(
+    configuration: Configuration, disturbances: Disturbances = NONE, fixed_base: bool = False, **changes: Any
+) -> PlantParameters:
+    """Mechanics that fit a configuration, with changes by name: a free body's joints are as high as its flippers'."""
+    fitting: dict[str, Any] = {
+        "geometry": configuration.geometry,
+        "arm_mass": configuration.arm,
+        "disturbances": disturbances,
+        "fixed_base": fixed_base,
+        "body": BodyShape(axis_above_belly_m=configuration.geometry.axis_height_m),
+    }
+    return PlantParameters(**(fitting | changes))
+
+
+class Lockstep:
+    """Owns the common time of robot and loop. Disturbances are of the mud and of the drives.
+
+    `plant` and `drives` are used as they are, in place of those that configuration, disturbances and base make.
+    `failures` make parts of the loop's side fail: begin them by `fail`.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        track: Track,
+        seed: int = 1,
+        recorder: Recording | None = None,
+        disturbances: Disturbances = NONE,
+        fixed_base: bool = False,
+        plant: PlantParameters | None = None,
+        drives: Mapping[str, OdriveParameters] | None = None,
+        motion_capture: MotionCaptureParameters = AT_EVERY_TICK,
+        failures: Failures | None = None,
+    ) -> None:
+        self.buses = {name: MockBus() for name in configuration.bus}
+        self.robot = SimulatedRobot(
+            plant or plant_of(configuration, disturbances, fixed_base),
+            track,
+            drives or drives_of(configuration, **drive_changes(disturbances)),
+            {joint: configuration.drive[joint].bus for joint in JOINTS},
+            {name: bus.open() for name, bus in self.buses.items()},
+            seed,
+        )
+        wires = failing_ports({name: bus.open() for name, bus in self.buses.items()}, configuration.drive, failures)
+        ports = OdriveDrives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
+        pose = failing_pose(SimulatedPose(self.robot.plant, motion_capture, seed + 1), failures)
+        rows = failing_recorder(recorder or NullRecorder(), failures)
+        wall_clock = failing_clock(self._now_s, failures)
+        self.loop = Loop(configuration, ports, pose, rows, self._now_s, wall_clock)
+        self._sound = failures is None
+        self.failures = failures or Failures(configuration.bus)
+        self._stalls = Stalls(self.failures)
+        self.tick_number = 0
+
+    @property
+    def now_s(self) -> float:
+        return self.tick_number * PERIOD_S
+
+    def _now_s(self) -> float:
+        return self.now_s
+
+    def step(self) -> None:
+        missed = int(self._stalls.next_s() / PERIOD_S)
+        self.tick_number += 1 + missed
+        self.robot.advance(self.now_s)
+        for failure in self.failures.update(self.now_s):
+            self.loop.news.tell(self.now_s, end_text(failure))
+        self.loop.tick(Beat(self.now_s, missed * PERIOD_S, self.tick_number, missed))
+
+    def fail(self, component: str, kind: str, for_s: float = USUAL_S) -> None:
+        """From the next tick on. Raises RuntimeError where it is refused."""
+        refused = "no failures were given" if self._sound else self.failures.refusal(component, kind, for_s)
+        if refused:
+            raise RuntimeError(refused)
+        self.loop.news.tell(self.now_s, begin_text(component, kind, for_s, "lockstep"))
+        self.failures.begin(component, kind, self.now_s, for_s)
+
+    def run_for(self, duration_s: float) -> None:
+        for _ in range(round(duration_s / PERIOD_S)):
+            self.step()
+
+    def run_until(self, done: Callable[[], bool], longest_s: float) -> bool:
+        """Whether it came to that within `longest_s` of simulated time."""
+        for _ in range(round(longest_s / PERIOD_S)):
+            if done():
+                return True
+            self.step()
+        return done()
+
+    def arm(self) -> None:
+        """From power-on to holding the pose. Raises RuntimeError with the reason where that fails."""
+        self.run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking(), 3.0)
+        refused = self.loop.request(Request.ARM, self.now_s)
+        if refused or not self.run_until(lambda: self.loop.mode is Mode.HOLD, 3.0):
+            raise RuntimeError(refused or f"not armed: {self.loop.fault}")
+
+    def walk(self, order: WalkOrder) -> None:
+        """Begin a walk. Raises RuntimeError where it is refused."""
+        refused = self.loop.request(Request.WALK, self.now_s, order)
+        if refused:
+            raise RuntimeError(refused)
+        self.step()

@@ -1,0 +1,143 @@
+"""The simulated robot as a process of its own, in real time, on the buses that a configuration names.
+
+It reads of the configuration what a real robot's bench would fix: buses, node ids, signs, geometry, a fixed base. The
+body's place goes where its pose is to come from, at motion-capture rate. SIGUSR1 stands for the person who moves the
+flippers back by hand, where they came to lie at their mechanical stops, beyond the limits: no torque leads back there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from control.records import JOINTS
+from firmware_host.buses import BusError, open_ports
+from firmware_host.configuration.configuration import (
+    EXIT_CONFIGURATION,
+    Configuration,
+    ConfigurationError,
+    load_configuration,
+)
+from firmware_host.ticker import Ticker
+from simulation.body.blocks import on_blocks
+from simulation.devices.pose_broadcast import PoseBroadcast
+from simulation.harness.robot import SimulatedRobot
+from simulation.harness.world import World, load_world
+from simulation.mud.clay import MUDS
+from simulation.mud.track import COMPARTMENT_M, Track
+
+STEP_S = 0.002  # the period of the drives' fastest messages
+WATCHDOG_S = 0.25  # of the simulated drives, on processors that everything shares
+LONGEST_CATCH_UP_S = 0.02  # a robot that was held up for longer has lost that time: commands waited meanwhile
+PRIORITY = 1  # of real time
+NICENESS = -10
+PR_SET_PDEATHSIG = 1
+
+
+class Peer:
+    def __init__(self, configuration: Configuration, world: World, seed: int) -> None:
+        self.ticker = Ticker(STEP_S)
+        self._ports = open_ports(configuration.bus)
+        self.robot = SimulatedRobot(
+            world.plant(configuration),
+            world.track,
+            world.drives(configuration, watchdog_s=WATCHDOG_S),
+            {joint: configuration.drive[joint].bus for joint in JOINTS},
+            self._ports,
+            seed,
+            start_s=self.ticker.wait().now_s,
+        )
+        self._pose = PoseBroadcast(configuration.pose, seed + 1)
+        self.ended = False
+
+    def end(self, number: int, frame: object) -> None:
+        """A signal handler."""
+        self.ended = True
+
+    def run(self) -> None:
+        while not self.ended:
+            self.step(self.ticker.wait().now_s)
+        self.close()
+
+    def step(self, now_s: float) -> None:
+        if now_s - self.robot.now_s > LONGEST_CATCH_UP_S:
+            self.robot.now_s = now_s
+        self.robot.advance(now_s)
+        self._pose.step(now_s, self.robot.plant)
+
+    def close(self) -> None:
+        self._pose.close()
+        for port in self._ports.values():
+            port.close()
+
+
+def track_of(waters: Sequence[str], length_m: float = COMPARTMENT_M) -> Track:
+    """Compartments of the named water contents, one after the other."""
+    return Track([(length_m, MUDS[water]) for water in waters])
+
+
+def end_with_parent() -> None:
+    """Ask the kernel for SIGTERM when the starting process dies, so that no robot is left behind."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="simulation.harness.peer", description=__doc__)
+    parser.add_argument("--config", type=Path, required=True)
+    ground = parser.add_mutually_exclusive_group()
+    ground.add_argument("--mud", action="append", choices=sorted(MUDS), help="water content in percent; repeatable")
+    ground.add_argument("--world", type=Path, help="file that describes the ground and more")
+    ground.add_argument("--on-blocks", action="store_true", help="for the bench: without mud, the flippers in air")
+    parser.add_argument("--seed", type=int, default=1)
+    return parser.parse_args(arguments)
+
+
+def _world(options: argparse.Namespace, configuration: Configuration) -> World:
+    """Raises ConfigurationError."""
+    if options.on_blocks:
+        return on_blocks(configuration)
+    return load_world(options.world) if options.world else World(track_of(options.mud or list(MUDS)))
+
+
+def take_precedence() -> None:
+    """Where it is permitted: a real robot does not wait for its computer.
+
+    Not in real time on a lone processor: a simulation that cannot keep up would leave it to nobody else.
+    """
+    with suppress(PermissionError):
+        if len(os.sched_getaffinity(0)) > 1:
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        else:
+            os.nice(NICENESS)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    options = _parse(arguments)
+    try:
+        configuration = load_configuration(options.config)
+        peer = Peer(configuration, _world(options, configuration), options.seed)
+    except ConfigurationError as problem:
+        print("\n".join(problem.problems), file=sys.stderr)
+        return EXIT_CONFIGURATION
+    except BusError as problem:
+        print(problem, file=sys.stderr)
+        return 1
+    except OSError as problem:
+        print(f"the body's place cannot be told from here: {problem.strerror or problem}", file=sys.stderr)
+        return 1
+    signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.lend_hand())
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, peer.end)
+    take_precedence()
+    peer.run()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,126 @@
+"""A plate on a load cell: what a mud does to a flipper's plate, measured without the flipper.
+
+As with the reference measurements of a laboratory, a stiff carrier moves the plate straight through the mud, at a
+constant speed and in a fixed attitude, and reads force against depth; an estimate made with a flipper, its joints and
+its motors can be held against that. The contact is the same as under the robot, the motion is its own. The surface
+is at depth 0, depths are those of the middle of the lower edge, forces are the mud's on the plate.
+
+With x forward, y outward, z up, a plate at the sweep angle α and the adduction angle β has its normal, its lower edge
+and its height along
+
+    n = (cos α, -sin α cos β, -sin α sin β)    r = (sin α, cos α cos β, cos α sin β)    s = (0, -sin β, cos β)
+"""
+
+from __future__ import annotations
+
+from math import ceil, cos, sin
+from typing import NamedTuple
+
+from control.geometry import FlipperGeometry
+from simulation.mud.clay import Clay, rate_factor
+from simulation.mud.flipper_contact import plate_size
+from simulation.mud.mud_springs import SIDEWAYS_YIELD_M
+from simulation.mud.plate_contact import PlateContact
+from simulation.mud.rigid_plate import Attitude, Twist, lowest_point_m
+
+STEP_S = 0.0005
+
+Vector = tuple[float, float, float]
+
+
+class LoadCurve(NamedTuple):
+    """Force upward on the plate against depth, one after the other in time."""
+
+    depths_m: tuple[float, ...]
+    forces_n: tuple[float, ...]
+
+
+class Insertion(NamedTuple):
+    down: LoadCurve
+    held: LoadCurve
+    up: LoadCurve
+
+
+class LoadCell:
+    """Owns the plate on its carrier: where it is, and its contact."""
+
+    def __init__(
+        self, clay: Clay, geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, relaxation: float = 0.0
+    ) -> None:
+        sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
+        self.axes: tuple[Vector, Vector, Vector] = ((ca, -sa * cb, -sa * sb), (sa, ca * cb, ca * sb), (0.0, -sb, cb))
+        self.clay = clay
+        self.plate = PlateContact(plate_size(geometry), relaxation)
+        self._upright = Attitude(0.0, -ca * sb, cb)
+        self.clear_m = -lowest_point_m(self._upright, geometry.plate_width_m)  # depth at which the plate is just out
+        self.reset()
+
+    def reset(self) -> None:
+        self.plate.reset()
+        self.depth_m = self.clear_m
+
+    def step(self, dt_s: float, forward_m_s: float, upward_m_s: float) -> tuple[float, float]:
+        """Force (forward, upward) at the end of a step of this motion."""
+        self.depth_m -= dt_s * upward_m_s
+        twist = Twist(*(axis[0] * forward_m_s + axis[2] * upward_m_s for axis in self.axes))
+        wrench = self.plate.step(dt_s, self.clay, self._upright._replace(depth_m=self.depth_m), twist)
+        forces_n = wrench[:3]  # along the three axes
+        forward_n = sum(force_n * axis[0] for force_n, axis in zip(forces_n, self.axes, strict=True))
+        return forward_n, sum(force_n * axis[2] for force_n, axis in zip(forces_n, self.axes, strict=True))
+
+    def lower(self, to_depth_m: float, speed_m_s: float) -> LoadCurve:
+        """Or raise: straight to a depth, in whole steps."""
+        way_m = to_depth_m - self.depth_m
+        steps = max(1, ceil(abs(way_m) / (speed_m_s * STEP_S)))
+        return self._record(steps, -way_m / (steps * STEP_S))
+
+    def hold(self, hold_s: float) -> LoadCurve:
+        return self._record(round(hold_s / STEP_S), 0.0)
+
+    def _record(self, steps: int, upward_m_s: float) -> LoadCurve:
+        depths_m, forces_n = [], []
+        for _ in range(steps):
+            forces_n.append(self.step(STEP_S, 0.0, upward_m_s)[1])
+            depths_m.append(self.depth_m)
+        return LoadCurve(tuple(depths_m), tuple(forces_n))
+
+
+def measure_insertion(
+    clay: Clay,
+    geometry: FlipperGeometry,
+    sweep_rad: float,
+    adduction_rad: float,
+    depth_m: float,
+    speed_m_s: float,
+    relaxation: float = 0.0,
+    hold_s: float = 0.0,
+) -> Insertion:
+    """From just above the mud down to `depth_m`, after a hold up again: everything that acts along the motion."""
+    cell = LoadCell(clay, geometry, sweep_rad, adduction_rad, relaxation)
+    down = cell.lower(depth_m, speed_m_s)
+    held = cell.hold(hold_s)
+    return Insertion(down, held, cell.lower(cell.clear_m, speed_m_s))
+
+
+def measure_shear(
+    clay: Clay,
+    geometry: FlipperGeometry,
+    sweep_rad: float,
+    adduction_rad: float,
+    depth_m: float,
+    speed_m_s: float,
+    distance_m: float = 0.2,
+) -> float:
+    """Forward force on a plate that is dragged backward at a depth: the mean over the second half of the way.
+
+    Raises ValueError where the first half is too short for all the mud to yield.
+    """
+    needed_m = 2.0 * SIDEWAYS_YIELD_M * rate_factor(speed_m_s) / cos(sweep_rad)
+    if distance_m < needed_m:
+        raise ValueError(f"distance_m = {distance_m:g}: must be at least {needed_m:.3f} for the mud to yield")
+    cell = LoadCell(clay, geometry, sweep_rad, adduction_rad)
+    cell.depth_m = depth_m
+    steps = ceil(distance_m / (speed_m_s * STEP_S))
+    forces_n = [cell.step(STEP_S, -speed_m_s, 0.0)[0] for _ in range(steps)]
+    steady_n = forces_n[steps // 2 :]
+    return sum(steady_n) / len(steady_n)

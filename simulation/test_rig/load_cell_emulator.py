@@ -1,0 +1,68 @@
+"""A load cell's amplifier as a serial port meets it: a serial talker that converts forces.
+
+A converter integrates over its period, adds noise and drift, rounds to a step of its own, and stops at its range.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from typing import Annotated
+
+from control.bounds import Bounds
+from simulation.devices.serial_device import SerialTalker, TalkerParameters
+
+STYLES = ("counts", "newtons", "indicator", "columns")
+
+
+@dataclass(frozen=True)
+class AmplifierParameters(TalkerParameters):
+    rate_hz: Annotated[float, Bounds(1.0, 1000.0)] = 80.0  # of an HX711 with its rate pin high; 10 with it low
+    style: str = "counts"
+    counts_per_newton: Annotated[float, Bounds(-1e6, 1e6)] = 42000.0  # a cell of 20 N, 2 mV/V, and gain 128
+    zero_counts: Annotated[float, Bounds(-8e6, 8e6)] = 81000.0
+    noise_n: Annotated[float, Bounds(0.0, 1.0)] = 0.008  # of the mounted cell: the stage shakes more than the chip
+    drift_n_s: Annotated[float, Bounds(-1.0, 1.0)] = 0.0
+    averaged: Annotated[int, Bounds(1, 64)] = 1  # conversions, of which an indicator's filter tells the mean
+    range_n: Annotated[float, Bounds(0.0, 1e4)] = 20.0  # beyond it the cell is overloaded
+
+
+class EmulatedAmplifier(SerialTalker):
+    """Owns when it was switched on.
+
+    `mean_force_n`, told a time, is the force on the cell on average since the last conversion.
+    """
+
+    def __init__(
+        self, mean_force_n: Callable[[float], float], parameters: AmplifierParameters, link: Path, seed: int = 1
+    ) -> None:
+        self.mean_force_n = mean_force_n
+        self.amplifier = parameters
+        self._noise_of_cell = Random(seed)
+        self._started_s: float | None = None
+        self._converted_n: deque[float] = deque(maxlen=parameters.averaged)
+        super().__init__(self._convert, parameters, link, Random(seed))
+
+    def _convert(self, at_s: float) -> bytes:
+        if self._started_s is None:
+            self._started_s = at_s
+        force_n = self.mean_force_n(at_s) + self._noise_of_cell.gauss(0.0, self.amplifier.noise_n)
+        force_n += self.amplifier.drift_n_s * (at_s - self._started_s)
+        self._converted_n.append(force_n)
+        return self._line(sum(self._converted_n) / len(self._converted_n), at_s)
+
+    def _line(self, force_n: float, at_s: float) -> bytes:
+        amplifier = self.amplifier
+        overloaded = abs(force_n) > amplifier.range_n
+        style, told = amplifier.style, max(min(force_n, 1e6), -1e6)
+        if style == "indicator":
+            return b"OL,GS,+-------kg\r\n" if overloaded else f"ST,GS,{told / 9.80665:+09.5f}kg\r\n".encode()
+        if style == "newtons":
+            return b"OL\r\n" if overloaded else f"Load: {told:.4f} N\r\n".encode()
+        end = 2**23 - 1 if force_n * amplifier.counts_per_newton > 0.0 else -(2**23)
+        counts = round(amplifier.zero_counts + amplifier.counts_per_newton * force_n)
+        counts = end if overloaded else max(-(2**23), min(counts, 2**23 - 1))
+        return f"{round(1000 * at_s)},{counts}\r\n".encode() if style == "columns" else f"{counts}\r\n".encode()

@@ -1,0 +1,52 @@
+"""What `mudskipper check` says of the pose's source where no daemon runs."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+
+import pytest
+
+from command_line.doctor.checks_before_arming import _pose_items
+from drivers.pose.natnet_parameters import NatNetParameters
+from drivers.pose.rail_encoder import RailEncoderParameters
+from firmware_host.configuration.configuration import Configuration, PoseParameters
+from simulation.devices.natnet_server import LOOPBACK, NatNetServer, RecordedPose
+
+
+def with_pose(configuration: Configuration, pose: PoseParameters) -> Configuration:
+    return replace(configuration, pose=pose)
+
+
+def test_a_robot_without_a_source_is_told_nothing_of_it(configuration: Configuration) -> None:
+    assert _pose_items(configuration) == []
+
+
+def test_a_source_that_does_not_open_fails(configuration: Configuration) -> None:
+    pytest.importorskip("serial", reason="pyserial is not installed")
+    encoder = RailEncoderParameters(device="/dev/nothing", metres_per_count=1e-5)
+    (item,) = _pose_items(with_pose(configuration, PoseParameters("rail_encoder", rail_encoder=encoder)))
+    assert not item["ok"] and "/dev/nothing does not open" in item["text"] and item["fix"]
+
+
+def test_motion_capture_is_listened_to(configuration: Configuration) -> None:
+    with NatNetServer() as server:
+        natnet = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
+        looked_at = with_pose(configuration, PoseParameters("natnet", natnet=natnet))
+        (item,) = _pose_items(looked_at)
+        assert item["ok"] and item["text"].startswith("warning: no NatNet frame comes from 127.0.0.1.")
+        ended = threading.Event()
+
+        def stream() -> None:
+            while not ended.is_set():
+                server.add(RecordedPose(time.monotonic(), (time.monotonic() % 1000.0 * 1e-3, 0.0, 0.0)))
+                server.step(time.monotonic())
+                time.sleep(0.005)
+
+        streaming = threading.Thread(target=stream)
+        streaming.start()
+        (item,) = _pose_items(looked_at)
+        ended.set()
+        streaming.join()
+    assert item["ok"] and item["text"].startswith("NatNet 4.1 from 127.0.0.1: ")

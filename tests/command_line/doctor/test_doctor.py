@@ -1,0 +1,97 @@
+"""`mudskipper doctor` as a person runs it: without a daemon, with one, and with a configuration that is wrong."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import exit_codes
+from command_line.doctor import doctor as module
+from command_line.doctor.doctor import examine_all, examine_daemon
+from command_line.main import main
+from control.records import JOINTS
+from firmware_host.computer.findings import Level, fail, ok, warn
+from firmware_host.configuration.configuration import Configuration, load_configuration
+from simulation.harness.local_setup import write_local_setup
+from tests.command_line.conftest import Bench
+from tests.waiting import LONGEST_S
+
+LINES = {"configuration", "kernel", "governor", "processors", "interrupts", "disk", "log", "clock", "daemon"}
+
+
+def made_up_status(**changes: Any) -> dict[str, Any]:
+    drives = [{"joint": joint, "watchdog_s": 0.1} for joint in JOINTS]
+    return {"version": "1.0", "mode": "idle", "drives": drives} | changes
+
+
+def test_without_a_daemon_every_line_is_there_and_says_what_to_do(
+    short_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_local_setup(short_folder, tmp_path / "logs")
+    status = main(["doctor", "--config", str(path), "--json"])
+    found = {line["id"]: line for line in json.loads(capsys.readouterr().out)}
+    assert set(found) >= LINES
+    assert {"bus.left", "load.left", "bus.right", "load.right"} <= set(found)
+    assert found["daemon"]["level"] == "warn"
+    assert all(set(line) == {"id", "level", "text", "fix"} for line in found.values())
+    assert all(bool(line["fix"]) is (line["level"] != "ok") for line in found.values())
+    failed = any(line["level"] == "fail" for line in found.values())
+    assert status == (exit_codes.UNHEALTHY if failed else exit_codes.OK)
+
+
+def test_a_wrong_configuration_fails_line_by_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text("[loop]\npriority = 1000\nspeed = 3\n", encoding="utf-8")
+    assert main(["doctor", "--config", str(path)]) == exit_codes.UNHEALTHY
+    shown = capsys.readouterr().out
+    assert "FAIL configuration" in shown
+    assert "loop.priority" in shown and "loop.speed" in shown
+    assert f"-> edit {path}" in shown
+
+
+def test_interfaces_that_are_missing_fail(configuration: Configuration, tmp_path: Path) -> None:
+    found = {finding.id: finding for finding in examine_all(configuration, tmp_path / "no.sock", {})}
+    assert found["bus.left"].level is Level.FAIL
+    assert found["bus.right"].text == "there is no interface can1"
+
+
+@pytest.mark.parametrize(
+    ("watchdog_s", "level"), [(0.3, Level.OK), (None, Level.WARN), (0.0, Level.FAIL), (0.5, Level.FAIL)]
+)
+def test_a_drive_without_a_watchdog_that_is_quick_enough_fails(watchdog_s: float | None, level: Level) -> None:
+    drives = [{"joint": "left_sweep", "watchdog_s": watchdog_s}]
+    found = {finding.id: finding.level for finding in examine_daemon(made_up_status(drives=drives), "1.0", 0.3)}
+    assert found == {"daemon": Level.OK, "watchdog.left_sweep": level}
+
+
+def test_a_daemon_of_another_version_is_warned_of() -> None:
+    found = next(iter(examine_daemon(made_up_status(), "1.1", 0.3)))
+    assert found.level is Level.WARN
+    assert "1.0" in found.text and "1.1" in found.text
+
+
+def test_the_exit_status_is_0_only_if_nothing_fails(capsys: pytest.CaptureFixture[str]) -> None:
+    assert module._show([ok("a", "fine"), warn("b", "hm", "look")], as_json=False) == exit_codes.OK
+    assert capsys.readouterr().out == f"ok   {'a':22} fine\nwarn {'b':22} hm\n       -> look\n"
+    assert module._show([ok("a", "fine"), fail("b", "bad", "mend")], as_json=True) == exit_codes.UNHEALTHY
+
+
+def test_a_running_daemon_tells_its_process_its_drives_and_its_limits(bench: Bench) -> None:
+    configuration = load_configuration(bench.configuration)
+    found = {finding.id: finding for finding in examine_all(configuration, bench.socket, {})}
+    assert found["daemon"].level is Level.OK
+    assert {f"watchdog.{joint}" for joint in JOINTS} <= set(found)
+    assert "unfinished_logs" not in found
+    assert found["loop.priority"].text.startswith("the running loop has real-time priority ")
+    assert "of the daemon" in found["realtime"].text
+    assert found["socket"].level is Level.OK
+
+
+def test_the_command_starts_without_the_libraries_of_other_commands() -> None:
+    code = "import sys, command_line.main; assert not {'can', 'pydantic', 'numpy'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=LONGEST_S)

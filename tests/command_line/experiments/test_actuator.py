@@ -1,0 +1,218 @@
+"""`mudskipper experiment actuator`, from the command to the report, and with a person at a terminal."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import pty
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.experiments.actuator import _applied as applied
+from command_line.experiments.actuator import _target as target_of
+from command_line.experiments.conduct_bench import Desk
+from command_line.main import main
+from experiments.actuator.bench import Readings
+from experiments.actuator.calibration import Show
+from experiments.actuator.fit import fit_joint
+from experiments.actuator.friction import QUICK, SLOW
+from experiments.actuator.plan import Plan
+from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A
+from experiments.robot.bench_robot import BenchError
+from experiments.robot.prompt import Person, Willing
+from experiments.trials.notebook import Notebook
+from firmware_host.configuration.configuration import load_configuration, parse_configuration
+from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
+from tests.experiments.actuator.test_fit import made_entries
+from tests.waiting import LONGEST_S
+
+SHORT = (
+    "experiment",
+    "actuator",
+    "--simulated",
+    "--joint",
+    "right_sweep",
+    "--weights",
+    "50,100,200,400,600",
+    "--trials",
+    "1",
+)
+
+
+def test_one_command_calibrates_a_motor_and_changes_a_copy_of_the_configuration(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*SHORT, "--out", str(tmp_path), "--apply", "--json"]) == exit_codes.OK
+    said = capsys.readouterr()
+    report = json.loads(said.out)
+    (joint,) = report["joints"]
+    assert joint["torque_constant_nm_a"] == pytest.approx(TRUE_CONSTANT_NM_A, rel=0.02)
+    assert joint["rmse_fitted_nm"] < joint["paper_rmse_nm"] < joint["rmse_configured_nm"]
+    assert not report["left_out"] and not report["not_fitted"]
+    written = load_configuration(tmp_path / "mudskipper.toml")
+    assert written.drive["right_sweep"].torque_constant_nm_a == round(joint["torque_constant_nm_a"], 5)
+    assert written.friction["right_sweep"].coulomb_nm > 0.0
+    assert "+torque_constant_nm_a" in said.err
+    assert {path.name for path in tmp_path.iterdir()} >= {"report.html", "summary.json", "torques.png", "errors.png"}
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Actuator calibration (simulated)" in page and "true k_t (N·m/A)</th>" in page
+    assert "What to set where" in page and "data:image/png;base64" in page
+
+    assert joint["torque_constant_error_nm_a"] > joint["torque_constant_tolerance_nm_a"] > 0.0
+    assert abs(joint["friction_nm"] - COULOMB_NM) < 3.0 * joint["friction_error_nm"]
+
+    coarse = [*SHORT, "--out", str(tmp_path), "--lever-tolerance", "10"]
+    assert main(coarse) == exit_codes.OK  # goes on behind what was read: nothing is left, and the doubt is another
+    assert "right_sweep" in capsys.readouterr().out
+    (doubtful,) = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["joints"]
+    assert doubtful["torque_constant_tolerance_nm_a"] == pytest.approx(0.048 * TRUE_CONSTANT_NM_A, rel=0.02)
+    assert doubtful["friction_error_nm"] > joint["friction_error_nm"]
+    assert main([*SHORT, "--out", str(tmp_path), "--lever", "10"]) == exit_codes.REFUSED
+    assert "lever_m = 0.12" in capsys.readouterr().err
+
+
+def test_weights_that_the_robot_cannot_hold_are_refused_before_anything_moves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = [*SHORT[:5], "--weights", "100,1500", "--out", str(tmp_path)]
+    assert main(command) == exit_codes.REFUSED
+    assert "limits.torque_nm = 1.4: must be at least" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "options", [["--weights", "heavy"], ["--weights", "100"], ["--lever", "0"], ["--trials", "0"], ["--joint", "knee"]]
+)
+def test_what_makes_no_plan_is_bad_usage(options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["experiment", "actuator", "--simulated", *options])
+    assert ended.value.code == exit_codes.USAGE
+    assert options[0] in capsys.readouterr().err
+
+
+def test_without_a_daemon_it_is_told_how_to_start_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["experiment", "actuator", "--socket", str(tmp_path / "none.sock"), "--out", str(tmp_path)]
+    assert main(command) == exit_codes.NO_DAEMON
+    assert "no daemon answers" in capsys.readouterr().err
+
+
+def test_a_person_at_a_terminal_is_asked_and_may_skip(bench: Bench, tmp_path: Path) -> None:  # noqa: F811
+    """In real time, with a daemon, whose simulated robot nobody can hang a weight on: all but the empty arm is left."""
+    command = ["experiment", "actuator", "--joint", "right_adduction", "--weights", "10,20", "--trials", "1"]
+    answers = [("take everything off", ""), ("hang 10 g", "s"), ("hang 20 g", "s"), ("take everything off", "s")]
+    shown = run_at_terminal(bench, [*command, "--out", str(tmp_path)], answers)
+    entries = Notebook(tmp_path / "right_adduction", read_plan(tmp_path / "right_adduction")).entries
+    assert entries["trial 1, 10 g"] == {"skipped": "on request"}, shown
+    assert abs(entries["trial 0, 0 g"]["angle_rad"]) < 0.01
+    assert [loop["quick"] for loop in entries["trial 0, 0 g"]["loops"]] == [False] * SLOW + [True] * QUICK
+    assert "Trial 1 of 1: hang 20 g at 12 cm from the axle, nothing else" in shown
+    assert bench.wait_for(lambda status: bool(status["mode"] == "idle"))
+
+
+def read_plan(folder: Path) -> dict[str, object]:
+    plan: dict[str, object] = json.loads((folder / "notebook.jsonl").read_text(encoding="utf-8").splitlines()[0])[
+        "plan"
+    ]
+    return plan
+
+
+def run_at_terminal(bench: Bench, command: list[str], answers: list[tuple[str, str]]) -> str:  # noqa: F811
+    """What was shown. Each question is answered by the first of `answers` that it holds, once."""
+    person, terminal = pty.openpty()
+    environment = os.environ | {"MUDSKIPPER_SOCKET": str(bench.socket)}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "command_line.main", *command],
+        stdin=terminal,
+        stderr=terminal,
+        stdout=subprocess.DEVNULL,
+        env=environment,
+    )
+    os.close(terminal)
+    killer = threading.Timer(100.0, process.kill)
+    killer.start()
+    shown, fresh = "", ""
+    try:
+        while True:
+            chunk = os.read(person, 4096).decode(errors="replace")
+            shown, fresh = shown + chunk, fresh + chunk
+            if fresh.rstrip(" ").endswith("]"):
+                place = next((place for place, (part, _) in enumerate(answers) if part in fresh), None)
+                os.write(person, f"{'' if place is None else answers.pop(place)[1]}\n".encode())
+                fresh = ""
+    except OSError:  # the other end is closed: it has ended
+        pass
+    finally:
+        process.wait(LONGEST_S)
+        killer.cancel()
+        os.close(person)
+    return shown
+
+
+class Plain:
+    """An ActuatorBench of which only the configuration is asked."""
+
+    def __init__(self, text: str) -> None:
+        self.configuration = parse_configuration(text)
+
+    def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
+        raise NotImplementedError
+
+    def leave(self, folder: Path, person: Person) -> list[Path]:
+        return []
+
+
+def made_options(**values: object) -> argparse.Namespace:
+    return argparse.Namespace(**({"simulated": False, "apply": True, "config": None} | values))
+
+
+def made_desk(folder: Path, told: list[str]) -> Desk:
+    return Desk(folder, Willing(told.append), lambda done, total: None)
+
+
+def test_only_the_file_that_the_daemon_runs_with_is_changed(tmp_path: Path, example_text: str) -> None:
+    path = tmp_path / "other.toml"
+    path.write_text(example_text + "# edited\n", encoding="utf-8")
+    with pytest.raises(BenchError, match=r"the daemon does not run with .*other.toml"):
+        target_of(made_options(config=path), made_desk(tmp_path, []), Plain(example_text))
+
+
+def test_a_file_that_may_not_be_written_is_refused_before_the_work(
+    tmp_path: Path, example_text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(example_text, encoding="utf-8")
+    assert target_of(made_options(config=path), made_desk(tmp_path, []), Plain(example_text)) == path
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(BenchError, match="you may not write"):
+        target_of(made_options(config=path), made_desk(tmp_path, []), Plain(example_text))
+
+
+def test_a_doubtful_constant_is_not_written_and_a_good_one_is(tmp_path: Path, example_text: str) -> None:
+    path, plan, told = tmp_path / "mudskipper.toml", Plan(("right_sweep",), trials=4), list[str]()
+    path.write_text(example_text, encoding="utf-8")
+    doubtful, good = (fit_joint("right_sweep", plan, made_entries(plan, noise_a=noise), 0.083) for noise in (3.0, 0.02))
+    assert doubtful is not None and good is not None
+    assert "needs no change" in applied(path, [doubtful], made_desk(tmp_path, told))[0]
+    assert "is not written" in told[0] and path.read_text(encoding="utf-8") == example_text
+    assert "is changed" in applied(path, [good], made_desk(tmp_path, told))[0]
+    assert "+torque_constant_nm_a = 0.07" in told[-1]
+    written = load_configuration(path)
+    assert written.drive["right_sweep"].torque_constant_nm_a == pytest.approx(0.0719, abs=0.001)
+    assert written.friction["right_sweep"].coulomb_nm == pytest.approx(good.friction_nm[0], abs=1e-4)
+    assert written.friction["right_sweep"].viscous_nm_s == pytest.approx(good.viscous_nm_s[0], abs=1e-4)
+
+
+def test_what_cannot_be_applied_costs_no_report(tmp_path: Path, example_text: str) -> None:
+    plan, path = Plan(("right_sweep",), trials=4), tmp_path / "mudskipper.toml"
+    path.write_text(example_text, encoding="utf-8")
+    entries = {key: entry | {"current_a": 2.0 * entry["current_a"]} for key, entry in made_entries(plan).items()}
+    fit = fit_joint("right_sweep", plan, entries, 0.083)
+    assert fit is not None
+    told, status = applied(path, [fit], made_desk(tmp_path, []))
+    assert told.startswith("nothing was applied: the configuration stays as it is") and "current_limit_a" in told
+    assert "run the same command again" in told and status == exit_codes.REFUSED

@@ -1,0 +1,186 @@
+"""Conducting an experiment at the bench: what a person is asked and told, and how it ends."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from errno import ENOSPC
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.experiments.conduct_bench import Desk, Finding, conduct_bench
+from command_line.experiments.terminal_prompt import AbsentPersonError, TerminalPerson
+from experiments.reports.report_page import Section
+from experiments.robot.bench_errors import BarredError, BenchError, GoneError
+from experiments.trials.notebook import Notebook
+
+ANSWERS = {"": "it hangs", "s": "skip it", "r": "the last one again"}
+
+
+@contextmanager
+def typed(monkeypatch: pytest.MonkeyPatch, text: str) -> Iterator[None]:
+    """A terminal at which this is typed, and then nothing more."""
+    source, sink = os.pipe()
+    os.write(sink, text.encode())
+    os.close(sink)
+    with open(source, encoding="utf-8") as stream:
+        monkeypatch.setattr(sys, "stdin", stream)
+        yield
+
+
+def nothing() -> None:
+    pass
+
+
+def test_an_answer_is_asked_for_until_it_is_one(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with typed(monkeypatch, "what\nS\n"):
+        assert TerminalPerson().ask("Hang 10 g on it.", ANSWERS, nothing) == "s"
+    said = capsys.readouterr().err
+    assert said.count("Hang 10 g on it.\n  [Enter: it hangs, s: skip it, r: the last one again]") == 2
+    assert "'what' is none of the answers" in said
+
+
+def test_a_number_is_asked_for_until_it_is_within_its_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    with typed(monkeypatch, "many\nnan\n99\n2,5\n"):
+        assert TerminalPerson().ask_number("How far?", 1.0, 5.0, nothing) == 2.5
+
+
+def test_the_robot_is_looked_after_while_a_person_thinks(monkeypatch: pytest.MonkeyPatch) -> None:
+    source, sink = os.pipe()
+    looks: list[int] = []
+
+    def look() -> None:
+        looks.append(1)
+        if len(looks) == 3:
+            os.write(sink, b"\n")
+            os.close(sink)
+
+    with open(source, encoding="utf-8") as stream:
+        monkeypatch.setattr(sys, "stdin", stream)
+        assert TerminalPerson().ask("Well?", ANSWERS, look) == ""
+    assert len(looks) == 3
+
+
+def test_an_enter_that_was_pressed_before_a_question_does_not_answer_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    keyboard, terminal = os.openpty()
+    os.write(keyboard, b"\n\n")  # in haste, while the robot still walked
+    looks: list[int] = []
+
+    def look() -> None:
+        looks.append(1)
+        os.write(keyboard, b"s\n")
+
+    with open(terminal, encoding="utf-8") as stream:
+        monkeypatch.setattr(sys, "stdin", stream)
+        assert TerminalPerson().ask("Are your hands out of the mud?", ANSWERS, look) == "s"
+    os.close(keyboard)
+    assert looks == [1]
+
+
+def test_where_nobody_can_answer_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    with typed(monkeypatch, ""), pytest.raises(AbsentPersonError, match="run it on a terminal"):
+        TerminalPerson().ask("Well?", ANSWERS, nothing)
+
+
+def options(folder: Path, **changes: object) -> argparse.Namespace:
+    return argparse.Namespace(**({"out": folder, "json": False, "simulated": True, "name": "trial"} | changes))
+
+
+def found(desk: Desk) -> Finding:
+    desk.person.tell(desk.person.ask("Well?", ANSWERS, nothing) or "it hangs")
+    return Finding({"experiment": "trial", "value": 1.0}, "A trial", [Section("Result", "Fine.")], "value 1.0")
+
+
+def test_it_ends_in_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert conduct_bench(options(tmp_path / "out"), "trials", found) == exit_codes.OK
+    said = capsys.readouterr()
+    assert said.out == "value 1.0\n" and "report.html" in said.err
+    assert json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["value"] == 1.0
+
+
+def test_json_alone_goes_to_standard_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def run(desk: Desk) -> Finding:
+        desk.show(1, 2)
+        desk.person.tell("half of it")
+        return found(desk)
+
+    conduct_bench(options(tmp_path, json=True), "trials", run)
+    said = capsys.readouterr()
+    assert json.loads(said.out) == {"experiment": "trial", "value": 1.0, "simulated": True}
+    assert said.err.splitlines()[0] == "half of it"  # no bar of progress either, where nobody watches
+    assert not {"\033", "\r"} & set(said.err)
+
+
+def test_without_a_folder_it_makes_one_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    conduct_bench(options(tmp_path, out=None), "trials", found)
+    assert (tmp_path / "mudskipper-trial" / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("problem", "status", "sentence"),
+    [
+        (BenchError("the robot no longer holds"), exit_codes.REFUSED, "the robot no longer holds"),
+        (BarredError("only for members"), exit_codes.NOT_PERMITTED, "only for members"),
+        (KeyboardInterrupt(), exit_codes.INTERRUPTED, "interrupted"),
+    ],
+)
+def test_what_was_measured_is_kept_whatever_ends_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], problem: BaseException, status: int, sentence: str
+) -> None:
+    def run(desk: Desk) -> Finding:
+        Notebook(desk.folder, {}).write("10 g", {"torque_nm": 0.1})
+        raise problem
+
+    assert conduct_bench(options(tmp_path), "trials", run) == status
+    said = capsys.readouterr().err
+    assert sentence in said and "the same command goes on from there" in said
+    assert Notebook(tmp_path, {}).begun
+
+
+def test_where_nothing_was_measured_nothing_is_said_to_be_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(desk: Desk) -> Finding:
+        Notebook(desk.folder, {})
+        raise GoneError("no daemon answers")
+
+    assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.NO_DAEMON
+    assert capsys.readouterr().err.strip().endswith("no daemon answers")
+
+
+def test_questions_go_where_data_does_not(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    with typed(monkeypatch, "\n"):
+        TerminalPerson().ask("Well?", ANSWERS, nothing)
+    said = capsys.readouterr()
+    assert not said.out and "Well?" in said.err
+
+
+def test_a_disk_that_is_full_is_told_with_how_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def run(desk: Desk) -> Finding:
+        Notebook(desk.folder, {}).write("one", {})
+        raise OSError(ENOSPC, "No space left on device")
+
+    assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.UNHEALTHY
+    told = capsys.readouterr().err
+    assert f"{tmp_path}: No space left on device" in told
+    assert "the same command goes on from there" in told
+
+
+def test_another_plan_is_not_told_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Notebook(tmp_path, {"depth_m": 0.03}).write("one", {})
+
+    def run(desk: Desk) -> Finding:
+        Notebook(desk.folder, {"depth_m": 0.05})
+        raise AssertionError("it is refused")
+
+    assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.REFUSED
+    assert "the same command" not in capsys.readouterr().err

@@ -1,0 +1,214 @@
+"""`mudskipper experiment estimation`: what it refuses, and what it prints and writes of one short trial."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import command_line.experiments.estimation
+from command_line import exit_codes
+from command_line.main import main
+from experiments.estimation.evaluation import Plan
+from simulation.mud.clay import MUDS, Clay
+from tests.command_line.command_lines import refusal
+from tests.waiting import LONGEST_S
+
+COMMAND = ("experiment", "estimation", "--simulated")
+SHORT = (*COMMAND, "--seeds", "1", "--setup", "single", "--mud", "49.5", "--layers", "none")
+PROMISED = {"setup", "mud", "coefficient", "method", "median", "p95", "coverage", "strides"}
+
+
+@pytest.fixture(autouse=True)
+def one_stride(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each trial, instead of two and eight."""
+    monkeypatch.setattr(command_line.experiments.estimation, "Plan", partial(Plan, single_strides=1, walking_strides=1))
+
+
+@pytest.fixture
+def no_trials(monkeypatch: pytest.MonkeyPatch) -> None:
+    def judge(*arguments: Any) -> None:
+        raise AssertionError("it must be refused before any trial")
+
+    monkeypatch.setattr(command_line.experiments.estimation, "judge", judge)
+
+
+# what is refused
+
+
+def test_without_a_simulated_load_cell_there_is_no_truth(capsys: pytest.CaptureFixture[str], no_trials: None) -> None:
+    sentence = refusal(capsys, "experiment", "estimation")
+    assert sentence.startswith("mudskipper: ")
+    assert "--simulated" in sentence
+
+
+@pytest.mark.parametrize("layers", ["fog", "noise,fog", "none,noise"])
+def test_a_layer_that_there_is_not_is_named(layers: str, capsys: pytest.CaptureFixture[str], no_trials: None) -> None:
+    sentence = refusal(capsys, *COMMAND, "--layers", layers)
+    assert repr("none" if "none" in layers else "fog") in sentence
+    assert "clinging" in sentence
+
+
+@pytest.mark.parametrize("percent", ["43.9", "56.1", "-1", "nan", "inf"])
+def test_a_water_content_out_of_range_is_named_with_the_range(
+    percent: str, capsys: pytest.CaptureFixture[str], no_trials: None
+) -> None:
+    sentence = refusal(capsys, *COMMAND, f"--mud={percent}")
+    assert f"{percent} %" in sentence
+    assert "44 to 56" in sentence
+
+
+@pytest.mark.parametrize("strength", ["49", "50001", "-1", "nan", "inf"])
+def test_a_strength_out_of_bounds_is_named_with_its_bounds(
+    strength: str, capsys: pytest.CaptureFixture[str], no_trials: None
+) -> None:
+    sentence = refusal(capsys, *COMMAND, f"--strength={strength}")
+    assert f"{strength}: " in sentence
+    assert "50 to 50000 Pa" in sentence
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--mud", "wet"),
+        ("--strength", "firm"),
+        ("--seeds", "0"),
+        ("--seeds", "1001"),
+        ("--setup", "flying"),
+        ("--mud", "49.5", "--strength", "1500"),
+    ],
+)
+def test_other_nonsense_is_wrong_usage(
+    options: tuple[str, ...], capsys: pytest.CaptureFixture[str], no_trials: None
+) -> None:
+    assert options[0] in refusal(capsys, *COMMAND, *options)
+
+
+def test_a_place_that_cannot_be_written_is_noticed_before_the_work(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, no_trials: None
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert main([*SHORT, "--out", str(tmp_path / "file" / "below")]) == exit_codes.UNHEALTHY
+    assert "file/below: Not a directory" in capsys.readouterr().err
+    assert "is no folder" in refusal(capsys, *SHORT, "--out", str(tmp_path / "file"))
+
+
+# what is planned
+
+
+def planned(monkeypatch: pytest.MonkeyPatch, *options: str) -> Plan:
+    """The plan that the command would have run."""
+    plans = list[Plan]()
+
+    def judge(plan: Plan, *arguments: Any) -> None:
+        plans.append(plan)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command_line.experiments.estimation, "judge", judge)
+    assert main([*COMMAND, *options]) == exit_codes.INTERRUPTED
+    return plans[0]
+
+
+def test_by_default_all_muds_setups_and_layers_are_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert planned(monkeypatch) == Plan(single_strides=1, walking_strides=1)
+
+
+def test_muds_and_setup_can_be_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = planned(monkeypatch, "--setup", "single", "--mud", "48.5", "--mud", "50", "--seeds", "3")
+    assert ([clay.name for clay in plan.single], plan.walking, plan.seeds) == (["48.5", "50"], (), 3)
+    assert plan.single[0].strength_pa == pytest.approx(MUDS["48.5"].strength_pa)
+    plan = planned(monkeypatch, "--setup", "walking", "--strength", "1500")
+    assert (plan.single, plan.walking) == ((), (Clay("1500 Pa", 1500.0),))
+
+
+@pytest.mark.parametrize("layers", ["none", ""])
+def test_without_layers_nothing_is_disturbed(layers: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = planned(monkeypatch, "--layers", layers)
+    assert (plan.disturbances.clinging_n, plan.repeats, plan.torque) == (0.0, False, False)
+
+
+# what is printed and written
+
+
+def test_json_is_one_object_with_the_promised_keys_and_is_written_too(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "made" / "here"
+    assert main([*SHORT, "--json", "--out", str(out)]) == exit_codes.OK
+    printed = capsys.readouterr()
+    report = json.loads(printed.out, parse_constant=pytest.fail)  # no NaN: that is no JSON
+    assert printed.out.count("\n") == 1
+    assert set(report) >= {"errors", "plates", "boundaries", "settings"}
+    assert len(report["errors"]) == 3 * 2  # coefficients and methods
+    for row in report["errors"]:
+        assert set(row) >= PROMISED
+        assert (row["setup"], row["mud"], row["strides"]) == ("single flipper", "49.5", 2)
+        assert 0.0 <= row["median"] <= row["p95"]
+        assert 0.0 <= row["coverage"] <= 1.0
+    assert json.loads((out / "summary.json").read_text(encoding="utf-8")) == report
+    assert (out / "estimation.png").read_bytes().startswith(b"\x89PNG")
+    assert "summary.json" in printed.err and "report.html" in printed.err
+
+
+def test_a_person_gets_a_table_of_errors_plates_and_boundaries(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(SHORT) == exit_codes.OK
+    errors, plates, boundaries = capsys.readouterr().out.split("\n\n")
+    head, *rows = errors.splitlines()
+    assert head.split()[:3] == ["setup", "mud", "method"]
+    assert len(rows) == 6
+    assert all(row.startswith("single flipper  49.5 %") and row.count("%") >= 5 for row in rows)
+    assert plates.startswith("The paper's upright plate")
+    assert boundaries.strip() == "Boundaries: none walked over"
+
+
+def test_dashes_stand_where_nothing_was_told() -> None:
+    row: dict[str, Any] = {"setup": "walking", "mud": "49.5", "coefficient": "k_s", "method": "default"}
+    row |= {"median": None, "p95": None}
+    row |= {"bias": None, "coverage": None, "strides": 0, "bounds": 4, "bounds_hold": 1.0, "not_valid": 0}
+    border = {"from": "49.5", "to": "51.2", "crossings": 2, "within_two": 0.5, "most_strides": "never"}
+    plate: dict[str, Any] = {"setup": "walking", "mud": "49.5", "coefficient": "k_s", "upright_over_leaning": 0.9}
+    plate |= {"estimate_over_upright": None, "lean_share": None}
+    errors, plates, boundaries = command_line.experiments.estimation.text_of(
+        {"errors": [row], "plates": [plate], "boundaries": [border]}
+    ).split("\n\n")
+    assert errors.splitlines()[1].split()[5:] == ["-", "-", "-", "-", "0", "4", "100.0", "%", "0"]
+    assert plates.splitlines()[2].split()[4:] == ["0.900", "-", "-"]
+    assert boundaries.splitlines()[2].split() == ["49.5", "%", "51.2", "%", "2", "50.0", "%", "never"]
+
+
+# Ctrl-C
+
+
+@pytest.mark.parametrize("seeds", ["1", "100"])
+def test_ctrl_c_ends_it_at_once_and_in_silence(seeds: str) -> None:
+    """In a terminal all processes get the signal: of one trial, while another worker waits, and of a hundred, which
+    take minutes.
+    """
+    command = [sys.executable, "-m", "command_line.main", *COMMAND, "--setup", "walking", "--mud", "49.5"]
+    command += ["--seeds", seeds, "--layers", "none"]
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        wait_for_workers(run.pid)
+        os.killpg(run.pid, signal.SIGINT)
+        printed, complaints = run.communicate(timeout=LONGEST_S)
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(run.pid, signal.SIGKILL)
+    assert run.returncode == exit_codes.INTERRUPTED
+    assert (printed, complaints) == ("", "")
+
+
+def wait_for_workers(pid: int) -> None:
+    children, deadline_s = Path(f"/proc/{pid}/task/{pid}/children"), time.monotonic() + LONGEST_S
+    while not children.read_text().split() and time.monotonic() < deadline_s:
+        time.sleep(0.05)
+    time.sleep(0.3)  # a trial has begun

@@ -1,0 +1,205 @@
+"""`mudskipper experiment loadcell` from its arguments to its report."""
+
+from __future__ import annotations
+
+import json
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import exit_codes
+from command_line.main import main
+from experiments.loadcell.comparison import CompareError, compared_with, load_flipper
+from experiments.loadcell.fits import OfMud
+from simulation.mud.clay import clay_of_water
+from simulation.test_rig.load_cell import measure_shear
+from simulation.test_rig.load_cell_bench import PAPER_PLATE
+from simulation.test_rig.load_cell_emulator import AmplifierParameters, EmulatedAmplifier
+
+SHORT = ["experiment", "loadcell", "--simulated", "--json", "--trials", "1", "--mud", "48.6"]
+PLATE = {"width": 0.025, "height": 0.07, "thickness": 0.004}
+FLIPPER = {
+    "settings": {"depth_m": 0.04},
+    "plate_m": PLATE,
+    "muds": [{"mud": "48.60", "k_p": {"value": 1.1e6, "std_error": 4e4}, "k_s": {"value": None}, "k_e": 3}],
+}
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    status = main(arguments)
+    told = capsys.readouterr()
+    return status, told.out, told.err
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("loadcell")
+
+
+@pytest.fixture(scope="module")
+def report(folder: Path) -> dict[str, Any]:
+    (folder / "flipper.json").write_text(json.dumps(FLIPPER))
+    printed = StringIO()
+    with redirect_stdout(printed):
+        status = main([*SHORT, "--out", str(folder / "out"), "--compare", str(folder / "flipper.json")])
+    assert status == exit_codes.OK
+    told: dict[str, Any] = json.loads(printed.getvalue())
+    return told
+
+
+def test_the_true_coefficients_stand_beside_those_of_a_simulated_mud(report: dict[str, Any]) -> None:
+    (told,) = report["muds"]
+    truth = report["truth"]["48.6"]
+    for name in ("k_p", "k_s", "k_e"):
+        assert told[name]["value"] == pytest.approx(truth[name], rel=0.03)
+    shear_n = measure_shear(clay_of_water(48.6), PAPER_PLATE, 0.0, 0.0, 0.03, 0.1)
+    assert truth["k_s"] == pytest.approx(shear_n / (0.03 * 0.03**2 / 2.0), rel=1e-3)
+
+
+def test_a_simulated_experiment_needs_no_questions_and_leaves_a_report(report: dict[str, Any], folder: Path) -> None:
+    assert report["experiment"] == "loadcell"
+    names = {path.name for path in (folder / "out").iterdir()}
+    pictures = {"coefficients.png", "comparison.png", "mud_48.6.png"}
+    assert {"report.html", "summary.json", "notebook.jsonl", "calibration.json", "raw", *pictures} <= names
+    assert all((folder / "out" / trial["file"]).exists() for trial in report["trials"])
+    page = (folder / "out" / "report.html").read_text()
+    assert page.count("data:image/png") == 3 and "Compared with the flipper" in page
+
+
+def test_the_coefficients_are_those_of_the_mud(report: dict[str, Any]) -> None:
+    (mud,) = report["muds"]
+    shear_n = measure_shear(clay_of_water(48.6), PAPER_PLATE, 0.0, 0.0, 0.03, 0.1)
+    assert mud["mud"] == "48.6"
+    assert mud["k_s"]["value"] == pytest.approx(shear_n / (0.03 * 0.03**2 / 2.0), rel=0.03)
+    assert all(0.0 < mud[name]["std_error"] < 0.1 * mud[name]["value"] for name in ("k_p", "k_e"))
+
+
+def test_the_flipper_stands_beside_it_where_it_has_a_value(report: dict[str, Any]) -> None:
+    (row,) = report["compared"]
+    (mud,) = report["muds"]
+    assert (row["mud"], row["coefficient"]) == ("48.6", "k_p")
+    assert row["ratio"] == pytest.approx(1.1e6 / mud["k_p"]["value"])
+
+
+def test_whoever_reads_the_ratio_reads_of_both_plates_and_depths(report: dict[str, Any], folder: Path) -> None:
+    page = (folder / "out" / "report.html").read_text()
+    for told in (
+        "3 x 3.5 cm, 4 mm thick, upright",
+        "2.5 x 7 cm, 4 mm thick, leaning",
+        "went 4 cm deep",
+        "8 to 12 % more true k_p",
+    ):
+        assert told in page
+
+
+def test_what_all_trials_have_alike_is_part_of_the_doubt(report: dict[str, Any]) -> None:
+    (mud,) = report["muds"]
+    told = mud["k_s"]
+    assert told["shared_error"] == pytest.approx(2.0 * 0.5 / 30.0 * told["value"], rel=0.01)
+    assert told["std_error"] == pytest.approx((told["trials_error"] ** 2 + told["shared_error"] ** 2) ** 0.5)
+
+
+def test_another_mud_is_added_to_what_is_there(
+    report: dict[str, Any], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, data, told = run(capsys, *SHORT, "--mud", "50.3", "--out", str(folder / "out"))
+    assert status == exit_codes.OK
+    assert "2 trials are in" in told and "2 are left" in told
+    muds = {mud["mud"]: mud for mud in json.loads(data)["muds"]}
+    assert muds["48.6"]["k_p"]["value"] == pytest.approx(report["muds"][0]["k_p"]["value"], rel=0.03)
+    assert muds["50.3"]["k_p"]["value"] < muds["48.6"]["k_p"]["value"]
+
+
+def test_another_depth_in_the_same_folder_is_refused(
+    report: dict[str, Any], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, _, told = run(capsys, *SHORT, "--depth", "2", "--out", str(folder / "out"))
+    assert status == exit_codes.REFUSED
+    assert "depth_m" in told and "--out" in told
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ([], "--port"),
+        (["--simulated", "--mud", "clay"], "water content"),
+        (["--simulated", "--mud", "70"], "44 to 56"),
+        (["--simulated", "--mud", "50", "--mud", "50"], "same name"),
+        (["--simulated", "--depth", "4"], "plate's height"),
+        (["--simulated", "--format", "words"], "column1 to column9"),
+        (["--simulated", "--unit", "stone"], "must be one of"),
+        (["--port", "/dev/nothing", "--position"], "--position PATH"),
+        (["--port", "/dev/nothing", "--position", "/dev/other"], "--position-step"),
+        (["--port", "/dev/nothing", "--position", "/dev/nothing"], "two ports"),
+        (["--port", "/dev/nothing", "--position", "/dev/../dev/nothing"], "two ports"),
+    ],
+)
+def test_what_cannot_be_is_refused_at_once(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], sentence: str
+) -> None:
+    status, _, told = run(capsys, "experiment", "loadcell", *arguments)
+    assert status == exit_codes.USAGE
+    assert sentence in told
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--plate", "3"], ["--plate", "3x900"], ["--speed", "0"], ["--baud", "5"], ["--scale", "-1"]]
+)
+def test_an_argument_out_of_bounds_is_refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["experiment", "loadcell", *arguments])
+    assert arguments[0] in capsys.readouterr().err
+
+
+def test_a_port_that_there_is_not_ends_with_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    port = str(tmp_path / "ttyNONE")
+    status, _, told = run(capsys, "experiment", "loadcell", "--port", port, "--out", str(tmp_path / "out"))
+    assert status == exit_codes.REFUSED
+    assert f"there is no serial port {port}" in told
+
+
+@pytest.mark.parametrize("text", ["", "[1]", '{"muds": 3}'])
+def test_a_file_that_is_no_summary_is_refused_by_its_name(tmp_path: Path, text: str) -> None:
+    (tmp_path / "summary.json").write_text(text)
+    with pytest.raises(CompareError, match="summary.json"):
+        load_flipper(tmp_path)
+
+
+def test_muds_are_compared_by_what_their_names_mean() -> None:
+    told = OfMud(1.0e6, 1e4, (1.0e6,), 0.0)
+    muds = {"48.6": dict.fromkeys(("k_p", "k_s", "k_e"), told), "Pond": {"k_p": told}}
+    flipper = {
+        "muds": [{"mud": "48.60 %", "k_p": {"value": 2e6, "std_error": 0}}, {"mud": "pond", "k_p": {"value": -1}}]
+    }
+    (row,) = compared_with(flipper, muds)
+    assert (row.mud, row.coefficient, row.ratio) == ("48.6", "k_p", 2.0)
+    assert row.ratio_std_error == pytest.approx(0.02)
+    assert compared_with(None, muds) == []
+
+
+def test_a_simulated_hand_with_an_encoder_finds_the_mud_as_well(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, data, _ = run(capsys, *SHORT, "--position", "--seed", "3", "--out", str(tmp_path / "out"))
+    assert status == exit_codes.OK
+    report = json.loads(data)
+    (told,), truth = report["muds"], report["truth"]["48.6"]
+    for name in ("k_p", "k_s", "k_e"):
+        assert told[name]["value"] == pytest.approx(truth[name], rel=0.03)
+    assert all(trial["is_measured"] and trial["position"]["breaks"] == 0 for trial in report["trials"])
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "place came from an encoder" in page and "known to within" in page
+
+
+def test_an_encoder_s_port_that_there_is_not_ends_with_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell = EmulatedAmplifier(lambda _: 0.0, AmplifierParameters(), tmp_path / "cell")
+    ports = ["--port", str(tmp_path / "cell"), "--position", str(tmp_path / "none"), "--position-step", "10"]
+    status, _, told = run(capsys, "experiment", "loadcell", *ports, "--out", str(tmp_path / "out"))
+    cell.close()
+    assert status == exit_codes.REFUSED
+    assert "the stage's encoder: there is no serial port" in told and "go on without --position" in told

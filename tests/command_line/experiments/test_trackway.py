@@ -1,0 +1,247 @@
+"""`mudskipper experiment trackway`, `sweep` and `mud-fit`: what they refuse, plan, print and write."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import exit_codes
+from command_line.main import main
+from experiments.trackway import comparison as trackway
+from experiments.trackway import depth_sweep, mud_fit
+from experiments.trackway.depth_rule import METHODS
+from experiments.trackway.one_mud import constant_walks
+from experiments.trackway.paper_table import ADAPTIVE
+from experiments.trackway.walk import Walk, WalkedStride
+from experiments.trials.notebook import Notebook
+from simulation.mud.clay import MUDS
+from tests.command_line.command_lines import failure, refusal
+
+MODULES = {"trackway": trackway, "sweep": depth_sweep, "mud-fit": mud_fit}
+NAMES = list(MODULES)
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where results go that nobody named a place for."""
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def no_walks(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(*arguments: Any) -> None:
+        raise AssertionError("it must be refused before any walk")
+
+    for module in MODULES.values():
+        monkeypatch.setattr(module, "run", run)
+
+
+# what is refused
+
+
+def test_without_a_daemon_nobody_walks_over_a_real_trackway(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, no_walks: None
+) -> None:
+    status = main(["experiment", "trackway", "--socket", str(tmp_path / "none"), "--out", str(tmp_path)])
+    assert status == exit_codes.NO_DAEMON
+    assert "no daemon answers" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [("--method", "paper"), ("--mud", "soft", "--mud", "soft")])
+def test_what_a_real_trackway_cannot_have_is_refused(
+    arguments: tuple[str, str], capsys: pytest.CaptureFixture[str], no_walks: None
+) -> None:
+    assert arguments[0] in refusal(capsys, "experiment", "trackway", *arguments)
+
+
+@pytest.mark.parametrize("name", ["sweep", "mud-fit"])
+def test_without_simulation_there_are_no_muds(name: str, capsys: pytest.CaptureFixture[str], no_walks: None) -> None:
+    assert "--simulated" in refusal(capsys, "experiment", name)
+
+
+@pytest.mark.parametrize("name", ["trackway", "sweep"])
+def test_a_method_that_there_is_not_is_named_with_those_that_there_are(
+    name: str, capsys: pytest.CaptureFixture[str], no_walks: None
+) -> None:
+    sentence = refusal(capsys, "experiment", name, "--simulated", "--method", "paper", "--method", "fog")
+    assert "'fog': must be one of default, paper" in sentence
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("trackway", "--seeds", "0"),
+        ("trackway", "--compartment", "0.1"),
+        ("trackway", "--compartment", "nan"),
+        ("sweep", "--strength", "49"),
+        ("sweep", "--strength", "firm"),
+        ("mud-fit", "--seeds", "1001"),
+    ],
+)
+def test_other_nonsense_is_wrong_usage(
+    arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str], no_walks: None
+) -> None:
+    assert arguments[1] in refusal(capsys, "experiment", *arguments, "--simulated")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_place_that_cannot_be_written_is_noticed_before_the_work(
+    name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, no_walks: None
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert "file: is no folder" in refusal(capsys, "experiment", name, "--simulated", "--out", str(tmp_path / "file"))
+    below = str(tmp_path / "file" / "below")
+    assert "file/below: Not a directory" in failure(capsys, "experiment", name, "--simulated", "--out", below)
+
+
+# what is planned
+
+
+def planned(monkeypatch: pytest.MonkeyPatch, name: str, *options: str) -> Any:
+    """The plan that the command would have run; Ctrl-C comes instead."""
+    plans = list[Any]()
+
+    def run(plan: Any, *arguments: Any) -> None:
+        plans.append(plan)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(MODULES[name], "run", run)
+    assert main(["experiment", name, "--simulated", *options]) == exit_codes.INTERRUPTED
+    return plans[0]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_by_default_it_is_the_experiments_own_plan(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert planned(monkeypatch, name) == MODULES[name].Plan()
+
+
+def test_trials_methods_and_compartments_can_be_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    options = ("--seeds", "2", "--compartment", "1.22", "--method", "paper", "--method", "default", "--method", "paper")
+    plan = planned(monkeypatch, "trackway", *options)
+    assert (plan.seeds, plan.compartment_m) == (2, 1.22)
+    assert [rule.name for rule in plan.rules] == ["3 cm", "5 cm", ADAPTIVE, "adaptive, default"]
+
+
+def test_strengths_of_a_sweep_can_be_chosen_and_come_in_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = planned(monkeypatch, "sweep", "--strength", "3000", "--strength", "500", "--strength", "500")
+    assert plan.strengths_pa == (500.0, 3000.0)
+    assert planned(monkeypatch, "sweep", "--method", "paper", "--seeds", "1").methods == ("paper",)
+    assert planned(monkeypatch, "mud-fit", "--seeds", "1").seeds == 1
+
+
+# what is printed and written
+
+
+def stride(mud: str, step_m: float = 0.12) -> WalkedStride:
+    return WalkedStride(mud, 1.8, 0.03, step_m, 2.0, 0.0)
+
+
+def run_trackway(plan: trackway.Plan, notebook: Notebook, show: Callable[[int, int], None]) -> dict[str, Any]:
+    """6 cm/s everywhere; one trial slips in the second stride of the second mud, and never sees the third."""
+    whole = Walk([stride(mud) for mud in MUDS for _ in range(4)], "")
+    short = Walk([stride("48.5")] * 4 + [stride("53.1"), stride("53.1", 0.02)], "")
+    walks = {rule.name: [whole] * (plan.seeds - 1) + [short] for rule in plan.rules}
+    return trackway.report_of(plan, walks, {mud: {0.0275: 8.0} for mud in MUDS})
+
+
+def run_sweep(plan: depth_sweep.Plan, show: Callable[[int, int], None]) -> dict[str, Any]:
+    plan = replace(plan, depths_m=(0.03,))
+    orders = plan.method_walks() + constant_walks(plan.clays(), plan.depths_m, plan.seeds)
+    return depth_sweep.report_of(plan, [(order, Walk([stride("mud")] * 4, "")) for order in orders])
+
+
+def run_fit(plan: mud_fit.Plan, show: Callable[[int, int], None]) -> dict[str, Any]:
+    today = mud_fit.present()
+    grounds = [mud_fit.Ground(today.damping_n_s_m, strength_pa) for strength_pa in today.strengths_pa.values()]
+    return mud_fit.report_of(plan, {ground: {0.03: 7.0, 0.05: 5.0} for ground in grounds}, today)
+
+
+@pytest.fixture
+def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)  # results go to a folder here unless another is named
+    for module, run in ((trackway, run_trackway), (depth_sweep, run_sweep), (mud_fit, run_fit)):
+        monkeypatch.setattr(module, "run", run)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_json_is_one_object_and_is_written_too(
+    name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, made_up: None
+) -> None:
+    out = tmp_path / "made" / "here"
+    assert main(["experiment", name, "--simulated", "--json", "--out", str(out)]) == exit_codes.OK
+    printed = capsys.readouterr()
+    report = json.loads(printed.out, parse_constant=pytest.fail)  # no NaN: that is no JSON
+    assert printed.out.count("\n") == 1
+    assert json.loads((out / "summary.json").read_text(encoding="utf-8")) == report
+    assert "summary.json" in printed.err
+
+
+@pytest.mark.parametrize("name", ["trackway", "sweep"])
+def test_the_walks_are_drawn(name: str, tmp_path: Path, made_up: None) -> None:
+    assert main(["experiment", name, "--simulated", "--out", str(tmp_path)]) == exit_codes.OK
+    assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_simulated_trackway_leaves_a_page_that_says_so_also_where_no_folder_is_named(made_up: None) -> None:
+    assert main(["experiment", "trackway", "--simulated"]) == exit_codes.OK
+    assert "Table I of the paper (simulated)</h1>" in Path("mudskipper-trackway/report.html").read_text("utf-8")
+
+
+def test_the_trackways_json_has_the_promised_keys(capsys: pytest.CaptureFixture[str], made_up: None) -> None:
+    main(["experiment", "trackway", "--simulated", "--json"])
+    report = json.loads(capsys.readouterr().out)
+    assert list(report["table"]) == ["3 cm", "5 cm", "adaptive"]
+    for row in report["table"].values():
+        assert list(row) == ["48.5", "53.1", "45.3"]
+        assert all(set(cell) >= {"mean", "sd", "failures"} for cell in row.values())
+    assert report["best_constant_depth"]["48.5"] == {"depth_cm": 2.75, "mean": 8.0}
+
+
+def test_a_person_gets_table_one_beside_the_papers(capsys: pytest.CaptureFixture[str], made_up: None) -> None:
+    main(["experiment", "trackway", "--simulated", "--seeds", "3"])
+    speeds, failed, best, short = capsys.readouterr().out.split("\n\n")
+    lines = [" ".join(line.split()) for line in speeds.splitlines()]
+    assert lines[2] == "3 cm 6.00 ± 0.00 5.17 ± 1.44 6.00 ± 0.00 5.72"  # 6, 6, and 3.5 of two strides
+    assert lines[4] == "paper 7.6 ± 0.5, ours outside 2.1 ± 0.8, ours outside 7.2 ± 0.5, ours outside 5.63"
+    assert "none of 12" in failed and "1 (0) slippage of 10" in failed
+    assert "2 past the end, 1 stuck in 53.1" in failed
+    assert best.splitlines()[2].split()[:3] == ["depth", "2.75", "cm"]
+    assert short.strip().endswith("3 times.")
+
+
+def test_a_person_gets_each_strength_and_where_the_methods_settle(
+    capsys: pytest.CaptureFixture[str], made_up: None
+) -> None:
+    main(["experiment", "sweep", "--simulated", "--strength", "500", "--strength", "1500"])
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[2:]] == ["500", "1500"]
+    assert all(line.count("100 %") == len(METHODS) and "0/4" in line for line in lines[2:])
+
+
+def test_a_person_gets_fitted_beside_present_values(capsys: pytest.CaptureFixture[str], made_up: None) -> None:
+    main(["experiment", "mud-fit", "--simulated"])
+    values, cells, damping = capsys.readouterr().out.split("\n\n")
+    assert f"{MUDS['48.5'].strength_pa:.0f} Pa" in values
+    assert "rail damping" in values
+    assert " ".join(cells.splitlines()[1].split()) == "3 cm w = 48.5 % 7.6 ± 0.5 7.00 7.00"
+    assert len(cells.splitlines()) == 1 + 6
+    assert len(damping.splitlines()) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--compartment", "0.5"), "--compartment is for --simulated"),
+        (("--simulated", "--mud", "48.5"), "--mud is for a real trackway"),
+        (("--mud", "48.5=5"), "its length from 20 to 10000 cm"),
+    ],
+)
+def test_muds_and_their_lengths_are_given_where_they_count(
+    arguments: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str], no_walks: None
+) -> None:
+    assert sentence in refusal(capsys, "experiment", "trackway", *arguments)

@@ -1,0 +1,378 @@
+"""`install` and `uninstall` on a made-up system, whose commands are only noted down."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sysconfig
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.install import installation, service_plan
+from command_line.install.installation import install, problem_with_place, uninstall
+from command_line.install.service_plan import (
+    CONFIGURATION,
+    LINK,
+    MANIFEST,
+    NETWORK,
+    SOURCES,
+    UNIT,
+    Plan,
+    System,
+    load_sources,
+    plan_installation,
+    plan_removal,
+)
+from command_line.install.service_steps import Command, Outcome, Remove, StepError, WriteFile, perform, run_command
+from command_line.main import build_parser
+from tests.folders import ROOT
+
+PREFIX = Path("/opt/robot/venv")
+
+
+class Machine:
+    """A root folder, and systemctl as far as it matters here."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.enabled: set[str] = set()
+        self.ran: list[str] = []
+        self.failing = ""
+
+    def run(self, words: Sequence[str]) -> Outcome:
+        line = " ".join(word for word in words if not word.startswith("--root"))
+        if line.startswith("systemctl is-enabled "):
+            return Outcome(0, "enabled\n" if words[-1] in self.enabled else "disabled\n")
+        if line.startswith("systemctl is-active "):
+            return Outcome(0, "active\n" if words[-1] in self.enabled else "inactive\n")
+        if self.failing and self.failing in line:
+            return Outcome(1, "something\nFailed to connect to bus\n")
+        self.ran.append(line)
+        if line.startswith("systemctl enable"):
+            self.enabled.add(words[-1])
+        if line.startswith("systemctl disable"):
+            self.enabled.discard(words[-1])
+        return Outcome(0, "")
+
+    def install(self, *options: str) -> int:
+        return install(self._options("install", options), self.run, lambda program: program)
+
+    def uninstall(self, *options: str) -> int:
+        return uninstall(self._options("uninstall", options), self.run, lambda program: program)
+
+    def _options(self, command: str, options: Sequence[str]) -> argparse.Namespace:
+        return build_parser().parse_args([command, "--root", str(self.root), *options])
+
+    def system(self) -> System:
+        """As if it were the one that runs."""
+        return System(self.root, PREFIX, self.run, live=True)
+
+    def text(self, place: str) -> str:
+        return (self.root / place).read_text(encoding="utf-8")
+
+    def edit(self, place: str) -> str:
+        edited = self.text(place) + "\n# mine\n"
+        (self.root / place).write_text(edited, encoding="utf-8")
+        return edited
+
+    def files(self) -> dict[str, str]:
+        return {
+            str(path.relative_to(self.root)): path.read_text(encoding="utf-8")
+            for path in self.root.rglob("*")
+            if path.is_file()
+        }
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Machine:
+    return Machine(tmp_path)
+
+
+def release(monkeypatch: pytest.MonkeyPatch, place: str) -> None:
+    """A new version of one file of ours."""
+    texts = load_sources(PREFIX)
+    changed = texts | {place: texts[place] + "# new\n"}
+    monkeypatch.setattr(service_plan, "load_sources", lambda prefix: changed)
+
+
+def written(plan: Plan) -> list[str]:
+    return [step.path.name for step in plan.steps if isinstance(step, WriteFile)]
+
+
+def commands(plan: Plan) -> list[str]:
+    return [" ".join(step.words) for step in plan.steps if isinstance(step, Command)]
+
+
+def test_all_files_are_written_readable_for_everybody_and_the_service_is_enabled(machine: Machine) -> None:
+    before = os.umask(0o077)
+    try:
+        assert machine.install() == exit_codes.OK
+    finally:
+        os.umask(before)
+    for place in SOURCES:
+        assert (machine.root / place).stat().st_mode & 0o777 == 0o644
+        assert (machine.root / place).parent.stat().st_mode & 0o777 == 0o755
+    assert machine.text(NETWORK) == (service_plan.source_folder() / "80-can.network").read_text(encoding="utf-8")
+    assert "mudskipper" in machine.enabled
+    assert (machine.root / LINK).is_symlink()
+
+
+def test_an_installed_package_carries_the_files_of_this_one() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["tool"]["setuptools"]["data-files"] == {"share/mudskipper": ["systemd/*"]}
+    assert all((ROOT / "systemd" / name).is_file() for name in SOURCES.values())
+
+
+def test_where_there_is_no_working_tree_the_files_come_from_the_environment(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(service_plan, "__file__", str(tmp_path / "site-packages/command_line/install/service_plan.py"))
+    assert service_plan.source_folder() == Path(sysconfig.get_path("data")) / "share/mudskipper"
+
+
+def test_the_unit_starts_the_daemon_of_the_environment_that_installed_it() -> None:
+    unit = load_sources(PREFIX)[UNIT]
+    assert "ExecStart=/opt/robot/venv/bin/mudskipperd --config /etc/mudskipper/mudskipper.toml" in unit
+    assert "/opt/mudskipper" not in unit
+
+
+def test_the_second_time_there_is_nothing_to_do(machine: Machine, capsys: pytest.CaptureFixture[str]) -> None:
+    machine.install()
+    before, ran = machine.files(), list(machine.ran)
+    capsys.readouterr()
+    assert machine.install() == exit_codes.OK
+    assert capsys.readouterr().out == "nothing to do\n"
+    assert (machine.files(), machine.ran) == (before, ran)
+
+
+def test_a_dry_run_shows_everything_and_does_nothing(machine: Machine, capsys: pytest.CaptureFixture[str]) -> None:
+    assert machine.install("--dry-run") == exit_codes.OK
+    shown = capsys.readouterr().out
+    assert all(str(machine.root / place) in shown for place in (*SOURCES, LINK, MANIFEST))
+    assert "run systemd-sysusers" in shown
+    assert (machine.files(), machine.ran) == ({}, [])
+
+
+def test_what_is_done_is_what_was_shown(machine: Machine, capsys: pytest.CaptureFixture[str]) -> None:
+    machine.install("--dry-run")
+    shown = capsys.readouterr().out.splitlines()[1:]
+    machine.install()
+    done = capsys.readouterr().out.splitlines()
+    assert done[1 : 1 + len(shown)] == shown
+    runs = [
+        line.strip().removeprefix("run ").replace(f"--root={machine.root} ", "") for line in shown if "run " in line
+    ]
+    assert machine.ran == [line.removesuffix(f" --root={machine.root}") for line in runs]
+
+
+def test_an_upgrade_replaces_what_nobody_edited(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    machine.install()
+    assert "Next: edit" in capsys.readouterr().out
+    release(monkeypatch, NETWORK)
+    assert machine.install() == exit_codes.OK
+    assert "Next" not in capsys.readouterr().out
+    assert machine.text(NETWORK).endswith("# new\n")
+    assert not (machine.root / f"{NETWORK}.new").exists()
+
+
+@pytest.mark.parametrize("place", [CONFIGURATION, NETWORK])
+def test_an_upgrade_keeps_what_was_edited_and_puts_the_new_one_beside_it_once(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    machine.install()
+    edited = machine.edit(place)
+    assert Path(place).name not in written(plan_installation(machine.system()))
+    release(monkeypatch, place)
+    assert machine.install() == exit_codes.OK
+    assert machine.text(place) == edited
+    assert machine.text(f"{place}.new").endswith("# new\n")
+    (machine.root / f"{place}.new").unlink()
+    assert machine.install() == exit_codes.OK
+    assert not (machine.root / f"{place}.new").exists()
+
+
+def test_a_configuration_that_nobody_edited_is_kept_too(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    machine.install()
+    before = machine.text(CONFIGURATION)
+    release(monkeypatch, CONFIGURATION)
+    machine.install()
+    assert machine.text(CONFIGURATION) == before
+    assert machine.text(f"{CONFIGURATION}.new").endswith("# new\n")
+
+
+def test_a_configuration_that_was_there_before_is_kept(machine: Machine) -> None:
+    (machine.root / CONFIGURATION).parent.mkdir(parents=True)
+    (machine.root / CONFIGURATION).write_text("[robot]\n", encoding="utf-8")
+    machine.install()
+    assert machine.text(CONFIGURATION) == "[robot]\n"
+
+
+def test_a_unit_that_was_masked_stays_so(machine: Machine) -> None:
+    (machine.root / UNIT).parent.mkdir(parents=True)
+    (machine.root / UNIT).symlink_to("/dev/null")
+    machine.install()
+    assert (machine.root / UNIT).readlink() == Path("/dev/null")
+
+
+def test_a_command_of_the_same_name_that_is_not_ours_stays(machine: Machine) -> None:
+    (machine.root / LINK).parent.mkdir(parents=True)
+    (machine.root / LINK).write_text("#!/bin/sh\n", encoding="utf-8")
+    machine.install()
+    machine.uninstall("--purge")
+    assert machine.text(LINK) == "#!/bin/sh\n"
+
+
+def test_a_running_system_is_told_to_look_again(machine: Machine) -> None:
+    for name in ("can0", "lo"):
+        (machine.root / "sys/class/net" / name).mkdir(parents=True)
+    assert commands(plan_installation(machine.system())) == [
+        "systemd-sysusers",
+        "systemctl daemon-reload",
+        "udevadm control --reload",
+        f"udevadm trigger --action=add {machine.root}/sys/class/net/can0",
+        "systemctl enable --now systemd-networkd",
+        "systemctl disable systemd-networkd-wait-online",
+        "networkctl reload",
+        "systemctl enable mudskipper",
+    ]
+
+
+def test_who_has_networkd_already_keeps_its_wait_for_the_network(machine: Machine) -> None:
+    machine.enabled.add("systemd-networkd")
+    assert not [line for line in commands(plan_installation(machine.system())) if "systemd-networkd" in line]
+
+
+def test_a_service_that_runs_is_never_restarted_under_a_robot(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine.install()
+    release(monkeypatch, UNIT)
+    plan = plan_installation(machine.system())
+    assert not [line for line in commands(plan) if "restart" in line or " start " in line]
+    assert any("systemctl restart mudskipper" in note for note in plan.notes)
+
+
+def test_a_failure_says_what_was_done_and_the_next_run_does_the_rest(
+    machine: Machine, capsys: pytest.CaptureFixture[str]
+) -> None:
+    machine.failing = "systemd-sysusers"
+    assert machine.install() == exit_codes.UNHEALTHY
+    said = capsys.readouterr().err
+    assert "could not run systemd-sysusers" in said
+    assert "Failed to connect to bus" in said
+    assert "done before that: 6 of 11 steps" in said
+    assert "Traceback" not in said
+    machine.failing = ""
+    assert machine.install() == exit_codes.OK
+    assert "systemd-sysusers" in machine.ran
+    assert "mudskipper" in machine.enabled
+
+
+def test_a_program_that_is_missing_is_told_before_anything_is_written(
+    machine: Machine, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = build_parser().parse_args(["install", "--root", str(machine.root)])
+    missing = install(options, machine.run, lambda program: None if program == "systemd-sysusers" else program)
+    assert missing == exit_codes.UNHEALTHY
+    assert "systemd-sysusers: not installed" in capsys.readouterr().err
+    assert machine.files() == {}
+
+
+@pytest.mark.parametrize("command", ["install", "uninstall"])
+def test_without_root_it_is_refused_before_anything_is_written(
+    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], machine: Machine
+) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(installation, "problem_with_place", lambda places: "")
+    monkeypatch.setattr(installation, "_perform_all", None)  # would raise
+    act = install if command == "install" else uninstall
+    assert act(build_parser().parse_args([command]), machine.run) == exit_codes.NOT_PERMITTED
+    assert "sudo" in capsys.readouterr().err
+    assert machine.ran == []
+
+
+@pytest.mark.parametrize("place", ["/home/ann/venv", "/root/venv", "/tmp/venv"])
+def test_an_environment_that_the_unit_hides_from_the_service_is_refused(place: str) -> None:
+    assert "hidden from the service" in problem_with_place((Path(place), PREFIX))
+    assert "hidden from the service" in problem_with_place((PREFIX, Path(place)))  # an editable installation
+
+
+def test_an_environment_without_the_daemon_is_refused(tmp_path: Path) -> None:
+    assert "there is no mudskipperd" in problem_with_place((PREFIX, PREFIX))
+
+
+def test_uninstall_keeps_configuration_and_logs_and_forgets_the_rest(machine: Machine) -> None:
+    machine.install()
+    edited = machine.edit(CONFIGURATION)
+    log = machine.root / "var/lib/mudskipper/logs/done/a.mcap"
+    log.parent.mkdir(parents=True)
+    log.write_text("a log", encoding="utf-8")
+    assert machine.uninstall() == exit_codes.OK
+    left = machine.files()
+    assert set(left) == {CONFIGURATION, MANIFEST, str(log.relative_to(machine.root))}
+    assert left[CONFIGURATION] == edited
+    assert set(json.loads(left[MANIFEST])) == {CONFIGURATION}
+    assert "mudskipper" not in machine.enabled
+    assert not (machine.root / LINK).is_symlink()
+
+
+def test_the_second_uninstall_has_nothing_to_do(machine: Machine, capsys: pytest.CaptureFixture[str]) -> None:
+    machine.install()
+    machine.uninstall()
+    capsys.readouterr()
+    assert machine.uninstall() == exit_codes.OK
+    assert "nothing to do" in capsys.readouterr().out
+
+
+def test_uninstall_leaves_a_network_file_that_was_edited_and_purge_does_not(machine: Machine) -> None:
+    machine.install()
+    edited = machine.edit(NETWORK)
+    machine.uninstall()
+    assert machine.text(NETWORK) == edited
+    machine.uninstall("--purge")
+    assert machine.files() == {}
+
+
+def test_a_purge_stops_the_service_first_and_removes_the_user_last(machine: Machine) -> None:
+    machine.install()
+    (machine.root / "etc/passwd").write_text("root:x:0:0::/root:/bin/sh\nmudskipper:x:990:990::/:\n", encoding="utf-8")
+    steps = plan_removal(machine.system(), purge=True).steps
+    assert str(steps[0]) == "run systemctl disable --now mudskipper"
+    assert str(steps[-1]) == "run userdel mudskipper"
+    assert Remove(machine.root / "etc/mudskipper") in steps
+
+
+def test_reinstalling_after_an_uninstall_keeps_the_configuration(machine: Machine) -> None:
+    machine.install()
+    edited = machine.edit(CONFIGURATION)
+    machine.uninstall()
+    assert machine.install() == exit_codes.OK
+    assert machine.text(CONFIGURATION) == edited
+    assert not (machine.root / f"{CONFIGURATION}.new").exists()
+
+
+def test_a_manifest_that_makes_no_sense_counts_as_none(machine: Machine) -> None:
+    machine.install()
+    (machine.root / MANIFEST).write_text("[1, 2", encoding="utf-8")
+    assert machine.install() == exit_codes.OK
+    assert set(json.loads(machine.text(MANIFEST))) == set(SOURCES)
+
+
+def test_a_command_that_is_not_there_or_fails_is_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(StepError, match="is not installed"):
+        perform(Command((str(tmp_path / "nothing"),)), run_command)
+    with pytest.raises(StepError, match="exit status 1"):
+        perform(Command(("false",)), run_command)
+
+
+def test_a_file_that_cannot_be_written_is_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(StepError, match="Not a directory|File exists"):
+        perform(WriteFile(tmp_path / "file" / "below", "x"), run_command)

@@ -1,0 +1,220 @@
+"""Commands that read logs print what a person and what a machine wants."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from command_line import exit_codes, screen
+from command_line.logs.recorded_walk import read_walk
+from command_line.main import main
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files
+from firmware_host.log.log_parameters import ONE_FILE
+from firmware_host.log.rows import ROW_KINDS
+from firmware_host.log.segments import LogSegments
+from firmware_host.log_reading.log_reader import read_log
+from tests.command_line.command_lines import run
+from tests.recorded_walks import record_walks
+from tests.waiting import LONGEST_S
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
+    """A recorded walk of two strides."""
+    path = tmp_path_factory.mktemp("logs") / "walk.mcap"
+    record_walks(path, configuration, 2)
+    return path
+
+
+def test_replay_prints_one_line_a_stride(walk: Path) -> None:
+    lines = run("replay", str(walk)).stdout.splitlines()
+    assert len(lines) == 2 + 4
+    assert lines[0].split()[:2] == ["flipper", "no"]
+
+
+def test_replay_json_has_the_promised_keys(walk: Path) -> None:
+    (first, *_) = json.loads(run("replay", str(walk), "--json").stdout)["strides"]
+    assert set(first) >= {"flipper", "index", "t_start_s", "k_p", "k_s", "k_e", "depth_m"}
+    assert set(first["k_p"]) >= {"value", "std_error", "samples", "valid"}
+    assert 1e5 < first["k_p"]["value"] < 1e7
+
+
+def test_log_info_counts(walk: Path) -> None:
+    told = json.loads(run("log", "info", str(walk), "--json").stdout)
+    assert told["robot"] == "test" and told["complete"] is True
+    assert told["missed_ticks"] == 0 and told["strides"] == 4
+    assert "ticks" in run("log", "info", str(walk)).stdout
+
+
+def test_an_exported_log_replays_like_the_log(walk: Path, tmp_path: Path) -> None:
+    """Up to what the authors' columns do not hold: velocity, and the arm's weight."""
+    path = tmp_path / "walk.csv"
+    assert run("log", "export", str(walk), "--csv", "--out", str(path)).returncode == exit_codes.OK
+    assert path.read_text(encoding="utf-8").splitlines()[1].startswith("time,turtle_state,leftadduction_pos")
+    ours = json.loads(run("replay", str(walk), "--json").stdout)["strides"]
+    theirs = json.loads(run("replay", str(path), "--json").stdout)["strides"]
+    assert [stride["index"] for stride in ours] == [stride["index"] for stride in theirs]
+    for one, other in zip(ours, theirs, strict=True):
+        assert other["k_s"]["value"] == pytest.approx(one["k_s"]["value"], rel=0.1)
+        assert other["stance_force_n"] == pytest.approx(one["stance_force_n"], abs=0.5)
+
+
+@pytest.mark.parametrize("contents", [b"", b"not a log"])
+def test_a_broken_log_is_a_sentence(tmp_path: Path, contents: bytes) -> None:
+    path = tmp_path / "broken.mcap"
+    path.write_bytes(contents)
+    for command in (("replay",), ("log", "info")):
+        ended = run(*command, str(path))
+        assert ended.returncode == exit_codes.UNHEALTHY
+        assert ended.stderr.startswith("mudskipper: ") and "broken.mcap" in ended.stderr
+        assert "Traceback" not in ended.stderr
+
+
+def make_segments(walk: Path, folder: Path) -> list[Path]:
+    """The same walk, cut into files of two seconds."""
+    rows = rows_of(walk)
+    parameters = replace(ONE_FILE, segment_s=2.0)
+    opening = {"configuration_text": read_log(walk).configuration_text, "metadata": {"robot": "test", "run_id": "run"}}
+    log = LogSegments(first_path(folder, "run"), opening, parameters)
+    for place in range(0, len(rows), 50):
+        log.write(rows[place : place + 50])
+    assert log.close()
+    return log_files(folder, DONE)
+
+
+def rows_of(path: Path) -> list[tuple[int, bytes]]:
+    topics = [kind.topic for kind in ROW_KINDS]
+    with path.open("rb") as file:
+        messages = make_reader(file).iter_messages(log_time_order=False)
+        return [(topics.index(channel.topic), message.data) for _, channel, message in messages]
+
+
+def test_segments_of_a_run_are_drawn_and_counted_as_one_log(walk: Path, tmp_path: Path) -> None:
+    paths = [str(path) for path in make_segments(walk, tmp_path)]
+    assert len(paths) > 2
+    whole, joined = read_walk(walk), read_walk(Path(paths[0]), 0, [Path(path) for path in paths[1:]])
+    assert np.array_equal(whole.sweep_angle_rad, joined.sweep_angle_rad)
+    assert (repr(joined.strides), joined.cut) == (repr(whole.strides), "")
+    assert run("plot", *paths, "--out", str(tmp_path / "walk.png")).stderr == ""
+    told = json.loads(run("log", "info", *paths, "--json").stdout)
+    assert told["strides"] == 4
+
+
+def test_a_walk_over_a_border_is_told(walk: Path, tmp_path: Path) -> None:
+    paths = make_segments(walk, tmp_path)
+    drawn = run("plot", str(paths[1]), "--out", str(tmp_path / "walk.png")).stderr
+    assert "the walk may have begun before segment 1 and gone on in the next segment; give those files too" in drawn
+    assert "the run's segments before 1 are not given" in run("replay", str(paths[1])).stderr
+    assert "not given" not in run("replay", str(paths[0])).stderr
+
+
+def test_a_picture_of_a_log_that_is_being_written_does_not_stay_beside_it(
+    walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for place in (ACTIVE, "here"):
+        (tmp_path / place).mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    path = tmp_path / ACTIVE / "walk.mcap"
+    path.write_bytes(walk.read_bytes()[:-1000])
+    assert main(["plot", str(path)]) == exit_codes.OK
+    assert (tmp_path / "here" / "walk.png").exists()
+    assert "still being written, or was cut off" in capsys.readouterr().err
+    (tmp_path / DONE).mkdir()
+    assert main(["plot", str(path)]) == exit_codes.OK
+    assert (tmp_path / DONE / "walk.png").exists()
+    assert list((tmp_path / ACTIVE).iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("command", "word"),
+    [
+        (("replay",), "ticks replayed"),
+        (("log", "info"), "kB read"),
+        (("log", "export", "--csv", "--out", "/dev/null"), "rows written"),
+    ],
+)
+def test_a_command_that_takes_its_time_says_how_far_it_is(
+    walk: Path, command: tuple[str, ...], word: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(screen, "SOON_S", 0.0)
+    assert main([*command, str(walk)]) == exit_codes.OK
+    assert word not in capsys.readouterr().err  # it took no time
+    monkeypatch.setattr(screen, "PATIENCE_S", 1e-9)
+    assert main([*command, str(walk)]) == exit_codes.OK
+    assert word in capsys.readouterr().err
+
+
+def test_a_log_that_is_not_there_is_a_sentence(tmp_path: Path) -> None:
+    for name in ("none.mcap", "none.csv"):
+        ended = run("replay", str(tmp_path / name))
+        assert ended.returncode == exit_codes.UNHEALTHY and "No such file" in ended.stderr
+
+
+def test_a_malformed_row_is_named_by_its_line(tmp_path: Path, walk: Path) -> None:
+    path = tmp_path / "walk.csv"
+    lines = run("log", "export", str(walk), "--csv").stdout.splitlines()
+    lines[100] = lines[100].replace(",", ",x", 1)
+    path.write_text("\n".join(lines), encoding="utf-8")
+    ended = run("replay", str(path))
+    assert ended.returncode == exit_codes.UNHEALTHY and "line 101" in ended.stderr
+
+
+def test_a_reader_that_stops_reading_is_no_error(walk: Path) -> None:
+    command = (
+        f"{shlex.quote(sys.executable)} -m command_line.main log export {shlex.quote(str(walk))} --csv | head -n 3"
+    )
+    ended = subprocess.run(
+        command, shell=True, capture_output=True, text=True, timeout=LONGEST_S, check=False, env=os.environ
+    )
+    assert len(ended.stdout.splitlines()) == 3 and ended.stderr == ""
+
+
+def test_an_export_never_overwrites_its_own_log(walk: Path) -> None:
+    before = walk.read_bytes()
+    ended = run("log", "export", str(walk), "--csv", "--out", str(walk))
+    assert ended.returncode == exit_codes.USAGE and "is the log itself" in ended.stderr
+    assert walk.read_bytes() == before
+
+
+def test_a_terminal_without_unicode_gets_question_marks(walk: Path) -> None:
+    environment = os.environ | {"PYTHONUTF8": "0", "LC_ALL": "C", "PYTHONIOENCODING": "ascii"}
+    command = [sys.executable, "-m", "command_line.main", "replay", str(walk)]
+    ended = subprocess.run(command, capture_output=True, timeout=LONGEST_S, check=False, env=environment)
+    assert ended.returncode == exit_codes.OK and b"N/cm?" in ended.stdout and ended.stderr == b""
+
+
+def test_a_reversed_log_names_the_line(tmp_path: Path, walk: Path) -> None:
+    lines = run("log", "export", str(walk), "--csv").stdout.splitlines()
+    path = tmp_path / "reversed.csv"
+    path.write_text("\n".join(lines[:2] + lines[:1:-1]), encoding="utf-8")
+    ended = run("replay", str(path))
+    assert ended.returncode == exit_codes.UNHEALTHY and "goes back in time" in ended.stderr
+
+
+def test_a_byte_order_mark_is_no_error(tmp_path: Path, walk: Path) -> None:
+    path = tmp_path / "bom.csv"
+    path.write_text("\ufeff" + run("log", "export", str(walk), "--csv").stdout, encoding="utf-8")
+    assert run("replay", str(path)).returncode == exit_codes.OK
+
+
+def test_numbers_beyond_all_measure_are_shown_as_unknown(tmp_path: Path, walk: Path) -> None:
+    lines = run("log", "export", str(walk), "--csv").stdout.splitlines()
+    column = lines[1].split(",").index("rightsweeping_curr")
+    rows = [line.split(",") for line in lines[2:]]
+    for row in rows[::7]:
+        row[column] = "1e154"
+    path = tmp_path / "huge.csv"
+    path.write_text("\n".join(lines[:2] + [",".join(row) for row in rows]), encoding="utf-8")
+    ended = run("replay", str(path))
+    assert ended.returncode == exit_codes.OK and "Traceback" not in ended.stderr

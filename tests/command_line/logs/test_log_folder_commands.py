@@ -1,0 +1,169 @@
+"""Listing, recovering and preserving logs, as a person types it."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes, main
+from command_line.logs import log_folder_commands as log_care
+from command_line.screen import size_text
+from firmware_host.log.log_file import LogFile
+from firmware_host.log.log_folder import ACTIVE, DONE, KEPT
+from firmware_host.log_reading.log_reader import read_log
+from tests.firmware_host.made_up_rows import OPENING, make_ticks
+from tests.folders import EXAMPLE_CONFIGURATION
+
+
+def make_log(folder: Path, name: str) -> LogFile:
+    log = LogFile(folder / ACTIVE / name, OPENING)
+    log.write(make_ticks(0, 381))
+    log.flush()
+    return log
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A finished log, and one whose writer was killed."""
+    make_log(tmp_path, "1.mcap").finish()
+    make_log(tmp_path, "2.mcap")._file.close()
+    return tmp_path
+
+
+def test_the_list_shows_what_is_known(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main.main(["log", "list", str(folder), "--json"]) == exit_codes.OK
+    report = json.loads(capsys.readouterr().out)
+    assert [(log["name"], log["place"], log["duration_s"]) for log in report["logs"]] == [
+        ("1.mcap", DONE, pytest.approx(1.0)),
+        ("2.mcap", ACTIVE, None),
+    ]
+    assert report["logs_bytes"] == sum(log["bytes"] for log in report["logs"])
+    assert 0 < report["free_bytes"] < report["disk_bytes"]
+    assert main.main(["log", "list", str(folder)]) == exit_codes.OK
+    assert "GB free" in capsys.readouterr().out
+
+
+def test_what_is_not_whole_is_listed_and_counted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    contents = (folder / DONE / "1.mcap").read_bytes()
+    (folder / DONE / "0.mcap").write_bytes(contents[:-100])
+    (folder / "00.mcap").write_bytes(contents)
+    for name in ("3.mcap.broken", "4.mcap.part", "notes.txt"):
+        (folder / ACTIVE / name).write_bytes(bytes(100))
+    assert main.main(["log", "list", str(folder), "--json"]) == exit_codes.OK
+    report = json.loads(capsys.readouterr().out)
+    assert {log["name"]: log["state"] for log in report["logs"]} == {
+        "00.mcap": "whole",
+        "0.mcap": "broken",
+        "1.mcap": "whole",
+        "2.mcap": "unfinished",
+        "3.mcap.broken": "broken",
+        "4.mcap.part": "unfinished",
+        "notes.txt": "no log",
+    }
+    sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
+    assert report["logs_bytes"] == sum(sizes)
+    assert main.main(["log", "list", str(folder)]) == exit_codes.OK
+    assert "remove what resists it" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("size", "text"), [(0, "0.0 MB"), (3_145_728, "3.1 MB"), (2e9, "2.0 GB")])
+def test_sizes_of_small_disks_say_something(size: float, text: str) -> None:
+    assert size_text(size) == text
+
+
+def test_recovery_of_a_folder_passes_over_what_is_being_written(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    living = make_log(folder, "3.mcap")
+    assert main.main(["log", "recover", str(folder)]) == exit_codes.OK
+    printed = capsys.readouterr()
+    assert "2.mcap: recovered" in printed.out and "3.mcap" not in printed.out + printed.err
+    assert main.main(["log", "recover", str(folder)]) == exit_codes.OK
+    assert capsys.readouterr().out == "nothing to recover\n"
+    living.finish()
+
+
+def test_several_logs_are_preserved_whatever_becomes_of_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    make_log(folder, "3.mcap").finish()
+    names = [str(folder / place / name) for place, name in ((ACTIVE, "2.mcap"), (DONE, "1.mcap"), (DONE, "3.mcap"))]
+    assert main.main(["log", "preserve", *names]) == exit_codes.REFUSED
+    assert "only a log in done/" in capsys.readouterr().err
+    assert sorted(path.name for path in (folder / KEPT).iterdir()) == ["1.mcap", "3.mcap"]
+
+
+def test_recovery_that_takes_its_time_says_how_far_it_is(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(log_care, "PATIENCE_S", 1e-9)
+    assert main.main(["log", "recover", str(folder)]) == exit_codes.OK
+    assert "of 1 logs" in capsys.readouterr().err
+
+
+def test_recovery_of_a_folder_says_what_became_of_each(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main.main(["log", "recover", str(folder), "--json"]) == exit_codes.OK
+    (log,) = json.loads(capsys.readouterr().out)["recovered"]
+    assert (log["path"], log["rows"], log["lost"]) == (str(folder / DONE / "2.mcap"), 381, 0)
+    assert read_log(folder / DONE / "2.mcap").complete
+    assert main.main(["log", "recover", str(folder)]) == exit_codes.OK
+    assert capsys.readouterr().out == "nothing to recover\n"
+    assert main.main(["log", "list", str(folder), "--json"]) == exit_codes.OK
+    assert [log["recovered"] for log in json.loads(capsys.readouterr().out)["logs"]] == [False, True]
+
+
+def test_what_cannot_be_recovered_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "x.mcap").write_text("no log")
+    living = make_log(folder, "3.mcap")
+    for path, word in ((folder / "x.mcap", "nothing of a log"), (living.path, "is being written")):
+        assert main.main(["log", "recover", str(path)]) == exit_codes.UNHEALTHY
+        assert word in capsys.readouterr().err
+    assert main.main(["log", "recover", str(folder / "none.mcap")]) == exit_codes.UNHEALTHY
+    assert "No such file" in capsys.readouterr().err
+    living.finish()
+
+
+def test_a_preserved_log_moves_to_kept_and_back(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main.main(["log", "preserve", str(folder / DONE / "1.mcap")]) == exit_codes.OK
+    kept = folder / KEPT / "1.mcap"
+    assert capsys.readouterr().out == f"{kept}\n" and kept.exists()
+    assert main.main(["log", "preserve", str(folder / ACTIVE / "2.mcap")]) == exit_codes.REFUSED
+    assert main.main(["log", "preserve", "--undo", str(kept)]) == exit_codes.OK
+    assert (folder / DONE / "1.mcap").exists()
+
+
+def test_who_may_not_read_or_move_a_log_is_told_what_to_do(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the kernel refuses it to whoever is not root, as whom tests may run."""
+
+    def refuse(path: Path, *_: object) -> Path:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+
+    log = str(folder / DONE / "1.mcap")
+    for name in ("read_bytes", "rename"):
+        monkeypatch.setattr(Path, name, refuse)
+    assert main.main(["log", "info", log]) == exit_codes.UNHEALTHY
+    assert f"have root add you to the group of {log}, then log in again, or do this as root" in capsys.readouterr().err
+    assert main.main(["log", "preserve", log]) == exit_codes.UNHEALTHY
+    assert capsys.readouterr().err.endswith(
+        "1.mcap: only the daemon's own user and root may move logs: do this as root\n"
+    )
+
+
+def test_a_folder_that_is_not_there_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main.main(["log", "list", str(tmp_path / "none")]) == exit_codes.UNHEALTHY
+    assert "there is no such folder" in capsys.readouterr().err
+
+
+def test_the_configured_folder_is_the_default(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = EXAMPLE_CONFIGURATION.read_text(encoding="utf-8")
+    configuration = folder / "mudskipper.toml"
+    configuration.write_text(text.replace("/var/lib/mudskipper/logs", str(folder)), encoding="utf-8")
+    assert main.main(["log", "list", "--config", str(configuration)]) == exit_codes.OK
+    assert "1.mcap" in capsys.readouterr().out
+    assert main.main(["log", "recover", "--config", str(folder / "none.toml")]) == exit_codes.CONFIGURATION

@@ -1,0 +1,189 @@
+"""One walk out of a log: of ours against the log's own rows, of the authors' form against the replay."""
+
+from __future__ import annotations
+
+import gzip
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from command_line.logs.recorded_walk import read_walk
+from control.controller import WalkOrder
+from control.modes import Mode
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.recorder import Recorder
+from firmware_host.log.rows import EVENT, EVENT_KIND
+from firmware_host.log_reading.lab_csv import read_lab_csv, write_lab_csv
+from firmware_host.log_reading.log_reader import LogError, read_log
+from firmware_host.log_reading.replay import replay_file
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track, paper_track
+
+
+@pytest.fixture(scope="module")
+def as_csv(two_walks: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("csv") / "two.csv.gz"
+    text = StringIO()
+    write_lab_csv(read_log(two_walks), text)
+    path.write_bytes(gzip.compress(text.getvalue().encode()))
+    return path
+
+
+def test_a_walk_is_the_rows_of_its_mode(two_walks: Path) -> None:
+    log, walks = read_log(two_walks), [read_walk(two_walks, number) for number in (1, 2)]
+    walking = log.ticks[log.ticks["mode"] == Mode.WALKING]
+    assert len(walks[0].time_s) + len(walks[1].time_s) == len(walking)
+    for walk, ticks in zip(walks, (walking[: len(walks[0].time_s)], walking[len(walks[0].time_s) :]), strict=True):
+        assert walk.time_s[0] == 0.0 and walk.walks == 2 and walk.complete
+        np.testing.assert_array_equal(walk.time_s, ticks["stamp_s"] - ticks["stamp_s"][0])
+        np.testing.assert_array_equal(walk.sweep_angle_rad, ticks["angle_rad"][:, 2])
+        np.testing.assert_array_equal(walk.adduction_angle_rad, ticks["angle_rad"][:, 3])
+        np.testing.assert_array_equal(walk.force_z_n, ticks["force_z_n"][:, 1])
+        np.testing.assert_array_equal(walk.depth_m, ticks["depth_m"][:, 1])
+        np.testing.assert_array_equal(walk.body_x_m, ticks["body_x_m"])
+
+
+def test_every_stride_belongs_to_one_walk(two_walks: Path) -> None:
+    walks = [read_walk(two_walks, number) for number in (1, 2)]
+    assert [[stride["index"] for stride in walk.own_strides] for walk in walks] == [[0, 1], [0]]
+    assert sum(len(walk.strides) for walk in walks) == len(read_log(two_walks).strides)
+    for walk in walks:
+        for stride in walk.strides:
+            assert 0.0 < stride["t_start_s"] < stride["stamp_s"] <= walk.time_s[-1]
+
+
+def test_the_last_walk_is_shown_unless_another_is_named(two_walks: Path) -> None:
+    assert len(read_walk(two_walks).own_strides) == 1
+    assert len(read_walk(two_walks, 2).own_strides) == 1
+    with pytest.raises(LogError, match="no walk 3, only 2"):
+        read_walk(two_walks, 3)
+
+
+def test_the_geometry_is_that_of_the_log(two_walks: Path, configuration: Configuration) -> None:
+    walk = read_walk(two_walks)
+    assert walk.geometry == configuration.geometry
+    assert walk.geometric_step_m == pytest.approx(configuration.geometry.flipper_length_m)  # 2 l sin 30°
+    assert walk.title.startswith("test  20")
+
+
+def test_nothing_is_missing_from_a_log_with_a_pose(two_walks: Path) -> None:
+    assert read_walk(two_walks).missing == []
+
+
+def test_a_mud_begins_with_the_stride_that_told_of_it(two_walks: Path) -> None:
+    strides = [
+        {"flipper": 1, "t_start_s": 1.0, "stamp_s": 2.0},
+        {"flipper": 0, "t_start_s": 2.9, "stamp_s": 4.0},
+        {"flipper": 1, "t_start_s": 3.0, "stamp_s": 4.0},
+        {"flipper": 1, "t_start_s": 5.0, "stamp_s": 6.0},
+    ]
+    walk = read_walk(two_walks)._replace(strides=strides, noticed_s=[4.0])
+    assert walk.mud_starts_s == [3.0]
+    assert walk._replace(noticed_s=[0.5, 6.0]).mud_starts_s == [0.5, 5.0]
+
+
+def test_another_mud_is_noticed_where_there_is_one(tmp_path: Path, configuration: Configuration) -> None:
+    """A short piece of firm mud, then the softest: the event of the loop comes back as a border of the walk."""
+    path = tmp_path / "border.mcap"
+    recorder = Recorder(path, configuration.text, {"robot": "test"})
+    robot = Lockstep(configuration, Track([(0.3, MUDS["45.3"]), (1.0, MUDS["53.1"])]), recorder=recorder)
+    robot.arm()
+    robot.walk(WalkOrder(0.03, False, 5))
+    robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
+    assert recorder.close(20.0)
+    walk = read_walk(path)
+    (noticed_s,), (start_s,) = walk.noticed_s, walk.mud_starts_s
+    (told,) = [stride for stride in walk.own_strides if stride["t_start_s"] == start_s]
+    assert told["stamp_s"] == noticed_s
+    assert 0.3 - 0.12 < told["place_m"] < 0.45  # the flippers reach half a step ahead of the body
+
+
+def test_a_log_without_a_walk_says_so(tmp_path: Path, configuration: Configuration) -> None:
+    path = tmp_path / "idle.mcap"
+    recorder = Recorder(path, configuration.text, {"robot": "test"})
+    Lockstep(configuration, paper_track(), recorder=recorder).run_for(0.1)
+    assert recorder.close(20.0)
+    with pytest.raises(LogError, match="nobody walked"):
+        read_walk(path)
+
+
+def test_a_log_of_a_foreign_configuration_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "foreign.mcap"
+    recorder = Recorder(path, "[robot]\ncolour = 'green'\n", {})
+    recorder.put(EVENT_KIND, EVENT.encode(0.0, "nothing"))
+    assert recorder.close(20.0)
+    with pytest.raises(LogError, match="not one of this version"):
+        read_walk(path)
+
+
+@pytest.mark.parametrize("name", ["walk.txt", "walk.csv.zip", "mcap"])
+def test_a_file_of_another_name_is_no_log(tmp_path: Path, name: str) -> None:
+    with pytest.raises(LogError, match="not a log"):
+        read_walk(tmp_path / name)
+
+
+# the authors' form
+
+
+def test_strides_of_the_authors_form_are_those_of_the_replay(as_csv: Path) -> None:
+    walk, replayed = read_walk(as_csv), replay_file(as_csv).strides
+    start_s = float(read_lab_csv(as_csv).stamp_s[0])
+    assert len(walk.strides) == len(replayed) > 2
+    for stride, estimate in zip(walk.strides, replayed, strict=True):
+        assert (stride["index"], ("left", "right")[stride["flipper"]]) == (estimate.index, estimate.flipper)
+        assert stride["stamp_s"] + start_s == estimate.t_end_s
+        np.testing.assert_array_equal(
+            [stride["k_p"], stride["k_s"], stride["k_e"], stride["step_m"], stride["k_p_std_error"]],
+            [estimate.k_p.value, estimate.k_s.value, estimate.k_e.value, estimate.step_m, estimate.k_p.std_error],
+        )
+        assert stride["released"] == estimate.released
+
+
+def test_the_authors_form_gives_depth_and_force_as_our_log_does(as_csv: Path, two_walks: Path) -> None:
+    """Where the flippers stand in mud; without velocities and the arm's weight the force is a little off."""
+    ours, theirs = read_walk(two_walks, 1), read_walk(as_csv)
+    first = int(np.argmax(read_log(two_walks).ticks["mode"] == Mode.WALKING))
+    rows = slice(first, first + len(ours.time_s))
+    np.testing.assert_allclose(theirs.sweep_angle_rad[rows], ours.sweep_angle_rad, atol=1e-6)
+    in_stance = ours.phase == 2
+    assert np.count_nonzero(in_stance) > 100
+    assert np.nanmedian(np.abs(theirs.depth_m[rows] - ours.depth_m)[in_stance]) < 1e-3
+    assert np.nanmedian(np.abs(theirs.force_x_n[rows] - ours.force_x_n)[in_stance]) < 0.5
+
+
+def test_what_the_authors_form_does_not_hold_is_named(as_csv: Path, tmp_path: Path) -> None:
+    lines = gzip.decompress(as_csv.read_bytes()).decode().splitlines()
+    names, rows = lines[1].split(","), [line.split(",") for line in lines[2:]]
+    path = tmp_path / "bare.csv"
+    kept = [number for number, name in enumerate(names) if not name.startswith("Optitrack")]
+    table = [",".join(row[number] for number in kept) for row in [names, *rows]]
+    path.write_text("\n".join(["# gait header: scenario | turtle", *table]), encoding="utf-8")
+    walk = read_walk(path)
+    assert walk.missing == ["the body's place, so no steps", "the commanded depth"]
+    assert np.isnan(walk.geometric_step_m)
+    assert read_walk(as_csv).missing == []
+    assert read_walk(as_csv).geometric_step_m == pytest.approx(0.12)
+
+
+def test_a_run_in_the_authors_form_is_one_walk(as_csv: Path) -> None:
+    assert read_walk(as_csv, 1).walks == 1
+    with pytest.raises(LogError, match="no walk 2"):
+        read_walk(as_csv, 2)
+
+
+def test_one_flipper_alone_is_the_one_shown(as_csv: Path, tmp_path: Path) -> None:
+    lines = gzip.decompress(as_csv.read_bytes()).decode().splitlines()
+    names = lines[1].split(",")
+    still = [number for number, name in enumerate(names) if name.startswith("right")]
+    rows = [line.split(",") for line in lines[2:]]
+    for row in rows:
+        for number in still:
+            row[number] = "0"
+    path = tmp_path / "left.csv"
+    path.write_text("\n".join([*lines[:2], *(",".join(row) for row in rows)]), encoding="utf-8")
+    walk = read_walk(path)
+    assert walk.flipper == "left"
+    assert walk.strides == walk.own_strides != []

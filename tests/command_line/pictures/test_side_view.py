@@ -1,0 +1,113 @@
+"""The flipper from the side, against the kinematics of control/ and the plate's integrals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, isclose, pi, sin
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from command_line.pictures.side_view import Point, convex_hull, view_from_side
+from control.geometry import FlipperGeometry
+from control.plate import submerged_plate
+from simulation.mud.flipper_contact import lowest_m
+
+GEOMETRY = FlipperGeometry()
+SHEET = replace(GEOMETRY, plate_thickness_m=0.0)
+SWEEPS = st.floats(-1.0, 1.0)
+ADDUCTIONS = st.floats(-1.2, 0.6)
+
+
+def area_m2(polygon: list[Point]) -> float:
+    """Of a polygon, positive where it runs counter-clockwise."""
+    pairs = zip(polygon, [*polygon[1:], *polygon[:1]], strict=True)
+    return sum(x1 * z2 - x2 * z1 for (x1, z1), (x2, z2) in pairs) / 2.0
+
+
+def below(polygon: list[Point], z_m: float) -> list[Point]:
+    """What of a convex polygon lies below a level."""
+    kept: list[Point] = []
+    for (x1, z1), (x2, z2) in zip(polygon, [*polygon[1:], polygon[0]], strict=True):
+        if z1 <= z_m:
+            kept.append((x1, z1))
+        if (z1 <= z_m) != (z2 <= z_m):
+            kept.append((x1 + (x2 - x1) * (z_m - z1) / (z2 - z1), z_m))
+    return kept
+
+
+@given(SWEEPS, ADDUCTIONS, st.floats(-2.0, 2.0))
+def test_the_edge_is_where_the_kinematics_put_it(sweep_rad: float, adduction_rad: float, body_x_m: float) -> None:
+    view = view_from_side(GEOMETRY, sweep_rad, adduction_rad, body_x_m)
+    x_m, _, z_m = GEOMETRY.edge_position(sweep_rad, adduction_rad)
+    assert view.edge == pytest.approx((body_x_m + x_m, GEOMETRY.axis_height_m + z_m), abs=1e-12)
+    assert view.edge[1] == pytest.approx(-GEOMETRY.depth_m(sweep_rad, adduction_rad), abs=1e-12)
+    assert view.shoulder == (body_x_m, GEOMETRY.axis_height_m)
+
+
+@given(SWEEPS, ADDUCTIONS)
+def test_arm_and_plate_keep_their_lengths_seen_square_on(sweep_rad: float, adduction_rad: float) -> None:
+    """The arm lies in the frame that tilts: seen along y, l sin α of it goes forward and l cos α sin β upward."""
+    view = view_from_side(GEOMETRY, sweep_rad, adduction_rad)
+    forward_m, up_m = (hand - shoulder for hand, shoulder in zip(view.hand, view.shoulder, strict=True))
+    outward_m = GEOMETRY.flipper_length_m * cos(sweep_rad)
+    assert forward_m == pytest.approx(GEOMETRY.flipper_length_m * sin(sweep_rad), abs=1e-12)
+    assert up_m == pytest.approx(outward_m * sin(adduction_rad), abs=1e-12)
+    assert view.hand[1] - view.edge[1] == pytest.approx(GEOMETRY.drop_m * cos(adduction_rad), abs=1e-12)
+
+
+@given(SWEEPS, ADDUCTIONS, st.integers(0, 2**32 - 1))
+def test_every_point_of_the_plate_is_seen_within_its_outline(sweep_rad: float, adduction_rad: float, seed: int) -> None:
+    """Against matrices: turn about z by the sweep, then about x by the adduction."""
+    random = np.random.default_rng(seed)
+    size = np.array([GEOMETRY.plate_thickness_m, GEOMETRY.plate_width_m, GEOMETRY.plate_height_m])
+    inside = random.uniform(-0.5, 0.5, (20, 3)) * size + [0.0, GEOMETRY.flipper_length_m, size[2] / 2 - GEOMETRY.drop_m]
+    sa, ca, sb, cb = np.sin(sweep_rad), np.cos(sweep_rad), np.sin(adduction_rad), np.cos(adduction_rad)
+    sweep = np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])
+    tilt = np.array([[1.0, 0.0, 0.0], [0.0, cb, -sb], [0.0, sb, cb]])
+    turned = inside @ (tilt @ sweep).T
+    outline = np.array(view_from_side(GEOMETRY, sweep_rad, adduction_rad).plate)
+    sides = np.roll(outline, -1, axis=0) - outline
+    for x_m, _, z_m in turned:
+        to_point = np.array([x_m, z_m + GEOMETRY.axis_height_m]) - outline
+        assert np.all(sides[:, 0] * to_point[:, 1] - sides[:, 1] * to_point[:, 0] > -1e-12)
+
+
+@given(SWEEPS, ADDUCTIONS)
+def test_a_thin_plate_shows_its_face_by_the_sine_of_the_sweep(sweep_rad: float, adduction_rad: float) -> None:
+    """Its normal (cos α, -sin α cos β, -sin α sin β): what is seen along y is the face times sin α cos β, of the part
+    in the mud too, whose area control/plate.py integrates.
+    """
+    outline, share = view_from_side(SHEET, sweep_rad, adduction_rad).plate, abs(sin(sweep_rad)) * cos(adduction_rad)
+    face_m2 = SHEET.plate_width_m * SHEET.plate_height_m
+    in_mud_m2 = submerged_plate(SHEET, sweep_rad, adduction_rad).area_m2
+    assert area_m2(outline) == pytest.approx(share * face_m2, abs=1e-12)
+    assert area_m2(below(outline, 0.0)) == pytest.approx(share * in_mud_m2, abs=1e-12)
+
+
+@given(SWEEPS, ADDUCTIONS)
+def test_the_lowest_corner_is_as_deep_as_the_simulator_has_it(sweep_rad: float, adduction_rad: float) -> None:
+    outline = view_from_side(SHEET, sweep_rad, adduction_rad).plate
+    assert -min(z_m for _, z_m in outline) == pytest.approx(lowest_m(SHEET, sweep_rad, adduction_rad), abs=1e-12)
+
+
+def test_a_plate_straight_below_the_shoulder_is_seen_by_its_edge() -> None:
+    outline = view_from_side(GEOMETRY, 0.0, 0.0).plate
+    width_m = max(x_m for x_m, _ in outline) - min(x_m for x_m, _ in outline)
+    assert width_m == pytest.approx(GEOMETRY.plate_thickness_m, abs=1e-12)
+    assert area_m2(outline) == pytest.approx(GEOMETRY.plate_thickness_m * GEOMETRY.plate_height_m, abs=1e-12)
+
+
+def test_a_hull_leaves_out_what_lies_inside_and_on_its_sides() -> None:
+    square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+    assert convex_hull([(0.5, 0.5), (0.5, 0.0), *reversed(square), (0.0, 0.5), (0.0, 0.0)]) == square
+
+
+@given(st.integers(3, 12), st.floats(0.0, 1.0))
+def test_a_hull_of_points_on_a_circle_is_all_of_them(number: int, turn: float) -> None:
+    points = [(cos(turn + 2.0 * pi * n / number), sin(turn + 2.0 * pi * n / number)) for n in range(number)]
+    hull = convex_hull(points)
+    assert sorted(hull) == sorted(points)
+    assert isclose(area_m2(hull), number / 2.0 * sin(2.0 * pi / number), rel_tol=1e-9)

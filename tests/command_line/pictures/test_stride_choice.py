@@ -1,0 +1,144 @@
+"""Which strides and which of their moments are shown, of walks made up row by row."""
+
+from __future__ import annotations
+
+from math import nan, radians
+from typing import Any
+
+import numpy as np
+import pytest
+
+from command_line.logs.recorded_walk import RecordedWalk
+from command_line.pictures.stride_choice import (
+    Outcome,
+    choose_strides,
+    duration_s,
+    moments_of,
+    outcome_of,
+    rows_of,
+)
+from control.geometry import FlipperGeometry
+from control.records import Phase
+
+STROKES = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING)
+ROWS = 10  # of each phase, 0.1 s apart
+STEP_M = 0.12  # 2 l sin 30°
+
+
+def stride_row(index: int, step_m: float, released: bool = True, flipper: int = 1) -> dict[str, Any]:
+    """Of the stride that begins with row 40 index, and closes on the first row of its swing."""
+    first_s = 0.1 * ROWS * len(STROKES) * index
+    return {
+        "index": index,
+        "flipper": flipper,
+        "t_start_s": first_s,
+        "stamp_s": first_s + 0.1 * ROWS * 3,
+        "step_m": step_m,
+        "released": released,
+    }
+
+
+def walk_of(strides: list[dict[str, Any]], phases: list[Phase] | None = None) -> RecordedWalk:
+    if phases is None:
+        phases = [phase for _ in strides for phase in STROKES for _ in range(ROWS)]
+    unknown = np.full(len(phases), nan)
+    return RecordedWalk(
+        title="made up",
+        geometry=FlipperGeometry(),
+        sweep_rad=radians(30.0),
+        flipper="right",
+        time_s=np.arange(len(phases), dtype=np.float64) / 10.0,
+        phase=np.array(phases, dtype=np.int64),
+        sweep_angle_rad=unknown,
+        adduction_angle_rad=unknown,
+        depth_m=unknown.copy(),
+        depth_command_m=unknown,
+        force_x_n=unknown,
+        force_z_n=unknown,
+        body_x_m=unknown,
+        strides=strides,
+        noticed_s=[],
+    )
+
+
+@pytest.mark.parametrize(
+    ("step_m", "released", "outcome"),
+    [
+        (0.12, True, Outcome.GOOD),
+        (0.0601, True, Outcome.GOOD),
+        (0.0599, True, Outcome.SLIPPING),
+        (-0.02, True, Outcome.SLIPPING),
+        (0.12, False, Outcome.STUCK),
+        (-0.02, False, Outcome.STUCK),
+        (nan, False, Outcome.STUCK),
+        (nan, True, Outcome.UNKNOWN),
+    ],
+)
+def test_a_stride_fails_below_half_of_the_geometric_step_or_where_the_flipper_stays(
+    step_m: float, released: bool, outcome: Outcome
+) -> None:
+    walk = walk_of([stride_row(0, step_m, released)])
+    assert walk.geometric_step_m == pytest.approx(STEP_M)
+    assert outcome_of(walk.strides[0], walk.geometric_step_m) is outcome
+
+
+def test_an_unknown_sweep_leaves_the_outcome_unknown() -> None:
+    assert outcome_of(stride_row(0, 0.1), nan) is Outcome.UNKNOWN
+
+
+def test_the_clearest_stride_of_each_outcome_is_chosen() -> None:
+    steps = [(0.11, True), (0.05, True), (0.02, False), (0.01, True), (-0.03, False), (0.13, True)]
+    walk = walk_of([stride_row(index, *step) for index, step in enumerate(steps)])
+    assert [stride["index"] for stride in choose_strides(walk)] == [3, 4, 5]  # slipping, stuck, good
+
+
+def test_a_stride_that_begins_stuck_is_chosen_only_where_there_is_no_other() -> None:
+    walk = walk_of([stride_row(0, 0.03, False), stride_row(1, -0.03, False)])
+    walk.depth_m[40] = 0.02
+    assert [stride["index"] for stride in choose_strides(walk)] == [0]
+    walk.depth_m[0] = 0.02
+    assert [stride["index"] for stride in choose_strides(walk)] == [1]
+
+
+def test_what_there_is_not_is_not_shown() -> None:
+    walk = walk_of([stride_row(0, 0.11), stride_row(1, 0.10)])
+    assert [stride["index"] for stride in choose_strides(walk)] == [0]
+    assert choose_strides(walk_of([])) == []
+
+
+def test_the_other_flippers_strides_are_not_chosen() -> None:
+    walk = walk_of([stride_row(0, 0.11), stride_row(0, 0.01, flipper=0)])
+    assert choose_strides(walk) == walk.strides[:1]
+
+
+def test_on_a_bench_any_stride_will_do() -> None:
+    assert len(choose_strides(walk_of([stride_row(0, nan), stride_row(1, nan)]))) == 1
+
+
+def test_a_stride_lasts_until_the_next_insertion() -> None:
+    walk = walk_of([stride_row(0, 0.11), stride_row(1, 0.11)])
+    assert rows_of(walk, walk.strides[0]) == range(40)
+    assert rows_of(walk, walk.strides[1]) == range(40, 80)
+    assert duration_s(walk, walk.strides[1]) == pytest.approx(3.9)
+
+
+def test_rest_ends_a_stride() -> None:
+    phases = [phase for phase in STROKES for _ in range(ROWS)] + [Phase.REST] * ROWS
+    walk = walk_of([stride_row(0, 0.11)], phases)
+    assert rows_of(walk, walk.strides[0]) == range(40)
+
+
+def test_moments_are_seven_in_the_order_of_the_gait() -> None:
+    walk = walk_of([stride_row(0, 0.11), stride_row(1, 0.11)])
+    rows = [moment.row for moment in moments_of(walk, walk.strides[1])]
+    assert rows == [40, 49, 54, 59, 69, 74, 79]
+    assert [Phase(walk.phase[row]).name.lower() for row in rows] == [
+        moment.caption.split()[0] for moment in moments_of(walk, walk.strides[1])
+    ]
+
+
+def test_a_log_that_breaks_off_has_fewer_moments() -> None:
+    phases = [phase for phase in STROKES[:3] for _ in range(ROWS)]
+    walk = walk_of([stride_row(0, 0.11)], phases)
+    assert moments_of(walk, walk.strides[0])[-1].row == 29
+    assert len(moments_of(walk, walk.strides[0])) == 5

@@ -1,0 +1,441 @@
+"""The choice of the next depth, against a search of every depth and in muds made up by clay practice."""
+
+from math import inf, log, nan, radians
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from control.depth.depth_choice import AdaptationParameters, DepthAdaptation, DepthChoice
+from control.depth.forecast import GRID_M, DepthForecast
+from control.depth.step_model import BodyDrag, Grip, step_m
+from control.gait.gait import GaitParameters
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
+from control.records import StrideEstimate
+from tests.control.made_up_muds import (
+    GAIT,
+    GEOMETRY,
+    LIFTING_NM,
+    MOTOR_FORCE_N,
+    PARAMETERS,
+    apart,
+    believed,
+    both,
+    bound,
+    lift_m4,
+    stride,
+    thrust_m3,
+    told,
+)
+
+DEPTHS_M = [0.015 + 0.0025 * i for i in range(15)]
+BEARABLE_NM = 0.95 * LIFTING_NM
+FIRM, SOFT, BOTTOMLESS = told(1.2e6), told(0.3e6), told(0.01e6)
+LOOSE, STICKY = told(0.3e6), told(1.5e6)
+
+
+def adapted(parameters: AdaptationParameters = PARAMETERS) -> DepthAdaptation:
+    return DepthAdaptation(parameters, GEOMETRY, GAIT)
+
+
+def chosen(belief: MudBelief, strides: list[StrideEstimate] | None = None, commanded_m: float = 0.03) -> DepthChoice:
+    adaptation = adapted()
+    adaptation.reset(commanded_m)
+    return adaptation.step(belief, both() if strides is None else strides, adaptation.choice.depth_m)
+
+
+def duration_s(depth_m: float) -> float:
+    """Down and up from 1.45 cm above the mud, the stance's arc of 2 α l, and 0.8 s of swing."""
+    travel_m = 0.0145 + depth_m
+    return travel_m / 0.1 + 2.0 * radians(30.0) * 0.12 / 0.5 + travel_m / 0.5 + 0.8
+
+
+def promised_m(thrust_n: float, k_s: float, depth_m: float) -> float:
+    """The step where the pad of 1.5 cm drags 2 cm deep through the same mud."""
+    drag = BodyDrag(2.5 + k_s * 0.015 * 0.02**2 / 2.0, 6.0, 1.0)
+    return step_m(GAIT, 0.12, drag, Grip(thrust_n, 2.0 * 250.0), depth_m)
+
+
+def forecast(belief: MudBelief, strides: list[StrideEstimate], commanded_m: float = 0.03) -> DepthForecast:
+    forecast = DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N)
+    forecast.update(belief, strides, commanded_m)
+    return forecast
+
+
+def steps_m(told: DepthForecast) -> dict[float, float]:
+    return {z: promised_m(told.thrust_n(z) or 0.0, told.shear_at(0.02), z) for z in DEPTHS_M}
+
+
+def same_depth(depth_m: float) -> object:
+    """Depths of the grid, however their sums round."""
+    return pytest.approx(depth_m, abs=1e-9)
+
+
+made_up_strides = st.builds(
+    lambda *each: [stride("left", *each[:3]), stride("right", *each[3:])],
+    *[st.floats(0.01, 0.05), st.booleans(), st.floats(-0.005, 0.005)] * 2,
+)
+shears = st.floats(log(0.02e6), log(1.5e6)).map(np.exp)
+suctions = st.floats(log(0.1e6), log(3e6)).map(np.exp)
+exponents = st.floats(-1.0, 0.2)
+
+
+class TestTheFastestDepth:
+    @given(shears, suctions, exponents, exponents, made_up_strides)
+    def test_it_promises_the_highest_speed_of_all_that_come_out(
+        self, k_s: float, k_e: float, m_s: float, m_e: float, strides: list[StrideEstimate]
+    ) -> None:
+        belief = believed(told(k_s, exponent=m_s), told(k_e, exponent=m_e))
+        known = forecast(belief, strides)
+        out = {z: step / duration_s(z) for z, step in steps_m(known).items() if known.extraction_nm(z) < BEARABLE_NM}
+        assume(out and max(out.values()) > 0.0)
+        choice = chosen(belief, strides)
+        best_m = max(out, key=lambda depth_m: out[depth_m])
+        assert choice.depth_m == same_depth(best_m) or out[best_m] == pytest.approx(
+            next(speed for z, speed in out.items() if abs(z - choice.depth_m) < 1e-9)
+        )
+
+    def test_it_slips_where_less_than_half_an_arm_is_promised(self) -> None:
+        """6 cm. At 5 cm, in muds that grow firmer in steps of 1 %, which is at most 3 mm of step."""
+        slipping, walking = list[float](), list[float]()
+        for k_s in 0.06e6 * 1.01 ** np.arange(60):
+            belief = believed(told(k_s), LOOSE)
+            choice, promised = chosen(belief), steps_m(forecast(belief, both()))[DEPTHS_M[-1]]
+            assert choice.depth_m == same_depth(0.05)
+            (slipping if choice.slips else walking).append(promised)
+        assert 0.057 < max(slipping) < 0.06 <= min(walking) < 0.063
+
+    @given(shears, suctions, made_up_strides)
+    def test_it_slips_by_what_is_promised_of_the_chosen_depth(
+        self, k_s: float, k_e: float, strides: list[StrideEstimate]
+    ) -> None:
+        belief = believed(told(k_s), told(k_e))
+        choice, steps = chosen(belief, strides), steps_m(forecast(belief, strides))
+        promised = next(step for z, step in steps.items() if abs(z - choice.depth_m) < 1e-9)
+        assume(abs(promised - 0.06) > 1e-9)
+        assert choice.slips == (promised < 0.06)
+
+    def test_firm_mud_is_walked_shallow_and_soft_mud_deep(self) -> None:
+        firm, soft = chosen(believed(FIRM, LOOSE)), chosen(believed(SOFT, LOOSE))
+        assert firm.depth_m < PARAMETERS.initial_depth_m < soft.depth_m
+        assert not firm.slips and not soft.slips
+        assert firm.reason == soft.reason == "fastest"
+
+    def test_mud_that_grows_sticky_is_walked_shallower(self) -> None:
+        adaptation = adapted()
+        before, after = (adaptation.step(believed(told(0.1e6), k_e), both(nan), 0.03) for k_e in (LOOSE, STICKY))
+        assert after.depth_m < before.depth_m
+
+    @pytest.mark.parametrize("k_e", [1.1e6, 1.3e6, 1.6e6])
+    def test_where_deeper_is_faster_it_goes_as_deep_as_it_comes_out_of(self, k_e: float) -> None:
+        depth_m = chosen(believed(told(0.1e6), told(k_e)), both(nan)).depth_m
+        assert k_e * lift_m4(depth_m) < BEARABLE_NM <= k_e * lift_m4(depth_m + GRID_M)
+
+    def test_where_nothing_comes_out_the_shallowest_is_taken(self) -> None:
+        soft, firm = chosen(believed(SOFT, told(20e6))), chosen(believed(told(1.5e6), told(20e6)))
+        assert soft == DepthChoice(0.015, True, "extraction")
+        assert firm.depth_m == 0.015
+
+    @pytest.mark.parametrize(("k_e", "expected_m"), [(LOOSE, 0.05), (told(1.5e6), 0.035)])
+    def test_where_no_depth_promises_a_step_the_deepest_that_comes_out_is_taken(
+        self, k_e: Coefficient, expected_m: float
+    ) -> None:
+        assert k_e.value * lift_m4(expected_m) < BEARABLE_NM
+        assert expected_m == 0.05 or k_e.value * lift_m4(expected_m + GRID_M) >= BEARABLE_NM
+        assert chosen(believed(BOTTOMLESS, k_e), both(nan))[:3] == (same_depth(expected_m), True, "thrust")
+
+    def test_a_heavier_body_or_more_drag_is_carried_deeper(self) -> None:
+        plain = chosen(believed(SOFT, LOOSE)).depth_m
+        for burden in (
+            AdaptationParameters(body_drag_n=4.0),
+            AdaptationParameters(body_mass_kg=2.5),
+            AdaptationParameters(body_damping_n_s_m=20.0),
+            AdaptationParameters(pad_width_m=0.1),
+        ):
+            assert adapted(burden).step(believed(SOFT, LOOSE), both(), 0.03).depth_m > plain
+
+    def test_a_surface_that_lies_deeper_needs_a_deeper_stride(self) -> None:
+        level, sunk = (chosen(believed(SOFT, LOOSE), both(surface_m=surface_m)) for surface_m in (0.0, 0.0075))
+        assert 0.0 < sunk.depth_m - level.depth_m <= 0.0075 + 1e-9
+
+
+class TestWhatIsNotKnown:
+    def test_where_nothing_is_known_of_the_thrust_the_depth_is_kept(self) -> None:
+        adaptation = adapted()
+        adaptation.reset(0.0375)
+        kept = DepthChoice(0.0375, False, "nothing known of the thrust, depth kept")
+        assert adaptation.step(believed(None, STICKY), both(), adaptation.choice.depth_m) == kept
+        assert adaptation.step(NOTHING_KNOWN, both(), adaptation.choice.depth_m) == kept
+        assert adaptation.step(believed(FIRM, LOOSE), [], adaptation.choice.depth_m) == kept
+
+    def test_a_reset_starts_at_its_depth(self) -> None:
+        adaptation = adapted()
+        adaptation.step(believed(BOTTOMLESS, LOOSE), both(), adaptation.choice.depth_m)
+        adaptation.reset(0.02)
+        assert adaptation.choice == DepthChoice(0.02, False, "start")
+
+    def test_the_first_depth_is_the_configured_one(self) -> None:
+        assert adapted(AdaptationParameters(initial_depth_m=0.04)).choice.depth_m == 0.04
+
+    def test_the_insertion_alone_is_enough_to_choose(self) -> None:
+        """By k_s of 0.55 times k_p, less a fifth."""
+        told_by_insertion = chosen(believed(None, LOOSE, told(0.3e6 / 0.44)))
+        assert told_by_insertion == chosen(believed(SOFT, LOOSE))
+
+    def test_an_extraction_without_any_k_e_allows_one_step_deeper_than_it_was(self) -> None:
+        assert chosen(believed(BOTTOMLESS), both(0.03)).depth_m == same_depth(0.0325)
+
+    def test_a_stride_of_which_nothing_is_known_is_survived(self) -> None:
+        lost = stride(depth_m=nan, surface_m=nan)
+        assert chosen(believed(FIRM), [lost, stride("right")]).depth_m == 0.015
+        assert chosen(NOTHING_KNOWN, [lost]).depth_m == PARAMETERS.initial_depth_m
+
+
+class TestDoubt:
+    """Within muds through which the motors can pull the pad: beyond 1.5 N/cm³ its own drag outgrows them."""
+
+    fractions = st.tuples(*[st.floats(0.0, 1.0)] * 2)
+
+    @given(shears, suctions, exponents, fractions)
+    def test_doubt_about_thrust_never_chooses_a_depth_with_less_thrust(
+        self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float]
+    ) -> None:
+        sure, doubtful = (
+            chosen(believed(told(k_s, share * k_s, exponent=exponent), told(k_e))) for share in sorted(pair)
+        )
+        assert doubtful.depth_m >= sure.depth_m
+        assert doubtful.slips >= sure.slips
+
+    @given(shears, suctions, exponents, fractions)
+    def test_doubt_about_suction_never_chooses_a_deeper_one(
+        self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float]
+    ) -> None:
+        sure, doubtful = (
+            chosen(believed(told(k_s), told(k_e, share * k_e, exponent=exponent))) for share in sorted(pair)
+        )
+        assert doubtful.depth_m <= sure.depth_m
+
+    @given(shears, suctions, exponents, st.tuples(*[st.floats(0.0, 1.0)] * 2), st.floats(0.02, 0.05))
+    def test_suction_learned_elsewhere_is_doubted_the_more_the_less_its_depth_law_is_known(
+        self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float], depth_m: float
+    ) -> None:
+        sure, doubtful = (chosen(believed(told(k_s), told(k_e, 0.0, depth_m, exponent, m))) for m in sorted(pair))
+        assert doubtful.depth_m <= sure.depth_m
+
+    def test_one_standard_error_of_thrust_and_two_of_suction_count(self) -> None:
+        assert chosen(believed(told(0.4e6, 0.1e6), LOOSE)) == chosen(believed(SOFT, LOOSE))
+        assert chosen(believed(told(0.1e6), told(0.5e6, 0.4e6))) == chosen(believed(told(0.1e6), told(1.3e6)))
+        assert chosen(believed(SOFT, LOOSE)).depth_m > chosen(believed(told(0.4e6), LOOSE)).depth_m
+
+    def test_mud_that_reads_softer_in_deeper_strides_is_walked_deeper(self) -> None:
+        depths_m = [chosen(believed(told(0.25e6, exponent=m), LOOSE)).depth_m for m in (0.0, -0.4, -0.8)]
+        assert depths_m == sorted(depths_m)
+        assert depths_m[0] < depths_m[-1]
+
+
+class TestStuck:
+    SINKING = believed(told(0.08e6), LOOSE)  # the deeper, the faster
+
+    @pytest.mark.parametrize("depth_m", [0.0225, 0.0325, 0.04, 0.05])
+    @pytest.mark.parametrize("k_s", [FIRM, SOFT, BOTTOMLESS, None])
+    def test_a_stuck_flipper_goes_shallower_than_where_it_stuck(self, depth_m: float, k_s: Coefficient | None) -> None:
+        choice = chosen(believed(k_s, told(1.0)), both(depth_m, released=False), depth_m)
+        assert choice.depth_m < 0.95 * depth_m
+        assert choice.reason == "a flipper was stuck"
+
+    @pytest.mark.parametrize("stuck", ["left", "right"])
+    def test_one_stuck_flipper_is_enough(self, stuck: str) -> None:
+        strides = [stride(flipper, 0.04, released=flipper != stuck) for flipper in ("left", "right")]
+        assert chosen(self.SINKING, strides, 0.04).depth_m == same_depth(0.0375)
+
+    def test_it_goes_no_shallower_than_the_torque_asks_for(self) -> None:
+        """In proportion to depth, 95 % of it pull out of 4.66 cm where a flipper stuck at 4.9 cm."""
+        assert chosen(self.SINKING, both(0.049, released=False), 0.049).depth_m == same_depth(0.045)
+
+    def test_without_any_thrust_known_it_takes_the_deepest_that_comes_out(self) -> None:
+        assert chosen(believed(None, LOOSE), both(0.04, released=False), 0.04).depth_m == same_depth(0.0375)
+
+    def test_a_flipper_that_stuck_at_the_shallowest_depth_stays_there(self) -> None:
+        for k_s in (SOFT, None):
+            assert chosen(believed(k_s), both(0.015, released=False)).depth_m == 0.015
+
+    @pytest.mark.parametrize("reached_m", [nan, inf, -inf])
+    def test_one_that_stuck_nobody_knows_where_goes_to_the_shallowest_depth(self, reached_m: float) -> None:
+        assert chosen(self.SINKING, both(reached_m, released=False)).depth_m == 0.015
+
+    def test_a_depth_that_stuck_stays_out_of_bounds_whatever_is_believed(self) -> None:
+        adaptation = adapted()
+        assert adaptation.step(self.SINKING, both(), adaptation.choice.depth_m).depth_m == same_depth(0.05)
+        for strides in (both(0.04, released=False), both(0.025), both(0.03), both(0.0375)):
+            assert adaptation.step(self.SINKING, strides, adaptation.choice.depth_m).depth_m <= 0.0375 + 1e-9
+
+    def test_a_flipper_that_comes_out_of_where_it_stuck_may_go_deeper_again(self) -> None:
+        adaptation = adapted()
+        adaptation.reset(0.04)
+        adaptation.step(self.SINKING, both(0.04, released=False), adaptation.choice.depth_m)
+        assert adaptation.step(self.SINKING, both(0.04), adaptation.choice.depth_m).depth_m == same_depth(0.05)
+
+    def test_where_a_flipper_stuck_is_forgotten_in_another_mud_and_in_another_walk(self) -> None:
+        other_mud, other_walk = adapted(), adapted()
+        for adaptation in (other_mud, other_walk):
+            adaptation.step(self.SINKING, both(0.04, released=False), adaptation.choice.depth_m)
+        other_walk.reset(0.03)
+        assert other_mud.step(
+            self.SINKING._replace(boundary=True), both(), other_mud.choice.depth_m
+        ).depth_m == same_depth(0.05)
+        assert other_walk.step(self.SINKING, both(), other_walk.choice.depth_m).depth_m == same_depth(0.05)
+
+    def test_a_lower_bound_of_suction_never_says_that_a_flipper_comes_out(self) -> None:
+        unknown, at_least = (chosen(believed(BOTTOMLESS, k_e), both(0.03)) for k_e in (None, bound(0.1e6)))
+        assert at_least == unknown
+
+
+class TestTwoMuds:
+    """Of one thrust and one suction."""
+
+    @given(shears, suctions, suctions)
+    def test_the_flipper_that_the_mud_holds_harder_decides(self, k_s: float, one: float, other: float) -> None:
+        flippers = [FlipperBelief(None, told(k_s), told(k_e)) for k_e in (one, other)]
+        alone = [chosen(apart(flipper, flipper)).depth_m for flipper in flippers]
+        together = {chosen(apart(*flippers)).depth_m, chosen(apart(*flippers[::-1])).depth_m}
+        assert together == {min(alone)}
+
+    @given(st.floats(0.05e6, 0.3e6), st.floats(0.05e6, 0.3e6))
+    def test_their_thrusts_add_up(self, one: float, other: float) -> None:
+        """Below the motors' limit at every depth: 6.25 N bear 0.15 N/cm³ at 5 cm."""
+        one, other = one / 2.0, other / 2.0
+        mean = believed(told((one + other) / 2.0), LOOSE)
+        two = apart(FlipperBelief(None, told(one), LOOSE), FlipperBelief(None, told(other), LOOSE))
+        assert chosen(two).depth_m == chosen(mean).depth_m
+
+
+class Clay(NamedTuple):
+    """Undrained: pressure min(3 + γ ζ/s_u + ζ/2w, 9) s_u across the plate, adhesion s_u/4 along it, 9 s_u beneath."""
+
+    strength_pa: float
+
+    def thrust_n(self, depth_m: float) -> float:
+        zeta = (np.arange(1000) + 0.5) / 1000.0 * depth_m
+        factor = np.minimum(3.0 + 17.5e3 * zeta / self.strength_pa + 0.5 * zeta / 0.025, 9.0)
+        return float(self.strength_pa * 0.025 * np.mean(factor) * depth_m)
+
+    def suction_n(self, depth_m: float) -> float:
+        edge_m2, around_m = 0.025 * 0.004, 2.0 * (0.025 + 0.004)
+        return self.strength_pa * (9.0 * edge_m2 + 0.25 * around_m * depth_m)
+
+    def k_s(self, depth_m: float) -> float:
+        """With which a plate straight out bears the same."""
+        return self.thrust_n(depth_m) / thrust_m3(depth_m)
+
+    def k_e(self, depth_m: float) -> float:
+        return self.suction_n(depth_m) / (0.025 * 0.004 * depth_m)
+
+    def belief(self) -> MudBelief:
+        """As it would be learned from strides between 3 and 4 cm."""
+        k_s, k_e = (
+            told(k(0.035), depth_m=0.035, exponent=log(k(0.04) / k(0.03)) / log(4.0 / 3.0))
+            for k in (self.k_s, self.k_e)
+        )
+        return believed(k_s, k_e)
+
+
+class TestMuds:
+    CLAYS = [Clay(strength_pa) for strength_pa in np.geomspace(300.0, 6000.0, 25)]
+
+    def test_the_softer_the_clay_the_deeper_the_stride(self) -> None:
+        depths_m = [chosen(clay.belief()).depth_m for clay in self.CLAYS]
+        assert depths_m == sorted(depths_m, reverse=True)
+        assert depths_m[0] == same_depth(0.05)
+        assert depths_m[-1] == 0.015
+        assert len(set(depths_m)) > 8
+
+    def test_the_depth_is_nearly_the_best_by_the_clay_itself(self) -> None:
+        """Its law is no power of depth: strides of 3 to 4 cm tell 4 % too much thrust of 2 cm, and a step that just
+        carries the body loses up to 6 % by that. Left out is clay in which every depth slips or sticks.
+        """
+        for clay in self.CLAYS:
+            choice = chosen(clay.belief())
+            if choice.slips or choice.reason != "fastest":
+                continue
+            speeds = {}
+            for z in DEPTHS_M:
+                thrust_n = 2.0 * min(clay.thrust_n(z), MOTOR_FORCE_N)
+                comes_out = clay.k_e(z) * lift_m4(z) < BEARABLE_NM
+                speeds[z] = promised_m(thrust_n, clay.k_s(0.02), z) / duration_s(z) if comes_out else 0.0
+            taken = next(speed for z, speed in speeds.items() if abs(z - choice.depth_m) < 1e-9)
+            assert taken > 0.94 * max(speeds.values())
+
+    def test_only_bottomless_clay_slips(self) -> None:
+        slipping = [clay.strength_pa for clay in self.CLAYS if chosen(clay.belief()).slips]
+        assert slipping == [clay.strength_pa for clay in self.CLAYS[: len(slipping)]]
+        assert 300.0 <= slipping[-1] < 700.0
+
+    @pytest.mark.parametrize("strength_pa", [500.0, 1500.0, 3000.0])
+    def test_the_choice_settles_where_the_strides_confirm_the_belief(self, strength_pa: float) -> None:
+        adaptation, clay = adapted(), Clay(strength_pa)
+        depths_m = []
+        for _ in range(6):
+            depth_m = adaptation.choice.depth_m
+            depths_m.append(adaptation.step(clay.belief(), both(depth_m, extraction_nm=0.2), depth_m).depth_m)
+        assert len(set(depths_m[1:])) == 1
+
+
+numbers = st.floats() | st.floats(-0.1, 0.1) | st.sampled_from([0.0, 0.03, 1e6])
+anything = st.builds(Coefficient, *[numbers] * 5, st.just(3), st.booleans())
+plausible = st.builds(
+    told, st.floats(0.0, 1e8), st.floats(0.0, 1e7), st.floats(0.005, 0.06), st.floats(-1.5, 0.5), st.floats(0.0, 0.5)
+)
+coefficients = plausible | anything | st.none()
+beliefs = st.builds(MudBelief, *[coefficients] * 3, *[st.builds(FlipperBelief, *[coefficients] * 3)] * 2)
+strides = st.builds(
+    stride,
+    st.sampled_from(["left", "right"]),
+    st.floats() | st.floats(0.0, 0.06),
+    st.booleans(),
+    st.floats() | st.floats(-0.02, 0.04),
+)
+pairs = st.lists(strides, min_size=1, max_size=2)
+
+
+class TestRange:
+    @given(st.lists(st.tuples(beliefs, pairs), max_size=5))
+    def test_the_depth_stays_within_its_bounds_and_within_reach(
+        self, walk: list[tuple[MudBelief, list[StrideEstimate]]]
+    ) -> None:
+        adaptation = adapted()
+        for belief, pair in walk:
+            choice = adaptation.step(belief, pair, adaptation.choice.depth_m)
+            assert PARAMETERS.min_depth_m <= choice.depth_m <= PARAMETERS.max_depth_m
+            assert GEOMETRY.is_reachable(radians(GAIT.sweep_angle_deg), choice.depth_m)
+
+    @given(st.floats(5.0, 45.0), st.floats(0.02, 0.2), beliefs, pairs)
+    def test_a_greatest_depth_out_of_reach_is_never_chosen(
+        self, sweep_deg: float, max_depth_m: float, belief: MudBelief, pair: list[StrideEstimate]
+    ) -> None:
+        gait, parameters = GaitParameters(sweep_angle_deg=sweep_deg), AdaptationParameters(max_depth_m=max_depth_m)
+        adaptation = DepthAdaptation(parameters, GEOMETRY, gait)
+        assert all(GEOMETRY.is_reachable(radians(sweep_deg), depth_m) for depth_m in adaptation.grid_m)
+        adaptation.reset(parameters.min_depth_m)
+        assert (
+            parameters.min_depth_m
+            <= adaptation.step(belief, pair, adaptation.choice.depth_m).depth_m
+            <= max_depth_m + 1e-9
+        )
+
+    def test_a_least_depth_out_of_reach_raises_nothing(self) -> None:
+        parameters = AdaptationParameters(min_depth_m=0.15, max_depth_m=0.2)
+        assert adapted(parameters).step(believed(FIRM, LOOSE), both(), 0.03).depth_m == 0.15
+
+    def test_the_grid_holds_both_ends_of_its_range(self) -> None:
+        assert adapted().grid_m == pytest.approx(DEPTHS_M, abs=1e-12)
+        assert DEPTHS_M[-1] == same_depth(PARAMETERS.max_depth_m)
+
+    @given(st.floats(0.01, 0.05), st.integers(0, 12), st.floats(0.01, 0.99))
+    def test_the_grid_never_passes_its_greatest_depth(self, low_m: float, steps: int, share: float) -> None:
+        high_m = low_m + (steps + share) * GRID_M
+        assume(high_m < GEOMETRY.deepest_m(30.0))
+        grid_m = adapted(AdaptationParameters(min_depth_m=low_m, max_depth_m=high_m)).grid_m
+        assert len(grid_m) == steps + 1
+        assert grid_m[-1] <= high_m

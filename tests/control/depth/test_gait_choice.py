@@ -1,0 +1,287 @@
+"""The choice of depth and sweep together, from beliefs made up of muds, against a search that looks at every pair."""
+
+from dataclasses import replace
+from math import nan, radians
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from control.depth.depth_choice import AdaptationParameters, DepthChoice, body_drag
+from control.depth.forecast import DepthForecast
+from control.depth.gait_choice import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptation, quickest
+from control.depth.step_model import Grip, step_m
+from control.gait.gait import Gait, GaitParameters, stride_duration_s
+from control.geometry import FlipperGeometry
+from control.limits import JointLimits
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
+from control.plate import stroke_moment_m4, submerged_plate
+from control.records import Estimate, StrideEstimate
+from tests.control.made_up_muds import both
+
+GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
+PARAMETERS = AdaptationParameters(method="gait")
+LIFTING_NM = PARAMETERS.motor_force_n * GEOMETRY.flipper_length_m
+NOT_TOLD = Estimate(nan, nan, 0, False, "not told")
+
+
+def told(value: float, at_least: bool = False) -> Coefficient:
+    return Coefficient(value, 0.05 * value, 0.03, 0.0, 0.1, 8, at_least)
+
+
+def believed(k_s: float, k_e: float, boundary: bool = False) -> MudBelief:
+    """By both flippers alike; a mud that never yielded has a k_s of this or more."""
+    flipper = FlipperBelief(None, told(k_s), told(k_e))
+    return MudBelief(None, told(k_s), told(k_e), flipper, flipper, boundary)
+
+
+FIRM, SOFT, STICKY = believed(2.0e6, 0.5e6), believed(0.2e6, 0.1e6), believed(2.0e6, 2.5e6)
+
+
+def strides(
+    released: bool = True, torque_nm: float = 0.2, depth_m: float = 0.03, surface_m: float = 0.0
+) -> list[StrideEstimate]:
+    return both(depth_m, released, surface_m, torque_nm)
+
+
+def adapted(parameters: AdaptationParameters = PARAMETERS) -> GaitAdaptation:
+    return GaitAdaptation(parameters, GEOMETRY, GAIT)
+
+
+def sweep_deg(choice: DepthChoice) -> float:
+    assert choice.gait is not None
+    return choice.gait.sweep_angle_deg
+
+
+def settled(belief: MudBelief, count: int = 5) -> DepthChoice:
+    adaptation = adapted()
+    for _ in range(count):
+        choice = adaptation.step(belief, strides(), adaptation.choice.depth_m)
+    return choice
+
+
+def brute_force(
+    belief: MudBelief, closed: list[StrideEstimate], walked: GaitParameters, widest_deg: float
+) -> list[tuple[float, float, float]]:
+    """(speed, depth, sweep) of every pair that comes out, the fastest first."""
+    found = []
+    for i in range(round((PARAMETERS.max_sweep_deg - PARAMETERS.min_sweep_deg) / SWEEP_STEP_DEG) + 1):
+        deg = PARAMETERS.min_sweep_deg + i * SWEEP_STEP_DEG
+        gait = replace(GAIT, sweep_angle_deg=deg, swing_duration_s=PARAMETERS.swing_duration_s)
+        forecast = DepthForecast(GEOMETRY, walked, PARAMETERS.motor_force_n)
+        forecast.update(belief, closed, PARAMETERS.initial_depth_m)
+        forecast.gait = gait
+        drag = body_drag(PARAMETERS, forecast)
+        for j in range(15):
+            depth_m = 0.015 + 0.0025 * j
+            if depth_m > GEOMETRY.deepest_m(deg) or deg > widest_deg:
+                continue
+            if forecast.extraction_nm(depth_m) >= PARAMETERS.lifting_share * LIFTING_NM:
+                continue
+            grip = Grip(forecast.thrust_n(depth_m) or 0.0, 2.0 * PARAMETERS.mobilisation_n_m)
+            carried_m = step_m(gait, GEOMETRY.flipper_length_m, drag, grip, depth_m)
+            found.append((carried_m / stride_duration_s(gait, GEOMETRY, depth_m), depth_m, deg))
+    return sorted(found, reverse=True)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    walked_deg=st.sampled_from([30.0, 40.0, 50.0]),
+    k_s=st.floats(0.15e6, 3e6),
+    k_e=st.floats(0.2e6, 5e6),
+    torque_nm=st.floats(0.0, 0.7),
+    surface_m=st.floats(-0.002, 0.002),
+)
+def test_it_takes_the_fastest_of_all_pairs_that_come_out(
+    walked_deg: float, k_s: float, k_e: float, torque_nm: float, surface_m: float
+) -> None:
+    """A stride of 1.5 cm came out and told its k_e, which the last one felt with some share of it."""
+    felt = Estimate(k_e, 0.05 * k_e, 50, True)
+    closed = [replace(each, k_e=felt) for each in strides(torque_nm=torque_nm, depth_m=0.015, surface_m=surface_m)]
+    walked, belief = replace(GAIT, sweep_angle_deg=walked_deg), believed(k_s, k_e)
+    choice = GaitAdaptation(PARAMETERS, GEOMETRY, walked).step(belief, closed, 0.03)
+    easily = torque_nm < 0.7 * LIFTING_NM
+    pairs = brute_force(belief, closed, walked, walked_deg + (WIDENING_DEG if easily else 0.0))
+    if not pairs or pairs[0][0] == 0.0:
+        assert choice.reason == ("thrust" if pairs else "extraction")
+        assert choice.depth_m == pytest.approx(max((depth_m for _, depth_m, _ in pairs), default=0.015))
+        return
+    speeds = {(round(depth_m, 6), deg): speed for speed, depth_m, deg in pairs}
+    assert speeds[round(choice.depth_m, 6), sweep_deg(choice)] == pytest.approx(pairs[0][0], rel=1e-9)
+
+
+@pytest.mark.parametrize("deg", [30.0, 40.0, 50.0])
+def test_the_torque_of_an_extraction_is_that_of_the_pose_at_its_own_rear(deg: float) -> None:
+    """Over the wider sweep Φ of 2 cm is smaller: what just sticks at ±30° comes out at ±50°."""
+    parameters = replace(PARAMETERS, min_depth_m=0.02, max_depth_m=0.02, initial_depth_m=0.02)
+    rear_rad = -radians(deg)
+    plate = submerged_plate(GEOMETRY, rear_rad, GEOMETRY.adduction_rad(rear_rad, 0.02))
+    limit_nm = parameters.lifting_share * LIFTING_NM
+    just = limit_nm / stroke_moment_m4(GEOMETRY, plate, rear_rad) / 1.1  # two standard errors of 5 %
+    for share, comes_out in ((0.999, True), (1.001, False)):
+        narrowed = replace(parameters, min_sweep_deg=deg, max_sweep_deg=deg)
+        adaptation = GaitAdaptation(narrowed, GEOMETRY, replace(GAIT, sweep_angle_deg=40.0))
+        k_e = Coefficient(share * just, 0.05 * share * just, 0.02, 0.0, 0.0, 8)
+        flipper = FlipperBelief(None, told(2e6), k_e)
+        choice = adaptation.step(
+            MudBelief(None, told(2e6), k_e, flipper, flipper), strides(depth_m=nan), adaptation.choice.depth_m
+        )
+        assert (choice.reason == "fastest") is comes_out
+
+
+def test_firm_mud_is_walked_wide_and_shallow_and_soft_mud_narrow_and_deep() -> None:
+    firm, soft = settled(FIRM), settled(SOFT)
+    assert sweep_deg(firm) > sweep_deg(soft)
+    assert firm.depth_m < soft.depth_m
+
+
+def test_every_stride_has_the_short_swing_of_the_method() -> None:
+    choice = settled(FIRM)
+    assert choice.gait is not None
+    assert choice.gait == replace(GAIT, sweep_angle_deg=sweep_deg(choice), swing_duration_s=0.3)
+
+
+def test_the_first_stride_is_walked_as_configured() -> None:
+    adaptation = adapted()
+    adaptation.reset(0.02)
+    assert adaptation.choice[:2] == (0.02, False)
+    assert adaptation.choice.gait == GAIT
+
+
+def test_the_sweep_grows_by_no_more_than_one_widening_from_stride_to_stride() -> None:
+    adaptation, before_deg, widest_deg = adapted(), 30.0, 0.0
+    for _ in range(6):
+        now_deg = sweep_deg(adaptation.step(FIRM, strides(), 0.03))
+        assert now_deg <= before_deg + WIDENING_DEG
+        before_deg, widest_deg = now_deg, max(widest_deg, now_deg)
+    assert widest_deg == 50.0
+
+
+@pytest.mark.parametrize("torque_nm", [0.7 * LIFTING_NM, nan])
+def test_no_stride_is_wider_after_an_extraction_that_was_hard_or_was_not_seen(torque_nm: float) -> None:
+    assert sweep_deg(adapted().step(FIRM, strides(torque_nm=torque_nm), 0.03)) == 30.0
+    assert sweep_deg(adapted().step(FIRM, strides(torque_nm=0.69 * LIFTING_NM), 0.03)) > 30.0
+
+
+def test_one_flipper_that_was_hard_to_lift_is_enough() -> None:
+    left, right = strides()[0], strides(torque_nm=0.6)[1]
+    assert sweep_deg(adapted().step(FIRM, [left, right], 0.03)) == 30.0
+
+
+def test_a_sweep_narrower_than_the_methods_becomes_its_narrowest_at_once() -> None:
+    adaptation = GaitAdaptation(PARAMETERS, GEOMETRY, replace(GAIT, sweep_angle_deg=15.0))
+    choice = adaptation.step(FIRM, strides(torque_nm=0.7), adaptation.choice.depth_m)
+    assert (sweep_deg(choice), choice.reason) == (30.0, "fastest")
+
+
+class TestStuck:
+    def walked(self) -> tuple[GaitAdaptation, DepthChoice]:
+        adaptation = adapted()
+        for _ in range(4):
+            choice = adaptation.step(FIRM, strides(), adaptation.choice.depth_m)
+        return adaptation, choice
+
+    def test_nothing_as_deep_and_as_wide_is_tried_again_in_the_same_mud(self) -> None:
+        adaptation, stuck = self.walked()
+        for torque_nm in (0.2, 0.3, 0.2, 0.2):
+            choice = adaptation.step(
+                FIRM, strides(torque_nm == 0.3, torque_nm, stuck.depth_m), adaptation.choice.depth_m
+            )
+            assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
+
+    def test_the_next_stride_has_the_narrowest_sweep(self) -> None:
+        adaptation, stuck = self.walked()
+        assert sweep_deg(stuck) == 50.0
+        assert sweep_deg(adaptation.step(FIRM, strides(released=False, depth_m=stuck.depth_m), 0.03)) == 30.0
+
+    def test_not_even_where_the_flipper_was_pressed_much_deeper_than_commanded(self) -> None:
+        """By the depth that it reached alone, the commanded one would be safe."""
+        adaptation, stuck = self.walked()
+        choice = adaptation.step(FIRM, strides(released=False, depth_m=0.05), adaptation.choice.depth_m)
+        assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
+
+    def test_at_the_shallowest_and_narrowest_it_stays_until_it_comes_out_of_there(self) -> None:
+        parameters = replace(PARAMETERS, initial_depth_m=0.015)
+        adaptation = GaitAdaptation(parameters, GEOMETRY, GAIT)
+        for _ in range(2):
+            choice = adaptation.step(FIRM, strides(released=False, depth_m=0.03), adaptation.choice.depth_m)
+            assert (choice.depth_m, sweep_deg(choice), choice.reason) == (0.015, 30.0, "a flipper was stuck")
+        choice = adaptation.step(FIRM, strides(depth_m=0.03), adaptation.choice.depth_m)
+        assert (choice.depth_m, sweep_deg(choice)) > (0.015, 30.0)
+
+    def test_it_says_so(self) -> None:
+        adaptation, _ = self.walked()
+        assert adaptation.step(FIRM, strides(released=False), adaptation.choice.depth_m).reason == "a flipper was stuck"
+
+    @pytest.mark.parametrize("forgotten", ["another mud", "another walk"])
+    def test_it_is_forgotten_in_another_mud_and_in_another_walk(self, forgotten: str) -> None:
+        adaptation, stuck = self.walked()
+        adaptation.step(FIRM, strides(released=False, depth_m=stuck.depth_m), adaptation.choice.depth_m)
+        if forgotten == "another walk":
+            adaptation.reset(0.03)
+        adaptation.step(FIRM._replace(boundary=True), strides(), adaptation.choice.depth_m)
+        for _ in range(4):
+            choice = adaptation.step(FIRM, strides(), adaptation.choice.depth_m)
+        assert (choice.depth_m, choice.gait) == (stuck.depth_m, stuck.gait)
+
+    def test_with_no_thrust_known_it_goes_on_with_something_else(self) -> None:
+        adaptation, stuck = self.walked()
+        choice = adaptation.step(
+            NOTHING_KNOWN, strides(released=False, depth_m=stuck.depth_m), adaptation.choice.depth_m
+        )
+        assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
+
+
+def test_where_nothing_is_known_of_the_thrust_depth_and_gait_stay() -> None:
+    adaptation = adapted()
+    before = adaptation.step(FIRM, strides(), adaptation.choice.depth_m)
+    after = adaptation.step(NOTHING_KNOWN, strides(), adaptation.choice.depth_m)
+    assert (after.depth_m, after.gait) == (before.depth_m, before.gait)
+    assert "nothing known" in after.reason
+
+
+def test_where_no_pair_comes_out_the_shallowest_and_narrowest_is_taken() -> None:
+    choice = adapted().step(believed(2.0e6, 50e6), strides(torque_nm=0.75, depth_m=0.01), 0.03)
+    assert (choice.depth_m, sweep_deg(choice), choice.reason) == (0.015, 30.0, "extraction")
+
+
+def test_where_none_promises_a_step_the_deepest_is_taken() -> None:
+    choice = adapted().step(believed(0.005e6, 0.001e6), strides(), 0.03)
+    assert (choice.reason, choice.slips) == ("thrust", True)
+    assert choice.depth_m == pytest.approx(0.05)
+
+
+@settings(max_examples=30, deadline=None)
+@given(k_s=st.floats(1e4, 1e7), k_e=st.floats(1e4, 1e7), seed=st.integers(0, 7))
+def test_every_choice_is_within_bounds_and_reach(k_s: float, k_e: float, seed: int) -> None:
+    adaptation = adapted()
+    for i in range(4):
+        choice = adaptation.step(believed(k_s, k_e), strides(released=bool(seed >> i & 1)), adaptation.choice.depth_m)
+        assert 0.015 <= choice.depth_m <= min(0.05, GEOMETRY.deepest_m(sweep_deg(choice)))
+        assert 30.0 <= sweep_deg(choice) <= 50.0
+
+
+def test_no_stride_that_may_be_chosen_asks_a_joint_for_more_than_its_velocity_limit() -> None:
+    limit_rad_s = JointLimits().velocity_rad_s
+    for stride in adapted().candidates:
+        gait = Gait(stride.gait, GEOMETRY)
+        gait.reset(stride.depth_m)
+        while (target := gait.step(0.002)).stride == 0:
+            adduction_rad = GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m)
+            adduction_rad_s = GEOMETRY.adduction_velocity_rad_s(
+                target.sweep_rad, adduction_rad, target.sweep_velocity_rad_s, target.depth_velocity_m_s
+            )
+            assert max(abs(adduction_rad_s), abs(target.sweep_velocity_rad_s)) < limit_rad_s
+
+
+def test_only_this_method_has_a_shorter_swing() -> None:
+    assert quickest(PARAMETERS, GEOMETRY, GAIT).swing_duration_s == 0.3
+    for method in ("default", "paper"):
+        assert quickest(replace(PARAMETERS, method=method), GEOMETRY, GAIT) is GAIT
+
+
+def test_what_stuck_is_not_forgotten_by_a_stride_that_ended_its_insertion_above_it() -> None:
+    adaptation = adapted()
+    held = adaptation.step(STICKY, strides(released=False, depth_m=0.04), 0.04)
+    adaptation.step(STICKY, strides(depth_m=0.02), 0.02)
+    assert any(each.depth_m == 0.04 for each in adaptation._stuck), held

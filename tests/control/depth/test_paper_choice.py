@@ -1,0 +1,174 @@
+"""The paper's own choice, with forces worked out by hand for the authors' plate of 2.5 cm by 4 mm.
+
+Its edge has 1 cm², so f_e = k_e · 1 cm² · z and f_m = 6.25 N: at 1 N/cm³ that would be 6.25 cm, at 2 N/cm³ 3.125 cm.
+"""
+
+from math import nan, radians
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.depth.depth_choice import AdaptationParameters, DepthChoice, depth_grid
+from control.depth.paper_choice import PaperAdaptation
+from control.gait.gait import GaitParameters
+from control.mud_estimate import NOTHING_KNOWN
+from control.records import Estimate, StrideEstimate
+from tests.control.made_up_muds import (
+    GAIT,
+    GEOMETRY,
+    NOT_TOLD,
+    PARAMETERS,
+    believed,
+    measured,
+    stride,
+    told,
+)
+
+OUT = "deepest that comes out"
+THREE_CM = DepthChoice(depth_grid(PARAMETERS, GEOMETRY, GAIT)[6], False, OUT)
+
+
+def adapted(parameters: AdaptationParameters = PARAMETERS, gait: GaitParameters = GAIT) -> PaperAdaptation:
+    return PaperAdaptation(parameters, GEOMETRY, gait)
+
+
+def alike(k_s: Estimate, k_e: Estimate) -> list[StrideEstimate]:
+    return [stride(flipper, k_s=k_s, k_e=k_e) for flipper in ("left", "right")]
+
+
+def chosen(k_s: Estimate, k_e: Estimate) -> DepthChoice:
+    return adapted().step(NOTHING_KNOWN, alike(k_s, k_e), 0.03)
+
+
+class TestDepth:
+    @pytest.mark.parametrize(
+        ("k_e", "depth_m"),
+        [
+            (1.0e6, 0.05),  # 5.00 N at the deepest
+            (1.26e6, 0.0475),  # 6.30 N at 5 cm, 5.985 N here
+            (2.0e6, 0.03),  # 6.50 N at 3.25 cm, 6.00 N here
+            (3.6e6, 0.015),  # 6.30 N at 1.75 cm, 5.40 N here
+        ],
+    )
+    def test_it_is_the_deepest_that_the_motors_force_pulls_out(self, k_e: float, depth_m: float) -> None:
+        choice = chosen(measured(1e6), measured(k_e))
+        assert choice.depth_m == pytest.approx(depth_m)
+        assert choice.reason == OUT
+
+    def test_a_force_equal_to_the_motors_does_not_pull_it_out(self) -> None:
+        """In round numbers: 2 N/cm³ · 1 cm² · 3 cm = 6 N."""
+        for motor_force_n, depth_m in ((6.0 + 1e-9, 0.03), (6.0 - 1e-9, 0.0275)):
+            parameters = AdaptationParameters(motor_force_n=motor_force_n)
+            choice = adapted(parameters).step(NOTHING_KNOWN, alike(NOT_TOLD, measured(2.0e6)), 0.03)
+            assert choice.depth_m == pytest.approx(depth_m)
+
+    def test_where_nothing_comes_out_it_is_the_shallowest(self) -> None:
+        """1.5 cm hold 7.5 N, where 2 · 1 N/cm³ · 2.5 cm · 1.5² cm² / 2 = 5.6 N face 8 N: it slips as well."""
+        assert chosen(measured(1e6), measured(5e6)) == DepthChoice(0.015, True, "extraction")
+
+    def test_a_weak_mud_is_not_walked_deeper_than_allowed(self) -> None:
+        assert chosen(NOT_TOLD, measured(1.0)).depth_m == pytest.approx(PARAMETERS.max_depth_m)
+
+    @given(st.floats(1e4, 1e7), st.floats(0.0, 5e6))
+    def test_doubt_and_what_is_believed_from_many_strides_are_not_asked(self, k_e: float, doubt: float) -> None:
+        doubtful = measured(k_e)._replace(std_error=doubt)
+        choice = adapted().step(believed(told(3e6), told(9e6)), alike(NOT_TOLD, doubtful), 0.03)
+        assert choice == chosen(NOT_TOLD, measured(k_e))
+
+
+class TestSlip:
+    """2 f_x = k_s · 2.5 cm · z² against f_r + f_a = 2.5 N + k_s · 3 cm³ + 2.5 N (1 kg, 0.5 m/s, 0.1 s).
+
+    At 5 cm that is k_s · 62.5 cm³ against 5 N + k_s · 3 cm³, so it slips up to 5 N / 59.5 cm³ = 0.0840 N/cm³; at 3 cm
+    up to 5 N / 19.5 cm³ = 0.2564 N/cm³.
+    """
+
+    @pytest.mark.parametrize(
+        ("k_s", "k_e", "slips"),
+        [(0.0839e6, 1e6, True), (0.0842e6, 1e6, False), (0.2563e6, 2e6, True), (0.2565e6, 2e6, False)],
+    )
+    def test_it_slips_where_thrust_is_no_more_than_drag_and_inertia(self, k_s: float, k_e: float, slips: bool) -> None:
+        assert chosen(measured(k_s), measured(k_e)).slips == slips
+
+    def test_a_slip_does_not_change_the_depth(self) -> None:
+        weak, strong = chosen(measured(1.0), measured(2e6)), chosen(measured(9e6), measured(2e6))
+        assert weak == strong._replace(slips=True)
+        assert not strong.slips
+
+    def test_without_a_k_s_it_does_not_claim_to_slip(self) -> None:
+        assert chosen(NOT_TOLD, measured(1e6)).slips is False
+
+    def test_inertia_is_mass_times_arc_over_acceleration_and_stance_time(self) -> None:
+        """Of 2 kg at 0.2 m/s within 0.2 s: 2 kg · α l / (0.2 s · t_s) = 1 N, so up to 3.5 N / 59.5 cm³ it slips."""
+        stance_s = 2.0 * radians(30.0) * 0.12 / 0.2
+        assert 2.0 * radians(30.0) * 0.12 / (0.2 * stance_s) == pytest.approx(1.0)
+        parameters, gait = (
+            AdaptationParameters(body_mass_kg=2.0, acceleration_s=0.2),
+            GaitParameters(stance_speed_m_s=0.2),
+        )
+        for k_s, slips in ((0.0587e6, True), (0.0589e6, False)):
+            choice = adapted(parameters, gait).step(NOTHING_KNOWN, alike(measured(k_s), measured(1e6)), 0.03)
+            assert choice.slips == slips
+
+    def test_a_larger_pad_slips_sooner(self) -> None:
+        """4 cm wide and 3 cm deep, 18 cm³: up to 5 N / 44.5 cm³ = 0.1124 N/cm³."""
+        parameters = AdaptationParameters(pad_width_m=0.04, pad_depth_m=0.03)
+        for k_s, slips in ((0.1122e6, True), (0.1125e6, False)):
+            choice = adapted(parameters).step(NOTHING_KNOWN, alike(measured(k_s), measured(1e6)), 0.03)
+            assert choice.slips == slips
+
+
+class TestMemory:
+    @pytest.mark.parametrize("first", [0, 1])
+    def test_the_right_flipper_decides_in_whatever_order_they_come(self, first: int) -> None:
+        strides = [stride("left", k_e=measured(1e6)), stride("right", k_e=measured(2e6))]
+        assert adapted().step(NOTHING_KNOWN, strides[first:] + strides[:first], 0.03).depth_m == pytest.approx(0.03)
+
+    def test_the_left_one_speaks_where_the_right_one_does_not_know(self) -> None:
+        strides = [stride("left", k_e=measured(2e6)), stride("right")]
+        assert adapted().step(NOTHING_KNOWN, strides, 0.03).depth_m == pytest.approx(0.03)
+
+    def test_the_last_valid_coefficients_are_kept(self) -> None:
+        adaptation = adapted()
+        known = adaptation.step(NOTHING_KNOWN, alike(measured(0.08e6), measured(1e6)), adaptation.choice.depth_m)
+        assert known.slips
+        invalid = measured(9e6)._replace(valid=False)
+        assert adaptation.step(NOTHING_KNOWN, alike(invalid, invalid), adaptation.choice.depth_m) == known
+        assert adaptation.step(NOTHING_KNOWN, [], adaptation.choice.depth_m) == known
+        assert adaptation.step(
+            NOTHING_KNOWN, alike(invalid, measured(2e6)), adaptation.choice.depth_m
+        ) == THREE_CM._replace(slips=True)
+        assert adaptation.step(NOTHING_KNOWN, alike(measured(0.3e6), invalid), adaptation.choice.depth_m) == THREE_CM
+
+    def test_without_a_k_e_the_depth_is_kept(self) -> None:
+        adaptation = adapted()
+        adaptation.reset(0.04)
+        kept = DepthChoice(0.04, False, "no k_e known, depth kept")
+        assert adaptation.step(NOTHING_KNOWN, alike(measured(1e6), NOT_TOLD), adaptation.choice.depth_m) == kept
+        assert adaptation.step(believed(told(1e6), told(1e6)), [], adaptation.choice.depth_m) == kept
+
+    def test_a_reset_forgets_and_starts_at_its_depth(self) -> None:
+        adaptation = adapted()
+        assert adaptation.choice == DepthChoice(PARAMETERS.initial_depth_m, False, "start")
+        adaptation.step(NOTHING_KNOWN, alike(measured(1e6), measured(1e6)), adaptation.choice.depth_m)
+        adaptation.reset(0.02)
+        assert adaptation.choice == DepthChoice(0.02, False, "start")
+        assert adaptation.step(NOTHING_KNOWN, [], adaptation.choice.depth_m).depth_m == 0.02
+
+    def test_a_stuck_flipper_is_not_asked(self) -> None:
+        """As in the paper, whose conditions know nothing of it."""
+        stuck = [stride("right", released=False, depth_m=nan, k_e=measured(1e6))]
+        assert adapted().step(NOTHING_KNOWN, stuck, 0.03).depth_m == pytest.approx(0.05)
+
+
+numbers = st.floats() | st.floats(0.0, 1e7)
+estimates = st.builds(Estimate, numbers, numbers, st.just(9), st.booleans())
+
+
+@given(st.lists(st.tuples(estimates, estimates), max_size=4))
+def test_whatever_is_measured_the_depth_stays_in_its_range(walk: list[tuple[Estimate, Estimate]]) -> None:
+    adaptation = adapted()
+    for k_s, k_e in walk:
+        depth_m = adaptation.step(NOTHING_KNOWN, alike(k_s, k_e), adaptation.choice.depth_m).depth_m
+        assert PARAMETERS.min_depth_m <= depth_m <= PARAMETERS.max_depth_m

@@ -1,0 +1,408 @@
+"""The stride's timing against the paper's numbers, and its motion against numeric derivatives."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import groupby, islice, pairwise
+from math import degrees, floor, pi, radians, sin
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.gait.gait import (
+    PROTOCOLS,
+    RAMP_S,
+    SINGLE_FLIPPER,
+    Gait,
+    GaitParameters,
+    smooth_progress,
+    stride_duration_s,
+    stride_table,
+)
+from control.geometry import FlipperGeometry
+from control.joint_pd import ArmMass
+from control.limits import JointLimits
+from control.records import GaitTarget, Phase
+
+GEOMETRY = FlipperGeometry(flipper_length_m=0.12, drop_m=0.05, axis_height_m=0.0645)
+WALKING = GaitParameters()
+TICK_S = 1.0 / 380.0
+DEPTHS_M = (0.03, 0.05)
+
+
+def targets(dt_s: float, depth_m: float, parameters: GaitParameters = WALKING) -> Iterator[GaitTarget]:
+    gait = Gait(parameters, GEOMETRY)
+    gait.reset(depth_m)
+    while True:
+        yield gait.step(dt_s)
+
+
+def one_stride(dt_s: float, depth_m: float, parameters: GaitParameters = WALKING) -> list[GaitTarget]:
+    count = floor(stride_duration_s(parameters, GEOMETRY, depth_m) / dt_s - 1e-6)
+    return list(islice(targets(dt_s, depth_m, parameters), count))
+
+
+def adduction_velocity_rad_s(target: GaitTarget) -> float:
+    angle = GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m)
+    return GEOMETRY.adduction_velocity_rad_s(
+        target.sweep_rad, angle, target.sweep_velocity_rad_s, target.depth_velocity_m_s
+    )
+
+
+@pytest.mark.parametrize("depth_m", DEPTHS_M)
+def test_a_stride_has_its_four_phases_in_order_and_once_each(depth_m: float) -> None:
+    order = [phase for phase, _ in groupby(target.phase for target in one_stride(TICK_S, depth_m))]
+    assert order == [Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING]
+
+
+def test_the_single_flipper_protocol_pauses_between_its_phases() -> None:
+    order = [phase for phase, _ in groupby(target.phase for target in one_stride(0.01, 0.03, SINGLE_FLIPPER))]
+    pause = Phase.PAUSE
+    assert order == [Phase.INSERTION, pause, Phase.STANCE, pause, Phase.EXTRACTION, pause, Phase.SWING]
+
+
+def test_the_single_flipper_protocol_is_the_papers() -> None:
+    rows = stride_table(SINGLE_FLIPPER, GEOMETRY, 0.03)
+    assert PROTOCOLS["single_flipper"] is SINGLE_FLIPPER
+    assert [row.duration_s for row in rows if row.phase is Phase.PAUSE] == [3.0, 3.0, 3.0]
+    for row in rows:
+        path_m = abs(row.depth_end_m - row.depth_start_m) + 0.12 * abs(row.sweep_end_rad - row.sweep_start_rad)
+        if row.phase is not Phase.PAUSE:
+            assert path_m / row.duration_s == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(("depth_m", "speed_cm_s"), [(0.03, 7.57), (0.05, 6.57)])
+def test_without_slip_the_robot_walks_at_the_papers_speed(depth_m: float, speed_cm_s: float) -> None:
+    step_cm = 100.0 * 2.0 * 0.12 * sin(radians(30.0))
+    assert step_cm / stride_duration_s(WALKING, GEOMETRY, depth_m) == pytest.approx(speed_cm_s, abs=0.005)
+
+
+def test_each_phase_lasts_its_path_over_its_speed() -> None:
+    parameters = GaitParameters(insertion_speed_m_s=0.2, stance_speed_m_s=0.3, extraction_speed_m_s=0.4)
+    durations = {row.phase: row.duration_s for row in stride_table(parameters, GEOMETRY, 0.04)}
+    assert durations[Phase.INSERTION] == pytest.approx((0.0145 + 0.04) / 0.2)
+    assert durations[Phase.STANCE] == pytest.approx(2.0 * pi / 6.0 * 0.12 / 0.3)
+    assert durations[Phase.EXTRACTION] == pytest.approx((0.0145 + 0.04) / 0.4)
+    assert durations[Phase.SWING] == 0.8
+
+
+def test_a_swing_duration_of_zero_follows_the_swing_speed() -> None:
+    parameters = GaitParameters(swing_duration_s=0.0, swing_speed_m_s=0.25)
+    swing = stride_table(parameters, GEOMETRY, 0.03)[-1]
+    assert swing.duration_s == pytest.approx(2.0 * pi / 6.0 * 0.12 / 0.25)
+
+
+@pytest.mark.parametrize("depth_m", DEPTHS_M)
+def test_the_depth_is_constant_through_the_stance(depth_m: float) -> None:
+    stance = [target for target in one_stride(TICK_S, depth_m) if target.phase is Phase.STANCE]
+    assert {target.depth_m for target in stance} == {depth_m}
+    assert {target.depth_velocity_m_s for target in stance} == {0.0}
+
+
+def test_the_stance_sweeps_from_plus_to_minus_thirty_degrees_and_the_swing_back() -> None:
+    rows = {row.phase: row for row in stride_table(WALKING, GEOMETRY, 0.03)}
+    stance, swing = rows[Phase.STANCE], rows[Phase.SWING]
+    assert (degrees(stance.sweep_start_rad), degrees(stance.sweep_end_rad)) == pytest.approx((30.0, -30.0))
+    assert (degrees(swing.sweep_start_rad), degrees(swing.sweep_end_rad)) == pytest.approx((-30.0, 30.0))
+    sweeps = [target.sweep_rad for target in one_stride(TICK_S, 0.03) if target.phase is Phase.STANCE]
+    assert all(later < earlier for earlier, later in pairwise(sweeps))
+    assert sweeps[0] > radians(29.9)
+    assert sweeps[-1] < radians(-29.9)
+
+
+def test_the_edge_swings_forward_above_the_mud() -> None:
+    swing = [target for target in one_stride(TICK_S, 0.05) if target.phase is Phase.SWING]
+    assert [target.depth_m for target in swing] == pytest.approx([-0.0145] * len(swing))
+    assert all(target.sweep_velocity_rad_s > 0.0 for target in swing[1:-1])
+
+
+@given(st.floats(0.001, 20.0), st.floats(0.0, 1.0))
+def test_smooth_progress_is_half_a_path_after_half_its_time_and_symmetric(duration: float, share: float) -> None:
+    fraction, rate = smooth_progress(share * duration, duration)
+    mirrored, mirrored_rate = smooth_progress(duration - share * duration, duration)
+    assert -1e-15 <= fraction <= 1.0 + 1e-15
+    assert fraction + mirrored == pytest.approx(1.0, abs=1e-9)
+    assert rate == pytest.approx(mirrored_rate, rel=1e-6, abs=1e-6 / duration)
+    assert smooth_progress(duration / 2.0, duration)[0] == pytest.approx(0.5)
+
+
+@given(st.floats(0.001, 20.0))
+def test_smooth_progress_rests_before_the_start_and_after_the_end(duration: float) -> None:
+    assert smooth_progress(-1.0, duration) == (0.0, 0.0)
+    assert smooth_progress(0.0, duration) == (0.0, 0.0)
+    assert smooth_progress(duration, duration) == (1.0, 0.0)
+    assert smooth_progress(duration + 1.0, duration) == (1.0, 0.0)
+
+
+@given(st.floats(0.01, 20.0), st.floats(0.01, 0.99))
+def test_smooth_progress_moves_at_the_rate_that_it_tells(duration: float, share: float) -> None:
+    time, step = share * duration, 1e-5 * duration
+    difference = smooth_progress(time + step, duration)[0] - smooth_progress(time - step, duration)[0]
+    _, rate = smooth_progress(time, duration)
+    assert difference / (2.0 * step) == pytest.approx(rate, rel=1e-4, abs=1e-4 / duration)
+    assert rate <= 1.0 / (duration - min(RAMP_S, duration / 2.0)) * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("depth_m", DEPTHS_M)
+def test_joint_velocities_are_the_derivatives_of_the_joint_angles(depth_m: float) -> None:
+    dt = TICK_S / 10.0
+    for before, now, after in zip(*(one_stride(dt, depth_m)[i:] for i in range(3)), strict=False):
+        sweep_velocity = (after.sweep_rad - before.sweep_rad) / (2.0 * dt)
+        angles = [GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m) for target in (before, after)]
+        assert now.sweep_velocity_rad_s == pytest.approx(sweep_velocity, abs=2e-3)
+        assert adduction_velocity_rad_s(now) == pytest.approx((angles[1] - angles[0]) / (2.0 * dt), abs=2e-2)
+
+
+@pytest.mark.parametrize("depth_m", DEPTHS_M)
+def test_no_joint_accelerates_between_ticks_harder_than_its_torque_limit_allows_in_air(depth_m: float) -> None:
+    stride = list(islice(targets(TICK_S, depth_m), 2000))
+    arm, torque_nm = ArmMass(), JointLimits().torque_nm
+    for now, after in pairwise(stride):
+        sweep_change = after.sweep_velocity_rad_s - now.sweep_velocity_rad_s
+        adduction_change = adduction_velocity_rad_s(after) - adduction_velocity_rad_s(now)
+        assert abs(sweep_change) / TICK_S * arm.sweep_inertia_kg_m2 < torque_nm
+        assert abs(adduction_change) / TICK_S * arm.adduction_inertia_kg_m2 < torque_nm
+
+
+def test_the_sweep_accelerates_no_harder_than_half_a_cosine_over_the_ramp() -> None:
+    rows = stride_table(WALKING, GEOMETRY, 0.03)
+    shortest = min(row.duration_s for row in rows if row.sweep_start_rad != row.sweep_end_rad)
+    bound = radians(60.0) / (shortest - RAMP_S) * pi / (2.0 * RAMP_S)
+    accelerations = [
+        abs(after.sweep_velocity_rad_s - now.sweep_velocity_rad_s) / TICK_S
+        for now, after in pairwise(islice(targets(TICK_S, 0.03), 2000))
+    ]
+    assert 0.9 * bound < max(accelerations) <= bound
+
+
+def test_joints_stand_still_where_phases_meet() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.03)
+    for row in stride_table(WALKING, GEOMETRY, 0.03):
+        target = gait.step(row.duration_s)
+        assert target.sweep_velocity_rad_s == pytest.approx(0.0, abs=1e-9)
+        assert target.depth_velocity_m_s == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("depth_m", DEPTHS_M)
+def test_a_thousand_strides_keep_their_exact_rate(depth_m: float) -> None:
+    quick = GaitParameters(insertion_speed_m_s=1.0, swing_duration_s=0.1)
+    duration = stride_duration_s(quick, GEOMETRY, depth_m)
+    ticks = round(1000.4 * duration / TICK_S)
+    gait = Gait(quick, GEOMETRY)
+    gait.reset(depth_m)
+    for _ in range(ticks):
+        target = gait.step(TICK_S)
+    alone = Gait(quick, GEOMETRY)
+    alone.reset(depth_m)
+    expected = alone.step(ticks * TICK_S - 1000 * duration)
+    assert target.stride == 1000
+    assert target.phase is expected.phase
+    assert target[2:] == pytest.approx(expected[2:], abs=1e-6)
+
+
+@given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=20))
+def test_the_place_in_the_stride_depends_on_the_time_only_and_not_on_the_ticks(steps: list[float]) -> None:
+    gait, other = Gait(WALKING, GEOMETRY), Gait(WALKING, GEOMETRY)
+    gait.reset(0.04)
+    other.reset(0.04)
+    for dt in steps:
+        stepped = gait.step(dt)
+    at_once = other.step(sum(steps))
+    duration = stride_duration_s(WALKING, GEOMETRY, 0.04)
+    assert stepped.stride + gait_share(stepped) == pytest.approx(at_once.stride + gait_share(at_once), abs=2e-4)
+    assert stepped.stride in (floor(sum(steps) / duration - 1e-9), floor(sum(steps) / duration + 1e-9))
+
+
+def gait_share(target: GaitTarget) -> float:
+    """A number from 0 to 1 that grows through the stride: paths covered, each phase a quarter."""
+    sweep = (radians(30.0) - target.sweep_rad) / radians(60.0)
+    depth = (target.depth_m + 0.0145) / (0.04 + 0.0145)
+    within = {Phase.INSERTION: depth, Phase.STANCE: sweep, Phase.EXTRACTION: 1.0 - depth, Phase.SWING: 1.0 - sweep}
+    return (target.phase - 1 + within[target.phase]) / 4.0
+
+
+def test_a_new_depth_waits_for_the_next_stride() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.03)
+    depths: dict[int, float] = {}
+    for tick in range(1000):
+        target = gait.step(TICK_S)
+        if tick == 100:
+            gait.next_depth_m = 0.045
+        if target.phase is Phase.STANCE:
+            depths[target.stride] = target.depth_m
+            assert gait.commanded_depth_m == target.depth_m
+    assert depths == {0: 0.03, 1: 0.045}
+
+
+@pytest.mark.parametrize("parameters", PROTOCOLS.values())
+def test_a_swing_that_may_not_begin_is_waited_for_at_the_rear_and_up(parameters: GaitParameters) -> None:
+    gait = Gait(parameters, GEOMETRY)
+    gait.reset(0.03)
+    before_swing_s = stride_duration_s(parameters, GEOMETRY, 0.03) - stride_table(parameters, GEOMETRY, 0.03)[-1][1]
+    for _ in range(round((before_swing_s + 2.0) / TICK_S)):
+        target = gait.step(TICK_S, may_swing=False)
+    assert gait.waits
+    assert target.phase in (Phase.EXTRACTION, Phase.PAUSE)
+    assert target[2:] == pytest.approx((radians(-30.0), 0.0, -GEOMETRY.clearance_m, 0.0))
+    assert gait.step(TICK_S).phase is Phase.SWING
+    assert not gait.waits
+
+
+def test_a_swing_that_may_not_begin_hinders_nothing_before_it() -> None:
+    free, held = Gait(WALKING, GEOMETRY), Gait(WALKING, GEOMETRY)
+    for gait in (free, held):
+        gait.reset(0.03)
+    while (target := free.step(TICK_S)).phase is not Phase.SWING:
+        assert held.step(TICK_S, may_swing=False) == target
+
+
+def test_a_swing_that_has_begun_is_not_held_up() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.03)
+    while gait.step(TICK_S).phase is not Phase.SWING:
+        pass
+    phases = [gait.step(TICK_S, may_swing=False).phase for _ in range(round(1.0 / TICK_S))]
+    assert phases[-1] is Phase.INSERTION
+
+
+def test_a_reset_starts_the_first_stride_again() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.03)
+    first = [gait.step(TICK_S) for _ in range(1000)]
+    gait.next_depth_m = 0.045
+    gait.reset(0.03)
+    assert [gait.step(TICK_S) for _ in range(1000)] == first
+
+
+@pytest.mark.parametrize("depth_m", DEPTHS_M)
+def test_no_joint_is_asked_for_more_than_its_velocity_limit(depth_m: float) -> None:
+    limit = JointLimits().velocity_rad_s
+    for target in islice(targets(TICK_S, depth_m), 1000):
+        assert max(abs(target.sweep_velocity_rad_s), abs(adduction_velocity_rad_s(target))) < limit
+
+
+WIDE = replace(WALKING, sweep_angle_deg=45.0, swing_duration_s=0.3)
+NARROW = replace(WALKING, sweep_angle_deg=20.0)
+
+
+def swept(changes: dict[float, GaitParameters], duration_s: float, dt_s: float = 0.0005) -> list[GaitTarget]:
+    """Targets of a walk whose next gait is set at the first tick in swing at or after each share of the swing."""
+    gait, seen, waiting = Gait(WALKING, GEOMETRY), list[GaitTarget](), dict(changes)
+    gait.reset(0.03)
+    swing_ticks = 0
+    for _ in range(round(duration_s / dt_s)):
+        if seen and seen[-1].phase is Phase.SWING and seen[-1].stride == 0:
+            swing_ticks += 1
+            for share in [share for share in waiting if swing_ticks * dt_s >= share * WALKING.swing_duration_s]:
+                gait.next_parameters = waiting.pop(share)
+        seen.append(gait.step(dt_s))
+    return seen
+
+
+STRIDE_S = stride_duration_s(WALKING, GEOMETRY, 0.03)
+
+
+@pytest.mark.parametrize("change", [{0.0: WIDE}, {0.0: NARROW}, {0.3: WIDE}, {0.1: WIDE, 0.4: NARROW}])
+def test_another_sweep_told_in_swing_moves_the_target_without_a_jump(change: dict[float, GaitParameters]) -> None:
+    seen = swept(change, STRIDE_S + 0.8)
+    for before, after in pairwise(seen):
+        mean_rad_s = (before.sweep_velocity_rad_s + after.sweep_velocity_rad_s) / 2.0
+        moved_rad = after.sweep_rad - before.sweep_rad
+        # The trapezium's error over a step of 0.5 ms is dt² Δa/8 at a bend; accelerations stay below 1000 rad/s².
+        assert moved_rad == pytest.approx(mean_rad_s * 0.0005, abs=3e-5)
+        assert abs(after.sweep_velocity_rad_s - before.sweep_velocity_rad_s) < 1000.0 * 0.0005
+
+
+@pytest.mark.parametrize("last", [WIDE, NARROW])
+def test_the_stride_after_a_change_sweeps_from_its_own_front_to_its_own_rear(last: GaitParameters) -> None:
+    seen = [target for target in swept({0.0: last}, STRIDE_S + 1.2) if target.stride == 1]
+    insertion = [target.sweep_rad for target in seen if target.phase is Phase.INSERTION]
+    extraction = [target.sweep_rad for target in seen if target.phase is Phase.EXTRACTION]
+    assert insertion == pytest.approx([radians(last.sweep_angle_deg)] * len(insertion))
+    assert extraction == pytest.approx([-radians(last.sweep_angle_deg)] * len(extraction))
+    assert insertion
+    assert extraction
+
+
+def test_the_swing_of_a_stride_lasts_as_long_as_its_own_gait_says() -> None:
+    seen = swept({0.0: WIDE}, 2.0 * STRIDE_S + 0.2)
+    assert [
+        sum(target.phase is Phase.SWING and target.stride == stride for target in seen) * 0.0005 for stride in (0, 1)
+    ] == pytest.approx([0.8, 0.3], abs=0.001)
+
+
+def test_a_gait_told_late_in_the_swing_is_that_of_the_stride_after_the_next() -> None:
+    seen = swept({0.6: WIDE}, 2.0 * STRIDE_S + 0.5)
+    fronts = [next(t.sweep_rad for t in seen if t.stride == i and t.phase is Phase.INSERTION) for i in (1, 2)]
+    assert fronts == pytest.approx([radians(30.0), radians(45.0)])
+
+
+def test_a_gait_whose_next_stride_is_never_set_walks_bit_for_bit_the_same() -> None:
+    free, told = Gait(WALKING, GEOMETRY), Gait(WALKING, GEOMETRY)
+    free.reset(0.03)
+    told.reset(0.03)
+    for _ in range(3000):
+        told.next_parameters = replace(WALKING)  # equal, and another object
+        assert told.step(TICK_S) == free.step(TICK_S)
+
+
+def test_a_reset_forgets_the_gait_of_the_next_stride() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.03)
+    first = [gait.step(TICK_S) for _ in range(1500)]
+    gait.next_parameters = WIDE
+    for _ in range(1500):
+        gait.step(TICK_S)
+    gait.reset(0.03)
+    assert [gait.step(TICK_S) for _ in range(1500)] == first
+
+
+def test_an_insertion_that_ends_early_leaves_the_rest_of_the_stride_at_its_depth() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.05)
+    before = gait.step(0.4)
+    gait.end_insertion()
+    after = gait.step(0.0)
+    assert (before.phase, after.phase) == (Phase.INSERTION, Phase.STANCE)
+    assert after.depth_m == gait.commanded_depth_m == before.depth_m < 0.03
+    assert after.sweep_rad == before.sweep_rad
+    stance = [target for target in (gait.step(0.01) for _ in range(20)) if target.phase is Phase.STANCE]
+    assert {target.depth_m for target in stance} == {before.depth_m}
+
+
+def test_only_an_insertion_can_end_early_and_only_that_of_its_own_stride() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.03)
+    gait.step(0.5)
+    gait.end_insertion()
+    assert gait.step(0.0).phase is Phase.STANCE
+    assert gait.commanded_depth_m == 0.03
+    gait.reset(0.03)
+    gait.step(0.3)
+    gait.end_insertion()
+    while gait.stride == 0:
+        gait.step(0.01)
+    assert gait.commanded_depth_m == 0.03
+
+
+def test_a_depth_meant_for_a_narrower_sweep_that_was_told_late_stays_within_reach() -> None:
+    gait = Gait(replace(WALKING, sweep_angle_deg=50.0), GEOMETRY)
+    gait.reset(0.02)
+    while (target := gait.step(TICK_S)).stride == 0:
+        late = target.phase is Phase.SWING and target.sweep_rad > 0.5
+        if late:
+            gait.next_depth_m, gait.next_parameters = 0.05, WALKING
+    assert gait.commanded_depth_m == GEOMETRY.deepest_m(50.0)
+    while gait.step(TICK_S).stride == 1:
+        pass
+    assert gait.commanded_depth_m == 0.05
+
+
+def test_an_insertion_does_not_end_above_the_mud() -> None:
+    gait = Gait(WALKING, GEOMETRY)
+    gait.reset(0.03)
+    gait.step(0.05)
+    assert not gait.end_insertion()
+    assert (gait.step(0.0).phase, gait.commanded_depth_m) == (Phase.INSERTION, 0.03)

@@ -1,0 +1,110 @@
+"""Paths between poses: where they start, where they end and how fast they go."""
+
+from itertools import pairwise
+from math import isfinite
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.gait.joint_path import SHORTEST_LEG_S, JointPath, still
+from control.records import JointAngles, JointTargets
+
+TICK_S = 1.0 / 380.0
+angles = st.floats(-1.5, 1.5)
+poses = st.tuples(angles, angles, angles, angles)
+speeds = st.floats(0.5, 10.0)
+
+
+def walked(path: JointPath) -> list[JointTargets]:
+    steps = []
+    while not path.finished:
+        steps.append(path.step(TICK_S))
+        assert len(steps) < 10_000
+    return steps
+
+
+def angles_of(targets: JointTargets) -> JointAngles:
+    return targets[0].angle_rad, targets[1].angle_rad, targets[2].angle_rad, targets[3].angle_rad
+
+
+@given(poses, poses, speeds)
+def test_a_path_starts_where_it_is_told_and_ends_at_its_last_point(
+    start: JointAngles, end: JointAngles, speed: float
+) -> None:
+    path = JointPath(start, [end], speed)
+    assert angles_of(path.step(0.0)) == start
+    assert walked(path)[-1] == still(end)
+
+
+@given(poses, st.lists(poses, min_size=1, max_size=3), speeds)
+def test_no_joint_is_faster_than_twice_the_mean_speed(
+    start: JointAngles, way_points: list[JointAngles], speed: float
+) -> None:
+    steps = [still(start), *walked(JointPath(start, way_points, speed))]
+    for before, after in pairwise(steps):
+        assert all(abs(joint.velocity_rad_s) <= 2.0 * speed * (1.0 + 1e-9) for joint in after)
+        moved = [abs(b - a) for a, b in zip(angles_of(before), angles_of(after), strict=True)]
+        assert max(moved) <= 2.0 * speed * TICK_S * (1.0 + 1e-9)
+
+
+@given(poses, st.lists(poses, min_size=1, max_size=3), speeds)
+def test_a_path_lasts_its_longest_ways_over_the_speed(
+    start: JointAngles, way_points: list[JointAngles], speed: float
+) -> None:
+    ways = [max(abs(b - a) for a, b in zip(p, q, strict=True)) for p, q in pairwise([start, *way_points])]
+    duration = sum(max(SHORTEST_LEG_S, way / speed) for way in ways)
+    assert len(walked(JointPath(start, way_points, speed))) * TICK_S == pytest.approx(duration, abs=1.01 * TICK_S)
+
+
+@given(poses, poses, speeds, st.integers(1, 500))
+def test_after_the_end_the_last_pose_is_held_at_rest(
+    start: JointAngles, end: JointAngles, speed: float, ticks: int
+) -> None:
+    path = JointPath(start, [end], speed)
+    walked(path)
+    assert {path.step(TICK_S) for _ in range(ticks)} == {still(end)}
+    assert path.finished
+
+
+@given(poses, speeds)
+def test_a_leg_without_way_takes_the_shortest_time_and_moves_nothing(pose: JointAngles, speed: float) -> None:
+    steps = walked(JointPath(pose, [pose, pose], speed))
+    assert len(steps) * TICK_S == pytest.approx(2.0 * SHORTEST_LEG_S, abs=2.0 * TICK_S)
+    assert set(steps) == {still(pose)}
+
+
+@given(poses, st.lists(poses, max_size=3), speeds, st.lists(st.floats(0.0, 5.0), max_size=20))
+def test_every_target_is_finite(
+    start: JointAngles, way_points: list[JointAngles], speed: float, steps: list[float]
+) -> None:
+    path = JointPath(start, way_points, speed)
+    for dt in [0.0, *steps]:
+        assert all(isfinite(joint.angle_rad + joint.velocity_rad_s) for joint in path.step(dt))
+
+
+def test_way_points_are_passed_one_after_the_other() -> None:
+    raised, front = (0.4, 0.0, 0.4, 0.0), (0.5, 0.0, 0.5, 0.0)
+    steps = walked(JointPath((0.4, -0.6, 0.4, -0.6), [raised, front], 1.0))
+    lifting = [step for step in steps if step[0].angle_rad == 0.4]
+    sweeping = [step for step in steps if step[0].angle_rad > 0.4]
+    assert steps == lifting + sweeping
+    assert all(step[1].angle_rad < 0.0 for step in lifting[:-1])
+    assert all(step[1].angle_rad == 0.0 for step in sweeping)
+
+
+def test_velocities_are_the_derivatives_of_the_angles() -> None:
+    path, dt = JointPath((0.0, -0.6, 0.2, 0.4), [(0.5, 0.0, 0.1, 0.4)], 1.0), 1e-4
+    steps = []
+    while not path.finished:
+        steps.append(path.step(dt))
+    for before, now, after in zip(steps, steps[1:], steps[2:], strict=False):
+        for joint in range(4):
+            slope = (after[joint].angle_rad - before[joint].angle_rad) / (2.0 * dt)
+            assert now[joint].velocity_rad_s == pytest.approx(slope, abs=1e-3)
+
+
+def test_a_path_without_points_is_finished_at_once() -> None:
+    path = JointPath((0.1, 0.2, 0.3, 0.4), [], 1.0)
+    assert path.finished
+    assert path.step(TICK_S) == still((0.1, 0.2, 0.3, 0.4))

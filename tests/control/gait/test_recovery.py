@@ -1,0 +1,397 @@
+"""Recoveries of made-up flippers, which follow their targets exactly but while the mud holds them still."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import groupby, pairwise
+from math import copysign, cos, degrees, nan, radians, sin
+from typing import NamedTuple
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.controller import Controller, MotionParameters, WalkOrder
+from control.gait.gait import PROTOCOLS, GaitParameters, stride_duration_s
+from control.gait.joint_path import still
+from control.gait.recovery import AWAY_SHARE, OUT_M, Gap, Recovery, RecoveryParameters, is_in_mud, lowest_m
+from control.geometry import FlipperGeometry
+from control.joint_pd import ArmMass, JointGains
+from control.limits import JointRange
+from control.modes import Mode
+from control.records import DriveState, DriveStates, GaitTarget, JointTargets, Phase
+from tests.control.made_up_states import states_at
+
+TICK_S = 1.0 / 380.0
+DEPTH_M = 0.04
+GEOMETRY, GAIT, PARAMETERS = FlipperGeometry(), GaitParameters(), RecoveryParameters()
+REAR_RAD = -radians(GAIT.sweep_angle_deg)
+SWEEPS, ADDUCTIONS = JointRange(radians(-60.0), radians(60.0)), JointRange(radians(-75.0), radians(45.0))
+RANGES = (SWEEPS, ADDUCTIONS, SWEEPS, ADDUCTIONS)
+BOTH = ("left", "right")
+LONGEST_S = PARAMETERS.grace_s + PARAMETERS.attempts * (PARAMETERS.pause_s + PARAMETERS.attempt_s)
+
+
+class Moment(NamedTuple):
+    target: GaitTarget
+    joints: JointTargets
+    attempt: int
+    news: str
+    angles_rad: tuple[float, ...]  # measured when the targets were chosen
+
+
+class SeenRecovery(Recovery):
+    """Keeps the targets that it gave last."""
+
+    def step(self, dt_s: float, stuck: Sequence[str], states: DriveStates, wanted: JointTargets) -> JointTargets:
+        self.given = super().step(dt_s, stuck, states, wanted)
+        return self.given
+
+
+Hold = Callable[["MadeUpRobot"], Sequence[str]]
+
+
+class MadeUpRobot:
+    """`hold` tells which flippers the mud holds where they are; it begins to with the extraction."""
+
+    def __init__(
+        self,
+        hold: Hold,
+        parameters: RecoveryParameters = PARAMETERS,
+        ranges: tuple[JointRange, JointRange, JointRange, JointRange] = RANGES,
+        gait: GaitParameters = GAIT,
+    ) -> None:
+        self.hold = hold
+        self.recovery = SeenRecovery(parameters, GEOMETRY, gait, ranges)
+        stiff = JointGains(1.0, 0.0, 1.0, 0.0)
+        mass = ArmMass(arm_mass_kg=0.0)
+        self.controller = Controller(gait, GEOMETRY, stiff, mass, MotionParameters(10.0, 0.0), self.recovery)
+        self.controller.order = WalkOrder(DEPTH_M, adaptive=False)
+        self.angles_rad = (0.0, 0.0, 0.0, 0.0)
+        self.moments: list[Moment] = []
+        self.waited_s = 0.0  # since the extraction began
+        self.attempt_s = 0.0  # since the attempt under way began
+
+    @property
+    def states(self) -> DriveStates:
+        return states_at(self.angles_rad)
+
+    def step(self, mode: Mode = Mode.WALKING) -> None:
+        before_rad = self.angles_rad
+        torques_nm = self.controller.step(TICK_S, mode, self.states)
+        wanted_rad = [angle + torque for angle, torque in zip(before_rad, torques_nm, strict=True)]
+        target = self.controller.target
+        self._time(target.phase, self.recovery.news)
+        for place, flipper in enumerate(BOTH):
+            if self.waited_s and flipper in self.hold(self):
+                wanted_rad[2 * place : 2 * place + 2] = before_rad[2 * place : 2 * place + 2]
+        a, b, c, d = wanted_rad
+        self.angles_rad = (a, b, c, d)
+        if target.stride >= 0:
+            news, attempt = self.recovery.news, self.recovery.attempt
+            self.moments.append(Moment(target, self.recovery.given, attempt, news, before_rad))
+
+    def _time(self, phase: Phase, news: str) -> None:
+        self.attempt_s = 0.0 if news else self.attempt_s + TICK_S
+        begun = phase is Phase.EXTRACTION or (self.waited_s > 0.0 and phase in (Phase.PAUSE, Phase.RECOVERY))
+        self.waited_s = self.waited_s + TICK_S if begun else 0.0
+
+    def walk(self, seconds: float) -> MadeUpRobot:
+        for _ in range(round(seconds / TICK_S)):
+            self.step()
+        return self
+
+    @property
+    def phases(self) -> list[Phase]:
+        return [phase for phase, _ in groupby(moment.target.phase for moment in self.moments)]
+
+    @property
+    def news(self) -> list[str]:
+        return [moment.news for moment in self.moments if moment.news]
+
+    def in_attempt(self, attempt: int) -> list[Moment]:
+        return [moment for moment in self.moments if moment.attempt == attempt]
+
+
+def nobody(robot: MadeUpRobot) -> Sequence[str]:
+    return ()
+
+
+def everybody(robot: MadeUpRobot) -> Sequence[str]:
+    return BOTH
+
+
+def until_attempt(attempt: int, flippers: Sequence[str] = BOTH, after_s: float = 1.0) -> Hold:
+    """Held until that attempt has lasted so long."""
+
+    def hold(robot: MadeUpRobot) -> Sequence[str]:
+        return () if robot.recovery.attempt == attempt and robot.attempt_s > after_s else flippers
+
+    return hold
+
+
+# when there is a recovery
+
+
+def test_flippers_that_follow_are_never_recovered_and_walk_as_if_nobody_waited() -> None:
+    waiting, other = MadeUpRobot(nobody).walk(6.0), MadeUpRobot(nobody, RecoveryParameters(attempts=0)).walk(6.0)
+    assert Phase.RECOVERY not in waiting.phases
+    assert waiting.moments == other.moments
+    assert waiting.moments[-1].target.stride >= 2
+
+
+def test_with_no_attempts_the_gaits_clock_does_not_wait() -> None:
+    held = MadeUpRobot(everybody, RecoveryParameters(attempts=0)).walk(6.0)
+    free = MadeUpRobot(nobody).walk(6.0)
+    assert [moment.target for moment in held.moments] == [moment.target for moment in free.moments]
+    assert [moment.joints for moment in held.moments] == [moment.joints for moment in free.moments]
+    assert not held.recovery.given_up
+
+
+@pytest.mark.parametrize("gait", PROTOCOLS.values())
+def test_a_flipper_that_comes_out_within_the_grace_is_only_waited_for(gait: GaitParameters) -> None:
+    extraction_s = (DEPTH_M + GEOMETRY.clearance_m) / gait.extraction_speed_m_s + gait.pause_s
+    late_s = extraction_s + PARAMETERS.grace_s - 5.0 * TICK_S
+
+    def hold(robot: MadeUpRobot) -> Sequence[str]:
+        return BOTH if robot.waited_s < late_s else ()
+
+    robot = MadeUpRobot(hold, gait=gait).walk(2.0 * stride_duration_s(gait, GEOMETRY, DEPTH_M))
+    assert Phase.RECOVERY not in robot.phases
+    assert robot.news == []
+    assert Phase.SWING in robot.phases
+    assert TICK_S * sum(moment.target.stride == 0 for moment in robot.moments) == pytest.approx(
+        stride_duration_s(gait, GEOMETRY, DEPTH_M) + late_s - extraction_s, abs=3.0 * TICK_S
+    )
+
+
+def test_a_flipper_that_stays_in_is_given_up_after_the_last_attempt_in_bounded_time() -> None:
+    robot = MadeUpRobot(lambda robot: ("right",))
+    while not robot.recovery.given_up:
+        robot.step()
+        assert robot.waited_s < LONGEST_S + 0.2
+    assert robot.recovery.given_up == ("right",)
+    fault = robot.controller.fault
+    assert fault is not None
+    assert fault.name == "flipper_stuck"
+    assert "right flipper" in fault.sentence
+    assert "after 3 attempts" in fault.sentence
+    assert robot.phases == [Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.RECOVERY]
+    assert robot.news == [f"the right flipper is stuck, attempt {n} of 3" for n in (1, 2, 3)]
+
+
+def test_a_flipper_that_comes_out_at_the_second_attempt_swings_and_walks_on() -> None:
+    robot = MadeUpRobot(until_attempt(2)).walk(8.5)
+    assert robot.controller.fault is None
+    assert robot.phases[:6] == [
+        Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.RECOVERY, Phase.SWING, Phase.INSERTION,
+    ]  # fmt: skip
+    assert robot.news == [
+        "both flippers are stuck, attempt 1 of 3",
+        "both flippers are stuck, attempt 2 of 3",
+        "the flippers came out after 2 attempts",
+    ]
+
+
+def test_swing_begins_in_the_tick_after_the_last_flipper_is_out() -> None:
+    robot = MadeUpRobot(until_attempt(1, ("left",))).walk(5.0)
+    out = next(
+        i
+        for i, moment in enumerate(robot.moments)
+        if moment.attempt and not is_in_mud(GEOMETRY, *robot.moments[i + 1].angles_rad[:2])
+    )
+    assert robot.moments[out].target.phase is Phase.RECOVERY
+    assert robot.moments[out + 1].target.phase is Phase.SWING
+
+
+def test_an_angle_that_nobody_knows_is_not_waited_for() -> None:
+    """Its silence is a fault of its own."""
+    lost, inside = DriveState(angle_rad=nan), DriveState(angle_rad=-0.6)
+    level = DriveState(angle_rad=0.0)
+    recovery = Recovery(PARAMETERS, GEOMETRY, GAIT, RANGES)
+    assert recovery.stuck((level, lost, level, inside)) == ("right",)
+    assert recovery.stuck((lost, level, level, level)) == ()
+
+
+def test_stopping_ends_a_recovery_and_forgets_it() -> None:
+    robot = MadeUpRobot(everybody).walk(3.0)
+    assert robot.recovery.attempt == 1
+    robot.step(Mode.STOPPING)
+    assert (robot.recovery.attempt, robot.recovery.news, robot.recovery.given_up) == (0, "", ())
+    assert robot.controller.fault is None
+
+
+# what it does
+
+
+def attempts_at(sweep_deg: float, lead_deg: float = PARAMETERS.lead_deg) -> list[list[JointTargets]]:
+    """The targets of each attempt at a left flipper that nothing moves."""
+    recovery = Recovery(replace(PARAMETERS, lead_deg=lead_deg), GEOMETRY, GAIT, RANGES)
+    free, given = DriveState(angle_rad=0.0), list[list[JointTargets]]()
+    states = (DriveState(angle_rad=radians(sweep_deg)), DriveState(angle_rad=-0.6), free, free)
+    while not recovery.given_up:
+        targets = recovery.step(TICK_S, ("left",), states, still((REAR_RAD, 0.0, REAR_RAD, 0.0)))
+        if recovery.attempt > len(given):
+            given.append([])
+        if recovery.attempt:
+            given[-1].append(targets)
+    return given
+
+
+@pytest.mark.parametrize("sweep_deg", [-55.0, -30.0, -10.0, 5.0, 14.0])
+def test_the_first_attempt_pulls_to_the_rear_and_the_others_away_from_the_middle(sweep_deg: float) -> None:
+    """Most of the time: the rest of it, the targets are as far on the other side of the flipper or on their way."""
+    ways = [-1.0, *[copysign(1.0, sweep_deg)] * (PARAMETERS.attempts - 1)]
+    for way, targets in zip(ways, attempts_at(sweep_deg), strict=True):
+        leads_deg = [way * (degrees(each[0].angle_rad) - sweep_deg) for each in targets]
+        pulled = leads_deg[round(PARAMETERS.pause_s / TICK_S) :]
+        reached = max(way * (way * 60.0 - sweep_deg), 0.0)  # the joint's limit
+        assert max(pulled) == pytest.approx(min(PARAMETERS.lead_deg, reached))
+        assert min(pulled) == pytest.approx(-PARAMETERS.lead_deg)
+        assert sum(lead_deg > 0.0 for lead_deg in pulled) / len(pulled) == pytest.approx(AWAY_SHARE, abs=0.1)
+
+
+def test_the_sweep_rocks_as_often_as_its_parameter_says() -> None:
+    targets = attempts_at(-30.0)[0]
+    leads_deg = [degrees(each[0].angle_rad) + 30.0 for each in targets]
+    turns = sum(before < 0.0 <= now for before, now in pairwise(leads_deg))
+    assert turns == pytest.approx(PARAMETERS.attempt_s / PARAMETERS.rock_s, abs=1)
+
+
+def test_every_attempt_lifts() -> None:
+    for targets in attempts_at(10.0, lead_deg=45.0):  # which lets the target arrive
+        lifts = [each[1] for each in targets]
+        assert lifts[0].angle_rad == pytest.approx(-0.6)
+        assert all(lift.velocity_rad_s >= 0.0 for lift in lifts)
+        assert lifts[-1].angle_rad > -0.1
+
+
+def test_a_flipper_that_is_out_stays_where_it_is() -> None:
+    for targets in attempts_at(10.0):
+        assert {each[2:] for each in targets} == {still((0.0, 0.0, 0.0, 0.0))[2:]}
+
+
+def test_both_flippers_go_the_same_way_also_from_both_sides_of_the_middle() -> None:
+    recovery = Recovery(PARAMETERS, GEOMETRY, GAIT, RANGES)
+    down, left, right = DriveState(angle_rad=-0.6), DriveState(angle_rad=0.2), DriveState(angle_rad=-0.1)
+    targets = still((0.0, 0.0, 0.0, 0.0))
+    while recovery.attempt < 2 or targets[0].angle_rad == pytest.approx(left.angle_rad):
+        targets = recovery.step(TICK_S, BOTH, (left, down, right, down), still((0.0, 0.0, 0.0, 0.0)))
+    lead_rad = radians(PARAMETERS.lead_deg)
+    assert targets[0].angle_rad == pytest.approx(left.angle_rad + lead_rad)
+    assert targets[2].angle_rad == pytest.approx(right.angle_rad + lead_rad)
+
+
+def test_every_attempt_lifts_at_the_same_speed() -> None:
+    robot = MadeUpRobot(everybody).walk(LONGEST_S + 1.5)
+    for attempt in (1, 2, 3):
+        speeds = [abs(moment.joints[place].velocity_rad_s) for moment in robot.in_attempt(attempt) for place in (1, 3)]
+        assert max(speeds) == pytest.approx(PARAMETERS.lift_rad_s)
+
+
+def test_each_attempt_begins_with_a_pause_where_the_flippers_are() -> None:
+    robot = MadeUpRobot(everybody).walk(LONGEST_S + 1.5)
+    for attempt in (1, 2, 3):
+        moments = robot.in_attempt(attempt)
+        for moment in moments[: round(PARAMETERS.pause_s / TICK_S) - 1]:
+            assert [joint.angle_rad for joint in moment.joints] == pytest.approx(moments[0].angles_rad)
+            assert all(joint.velocity_rad_s == 0.0 for joint in moment.joints)
+        assert moments[-1].joints[1].angle_rad > moments[0].angles_rad[1]
+
+
+def test_targets_lead_their_joints_by_no_more_than_the_lead() -> None:
+    robot = MadeUpRobot(everybody).walk(LONGEST_S + 1.5)
+    leads = [
+        abs(joint.angle_rad - angle_rad)
+        for moment in robot.moments
+        if moment.attempt
+        for joint, angle_rad in zip(moment.joints, moment.angles_rad, strict=True)
+    ]
+    assert max(leads) == pytest.approx(radians(PARAMETERS.lead_deg))
+
+
+@pytest.mark.parametrize("margin_deg", [0.0, 3.0, 30.0])
+def test_targets_stay_within_the_joints_limits(margin_deg: float) -> None:
+    sweeps = JointRange(radians(-30.0 - margin_deg), radians(30.0 + margin_deg))
+    lifts = JointRange(radians(-75.0), 0.0)
+    wild = RecoveryParameters(lift_rad_s=5.0, rock_s=2.0, lead_deg=45.0)
+    robot = MadeUpRobot(until_attempt(3), wild, (sweeps, lifts, sweeps, lifts)).walk(LONGEST_S + 1.0)
+    assert "the flippers came out after 3 attempts" in robot.news
+    for moment in robot.moments:
+        for joint, span in zip(moment.joints, (sweeps, lifts, sweeps, lifts), strict=True):
+            assert span.min_rad - 1e-9 <= joint.angle_rad <= span.max_rad + 1e-9
+
+
+# into the swing
+
+
+@pytest.mark.parametrize("attempt", [1, 2, 3])
+@pytest.mark.parametrize("after_s", [0.5, 1.0, 2.0])
+def test_targets_and_their_velocities_are_continuous_from_recovery_through_swing(attempt: int, after_s: float) -> None:
+    """Gap and swing ask for 130 rad/s² at most, so an angle is the mean velocity's way to 0.1 mrad."""
+    robot = MadeUpRobot(until_attempt(attempt, after_s=after_s)).walk(LONGEST_S + 3.0)
+    begin = next(i for i, moment in enumerate(robot.moments) if moment.news.startswith("the flippers came out"))
+    end = next(i for i, moment in enumerate(robot.moments) if moment.target.stride == 1)
+    assert {moment.target.phase for moment in robot.moments[begin:end]} == {Phase.SWING}
+    assert max(abs(joint.velocity_rad_s) for joint in robot.moments[begin - 1].joints) > 0.1
+    for before, now in pairwise(robot.moments[begin - 1 : end + 20]):
+        for old, new in zip(before.joints, now.joints, strict=True):
+            mean_rad_s = (old.velocity_rad_s + new.velocity_rad_s) / 2.0
+            assert new.angle_rad - old.angle_rad == pytest.approx(mean_rad_s * TICK_S, abs=1e-4)
+            assert abs(new.velocity_rad_s - old.velocity_rad_s) < 130.0 * TICK_S
+
+
+def test_the_swing_after_a_recovery_ends_where_every_swing_ends() -> None:
+    robot = MadeUpRobot(until_attempt(2)).walk(9.0)
+    first = next(moment for moment in robot.moments if moment.target.stride == 1)
+    assert first.target.phase is Phase.INSERTION
+    assert first.joints == robot.controller._follow(first.target)
+
+
+def test_the_plates_are_clear_of_the_mud_soon_after_the_swing_began() -> None:
+    robot = MadeUpRobot(until_attempt(2)).walk(9.0)
+    swing = [moment for moment in robot.moments if moment.target.phase is Phase.SWING and moment.target.stride == 0]
+    for moment in swing[round(0.2 / TICK_S) :]:
+        assert lowest_m(GEOMETRY, *moment.angles_rad[:2]) < -0.9 * GEOMETRY.clearance_m
+
+
+angles = st.floats(-1.0, 1.0)
+
+
+@given(angles, angles, st.floats(0.05, 2.0))
+def test_a_gap_fades_from_itself_to_nothing(angle_rad: float, velocity_rad_s: float, duration_s: float) -> None:
+    gap = Gap(angle_rad, velocity_rad_s, duration_s)
+    assert gap.after(0.0) == pytest.approx((angle_rad, velocity_rad_s))
+    assert gap.after(duration_s * (1.0 - 1e-9)) == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert gap.after(duration_s) == (0.0, 0.0)
+
+
+@given(angles, angles, st.floats(0.05, 2.0), st.floats(0.01, 0.99))
+def test_the_velocity_of_a_gap_is_its_derivative(
+    angle_rad: float, velocity_rad_s: float, duration_s: float, share: float
+) -> None:
+    gap, step_s = Gap(angle_rad, velocity_rad_s, duration_s), 1e-5 * duration_s
+    early, late = (gap.after(share * duration_s + offset_s) for offset_s in (-step_s, step_s))
+    slope = (late.angle_rad - early.angle_rad) / (2.0 * step_s)
+    assert gap.after(share * duration_s).velocity_rad_s == pytest.approx(slope, abs=1e-4)
+
+
+# what is out
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-1.2, 0.5))
+def test_the_lowest_point_is_the_deeper_corner(sweep_rad: float, adduction_rad: float) -> None:
+    """The edge's ends stand at l ± w/2 along the arm."""
+    ends_m = [
+        GEOMETRY.drop_m * cos(adduction_rad) - length_m * cos(sweep_rad) * sin(adduction_rad) - GEOMETRY.axis_height_m
+        for length_m in (GEOMETRY.flipper_length_m - 0.0125, GEOMETRY.flipper_length_m + 0.0125)
+    ]
+    assert lowest_m(GEOMETRY, sweep_rad, adduction_rad) == pytest.approx(max(ends_m), abs=1e-12)
+
+
+def test_a_level_flipper_is_out_and_one_at_the_surface_is_not_while_its_corner_is_deeper() -> None:
+    assert not is_in_mud(GEOMETRY, REAR_RAD, 0.0)
+    assert lowest_m(GEOMETRY, 0.0, GEOMETRY.adduction_rad(0.0, 0.001)) > OUT_M - 0.001
+    assert is_in_mud(GEOMETRY, 0.0, GEOMETRY.adduction_rad(0.0, OUT_M))
+    assert degrees(GEOMETRY.adduction_rad(0.0, 0.0)) < -5.0

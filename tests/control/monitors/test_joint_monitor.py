@@ -1,0 +1,602 @@
+"""Each watch of a joint on both sides of its bound, in ticks from the cause, and what does not set it off."""
+
+from collections.abc import Callable, Iterable
+from math import inf, isfinite, nan, radians
+from random import Random
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.fault_kinds import KINDS
+from control.faults import Reaction
+from control.limits import JointLimits, JointRange
+from control.monitors.joint_monitor import (
+    CURRENT_TICKS,
+    MISSING_S,
+    MISSING_SHARE,
+    SLOW_SILENCE_S,
+    TWO_MESSAGES_S,
+    FaultBounds,
+    JointFacts,
+    JointWatch,
+)
+from control.monitors.winding import WindingParameters
+from control.records import NEVER_S, DriveState
+
+JOINT = "left_sweep"
+TICK_S = 1.0 / 380.0
+MESSAGE_S = 0.002
+START_S = 1000.0
+LIMITS, BOUNDS = JointLimits(), FaultBounds()
+SPAN = JointRange(radians(-60.0), radians(60.0))
+CURRENT_LIMIT_A = 12.0
+FAST_TICKS = round(FaultBounds().fast_s * 380.0)
+TWO_MESSAGES = round(TWO_MESSAGES_S * 380.0)
+HEALTHY = DriveState(
+    angle_rad=0.1,
+    velocity_rad_s=0.0,
+    angle_stamp_s=START_S,
+    current_a=0.0,
+    current_stamp_s=START_S,
+    closed_loop=True,
+    heartbeat_stamp_s=START_S,
+    temperature_c=25.0,
+    temperature_stamp_s=START_S,
+    bus_voltage_v=24.0,
+)
+BEYOND = 1e-6
+SEVERITY = [
+    "drive_late",
+    "current_stale",
+    "current_silent",
+    "position_stale",
+    "drive_quiet",
+    "position_silent",
+    "drive_silent",
+]
+
+
+def make_watch() -> JointWatch:
+    return JointWatch(JOINT, LIMITS, SPAN, BOUNDS, WindingParameters(), CURRENT_LIMIT_A, 0.083)
+
+
+def facts(now_s: float = START_S, **changes: Any) -> JointFacts:
+    return JointFacts(now_s, TICK_S, True, True, 0.0, False)._replace(**changes)
+
+
+def seen(watch: JointWatch, state: DriveState, now_s: float = START_S, **changes: Any) -> dict[str, str]:
+    """Sentences by name."""
+    found = watch.update(facts(now_s, **changes), state)
+    assert all(fault.subject == JOINT for fault in found)
+    return {fault.name: fault.sentence for fault in found}
+
+
+def names(state: DriveState, **changes: Any) -> set[str]:
+    """What a fresh watch says of one sample."""
+    return set(seen(make_watch(), state, **changes))
+
+
+def lasting(state: DriveState, watch: JointWatch | None = None) -> set[str]:
+    """What is said of one that stays so for two slow messages; before that nothing is."""
+    watch = watch or make_watch()
+    before = [seen(watch, state) for _ in range(TWO_MESSAGES)]
+    assert not any(before[:-1])
+    return set(seen(watch, state)) | set(seen(watch, state))
+
+
+def fresh(now_s: float, **changes: Any) -> DriveState:
+    """A drive that has just sent everything."""
+    stamps: dict[str, Any] = dict.fromkeys(
+        ("angle_stamp_s", "current_stamp_s", "heartbeat_stamp_s", "temperature_stamp_s"), now_s
+    )
+    return HEALTHY._replace(**(stamps | changes))
+
+
+def ticks_until(name: str, state_at: Callable[[float], DriveState], longest: int = 1000, **changes: Any) -> int:
+    """From the first tick after START_S, at which the cause began, to the first with the fault."""
+    watch = make_watch()
+    for tick in range(-20, longest):
+        now_s = START_S + tick * TICK_S
+        state = state_at(now_s) if tick > 0 else fresh(now_s)
+        if name in seen(watch, state, now_s, **changes):
+            return tick
+    raise AssertionError(f"{name} never came")
+
+
+def last_message_s(now_s: float, ended_s: float, period_s: float, offset_s: float) -> float:
+    """The stamp of a cyclic message that ended."""
+    until_s = min(now_s, ended_s)
+    return START_S + offset_s + (until_s - START_S - offset_s) // period_s * period_s
+
+
+def test_a_healthy_drive_shows_no_fault() -> None:
+    assert names(HEALTHY) == set()
+
+
+# silence
+
+
+@pytest.mark.parametrize(
+    ("stamps", "bound_s", "before", "after"),
+    [
+        (("angle_stamp_s",), BOUNDS.late_s, None, "drive_late"),
+        (("current_stamp_s",), BOUNDS.late_s, None, "drive_late"),
+        (("angle_stamp_s",), BOUNDS.quiet_s, "drive_late", "position_stale"),
+        (("current_stamp_s",), BOUNDS.quiet_s, "drive_late", "current_stale"),
+        (("angle_stamp_s", "current_stamp_s"), BOUNDS.quiet_s, "drive_late", "drive_quiet"),
+        (("angle_stamp_s",), BOUNDS.silence_s, "position_stale", "position_silent"),
+        (("current_stamp_s",), BOUNDS.silence_s, "current_stale", "current_silent"),
+        (("angle_stamp_s", "current_stamp_s"), BOUNDS.silence_s, "drive_quiet", "drive_silent"),
+        (("heartbeat_stamp_s",), 0.5, None, "heartbeat_silent"),
+        (("temperature_stamp_s",), SLOW_SILENCE_S, None, "temperature_silent"),
+    ],
+)
+def test_a_signal_counts_as_gone_from_its_bound_on(
+    stamps: tuple[str, ...], bound_s: float, before: str | None, after: str
+) -> None:
+    def told(age_s: float) -> set[str]:
+        stamped: dict[str, Any] = dict.fromkeys(stamps, START_S - age_s)
+        return names(HEALTHY._replace(**stamped))
+
+    assert told(bound_s - BEYOND) == ({before} - {None})
+    assert told(bound_s + BEYOND) == {after}
+
+
+@given(
+    st.floats(0.0, 0.1) | st.sampled_from([inf]),
+    st.floats(0.0, 0.1) | st.sampled_from([inf]),
+)
+def test_of_two_silences_the_hardest_is_told_and_more_silence_is_never_milder(
+    position_s: float, current_s: float
+) -> None:
+    def told(position_age_s: float, current_age_s: float) -> int:
+        found = names(HEALTHY._replace(angle_stamp_s=START_S - position_age_s, current_stamp_s=START_S - current_age_s))
+        assert len(found - {"current_silent"}) <= 1
+        return max((SEVERITY.index(name) for name in found), default=-1)
+
+    def reaction(place: int) -> Reaction:
+        return KINDS[SEVERITY[place]].reaction if place >= 0 else Reaction.NONE
+
+    here = reaction(told(position_s, current_s))
+    assert reaction(told(position_s + 0.003, current_s)) >= here
+    assert reaction(told(position_s, current_s + 0.003)) >= here
+
+
+@pytest.mark.parametrize("offset_s", [0.0, 0.0003, 0.001, 0.0019])
+@pytest.mark.parametrize(
+    ("name", "stamps"),
+    [
+        ("drive_late", ("angle_stamp_s", "current_stamp_s")),
+        ("drive_quiet", ("angle_stamp_s", "current_stamp_s")),
+        ("drive_silent", ("angle_stamp_s", "current_stamp_s")),
+        ("position_stale", ("angle_stamp_s",)),
+        ("position_silent", ("angle_stamp_s",)),
+        ("current_stale", ("current_stamp_s",)),
+        ("current_silent", ("current_stamp_s",)),
+    ],
+)
+def test_silence_is_noticed_within_its_ticks_wherever_between_two_messages_it_began(
+    name: str, stamps: tuple[str, ...], offset_s: float
+) -> None:
+    def state_at(now_s: float) -> DriveState:
+        return fresh(now_s, **dict.fromkeys(stamps, last_message_s(now_s, START_S, MESSAGE_S, offset_s)))
+
+    earliest = {"drive_late": 2, "drive_quiet": 3, "position_stale": 3, "current_stale": 3}.get(name, 9)
+    assert earliest <= ticks_until(name, state_at) <= KINDS[name].bound_ticks
+
+
+@pytest.mark.parametrize(
+    ("name", "stamp"), [("heartbeat_silent", "heartbeat_stamp_s"), ("temperature_silent", "temperature_stamp_s")]
+)
+@pytest.mark.parametrize("offset_s", [0.0, 0.05, 0.099])
+def test_slow_signals_that_end_are_noticed_within_their_ticks(name: str, stamp: str, offset_s: float) -> None:
+    def state_at(now_s: float) -> DriveState:
+        return fresh(now_s, **{stamp: last_message_s(now_s, START_S, 0.1, offset_s)})
+
+    assert KINDS[name].bound_ticks - 42 <= ticks_until(name, state_at) <= KINDS[name].bound_ticks
+
+
+def test_messages_every_two_milliseconds_are_never_late_whatever_their_phase_to_the_ticks() -> None:
+    for offset in range(20):
+        watch = make_watch()
+        for tick in range(1, 400):
+            now_s = START_S + tick * TICK_S
+            stamp_s = last_message_s(now_s, inf, MESSAGE_S, 1e-4 * offset)
+            assert not seen(watch, fresh(now_s, angle_stamp_s=stamp_s, current_stamp_s=stamp_s), now_s)
+
+
+def test_one_message_that_is_lost_is_at_most_late() -> None:
+    for offset in range(20):
+        watch = make_watch()
+        found: set[str] = set()
+        for tick in range(1, 40):
+            now_s = START_S + tick * TICK_S
+            stamp_s = last_message_s(now_s, inf, MESSAGE_S, 1e-4 * offset)
+            if START_S + 0.05 <= stamp_s < START_S + 0.05 + MESSAGE_S:
+                stamp_s -= MESSAGE_S
+            found |= set(seen(watch, fresh(now_s, angle_stamp_s=stamp_s, current_stamp_s=stamp_s), now_s))
+        assert found <= {"drive_late"}
+
+
+def test_a_drive_that_never_told_its_temperature_is_not_asked_for_it() -> None:
+    assert names(HEALTHY._replace(temperature_c=nan, temperature_stamp_s=NEVER_S)) == set()
+
+
+def test_silence_is_told_with_signal_joint_and_time() -> None:
+    late = seen(make_watch(), HEALTHY._replace(current_stamp_s=START_S - 0.0201))
+    assert late == {"current_stale": "No current came from the left_sweep drive for 20 ms."}
+    gone = seen(make_watch(), HEALTHY._replace(angle_stamp_s=NEVER_S, current_stamp_s=NEVER_S))
+    assert gone == {"drive_silent": "No message came from the left_sweep drive at all."}
+    beat = seen(make_watch(), HEALTHY._replace(heartbeat_stamp_s=NEVER_S))
+    assert beat == {"heartbeat_silent": "No heartbeat came from the left_sweep drive at all."}
+
+
+def test_what_is_late_is_named_by_the_older_of_the_two() -> None:
+    sentence = seen(make_watch(), HEALTHY._replace(angle_stamp_s=START_S - 0.006, current_stamp_s=START_S - 0.007))
+    assert sentence == {"drive_late": "No current came from the left_sweep drive for 7 ms."}
+
+
+# the drive
+
+
+@pytest.mark.parametrize("flags", [1, 0x10, 0x4000000])
+def test_any_error_flag_is_a_fault(flags: int) -> None:
+    sentence = seen(make_watch(), HEALTHY._replace(error_flags=flags))
+    assert sentence == {"drive_error": f"The left_sweep drive reports error 0x{flags:x}."}
+
+
+def test_a_drive_out_of_closed_loop_is_a_fault_only_where_it_is_expected_there() -> None:
+    idle = HEALTHY._replace(closed_loop=False)
+    assert names(idle, moving=True) == {"drive_disarmed"}
+    assert names(idle, moving=False) == set()
+
+
+def test_a_drive_in_closed_loop_unasked_is_told_once_it_had_time_to_obey() -> None:
+    watch = make_watch()
+    unasked = [tick for tick in range(200) if "drive_energised" in seen(watch, HEALTHY, energised=False, moving=False)]
+    assert unasked[0] == pytest.approx(0.2 / TICK_S, abs=1)
+    assert unasked[0] + 38 + 2 <= KINDS["drive_energised"].bound_ticks  # a heartbeat tells of it
+
+
+def test_the_time_to_obey_begins_anew_with_every_obedience() -> None:
+    watch = make_watch()
+    for tick in range(400):
+        told = seen(watch, HEALTHY._replace(closed_loop=tick % 70 > 0), energised=False, moving=False)
+        assert "drive_energised" not in told
+
+
+@pytest.mark.parametrize(
+    ("voltage_v", "expected"),
+    [(24.0, None), (20.0, None), (19.99, "voltage_low"), (18.0, "voltage_low"), (17.99, "voltage_under"), (nan, None)],
+)
+def test_a_supply_is_low_and_then_too_low_once_two_messages_say_so(voltage_v: float, expected: str | None) -> None:
+    assert lasting(HEALTHY._replace(bus_voltage_v=voltage_v)) == ({expected} - {None})
+
+
+# motion
+
+
+@pytest.mark.parametrize(("edge", "outward"), [(70.0, 1.0), (-70.0, -1.0)])
+def test_a_joint_may_be_past_its_range_by_the_margin_and_no_further(edge: float, outward: float) -> None:
+    assert names(HEALTHY._replace(angle_rad=radians(edge) - outward * 1e-9)) == set()
+    assert names(HEALTHY._replace(angle_rad=radians(edge) + outward * 1e-9)) == {"joint_position"}
+
+
+def test_out_of_range_is_told_in_degrees_with_the_range() -> None:
+    (sentence,) = seen(make_watch(), HEALTHY._replace(angle_rad=radians(80.0))).values()
+    assert sentence == "The left_sweep joint is at 80.0 degrees, outside of -70 to 70."
+
+
+def test_an_angle_that_is_no_number_is_out_of_range() -> None:
+    for angle in (nan, inf, -inf):
+        assert "joint_position" in names(HEALTHY._replace(angle_rad=angle))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_joint_is_too_fast_from_a_quarter_over_its_limit_on(sign: float) -> None:
+    bound = 1.25 * LIMITS.velocity_rad_s
+
+    def ticks_at(velocity_rad_s: float) -> list[set[str]]:
+        watch = make_watch()
+        return [set(seen(watch, HEALTHY._replace(velocity_rad_s=sign * velocity_rad_s))) for _ in range(10)]
+
+    assert ticks_at(bound) == [set()] * 10
+    fast = [{"joint_velocity"}] * (10 - FAST_TICKS + 1)
+    assert ticks_at(bound + BEYOND) == [set()] * (FAST_TICKS - 1) + fast
+    assert KINDS["joint_velocity"].bound_ticks > FAST_TICKS + 1
+
+
+def test_two_fast_samples_again_and_again_are_no_fault() -> None:
+    watch = make_watch()
+    for tick in range(100):
+        assert not seen(watch, HEALTHY._replace(velocity_rad_s=100.0 if tick % 3 else 0.0))
+
+
+def moving_ticks(speed_rad_s: float, noise_rad_s: float = 0.0, energised: bool = False) -> int:
+    """Of 200, in which a joint with this speed is told to move."""
+    watch, random, count = make_watch(), Random(1), 0
+    for tick in range(200):
+        now_s = START_S + tick * TICK_S
+        told_rad_s = speed_rad_s + random.gauss(0.0, noise_rad_s)
+        state = fresh(now_s, angle_rad=speed_rad_s * tick * TICK_S, velocity_rad_s=told_rad_s, closed_loop=False)
+        count += "joint_moving" in seen(watch, state, now_s, energised=energised, moving=False)
+    return count
+
+
+def test_a_joint_that_moves_without_torque_stands_against_arming_and_only_then() -> None:
+    assert moving_ticks(0.5) > 150
+    assert moving_ticks(-0.5) > 150
+    assert moving_ticks(0.5, energised=True) == 0
+
+
+def test_a_joint_at_rest_whose_speed_is_noise_may_be_armed() -> None:
+    assert moving_ticks(0.0, noise_rad_s=0.5) == 0
+
+
+def samples(watch: JointWatch, steps: Iterable[tuple[float, float]]) -> list[set[str]]:
+    """Of angles that arrive at times after START_S, one in each tick."""
+    return [set(seen(watch, fresh(START_S + time_s, angle_rad=angle), START_S + time_s)) for time_s, angle in steps]
+
+
+def test_an_encoder_jumps_beyond_what_its_speed_explains() -> None:
+    for step_rad, expected in ((0.05 - BEYOND, set()), (0.05 + BEYOND, {"encoder_jump"})):
+        for sign in (1.0, -1.0):
+            assert samples(make_watch(), [(0.0, 0.0), (0.002, sign * step_rad)]) == [set(), expected]
+
+
+def test_a_jump_is_told_once_and_the_new_place_is_then_where_it_is() -> None:
+    found = samples(make_watch(), [(0.002 * tick, 0.5 * (tick >= 5)) for tick in range(10)])
+    assert found == [set()] * 5 + [{"encoder_jump"}] + [set()] * 4
+
+
+def test_the_first_sample_is_never_a_jump() -> None:
+    watch = make_watch()
+    assert samples(watch, [(0.0, 1.0)]) == [set()]
+    watch.reset()
+    assert samples(watch, [(0.0, -1.0)]) == [set()]
+
+
+def test_the_same_message_seen_twice_is_no_jump_and_no_step() -> None:
+    watch = make_watch()
+    samples(watch, [(0.0, 0.0)])
+    for tick in range(1, 3):
+        assert not seen(watch, HEALTHY._replace(angle_rad=0.0), START_S + tick * 0.002)
+
+
+def test_a_stamp_before_the_one_before_makes_no_jump() -> None:
+    """A frame that came without a time is stamped when it is read, which may be after the next one's own time."""
+    assert samples(make_watch(), [(0.05, 0.1), (0.01, 0.1), (0.012, 0.11)]) == [set(), set(), set()]
+
+
+def test_a_joint_at_the_velocity_limit_never_jumps() -> None:
+    watch, speed_rad_s = make_watch(), LIMITS.velocity_rad_s
+    for tick in range(30):
+        now_s = START_S + tick * TICK_S
+        angle_rad = -0.9 + speed_rad_s * tick * TICK_S
+        assert not seen(watch, fresh(now_s, angle_rad=angle_rad, velocity_rad_s=speed_rad_s), now_s)
+
+
+# load
+
+
+def stalled_ticks(torque_nm: float, velocity_rad_s: float, excused: bool = False, ticks: int = 900) -> int | None:
+    watch = make_watch()
+    for tick in range(1, ticks):
+        state = HEALTHY._replace(velocity_rad_s=velocity_rad_s, angle_rad=0.1 + velocity_rad_s * tick * TICK_S)
+        if "joint_not_following" in seen(watch, state, torque_nm=torque_nm, may_stand_still=excused):
+            return tick
+    return None
+
+
+def test_a_joint_that_stands_still_at_full_torque_does_not_follow() -> None:
+    for torque_nm in (LIMITS.torque_nm, 0.95 * LIMITS.torque_nm + BEYOND, -LIMITS.torque_nm):
+        ticks = stalled_ticks(torque_nm, 0.0)
+        assert ticks == pytest.approx(760, abs=2)
+        assert ticks is not None and ticks <= KINDS["joint_not_following"].bound_ticks
+
+
+@pytest.mark.parametrize(
+    ("torque_nm", "velocity_rad_s", "excused"),
+    [
+        (0.94 * LIMITS.torque_nm, 0.0, False),  # not saturated
+        (LIMITS.torque_nm, 0.11, False),  # it moves
+        (LIMITS.torque_nm, -0.11, False),
+        (LIMITS.torque_nm, 0.0, True),  # a recovery means to
+        (0.0, 0.0, False),
+    ],
+)
+def test_everything_else_follows_or_is_excused(torque_nm: float, velocity_rad_s: float, excused: bool) -> None:
+    assert stalled_ticks(torque_nm, velocity_rad_s, excused, 2000) is None
+
+
+def test_a_move_begins_the_wait_anew_and_the_noise_of_a_speed_does_not() -> None:
+    watch, random = make_watch(), Random(1)
+    for tick in range(2000):
+        state = HEALTHY._replace(angle_rad=0.05 * (tick // 700))
+        assert "joint_not_following" not in seen(watch, state, torque_nm=LIMITS.torque_nm)
+    watch = make_watch()
+    noisy = [HEALTHY._replace(velocity_rad_s=random.gauss(0.0, 0.3)) for _ in range(800)]
+    assert any("joint_not_following" in seen(watch, state, torque_nm=LIMITS.torque_nm) for state in noisy)
+
+
+def test_missed_ticks_count_for_as_long_as_they_lasted() -> None:
+    watch = make_watch()
+    found = [
+        tick
+        for tick in range(1, 200)
+        if "joint_not_following" in seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=10.0 * TICK_S)
+    ]
+    assert found[0] == pytest.approx(76, abs=1)
+
+
+def test_one_sample_after_a_long_stall_is_no_proof_of_what_lasted() -> None:
+    """A daemon that hung for seconds looks once."""
+    watch = make_watch()
+    stalled = seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=3.0)
+    assert set(stalled).isdisjoint({"joint_not_following", "torque_missing", "joint_velocity"})
+
+
+@pytest.mark.parametrize("missed", [1, 5, 9, 200])
+def test_a_joint_at_rest_is_not_too_fast_after_missed_ticks(missed: int) -> None:
+    assert names(HEALTHY, dt_s=(1 + missed) * TICK_S) == set()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_motor_takes_too_much_from_a_quarter_over_its_limit_on(sign: float) -> None:
+    def ticks_at(current_a: float) -> list[bool]:
+        watch = make_watch()
+        state = HEALTHY._replace(current_a=sign * current_a)
+        return ["joint_current" in seen(watch, state) for _ in range(6)]
+
+    assert ticks_at(1.25 * CURRENT_LIMIT_A) == [False] * 6
+    assert ticks_at(1.25 * CURRENT_LIMIT_A + BEYOND) == [False] * (CURRENT_TICKS - 1) + [True] * (7 - CURRENT_TICKS)
+    assert KINDS["joint_current"].bound_ticks > CURRENT_TICKS + 1
+
+
+# heat
+
+
+@pytest.mark.parametrize(
+    ("temperature_c", "expected"),
+    [
+        (79.99, None),
+        (80.0, "motor_overheating"),
+        (89.99, "motor_overheating"),
+        (90.0, "motor_hot"),
+        (200.0, "motor_hot"),
+        (inf, "motor_hot"),
+        (nan, None),
+        (0.0, None),
+        (-inf, None),
+    ],
+)
+def test_a_sensor_is_nearly_too_hot_half_way_to_its_bound_and_then_too_hot(
+    temperature_c: float, expected: str | None
+) -> None:
+    assert lasting(HEALTHY._replace(temperature_c=temperature_c)) == ({expected} - {None})
+
+
+def warm_watch(winding_c: float) -> JointWatch:
+    watch = make_watch()
+    watch.winding.temperature_c = winding_c
+    return watch
+
+
+@pytest.mark.parametrize("measured_c", [nan, 0.0, 25.0, 79.0])
+@pytest.mark.parametrize(
+    ("winding_c", "expected"), [(79.0, None), (80.5, "winding_overheating"), (91.0, "winding_hot")]
+)
+def test_currents_guard_a_motor_whose_sensor_sees_nothing(
+    measured_c: float, winding_c: float, expected: str | None
+) -> None:
+    told = seen(warm_watch(winding_c), HEALTHY._replace(temperature_c=measured_c))
+    assert set(told) == ({expected} - {None})
+    assert all("by its currents" in sentence for sentence in told.values())
+
+
+def test_a_winding_that_is_too_hot_is_not_hidden_by_a_sensor_that_is_nearly_so() -> None:
+    assert set(seen(warm_watch(95.0), HEALTHY._replace(temperature_c=85.0))) == {"winding_hot"}
+
+
+def test_where_both_are_as_hot_the_sensor_is_believed() -> None:
+    watch = warm_watch(95.0)
+    for _ in range(TWO_MESSAGES + 2):
+        told = seen(watch, HEALTHY._replace(temperature_c=96.0))
+    assert told == {"motor_hot": "The left_sweep motor has 96 degrees C."}
+
+
+def test_one_absurd_temperature_is_over_in_minutes() -> None:
+    for absurd in (inf, 1e38):
+        watch = make_watch()
+        for _ in range(TWO_MESSAGES + 2):
+            told = seen(watch, HEALTHY._replace(temperature_c=absurd))
+        assert set(told) == {"motor_hot"}
+        ticks = 0
+        while seen(watch, HEALTHY, dt_s=1.0):
+            ticks += 1
+            assert ticks < 180
+
+
+def test_a_reset_does_not_cool_a_winding() -> None:
+    watch = warm_watch(95.0)
+    watch.reset()
+    assert set(seen(watch, HEALTHY)) == {"winding_hot"}
+
+
+# whatever comes
+
+anything = st.floats(allow_nan=True, allow_infinity=True)
+drive_states = st.builds(
+    DriveState, anything, anything, anything, anything, anything, st.booleans(), st.integers(0, 2**32 - 1), anything,
+    anything, anything, anything,
+)  # fmt: skip
+
+
+@given(st.lists(drive_states, min_size=1, max_size=6), st.booleans(), st.booleans(), anything)
+def test_no_value_makes_it_fail_and_every_fault_has_a_sentence(
+    states: list[DriveState], energised: bool, moving: bool, torque_nm: float
+) -> None:
+    watch = make_watch()
+    for tick, state in enumerate(states):
+        now_s = START_S + tick * TICK_S
+        for name, sentence in seen(
+            watch, state, now_s, energised=energised, moving=moving, torque_nm=torque_nm
+        ).items():
+            assert name in KINDS
+            assert sentence.startswith(("The left_sweep ", "No ")) and sentence.endswith((".", "C", "s."))
+        assert isfinite(watch.winding.temperature_c)
+
+
+@given(st.lists(drive_states, min_size=1, max_size=4))
+def test_a_watch_forgets_garbage_once_the_signals_are_good_again(states: list[DriveState]) -> None:
+    """All but heat and the jump back."""
+    watch = make_watch()
+    for tick, state in enumerate(states):
+        seen(watch, state, START_S + tick * TICK_S)
+    found: set[str] = set()
+    for tick in range(len(states), len(states) + 5):
+        now_s = START_S + tick * TICK_S
+        found = set(seen(watch, fresh(now_s), now_s))
+    assert found <= {"winding_hot", "winding_overheating"}
+
+
+# torque that is not there
+
+
+def missing_ticks(sent_nm: float, current_a: float, moving: bool = True) -> int | None:
+    watch = make_watch()
+    for tick in range(1, 200):
+        state = fresh(START_S + tick * TICK_S, current_a=current_a)
+        if "torque_missing" in seen(watch, state, START_S + tick * TICK_S, torque_nm=sent_nm, moving=moving):
+            return tick
+    return None
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_torque_is_missing_beyond_its_share_of_the_limit_and_not_before(sign: float) -> None:
+    share_nm = MISSING_SHARE * LIMITS.torque_nm
+    assert missing_ticks(sign * (share_nm + 1e-6), 0.0) is not None
+    assert missing_ticks(sign * (share_nm - 1e-6), 0.0) is None
+    assert missing_ticks(0.0, sign * (share_nm + 1e-6) / 0.083) is not None
+
+
+def test_a_missing_torque_is_noticed_within_its_ticks() -> None:
+    ticks = missing_ticks(0.7, 0.0)
+    assert ticks is not None
+    assert MISSING_S / TICK_S <= ticks <= KINDS["torque_missing"].bound_ticks
+
+
+def test_no_torque_is_missed_of_a_drive_that_is_not_in_closed_loop() -> None:
+    assert missing_ticks(0.7, 0.0, moving=False) is None
+
+
+def test_a_current_that_follows_within_ticks_is_not_missed() -> None:
+    """The current told in a tick answers the torque of the tick before."""
+    watch, before_nm = make_watch(), 0.0
+    for tick in range(400):
+        now_s, sent_nm = START_S + tick * TICK_S, 0.7 if tick // 30 % 2 else -0.7
+        state = fresh(now_s, current_a=before_nm / 0.083, velocity_rad_s=1.0, angle_rad=0.1 + 1e-3 * (tick % 2))
+        assert "torque_missing" not in seen(watch, state, now_s, torque_nm=sent_nm)
+        before_nm = sent_nm

@@ -1,0 +1,129 @@
+"""The winding's temperature against the closed form, against scipy's integrator, and what a sensor makes of it."""
+
+from math import exp, inf, isfinite, nan, sin
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from control.limits import JointLimits
+from control.monitors.winding import HOTTEST_C, Winding, WindingParameters
+
+TICK_S = 1.0 / 380.0
+PARAMETERS = WindingParameters()
+
+
+def heated(current_a: float, ticks: int, dt_s: float = TICK_S, parameters: WindingParameters = PARAMETERS) -> Winding:
+    winding = Winding(parameters)
+    for _ in range(ticks):
+        winding.update(dt_s, current_a, nan)
+    return winding
+
+
+def closed_form_c(current_a: float, time_s: float) -> float:
+    """With R growing by 0.39 % a kelvin the equation stays linear: τ dT/dt = a - b T, from the room's temperature."""
+    p = PARAMETERS
+    watts_per_ohm = p.thermal_resistance_k_w * 1.5 * p.resistance_ohm * current_a**2
+    b = 1.0 - 0.0039 * watts_per_ohm
+    end_c = (p.room_c + watts_per_ohm * (1.0 - 0.0039 * 25.0)) / b
+    return end_c + (p.room_c - end_c) * exp(-b * time_s / p.time_constant_s)
+
+
+def test_it_begins_as_warm_as_the_room_and_stays_so_without_current() -> None:
+    assert heated(0.0, 1000).temperature_c == PARAMETERS.room_c
+
+
+@pytest.mark.parametrize("current_a", [2.0, -2.0, 5.0, 9.0])
+@pytest.mark.parametrize("time_s", [1.0, 20.0, 120.0])
+def test_a_steady_current_warms_it_as_the_closed_form_says(current_a: float, time_s: float) -> None:
+    told_c = heated(current_a, round(time_s / TICK_S)).temperature_c
+    assert told_c == pytest.approx(closed_form_c(current_a, time_s), abs=0.02)
+
+
+def test_a_changing_current_warms_it_as_an_integrator_says() -> None:
+    def current_a(time_s: float) -> float:
+        return 6.0 * sin(2.0 * time_s) + 2.0
+
+    def slope_k_s(time_s: float, temperature_c: np.ndarray) -> np.ndarray:
+        watts = 1.5 * PARAMETERS.resistance_ohm * (1.0 + 0.0039 * (temperature_c - 25.0)) * current_a(time_s) ** 2
+        gap_k = PARAMETERS.room_c - temperature_c
+        return np.asarray((gap_k + PARAMETERS.thermal_resistance_k_w * watts) / PARAMETERS.time_constant_s)
+
+    exact = solve_ivp(slope_k_s, (0.0, 60.0), [PARAMETERS.room_c], rtol=1e-9, atol=1e-9).y[0, -1]
+    winding = Winding(PARAMETERS)
+    for tick in range(round(60.0 / TICK_S)):
+        winding.update(TICK_S, current_a((tick + 0.5) * TICK_S), nan)
+    assert winding.temperature_c == pytest.approx(float(exact), abs=0.01)
+    assert exact > 40.0
+
+
+def test_copper_that_is_hotter_heats_more() -> None:
+    """By 0.39 % a kelvin: the first step from 85 °C against that from 35 °C, less what the room takes."""
+
+    def watts(temperature_c: float) -> float:
+        winding = Winding(PARAMETERS)
+        winding.temperature_c = temperature_c
+        rise_k = winding.update(1e-3, 5.0, nan) - temperature_c
+        to_room_k_s = (temperature_c - PARAMETERS.room_c) / PARAMETERS.time_constant_s
+        heat_k_s = rise_k / 1e-3 + to_room_k_s
+        return heat_k_s * PARAMETERS.time_constant_s / PARAMETERS.thermal_resistance_k_w
+
+    assert watts(25.0) == pytest.approx(1.5 * 0.5 * 25.0, rel=1e-3)
+    assert watts(85.0) / watts(25.0) == pytest.approx(1.0 + 0.0039 * 60.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("dt_s", [TICK_S / 4.0, 3.0 * TICK_S, 40.0 * TICK_S])
+def test_the_step_makes_no_difference(dt_s: float) -> None:
+    by_ticks = heated(6.0, round(30.0 / TICK_S)).temperature_c
+    assert heated(6.0, round(30.0 / dt_s), dt_s).temperature_c == pytest.approx(by_ticks, abs=0.1)
+
+
+def test_it_cools_to_the_rooms_temperature_with_its_time_constant() -> None:
+    winding = heated(9.0, 40000)
+    rise_k = winding.temperature_c - PARAMETERS.room_c
+    for _ in range(round(PARAMETERS.time_constant_s / TICK_S)):
+        winding.update(TICK_S, 0.0, nan)
+    assert (winding.temperature_c - PARAMETERS.room_c) / rise_k == pytest.approx(exp(-1.0), rel=1e-3)
+
+
+def test_a_sensor_that_reads_higher_is_believed_and_one_that_reads_lower_is_not() -> None:
+    winding = heated(5.0, 10000)
+    before_c = winding.temperature_c
+    assert winding.update(TICK_S, 5.0, before_c - 10.0) == pytest.approx(before_c, abs=0.01)
+    assert winding.update(TICK_S, 5.0, before_c + 10.0) == before_c + 10.0
+    assert winding.update(TICK_S, 5.0, nan) == pytest.approx(before_c + 10.0, abs=0.01)
+
+
+def test_a_current_that_is_no_number_adds_no_heat() -> None:
+    for current_a in (nan, inf, -inf):
+        assert heated(current_a, 100).temperature_c == PARAMETERS.room_c
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 10.0), st.floats(-1e38, 1e38) | st.just(nan), st.floats() | st.just(nan))))
+def test_whatever_is_told_the_temperature_stays_a_number_from_the_room_to_burning(
+    updates: list[tuple[float, float, float]],
+) -> None:
+    winding = Winding(PARAMETERS)
+    for dt_s, current_a, measured_c in updates:
+        temperature_c = winding.update(dt_s, current_a, measured_c)
+        assert isfinite(temperature_c) and PARAMETERS.room_c - 1e-9 <= temperature_c <= HOTTEST_C
+
+
+def test_full_torque_by_the_limits_is_a_matter_of_a_minute_and_of_an_hour_at_a_third() -> None:
+    """0.75 N·m at 0.083 N·m/A are 9 A: more than a motor bears for long, and far less is no matter at all."""
+    limits = JointLimits()
+    full_a = limits.torque_nm / 0.083
+    winding, seconds = Winding(PARAMETERS), 0
+    while winding.update(1.0, full_a, nan) < limits.temperature_hot_c:
+        seconds += 1
+        assert seconds < 120
+    assert seconds > 20
+    assert heated(full_a / 3.0, 3600, 1.0).temperature_c < limits.temperature_warm_c
+
+
+def test_a_reset_makes_it_as_warm_as_the_room() -> None:
+    winding = heated(9.0, 1000)
+    winding.reset()
+    assert winding.temperature_c == PARAMETERS.room_c

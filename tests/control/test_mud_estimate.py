@@ -1,0 +1,74 @@
+"""A coefficient at another depth, against numpy's power law and against samples drawn from what it says it doubts."""
+
+from math import inf, isnan, log, nan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
+
+KNOWN = Coefficient(0.6e6, 0.03e6, 0.03, -0.5, 0.3, 8)
+depths = st.floats(0.005, 0.2)
+
+
+def test_at_its_own_depth_a_coefficient_is_what_was_measured() -> None:
+    assert KNOWN.at(0.03) == pytest.approx((0.6e6, 0.03e6))
+
+
+@given(depths, depths, st.floats(-2.0, 1.0))
+def test_the_value_follows_the_power_of_depth(own_m: float, other_m: float, exponent: float) -> None:
+    value, _ = KNOWN._replace(depth_m=own_m, exponent=exponent).at(other_m)
+    assert value == pytest.approx(0.6e6 * float(np.power(other_m / own_m, exponent)))
+
+
+def test_the_prior_alone_makes_k_s_a_fifth_lower_at_5_cm_than_at_3() -> None:
+    assert KNOWN.at(0.05)[0] / KNOWN.at(0.03)[0] == pytest.approx(0.775, abs=0.001)
+
+
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.04, 0.06])
+def test_the_doubt_is_the_spread_of_samples_of_level_and_exponent(depth_m: float) -> None:
+    random = np.random.default_rng(1)
+    coefficient = KNOWN._replace(exponent_std_error=0.1)
+    levels = np.log(coefficient.value) + 0.05 * random.standard_normal(200_000)
+    exponents = -0.5 + 0.1 * random.standard_normal(200_000)
+    spread = float(np.std(levels + exponents * np.log(depth_m / 0.03)))
+    value, std_error = coefficient.at(depth_m)
+    assert std_error / value == pytest.approx(spread, rel=0.01)
+
+
+@given(depths, depths)
+def test_a_force_predicted_farther_off_is_doubted_more(one_m: float, other_m: float) -> None:
+    nearer_m, farther_m = sorted((one_m, other_m), key=lambda depth_m: abs(log(depth_m / KNOWN.depth_m)))
+    near, near_error = KNOWN.at(nearer_m)
+    far, far_error = KNOWN.at(farther_m)
+    assert far_error / far >= near_error / near * (1.0 - 1e-9) >= 0.05 * (1.0 - 2e-9)
+
+
+@given(depths)
+def test_a_law_that_is_known_exactly_adds_no_doubt(depth_m: float) -> None:
+    value, std_error = KNOWN._replace(exponent_std_error=0.0).at(depth_m)
+    assert std_error / value == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("depth_m", [0.0, -0.01, -inf, nan])
+def test_where_there_is_no_mud_there_is_no_coefficient(depth_m: float) -> None:
+    assert all(isnan(number) for number in KNOWN.at(depth_m))
+    assert all(isnan(number) for number in KNOWN._replace(depth_m=depth_m).at(0.03))
+
+
+@given(st.tuples(*[st.floats()] * 5), st.floats())
+def test_no_number_makes_it_raise(numbers: tuple[float, float, float, float, float], depth_m: float) -> None:
+    value, std_error = Coefficient(*numbers, 1).at(depth_m)
+    assert isinstance(value, float) and isinstance(std_error, float)
+
+
+def test_a_belief_tells_the_flippers_apart() -> None:
+    belief = MudBelief(left=FlipperBelief(k_s=KNOWN), right=FlipperBelief(k_e=KNOWN))
+    assert belief.of("left") == FlipperBelief(None, KNOWN, None)
+    assert belief.of("right") == FlipperBelief(None, None, KNOWN)
+
+
+def test_nothing_known_is_nothing_at_all() -> None:
+    assert NOTHING_KNOWN == (None, None, None, (None, None, None), (None, None, None), False)

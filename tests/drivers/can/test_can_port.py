@@ -1,0 +1,176 @@
+"""A port over python-can: what passes, what is counted, and that nothing waits or raises."""
+
+import errno
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import can
+import pytest
+
+from control.records import NEVER_S
+from drivers.can.can_port import MOST_FAILURES_PER_READ, MOST_FRAMES_PER_READ, CanPort, PythonCanPort, open_port
+from drivers.can.frames import Frame
+
+FRAMES = [
+    Frame(0x009, bytes(range(8))),
+    Frame(0x7FF),
+    Frame(0x060, is_remote=True),
+    Frame(0x18FEF100, b"\xff", is_extended=True),
+]
+
+
+@pytest.fixture
+def other() -> Iterator[can.BusABC]:
+    with can.Bus(interface="virtual", channel="port-test") as bus:
+        yield bus
+
+
+@pytest.fixture
+def port(other: can.BusABC) -> Iterator[CanPort]:
+    opened = open_port("virtual", "port-test", {})
+    yield opened
+    opened.close()
+
+
+class FakeBus(can.BusABC):
+    """Receives the same message for ever, or fails in both directions."""
+
+    def __init__(self, problem: can.CanError | None = None) -> None:
+        super().__init__(channel="fake")
+        self.problem = problem
+        self.timeouts: list[float | None] = []
+        self.answers = 10**6
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        self.timeouts.append(timeout)
+        if self.problem:
+            raise self.problem
+        self.answers -= 1
+        return can.Message(arbitration_id=9, is_extended_id=False) if self.answers >= 0 else None
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        if self.problem:
+            raise self.problem
+
+
+def as_message(frame: Frame) -> can.Message:
+    return can.Message(
+        arbitration_id=frame.arbitration_id,
+        data=frame.data,
+        is_extended_id=frame.is_extended,
+        is_remote_frame=frame.is_remote,
+        is_error_frame=frame.is_error,
+    )
+
+
+def unstamped(port: CanPort) -> list[Frame]:
+    return [frame._replace(stamp_s=NEVER_S) for frame in port.receive()]
+
+
+def test_a_frame_says_when_it_was_on_the_bus(port: CanPort, other: can.BusABC) -> None:
+    before_s = time.monotonic()
+    other.send(as_message(FRAMES[0]))
+    after_s = time.monotonic()
+    time.sleep(0.02)
+    (frame,) = port.receive()
+    assert before_s - 0.005 < frame.stamp_s < after_s + 0.005  # the clock on the wall is read a moment later
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_frames_come_in_unchanged(port: CanPort, other: can.BusABC, frame: Frame) -> None:
+    other.send(as_message(frame))
+    assert unstamped(port) == [frame]
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_frames_go_out_unchanged(port: CanPort, other: can.BusABC, frame: Frame) -> None:
+    port.send(frame)
+    message = other.recv(0.0)
+    assert message is not None
+    assert message.equals(as_message(frame), timestamp_delta=None, check_channel=False, check_direction=False)
+    assert other.recv(0.0) is None
+
+
+def test_error_frames_are_counted_and_not_passed_on(port: CanPort, other: can.BusABC) -> None:
+    for frame in (Frame(0x040, bytes(8), is_error=True), Frame(0x009, b"\x01")):
+        other.send(as_message(frame))
+    assert unstamped(port) == [Frame(0x009, b"\x01")]
+    assert port.error_frames == 1
+
+
+def test_frames_keep_their_order(port: CanPort, other: can.BusABC) -> None:
+    sent = [Frame(number, bytes([number])) for number in range(100)]
+    for frame in sent:
+        other.send(as_message(frame))
+    assert unstamped(port) == sent
+
+
+def test_nothing_is_waited_for() -> None:
+    bus = FakeBus()
+    bus.answers = 1
+    assert len(PythonCanPort(bus).receive()) == 1
+    assert bus.timeouts == [0.0, 0.0]
+
+
+def test_a_babbling_node_does_not_hold_the_loop() -> None:
+    assert len(PythonCanPort(FakeBus()).receive()) == MOST_FRAMES_PER_READ
+
+
+def test_what_one_read_leaves_the_next_one_takes(port: CanPort, other: can.BusABC) -> None:
+    for number in range(MOST_FRAMES_PER_READ + 5):
+        other.send(as_message(Frame(number % 1000)))
+    assert len(port.receive()) == MOST_FRAMES_PER_READ
+    left = [(MOST_FRAMES_PER_READ + number) % 1000 for number in range(5)]
+    assert [frame.arbitration_id for frame in port.receive()] == left
+
+
+def test_failed_sends_are_counted_and_do_not_raise() -> None:
+    port = PythonCanPort(FakeBus(can.CanOperationError("No buffer space available", errno.ENOBUFS)))
+    port.send(Frame(1))
+    port.send(Frame(2))
+    assert port.failed_sends == 2
+    assert "No buffer space" in port.last_send_error
+
+
+def test_a_failed_receive_is_counted_and_does_not_raise() -> None:
+    port = PythonCanPort(FakeBus(can.CanOperationError("garbage")))
+    assert port.receive() == []
+    assert port.error_frames == MOST_FAILURES_PER_READ
+    assert "garbage" in port.last_error
+
+
+def test_garbage_does_not_hide_the_good_frames_behind_it() -> None:
+    class Noisy(FakeBus):
+        def recv(self, timeout: float | None = None) -> can.Message | None:
+            self.answers -= 1
+            if self.answers % 10 == 0:
+                return can.Message(arbitration_id=9, is_extended_id=False)
+            if self.answers < 10**6 - 30:
+                return None
+            raise ValueError("invalid literal for int() with base 16: 'G'")
+
+    port = PythonCanPort(Noisy())
+    assert len(port.receive()) == 3
+    assert port.error_frames == 27
+
+
+def test_ports_talk_over_the_local_bus(tmp_path: Path) -> None:
+    first, second = (open_port("mudskipper_local", str(tmp_path), {}) for _ in range(2))
+    for frame in FRAMES:
+        first.send(frame)
+    assert unstamped(second) == FRAMES
+    first.close()
+    second.close()
+
+
+def test_options_reach_the_interface() -> None:
+    port = open_port("virtual", "own-messages", {"receive_own_messages": True})
+    port.send(Frame(1))
+    assert unstamped(port) == [Frame(1)]
+    port.close()
+
+
+def test_an_interface_that_does_not_exist_is_refused() -> None:
+    with pytest.raises(can.CanInterfaceNotImplementedError, match="no-such-interface"):
+        open_port("no-such-interface", "x", {})

@@ -1,0 +1,369 @@
+"""The local bus as a bus: who hears whom, while nodes come, go, stop and die."""
+
+import asyncio
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import can
+import pytest
+
+from drivers.can.frames import Frame, encode_frame
+from drivers.can.local_bus import LocalBus, LocalLink, make_channel_folder
+from tests.waiting import LONGEST_S
+
+Open = Callable[[], LocalBus]
+Start = Callable[[str], subprocess.Popen[str]]
+
+
+@pytest.fixture
+def open_bus(tmp_path: Path) -> Iterator[Open]:
+    opened: list[LocalBus] = []
+
+    def open_one() -> LocalBus:
+        opened.append(LocalBus(tmp_path))
+        return opened[-1]
+
+    yield open_one
+    for bus in opened:
+        bus.shutdown()
+
+
+@pytest.fixture
+def start_node(tmp_path: Path) -> Iterator[Start]:
+    """Run a node in a process of its own, up to the line that it prints; `bus` is its name there."""
+    started: list[subprocess.Popen[str]] = []
+    opening = f"import sys\nfrom drivers.can.local_bus import LocalBus\nbus = LocalBus({str(tmp_path)!r})\n"
+
+    def start(code: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-c", opening + code]
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        started.append(process)
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        return process
+
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+IDLE_NODE = "print('ready', flush=True); sys.stdin.read()"
+
+
+def make_message(number: int) -> can.Message:
+    return can.Message(arbitration_id=0x123, data=number.to_bytes(8, "little"), is_extended_id=False)
+
+
+def drain(bus: can.BusABC) -> list[int]:
+    numbers = []
+    while message := bus.recv(0):
+        numbers.append(int.from_bytes(message.data, "little"))
+    return numbers
+
+
+def kill(process: subprocess.Popen[str]) -> None:
+    process.send_signal(signal.SIGKILL)
+    process.wait(LONGEST_S)
+
+
+def fill(bus: LocalBus) -> int:
+    """Send until a frame is lost; the number of those that were not."""
+    for number in range(100_000):
+        bus.send(make_message(number))
+        if bus.lost_frames:
+            return number
+    raise AssertionError("no frame was ever counted as lost")
+
+
+def test_frames_keep_their_order_and_nobody_hears_itself(open_bus: Open) -> None:
+    sender, receiver = open_bus(), open_bus()
+    for number in range(100):
+        sender.send(make_message(number))
+    assert drain(receiver) == list(range(100))
+    assert drain(sender) == []
+
+
+def test_every_one_of_three_nodes_hears_the_other_two(open_bus: Open) -> None:
+    nodes = [open_bus() for _ in range(3)]
+    for number, node in enumerate(nodes):
+        node.send(make_message(number))
+    assert [sorted(drain(node)) for node in nodes] == [[1, 2], [0, 2], [0, 1]]
+
+
+def test_a_node_that_only_sends_notices_a_late_joiner(open_bus: Open) -> None:
+    sender = open_bus()
+    sender.send(make_message(1))
+    late = open_bus()
+    sender.send(make_message(2))
+    assert drain(late) == [2]
+
+
+def test_nodes_that_join_at_once_are_all_connected(tmp_path: Path) -> None:
+    buses: list[LocalBus] = []
+    threads = [threading.Thread(target=lambda: buses.append(LocalBus(tmp_path))) for _ in range(12)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for number, bus in enumerate(buses):
+        bus.send(make_message(number))
+    for number, bus in enumerate(buses):
+        assert sorted(drain(bus)) == [other for other in range(12) if other != number]
+        bus.shutdown()
+
+
+def test_what_a_node_sent_before_it_left_still_arrives(open_bus: Open) -> None:
+    stayer, leaver = open_bus(), open_bus()
+    stayer.send(make_message(7))  # never read: the kernel answers its sender with a reset
+    leaver.send(make_message(8))
+    leaver.shutdown()
+    stayer.send(make_message(9))
+    assert drain(stayer) == [8]
+    assert stayer.lost_frames == 0
+
+
+def test_a_node_may_leave_and_come_back(open_bus: Open, tmp_path: Path) -> None:
+    stayer = open_bus()
+    for number in range(20):
+        with LocalBus(tmp_path) as visitor:
+            stayer.send(make_message(number))
+            assert drain(visitor) == [number]
+    assert drain(stayer) == []
+    assert len(list(tmp_path.glob("*.node"))) == 1
+
+
+def test_a_killed_node_does_no_harm_and_its_socket_is_cleaned(
+    open_bus: Open, start_node: Start, tmp_path: Path
+) -> None:
+    sender, receiver = open_bus(), open_bus()
+    victim = start_node(IDLE_NODE)
+    sender.send(make_message(1))
+    kill(victim)
+    stale = list(tmp_path.glob(f"{victim.pid}-*.node"))
+    sender.send(make_message(2))
+    late = open_bus()
+    sender.send(make_message(3))
+    assert drain(receiver) == [1, 2, 3]
+    assert drain(late) == [3]
+    assert sender.lost_frames == 0
+    assert len(stale) == 1
+    assert not stale[0].exists()
+
+
+def test_a_file_that_is_no_socket_is_left_alone(open_bus: Open, tmp_path: Path) -> None:
+    (tmp_path / "notes.node").write_text("mine")
+    open_bus()
+    assert (tmp_path / "notes.node").read_text() == "mine"
+
+
+def test_a_stopped_node_never_blocks_the_sender(open_bus: Open, start_node: Start) -> None:
+    sender, receiver = open_bus(), open_bus()
+    process = start_node(IDLE_NODE)
+    process.send_signal(signal.SIGSTOP)
+    heard = 0
+    for number in range(20_000):
+        sender.send(make_message(number))  # would wait for ever
+        heard += len(drain(receiver))
+        if sender.lost_frames == 100:
+            break
+    assert sender.lost_frames == 100
+    assert heard == number + 1
+
+
+def test_a_node_that_never_reads_loses_the_newest_frames_only(open_bus: Open) -> None:
+    sender, idle = open_bus(), open_bus()
+    kept = fill(sender)
+    assert kept >= 200  # with the kernel's smallest usual buffer
+    assert drain(idle) == list(range(kept))
+    sender.send(make_message(kept + 1))
+    assert drain(idle) == [kept + 1]
+    assert sender.lost_frames == 1
+
+
+def test_a_first_receive_hears_a_newcomer_that_sent_before(open_bus: Open) -> None:
+    first, newcomer = open_bus(), open_bus()
+    newcomer.send(make_message(1))
+    message = first.recv(0)
+    assert message is not None
+    assert message.data[0] == 1
+
+
+def test_a_stopped_node_may_be_joined_and_hears_all_of_it_later(open_bus: Open, start_node: Start) -> None:
+    process = start_node(
+        """print("ready", flush=True)
+sys.stdin.readline()
+bus.send(bus.recv())
+sys.stdin.read()"""
+    )
+    process.send_signal(signal.SIGSTOP)
+    bus = open_bus()
+    bus.send(make_message(5))
+    process.send_signal(signal.SIGCONT)
+    assert process.stdin is not None
+    process.stdin.write("\n")
+    process.stdin.flush()
+    message = bus.recv(LONGEST_S)
+    assert message is not None
+    assert message.data[0] == 5
+
+
+@pytest.mark.parametrize("size", [1, 5, 16, 17, 31])
+def test_frames_cut_anywhere_by_the_stream_are_put_together(tmp_path: Path, size: int) -> None:
+    frames = [encode_frame(Frame(number, bytes([number]))) for number in range(20)]
+    stream = b"".join(frames)
+    link = LocalLink(tmp_path)
+    with socket.socket(socket.AF_UNIX) as raw:
+        raw.connect(str(next(tmp_path.glob("*.node"))))
+        received = []
+        for start in range(0, len(stream), size):
+            raw.sendall(stream[start : start + size])
+            for _ in range(3):  # the first call only accepts
+                if data := link.receive():
+                    received.append(data)
+        assert received == frames
+    link.close()
+
+
+def test_garbage_is_reported_as_a_can_error(open_bus: Open, tmp_path: Path) -> None:
+    bus, link = open_bus(), LocalLink(tmp_path)
+    link.send(b"\xff" * 16)
+    with pytest.raises(can.CanOperationError, match="255"):
+        bus.recv(0.1)
+    link.close()
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        can.Message(arbitration_id=0x18FEF100, data=b"\x01\x02", is_extended_id=True),
+        can.Message(arbitration_id=0x029, is_remote_frame=True, is_extended_id=False),
+        can.Message(arbitration_id=0x044, data=bytes(8), is_error_frame=True, is_extended_id=False),
+        can.Message(arbitration_id=0x7FF, is_extended_id=False),
+    ],
+)
+def test_every_kind_of_frame_survives(open_bus: Open, message: can.Message) -> None:
+    sender, receiver = open_bus(), open_bus()
+    before_s = time.time()
+    sender.send(message)
+    received = receiver.recv(0)
+    assert received is not None
+    assert received.equals(message, timestamp_delta=None, check_channel=False)
+    assert before_s <= received.timestamp <= time.time()
+
+
+def test_can_fd_and_own_messages_are_refused(open_bus: Open, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="CAN FD"):
+        open_bus().send(can.Message(data=bytes(8), is_fd=True))
+    with pytest.raises(can.CanInitializationError, match="own messages"):
+        LocalBus(tmp_path, receive_own_messages=True)
+
+
+def test_python_can_opens_it_by_name_with_filters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    wanted = [can.typechecking.CanFilter(can_id=0x123, can_mask=0x7FF)]
+    with (
+        can.Bus(interface="mudskipper_local", channel="demo", can_filters=wanted) as receiver,
+        can.Bus(interface="mudskipper_local", channel="demo") as sender,
+    ):
+        sender.send(can.Message(arbitration_id=0x124, is_extended_id=False))
+        sender.send(make_message(1))
+        assert drain(receiver) == [1]
+    folder = tmp_path / f"mudskipper-bus-{os.geteuid()}" / "demo"
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert folder.parent.stat().st_mode & 0o777 == 0o700
+    assert [path.name for path in folder.iterdir()] == ["lock"]
+
+
+def test_a_receive_with_a_timeout_waits_that_long_whatever_wakes_it(open_bus: Open) -> None:
+    bus, start_s = open_bus(), time.monotonic()
+    open_bus()  # wakes the first one, without a frame
+    assert bus.recv(0.05) is None
+    assert time.monotonic() - start_s > 0.049
+
+
+def test_select_sees_frames_that_were_read_but_not_yet_taken(open_bus: Open) -> None:
+    sender, receiver = open_bus(), open_bus()
+    receiver.recv(0)
+    assert select.select([receiver], [], [], 0)[0] == []
+    for number in range(3):
+        sender.send(make_message(number))
+    for _ in range(3):
+        assert select.select([receiver], [], [], 0)[0] == [receiver]
+        assert receiver.recv(0)
+    assert select.select([receiver], [], [], 0)[0] == []
+
+
+def test_an_asyncio_notifier_gets_every_frame(open_bus: Open) -> None:
+    sender, receiver = open_bus(), open_bus()
+
+    async def listen() -> list[int]:
+        reader = can.AsyncBufferedReader()
+        with can.Notifier(receiver, [reader], loop=asyncio.get_running_loop()):
+            for number in range(50):
+                sender.send(make_message(number))
+            return [(await asyncio.wait_for(reader.get_message(), LONGEST_S)).data[0] for _ in range(50)]
+
+    assert asyncio.run(listen()) == list(range(50))
+
+
+def test_shutting_down_twice_is_fine_and_leaves_no_descriptor_open(tmp_path: Path) -> None:
+    with LocalBus(tmp_path) as bus:  # python-can itself opens a few things at first
+        pass
+    before = sorted(os.listdir("/proc/self/fd"))
+    first, second = LocalBus(tmp_path), LocalBus(tmp_path)
+    first.send(make_message(1))
+    assert drain(second) == [1]
+    for bus in (first, second, first, second):
+        bus.shutdown()
+    assert sorted(os.listdir("/proc/self/fd")) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["lock"]
+
+
+def test_a_folder_that_is_too_deep_for_a_socket_is_refused(tmp_path: Path) -> None:
+    deep = tmp_path / ("x" * 100)
+    with pytest.raises(can.CanInitializationError, match="107 bytes"):
+        LocalBus(deep)
+
+
+@pytest.mark.parametrize("channel", ["", ".", "..", "a/b", "../demo", "demo/"])
+def test_a_channel_that_is_neither_name_nor_path_is_refused(channel: str) -> None:
+    with pytest.raises(can.CanInitializationError, match="plain name"):
+        LocalBus(channel)
+
+
+def test_a_folder_of_somebody_else_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 54321)
+    with pytest.raises(can.CanInitializationError, match="belongs to user"):
+        LocalBus(tmp_path)
+
+
+def test_without_a_runtime_folder_the_channel_lies_with_temporary_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert make_channel_folder("demo") == tmp_path / f"mudskipper-bus-{os.geteuid()}" / "demo"
+
+
+def test_two_processes_exchange_ten_thousand_frames(open_bus: Open, start_node: Start) -> None:
+    bus = open_bus()
+    start_node("print('ready', flush=True)\nwhile True: bus.send(bus.recv())")
+    echoed: list[int] = []
+    for start in range(0, 10_000, 100):  # no more on the way than the smallest buffer holds
+        for number in range(start, start + 100):
+            bus.send(make_message(number))
+        while len(echoed) < start + 100:
+            message = bus.recv(LONGEST_S)
+            assert message is not None
+            echoed.append(int.from_bytes(message.data, "little"))
+    assert echoed == list(range(10_000))
+    assert bus.lost_frames == 0

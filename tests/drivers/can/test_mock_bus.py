@@ -1,0 +1,45 @@
+"""The bus within one process: who hears what, and in which order."""
+
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import LONGEST_QUEUE, MockBus
+
+
+def test_all_others_hear_frames_in_order_and_nobody_hears_himself() -> None:
+    bus = MockBus()
+    sender, first, second = bus.open(), bus.open(), bus.open()
+    sent = [Frame(0x10, b"\x01"), Frame(0x20, is_remote=True), Frame(0x18FEF100, b"\x02", is_extended=True)]
+    for frame in sent:
+        sender.send(frame)
+    assert first.receive() == second.receive() == sent
+    assert sender.receive() == []
+
+
+def test_a_frame_is_received_once() -> None:
+    bus = MockBus()
+    sender, listener = bus.open(), bus.open()
+    sender.send(Frame(1))
+    assert listener.receive() == [Frame(1)]
+    assert listener.receive() == []
+
+
+def test_two_buses_do_not_hear_each_other() -> None:
+    sender, stranger = MockBus().open(), MockBus().open()
+    sender.send(Frame(1))
+    assert stranger.receive() == []
+
+
+def test_a_port_that_nobody_reads_loses_its_oldest_frames() -> None:
+    bus = MockBus()
+    sender, listener = bus.open(), bus.open()
+    for number in range(LONGEST_QUEUE + 3):
+        sender.send(Frame(number % 0x800, number.to_bytes(2, "little")))
+    kept = [int.from_bytes(frame.data, "little") for frame in listener.receive()]
+    assert kept == list(range(3, LONGEST_QUEUE + 3))
+
+
+def test_a_closed_port_hears_nothing_more() -> None:
+    bus = MockBus()
+    sender, listener = bus.open(), bus.open()
+    listener.close()
+    sender.send(Frame(1))
+    assert listener.receive() == []

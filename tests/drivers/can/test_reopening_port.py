@@ -1,0 +1,154 @@
+"""A port that vanishes and comes back, over mock ports, with a clock that the test turns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from drivers.can.can_port import BusState
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockBus, MockPort
+from drivers.can.reopening_port import RETRY_S, NotOpenError, ReopeningPort
+
+FRAME = Frame(0x009, bytes(8))
+BUS_OFF = 0x040
+
+
+class Adapter:
+    """Plugged in or not; every port that it was opened as."""
+
+    def __init__(self, plugged: bool = True) -> None:
+        self.plugged = plugged
+        self.bus = MockBus()
+        self.peer = self.bus.open()
+        self.opened: list[MockPort] = []
+        self.tries = 0
+
+    def open(self) -> MockPort:
+        self.tries += 1
+        if not self.plugged:
+            raise NotOpenError("there is no such interface")
+        self.opened.append(self.bus.open())
+        return self.opened[-1]
+
+    def vanish(self) -> None:
+        self.plugged = False
+        self.opened[-1].state = BusState.OFF
+        self.opened[-1].last_error = "No such device"
+        self.opened[-1].failed_sends, self.opened[-1].error_frames = 3, 2
+
+
+def run(port: ReopeningPort, since_s: float, for_s: float, done: Callable[[], bool] = lambda: False) -> float:
+    """Ticks of 1/10 s."""
+    now_s = since_s
+    while now_s < since_s + for_s and not done():
+        port.receive()
+        port.reopen(now_s)
+        now_s += 0.1
+    return now_s
+
+
+def state_of(port: ReopeningPort) -> BusState:
+    return port.state
+
+
+def test_without_waiting_a_port_that_does_not_open_is_refused() -> None:
+    with pytest.raises(NotOpenError, match="no such interface"):
+        ReopeningPort(Adapter(plugged=False).open, wait=False)
+
+
+def test_a_port_that_is_waited_for_is_off_and_says_why() -> None:
+    port = ReopeningPort(Adapter(plugged=False).open, wait=True)
+    port.send(FRAME)
+    assert (port.state, port.last_error) == (BusState.OFF, "there is no such interface")
+    assert (port.failed_sends, port.last_send_error) == (1, "there is no such interface")
+    assert list(port.receive()) == []
+
+
+def test_it_is_tried_once_a_second_and_not_in_every_tick() -> None:
+    adapter = Adapter(plugged=False)
+    port = ReopeningPort(adapter.open, wait=True)
+    run(port, 100.0, 5.0 * RETRY_S)
+    assert 4 <= adapter.tries - 1 <= 5
+
+
+def test_a_port_that_is_plugged_in_later_works_and_is_active_once_it_hears_something() -> None:
+    adapter = Adapter(plugged=False)
+    port = ReopeningPort(adapter.open, wait=True)
+    adapter.plugged = True
+    now_s = run(port, 0.0, 3.0, lambda: bool(adapter.opened))
+    assert state_of(port) is BusState.OFF
+    adapter.peer.send(FRAME)
+    assert list(port.receive()) == [FRAME]
+    assert state_of(port) is BusState.ACTIVE
+    port.send(FRAME)
+    assert adapter.peer.receive() == [FRAME]
+    run(port, now_s, 3.0)
+    assert len(adapter.opened) == 1
+
+
+def test_a_port_that_vanishes_is_closed_and_opened_again_when_it_is_back() -> None:
+    adapter = Adapter()
+    port = ReopeningPort(adapter.open, wait=False)
+    assert state_of(port) is BusState.ACTIVE
+    adapter.vanish()
+    run(port, 0.0, 3.0)
+    assert (port.state, port.last_error) == (BusState.OFF, "there is no such interface")
+    assert adapter.opened[0] not in adapter.bus.ports
+    adapter.plugged = True
+    run(port, 3.0, 3.0, lambda: len(adapter.opened) == 2)
+    adapter.peer.send(FRAME)
+    assert list(port.receive()) == [FRAME]
+    assert state_of(port) is BusState.ACTIVE
+
+
+def test_counts_only_grow_over_all_the_ports_there_were() -> None:
+    adapter = Adapter()
+    port = ReopeningPort(adapter.open, wait=False)
+    adapter.vanish()
+    run(port, 0.0, 1.5)  # closed meanwhile, and not open yet
+    port.send(FRAME)
+    assert (port.failed_sends, port.error_frames) == (4, 2)
+    adapter.plugged = True
+    run(port, 1.5, 3.0, lambda: len(adapter.opened) == 2)
+    adapter.opened[-1].full = True
+    port.send(FRAME)
+    port.receive()
+    assert (port.failed_sends, port.error_frames) == (5, 2)
+    assert port.last_send_error == "No buffer space available"
+
+
+def test_a_bus_off_that_the_controller_recovers_from_by_itself_is_left_alone() -> None:
+    adapter = Adapter()
+    port = ReopeningPort(adapter.open, wait=False)
+    adapter.opened[0].inject_error(BUS_OFF)
+    run(port, 0.0, 0.5 * RETRY_S)
+    adapter.opened[0].state = BusState.ACTIVE
+    run(port, 0.5 * RETRY_S, 5.0 * RETRY_S)
+    assert len(adapter.opened) == 1
+
+
+def test_a_controller_that_stays_out_of_the_bus_counts_as_off_however_often_it_is_opened() -> None:
+    adapter = Adapter()
+    port = ReopeningPort(adapter.open, wait=False)
+    adapter.opened[0].inject_error(BUS_OFF)
+    now_s = run(port, 0.0, 5.0, lambda: len(adapter.opened) == 3)
+    assert now_s < 5.0
+    assert state_of(port) is BusState.OFF
+    adapter.opened[-1].inject_error(0x004, bytes((0, 0x08, 0, 0, 0, 0, 0, 0)))
+    port.receive()
+    assert state_of(port) is BusState.WARNING
+
+
+def test_an_adapter_that_complains_when_it_is_closed_is_opened_all_the_same() -> None:
+    adapter = Adapter()
+    port = ReopeningPort(adapter.open, wait=False)
+
+    def complain() -> None:
+        raise OSError("write failed")
+
+    adapter.opened[0].close = complain  # type: ignore[method-assign]
+    adapter.opened[0].state = BusState.OFF
+    run(port, 0.0, 3.0, lambda: len(adapter.opened) == 2)
+    assert len(adapter.opened) == 2

@@ -1,0 +1,345 @@
+"""The fast path to SocketCAN: over python-can's own bus on one end of a datagram pair, into whose other end the
+kernel's bytes are written. What the kernel tells beside a frame is made up here: these sockets lose none.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+import struct
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from can.interfaces.socketcan import constants
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks.speed.can_paths import StandIn, open_bus, open_pair
+from control.records import JOINTS, NEVER_S
+from drivers.can.can_port import CanPort, PythonCanPort, open_port
+from drivers.can.error_frames import BusState
+from drivers.can.frames import Frame, encode_frame
+from drivers.can.port_health import MOST_FRAMES_PER_READ
+from drivers.can.socketcan_port import SO_RXQ_OVFL, SO_TIMESTAMPNS, SocketcanPort
+from drivers.odrive.drives import OdriveDrives
+from firmware_host.configuration.configuration import Configuration
+
+ENCODER = Frame(0x009, bytes(range(8)))
+OFF = Frame(0x040, bytes(8), is_error=True)
+GOLDEN = {  # the 16 bytes of struct can_frame, written down by hand
+    "09000000 08000000 0001020304050607": ENCODER,
+    "ff070000 00000000 0000000000000000": Frame(0x7FF),
+    "4e000000 04000000 0000803e00000000": Frame(0x04E, bytes.fromhex("0000803e")),
+    "60000040 00000000 0000000000000000": Frame(0x060, is_remote=True),
+    "00f1fe98 01000000 ff00000000000000": Frame(0x18FEF100, b"\xff", is_extended=True),
+    "00f1fed8 00000000 0000000000000000": Frame(0x18FEF100, is_remote=True, is_extended=True),
+}
+
+
+class KernelSocket(StandIn):
+    """Tells what a test gives it in front of what has really arrived; an exception is raised."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.told: list[Any] = []
+        self.send_problem: OSError | None = None
+        self.socket_options: dict[int, Any] = {}
+
+    def setsockopt(self, level: int, number: int, value: Any, *more: Any) -> None:
+        super().setsockopt(level, number, value, *more)
+        self.socket_options[number] = value
+
+    def recvmsg(self, *arguments: Any) -> Any:
+        if not self.told:
+            return super().recvmsg(*arguments)
+        told = self.told.pop(0)
+        if isinstance(told, OSError):
+            raise told
+        return told
+
+    def send(self, data: Any, *flags: Any) -> int:
+        if self.send_problem is not None:
+            raise self.send_problem
+        return super().send(data, *flags)
+
+
+class Bench:
+    """A port, the socket under it, and the kernel's side of that."""
+
+    def __init__(self) -> None:
+        self.kernel, near = open_pair(KernelSocket)
+        assert isinstance(near, KernelSocket)
+        self.socket = near
+        self.port = SocketcanPort(open_bus(near))
+
+    def tell(self, *frames: Frame) -> None:
+        for frame in frames:
+            self.kernel.send(encode_frame(frame))
+
+    def receive(self) -> list[Frame]:
+        return [frame._replace(stamp_s=NEVER_S) for frame in self.port.receive()]
+
+    def close(self) -> None:
+        self.port.close()
+        self.kernel.close()
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    made = Bench()
+    yield made
+    made.close()
+
+
+def message(frame: Frame, marks: int = 0, lost: int | None = None) -> tuple[bytes, list[Any], int, None]:
+    """What `recvmsg` tells of a frame; the kernel counts lost frames from the first one on."""
+    ancillary = [(socket.SOL_SOCKET, SO_TIMESTAMPNS, struct.pack("@ll", 1_700_000_000, 250_000_000))]
+    if lost is not None:
+        ancillary.append((socket.SOL_SOCKET, SO_RXQ_OVFL, struct.pack("@I", lost)))
+    return encode_frame(frame), ancillary, marks, None
+
+
+def test_only_socketcan_goes_by_the_fast_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    far, near = open_pair()
+    monkeypatch.setattr("can.interfaces.socketcan.socketcan.create_socket", lambda: near)
+    monkeypatch.setattr("can.interfaces.socketcan.socketcan.bind_socket", lambda *arguments: None)
+    fast, other = open_port("socketcan", "can0", {}), open_port("virtual", "not-can0", {})
+    assert isinstance(fast, SocketcanPort)
+    assert isinstance(other, PythonCanPort)
+    for end in (fast, other, far):
+        end.close()
+
+
+@pytest.mark.parametrize(("encoded", "frame"), [(bytes.fromhex(text), frame) for text, frame in GOLDEN.items()])
+def test_the_kernel_s_bytes_are_the_frames_in_both_directions(bench: Bench, encoded: bytes, frame: Frame) -> None:
+    bench.kernel.send(encoded)
+    assert bench.receive() == [frame]
+    bench.port.send(frame)
+    assert bench.kernel.recv(64) == encoded
+
+
+def test_frames_keep_their_order_and_nothing_is_waited_for(bench: Bench) -> None:
+    sent = [Frame(number, bytes([number])) for number in range(100)]
+    bench.tell(*sent)
+    assert bench.receive() == sent
+    assert bench.receive() == []
+
+
+def test_an_error_frame_is_told_apart_before_its_class_bits_look_like_an_id(bench: Bench) -> None:
+    looks_like_the_encoder = Frame(0x009, bytes(8), is_error=True)
+    bench.tell(looks_like_the_encoder, ENCODER)
+    bench.kernel.send(bytes.fromhex("040000e0 08000000 0008000000000000"))  # with the bits of a remote extended frame
+    assert bench.receive() == [ENCODER]
+    assert (bench.port.error_frames, bench.port.state) == (2, BusState.WARNING)
+
+
+def test_a_frame_says_when_it_was_on_the_bus(bench: Bench) -> None:
+    before_s = time.monotonic()
+    bench.tell(ENCODER)
+    after_s = time.monotonic()
+    time.sleep(0.02)
+    (frame,) = bench.port.receive()
+    assert before_s - 0.005 < frame.stamp_s < after_s + 0.005  # the clock on the wall is read a moment later
+
+
+def test_a_frame_without_a_stamp_passes_without_one(bench: Bench) -> None:
+    bench.socket.told = [(encode_frame(ENCODER), [], 0, None)]
+    assert bench.port.receive() == [ENCODER._replace(stamp_s=NEVER_S)]
+
+
+def test_the_kernel_is_asked_to_count_what_it_loses(bench: Bench) -> None:
+    assert bench.socket.socket_options[SO_RXQ_OVFL] == 1
+
+
+def test_frames_that_found_the_queue_full_are_counted_once(bench: Bench) -> None:
+    bench.socket.told = [message(ENCODER, lost=lost) for lost in (None, 3, 3)]
+    assert len(bench.port.receive()) == 3
+    assert bench.port.lost_frames == 3
+    bench.socket.told = [message(ENCODER, lost=lost) for lost in (3, 10, None)]
+    assert len(bench.port.receive()) == 3
+    assert bench.port.lost_frames == 10
+
+
+def test_the_kernel_s_count_may_go_round(bench: Bench) -> None:
+    bench.socket.told = [message(ENCODER, lost=lost) for lost in (2**32 - 2, 1)]
+    bench.port.receive()
+    assert bench.port.lost_frames == 2**32 + 1
+
+
+def test_an_error_frame_tells_of_lost_frames_as_well(bench: Bench) -> None:
+    bench.socket.told = [message(OFF, lost=5)]
+    assert bench.port.receive() == []
+    assert (bench.port.lost_frames, bench.port.error_frames) == (5, 1)
+
+
+def test_a_frame_of_a_process_beside_us_does_not_end_bus_off_and_one_of_a_peer_does(bench: Bench) -> None:
+    states = []
+    for told in (message(OFF), message(ENCODER, marks=socket.MSG_DONTROUTE), message(ENCODER)):
+        bench.socket.told = [told]
+        bench.port.receive()
+        states.append(bench.port.state)
+    assert states == [BusState.OFF, BusState.OFF, BusState.ACTIVE]
+
+
+@pytest.mark.parametrize(
+    ("number", "state"),
+    [(errno.ENOBUFS, BusState.ACTIVE), (errno.EAGAIN, BusState.ACTIVE)]
+    + [(number, BusState.OFF) for number in (errno.ENETDOWN, errno.ENODEV, errno.ENXIO)],
+)
+def test_a_send_that_fails_is_counted_at_once_and_tells_if_the_interface_is_gone(
+    bench: Bench, number: int, state: BusState
+) -> None:
+    bench.socket.send_problem = OSError(number, os.strerror(number))
+    bench.port.send(ENCODER)
+    assert (bench.port.failed_sends, bench.port.state) == (1, state)
+    assert bench.port.last_send_error == ("Transmit buffer full" if number == errno.EAGAIN else os.strerror(number))
+    bench.socket.send_problem = None
+    bench.port.send(ENCODER)
+    assert (bench.port.failed_sends, len(bench.kernel.recv(64))) == (1, 16)
+
+
+def test_a_queue_that_nobody_empties_does_not_hold_the_sender(bench: Bench) -> None:
+    for _ in range(2000):
+        bench.port.send(ENCODER)
+    assert bench.port.failed_sends > 0
+
+
+@pytest.mark.parametrize("frame", [Frame(0x800), Frame(0x009, bytes(9)), Frame(-1)])
+def test_a_frame_that_has_no_bytes_is_a_failed_send(bench: Bench, frame: Frame) -> None:
+    bench.port.send(frame)
+    assert bench.port.failed_sends == 1
+    bench.kernel.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        bench.kernel.recv(64)
+
+
+@pytest.mark.parametrize("number", [errno.ENETDOWN, errno.ENODEV, errno.ENXIO])
+def test_an_interface_that_went_down_is_told_and_is_back_with_the_first_frame(bench: Bench, number: int) -> None:
+    bench.socket.told = [OSError(number, os.strerror(number))]
+    bench.tell(ENCODER)
+    assert bench.receive() == []
+    assert (bench.port.state, bench.port.error_frames) == (BusState.OFF, 1)
+    assert bench.port.last_error == os.strerror(number)
+    assert bench.receive() == [ENCODER]
+    assert bench.port.state is BusState.ACTIVE
+
+
+@pytest.mark.parametrize(
+    "garbage",
+    [bytes(size) for size in (0, 1, 8, 15, 17, 64, 72, 2000)]
+    + [struct.pack("<IB11x", 9, length) for length in (9, 255)],
+)
+def test_garbage_of_another_size_is_counted_and_hides_nothing(bench: Bench, garbage: bytes) -> None:
+    bench.kernel.send(garbage)
+    bench.tell(ENCODER)
+    assert bench.receive() == [ENCODER]
+    assert (bench.port.error_frames, bench.port.state) == (1, BusState.ACTIVE)
+    assert bench.port.last_error == "a frame of another length than CAN 2.0 has"
+
+
+def test_a_babbling_node_does_not_hold_the_loop(bench: Bench) -> None:
+    bench.socket.told = [message(ENCODER)] * (MOST_FRAMES_PER_READ + 5)
+    assert len(bench.port.receive()) == MOST_FRAMES_PER_READ
+    assert len(bench.port.receive()) == 5
+
+
+def passes(filters: bytes, word: int) -> bool:
+    """The rule of CAN_RAW_FILTER (linux/can.h): received & mask == id & mask, of any one filter."""
+    pairs = struct.iter_unpack("=II", filters)
+    return any(word & mask == identifier & mask for identifier, mask in pairs)
+
+
+def test_the_kernel_is_asked_for_what_the_drives_send_and_for_all_error_frames(configuration: Configuration) -> None:
+    benches = {name: Bench() for name in configuration.bus}
+    drives = OdriveDrives(configuration.drive, {name: bench.port for name, bench in benches.items()})
+    for name, bench in benches.items():
+        filters = bench.socket.can_options[constants.CAN_RAW_FILTER]
+        wanted = {
+            identifier
+            for joint, axis in zip(JOINTS, drives.axes, strict=True)
+            if configuration.drive[joint].bus == name
+            for identifier in axis.receivers
+        }
+        assert len(wanted) == 16
+        assert {word for word in range(0x800) if passes(filters, word)} == wanted
+        for identifier in wanted:
+            assert not passes(filters, identifier | constants.CAN_RTR_FLAG)
+            assert not passes(filters, identifier | constants.CAN_EFF_FLAG)
+        assert bench.socket.can_options[constants.CAN_RAW_ERR_FILTER] == 0x1FFFFFFF
+        bench.close()
+
+
+def test_without_wishes_everything_is_heard(bench: Bench) -> None:
+    filters = bench.socket.can_options[constants.CAN_RAW_FILTER]
+    assert all(passes(filters, word) for word in (0x7FF, 0x9FFFFFFF, 0x40000009))
+
+
+def test_a_kernel_that_refuses_filters_only_lets_strangers_through(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(self: StandIn, level: int, number: int, value: Any, *more: Any) -> None:
+        raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+
+    monkeypatch.setattr(KernelSocket, "setsockopt", refuse)
+    bench.port.listen_to([0x009])
+    bench.tell(ENCODER, Frame(0x123))
+    assert bench.receive() == [ENCODER, Frame(0x123)]
+
+
+def close_all(*ends: Any) -> None:
+    for end in ends:
+        end.close()
+
+
+ERROR_WORDS = st.integers(0, 0x7FF).map(lambda bits: bits | constants.CAN_ERR_FLAG)  # python-can keeps 11 class bits
+WORDS = st.one_of(st.integers(0, 0x7FF), ERROR_WORDS, st.integers(0, 2**32 - 1).filter(lambda w: not w & 0x20000000))
+ANY_FRAME = st.builds(struct.Struct("<IB11s").pack, WORDS, st.integers(0, 8), st.binary(min_size=11, max_size=11))
+
+
+@settings(max_examples=150)
+@given(reads=st.lists(st.lists(ANY_FRAME, max_size=8), max_size=4))
+def test_whatever_the_kernel_gives_both_paths_make_the_same_of_it(reads: list[list[bytes]]) -> None:
+    (first, near), (second, beside) = open_pair(), open_pair()
+    own, python_can = SocketcanPort(open_bus(near)), PythonCanPort(open_bus(beside))
+    for read in reads:
+        for encoded in read:
+            first.send(encoded)
+            second.send(encoded)
+        seen = [[frame._replace(stamp_s=NEVER_S) for frame in port.receive()] for port in (own, python_can)]
+        assert seen[0] == seen[1]
+        assert health(own) == health(python_can)
+    close_all(own, python_can, first, second)
+
+
+def health(port: CanPort) -> tuple[BusState, int, str]:
+    return port.state, port.error_frames, port.last_error
+
+
+@settings(max_examples=150)
+@given(
+    identifier=st.integers(0, 0x1FFFFFFF),
+    data=st.binary(max_size=8),
+    is_extended=st.booleans(),
+    is_remote=st.booleans(),
+)
+def test_both_paths_put_the_same_frame_on_the_wire(
+    identifier: int, data: bytes, is_extended: bool, is_remote: bool
+) -> None:
+    (first, near), (second, beside) = open_pair(), open_pair()
+    own, python_can = SocketcanPort(open_bus(near)), PythonCanPort(open_bus(beside))
+    identifier = identifier if is_extended else identifier & 0x7FF
+    for port in (own, python_can):
+        port.send(Frame(identifier, b"" if is_remote else data, is_remote, is_extended=is_extended))
+    ours, theirs = first.recv(64), second.recv(64)
+    assert ours[:5] + ours[8:] == theirs[:5] + theirs[8:]  # python-can repeats the length in a byte that nobody reads
+    close_all(own, python_can, first, second)
+
+
+def test_a_bus_that_is_closed_is_told_and_nothing_is_raised(bench: Bench) -> None:
+    bench.port.close()
+    assert bench.port.receive() == []
+    bench.port.send(ENCODER)
+    assert (bench.port.error_frames, bench.port.failed_sends) == (1, 1)

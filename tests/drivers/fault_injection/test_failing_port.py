@@ -1,0 +1,349 @@
+"""A failing port beside a sound one on the same traffic: what fails is seen, and nothing else is touched."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from typing import Any, NamedTuple
+
+import pytest
+
+from control.records import JOINTS
+from drivers.can.can_port import BusState
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockBus, MockPort
+from drivers.fault_injection.failing_port import FailingPort, garbled
+from drivers.fault_injection.failures import EFFECTS, FailureKind, Failures
+from drivers.odrive import codec
+from drivers.odrive.codec import AxisState, GarbledMessageError, arbitration_id
+from drivers.odrive.drives import DriveParameters
+
+DRIVES = {joint: DriveParameters("left" if place < 2 else "right", place) for place, joint in enumerate(JOINTS)}
+NODES = {joint: drive.node_id for joint, drive in DRIVES.items()}
+PERIOD_S = 0.0025
+BEGIN_S, END_S, STOP_S = 0.1, 0.5, 0.7
+TOLD = (
+    codec.GET_ENCODER_ESTIMATES,
+    codec.GET_IQ,
+    codec.HEARTBEAT,
+    codec.GET_ERROR,
+    codec.GET_TEMPERATURE,
+    codec.GET_BUS_VOLTAGE_CURRENT,
+)
+PARTS = {
+    "position": {codec.GET_ENCODER_ESTIMATES},
+    "current": {codec.GET_IQ},
+    "heartbeat": {codec.HEARTBEAT},
+    "temperature": {codec.GET_TEMPERATURE},
+    "voltage": {codec.GET_BUS_VOLTAGE_CURRENT},
+    "error": {codec.HEARTBEAT, codec.GET_ERROR},
+    "command": set(),
+}
+ON_THE_LEFT = [
+    (component, kind)
+    for component, kind, _ in Failures(("left", "right")).table()
+    if component.startswith(("left_", "bus.left"))
+]
+
+
+class Seen(NamedTuple):
+    """What passed a port: (tick, payload) by arbitration id, the wish and its counters."""
+
+    received: dict[int, list[tuple[int, bytes]]]
+    sent: dict[int, list[tuple[int, bytes]]]
+    wanted: dict[int, list[tuple[int, bytes]]]
+    worst_state: BusState
+    failed_sends: int
+    error_frames: int
+    last_send_error: str
+    stamps_s: list[tuple[float, float]]
+
+
+def told_payload(message: codec.Message, tick: int) -> bytes:
+    """A drive's message, another one in each tick."""
+    if message is codec.HEARTBEAT:
+        return message.encode(0, AxisState.CLOSED_LOOP, tick % 256, 0)
+    if message is codec.GET_ERROR:
+        return message.encode(0, 0)
+    return message.encode(0.001 * tick, 0.002 * tick)
+
+
+def run(component: str = "", kind: str = "", joints: tuple[str, ...] = JOINTS[:2], seed: int = 1) -> Seen:
+    failures = Failures(("left", "right"), seed)
+    bus = MockBus()
+    robot, inner = bus.open(), bus.open()
+    port = FailingPort("left", inner, DRIVES, failures)
+    received, sent, wanted = defaultdict(list), defaultdict(list), defaultdict(list)
+    worst, stamps_s = BusState.ACTIVE, []
+    for tick in range(round(STOP_S / PERIOD_S)):
+        now_s = tick * PERIOD_S
+        failures.update(now_s)
+        if component and tick == round(BEGIN_S / PERIOD_S):
+            assert failures.begin(component, kind, now_s, END_S - BEGIN_S) is None
+        for joint in joints:
+            for message in TOLD:
+                place = arbitration_id(NODES[joint], message)
+                robot.send(Frame(place, told_payload(message, tick), stamp_s=now_s))
+        for frame in port.receive():
+            received[frame.arbitration_id].append((tick, frame.data))
+            stamps_s.append((now_s, frame.stamp_s))
+        worst = max(worst, port.state)
+        for joint in joints:
+            frame = Frame(arbitration_id(NODES[joint], codec.SET_INPUT_TORQUE), codec.SET_INPUT_TORQUE.encode(tick))
+            wanted[frame.arbitration_id].append((tick, frame.data))
+            port.send(frame)
+        for frame in robot.receive():
+            sent[frame.arbitration_id].append((tick, frame.data))
+    return Seen(received, sent, wanted, worst, port.failed_sends, port.error_frames, port.last_send_error, stamps_s)
+
+
+SOUND = run()
+
+
+def differing(one: dict[int, Any], other: dict[int, Any]) -> set[int]:
+    return {place for place in one.keys() | other.keys() if one.get(place) != other.get(place)}
+
+
+def ids_of(component: str) -> set[int]:
+    """Arbitration ids from the drives that a failure of `component` may touch."""
+    name, _, part = component.partition(".")
+    if name == "bus":
+        return set(range(0x800))
+    return {arbitration_id(NODES[name], message) for message in (PARTS[part] if part else TOLD)}
+
+
+def commands_of(component: str, kind: str) -> set[int]:
+    name, _, part = component.partition(".")
+    if name == "bus":
+        return {arbitration_id(NODES[joint], codec.SET_INPUT_TORQUE) for joint in JOINTS}
+    reaches = part == "command" or not part and kind not in ("stuck", "garbage")
+    return {arbitration_id(NODES[name], codec.SET_INPUT_TORQUE)} if reaches else set()
+
+
+def test_without_a_failure_everything_passes_as_it_is() -> None:
+    assert SOUND.sent == SOUND.wanted and len(SOUND.sent) == 2
+    ticks = round(STOP_S / PERIOD_S)
+    assert {len(told) for told in SOUND.received.values()} == {ticks} and len(SOUND.received) == 2 * len(TOLD)
+    assert (SOUND.worst_state, SOUND.failed_sends, SOUND.error_frames) == (BusState.ACTIVE, 0, 0)
+
+
+@pytest.mark.parametrize(("component", "kind"), ON_THE_LEFT)
+def test_each_failure_is_seen_where_it_is_and_nowhere_else(component: str, kind: str) -> None:
+    seen = run(component, kind)
+    touched, commanded = differing(seen.received, SOUND.received), differing(seen.sent, SOUND.sent)
+    assert touched <= ids_of(component)
+    assert commanded <= commands_of(component, kind)
+    state_only = kind in ("warning", "passive")
+    assert bool(touched or commanded) is not state_only
+    assert (seen.worst_state is not BusState.ACTIVE) is (kind in ("warning", "passive", "bus-off"))
+
+
+@pytest.mark.parametrize(("component", "kind"), ON_THE_LEFT)
+def test_each_failure_begins_in_its_tick_and_is_over_after_its_time(component: str, kind: str) -> None:
+    seen, begin, end = run(component, kind), round(BEGIN_S / PERIOD_S), round(END_S / PERIOD_S)
+    for mine, sound in ((seen.received, SOUND.received), (seen.sent, SOUND.sent)):
+        for place, frames in sound.items():
+            assert [f for f in mine[place] if f[0] < begin] == [f for f in frames if f[0] < begin]
+            assert [f for f in mine[place] if f[0] > end] == [f for f in frames if f[0] > end]
+
+
+@pytest.mark.parametrize(("component", "kind"), ON_THE_LEFT)
+def test_what_leaves_was_sent_and_leaves_in_its_order(component: str, kind: str) -> None:
+    seen = run(component, kind)
+    for place, frames in seen.sent.items():
+        wanted = iter(seen.wanted[place])
+        assert all(any(payload == wish for _, wish in wanted) for _, payload in frames)  # a subsequence
+        when = {payload: tick for tick, payload in seen.wanted[place]}
+        assert all(when[payload] <= tick for tick, payload in frames)
+
+
+@pytest.mark.parametrize(("component", "kind"), ON_THE_LEFT)
+def test_the_same_seed_fails_in_the_same_way(component: str, kind: str) -> None:
+    first, second = run(component, kind), run(component, kind)
+    assert first == second
+
+
+def test_another_seed_loses_other_messages() -> None:
+    assert run("left_sweep", "intermittent", seed=1) != run("left_sweep", "intermittent", seed=2)
+
+
+@pytest.mark.parametrize("component", [*JOINTS[2:], "bus.right"])
+def test_a_failure_of_another_bus_is_not_seen(component: str) -> None:
+    assert run(component, "off") == SOUND
+
+
+def during(frames: list[tuple[int, bytes]]) -> list[tuple[int, bytes]]:
+    return [frame for frame in frames if BEGIN_S <= frame[0] * PERIOD_S < END_S]
+
+
+def position(seen: Seen) -> list[tuple[int, bytes]]:
+    return during(seen.received[arbitration_id(0, codec.GET_ENCODER_ESTIMATES)])
+
+
+TICKS = round((END_S - BEGIN_S) / PERIOD_S)
+
+
+@pytest.mark.parametrize("component", ["left_sweep", "left_sweep.position"])
+def test_a_stuck_signal_stands_still_while_messages_keep_coming(component: str) -> None:
+    frames = position(run(component, "stuck"))
+    assert len(frames) == TICKS and len({data for _, data in frames}) == 1
+
+
+@pytest.mark.parametrize("component", ["left_sweep", "left_sweep.position", "bus.left"])
+def test_a_signal_that_is_off_does_not_come(component: str) -> None:
+    assert position(run(component, "off")) == []
+
+
+@pytest.mark.parametrize("component", ["left_sweep", "left_sweep.position", "bus.left"])
+def test_an_intermittent_signal_loses_about_half(component: str) -> None:
+    assert 0.35 * TICKS < len(position(run(component, "intermittent"))) < 0.65 * TICKS
+
+
+@pytest.mark.parametrize("component", ["left_sweep", "left_sweep.position", "bus.left"])
+def test_a_slow_signal_is_whole_in_order_late_and_stamped_when_it_came(component: str) -> None:
+    seen = run(component, "slow")
+    frames, sound = (each.received[arbitration_id(0, codec.GET_ENCODER_ESTIMATES)] for each in (seen, SOUND))
+    assert [data for _, data in frames] == [data for _, data in sound]
+    delays = [late - tick for (late, _), (tick, _) in zip(frames, sound, strict=True)]
+    assert max(delays) * PERIOD_S <= 0.02 + PERIOD_S and sum(delays) > 3 * TICKS
+    assert all(stamp_s == now_s for now_s, stamp_s in seen.stamps_s)
+
+
+def test_garbage_is_of_every_sort() -> None:
+    payloads = [data for _, data in position(run("left_sweep.position", "garbage"))]
+    assert {len(data) for data in payloads} >= {0, 1, 4, 7, 8}
+    turns = [codec.GET_ENCODER_ESTIMATES.decode(data)[0] for data in payloads if len(data) == 8]
+    assert any(math.isnan(value) for value in turns) and any(math.isinf(value) for value in turns)
+    assert any(1e30 < abs(value) < math.inf for value in turns) and any(0.0 < abs(value) < 2.0 for value in turns)
+
+
+def test_garbage_never_has_the_payload_s_length_where_it_is_of_another() -> None:
+    from random import Random
+
+    random = Random(3)
+    assert {len(garbled(b"\1\2\3", random)) for _ in range(500)} == set(range(9))
+
+
+def heartbeats(kind: str) -> list[tuple[int, int]]:
+    frames = during(run("left_sweep.error", kind).received[arbitration_id(0, codec.HEARTBEAT)])
+    return [codec.HEARTBEAT.decode(data)[:2] for _, data in frames]
+
+
+def errors(kind: str) -> list[tuple[int, int]]:
+    frames = during(run("left_sweep.error", kind).received[arbitration_id(0, codec.GET_ERROR)])
+    return [codec.GET_ERROR.decode(data) for _, data in frames]
+
+
+def test_a_drive_can_tell_that_it_left_closed_loop_and_of_no_error() -> None:
+    assert set(heartbeats("off")) == {(0, AxisState.IDLE)} and set(errors("off")) == {(0, 0)}
+
+
+def test_a_drive_can_tell_of_an_error() -> None:
+    assert codec.error_text(0x20) == "gate driver fault"
+    assert set(heartbeats("stuck")) == {(0x20, AxisState.IDLE)} and set(errors("stuck")) == {(0x20, 0x20)}
+
+
+def test_an_error_can_come_and_go() -> None:
+    assert set(heartbeats("intermittent")) == {(0, AxisState.CLOSED_LOOP), (0x20, AxisState.IDLE)}
+
+
+def test_random_errors_are_never_none_and_leave_the_state_as_it_is() -> None:
+    told = heartbeats("garbage")
+    assert len({flags for flags, _ in told}) > 10 and all(flags for flags, _ in told)
+    assert {state for _, state in told} == {AxisState.CLOSED_LOOP}
+
+
+def test_a_garbled_heartbeat_of_a_drive_with_an_error_stays_garbled() -> None:
+    failures, bus = Failures(("left",)), MockBus()
+    robot, inner = bus.open(), bus.open()
+    port = FailingPort("left", inner, DRIVES, failures)
+    failures.begin("left_sweep.error", "stuck", 0.0)
+    failures.update(0.0)
+    robot.send(Frame(arbitration_id(0, codec.HEARTBEAT), b"\1"))
+    (frame,) = port.receive()
+    with pytest.raises(GarbledMessageError):
+        codec.HEARTBEAT.decode(frame.data)
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"), [("off", "Network is down"), ("stuck", "No buffer space"), ("bus-off", "Network is down")]
+)
+def test_a_bus_that_cannot_send_counts_what_it_refuses_and_says_why(kind: str, said: str) -> None:
+    seen = run("bus.left", kind)
+    assert seen.failed_sends == 2 * TICKS
+    assert said in seen.last_send_error and "on purpose" in seen.last_send_error
+
+
+@pytest.mark.parametrize(
+    ("kind", "state"),
+    [("warning", BusState.WARNING), ("passive", BusState.PASSIVE), ("bus-off", BusState.OFF)],
+)
+def test_a_controller_in_trouble_shows_its_state_and_error_frames(kind: str, state: BusState) -> None:
+    seen = run("bus.left", kind)
+    assert seen.worst_state is state and seen.error_frames == TICKS
+
+
+def test_a_stuck_transmit_queue_still_receives() -> None:
+    assert run("bus.left", "stuck").received == SOUND.received
+
+
+def test_a_bus_full_of_garbage_brings_frames_of_strangers_and_leaves_commands_alone() -> None:
+    seen = run("bus.left", "garbage")
+    assert len(seen.received) > 50 and seen.sent == SOUND.sent
+
+
+def test_frames_of_strangers_and_other_formats_suffer_only_from_the_bus() -> None:
+    odd = [
+        Frame(arbitration_id(9, codec.GET_IQ), b"\0" * 8),
+        Frame(arbitration_id(0, codec.GET_IQ), b"\0" * 8, is_extended=True),
+    ]
+    for component, passed in (("left_sweep", odd), ("bus.left", [])):
+        failures, bus = Failures(("left",)), MockBus()
+        robot, inner = bus.open(), bus.open()
+        port = FailingPort("left", inner, DRIVES, failures)
+        failures.begin(component, "off", 0.0)
+        for frame in odd:
+            robot.send(frame)
+        assert list(port.receive()) == passed
+
+
+class FullPort(MockPort):
+    """A real port that has trouble of its own."""
+
+    def send(self, frame: Frame) -> None:
+        self.failed_sends += 1
+        self.last_send_error = "of its own"
+
+
+def test_the_trouble_of_the_wrapped_port_shows_through() -> None:
+    inner = FullPort(MockBus())
+    inner.error_frames, inner.state = 4, BusState.PASSIVE
+    failures = Failures(("left",))
+    port = FailingPort("left", inner, DRIVES, failures)
+    port.send(Frame(1))
+    assert (port.failed_sends, port.error_frames, port.state) == (1, 4, BusState.PASSIVE)
+    assert port.last_send_error == "of its own"
+    failures.begin("bus.left", "warning", 0.0)
+    port.receive()
+    assert (port.error_frames, port.state) == (5, BusState.PASSIVE)  # the worse of both
+
+
+def test_late_commands_arrive_at_once_and_in_order_when_all_failures_are_ended() -> None:
+    """So a disarm behind them is not held up."""
+    failures, bus = Failures(("left",)), MockBus()
+    robot, inner = bus.open(), bus.open()
+    port = FailingPort("left", inner, DRIVES, failures)
+    failures.update(0.0)
+    failures.begin("left_sweep.command", "slow", 0.0)
+    frames = [Frame(arbitration_id(0, codec.SET_INPUT_TORQUE), bytes([number] * 4)) for number in range(3)]
+    for frame in frames[:2]:
+        port.send(frame)
+    assert robot.receive() == []
+    failures.end_all()
+    port.send(frames[2])
+    assert robot.receive() == frames
+
+
+def test_every_family_of_the_port_is_in_the_table() -> None:
+    assert {f"JOINT.{part}" for part in PARTS} | {"JOINT", "bus.NAME", "pose", "log", "loop", "clock"} == set(EFFECTS)
+    assert set(FailureKind) >= {FailureKind(kind) for _, kind in ON_THE_LEFT}

@@ -1,0 +1,93 @@
+"""Two weights on a cell: what they tell, and when they tell nothing."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from drivers.load_cell.calibration import (
+    CalibrationError,
+    LoadCellCalibration,
+    calibrate,
+    of_unit,
+    read_calibration,
+    remarks_on,
+    weigh,
+    write_calibration,
+)
+
+
+def readings(force_n: float, seed: int, drift: float = 0.0, per_newton: float = 42000.0) -> list[float]:
+    random = Random(seed)
+    return [81000.0 + per_newton * force_n + random.gauss(0.0, 400.0) + drift * i for i in range(160)]
+
+
+def test_two_weights_tell_span_and_zero_within_their_standard_errors() -> None:
+    for seed in range(20):
+        light, heavy = weigh(0.0, readings(0.0, seed)), weigh(4.9, readings(4.9, seed + 100))
+        told = calibrate("counts", light, heavy)
+        assert abs(told.per_newton - 42000.0) < 4.0 * told.per_newton_std_error
+        assert abs(told.zero - 81000.0) < 4.0 * told.zero_std_error
+        assert told.relative_error < 0.001
+        assert remarks_on(told, light, heavy) == []
+
+
+def test_a_force_is_what_was_loaded() -> None:
+    told = LoadCellCalibration("counts", -42000.0, 81000.0)
+    assert told.force_n(81000.0 - 42000.0 * 2.5) == pytest.approx(2.5)
+
+
+def test_the_same_weight_twice_is_refused() -> None:
+    with pytest.raises(CalibrationError, match="another one"):
+        calibrate("counts", weigh(2.0, readings(2.0, 1)), weigh(2.0, readings(2.0, 2)))
+
+
+def test_a_weight_that_the_cell_does_not_feel_is_refused() -> None:
+    with pytest.raises(CalibrationError, match="hardly changed"):
+        calibrate("counts", weigh(0.0, readings(0.0, 1)), weigh(4.9, readings(0.0, 2)))
+
+
+def test_too_few_readings_are_refused() -> None:
+    with pytest.raises(CalibrationError, match="only 3"):
+        weigh(0.0, [1.0, 2.0, 3.0])
+
+
+def test_a_drift_and_a_turned_cell_are_told() -> None:
+    light, heavy = weigh(0.0, readings(0.0, 1, drift=60.0)), weigh(4.9, readings(4.9, 2, per_newton=-42000.0))
+    told = remarks_on(calibrate("counts", light, heavy), light, heavy)
+    assert [("drifted" in each, "other way round" in each) for each in told] == [(True, False), (False, True)]
+
+
+def test_a_calibration_reads_back(tmp_path: Path) -> None:
+    told = LoadCellCalibration("counts", 42000.0, 81000.0, 8.0, 30.0)
+    write_calibration(tmp_path / "cell.json", told)
+    assert read_calibration(tmp_path / "cell.json") == told
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        '{"unit": "g"}',
+        json.dumps(LoadCellCalibration("g", 0.0)._asdict()),
+        json.dumps(LoadCellCalibration("g", 1.0)._asdict() | {"zero": "much"}),
+        json.dumps(LoadCellCalibration("g", 1.0)._asdict() | {"zero": float("nan")}),
+    ],
+)
+def test_a_file_that_is_no_calibration_is_refused_by_its_name(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "cell.json"
+    path.write_text(text)
+    with pytest.raises(CalibrationError, match="cell.json"):
+        read_calibration(path)
+
+
+def test_an_amplifier_that_prints_grams_needs_no_weights() -> None:
+    grams = of_unit("g", None)
+    assert grams is not None and grams.force_n(1000.0) == pytest.approx(9.80665)
+    scaled = of_unit("counts", 2.5e-5)
+    assert scaled is not None and scaled.force_n(40000.0) == pytest.approx(1.0)
+    assert of_unit("counts", None) is None

@@ -1,0 +1,124 @@
+"""A load cell's serial port over a real tty, whatever happens to the amplifier at its other end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.load_cell.calibration import LoadCellCalibration
+from drivers.load_cell.line_formats import LineFormat
+from drivers.load_cell.load_cell_port import LoadCellPort, Sample
+from simulation.test_rig.load_cell_emulator import AmplifierParameters, EmulatedAmplifier
+
+FORCE_N = 1.5
+COUNTS = LoadCellCalibration("counts", 42000.0, 81000.0)
+
+
+class Cable:
+    """An amplifier under a constant load, a port, and the time of both."""
+
+    def __init__(self, folder: Path, baud: int = 115200, name: str = "number", **changes: float | str) -> None:
+        parameters = AmplifierParameters(**{"noise_n": 0.0, **changes})  # type: ignore[arg-type]
+        self.amplifier = EmulatedAmplifier(lambda _: FORCE_N, parameters, folder / "cell")
+        self.path = str(folder / "cell")
+        self.port = LoadCellPort(self.path, baud, LineFormat(name), COUNTS)
+        self.now_s = 0.0
+
+    def run(self, duration_s: float) -> list[Sample]:
+        samples, end_s = list[Sample](), self.now_s + duration_s
+        while self.now_s < end_s:
+            self.now_s += 0.01
+            self.amplifier.step(self.now_s)
+            samples += self.port.read(self.now_s)
+        return samples
+
+    def close(self) -> None:
+        self.port.close()
+        self.amplifier.close()
+
+
+@pytest.fixture
+def cable(tmp_path: Path) -> Iterator[Cable]:
+    made = Cable(tmp_path)
+    yield made
+    made.close()
+
+
+def test_every_line_becomes_a_sample_of_the_force(cable: Cable) -> None:
+    samples = cable.run(2.0)
+    assert len(samples) >= 157  # of 160: the first may be cut, the last are on their way
+    assert {round(sample.force_n, 4) for sample in samples} == {FORCE_N}
+    assert cable.port.rate_hz == pytest.approx(80.0, rel=0.02)
+    assert cable.port.garbled_lines == cable.port.unpluggings == 0
+
+
+def test_reading_never_waits_where_nothing_comes(cable: Cable) -> None:
+    assert cable.port.read(1.0) == []
+    assert cable.port.silent_for_s(3.0) == 2.0
+
+
+def test_garbled_lines_are_counted_and_kept_to_be_shown(tmp_path: Path) -> None:
+    cable = Cable(tmp_path, garbled_share=0.25)
+    samples = cable.run(4.0)
+    port = cable.port
+    assert 40 < port.garbled_lines < 120
+    assert len(samples) == port.lines - port.garbled_lines
+    assert {round(sample.force_n, 4) for sample in samples} == {FORCE_N}
+    assert "\\x" in port.last_garbled
+    cable.close()
+
+
+def test_an_amplifier_that_is_unplugged_is_opened_again_when_it_is_back(cable: Cable) -> None:
+    cable.run(1.0)
+    cable.amplifier.unplug()
+    assert cable.run(1.0) == []
+    assert not cable.port.is_there
+    assert "no serial port" in cable.port.last_problem
+    cable.amplifier.plug_in()
+    samples = cable.run(2.0)
+    assert cable.port.is_there
+    assert cable.port.unpluggings == 1
+    assert len(samples) > 80
+    assert samples[0].stamp_s > 2.0
+
+
+def test_a_drop_out_is_a_gap_in_the_stamps(tmp_path: Path) -> None:
+    cable = Cable(tmp_path, drop_out_rate_hz=1.0, drop_out_s=0.3)
+    stamps_s = [sample.stamp_s for sample in cable.run(10.0)]
+    gaps = [after - before for before, after in zip(stamps_s, stamps_s[1:], strict=False) if after - before > 0.2]
+    assert 2 < len(gaps) - 1 <= cable.port.clock.drop_outs <= len(gaps)  # the first comes before the rate is known
+    cable.close()
+
+
+def test_another_baud_rate_is_no_text(tmp_path: Path) -> None:
+    cable = Cable(tmp_path, baud=9600)
+    assert cable.run(2.0) == []
+    assert cable.port.arrivals.text < 0.5
+    assert cable.port.arrivals.readable == 0.0
+    cable.close()
+
+
+@pytest.mark.parametrize(("style", "name"), [("counts", "number"), ("indicator", "indicator")])
+def test_an_overload_is_a_sample_without_a_force(tmp_path: Path, style: str, name: str) -> None:
+    cable = Cable(tmp_path, name=name, style=style, range_n=1.0)
+    samples = cable.run(1.0)
+    assert samples and all(sample.overloaded for sample in samples)
+    assert cable.port.overloads == len(samples) == cable.port.lines
+    cable.close()
+
+
+def test_a_line_that_names_its_unit_is_believed(tmp_path: Path) -> None:
+    cable = Cable(tmp_path, name="indicator", style="indicator")
+    cable.port.calibration = LoadCellCalibration("N", 1.0)
+    assert cable.run(1.0)[-1].force_n == pytest.approx(FORCE_N, abs=1e-3)
+    cable.close()
+
+
+def test_noise_without_an_end_does_not_grow(cable: Cable) -> None:
+    for _ in range(100):
+        cable.amplifier.waiting = b"\xff" * 60
+        cable.amplifier.hand_over()
+        cable.port.read(1.0)
+    assert cable.port.garbled_lines > 20

@@ -1,0 +1,92 @@
+"""A stage's encoder over a real tty, whatever happens to the counter at its other end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.load_cell.stage_encoder import Place, StageEncoder, StageEncoderSettings
+from drivers.serial.serial_line import SerialLineError
+from simulation.test_rig.stage_encoder_emulator import EmulatedStageEncoder, StageEncoderParameters
+
+pytest.importorskip("serial", reason="pyserial is not installed")
+
+SPEED_M_S = 0.1
+
+
+class Rail:
+    """A stage that moves evenly, its counter, and whoever listens."""
+
+    def __init__(self, folder: Path, baud: int = 115200, label: str = "", **changes: float | str) -> None:
+        parameters = StageEncoderParameters(**changes)  # type: ignore[arg-type]
+        self.counter = EmulatedStageEncoder(lambda at_s: SPEED_M_S * at_s, parameters, folder / "encoder")
+        self.encoder = StageEncoder(StageEncoderSettings(str(folder / "encoder"), 1e-5, baud, label))
+        self.now_s = 0.0
+
+    def run(self, duration_s: float) -> list[Place]:
+        places, end_s = list[Place](), self.now_s + duration_s
+        while self.now_s < end_s:
+            self.now_s += 0.01
+            self.counter.step(self.now_s)
+            places += self.encoder.read(self.now_s)
+        return places
+
+    def close(self) -> None:
+        self.encoder.close()
+        self.counter.close()
+
+
+@pytest.fixture
+def rail(tmp_path: Path) -> Iterator[Rail]:
+    made = Rail(tmp_path)
+    yield made
+    made.close()
+
+
+def test_places_come_at_the_times_they_were_taken_but_for_a_constant(rail: Rail) -> None:
+    places = rail.run(3.0)[100:]
+    late_s = [place.stamp_s - place.place_m / SPEED_M_S for place in places]
+    assert len(places) > 190
+    assert max(late_s) - min(late_s) < 0.002
+    assert rail.encoder.rate_hz == pytest.approx(100.0, rel=0.01)
+
+
+def test_garbled_counts_are_counted_and_no_place(tmp_path: Path) -> None:
+    rail = Rail(tmp_path, garbled_share=0.2, label="pos")
+    rail.counter.encoder = StageEncoderParameters(label="pos=")
+    places = rail.run(3.0)
+    assert 20 < rail.encoder.counts.garbled < 110
+    assert all(before.place_m < after.place_m for before, after in zip(places, places[1:], strict=False))
+    rail.close()
+
+
+def test_an_encoder_that_was_away_has_another_zero_and_says_so(rail: Rail) -> None:
+    rail.run(1.0)
+    rail.counter.unplug()
+    assert rail.run(1.0) == [] and not rail.encoder.is_there
+    assert rail.encoder.last_problem == "No such file or directory"
+    rail.counter.plug_in()
+    places = rail.run(1.5)
+    assert rail.encoder.breaks == 1
+    assert places[0].place_m < 0.5 * SPEED_M_S  # a counter begins at zero
+
+
+def test_one_that_says_nothing_is_silent(tmp_path: Path) -> None:
+    rail = Rail(tmp_path, drop_out_rate_hz=10.0, rate_hz=10.0, drop_out_s=10.0)
+    rail.run(2.0)
+    assert rail.encoder.silent_for_s(rail.now_s) > 1.9
+    rail.close()
+
+
+def test_another_baud_rate_is_no_text(tmp_path: Path) -> None:
+    rail = Rail(tmp_path, baud=9600)
+    assert rail.run(2.0) == []
+    assert rail.encoder.arrivals.text < 0.5 and rail.encoder.arrivals.readable == 0.0
+    rail.close()
+
+
+def test_a_port_that_there_is_not_is_told(tmp_path: Path) -> None:
+    with pytest.raises(SerialLineError, match="no serial port"):
+        StageEncoder(StageEncoderSettings(str(tmp_path / "nothing"), 1e-5))

@@ -1,0 +1,369 @@
+"""Four drives as joints, over buses in this process: what is understood, what is ignored, what is transmitted."""
+
+from math import inf, isfinite, nan, pi
+from struct import pack
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from control.limits import JointLimits
+from control.records import JOINTS, NEVER_S, DriveStates
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockBus, MockPort
+from drivers.odrive.codec import (
+    GET_BUS_VOLTAGE_CURRENT,
+    GET_ENCODER_ESTIMATES,
+    GET_ERROR,
+    GET_IQ,
+    GET_TEMPERATURE,
+    GET_VERSION,
+    HEARTBEAT,
+    Message,
+    arbitration_id,
+)
+from drivers.odrive.drives import REPEAT_S, VERSION_REPEAT_S, DriveParameters, OdriveDrives
+
+PARAMETERS = {
+    "left_sweep": DriveParameters("left", 0),
+    "left_adduction": DriveParameters("left", 1, sign=-1, zero_turn=0.25),
+    "right_sweep": DriveParameters("right", 3, sign=-1),
+    "right_adduction": DriveParameters("right", 2, velocity_limit_turn_s=8.0, current_limit_a=6.0),
+}
+SIGNALS: list[tuple[Message, tuple[float, ...]]] = [
+    (GET_ENCODER_ESTIMATES, (0.5, 2.0)),
+    (GET_IQ, (1.0, 3.0)),
+    (HEARTBEAT, (0, 8, 0, 0)),
+]
+SLOW_SIGNALS: list[tuple[Message, tuple[float, ...]]] = [
+    (GET_TEMPERATURE, (25.0, 40.0)),
+    (GET_BUS_VOLTAGE_CURRENT, (24.0, 1.0)),
+    (GET_ERROR, (0, 0)),
+    (GET_VERSION, (2, 4, 4, 58, 0, 6, 11, 0)),
+]
+RECEIVED = [message for message, _ in SIGNALS + SLOW_SIGNALS]
+BOUNDLESS = JointLimits(torque_nm=1e9, torque_rate_nm_s=1e12)
+ANY_SIGN = st.sampled_from([-1, 1])
+FINITE = st.floats(-1000.0, 1000.0, width=32)
+
+
+class Bench:
+    """The drives, and the far ends of their two buses."""
+
+    def __init__(self, parameters: dict[str, DriveParameters] = PARAMETERS, limits: JointLimits | None = None) -> None:
+        buses = {"left": MockBus(), "right": MockBus()}
+        self.parameters = parameters
+        self.far: dict[str, MockPort] = {name: bus.open() for name, bus in buses.items()}
+        self.drives = OdriveDrives(parameters, {name: bus.open() for name, bus in buses.items()}, limits)
+
+    def tell(self, joint: str, message: Message, *values: float, stamp_s: float = NEVER_S) -> None:
+        drive = self.parameters[joint]
+        frame = Frame(arbitration_id(drive.node_id, message), message.encode(*values), stamp_s=stamp_s)
+        self.far[drive.bus].send(frame)
+
+    def tell_everything(self, now_s: float, closed_loop: bool = True) -> DriveStates:
+        for joint in JOINTS:
+            for message, values in SIGNALS + SLOW_SIGNALS:
+                self.tell(joint, message, *values)
+            self.tell(joint, HEARTBEAT, 0, 8 if closed_loop else 1, 0, 0)
+        return self.drives.read(now_s)
+
+    def sent(self) -> dict[str, list[Frame]]:
+        return {name: port.receive() for name, port in self.far.items()}
+
+    def silent(self) -> bool:
+        return not any(self.sent().values())
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+@given(ANY_SIGN, FINITE, FINITE, FINITE, FINITE)
+def test_a_sign_turns_angle_velocity_current_and_torque_alike(
+    sign: int, turns: float, turns_s: float, current_a: float, torque_nm: float
+) -> None:
+    bench = Bench(PARAMETERS | {"left_sweep": DriveParameters("left", 0, sign=sign)}, BOUNDLESS)
+    bench.drives.gate.open()
+    bench.tell("left_sweep", GET_ENCODER_ESTIMATES, turns, turns_s)
+    bench.tell("left_sweep", GET_IQ, 0.0, current_a)
+    state = bench.drives.read(1.0)[0]
+    assert state.angle_rad == pytest.approx(sign * turns * 2.0 * pi)
+    assert state.velocity_rad_s == pytest.approx(sign * turns_s * 2.0 * pi)
+    assert state.current_a == sign * current_a
+    bench.drives.send((torque_nm, 0.0, 0.0, 0.0))
+    assert bench.sent()["left"][0].data == pack("<f", sign * torque_nm)
+
+
+def test_the_zero_is_taken_off_before_the_sign(bench: Bench) -> None:
+    bench.tell("left_adduction", GET_ENCODER_ESTIMATES, 0.5, 0.0)
+    assert bench.drives.read(1.0)[1].angle_rad == pytest.approx(-0.25 * 2.0 * pi)
+
+
+def test_the_measured_current_is_taken_not_the_set_point(bench: Bench) -> None:
+    bench.tell("left_sweep", GET_IQ, 9.0, 1.5)
+    assert bench.drives.read(1.0)[0].current_a == 1.5
+
+
+def test_every_signal_has_its_own_stamp(bench: Bench) -> None:
+    for now_s, (message, values) in enumerate(SIGNALS, start=1):
+        bench.tell("left_sweep", message, *values)
+        bench.drives.read(float(now_s))
+    state, untold = bench.drives.read(9.0)[:2]
+    assert (state.angle_stamp_s, state.current_stamp_s, state.heartbeat_stamp_s) == (1.0, 2.0, 3.0)
+    assert (untold.angle_stamp_s, untold.current_stamp_s, untold.heartbeat_stamp_s) == (NEVER_S, NEVER_S, NEVER_S)
+
+
+@pytest.mark.parametrize(
+    ("frame_s", "stamp_s"),
+    [(8.999, 8.999), (9.0, 9.0), (8.96, 8.96), (7.01, 7.01), (6.9, 9.0), (9.001, 9.0), (1.7e9, 9.0), (NEVER_S, 9.0)],
+)
+def test_a_signal_has_the_stamp_of_its_frame_unless_that_is_of_another_clock(
+    bench: Bench, frame_s: float, stamp_s: float
+) -> None:
+    bench.tell("left_sweep", GET_IQ, 0.0, 1.0, stamp_s=frame_s)
+    assert bench.drives.read(9.0)[0].current_stamp_s == stamp_s
+
+
+def test_the_newest_frame_wins(bench: Bench) -> None:
+    for current_a in (1.0, 2.0, 3.0):
+        bench.tell("left_sweep", GET_IQ, 0.0, current_a)
+    assert bench.drives.read(1.0)[0].current_a == 3.0
+
+
+def test_every_field_comes_from_its_message(bench: Bench) -> None:
+    bench.tell_everything(1.0)
+    bench.tell("right_sweep", HEARTBEAT, 0x1000000, 1, 0, 0)
+    state = bench.drives.read(2.0)[2]
+    assert (state.closed_loop, state.error_flags, state.heartbeat_stamp_s) == (False, 0x1000000, 2.0)
+    assert (state.temperature_c, state.bus_voltage_v) == (40.0, 24.0)
+    bench.tell("right_sweep", GET_ERROR, 0x2000000, 0x1000000)
+    assert bench.drives.read(3.0)[2].error_flags == 0x2000000
+    assert bench.drives.axes[2].disarm_reason == 0x1000000
+
+
+def test_a_node_id_on_the_wrong_bus_is_a_stranger(bench: Bench) -> None:
+    before = bench.tell_everything(1.0)
+    bench.far["right"].send(Frame(arbitration_id(0, GET_IQ), GET_IQ.encode(0.0, 99.0)))
+    assert bench.drives.read(2.0) == before
+    assert bench.drives.unknown_frames == 1
+
+
+def test_the_same_node_id_on_two_buses_is_two_drives() -> None:
+    twins = {joint: DriveParameters(joint.split("_")[0], joint.endswith("adduction")) for joint in JOINTS}
+    bench = Bench(twins)
+    bench.tell("left_sweep", GET_IQ, 0.0, 1.0)
+    bench.tell("right_sweep", GET_IQ, 0.0, 2.0)
+    states = bench.drives.read(1.0)
+    assert (states[0].current_a, states[2].current_a) == (1.0, 2.0)
+
+
+def known_frame(message: Message, data: bytes, **flags: bool) -> Frame:
+    return Frame(arbitration_id(0, message), data, **flags)
+
+
+GARBLED = [
+    known_frame(GET_ENCODER_ESTIMATES, bytes(7)),
+    known_frame(GET_ENCODER_ESTIMATES, pack("<ff", nan, 0.0)),
+    known_frame(GET_ENCODER_ESTIMATES, pack("<ff", 0.0, -inf)),
+    known_frame(GET_IQ, pack("<ff", 0.0, nan)),
+    known_frame(GET_IQ, pack("<ff", 0.0, inf)),
+    known_frame(GET_IQ, b""),
+    known_frame(HEARTBEAT, bytes(4)),
+    known_frame(GET_ERROR, bytes(3)),
+    known_frame(GET_TEMPERATURE, bytes(9)),
+    known_frame(GET_BUS_VOLTAGE_CURRENT, bytes(1)),
+    known_frame(GET_VERSION, bytes(6)),
+]
+UNKNOWN = [
+    known_frame(GET_IQ, b"", is_remote=True),
+    known_frame(GET_IQ, pack("<ff", 0.0, 9.0), is_extended=True),
+    Frame(arbitration_id(5, GET_IQ), pack("<ff", 0.0, 9.0)),
+    Frame(arbitration_id(0, Message(0x0A, "<ii")), bytes(8)),
+]
+
+
+@pytest.mark.parametrize(("frames", "garbled", "unknown"), [(GARBLED, len(GARBLED), 0), (UNKNOWN, 0, len(UNKNOWN))])
+def test_garbled_and_unknown_frames_are_counted_and_change_nothing(
+    bench: Bench, frames: list[Frame], garbled: int, unknown: int
+) -> None:
+    before = bench.tell_everything(1.0)
+    for frame in frames:
+        bench.far["left"].send(frame)
+    assert bench.drives.read(2.0) == before
+    assert (bench.drives.garbled_frames, bench.drives.unknown_frames) == (garbled, unknown)
+
+
+def understood(frame: Frame, node_ids: tuple[int, int]) -> bool:
+    known = {arbitration_id(node, message): message for node in node_ids for message in RECEIVED}
+    if frame.is_remote or frame.is_extended or frame.arbitration_id not in known:
+        return False
+    return len(frame.data) == 8
+
+
+KNOWN_IDS = [arbitration_id(node, message) for node in range(4) for message in RECEIVED]
+ANY_ID = st.integers(0, 0x7FF) | st.sampled_from(KNOWN_IDS)
+ANY_FLOATS = st.tuples(st.floats(width=32), st.floats(width=32)).map(lambda pair: pack("<ff", *pair))
+ANY_FRAME = st.builds(Frame, ANY_ID, st.binary(max_size=8) | ANY_FLOATS, st.booleans(), st.just(False), st.booleans())
+
+
+def test_two_thousand_random_frames_crash_nothing_and_leave_the_states_finite() -> None:
+    bench = Bench()
+    bench.tell_everything(0.0)
+
+    @settings(max_examples=2000, deadline=None)
+    @given(ANY_FRAME)
+    def examine(frame: Frame) -> None:
+        before, states = bench.drives.garbled_frames + bench.drives.unknown_frames, bench.drives.read(1.0)
+        bench.far["left"].send(frame)
+        after = bench.drives.read(1.0)
+        ignored = bench.drives.garbled_frames + bench.drives.unknown_frames - before
+        assert ignored in (0, 1) if understood(frame, (0, 1)) else ignored == 1
+        assert not ignored or repr(after) == repr(states)
+        assert all(isfinite(state.angle_rad + state.velocity_rad_s + state.current_a) for state in after)
+        assert repr(after[2:]) == repr(states[2:])  # the other bus
+
+    examine()
+    assert bench.drives.garbled_frames > 0
+    assert bench.silent()
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+@pytest.mark.parametrize("missing", [message for message, _ in SIGNALS])
+def test_the_drives_are_heard_once_every_signal_of_all_has_come(bench: Bench, joint: str, missing: Message) -> None:
+    for other in JOINTS:
+        for message, values in SIGNALS:
+            if (other, message) != (joint, missing):
+                bench.tell(other, message, *values)
+    bench.drives.read(1.0)
+    assert not bench.drives.heard
+    bench.tell(joint, missing, *dict(SIGNALS)[missing])
+    bench.drives.read(2.0)
+    assert bench.drives.heard
+
+
+def test_reading_transmits_nothing(bench: Bench) -> None:
+    bench.drives.read(0.0)
+    bench.tell_everything(1.0)
+    assert bench.silent()
+
+
+def test_torques_leave_in_the_order_of_the_joints_with_these_bytes() -> None:
+    bench = Bench(limits=BOUNDLESS)
+    bench.drives.gate.open()
+    bench.drives.send((0.5, 0.25, -1.0, 2.0))
+    assert bench.sent() == {
+        "left": [Frame(0x00E, bytes.fromhex("0000003f")), Frame(0x02E, bytes.fromhex("000080be"))],
+        "right": [Frame(0x06E, bytes.fromhex("0000803f")), Frame(0x04E, bytes.fromhex("00000040"))],
+    }
+
+
+def test_arming_sends_mode_limits_gain_zero_torque_and_closed_loop_in_that_order(bench: Bench) -> None:
+    bench.tell_everything(1.0, closed_loop=False)
+    bench.drives.arm(1.0)
+    right = [frame for frame in bench.sent()["right"] if frame.arbitration_id >> 5 == 2]
+    assert right == [
+        Frame(0x04B, bytes.fromhex("01000000 01000000")),
+        Frame(0x04F, bytes.fromhex("00000041 0000c040")),  # 8 turns/s, 6 A
+        Frame(0x05B, bytes.fromhex("0000003f 00000000")),  # 0.5 N·m per turn/s
+        Frame(0x04E, bytes.fromhex("00000000")),
+        Frame(0x047, bytes.fromhex("08000000")),
+    ]
+
+
+def test_at_once_drives_are_prepared_and_not_yet_asked(bench: Bench) -> None:
+    bench.tell_everything(1.0, closed_loop=False)
+    bench.drives.arm(1.0, at_once=True)
+    assert all(frame.arbitration_id & 0x1F != 0x07 for frames in bench.sent().values() for frame in frames)
+    bench.drives.arm(1.0)
+    assert sum(frame.arbitration_id & 0x1F == 0x07 for frames in bench.sent().values() for frame in frames) == 4
+
+
+def test_no_drive_is_asked_for_closed_loop_while_what_prepares_it_is_lost(bench: Bench) -> None:
+    bench.tell_everything(1.0, closed_loop=False)
+    port = bench.drives.ports["left"]
+    assert isinstance(port, MockPort)
+    port.full = True
+    bench.drives.arm(1.0)
+    port.full = False
+    assert not any(frame.arbitration_id & 0x1F == 0x07 for frame in bench.sent()["right"])
+    bench.drives.arm(1.01 + REPEAT_S)
+    assert sum(frame.arbitration_id & 0x1F == 0x07 for frames in bench.sent().values() for frame in frames) == 4
+
+
+def test_arming_is_repeated_after_a_while_and_only_for_drives_not_in_closed_loop(bench: Bench) -> None:
+    bench.tell_everything(1.0, closed_loop=False)
+    bench.drives.arm(1.0)
+    assert {name: len(frames) for name, frames in bench.sent().items()} == {"left": 10, "right": 10}
+    for joint in JOINTS[:3]:
+        bench.tell(joint, HEARTBEAT, 0, 8, 0, 0)
+    bench.drives.read(1.05)
+    bench.drives.arm(1.0 + 0.99 * REPEAT_S)
+    assert bench.silent()
+    bench.drives.arm(1.01 + REPEAT_S)
+    sent = bench.sent()
+    assert sent["left"] == []
+    assert [frame.arbitration_id >> 5 for frame in sent["right"]] == [2] * 5
+
+
+def test_disarming_at_once_goes_to_all_with_zero_torque_and_idle(bench: Bench) -> None:
+    bench.tell_everything(1.0, closed_loop=False)
+    bench.drives.arm(1.0)
+    bench.sent()
+    bench.drives.disarm(1.0, at_once=True)
+    assert bench.sent() == {
+        "left": [Frame(0x00E, bytes(4)), Frame(0x007, b"\1\0\0\0"), Frame(0x02E, bytes(4)), Frame(0x027, b"\1\0\0\0")],
+        "right": [Frame(0x06E, bytes(4)), Frame(0x067, b"\1\0\0\0"), Frame(0x04E, bytes(4)), Frame(0x047, b"\1\0\0\0")],
+    }
+
+
+def test_disarming_is_repeated_for_drives_still_in_closed_loop(bench: Bench) -> None:
+    bench.tell_everything(1.0, closed_loop=False)
+    bench.tell("left_adduction", HEARTBEAT, 0, 8, 0, 0)
+    bench.drives.read(1.0)
+    for _ in range(3):
+        bench.drives.disarm(1.0)
+    assert bench.sent() == {"left": [Frame(0x02E, bytes(4)), Frame(0x027, b"\1\0\0\0")], "right": []}
+    bench.drives.disarm(1.01 + REPEAT_S)
+    assert len(bench.sent()["left"]) == 2
+
+
+def test_errors_are_cleared_on_all_drives(bench: Bench) -> None:
+    bench.drives.clear_errors()
+    assert bench.sent() == {
+        "left": [Frame(0x018, b"\0"), Frame(0x038, b"\0")],
+        "right": [Frame(0x078, b"\0"), Frame(0x058, b"\0")],
+    }
+
+
+def test_versions_are_asked_for_by_remote_frame_until_they_are_told(bench: Bench) -> None:
+    bench.drives.request_versions(1.0)
+    assert bench.sent() == {
+        "left": [Frame(0x000, is_remote=True), Frame(0x020, is_remote=True)],
+        "right": [Frame(0x060, is_remote=True), Frame(0x040, is_remote=True)],
+    }
+    bench.far["left"].send(Frame(0x000, bytes.fromhex("02 04 04 3a 00 06 0b 00")))
+    bench.drives.read(1.1)
+    assert bench.drives.axes[0].version == (0, 6, 11)
+    bench.drives.request_versions(1.0 + 0.99 * VERSION_REPEAT_S)
+    assert bench.silent()
+    bench.drives.request_versions(1.01 + VERSION_REPEAT_S)
+    assert [frame.arbitration_id for frame in bench.sent()["left"]] == [0x020]
+
+
+def test_a_reset_forgets_everything(bench: Bench) -> None:
+    bench.tell_everything(1.0)
+    bench.far["left"].send(GARBLED[0])
+    bench.drives.read(1.0)
+    bench.drives.reset()
+    assert not bench.drives.heard
+    assert bench.drives.garbled_frames == 0
+    assert bench.drives.axes[0].version is None
+    assert repr(bench.drives.read(2.0)) == repr(Bench().drives.read(2.0))
+
+
+def test_closing_closes_the_ports(bench: Bench) -> None:
+    bench.drives.close()
+    bench.tell("left_sweep", GET_IQ, 0.0, 5.0)
+    assert bench.drives.read(1.0)[0].current_stamp_s == NEVER_S

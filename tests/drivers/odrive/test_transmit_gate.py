@@ -1,0 +1,425 @@
+"""What passes the gate to the wires and what does not, byte by byte; every branch, and every mutant of it."""
+
+from __future__ import annotations
+
+import ast
+import json
+import subprocess
+import sys
+from math import inf, isfinite, nan
+from pathlib import Path
+from struct import pack, unpack
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from control.limits import JointLimits
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockBus
+from drivers.odrive.axis import DriveParameters
+from drivers.odrive.transmit_gate import GatedPort, TransmitGate
+from tests.folders import ROOT
+
+LIMITS = JointLimits(torque_nm=0.75, torque_rate_nm_s=100.0)
+STEP_S = 0.002  # so that a step is 0.2 N·m
+MOTOR, OTHER = 0x04E, 0x06E  # torque of nodes 2 and 3
+ZERO = bytes(4)
+IDLE, CLOSED_LOOP = b"\1\0\0\0", b"\x08\0\0\0"
+TORQUE_MODE = bytes.fromhex("01000000 01000000")
+CONFIGURED = bytes.fromhex("00000041 0000c040")  # 8 turns/s, 6 A
+GAINS = bytes.fromhex("0000003f 00000000")  # 0.5 N·m per turn/s, no integrator
+HARMLESS = [
+    Frame(0x047, IDLE),
+    Frame(0x04B, TORQUE_MODE),
+    Frame(0x04F, CONFIGURED),
+    Frame(0x05B, GAINS),
+    Frame(0x058, b"\0"),
+    Frame(0x04E, ZERO),
+    Frame(0x04E, bytes.fromhex("00000080")),  # minus zero
+    Frame(0x044, bytes.fromhex("00 c8 01 00")),
+    Frame(0x064, bytes.fromhex("00 00 00 00")),
+    Frame(0x040, is_remote=True),
+    Frame(0x060, is_remote=True),
+]
+
+
+class Bench:
+    def __init__(self, limits: JointLimits = LIMITS) -> None:
+        bus = MockBus()
+        self.far = bus.open()
+        self.gate = TransmitGate(limits)
+        drives = [DriveParameters("left", node, velocity_limit_turn_s=8.0, current_limit_a=6.0) for node in (2, 3)]
+        self.port = self.gate.outlet(bus.open(), drives)
+        self.gate.allow_step(STEP_S)
+
+    def send(self, frame: Frame) -> list[Frame]:
+        self.port.send(frame)
+        return self.far.receive()
+
+    def torque(self, torque_nm: float, identifier: int = MOTOR) -> float:
+        """What leaves for it."""
+        (frame,) = self.send(Frame(identifier, pack("<f", torque_nm)))
+        assert frame.arbitration_id == identifier
+        sent: float = unpack("<f", frame.data)[0]
+        return sent
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+@pytest.fixture
+def armed() -> Bench:
+    bench = Bench()
+    bench.gate.open()
+    return bench
+
+
+@pytest.mark.parametrize("is_open", [False, True])
+@pytest.mark.parametrize("frame", HARMLESS)
+def test_what_we_use_passes_unchanged_open_or_closed(bench: Bench, frame: Frame, is_open: bool) -> None:
+    if is_open:
+        bench.gate.open()
+    assert bench.send(frame) == [frame]
+    assert (bench.gate.refused, bench.gate.last_refusal) == (0, "")
+
+
+REFUSED = [
+    Frame(0x02E, ZERO),  # another node
+    Frame(0x04D, bytes(8)),  # velocity
+    Frame(0x04C, bytes(8)),  # position
+    Frame(0x042),  # emergency stop: not used
+    Frame(0x056, b"\0"),  # reboot
+    Frame(0x05F),  # firmware update
+    Frame(0x047, b"\3\0\0\0"),  # calibration
+    Frame(0x05B, bytes.fromhex("0000003f 0000803f")),  # an integrator
+    Frame(0x05B, bytes.fromhex("0000803f 00000000")),
+    Frame(0x047, b"\1"),
+    Frame(0x047, b"\1\0\0\0\0"),
+    Frame(0x047, IDLE, is_extended=True),
+    Frame(0x047, IDLE, is_error=True),
+    Frame(0x047, IDLE, is_remote=True),
+    Frame(0x04B, bytes.fromhex("03000000 01000000")),  # position control
+    Frame(0x04B, bytes.fromhex("01000000 06000000")),  # torque ramp
+    Frame(0x04B, CLOSED_LOOP),
+    Frame(0x04F, bytes.fromhex("01000041 0000c040")),  # the least bit more than 8 turns/s
+    Frame(0x04F, bytes.fromhex("00000041 0100c040")),
+    Frame(0x04F, CONFIGURED + b"\0"),
+    Frame(0x058, b"\1"),
+    Frame(0x058),
+    Frame(0x044, bytes.fromhex("01 c8 01 00")),  # writes
+    Frame(0x044, bytes.fromhex("00 c8 01 01")),
+    Frame(0x044, bytes.fromhex("00 c8 01")),
+    Frame(0x044, bytes.fromhex("00 c8 01 00 00")),
+    Frame(0x044, bytes.fromhex("01 c8 01 00 00 00 00 00")),
+    Frame(0x044, is_remote=True),
+    Frame(0x04E, is_remote=True),
+    Frame(0x04E, ZERO, is_extended=True),
+    Frame(0x04E, ZERO, is_error=True),
+    Frame(0x040),
+    Frame(0x040, is_extended=True),
+    Frame(0x040, is_error=True),
+    Frame(0x040, is_remote=True, is_extended=True),
+    Frame(0x040, is_remote=True, is_error=True),
+    Frame(0x040, b"\0", is_remote=True),
+    Frame(0x049, is_remote=True),
+]
+
+
+@pytest.mark.parametrize("is_open", [False, True])
+@pytest.mark.parametrize("frame", REFUSED)
+def test_anything_else_is_not_sent_but_counted(bench: Bench, frame: Frame, is_open: bool) -> None:
+    if is_open:
+        bench.gate.open()
+    assert bench.send(frame) == []
+    assert bench.gate.refused == 1
+    assert bench.gate.last_refusal.startswith(
+        f"A frame that is not on the list was not sent: 0x{frame.arbitration_id:03x}"
+    )
+
+
+@pytest.mark.parametrize(
+    ("frame", "text"),
+    [
+        (Frame(0x04C, b"\1\xab"), "0x04c 01 ab"),
+        (Frame(0x04C), "0x04c"),
+        (Frame(0x18FEF100, b"\2", is_extended=True), "0x18fef100 extended 02"),
+        (Frame(0x004, is_error=True, is_remote=True), "0x004 error remote"),
+    ],
+)
+def test_a_refused_frame_is_told(bench: Bench, frame: Frame, text: str) -> None:
+    bench.send(frame)
+    bench.send(frame)
+    assert bench.gate.last_refusal == f"A frame that is not on the list was not sent: {text}."
+    assert bench.gate.refused == 2
+
+
+def test_closed_loop_is_asked_for_through_an_open_gate_only(bench: Bench) -> None:
+    asking = Frame(0x047, CLOSED_LOOP)
+    assert bench.send(asking) == []
+    bench.gate.open()
+    assert bench.send(asking) == [asking]
+    bench.gate.close()
+    assert bench.send(asking) == []
+    assert bench.gate.refused == 2
+
+
+def test_only_the_message_for_the_axis_state_asks_for_closed_loop(armed: Bench) -> None:
+    """The same bytes as a torque are 1e-44 N·m."""
+    for command in range(32):
+        passed = armed.send(Frame(2 << 5 | command, CLOSED_LOOP))
+        assert [frame.data for frame in passed] == ([CLOSED_LOOP] if command in (7, 14) else [])
+
+
+def test_a_gate_is_closed_until_it_is_opened_and_lets_zero_pass_only(bench: Bench) -> None:
+    assert not bench.gate.is_open
+    assert bench.torque(0.1) == 0.0
+    assert bench.gate.last_refusal == "Node 2 got no torque in place of 0.1 N·m: the drives are not armed."
+    bench.gate.open()
+    assert bench.gate.is_open
+    assert bench.torque(0.1) == pytest.approx(0.1)
+    bench.gate.close()
+    assert not bench.gate.is_open
+    assert bench.torque(0.1) == 0.0
+    assert bench.torque(5e-324) == 0.0
+    assert bench.torque(1.5e-45) == 0.0  # the smallest that binary32 holds
+    assert bench.gate.refused == 3
+
+
+@pytest.mark.parametrize("torque_nm", [nan, inf, -inf, 0.7501, -0.7501, 3.4e38])
+def test_what_is_no_number_or_beyond_the_limit_becomes_zero(torque_nm: float) -> None:
+    bench = Bench(JointLimits(torque_nm=0.75, torque_rate_nm_s=1e9))
+    bench.gate.open()
+    assert bench.torque(torque_nm) == 0.0
+    assert bench.gate.refused == 1
+    assert bench.gate.last_refusal == f"Node 2 got no torque in place of {torque_nm:.4g} N·m: the limit is 0.75 N·m."
+
+
+@pytest.mark.parametrize("limit_nm", [0.75, 0.7, 0.3, 5.0])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_limit_itself_passes_in_both_directions_also_where_binary32_rounds_it_up(
+    limit_nm: float, sign: float
+) -> None:
+    bench = Bench(JointLimits(torque_nm=limit_nm, torque_rate_nm_s=1e9))
+    bench.gate.open()
+    assert bench.torque(sign * limit_nm) == pytest.approx(sign * limit_nm)
+    assert bench.torque(sign * (limit_nm + 4e-6)) == 0.0
+    assert bench.gate.refused == 1
+
+
+@pytest.mark.parametrize("data", [b"", ZERO[:3], bytes(5), bytes(8)])
+def test_a_torque_of_another_length_becomes_zero(armed: Bench, data: bytes) -> None:
+    assert armed.send(Frame(MOTOR, data)) == [Frame(MOTOR, ZERO)]
+    assert armed.gate.refused == 1
+    assert armed.gate.last_refusal == "Node 2 got no torque in place of nan N·m: the limit is 0.75 N·m."
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_torque_moves_away_from_zero_by_one_step_at_most(armed: Bench, sign: float) -> None:
+    for torque_nm in (0.2, 0.4, 0.6, 0.65, 0.75):
+        assert armed.torque(sign * torque_nm) == pytest.approx(sign * torque_nm)
+    assert armed.gate.refused == 0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_larger_step_becomes_zero_from_where_the_next_step_counts(armed: Bench, sign: float) -> None:
+    assert armed.torque(sign * 0.2) == pytest.approx(sign * 0.2)
+    assert armed.torque(sign * 0.40001) == 0.0
+    assert armed.gate.last_refusal == (
+        f"Node 2 got no torque in place of {sign * 0.4:.4g} N·m: too far from the {sign * 0.2:.4g} N·m before."
+    )
+    assert armed.torque(sign * 0.3) == 0.0
+    assert armed.gate.refused == 2
+    assert armed.torque(sign * 0.2) == pytest.approx(sign * 0.2)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("after_nm", "passes"), [(0.55, True), (0.01, True), (0.0, True), (-0.01, False)])
+def test_towards_zero_is_always_allowed_and_no_further(
+    armed: Bench, sign: float, after_nm: float, passes: bool
+) -> None:
+    for torque_nm in (0.2, 0.4, 0.6):
+        armed.torque(sign * torque_nm)
+    assert armed.torque(sign * after_nm) == pytest.approx(sign * after_nm if passes else 0.0)
+    assert armed.gate.refused == (not passes)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_one_step_may_lead_through_zero(armed: Bench, sign: float) -> None:
+    armed.torque(sign * 0.15)
+    assert armed.torque(sign * -0.05) == pytest.approx(sign * -0.05)
+    assert armed.torque(sign * 0.1500) == pytest.approx(sign * 0.15)
+    assert armed.torque(sign * -0.0501) == 0.0
+
+
+def test_the_step_is_as_long_as_the_time_that_has_passed(armed: Bench) -> None:
+    armed.gate.allow_step(0.004)
+    assert armed.torque(0.4) == pytest.approx(0.4)
+    armed.gate.allow_step(0.001)
+    assert armed.torque(0.5) == pytest.approx(0.5)
+    assert armed.torque(0.601) == 0.0
+
+
+def test_the_bounds_themselves_belong_to_what_may_pass() -> None:
+    gate = TransmitGate(JointLimits(torque_nm=0.75, torque_rate_nm_s=128.0))
+    gate.open()
+    gate.allow_step(1.0 / 512.0)
+    step_nm = 0.25 + 1e-6
+    for sign in (1.0, -1.0):
+        assert gate.torque_problem(sign * (0.5 + step_nm), sign * 0.5) == ""
+        assert gate.torque_problem(sign * (0.5 + 1.001 * step_nm), sign * 0.5) != ""
+        assert gate.torque_problem(sign * (0.75 + 1e-6), sign * 0.75) == ""
+        assert gate.torque_problem(sign * (0.75 + 1.1e-6), sign * 0.75) != ""
+        assert gate.torque_problem(sign * 0.0, sign * 0.75) == ""
+
+
+def test_no_torque_passes_before_a_step_was_allowed() -> None:
+    gate, bus = TransmitGate(LIMITS), MockBus()
+    far, port = bus.open(), gate.outlet(bus.open(), [DriveParameters("left", 2)])
+    gate.open()
+    port.send(Frame(MOTOR, pack("<f", 1e-7)))
+    assert far.receive() == [Frame(MOTOR, ZERO)]
+
+
+def test_every_drive_has_its_own_torque_before(armed: Bench) -> None:
+    armed.torque(0.2, MOTOR)
+    assert armed.torque(0.4, MOTOR) == pytest.approx(0.4)
+    assert armed.torque(0.4, OTHER) == 0.0
+    assert armed.gate.last_refusal.startswith("Node 3 ")
+
+
+def test_the_first_torque_after_arming_counts_from_zero_on_every_bus(armed: Bench) -> None:
+    bus = MockBus()
+    far, second = bus.open(), armed.gate.outlet(bus.open(), [DriveParameters("right", 2)])
+    second.send(Frame(MOTOR, pack("<f", 0.4)))
+    assert far.receive() == [Frame(MOTOR, ZERO)]
+    for torque_nm in (0.2, 0.4):
+        armed.torque(torque_nm)
+        second.send(Frame(MOTOR, pack("<f", torque_nm)))
+    armed.gate.close()
+    armed.gate.open()
+    far.receive()
+    assert armed.torque(0.4) == 0.0
+    second.send(Frame(MOTOR, pack("<f", 0.4)))
+    assert far.receive() == [Frame(MOTOR, ZERO)]
+
+
+def test_opening_an_open_gate_changes_nothing(armed: Bench) -> None:
+    armed.torque(0.2)
+    armed.gate.open()
+    assert armed.torque(0.4) == pytest.approx(0.4)
+
+
+def test_closing_at_full_torque_lets_zero_leave_at_once(armed: Bench) -> None:
+    for torque_nm in (0.2, 0.4, 0.6):
+        armed.torque(torque_nm)
+    armed.gate.close()
+    assert armed.torque(0.0) == 0.0
+    assert armed.gate.refused == 0
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from([MOTOR, OTHER]), st.floats(width=32)), max_size=30), st.booleans())
+def test_whatever_is_sent_what_leaves_is_within_limit_and_slew(torques: list[tuple[int, float]], is_open: bool) -> None:
+    bench = Bench()
+    if is_open:
+        bench.gate.open()
+    left_nm = {MOTOR: 0.0, OTHER: 0.0}
+    for identifier, wanted_nm in torques:
+        before_nm, sent_nm = left_nm[identifier], bench.torque(wanted_nm, identifier)
+        assert isfinite(sent_nm)
+        assert abs(sent_nm) <= (0.75 + 2e-6 if is_open else 0.0)
+        assert abs(sent_nm) <= abs(before_nm) + 0.2 + 2e-6
+        assert sent_nm * before_nm >= 0.0 or abs(sent_nm - before_nm) <= 0.2 + 2e-6
+        left_nm[identifier] = sent_nm
+
+
+ANY_FRAME = st.builds(
+    Frame,
+    st.integers(0, 0x7FF) | st.integers(0x040, 0x07F) | st.integers(0, 0x1FFFFFFF),
+    st.binary(max_size=8) | st.sampled_from([ZERO, IDLE, CLOSED_LOOP, TORQUE_MODE, CONFIGURED]),
+    st.booleans(),
+    st.booleans(),
+    st.booleans(),
+)
+
+
+@settings(max_examples=1000, deadline=None)
+@given(ANY_FRAME)
+def test_no_frame_raises_and_none_passes_a_closed_gate_but_harmless_ones(frame: Frame) -> None:
+    bench = Bench()
+    passed = bench.send(frame)
+    for other in passed:
+        known = other.arbitration_id in {each.arbitration_id for each in HARMLESS} | {0x067, 0x06B, 0x06E, 0x06F, 0x078}
+        assert known
+        assert not other.is_extended and not other.is_error
+        assert other.data != CLOSED_LOOP
+        assert other.arbitration_id not in (MOTOR, OTHER) or other.data in (ZERO, bytes.fromhex("00000080"))
+        assert other == frame or other.data == ZERO
+    assert len(passed) <= 1
+
+
+def modules_of(*packages: str) -> list[Path]:
+    return [path for package in packages for path in sorted((ROOT / package).rglob("*.py"))]
+
+
+def calls_of(path: Path, name: str) -> list[str]:
+    """The text before `.name(` of every such call."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    return [ast.unparse(call.value) for call in calls if isinstance(call, ast.Attribute) and call.attr == name]
+
+
+def test_nothing_but_the_gate_sends_on_a_port() -> None:
+    """In drivers, all that is called `.send(` is known; above them only sockets and the drives themselves send."""
+    senders = {path.name: set(calls_of(path, "send")) for path in modules_of("drivers")}
+    allowed = {
+        "transmit_gate.py": {"self._port"},
+        "axis.py": {"self._outlet"},
+        "can_port.py": {"self._bus"},  # python-can's
+        "socketcan_port.py": {"self._socket"},  # the same bus's socket
+        "reopening_port.py": {"port"},  # behind the gate too: stands before a wire that may vanish
+        "failing_port.py": {"self._port"},  # behind the gate: what fails on purpose stands in for the wire
+        "local_bus.py": {"self._link", "peer.connection"},
+    }
+    assert {name: calls for name, calls in senders.items() if calls} == allowed
+    for path in modules_of("control", "estimation", "firmware_host", "command_line"):
+        for receiver in calls_of(path, "send"):
+            assert "port" not in receiver.split(".")[-1].replace("reporter", "") and "bus" not in receiver, (
+                f"{path.name}: {receiver}.send("
+            )
+
+
+def test_an_axis_gets_a_gated_outlet_and_no_port() -> None:
+    source = ast.parse((ROOT / "drivers" / "odrive" / "drives.py").read_text(encoding="utf-8"))
+    axes = [node for node in ast.walk(source) if isinstance(node, ast.Call) and ast.unparse(node.func) == "OdriveAxis"]
+    assert [ast.unparse(axis.args[2]) for axis in axes] == ["outlets[parameters[joint].bus]"]
+    assert GatedPort is not None
+
+
+@pytest.mark.parametrize("word", ["send_periodic", "BCM", "CyclicSendTask", "ModifiableCyclicTask", "bcm"])
+def test_no_frame_is_repeated_by_the_kernel(word: str) -> None:
+    """python-can's periodic tasks go on after this process has died, and feed the drives' watchdogs."""
+    packages = ("control", "estimation", "drivers", "firmware_host", "simulation", "experiments", "command_line")
+    for path in modules_of(*packages):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        names = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+        names |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+        names |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names}
+        assert not [name for name in names if word in name], path
+
+
+def test_every_branch_of_the_gate_is_run_by_these_tests(tmp_path: Path) -> None:
+    """In a process of its own, with the test that would start it again left out."""
+    data, report = tmp_path / "coverage", tmp_path / "coverage.json"
+    measure = [sys.executable, "-m", "coverage"]
+    chosen = ["-p", "no:cacheprovider", "-k", "not every_branch", str(Path(__file__))]
+    run = [*measure, "run", "--branch", f"--data-file={data}", "--include=*/transmit_gate.py", "-m", "pytest", "-q"]
+    subprocess.run([*run, *chosen], cwd=ROOT, check=True, capture_output=True)
+    write = [*measure, "json", f"--data-file={data}", "-o", str(report)]
+    subprocess.run(write, cwd=ROOT, check=True, capture_output=True)
+    (covered,) = json.loads(report.read_text(encoding="utf-8"))["files"].values()
+    assert covered["summary"]["num_branches"] > 10
+    assert (covered["missing_lines"], covered["missing_branches"]) == ([], [])

@@ -1,0 +1,275 @@
+"""Motion capture over UDP on the loopback: time is told, nothing waits."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from errno import EAFNOSUPPORT
+from math import isfinite
+from typing import Any
+
+import pytest
+
+from control.records import BodyPose
+from drivers.pose.natnet_codec import NatNetVersion
+from drivers.pose.natnet_parameters import NatNetParameters
+from drivers.pose.natnet_port import NatNetPort
+from drivers.pose.natnet_sockets import MOST_PACKETS_PER_READ
+from drivers.pose.pose_port import STALE_S, PoseSourceError
+from drivers.pose.track_axis import Direction
+from simulation.devices.natnet_server import (
+    LOOPBACK,
+    FrameTimes,
+    NatNetServer,
+    RecordedPose,
+    encode_frame,
+    encode_rigid_body,
+    encode_server_info,
+)
+
+FRAME_S, TICK_S = 1.0 / 120.0, 1.0 / 380.0
+ALONG_X = (1.0, 0.0, 0.0)
+SPEED_M_S = 0.1
+GROUP = "239.255.42.99"
+NOTHING: Mapping[str, Any] = {}
+NOT_SEEN = "motion capture does not see the body."
+
+
+def moving(duration_s: float, start_s: float = 0.0) -> list[RecordedPose]:
+    """A body that moves along x at SPEED_M_S."""
+    return [
+        RecordedPose(start_s + frame * FRAME_S, (SPEED_M_S * (start_s + frame * FRAME_S), 0.2, 1.0))
+        for frame in range(round(duration_s / FRAME_S))
+    ]
+
+
+class Laboratory:
+    """A server and a port, ticks of the loop apart."""
+
+    def __init__(self, server: NatNetServer, port: NatNetPort) -> None:
+        self.server, self.port = server, port
+        self.now_s = -0.5
+
+    def run(self, until_s: float) -> list[tuple[float, BodyPose]]:
+        seen = []
+        while self.now_s < until_s:
+            self.server.step(self.now_s)
+            seen.append((self.now_s, self.port.read(self.now_s)))
+            self.now_s += TICK_S
+        return seen
+
+    def send(self, *packets: bytes) -> BodyPose:
+        """And read them in the next tick."""
+        for packet in packets:
+            self.server.send_packet(packet)
+        self.now_s += TICK_S
+        return self.port.read(self.now_s)
+
+
+Open = Callable[..., Laboratory]
+
+
+@pytest.fixture
+def open_laboratory() -> Iterator[Open]:
+    with ExitStack() as stack:
+
+        def opened(
+            poses: Sequence[RecordedPose] = (),
+            listening: Mapping[str, Any] = NOTHING,
+            direction: Direction = ALONG_X,
+            origin_m: float = 0.0,
+            **serving: Any,
+        ) -> Laboratory:
+            """`listening`: changes of the port's parameters; `serving`: of the server's."""
+            server = NatNetServer(poses, **serving)
+            stack.callback(server.close)
+            parameters = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
+            port = NatNetPort(replace(parameters, **listening), direction, origin_m)
+            stack.callback(port.close)
+            return Laboratory(server, port)
+
+        yield opened
+
+
+def known(seen: Sequence[tuple[float, BodyPose]]) -> list[tuple[float, BodyPose]]:
+    return [(now_s, body) for now_s, body in seen if isfinite(body.x_m)]
+
+
+@pytest.mark.parametrize("version", [(2, 7), (3, 0), (4, 0), (4, 1)])
+def test_the_place_now_is_told_and_when_it_was_exposed(open_laboratory: Open, version: tuple[int, int]) -> None:
+    """From 3.0 on a frame tells its own age; before, it has to be configured."""
+    configured = {"latency_s": 0.012} if version < (3, 0) else NOTHING
+    lab = open_laboratory(moving(2.0), configured, version=NatNetVersion(*version), latency_s=0.012, crowded=True)
+    told = known(lab.run(2.0))[40:]
+    assert len(told) > 600
+    for now_s, body in told:
+        assert body.x_m == pytest.approx(SPEED_M_S * now_s, abs=3e-4)
+        assert 0.0119 < now_s - body.stamp_s < 0.012 + FRAME_S + TICK_S
+    assert lab.port.report()[1:] == (lab.port.poses, 0, 1, "", "")
+
+
+def test_x_goes_along_a_direction_from_an_origin(open_laboratory: Open) -> None:
+    poses = [RecordedPose(frame * FRAME_S, (9.0 + 1e-5 * frame, -1.0, 1.0)) for frame in range(20)]
+    lab = open_laboratory(poses, direction=(0.0, -0.6, 0.8), origin_m=0.5)
+    assert lab.run(0.15)[-1][1].x_m == pytest.approx(1.4 - 0.5)
+
+
+def test_a_body_is_found_by_name_or_by_id(open_laboratory: Open) -> None:
+    ways: list[dict[str, Any]] = [{"body": "mudskipper"}, {"body_id": 7}, {}]
+    for how in ways:
+        lab = open_laboratory(moving(0.3), how, identity=7)
+        assert known(lab.run(0.3)), how
+    wrong_ways: list[dict[str, Any]] = [{"body": "somebody"}, {"body_id": 6}]
+    for how in wrong_ways:
+        lab = open_laboratory(moving(0.3), how, identity=7)
+        assert not known(lab.run(0.29)), how
+        trouble = lab.port.report().trouble
+        assert trouble == ("there is no rigid body named 'somebody'." if "body" in how else NOT_SEEN)
+
+
+def test_a_body_that_is_defined_anew_is_looked_for_by_its_name_again(open_laboratory: Open) -> None:
+    lab = open_laboratory(moving(3.0), {"body": "mudskipper"}, identity=7)
+    assert known(lab.run(1.0))
+    lab.server.change_model(8)
+    assert not known(lab.run(1.2)[30:])
+    assert known(lab.run(2.9))
+
+
+@pytest.mark.parametrize("interface", ["lo", LOOPBACK])
+def test_multicast_frames_are_heard_on_an_interface(open_laboratory: Open, interface: str) -> None:
+    """Without any answer, where the version is configured."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind((LOOPBACK, 0))
+        number = free.getsockname()[1]
+    changes = {"group": GROUP, "port": number, "version": "4.1", "server": "", "interface": interface}
+    lab = open_laboratory(moving(0.5), changes, target=(GROUP, number))
+    assert len(known(lab.run(0.5))) > 100
+
+
+def test_frames_that_are_not_of_a_version_known_wait_for_it(open_laboratory: Open) -> None:
+    blind = open_laboratory(moving(4.0))
+    blind.server.answers = False
+    blind.run(0.0)
+    assert "no NatNet frame comes from 127.0.0.1" in blind.port.report().trouble
+    blind.server.answers = True  # asked again a second later
+    assert known(blind.run(2.0))
+
+
+def test_a_server_that_speaks_what_is_not_read_here_is_told(open_laboratory: Open) -> None:
+    lab = open_laboratory(moving(1.0), version=NatNetVersion(2, 5))
+    assert not known(lab.run(0.9))
+    assert lab.port.report().trouble == "Motive speaks NatNet 2.5; 2.6 to 4 are read here."
+
+
+def test_a_body_that_is_not_tracked_is_none_and_is_counted(open_laboratory: Open) -> None:
+    poses = [pose._replace(tracked=pose.time_s < 0.5) for pose in moving(1.0)]
+    lab = open_laboratory(poses)
+    assert known(lab.run(0.5 + STALE_S))
+    assert not known(lab.run(0.99)[5:])
+    assert lab.port.report().trouble == NOT_SEEN
+    assert lab.port.lost == pytest.approx(59, abs=2)
+
+
+def test_the_same_digits_again_and_again_are_no_pose(open_laboratory: Open) -> None:
+    """What some bridges repeat while the capture is lost."""
+    poses = [pose if pose.time_s < 0.5 else pose._replace(position_m=(0.05, 0.2, 1.0)) for pose in moving(1.0)]
+    lab = open_laboratory(poses)
+    lab.run(0.5 + 2.0 * STALE_S)
+    assert not known(lab.run(0.99))
+    assert "frozen" in lab.port.report().trouble
+
+
+def test_a_pose_after_a_long_gap_or_a_leap_is_believed_when_a_second_one_follows(open_laboratory: Open) -> None:
+    lab = open_laboratory([*moving(0.5), RecordedPose(0.75, (0.3, 0.2, 1.0)), *moving(0.5, 1.5)])
+    lab.run(0.74)
+    assert not known(lab.run(1.5))  # the one of 0.75 s had leapt
+    told = known(lab.run(1.9))
+    assert told and all(body.x_m == pytest.approx(SPEED_M_S * now_s, abs=1e-3) for now_s, body in told)
+    assert told[0][0] >= 1.5 + FRAME_S
+
+
+def test_a_pose_ends_when_it_is_stale(open_laboratory: Open) -> None:
+    seen = open_laboratory(moving(0.5)).run(1.0)
+    last_s = known(seen)[-1][0]
+    assert 0.49 + STALE_S - FRAME_S < last_s <= 0.5 + STALE_S
+
+
+def test_garbled_and_foreign_packets_are_counted_and_cost_nothing_else(open_laboratory: Open) -> None:
+    lab = open_laboratory(moving(0.5))
+    assert known(lab.run(0.4))
+    frame = encode_frame(lab.server.version, 1, [], FrameTimes(0.0, 0, 0, 0))
+    assert isfinite(lab.send(b"", b"\x07", frame[:-30], b"\x07\x00\xff\xff" + bytes(20)).x_m)
+    assert lab.port.garbled == 4
+    lab.port.parameters = replace(lab.port.parameters, server="127.0.0.9")
+    lab.send(frame)
+    assert lab.port.garbled == 5
+
+
+def test_all_that_is_garbled_is_told(open_laboratory: Open) -> None:
+    """As with a version that is configured wrongly."""
+    lab = open_laboratory(moving(0.5), {"version": "3.0"}, version=NatNetVersion(4, 1), crowded=True)
+    assert not known(lab.run(0.4))
+    assert lab.port.report().trouble == "all NatNet frames are garbled."
+
+
+def test_a_sender_gone_wild_is_heard_in_bounded_pieces(open_laboratory: Open) -> None:
+    lab = open_laboratory(moving(0.2))
+    lab.run(0.2)
+    for number in range(3 * MOST_PACKETS_PER_READ):
+        body = encode_rigid_body(lab.server.version, 1, RecordedPose(0.0, (0.02 + 1e-4 * number, 0.0, 0.0)))
+        ticks = 10**10 + number
+        lab.server.send_packet(encode_frame(lab.server.version, number, [body], FrameTimes(0.0, ticks, ticks, ticks)))
+    before = lab.port.poses + lab.port.lost
+    lab.send()
+    assert lab.port.poses + lab.port.lost - before == MOST_PACKETS_PER_READ
+
+
+def test_a_server_that_comes_back_with_another_version_is_understood(open_laboratory: Open) -> None:
+    lab = open_laboratory(moving(1.0), version=NatNetVersion(4, 1))
+    assert known(lab.run(0.9))
+    lab.server.send_packet(encode_server_info(NatNetVersion(3, 0)))
+    lab.server.version = NatNetVersion(3, 0)
+    assert known(lab.run(1.0))
+    assert lab.port.report().source == "NatNet 3.0 from 127.0.0.1"
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"interface": "nothing0"}, "NatNet cannot be received from 127.0.0.1 on nothing0: No such device"),
+        ({"interface": "192.0.2.1"}, "on 192.0.2.1: Cannot assign requested address"),
+        ({"group": GROUP, "interface": "nothing0"}, f"in group {GROUP}, port 1511 on nothing0: No such device"),
+    ],
+)
+def test_an_interface_that_is_not_there_is_told(changes: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(PoseSourceError, match=sentence):
+        NatNetPort(replace(NatNetParameters(server=LOOPBACK, group=""), **changes), ALONG_X)
+
+
+def test_without_a_network_it_is_silent_and_asks_again(open_laboratory: Open) -> None:
+    lab = open_laboratory(moving(2.0))
+    lab.server.close()
+    for now_s in (0.0, 0.5, 1.0, 1.1, 2.2, 2.3):
+        assert not isfinite(lab.port.read(now_s).x_m)
+    assert lab.port.garbled == 0
+
+
+def test_a_service_that_may_use_no_network_is_told_what_to_change(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(family: int, kind: int) -> None:
+        raise OSError(EAFNOSUPPORT, "Address family not supported by protocol")
+
+    monkeypatch.setattr(socket, "socket", refused)
+    with pytest.raises(PoseSourceError, match="add AF_INET to RestrictAddressFamilies="):
+        NatNetPort(NatNetParameters(server=LOOPBACK), ALONG_X)
+
+
+def test_frames_of_another_computer_than_the_one_named_are_told(open_laboratory: Open) -> None:
+    laboratory = open_laboratory(moving(1.0))
+    laboratory.run(0.3)
+    laboratory.port.parameters = replace(laboratory.port.parameters, server="127.0.0.9")
+    laboratory.run(0.3 + 2.0 * STALE_S)
+    report = laboratory.port.report()
+    assert report.trouble == f"packets come from {LOOPBACK}, and none from 127.0.0.9."
+    assert "pose.natnet.server" in report.what_to_do

@@ -1,0 +1,202 @@
+"""A counter on a serial line: what is a count, what is not, and what happens when it is unplugged."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from math import isnan
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.pose.pose_port import STALE_S, PoseSourceError
+from drivers.pose.rail_encoder import LONGEST_LINE_BYTES, RETRY_S, RailEncoder, RailEncoderParameters
+from simulation.devices.rail_encoder_emulator import RailEncoderEmulator
+from tests.waiting import LONGEST_S
+
+pytest.importorskip("serial", reason="pyserial is not installed")
+
+METRES = 1e-5
+
+
+class Rail:
+    """A counter, and the encoder that reads it; `now_s` is told."""
+
+    def __init__(self, device: Path, **changes: object) -> None:
+        label = str(changes.get("label", ""))
+        self.counter = RailEncoderEmulator(device, METRES, label)
+        parameters = RailEncoderParameters(device=str(device), metres_per_count=METRES)
+        self.encoder = RailEncoder(replace(parameters, **changes))  # type: ignore[arg-type]
+        self.now_s = 0.0
+        self.written = self.fetched = 0  # bytes: a pseudo-terminal delivers when it likes
+        self._write, self._fetch = self.counter.write, self.encoder.line._fetch
+        self.counter.write = self._count_written  # type: ignore[method-assign]
+        self.encoder.line._fetch = self._count_fetched  # type: ignore[method-assign]
+        self.write(b"\n")  # the end of a line that had begun before
+
+    def _count_written(self, data: bytes) -> None:
+        self.written += len(data)
+        self._write(data)
+
+    def _count_fetched(self) -> bytes:
+        data = self._fetch()
+        self.fetched += len(data)
+        return data
+
+    def write(self, data: bytes) -> float:
+        """x once all of it has been read."""
+        if data:
+            self.counter.write(data)
+        return self.read_until(lambda: not self.encoder.line.is_there or self.fetched >= self.written)
+
+    def send(self, place_m: float) -> float:
+        self.counter.send(place_m)
+        heard = self.heard
+        return self.read_until(lambda: self.heard > heard)
+
+    @property
+    def heard(self) -> int:
+        return self.encoder.poses + self.encoder.garbled
+
+    def read_until(self, done: Callable[[], bool]) -> float:
+        self.now_s += 0.01
+        deadline_s = time.monotonic() + LONGEST_S
+        x_m = self.encoder.read(self.now_s).x_m
+        while not done() and time.monotonic() < deadline_s:
+            x_m = self.encoder.read(self.now_s).x_m
+        return x_m
+
+    def close(self) -> None:
+        self.encoder.close()
+        self.counter.unplug()
+
+
+@pytest.fixture
+def rail(tmp_path: Path) -> Iterator[Rail]:
+    opened = Rail(tmp_path / "encoder")
+    yield opened
+    opened.close()
+
+
+def test_counts_become_metres(rail: Rail) -> None:
+    assert rail.send(0.0) == 0.0
+    assert rail.send(0.005) == pytest.approx(0.005)
+    assert rail.send(-0.003) == pytest.approx(-0.003)
+    assert rail.encoder.report()[1:] == (3, 0, 0, "", "")
+
+
+@pytest.mark.parametrize(
+    ("label", "line"),
+    [("", b"250\n"), ("", b" +250 \r"), ("x", b"x:250\r\n"), ("x", b"x = 250\n"), ("p.", b"p. 250\n")],
+)
+def test_lines_may_look_like_this(tmp_path: Path, label: str, line: bytes) -> None:
+    rail = Rail(tmp_path / "encoder", label=label, metres_per_count=-0.001)
+    rail.counter.write(line)
+    assert rail.read_until(lambda: rail.encoder.poses > 0) == -0.25
+    rail.close()
+
+
+def test_the_rest_of_a_line_that_was_under_way_is_no_count(tmp_path: Path) -> None:
+    rail = Rail(tmp_path / "encoder")
+    rail.encoder.reset()  # as after opening
+    rail.counter.write(b"345\n12350\n")  # of 12345
+    assert rail.read_until(lambda: rail.encoder.poses > 0) == pytest.approx(0.12350)
+    assert (rail.encoder.poses, rail.encoder.garbled) == (1, 0)
+    rail.close()
+
+
+def test_a_line_in_pieces_is_one_line(rail: Rail) -> None:
+    for piece in (b"12", b"3", b"4\r"):
+        rail.write(piece)
+    assert rail.read_until(lambda: rail.encoder.poses > 0) == pytest.approx(0.01234)
+
+
+@pytest.mark.parametrize("line", [b"abc", b"12.5", b"1 2", b"0x10", b"\xff\xfe", b"1" * 16, b"-", b"x:5"])
+def test_what_is_no_count_is_counted_and_changes_nothing(rail: Rail, line: bytes) -> None:
+    rail.send(0.1)
+    rail.counter.write(line + b"\n")
+    assert rail.read_until(lambda: rail.encoder.garbled > 0) == pytest.approx(0.1)
+    assert (rail.encoder.poses, rail.encoder.garbled) == (1, 1)
+
+
+def test_a_line_that_never_ends_is_counted_and_the_next_one_read(rail: Rail) -> None:
+    rail.write(b"7" * (LONGEST_LINE_BYTES + 1))
+    rail.read_until(lambda: rail.encoder.garbled > 0)
+    rail.write(b"7\n")
+    assert rail.send(0.02) == pytest.approx(0.02)
+    assert rail.encoder.garbled == 1
+
+
+def test_a_count_that_lost_a_digit_is_not_believed_but_one_that_stays_is(rail: Rail) -> None:
+    rail.send(1.23456)
+    assert rail.send(0.12345) == pytest.approx(1.23456)
+    assert rail.send(1.23500) == pytest.approx(1.23500)
+    assert rail.encoder.garbled == 1
+    rail.send(0.0)  # the counter was restarted
+    assert rail.send(0.001) == pytest.approx(0.001)
+    assert rail.encoder.garbled == 2
+
+
+def test_a_count_ends_when_it_is_stale(rail: Rail) -> None:
+    rail.send(0.1)
+    assert rail.encoder.read(rail.now_s + 0.9 * STALE_S).x_m == pytest.approx(0.1)
+    assert isnan(rail.encoder.read(rail.now_s + 1.1 * STALE_S).x_m)
+    assert rail.encoder.report().trouble == f"no count comes from {rail.counter.device}."
+
+
+def test_an_encoder_that_is_unplugged_is_none_and_is_opened_again(rail: Rail) -> None:
+    rail.send(0.1)
+    rail.counter.unplug()
+    assert isnan(rail.read_until(lambda: bool(rail.encoder.report().trouble)))
+    assert rail.encoder.report().trouble.startswith("the rail encoder is gone: ")
+    lost_s = rail.now_s
+    assert not rail.encoder.reopen(lost_s + 0.9 * RETRY_S)
+    assert not rail.encoder.reopen(lost_s + 1.1 * RETRY_S)  # it is not there yet
+    assert "No such file" in rail.encoder.report().trouble
+    rail.counter.plug_in()
+    assert not rail.encoder.reopen(lost_s + 1.9 * RETRY_S)  # once in a second
+    assert rail.encoder.reopen(lost_s + 2.2 * RETRY_S)
+    rail.now_s = lost_s + 2.2 * RETRY_S
+    rail.write(b"\n")
+    assert rail.send(0.002) == pytest.approx(0.002)
+    assert rail.encoder.report().trouble == ""
+
+
+def test_a_device_that_does_not_open_is_told(tmp_path: Path) -> None:
+    parameters = RailEncoderParameters(device=str(tmp_path / "nothing"), metres_per_count=METRES)
+    with pytest.raises(PoseSourceError, match="^the rail encoder .*/nothing does not open: No such file or directory$"):
+        RailEncoder(parameters)
+
+
+class Wire:
+    """A port of pyserial on a pipe, for speed."""
+
+    def __init__(self, file: int) -> None:
+        self.file, self.in_waiting = file, 1
+
+    def fileno(self) -> int:
+        return self.file
+
+    def close(self) -> None:
+        return
+
+
+def test_no_bytes_are_too_wild(tmp_path: Path) -> None:
+    path = tmp_path / "bytes"
+    parameters = RailEncoderParameters(device="wire", metres_per_count=METRES, label="x")
+
+    @given(st.lists(st.binary(max_size=40) | st.integers(-(10**20), 10**20).map(lambda n: f"x{n}\n".encode())))
+    def examine(pieces: list[bytes]) -> None:
+        path.write_bytes(b"\n".join(pieces))
+        with path.open("rb") as file:
+            encoder = RailEncoder(parameters, open_device=lambda *_: Wire(file.fileno()))
+            for tick in range(5):
+                assert abs(encoder.read(0.01 * tick).x_m) < 1e11 or not encoder.poses
+            assert encoder.poses + encoder.garbled <= sum(
+                piece.count(b"\n") + piece.count(b"\r") + 1 for piece in pieces
+            )
+
+    examine()

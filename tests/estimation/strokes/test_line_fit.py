@@ -1,0 +1,133 @@
+"""The running fit of y = k x against numpy's batch solution, and its standard error against many seeds."""
+
+from math import isfinite, nan, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from control.records import Estimate
+from estimation.strokes.line_fit import LARGEST_DOUBT, MIN_SAMPLES, LineFit
+
+Array = NDArray[np.float64]
+
+
+def fitted(x: Array, y: Array) -> Estimate:
+    fit = LineFit()
+    for each_x, each_y in zip(x.tolist(), y.tolist(), strict=True):
+        fit.update(each_x, each_y)
+    return fit.estimate()
+
+
+def noisy_line(seed: int, count: int, k: float, noise: float) -> tuple[Array, Array]:
+    random = np.random.default_rng(seed)
+    x = random.uniform(0.1, 3.0, count)
+    return x, k * x + noise * random.standard_normal(count)
+
+
+@given(st.integers(0, 10**6), st.integers(MIN_SAMPLES, 300), st.floats(0.1, 3.0), st.floats(0.3, 3.0))
+def test_the_fit_equals_numpys_least_squares(seed: int, count: int, k: float, noise: float) -> None:
+    x, y = noisy_line(seed, count, k, noise)
+    solution, residual, _, _ = np.linalg.lstsq(x[:, None], y)
+    estimate = fitted(x, y)
+    assert estimate.value == pytest.approx(float(solution[0]), rel=1e-9, abs=1e-12)
+    assert estimate.std_error == pytest.approx(sqrt(float(residual[0]) / (count - 1) / float(x @ x)), rel=1e-9)
+    assert estimate.samples == count
+
+
+@pytest.mark.parametrize("scale", [1e-8, 1e-6, 1.0, 1e6])
+def test_the_fit_does_not_care_about_the_unit_of_x(scale: float) -> None:
+    x, y = noisy_line(1, 50, 2.0, 0.1)
+    small, plain = fitted(x * scale, y), fitted(x, y)
+    assert small.value * scale == pytest.approx(plain.value, rel=1e-12)
+    assert small.std_error * scale == pytest.approx(plain.std_error, rel=1e-9)
+    assert small.valid
+
+
+def test_the_standard_error_covers_the_truth_about_95_times_in_a_hundred() -> None:
+    runs = 1500
+    covered = 0
+    for seed in range(runs):
+        estimate = fitted(*noisy_line(seed, 40, 2.0, 0.5))
+        covered += abs(estimate.value - 2.0) <= 2.023 * estimate.std_error  # t of 39 degrees of freedom
+    assert 0.935 <= covered / runs <= 0.965
+
+
+def test_the_fit_is_unbiased() -> None:
+    estimates = [fitted(*noisy_line(seed, 40, 2.0, 0.5)) for seed in range(500)]
+    mean = sum(estimate.value for estimate in estimates) / 500
+    assert mean == pytest.approx(2.0, abs=4.0 * estimates[0].std_error / sqrt(500))
+
+
+def test_a_line_without_noise_is_found_without_doubt() -> None:
+    x = np.linspace(0.1, 3.0, 20)
+    estimate = fitted(x, 4.0 * x)
+    assert estimate.value == pytest.approx(4.0, rel=1e-14)
+    assert estimate.std_error == pytest.approx(0.0, abs=1e-7)
+    assert estimate.valid
+
+
+@pytest.mark.parametrize("count", range(MIN_SAMPLES + 2))
+def test_too_few_samples_tell_nothing(count: int) -> None:
+    x = np.linspace(0.5, 1.0, count)
+    estimate = fitted(x, x)
+    assert estimate.valid == (count >= MIN_SAMPLES)
+    assert estimate.samples == count
+    assert ("fewer than 5 samples" in estimate.reason) == (count < MIN_SAMPLES)
+
+
+def test_samples_at_the_surface_tell_nothing() -> None:
+    estimate = fitted(np.zeros(50), np.ones(50))
+    assert not estimate.valid
+    assert estimate.reason
+    assert not isfinite(estimate.value)
+
+
+@pytest.mark.parametrize("k", [-1.0, 0.0])
+def test_a_force_along_the_motion_is_not_valid(k: float) -> None:
+    estimate = fitted(np.linspace(0.1, 1.0, 20), k * np.linspace(0.1, 1.0, 20))
+    assert not estimate.valid
+    assert estimate.value == pytest.approx(k)
+    assert estimate.reason == "the force does not oppose the motion"
+
+
+def test_a_doubt_is_too_large_from_half_of_the_value_on() -> None:
+    verdicts = set()
+    for noise in np.linspace(0.1, 8.0, 200):
+        estimate = fitted(*noisy_line(7, 20, 1.0, float(noise)))
+        if estimate.value > 0.0:
+            assert estimate.valid == (estimate.std_error <= LARGEST_DOUBT * estimate.value)
+            assert (estimate.reason == "") == estimate.valid
+            verdicts.add(estimate.valid)
+    assert verdicts == {True, False}
+
+
+@given(st.lists(st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6)), max_size=30))
+def test_a_valid_estimate_is_positive_and_finite(pairs: list[tuple[float, float]]) -> None:
+    fit = LineFit()
+    for x, y in pairs:
+        fit.update(x, y)
+    estimate = fit.estimate()
+    assert not estimate.valid or (estimate.value > 0.0 and isfinite(estimate.value + estimate.std_error))
+    assert estimate.valid == (estimate.reason == "")
+
+
+def test_a_sample_that_is_not_a_number_never_gives_a_valid_estimate() -> None:
+    for bad in ((nan, 1.0), (1.0, nan)):
+        fit = LineFit()
+        for x in range(1, 20):
+            fit.update(float(x), float(x))
+        fit.update(*bad)
+        assert not fit.estimate().valid
+
+
+def test_a_reset_forgets_everything() -> None:
+    x, y = noisy_line(3, 30, 2.0, 0.1)
+    fit = LineFit()
+    fit.update(100.0, -5.0)
+    fit.reset()
+    for each_x, each_y in zip(x.tolist(), y.tolist(), strict=True):
+        fit.update(each_x, each_y)
+    assert fit.estimate() == fitted(x, y)

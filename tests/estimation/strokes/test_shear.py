@@ -1,0 +1,324 @@
+"""Stances of made-up batches: whether the mud gave way or the body, and what that says about the mud's strength.
+
+A flipper sweeps back from 30 to -30 degrees at 3 cm in pieces of 6 mm, as the estimator's batches are. The mud bears
+k_s Ψ once it has been sheared far enough and less before, as mud does; the body stands, or goes forward by a share of
+the flipper's way.
+"""
+
+from collections.abc import Sequence
+from math import cos, inf, nan, radians, sin
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.geometry import FlipperGeometry
+from control.plate import stance_moment_m4, submerged_plate
+from estimation.strokes.origin_fit import MIN_BATCHES, fit_through_origin
+from estimation.strokes.shear import HELD, MOBILISED_M, QUICK_DOUBT, SLIPPING, STANDS, Base, Shear, find_shear, slips_m
+from estimation.strokes.stroke import Batch
+
+GEOMETRY = FlipperGeometry()
+LENGTH_M, FRONT_RAD, STEP_RAD = 0.12, radians(30.0), 0.05
+DEPTH_M, K_S, DRAG_N = 0.03, 0.6e6, 2.5
+COUNT = 21
+EXACT = 1e-9  # rounding
+
+
+def moment_m4(batch: Batch, surface_m: float = 0.0) -> float:
+    plate = submerged_plate(GEOMETRY, batch.sweep_rad, batch.adduction_rad, surface_m)
+    return stance_moment_m4(GEOMETRY, plate)
+
+
+def poses(body_share: float = 0.0, depth_m: float = DEPTH_M, count: int = COUNT) -> list[Batch]:
+    """Without any load. The body advances by `body_share` of the flipper's way."""
+    batches, front_m = [], LENGTH_M * sin(FRONT_RAD)
+    for i in range(count):
+        sweep_rad = FRONT_RAD - STEP_RAD * i
+        adduction_rad = GEOMETRY.adduction_rad(sweep_rad, depth_m)
+        body_m = body_share * (front_m - LENGTH_M * sin(sweep_rad))
+        batches.append(Batch(LENGTH_M * sweep_rad, sweep_rad, adduction_rad, 0.0, 0.0, body_m, False, 10, 0.5))
+    return batches
+
+
+def pressed(batches: Sequence[Batch], k_s: float = K_S, surface_m: float = 0.0) -> list[Batch]:
+    """Of mud that bears its whole strength in every batch."""
+    return [batch._replace(sweep_nm=k_s * moment_m4(batch, surface_m)) for batch in batches]
+
+
+def sheared(batches: Sequence[Batch], k_s: float = K_S, base: Base = Base.FREE) -> list[Batch]:
+    """Of mud that bears the more, the farther it has been sheared, up to its strength at MOBILISED_M."""
+    way_m, loaded = 0.0, []
+    for batch, slip_m in zip(batches, [0.0, *(slips_m(GEOMETRY, batches, base) or ())], strict=True):
+        way_m += slip_m
+        loaded.append(batch._replace(sweep_nm=min(way_m / MOBILISED_M, 1.0) * k_s * moment_m4(batch)))
+    return loaded
+
+
+def blind(batches: Sequence[Batch]) -> list[Batch]:
+    return [batch._replace(body_m=nan) for batch in batches]
+
+
+def found(batches: Sequence[Batch], base: Base = Base.FREE, drag_n: float = DRAG_N, surface_m: float = 0.0) -> Shear:
+    return find_shear(GEOMETRY, batches, surface_m, base, drag_n)
+
+
+def k_of(shear: Shear) -> float:
+    assert shear.fit is not None
+    return shear.fit.slope
+
+
+def borne(batches: Sequence[Batch]) -> list[float]:
+    return [batch.sweep_nm / moment_m4(batch) for batch in batches]
+
+
+# the body stands
+
+
+@pytest.mark.parametrize("surface_m", [-0.003, 0.0, 0.003])
+@pytest.mark.parametrize("k_s", [0.05e6, 0.6e6, 5.0e6])
+@pytest.mark.parametrize("base", [Base.FREE, Base.FIXED])
+def test_where_the_body_stands_the_mud_yields_and_its_strength_is_told(
+    base: Base, k_s: float, surface_m: float
+) -> None:
+    shear = found(pressed(poses(), k_s, surface_m), base, surface_m=surface_m)
+    assert (shear.case, shear.at_least, shear.reason) == ("yield", False, "")
+    assert k_of(shear) == pytest.approx(k_s, rel=EXACT)
+
+
+@pytest.mark.parametrize("base", [Base.FREE, Base.FIXED])
+def test_what_was_borne_before_the_mud_was_mobilised_does_not_count(base: Base) -> None:
+    batches = sheared(poses(), base=base)
+    assert borne(batches)[2] < 0.6 * K_S  # so it would be noticed
+    assert k_of(found(batches, base)) == pytest.approx(K_S, rel=EXACT)
+
+
+def test_the_strength_is_fitted_to_the_pieces_that_had_been_sheared_far_enough() -> None:
+    """To just those, scattered by 2 %."""
+    even = sheared(poses())
+    full = [share > (1.0 - EXACT) * K_S for share in borne(even)]
+    shaken = [b._replace(sweep_nm=b.sweep_nm * (1.02 if i % 2 else 0.98)) for i, b in enumerate(even)]
+    told = [b for b, is_full in zip(shaken, full, strict=True) if is_full]
+    shear = found(shaken)
+    assert shear.fit == fit_through_origin([moment_m4(b) for b in told], [b.sweep_nm for b in told])
+    assert shear.samples == 10 * len(told)
+
+
+def test_a_fixed_base_needs_no_pose() -> None:
+    assert found(blind(sheared(poses())), Base.FIXED) == found(sheared(poses()), Base.FIXED)
+
+
+def test_on_a_fixed_base_it_does_not_matter_what_a_pose_says() -> None:
+    assert found(pressed(poses(0.9)), Base.FIXED).case == "yield"
+
+
+def test_the_doubt_is_that_of_the_batches_that_yield() -> None:
+    """5 % up and down in turn: more doubt than without, and not more than 5 %."""
+    batches = pressed(poses())
+    shaken = [b._replace(sweep_nm=b.sweep_nm * (1.05 if i % 2 else 0.95)) for i, b in enumerate(batches)]
+    fit = found(shaken).fit
+    assert fit is not None
+    assert 0.003 * K_S < fit.std_error < 0.05 * K_S
+
+
+# the body moves
+
+
+def test_where_the_body_goes_along_and_the_mud_holds_there_is_a_bound() -> None:
+    """The body's drag is all that the mud had to bear: a third of its strength."""
+    shear = found(pressed(poses(0.95), K_S / 3.0))
+    assert (shear.case, shear.at_least, shear.reason) == ("body", True, "the mud held: the body moved")
+    assert k_of(shear) == pytest.approx(K_S / 3.0, rel=EXACT)
+    assert shear.samples == 10 * COUNT
+
+
+@pytest.mark.parametrize("body_share", [0.25, 0.5, 0.7])
+def test_where_the_plate_slips_while_the_body_advances_the_strength_is_told(body_share: float) -> None:
+    """At 70 % of 12 cm it slips 3.6 cm, so few batches are left; but they have all of the strength."""
+    shear = found(sheared(poses(body_share), base=Base.FREE))
+    assert (shear.case, shear.at_least) == ("mixed", False)
+    assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
+
+
+def test_only_the_pieces_count_in_which_the_plate_slips() -> None:
+    """The body stands for half of the way and is then pushed along, with half of the force."""
+    still, moved = pressed(poses(0.0)), pressed(poses(1.0), K_S / 2.0)
+    middle = COUNT // 2
+    start_m = moved[middle].body_m
+    batches = [*still[:middle], *(batch._replace(body_m=batch.body_m - start_m) for batch in moved[middle:])]
+    shear = found(batches)
+    assert shear.case == "mixed"
+    assert k_of(shear) == pytest.approx(K_S, rel=0.02)  # the border's batch has half of either
+
+
+@pytest.mark.parametrize(("body_share", "case"), [(0.15, "yield"), (0.25, "mixed")])
+def test_up_to_a_fifth_of_the_way_the_body_counts_as_standing(body_share: float, case: str) -> None:
+    assert found(pressed(poses(body_share))).case == case
+
+
+def test_a_plate_that_hardly_slips_is_held() -> None:
+    """Over a long way it would slip MOBILISED_M all the same."""
+    share = 1.0 - 0.9 * SLIPPING
+    assert found(pressed(poses(share))).case == "body"
+
+
+def test_a_body_that_slides_back_is_no_travel_of_the_plates() -> None:
+    """The plate is dragged backward faster than the flipper sweeps: it slips all the more."""
+    shear = found(pressed(poses(-0.5)))
+    assert shear.case == "yield"
+    assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
+
+
+def test_the_slip_is_the_way_back_through_the_mud() -> None:
+    batches = poses(0.4)
+    told = slips_m(GEOMETRY, batches, Base.FREE)
+    assert told is not None
+    way_m = LENGTH_M * (sin(batches[0].sweep_rad) - sin(batches[-1].sweep_rad))
+    assert sum(told) == pytest.approx(0.6 * way_m)
+    assert sum(slips_m(GEOMETRY, batches, Base.FIXED) or ()) == pytest.approx(way_m)
+    assert slips_m(GEOMETRY, blind(batches), Base.FREE) is None
+
+
+# a motor at its limit
+
+
+def stuck(count: int) -> list[Batch]:
+    return [batch._replace(saturated=i >= count - 2) for i, batch in enumerate(pressed(poses(count=count)))]
+
+
+@pytest.mark.parametrize("base", [Base.FREE, Base.FIXED])
+def test_a_motor_at_its_limit_bounds_the_strength(base: Base) -> None:
+    shear = found(stuck(6), base)
+    assert (shear.case, shear.at_least, shear.reason) == ("saturated", True, "a motor at its limit")
+    assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
+
+
+def test_a_motor_at_its_limit_that_still_shears_the_mud_tells_its_strength() -> None:
+    shear = found(stuck(COUNT))
+    assert (shear.case, shear.at_least) == ("yield", False)
+
+
+@pytest.mark.parametrize("count", range(1, HELD[0]))
+def test_less_than_three_pieces_say_nothing(count: int) -> None:
+    shear = found(stuck(count))
+    assert shear.fit is None
+    assert shear.reason == "a motor at its limit"
+
+
+def test_between_bound_and_value_lie_the_pieces_that_a_fit_needs() -> None:
+    """As the stance gets longer, a bound becomes a value when MIN_BATCHES have yielded."""
+    cases = [found(pressed(poses(count=count))).case for count in range(3, COUNT + 1)]
+    first = cases.index("yield")
+    assert set(cases[:first]) == {"body"} and set(cases[first:]) == {"yield"}
+    way_m = LENGTH_M * (sin(FRONT_RAD) - sin(FRONT_RAD - STEP_RAD * (first + 2)))
+    assert way_m == pytest.approx(MOBILISED_M + (MIN_BATCHES - 1) * 0.006, abs=0.006)  # to one piece
+
+
+# without a pose
+
+
+def test_below_the_bodys_drag_the_body_cannot_have_moved() -> None:
+    """Both flippers together: 2 cos α τ / l is under 2 N everywhere for the strength of a third of that."""
+    weak = 0.33 * STANDS * DRAG_N / 2.0 * LENGTH_M / moment_m4(poses()[COUNT // 2])
+    shear = found(blind(sheared(poses(), weak)))
+    assert (shear.case, shear.at_least, shear.reason) == ("yield", False, "")
+    assert k_of(shear) == pytest.approx(weak, rel=EXACT)
+
+
+def test_above_the_bodys_drag_it_may_have_moved() -> None:
+    shear = found(blind(pressed(poses())))
+    assert (shear.case, shear.at_least) == ("unknown", True)
+    assert shear.reason == "no pose: the body may have moved"
+    assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
+
+
+@pytest.mark.parametrize(("share", "case"), [(0.79, "yield"), (0.81, "unknown")])
+def test_four_fifths_of_the_drag_is_the_border(share: float, case: str) -> None:
+    batches = [batch._replace(sweep_nm=share * DRAG_N / 2.0 * LENGTH_M / cos(batch.sweep_rad)) for batch in poses()]
+    assert found(blind(batches)).case == case
+
+
+def test_without_drag_there_is_never_a_value() -> None:
+    assert found(blind(pressed(poses(), 1e3)), drag_n=0.0).at_least
+
+
+def test_two_wild_pieces_do_not_move_the_body() -> None:
+    weak = blind(pressed(poses(), 0.05e6))
+    for place in (3, 12):
+        weak[place] = weak[place]._replace(sweep_nm=5.0)
+    assert found(weak).case == "yield"
+
+
+def test_one_lost_place_of_the_body_is_no_pose() -> None:
+    batches = pressed(poses())
+    batches[7] = batches[7]._replace(body_m=nan)
+    assert found(batches).case == "unknown"
+
+
+def test_without_a_pose_a_short_stance_tells_no_value() -> None:
+    """However small its force: so little way mobilises no mud."""
+    assert found(blind(pressed(poses(count=5), 1e3))).at_least
+
+
+# bounds
+
+
+loads_nm = st.lists(st.floats(0.0, 2.0), min_size=3, max_size=COUNT)
+
+
+@given(loads_nm)
+def test_a_bound_never_exceeds_what_two_pieces_have_borne(torques_nm: list[float]) -> None:
+    """The body moves all the way. One wild piece cannot make a bound: it is a median of three at least."""
+    batches = [batch._replace(sweep_nm=torque_nm) for batch, torque_nm in zip(poses(1.0), torques_nm, strict=False)]
+    shear = found(batches)
+    assert shear.case == "body"
+    assert k_of(shear) <= sorted(borne(batches))[-2]
+
+
+@given(st.lists(st.floats(0.1, 2.0), min_size=3, max_size=COUNT))
+def test_what_all_pieces_have_borne_is_a_bound(torques_nm: list[float]) -> None:
+    batches = [batch._replace(sweep_nm=torque_nm) for batch, torque_nm in zip(poses(1.0), torques_nm, strict=False)]
+    assert k_of(found(batches)) >= min(borne(batches))
+
+
+def test_the_bound_is_the_largest_that_was_borne_for_a_while() -> None:
+    """Half of the strength, all of it, and half again."""
+    shares = [0.5] * 7 + [1.0] * 7 + [0.5] * 7
+    batches = [b._replace(sweep_nm=share * b.sweep_nm) for b, share in zip(pressed(poses(1.0)), shares, strict=True)]
+    assert k_of(found(batches)) == pytest.approx(K_S, rel=EXACT)
+
+
+def test_a_bound_is_in_more_doubt_where_it_was_borne_unevenly() -> None:
+    even = pressed(poses(1.0))
+    uneven = [b._replace(sweep_nm=b.sweep_nm * (1.2 if i % 2 else 0.8)) for i, b in enumerate(even)]
+    doubts = [fit.std_error / fit.slope for fit in (found(even).fit, found(uneven).fit) if fit is not None]
+    assert doubts[0] == pytest.approx(QUICK_DOUBT)
+    assert doubts[1] > 1.5 * doubts[0]
+
+
+# no mud, nonsense
+
+
+@pytest.mark.parametrize("base", [Base.FREE, Base.FIXED])
+def test_a_plate_in_the_air_tells_nothing(base: Base) -> None:
+    shear = found(poses(depth_m=-0.005), base)
+    assert shear == Shear(None, False, "unknown", 0, "no depth in any batch")
+    assert found([], base).fit is None
+
+
+def test_pieces_above_the_surface_bear_nothing() -> None:
+    """A plate that comes in on the way: what lies before has no pressure, and no part in a bound."""
+    batches = [*poses(1.0, -0.005, 4), *pressed(poses(1.0))[4:]]
+    assert k_of(found(batches)) == pytest.approx(K_S, rel=EXACT)
+
+
+@given(st.lists(st.floats(), min_size=COUNT, max_size=COUNT), st.floats(0.0, 1.0), st.floats(), st.floats())
+def test_no_torque_makes_it_raise(torques_nm: list[float], body_share: float, drag_n: float, surface_m: float) -> None:
+    batches = [batch._replace(sweep_nm=each) for batch, each in zip(poses(body_share), torques_nm, strict=True)]
+    for base in Base:
+        for seen in (batches, blind(batches)):
+            found(seen, base, drag_n, surface_m)
+
+
+def test_endless_torques_are_no_bound() -> None:
+    assert found([batch._replace(sweep_nm=inf) for batch in poses(1.0)]).fit is None

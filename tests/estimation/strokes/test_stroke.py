@@ -1,0 +1,203 @@
+"""Batches of equal travel: what they keep of the samples, and what they do not depend on."""
+
+from collections.abc import Iterable
+from math import isfinite, nan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from estimation.strokes.stroke import LONGEST, MOSTLY, MOVING, Batch, Stroke
+
+STEP_M, SPEED_M_S = 0.0015, 0.1
+Row = tuple[float, float]  # time and travel
+
+
+def row(
+    now_s: float, travel_m: float, saturated: bool = False, body_m: float | None = None
+) -> tuple[float, float, float, float, float, float, float, bool]:
+    """All else in proportion to the travel, so that a batch's means can be told."""
+    body_m = 6.0 * travel_m if body_m is None else body_m
+    return now_s, travel_m, 2.0 * travel_m, 3.0 * travel_m, 4.0 * travel_m, 5.0 * travel_m, body_m, saturated
+
+
+def even(rate_hz: float, way_m: float = 0.045, speed_m_s: float = SPEED_M_S, start_m: float = -0.0145) -> list[Row]:
+    count = round(way_m / speed_m_s * rate_hz)
+    return [(i / rate_hz, start_m + speed_m_s * i / rate_hz) for i in range(count)]
+
+
+def stroke_of(rows: Iterable[Row], step_m: float = STEP_M) -> Stroke:
+    stroke, now_s, travel_m = Stroke(step_m), 0.0, 0.0
+    for now_s, travel_m in rows:
+        stroke.update(*row(now_s, travel_m))
+    stroke.close(now_s, travel_m)
+    return stroke
+
+
+@given(st.lists(st.floats(-0.02, 0.02), min_size=1, max_size=LONGEST))
+def test_batches_are_means_of_all_samples_in_their_order(travels_m: list[float]) -> None:
+    batches = stroke_of((0.01 * i, travel_m) for i, travel_m in enumerate(travels_m)).batches
+    assert sum(batch.samples for batch in batches) == len(travels_m)
+    begin = 0
+    for batch in batches:
+        mean_m = float(np.mean(travels_m[begin : begin + batch.samples]))
+        begin += batch.samples
+        assert batch[:6] == pytest.approx(tuple(factor * mean_m for factor in (1, 2, 3, 4, 5, 6)), abs=1e-15)
+
+
+@given(st.lists(st.floats(-0.02, 0.02), min_size=1, max_size=LONGEST))
+def test_no_sample_of_a_batch_is_a_step_away_from_its_first(travels_m: list[float]) -> None:
+    begin = 0
+    for batch in stroke_of((0.01 * i, travel_m) for i, travel_m in enumerate(travels_m)).batches:
+        travels = travels_m[begin : begin + batch.samples]
+        assert all(abs(travel_m - travels[0]) < STEP_M for travel_m in travels)
+        begin += batch.samples
+
+
+@pytest.mark.parametrize("start_m", [-0.0145, 0.0, 0.03])
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_even_motion_leaves_batches_of_equal_travel_in_either_direction(direction: float, start_m: float) -> None:
+    rows = [(now_s, direction * travel_m) for now_s, travel_m in even(3800.0, start_m=start_m)]
+    travels_m = np.array([batch.travel_m for batch in stroke_of(rows).batches[:-1]])
+    per_sample_m = SPEED_M_S / 3800.0
+    assert np.diff(travels_m) == pytest.approx(direction * STEP_M, abs=1.01 * per_sample_m)
+
+
+def test_the_rate_of_messages_does_not_change_the_batches() -> None:
+    """A batch ends with the first sample that is a step away: later by less than the way between two samples."""
+    often, seldom = (stroke_of(even(rate_hz)).batches for rate_hz in (38000.0, 380.0))
+    per_sample_m = SPEED_M_S / 380.0
+    assert len(often) * STEP_M / (STEP_M + per_sample_m) - 1 <= len(seldom) <= len(often)
+    assert np.diff([batch.travel_m for batch in seldom[:-1]]).max() <= STEP_M + per_sample_m
+
+
+def test_a_message_that_is_read_more_often_moves_no_mean() -> None:
+    rows = even(380.0)
+    again = [each for now_s, travel_m in rows for each in [(now_s, travel_m)] * 3]
+    for batch, plain in zip(stroke_of(again).batches, stroke_of(rows).batches, strict=True):
+        assert batch[:5] == pytest.approx(plain[:5], abs=1e-15)
+        assert batch.samples == 3 * plain.samples
+
+
+def test_a_flipper_that_stands_still_adds_to_one_batch() -> None:
+    rows = even(380.0, way_m=0.015)
+    end_s, end_m = rows[-1]
+    held = [*rows, *((end_s + i / 380.0, end_m) for i in range(1, 5000))]
+    assert len(stroke_of(held).batches) == len(stroke_of(rows).batches)
+
+
+def test_a_flipper_that_trembles_adds_to_one_batch() -> None:
+    random = np.random.default_rng(1)
+    rows = [(i / 380.0, float(0.4 * STEP_M * random.uniform(-1.0, 1.0))) for i in range(1000)]
+    assert len(stroke_of(rows).batches) == 1
+
+
+def test_a_stroke_without_end_takes_no_more_memory() -> None:
+    stroke = stroke_of(even(380.0, way_m=10.0))
+    assert len(stroke.batches) == LONGEST
+    assert stroke.batches[-1].travel_m < (LONGEST + 10) * STEP_M
+
+
+def test_the_longest_stroke_of_this_robot_is_kept_whole() -> None:
+    """A sweep of ±60° at 6 mm, and 7 cm of insertion from 1.5 cm above the mud at 1.5 mm."""
+    assert 2.0 * np.deg2rad(60.0) * 0.12 / 0.006 < LONGEST
+    assert (0.07 + 0.0145) / STEP_M < LONGEST
+
+
+def test_a_lost_place_of_the_body_loses_only_the_place() -> None:
+    stroke = Stroke(STEP_M)
+    for i in range(10):
+        stroke.update(*row(0.01 * i, 0.0, body_m=nan if i == 3 else 1.0))
+    stroke.close(0.1, 0.0)
+    (batch,) = stroke.batches
+    assert not isfinite(batch.body_m)
+    assert isfinite(sum(batch[:5]))
+
+
+@pytest.mark.parametrize(("clipped", "saturated"), [(0, False), (3, False), (4, True), (10, True)])
+def test_a_batch_is_saturated_from_a_third_of_its_samples_on(clipped: int, saturated: bool) -> None:
+    assert 0.3 <= MOSTLY < 0.4
+    stroke = Stroke(STEP_M)
+    for i in range(10):
+        stroke.update(*row(0.01 * i, 0.0, saturated=i < clipped))
+    stroke.close(0.1, 0.0)
+    assert stroke.batches[0].saturated is saturated
+
+
+# speed, and which batches count as moving
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_the_speed_is_that_along_the_stroke(direction: float) -> None:
+    for batch in stroke_of((now_s, direction * travel_m) for now_s, travel_m in even(380.0)).batches[:-1]:
+        assert batch.speed_m_s == pytest.approx(SPEED_M_S, rel=1e-9)
+
+
+@pytest.mark.parametrize("times_s", [(1.0, 1.0, 1.0), (3.0, 2.0, 1.0)])
+def test_a_clock_that_stands_or_runs_backward_makes_no_speed(times_s: tuple[float, ...]) -> None:
+    stroke = stroke_of([(now_s, 0.002 * i) for i, now_s in enumerate(times_s)])
+    assert [batch.speed_m_s for batch in stroke.batches] == [0.0, 0.0, 0.0]
+
+
+def moving(speeds_m_s: list[float]) -> list[float]:
+    stroke = Stroke(STEP_M)
+    stroke.batches = [Batch(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, 1, speed_m_s) for speed_m_s in speeds_m_s]
+    return [batch.speed_m_s for batch in stroke.moving()]
+
+
+def test_slow_batches_at_either_end_do_not_count_as_moving() -> None:
+    assert moving([0.01, 0.05, 0.09, 0.1, 0.1, 0.11, 0.05, 0.02]) == [0.09, 0.1, 0.1, 0.11]
+
+
+def test_a_slow_batch_in_the_middle_stays() -> None:
+    assert moving([0.01, 0.1, 0.1, 0.0, 0.1, 0.1, 0.01]) == [0.1, 0.1, 0.0, 0.1, 0.1]
+
+
+@given(st.lists(st.floats(0.0, 1.0), max_size=LONGEST))
+def test_what_counts_as_moving_is_one_piece_whose_ends_are_quick(speeds_m_s: list[float]) -> None:
+    kept = moving(speeds_m_s)
+    assert bool(kept) == bool(speeds_m_s)
+    if kept:
+        least = MOVING * sorted(speeds_m_s)[len(speeds_m_s) // 2]
+        assert kept[0] >= least
+        assert kept[-1] >= least
+        assert any(speeds_m_s[i : i + len(kept)] == kept for i in range(len(speeds_m_s)))
+
+
+def test_a_stroke_that_never_moved_is_kept() -> None:
+    assert moving([0.0, 0.0]) == [0.0, 0.0]
+    assert moving([]) == []
+
+
+# beginning and end
+
+
+def test_the_first_travel_is_kept() -> None:
+    assert stroke_of(even(380.0)).first_m == pytest.approx(-0.0145)
+    assert not isfinite(Stroke(STEP_M).first_m)
+
+
+def test_ending_a_stroke_twice_or_without_samples_adds_nothing() -> None:
+    stroke = stroke_of(even(380.0))
+    batches = list(stroke.batches)
+    stroke.close(9.0, 9.0)
+    assert stroke.batches == batches
+    assert stroke_of([]).batches == []
+
+
+def test_a_single_sample_is_a_batch_of_its_own() -> None:
+    (batch,) = stroke_of([(1.0, 0.02)]).batches
+    assert batch == Batch(0.02, 0.04, 0.06, 0.08, 0.1, 0.12, False, 1, 0.0)
+
+
+def test_a_reset_forgets_everything() -> None:
+    stroke = stroke_of(even(380.0))
+    stroke.update(*row(5.0, 1.0))
+    stroke.reset()
+    for now_s, travel_m in even(190.0):
+        stroke.update(*row(now_s, travel_m))
+    stroke.close(*even(190.0)[-1])
+    fresh = stroke_of(even(190.0))
+    assert stroke.batches == fresh.batches
+    assert stroke.first_m == fresh.first_m

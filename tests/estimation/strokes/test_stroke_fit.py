@@ -1,0 +1,408 @@
+"""From batches of one stroke to k_p and k_e: made-up strokes that keep the law, and strokes that bend from it."""
+
+from collections.abc import Callable, Sequence
+from math import cos, hypot, inf, isfinite, nan, radians
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from control.geometry import FlipperGeometry
+from control.plate import crossing, stroke_moment_m4, submerged_plate
+from control.records import Estimate
+from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit
+from estimation.strokes.stroke import Batch
+from estimation.strokes.stroke_fit import (
+    CROSSING_DOUBT,
+    LARGEST_DOUBT,
+    MIN_VERTICAL_LEVER_M,
+    NOT_OUT,
+    NOT_THERE,
+    TORQUE_REPEATABILITY,
+    UNOBSERVABLE,
+    _slope_per_surface,
+    bound_extraction,
+    fit_extraction,
+    fit_insertion,
+    judged,
+    level_free,
+    ways_m,
+)
+from estimation.strokes.surface import Surface
+
+GEOMETRY = FlipperGeometry()
+EDGE_M2 = 0.025 * 0.004
+STEP_M, SAMPLES = 0.0015, 6
+FRONT_RAD = radians(30.0)
+K = 1.0e6
+EXACT = 1e-9  # rounding
+
+Law = Callable[[float], float]  # share of k Φ at a depth
+
+
+def as_the_law(depth_m: float) -> float:
+    return 1.0
+
+
+def bearing_at_once(depth_m: float) -> float:
+    """Mud that bears a sixth of the force at 3 cm as soon as it is touched."""
+    return 1.0 + 0.005 / max(depth_m, 0.001)
+
+
+def surface_at(depth_m: float, std_error_m: float = 0.0) -> Surface:
+    return Surface(depth_m, std_error_m, 0.0, 0.0, True)
+
+
+NOMINAL = surface_at(0.0)
+
+
+def batch_at(travel_m: float, sweep_rad: float = FRONT_RAD, samples: int = SAMPLES) -> Batch:
+    adduction_rad = GEOMETRY.adduction_rad(sweep_rad, travel_m)
+    return Batch(travel_m, sweep_rad, adduction_rad, 0.0, 0.0, 0.0, False, samples, 0.1)
+
+
+def loaded(batch: Batch, k: float, surface_m: float = 0.0, law: Law = as_the_law, face_nm: float = 0.0) -> Batch:
+    """τ₂ = k Φ and what crosses over from a face that turns the sweep joint by `face_nm`."""
+    plate = submerged_plate(GEOMETRY, batch.sweep_rad, batch.adduction_rad, surface_m)
+    moment_m4 = law(batch.travel_m - surface_m) * stroke_moment_m4(GEOMETRY, plate, batch.sweep_rad)
+    across_nm = crossing(GEOMETRY, plate, batch.sweep_rad) * face_nm
+    return batch._replace(sweep_nm=face_nm, adduction_nm=k * moment_m4 + across_nm)
+
+
+def depths(start_m: float = -0.012, end_m: float = 0.03, step_m: float = STEP_M) -> list[float]:
+    count = round((end_m - start_m) / step_m)
+    return [start_m + step_m * (i + 0.5) for i in range(count)]
+
+
+def down(
+    k: float = K, surface_m: float = 0.0, law: Law = as_the_law, face_nm: float = 0.0, sweep_rad: float = FRONT_RAD
+) -> list[Batch]:
+    return [loaded(batch_at(travel_m, sweep_rad), k, surface_m, law, face_nm) for travel_m in depths()]
+
+
+def up(
+    k: float = K, surface_m: float = 0.0, law: Law = as_the_law, face_nm: float = 0.0, sweep_rad: float = -FRONT_RAD
+) -> list[Batch]:
+    ways = reversed(depths(step_m=0.002))
+    return [loaded(batch_at(travel_m, sweep_rad), -k, surface_m, law, face_nm) for travel_m in ways]
+
+
+def insertion(batches: Sequence[Batch], surface: Surface = NOMINAL, zero_error_n: float = 0.0) -> Estimate:
+    return fit_insertion(GEOMETRY, batches, surface, zero_error_n)
+
+
+def extraction(
+    batches: Sequence[Batch], surface: Surface = NOMINAL, zero_error_n: float = 0.0, start_m: float = 0.03
+) -> Estimate:
+    return fit_extraction(GEOMETRY, batches, surface, zero_error_n, start_m)
+
+
+# the law is found
+
+
+@pytest.mark.parametrize("face_nm", [-0.3, 0.0, 0.1, 0.3])
+@pytest.mark.parametrize("surface_m", [-0.003, 0.0, 0.0021])
+@pytest.mark.parametrize("k", [1e4, 1e6, 3e7])
+def test_a_stroke_that_keeps_the_law_tells_its_coefficient(k: float, surface_m: float, face_nm: float) -> None:
+    """Exactly, whatever the face bears: that is what the sweep joint is asked for."""
+    inserted = insertion(down(k, surface_m, face_nm=face_nm), surface_at(surface_m))
+    extracted = extraction(up(k, surface_m, face_nm=face_nm), surface_at(surface_m))
+    assert inserted.value == pytest.approx(k, rel=EXACT)
+    assert extracted.value == pytest.approx(k, rel=EXACT)
+
+
+@pytest.mark.parametrize("sweep_rad", [radians(angle) for angle in (-45.0, -15.0, 0.0, 30.0, 40.0)])
+def test_the_law_is_found_at_any_sweep_angle(sweep_rad: float) -> None:
+    assert insertion(down(sweep_rad=sweep_rad, face_nm=0.2)).value == pytest.approx(K, rel=EXACT)
+
+
+def test_a_face_load_that_was_left_in_would_be_taken_for_mud() -> None:
+    unfelt = [batch._replace(sweep_nm=0.0) for batch in down(face_nm=0.3)]
+    assert abs(insertion(unfelt).value / K - 1.0) > 0.1
+
+
+def test_only_batches_in_the_mud_count() -> None:
+    """A force above the surface, and samples there, change nothing; nor do the first quarter of the way up."""
+    batches, rising = down(), up()
+    start_m = 0.75 * 0.03
+    odd_down = [b._replace(adduction_nm=1.0, samples=1) if b.travel_m < -STEP_M else b for b in batches]
+    odd_up = [
+        b._replace(adduction_nm=1.0, samples=1) if b.travel_m > start_m + 0.001 or b.travel_m < -0.001 else b
+        for b in rising
+    ]
+    assert insertion(odd_down) == insertion(batches)
+    assert extraction(odd_up) == extraction(rising)
+
+
+def test_samples_are_those_of_the_batches_in_the_mud() -> None:
+    inside = sum(travel_m > 0.0 for travel_m in depths())
+    assert insertion(down()).samples == inside * SAMPLES
+
+
+def test_pieces_count_by_their_way_and_not_by_their_number() -> None:
+    """The lower half in pieces a quarter as long: where the law bends, counting pieces would read 2 % less. Half a
+    percent is left, since the Huber weights ask all pieces for their median residual.
+    """
+    even = [loaded(batch_at(travel_m), K, law=bearing_at_once) for travel_m in depths()]
+    halves = depths(-0.012, 0.015), depths(0.015, 0.03, STEP_M / 4.0)
+    finer = [loaded(batch_at(travel_m), K, law=bearing_at_once) for half in halves for travel_m in half]
+    assert counted_alike(finer) / counted_alike(even) < 0.985
+    assert insertion(finer).value == pytest.approx(insertion(even).value, rel=0.005)
+
+
+def counted_alike(batches: Sequence[Batch]) -> float:
+    """Least squares over the batches in the mud."""
+    wet = [b for b in batches if b.travel_m > 0.0]
+    plates = [submerged_plate(GEOMETRY, b.sweep_rad, b.adduction_rad) for b in wet]
+    moments = np.array([stroke_moment_m4(GEOMETRY, plate, FRONT_RAD) for plate in plates])
+    return float(moments @ np.array([b.adduction_nm for b in wet]) / (moments @ moments))
+
+
+# parts of batches
+
+
+@given(
+    st.lists(st.floats(1e-4, 3e-3), min_size=2, max_size=40),
+    st.floats(-0.02, 0.03),
+    st.floats(0.0, 0.05),
+    st.booleans(),
+)
+def test_the_ways_between_two_depths_add_up_to_what_lies_between_them(
+    steps_m: list[float], shallowest_m: float, height_m: float, upward: bool
+) -> None:
+    """Batches meet half-way between their means, and reach as far beyond the first and the last one."""
+    travels_m = list(np.cumsum(steps_m) - 0.012)
+    first_m, last_m = travels_m[0] - steps_m[1] / 2.0, travels_m[-1] + steps_m[-1] / 2.0
+    ordered = reversed(travels_m) if upward else travels_m
+    batches = [batch_at(0.0)._replace(travel_m=float(travel_m)) for travel_m in ordered]
+    deepest_m = shallowest_m + height_m
+    inside_m = max(0.0, min(last_m, deepest_m) - max(first_m, shallowest_m))
+    ways = ways_m(batches, shallowest_m, deepest_m)
+    assert len(ways) == len(batches)
+    assert sum(max(way_m, 0.0) for way_m in ways) == pytest.approx(inside_m, abs=1e-12)
+
+
+def test_one_batch_has_no_way() -> None:
+    assert ways_m([batch_at(0.01)], -1.0, 1.0) == [0.0]
+    assert ways_m([], -1.0, 1.0) == []
+
+
+@pytest.mark.parametrize("limit", ["surface", "start"])
+def test_a_coefficient_moves_smoothly_as_a_limit_crosses_batches(limit: str) -> None:
+    """Over two batches in steps of 10 µm. A batch taken in whole or not at all, a twentieth of the way with a value
+    that is off by some ten percent, would jump by about 1 %; the surface itself moves k by 3/2 · 10 µm / 2 cm a step.
+    """
+    stroke = up(law=bearing_at_once)
+    values = []
+    for i in range(400):
+        moved_m = 1e-5 * i
+        surface_m, start_m = (moved_m, 0.03) if limit == "surface" else (0.0, 0.026 + moved_m)
+        values.append(extraction(stroke, surface_at(surface_m), start_m=start_m).value)
+    steps = np.abs(np.diff(values)) / K
+    assert 0.0 < steps.max() < 2e-3
+
+
+def test_an_insertion_moves_smoothly_with_the_surface() -> None:
+    stroke = down(law=bearing_at_once)
+    values = [insertion(stroke, surface_at(1e-5 * i)).value for i in range(400)]
+    assert np.abs(np.diff(values)).max() / K < 2e-3  # as above
+
+
+# the doubt
+
+
+def pieces(surface_m: float, k: float = K, law: Law = as_the_law) -> tuple[list[float], list[float], list[float]]:
+    """Leverages for a surface at `surface_m`, torques of one at 0, and depths."""
+    batches = [loaded(batch_at(travel_m), k, 0.0, law) for travel_m in depths() if travel_m > 0.004]
+    plates = [submerged_plate(GEOMETRY, b.sweep_rad, b.adduction_rad, surface_m) for b in batches]
+    moments = [stroke_moment_m4(GEOMETRY, plate, FRONT_RAD) for plate in plates]
+    return moments, [b.adduction_nm for b in batches], [b.travel_m - surface_m for b in batches]
+
+
+def plain_slope(surface_m: float, law: Law) -> float:
+    moments, torques, _ = (np.array(each) for each in pieces(surface_m, law=law))
+    return float(moments @ torques / (moments @ moments))
+
+
+@pytest.mark.parametrize("law", [as_the_law, bearing_at_once])
+def test_the_slope_per_surface_is_the_numeric_derivative(law: Law) -> None:
+    """To 5 %: Φ falls by about Φ dδ/z, for the plate leans and its volume's middle moves."""
+    numeric = (plain_slope(1e-6, law) - plain_slope(-1e-6, law)) / 2e-6
+    told = _slope_per_surface(OriginFit(plain_slope(0.0, law), 0.0), *pieces(0.0, law=law))
+    assert told == pytest.approx(numeric, rel=0.05)
+
+
+def test_the_slope_per_surface_is_three_halves_of_slope_over_depth() -> None:
+    """Of an upright plate, whose Φ is in proportion to z, in many small pieces: Σz/Σz² = 3/(2 z)."""
+    depths_m = [1e-5 * (i + 0.5) for i in range(3000)]
+    told = _slope_per_surface(OriginFit(K, 0.0), depths_m, [K * depth_m for depth_m in depths_m], depths_m)
+    assert told == pytest.approx(1.5 * K / 0.03, rel=1e-3)
+
+
+def systematic(estimate: Estimate) -> float:
+    """What is left of the doubt beside the torque's repeatability, as a share."""
+    share = estimate.std_error / estimate.value
+    return float(np.sqrt(share * share - TORQUE_REPEATABILITY * TORQUE_REPEATABILITY))
+
+
+def test_without_noise_only_the_torques_repeatability_is_left() -> None:
+    for estimate in (insertion(down()), extraction(up())):
+        assert estimate.std_error == pytest.approx(TORQUE_REPEATABILITY * K, rel=1e-6)
+
+
+@pytest.mark.parametrize("error_m", [0.0002, 0.001])
+def test_the_doubt_of_the_surface_is_that_of_a_moved_one(error_m: float) -> None:
+    """To 10 %: first order in 1 mm of 3 cm, and Φ's fall as above."""
+    told = systematic(insertion(down(), surface_at(0.0, error_m)))
+    deeper, higher = (insertion(down(), surface_at(sign * error_m)).value for sign in (1.0, -1.0))
+    assert told == pytest.approx((deeper - higher) / 2.0 / K, rel=0.1)
+
+
+def test_the_doubt_of_the_zero_allows_for_a_weight_on_the_edge() -> None:
+    """3/2 of it over the edge and the depth, for a line through the origin: as of a plate that moves straight down.
+    A leaning one has less lever for a weight than for its volume, so this is more than enough, by half as much again.
+    """
+    weight_n = 0.1
+    told = systematic(insertion(down(), zero_error_n=weight_n))
+    lifted = [
+        b._replace(adduction_nm=b.adduction_nm + weight_n * GEOMETRY.vertical_lever_m(b.sweep_rad, b.adduction_rad))
+        for b in down()
+    ]
+    truly = insertion(lifted).value / K - 1.0
+    assert truly < told < 2.0 * truly
+    assert told == pytest.approx(1.5 * weight_n / (EDGE_M2 * 0.03) / K, rel=0.03)  # the last batch's middle is higher
+
+
+@pytest.mark.parametrize("face_nm", [-0.3, 0.2])
+def test_a_quarter_of_what_is_taken_off_the_face_stays_in_doubt(face_nm: float) -> None:
+    unfelt = insertion([batch._replace(sweep_nm=0.0) for batch in down(face_nm=face_nm)]).value
+    told = systematic(insertion(down(face_nm=face_nm)))
+    assert told == pytest.approx(CROSSING_DOUBT * abs(unfelt / K - 1.0), rel=1e-3)
+
+
+def test_scatter_of_the_batches_adds_to_the_doubt() -> None:
+    random = np.random.default_rng(1)
+    doubts = []
+    for noise_nm in (0.005, 0.02):
+        noisy = [b._replace(adduction_nm=b.adduction_nm + float(random.normal(0.0, noise_nm))) for b in down()]
+        doubts.append(systematic(insertion(noisy)))
+    assert 0.002 < doubts[0] < doubts[1] < 0.05
+
+
+# what is no coefficient
+
+
+def lever_m(batch: Batch) -> float:
+    return GEOMETRY.vertical_lever_m(batch.sweep_rad, batch.adduction_rad)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_pieces_in_poses_without_a_vertical_lever_are_not_asked(sign: float) -> None:
+    """At 5 cm and 30 degrees there are 14 mm of it, and 30 mm at 4.68 cm."""
+    batches = [loaded(batch_at(travel_m, sign * FRONT_RAD), sign * K) for travel_m in depths(end_m=0.05)[:: int(sign)]]
+    blind = [batch for batch in batches if lever_m(batch) < MIN_VERTICAL_LEVER_M]
+    wrong = [batch._replace(adduction_nm=9.0) if batch in blind else batch for batch in batches]
+    told, seen = ((insertion(each) if sign > 0.0 else extraction(each, start_m=0.07)) for each in (wrong, batches))
+    assert 0.0468 < min(batch.travel_m for batch in blind) < 0.0468 + STEP_M
+    assert told == seen
+    assert told.valid
+    assert told.value == pytest.approx(K, rel=EXACT)
+    assert told.samples == SAMPLES * sum(batch.travel_m > 0.0 and batch not in blind for batch in batches)
+
+
+def test_a_stroke_wholly_in_poses_without_a_vertical_lever_cannot_be_observed() -> None:
+    """In mud that begins 4.7 cm deep. One that ends above is as short of pieces, but not for their poses."""
+    batches = [loaded(batch_at(travel_m), K, 0.047) for travel_m in depths(end_m=0.05, step_m=0.0005)]
+    told = insertion(batches, surface_at(0.047))
+    assert (told.valid, told.reason, told.samples) == (False, UNOBSERVABLE, 0)
+    above = [batch for batch in batches if lever_m(batch) >= MIN_VERTICAL_LEVER_M]
+    assert insertion(above, surface_at(0.047)) == NOT_THERE
+
+
+@pytest.mark.parametrize("count", range(MIN_BATCHES))
+def test_too_few_pieces_say_so(count: int) -> None:
+    told = insertion(down()[-count:] if count else [])
+    assert told == NOT_THERE._replace(samples=told.samples)
+    assert not told.valid and told.reason
+
+
+def test_a_stroke_in_the_air_says_so() -> None:
+    assert insertion([batch_at(travel_m) for travel_m in depths(end_m=0.0)]) == NOT_THERE
+
+
+def test_a_force_along_the_motion_is_no_mud() -> None:
+    for told in (insertion(down(-K)), extraction(up(-K))):
+        assert (told.valid, told.reason) == (False, "the force does not oppose the motion")
+
+
+def test_a_fit_is_judged_with_all_its_doubt() -> None:
+    told = judged(OriginFit(K, 0.03 * K), 0.04 * K, 7)
+    assert told._replace(std_error=0.0) == Estimate(K, 0.0, 7, True)
+    assert told.std_error == pytest.approx(hypot(0.03, 0.04, TORQUE_REPEATABILITY) * K)
+
+
+@pytest.mark.parametrize(
+    ("slope", "std_error", "reason"),
+    [
+        (-K, 0.01 * K, "the force does not oppose the motion"),
+        (0.0, 0.01 * K, "the force does not oppose the motion"),
+        (K, 1.01 * LARGEST_DOUBT * K, "the samples do not follow the law"),
+        (nan, 1.0, "not finite"),
+        (inf, 1.0, "not finite"),
+        (K, inf, "not finite"),
+        (K, nan, "not finite"),
+    ],
+)
+def test_what_is_not_believed_says_why(slope: float, std_error: float, reason: str) -> None:
+    told = judged(OriginFit(slope, std_error), 0.0, 7)
+    assert (told.valid, told.at_least, told.samples, told.reason) == (False, False, 7, reason)
+    assert isfinite(told.value) == (reason != "not finite")
+
+
+def test_up_to_half_of_itself_a_doubt_is_borne() -> None:
+    assert judged(OriginFit(K, 0.0), 0.99 * float(np.sqrt(LARGEST_DOUBT**2 - TORQUE_REPEATABILITY**2)) * K, 7).valid
+
+
+@example([0.0] * 28, -5e-324, 0.0)  # a piece of way whose half is nothing
+@given(st.lists(st.floats(), min_size=28, max_size=28), st.floats(-0.02, 0.02), st.floats(0.0, 1.0))
+def test_no_torque_makes_it_raise(torques_nm: list[float], surface_m: float, zero_error_n: float) -> None:
+    batches = [b._replace(adduction_nm=t, sweep_nm=t / 2.0) for b, t in zip(down(), torques_nm, strict=True)]
+    for told in (
+        insertion(batches, surface_at(surface_m), zero_error_n),
+        extraction(batches[::-1], surface_at(surface_m), zero_error_n),
+        bound_extraction(GEOMETRY, batches, surface_at(surface_m)),
+    ):
+        assert isfinite(told.value + told.std_error) or not told.valid
+
+
+# the level above the mud
+
+
+@pytest.mark.parametrize("level_nm", [-0.05, 0.0, 0.08])
+def test_a_level_is_taken_off_as_of_a_straight_arm(level_nm: float) -> None:
+    """It was told of the force τ₂ / cos α, so it is the same in all poses times cos α; nothing else changes."""
+    batches = [*down(face_nm=0.1), *up(face_nm=0.1)]
+    lifted = [b._replace(adduction_nm=b.adduction_nm + level_nm * cos(b.sweep_rad)) for b in batches]
+    for freed, batch in zip(level_free(lifted, level_nm), batches, strict=True):
+        assert freed.adduction_nm == pytest.approx(batch.adduction_nm, abs=1e-15)
+        assert freed._replace(adduction_nm=0.0) == batch._replace(adduction_nm=0.0)
+
+
+# a flipper that did not come out
+
+
+def test_mud_that_held_on_has_borne_at_least_so_much() -> None:
+    """It rose by 6 mm: too little for a fit."""
+    batches = [loaded(batch_at(travel_m, -FRONT_RAD), -K, face_nm=0.2) for travel_m in (0.03, 0.028, 0.026, 0.024)]
+    told = bound_extraction(GEOMETRY, batches, surface_at(0.0))
+    assert (told.valid, told.at_least, told.reason) == (True, True, NOT_OUT)
+    assert told.value == pytest.approx(K, rel=EXACT)
+    assert told.std_error == pytest.approx(TORQUE_REPEATABILITY * K)
+    assert told.samples == 4 * SAMPLES
+
+
+def test_what_bore_nothing_is_no_bound() -> None:
+    for batches in ([], [batch_at(-0.01)], [loaded(batch_at(0.03), K)]):
+        told = bound_extraction(GEOMETRY, batches, surface_at(0.0))
+        assert not told.valid and not told.at_least

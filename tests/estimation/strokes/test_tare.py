@@ -1,0 +1,168 @@
+"""The zero of a flipper that hangs in the air, with mud that clings to it and motors that are off."""
+
+from math import cos, inf, isfinite, nan, pi, sin, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.geometry import FlipperGeometry
+from estimation.strokes.tare import CREEP_N, FEWEST, MEMORY, Tare, Zero
+
+GEOMETRY = FlipperGeometry()
+WEIGHT_N, OFFSET_NM, NOISE_NM = 0.8, 0.02, 0.008  # the noise of a hold in air, section 1.6
+EXACT = 1e-12
+
+
+def hang(tare: Tare, poses: list[tuple[float, float]], weight_n: float, noise_nm: float = 0.0, seed: int = 1) -> None:
+    """A weight at the lower edge turns the joints by -W ∂z/∂q; the sweep motor reads OFFSET_NM too much."""
+    random = np.random.default_rng(seed)
+    for sweep_rad, adduction_rad in poses:
+        jacobian = GEOMETRY.jacobian(sweep_rad, adduction_rad)
+        noise = noise_nm * random.standard_normal(2)
+        sweep_nm = OFFSET_NM - weight_n * jacobian.z_sweep + float(noise[0])
+        adduction_nm = -weight_n * jacobian.z_adduction + float(noise[1])
+        tare.update(jacobian.z_sweep, jacobian.z_adduction, sweep_nm, adduction_nm)
+
+
+def swing(count: int = 100) -> list[tuple[float, float]]:
+    """Forward through the air, from minus to plus 30 degrees."""
+    return [(pi / 6.0 * sin(pi * (i / count - 0.5)), 0.2 * cos(pi * i / count)) for i in range(count)]
+
+
+def taken(poses: list[tuple[float, float]], weight_n: float, noise_nm: float = 0.0, seed: int = 1) -> Tare:
+    tare = Tare()
+    hang(tare, poses, weight_n, noise_nm, seed)
+    tare.take()
+    return tare
+
+
+def test_before_any_air_the_zero_is_zero() -> None:
+    assert Tare().zero == Zero(0.0, 0.0, 0.0)
+    assert not isfinite(Tare().drift_n)
+
+
+@given(st.floats(-3.0, 3.0))
+def test_a_weight_and_an_offset_are_found_in_any_pose(weight_n: float) -> None:
+    zero = taken(swing(), weight_n).zero
+    assert zero.weight_n == pytest.approx(weight_n, abs=EXACT)
+    assert zero.sweep_offset_nm == pytest.approx(OFFSET_NM, abs=EXACT)
+    assert zero.std_error_n == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_zero_takes_effect_when_it_is_taken() -> None:
+    tare = Tare()
+    hang(tare, swing(), WEIGHT_N)
+    assert tare.zero == Zero()
+    tare.take()
+    assert tare.zero.weight_n == pytest.approx(WEIGHT_N)
+
+
+def test_the_standard_error_is_that_of_the_weights_scatter() -> None:
+    """A fading mean of MEMORY samples errs by σ/√(2 MEMORY - 1); the doubt is a plain mean's, σ/√MEMORY, and more."""
+    level = [(0.0, 0.1)] * 200
+    per_nm = 1.0 / GEOMETRY.jacobian(0.0, 0.1).z_adduction
+    zeros = [taken(level, WEIGHT_N, NOISE_NM, seed).zero for seed in range(300)]
+    scatter_n = float(np.std([zero.weight_n for zero in zeros]))
+    assert scatter_n == pytest.approx(per_nm * NOISE_NM / sqrt(2 * MEMORY - 1), rel=0.15)
+    told_n = float(np.mean([zero.std_error_n for zero in zeros]))
+    assert told_n == pytest.approx(per_nm * NOISE_NM / sqrt(MEMORY), rel=0.1)
+    assert np.mean([zero.weight_n for zero in zeros]) == pytest.approx(WEIGHT_N, abs=4.0 * scatter_n / sqrt(300))
+
+
+def test_of_few_samples_the_squared_doubt_is_that_of_their_mean() -> None:
+    """σ²/n without bias: the variance is counted about the samples' own mean."""
+    per_nm = 1.0 / GEOMETRY.jacobian(0.0, 0.1).z_adduction
+    squares = [taken([(0.0, 0.1)] * 8, WEIGHT_N, NOISE_NM, seed).zero.std_error_n ** 2 for seed in range(1000)]
+    assert np.mean(squares) == pytest.approx((per_nm * NOISE_NM) ** 2 / 8.0, rel=0.07)  # four sampling errors
+
+
+def test_a_weight_that_is_there_from_the_start_is_no_scatter() -> None:
+    """The first sample's way from nothing to the weight is none either."""
+    zero = taken(swing(FEWEST), 5.0).zero
+    assert zero.weight_n == pytest.approx(5.0)
+    assert zero.std_error_n == pytest.approx(0.0, abs=1e-9)
+
+
+def test_mud_that_drips_off_is_followed() -> None:
+    """The tail of the swing counts: after 3 MEMORY samples the weight before has faded to e⁻³."""
+    tare = Tare()
+    hang(tare, [(0.0, 0.1)] * 100, 2.0)
+    hang(tare, [(0.0, 0.1)] * 3 * MEMORY, 0.5)
+    tare.take()
+    assert 0.5 < tare.zero.weight_n < 0.5 + 1.5 * 0.06
+
+
+@pytest.mark.parametrize("count", range(FEWEST))
+def test_a_stride_with_hardly_any_air_keeps_the_zero_of_the_one_before(count: int) -> None:
+    tare = taken(swing(), WEIGHT_N)
+    before = tare.zero
+    hang(tare, swing()[:count], 5.0)
+    tare.take()
+    assert tare.zero == before
+
+
+def test_what_was_too_little_air_does_not_count_for_the_next_stride() -> None:
+    tare = taken(swing(), WEIGHT_N)
+    hang(tare, swing()[:3], 100.0)
+    tare.take()
+    hang(tare, swing(), 0.3)
+    tare.take()
+    assert tare.zero.weight_n == pytest.approx(0.3)
+
+
+def test_the_drift_is_the_change_from_stride_to_stride() -> None:
+    tare = taken(swing(), 1.5)
+    assert not isfinite(tare.drift_n)
+    for weight_n, drift_n in ((1.1, -0.4), (1.2, 0.1)):
+        hang(tare, swing(), weight_n)
+        tare.take()
+        assert tare.drift_n == pytest.approx(drift_n)
+
+
+def test_the_drift_is_of_the_air_whatever_the_way_down_corrected() -> None:
+    tare = taken(swing(), 1.0)
+    tare.correct(0.5, 0.001)
+    hang(tare, swing(), 1.0)
+    tare.take()
+    assert tare.drift_n == pytest.approx(0.0, abs=EXACT)
+
+
+@given(st.floats(-1.0, 1.0), st.floats(1e-4, 1.0))
+def test_a_correction_is_weighed_by_its_own_error_against_the_zeros(weight_n: float, std_error_n: float) -> None:
+    """Two readings of one weight: the air's with its scatter and CREEP_N, and the way down's."""
+    tare = taken([(0.0, 0.1)] * 50, WEIGHT_N, NOISE_NM)
+    before = tare.zero
+    own = before.std_error_n**2 + CREEP_N**2
+    share = own / (own + std_error_n**2)
+    assert tare.correct(weight_n, std_error_n) == pytest.approx(share * weight_n)
+    assert tare.zero.weight_n == pytest.approx(before.weight_n + share * weight_n)
+    assert tare.zero.std_error_n == pytest.approx((1.0 / own + 1.0 / std_error_n**2) ** -0.5)
+    assert tare.zero.sweep_offset_nm == before.sweep_offset_nm
+
+
+def test_a_correction_of_which_nothing_is_known_changes_no_weight() -> None:
+    tare = taken(swing(), WEIGHT_N)
+    assert tare.correct(0.0, inf) == 0.0
+    assert tare.zero.weight_n == pytest.approx(WEIGHT_N)
+
+
+def test_a_reset_forgets_the_zero_and_what_is_gathered() -> None:
+    tare = taken(swing(), WEIGHT_N)
+    hang(tare, swing(), 5.0)
+    tare.reset()
+    assert tare.zero == Zero()
+    tare.take()
+    assert tare.zero == Zero()
+    assert not isfinite(tare.drift_n)
+
+
+@given(st.lists(st.tuples(st.floats(0.01, 0.2), st.floats()), max_size=20), st.floats(), st.floats(1e-6, inf))
+def test_no_torque_makes_it_raise(rows: list[tuple[float, float]], weight_n: float, std_error_n: float) -> None:
+    tare = Tare()
+    for rise_m, torque_nm in rows:
+        tare.update(-rise_m, rise_m, torque_nm, torque_nm)
+    tare.take()
+    tare.correct(weight_n, std_error_n)
+    tare.update(0.1, 0.1, nan, nan)

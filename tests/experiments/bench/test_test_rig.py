@@ -1,0 +1,259 @@
+"""Whatever goes wrong at the bench ends with idle drives and a sentence; its figures are told as they are."""
+
+from __future__ import annotations
+
+from math import nan
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from control.records import JOINTS, NO_TORQUE
+from drivers.odrive.codec import ERROR_WATCHDOG, AxisState
+from experiments.bench.joint_zero_check import level_pose, turned
+from experiments.bench.operator import AbsentAttendant, AskedAttendant, SimulatedAttendant
+from experiments.bench.reading import Reading, left_out
+from experiments.bench.rig import SimulatedRig
+from experiments.bench.sign_check import MOST_NM, gently, nudged, shown
+from experiments.bench.stroke_tracking import lag_ticks
+from experiments.bench.test_rig import Stand, first_lasting
+from experiments.robot.bench_robot import CLEAR, LEAVE, BenchError
+from firmware_host.configuration.configuration import Configuration
+from tests.bench.bench_table import HEADS, table_lines
+from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, BenchReport, StagedBench, stage_of
+from tests.scripted_person import ScriptedPerson
+
+
+@pytest.fixture
+def rig(configuration: Configuration) -> SimulatedRig:
+    return SimulatedRig(configuration)
+
+
+@pytest.fixture
+def bench(rig: SimulatedRig) -> StagedBench:
+    return StagedBench(Stand(rig, SimulatedAttendant(rig)), BenchReport())
+
+
+def axis_states(rig: SimulatedRig) -> set[AxisState]:
+    return {drive.axis_state for drive in rig.robot.drives}
+
+
+def test_ctrl_c_with_raised_flippers_leaves_the_drives_idle(bench: StagedBench, rig: SimulatedRig) -> None:
+    with pytest.raises(KeyboardInterrupt), bench.stand.raised():
+        assert axis_states(rig) == {AxisState.CLOSED_LOOP}
+        raise KeyboardInterrupt
+    assert axis_states(rig) == {AxisState.IDLE}
+
+
+def test_the_end_idles_the_drives_without_the_loop(bench: StagedBench, rig: SimulatedRig) -> None:
+    bench.stand.arm(lambda held, states: NO_TORQUE)
+    bench.stand.end()
+    rig.wait()
+    assert axis_states(rig) == {AxisState.IDLE}
+
+
+def test_a_fault_ends_a_measurement_with_its_sentence(bench: StagedBench, rig: SimulatedRig) -> None:
+    bench.stand.arm(lambda held, states: NO_TORQUE)
+    rig.robot.restart_drive(1)
+    with pytest.raises(BenchError, match=r"left_adduction.*\."):
+        bench.stand.run_for(1.0)
+
+
+def test_a_robot_that_is_not_idle_is_not_armed_again(bench: StagedBench) -> None:
+    bench.stand.arm(lambda held, states: NO_TORQUE)
+    with pytest.raises(BenchError, match=r"cannot be armed: it is in hold\."):
+        bench.stand.arm()
+
+
+class Asked(AskedAttendant):
+    """With a person who says the same of every fault."""
+
+    def __init__(self, answer: str) -> None:
+        person = ScriptedPerson(answer)
+        super().__init__(person, sure=True)
+        self.asked = person.asked
+
+
+@pytest.mark.parametrize("answer", [CLEAR, LEAVE])
+def test_a_fault_of_before_is_cleared_where_a_person_says_so(rig: SimulatedRig, answer: str) -> None:
+    """No daemon may run beside the bench, so 'mudskipper clear' is not to be had."""
+    rig.robot.drives[1].errors = ERROR_WATCHDOG
+    attendant = Asked(answer)
+    stand = Stand(rig, attendant)
+    if answer == CLEAR:
+        stand.arm(lambda held, states: NO_TORQUE)
+        assert axis_states(rig) == {AxisState.CLOSED_LOOP}
+    else:
+        with pytest.raises(BenchError, match="cannot be armed: The left_adduction drive reports error"):
+            stand.arm()
+        assert rig.robot.drives[1].errors == ERROR_WATCHDOG
+    (question,) = attendant.asked
+    assert "The left_adduction drive reports error" in question and question.endswith("Is the cause gone?")
+
+
+def test_where_nobody_is_there_a_fault_of_before_stands(rig: SimulatedRig) -> None:
+    rig.robot.drives[1].errors = ERROR_WATCHDOG
+    with pytest.raises(BenchError, match="cannot be armed: The left_adduction drive reports error"):
+        Stand(rig, AbsentAttendant()).arm()
+    assert rig.robot.drives[1].errors == ERROR_WATCHDOG
+
+
+def test_a_drive_that_does_not_let_go_is_told(bench: StagedBench, rig: SimulatedRig) -> None:
+    bench.stand.arm(lambda held, states: NO_TORQUE)
+    for port in rig.buses["right"].ports[1:]:
+        port.full = True
+    rig.others.append(lambda _: rig.robot.drives[3]._set_torque(0.0, rig.now_s))  # somebody feeds its watchdog
+    with pytest.raises(BenchError, match="right_adduction: still in closed loop"):
+        bench.stand.let_go()
+
+
+def test_what_holds_gently_never_exceeds_a_tiny_torque(bench: StagedBench) -> None:
+    held = (1.0, -1.0, 0.1, -0.1)
+    assert gently(held, bench.stand.loop.states) == (MOST_NM, -MOST_NM, 0.1, -0.1)
+
+
+def test_where_nobody_is_there_hands_are_not_needed_and_eyes_not_claimed(configuration: Configuration) -> None:
+    stand = Stand(SimulatedRig(configuration), AbsentAttendant())
+    readings = [*level_pose(stand), *turned(stand, "left_sweep"), *shown(stand, "left_sweep")]
+    assert [(reading.left_out, reading.good, reading.value_text) for reading in readings] == [
+        (True, True, "left out")
+    ] * 3
+
+
+def test_what_nobody_was_there_for_is_not_told_as_passed() -> None:
+    report = BenchReport()
+    report.begin(3, "test")
+    report.keep(left_out("left_sweep: turned by hand"))
+    report.end()
+    lines = [line for line, _ in report.lines(brief=False)]
+    assert "stage 3, zeros: passed, without 1 checks that need a person" in lines
+    assert report.as_json["tests"][0]["readings"][0]["left_out"] is True
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_an_encoder_that_counts_against_its_motor_never_closes_a_loop(rig: SimulatedRig, place: int) -> None:
+    """Feedback would be positive there: each joint's nudge ends by itself, and nothing may hold a pose after it."""
+    drive, report = rig.robot.drives[place], BenchReport()
+    measure = drive.measure
+    drive.measure = lambda angle_rad, velocity_rad_s: measure(-angle_rad, -velocity_rad_s)  # type: ignore[method-assign]
+    stand = Stand(rig, SimulatedAttendant(rig))
+    before = rig.robot.plant.angles_rad
+    farthest_rad = 0.0
+    for joint in JOINTS:
+        test = f"test_a_tiny_torque[{joint}]"
+        assert report.stumble(2, test) == ""
+        report.begin(2, test)
+        good = all([reading.good for reading in nudged(stand, joint)])
+        report.worsen(PASSED if good else FAILED, "")
+        report.end()
+        moved = (abs(there - here) for here, there in zip(before, rig.robot.plant.angles_rad, strict=True))
+        farthest_rad = max(farthest_rad, *moved)
+    assert farthest_rad < 0.15
+    assert report.stumble(2, "test_eyes_see[left_sweep]") == (
+        f"test_a_tiny_torque[{JOINTS[place]}] failed: mend that before anything else moves"
+    )
+    assert report.stumble(6, "test_joints_follow_a_slow_stroke") == ""
+
+
+def test_joints_stand_side_by_side_in_the_table() -> None:
+    well = [Reading(f"{joint}: lag", 1.0 + place, "ms", -9.0, 9.0) for place, joint in enumerate(JOINTS)]
+    lines = list(
+        table_lines("stage 6", [*well[:3], well[3]._replace(value=20.0), Reading("load", 35.0, "%", 0.0, 80.0)])
+    )
+    assert [(line.split(), good) for line, good in lines[1:]] == [
+        (["!", "lag", "1", "2", "3", "!20", "-9", "to", "9", "ms"], False),
+        (["load", "35", "0", "to", "80", "%"], True),
+    ]
+    columns = lines[0][0]
+    assert lines[1][0].index("!20") + 3 == columns.index(HEADS[JOINTS[3]]) + len(HEADS[JOINTS[3]])
+    assert lines[2][0].index("35") + 2 == columns.index("robot") + len("robot")
+
+
+def test_a_reading_out_of_its_bounds_fails_with_what_to_do(bench: StagedBench) -> None:
+    bench.report.begin(1, "test")
+    good, bad = Reading("speed", 1.0, "m/s", 0.0, 2.0), Reading("load", 90.0, "%", 0.0, 80.0, "take strangers off")
+    with pytest.raises(pytest.fail.Exception) as failure:
+        bench.check(lambda stand: iter([good, bad]))
+    assert str(failure.value) == "load is 90 %, must be 0 to 80: take strangers off."
+    bench.report.end()
+    assert bench.report.as_json["tests"][0]["readings"] == [good.as_json, bad.as_json]
+
+
+def test_what_could_not_be_measured_is_never_good_and_is_null_in_json() -> None:
+    reading = Reading("delay", nan, "s")
+    assert not reading.good
+    assert reading.value_text == "unknown"
+    assert reading.as_json["value"] is reading.as_json["low"] is None
+
+
+def report_with(*outcomes: str) -> BenchReport:
+    """One test a stage, from the first stage on."""
+    report = BenchReport()
+    for stage, outcome in enumerate(outcomes, 1):
+        report.begin(stage, "test")
+        report.worsen(outcome, "")
+        report.end()
+    return report
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "obstacle"),
+    [
+        ((), "stage 1, wiring, was not passed in this run"),
+        ((PASSED, FAILED), "stage 2, signs, failed"),
+        ((PASSED, SKIPPED), "stage 2, signs, was not passed"),
+        ((PASSED,), "stage 2, signs, was not passed"),
+    ],
+)
+def test_a_stage_waits_for_all_before_it(outcomes: tuple[str, ...], obstacle: str) -> None:
+    assert obstacle in report_with(*outcomes).obstacle(3)
+
+
+def test_a_stage_begins_where_all_before_it_have_passed() -> None:
+    assert report_with(PASSED, PASSED).obstacle(3) == ""
+    assert report_with().obstacle(1) == ""
+
+
+def test_a_stage_that_was_not_done_says_why() -> None:
+    report = report_with(PASSED)
+    report.begin(2, "test")
+    report.worsen(SKIPPED, "interrupted")
+    report.end()
+    lines = [line for line, _ in report.lines(brief=True)]
+    assert lines[:3] == ["stage 1, wiring: passed", "stage 2, signs: skipped: interrupted", "stage 3, zeros: skipped"]
+
+
+def test_nothing_begins_after_a_drive_that_kept_its_torque() -> None:
+    report = report_with(PASSED)
+    report.out_of_hand = "left_sweep: cut the power"
+    assert [report.obstacle(stage) for stage in (1, 2)] == ["left_sweep: cut the power"] * 2
+
+
+def test_what_was_told_first_of_a_test_remains() -> None:
+    report = BenchReport()
+    report.begin(1, "test")
+    report.worsen(FAILED, "first")
+    report.worsen(PASSED, "second")
+    report.end()
+    assert (report.tests[0]["outcome"], report.tests[0]["why"]) == (FAILED, "first")
+
+
+def test_only_files_with_a_number_are_stages() -> None:
+    assert stage_of(Path("tests/bench/test_3_zeros.py")) == 3
+    assert stage_of(Path("tests/bench/test_other.py")) == 0
+
+
+@pytest.mark.parametrize("shift", [-2.0, 0.0, 1.4, 6.0])
+def test_the_lag_of_a_shifted_motion_is_found(shift: float) -> None:
+    ticks = np.arange(600.0)
+    commanded, measured = (np.sin((ticks - late) / 20.0) + 0.3 * np.sin((ticks - late) / 7.0) for late in (0.0, shift))
+    assert lag_ticks(commanded, 0.9 * measured + 0.5) == pytest.approx(shift, abs=0.05)
+
+
+@pytest.mark.parametrize(("flags", "first"), [("1100111", 4), ("0111", 1), ("0110", None), ("", None)])
+def test_what_lasts_begins_where_enough_follow(flags: str, first: int | None) -> None:
+    assert first_lasting([flag == "1" for flag in flags], 3) == first
+
+
+def test_where_nothing_moves_there_is_no_lag() -> None:
+    assert np.isnan(lag_ticks(np.zeros(100), np.zeros(100)))

@@ -1,0 +1,237 @@
+"""The plan of the experiment, and a short piece of it done for real."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from math import isfinite
+from typing import Any
+
+import pytest
+
+import experiments.estimation.evaluation
+from experiments.estimation.evaluation import (
+    FIELD_OF_LAYER,
+    LAYERS,
+    REPEATS,
+    TORQUE,
+    Outcome,
+    Part,
+    Plan,
+    judge,
+    methods_of,
+    report_of,
+    run_part,
+    with_layers,
+)
+from experiments.reports.error_table import COEFFICIENTS, error_rows
+from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING, Setup
+from simulation.mud.clay import clay_of_water
+from simulation.mud.disturbances import LAB, NONE, Disturbances
+from simulation.mud.track import Track
+
+STRONG = clay_of_water(47.6)
+SHORT = Plan(single=(STRONG,), walking=(STRONG,), seeds=1, single_strides=1, walking_strides=2)
+
+
+@cache
+def outcome() -> Outcome:
+    """Two trials: a single flipper of one stride, a walk of two."""
+    return judge(SHORT, lambda done, total: None, processes=1)
+
+
+# the plan
+
+
+def test_without_layers_nothing_is_disturbed() -> None:
+    plan = with_layers(Plan(), ())
+    assert (plan.disturbances, plan.repeats, plan.torque) == (NONE, False, False)
+
+
+def test_with_all_layers_it_is_the_laboratory() -> None:
+    plan = with_layers(Plan(), LAYERS)
+    assert plan == Plan()
+    assert (plan.disturbances, plan.repeats, plan.torque) == (LAB, True, True)
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_one_layer_is_that_layer_alone(layer: str) -> None:
+    plan = with_layers(Plan(), (layer,))
+    field = FIELD_OF_LAYER.get(layer)
+    assert plan.disturbances == (replace(NONE, **{field: getattr(LAB, field)}) if field else NONE)
+    assert (plan.repeats, plan.torque) == (layer == REPEATS, layer == TORQUE)
+    assert plan != with_layers(Plan(), ())
+
+
+def test_a_layer_that_there_is_not_is_named() -> None:
+    with pytest.raises(ValueError, match=r"'fog': must be one of clinging, .*, or none"):
+        with_layers(Plan(), ("noise", "fog"))
+
+
+def test_layers_leave_the_rest_of_the_plan() -> None:
+    plan = with_layers(SHORT, ("noise",))
+    assert replace(plan, disturbances=SHORT.disturbances, repeats=True, torque=True) == SHORT
+
+
+def test_the_plan_is_every_mud_and_seed_and_a_crossing_of_each_seed() -> None:
+    plan = Plan(seeds=3)
+    parts = plan.parts()
+    crossings, alone = [p for p in parts if len(p.muds) > 1], [p for p in parts if len(p.muds) == 1]
+    assert parts[: len(crossings)] == crossings  # the longest first
+    assert [(p.setup, p.seed, p.strides) for p in crossings] == [(WALKING, seed, 24) for seed in (1, 2, 3)]
+    for setup, muds, strides in ((SINGLE, plan.single, 2), (WALKING, plan.walking, 8)):
+        told = {(p.muds[0], p.seed) for p in alone if p.setup == setup and p.strides == strides}
+        assert told == {(mud, seed) for mud in muds for seed in (1, 2, 3)}
+    assert len(alone) == 3 * (5 + 3)
+
+
+def test_crossings_go_both_ways() -> None:
+    plan = Plan(seeds=2)
+    first, second, *_ = plan.parts()
+    assert first.muds == second.muds[::-1]
+
+
+def test_one_mud_alone_has_no_border() -> None:
+    assert {len(part.muds) for part in SHORT.parts()} == {1}
+
+
+def test_on_a_bench_the_methods_are_ours_and_the_papers() -> None:
+    methods = methods_of(SINGLE)
+    assert [(m.name, m.setup, m.with_pose) for m in methods] == [
+        ("default", "single flipper", True),
+        ("paper", "single flipper", True),
+    ]
+    assert all(m.parameters.fixed_base for m in methods)
+    assert [m.parameters.method for m in methods] == ["default", "paper"]
+
+
+def test_a_walk_is_also_judged_with_the_papers_drag_and_without_a_pose() -> None:
+    methods = {(m.name, m.setup): m for m in methods_of(WALKING)}
+    assert list(methods) == [
+        ("default", "walking"),
+        ("paper", "walking"),
+        ("paper compensated", "walking"),
+        ("default", "walking without pose"),
+    ]
+    assert not any(m.parameters.fixed_base for m in methods.values())
+    compensated, blind = methods["paper compensated", "walking"], methods["default", "walking without pose"]
+    assert compensated.parameters.paper_compensation and compensated.parameters.method == "paper"
+    assert not blind.with_pose and blind.parameters.method == "default"
+    assert not methods["paper", "walking"].parameters.paper_compensation
+
+
+# a short one, for real
+
+
+def rows_of(setup: str, coefficient: str) -> dict[str, dict[str, Any]]:
+    """By method."""
+    rows = error_rows(outcome().judged)
+    return {row["method"]: row for row in rows if (row["setup"], row["coefficient"]) == (setup, coefficient)}
+
+
+@pytest.mark.parametrize(
+    ("setup", "coefficient"),
+    [
+        ("single flipper", "k_p"),
+        ("single flipper", "k_s"),
+        ("single flipper", "k_e"),
+        ("walking", "k_p"),
+        ("walking", "k_e"),
+    ],
+)
+def test_the_default_is_closer_to_the_truth_than_the_paper(setup: str, coefficient: str) -> None:
+    rows = rows_of(setup, coefficient)
+    assert rows["default"]["strides"] == rows["paper"]["strides"] == (2 if setup == "single flipper" else 4)
+    assert rows["default"]["median"] < rows["paper"]["median"]
+
+
+def test_where_the_walking_body_moves_the_default_gives_bounds_and_they_hold() -> None:
+    for setup in ("walking", "walking without pose"):
+        row = rows_of(setup, "k_s")["default"]
+        assert row["bounds"] + row["strides"] == 4
+        assert row["bounds"] >= 2
+        assert row["bounds_hold"] == 1.0
+
+
+def test_each_stride_of_each_method_is_judged_once() -> None:
+    judged = outcome().judged
+    assert all(isfinite(each.truth) for each in judged)
+    for setup, methods, strides in (("single flipper", 2, 2), ("walking", 3, 4), ("walking without pose", 1, 4)):
+        told = [each for each in judged if each.setup == setup]
+        assert len(told) == methods * strides * len(COEFFICIENTS)
+    assert {each.mud for each in judged} == {"47.6"}
+    assert outcome().crossings == []
+
+
+def test_progress_counts_all_trials() -> None:
+    shown: list[tuple[int, int]] = []
+    judge(replace(SHORT, single=(), walking_strides=1), lambda done, total: shown.append((done, total)), 1)
+    assert shown == [(1, 1)]
+
+
+def test_a_trial_in_another_process_is_the_same_trial() -> None:
+    part = Part(WALKING, (STRONG,), SHORT.walking_strides, 1)
+    here = run_part(part, SHORT).judged
+    assert repr(here) == repr([each for each in outcome().judged if each.setup.startswith("walking")])
+
+
+def trial_of(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What a part of the plan is simulated with."""
+    asked: dict[str, Any] = {}
+
+    def run_trial(setup: Setup, track: Track, disturbances: Disturbances, strides: int, seed: int, error: float) -> Any:
+        asked.update(setup=setup, disturbances=disturbances, torque_error=error)
+        raise InterruptedError
+
+    monkeypatch.setattr(experiments.estimation.evaluation, "run_trial", run_trial)
+    with pytest.raises(InterruptedError):
+        run_part(Part(WALKING, (STRONG,), 1, 1), plan)
+    return asked
+
+
+@pytest.mark.parametrize(("layers", "period_s", "error"), [((REPEATS,), 0.005, 0.0), ((TORQUE,), 0.0, 0.032)])
+def test_rows_and_torque_constants_are_disturbed_as_asked(
+    layers: tuple[str, ...], period_s: float, error: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = trial_of(with_layers(SHORT, layers), monkeypatch)
+    assert (asked["setup"].row_period_s, asked["torque_error"]) == (period_s, error)
+    assert asked["setup"].gait == WALKING.gait
+    assert asked["disturbances"] == NONE
+
+
+def test_a_walk_over_a_border_tells_how_soon_it_was_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From soft to strong mud after 10 cm: the first stride goes in at l sin 30° = 6 cm, and each carries the body no
+    farther than the arms' 12 cm. In three strides at most, each flipper's crossing is told.
+    """
+    monkeypatch.setattr(experiments.estimation.evaluation, "COMPARTMENT_M", 0.1)
+    soft = clay_of_water(51.2)
+    outcome = run_part(Part(WALKING, (soft, STRONG), 5, 1), with_layers(SHORT, ()))
+    assert outcome.judged == []
+    assert {(each.before, each.after) for each in outcome.crossings} == {("51.2", "47.6")}
+    assert sorted(each.flipper for each in outcome.crossings) == ["left", "right"]
+    assert all(each.strides is not None and each.strides <= 3 for each in outcome.crossings)
+
+
+# the report
+
+
+def keys(rows: Sequence[dict[str, Any]]) -> set[str]:
+    return set().union(*rows)
+
+
+def test_the_report_is_json_with_errors_plates_boundaries_and_settings() -> None:
+    report = json.loads(json.dumps(report_of(SHORT, outcome())))
+    assert set(report) == {"experiment", "errors", "plates", "boundaries", "settings"}
+    assert report["experiment"] == "estimation"
+    assert keys(report["errors"]) >= {"setup", "mud", "coefficient", "method", "median", "p95", "coverage", "strides"}
+    assert report["boundaries"] == []
+    settings = report["settings"]
+    assert (settings["seeds"], settings["torque_error"], settings["repeats"]) == (1, TORQUE_ERROR, True)
+    assert settings["single_strength_pa"] == {"47.6": round(STRONG.strength_pa, 1)}
+
+
+def test_the_settings_are_those_that_were_run() -> None:
+    settings = report_of(with_layers(SHORT, ("noise",)), Outcome([], []))["settings"]
+    assert (settings["torque_error"], settings["repeats"]) == (0.0, False)
+    assert settings["disturbances"]["current_noise_a"] == LAB.current_noise_a
+    assert settings["disturbances"]["clinging_n"] == 0.0

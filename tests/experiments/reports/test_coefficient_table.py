@@ -1,0 +1,211 @@
+"""Coefficients over trials, beside a load cell's, and the files that they come from."""
+
+from __future__ import annotations
+
+import json
+from math import nan, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import t as student_t
+
+from experiments.reports.coefficient_table import (
+    Beside,
+    coefficient_text,
+    error_table,
+    error_text_rows,
+    gathered,
+    load_truth,
+    missing_text,
+    mud_rows,
+    truth_in,
+)
+from experiments.robot.bench_robot import BenchError
+from experiments.trials.mud_names import mud_name
+from tests.experiments.made_up_strides import make_estimate, make_stride
+
+
+def test_trials_make_a_mean_with_its_error_and_scatter() -> None:
+    told = gathered(make_estimate(value) for value in (1.0e6, 1.2e6, 1.4e6))
+    assert told["value"] == pytest.approx(1.2e6)
+    assert told["trials_error"] == pytest.approx(0.2e6 / sqrt(3) * student_t.ppf(0.975, 2) / 1.96, rel=1e-3)
+    assert told["repeatability"] == pytest.approx(1 / 6)
+    assert told["trials"] == [1.0e6, 1.2e6, 1.4e6]
+
+
+def test_what_the_scatter_does_not_show_of_an_estimator_s_doubt_is_shared_by_all_trials() -> None:
+    """Of 10 % in all, trials that scatter by 6 % share 8 %."""
+    scattered = gathered(make_estimate(value, std_error=1e5) for value in (0.94e6, 1e6, 1.06e6))
+    assert scattered["shared_error"] == pytest.approx(8e4)
+    assert scattered["std_error"] ** 2 == pytest.approx(scattered["trials_error"] ** 2 + 8e4**2)
+
+
+def test_trials_that_scatter_more_than_was_foreseen_still_share_the_motors_doubt() -> None:
+    told = gathered(make_estimate(value, std_error=1e4) for value in (0.8e6, 1e6, 1.2e6))
+    assert told["shared_error"] == pytest.approx(0.032e6)
+
+
+def test_two_standard_errors_hold_the_truth_19_times_in_20_where_all_trials_have_one_part_of_their_error_alike() -> (
+    None
+):
+    """Made-up trials, each off by 4 % of its own and by 4 % that all share, and doubted so."""
+    random, held = np.random.default_rng(1), 0
+    for _ in range(1000):
+        values = 1e6 * (1.0 + 0.04 * random.standard_normal() + 0.04 * random.standard_normal(3))
+        told = gathered(make_estimate(float(value), std_error=0.04e6 * sqrt(2.0)) for value in values)
+        held += abs(told["value"] - 1e6) <= 2.0 * told["std_error"]
+    assert 940 <= held <= 995
+
+
+def test_one_trial_has_the_doubt_of_its_own_estimate() -> None:
+    told = gathered([make_estimate(1e6, std_error=7e4)])
+    assert (told["value"], told["std_error"], told["repeatability"]) == (1e6, 7e4, None)
+    assert (told["trials_error"], told["shared_error"]) == (None, None)
+    assert coefficient_text(told) == "1.000 ± 0.070"
+
+
+def test_bounds_do_not_mix_with_values() -> None:
+    mixed = gathered([make_estimate(1e6), make_estimate(9e6, at_least=True)])
+    assert (mixed["value"], mixed["at_least"], mixed["bounds"]) == (1e6, False, 1)
+    bounds = gathered(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
+    assert (bounds["value"], bounds["at_least"], bounds["bounds"]) == (2e6, True, 3)
+    assert coefficient_text(bounds).startswith("≥ 2.00")
+
+
+def strides_in_mud_that_gives_way_at(limit: float) -> list[dict[str, Any]]:
+    """Of 1e6 in truth, each told wrong by 5 %: where it resists more than `limit` a stride tells no more than that."""
+    errors = 0.05 * np.random.default_rng(1).standard_normal(200)
+    return [
+        make_estimate(1e6 * (1.0 + error)) if 1e6 * (1.0 + error) < limit else make_estimate(limit, at_least=True)
+        for error in errors.tolist()
+    ]
+
+
+def test_a_few_strides_in_which_mud_gave_way_that_mostly_holds_do_not_speak_for_it() -> None:
+    """Alone they would tell 7 % too little, and their scatter would not show it."""
+    strides = strides_in_mud_that_gives_way_at(0.95e6)
+    alone = gathered(each for each in strides if not each["at_least"])
+    assert alone["value"] + 2.0 * alone["trials_error"] < 1e6
+    told = gathered(strides)
+    assert (told["value"], told["at_least"], told["std_error"]) == (0.95e6, True, None)
+
+
+def test_mud_that_gives_way_in_most_strides_is_known_by_them() -> None:
+    told = gathered(strides_in_mud_that_gives_way_at(1.05e6))
+    assert not told["at_least"]
+    assert told["bounds"] > 10
+    assert abs(told["value"] - 1e6) < 2.0 * told["std_error"]
+
+
+def test_a_median_of_bounds_has_no_error() -> None:
+    bounds = gathered(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
+    assert bounds["std_error"] is bounds["trials_error"] is bounds["shared_error"] is None
+    assert coefficient_text(bounds) == "≥ 2.000"
+
+
+def test_a_trial_that_does_not_tell_its_doubt_is_not_taken_for_exact() -> None:
+    doubts = (1e5, nan, 1e5)
+    told = gathered(make_estimate(1e6 + k, std_error=doubt) for k, doubt in enumerate(doubts))
+    assert told["shared_error"] == pytest.approx(1e5, rel=1e-3)
+
+
+def test_what_is_not_valid_counts_for_nothing_but_is_told() -> None:
+    told = gathered([make_estimate(1e6), make_estimate(None, reason="too short")])
+    assert (told["value"], told["not_valid"]) == (1e6, ["too short"])
+    nothing = gathered([make_estimate(None, reason="too short")])
+    assert (nothing["value"], nothing["std_error"], nothing["trials"]) == (None, None, [])
+    assert coefficient_text(nothing) == "-"
+
+
+@pytest.mark.parametrize("written", ["47.6", "47.6 %", "47.6%", "w = 47.6 %", "w=47.6"])
+def test_a_water_content_is_the_same_however_it_is_written(written: str) -> None:
+    assert mud_name(written) == "47.6"
+
+
+def test_other_names_stay_as_they_are() -> None:
+    assert mud_name("kaolin 2") == "kaolin 2"
+
+
+# a load cell's file
+
+
+def write_truth(folder: Path, contents: Any) -> Path:
+    path = folder / "summary.json"
+    path.write_text(contents if isinstance(contents, str) else json.dumps(contents))
+    return path
+
+
+def test_a_mud_is_found_however_its_name_is_written(tmp_path: Path) -> None:
+    muds = [{"mud": "48.60", "k_p": {"value": 1e6}}, {"mud": "Pond", "k_p": {"value": 2e6}}]
+    truth = load_truth(write_truth(tmp_path, {"muds": muds}))
+    assert truth_in(truth, "48.6") == truth_in(truth, "w = 48.600 %") == {"k_p": 1e6}
+    assert truth_in(truth, "pond") == {"k_p": 2e6}
+    assert truth_in(truth, "48.61") == {}
+    assert missing_text(truth, ["48.6", "pond", "48.61"]).endswith("says nothing of 48.61 %.")
+
+
+def test_a_summary_is_read_by_mud_and_coefficient_but_for_bounds(tmp_path: Path) -> None:
+    firm = {"mud": "47.6 %", "k_p": {"value": 1e6}, "k_s": {"value": None}, "k_e": {"value": 3e6, "at_least": True}}
+    muds = [firm, {"mud": "soft", "k_e": {"value": 2e6, "at_least": False}}]
+    assert load_truth(write_truth(tmp_path, {"muds": muds})) == {"47.6": {"k_p": 1e6}, "soft": {"k_e": 2e6}}
+    assert load_truth(tmp_path) == load_truth(tmp_path / "summary.json")
+
+
+@pytest.mark.parametrize(
+    "contents",
+    [
+        "no json",
+        "[]",
+        {"other": []},
+        {"muds": [1]},
+        {"muds": [{"k_p": {"value": 1.0}}]},
+        {"muds": [{"mud": "a", "k_p": {"value": -1.0}}]},
+        {"muds": [{"mud": "a", "k_p": {"value": "much"}}]},
+        {"muds": [{"mud": "a", "k_p": 3.0}]},
+    ],
+)
+def test_another_file_is_refused_with_what_to_give(tmp_path: Path, contents: Any) -> None:
+    with pytest.raises(BenchError, match=r"give the summary\.json of 'mudskipper experiment loadcell'"):
+        load_truth(write_truth(tmp_path, contents))
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BenchError, match=r"none\.json: No such file"):
+        load_truth(tmp_path / "none.json")
+
+
+# tables
+
+
+def test_errors_are_those_of_values_and_bounds_are_told_as_bounds() -> None:
+    truth = {"k_p": 1e6, "k_s": 1e6, "k_e": None}
+    strides = [
+        make_stride(k_p=make_estimate(1.1e6), k_s=make_estimate(0.8e6, at_least=True)),
+        make_stride(k_p=make_estimate(1.3e6), k_s=make_estimate(0.6e6, at_least=True)),
+    ]
+    errors = error_table((Beside("49.5", "default", stride, truth) for stride in strides), "walking")
+    (row,) = error_text_rows(errors)[1:]
+    assert row == ["49.5 %", "default", "20 % (+20 %)", "≥ 70 % of it (2)", "-", "2"]
+
+
+def test_a_method_that_says_nothing_of_a_coefficient_has_no_row_of_it() -> None:
+    stride = make_stride(k_p=None, k_e=None)
+    errors = error_table([Beside("49.5", "law", stride, {"k_p": 1e6, "k_s": 1e6, "k_e": 1e6})], "walking")
+    assert [row["coefficient"] for row in errors] == ["k_s"]
+
+
+def test_a_table_of_muds_has_the_load_cell_beside() -> None:
+    told = gathered([make_estimate(1.5e6), make_estimate(1.7e6)])
+    muds = [{"mud": "47.6", "k_p": told, "k_s": told, "k_e": told, "truth": {"k_p": 1.55e6}}]
+    head, row = mud_rows(muds)
+    assert len(head) == len(row)
+    assert row[:4] == ["47.6 %", "1.600 ± 0.65 ± 0.051", "8.8 % of 2", "1.550"]
+    assert row[6] == "-"
+
+
+def test_methods_of_one_mud_stand_together() -> None:
+    rows = [Beside(mud, method, make_stride(), {"k_p": 1e6}) for method in ("one", "two") for mud in ("b", "a")]
+    table = error_text_rows(error_table(rows, "walking"))
+    assert [row[:2] for row in table[1:]] == [["b", "one"], ["b", "two"], ["a", "one"], ["a", "two"]]

@@ -1,0 +1,103 @@
+"""A report is one page that needs nothing beside it, and its numbers and pictures apart."""
+
+from __future__ import annotations
+
+import base64
+import errno
+import json
+import os
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from experiments.reports.report_page import Figure, Section, write_report
+
+DOT = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR4nGNgYGD4DwABBAEAwS2OUAAAAABJRU5ErkJggg=="
+)
+
+
+def draw_dot(path: Path) -> None:
+    path.write_bytes(DOT)
+
+
+SECTION = Section(
+    "Torque < force & such",
+    "First.\n\nSecond: k_p > 1.",
+    "a  b < c",
+    [["mud", "k_p"], ["48.5 %", "1.20 <N/cm³>"]],
+    [Figure("dots", 'A "dot" & more', draw_dot)],
+)
+
+
+class Elements(HTMLParser):
+    """Counts what is opened and closed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in ("meta", "img"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def test_the_page_holds_its_pictures_and_asks_for_nothing(tmp_path: Path) -> None:
+    log = tmp_path / "a.mcap"
+    written = write_report(tmp_path / "out", {"experiment": "x", "value": 1.5}, "Title", [SECTION], [log])
+    assert [path.name for path in written] == ["report.html", "summary.json", "dots.png", "a.mcap"]
+    page = written[0].read_text(encoding="utf-8")
+    assert base64.b64encode(DOT).decode() in page
+    assert not re.findall(r"(?:src|href)=\"(?!data:)", page)
+    assert json.loads(written[1].read_text(encoding="utf-8")) == {"experiment": "x", "value": 1.5}
+    assert written[2].read_bytes() == DOT
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_a_disk_that_fills_up_leaves_the_report_that_was_there_and_nothing_cut(
+    place: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Up to numbers, picture or page: what is written is on the disk up to a half."""
+    before = {path: path.read_bytes() for path in write_report(tmp_path, {"k": 1}, "Before", [SECTION])}
+    room, write = [place], Path.write_bytes
+
+    def fill(path: Path, contents: bytes) -> int:
+        room[0] -= 1
+        if room[0] >= 0:
+            return write(path, contents)
+        write(path, contents[: len(contents) // 2])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    monkeypatch.setattr(Path, "write_bytes", fill)
+    monkeypatch.setattr(Path, "write_text", lambda path, text, **_: fill(path, text.encode()))
+    with pytest.raises(OSError, match="No space left"):
+        write_report(tmp_path, {"k": 2}, "After", [SECTION])
+    assert sorted(tmp_path.iterdir()) == sorted(before)
+    assert (tmp_path / "report.html").read_bytes() == before[tmp_path / "report.html"]
+    assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8")) == {"k": 1 if place == 0 else 2}
+    assert (tmp_path / "dots.png").read_bytes() == DOT
+
+
+def test_whatever_is_told_is_shown_as_it_is(tmp_path: Path) -> None:
+    page = write_report(tmp_path, {}, "A < B", [SECTION])[0].read_text(encoding="utf-8")
+    elements = Elements()
+    elements.feed(page)
+    assert not elements.open
+    for text in ("A < B", "Torque < force & such", "Second: k_p > 1.", "a  b < c", "1.20 <N/cm³>", 'A "dot" & more'):
+        assert text in elements.text
+
+
+def test_numbers_that_are_none_are_null_for_every_reader_of_json(tmp_path: Path) -> None:
+    report = {"experiment": "x", "k": [1.0, float("nan")], "deep": {"sd": float("inf"), "n": (2, float("nan"))}}
+    _, summary, *_ = write_report(tmp_path, report, "Odd \udcff name", [])
+    strict = json.loads(summary.read_text(encoding="utf-8"), parse_constant=lambda name: pytest.fail(name))
+    assert strict == {"experiment": "x", "k": [1.0, None], "deep": {"sd": None, "n": [2, None]}}

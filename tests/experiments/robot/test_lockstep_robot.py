@@ -1,0 +1,252 @@
+"""An experiment operates a simulated robot through the daemon's calls, and finds in the log what it did."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from control.controller import MotionParameters
+from control.modes import Mode
+from control.monitors.joint_monitor import FaultBounds
+from control.records import JOINTS
+from drivers.fault_injection.failures import Failures
+from experiments.robot.bench_errors import EndedError
+from experiments.robot.bench_robot import (
+    CLEAR,
+    LEAVE,
+    BenchError,
+    arm,
+    disarm,
+    face_faults,
+    move,
+    require_hold,
+    strides_since,
+    told_by,
+    walk,
+)
+from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from firmware_host.log.file_recorder import FileRecorder
+from firmware_host.log_reading.log_reader import read_log
+from firmware_host.operator.status_client import CallRefusedError
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Iterator[LockstepRobot]:
+    configuration = simulated_configuration()
+    recorder = FileRecorder(tmp_path / "log.mcap", configuration)
+    track, failures = Track([(5.0, MUDS["48.5"])]), Failures(configuration.bus)
+    made = LockstepRobot(Lockstep(configuration, track, recorder=recorder, failures=failures), recorder)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+def test_a_walk_comes_back_with_its_strides_and_its_rows(robot: LockstepRobot, tmp_path: Path) -> None:
+    arm(robot)
+    walked = walk(robot, 0.03, 2)
+    assert [(stride["flipper"], stride["index"]) for stride in walked.strides] == [
+        ("left", 0), ("right", 0), ("left", 1), ("right", 1),
+    ]  # fmt: skip
+    rows = robot.record(walked.from_s, walked.to_s)
+    assert len(rows.strides) == 4
+    assert np.sum(rows.ticks["mode"] == Mode.WALKING) > 0.9 * 380 * 2 * 2.0
+    assert walked.from_s <= rows.ticks["stamp_s"][0] and rows.ticks["stamp_s"][-1] <= walked.to_s
+    disarm(robot)
+    (log,) = robot.copy_logs(tmp_path / "..")
+    assert read_log(log).complete
+
+
+def test_a_joint_is_where_it_was_moved_to(robot: LockstepRobot) -> None:
+    arm(robot)
+    move(robot, {"right_adduction": 0.2})
+    robot.wait(0.5)
+    assert robot.call("status")["drives"][3]["angle_rad"] == pytest.approx(0.2, abs=0.02)
+
+
+def test_a_walk_that_somebody_else_stops_is_not_taken_for_a_whole_one(
+    robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm(robot)
+    wait, stopped_s = robot.wait, robot.lockstep.now_s + 5.0
+
+    def stopping(duration_s: float) -> None:
+        wait(duration_s)
+        if robot.lockstep.now_s > stopped_s and robot.call("status")["mode"] == "walking":
+            robot.call("stop")
+
+    monkeypatch.setattr(robot, "wait", stopping)
+    with pytest.raises(BenchError, match="ended early, after [1-3] of 4 strides"):
+        walk(robot, 0.03, 4)
+
+
+def test_a_robot_that_was_held_too_long_tells_why_it_let_go(robot: LockstepRobot) -> None:
+    robot.lockstep.loop.controller.motion = MotionParameters(longest_hold_s=1.0)
+    arm(robot)
+    robot.wait(0.8)
+    move(robot, {"right_adduction": 0.2})  # somebody needs it
+    robot.wait(0.8)
+    require_hold(robot.call("status"))
+    robot.wait(0.3)
+    with pytest.raises(BenchError, match="held for .* without a request: torque went off by itself"):
+        move(robot, {"right_adduction": 0.1})
+
+
+def test_a_fault_that_asks_for_a_still_pose_ends_a_move(tmp_path: Path) -> None:
+    configuration = replace(simulated_configuration(), faults=FaultBounds())
+    recorder, failures = FileRecorder(tmp_path / "log.mcap", configuration), Failures(configuration.bus)
+    lockstep = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=recorder, failures=failures)
+    robot = LockstepRobot(lockstep, recorder)
+    arm(robot)
+    robot.call("move", right_sweep_rad=0.6)
+    robot.wait(0.1)
+    lockstep.fail("left_sweep.current", "off", 0.1)
+    robot.wait(0.016)
+    status = robot.call("status")
+    assert not status["moving"] and status["mode"] == "hold"
+    assert "stopped on their way: " in status["notice"] and "current" in status["notice"]
+    with pytest.raises(CallRefusedError, match="current"):
+        robot.call("move", right_sweep_rad=0.6)
+    robot.close()
+
+
+def test_whatever_the_robot_does_arming_leads_to_hold(robot: LockstepRobot) -> None:
+    arm(robot)
+    robot.call("walk", depth_m=0.03)
+    robot.wait(3.0)
+    robot.call("stop")
+    arm(robot)
+    assert robot.call("status")["mode"] == "hold"
+
+
+def test_the_daemon_s_sentence_comes_back_where_it_refuses(robot: LockstepRobot) -> None:
+    with pytest.raises(CallRefusedError):
+        robot.call("walk", depth_m=0.03)
+    with pytest.raises(BenchError, match="no longer holds its pose"):
+        move(robot, {"right_adduction": 0.2})
+
+
+def test_a_fault_that_ends_a_walk_is_told_in_its_own_words(
+    robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm(robot)
+    pulled_s = robot.lockstep.now_s + 2.0
+
+    def wait(duration_s: float) -> None:
+        if robot.lockstep.now_s > pulled_s:
+            robot.lockstep.robot.restart_drive(JOINTS.index("right_sweep"))
+        robot.lockstep.run_for(duration_s)
+
+    monkeypatch.setattr(robot, "wait", wait)
+    with pytest.raises(BenchError, match="the walk ended early: stopped by .*right_sweep"):
+        walk(robot, 0.03, 1)
+
+
+class Decided:
+    """A Person who says the same of every fault."""
+
+    def __init__(self, answer: str) -> None:
+        self.answer = answer
+        self.asked: list[str] = []
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        assert set(answers) == {CLEAR, LEAVE} and next(iter(answers)) == CLEAR  # which Willing takes
+        self.asked.append(question)
+        meanwhile()
+        return self.answer
+
+    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
+        raise AssertionError("no number is wanted")
+
+    def tell(self, sentence: str) -> None: ...
+
+
+@pytest.fixture
+def faulty(robot: LockstepRobot) -> LockstepRobot:
+    """In FAULT: a drive was restarted under torque, some seconds ago."""
+    arm(robot)
+    robot.lockstep.robot.restart_drive(JOINTS.index("right_sweep"))
+    robot.wait(3.0)
+    assert robot.call("status")["mode"] == "fault"
+    return robot
+
+
+def test_a_fault_is_cleared_where_a_person_says_so(faulty: LockstepRobot) -> None:
+    person = Decided(CLEAR)
+    arm(faulty, person)
+    assert faulty.call("status")["mode"] == "hold"
+    (question,) = person.asked
+    assert question.startswith("The robot is in FAULT:\n") and "right_sweep" in question and "(for 4 s)\n" in question
+
+
+def test_a_fault_that_a_person_leaves_ends_the_experiment_and_stands(faulty: LockstepRobot) -> None:
+    with pytest.raises(EndedError, match="the fault stands; when its cause is gone, 'mudskipper clear'"):
+        arm(faulty, Decided(LEAVE))
+    assert faulty.call("status")["mode"] == "fault"
+
+
+def test_where_nobody_is_there_a_fault_stands(faulty: LockstepRobot) -> None:
+    with pytest.raises(BenchError, match="(?s)The robot is in FAULT:.*right_sweep.*'mudskipper clear'"):
+        arm(faulty)
+    assert faulty.call("status")["mode"] == "fault"
+
+
+def test_a_fault_that_comes_back_is_cleared_three_times_at_most(
+    faulty: LockstepRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    call, person = faulty.call, Decided(CLEAR)
+    monkeypatch.setattr(faulty, "call", lambda method, **params: None if method == "clear" else call(method, **params))
+    with pytest.raises(BenchError, match="the fault comes back: The robot is in FAULT"):
+        face_faults(faulty, person)
+    assert len(person.asked) == 3
+
+
+def test_of_what_is_over_by_itself_nobody_is_asked(robot: LockstepRobot) -> None:
+    robot.wait(1.0)
+    robot.lockstep.fail("left_sweep.position", "off", 2.0)
+    robot.wait(1.9)
+    assert any(fault["blocks_arming"] for fault in robot.call("status")["faults"])
+    person = Decided(LEAVE)
+    arm(robot, person)
+    assert person.asked == [] and robot.call("status")["mode"] == "hold"
+
+
+@pytest.mark.parametrize(("kept", "whole"), [(45, True), (44, False), (10, False)])
+def test_strides_that_the_daemon_no_longer_keeps_are_not_passed_over(
+    robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch, kept: int, whole: bool
+) -> None:
+    strides = [{"number": number} for number in range(5, 50)][-kept:]
+    tell = lambda method, since: [stride for stride in strides if stride["number"] >= since][:20]  # noqa: E731
+    monkeypatch.setattr(robot, "call", tell)
+    if whole:
+        assert strides_since(robot, 5) == strides
+    else:
+        with pytest.raises(BenchError, match="more strides than the daemon keeps"):
+            strides_since(robot, 5)
+
+
+def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) -> None:
+    arm(robot)
+    robot.close()
+    log = robot.record(0.0, 1e9)
+    assert log.complete and log.ticks["mode"][-1] == Mode.IDLE
+
+
+@pytest.mark.parametrize(
+    ("mode", "notice", "told"),
+    [
+        ("idle", "", "its torque was switched off"),
+        ("idle", "the lease was lost", "the lease was lost"),
+        ("fault", "", "The left_sweep joint moves."),
+    ],
+)
+def test_why_a_robot_stopped_is_told_by_its_cause(mode: str, notice: str, told: str) -> None:
+    fault = {"sentence": "The left_sweep joint moves."}
+    assert told_by({"mode": mode, "notice": notice, "fault": fault}) == told

@@ -1,0 +1,219 @@
+"""The truth of a stride against the clay's own numbers, worked out by hand for an upright plate, and along the arc.
+
+At the depth z, with the edge's area A and the plate's girth G, the rate factor g and the strength s_u,
+
+    down  F = g s_u (5.14 A + 0.25 G z)        up  F = g s_u (9 A min(z/1 cm, 1) + 0.25 G z)
+
+and sideways N_p s_u on the face. k is the least-squares slope of F against V = A z, or F over ∫ζ dA.
+"""
+
+from dataclasses import replace
+from math import cos, hypot, isfinite, nan, radians, sin
+from typing import Any
+
+import numpy as np
+import pytest
+
+from control.geometry import FlipperGeometry
+from estimation.mud import EstimationParameters
+from experiments.trials.load_cell_truth import (
+    PAPER_SPEED_M_S,
+    REVERSAL_SHARE,
+    LoadCellTruth,
+    TrueCoefficients,
+    load_cell_truth,
+)
+from experiments.trials.trial import WALKING, run_trial, strides_of
+from simulation.body.reference_sensor import StrideTruth, StrokeTruth
+from simulation.mud.clay import (
+    ADHESION,
+    BEARING_FACTOR,
+    DEEP_FACTOR,
+    MATLOCK_J,
+    SUCTION_FADE_M,
+    UNIT_WEIGHT_N_M3,
+    Clay,
+    clay_of_water,
+    rate_factor,
+)
+from simulation.mud.disturbances import NONE
+from simulation.mud.track import Track
+
+GEOMETRY = FlipperGeometry()
+EDGE_M2 = GEOMETRY.plate_width_m * GEOMETRY.plate_thickness_m
+GIRTH_M = 2.0 * (GEOMETRY.plate_width_m + GEOMETRY.plate_thickness_m)
+CLAY = clay_of_water(49.5)
+DEPTH_M, SPEED_M_S = 0.03, 0.2
+NEVER = StrokeTruth(nan, nan, nan, nan, nan, nan)
+
+
+def stroke(
+    sweep_rad: float = 0.0, adduction_rad: float = 0.0, deepest_m: float = DEPTH_M, speed_m_s: float = SPEED_M_S
+) -> StrokeTruth:
+    return StrokeTruth(sweep_rad, adduction_rad, deepest_m, speed_m_s, 0.05, 0.9 * deepest_m)
+
+
+def stride(clay: Clay = CLAY, **changes: Any) -> StrideTruth:
+    return replace(StrideTruth("left", 0, clay, 0.0, stroke(), stroke(), stroke()), **changes)
+
+
+def with_stroke(name: str, of: StrokeTruth) -> StrideTruth:
+    changes: dict[str, Any] = {name: of}
+    return stride(**changes)
+
+
+def truth(of: StrideTruth, relaxation: float = 0.0, hold_s: float = 0.0) -> LoadCellTruth:
+    return load_cell_truth(of, GEOMETRY, relaxation, hold_s)
+
+
+def slope(depths_m: np.ndarray, forces_n: np.ndarray) -> float:
+    volumes = EDGE_M2 * depths_m
+    return float(volumes @ forces_n / (volumes @ volumes))
+
+
+# the closed law
+
+
+@pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(51.2)])
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.05])
+def test_penetration_of_an_upright_plate_is_bearing_and_adhesion(depth_m: float, clay: Clay) -> None:
+    """To 1 %: along the plate mud yields after a millimetre, in which it bears less."""
+    z = np.linspace(0.0, depth_m, 2001)
+    forces_n = rate_factor(SPEED_M_S) * clay.strength_pa * (BEARING_FACTOR * EDGE_M2 + ADHESION * GIRTH_M * z)
+    told = truth(stride(clay, insertion=stroke(deepest_m=depth_m)))
+    assert told.upright.k_p == pytest.approx(slope(z, forces_n), rel=0.01)
+
+
+@pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(51.2)])
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.05])
+def test_extraction_of_an_upright_plate_is_suction_and_adhesion(depth_m: float, clay: Clay) -> None:
+    """To 0.2 %, steps of the carrier: over the last three quarters all mud has turned."""
+    z = np.linspace(0.0, (1.0 - REVERSAL_SHARE) * depth_m, 2001)
+    suction = DEEP_FACTOR * EDGE_M2 * np.minimum(z / SUCTION_FADE_M, 1.0)
+    forces_n = rate_factor(SPEED_M_S) * clay.strength_pa * (suction + ADHESION * GIRTH_M * z)
+    told = truth(stride(clay, extraction=stroke(deepest_m=depth_m)))
+    assert told.upright.k_e == pytest.approx(slope(z, forces_n), rel=2e-3)
+
+
+@pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(51.2)])
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.05])
+def test_shear_of_an_upright_plate_is_the_pressure_on_its_face(depth_m: float, clay: Clay) -> None:
+    """To rounding: once it has yielded the mud bears what the clay's sideways law says, at the stance's mean depth."""
+    mean_m = 0.9 * depth_m
+    force_n = rate_factor(SPEED_M_S) * clay.lateral_n(mean_m, GEOMETRY.plate_width_m)
+    told = truth(stride(clay, stance=stroke(deepest_m=depth_m)))
+    assert told.upright.k_s == pytest.approx(force_n / (GEOMETRY.plate_width_m * mean_m**2 / 2.0), rel=1e-6)
+
+
+def test_firmer_mud_is_so_in_proportion_along_the_plate() -> None:
+    """Sideways the weight of the mud bears too, whatever its strength."""
+    soft, firm = (truth(stride(Clay("", strength_pa))).upright for strength_pa in (1000.0, 2000.0))
+    assert firm.k_p == pytest.approx(2.0 * soft.k_p)
+    assert firm.k_e == pytest.approx(2.0 * soft.k_e)
+    assert 1.5 * soft.k_s < firm.k_s < 2.0 * soft.k_s
+
+
+@pytest.mark.parametrize("name", ["insertion", "stance", "extraction"])
+def test_each_coefficient_is_of_its_own_strokes_speed(name: str) -> None:
+    slow, quick = (truth(with_stroke(name, stroke(speed_m_s=speed_m_s))).upright for speed_m_s in (0.05, 0.8))
+    grip = rate_factor(0.8) / rate_factor(0.05)
+    ratios = [b / a for a, b in zip(slow, quick, strict=True)]
+    place = ("insertion", "stance", "extraction").index(name)
+    assert ratios.pop(place) == pytest.approx(grip, rel=0.01)  # the carrier's steps
+    assert ratios == [1.0, 1.0]
+
+
+# the flipper's own way
+
+
+SWEEP_RAD = radians(30.0)
+
+
+def leaning(depth_m: float = DEPTH_M) -> StrokeTruth:
+    return stroke(SWEEP_RAD, GEOMETRY.adduction_rad(SWEEP_RAD, depth_m / 2.0), depth_m)
+
+
+def arc_row(depth_m: float) -> tuple[float, float]:
+    """By hand, each piece by its own way per radian of adduction, (l + u) cos α along the plate and (h - s) cos α
+    outward: the leverage of the submerged volume, and the moment of edge, narrow sides and adhesion.
+    """
+    lift_rad = GEOMETRY.adduction_rad(SWEEP_RAD, depth_m)
+    u, s = np.meshgrid(np.linspace(-0.5, 0.5, 41) * GEOMETRY.plate_width_m, np.linspace(0.0, 0.07, 281))
+    depths_m = depth_m - u * cos(SWEEP_RAD) * sin(lift_rad) - s * cos(lift_rad)
+    piece_m2 = np.where(depths_m > 0.0, (GEOMETRY.plate_width_m / 41) * (0.07 / 281), 0.0)
+    along_m = (GEOMETRY.flipper_length_m + u) * cos(SWEEP_RAD)
+    outward_m = (GEOMETRY.drop_m - s) * cos(SWEEP_RAD)
+    thickness_m = GEOMETRY.plate_thickness_m
+    factor = np.minimum(3.0 + (UNIT_WEIGHT_N_M3 / CLAY.strength_pa + MATLOCK_J / thickness_m) * depths_m, DEEP_FACTOR)
+    rows_m2 = piece_m2 * thickness_m / GEOMETRY.plate_width_m
+    sticking = ADHESION * (2.0 * piece_m2 + rows_m2 * 2.0) * np.hypot(along_m, outward_m)
+    wet_m2 = EDGE_M2 * np.mean(piece_m2[0] > 0.0)
+    bearing = BEARING_FACTOR * wet_m2 * np.mean(along_m[0][piece_m2[0] > 0.0])
+    moment = bearing + np.sum(factor * rows_m2 * np.abs(outward_m)) + np.sum(sticking)
+    area_m2 = np.sum(piece_m2)
+    centre_m = [np.sum(piece_m2 * each) / area_m2 for each in (along_m, outward_m)]
+    return thickness_m * area_m2 * hypot(*centre_m), rate_factor(SPEED_M_S) * CLAY.strength_pa * moment
+
+
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.045])
+def test_along_the_flippers_arc_penetration_is_of_edge_sides_and_adhesion(depth_m: float) -> None:
+    """To 2 %: mud yields after a millimetre. At no depth is the load of the face in it."""
+    told = truth(stride(insertion=leaning(depth_m))).leaning.k_p
+    moments_m4, moments_nm = np.array([arc_row(z) for z in np.linspace(0.0005, depth_m, 60)]).T
+    assert told == pytest.approx(moments_m4 @ moments_nm / (moments_m4 @ moments_m4), rel=0.02)
+
+
+@pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(53.1)])
+@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.04, 0.05])
+def test_at_any_depth_the_flippers_way_and_the_upright_plates_tell_nearly_the_same(depth_m: float, clay: Clay) -> None:
+    """Straight down in the mean attitude the leaning plate's face bears a part: at 5 cm k_p was a third more."""
+    told = truth(stride(clay, insertion=leaning(depth_m), extraction=leaning(depth_m)))
+    assert 1.0 < told.leaning.k_p / told.upright.k_p < 1.07
+    assert 0.95 < told.leaning.k_e / told.upright.k_e < 1.0
+
+
+def test_the_surface_may_lie_below_its_nominal_height() -> None:
+    """The plate leans more there, and nothing else."""
+    told = [truth(stride(insertion=leaning(), surface_m=surface_m)).leaning.k_p for surface_m in (0.0, 0.003)]
+    assert told[1] == pytest.approx(told[0], rel=0.02)
+    assert told[1] != told[0]
+
+
+@pytest.mark.parametrize("depth_m", [0.03, 0.05])
+def test_what_a_walk_says_of_k_p_holds_the_truth_at_any_depth(depth_m: float) -> None:
+    setup = replace(WALKING, row_period_s=0.0, depth_m=depth_m)
+    walk = run_trial(setup, Track([(10.0, clay_of_water(53.1))]), NONE, 2, 1)
+    truths = {(each.flipper, each.index): truth(each).leaning.k_p for each in walk.truths}
+    told = strides_of(walk, EstimationParameters())
+    assert len(told) == 4
+    for each in told:
+        assert abs(each.k_p.value - truths[each.flipper, each.index]) < 1.96 * each.k_p.std_error
+
+
+def test_in_stance_the_plate_is_square_to_its_way() -> None:
+    """The sweep angle turns through zero: only the lean of the adduction is the flipper's."""
+    turned = stroke(sweep_rad=0.3, adduction_rad=-0.3)
+    assert truth(stride(stance=turned)).leaning.k_s == truth(stride(stance=turned._replace(sweep_rad=0.0))).leaning.k_s
+    assert truth(stride(stance=turned)).leaning.k_s != truth(stride(stance=turned)).upright.k_s
+
+
+# strokes that did not happen
+
+
+@pytest.mark.parametrize(("name", "place"), [("insertion", 0), ("stance", 1), ("extraction", 2)])
+@pytest.mark.parametrize("gone", [NEVER, stroke(deepest_m=0.0), stroke(deepest_m=-0.01)])
+def test_a_stroke_that_did_not_happen_has_no_coefficient(name: str, place: int, gone: StrokeTruth) -> None:
+    for told in truth(with_stroke(name, gone)):
+        assert isinstance(told, TrueCoefficients)
+        assert [isfinite(k) for k in told] == [i != place for i in range(3)]
+
+
+def test_a_plate_that_never_slipped_is_dragged_at_the_papers_speed() -> None:
+    held = truth(stride(stance=stroke(speed_m_s=nan)))
+    assert held.leaning.k_s == truth(stride(stance=stroke(speed_m_s=PAPER_SPEED_M_S))).leaning.k_s
+
+
+def test_relaxation_in_a_hold_is_forgotten_on_the_way_up() -> None:
+    """It takes the load that holds the plate up at rest; mud that holds it down has to be sheared anew anyway."""
+    at_once, held = truth(stride(), 0.13, 0.0).leaning.k_e, truth(stride(), 0.13, 3.0).leaning.k_e
+    assert held == pytest.approx(at_once, rel=1e-3)  # 7 mm of the way up: seven times what makes it forget

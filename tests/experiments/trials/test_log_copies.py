@@ -1,0 +1,104 @@
+"""Of a daemon's run the segments that hold an experiment's time, whole, and enough to be read by themselves."""
+
+from __future__ import annotations
+
+import dataclasses
+import errno
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.main import main
+from experiments.trials.log_copies import copy_since
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.log_file import LogFile
+from firmware_host.log.log_folder import ACTIVE, first_path, run_files, segment_path
+from firmware_host.log.log_parameters import LogParameters
+from firmware_host.log.recorder import Recorder
+from firmware_host.log_reading.log_reader import read_log, read_logs
+from firmware_host.log_reading.replay import replay_files
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.track import paper_track
+from tests.firmware_host.made_up_rows import OPENING, make_ticks
+from tests.recorded_walks import walk_and_hold
+
+SEGMENT_TICKS = 380
+
+
+@pytest.fixture
+def segments(tmp_path: Path) -> list[Path]:
+    """Five of a second each, of which the last one is still being written."""
+    first = tmp_path / "logs" / ACTIVE / "run-0000.mcap"
+    for number in range(5):
+        metadata = OPENING["metadata"] | {"segment": str(number)}
+        log = LogFile(segment_path(first, number), OPENING | {"metadata": metadata})
+        log.write(make_ticks(number * SEGMENT_TICKS, (number + 1) * SEGMENT_TICKS))
+        if number < 4:
+            log.finish()
+        else:
+            log.flush()
+    return run_files(first)
+
+
+@pytest.mark.parametrize(("from_s", "kept"), [(-1.0, 5), (0.0, 5), (2.5, 3), (2.998, 2), (3.0, 2), (4.9, 1), (9.0, 1)])
+def test_a_segment_that_ends_before_the_experiment_began_is_left_out(
+    segments: list[Path], tmp_path: Path, from_s: float, kept: int
+) -> None:
+    copies = copy_since(segments, from_s, tmp_path)
+    assert [copy.name for copy in copies] == [log.name for log in segments][5 - kept :]
+    assert sorted(tmp_path.glob("*.mcap*")) == copies
+    assert all(read_log(copy).complete for copy in copies)
+    if copies:
+        assert len(read_logs(copies).ticks) == kept * SEGMENT_TICKS
+
+
+def test_of_a_run_that_ended_before_the_experiment_began_nothing_is_copied(
+    segments: list[Path], tmp_path: Path
+) -> None:
+    assert copy_since(segments[:4], 4.0, tmp_path) == []
+
+
+def test_of_the_segments_before_one_is_opened(segments: list[Path], tmp_path: Path) -> None:
+    segments[1].write_bytes(b"not to be read")
+    assert len(copy_since(segments, 3.5, tmp_path)) == 2
+
+
+def test_a_segment_that_has_only_just_begun_hides_none_before_it(segments: list[Path], tmp_path: Path) -> None:
+    LogFile(segment_path(segments[0].parent.parent / ACTIVE / segments[0].name, 5), OPENING).flush()
+    logs = run_files(segments[-1])
+    assert [log.name for log in copy_since(logs, 3.5, tmp_path)] == [log.name for log in logs[3:]]
+
+
+def test_a_full_disk_leaves_no_copy_that_is_cut(
+    segments: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fill(source: Path, target: Path) -> None:
+        target.write_bytes(source.read_bytes()[:1000])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(target))
+
+    monkeypatch.setattr(shutil, "copyfile", fill)
+    with pytest.raises(OSError, match="No space left"):
+        copy_since(segments, 0.0, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["logs"]
+
+
+def test_what_is_copied_is_replayed_and_reported_without_the_segments_before_it(
+    tmp_path: Path, configuration: Configuration, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Another walk and a long rest come before the experiment's own."""
+    parameters = LogParameters(directory=str(tmp_path / "logs"), segment_s=3.0)
+    first = first_path(tmp_path / "logs", "run")
+    recorder = Recorder(first, configuration.text, {"robot": "test", "run_id": "run"}, parameters)
+    robot = Lockstep(configuration, paper_track(), recorder=recorder)
+    _, (begun_s, _) = walk_and_hold(robot, 1, 2, rest_s=4.0)
+    assert recorder.close(20.0)
+    copies = copy_since(run_files(first), begun_s, tmp_path)
+    assert 0 < len(copies) < len(run_files(first)) and copies[0].name != first.name
+    live = [stride.estimate for stride in robot.loop.learning.strides][2:]
+    replayed = replay_files(copies).strides
+    assert [repr(dataclasses.astuple(one)) for one in live] == [repr(dataclasses.astuple(one)) for one in replayed]
+    assert main(["log", "report", *map(str, copies), "--out", str(tmp_path / "report")]) == exit_codes.OK
+    assert (tmp_path / "report" / "walk-1.png").exists()

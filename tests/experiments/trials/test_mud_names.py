@@ -1,0 +1,31 @@
+"""A water content is told as one, however it is written; a name that a person gave a mud is left alone."""
+
+from __future__ import annotations
+
+import pytest
+
+from experiments.trials.mud_names import mud_key, mud_label, mud_name, mud_text
+
+
+@pytest.mark.parametrize("name", ["wet", "w", "bay=3", "watery clay", "kaolin 2", "1500 Pa"])
+def test_a_persons_name_for_a_mud_stays_as_it_is(name: str) -> None:
+    assert mud_name(name) == mud_label(name) == mud_text(name) == name
+
+
+@pytest.mark.parametrize("name", ["47.6", "47.6%", "w47.6", "w = 47.6 %"])
+def test_a_water_content_gets_one_percent_sign_however_it_is_written(name: str) -> None:
+    assert (mud_name(name), mud_label(name), mud_text(name)) == ("47.6", "w = 47.6 %", "47.6 %")
+
+
+def test_only_a_water_content_gets_a_percent_sign() -> None:
+    assert (mud_label("47.6"), mud_text("47.6"), mud_text("47.6 at 3 cm")) == ("w = 47.6 %", "47.6 %", "47.6 % at 3 cm")
+
+
+@pytest.mark.parametrize("name", ["48.6", "48.60", "48.600 %", "w = 48.6 %", " 048.6% "])
+def test_one_water_content_is_one_mud(name: str) -> None:
+    assert mud_key(name) == "48.6"
+
+
+def test_names_that_differ_in_more_than_capitals_are_different_muds() -> None:
+    assert mud_key("Pond ") == mud_key("pond") != mud_key("pond 2")
+    assert mud_key("48.6") != mud_key("48.61")

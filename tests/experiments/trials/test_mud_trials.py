@@ -1,0 +1,247 @@
+"""Trials one after another: nothing is lost, nothing counts twice, and the person decides what is doubtful."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.robot.bench_errors import EndedError
+from experiments.robot.bench_robot import CLEAR, LEAVE, BenchError, leave
+from experiments.robot.prompt import GO_ON, REDO, SKIP
+from experiments.trials.mud_trials import (
+    KEEP,
+    Bench,
+    PlannedTrial,
+    PromptedBed,
+    SpoiltTrialError,
+    Truths,
+    conduct_trials,
+    measured_of,
+)
+from experiments.trials.notebook import Entry, Notebook
+from tests.experiments.still_robot import StillRobot
+from tests.scripted_person import ScriptedPerson
+
+TRIALS = [PlannedTrial(f"47.6/{number}", "47.6", number, 3) for number in (1, 2, 3)]
+PLAN = {"experiment": "made up"}
+
+
+class AskedRobot(StillRobot):
+    """A BenchRobot that does nothing but remember what it was asked for."""
+
+    def __init__(self) -> None:
+        super().__init__("idle")
+        self.called: list[str] = []
+        self.blocked = False
+        self.deaf = False
+
+    def call(self, method: str, **params: Any) -> Any:
+        if self.deaf:
+            raise BenchError("the daemon does not answer")
+        self.called.append(method)
+        if method in ("disarm", "stop"):
+            self.mode = "idle"
+        self.blocked = self.blocked and method != "clear"
+        told = {"sentence": "A drive is silent.", "for_s": 150.0, "what_to_do": "check it", "blocks_arming": True}
+        faults = [told] if self.blocked else []
+        return {"mode": self.mode, "now_s": self.now_s, "faults": faults} if method == "status" else "accepted"
+
+
+class ScriptedBed:
+    def __init__(self, *answers: str) -> None:
+        self.answers = list(answers)
+        self.prepared: list[str] = []
+
+    def prepare(self, trial: PlannedTrial) -> str:
+        self.prepared.append(trial.key)
+        return self.answers.pop(0) if self.answers else GO_ON
+
+    def truths(self, flipper: str) -> Truths:
+        return {}
+
+
+class Session:
+    """A bench of these, and measurements that come as they are told."""
+
+    def __init__(self, folder: Path, person: ScriptedPerson | None = None, bed: ScriptedBed | None = None) -> None:
+        self.robot, self.person, self.bed = AskedRobot(), person or ScriptedPerson(), bed or ScriptedBed()
+        self.notebook = Notebook(folder, PLAN)
+        self.bench = Bench(self.robot, self.bed, self.person, self.notebook)
+        self.measured: list[str] = []
+        self.outcomes: list[Entry | BaseException] = []
+        self.shown: list[tuple[int, int]] = []
+
+    def measure(self, trial: PlannedTrial) -> Entry:
+        self.measured.append(trial.key)
+        outcome = self.outcomes.pop(0) if self.outcomes else {"remarks": [], "count": len(self.measured)}
+        if isinstance(outcome, BaseException):
+            raise outcome
+        return outcome
+
+    def conduct(self) -> Session:
+        conduct_trials(self.bench, TRIALS, self.measure, lambda done, of: self.shown.append((done, of)))
+        return self
+
+
+ALL = [trial.key for trial in TRIALS]
+
+
+def test_every_trial_is_prepared_measured_and_written(tmp_path: Path) -> None:
+    session = Session(tmp_path).conduct()
+    assert session.bed.prepared == session.measured == list(session.notebook.entries) == ALL
+    assert session.shown == [(0, 3), (1, 3), (2, 3), (3, 3)]
+
+
+def test_torque_is_off_after_every_trial(tmp_path: Path) -> None:
+    session = Session(tmp_path).conduct()
+    assert session.robot.called.count("disarm") == len(TRIALS)
+
+
+def test_an_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
+    first = Session(tmp_path)
+    first.outcomes = [{"remarks": []}, KeyboardInterrupt()]
+    with pytest.raises(KeyboardInterrupt):
+        first.conduct()
+    second = Session(tmp_path).conduct()
+    assert second.bed.prepared == second.measured == ALL[1:]
+
+
+def test_a_trial_that_is_left_out_is_written_down_and_not_asked_for_again(tmp_path: Path) -> None:
+    session = Session(tmp_path, bed=ScriptedBed(GO_ON, SKIP)).conduct()
+    assert list(measured_of(session.notebook)) == [ALL[0], ALL[2]]
+    again = Session(tmp_path).conduct()
+    assert again.bed.prepared == [] and again.notebook.left_out == {ALL[1]: {"skipped": True, "why": []}}
+
+
+def test_one_that_was_left_out_by_mistake_is_the_last_one_too(tmp_path: Path) -> None:
+    session = Session(tmp_path, bed=ScriptedBed(SKIP, REDO)).conduct()
+    assert session.measured == ALL and not session.notebook.left_out
+
+
+def test_the_last_trial_can_be_measured_again(tmp_path: Path) -> None:
+    session = Session(tmp_path, bed=ScriptedBed(GO_ON, REDO)).conduct()
+    assert session.measured == [ALL[0], ALL[0], ALL[1], ALL[2]]
+    assert session.notebook.entries[ALL[0]]["count"] == 2
+
+
+def test_before_the_first_there_is_none_to_measure_again(tmp_path: Path) -> None:
+    session = Session(tmp_path, bed=ScriptedBed(REDO)).conduct()
+    assert session.measured == ALL
+    assert "nothing was measured" in session.person.told[0]
+
+
+def test_a_fault_is_told_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.outcomes = [BenchError("the walk ended early: a drive is silent.")]
+    session.conduct()
+    assert session.person.asked == ["47.6 %, trial 1 of 3 went wrong: the walk ended early: a drive is silent."]
+    assert session.bed.prepared == session.measured == [ALL[0], *ALL]
+
+
+@pytest.mark.parametrize("answer", [CLEAR, LEAVE])
+def test_before_a_person_levels_mud_they_judge_the_fault_that_stands(tmp_path: Path, answer: str) -> None:
+    robot, person = AskedRobot(), ScriptedPerson(answer)
+    robot.blocked = True
+    bed = PromptedBed(robot, person, lambda trial: "Level it")
+    if answer == CLEAR:
+        assert bed.prepare(TRIALS[0]) == GO_ON
+    else:
+        with pytest.raises(EndedError, match="'mudskipper clear', then the same command again"):
+            bed.prepare(TRIALS[0])
+    assert person.asked[0] == (
+        "A fault stands:\n  A drive is silent. (for 2 min)\n    -> check it\nTorque stays off until this is cleared."
+    )
+    assert robot.called.count("clear") == (answer == CLEAR) and len(person.asked) == 1 + (answer == CLEAR)
+
+
+def test_a_trial_that_went_wrong_clears_nothing_by_itself(tmp_path: Path) -> None:
+    session = Session(tmp_path, ScriptedPerson(SKIP))
+    session.robot.blocked = True
+    session.outcomes = [SpoiltTrialError("no mud")]
+    session.conduct()
+    assert "clear" not in session.robot.called
+
+
+def test_a_person_who_ends_the_experiment_is_not_asked_whether_to_repeat(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.outcomes = [{"remarks": []}, EndedError("the fault stands")]
+    with pytest.raises(EndedError):
+        session.conduct()
+    assert session.person.asked == [] and list(session.notebook.entries) == ALL[:1]
+
+
+def test_a_spoilt_trial_can_be_left_out(tmp_path: Path) -> None:
+    session = Session(tmp_path, ScriptedPerson(SKIP))
+    session.outcomes = [SpoiltTrialError("no mud")]
+    session.conduct()
+    assert list(measured_of(session.notebook)) == ALL[1:]
+    assert session.notebook.left_out[ALL[0]]["why"] == ["no mud"]
+
+
+@pytest.mark.parametrize(("answer", "measured"), [(GO_ON, [ALL[0], *ALL]), (KEEP, ALL)])
+def test_a_worthless_trial_is_repeated_by_enter_and_kept_by_a_key(
+    tmp_path: Path, answer: str, measured: list[str]
+) -> None:
+    session = Session(tmp_path, ScriptedPerson(answer))
+    session.outcomes = [SpoiltTrialError("the base moved by 113 mm", {"remarks": []})]
+    assert session.conduct().measured == measured
+    kept = ["the base moved by 113 mm"] if answer == KEEP else []
+    assert session.notebook.entries[ALL[0]]["remarks"] == kept
+
+
+def test_a_trial_that_left_nothing_cannot_be_kept(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.outcomes = [SpoiltTrialError("no mud")]
+    session.conduct()
+    assert KEEP not in session.person.offered[0]
+
+
+def test_a_robot_that_walks_on_is_stopped_before_anybody_is_asked(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.robot.mode = "walking"
+    session.outcomes = [SpoiltTrialError("the pose is lost")]
+    session.conduct()
+    assert session.robot.called[:2] == ["status", "stop"]
+
+
+@pytest.mark.parametrize(("answer", "kept"), [(REDO, ALL), (SKIP, ALL[1:])])
+def test_a_person_may_go_on_also_after_the_third_time(tmp_path: Path, answer: str, kept: list[str]) -> None:
+    session = Session(tmp_path, ScriptedPerson(GO_ON, GO_ON, answer))
+    session.outcomes = [BenchError("it was told to stop") for _ in range(3)]
+    session.conduct()
+    assert "went wrong 3 times; the last time: it was told to stop." in session.person.asked[-1]
+    assert list(measured_of(session.notebook)) == kept
+
+
+def test_what_goes_wrong_three_times_ends_where_nobody_wants_it_repeated(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.outcomes = [{"remarks": []}, *(SpoiltTrialError("no mud") for _ in range(3))]
+    with pytest.raises(BenchError, match="trial 2 of 3 went wrong 3 times; the last time: no mud"):
+        session.conduct()
+    assert list(session.notebook.entries) == ALL[:1]
+
+
+@pytest.mark.parametrize(("answer", "kept"), [(GO_ON, ALL), (SKIP, ALL[1:]), (REDO, ALL)])
+def test_a_doubtful_trial_counts_as_the_person_says(tmp_path: Path, answer: str, kept: list[str]) -> None:
+    session = Session(tmp_path, ScriptedPerson(answer))
+    session.outcomes = [{"remarks": ["the base moved by 5.0 mm"]}]
+    session.conduct()
+    assert session.person.told == ["47.6 %, trial 1 of 3: the base moved by 5.0 mm"]
+    assert list(measured_of(session.notebook)) == kept
+    assert len(session.measured) == (4 if answer == REDO else 3)
+
+
+def test_a_robot_that_no_longer_answers_is_left_with_a_word(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    session.robot.deaf = True
+    (tmp_path / "old.mcap").touch()
+    assert leave(session.bench.robot, session.bench.person, tmp_path) == [tmp_path / "old.mcap"]
+    assert session.person.told == ["the daemon does not answer"]
+    assert session.robot.closed
+
+
+def test_an_experiment_of_which_nothing_is_left_ends_with_a_word(tmp_path: Path) -> None:
+    with pytest.raises(BenchError, match="nothing was measured"):
+        measured_of(Session(tmp_path, bed=ScriptedBed(SKIP, SKIP, SKIP)).conduct().notebook)

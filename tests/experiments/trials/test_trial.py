@@ -1,0 +1,175 @@
+"""Simulated trials: what an estimator meets in them, and that they can be met again. One stride of each, for time."""
+
+from dataclasses import replace
+from functools import cache
+from itertools import groupby
+from math import isfinite
+
+import numpy as np
+import pytest
+
+from control.records import FLIPPERS, Phase
+from estimation.mud import EstimationParameters, MudEstimator
+from experiments.trials.trial import (
+    BENCH_CURRENT_A,
+    BENCH_TORQUE_NM,
+    SINGLE,
+    WALKING,
+    Sample,
+    Setup,
+    Trial,
+    beliefs_of,
+    configuration_of,
+    run_trial,
+    strides_of,
+)
+from firmware_host.ticker import PERIOD_S
+from simulation.mud.clay import clay_of_water
+from simulation.mud.disturbances import LAB, NONE
+from simulation.mud.track import Track
+
+TRACK = Track([(100.0, clay_of_water(47.6))])
+EVERY_ROW_NEW = replace(WALKING, row_period_s=0.0)
+
+
+@cache
+def trial(setup: Setup = WALKING, seed: int = 1, torque_error: float = 0.032) -> Trial:
+    return run_trial(setup, TRACK, LAB, 1, seed, torque_error)
+
+
+def readings(sample: Sample) -> tuple[object, ...]:
+    """All but time and phase."""
+    return sample[2:]
+
+
+def test_a_trial_can_be_repeated() -> None:
+    first, again = trial(), trial.__wrapped__()
+    assert repr(again.samples) == repr(first.samples)
+    assert again.truths == first.truths
+    assert again.drives == first.drives
+
+
+def test_another_seed_is_another_trial() -> None:
+    assert repr(trial(seed=2).samples) != repr(trial().samples)
+    assert trial(seed=2).truths != trial().truths
+    assert trial(seed=2).drives != trial().drives
+
+
+def test_there_is_a_sample_of_every_tick() -> None:
+    times_s = [sample.now_s for sample in trial().samples]
+    assert np.diff(times_s) == pytest.approx(PERIOD_S)
+
+
+@pytest.mark.parametrize("setup", [WALKING, replace(WALKING, row_period_s=0.02), EVERY_ROW_NEW])
+def test_rows_repeat_as_asked(setup: Setup) -> None:
+    """Each lasts its period, in whole ticks: two of 2.6 ms where 5 ms are asked for, one where every row is new."""
+    runs = [len(list(run)) for _, run in groupby(trial(setup).samples, key=readings)]
+    ticks = max(1, int(np.ceil(setup.row_period_s / PERIOD_S - 1e-9)))
+    assert set(runs[1:-1]) == {ticks}
+
+
+def test_repeating_rows_is_behind_the_loop() -> None:
+    """The robot does the same, and a row that is new is the same row."""
+    often, seldom = trial(EVERY_ROW_NEW).samples, trial(replace(WALKING, row_period_s=0.02)).samples
+    assert trial(EVERY_ROW_NEW).truths == trial(replace(WALKING, row_period_s=0.02)).truths
+    new = [i for i, (a, b) in enumerate(zip(seldom, seldom[1:], strict=False), 1) if readings(a) != readings(b)]
+    assert len(new) > 20
+    for i in new:
+        assert repr(seldom[i]) == repr(often[i])
+
+
+def test_each_row_has_the_phase_of_its_own_tick() -> None:
+    phases = [sample.phase for sample in trial().samples]
+    assert phases == [sample.phase for sample in trial(EVERY_ROW_NEW).samples]
+    assert {Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION} <= set(phases)
+
+
+def test_messages_are_at_most_two_milliseconds_old() -> None:
+    """The drives send every 2 ms, and are read at the tick; a robot's step is 1 ms."""
+    for sample in trial(EVERY_ROW_NEW).samples:
+        for age_s in (*sample.angle_ages_s, *sample.current_ages_s):
+            assert 0.0 <= age_s < 0.0031
+
+
+def test_there_is_a_truth_of_each_flippers_every_stride() -> None:
+    assert [(truth.flipper, truth.index) for truth in trial().truths] == [(flipper, 0) for flipper in FLIPPERS]
+    for truth in trial().truths:
+        assert truth.clay.name == "47.6"
+        assert truth.insertion.deepest_m > 0.02
+
+
+def test_a_fixed_base_stays_where_it_is_and_a_free_one_does_not() -> None:
+    """But for the pose's noise of 0.1 mm. (The single flipper has all the time to move in.)"""
+    fixed, free = ([sample.body_x_m for sample in trial(setup).samples] for setup in (SINGLE, WALKING))
+    assert max(map(abs, fixed)) < 0.6e-3
+    assert max(map(abs, free)) > 5e-3
+
+
+# how the robot is set up
+
+
+def test_a_single_flipper_hangs_from_a_bench_with_its_own_drives() -> None:
+    configuration = configuration_of(SINGLE)
+    assert configuration.estimation.fixed_base
+    assert configuration.gait == SINGLE.gait
+    assert configuration.limits.torque_nm == BENCH_TORQUE_NM
+    assert {drive.current_limit_a for drive in configuration.drive.values()} == {BENCH_CURRENT_A}
+
+
+def test_a_walking_robot_keeps_its_drives() -> None:
+    walking, single = configuration_of(WALKING), configuration_of(SINGLE)
+    assert not walking.estimation.fixed_base
+    assert walking.limits.torque_nm != single.limits.torque_nm
+    assert walking.geometry == single.geometry
+
+
+def test_torque_constants_are_known_as_wrongly_as_asked() -> None:
+    exactly = configuration_of(WALKING).flipper_drives
+    assert trial(torque_error=0.0).drives == exactly
+    for known, true in zip(trial().drives, exactly, strict=True):
+        assert known.sweep_constant_nm_a != true.sweep_constant_nm_a
+        assert known.adduction_constant_nm_a == pytest.approx(true.adduction_constant_nm_a, rel=0.15)
+        assert known._replace(sweep_constant_nm_a=0.0, adduction_constant_nm_a=0.0) == true._replace(
+            sweep_constant_nm_a=0.0, adduction_constant_nm_a=0.0
+        )
+
+
+def test_each_joints_constant_is_wrong_in_its_own_way() -> None:
+    wrong = [constant for drive in trial().drives for constant in drive[1:3]]
+    assert len(set(wrong)) == 4
+
+
+# what an estimator says about it
+
+
+def test_estimators_see_the_pose_only_if_they_may() -> None:
+    with_pose = strides_of(trial(), EstimationParameters())
+    without = strides_of(trial(), EstimationParameters(), with_pose=False)
+    assert [stride.flipper for stride in with_pose] == list(FLIPPERS)
+    assert all(isfinite(stride.step_m) for stride in with_pose)
+    assert not any(isfinite(stride.step_m) for stride in without)
+
+
+def test_the_estimators_strides_are_those_of_the_truth() -> None:
+    told = [(stride.flipper, stride.index) for stride in strides_of(trial(), EstimationParameters())]
+    assert told == [(truth.flipper, truth.index) for truth in trial().truths]
+
+
+def test_beliefs_are_those_after_each_stride() -> None:
+    parameters = EstimationParameters()
+    estimator = MudEstimator(trial().configuration.geometry, trial().drives, parameters)
+    for sample in trial().samples:
+        estimator.update(*sample)
+    assert beliefs_of(trial(), parameters) == {0: estimator.belief}
+
+
+def test_in_a_walk_both_flippers_read_the_same_of_the_same_mud() -> None:
+    """Within 10 %. Their drives tell at other moments; currents along a line would make 10 to 34 % of that in k_e,
+    which comes from a quick extraction.
+    """
+    soft = Track([(100.0, clay_of_water(51.2))])
+    walked = run_trial(EVERY_ROW_NEW, soft, NONE, 3, 1)
+    strides = strides_of(walked, EstimationParameters())
+    k_e = {(stride.flipper, stride.index): stride.k_e.value for stride in strides}
+    assert len(k_e) == 6
+    assert [k_e["right", index] / k_e["left", index] for index in range(3)] == pytest.approx([1.0] * 3, abs=0.1)

@@ -1,0 +1,104 @@
+"""The loop gets from the operating system what is permitted, and a sentence for what is not.
+
+All of it changes the process for good, so every test asks a child of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+
+from tests.folders import ROOT
+from tests.waiting import LONGEST_S
+
+IMPORTS = (
+    "import ctypes, gc, json, os, resource, subprocess, sys; from firmware_host.computer.realtime import prepare_loop\n"
+)
+# Whoever runs the tests, this child may neither raise its priority nor lock memory.
+DROP_RIGHTS = """
+for limit in (resource.RLIMIT_RTPRIO, resource.RLIMIT_MEMLOCK):
+    resource.setrlimit(limit, (0, 0))
+if os.geteuid() == 0:
+    os.setgroups([])
+    os.setgid(65534)
+    os.setuid(65534)
+"""
+
+
+def in_child(code: str) -> Any:
+    """What `code` leaves in `answer`."""
+    program = f"{IMPORTS}{code}\nprint(json.dumps(answer))"
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=LONGEST_S)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def needs(permitted: str, warnings: list[str]) -> None:
+    refused = [warning for warning in warnings if permitted in warning]
+    if refused:
+        pytest.skip(f"not permitted here: {refused[0]}")
+
+
+def test_what_is_not_permitted_becomes_one_sentence_each_and_never_an_exception() -> None:
+    memory, priority = in_child(f"{DROP_RIGHTS}\nanswer = prepare_loop(45, -1, True)")
+    assert memory.startswith("memory not locked: ")
+    assert memory.endswith("; raise the memlock limit")
+    assert priority.startswith("no real-time priority 45: ")
+    assert priority.endswith("; raise the rtprio limit")
+
+
+def test_a_processor_that_is_not_there_becomes_a_sentence() -> None:
+    answer = in_child("answer = prepare_loop(0, 1023, False)")
+    assert answer[0].startswith("not pinned to processor 1023: ")
+
+
+def test_priority_zero_is_said_to_be_the_configuration_s_choice() -> None:
+    assert in_child("answer = prepare_loop(0, -1, False)") == ["no real-time priority: loop.priority is 0"]
+
+
+def test_the_loop_runs_on_its_processor_alone() -> None:
+    cpu = max(os.sched_getaffinity(0))
+    assert in_child(f"prepare_loop(0, {cpu}, False); answer = sorted(os.sched_getaffinity(0))") == [cpu]
+
+
+def test_garbage_is_frozen_and_collected_no_more() -> None:
+    code = "prepare_loop(0, -1, False); answer = [gc.isenabled(), gc.get_freeze_count()]"
+    enabled, frozen = in_child(code)
+    assert not enabled
+    assert frozen > 1000  # everything that was imported
+
+
+def test_a_full_collection_after_freezing_has_next_to_nothing_to_look_at() -> None:
+    code = "heap = [[number] for number in range(200_000)]; prepare_loop(0, -1, False); answer = len(gc.get_objects())"
+    assert in_child(code) < 1000
+
+
+def test_any_other_python_thread_has_to_give_way_quickly() -> None:
+    assert in_child("prepare_loop(0, -1, False); answer = sys.getswitchinterval()") == pytest.approx(1e-4)
+
+
+def test_memory_is_locked_where_that_is_permitted() -> None:
+    code = "answer = [prepare_loop(0, -1, True), open('/proc/self/status').read()]"
+    warnings, status = in_child(code)
+    needs("memory not locked", warnings)
+    locked_kb = int(status.split("VmLck:")[1].split()[0])
+    assert locked_kb > 1000
+
+
+def test_children_of_the_loop_are_ordinary_processes() -> None:
+    code = """
+warnings = prepare_loop(1, -1, False)
+ask = [sys.executable, "-c", "import os; print(os.sched_getscheduler(0))"]
+child = subprocess.run(ask, capture_output=True, text=True, check=True)
+answer = [warnings, os.sched_getscheduler(0), os.sched_getparam(0).sched_priority, int(child.stdout)]
+"""
+    warnings, loop, priority, child = in_child(code)
+    needs("no real-time priority", warnings)
+    assert loop == os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+    assert priority == 1
+    assert child == os.SCHED_OTHER

@@ -1,0 +1,109 @@
+"""A beat that stalls and a clock that steps, with a clock that the test turns."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.fault_injection.failures import Failures
+from firmware_host.fault_injection.failing_time import (
+    CLOCK_STEP_S,
+    SLOW_TICK_S,
+    STALL_S,
+    FailingClock,
+    FailingTicker,
+    failing_clock,
+    failing_ticker,
+)
+from firmware_host.ticker import PERIOD_S, Beat, Ticker
+
+
+class TurnedClock:
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def read(self) -> float:
+        return self.now_s
+
+    def sleep(self, duration_s: float) -> None:
+        self.now_s += duration_s
+
+
+class Bench:
+    def __init__(self) -> None:
+        self.clock, self.failures = TurnedClock(), Failures(())
+        self.told: list[tuple[float, str]] = []
+        ticker = Ticker(PERIOD_S, self.clock.read, self.clock.sleep)
+        tell = lambda now_s, text: self.told.append((now_s, text))  # noqa: E731
+        self.ticker = FailingTicker(ticker, self.failures, tell, self.clock.sleep)
+
+    def wait(self, ticks: int) -> list[Beat]:
+        return [self.ticker.wait() for _ in range(ticks)]
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_without_a_failure_no_beat_is_missed(bench: Bench) -> None:
+    assert all(beat.missed == 0 and beat.late_s < 1e-9 for beat in bench.wait(100))
+
+
+def test_a_stuck_loop_stands_still_once(bench: Bench) -> None:
+    bench.wait(10)
+    bench.failures.begin("loop", "stuck", bench.clock.now_s, 1.0)
+    first, *others = bench.wait(100)
+    assert (first.missed + 1) * PERIOD_S <= STALL_S < (first.missed + 2) * PERIOD_S
+    assert all(beat.missed == 0 for beat in others)
+
+
+def test_a_loop_can_be_made_to_stand_still_again(bench: Bench) -> None:
+    for _ in range(2):
+        bench.failures.begin("loop", "stuck", bench.clock.now_s, 1.0)
+        assert [beat.missed > 0 for beat in bench.wait(5)] == [True, False, False, False, False]
+
+
+def test_a_slow_loop_lags_until_its_time_is_over(bench: Bench) -> None:
+    bench.wait(10)
+    begin_s = bench.clock.now_s
+    bench.failures.begin("loop", "slow", begin_s, 1.0)
+    slow = [beat for beat in bench.wait(300) if beat.now_s < begin_s + 1.0]
+    mean_s = (slow[-1].now_s - begin_s) / len(slow)
+    assert SLOW_TICK_S <= mean_s < 2.0 * PERIOD_S
+    assert all(beat.missed == 0 for beat in bench.wait(100))
+
+
+def test_the_end_of_a_failure_is_told_in_its_tick(bench: Bench) -> None:
+    bench.failures.begin("pose", "off", bench.clock.now_s, 0.02)
+    bench.wait(20)
+    ((now_s, text),) = bench.told
+    assert text == "end of failing on purpose: pose off"
+    assert 100.02 <= now_s < 100.02 + PERIOD_S
+
+
+def test_a_clock_that_stands_still_goes_on_afterwards() -> None:
+    wall, failures = TurnedClock(), Failures(())
+    clock = FailingClock(wall.read, failures)
+    assert clock() == 100.0
+    failures.begin("clock", "stuck", 0.0, 1.0)
+    seen = []
+    for _ in range(3):
+        wall.sleep(1.0)
+        seen.append(clock())
+    failures.end_all()
+    assert seen == [101.0] * 3 and clock() == 103.0
+
+
+def test_a_clock_steps_by_an_hour_and_back() -> None:
+    wall, failures = TurnedClock(), Failures(())
+    clock = FailingClock(wall.read, failures)
+    failures.begin("clock", "garbage", 0.0, 1.0)
+    assert clock() == 100.0 + CLOCK_STEP_S
+    failures.end_all()
+    assert clock() == 100.0
+
+
+def test_time_that_may_not_fail_is_not_wrapped() -> None:
+    ticker, clock = Ticker(), TurnedClock().read
+    assert failing_ticker(ticker, None, lambda now_s, text: None) is ticker
+    assert failing_clock(clock, None) is clock

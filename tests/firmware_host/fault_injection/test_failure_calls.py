@@ -1,0 +1,154 @@
+"""What a person can ask of the failures, and what stands in log and status of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from drivers.can.mock_bus import MockBus
+from drivers.fault_injection.failing_port import FailingPort, failing_ports
+from drivers.fault_injection.failures import FailureParameters, Failures
+from firmware_host.configuration.configuration import Configuration, parse_configuration
+from firmware_host.fault_injection.failure_calls import failures_of, with_failures
+from firmware_host.operator.connection import Caller
+from firmware_host.operator.rights import Level, Peer
+from firmware_host.operator.status_socket import Methods, RefusedError
+
+MIA = Caller(1, Peer(7, 1000, frozenset()), Level.DRIVE)
+
+
+class Bench:
+    def __init__(self, failures: Failures | None) -> None:
+        self.now_s = 10.0
+        self.told: list[tuple[float, str, bool]] = []  # when, what, and whether anything failed then
+        self.failures = failures
+        self.failing_at_disarm: list[str] = []
+        self.methods = with_failures(self._plain(), failures, self._tell, lambda: self.now_s)
+
+    def _plain(self) -> Methods:
+        return {"status": self._status, "disarm": self._disarm, "arm": self._arm}
+
+    def _status(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
+        return {"warnings": ["hot"], "mode": "idle"}
+
+    def _arm(self, params: dict[str, Any], caller: Caller) -> str:
+        return "accepted"
+
+    def _disarm(self, params: dict[str, Any], caller: Caller) -> str:
+        self.failing_at_disarm = list(self.failures.failing) if self.failures else []
+        return "accepted"
+
+    def _tell(self, now_s: float, text: str) -> None:
+        self.told.append((now_s, text, bool(self.failures and self.failures.failing)))
+
+    def fail(self, component: str, kind: str, **others: Any) -> Any:
+        return self.methods["fail"]({"component": component, "kind": kind, **others}, MIA)
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench(Failures(("left", "right")))
+
+
+def test_a_failure_begins_bounded_and_is_told_before_it_does(bench: Bench) -> None:
+    (failing,) = bench.fail("log", "off")
+    assert failing == {
+        "component": "log",
+        "kind": "off",
+        "remaining_s": 2.0,
+        "does": "the log's writer looks dead and takes no row",
+    }
+    assert bench.told == [(10.0, "failing on purpose: log off for 2 s, asked by uid 1000 (process 7)", False)]
+
+
+def test_what_fails_is_shown_in_the_status(bench: Bench) -> None:
+    assert bench.methods["status"]({}, MIA) == {"warnings": ["hot"], "mode": "idle", "failing": []}
+    bench.fail("left_sweep", "off", for_s=1.5)
+    bench.now_s += 0.5
+    report = bench.methods["status"]({}, MIA)
+    assert report["warnings"] == ["hot", "failing on purpose: left_sweep off, 1.0 s more"]
+    assert [each["component"] for each in report["failing"]] == ["left_sweep"]
+
+
+def test_one_or_all_can_be_ended_by_hand_and_each_end_is_told(bench: Bench) -> None:
+    for component in ("pose", "log", "loop"):
+        bench.fail(component, "stuck")
+    assert [each["component"] for each in bench.fail("log", "ok")] == ["pose", "loop"]
+    assert bench.fail("all", "ok") == []
+    assert [text for _, text, _ in bench.told[3:]] == [
+        "end of failing on purpose: log stuck",
+        "end of failing on purpose: pose stuck",
+        "end of failing on purpose: loop stuck",
+    ]
+
+
+def test_ending_what_does_not_fail_is_fine_and_told_nowhere(bench: Bench) -> None:
+    assert bench.fail("pose", "ok") == [] and bench.fail("all", "ok") == []
+    assert bench.told == []
+
+
+def test_a_disarm_ends_every_failure_before_it_is_done(bench: Bench) -> None:
+    bench.fail("left_sweep.command", "off")
+    assert bench.methods["disarm"]({}, MIA) == "accepted"
+    assert bench.failing_at_disarm == []
+    assert bench.told[-1][1] == "end of failing on purpose: left_sweep.command off"
+
+
+def test_the_other_methods_are_as_they_were(bench: Bench) -> None:
+    assert bench.methods["arm"]({}, MIA) == "accepted"
+    assert set(bench.methods) == {"status", "disarm", "arm", "fail", "failures"}
+
+
+def test_the_list_holds_all_that_can_fail(bench: Bench) -> None:
+    bench.fail("pose", "off")
+    report = bench.methods["failures"]({}, MIA)
+    assert bench.failures is not None
+    assert [(row["component"], row["kind"], row["does"]) for row in report["table"]] == list(bench.failures.table())
+    assert report["allowed"] and [each["component"] for each in report["failing"]] == ["pose"]
+
+
+@pytest.mark.parametrize(
+    ("params", "said"),
+    [
+        ({}, "there is no ''"),
+        ({"component": "left_knee", "kind": "off"}, "left_knee"),
+        ({"component": "left_knee", "kind": "ok"}, "left_knee"),
+        ({"component": "all", "kind": "off"}, "there is no 'all'"),
+        ({"component": "log", "kind": "slow"}, "it can be off"),
+        ({"component": "log", "kind": "off", "for_s": 61}, "0.01 to 60"),
+        ({"component": "log", "kind": "off", "for_s": "long"}, "must be a number"),
+        ({"component": "log", "kind": "off", "for_s": True}, "must be a number"),
+        ({"component": "log", "kind": "off", "for_s": float("nan")}, "must be a number"),
+        ({"component": ["log"], "kind": "off"}, "component: must be"),
+        ({"component": "log", "kind": "x" * 65}, "kind: must be"),
+        ({"component": "two\nlines", "kind": "off"}, "component: must be"),
+    ],
+)
+def test_nonsense_is_refused_with_a_sentence(bench: Bench, params: dict[str, Any], said: str) -> None:
+    with pytest.raises(RefusedError, match=said):
+        bench.methods["fail"](params, MIA)
+    assert bench.failures is not None and not bench.failures.failing and bench.told == []
+
+
+def test_where_it_is_not_allowed_nothing_fails_and_the_key_is_named() -> None:
+    bench = Bench(None)
+    with pytest.raises(RefusedError, match=r"failures\.allowed = true"):
+        bench.fail("pose", "off")
+    assert bench.methods["failures"]({}, MIA) == {"allowed": False, "failing": [], "table": []}
+    assert bench.methods["status"]({}, MIA) == {"warnings": ["hot"], "mode": "idle"}
+
+
+def test_only_the_configuration_s_switch_allows_it(configuration: Configuration, example_text: str) -> None:
+    assert failures_of(configuration) is None
+    allowed = failures_of(parse_configuration(example_text + "\n[failures]\nallowed = true\n"))
+    assert allowed is not None and "bus.left" in allowed.families
+
+
+def test_without_the_switch_there_is_no_wrapper_at_all(configuration: Configuration) -> None:
+    ports = {name: MockBus().open() for name in configuration.bus}
+    assert failing_ports(ports, configuration.drive, failures_of(configuration)) is ports
+    allowing = replace(configuration, failures=FailureParameters(True))
+    wrapped = failing_ports(ports, configuration.drive, failures_of(allowing))
+    assert all(isinstance(port, FailingPort) for port in wrapped.values()) and wrapped.keys() == ports.keys()

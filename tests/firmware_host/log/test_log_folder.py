@@ -1,0 +1,163 @@
+"""Which log is freed, which never, and how logs are named."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from firmware_host.log.log_file import LogFile
+from firmware_host.log.log_folder import (
+    ACTIVE,
+    DONE,
+    KEPT,
+    LAST_BYTES,
+    TOP,
+    finished_path,
+    first_path,
+    free_logs,
+    free_space,
+    log_files,
+    new_run_id,
+    present_path,
+    preserve,
+    segment_path,
+    stored_files,
+    take_owner,
+    unfinished_files,
+)
+from tests.firmware_host.made_up_rows import OPENING
+
+
+def make_files(folder: Path, place: str, *names: str) -> list[Path]:
+    (folder / place).mkdir(exist_ok=True)
+    paths = [folder / place / f"{name}.mcap" for name in names]
+    for path in paths:
+        path.write_bytes(bytes(92) + LAST_BYTES)
+    return paths
+
+
+def test_names_sort_by_time_and_then_by_segment(tmp_path: Path) -> None:
+    names = []
+    for _ in range(3):
+        first = first_path(tmp_path, new_run_id("mud/skipper ü"))
+        assert first.parent == tmp_path / ACTIVE
+        names += [segment_path(first, number).name for number in (0, 1, 2, 10)]
+    assert names == sorted(set(names))
+    assert all("mud_skipper_" in name for name in names)
+
+
+def test_only_a_log_in_active_has_somewhere_to_go(tmp_path: Path) -> None:
+    assert finished_path(tmp_path / ACTIVE / "a.mcap") == tmp_path / DONE / "a.mcap"
+    for path in (tmp_path / "a.mcap", tmp_path / ACTIVE / "a.mcap.part", tmp_path / DONE / "a.mcap"):
+        assert finished_path(path) == path
+
+
+def test_a_log_is_found_where_it_has_gone(tmp_path: Path) -> None:
+    (done,) = make_files(tmp_path, DONE, "a")
+    assert present_path(tmp_path / ACTIVE / "a.mcap") == done
+    assert present_path(tmp_path / ACTIVE / "b.mcap") == tmp_path / ACTIVE / "b.mcap"
+
+
+def test_the_oldest_goes_first_and_only_as_many_as_must(tmp_path: Path) -> None:
+    make_files(tmp_path, DONE, "3", "1", "2")
+    assert [freed.name for freed in free_logs(tmp_path, 250, 0.0)] == ["1.mcap"]
+    assert [freed.name for freed in free_logs(tmp_path, 250, 0.0)] == []
+    assert [path.name for path in log_files(tmp_path, DONE)] == ["2.mcap", "3.mcap"]
+
+
+def test_what_is_being_written_or_preserved_is_never_freed(tmp_path: Path) -> None:
+    active, kept = make_files(tmp_path, ACTIVE, "0"), make_files(tmp_path, KEPT, "1")
+    make_files(tmp_path, DONE, "2", "3")
+    assert [(freed.name, freed.size) for freed in free_logs(tmp_path, 1, 0.0)] == [("2.mcap", 100)]
+    assert all(path.exists() for path in (*active, *kept))
+
+
+def test_a_disk_without_room_frees_too(tmp_path: Path) -> None:
+    make_files(tmp_path, DONE, "1", "2")
+    assert list(free_logs(tmp_path, 0, 0.0)) == []
+    assert [freed.name for freed in free_logs(tmp_path, 0, 1.1)] == ["1.mcap"]
+
+
+def test_a_preserved_log_comes_back(tmp_path: Path) -> None:
+    (path,) = make_files(tmp_path, DONE, "1")
+    kept = preserve(path)
+    assert kept == tmp_path / KEPT / "1.mcap" and kept.exists() and not path.exists()
+    assert preserve(kept) == kept
+    assert preserve(kept, undo=True) == path and path.exists()
+
+
+def test_what_is_not_whole_cannot_be_preserved(tmp_path: Path) -> None:
+    (path,) = make_files(tmp_path, ACTIVE, "1")
+    with pytest.raises(ValueError, match="only a log in done/"):
+        preserve(path)
+    with pytest.raises(FileNotFoundError):
+        preserve(tmp_path / DONE / "none.mcap")
+
+
+def test_a_log_of_the_same_name_is_not_replaced(tmp_path: Path) -> None:
+    (path,), _ = make_files(tmp_path, DONE, "1"), make_files(tmp_path, KEPT, "1")
+    with pytest.raises(ValueError, match="exists already"):
+        preserve(path)
+
+
+def test_free_space_is_known_before_the_folder_is_made(tmp_path: Path) -> None:
+    assert free_space(tmp_path / "none" / "yet").free_share == pytest.approx(free_space(tmp_path).free_share, abs=0.05)
+
+
+def test_the_newest_finished_log_is_never_freed(tmp_path: Path) -> None:
+    make_files(tmp_path, DONE, "1", "2")
+    assert [freed.name for freed in free_logs(tmp_path, 1, 1.1)] == ["1.mcap"]
+    assert list(free_logs(tmp_path, 1, 1.1)) == []
+
+
+def test_what_a_person_preserved_does_not_use_up_the_quota(tmp_path: Path) -> None:
+    make_files(tmp_path, DONE, "3", "4")
+    make_files(tmp_path, KEPT, "1", "2")
+    assert list(free_logs(tmp_path, 250, 0.0)) == []
+    assert [freed.name for freed in free_logs(tmp_path, 150, 0.0)] == ["3.mcap"]
+
+
+def test_whatever_lies_in_active_counts_as_logs(tmp_path: Path) -> None:
+    make_files(tmp_path, DONE, "1", "2")
+    make_files(tmp_path, ACTIVE, "3")
+    for name in ("0.mcap.broken", "0.mcap.part", "notes.txt"):
+        (tmp_path / ACTIVE / name).write_bytes(bytes(100))
+    assert len(stored_files(tmp_path)) == 6
+    assert list(free_logs(tmp_path, 600, 0.0)) == []
+    assert [freed.name for freed in free_logs(tmp_path, 599, 0.0)] == ["1.mcap"]
+
+
+def test_logs_of_the_older_layout_are_seen(tmp_path: Path) -> None:
+    whole, cut = make_files(tmp_path, TOP, "1", "2")
+    cut.write_bytes(bytes(100))
+    (done,) = make_files(tmp_path, DONE, "3")
+    assert stored_files(tmp_path) == [whole, cut, done]
+    assert unfinished_files(tmp_path) == [cut]
+    assert [freed.name for freed in free_logs(tmp_path, 1, 0.0)] == ["1.mcap"]  # what is cut off is not freed
+
+
+def test_a_log_of_the_older_layout_can_be_preserved(tmp_path: Path) -> None:
+    (path,) = make_files(tmp_path, TOP, "1")
+    (tmp_path / DONE).mkdir()
+    assert preserve(path) == tmp_path / KEPT / "1.mcap"
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root makes files that are somebody else's")
+def test_what_root_makes_belongs_to_the_owner_of_the_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    os.chown(folder, 12345, 23456)
+    log = LogFile(first_path(folder, "run"), OPENING)
+    kept = preserve(log.finish())
+    for path in (folder / ACTIVE, folder / DONE, kept.parent, kept):
+        assert (path.stat().st_uid, path.stat().st_gid) == (12345, 23456), path
+
+
+def test_an_owner_that_may_not_be_given_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(path: Path, user: int, group: int) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "chown", refuse)
+    take_owner(tmp_path)

@@ -1,0 +1,370 @@
+"""The recorder with its real writer: what is put in comes out bit for bit, and a loss is told.
+
+Two readers that share no code with the project, rosbags and mcap-ros2-support, must see the same values.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+
+from firmware_host.log.log_folder import DONE, first_path, unfinished_files
+from firmware_host.log.log_parameters import LogParameters
+from firmware_host.log.recorder import (
+    HEADER,
+    HEALTHY,
+    LONGEST_TEXT,
+    LogReport,
+    NullRecorder,
+    Recorder,
+    Recording,
+)
+from firmware_host.log.rows import EVENT, EVENT_KIND, ROW_KINDS, STRIDE, TICK, TICK_KIND, RowKind
+from firmware_host.log_reading.log_reader import read_log
+from tests.waiting import LONGEST_S, wait_until
+
+CONFIGURATION = '[robot]\nname = "Ünïcode"\n'
+NUMBERS = random.Random(1)  # noise does not compress, so a file grows as rows are put
+
+MAKE: dict[str, Callable[[int], Any]] = {
+    "float64": lambda place: place * NUMBERS.random(),
+    "uint32": lambda place: 2**32 - place,
+    "int32": lambda place: -place,
+    "uint8": lambda place: place % 6,
+    "bool": lambda place: place % 2 == 0,
+    "string": lambda place: "mud, glorious mud: ü",
+}
+
+
+class Row(NamedTuple):
+    kind: RowKind
+    values: list[Any]
+
+    @property
+    def payload(self) -> bytes:
+        return self.kind.encode(*self.values)
+
+
+def make_row(kind: RowKind, stamp_s: float) -> Row:
+    """A value of its own in every place, one of them NaN."""
+    kinds = [field.kind for field in kind.fields for _ in range(field.count)]
+    values = [stamp_s, *(MAKE[name](place) for place, name in enumerate(kinds) if place > 0)]
+    if len(values) > 2:
+        values[1] = math.nan
+    return Row(kind, values)
+
+
+def make_tick(stamp_s: float) -> bytes:
+    return make_row(TICK, stamp_s).payload
+
+
+def fill_pipe(recorder: Recorder) -> int:
+    """Put ticks until one is dropped; returns how many went in."""
+    accepted = 0
+    while recorder.put(TICK_KIND, make_tick(float(accepted))):
+        accepted += 1
+    return accepted
+
+
+@pytest.fixture
+def recorder(tmp_path: Path) -> Recorder:
+    return Recorder(tmp_path / "logs" / "run.mcap", CONFIGURATION, {"robot": "test"})
+
+
+@pytest.fixture
+def golden(recorder: Recorder) -> list[Row]:
+    """Three rows of every kind, in a finished log."""
+    rows = [make_row(kind, 100.0 + number) for number in range(3) for kind in ROW_KINDS]
+    for row in rows:
+        assert recorder.put(ROW_KINDS.index(row.kind), row.payload)
+    assert recorder.close(LONGEST_S)
+    return rows
+
+
+def comparable(values: list[Any]) -> list[str]:
+    """Bit for bit, NaN equal to NaN and a truth to its number."""
+    return [value if isinstance(value, str) else float(value).hex() for value in values]
+
+
+def values_of(message: Any, kind: RowKind) -> list[Any]:
+    """Of a message that another reader decoded, in the order of the row's table."""
+    values: list[Any] = []
+    for field in kind.fields:
+        value = getattr(message, field.name)
+        values.extend(value if field.count > 1 else [value])
+    return values
+
+
+def test_rows_come_back_bit_for_bit(recorder: Recorder, golden: list[Row]) -> None:
+    with recorder.path.open("rb") as file:
+        rows = list(make_reader(file, validate_crcs=True).iter_messages(log_time_order=False))
+    assert [message.data for _, _, message in rows] == [row.payload for row in golden]
+    assert [channel.topic for _, channel, _ in rows] == [row.kind.topic for row in golden]
+    assert [message.sequence for _, _, message in rows] == [0, 0, 0, 1, 1, 1, 2, 2, 2]
+
+
+def test_log_time_is_the_stamp_on_the_wall_clock(recorder: Recorder, golden: list[Row]) -> None:
+    offset_ns = time.time_ns() - time.monotonic_ns()
+    with recorder.path.open("rb") as file:
+        times_ns = [row.log_time for _, _, row in make_reader(file).iter_messages(log_time_order=False)]
+    assert [time_ns - times_ns[0] for time_ns in times_ns[::3]] == [0, 1_000_000_000, 2_000_000_000]
+    assert times_ns[0] - 100_000_000_000 == pytest.approx(offset_ns, abs=10e9)
+
+
+def test_our_reader_finds_every_row(recorder: Recorder, golden: list[Row]) -> None:
+    log = read_log(recorder.path)
+    assert (log.complete, log.configuration_text, log.metadata["robot"]) == (True, CONFIGURATION, "test")
+    assert log.ticks.tobytes() == b"".join(row.payload for row in golden if row.kind is TICK)
+    assert log.events == [EVENT.decode(row.payload) for row in golden if row.kind is EVENT]
+    strides = [row.values for row in golden if row.kind is STRIDE]
+    assert [stride["k_p"] for stride in log.strides] == [values[5] for values in strides]
+
+
+def test_mcap_ros2_decodes_the_same_values(recorder: Recorder, golden: list[Row]) -> None:
+    with recorder.path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        messages = [row.decoded_message for row in reader.iter_decoded_messages(log_time_order=False)]
+    for row, message in zip(golden, messages, strict=True):
+        assert comparable(values_of(message, row.kind)) == comparable(row.values)
+
+
+def test_rosbags_decodes_the_same_values(recorder: Recorder, golden: list[Row]) -> None:
+    with AnyReader([recorder.path]) as bag:
+        for kind in ROW_KINDS:
+            connections = [connection for connection in bag.connections if connection.topic == kind.topic]
+            messages = [bag.deserialize(raw, source.msgtype) for source, _, raw in bag.messages(connections)]
+            expected = [row.values for row in golden if row.kind is kind]
+            for values, message in zip(expected, messages, strict=True):
+                assert comparable(values_of(message, kind)) == comparable(values)
+
+
+def test_a_full_pipe_drops_at_once_and_the_log_says_how_many(recorder: Recorder) -> None:
+    wait_until(recorder.path.exists)
+    os.kill(recorder.writer_pid, signal.SIGSTOP)
+    accepted = fill_pipe(recorder)
+    for stamp_s in range(9):
+        assert not recorder.put(TICK_KIND, make_tick(float(stamp_s)))  # would wait for ever
+    assert (recorder.dropped, recorder.writer_alive) == (10, True)
+    os.kill(recorder.writer_pid, signal.SIGCONT)
+    wait_until(lambda: recorder.put(TICK_KIND, make_tick(1e3)))
+    assert recorder.close(LONGEST_S)
+    with recorder.path.open("rb") as file:
+        topics = [row.topic for _, row, _ in make_reader(file).iter_messages(log_time_order=False)]
+    assert topics == ["/tick"] * accepted + ["/event", "/tick"]
+    (event,) = read_log(recorder.path).events
+    assert event["text"].startswith(f"rows missing here: {recorder.dropped},")
+
+
+def test_rows_lost_at_the_very_end_are_reported_too(recorder: Recorder) -> None:
+    wait_until(recorder.path.exists)
+    os.kill(recorder.writer_pid, signal.SIGSTOP)
+    fill_pipe(recorder)
+    os.kill(recorder.writer_pid, signal.SIGCONT)
+    assert recorder.close(LONGEST_S)
+    (event,) = read_log(recorder.path).events
+    assert event["text"].startswith("rows missing here: 1,")
+
+
+def test_close_ends_though_the_writer_hangs(recorder: Recorder) -> None:
+    wait_until(recorder.path.exists)
+    os.kill(recorder.writer_pid, signal.SIGSTOP)
+    fill_pipe(recorder)
+    assert not recorder.close(0.1)  # would wait for ever
+    os.kill(recorder.writer_pid, signal.SIGCONT)
+    assert recorder.close(LONGEST_S)
+
+
+@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM, signal.SIGABRT])
+def test_signals_do_not_cut_the_log(recorder: Recorder, signal_number: int) -> None:
+    os.kill(recorder.writer_pid, signal_number)  # while it is still starting
+    recorder.put(TICK_KIND, make_tick(1.0))
+    wait_until(recorder.path.exists)
+    os.kill(recorder.writer_pid, signal_number)
+    recorder.put(TICK_KIND, make_tick(2.0))
+    assert recorder.close(LONGEST_S)
+    log = read_log(recorder.path)
+    assert (log.complete, log.ticks["stamp_s"].tolist()) == (True, [1.0, 2.0])
+
+
+def test_a_killed_writer_leaves_a_readable_log_and_the_loop_running(recorder: Recorder) -> None:
+    for number in range(1000):
+        assert recorder.put(TICK_KIND, make_tick(float(number)))
+    wait_until(lambda: recorder.path.exists() and recorder.path.stat().st_size > 200_000)
+    os.kill(recorder.writer_pid, signal.SIGKILL)
+    wait_until(lambda: not recorder.put(TICK_KIND, make_tick(0.0)))
+    assert not recorder.writer_alive
+    assert not recorder.close(LONGEST_S)
+    log = read_log(recorder.path)
+    assert not log.complete
+    assert log.configuration_text == CONFIGURATION
+    assert len(log.ticks) > 500
+    assert log.ticks["stamp_s"].tolist() == [float(number) for number in range(len(log.ticks))]
+
+
+def test_an_event_of_any_length_is_logged_shortened(recorder: Recorder) -> None:
+    assert recorder.put(EVENT_KIND, EVENT.encode(1.0, "ü" * 5000))
+    assert recorder.close(LONGEST_S)
+    (event,) = read_log(recorder.path).events
+    assert event == {"stamp_s": 1.0, "text": "ü" * (LONGEST_TEXT // 2)}
+
+
+def test_a_configuration_longer_than_the_pipe_arrives(tmp_path: Path) -> None:
+    text = "# a long comment\n" * 200_000
+    recorder = Recorder(tmp_path / "run.mcap", text, {})
+    assert recorder.close(LONGEST_S)
+    assert read_log(recorder.path).configuration_text == text
+
+
+def test_a_row_without_a_stamp_does_not_stop_the_writer(recorder: Recorder) -> None:
+    for stamp_s in (1.0, math.nan, -math.inf, 2.0):
+        recorder.put(EVENT_KIND, EVENT.encode(stamp_s, "event"))
+    assert recorder.close(LONGEST_S)
+    assert len(read_log(recorder.path).events) == 4
+
+
+def test_the_writer_is_last_in_line_for_the_cpu(recorder: Recorder) -> None:
+    wait_until(recorder.path.exists)
+    niceness = os.getpriority(os.PRIO_PROCESS, recorder.writer_pid)
+    assert niceness == min(19, os.getpriority(os.PRIO_PROCESS, 0) + 10)
+    assert os.sched_getscheduler(recorder.writer_pid) == os.SCHED_OTHER
+    assert recorder.close(LONGEST_S)
+
+
+def test_a_path_that_cannot_be_made_is_told_in_a_sentence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").touch()
+    recorder = Recorder(tmp_path / "file" / "run.mcap", "", {})
+    assert not recorder.close(LONGEST_S)
+    assert capfd.readouterr().err == f"The log {recorder.path} cannot be written: Not a directory.\n"
+
+
+def test_a_log_is_never_written_over(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_text("precious")
+    recorder = Recorder(path, "", {})
+    assert recorder.close(LONGEST_S)
+    assert (path.read_text(), recorder.path.name) == ("precious", "run-0001.mcap")
+    assert capfd.readouterr().err == f"The log {path} cannot be written: File exists.\n"
+
+
+def test_a_disk_that_refuses_costs_rows_that_the_log_counts(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """The kernel lets no file grow beyond a size; then it does again."""
+    recorder = Recorder(tmp_path / "run.mcap", "", {})
+    wait_until(recorder.path.exists)
+    resource.prlimit(recorder.writer_pid, resource.RLIMIT_FSIZE, (2000, resource.RLIM_INFINITY))
+    put = 0
+    deadline_s = time.monotonic() + LONGEST_S
+    while not look(recorder).problem and time.monotonic() < deadline_s:
+        put += recorder.put(TICK_KIND, make_tick(float(put)))
+        time.sleep(0.003)
+    assert look(recorder).problem == f"The log {tmp_path / 'run.mcap'} cannot be written: File too large."
+    assert recorder.writer_alive
+    unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+    resource.prlimit(recorder.writer_pid, resource.RLIMIT_FSIZE, unlimited)
+    while look(recorder).problem and time.monotonic() < deadline_s:
+        put += recorder.put(TICK_KIND, make_tick(float(put)))
+        time.sleep(0.003)
+    assert recorder.close(LONGEST_S)
+    log = read_log(recorder.path)
+    lost = int(log.events[0]["text"].split()[3].rstrip(","))
+    assert recorder.dropped == lost > 0
+    assert log.ticks["stamp_s"].tolist() == [float(number) for number in range(lost, put)]
+    assert log.events[0]["text"].endswith("the log could not be written: File too large")
+    assert capfd.readouterr().err.count("\n") == 1
+
+
+def test_what_a_killed_writer_left_is_recovered_at_the_next_start(tmp_path: Path) -> None:
+    killed = Recorder(first_path(tmp_path, "1"), CONFIGURATION, {"robot": "test"}, LogParameters())
+    for number in range(500):
+        killed.put(TICK_KIND, make_tick(float(number)))
+    wait_until(lambda: killed.path.exists() and killed.path.stat().st_size > 50_000)
+    os.kill(killed.writer_pid, signal.SIGKILL)
+    assert not killed.close(LONGEST_S)
+    recorder = Recorder(first_path(tmp_path, "2"), CONFIGURATION, {"robot": "test"}, LogParameters())
+    recorder.put(TICK_KIND, make_tick(1.0))
+    wait_until((tmp_path / DONE / "1-0000.mcap").exists)
+    assert recorder.close(LONGEST_S)
+    assert recorder.path == tmp_path / DONE / "2-0000.mcap"
+    wait_until(lambda: not unfinished_files(tmp_path))
+    recovered = read_log(tmp_path / DONE / "1-0000.mcap")
+    assert recovered.complete and recovered.metadata["recovered"] == "true"
+    assert recovered.ticks["stamp_s"].tolist() == [float(number) for number in range(len(recovered.ticks))]
+    assert len(recovered.ticks) > 100
+
+
+def look(recorder: Recorder) -> LogReport:
+    """Into the pipe of reports, now."""
+    recorder._calls = 0
+    return recorder.report()
+
+
+def test_the_writer_reports_the_disk(recorder: Recorder) -> None:
+    wait_until(lambda: look(recorder).free_bytes < HEALTHY.free_bytes)
+    report, disk = look(recorder), os.statvfs(recorder.path)
+    assert report.free_share == pytest.approx(disk.f_bavail / disk.f_blocks, abs=0.05)
+    assert (report.alive, report.dropped, report.problem) == (True, 0, "")
+    assert 0.0 <= report.slowest_write_s < LONGEST_S
+    os.kill(recorder.writer_pid, signal.SIGKILL)
+    wait_until(lambda: not look(recorder).alive)
+    recorder.close(LONGEST_S)
+
+
+def test_a_writer_that_waits_for_its_disk_shows_as_a_slow_write(recorder: Recorder) -> None:
+    wait_until(lambda: look(recorder).free_bytes < HEALTHY.free_bytes)
+    recorder._heard_s -= 60.0
+    assert look(recorder).slowest_write_s >= 60.0
+    recorder.close(LONGEST_S)
+
+
+@pytest.mark.parametrize(
+    "line", [b"a stray line", b"[]", b"{}", b"7", b"\xff", b'{"path": 3, "dropped": "x"}', b"[" * 5000], ids=repr
+)
+def test_what_is_no_report_neither_ends_the_loop_nor_changes_what_is_known(
+    tmp_path: Path, line: bytes, capfd: pytest.CaptureFixture[str]
+) -> None:
+    recorder = Recorder(tmp_path / "run.mcap", "", {})
+    wait_until(lambda: look(recorder).free_bytes < HEALTHY.free_bytes)
+    report = recorder._report
+    assert not recorder._take(line)
+    assert (recorder._report, recorder.odd_reports, recorder.path) == (report, 1, tmp_path / "run.mcap")
+    assert recorder.close(LONGEST_S)
+    assert "1 things that no report says" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("sent", [b"", HEADER.pack(0, 100) + b"{"], ids=["nothing", "half an opening"])
+def test_a_writer_that_hears_nothing_makes_no_file(tmp_path: Path, sent: bytes) -> None:
+    path = tmp_path / "run.mcap"
+    command = [sys.executable, "-m", "firmware_host.log.writer", str(path)]
+    ended = subprocess.run(command, input=sent, capture_output=True, timeout=LONGEST_S, check=True)
+    assert (ended.stderr, path.exists()) == (b"", False)
+
+
+def test_a_row_cut_off_with_its_sender_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    opening = {"configuration_text": "", "metadata": {}, "wall_minus_monotonic_ns": 0}
+    records = [(0, json.dumps(opening).encode()), (TICK_KIND, make_tick(1.0)), (TICK_KIND, make_tick(2.0))]
+    sent = b"".join(HEADER.pack(kind, len(payload)) + payload for kind, payload in records)
+    command = [sys.executable, "-m", "firmware_host.log.writer", str(path)]
+    subprocess.run(command, input=sent[:-1], timeout=LONGEST_S, check=True)
+    assert read_log(path).ticks["stamp_s"].tolist() == [1.0]
+
+
+def test_the_null_recorder_takes_everything() -> None:
+    recording: Recording = NullRecorder()
+    assert recording.put(TICK_KIND, make_tick(1.0))
+    assert recording.close(0.0)
+    assert (recording.dropped, recording.writer_alive, recording.report()) == (0, True, HEALTHY)

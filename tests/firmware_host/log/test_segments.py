@@ -1,0 +1,253 @@
+"""The files of one run: what each carries, that no row is lost or doubled between them, and a disk that refuses."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import subprocess
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from control.modes import Mode
+from firmware_host.log import log_file, log_folder
+from firmware_host.log import segments as log_segments
+from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files, unfinished_files
+from firmware_host.log.log_parameters import ONE_FILE, LogParameters
+from firmware_host.log.segments import LogSegments
+from firmware_host.log_reading.log_reader import LogError, read_log, read_logs
+from tests.firmware_host.made_up_rows import OPENING, make_event, make_ticks
+
+BY_TIME = replace(ONE_FILE, segment_s=1.0)
+
+
+def make_segments(folder: Path, parameters: LogParameters = BY_TIME) -> LogSegments:
+    return LogSegments(first_path(folder, "run"), OPENING, parameters)
+
+
+def write_ticks(log: LogSegments, first: int, end: int) -> None:
+    for number in range(first, end, 19):
+        log.write(make_ticks(number, min(number + 19, end), Mode.WALKING))
+
+
+def test_no_row_is_lost_or_doubled_at_a_border(tmp_path: Path) -> None:
+    log = make_segments(tmp_path)
+    write_ticks(log, 0, 1500)
+    assert log.close()
+    paths = log_files(tmp_path, DONE)
+    assert [path.name for path in paths] == [f"run-{number:04d}.mcap" for number in range(4)]
+    assert read_logs(paths).ticks["tick"].tolist() == list(range(1500))
+    assert unfinished_files(tmp_path) == []
+
+
+def test_a_segment_ends_by_its_size(tmp_path: Path) -> None:
+    log = make_segments(tmp_path, replace(ONE_FILE, segment_bytes=100_000))
+    for _ in range(5):
+        log.write([make_event(os.urandom(500).hex()) for _ in range(100)])
+    assert log.close()
+    assert len(log_files(tmp_path, DONE)) == 5
+    assert all(path.stat().st_size < 200_000 for path in log_files(tmp_path, DONE))
+
+
+def test_every_segment_says_what_it_belongs_to_and_reads_alone(tmp_path: Path) -> None:
+    log = make_segments(tmp_path)
+    write_ticks(log, 0, 500)
+    assert log.close()
+    for number, path in enumerate(log_files(tmp_path, DONE)):
+        alone = read_log(path)
+        assert alone.complete and alone.configuration_text == "[robot]\n"
+        assert alone.metadata["segment"] == str(number)
+        assert (alone.metadata["robot"], alone.metadata["run_id"]) == ("mudskipper-1", "run")
+        assert alone.metadata["configuration_sha256"] == sha256(b"[robot]\n").hexdigest()
+        assert set(alone.metadata) >= {"host", "kernel", "started", "wall_minus_monotonic_ns", "rest_hz"}
+
+
+def test_segments_of_a_run_are_joined_only_if_they_are_all_there(tmp_path: Path) -> None:
+    log = make_segments(tmp_path)
+    write_ticks(log, 0, 1500)
+    assert log.close()
+    first, second, third, fourth = log_files(tmp_path, DONE)
+    assert len(read_logs([third, second]).ticks) == len(read_log(second).ticks) + len(read_log(third).ticks)
+    with pytest.raises(LogError, match="segments 0 to 3 of its run are not all here, each once: 1, 2 missing"):
+        read_logs([first, fourth])
+    with pytest.raises(LogError, match="3 given twice"):
+        read_logs([fourth, fourth])
+
+
+def make_old_logs(folder: Path, count: int = 2) -> list[Path]:
+    paths = [folder / DONE / f"{number}.mcap" for number in range(1, count + 1)]
+    paths[0].parent.mkdir()
+    for path in paths:
+        path.write_bytes(bytes(5000))
+    return paths
+
+
+def full(descriptor: int, piece: bytes) -> int:
+    """In place of os.write."""
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def fill_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
+    monkeypatch.setattr(os, "write", full)
+
+
+def test_a_full_disk_frees_nothing_where_nothing_may_be_freed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    old = make_old_logs(tmp_path)
+    log = make_segments(tmp_path, ONE_FILE)
+    with monkeypatch.context() as patch:
+        fill_disk(patch)
+        for number in range(5):
+            log.write(make_ticks(100 * number, 100 * number + 190))
+    assert log.problem and all(path.exists() for path in old)
+
+
+def test_freeing_that_does_not_help_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Somebody else takes what becomes free, or another name keeps the file."""
+    old = make_old_logs(tmp_path, 5)
+    log = make_segments(tmp_path, replace(ONE_FILE, quota_bytes=10**9))
+    monkeypatch.setattr(log_segments, "free_space", lambda folder: log_folder.FreeSpace(0.0, 0))
+    with monkeypatch.context() as patch:
+        fill_disk(patch)
+        for number in range(5):
+            log.write(make_ticks(100 * number, 100 * number + 190))
+    assert [path.exists() for path in old] == [False, True, True, True, True]
+
+
+@pytest.mark.parametrize("removed", [ACTIVE, "."])
+def test_a_log_removed_under_the_writer_is_noticed(
+    tmp_path: Path, removed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
+    monkeypatch.setattr(log_file, "SYNC_INTERVAL_S", 0.0)
+    monkeypatch.setattr(log_file, "FLUSH_INTERVAL_S", 0.0)
+    folder = tmp_path / "logs"
+    log = make_segments(folder, ONE_FILE)
+    log.write(make_ticks(0, 100))
+    shutil.rmtree(folder / removed)
+    log.write(make_ticks(100, 200))
+    assert log.problem.endswith("run-0000.mcap cannot be written: it was removed or moved away.")
+    assert log.dropped == 200
+    log.write(make_ticks(200, 300))
+    assert log.close()
+    (path,) = log_files(folder, DONE)
+    read = read_log(path)
+    assert read.ticks["tick"].tolist() == list(range(200, 300))
+    assert read.events[0]["text"].startswith("rows missing here: 200, ")
+
+
+def test_what_took_the_place_of_a_removed_log_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
+    log = make_segments(tmp_path, ONE_FILE)
+    path = tmp_path / ACTIVE / "run-0000.mcap"
+    path.rename(tmp_path / "elsewhere")
+    path.write_text("somebody's")
+    (tmp_path / "elsewhere").unlink()
+    monkeypatch.setattr(log_file, "SYNC_INTERVAL_S", 0.0)
+    monkeypatch.setattr(log_file, "FLUSH_INTERVAL_S", 0.0)
+    log.write(make_ticks(0, 100))
+    assert (log.dropped, path.read_text()) == (100, "somebody's")
+    log.write(make_ticks(100, 200))
+    log.write(make_ticks(200, 300))
+    assert log.close() and (tmp_path / DONE / "run-0001.mcap").exists()
+
+
+def test_a_log_moved_away_keeps_its_rows_and_its_place_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
+    log = make_segments(tmp_path, ONE_FILE)
+    monkeypatch.setattr(log_file, "SYNC_INTERVAL_S", 0.0)
+    monkeypatch.setattr(log_file, "FLUSH_INTERVAL_S", 0.0)
+    log.write(make_ticks(0, 100))
+    (tmp_path / ACTIVE / "run-0000.mcap").rename(tmp_path / "elsewhere")
+    (tmp_path / ACTIVE / "run-0000.mcap").write_text("somebody's")
+    log.write(make_ticks(100, 200))
+    assert log.problem and log.dropped == 0
+    log.write(make_ticks(200, 300))
+    assert (tmp_path / ACTIVE / "run-0000.mcap").read_text() == "somebody's"
+    assert len(read_log(tmp_path / "elsewhere").ticks) == 200
+    log.close()
+
+
+def test_what_resists_recovery_is_tried_once_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / ACTIVE).mkdir()
+    (tmp_path / ACTIVE / "junk.mcap").write_text("junk")
+    started: list[list[str]] = []
+
+    class Ended:
+        def __init__(self, command: list[str], **_: object) -> None:
+            started.append(command)
+
+        def poll(self) -> int:
+            return 0
+
+    monkeypatch.setattr(subprocess, "Popen", Ended)
+    log = make_segments(tmp_path)
+    write_ticks(log, 0, 1500)
+    assert log.close()
+    assert len(log_files(tmp_path, DONE)) == 4 and len(started) == 1
+
+
+def test_a_full_disk_frees_the_oldest_log_and_counts_what_it_cost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old, newest = make_old_logs(tmp_path)
+    monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
+    log = make_segments(tmp_path, replace(ONE_FILE, quota_bytes=10**9))
+    log.write(make_ticks(0, 10))
+    assert log._file is not None
+    log._file.flush()
+
+    write = os.write
+    monkeypatch.setattr(os, "write", full)
+    log.write(make_ticks(10, 200))
+    assert log.problem.endswith("run-0000.mcap cannot be written: No space left on device.")
+    assert log.dropped == 190
+    monkeypatch.setattr(os, "write", write)
+    log.write(make_ticks(200, 210))
+    assert (log.problem, old.exists(), newest.exists()) == ("", False, True)
+    assert log.close()
+    capsys.readouterr()
+    ours = read_log(tmp_path / DONE / "run-0001.mcap")
+    assert ours.ticks["tick"].tolist() == list(range(200, 210))
+    assert [event["text"] for event in ours.events] == [
+        "room for logs: 1.mcap was freed, 5000 bytes",
+        "rows missing here: 190, the log could not be written: No space left on device",
+    ]
+    left = read_log(log_folder.present_path(tmp_path / ACTIVE / "run-0000.mcap"))
+    assert left.ticks["tick"].tolist() == list(range(10))  # to the row, not to the chunk
+
+
+def test_the_quota_frees_the_oldest_and_says_so(tmp_path: Path) -> None:
+    (tmp_path / DONE).mkdir()
+    (tmp_path / "kept").mkdir()
+    for folder, name in ((DONE, "1"), (DONE, "2"), ("kept", "0")):
+        (tmp_path / folder / f"{name}.mcap").write_bytes(bytes(1000))
+    log = make_segments(tmp_path, replace(ONE_FILE, quota_bytes=50_000))
+    log.write([make_event("first")])
+    assert log.close()
+    (event,) = read_log(tmp_path / DONE / "run-0000.mcap").events
+    assert event["text"] == "first"
+    log = LogSegments(first_path(tmp_path, "sun"), OPENING, replace(ONE_FILE, quota_bytes=4000))
+    log.write([make_event("first")])
+    assert log.close()
+    events = [event["text"] for event in read_log(tmp_path / DONE / "sun-0000.mcap").events]
+    assert "room for logs: 1.mcap was freed, 1000 bytes" in events
+    assert (tmp_path / "kept" / "0.mcap").exists()
+
+
+def test_thinning_is_said_in_the_log(tmp_path: Path) -> None:
+    log = make_segments(tmp_path, replace(ONE_FILE, rest_hz=10.0, rest_full_s=1.0))
+    log.write(make_ticks(0, 2000, Mode.IDLE))
+    log.write(make_ticks(2000, 2100, Mode.ARMING))
+    assert log.close()
+    read = read_log(tmp_path / DONE / "run-0000.mcap")
+    assert read.metadata["rest_hz"] == "10"
+    assert [event["text"].split(":")[0] for event in read.events] == ["at rest", "end of the rest"]
+    numbers = read.ticks["tick"].tolist()
+    assert numbers == sorted(set(numbers))
+    assert numbers[-480:] == list(range(1620, 2100))

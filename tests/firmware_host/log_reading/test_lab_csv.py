@@ -1,0 +1,299 @@
+"""The authors' measurements in our conventions, our logs in theirs, and every malformed line named.
+
+The measurements are no part of this project; they are looked for beside it or in MUDSKIPPER_SHARED_DATA.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from control.records import JOINTS, Phase
+from firmware_host.log_reading.lab_csv import STATE_OF_PHASE, LabLog, read_lab_csv, write_lab_csv
+from firmware_host.log_reading.log_reader import Log, LogError, tick_type
+from tests.folders import SHARED_DATA
+
+SHARED = SHARED_DATA
+MEASURED = sorted(SHARED.glob("flipper_in_mud/*.csv.gz"))
+needs_measurements = pytest.mark.skipif(not MEASURED, reason="the shared measurements are not here")
+absent = [pytest.param(SHARED, marks=needs_measurements)]
+measured = pytest.mark.parametrize("path", MEASURED or absent, ids=lambda path: path.name.split(".csv")[0])
+
+SWEEPS, ADDUCTIONS = (0, 2), (1, 3)
+HEAD = (
+    "# gait header: scenario,insertion_angle,drag_speed | turtle,0.03,0.1\n"
+    "time,turtle_state,leftadduction_pos,leftsweeping_pos,rightadduction_pos,rightsweeping_pos,"
+    "leftadduction_curr,leftsweeping_curr,rightadduction_curr,rightsweeping_curr"
+)
+ROW = "{},2,0,0,{},0,0,0,1,0"
+
+Numbers = NDArray[Any]
+
+
+def inside(log: LabLog, phase: Phase) -> Numbers:
+    """Steps from row to row within a phase."""
+    steps: Numbers = (log.phase[1:] == phase) & (log.phase[:-1] == phase)
+    return steps
+
+
+def travel(log: LabLog, joint: int, phase: Phase) -> float:
+    return float(np.sum(np.diff(log.angle_rad[:, joint])[inside(log, phase)]))
+
+
+def work(log: LabLog, joint: int, phase: Phase) -> float:
+    """In A·rad, positive where the motor drives the joint."""
+    steps = np.diff(log.angle_rad[:, joint]) * log.current_a[1:, joint]
+    return float(np.sum(steps[inside(log, phase)]))
+
+
+def joints_of(log: LabLog, joints: tuple[int, int]) -> list[int]:
+    return [joint for joint in joints if JOINTS[joint].split("_")[0] in log.flippers]
+
+
+def write(path: Path, *lines: str) -> Path:
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def make_walk(strides: int = 3, rate_hz: float = 100.0) -> Log:
+    """A log of ours in which both flippers walk in mud: they go down, back, up and forward, and push."""
+    pose = {  # sweep and adduction in rad at the end of each phase of one second
+        Phase.REST: (0.0, 0.1),
+        Phase.PAUSE: (0.5, 0.1),
+        Phase.INSERTION: (0.5, -0.3),
+        Phase.STANCE: (-0.5, -0.3),
+        Phase.EXTRACTION: (-0.5, 0.1),
+        Phase.SWING: (0.5, 0.1),
+    }
+    cycle = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING)
+    phases = [Phase.REST, Phase.PAUSE, *cycle * strides]
+    corners = np.array([pose[Phase.REST], *(pose[phase] for phase in phases)])
+    time_s = np.arange(len(phases) * rate_hz) / rate_hz
+    angles = [np.interp(time_s, np.arange(len(corners)), corners[:, part]) for part in (0, 1)]
+    ticks = np.zeros(len(time_s), tick_type())
+    ticks["stamp_s"] = 1234.5 + time_s
+    ticks["phase"] = np.repeat(phases, int(rate_hz))
+    ticks["angle_rad"] = np.column_stack([*angles, *angles])
+    ticks["current_a"] = 3.0 * np.sign(np.gradient(ticks["angle_rad"], axis=0)) + 0.1
+    ticks["stride_depth_m"] = 0.035
+    ticks["body_x_m"] = np.cumsum(ticks["phase"] == Phase.STANCE) * 1e-4
+    return Log({}, "[gait]\nsweep_angle_deg = 30.0\nprotocol = 'walking'\n", ticks, [], [], True)
+
+
+def export(log: Log) -> str:
+    out = io.StringIO()
+    write_lab_csv(log, out)
+    return out.getvalue()
+
+
+@needs_measurements
+def test_all_twelve_measurements_are_there() -> None:
+    assert len(MEASURED) == 12
+
+
+@measured
+def test_flippers_that_were_there_are_found(path: Path) -> None:
+    log = read_lab_csv(path)
+    present = ("right",) if path.name.startswith("single") else ("left", "right")
+    absent_joints = [name.split("_")[0] not in present for name in JOINTS]
+    assert log.flippers == present
+    assert np.isnan(log.angle_rad).any(axis=0).tolist() == absent_joints
+
+
+@measured
+def test_insertion_lowers_and_extraction_raises_the_flipper(path: Path) -> None:
+    log = read_lab_csv(path)
+    for joint in joints_of(log, ADDUCTIONS):
+        assert travel(log, joint, Phase.INSERTION) < 0.0 < travel(log, joint, Phase.EXTRACTION)
+
+
+@measured
+def test_stance_sweeps_back_and_swing_forward(path: Path) -> None:
+    log = read_lab_csv(path)
+    for joint in joints_of(log, SWEEPS):
+        assert travel(log, joint, Phase.STANCE) < 0.0 < travel(log, joint, Phase.SWING)
+
+
+@measured
+def test_motors_drive_the_flippers_through_the_mud(path: Path) -> None:
+    """Extraction was not used to find the signs, so its work shows that they are right."""
+    log = read_lab_csv(path)
+    for joint in joints_of(log, SWEEPS):
+        assert work(log, joint, Phase.STANCE) > 0.0
+    for joint in joints_of(log, ADDUCTIONS):
+        assert work(log, joint, Phase.INSERTION) > 0.0
+        assert work(log, joint, Phase.EXTRACTION) > 0.0
+
+
+@measured
+def test_the_body_advances_in_stance(path: Path) -> None:
+    log = read_lab_csv(path)
+    if path.name.startswith("single"):
+        assert np.isnan(log.body_x_m).all()
+    else:
+        assert 0.03 < np.nansum(np.diff(log.body_x_m)[inside(log, Phase.STANCE)]) < 0.1
+
+
+@measured
+def test_the_commanded_depth_is_in_the_gait(path: Path) -> None:
+    assert 0.03 <= read_lab_csv(path).gait["insertion_angle"] <= 0.07
+
+
+@needs_measurements
+def test_a_walk_of_70_mm_pulls_itself_back_in_swing() -> None:
+    (path,) = (path for path in MEASURED if "70mm" in path.name)
+    log = read_lab_csv(path)
+    steps_m = np.diff(log.body_x_m)
+    assert np.sum(steps_m[inside(log, Phase.SWING)]) < -0.5 * np.sum(steps_m[inside(log, Phase.STANCE)])
+
+
+def test_what_was_written_is_read_back(tmp_path: Path) -> None:
+    walk = make_walk()
+    log = read_lab_csv(write(tmp_path / "walk.csv", export(walk)))
+    assert log.phase.tolist() == walk.ticks["phase"].tolist()
+    assert log.flippers == ("left", "right")
+    np.testing.assert_allclose(log.stamp_s, walk.ticks["stamp_s"] - 1234.5, atol=1e-9)
+    np.testing.assert_allclose(log.angle_rad, walk.ticks["angle_rad"], rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(log.current_a, walk.ticks["current_a"], rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(log.body_x_m, walk.ticks["body_x_m"], rtol=1e-8, atol=1e-12)
+
+
+@pytest.mark.parametrize("turned", range(4), ids=JOINTS)
+@pytest.mark.parametrize("signal", ["angle_rad", "current_a"])
+def test_a_mirrored_signal_is_turned_round_again(signal: str, turned: int, tmp_path: Path) -> None:
+    straight = read_lab_csv(write(tmp_path / "straight.csv", export(make_walk())))
+    walk = make_walk()
+    walk.ticks[signal][:, turned] *= -1.0
+    mirrored = read_lab_csv(write(tmp_path / "mirrored.csv", export(walk)))
+    np.testing.assert_array_equal(mirrored.angle_rad, straight.angle_rad)
+    np.testing.assert_array_equal(mirrored.current_a, straight.current_a)
+
+
+def test_writing_keeps_the_authors_columns_and_units() -> None:
+    settings, names, first, *_ = export(make_walk()).splitlines()
+    assert settings == "# gait header: scenario,insertion_angle,sweep_angle_deg | mudskipper,0.035,30.0"
+    assert names == HEAD.splitlines()[1] + ",OptitrackPosition_x"
+    turns = [float(field) for field in first.split(",")[2:6]]
+    assert turns == pytest.approx([0.1 / math.tau, 0.0, 0.1 / math.tau, 0.0])
+
+
+def test_a_log_without_a_pose_has_no_column_for_it() -> None:
+    walk = make_walk()
+    walk.ticks["body_x_m"] = math.nan
+    assert "Optitrack" not in export(walk)
+
+
+def test_an_empty_log_is_written_as_a_head() -> None:
+    walk = make_walk()
+    assert export(walk._replace(ticks=walk.ticks[:0])).count("\n") == 2
+
+
+def test_a_configuration_that_is_not_toml_is_refused() -> None:
+    with pytest.raises(LogError, match="the configuration in the log is not TOML"):
+        export(make_walk()._replace(configuration_text="[gait"))
+
+
+def test_states_become_phases(tmp_path: Path) -> None:
+    states = (-1, 0, 1, 2, 3, 4, 5, 6, 7, 8)
+    rows = [f"{number},{state},0,0,0,0,0,0,0,0" for number, state in enumerate(states)]
+    log = read_lab_csv(write(tmp_path / "states.csv", HEAD, *rows))
+    still = [Phase.PAUSE] * 4
+    moving = [Phase.SWING, Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION]
+    assert log.phase.tolist() == [Phase.REST, Phase.REST, *moving, *still]
+    assert log.flippers == ()
+
+
+def test_settings_that_are_numbers_are_kept(tmp_path: Path) -> None:
+    log = read_lab_csv(write(tmp_path / "run.csv", HEAD, ROW.format(0, 0)))
+    assert log.gait == {"insertion_angle": 0.03, "drag_speed": 0.1}
+
+
+def test_lost_poses_are_not_positions(tmp_path: Path) -> None:
+    """An old pose held until the true one is found, and zeros, are no motion of the body."""
+    body_m = [0.8] * 10 + [0.1, 0.11, 0.12, 0.0, 0.13, 0.14]
+    rows = [f"{number / 10},3,0,0,0,0,0,0,0,0,0,{x_m},0" for number, x_m in enumerate(body_m)]
+    head = HEAD + ",OptitrackPosition_x,OptitrackPosition_y,OptitrackPosition_z"
+    log = read_lab_csv(write(tmp_path / "lost.csv", head, *rows))
+    np.testing.assert_allclose(log.body_x_m, [math.nan] * 10 + [0.1, 0.11, 0.12, math.nan, 0.13, 0.14])
+
+
+def test_a_body_at_rest_is_not_lost(tmp_path: Path) -> None:
+    body_m = [0.1] * 10 + [0.101, 0.102]
+    rows = [f"{number / 10},3,0,0,0,0,0,0,0,0,{x_m}" for number, x_m in enumerate(body_m)]
+    log = read_lab_csv(write(tmp_path / "rest.csv", HEAD + ",OptitrackPosition_x", *rows))
+    np.testing.assert_allclose(log.body_x_m, body_m)
+
+
+GOOD = [ROW.format(number / 10, number / 100) for number in range(5)]
+MALFORMED = {
+    "nothing": ([], "ends at line 0"),
+    "only a head": ([HEAD], "ends at line 2; the rows begin at line 3"),
+    "no settings": ([HEAD.replace("# gait header: ", ""), *GOOD], "line 1 is not"),
+    "a value too few": ([HEAD.replace(",0.1\n", "\n"), *GOOD], "line 1 is not"),
+    "a missing column": ([HEAD.replace("time,", "t,"), *GOOD], "line 2 names no column time"),
+    "a short row": ([HEAD, *GOOD, "1,2,3"], "line 8 has 3 fields, line 2 names 10"),
+    "a long first row": ([HEAD, GOOD[0] + ",1", *GOOD], "line 3 has 11 fields, line 2 names 10"),
+    "rows all short": ([HEAD, "1,2,3", "1,2,3"], "line 3 has 3 fields, line 2 names 10"),
+    "an empty row": ([HEAD, GOOD[0], "", *GOOD], "line 4 has 1 fields, line 2 names 10"),
+    "a word": ([HEAD, *GOOD, ROW.format("mud", 0)], "line 8: 'mud' is not a number"),
+    "an empty field": ([HEAD, *GOOD, ROW.format("", 0)], "line 8: '' is not a number"),
+    "python's own number": ([HEAD, *GOOD, ROW.format("1_0", 0)], "the rows from line 3 on are not a table"),
+    "no time": ([HEAD, *GOOD, ROW.format("nan", 0)], "line 8 has no time"),
+    "time backwards": ([HEAD, ROW.format(7, 0), *GOOD], "line 4 goes back in time by more than 1 s"),
+    "an unknown state": ([HEAD, *GOOD, GOOD[0].replace(",2,", ",9,")], "line 8 has a turtle_state"),
+    "half a state": ([HEAD, *GOOD, GOOD[0].replace(",2,", ",2.5,")], "line 8 has a turtle_state"),
+}
+
+
+@pytest.mark.parametrize(("lines", "reason"), MALFORMED.values(), ids=MALFORMED)
+def test_a_malformed_file_is_refused_by_line(lines: list[str], reason: str, tmp_path: Path) -> None:
+    path = write(tmp_path / "100%.csv", *lines)
+    with pytest.raises(LogError, match=re.escape(str(path)) + ": .*" + re.escape(reason)):
+        read_lab_csv(path)
+
+
+def test_small_disorder_is_kept_as_it_is(tmp_path: Path) -> None:
+    path = write(tmp_path / "run.csv", HEAD, *(ROW.format(stamp_s, 0) for stamp_s in (0.0, 0.9, 0.2, 1.0)))
+    assert read_lab_csv(path).stamp_s.tolist() == [0.0, 0.9, 0.2, 1.0]
+
+
+def test_bytes_that_are_no_text_are_named_by_line(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_bytes("\n".join([HEAD, GOOD[0]]).encode() + b"\n0.1,\xff\n")
+    with pytest.raises(LogError, match="line 4 is not text"):
+        read_lab_csv(path)
+
+
+def test_a_broken_off_archive_names_the_last_good_line(tmp_path: Path) -> None:
+    chance = np.random.default_rng(4)
+    rows = [ROW.format(number / 10, noise) for number, noise in enumerate(chance.random(5000))]
+    packed = gzip.compress("\n".join([HEAD, *rows]).encode())
+    path = tmp_path / "run.csv.gz"
+    path.write_bytes(packed)
+    assert len(read_lab_csv(path).stamp_s) == 5000
+    path.write_bytes(packed[: len(packed) // 2])
+    with pytest.raises(LogError, match=r"run\.csv\.gz: .* is damaged after line \d+$") as refusal:
+        read_lab_csv(path)
+    assert 2000 < int(str(refusal.value).split()[-1]) < 3000
+
+
+def test_an_archive_that_is_none_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="breaks off or is damaged after line 0"):
+        read_lab_csv(write(tmp_path / "run.csv.gz", HEAD, *GOOD))
+
+
+def test_a_file_that_is_not_there_is_told_in_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"none\.csv: No such file or directory"):
+        read_lab_csv(tmp_path / "none.csv")
+
+
+def test_every_phase_has_a_state_to_be_written_as() -> None:
+    assert set(STATE_OF_PHASE) == set(Phase)

@@ -1,0 +1,286 @@
+"""Reading logs that are whole, cut off or damaged: all that is there, or one sentence of refusal."""
+
+from __future__ import annotations
+
+import random
+import struct
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+
+from firmware_host.log.log_file import LogFile
+from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE, STRIDE_KIND, TICK, TICK_KIND, RowKind
+from firmware_host.log_reading.log_reader import LayoutError, Log, LogError, log_summary, read_log
+from tests.firmware_host.made_up_rows import encode_row
+
+WALL_NS = 1_700_000_000_000_000_000  # 2023-11-14 22:13:20 UTC
+OPENING: dict[str, Any] = {
+    "configuration_text": "[robot]\n",
+    "metadata": {"robot": "mudskipper-1"},
+    "wall_minus_monotonic_ns": WALL_NS,
+}
+TICKS = 1000  # six chunks
+
+
+def make_tick(number: int) -> bytes:
+    return encode_row(
+        TICK,
+        stamp_s=number / 380,
+        angle_rad=[number + joint / 10 for joint in range(4)],
+        tick=number,
+        missed_ticks=number // 100,
+        stride=-1,
+        limited=number % 2,
+    )
+
+
+def make_log(path: Path, ticks: int = TICKS) -> Path:
+    """A finished log: ticks, and among them two strides and three events."""
+    rows = [(TICK_KIND, make_tick(number)) for number in range(ticks)]
+    strides = [encode_row(STRIDE, stamp_s=1.0, index=index, flipper=index) for index in range(2)]
+    events = [encode_row(EVENT, stamp_s=1.0, text=text) for text in ("walk", "mud", "stop")]
+    rows[ticks // 2 : ticks // 2] = [(STRIDE_KIND, row) for row in strides]
+    rows[ticks // 3 : ticks // 3] = [(EVENT_KIND, row) for row in events]
+    log = LogFile(path, OPENING)
+    log.write(rows)
+    log.finish()
+    return path
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_log(tmp_path_factory.mktemp("logs") / "run.mcap")
+
+
+@pytest.fixture(scope="module")
+def whole(path: Path) -> Log:
+    return read_log(path)
+
+
+def read_bytes(tmp_path: Path, contents: bytes) -> Log:
+    changed = tmp_path / "changed.mcap"
+    changed.write_bytes(contents)
+    return read_log(changed)
+
+
+def holds_first_rows_of(log: Log, whole: Log) -> bool:
+    return (
+        log.ticks.tobytes() == whole.ticks[: len(log.ticks)].tobytes()
+        and log.strides == whole.strides[: len(log.strides)]
+        and log.events == whole.events[: len(log.events)]
+    )
+
+
+def test_ticks_are_an_array_with_the_fields_of_the_table(whole: Log) -> None:
+    assert whole.ticks.dtype.names == tuple(field.name for field in TICK.fields)
+    assert whole.ticks["angle_rad"].shape == (TICKS, 4)
+    for number in (0, 1, TICKS - 1):
+        expected = TICK.decode(make_tick(number))
+        assert {name: np.array(whole.ticks[number][name]).tolist() for name in expected} == {
+            name: list(value) if isinstance(value, tuple) else value for name, value in expected.items()
+        }
+
+
+def test_strides_and_events_are_dictionaries(whole: Log) -> None:
+    assert [(stride["index"], stride["flipper"]) for stride in whole.strides] == [(0, 0), (1, 1)]
+    assert [event["text"] for event in whole.events] == ["walk", "mud", "stop"]
+
+
+def test_the_summary_tells_what_happened(whole: Log) -> None:
+    assert log_summary(whole) == {
+        "robot": "mudskipper-1",
+        "run": "",
+        "segment": "",
+        "started": "2023-11-14T22:13:20+00:00",
+        "duration_s": pytest.approx((TICKS - 1) / 380),
+        "ticks": TICKS,
+        "missed_ticks": (TICKS - 1) // 100,
+        "rate_hz": pytest.approx(380),
+        "strides": 2,
+        "events": 3,
+        "complete": True,
+        "recovered": False,
+    }
+
+
+def test_a_log_without_rows_is_a_log(tmp_path: Path) -> None:
+    LogFile(tmp_path / "empty.mcap", OPENING).finish()
+    log = read_log(tmp_path / "empty.mcap")
+    assert (len(log.ticks), log.complete, log.configuration_text) == (0, True, "[robot]\n")
+    assert log_summary(log)["started"] == ""
+
+
+def test_a_minute_costs_about_as_much_as_its_bare_messages(tmp_path: Path) -> None:
+    """0.5 to 0.8 of it, measured; where each row would be unpacked by itself, many times as much."""
+    path = make_log(tmp_path / "minute.mcap", 60 * 380)
+    assert len(read_log(path).ticks) == 60 * 380
+    assert least_cost_s(lambda: read_log(path)) < 2.0 * least_cost_s(lambda: bare_messages(path))
+
+
+def bare_messages(path: Path) -> int:
+    with path.open("rb") as file:
+        return sum(1 for _ in make_reader(file).iter_messages(log_time_order=False))
+
+
+def least_cost_s(do: Callable[[], object]) -> float:
+    """Processor time, of three."""
+    costs_s = []
+    for _ in range(3):
+        begun_s = time.process_time()
+        do()
+        costs_s.append(time.process_time() - begun_s)
+    return min(costs_s)
+
+
+def test_an_unfinished_log_is_read_up_to_its_cut(path: Path, whole: Log, tmp_path: Path) -> None:
+    contents = path.read_bytes()
+    lengths = [*range(len(MCAP0_MAGIC), len(contents), 499), *range(len(contents) - 40, len(contents))]
+    counts = []
+    for length in lengths:
+        log = read_bytes(tmp_path, contents[:length])
+        assert not log.complete
+        assert holds_first_rows_of(log, whole)
+        counts.append(len(log.ticks))
+    assert counts == sorted(counts)
+    assert (counts[0], counts[-1]) == (0, TICKS)
+
+
+def chunk_places(path: Path) -> list[int]:
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    return [chunk.chunk_start_offset for chunk in summary.chunk_indexes]
+
+
+def test_a_tail_of_zeros_after_a_power_cut_is_a_cut(path: Path, whole: Log, tmp_path: Path) -> None:
+    log = read_bytes(tmp_path, path.read_bytes()[: chunk_places(path)[3]] + bytes(4096))
+    assert not log.complete
+    assert len(log.ticks) > TICKS / 3
+    assert holds_first_rows_of(log, whole)
+
+
+def test_a_chunk_that_no_longer_looks_like_one_is_missed(path: Path, tmp_path: Path) -> None:
+    damaged = bytearray(path.read_bytes())
+    damaged[chunk_places(path)[3]] = 0x7F
+    with pytest.raises(LogError, match=r"changed\.mcap: damaged: only \d+ of its \d+ rows can be found"):
+        read_bytes(tmp_path, bytes(damaged))
+
+
+def test_damage_is_refused_or_does_not_touch_the_rows(path: Path, whole: Log, tmp_path: Path) -> None:
+    """Flip one bit anywhere: the rows are all right or the file is refused, whichever byte it was."""
+    chance = random.Random(2)
+    contents = path.read_bytes()
+    refused = 0
+    for _ in range(600):
+        damaged = bytearray(contents)
+        damaged[chance.randrange(len(damaged))] ^= 1 << chance.randrange(8)
+        try:
+            log = read_bytes(tmp_path, bytes(damaged))
+        except LogError as error:
+            refused += 1
+            assert "changed.mcap: damaged" in str(error)
+            continue
+        assert holds_first_rows_of(log, whole)
+        assert len(log.ticks) == TICKS or not log.complete
+    assert refused > 300
+
+
+def test_garbage_after_a_good_beginning_is_refused_or_a_cut(path: Path, tmp_path: Path) -> None:
+    chance = random.Random(3)
+    beginning = path.read_bytes()[:2000]
+    for _ in range(200):
+        try:
+            log = read_bytes(tmp_path, beginning + chance.randbytes(500))
+        except LogError:
+            continue
+        assert not log.complete
+
+
+@pytest.mark.parametrize("contents", [b"", b"time,turtle_state\n", MCAP0_MAGIC[:-1]])
+def test_what_is_no_log_is_refused_at_its_first_byte(contents: bytes, tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"changed\.mcap: damaged at byte 0: .* MCAP"):
+        read_bytes(tmp_path, contents)
+
+
+def test_a_log_that_is_not_there_is_told_in_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"none\.mcap: No such file or directory"):
+        read_log(tmp_path / "none.mcap")
+
+
+def write_foreign(
+    path: Path,
+    rows: list[bytes],
+    *,
+    kind: RowKind = TICK,
+    topic: str = "",
+    ros_text: str = "",
+    compression: CompressionType = CompressionType.LZ4,
+) -> Path:
+    """A log of one channel, sound as a file, that this program need not have written."""
+    with path.open("wb") as file:
+        writer = Writer(file, compression=compression)
+        writer.start(profile="ros2", library="another")
+        text = (ros_text or kind.ros_text).encode()
+        schema = writer.register_schema(kind.schema_name, "ros2msg", text)
+        channel = writer.register_channel(topic or kind.topic, "cdr", schema)
+        for row in rows:
+            writer.add_message(channel, 0, row, 0)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path
+
+
+def test_a_row_of_the_wrong_length_is_named_by_its_number(tmp_path: Path) -> None:
+    path = write_foreign(tmp_path / "short.mcap", [make_tick(0), make_tick(1)[:-1]])
+    with pytest.raises(LogError, match=r"short\.mcap: row 2 of /tick has 370 bytes, not 371"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("kind", [STRIDE, EVENT])
+def test_a_row_that_ends_early_is_named_by_its_number(kind: RowKind, tmp_path: Path) -> None:
+    path = write_foreign(tmp_path / "short.mcap", [encode_row(kind), encode_row(kind)[:10]], kind=kind)
+    with pytest.raises(LogError, match=rf"short\.mcap: row 2 of {kind.topic} is damaged"):
+        read_log(path)
+
+
+def test_rows_of_another_layout_are_refused(tmp_path: Path) -> None:
+    path = write_foreign(tmp_path / "old.mcap", [make_tick(0)], ros_text="float64 stamp_s\n")
+    with pytest.raises(
+        LayoutError, match=r"old\.mcap: rows of /tick have another layout than this version's; "
+    ) as told:
+        read_log(path)
+    assert "recover" not in str(told.value)  # which cannot help
+
+
+def test_other_comments_are_no_other_layout(tmp_path: Path) -> None:
+    ros_text = "".join(f"{line.split('#')[0]} # new words\n" for line in TICK.ros_text.splitlines())
+    assert len(read_log(write_foreign(tmp_path / "run.mcap", [make_tick(0)], ros_text=ros_text)).ticks) == 1
+
+
+def test_channels_of_others_are_passed_over(tmp_path: Path) -> None:
+    log = read_log(write_foreign(tmp_path / "more.mcap", [b"anything"], topic="/camera"))
+    assert (len(log.ticks), log.complete) == (0, True)
+
+
+def test_a_log_that_a_tool_has_compressed_again_is_read(tmp_path: Path) -> None:
+    path = write_foreign(tmp_path / "zstd.mcap", [make_tick(0)], compression=CompressionType.ZSTD)
+    assert len(read_log(path).ticks) == 1
+
+
+def test_a_row_before_its_channel_is_refused(tmp_path: Path) -> None:
+    message = struct.pack("<BQHIQQ", 5, 22, 7, 0, 0, 0)
+    with pytest.raises(LogError, match="damaged before byte 39: a row of channel 7, which was not described"):
+        read_bytes(tmp_path, MCAP0_MAGIC + message)
+
+
+def test_a_log_read_from_a_moment_on_holds_all_that_came_after(path: Path) -> None:
+    whole, late = read_log(path), read_log(path, from_s=2.0)
+    assert len(late.ticks) < 0.7 * len(whole.ticks)
+    after = whole.ticks[whole.ticks["stamp_s"] >= 2.0]
+    assert len(after) and late.ticks[late.ticks["stamp_s"] >= 2.0]["tick"].tolist() == after["tick"].tolist()
+    assert late.metadata == whole.metadata and late.complete

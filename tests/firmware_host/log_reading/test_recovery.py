@@ -1,0 +1,291 @@
+"""A log whose writer was cut off comes back with every row that is still there, and opens everywhere."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+
+from benchmarks.stress.corrupted_logs import corrupt, make_sound_log, try_log
+from firmware_host.log.log_file import LogFile
+from firmware_host.log.log_folder import ACTIVE, DONE, unfinished_files
+from firmware_host.log.rows import TICK
+from firmware_host.log_reading import salvage as log_salvage
+from firmware_host.log_reading.log_reader import LayoutError, LogError, read_log
+from firmware_host.log_reading.recovery import recover_all, recover_log
+from tests.firmware_host.made_up_rows import OPENING, make_event, make_ticks
+from tests.waiting import LONGEST_S
+
+CHUNK = 100  # ticks
+
+
+def make_file(path: Path, chunks: int = 5) -> LogFile:
+    """Every chunk flushed, then three ticks that are not."""
+    log = LogFile(path, OPENING)
+    for chunk in range(chunks):
+        log.write(make_ticks(chunk * CHUNK, (chunk + 1) * CHUNK))
+        log.flush()
+    return log
+
+
+def make_cut_log(folder: Path, name: str = "run-0000.mcap") -> Path:
+    """As SIGKILL leaves it: no index, no lock."""
+    log = make_file(folder / ACTIVE / name)
+    log._file.close()
+    return log.path
+
+
+def test_every_row_comes_back_and_the_file_moves_to_done(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    recovered = recover_log(path)
+    assert recovered.path == tmp_path / DONE / path.name
+    assert (recovered.rows, recovered.lost) == (5 * CHUNK, 0)
+    assert unfinished_files(tmp_path) == []
+    log = read_log(recovered.path)
+    assert log.complete and log.ticks["tick"].tolist() == list(range(5 * CHUNK))
+    assert log.metadata["recovered"] == "true" and log.metadata["run_id"] == "run"
+    assert log.metadata["wall_minus_monotonic_ns"] == str(OPENING["wall_minus_monotonic_ns"])
+    assert log.configuration_text == OPENING["configuration_text"]
+    assert log.events[-1]["text"].startswith("recovered: 500 rows kept; ")
+
+
+def test_readers_of_others_open_what_was_recovered(tmp_path: Path) -> None:
+    path = recover_log(make_cut_log(tmp_path)).path
+    with AnyReader([path]) as bag:
+        assert bag.message_count == sum(1 for _ in bag.messages()) == 5 * CHUNK + 1
+    with path.open("rb") as file:
+        messages = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages()
+        assert [row.decoded_message.tick for row in messages if row.channel.topic == "/tick"] == list(range(5 * CHUNK))
+
+
+def test_damage_in_the_middle_costs_what_it_touches(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    contents = bytearray(path.read_bytes())
+    contents[len(contents) // 2] ^= 0x10
+    path.write_bytes(contents)
+    recovered = recover_log(path)
+    log = read_log(recovered.path)
+    assert (recovered.rows, recovered.lost, len(log.ticks)) == (4 * CHUNK, CHUNK, 4 * CHUNK)
+    assert log.ticks["tick"][-1] == 5 * CHUNK - 1
+    assert f"{CHUNK} lost in damaged places" in log.events[-1]["text"]
+    assert log.metadata["rows_lost"] == str(CHUNK)
+
+
+def test_rows_of_a_log_without_its_beginning_come_back(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    contents = bytearray(path.read_bytes())
+    contents[:200] = bytes(200)
+    path.write_bytes(contents)
+    assert len(read_log(recover_log(path).path).ticks) == 5 * CHUNK
+
+
+def test_a_log_that_is_being_written_is_left_alone(tmp_path: Path) -> None:
+    log = make_file(tmp_path / ACTIVE / "run-0000.mcap")
+    with pytest.raises(BlockingIOError):
+        recover_log(log.path)
+    complaints: list[str] = []
+    assert not recover_all(tmp_path, complaints.append) and not complaints
+    log.finish()
+    assert len(read_log(tmp_path / DONE / "run-0000.mcap").ticks) == 5 * CHUNK
+
+
+def test_a_recovery_that_was_cut_off_is_done_again(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    path = path.rename(path.with_name(path.name + ".broken"))
+    path.with_name("run-0000.mcap.part").write_bytes(b"half")
+    recover_all(tmp_path, print)
+    assert unfinished_files(tmp_path) == []
+    assert len(read_log(tmp_path / DONE / "run-0000.mcap").ticks) == 5 * CHUNK
+
+
+def test_a_recovery_cut_off_at_its_very_end_recovers_nothing_twice(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    contents = path.read_bytes()
+    done = recover_log(path).path
+    before = done.read_bytes()
+    path.with_name(path.name + ".broken").write_bytes(contents)
+    recover_all(tmp_path, print)
+    assert (unfinished_files(tmp_path), done.read_bytes()) == ([], before)
+
+
+def test_a_whole_file_that_was_not_renamed_is_only_renamed(tmp_path: Path) -> None:
+    log = make_file(tmp_path / "run-0000.mcap")
+    path = log.finish()
+    (tmp_path / ACTIVE).mkdir()
+    before = path.read_bytes()
+    recovered = recover_log(path.rename(tmp_path / ACTIVE / path.name))
+    assert (recovered.note, recovered.path.read_bytes()) == ("is whole", before)
+
+
+def test_a_log_anywhere_else_is_rewritten_in_its_place(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    path = path.rename(tmp_path / "copy.mcap")
+    assert recover_log(path).path == path
+    assert read_log(path).complete
+    assert [entry.name for entry in tmp_path.iterdir() if entry.is_file()] == ["copy.mcap"]
+
+
+def test_what_never_was_a_log_is_told_and_stays(tmp_path: Path) -> None:
+    (tmp_path / ACTIVE).mkdir()
+    path = tmp_path / ACTIVE / "x.mcap"
+    path.write_bytes(b"no log at all" * 1000)
+    with pytest.raises(LogError, match="nothing of a log can be found in it; remove it"):
+        recover_log(path)
+    assert path.exists()
+
+
+def test_an_empty_file_goes(tmp_path: Path) -> None:
+    (tmp_path / ACTIVE).mkdir()
+    (tmp_path / ACTIVE / "x.mcap").touch()
+    recover_all(tmp_path, print)
+    assert unfinished_files(tmp_path) == []
+
+
+def test_a_disk_without_room_keeps_the_broken_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = make_cut_log(tmp_path)
+
+    def refuse(log: LogFile) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(LogFile, "finish", refuse)
+    complaints: list[str] = []
+    recover_all(tmp_path, complaints.append)
+    assert complaints == [f"{path}: cannot be recovered: No space left on device"]
+    monkeypatch.undo()
+    assert [entry.name for entry in unfinished_files(tmp_path)] == [path.name + ".broken"]
+    recover_all(tmp_path, complaints.append)
+    assert len(read_log(tmp_path / DONE / path.name).ticks) == 5 * CHUNK
+
+
+def test_the_program_recovers_a_folder(tmp_path: Path) -> None:
+    make_cut_log(tmp_path)
+    command = [sys.executable, "-m", "firmware_host.log_reading.recovery", str(tmp_path)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=True)
+    assert "recovered: 500 rows kept" in ended.stderr and ended.stdout == ""
+    assert unfinished_files(tmp_path) == []
+
+
+def test_rows_written_late_are_read_in_order(tmp_path: Path) -> None:
+    log = LogFile(tmp_path / "x.mcap", OPENING)
+    log.write([*make_ticks(10, 20), make_event("between"), *make_ticks(0, 10)])
+    assert read_log(log.finish()).ticks["tick"].tolist() == list(range(20))
+
+
+def test_a_log_of_the_older_layout_is_recovered_where_it_lies(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    path = path.rename(tmp_path / path.name)
+    recover_all(tmp_path, print)
+    assert read_log(path).complete and unfinished_files(tmp_path) == []
+
+
+def recompress(path: Path, cut_bytes: int = 0, ros_text: str = "", topics: tuple[str, ...] = ("/tick",)) -> Path:
+    """As another program writes it, or with another layout of its rows."""
+    ticks = [payload for _, payload in make_ticks(0, 300)]
+    with path.open("wb") as file:
+        compression = CompressionType.LZ4 if ros_text or len(topics) > 1 else CompressionType.ZSTD
+        writer = Writer(file, compression=compression, chunk_size=10_000)
+        writer.start(profile="ros2", library="another")
+        writer.add_metadata("mudskipper", {"run_id": "run"})
+        schema = writer.register_schema(TICK.schema_name, "ros2msg", (ros_text or TICK.ros_text).encode())
+        channels = [writer.register_channel(topic, "cdr", schema) for topic in topics]
+        for number, payload in enumerate(ticks):
+            for channel in channels:
+                writer.add_message(channel, 0, payload, 0, number)
+        writer.finish()  # type: ignore[no-untyped-call]
+    path.write_bytes(path.read_bytes()[: path.stat().st_size - cut_bytes])
+    return path
+
+
+def test_a_cut_log_that_another_program_compressed_is_left_as_it_is(tmp_path: Path) -> None:
+    path = recompress(tmp_path / "run.mcap", cut_bytes=2000)
+    before, rows = path.read_bytes(), len(read_log(path).ticks)
+    with pytest.raises(LogError, match="left as it is: another program has compressed it"):
+        recover_log(path)
+    assert rows > 100 and path.read_bytes() == before
+
+
+def test_a_log_is_never_replaced_by_one_with_fewer_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = recompress(tmp_path / "run.mcap", cut_bytes=2000)
+    before = path.read_bytes()
+    monkeypatch.setattr(log_salvage, "FOREIGN_SIGNATURE", b"none such")
+    with pytest.raises(LogError, match=r"left as it is: only 0 of the \d+ rows"):
+        recover_log(path)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("cut_bytes", [0, 2000])
+def test_a_log_of_another_version_is_left_as_it_is(tmp_path: Path, cut_bytes: int) -> None:
+    path = recompress(tmp_path / "run.mcap", cut_bytes, ros_text="float64 stamp_s\n")
+    before = path.read_bytes()
+    with pytest.raises(LayoutError, match="left as it is: rows of /tick have another layout"):
+        recover_log(path)
+    assert path.read_bytes() == before
+
+
+def test_rows_of_other_programs_are_counted_as_lost(tmp_path: Path) -> None:
+    path = recompress(tmp_path / "run.mcap", 2000, topics=("/camera", "/tick"))
+    recovered = recover_log(path)
+    assert recovered.rows > 100 and 0 <= recovered.lost - recovered.rows <= 1
+    assert f"{recovered.lost} of other programs left out" in recovered.note
+    log = read_log(path)
+    assert len(log.ticks) == recovered.rows and log.metadata["rows_lost"] == str(recovered.lost)
+
+
+def test_a_finished_log_of_the_same_name_with_fewer_rows_takes_nothing_away(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    other = make_file(tmp_path / "other.mcap", chunks=1).finish()
+    (tmp_path / DONE).mkdir()
+    other = other.rename(tmp_path / DONE / path.name)
+    with pytest.raises(LogError, match="has its name and fewer rows"):
+        recover_log(path)
+    assert path.exists() and len(read_log(other).ticks) == CHUNK
+
+
+def test_a_summary_that_looks_like_a_row_is_none(tmp_path: Path) -> None:
+    path = make_file(tmp_path / "run.mcap").finish()
+    contents = bytearray(path.read_bytes())
+    contents[contents.rfind(b"/tick") - 17] += 1  # a channel's opcode, in the summary: it makes a message of it
+    path.write_bytes(contents)
+    with pytest.raises(LogError, match="damaged"):
+        read_log(path)
+    assert recover_log(path).rows == 5 * CHUNK
+
+
+def test_nothing_is_said_to_be_missing_at_an_end_that_is_there(tmp_path: Path) -> None:
+    path = make_file(tmp_path / "run.mcap").finish()
+    contents = bytearray(path.read_bytes())
+    contents[contents.find(b"\x03\x00\x00\x00lz4") + 200] ^= 0x10
+    path.write_bytes(contents)
+    assert recover_log(path).note == f"recovered: {4 * CHUNK} rows kept, {CHUNK} lost in damaged places"
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_corrupted_logs_cost_no_row_that_is_still_there(tmp_path: Path, finished: bool) -> None:
+    """The long version is `python -m benchmarks.stress.corrupted_logs`."""
+    chance = random.Random(7)
+    (tmp_path / ACTIVE).mkdir()
+    sound = make_sound_log(tmp_path / "sound.mcap", chance, finished)
+    wrong = []
+    for number in range(150):
+        contents, first, how = corrupt(sound, chance)
+        _, complaint = try_log(tmp_path / ACTIVE / f"{number}.mcap", sound, contents, first)
+        wrong += [f"{number} {how}: {complaint}"] * bool(complaint)
+    assert wrong == []
+
+
+def test_a_length_of_2_to_the_60_costs_no_memory(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    contents = bytearray(path.read_bytes())
+    place = contents.find(b"\x03\x00\x00\x00lz4") - 12  # the first chunk's size when opened
+    contents[place : place + 8] = (1 << 60).to_bytes(8, "little")
+    path.write_bytes(contents)
+    with pytest.raises(LogError, match="cannot hold 1152921504606846976"):
+        read_log(path)
+    assert recover_log(path).rows == 4 * CHUNK

@@ -1,0 +1,117 @@
+"""A replayed log says what the robot knew while it walked; the authors' logs are read as they are."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import pytest
+
+from control.controller import WalkOrder
+from control.modes import Mode
+from control.records import StrideEstimate
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.log_folder import DONE, first_path, log_files
+from firmware_host.log.log_parameters import LogParameters
+from firmware_host.log.recorder import Recorder
+from firmware_host.log_reading.log_reader import LogError, read_logs
+from firmware_host.log_reading.replay import replay_file, replay_files
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.track import paper_track
+from tests.folders import SHARED_DATA
+from tests.recorded_walks import record_walks
+
+SHARED = SHARED_DATA
+LAB_LOGS = sorted((SHARED / "flipper_in_mud").glob("*.csv.gz"))
+
+
+def same(live: StrideEstimate, replayed: StrideEstimate) -> bool:
+    """To the last digit; NaN is the same as NaN."""
+    return repr(dataclasses.astuple(live)) == repr(dataclasses.astuple(replayed))
+
+
+def test_a_replayed_walk_gives_the_same_strides_to_the_last_digit(tmp_path: Path, configuration: Configuration) -> None:
+    path = tmp_path / "walk.mcap"
+    robot = record_walks(path, configuration, 4, 2)  # the second walk in one log begins afresh
+    live = [stride.estimate for stride in robot.loop.learning.strides]
+    replayed = replay_file(path).strides
+    assert len(live) == len(replayed) == 12
+    assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
+
+
+def test_a_log_that_was_thinned_and_cut_into_segments_gives_the_same_strides(
+    tmp_path: Path, configuration: Configuration
+) -> None:
+    """A long rest first, of which few ticks are written, and a border every three seconds of the walk."""
+    parameters = LogParameters(directory=str(tmp_path), segment_s=3.0)
+    first = first_path(tmp_path, "run")
+    recorder = Recorder(first, configuration.text, {"robot": "test", "run_id": "run"}, parameters)
+    robot = Lockstep(configuration, paper_track(), recorder=recorder)
+    robot.run_for(20.0)
+    robot.arm()
+    robot.walk(WalkOrder(0.03, True, 5))
+    robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
+    assert recorder.close(20.0) and recorder.dropped == 0
+    paths = log_files(tmp_path, DONE)
+    assert len(paths) > 3
+    assert len(read_logs(paths).ticks) < robot.tick_number - 3000
+    live = [stride.estimate for stride in robot.loop.learning.strides]
+    replayed = replay_files(paths).strides
+    assert len(live) == len(replayed) == 10
+    assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
+
+
+@pytest.mark.skipif(not LAB_LOGS, reason="the shared measurements are not beside the repository")
+@pytest.mark.parametrize("path", LAB_LOGS, ids=lambda path: path.name.removesuffix(".csv.gz"))
+def test_the_authors_logs_replay_with_forces_of_the_right_sign(path: Path) -> None:
+    replayed = replay_file(path)
+    first = replayed.strides[0]
+    assert len(replayed.strides) >= 1
+    assert first.insertion_force_n > 1.0
+    assert first.stance_force_n > 4.0
+    assert first.extraction_force_n < -1.0
+
+
+# First strokes in undisturbed mud, ranges over all trials measured with the published formula: mud-physics 1.5. The
+# extraction peak is a single sample, so it is allowed the noise of one, 0.3 N, beyond the range.
+MEASURED = {
+    "single_12.5N": ((2.3, 2.9), (7.4, 8.3), (-2.6, -1.6)),
+    "single_12N": ((1.9, 3.0), (7.0, 8.3), (-2.9, -1.4)),
+    "single_10.3N": ((2.1, 2.6), (6.3, 6.6), (-2.6, -1.7)),
+}
+
+
+@pytest.mark.skipif(not LAB_LOGS, reason="the shared measurements are not beside the repository")
+@pytest.mark.parametrize("mud", MEASURED)
+def test_first_strokes_have_the_sizes_that_were_measured(mud: str) -> None:
+    insertion_n, stance_n, extraction_n = MEASURED[mud]
+    logs = [path for path in LAB_LOGS if path.name.startswith(f"{mud}_")]
+    assert len(logs) >= 2
+    for path in logs:
+        first = replay_file(path, method="paper").strides[0]
+        assert insertion_n[0] <= first.insertion_force_n <= insertion_n[1], path.name
+        assert stance_n[0] <= first.stance_force_n <= stance_n[1], path.name
+        assert extraction_n[0] <= first.extraction_force_n <= extraction_n[1], path.name
+
+
+def test_a_file_of_another_kind_is_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"notes\.txt: not a log"):
+        replay_file(tmp_path / "notes.txt")
+
+
+def test_a_lab_log_that_is_not_one_names_the_line(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text("# gait header: a | 1\ntime,turtle_state\n0,1\n", encoding="utf-8")
+    with pytest.raises(LogError, match="line 2"):
+        replay_file(path)
+
+
+def test_estimates_of_an_absent_flipper_are_left_out() -> None:
+    single = [path for path in LAB_LOGS if path.name.startswith("single")]
+    if not single:
+        pytest.skip("the shared measurements are not beside the repository")
+    replayed = replay_file(single[0])
+    assert replayed.flippers == ("right",)
+    assert {stride.flipper for stride in replayed.strides} == {"right"}
+    assert math.isnan(replayed.strides[0].step_m)

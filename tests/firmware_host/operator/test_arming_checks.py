@@ -1,0 +1,131 @@
+"""The list of `mudskipper check`: every fault that stands against arming is a line of it, and none that does not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from control.fault_kinds import KINDS, make_fault
+from control.faults import Blocks, FaultKind, Reaction
+from control.modes import Mode, Request
+from control.records import JOINTS
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.operator.arming_checks import arming_checks
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
+
+SUBJECTS = {"drive": "left_sweep", "watchdog": "left_sweep", "joint": "left_sweep", "bus": "left", "flipper": "right"}
+
+
+@pytest.fixture(scope="module")
+def ready(configuration: Configuration) -> Lockstep:
+    """A robot with nothing against it. Tests give it faults and take them away."""
+    robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
+    robot.run_until(lambda: robot.loop.mode is Mode.IDLE and not robot.loop.faults.standing, 3.0)
+    return robot
+
+
+def lines_of(robot: Lockstep, *names: str, warnings: tuple[str, ...] = ()) -> dict[str, dict[str, Any]]:
+    """With these faults alone."""
+    faults = [
+        make_fault(name, SUBJECTS.get(KINDS[name].check, ""), f"{KINDS[name].meaning} ({name})") for name in names
+    ]
+    robot.loop.faults.reset()
+    robot.loop.faults.update(faults, False)
+    items = arming_checks(robot.loop, "logs/a.mcap", warnings)
+    robot.loop.faults.reset()
+    lines = {item["id"]: item for item in items}
+    assert len(lines) == len(items)
+    return lines
+
+
+def test_of_a_robot_that_is_ready_every_line_is_good(ready: Lockstep) -> None:
+    lines = lines_of(ready)
+    assert all(item["ok"] and not item["fix"] for item in lines.values())
+    expected = {"configuration", "loop", "log", "bus.left", "bus.right"}
+    assert set(lines) == expected | {f"{part}.{joint}" for part in ("drive", "joint", "watchdog") for joint in JOINTS}
+    assert lines["log"]["text"] == "logs/a.mcap"
+    assert "firmware 0.6.11" in lines["drive.left_sweep"]["text"]
+    assert "30 degrees C" in lines["joint.left_sweep"]["text"]
+    assert lines["watchdog.left_sweep"]["text"] == "trips after 0.1 s"
+    assert "380" in lines["loop"]["text"]
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=list(KINDS))
+def test_a_line_fails_exactly_where_its_fault_stands_against_arming(ready: Lockstep, kind: FaultKind) -> None:
+    lines = lines_of(ready, kind.name)
+    line = lines[make_fault(kind.name, SUBJECTS.get(kind.check, ""), "").check]
+    assert line["ok"] == (kind.blocks is Blocks.NO)
+    assert line["mandatory"] == (kind.blocks is Blocks.ALWAYS)
+    assert f"({kind.name})" in line["text"]
+    assert line["text"].startswith("warning: ") == line["ok"]
+    assert line["fix"] == ("" if line["ok"] else kind.what_to_do)
+    assert all(each["ok"] for identity, each in lines.items() if identity != line["id"])
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=list(KINDS))
+@pytest.mark.parametrize("forced", [False, True])
+def test_the_check_and_a_refused_arm_agree(ready: Lockstep, kind: FaultKind, forced: bool) -> None:
+    fault = make_fault(kind.name, SUBJECTS.get(kind.check, ""), kind.meaning)
+    loop = ready.loop
+    lines = lines_of(ready, kind.name)
+    loop.faults.update([fault], False)
+    loop.health = loop.health._replace(worst=loop.faults.worst)
+    against = [line for line in lines.values() if not line["ok"] and (line["mandatory"] or not forced)]
+    refused = loop.request(Request.ARM, ready.now_s, forced=forced)
+    loop._request, loop.forced = Request.NONE, False
+    loop.faults.reset()
+    loop.health = loop.health._replace(worst=None)
+    assert (refused is not None) == bool(against)
+    assert refused is None or refused == kind.meaning
+
+
+def test_of_several_faults_in_one_line_those_that_block_are_told_and_each_advice_once(ready: Lockstep) -> None:
+    line = lines_of(ready, "drive_late", "drive_silent", "drive_version", "heartbeat_silent")["drive.left_sweep"]
+    assert "(drive_late)" not in line["text"]
+    assert all(f"({name})" in line["text"] for name in ("drive_silent", "drive_version", "heartbeat_silent"))
+    assert line["fix"] == f"{KINDS['drive_silent'].what_to_do}; {KINDS['drive_version'].what_to_do}"
+
+
+def test_a_mandatory_fault_beside_one_that_is_not_makes_the_line_mandatory(ready: Lockstep) -> None:
+    lines = lines_of(ready, "watchdog_unknown", "watchdog_off")
+    assert lines["watchdog.left_sweep"]["mandatory"]
+    assert not lines_of(ready, "watchdog_unknown")["watchdog.left_sweep"]["mandatory"]
+
+
+def test_warnings_of_the_computer_are_lines_that_block_nothing(ready: Lockstep) -> None:
+    line = lines_of(ready, warnings=("no real-time priority",))["realtime"]
+    assert (line["ok"], line["text"]) == (True, "warning: no real-time priority")
+
+
+def test_a_drive_that_was_not_heard_is_a_mandatory_line_with_what_is_missing(configuration: Configuration) -> None:
+    robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
+    silent = robot.robot.drives[2]
+    silent.cyclic_frames = lambda now_s: iter(())  # type: ignore[method-assign]
+    robot.run_for(0.5)
+    items = {item["id"]: item for item in arming_checks(robot.loop, "off", [])}
+    unheard = {identity for identity, item in items.items() if not item["ok"]}
+    assert unheard == {"drive.right_sweep"}
+    assert items["drive.right_sweep"]["text"] == "not heard: no position, current, heartbeat yet"
+    assert items["drive.right_sweep"]["mandatory"] and "wiring" in items["drive.right_sweep"]["fix"]
+    assert not items.keys() & {"joint.right_sweep", "watchdog.right_sweep"}
+    assert "joint.left_sweep" in items and not any("nan" in item["text"] for item in items.values())
+    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
+
+
+def test_a_drive_that_never_tells_its_temperature_is_said_to_be_guarded_by_its_currents(
+    configuration: Configuration,
+) -> None:
+    robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
+    for drive in robot.robot.drives:
+        everything = drive.cyclic_frames
+        drive.cyclic_frames = lambda now_s, everything=everything: (  # type: ignore[method-assign, misc]
+            frame for frame in everything(now_s) if frame.arbitration_id & 0x1F != 0x15
+        )
+    robot.run_until(lambda: robot.loop.mode is Mode.IDLE and not robot.loop.faults.blocking(), 3.0)
+    items = {item["id"]: item for item in arming_checks(robot.loop, "off", [])}
+    assert all("the currents alone guard it" in items[f"drive.{joint}"]["text"] for joint in JOINTS)
+    assert all(item["ok"] for item in items.values())
+    assert robot.loop.faults.reaction is Reaction.NONE

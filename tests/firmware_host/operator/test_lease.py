@@ -1,0 +1,117 @@
+"""A lease is lost by silence or by hanging up, and stays lost until somebody ends that."""
+
+from __future__ import annotations
+
+from firmware_host.operator.lease import Lease
+
+HALF_S = 0.5
+
+
+def test_nothing_is_lost_where_nothing_was_promised() -> None:
+    lease = Lease()
+    assert not lease.held and not lease.lost(1e9)
+    lease.hang_up("anna")
+    assert not lease.lost(1e9)
+
+
+def test_a_lease_that_is_renewed_in_time_is_never_lost() -> None:
+    lease = Lease()
+    for number in range(100):
+        now_s = 10.0 + 0.2 * number
+        assert not lease.lost(now_s)
+        assert lease.renew("anna", now_s, HALF_S) is None
+    assert lease.held and lease.holder == "anna"
+
+
+def test_the_last_promise_counts_also_where_it_is_a_shorter_one() -> None:
+    lease = Lease()
+    lease.renew("anna", 10.0, 5.0)
+    lease.renew("anna", 11.0, HALF_S)
+    assert not lease.lost(11.5) and lease.lost(11.51)
+
+
+def test_a_late_renewal_does_not_bring_it_back() -> None:
+    lease = Lease()
+    lease.renew("anna", 10.0, HALF_S)
+    refused = lease.renew("anna", 10.6, HALF_S)
+    assert refused is not None and "anna has lost the lease" in refused
+    assert lease.lost(10.7) and lease.lost(0.0) and not lease.held
+
+
+def test_a_holder_that_hangs_up_has_lost_it_at_once() -> None:
+    lease = Lease()
+    lease.renew("anna", 10.0, HALF_S)
+    lease.hang_up("ben")
+    assert not lease.lost(10.1)
+    lease.hang_up("anna")
+    assert lease.lost(10.1)
+
+
+def test_a_holder_that_has_released_it_may_hang_up() -> None:
+    lease = Lease()
+    lease.renew("anna", 10.0, HALF_S)
+    assert lease.release("anna") is None
+    lease.hang_up("anna")
+    assert not lease.lost(1e9) and not lease.held
+
+
+def test_a_second_one_is_told_who_holds_it() -> None:
+    lease = Lease()
+    lease.renew("anna", 10.0, HALF_S)
+    told = lease.renew("ben", 10.1, HALF_S) or ""
+    assert told.startswith("anna operates the robot: wait until that program has ended, or has been silent for 0.4 s, ")
+    assert lease.release("ben") == "anna holds the lease"
+    assert lease.lost(10.51)  # which was not renewed by that
+
+
+def test_a_lost_one_is_released_by_anybody_and_then_free() -> None:
+    lease = Lease()
+    lease.renew("anna", 10.0, HALF_S)
+    lease.hang_up("anna")
+    assert lease.renew("ben", 10.1, HALF_S) is not None
+    assert lease.release("ben") is None
+    assert not lease.lost(1e9)
+    assert lease.renew("ben", 10.2, HALF_S) is None
+
+
+def test_reset_forgets_all() -> None:
+    lease = Lease()
+    lease.renew("anna", 10.0, HALF_S)
+    assert lease.lost(11.0)
+    lease.reset()
+    assert not lease.lost(12.0) and lease.holder is None
+
+
+def test_only_its_holder_moves_the_robot_and_where_there_is_none_anybody() -> None:
+    lease = Lease()
+    assert lease.refusal("anna", 10.0) is lease.refusal("ben", 10.0) is None
+    lease.renew("anna", 10.0, HALF_S)
+    assert lease.refusal("anna", 10.1) is None
+    assert "anna operates the robot" in (lease.refusal("ben", 10.1) or "")
+    assert "anna has lost the lease" in (lease.refusal("ben", 10.6, take_over=True) or "")  # the robot stops
+    lease.reset()
+    assert lease.refusal("ben", 10.7) is None
+
+
+def test_whoever_was_ousted_stays_out_until_it_connects_anew() -> None:
+    lease = Lease()
+    lease.renew("anna", 10.0, HALF_S)
+    assert lease.refusal("ben", 10.1, take_over=True) is None
+    lease.oust("ben")
+    assert not lease.held and not lease.lost(99.0)
+    lease.reset()  # the torque went off meanwhile
+    for refused in (
+        lease.refusal("anna", 10.2),
+        lease.refusal("anna", 10.2, take_over=True),
+        lease.renew("anna", 10.2, 1.0),
+    ):
+        assert refused == "taken over: ben wanted the robot; begin again when it is free"
+    lease.hang_up("anna")
+    assert not lease.lost(99.0) and lease.renew("anna", 99.0, 1.0) is None
+
+
+def test_nobody_ousts_oneself() -> None:
+    lease = Lease()
+    lease.renew("anna", 10.0, HALF_S)
+    lease.oust("anna")
+    assert lease.held and lease.refusal("anna", 10.1) is None

@@ -1,0 +1,337 @@
+"""Whoever asks is named in the log; under a lease only its holder moves the robot, and everybody stops it."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import Any
+
+import pytest
+
+from control.fault_kinds import make_fault
+from control.modes import Mode
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.operator.connection import Caller
+from firmware_host.operator.operator_calls import OperatorCalls
+from firmware_host.operator.rights import NEEDED, Level, Peer
+from firmware_host.operator.rpc import RefusedError
+from firmware_host.ticker import PERIOD_S
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
+from tests.kept_events import EventRecorder
+
+ANNA = Caller(1, Peer(77, 1000, frozenset({71})), Level.DRIVE)
+BEN = Caller(2, Peer(78, 1001, frozenset({71})), Level.DRIVE)
+
+
+class Robot:
+    """A simulated one, with its calls."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        self.events = EventRecorder()
+        self.steps = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=self.events)
+        self.lease = self.steps.loop.lease
+        calls = OperatorCalls(self.steps.loop, self.events, [], lambda: self.steps.now_s)
+        self._methods = calls.methods
+        self.names = set(self._methods)
+
+    def ask(self, method: str, caller: Caller = ANNA, **params: Any) -> Any:
+        return self._methods[method](params, caller)
+
+
+@pytest.fixture
+def robot(configuration: Configuration) -> Robot:
+    return Robot(configuration)
+
+
+@pytest.fixture
+def armed(robot: Robot) -> Robot:
+    robot.steps.arm()
+    return robot
+
+
+def test_whoever_asks_for_something_is_named_in_the_log(armed: Robot) -> None:
+    armed.ask("walk", strides=2)
+    armed.steps.run_for(0.1)
+    armed.ask("stop", BEN)
+    armed.ask("disarm", BEN)
+    assert [text for text in armed.events.texts if text.startswith("request")] == [
+        "request arm",  # by the test
+        "request walk by uid 1000 (process 77)",
+        "request stop by uid 1001 (process 78)",
+        "request disarm by uid 1001 (process 78)",
+    ]
+
+
+def test_a_stop_that_changes_nothing_does_not_fill_the_log_but_is_counted(armed: Robot) -> None:
+    armed.ask("disarm")
+    armed.steps.step()
+    told = len(armed.events.texts)
+    for _ in range(50):
+        assert armed.ask("stop", BEN) == armed.ask("disarm", BEN) == "accepted"
+        armed.steps.step()
+    assert not armed.events.about("request")[2:] and len(armed.events.texts) - told <= 2  # the mode, a lease
+    assert armed.ask("status")["untold_requests"] == 100
+    armed.ask("arm")
+    assert armed.events.texts[-1].startswith("request arm by uid 1000 (process 77); 100 before it")
+
+
+def test_an_arm_by_force_is_told_with_who_asked(robot: Robot) -> None:
+    robot.steps.run_for(2.0)
+    fault = make_fault("log_unwritable", "", "It cannot be written.")
+    robot.steps.loop.faults.update([fault], False)
+    robot.ask("arm", force=True)
+    assert robot.events.about("request") == ["request arm by force by uid 1000 (process 77)"]
+
+
+def test_the_same_request_again_and_again_is_told_once_a_second(robot: Robot) -> None:
+    robot.steps.run_for(1.0)
+    for _ in range(400):
+        robot.ask("clear")
+        robot.steps.step()
+    assert robot.events.about("request") == [
+        "request clear by uid 1000 (process 77)",
+        "request clear by uid 1000 (process 77); 379 before it changed nothing or came again",
+    ]
+
+
+def test_a_request_that_is_refused_is_nobody_s(robot: Robot) -> None:
+    with pytest.raises(RefusedError):
+        robot.ask("walk")
+    assert not [text for text in robot.events.texts if "uid" in text]
+
+
+def test_whatever_moves_the_robot_is_for_operators(robot: Robot) -> None:
+    assert robot.names - NEEDED.keys() == {"arm", "walk", "move", "clear", "lease", "release", "reset_timing"}
+
+
+def test_under_a_lease_nobody_else_arms_a_robot_that_hands_are_on(robot: Robot) -> None:
+    robot.steps.run_for(1.0)
+    robot.ask("lease", for_s=0.5)
+    with pytest.raises(
+        RefusedError, match=r"^uid 1000 \(process 77\) operates the robot: .* has been silent for 0.5 s"
+    ):
+        robot.ask("arm", BEN)
+
+
+@pytest.mark.parametrize("end", ["hang_up", "silence"])
+def test_a_lease_that_ends_while_torque_is_off_keeps_nobody_from_arming(robot: Robot, end: str) -> None:
+    robot.steps.run_for(1.0)
+    robot.ask("lease", for_s=0.5)
+    if end == "hang_up":
+        robot.lease.hang_up(ANNA)
+    robot.steps.run_for(PERIOD_S if end == "hang_up" else 0.5 + 2 * PERIOD_S)
+    assert robot.ask("status")["faults"] == [] and not robot.events.about("lease_lost")
+    assert robot.events.texts[-1] == "lease of uid 1000 (process 77) is over"
+    assert robot.ask("arm", BEN) == "accepted"
+    robot.steps.run_for(0.5)
+    assert robot.ask("status")["mode"] == "hold"
+
+
+@pytest.mark.parametrize("method", ["hang_up", "silence"])
+def test_whoever_dies_between_lease_and_torque_has_armed_nothing(robot: Robot, method: str) -> None:
+    robot.steps.run_for(1.0)
+    robot.ask("lease", for_s=0.1)
+    robot.steps.run_for(0.1 if method == "silence" else 0.0)
+    robot.ask("arm")
+    if method == "hang_up":
+        robot.lease.hang_up(ANNA)
+    robot.steps.run_for(1.0)
+    assert robot.ask("status")["mode"] == "idle" and robot.steps.loop.sent.torques_nm == (0.0, 0.0, 0.0, 0.0)
+    assert "mode idle to arming" not in robot.events.texts
+
+
+MOTIONS: list[tuple[str, dict[str, Any]]] = [("walk", {"strides": 1}), ("move", {"left_sweep_rad": 0.1})]
+
+
+@pytest.mark.parametrize(("method", "params"), MOTIONS)
+def test_under_a_lease_nobody_else_moves_the_robot(armed: Robot, method: str, params: dict[str, Any]) -> None:
+    armed.ask("lease", for_s=0.5)
+    with pytest.raises(RefusedError, match="operates the robot: .*silent for 0.5 s, or overrule it with --take-over"):
+        armed.ask(method, BEN, **params)
+    armed.steps.run_for(0.1)
+    assert armed.ask("status")["mode"] == "hold" and not armed.ask("status")["moving"]
+    assert armed.ask(method, ANNA, **params) == "accepted"
+
+
+@pytest.mark.parametrize(("method", "mode"), [("stop", "stopping"), ("disarm", "idle")])
+def test_whoever_holds_the_lease_anybody_stops_the_robot(armed: Robot, method: str, mode: str) -> None:
+    armed.ask("lease", for_s=10.0)
+    armed.ask("walk", strides=0)
+    armed.steps.run_for(0.5)
+    assert armed.ask(method, BEN) == "accepted"
+    armed.steps.run_for(0.01)
+    assert armed.ask("status")["mode"] == mode
+
+
+@pytest.mark.parametrize(("method", "params"), [*MOTIONS, ("walk", {"lease_s": 0.5})])
+def test_whoever_overrules_a_lease_has_the_robot_and_its_holder_does_not(
+    armed: Robot, method: str, params: dict[str, Any]
+) -> None:
+    armed.ask("lease", for_s=0.5)
+    assert armed.ask(method, BEN, take_over=True, **params) == "accepted"
+    assert armed.events.about("lease of") == ["lease of uid 1000 (process 77) taken over by uid 1001 (process 78)"]
+    for again in ("lease", "walk", "move", "arm"):
+        with pytest.raises(RefusedError, match=r"^taken over: uid 1001 \(process 78\)"):
+            armed.ask(again, ANNA, for_s=0.5)
+    armed.lease.hang_up(ANNA)
+    armed.steps.run_for(0.3)
+    assert armed.ask("status")["notice"] == ""  # nothing was lost
+    assert armed.ask("status")["mode"] in ("hold", "walking")
+
+
+def test_a_take_over_that_is_refused_takes_nothing_over(armed: Robot) -> None:
+    armed.ask("lease", for_s=0.5)
+    for method, params in (
+        ("arm", {}),
+        ("move", {"left_sweep_rad": 9.0}),
+        ("walk", {"depth_m": 1.0}),
+        ("walk", {"lease_s": 99.0}),
+        ("lease", {"for_s": 0.5}),
+    ):
+        with pytest.raises(RefusedError):
+            armed.ask(method, BEN, take_over=True, **params)
+    with pytest.raises(RefusedError, match="take_over = 1: must be true or false"):
+        armed.ask("walk", BEN, take_over=1)
+    assert armed.ask("lease", ANNA, for_s=0.5) == "accepted"
+
+
+def test_an_order_can_promise_to_attend_what_it_sets_in_motion(armed: Robot) -> None:
+    assert armed.ask("walk", lease_s=0.5) == "accepted"
+    armed.steps.run_for(0.4)
+    with pytest.raises(RefusedError, match="operates the robot"):
+        armed.ask("walk", BEN)
+    assert armed.ask("status")["mode"] == "walking"
+    armed.steps.run_for(0.2)  # in which it was to be renewed
+    assert armed.ask("status")["mode"] == "stopping"
+
+
+def test_an_order_that_is_refused_promises_nothing(armed: Robot) -> None:
+    with pytest.raises(RefusedError):
+        armed.ask("walk", depth_m=1.0, lease_s=0.5)
+    assert not armed.lease.held
+
+
+@pytest.mark.parametrize("for_s", [None, True, "0.5", 0, 0.09, 10.1, -1.0, nan, 2**70])
+def test_a_lease_is_for_a_tenth_of_a_second_to_ten(armed: Robot, for_s: Any) -> None:
+    for method, name in (("lease", "for_s"), ("walk", "lease_s")):
+        with pytest.raises(RefusedError, match=rf"^{name} = .*: must be a number from 0.1 to 10"):
+            armed.ask(method, **{name: for_s})
+    armed.steps.run_for(0.01)
+    assert not armed.lease.held and armed.ask("status")["mode"] == "hold"
+
+
+def test_a_lease_that_is_renewed_is_told_once(armed: Robot) -> None:
+    for _ in range(5):
+        armed.ask("lease", for_s=0.5)
+        armed.steps.run_for(0.2)
+    assert armed.lease.held and not armed.lease.lost(armed.steps.now_s)
+    assert armed.events.texts.count("lease taken by uid 1000 (process 77)") == 1
+
+
+def test_another_operator_is_told_who_holds_it(armed: Robot) -> None:
+    armed.ask("lease", for_s=0.5)
+    for method, params in (("lease", {"for_s": 0.5}), ("release", {})):
+        with pytest.raises(RefusedError, match=r"^uid 1000 \(process 77\) (operates the robot|holds the lease$)"):
+            armed.ask(method, BEN, **params)
+
+
+def test_the_same_user_s_next_connection_is_another_holder(armed: Robot) -> None:
+    armed.ask("lease", for_s=0.5)
+    with pytest.raises(RefusedError, match="operates the robot"):
+        armed.ask("lease", ANNA._replace(connection=3), for_s=0.5)
+
+
+def test_a_lost_lease_is_lost_until_an_operator_releases_it(armed: Robot) -> None:
+    armed.ask("lease", for_s=0.5)
+    armed.steps.run_for(0.6)
+    assert armed.lease.lost(armed.steps.now_s)
+    with pytest.raises(RefusedError, match="has lost the lease"):
+        armed.ask("lease", for_s=0.5)
+    armed.ask("release", BEN)
+    assert not armed.lease.lost(armed.steps.now_s)
+    armed.ask("lease", BEN, for_s=0.5)
+
+
+def test_a_lost_lease_ends_with_the_torque_and_a_person_arms_again(armed: Robot) -> None:
+    armed.ask("lease", for_s=0.5)
+    armed.lease.hang_up(ANNA)
+    with pytest.raises(RefusedError, match="has lost the lease: the robot stops; then arm again"):
+        armed.ask("lease", BEN, for_s=0.5)
+    assert armed.steps.run_until(lambda: armed.steps.loop.mode is Mode.IDLE, 5.0)
+    armed.steps.arm()
+    assert armed.ask("lease", BEN, for_s=0.5) == "accepted"
+
+
+def test_a_clear_while_the_robot_holds_has_nothing_to_clear(armed: Robot) -> None:
+    with pytest.raises(RefusedError, match="^nothing to clear"):
+        armed.ask("clear")
+
+
+def test_the_notice_of_a_stop_is_made_of_whole_sentences(armed: Robot) -> None:
+    armed.ask("lease", for_s=0.5)
+    armed.lease.hang_up(ANNA)
+    armed.steps.run_for(4.0)
+    notice = armed.ask("status")["notice"]
+    assert notice.startswith("stopped by lease_lost: ") and notice.endswith(
+        "is gone. Look after the robot, then arm again."
+    )
+
+
+def test_a_held_joint_moves_where_it_is_asked_to_and_the_others_stay(armed: Robot) -> None:
+    held_rad = [drive["angle_rad"] for drive in armed.ask("status")["drives"]]
+    armed.ask("move", BEN, left_sweep_rad=0.3, left_adduction_rad=0.2)
+    assert armed.ask("status")["moving"]
+    armed.steps.run_until(lambda: not armed.ask("status")["moving"], 5.0)
+    armed.steps.run_for(0.5)
+    angles_rad = [drive["angle_rad"] for drive in armed.ask("status")["drives"]]
+    assert angles_rad == pytest.approx([0.3, 0.2, held_rad[2], held_rad[3]], abs=0.02)
+    assert armed.ask("status")["mode"] == "hold"
+    assert armed.events.about("move")[-1].endswith("left_adduction to 0.2000 rad by uid 1001 (process 78)")
+
+
+def test_a_move_ends_with_hold(armed: Robot) -> None:
+    armed.ask("move", left_sweep_rad=0.3)
+    armed.steps.run_for(0.1)
+    armed.ask("stop", BEN)
+    status = armed.ask("status")
+    assert not status["moving"] and status["mode"] == "hold"
+    assert status["notice"] == "the joints stopped on their way: stop was asked for by uid 1001 (process 78)."
+    armed.steps.run_for(0.5)
+    assert armed.ask("status")["drives"][0]["angle_rad"] < 0.2
+    armed.ask("move", left_sweep_rad=0.3)
+    assert armed.ask("status")["notice"] == ""
+    armed.ask("disarm")
+    armed.steps.run_for(0.1)
+    assert not armed.ask("status")["moving"]
+
+
+def test_flippers_that_may_be_in_the_mud_are_raised_before_they_are_moved(armed: Robot) -> None:
+    armed.steps.loop.controller.cut_short = True
+    with pytest.raises(RefusedError, match="'mudskipper stop' raises them first"):
+        armed.ask("move", left_sweep_rad=0.3)
+
+
+@pytest.mark.parametrize(
+    ("angles_rad", "sentence"),
+    [
+        ({}, "no joint is named: at least one of left_sweep_rad"),
+        ({"tail_rad": 0.1}, "'tail_rad' is no joint's angle"),
+        ({"left_sweep": 0.1}, "'left_sweep' is no joint's angle"),
+        ({"left_sweep_rad": "far"}, "left_sweep_rad = 'far': must be a number"),
+        ({"left_sweep_rad": True}, "must be a number"),
+        ({"left_sweep_rad": nan}, "must be a number"),
+        ({"left_sweep_rad": 3.0}, "left_sweep_rad = 3: must be from"),
+        ({"right_adduction_rad": -3.0}, "right_adduction_rad = -3: must be from"),
+    ],
+)
+def test_a_move_to_nowhere_is_refused_with_its_reason(armed: Robot, angles_rad: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(RefusedError, match=sentence):
+        armed.ask("move", **angles_rad)
+    assert not armed.ask("status")["moving"]
+
+
+def test_nothing_moves_before_the_robot_holds_its_pose(robot: Robot) -> None:
+    robot.steps.run_for(1.0)
+    with pytest.raises(RefusedError, match="only in hold, so arm first"):
+        robot.ask("move", left_sweep_rad=0.1)

@@ -1,0 +1,104 @@
+"""The client gives each answer to its own request, and tells a closed door from an absent daemon."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import pytest
+
+from firmware_host.operator import rpc
+from firmware_host.operator.status_client import (
+    CallRefusedError,
+    DroppedError,
+    NoDaemonError,
+    NotPermittedError,
+    StatusClient,
+)
+
+Ends = tuple[StatusClient, socket.socket]
+
+
+@pytest.fixture
+def ends(short_folder: Path) -> Iterator[Ends]:
+    """A client and what it is connected to."""
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(short_folder / "s"))
+        listener.listen()
+        client = StatusClient(short_folder / "s", timeout_s=0.2)
+        connection, _ = listener.accept()
+        with connection:
+            yield client, connection
+        client.close()
+
+
+def answer(ends: Ends, *messages: Any) -> Any:
+    """What the client makes of them; they are there before it asks."""
+    client, connection = ends
+    connection.sendall(b"".join(msgpack.packb(message) for message in messages))
+    return client.call("status")
+
+
+def test_an_answer_to_an_earlier_request_is_passed_over(ends: Ends) -> None:
+    """A Ctrl-C may have kept it from being read."""
+    assert answer(ends, [rpc.RESPONSE, 0, None, "old"], [rpc.RESPONSE, 1, None, "new"]) == "new"
+
+
+def test_a_refusal_keeps_its_sentence(ends: Ends) -> None:
+    with pytest.raises(CallRefusedError, match="^arm first$"):
+        answer(ends, [rpc.RESPONSE, 1, "arm first", None])
+
+
+def test_a_refusal_for_want_of_rights_is_told_apart(ends: Ends) -> None:
+    with pytest.raises(NotPermittedError, match="^join$"):
+        answer(ends, [rpc.RESPONSE, 1, f"{rpc.NOT_PERMITTED}join", None])
+
+
+def test_a_rejection_without_a_number_is_for_whoever_asks(ends: Ends) -> None:
+    with pytest.raises(CallRefusedError, match=r"a request is \[0"):
+        answer(ends, [rpc.RESPONSE, None, rpc.SHAPE, None])
+
+
+@pytest.mark.parametrize("message", [5, None, [1, 2], "x" * 5000, {"a": 1}])
+def test_what_is_no_answer_comes_from_no_daemon_of_ours(ends: Ends, message: Any) -> None:
+    with pytest.raises(NoDaemonError, match="no mudskipper daemon"):
+        answer(ends, message)
+
+
+def test_silence_is_no_absent_daemon(ends: Ends) -> None:
+    with pytest.raises(DroppedError, match="does not answer: 'systemctl status"):
+        answer(ends)
+
+
+@pytest.mark.parametrize("before", [0, 1])
+def test_a_connection_that_the_daemon_has_closed_is_said_to_be_closed(ends: Ends, before: int) -> None:
+    client, connection = ends
+    for _ in range(before):
+        answer(ends, [rpc.RESPONSE, 1, None, "new"])
+    connection.close()
+    with pytest.raises(DroppedError, match="closed the connection: it is ending, or made room"):
+        client.call("status")
+
+
+def test_a_sentence_before_the_door_closes_is_read(ends: Ends) -> None:
+    client, connection = ends
+    connection.sendall(msgpack.packb([rpc.RESPONSE, None, f"{rpc.NOT_PERMITTED}join", None]))
+    connection.close()
+    with pytest.raises(NotPermittedError, match="^join$"):
+        client.call("status")
+
+
+def test_a_full_queue_is_waited_for(short_folder: Path) -> None:
+    """Where somebody else connects all the time, the next in the queue may be us."""
+    with socket.socket(socket.AF_UNIX) as listener, socket.socket(socket.AF_UNIX) as before:
+        listener.bind(str(short_folder / "s"))
+        listener.listen(0)
+        before.connect(str(short_folder / "s"))
+        begin_s = time.monotonic()
+        with pytest.raises(NoDaemonError):
+            StatusClient(short_folder / "s", timeout_s=0.1)
+        assert time.monotonic() - begin_s >= 0.09

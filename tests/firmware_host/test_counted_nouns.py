@@ -1,8 +1,0 @@
-import pytest
-
-from firmware_host.counted_nouns import counted
-
-
-@pytest.mark.parametrize(("number", "told"), [(0, "0 strides"), (1, "1 stride"), (2, "2 strides")])
-def test_one_is_told_in_the_singular(number: int, told: str) -> None:
-    assert counted(number, "stride") == told

@@ -1,0 +1,337 @@
+"""What a tick shows beyond one joint's signals: buses, gate, arming, what drives tell of themselves, pose and trust."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isnan, nan
+from typing import Any
+
+import pytest
+
+from control.fault_kinds import KINDS
+from control.faults import Fault
+from control.limits import LimitedTorques
+from control.modes import ENERGISED, Mode
+from control.records import JOINTS, NO_TORQUE, BodyPose, DriveState, DriveStates
+from drivers.can.can_port import BusState
+from drivers.can.mock_bus import MockBus, MockPort
+from drivers.odrive.axis import OdriveAxis, Version
+from drivers.odrive.drives import OdriveDrives
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.fault_monitor import ARMING_S, BUS_TROUBLE_S, POSE_FORGOTTEN_S, REFUSED_TICKS, FaultWatch, Situation
+from firmware_host.log.recorder import HEALTHY
+from firmware_host.ticker import PERIOD_S, Beat
+
+START_S = 100.0
+KNOWN = Version(0, 6, 11)
+
+
+class Bench:
+    """Owns a fault watch, the drives' ends of two buses, and the ticks."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        self.ports: dict[str, MockPort] = {name: MockBus().open() for name in configuration.bus}
+        self.drives = OdriveDrives(configuration.drive, self.ports, configuration.limits)
+        for axis in self.drives.axes:
+            tell_settings(axis)
+        self.watch = FaultWatch(configuration, self.drives)
+        self.tick_number = 0
+
+    @property
+    def now_s(self) -> float:
+        return START_S + self.tick_number * PERIOD_S
+
+    def states(self, place: int = -1, **changes: Any) -> DriveStates:
+        """Of the next tick: healthy ones that have just come, but for one joint."""
+        now_s = self.now_s + PERIOD_S
+        well = DriveState(0.1, 0.0, now_s, 0.0, now_s, True, 0, now_s, 25.0, now_s, 24.0)
+        a, b, c, d = (well._replace(**changes) if joint == place else well for joint in range(4))
+        return a, b, c, d
+
+    def tick(self, mode: Mode = Mode.HOLD, states: DriveStates | None = None, **changes: Any) -> list[Fault]:
+        states = states or self.states()
+        self.tick_number += 1
+        sent = LimitedTorques(NO_TORQUE, False, True)
+        situation = Situation(mode, START_S, states, BodyPose(), sent, False, 0.0, HEALTHY, "")
+        return self.watch.update(Beat(self.now_s, 0.0, self.tick_number, 0), situation._replace(**changes))
+
+
+def tell_settings(axis: OdriveAxis, version: Version | None = KNOWN, watchdog_s: float = 0.1) -> None:
+    axis.version = version
+    axis._watchdog_enabled = None if isnan(watchdog_s) else watchdog_s > 0.0
+    axis._watchdog_timeout_s = watchdog_s
+
+
+@pytest.fixture
+def bench(configuration: Configuration) -> Bench:
+    return Bench(configuration)
+
+
+def told(faults: Sequence[Fault]) -> list[tuple[str, str]]:
+    return [(fault.name, fault.subject) for fault in faults]
+
+
+@pytest.mark.parametrize("mode", sorted(ENERGISED))
+def test_where_all_is_well_there_is_no_fault(bench: Bench, mode: Mode) -> None:
+    for _ in range(200):
+        assert bench.tick(mode) == []
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_each_joint_is_watched_under_its_own_name(bench: Bench, place: int) -> None:
+    assert told(bench.tick(states=bench.states(place, angle_rad=2.0))) == [("joint_position", JOINTS[place])]
+
+
+def test_joints_have_their_own_ranges(bench: Bench) -> None:
+    below = bench.tick(states=bench.states(0, angle_rad=-1.4)), bench.tick(states=bench.states(1, angle_rad=-1.4))
+    assert [told(faults) for faults in below][0] == [("joint_position", "left_sweep")]
+    assert ("joint_position", "left_adduction") not in told(below[1])
+
+
+def test_before_all_drives_were_heard_joints_are_not_judged(bench: Bench) -> None:
+    nothing = (DriveState(), DriveState(), DriveState(), DriveState())
+    assert bench.tick(Mode.BOOT, nothing) == []
+
+
+# buses
+
+
+@pytest.mark.parametrize(
+    ("state", "name"),
+    [(BusState.WARNING, "bus_warning"), (BusState.PASSIVE, "bus_passive"), (BusState.OFF, "bus_off")],
+)
+def test_a_bus_tells_its_state_with_the_last_error(bench: Bench, state: BusState, name: str) -> None:
+    bench.ports["right"].state = state
+    bench.ports["right"].last_error = "no acknowledgement"
+    (fault,) = bench.tick()
+    assert (fault.name, fault.subject) == (name, "right")
+    assert fault.sentence.startswith("The right bus ") and fault.sentence.endswith(": no acknowledgement.")
+
+
+def test_every_state_of_a_bus_but_active_is_a_fault(bench: Bench) -> None:
+    for state in BusState:
+        bench.ports["left"].state = state
+        assert bool(bench.tick()) == (state is not BusState.ACTIVE)
+
+
+def test_frames_that_were_lost_on_their_way_in_are_told_once(bench: Bench) -> None:
+    bench.ports["right"].lost_frames += 7
+    (fault,) = bench.tick()
+    assert (fault.name, fault.subject) == ("frames_lost", "right")
+    assert fault.sentence.startswith("7 frames of the right bus were lost")
+    assert bench.tick() == []
+
+
+def test_a_bus_that_loses_commands_in_three_ticks_in_a_row_is_a_fault(bench: Bench) -> None:
+    found = []
+    for _ in range(5):
+        bench.ports["left"].failed_sends += 2
+        bench.ports["left"].last_send_error = "No buffer space available"
+        found.append(bench.tick())
+    assert [told(each) for each in found] == [[]] * (REFUSED_TICKS - 1) + [[("bus_refuses", "left")]] * 3
+    assert found[2][0].sentence == "The left bus lost commands in 3 ticks in a row: No buffer space available."
+    assert bench.tick() == []
+    assert KINDS["bus_refuses"].bound_ticks > REFUSED_TICKS + 1
+
+
+def test_two_ticks_of_lost_commands_again_and_again_are_none(bench: Bench) -> None:
+    for tick in range(100):
+        bench.ports["left"].failed_sends += tick % 3 > 0
+        bench.ports["right"].failed_sends += tick % 3 == 0
+        assert bench.tick() == []
+
+
+def test_commands_that_were_lost_before_the_watch_began_do_not_count(configuration: Configuration) -> None:
+    bench = Bench(configuration)
+    bench.ports["left"].failed_sends = 99
+    bench.watch.reset()
+    for _ in range(10):
+        assert bench.tick() == []
+
+
+# drives
+
+
+def test_a_torque_that_was_no_number_is_told(bench: Bench) -> None:
+    assert told(bench.tick(sent=LimitedTorques(NO_TORQUE, True, False))) == [("torque_not_finite", "")]
+
+
+def test_a_command_that_the_gate_refuses_is_told_once(bench: Bench) -> None:
+    gate = bench.drives.gate
+    gate.refused += 2
+    gate.last_refusal = "A torque was refused."
+    assert [(fault.name, fault.sentence) for fault in bench.tick()] == [("command_refused", "A torque was refused.")]
+    assert bench.tick() == []
+
+
+def test_a_drive_that_does_not_arm_is_told_after_two_seconds_and_only_while_arming(bench: Bench) -> None:
+    ticks = 0
+    while not (found := bench.tick(Mode.ARMING, bench.states(2, closed_loop=False))):
+        ticks += 1
+        assert ticks < 1000
+    assert told(found) == [("arming_failed", "right_sweep")]
+    assert ticks == pytest.approx(ARMING_S / PERIOD_S, abs=1)
+    assert ticks < KINDS["arming_failed"].bound_ticks
+    assert told(bench.tick(Mode.HOLD, bench.states(2, closed_loop=False))) == [("drive_disarmed", "right_sweep")]
+
+
+def test_a_drive_that_left_closed_loop_says_why(bench: Bench) -> None:
+    bench.drives.axes[2].disarm_reason = 0x1000000
+    (fault,) = bench.tick(states=bench.states(2, closed_loop=False))
+    assert fault.sentence == "The right_sweep drive left closed loop by itself. (watchdog expired)"
+
+
+def test_other_faults_do_not_borrow_a_drives_words(bench: Bench) -> None:
+    bench.drives.axes[0].disarm_reason = 0x1000000
+    (fault,) = bench.tick(states=bench.states(0, angle_rad=2.0))
+    assert "watchdog" not in fault.sentence
+
+
+@pytest.mark.parametrize(
+    ("version", "expected"),
+    [
+        (None, "The left_sweep drive did not tell its firmware version yet."),
+        (Version(0, 5, 6), "The left_sweep drive runs firmware 0.5.6; 0.6 is supported."),
+        (Version(1, 6, 0), "The left_sweep drive runs firmware 1.6.0; 0.6 is supported."),
+        (Version(0, 6, 0), None),
+    ],
+)
+def test_firmware_is_known_or_a_fault(bench: Bench, version: Version | None, expected: str | None) -> None:
+    tell_settings(bench.drives.axes[0], version)
+    found = bench.tick(Mode.IDLE, bench.states())
+    assert [(fault.name, fault.sentence) for fault in found] == ([("drive_version", expected)] if expected else [])
+
+
+@pytest.mark.parametrize(
+    ("watchdog_s", "name", "sentence"),
+    [
+        (nan, "watchdog_unknown", "The left_sweep drive's watchdog was not read back."),
+        (0.0, "watchdog_off", "The left_sweep drive's watchdog is off."),
+        (0.31, "watchdog_off", "The left_sweep drive's watchdog waits for 0.31 s; 0.3 s is the most."),
+    ],
+)
+def test_a_watchdog_is_known_and_on_and_quick(bench: Bench, watchdog_s: float, name: str, sentence: str) -> None:
+    tell_settings(bench.drives.axes[0], watchdog_s=watchdog_s)
+    assert [(fault.name, fault.sentence) for fault in bench.tick()] == [(name, sentence)]
+    tell_settings(bench.drives.axes[0], watchdog_s=0.3)
+    assert bench.tick() == []
+
+
+def test_a_restart_is_told_once(bench: Bench) -> None:
+    assert bench.tick() == []
+    bench.drives.axes[3].restarts += 1
+    assert told(bench.tick()) == [("drive_restarted", "right_adduction")]
+    assert bench.tick() == []
+
+
+def test_two_drives_under_one_id_are_told_while_they_seem_so(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(OdriveAxis, "twins", property(lambda axis: axis.joint == "left_adduction"))
+    for _ in range(3):
+        assert told(bench.tick()) == [("drive_twins", "left_adduction")]
+
+
+# the body's place
+
+
+def test_a_place_that_was_never_told_is_not_missed(bench: Bench) -> None:
+    assert not any(bench.tick() for _ in range(100))
+
+
+def test_a_place_that_is_lost_is_told_until_it_is_back_or_forgotten(bench: Bench) -> None:
+    known = BodyPose(START_S, 0.5)
+    assert bench.tick(body=known) == []
+    assert told(bench.tick()) == [("pose_lost", "")]
+    assert bench.tick(body=known) == []
+    lost = [bool(bench.tick()) for _ in range(round(POSE_FORGOTTEN_S / PERIOD_S) + 10)]
+    assert sum(lost) == pytest.approx(POSE_FORGOTTEN_S / PERIOD_S, abs=2)
+    assert not lost[-1]
+
+
+def test_who_lost_the_lease_is_named(bench: Bench) -> None:
+    (fault,) = bench.tick(lease_holder="the operator's tablet")
+    assert (fault.name, fault.sentence) == (
+        "lease_lost",
+        "the operator's tablet promised to attend the robot and is gone.",
+    )
+
+
+# trust in encoders
+
+
+def test_encoders_are_trusted_until_something_is_said_against_them(bench: Bench) -> None:
+    bench.tick()
+    assert bench.watch.trusted == (True, True, True, True)
+    bench.tick(states=bench.states(1, angle_rad=2.0))
+    assert bench.watch.trusted[2:] == (True, True)
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_an_encoder_that_is_silent_is_trusted_again_with_its_next_message(bench: Bench, place: int) -> None:
+    bench.tick()
+    bench.tick(states=bench.states(place, angle_stamp_s=bench.now_s - 0.02))
+    assert bench.watch.trusted == tuple(joint != place for joint in range(4))
+    bench.tick()
+    assert bench.watch.trusted == (True, True, True, True)
+
+
+def test_currents_say_nothing_against_an_encoder(bench: Bench) -> None:
+    assert told(bench.tick(states=bench.states(0, current_stamp_s=0.0))) == [("current_silent", "left_sweep")]
+    assert bench.watch.trusted == (True, True, True, True)
+
+
+def test_an_encoder_that_jumped_is_not_trusted_until_torque_is_off(bench: Bench) -> None:
+    bench.tick()
+    assert told(bench.tick(states=bench.states(2, angle_rad=0.5))) == [("encoder_jump", "right_sweep")]
+    for _ in range(100):
+        assert bench.tick(Mode.DAMPING, bench.states(2, angle_rad=0.5)) == []
+        assert bench.watch.trusted == (True, True, False, True)
+    bench.tick(Mode.FAULT, bench.states(2, angle_rad=0.5))
+    assert bench.watch.trusted == (True, True, True, True)
+
+
+# heat
+
+
+def test_the_limits_see_the_windings_heat_once_it_matters(bench: Bench) -> None:
+    states = bench.states()
+    assert bench.watch.with_winding_heat(states) is states
+    bench.watch.joints[1].winding.temperature_c = 75.0
+    told_c = [state.temperature_c for state in bench.watch.with_winding_heat(states)]
+    assert told_c == [30.0, 75.0, 30.0, 30.0]
+    assert bench.watch.with_winding_heat(states)[1]._replace(temperature_c=25.0) == states[1]
+
+
+def test_a_joint_in_a_recovery_is_not_asked_to_follow_and_one_that_walks_is(bench: Bench) -> None:
+    full = LimitedTorques((0.75, 0.0, 0.0, 0.0), False, True)
+
+    def ticks(mode: Mode, freeing: bool) -> list[Fault]:
+        found: list[Fault] = []
+        for tick in range(800):
+            states = bench.states(0, current_a=0.75 / 0.083, velocity_rad_s=1e-4 * (tick % 2))
+            found += bench.tick(mode, states, sent=full, freeing=freeing)
+        return found
+
+    assert ticks(Mode.WALKING, True) == []
+    assert ticks(Mode.DAMPING, False) == []
+    assert set(told(ticks(Mode.WALKING, False))) == {("joint_not_following", "left_sweep")}
+
+
+@pytest.mark.parametrize("state", [BusState.WARNING, BusState.PASSIVE])
+def test_trouble_of_a_bus_is_over_without_further_error_frames_and_one_that_is_off_stays_so(
+    bench: Bench, state: BusState
+) -> None:
+    bench.ports["left"].state = state
+    for _ in range(int(BUS_TROUBLE_S / PERIOD_S) - 1):
+        assert bench.tick()
+    bench.tick()
+    assert bench.tick() == []
+    bench.ports["left"].error_frames += 1
+    assert bench.tick()
+    bench.ports["right"].state = BusState.OFF
+    assert all("bus_off" in [fault.name for fault in bench.tick()] for _ in range(1000))
+
+
+def test_a_drive_that_calibrates_stands_against_arming_and_is_no_fault_in_a_walk(bench: Bench) -> None:
+    bench.drives.axes[2].busy_state = 4
+    assert ("drive_energised", JOINTS[2]) in told(bench.tick(Mode.IDLE))
+    assert bench.tick(Mode.WALKING) == []

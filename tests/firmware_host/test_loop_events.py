@@ -1,0 +1,73 @@
+"""What the loop tells: every sentence into the log, and the notice for whoever asks for the status later."""
+
+from __future__ import annotations
+
+import pytest
+
+from control.fault_kinds import make_fault
+from control.modes import Mode, Request
+from firmware_host.loop_events import LoopNews, ModeChange
+from tests.kept_events import EventRecorder
+
+FAULT = make_fault("lease_lost", "", "Anna is gone.")
+
+
+@pytest.fixture
+def recorder() -> EventRecorder:
+    return EventRecorder()
+
+
+@pytest.fixture
+def news(recorder: EventRecorder) -> LoopNews:
+    return LoopNews(recorder, longest_hold_s=60.0)
+
+
+def change(before: Mode, after: Mode, faulty: bool = False, rested: bool = False, up: bool = True) -> ModeChange:
+    return ModeChange(before, after, FAULT if faulty else None, rested, up)
+
+
+def test_a_change_of_mode_is_told_with_its_cause(news: LoopNews, recorder: EventRecorder) -> None:
+    news.tell_change(1.0, change(Mode.WALKING, Mode.STOPPING, faulty=True))
+    assert recorder.texts == ["mode walking to stopping: Anna is gone."]
+    assert news.notice.startswith("stopped by lease_lost: Anna is gone. ")
+
+
+@pytest.mark.parametrize("mode", [Mode.ARMING, Mode.WALKING])
+def test_a_notice_stands_until_the_robot_is_moved_again(news: LoopNews, mode: Mode) -> None:
+    news.tell_end_of_move(1.0, "stop was asked for.")
+    news.tell_change(2.0, change(Mode.HOLD, Mode.IDLE))
+    assert news.notice == "the joints stopped on their way: stop was asked for."
+    news.tell_change(3.0, change(Mode.IDLE, mode))
+    assert news.notice == ""
+
+
+@pytest.mark.parametrize(
+    ("changed", "notice"),
+    [
+        (change(Mode.HOLD, Mode.IDLE, rested=True), "the pose was held for 60 s without a request"),
+        (change(Mode.STOPPING, Mode.HOLD, up=False), "the flippers did not come out of the mud"),
+    ],
+)
+def test_what_a_person_should_know_is_in_the_log_as_well(
+    news: LoopNews, recorder: EventRecorder, changed: ModeChange, notice: str
+) -> None:
+    news.tell_change(1.0, changed)
+    assert news.notice.startswith(notice)
+    assert recorder.texts[1:] == [news.notice]
+
+
+@pytest.mark.parametrize(
+    "changed", [change(Mode.HOLD, Mode.IDLE), change(Mode.STOPPING, Mode.HOLD), change(Mode.BOOT, Mode.IDLE, True)]
+)
+def test_usual_changes_and_faults_without_torque_leave_no_notice(news: LoopNews, changed: ModeChange) -> None:
+    news.tell_change(1.0, changed)
+    assert news.notice == ""
+
+
+def test_a_reset_forgets_the_notice_and_which_requests_were_told(news: LoopNews, recorder: EventRecorder) -> None:
+    for _ in range(2):
+        news.tell_end_of_move(1.0, "a fault stands.")
+        news.tell_request(1.0, Request.STOP, False, "anna", True)
+        news.reset()
+    assert (news.notice, news.requests.untold) == ("", 0)
+    assert recorder.about("request") == ["request stop by anna"] * 2

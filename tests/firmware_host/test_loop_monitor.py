@@ -1,0 +1,189 @@
+"""The loop's own beat under made-up clocks: what is told of missed ticks, and that a good beat tells nothing."""
+
+from collections.abc import Iterable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.fault_kinds import KINDS
+from control.faults import Fault
+from control.monitors.joint_monitor import FaultBounds
+from firmware_host.loop_monitor import CRAWL_TICKS, MEAN_TICKS, LoopWatch
+from firmware_host.ticker import PERIOD_S, Beat, Ticker
+
+START_S = 5000.0
+DISTANCE_S = 1.7e9  # of the clock on the wall
+
+
+class Clock:
+    """Owns a made-up time in which a ticker sleeps."""
+
+    def __init__(self) -> None:
+        self.now_s = START_S
+
+    def __call__(self) -> float:
+        return self.now_s
+
+    def sleep(self, duration_s: float) -> None:
+        self.now_s += duration_s
+
+
+def watched(busy_s: Iterable[float]) -> list[list[Fault]]:
+    """What is told at each beat of the real ticker, after work of `busy_s` before each."""
+    clock = Clock()
+    ticker, watch = Ticker(clock=clock, sleep=clock.sleep), LoopWatch(FaultBounds())
+    told = []
+    for each in busy_s:
+        clock.now_s += each
+        told.append(watch.update(ticker.wait(), DISTANCE_S))
+    return told
+
+
+def names(told: Iterable[Fault]) -> list[str]:
+    return [fault.name for fault in told]
+
+
+def missing(ticks: int) -> float:
+    """Work for so long that as many deadlines are missed."""
+    return (ticks + 1.5) * PERIOD_S
+
+
+def after_missing(ticks: int) -> list[list[str]]:
+    """At the beat after so many missed ones, in the middle of a good run, and at those that follow."""
+    told = watched([0.001] * 200 + [missing(ticks)] + [0.001] * 250)
+    assert told[:200] == [[]] * 200
+    return [names(each) for each in told[200:]]
+
+
+def test_a_good_beat_is_never_a_fault_from_the_first_tick_on() -> None:
+    assert not any(watched([0.0, *[0.0025] * 1000]))
+
+
+@pytest.mark.parametrize("ticks", [1, 2, 4])
+def test_a_tick_that_is_missed_is_told_once_and_is_no_lag(ticks: int) -> None:
+    told = after_missing(ticks)
+    assert told[0] == ["loop_overrun"]
+    assert not any(told[1:])
+
+
+@pytest.mark.parametrize("ticks", [5, 9])
+def test_five_in_a_row_are_a_lag(ticks: int) -> None:
+    assert after_missing(ticks)[0] == ["loop_lagging"]
+
+
+@pytest.mark.parametrize("ticks", [10, 11, 400])
+def test_ten_in_a_row_are_a_stall(ticks: int) -> None:
+    told = after_missing(ticks)
+    assert told[0][0] == "loop_stalled"
+
+
+def test_a_stall_is_forgotten_after_the_ticks_of_a_mean() -> None:
+    told = after_missing(400)
+    assert all("loop_lagging" in each for each in told[:MEAN_TICKS])
+    assert not any(told[MEAN_TICKS:])
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.0, False), (0.09, False), (0.12, True), (1.0, True)])
+def test_a_rate_that_is_not_kept_is_a_lag_though_no_five_are_missed(share: float, expected: bool) -> None:
+    watch = LoopWatch(FaultBounds())
+    told = [
+        watch.update(Beat(START_S + tick * PERIOD_S * (1.0 + share), 0.0, tick, 0), DISTANCE_S) for tick in range(300)
+    ]
+    assert not any(told[:MEAN_TICKS])  # a mean of fewer says nothing
+    assert [names(each) for each in told[MEAN_TICKS:]] == [["loop_lagging"] * expected] * (300 - MEAN_TICKS)
+
+
+def test_single_missed_ticks_make_a_lag_once_they_are_more_than_a_tenth() -> None:
+    def lags(every: int) -> bool:
+        busy_s = [missing(1) if tick % every == 0 else 0.001 for tick in range(1, 500)]
+        return "loop_lagging" in {name for each in watched(busy_s) for name in names(each)}
+
+    assert lags(8)
+    assert not lags(12)
+
+
+def test_what_is_told_has_numbers() -> None:
+    sentences = {ticks: watched([0.0] * 5 + [missing(ticks)])[-1][0].sentence for ticks in (2, 6, 20)}
+    assert sentences == {
+        2: "The loop missed 2 of its ticks.",
+        6: "The loop missed 6 ticks in a row.",
+        20: "The loop stood still for 54 ms.",
+    }
+
+
+def stepped(step_s: float) -> list[list[str]]:
+    watch = LoopWatch(FaultBounds())
+    return [
+        names(watch.update(Beat(START_S + tick * PERIOD_S, 0.0, tick, 0), DISTANCE_S + step_s * (tick >= 50)))
+        for tick in range(100)
+    ]
+
+
+@pytest.mark.parametrize("step_s", [0.11, -0.11, 3600.0, -1.6e9])
+def test_a_clock_that_is_set_is_told_once(step_s: float) -> None:
+    assert stepped(step_s) == [[]] * 50 + [["clock_step"]] + [[]] * 49
+
+
+@pytest.mark.parametrize("step_s", [0.0, 0.09, -0.09])
+def test_a_clock_that_is_nudged_is_not(step_s: float) -> None:
+    assert not any(stepped(step_s))
+
+
+def test_a_clock_that_drifts_is_not_set() -> None:
+    """500 ppm, the most that ntpd lets a clock slew by."""
+    watch = LoopWatch(FaultBounds())
+    for tick in range(20000):
+        now_s = START_S + tick * PERIOD_S
+        assert not watch.update(Beat(now_s, 0.0, tick, 0), DISTANCE_S + 500e-6 * now_s)
+
+
+def test_a_computer_that_slept_is_told_by_its_clock() -> None:
+    """The monotonic clock stood still meanwhile, so no tick was missed."""
+    assert stepped(8 * 3600.0)[50] == ["clock_step"]
+
+
+def test_after_a_reset_the_first_beat_is_compared_with_nothing() -> None:
+    watch = LoopWatch(FaultBounds())
+    for tick in range(200):
+        watch.update(Beat(START_S + tick * PERIOD_S, 0.0, tick, 0), DISTANCE_S)
+    watch.reset()
+    for tick in range(150):
+        assert not watch.update(Beat(2.0 * START_S + tick * PERIOD_S, 0.0, tick, 0), 0.0)
+
+
+@given(st.lists(st.floats(0.0, 0.05), max_size=150))
+def test_whatever_the_beat_a_missed_tick_is_always_told(busy_s: list[float]) -> None:
+    clock = Clock()
+    ticker, watch = Ticker(clock=clock, sleep=clock.sleep), LoopWatch(FaultBounds())
+    for each in busy_s:
+        clock.now_s += each
+        beat = ticker.wait()
+        told = names(watch.update(beat, DISTANCE_S))
+        assert told or not beat.missed
+
+
+def crawled(period_ticks: float, beats: int = 40) -> list[str]:
+    """All names told of a loop whose beats come every so many ticks."""
+    watch, found = LoopWatch(FaultBounds()), []
+    for number in range(beats):
+        now_s = START_S + number * period_ticks * PERIOD_S
+        found += names(watch.update(Beat(now_s, 0.0, number, 0), DISTANCE_S))
+    return found
+
+
+def test_a_loop_that_commands_too_seldom_to_brake_a_joint_is_told_and_one_at_a_third_of_its_rate_is_not() -> None:
+    assert "loop_crawling" in crawled(4.05)
+    assert "loop_crawling" not in crawled(3.0)
+
+
+def test_a_crawl_is_told_within_its_ticks() -> None:
+    for period_ticks in (4.05, 7.0, 12.0):
+        watch = LoopWatch(FaultBounds())
+        passed = next(
+            number * period_ticks
+            for number in range(100)
+            if "loop_crawling"
+            in names(watch.update(Beat(START_S + number * period_ticks * PERIOD_S, 0.0, number, 0), DISTANCE_S))
+        )
+        assert passed <= max(KINDS["loop_crawling"].bound_ticks, CRAWL_TICKS * period_ticks)

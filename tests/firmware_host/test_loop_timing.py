@@ -1,0 +1,48 @@
+"""The loop's figures agree with numpy's on the same durations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from firmware_host.loop_timing import LONGEST_US, Histogram, LoopTiming
+from firmware_host.ticker import PERIOD_S
+
+
+def test_percentiles_are_exact_to_a_microsecond() -> None:
+    durations_s = np.random.default_rng(1).gamma(2.0, 80e-6, 10000)
+    histogram = Histogram()
+    for duration_s in durations_s:
+        histogram.add(float(duration_s))
+    for share in (0.5, 0.99, 0.999):
+        exact_us = 1e6 * float(np.quantile(durations_s, share, method="inverted_cdf"))
+        assert histogram.percentile_us(share) == pytest.approx(exact_us, abs=1.0)
+    assert histogram.max_us == pytest.approx(1e6 * durations_s.max())
+
+
+def test_a_duration_beyond_the_buckets_keeps_its_maximum() -> None:
+    histogram = Histogram()
+    histogram.add(3.0 * LONGEST_US / 1e6)
+    assert histogram.summary()["max"] == pytest.approx(3.0 * LONGEST_US)
+    assert histogram.percentile_us(0.5) == pytest.approx(3.0 * LONGEST_US)
+
+
+def test_an_empty_histogram_says_nothing() -> None:
+    assert Histogram().summary() == {"p50": 0.0, "p99": 0.0, "max": 0.0}
+
+
+def test_missed_ticks_lower_the_rate_that_is_told() -> None:
+    timing = LoopTiming()
+    for number in range(381):
+        if number % 10 != 9:
+            timing.update(number * PERIOD_S, 0.0, 1 if number % 10 == 0 and number else 0, 1e-4)
+    assert timing.rate_hz == pytest.approx(380.0 * 0.9, rel=2e-3)
+    assert timing.missed_ticks == 38
+
+
+def test_reset_forgets() -> None:
+    timing = LoopTiming()
+    timing.update(1.0, 1e-3, 5, 1e-3)
+    timing.reset()
+    assert timing.summary()["ticks"] == 0 == timing.summary()["missed_ticks"]
+    assert timing.tick.max_us == 0.0

@@ -1,0 +1,44 @@
+"""The body on its rail, apart from the flippers: how dry contacts hold it, and what it tells of its motion."""
+
+import pytest
+
+from simulation.body.rail_body import DRAG_STIFFNESS_N_M, BodyMotion, DragPad, DryDrag, RailBody
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
+
+DT_S = 0.0001
+
+
+def test_a_dry_contact_is_a_spring_until_it_yields_and_remembers_how_far() -> None:
+    drag = DryDrag()
+    for _ in range(10):
+        held_n = drag.step(DT_S, 0.01, 5.0)
+    assert held_n == pytest.approx(-DRAG_STIFFNESS_N_M * 1e-5 - 0.71)  # 10 um of spring, and damping of 71 N s/m
+    for _ in range(1000):
+        assert drag.step(DT_S, 0.1, 5.0) >= -5.0
+    assert drag.step(DT_S, 0.0, 5.0) == -5.0
+    assert drag.step(DT_S, 0.0, 2.0) == -2.0  # a weaker contact lets go of what it cannot hold
+    assert drag.step(DT_S, 0.0, 5.0) == -2.0
+
+
+def test_a_dry_contact_that_is_reset_is_not_stretched() -> None:
+    drag = DryDrag()
+    drag.step(1.0, 1.0, 5.0)
+    drag.reset()
+    assert drag.step(DT_S, 0.0, 5.0) == 0.0
+
+
+def test_the_pad_resists_as_deep_as_it_is_and_only_in_the_mud() -> None:
+    clay, pad = MUDS["48.5"], DragPad(0.015, 0.02)
+    assert pad.yield_n(clay) == clay.lateral_n(0.02, 0.015)
+    assert pad.yield_n(clay, 0.01) == pytest.approx(clay.lateral_n(0.03, 0.015))
+    assert pad.yield_n(clay, -0.02) == DragPad(0.0, 0.02).yield_n(clay) == 0.0
+
+
+def test_it_tells_its_speed_and_that_it_lies_level() -> None:
+    body = RailBody(1.0, 2.5, 0.0, DragPad(0.0, 0.0), Track([(1.0, MUDS["48.5"])]))
+    body.forward_m_s = 0.3
+    assert body.motion == BodyMotion((0.3, 0.0, 0.0))
+    assert body.carriages == (None, None)
+    body.reset()
+    assert body.motion.velocity_m_s == (0.0, 0.0, 0.0)

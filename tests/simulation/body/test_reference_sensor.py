@@ -1,0 +1,221 @@
+"""What the witness tells of strokes, with arms moved by hand and in whole walks."""
+
+from dataclasses import replace
+from math import isfinite, isnan, radians, sin
+
+import pytest
+
+from control.controller import WalkOrder
+from control.gait.gait import SINGLE_FLIPPER
+from control.records import Phase
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.ticker import PERIOD_S
+from simulation.body.plant import Plant, PlantParameters
+from simulation.body.reference_sensor import StrideTruth, StrokeTruth, StrokeWitness
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS, Clay
+from simulation.mud.disturbances import Disturbances
+from simulation.mud.track import Ridges, Track
+from simulation.test_rig.load_cell import measure_shear
+
+DT_S = 0.01
+STRIDE = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING)
+
+
+def make_plant(depth_m: float = 0.03) -> Plant:
+    plant = Plant(PlantParameters(), Track([(1.0, MUDS["48.5"])]))
+    for arm in plant.arms:
+        arm.adduction_rad = arm.parameters.geometry.adduction_rad(0.0, depth_m)
+    return plant
+
+
+def watch(witness: StrokeWitness, plant: Plant, *phases: Phase) -> list[StrideTruth]:
+    """One tick in each phase."""
+    return [truth for phase in phases for truth in witness.step(DT_S, plant, phase)]
+
+
+def is_unseen(stroke: StrokeTruth) -> bool:
+    return all(isnan(value) for value in stroke)
+
+
+def test_a_stride_of_each_flipper_closes_when_swing_begins() -> None:
+    witness, plant = StrokeWitness(), make_plant()
+    assert watch(witness, plant, Phase.SWING, *STRIDE[:3]) == []
+    closed = watch(witness, plant, Phase.SWING)
+    assert [(truth.flipper, truth.index) for truth in closed] == [("left", 0), ("right", 0)]
+    assert watch(witness, plant, Phase.SWING) == []
+    assert [truth.index for truth in watch(witness, plant, *STRIDE)] == [1, 1]
+
+
+def test_pauses_between_the_strokes_do_not_close_a_stride() -> None:
+    pause = Phase.PAUSE
+    phases = (Phase.INSERTION, pause, Phase.STANCE, pause, Phase.EXTRACTION, pause)
+    witness, plant = StrokeWitness(), make_plant()
+    assert watch(witness, plant, *phases) == []
+    assert len(watch(witness, plant, Phase.SWING)) == 2
+
+
+def test_a_stride_with_a_recovery_closes_once_and_the_recovery_is_no_stroke() -> None:
+    strides = []
+    for phases in (STRIDE[:3], (*STRIDE[:3], Phase.RECOVERY)):
+        witness, plant = StrokeWitness(), make_plant()
+        assert watch(witness, plant, *phases) == []
+        strides.append(watch(witness, plant, Phase.SWING))
+        assert watch(witness, plant, Phase.SWING) == []
+    assert len(strides[0]) == len(strides[1]) == 2
+    assert repr(strides[0]) == repr(strides[1])
+
+
+def test_an_insertion_closes_a_stride_too() -> None:
+    witness, plant = StrokeWitness(), make_plant()
+    assert len(watch(witness, plant, *STRIDE[:3], Phase.INSERTION)) == 2
+
+
+@pytest.mark.parametrize(
+    "phases",
+    [
+        (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.REST, Phase.SWING),
+        (Phase.INSERTION, Phase.STANCE, Phase.SWING),
+        (Phase.INSERTION, Phase.STANCE, Phase.REST, Phase.EXTRACTION, Phase.SWING),
+        (Phase.STANCE, Phase.EXTRACTION, Phase.SWING),
+    ],
+)
+def test_strides_that_are_cut_short_do_not_count(phases: tuple[Phase, ...]) -> None:
+    witness, plant = StrokeWitness(), make_plant()
+    assert watch(witness, plant, *phases) == []
+    assert [truth.index for truth in watch(witness, plant, *STRIDE)] == [0, 0]
+
+
+def test_means_are_those_of_the_part_in_the_mud_and_the_depth_is_the_greatest() -> None:
+    witness, plant = StrokeWitness(), make_plant()
+    arm, geometry = plant.arms[0], plant.parameters.geometry
+    for sweep_rad, depth_m in ((0.9, -0.01), (0.2, 0.01), (0.4, 0.04), (0.6, 0.02)):
+        arm.sweep_rad, arm.adduction_rad = sweep_rad, geometry.adduction_rad(sweep_rad, depth_m)
+        watch(witness, plant, Phase.INSERTION)
+    left, _ = watch(witness, plant, *STRIDE[1:])
+    assert left.insertion.sweep_rad == pytest.approx(0.4)
+    expected_rad = sum(geometry.adduction_rad(*pose) for pose in ((0.2, 0.01), (0.4, 0.04), (0.6, 0.02))) / 3.0
+    assert left.insertion.adduction_rad == pytest.approx(expected_rad)
+    assert left.insertion.deepest_m == pytest.approx(0.04)
+    assert isnan(left.insertion.slip_m)
+
+
+def test_the_speed_is_that_of_the_edge_through_the_mud_the_body_s_included() -> None:
+    witness, plant = StrokeWitness(), make_plant()
+    arm, geometry = plant.arms[1], plant.parameters.geometry
+    arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s, plant.body.forward_m_s = 0.4, -0.8, 0.1
+    jacobian = geometry.jacobian(arm.sweep_rad, arm.adduction_rad)
+    velocity_m_s = (
+        0.4 * jacobian.x_sweep - 0.8 * jacobian.x_adduction + 0.1,
+        0.4 * jacobian.y_sweep - 0.8 * jacobian.y_adduction,
+        0.4 * jacobian.z_sweep - 0.8 * jacobian.z_adduction,
+    )
+    _, right = watch(witness, plant, *STRIDE)
+    assert right.insertion.speed_m_s == pytest.approx(sum(part**2 for part in velocity_m_s) ** 0.5)
+    assert right.extraction.speed_m_s == pytest.approx(right.insertion.speed_m_s)
+
+
+def test_in_stance_only_backward_slip_counts() -> None:
+    witness, plant = StrokeWitness(), make_plant()
+    watch(witness, plant, Phase.INSERTION)
+    length_m = plant.parameters.geometry.flipper_length_m
+    for slip_m_s in (0.1, 0.3, 0.019, -0.5):
+        plant.arms[0].sweep_velocity_rad_s = -(slip_m_s + 0.2) / length_m
+        plant.body.forward_m_s = 0.2
+        watch(witness, plant, Phase.STANCE)
+    left, right = watch(witness, plant, Phase.EXTRACTION, Phase.SWING)
+    assert left.stance.speed_m_s == pytest.approx(0.1 * 0.25 + 0.3 * 0.75)  # of each place its own: by its way
+    assert left.stance.slip_m == pytest.approx(DT_S * 0.4)
+    assert isnan(right.stance.speed_m_s)  # it went forward with the body
+    assert right.stance.slip_m == 0.0
+
+
+def test_a_flipper_in_the_air_has_no_strokes_to_repeat() -> None:
+    witness, plant = StrokeWitness(), make_plant(-0.01)
+    left, right = watch(witness, plant, *STRIDE)
+    assert all(is_unseen(stroke) for stroke in (left.insertion, left.stance, left.extraction, right.stance))
+
+
+def test_clay_and_surface_are_those_that_the_flipper_met_first() -> None:
+    witness, plant = StrokeWitness(), make_plant()
+    arm = plant.arms[0]
+    arm.clay, arm.history.surface_m = Clay("remoulded", 1234.0), 0.002
+    watch(witness, plant, Phase.INSERTION)
+    arm.clay, arm.history.surface_m = Clay("next", 2000.0), -0.001
+    left, right = watch(witness, plant, Phase.STANCE, Phase.EXTRACTION, Phase.SWING)
+    assert (left.clay, left.surface_m) == (Clay("remoulded", 1234.0), 0.002)
+    assert (right.clay, right.surface_m) == (MUDS["48.5"], 0.0)
+    assert left.insertion.deepest_m == pytest.approx(0.028)
+
+
+def test_depths_and_surface_are_those_of_the_ridge_that_the_flipper_met() -> None:
+    """A crest of 4 mm lies under a flipper that stands straight out, with the body a quarter of a ridge ahead."""
+    witness, plant = StrokeWitness(), make_plant()
+    plant.track = Track([(1.0, MUDS["48.5"])], ridges=Ridges(0.004, 0.2))
+    for arm in plant.arms:
+        arm.track = plant.track
+        arm.step(1e-9, 0.05, 0.0, 0.0, 0.0)  # so short that nothing moves
+    left, _ = watch(witness, plant, *STRIDE)
+    assert left.surface_m == pytest.approx(-0.004)
+    assert left.insertion.deepest_m == pytest.approx(0.03 + 0.004)
+
+
+def test_a_reset_witness_counts_from_zero() -> None:
+    witness, plant = StrokeWitness(), make_plant()
+    watch(witness, plant, *STRIDE, Phase.INSERTION, Phase.STANCE)
+    witness.reset()
+    assert watch(witness, plant, Phase.EXTRACTION, Phase.SWING) == []
+    assert [truth.index for truth in watch(witness, plant, *STRIDE)] == [0, 0]
+
+
+def witnessed(lockstep: Lockstep, depth_m: float, seconds: float) -> list[StrideTruth]:
+    lockstep.arm()
+    lockstep.walk(WalkOrder(depth_m, adaptive=False))
+    witness, truths = StrokeWitness(), []
+    for _ in range(round(seconds / PERIOD_S)):
+        lockstep.step()
+        truths += witness.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target_before.phase)
+    return truths
+
+
+def test_a_walk_has_the_strides_that_the_loop_closes(configuration: Configuration) -> None:
+    lockstep = Lockstep(configuration, Track([(1.0, MUDS["53.1"])]))
+    truths = witnessed(lockstep, 0.03, 6.0)
+    assert len(truths) >= 6
+    closed = [(stride.estimate.flipper, stride.estimate.index) for stride in lockstep.loop.learning.strides]
+    assert [(truth.flipper, truth.index) for truth in truths] == closed
+    assert all(truth.insertion.deepest_m == pytest.approx(0.03, abs=0.002) for truth in truths)
+
+
+def test_in_soft_mud_slip_and_advance_make_up_the_sweep(configuration: Configuration) -> None:
+    lockstep = Lockstep(configuration, Track([(1.0, MUDS["53.1"])]))
+    truths = [truth for truth in witnessed(lockstep, 0.03, 8.0) if truth.flipper == "left"]
+    steps_m = lockstep.robot.plant.body_m / len(truths)
+    arc_m = 2.0 * configuration.geometry.flipper_length_m * sin(radians(configuration.gait.sweep_angle_deg))
+    assert truths[-1].stance.slip_m + steps_m == pytest.approx(arc_m, abs=0.02)  # the body goes on a bit in extraction
+
+
+def test_a_load_cell_that_repeats_a_stance_feels_what_the_flipper_felt(configuration: Configuration) -> None:
+    lockstep = Lockstep(
+        replace(configuration, gait=SINGLE_FLIPPER),
+        Track([(1.0, MUDS["53.1"])]),
+        disturbances=Disturbances(surface_sd_m=0.0015, remoulding=1.0),
+        fixed_base=True,
+    )
+    thrusts_n: list[float] = []
+    arm = lockstep.robot.plant.arms[0]
+    step = lockstep.step
+
+    def recording_step() -> None:
+        step()
+        if lockstep.loop.target_before.phase is Phase.STANCE and abs(arm.sweep_rad) < 0.2:
+            thrusts_n.append(arm.force.thrust_n)
+
+    lockstep.step = recording_step  # type: ignore[method-assign]
+    first = next(truth for truth in witnessed(lockstep, 0.03, 20.0) if truth.flipper == "left")
+    stance = first.stance
+    assert isfinite(stance.speed_m_s)
+    shear_n = measure_shear(
+        first.clay, configuration.geometry, stance.sweep_rad, stance.adduction_rad, stance.deepest_m, stance.speed_m_s
+    )
+    assert sum(thrusts_n) / len(thrusts_n) == pytest.approx(shear_n, rel=0.1)

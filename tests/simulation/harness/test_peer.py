@@ -1,0 +1,92 @@
+"""The simulated robot in real time, on a computer that is busy with other things."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from control.records import JOINTS
+from drivers.odrive.axis import OdriveAxis
+from drivers.odrive.codec import AxisState
+from firmware_host.buses import open_ports
+from firmware_host.configuration.configuration import load_configuration
+from simulation.harness.local_setup import write_local_setup
+from simulation.harness.peer import WATCHDOG_S, Peer, take_precedence, track_of
+from simulation.harness.world import World
+
+HELD_UP_S = 4.0 * WATCHDOG_S
+
+
+class Bench:
+    """Owns a robot that is stepped by hand, and the other end of its buses."""
+
+    def __init__(self, folder: Path) -> None:
+        configuration = load_configuration(write_local_setup(folder, folder / "logs"))
+        self.peer = Peer(configuration, World(track_of(["48.5"])), seed=1)
+        self.ports = open_ports(configuration.bus)
+        drives = configuration.drive
+        self.axes = [OdriveAxis(joint, drives[joint], self.ports[drives[joint].bus]) for joint in JOINTS]
+        self.now_s = self.peer.robot.now_s
+        for axis in self.axes:
+            axis.prepare()
+            axis.close_loop()
+        self.step(0.002)
+
+    def step(self, duration_s: float) -> None:
+        self.now_s += duration_s
+        self.peer.step(self.now_s)
+
+    @property
+    def axis_states(self) -> set[AxisState]:
+        return {drive.axis_state for drive in self.peer.robot.drives}
+
+    def close(self) -> None:
+        self.peer.close()
+        for port in self.ports.values():
+            port.close()
+
+
+@pytest.fixture
+def bench(short_folder: Path) -> Iterator[Bench]:
+    made = Bench(short_folder)
+    yield made
+    made.close()
+
+
+def test_commands_that_waited_while_the_robot_was_held_up_feed_its_watchdogs(bench: Bench) -> None:
+    assert bench.axis_states == {AxisState.CLOSED_LOOP}
+    for axis in bench.axes:
+        axis.send_torque(0.0)
+    bench.step(HELD_UP_S)
+    bench.step(0.002)
+    assert bench.axis_states == {AxisState.CLOSED_LOOP}
+
+
+def test_without_a_command_the_drives_are_idle_after_their_time_also_when_held_up(bench: Bench) -> None:
+    bench.step(HELD_UP_S)
+    bench.step(0.002)
+    assert bench.axis_states == {AxisState.IDLE}
+
+
+def test_joints_do_not_move_on_in_time_that_the_robot_has_lost(bench: Bench) -> None:
+    for axis in bench.axes:
+        axis.send_torque(0.5)
+    before = bench.peer.robot.plant.angles_rad
+    bench.step(0.5)
+    assert bench.peer.robot.plant.angles_rad == before
+    bench.step(0.01)
+    assert bench.peer.robot.plant.angles_rad != before
+
+
+@pytest.mark.parametrize(("processors", "expected"), [({0}, ["nice"]), ({0, 1}, ["real time"])], ids=["one", "two"])
+def test_a_lone_processor_is_not_taken_in_real_time(
+    monkeypatch: pytest.MonkeyPatch, processors: set[int], expected: list[str]
+) -> None:
+    taken: list[str] = []
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: processors)
+    monkeypatch.setattr("os.sched_setscheduler", lambda *_: taken.append("real time"))
+    monkeypatch.setattr("os.nice", lambda _: taken.append("nice"))
+    take_precedence()
+    assert taken == expected

@@ -1,0 +1,292 @@
+"""A world is taken as it is written or refused as a whole, with everything that is wrong."""
+
+from dataclasses import fields, replace
+from math import isfinite
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.bounds import Bounds
+from control.controller import WalkOrder
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.toml_records import ConfigurationError
+from simulation.body.blocks import on_blocks
+from simulation.body.plant import PlantParameters
+from simulation.devices.odrive import OdriveParameters
+from simulation.harness.lockstep import Lockstep
+from simulation.harness.world import (
+    FIXED_OF_DRIVE,
+    FIXED_OF_ROBOT,
+    STRONGEST_PA,
+    SegmentText,
+    World,
+    WorldText,
+    load_world,
+    parse_world,
+)
+from simulation.mud.clay import MUDS, Clay, Layer, clay_of_water
+from simulation.mud.disturbances import NONE, Disturbances
+from simulation.mud.stones import Stone
+from simulation.mud.track import LEVEL, RandomStrength, Ridges
+from tests.folders import EXAMPLE_WORLD
+
+EXAMPLE = EXAMPLE_WORLD
+SHORTEST = """\
+[[segment]]
+start_m = 0
+end_m = 0.5
+strength_pa = 2000
+"""
+SECOND = """
+[[segment]]
+start_m = 0.5
+end_m = 1.0
+water_percent = 48.5
+"""
+LAYER = "[[segment.layer]]\ntop_m = 0.01\nbottom_m = 0.02\nfactor = 3.0\n"
+STONE = "[[stone]]\nstart_m = 0.2\nend_m = 0.3\ntop_m = 0.02\n"
+
+
+def problems_of(text: str) -> list[str]:
+    with pytest.raises(ConfigurationError) as caught:
+        parse_world(text)
+    return caught.value.problems
+
+
+def test_the_example_says_what_it_says() -> None:
+    world = load_world(EXAMPLE)
+    crusted = Clay("1500 Pa", 1500.0, (Layer(0.0, 0.004, 1.5), Layer(0.025, 0.035, 0.5)))
+    assert [segment.clay for segment in world.track.segments] == [clay_of_water(48.5), crusted, clay_of_water(46.0)]
+    assert [segment.end_m for segment in world.track.segments] == pytest.approx([0.6, 1.2, 1.8])
+    assert world.track.stones == (Stone(0.40, 0.46, 0.015),)
+    assert world.track.ridges == Ridges(0.002, 0.25)
+    assert world.track.clay_at(0.3).strength_pa != clay_of_water(48.5).strength_pa
+    assert world.disturbances == Disturbances(0.7, 1.0, 0.13, 0.0015)
+    assert world.robot_changes == {
+        "body_mass_kg": 1.0,
+        "rail_drag_n": 2.5,
+        "rail_damping_n_s_m": 6.0,
+        "pad_width_m": 0.015,
+        "pad_depth_m": 0.02,
+    }
+    assert world.drive_changes == {
+        "current_noise_a": 0.2,
+        "encoder_counts": 16384,
+        "torque_constant_error": 0.02,
+        "cogging_nm": 0.005,
+        "current_lag_s": 0.0005,
+        "message_delay_s": 0.001,
+    }
+
+
+def test_the_example_shows_every_section() -> None:
+    shown = EXAMPLE.read_text(encoding="utf-8")
+    sections = {item.name for item in fields(WorldText)} - {"segment", "stone"}
+    for name in ("[[segment]]", "[[segment.layer]]", "[[stone]]", *(f"[{section}]" for section in sections)):
+        assert name in shown
+
+
+def test_the_shortest_world_is_one_segment_and_nothing_else() -> None:
+    world = parse_world(SHORTEST)
+    assert [segment.clay for segment in world.track.segments] == [Clay("2000 Pa", 2000.0)]
+    assert (world.track.stones, world.track.ridges) == ((), LEVEL)
+    assert world.track.clay_at(0.3) == Clay("2000 Pa", 2000.0)
+    assert (world.disturbances, world.robot_changes, world.drive_changes) == (NONE, {}, {})
+
+
+def test_a_mud_by_its_water_is_the_paper_s() -> None:
+    clay = parse_world(SHORTEST + SECOND).track.clay_at(0.7)
+    assert clay.name == "48.5"
+    assert clay.strength_pa == pytest.approx(MUDS["48.5"].strength_pa)
+
+
+@pytest.mark.parametrize(
+    ("added", "told"),
+    [
+        ("[ridge]\n", "ridge: there is no such key"),
+        ("[ridges]\namplitude = 1\n", "ridges.amplitude: there is no such key"),
+        ("[robot]\nflipper_length_m = 0.1\n", "robot.flipper_length_m: there is no such key"),
+        ("[robot]\nfixed_base = true\n", "robot.fixed_base: there is no such key"),
+        ("[drives]\nnode_id = 3\n", "drives.node_id: there is no such key"),
+        ("[ridges]\namplitude_m = 0.5\n", "ridges.amplitude_m = 0.5: must be at most 0.01"),
+        ("[ridges]\namplitude_m = nan\n", "ridges.amplitude_m = nan: should be a finite number"),
+        ("[random_strength]\nrelative_spread = -0.1\n", "random_strength.relative_spread = -0.1: must be at least 0.0"),
+        ("[random_strength]\nseed = 1.5\n", "random_strength.seed = 1.5: should be a valid integer"),
+        ("[disturbances]\nremoulding = 1.5\n", "disturbances.remoulding = 1.5: must be at most 1.0"),
+        ("[robot]\nrail_drag_n = 'much'\n", "robot.rail_drag_n = 'much': should be a valid number"),
+        ("[drives]\nencoder_counts = true\n", "drives.encoder_counts = True: should be a valid integer"),
+        (STONE.replace("0.3", "0.2"), "stone 1.end_m = 0.2: must be more than start_m = 0.2"),
+        (STONE.replace("0.02", "-0.02"), "stone 1.top_m = -0.02: must be at least 0.0"),
+        (STONE.replace("end_m = 0.3\n", ""), "stone 1.end_m is missing"),
+        (STONE + STONE, "stone 2.start_m = 0.2: must be more than 0.3, where stone 1 ends"),
+        (
+            "[ridges]\namplitude_m = 0.01\n" + STONE.replace("0.02", "0.005"),
+            "stone 1.top_m = 0.005: must be at least 0.01, ridges.amplitude_m",
+        ),
+        ("stone = 3\n", "stone = 3: must be tables, each under [[stone]]"),
+        (
+            "[disturbances]\nsample_period_s = 0.004\n[drives]\nencoder_period_s = 0.002\n",
+            "drives.encoder_period_s = 0.002: must not stand beside disturbances.sample_period_s = 0.004",
+        ),
+        (SECOND.replace("48.5", "60"), "segment 2.water_percent = 60: must be at most 56.0"),
+        (SECOND.replace("48.5", "43.9"), "segment 2.water_percent = 43.9: must be at least 44.0"),
+        (
+            SECOND.replace("water_percent = 48.5", "strength_pa = -5"),
+            "segment 2.strength_pa = -5: must be at least 50.0",
+        ),
+        (SECOND.replace("48.5", "'wet'"), "segment 2.water_percent = 'wet': should be a valid number"),
+        (
+            SECOND + "strength_pa = 900",
+            "segment 2.water_percent = 48.5: must not stand beside strength_pa = 900; one of them is enough",
+        ),
+        (SECOND.replace("water_percent = 48.5", ""), "segment 2: water_percent or strength_pa is missing"),
+        (SECOND.replace("0.5", "0.4"), "segment 2.start_m = 0.4: must be 0.5, where segment 1 ends, without overlap"),
+        (SECOND.replace("0.5", "0.6"), "segment 2.start_m = 0.6: must be 0.5, where segment 1 ends, without gap"),
+        (SECOND.replace("1.0", "0.5"), "segment 2.end_m = 0.5: must be more than start_m = 0.5"),
+        (LAYER.replace("0.02", "0.005"), "segment 1.layer 1.bottom_m = 0.005: must be more than top_m = 0.01"),
+        (LAYER.replace("3.0", "0"), "segment 1.layer 1.factor = 0: must be at least 0.01"),
+        (LAYER + LAYER, "segment 1.layer 2.top_m = 0.01: must be at least 0.02, where layer 1 ends"),
+        (SECOND + LAYER.replace("3.0", "20"), "segment 2.layer 1.factor = 20: must be at most 17.9 in mud of 2800 Pa"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_key_value_and_bound(added: str, told: str) -> None:
+    before = added + SHORTEST if added.startswith("stone =") else SHORTEST + added
+    assert problems_of(before) == [told]
+
+
+def test_a_track_begins_at_its_beginning() -> None:
+    (told,) = problems_of(SHORTEST.replace("start_m = 0", "start_m = 0.1"))
+    assert told == "segment 1.start_m = 0.1: must be 0, where the track begins, without gap"
+
+
+def test_a_world_without_mud_is_refused() -> None:
+    assert problems_of("[ridges]\namplitude_m = 0.002\n") == ["segment is missing"]
+    assert problems_of("segment = []\n") == ["segment = []: must be at least one"]
+    assert "must be tables, each under [[segment]]" in problems_of("[segment]\nstart_m = 0\n")[0]
+
+
+def test_all_problems_are_told_at_once_whatever_their_kind() -> None:
+    wrong = (
+        "depth_m = 3\n"
+        + SHORTEST.replace("2000", "-1")
+        + SECOND.replace("0.5", "0.7")
+        + LAYER.replace("0.02", "0.0")
+        + STONE.replace("0.3", "0.1")
+    )
+    told = problems_of(wrong)
+    for key in ("depth_m", "segment 1.strength_pa", "segment 2.start_m", "segment 2.layer 1.bottom_m", "stone 1.end_m"):
+        assert sum(sentence.startswith((f"{key} ", f"{key}:")) for sentence in told) == 1
+    assert len(told) == 5
+
+
+def test_the_strongest_mud_may_be_reached_by_a_layer_and_not_surpassed() -> None:
+    firm = SHORTEST.replace("2000", f"{STRONGEST_PA / 2.0}")
+    assert parse_world(firm + LAYER.replace("3.0", "2.0")).track.clay_at(0.0).strength_at_pa(0.015) == STRONGEST_PA
+    assert problems_of(firm + LAYER.replace("3.0", "2.01"))
+
+
+def test_a_file_that_is_no_world_is_told_by_its_name_or_line(tmp_path: Path) -> None:
+    path = tmp_path / "world.toml"
+    with pytest.raises(ConfigurationError, match=r"world\.toml: No such file"):
+        load_world(path)
+    path.write_bytes(b"\xff\xfe")
+    with pytest.raises(ConfigurationError, match=r"world\.toml: not UTF-8 text \(at line 1\)"):
+        load_world(path)
+    path.write_text("[[segment]\n", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=r"world\.toml: not a TOML file: .*line 1"):
+        load_world(path)
+
+
+VALUES = st.one_of(
+    st.integers(-(2**40), 2**40).map(str),
+    st.floats(allow_nan=True).map(repr),
+    st.sampled_from(["true", '""', "[]", "{}", "[1, 2]", "[{}]", "[{ start_m = 1 }]", "{ a = 1 }"]),
+)
+KEYS = st.sampled_from(
+    ["segment", "stone", "ridges", "robot", "drives", "disturbances", "random_strength", "ridges.amplitude_m", "x",
+     "robot.body_mass_kg", "drives.encoder_counts", "disturbances.relaxation", "random_strength.seed", "robot.x.y"]
+)  # fmt: skip
+
+
+@given(KEYS, VALUES)
+def test_any_value_anywhere_is_taken_or_refused_by_name(key: str, value: str) -> None:
+    """Never another exception than ConfigurationError."""
+    try:
+        parse_world(f"{key} = {value}\n" + ("" if key == "segment" else SHORTEST))
+    except ConfigurationError as problem:
+        assert problem.problems and all(problem.problems)
+
+
+@pytest.mark.parametrize("record", [Layer, Stone, Ridges, RandomStrength, Disturbances, SegmentText])
+def test_every_number_of_a_world_has_bounds(record: type) -> None:
+    hints = get_type_hints(record, include_extras=True)
+    for item in fields(record):
+        kinds = get_args(hints[item.name])
+        if kinds and kinds[0] in (int, float, float | None):
+            assert isinstance(kinds[1], Bounds), item.name
+
+
+def test_robot_and_drives_may_be_given_whatever_their_records_hold() -> None:
+    """So that a field which is added there can be set here."""
+    settable: dict[str, dict[str, Any]] = {
+        section: {item.name: item.default for item in fields(record) if item.name not in fixed}
+        for section, record, fixed in (
+            ("robot", PlantParameters, FIXED_OF_ROBOT),
+            ("drives", OdriveParameters, FIXED_OF_DRIVE),
+        )
+    }
+    for section, defaults in settable.items():
+        numbers = {name: value for name, value in defaults.items() if type(value) in (int, float) and isfinite(value)}
+        assert len(numbers) > 3
+        lines = "".join(f"{name} = {value!r}\n" for name, value in numbers.items())
+        world = parse_world(f"{SHORTEST}[{section}]\n{lines}")
+        assert {"robot": world.robot_changes, "drives": world.drive_changes}[section] == numbers
+
+
+def test_what_the_configuration_fixes_is_in_no_world() -> None:
+    assert {item.name for item in fields(PlantParameters)} > FIXED_OF_ROBOT
+    assert {item.name for item in fields(OdriveParameters)} > FIXED_OF_DRIVE
+
+
+def test_a_base_is_fixed_where_the_configuration_says_so(configuration: Configuration) -> None:
+    on_a_bench = replace(configuration, estimation=replace(configuration.estimation, fixed_base=True))
+    world, free = parse_world(SHORTEST), parse_world(SHORTEST + "[robot]\nfree_body = true\n")
+    assert world.plant(on_a_bench).fixed_base and not world.plant(configuration).fixed_base
+    assert on_blocks(configuration).plant(configuration).fixed_base
+    assert free.plant(configuration).free_body
+    with pytest.raises(ConfigurationError) as caught:
+        free.plant(on_a_bench)
+    assert caught.value.problems == ["robot.free_body = true: the configuration says estimation.fixed_base = true"]
+
+
+def test_a_lockstep_lives_in_a_world(configuration: Configuration) -> None:
+    world = parse_world(
+        SHORTEST.replace("2000", "20000")
+        + "[robot]\nbody_mass_kg = 2.0\n[drives]\nencoder_counts = 4096\n[disturbances]\ncurrent_noise_a = 0.3\n"
+    )
+    lockstep = Lockstep(
+        configuration, world.track, plant=world.plant(configuration), drives=world.drives(configuration)
+    )
+    plant = lockstep.robot.plant
+    assert (plant.track, plant.parameters.body_mass_kg) == (world.track, 2.0)
+    assert plant.parameters.disturbances == world.disturbances
+    for joint, drive in zip(configuration.drive.values(), lockstep.robot.drives, strict=False):
+        assert (drive.parameters.encoder_counts, drive.parameters.current_noise_a) == (4096, 0.3)
+        assert drive.parameters.torque_constant_nm_a == joint.torque_constant_nm_a
+    lockstep.arm()
+    lockstep.walk(WalkOrder(0.03))
+    lockstep.run_for(1.0)
+    assert plant.arms[0].clay == Clay("20000 Pa", 20000.0)
+
+
+def test_a_world_of_a_track_alone_changes_nothing() -> None:
+    track = parse_world(SHORTEST).track
+    assert World(track) == World(track, NONE, {}, {})
+
+
+def test_a_whole_number_beyond_all_floats_is_refused_by_its_key() -> None:
+    told = problems_of(SHORTEST + SECOND.replace("1.0", "1" + "0" * 400))
+    assert [problem.split(" = ")[0] for problem in told] == ["segment 2.end_m"]

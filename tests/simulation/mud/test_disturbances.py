@@ -1,0 +1,394 @@
+"""Each layer on its own: what it does to the mud, to the arm or to the drives, and nothing where it is off."""
+
+from dataclasses import fields, replace
+from itertools import pairwise
+from math import exp, nan
+from statistics import mean, pstdev
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.controller import WalkOrder
+from control.gait.gait import SINGLE_FLIPPER
+from control.geometry import FlipperGeometry
+from control.modes import Mode
+from control.monitors.joint_monitor import FaultBounds
+from control.records import Phase
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.ticker import PERIOD_S
+from simulation.body.plant import Arm
+from simulation.body.reference_sensor import StrideTruth, StrokeWitness
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.disturbances import (
+    CLINGING_ABOVE_EDGE_M,
+    LAB,
+    NONE,
+    Disturbances,
+    StrokeHistory,
+    clinging_torques_nm,
+    drive_changes,
+)
+from simulation.mud.track import Track
+
+GEOMETRY = FlipperGeometry()
+SOFT = Track([(5.0, MUDS["53.1"])])
+
+
+def stroke(history: StrokeHistory, depth_m: float = 0.03, place_m: float = 0.0) -> None:
+    """From the air down to a depth and up again."""
+    for lowest_m in (-0.014, 0.5 * depth_m, depth_m, 0.5 * depth_m, -0.014, -0.014):
+        history.step(lowest_m, place_m)
+
+
+def lowered(history: StrokeHistory, place_m: float = 0.0) -> StrokeHistory:
+    history.step(-0.014, place_m)
+    history.step(0.02, place_m)
+    return history
+
+
+def raise_again(history: StrokeHistory) -> None:
+    for lowest_m in (0.01, -0.014, -0.014):
+        history.step(lowest_m, 0.0)
+
+
+def test_everything_is_off_by_default() -> None:
+    assert all(getattr(NONE, field.name) == 0.0 for field in fields(NONE))
+    assert drive_changes(NONE) == {}
+    history = StrokeHistory(NONE, 1)
+    for _ in range(5):
+        stroke(history)
+    assert (history.clinging_n, history.firmness, history.surface_m) == (0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize("field", [field.name for field in fields(NONE)])
+@pytest.mark.parametrize("value", [-0.1, nan])
+def test_negative_amounts_and_no_numbers_are_refused(field: str, value: float) -> None:
+    with pytest.raises(ValueError, match=field):
+        Disturbances(**{field: value})
+
+
+def test_shares_of_more_than_everything_are_refused() -> None:
+    assert Disturbances(remoulding=1.0, relaxation=0.99).remoulding == 1.0
+    with pytest.raises(ValueError, match="at most 1"):
+        Disturbances(remoulding=1.01)
+    with pytest.raises(ValueError, match="less than 1"):
+        Disturbances(relaxation=1.0)
+
+
+@given(st.floats(-0.6, 0.6), st.floats(-1.2, 0.5))
+def test_clinging_mud_pulls_at_the_joints_as_a_weight_on_the_plate(sweep_rad: float, adduction_rad: float) -> None:
+    """Against differences of the weight's height: the edge's, and the plate's slant for the 15 mm above it."""
+
+    def energy_j(sweep: float, adduction: float) -> float:
+        upright = replace(GEOMETRY, drop_m=GEOMETRY.drop_m - CLINGING_ABOVE_EDGE_M)
+        return 0.7 * upright.edge_position(sweep, adduction)[2]
+
+    step = 1e-6
+    torques_nm = (
+        -(energy_j(sweep_rad + step, adduction_rad) - energy_j(sweep_rad - step, adduction_rad)) / (2.0 * step),
+        -(energy_j(sweep_rad, adduction_rad + step) - energy_j(sweep_rad, adduction_rad - step)) / (2.0 * step),
+    )
+    assert clinging_torques_nm(GEOMETRY, sweep_rad, adduction_rad, 0.7) == pytest.approx(torques_nm, abs=1e-7)
+
+
+def test_mud_clings_from_the_first_extraction_on_until_the_next_one() -> None:
+    history = StrokeHistory(Disturbances(clinging_n=0.7), 1)
+    amounts_n = []
+    for _ in range(6):
+        before_n = history.clinging_n
+        assert lowered(history).clinging_n == before_n
+        raise_again(history)
+        amounts_n.append(history.clinging_n)
+    assert all(before_n != after_n for before_n, after_n in pairwise([0.0, *amounts_n]))
+    assert all(0.6 * 0.7 <= amount_n <= 1.4 * 0.7 for amount_n in amounts_n)
+
+
+def test_the_amounts_spread_evenly_by_forty_percent_around_their_mean() -> None:
+    history, amounts_n = StrokeHistory(Disturbances(clinging_n=1.0), 1), []
+    for _ in range(2000):
+        stroke(history)
+        amounts_n.append(history.clinging_n)
+    assert mean(amounts_n) == pytest.approx(1.0, abs=0.02)  # four standard errors
+    assert pstdev(amounts_n) == pytest.approx(0.4 / 3.0**0.5, rel=0.05)
+    assert min(amounts_n) < 0.61
+    assert max(amounts_n) > 1.39
+
+
+@pytest.mark.parametrize(("depth_m", "clings"), [(0.004, False), (0.006, True)])
+def test_a_touch_of_less_than_half_a_centimetre_is_no_stroke(depth_m: float, clings: bool) -> None:
+    history = StrokeHistory(Disturbances(clinging_n=0.7, remoulding=1.0), 1)
+    stroke(history, depth_m)
+    assert (history.clinging_n > 0.0) is clings
+    assert (lowered(history).firmness < 1.0) is clings
+
+
+def test_strokes_in_the_same_place_find_softer_mud() -> None:
+    history = StrokeHistory(Disturbances(remoulding=1.0), 1)
+    for earlier in range(8):
+        assert lowered(history).firmness == pytest.approx(0.5 + 0.5 * exp(-0.4 * earlier))
+        raise_again(history)
+
+
+def test_a_share_of_remoulding_softens_by_that_share() -> None:
+    history = StrokeHistory(Disturbances(remoulding=0.5), 1)
+    stroke(history)
+    assert lowered(history).firmness == pytest.approx(1.0 - 0.25 * (1.0 - exp(-0.4)))
+
+
+@pytest.mark.parametrize(("place_m", "earlier"), [(0.0, 1), (0.014, 1), (-0.014, 1), (0.016, 0), (-0.12, 0)])
+def test_the_same_place_ends_after_a_centimetre_and_a_half(place_m: float, earlier: int) -> None:
+    history = StrokeHistory(Disturbances(remoulding=1.0), 1)
+    stroke(history)
+    assert lowered(history, place_m).firmness == pytest.approx(0.5 + 0.5 * exp(-0.4 * earlier))
+
+
+def test_a_place_is_where_the_flipper_came_in_and_its_mud_stays_the_same_through_the_stroke() -> None:
+    history = StrokeHistory(Disturbances(remoulding=1.0), 1)
+    stroke(history)
+    history.step(0.02, 0.0)
+    for place_m in (0.0, -0.02, -0.06):  # as a flipper that slips
+        history.step(0.02, place_m)
+        assert history.firmness == pytest.approx(0.5 + 0.5 * exp(-0.4))
+    history.step(-0.014, -0.06)
+    assert lowered(history, -0.06).firmness == 1.0
+
+
+def surfaces_m(history: StrokeHistory, strokes: int) -> list[float]:
+    found_m = []
+    for _ in range(strokes):
+        found_m.append(lowered(history).surface_m)
+        raise_again(history)
+    return found_m
+
+
+def test_every_stroke_meets_its_own_surface() -> None:
+    found_m = surfaces_m(StrokeHistory(Disturbances(surface_sd_m=0.0015), 1), 2000)
+    assert len(set(found_m)) == len(found_m)
+    assert mean(found_m) == pytest.approx(0.0, abs=1.4e-4)  # four standard errors
+    assert pstdev(found_m) == pytest.approx(0.0015, rel=0.07)
+
+
+def test_the_surface_stays_through_a_stroke_and_never_rises_over_a_plate_outside() -> None:
+    history = StrokeHistory(Disturbances(surface_sd_m=0.003), 1)
+    for _ in range(200):
+        met_m = lowered(history).surface_m
+        for lowest_m in (0.01, 0.03, 0.02, met_m + 1e-4):
+            history.step(lowest_m, 0.0)
+            assert history.surface_m == met_m
+        for lowest_m in (met_m - 1e-5, met_m - 1e-5, -0.014):  # it lingers just above the mud
+            history.step(lowest_m, 0.0)
+            assert lowest_m <= history.surface_m
+
+
+def test_a_seed_gives_the_same_history_also_after_a_reset_and_another_one_another() -> None:
+    first, second, other = (StrokeHistory(LAB, seed) for seed in (1, 1, 2))
+    found_m = surfaces_m(first, 5)
+    assert surfaces_m(second, 5) == found_m
+    assert surfaces_m(other, 5) != found_m
+    first.reset()
+    assert (first.clinging_n, first.firmness) == (0.0, 1.0)
+    assert surfaces_m(first, 5) == found_m
+
+
+def test_layers_do_not_change_each_other_s_draws() -> None:
+    alone, together = StrokeHistory(Disturbances(surface_sd_m=LAB.surface_sd_m), 1), StrokeHistory(LAB, 1)
+    assert surfaces_m(alone, 5) == surfaces_m(together, 5)
+
+
+def single_flipper(configuration: Configuration, disturbances: Disturbances, track: Track = SOFT) -> Lockstep:
+    gait = replace(SINGLE_FLIPPER, stance_speed_m_s=0.3, pause_s=1.0)  # short holds for a short test
+    lockstep = Lockstep(replace(configuration, gait=gait), track, disturbances=disturbances, fixed_base=True)
+    lockstep.arm()
+    lockstep.walk(WalkOrder(0.03, adaptive=False))
+    return lockstep
+
+
+def truths_of(lockstep: Lockstep, seconds: float) -> list[StrideTruth]:
+    witness, truths = StrokeWitness(), []
+    for _ in range(round(seconds / PERIOD_S)):
+        lockstep.step()
+        truths += witness.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target_before.phase)
+    return truths
+
+
+def swing_currents_a(lockstep: Lockstep, strides: int) -> list[float]:
+    """Mean adduction current of the left flipper in each swing, and in the air before the first one."""
+    means_a = []
+    for stride in range(strides):
+        lockstep.run_until(lambda: lockstep.loop.target_before.phase is Phase.INSERTION, 20.0)
+        if stride == 0:  # as raised as in swing
+            means_a.append(lockstep.loop.states[1].current_a)
+        lockstep.run_until(lambda: lockstep.loop.target_before.phase is Phase.SWING, 20.0)
+        currents_a = []
+        while lockstep.loop.target_before.phase is Phase.SWING:
+            lockstep.step()
+            currents_a.append(lockstep.loop.states[1].current_a)
+        means_a.append(mean(currents_a[len(currents_a) // 2 :]))
+    return means_a
+
+
+def test_clinging_mud_is_felt_in_swing_from_the_first_extraction_on(configuration: Configuration) -> None:
+    firm = Track([(5.0, MUDS["48.5"])])  # in which the arms do not sink under their own weight before the walk
+    clean_a = swing_currents_a(single_flipper(configuration, NONE, firm), 3)
+    weighed_a = swing_currents_a(single_flipper(configuration, Disturbances(clinging_n=0.7), firm), 3)
+    assert weighed_a[0] == clean_a[0]
+    lever_m = 0.95 * configuration.geometry.flipper_length_m  # its mean over a swing from -30 to 30 degrees
+    mean_a = 0.7 * lever_m / configuration.drive["left_adduction"].torque_constant_nm_a
+    for clean, weighed in zip(clean_a[1:], weighed_a[1:], strict=True):
+        assert 0.55 * mean_a < weighed - clean < 1.45 * mean_a
+
+
+def test_remoulded_mud_lets_the_flipper_through_more_easily_stroke_by_stroke(configuration: Configuration) -> None:
+    truths = truths_of(single_flipper(configuration, Disturbances(remoulding=1.0)), 25.0)
+    left = [truth.clay.strength_pa / MUDS["53.1"].strength_pa for truth in truths if truth.flipper == "left"]
+    assert len(left) >= 4
+    assert left == pytest.approx([0.5 + 0.5 * exp(-0.4 * earlier) for earlier in range(len(left))])
+
+
+def peak_thrusts_n(lockstep: Lockstep, strides: int) -> list[float]:
+    arm, peaks_n = lockstep.robot.plant.arms[0], []
+    for _ in range(strides):
+        lockstep.run_until(lambda: lockstep.loop.target_before.phase is Phase.STANCE, 20.0)
+        forces_n = [0.0]
+        while lockstep.loop.target_before.phase is Phase.STANCE:
+            lockstep.step()
+            forces_n.append(arm.force.thrust_n)
+        peaks_n.append(max(forces_n))
+    return peaks_n
+
+
+def test_repeated_stances_lose_force_as_the_logs_do(configuration: Configuration) -> None:
+    """15 to 20 % a stroke at first; the pressure from the mud's weight is not remoulded."""
+    remoulded_n = peak_thrusts_n(single_flipper(configuration, Disturbances(remoulding=1.0)), 4)
+    assert 0.10 < 1.0 - remoulded_n[1] / remoulded_n[0] < 0.20
+    assert all(after_n < before_n for before_n, after_n in pairwise(remoulded_n))
+    steady_n = peak_thrusts_n(single_flipper(configuration, NONE), 3)
+    assert steady_n[1:] == pytest.approx([steady_n[0]] * 2, rel=0.02)
+
+
+def held_thrust_n(lockstep: Lockstep) -> tuple[float, float]:
+    """In the pause after the stance: at its beginning and a second later."""
+    arm: Arm = lockstep.robot.plant.arms[0]
+    lockstep.run_until(lambda: lockstep.loop.target_before.phase is Phase.STANCE, 20.0)
+    lockstep.run_until(lambda: lockstep.loop.target_before.phase is Phase.PAUSE, 20.0)
+    lockstep.run_for(0.05)  # to come to rest
+    early_n = arm.force.thrust_n
+    lockstep.run_for(0.9)
+    return early_n, arm.force.thrust_n
+
+
+@pytest.mark.parametrize("relaxation", [0.13, 0.3])
+def test_a_load_relaxes_in_the_holds(configuration: Configuration, relaxation: float) -> None:
+    """Beside what the mud's rate takes from a plate that stops."""
+    early_n, late_n = held_thrust_n(single_flipper(configuration, Disturbances(relaxation=relaxation)))
+    plain_early_n, plain_late_n = held_thrust_n(single_flipper(configuration, NONE))
+    assert early_n == pytest.approx(plain_early_n, rel=0.02)
+    assert late_n == pytest.approx((1.0 - relaxation) * plain_late_n, rel=0.08)  # the servo pushes on
+
+
+def test_both_flippers_meet_their_own_surfaces_and_are_as_much_deeper(configuration: Configuration) -> None:
+    truths = truths_of(single_flipper(configuration, Disturbances(surface_sd_m=0.003)), 20.0)
+    assert len(truths) >= 6
+    assert len({truth.surface_m for truth in truths}) == len(truths)
+    assert max(truth.surface_m for truth in truths) - min(truth.surface_m for truth in truths) > 0.003
+    for truth in truths:
+        assert truth.stance.deepest_m + truth.surface_m == pytest.approx(0.031, abs=0.002)  # the servo overshoots
+
+
+def test_the_drives_take_over_their_part() -> None:
+    disturbances = Disturbances(0.7, 1.0, 0.13, 0.0015, current_noise_a=0.3, sample_period_s=0.008, current_limit_a=9.0)
+    assert drive_changes(disturbances) == {
+        "current_noise_a": 0.3,
+        "encoder_period_s": 0.008,
+        "current_period_s": 0.008,
+        "motor_current_limit_a": 9.0,
+    }
+
+
+def patient(configuration: Configuration) -> Configuration:
+    """For messages that come so seldom that a robot would take them for lost, and joints that swing."""
+    return replace(configuration, faults=FaultBounds(late_s=0.02, quiet_s=0.02, jump_rad=1.0, fast_s=1.0))
+
+
+def test_the_joints_stay_calm_in_the_lab(configuration: Configuration) -> None:
+    """A loop that is closed over seldom messages swings by itself, at 10 ms by 10 rad/s."""
+    spreads = []
+    configuration = patient(configuration)
+    for disturbances in (NONE, LAB, replace(LAB, sample_period_s=0.010)):
+        lockstep = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), disturbances=disturbances)
+        lockstep.arm()
+        lockstep.walk(WalkOrder(0.03, adaptive=False))
+        lockstep.run_for(3.0)
+        rates_rad_s = []
+        for _ in range(round(4.0 / PERIOD_S)):
+            lockstep.step()
+            if lockstep.loop.target_before.phase is Phase.SWING:
+                rates_rad_s.append(lockstep.robot.plant.velocities_rad_s[1])
+        spreads.append(pstdev(rates_rad_s))
+    none, lab, seldom = spreads
+    assert lab < none + 0.5
+    assert seldom > 3.0
+
+
+def test_the_current_is_as_noisy_as_stated(configuration: Configuration) -> None:
+    deviations_a = []
+    for noise_a in (0.0, 0.4):
+        lockstep = Lockstep(configuration, SOFT, disturbances=Disturbances(current_noise_a=noise_a))
+        lockstep.run_for(0.5)
+        currents_a = []
+        for _ in range(2000):  # of idle drives
+            lockstep.step()
+            currents_a.append(lockstep.loop.states[0].current_a)
+        deviations_a.append(pstdev(currents_a))
+    assert deviations_a == pytest.approx([0.1, 0.4], rel=0.07)  # 0: the drive's own
+
+
+def test_seldom_messages_are_read_again_and_again(configuration: Configuration) -> None:
+    counts = []
+    configuration = patient(configuration)
+    for period_s in (0.0, 0.010):
+        lockstep = Lockstep(configuration, SOFT, disturbances=Disturbances(sample_period_s=period_s))
+        lockstep.run_for(0.5)
+        readings = []
+        for _ in range(380):
+            lockstep.step()
+            state = lockstep.loop.states[2]
+            readings.append((state.angle_stamp_s, state.current_stamp_s))
+        assert lockstep.loop.fault is None
+        counts.append([len(set(stamps)) for stamps in zip(*readings, strict=True)])
+    often, seldom = counts
+    assert all(count > 370 for count in often)
+    assert all(abs(count - 100) <= 2 for count in seldom)
+
+
+def test_a_clipped_motor_cannot_lift_what_a_free_one_lifts(configuration: Configuration) -> None:
+    stiff = Track([(5.0, MUDS["45.3"])])
+    clipped = single_flipper(configuration, Disturbances(current_limit_a=4.0), stiff)
+    free = single_flipper(configuration, NONE, stiff)
+    (clipped_n,), (free_n,) = peak_thrusts_n(clipped, 1), peak_thrusts_n(free, 1)
+    assert clipped_n < 0.6 * free_n
+
+
+@pytest.mark.parametrize("water", MUDS)
+def test_the_robot_walks_in_the_lab_without_a_fault(configuration: Configuration, water: str) -> None:
+    lockstep = Lockstep(configuration, Track([(5.0, MUDS[water])]), disturbances=LAB)
+    lockstep.arm()
+    lockstep.walk(WalkOrder(0.04, adaptive=False))
+    lockstep.run_for(6.0)
+    assert lockstep.loop.mode is Mode.WALKING
+    assert lockstep.robot.plant.body_m > 0.05
+
+
+def test_the_lab_is_the_same_for_the_same_seed_and_another_for_another(configuration: Configuration) -> None:
+    walks = []
+    for seed in (3, 3, 4):
+        lockstep = Lockstep(configuration, SOFT, seed, disturbances=LAB)
+        lockstep.arm()
+        lockstep.walk(WalkOrder(0.03, adaptive=False))
+        walks.append(truths_of(lockstep, 4.0))
+    assert len(walks[0]) >= 4
+    assert repr(walks[0]) == repr(walks[1])
+    surfaces = [{truth.surface_m for truth in walk} for walk in walks]
+    assert not surfaces[0] & surfaces[2]

@@ -1,0 +1,109 @@
+"""The emulated amplifier, heard through its tty with nothing but the operating system."""
+
+from __future__ import annotations
+
+import os
+import termios
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import fmean, stdev
+
+import pytest
+
+from simulation.test_rig.load_cell_bench import EmulatedBench, clay_plate, obey
+from simulation.test_rig.load_cell_emulator import AmplifierParameters, EmulatedAmplifier
+
+
+class Listener:
+    def __init__(self, folder: Path, parameters: AmplifierParameters, baud: int = termios.B115200) -> None:
+        self.force_n = 1.0
+        self.amplifier = EmulatedAmplifier(lambda _: self.force_n, parameters, folder / "cell")
+        self.file = os.open(folder / "cell", os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        tty.setraw(self.file)
+        settings = termios.tcgetattr(self.file)
+        settings[4] = settings[5] = baud
+        termios.tcsetattr(self.file, termios.TCSANOW, settings)
+
+    def hear(self, from_s: float, to_s: float) -> bytes:
+        heard, now_s = b"", from_s
+        while now_s < to_s:
+            now_s += 0.02
+            self.amplifier.step(now_s)
+            try:
+                heard += os.read(self.file, 65536)
+            except BlockingIOError:
+                continue
+        return heard
+
+    def close(self) -> None:
+        os.close(self.file)
+        self.amplifier.close()
+
+
+@pytest.fixture
+def listener(tmp_path: Path) -> Iterator[Listener]:
+    made = Listener(tmp_path, AmplifierParameters(noise_n=0.01, burst_s=0.0))
+    yield made
+    made.close()
+
+
+def test_it_prints_counts_at_its_rate_with_its_noise(listener: Listener) -> None:
+    counts = [int(line) for line in listener.hear(0.0, 5.0).split()]
+    assert len(counts) == pytest.approx(400, abs=3)
+    assert fmean(counts) == pytest.approx(81000.0 + 42000.0, abs=100.0)
+    assert stdev(counts) == pytest.approx(420.0, rel=0.15)
+
+
+def test_at_another_baud_rate_it_is_noise(tmp_path: Path) -> None:
+    listener = Listener(tmp_path, AmplifierParameters(), termios.B9600)
+    heard = listener.hear(0.0, 1.0)
+    assert len(heard) > 300
+    assert not any(byte in b"0123456789\n" for byte in heard)
+    listener.close()
+
+
+def test_beyond_its_range_it_stays_at_the_converter_s_end(listener: Listener) -> None:
+    listener.force_n = -25.0
+    assert set(listener.hear(0.0, 0.5).split()) == {b"-8388608"}
+
+
+@pytest.mark.parametrize(("style", "line"), [("newtons", b"Load: 1.0000 N"), ("indicator", b"ST,GS,+00.10197kg")])
+def test_other_amplifiers_print_other_lines(tmp_path: Path, style: str, line: bytes) -> None:
+    listener = Listener(tmp_path, AmplifierParameters(style=style, noise_n=0.0))
+    assert set(listener.hear(0.0, 0.5).split(b"\r\n")) == {line, b""}
+    listener.close()
+
+
+def test_an_unplugged_amplifier_hangs_up_and_comes_back_by_the_same_name(tmp_path: Path) -> None:
+    listener = Listener(tmp_path, AmplifierParameters())
+    listener.amplifier.unplug()
+    assert not (tmp_path / "cell").exists()
+    assert os.read(listener.file, 1) == b""
+    listener.amplifier.plug_in()
+    assert (tmp_path / "cell").exists()
+    listener.close()
+
+
+def test_what_nobody_reads_is_lost_and_counted(tmp_path: Path) -> None:
+    amplifier = EmulatedAmplifier(lambda _: 1.0, AmplifierParameters(rate_hz=1000.0), tmp_path / "cell")
+    amplifier.awaits_delivery = False
+    for second in range(1, 60):
+        amplifier.step(float(second))
+    assert amplifier.lost_lines > 1000
+    amplifier.close()
+
+
+def test_a_person_at_the_emulated_bench_moves_the_plate(tmp_path: Path) -> None:
+    bench = EmulatedBench(clay_plate(49.5), tmp_path / "cell")
+    bench.amplifier.awaits_delivery = False
+    assert "there are insert" in obey(bench, ["jump"])
+    assert obey(bench, ["lower"]) == "lower at 0.0 s"
+    bench.pass_time(1.0)
+    assert bench.stage.plate.depth_m == pytest.approx(0.03)
+    obey(bench, ["lift"])
+    bench.pass_time(1.0)
+    assert bench.stage.plate.depth_m < 0.0
+    obey(bench, ["hang", "100"])
+    assert bench.stage.hung_n == pytest.approx(0.980665)
+    bench.close()

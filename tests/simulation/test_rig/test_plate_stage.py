@@ -1,0 +1,115 @@
+"""The stage: where it is when, whatever the steps it is asked in."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simulation.test_rig.plate_stage import LIFTED_M, PlateStage, StageParameters
+from simulation.test_rig.stage_motion import HandMotion, HandParameters, RampedMotion
+
+
+class Air:
+    """A CarriedPlate that feels how deep it is, in newtons a metre; forward it feels its way."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        self.depth_m = self.way_m = 0.0
+
+    def step(self, dt_s: float, forward_m_s: float, upward_m_s: float) -> tuple[float, float]:
+        self.depth_m -= dt_s * upward_m_s
+        self.way_m += dt_s * forward_m_s
+        return self.way_m, self.depth_m
+
+
+@given(st.floats(0.001, 0.5), st.floats(0.005, 0.5), st.floats(0.1, 20.0))
+def test_a_ramped_way_ends_where_and_when_it_should(way_m: float, speed_m_s: float, acceleration: float) -> None:
+    motion = RampedMotion(way_m, speed_m_s, acceleration)
+    duration_s = motion.duration_s
+    assert motion.way_m(0.0) == 0.0
+    assert motion.way_m(duration_s) == pytest.approx(way_m)
+    assert motion.way_m(duration_s / 2.0) == pytest.approx(way_m / 2.0)
+    step_s = 1e-4 * duration_s
+    steps = [motion.way_m(i * 100 * step_s + step_s) for i in range(100)]
+    before = [motion.way_m(i * 100 * step_s) for i in range(100)]
+    speeds = [(b - a) / step_s for a, b in zip(before, steps, strict=True)]
+    assert min(speeds) >= 0.0 and max(speeds) <= speed_m_s * (1.0 + 1e-6)
+
+
+def test_an_insertion_goes_down_holds_and_comes_up() -> None:
+    stage = PlateStage(Air(), StageParameters(2.0))
+    stage.reset()
+    stage.mean_force_n(0.0)
+    stage.insert(1.0, 0.03, 0.1, 3.0)
+    stroke_s = 0.05 / 0.1 + 0.1 / 2.0
+    depths_m = {}
+    for at_s in (0.9, 1.0 + stroke_s, 1.0 + stroke_s + 2.9, stage.ends_s + 0.1):
+        stage.mean_force_n(at_s)
+        depths_m[at_s] = stage.plate.depth_m
+    assert list(depths_m.values()) == pytest.approx([-LIFTED_M, 0.03, 0.03, -LIFTED_M])
+    assert stage.ends_s == pytest.approx(1.0 + 2.0 * stroke_s + 3.0)
+
+
+def test_lowering_and_lifting_end_at_their_depths_and_a_drag_goes_backward() -> None:
+    air = Air()
+    stage = PlateStage(air)
+    stage.place_over(air, sideways=True)
+    stage.mean_force_n(0.0)
+    stage.lower(0.0, 0.03)
+    stage.mean_force_n(2.0)
+    assert air.depth_m == pytest.approx(0.03)
+    stage.drag(2.0, 0.2, 0.1)
+    stage.mean_force_n(5.0)
+    assert (air.way_m, stage.force_n) == pytest.approx((-0.2, -0.2))
+    stage.lift(5.0)
+    stage.mean_force_n(7.0)
+    assert air.depth_m == pytest.approx(-LIFTED_M)
+
+
+def test_the_cell_reads_the_mean_since_the_last_time_and_what_hangs_on_it() -> None:
+    stage = PlateStage(Air(), StageParameters(1e6, cell_sign=-1.0))
+    stage.reset()
+    stage.mean_force_n(0.0)
+    stage.hung_n = 2.0
+    assert stage.mean_force_n(0.5) == pytest.approx(-2.0 + LIFTED_M)
+    stage.hung_n = 0.0
+    stage.insert(0.5, 0.0, 0.1, 0.0)  # 2 cm down within 0.2 s
+    assert stage.mean_force_n(0.7) == pytest.approx(LIFTED_M / 2.0, rel=0.01)
+
+
+@given(st.floats(0.003, 0.3), st.integers(0, 10**6))
+def test_a_hand_goes_all_its_way_forward_and_never_faster_than_it_can(way_m: float, seed: int) -> None:
+    hand = HandParameters()
+    motion = HandMotion(way_m, hand, Random(seed))
+    step_s = motion.duration_s / 500.0
+    places_m = [motion.way_m(i * step_s) for i in range(501)]
+    assert (places_m[0], places_m[-1]) == (0.0, way_m)
+    speeds_m_s = [(after - before) / step_s for before, after in pairwise(places_m)]
+    assert min(speeds_m_s) >= -1e-9 and max(speeds_m_s) <= 1.01 * hand.fastest_m_s
+
+
+def test_a_hand_stutters_and_rests() -> None:
+    motion = HandMotion(0.2, HandParameters(), Random(3))
+    speeds_m_s = [100.0 * (motion.way_m(i / 100.0) - motion.way_m((i - 1) / 100.0)) for i in range(10, 150)]
+    assert sum(speed < 1e-6 for speed in speeds_m_s) > 5
+    assert max(speeds_m_s) > 2.0 * 0.06
+
+
+def test_an_encoder_on_the_stage_counts_every_stroke_and_nothing_else() -> None:
+    stage = PlateStage(Air(), StageParameters(hand=HandParameters()))
+    stage.mean_force_n(0.0)
+    stage.insert(1.0, 0.03, 0.1, 3.0)
+    down_s = stage.ends_s
+    for at_s in (1.3, 1.4, 3.0, down_s):
+        stage.mean_force_n(at_s)
+        assert -stage.travelled_m(at_s) == pytest.approx(stage.plate.depth_m + LIFTED_M, abs=1e-6)
+    stage.place_over(stage.plate, sideways=True)
+    stage.drag(down_s, 0.2, 0.1)
+    assert stage.travelled_m(down_s) == pytest.approx(0.0, abs=1e-9)
+    assert stage.travelled_m(stage.ends_s) == pytest.approx(-0.2)
