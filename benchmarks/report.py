@@ -36,8 +36,8 @@ def summary_us(durations_s: Sequence[float]) -> dict[str, float]:
     """Median, p99 and the longest in microseconds; zeros where nothing was measured."""
     ordered = sorted(durations_s) or [0.0]
     last = len(ordered) - 1
-    shares = {"median": 0.50, "p99": 0.99, "max": 1.0}
-    return {name: round(1e6 * ordered[round(share * last)], 2) for name, share in shares.items()}
+    fractions = {"median": 0.50, "p99": 0.99, "max": 1.0}
+    return {name: round(1e6 * ordered[round(fraction * last)], 2) for name, fraction in fractions.items()}
 
 
 class Progress:
@@ -49,8 +49,8 @@ class Progress:
 
     def show(self, done: float, what: str) -> None:
         if self._shown:
-            share = min(1.0, done / self._total)
-            print(f"\r\033[K{share:4.0%}  {what}", end="", file=sys.stderr, flush=True)
+            fraction = min(1.0, done / self._total)
+            print(f"\r\033[K{fraction:4.0%}  {what}", end="", file=sys.stderr, flush=True)
 
     def clear(self) -> None:
         if self._shown:

@@ -88,10 +88,10 @@ def watched() -> Iterator[Callable[[str, int, int], None]]:
         progress.clear()
 
 
-def complain(*sentences: str) -> None:
+def complain(*messages: str) -> None:
     """To a person, beside the data."""
-    for sentence in sentences:
-        print(f"mudskipper: {sentence}", file=sys.stderr)
+    for message in messages:
+        print(f"mudskipper: {message}", file=sys.stderr)
 
 
 def coefficient(estimate: dict[str, Any]) -> str:

@@ -247,5 +247,5 @@ def _held_by_the_mud(flippers: Sequence[str], attempts: int) -> Fault:
     """Of flippers that a recovery has given up."""
     one = len(flippers) == 1
     held = f"The {flippers[0]} flipper is" if one else "Both flippers are"
-    sentence = f"{held} stuck in the mud after {attempts} attempt{'s' if attempts > 1 else ''}."
-    return make_fault("flipper_stuck", flippers[0] if one else "", sentence)
+    message = f"{held} stuck in the mud after {attempts} attempt{'s' if attempts > 1 else ''}."
+    return make_fault("flipper_stuck", flippers[0] if one else "", message)

@@ -14,7 +14,7 @@ NO, UNLESS_FORCED, ALWAYS = Blocks
 WHEN_GONE, BY_HAND, BY_RESTART = Clears
 
 WIRING = "check its power, wiring, node id and message periods (README, 'Setting up the drives')"
-MEND = "mend the cause, then 'mudskipper clear'"
+FIX = "mend the cause, then 'mudskipper clear'"
 COOL = "let it cool; walk less deep or slower"
 REPORT = "this is a bug: keep the log, report it, and restart the daemon"
 WIRES = "check wiring, termination and bit rate; 'ip -s -d link show' tells more"
@@ -34,8 +34,8 @@ _ROWS: tuple[FaultKind, ...] = (
     FaultKind("heartbeat_silent", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 192, "No heartbeat for 0.5 s.", WIRING),
     FaultKind("temperature_silent", "drive", SOFT_STOP, ALWAYS, WHEN_GONE, 382, "No temperature for 1 s.", WIRING),
     FaultKind("voltage_silent", "drive", WARN, UNLESS_FORCED, WHEN_GONE, 382, "No bus voltage for 1 s.", WIRING),
-    FaultKind("drive_error", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 41, "The drive reports an error.", MEND),
-    FaultKind("drive_disarmed", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 41, "It left closed loop by itself.", MEND),
+    FaultKind("drive_error", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 41, "The drive reports an error.", FIX),
+    FaultKind("drive_disarmed", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 41, "It left closed loop by itself.", FIX),
     FaultKind(
         "drive_energised", "drive", WARN, ALWAYS, WHEN_GONE, 117,
         "It is energised though nobody armed it.", "end what else commands it, or 'mudskipper disarm'",
@@ -71,7 +71,7 @@ _ROWS: tuple[FaultKind, ...] = (
         "joint_position", "joint", DAMPING, ALWAYS, BY_HAND, 3,
         "A joint is outside of its range.", "move it back by hand, then 'mudskipper clear'",
     ),
-    FaultKind("joint_velocity", "joint", DAMPING, ALWAYS, BY_HAND, 5, "A joint is faster than its limit allows.", MEND),
+    FaultKind("joint_velocity", "joint", DAMPING, ALWAYS, BY_HAND, 5, "A joint is faster than its limit allows.", FIX),
     FaultKind(
         "joint_moving", "joint", NONE, ALWAYS, WHEN_GONE, 40,
         "A joint moves while it should rest.", "wait until it is at rest",
@@ -115,7 +115,7 @@ _ROWS: tuple[FaultKind, ...] = (
     ),
     FaultKind(
         "arming_failed", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 765,
-        "A drive did not go into closed loop.", MEND,
+        "A drive did not go into closed loop.", FIX,
     ),
     # the loop itself
     FaultKind("torque_not_finite", "loop", DRIVES_IDLE, ALWAYS, BY_RESTART, 2, "A torque was no number.", REPORT),
@@ -158,5 +158,5 @@ _ROWS: tuple[FaultKind, ...] = (
 KINDS: dict[str, FaultKind] = {kind.name: kind for kind in _ROWS}
 
 
-def make_fault(name: str, subject: str, sentence: str) -> Fault:
-    return Fault(KINDS[name], subject, sentence)
+def make_fault(name: str, subject: str, message: str) -> Fault:
+    return Fault(KINDS[name], subject, message)

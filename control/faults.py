@@ -54,7 +54,7 @@ class Fault(NamedTuple):
 
     kind: FaultKind
     subject: str
-    sentence: str
+    message: str
 
     @property
     def name(self) -> str:
@@ -64,7 +64,7 @@ class Fault(NamedTuple):
     def advice(self) -> str:
         """What happened, and what to do."""
         to_do = self.kind.what_to_do
-        return f"{self.sentence} {to_do[:1].upper()}{to_do[1:]}."
+        return f"{self.message} {to_do[:1].upper()}{to_do[1:]}."
 
     @property
     def check(self) -> str:

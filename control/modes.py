@@ -173,4 +173,4 @@ def refusal(mode: Mode, request: Request, health: Health) -> str | None:
 
 def _against(health: Health) -> str:
     faults = health.blocking or ((health.worst,) if health.worst else ())
-    return " ".join(fault.sentence for fault in faults) or WHAT_TO_DO[Mode.BOOT]
+    return " ".join(fault.message for fault in faults) or WHAT_TO_DO[Mode.BOOT]

@@ -40,7 +40,7 @@ class Coefficient(NamedTuple):
         return value, hypot(ratio * self.std_error, value * log_depths * self.exponent_std_error)
 
 
-class FlipperBelief(NamedTuple):
+class FlipperEstimate(NamedTuple):
     """What one flipper's strides say; None where they said nothing yet."""
 
     k_p: Coefficient | None = None
@@ -48,7 +48,7 @@ class FlipperBelief(NamedTuple):
     k_e: Coefficient | None = None
 
 
-class MudBelief(NamedTuple):
+class MudEstimate(NamedTuple):
     """Each flipper apart, and both together where they agree. They go through two muds at times: then there is no
     such thing as the mud's coefficient, and together it is None.
     """
@@ -56,12 +56,12 @@ class MudBelief(NamedTuple):
     k_p: Coefficient | None = None
     k_s: Coefficient | None = None
     k_e: Coefficient | None = None
-    left: FlipperBelief = FlipperBelief()
-    right: FlipperBelief = FlipperBelief()
+    left: FlipperEstimate = FlipperEstimate()
+    right: FlipperEstimate = FlipperEstimate()
     boundary: bool = False  # this stride did not fit what was remembered, which was dropped: another mud
 
-    def of(self, flipper: str) -> FlipperBelief:
+    def of(self, flipper: str) -> FlipperEstimate:
         return self.left if flipper == "left" else self.right
 
 
-NOTHING_KNOWN = MudBelief()
+NOTHING_KNOWN = MudEstimate()

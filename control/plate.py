@@ -117,7 +117,7 @@ def stroke_moment_m4(geometry: FlipperGeometry, plate: SubmergedPlate, sweep_rad
     return volume_m3 * cos(sweep_rad) * sqrt(outward_m * outward_m + below_arm_m * below_arm_m)
 
 
-def crossing(geometry: FlipperGeometry, plate: SubmergedPlate, sweep_rad: float) -> float:
+def cross_coupling(geometry: FlipperGeometry, plate: SubmergedPlate, sweep_rad: float) -> float:
     """Adduction torque per sweep torque of a load across the plate's face, -e sin α / (l + u) at its pressure centre.
 
     Such a load f_n turns the sweep joint by (l + u) f_n and the adduction joint by -e sin α f_n, where e is how far

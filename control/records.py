@@ -121,7 +121,7 @@ class StrideEstimate:
     extraction_force_n: float  # most negative upward force in extraction
     step_m: float  # the body's advance since the stride before; NaN without a pose
     surface_std_error_m: float = UNKNOWN
-    place_m: float = UNKNOWN  # of the body along the track when the insertion ended; NaN without a pose
+    position_m: float = UNKNOWN  # of the body along the track when the insertion ended; NaN without a pose
     stance: str = "unknown"  # yield, body, mixed, saturated or unknown: whether the mud sheared or the body moved
     tare_n: float = UNKNOWN  # weight of what clings to the flipper
     tare_drift_n: float = UNKNOWN  # since the stride before

@@ -19,13 +19,20 @@ from estimation.joint_load import FlipperDrive, JointLoad, JointLoads, JointSamp
 from estimation.stride_clock import StrideClock
 from estimation.strokes.shear import Base, Shear, find_shear
 from estimation.strokes.stroke import Batch, Stroke
-from estimation.strokes.stroke_fit import NOT_THERE, bound_extraction, fit_extraction, fit_insertion, judged, level_free
+from estimation.strokes.stroke_fit import (
+    NOT_THERE,
+    bound_extraction,
+    evaluated,
+    fit_extraction,
+    fit_insertion,
+    level_free,
+)
 from estimation.strokes.surface import NO_SURFACE, combined, find_surface
 from estimation.strokes.tare import Tare
 
 STEPS_M = {Phase.INSERTION: 0.0015, Phase.STANCE: 0.006, Phase.EXTRACTION: 0.002}
 OWN_ERROR_M = 0.002  # by which a stroke's own force may seem to begin elsewhere than at the mud's surface
-FREE_SHARE = 0.4  # of the clearance that the edge must be above the mud to count as free air
+FREE_FRACTION = 0.4  # of the clearance that the edge must be above the mud to count as free air
 CLINGING_M = 0.015  # above the lower edge: the middle of what a stroke of 3 cm wets
 
 
@@ -46,7 +53,7 @@ class FlipperEstimator:
         self.base = base
         self.body_drag_n = body_drag_n
         self.surface_error_m = surface_error_m
-        self._free_m = -FREE_SHARE * geometry.clearance_m
+        self._free_m = -FREE_FRACTION * geometry.clearance_m
         self._loads = JointLoads(geometry, drive)
         self._clock = StrideClock()
         self._tare = Tare()
@@ -179,7 +186,7 @@ class FlipperEstimator:
             stance_force_n=self._stance_n,
             extraction_force_n=self._extraction_n,
             step_m=body_m - self._body_at_close_m,
-            place_m=self._body_at_insertion_m,
+            position_m=self._body_at_insertion_m,
             stance=shear.case,
             tare_n=self._tare.zero.weight_n,
             tare_drift_n=self._tare.drift_n,
@@ -190,11 +197,11 @@ class FlipperEstimator:
         return estimate
 
     def _learn_extraction(self, stroke: Stroke) -> Estimate:
-        told = fit_extraction(
+        reported = fit_extraction(
             self.geometry, stroke.moving(), self._surface, self._tare.zero.std_error_n, stroke.first_m
         )
-        if told.valid or not self._stuck:
-            return told
+        if reported.valid or not self._stuck:
+            return reported
         return bound_extraction(self.geometry, stroke.batches, self._surface)
 
     def _shear_estimate(self, shear: Shear) -> Estimate:
@@ -203,7 +210,7 @@ class FlipperEstimator:
             return NOT_THERE._replace(samples=shear.samples, reason=shear.reason or NOT_THERE.reason)
         depth_m = self._deepest_m - self.surface_m
         surface = 2.0 * shear.fit.slope * self._surface.std_error_m / depth_m if depth_m > 0.0 else 0.0
-        estimate = judged(shear.fit, surface, shear.samples)
+        estimate = evaluated(shear.fit, surface, shear.samples)
         return estimate._replace(at_least=shear.at_least, reason=estimate.reason or shear.reason)
 
 

@@ -85,11 +85,15 @@ def motion_between(before: JointSample, now: JointSample) -> JointMotion:
     if not (SHORTEST_GAP_S < dt_s < LONGEST_GAP_S and isfinite(change_rad_s)):
         return angle_rad, now_rad_s, 0.0, current_a
     if earlier_s < current_before_s <= later_s < current_s:
-        share = (later_s - angle_before_s) / dt_s
-        current_a += (current_before_a - current_a) * (share if 0.0 < share < 1.0 else 1.0 if share > 0.0 else 0.0)
+        fraction = (later_s - angle_before_s) / dt_s
+        current_a += (current_before_a - current_a) * (
+            fraction if 0.0 < fraction < 1.0 else 1.0 if fraction > 0.0 else 0.0
+        )
     elif current_s > current_before_s:
-        share = (current_s - angle_s + dt_s / 2.0) / (current_s - current_before_s)
-        current_a -= (current_a - current_before_a) * (share if -1.0 < share < 2.0 else 2.0 if share > 0.0 else -1.0)
+        fraction = (current_s - angle_s + dt_s / 2.0) / (current_s - current_before_s)
+        current_a -= (current_a - current_before_a) * (
+            fraction if -1.0 < fraction < 2.0 else 2.0 if fraction > 0.0 else -1.0
+        )
     return (angle_rad + angle_before_rad) / 2.0, before_rad_s + change_rad_s / 2.0, change_rad_s / dt_s, current_a
 
 

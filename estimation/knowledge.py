@@ -33,7 +33,7 @@ from collections.abc import Sequence
 from math import exp, log, sqrt
 from typing import NamedTuple
 
-from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.records import FLIPPERS, StrideEstimate
 from estimation.strokes.depth_line import REMEMBERED_STRIDES, DepthLaw, Line, Reading, reading_of
 
@@ -89,9 +89,9 @@ class CoefficientMemory:
         if reading is None or reading.at_least:
             return last
         weight, last_weight = 1.0 / reading.variance, 1.0 / last.variance
-        share = weight / (weight + last_weight)
-        log_k = last.log_k + share * (reading.log_k - last.log_k)
-        log_depth = last.log_depth + share * (reading.log_depth - last.log_depth)
+        fraction = weight / (weight + last_weight)
+        log_k = last.log_k + fraction * (reading.log_k - last.log_k)
+        log_depth = last.log_depth + fraction * (reading.log_depth - last.log_depth)
         return Reading(log_k, 1.0 / (weight + last_weight), log_depth)
 
     def remember(self, reading: Reading | None, kept: Kept) -> None:
@@ -151,8 +151,8 @@ class FlipperKnowledge:
         self._k_e.remember(k_e, mud.both(suction))
         return boundary
 
-    def belief(self) -> FlipperBelief:
-        return FlipperBelief(self._k_p.coefficient(), self._k_s.coefficient(), self._k_e.coefficient())
+    def mud_estimate(self) -> FlipperEstimate:
+        return FlipperEstimate(self._k_p.coefficient(), self._k_s.coefficient(), self._k_e.coefficient())
 
 
 class MudKnowledge:
@@ -160,20 +160,22 @@ class MudKnowledge:
 
     def __init__(self) -> None:
         self._flippers = {flipper: FlipperKnowledge() for flipper in FLIPPERS}
-        self.belief = NOTHING_KNOWN
+        self.mud_estimate = NOTHING_KNOWN
 
     def reset(self) -> None:
         for flipper in self._flippers.values():
             flipper.reset()
-        self.belief = NOTHING_KNOWN
+        self.mud_estimate = NOTHING_KNOWN
 
-    def update(self, strides: Sequence[StrideEstimate]) -> MudBelief:
+    def update(self, strides: Sequence[StrideEstimate]) -> MudEstimate:
         """The belief after the strides that closed just now."""
-        told = [self._flippers[stride.flipper].update(stride) for stride in strides if stride.flipper in self._flippers]
-        left, right = (self._flippers[flipper].belief() for flipper in FLIPPERS)
+        reported = [
+            self._flippers[stride.flipper].update(stride) for stride in strides if stride.flipper in self._flippers
+        ]
+        left, right = (self._flippers[flipper].mud_estimate() for flipper in FLIPPERS)
         k_p, k_s, k_e = (_together(one, other) for one, other in zip(left, right, strict=True))
-        self.belief = MudBelief(k_p, k_s, k_e, left, right, any(told))
-        return self.belief
+        self.mud_estimate = MudEstimate(k_p, k_s, k_e, left, right, any(reported))
+        return self.mud_estimate
 
 
 def _together(left: Coefficient | None, right: Coefficient | None) -> Coefficient | None:
@@ -201,14 +203,14 @@ def _mean(
     """
     between = max(0.0, (excess * excess - variance_left - variance_right) / 2.0)
     weight_left, weight_right = 1.0 / (variance_left + between), 1.0 / (variance_right + between)
-    share = weight_right / (weight_left + weight_right)
-    k = left.at(depth_m)[0] * exp(share * excess)
+    fraction = weight_right / (weight_left + weight_right)
+    k = left.at(depth_m)[0] * exp(fraction * excess)
     return Coefficient(
         k,
         k / sqrt(weight_left + weight_right),
         depth_m,
-        left.exponent + share * (right.exponent - left.exponent),
-        left.exponent_std_error + share * (right.exponent_std_error - left.exponent_std_error),
+        left.exponent + fraction * (right.exponent - left.exponent),
+        left.exponent_std_error + fraction * (right.exponent_std_error - left.exponent_std_error),
         left.strides + right.strides,
     )
 

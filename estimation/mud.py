@@ -13,7 +13,7 @@ from typing import Annotated, Literal, NamedTuple
 
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
-from control.mud_estimate import NOTHING_KNOWN, MudBelief
+from control.mud_estimate import NOTHING_KNOWN, MudEstimate
 from control.records import FLIPPERS, NO_LOAD, FlipperLoad, JointAngles, Phase, StrideEstimate
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import NO_COMMANDS, FlipperDrive, JointSample
@@ -62,7 +62,7 @@ class MudEstimator:
         self._knowledge = MudKnowledge()
         self._commands_s = NO_COMMANDS  # the drives are given new ones after each sample
         self.map = MudMap()
-        self.belief: MudBelief = NOTHING_KNOWN
+        self.mud_estimate: MudEstimate = NOTHING_KNOWN
 
     def reset(self) -> None:
         self.left.reset()
@@ -70,7 +70,7 @@ class MudEstimator:
         self._knowledge.reset()
         self._commands_s = NO_COMMANDS
         self.map.reset()
-        self.belief = NOTHING_KNOWN
+        self.mud_estimate = NOTHING_KNOWN
 
     def update(
         self,
@@ -99,7 +99,7 @@ class MudEstimator:
         if left_stride is None and right_stride is None:
             return MudReading(left, right)
         strides = tuple(stride for stride in (left_stride, right_stride) if stride is not None)
-        self.belief = self._knowledge.update(strides)
+        self.mud_estimate = self._knowledge.update(strides)
         self.map.update(body_x_m, strides)
         return MudReading(left, right, strides)
 

@@ -31,7 +31,7 @@ class Mapped(NamedTuple):
 
 
 class MapRow(NamedTuple):
-    place_m: float  # the piece's middle
+    position_m: float  # the piece's middle
     k_p: Mapped | None
     k_s: Mapped | None
     k_e: Mapped | None
@@ -53,13 +53,13 @@ class Sums(NamedTuple):
         if self.at_least:
             return _alone(reading)
         weight = 1.0 / reading.variance
-        share = weight / (self.weight + weight)
+        fraction = weight / (self.weight + weight)
         stronger = reading.log_k - self.log_k
         return Sums(
             self.weight + weight,
-            self.log_k + share * stronger,
-            self.log_depth + share * (reading.log_depth - self.log_depth),
-            self.squares + self.weight * share * stronger * stronger,
+            self.log_k + fraction * stronger,
+            self.log_depth + fraction * (reading.log_depth - self.log_depth),
+            self.squares + self.weight * fraction * stronger * stronger,
             self.strides + 1,
             False,
         )
@@ -86,11 +86,11 @@ class MudMap:
     def reset(self) -> None:
         self._pieces.clear()
 
-    def update(self, place_m: float, strides: Sequence[StrideEstimate]) -> None:
+    def update(self, position_m: float, strides: Sequence[StrideEstimate]) -> None:
         """The strides that closed with the body at `place_m`, NaN without a pose."""
-        if not isfinite(place_m / PIECE_M):
+        if not isfinite(position_m / PIECE_M):
             return
-        number = floor(place_m / PIECE_M)
+        number = floor(position_m / PIECE_M)
         for stride in strides:
             k_p, k_s, k_e = (reading_of(each, stride.depth_m) for each in (stride.k_p, stride.k_s, stride.k_e))
             if k_p is None and k_s is None and k_e is None:

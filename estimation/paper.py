@@ -24,7 +24,7 @@ from estimation.stride_clock import StrideClock
 from estimation.strokes.line_fit import LineFit
 
 SURFACE_FORCE_N = 0.5  # the paper's trigger, chosen above its noise
-STEADY_SHARE = 0.6  # of the sweep's half range around the middle: the force has reached its plateau by then
+STEADY_FRACTION = 0.6  # of the sweep's half range around the middle: the force has reached its plateau by then
 MOBILISED_M = 0.002  # rise after which the mud under an extracted flipper yields instead of springing back
 ADVANCED_M = 0.002  # from which the body has moved
 
@@ -110,7 +110,7 @@ class PaperEstimator:
         self._stance_force_n = _larger(load.force_x_n, self._stance_force_n)
         self._deepest_m = max(self._deepest_m, load.depth_m)
         if self._steady_rad == 0.0:
-            self._steady_rad = STEADY_SHARE * abs(sweep_rad)
+            self._steady_rad = STEADY_FRACTION * abs(sweep_rad)
             self._body_at_stance_m = body_x_m
         submerged_m = load.depth_m - self.surface_m
         if submerged_m > 0.0 and abs(sweep_rad) <= self._steady_rad:
@@ -164,7 +164,7 @@ class PaperEstimator:
             stance_force_n=self._stance_force_n,
             extraction_force_n=self._extraction_force_n,
             step_m=body_x_m - self._body_at_close_m,
-            place_m=self._body_at_insertion_m,
+            position_m=self._body_at_insertion_m,
             extraction_torque_nm=self._extraction_nm,
         )
         self._clock.index += 1

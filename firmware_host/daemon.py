@@ -46,7 +46,7 @@ from firmware_host.operator.rights import Rights, load_rights
 from firmware_host.operator.status_socket import AlreadyServedError, StatusSocket
 from firmware_host.pose_sources import open_pose
 from firmware_host.software_version import software_version
-from firmware_host.ticker import RATE_HZ, Beat, Ticker
+from firmware_host.ticker import RATE_HZ, Tick, Ticker
 
 EXIT_FAILED = 1
 LONGEST_SHUTDOWN_S = 5.0
@@ -63,9 +63,9 @@ class WatchdogFeed:
         self._notifier = notifier
         self._made = self._missed = 0
 
-    def update(self, beat: Beat, mode: Mode) -> None:
+    def update(self, tick: Tick, mode: Mode) -> None:
         self._made += 1
-        self._missed += beat.missed
+        self._missed += tick.missed
         if self._made < NOTIFY_TICKS:
             return
         if self._missed <= self._made:
@@ -138,7 +138,7 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock)
         warnings: list[str] = []
         calls = OperatorCalls(loop, recorder, warnings, time.monotonic)
-        status.methods = with_failures(calls.methods, failures, loop.news.tell, time.monotonic)
+        status.methods = with_failures(calls.methods, failures, loop.events.report, time.monotonic)
         _serve_loop(status, loop)
         notifier = SystemdNotifier()
         stack.callback(notifier.close)
@@ -150,7 +150,7 @@ def _serve_loop(status: StatusSocket, loop: Loop) -> None:
     """What the socket needs of the loop beside its methods."""
     status.on_hang_up = loop.lease.hang_up
     status.spares = lambda caller: caller == loop.lease.holder
-    status.report_bug = lambda sentence: loop.news.tell(time.monotonic(), sentence)
+    status.report_bug = lambda message: loop.events.report(time.monotonic(), message)
 
 
 def _prepare(parameters: LoopParameters) -> list[str]:
@@ -170,16 +170,16 @@ def _run_loop(
     notifier: SystemdNotifier,
     shutdown: Shutdown,
 ) -> int:
-    ticker, watchdog = failing_ticker(Ticker(), failures, loop.news.tell), WatchdogFeed(notifier)
+    ticker, watchdog = failing_ticker(Ticker(), failures, loop.events.report), WatchdogFeed(notifier)
     notifier.send("READY=1", "STATUS=running")
     now_s = time.monotonic()
     try:
         while not shutdown.step(loop, now_s):
-            beat = ticker.wait()
-            now_s = beat.now_s
-            loop.tick(beat)
+            tick = ticker.wait()
+            now_s = tick.now_s
+            loop.tick(tick)
             status.serve(now_s)
-            watchdog.update(beat, loop.mode)
+            watchdog.update(tick, loop.mode)
             reopen_buses(loop, buses, now_s)
             reopen_pose(loop, pose, now_s)
         notifier.send("STOPPING=1")
@@ -197,13 +197,13 @@ def reopen_buses(loop: Loop, buses: Mapping[str, ReopeningPort], now_s: float) -
         return
     for name, port in buses.items():
         if port.reopen(now_s):
-            loop.news.tell(now_s, f"bus {name} opened again")
+            loop.events.report(now_s, f"bus {name} opened again")
 
 
 def reopen_pose(loop: Loop, pose: OpenedPose, now_s: float) -> None:
     """The same for a source that was unplugged."""
     if loop.mode not in ENERGISED and pose.reopen(now_s):
-        loop.news.tell(now_s, "the pose's source was opened again; its zero may be another one")
+        loop.events.report(now_s, "the pose's source was opened again; its zero may be another one")
 
 
 def _end_safely(loop: Loop, problem: Exception) -> int:
@@ -212,10 +212,10 @@ def _end_safely(loop: Loop, problem: Exception) -> int:
         with suppress(Exception):  # what broke may be one bus; the others' drives still have to hear it
             axis.disarm()
     place = traceback.extract_tb(problem.__traceback__)[-1]
-    sentence = f"{type(problem).__name__}: {problem} ({Path(place.filename).name}, line {place.lineno})"
-    print(f"mudskipperd: stopped by a bug, the drives are idle: {sentence}", file=sys.stderr)
+    message = f"{type(problem).__name__}: {problem} ({Path(place.filename).name}, line {place.lineno})"
+    print(f"mudskipperd: stopped by a bug, the drives are idle: {message}", file=sys.stderr)
     with suppress(Exception):  # or the log
-        loop.news.tell(time.monotonic(), f"stopped by a bug: {sentence}")
+        loop.events.report(time.monotonic(), f"stopped by a bug: {message}")
     return EXIT_FAILED
 
 
@@ -228,7 +228,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         configuration = load_configuration(options.config)
         rights = load_rights(configuration.status)
     except ConfigurationError as problem:
-        return _refuse([f"mudskipperd: {sentence}" for sentence in problem.problems], EXIT_CONFIGURATION)
+        return _refuse([f"mudskipperd: {message}" for message in problem.problems], EXIT_CONFIGURATION)
     if options.check_config:
         return 0
     shutdown = Shutdown()
@@ -247,9 +247,9 @@ def _on_signals(handler: Callable[[int, object], None]) -> None:
         signal.signal(number, handler)
 
 
-def _refuse(sentences: Sequence[str], status: int) -> int:
-    for sentence in sentences:
-        print(sentence, file=sys.stderr)
+def _refuse(messages: Sequence[str], status: int) -> int:
+    for message in messages:
+        print(message, file=sys.stderr)
     return status
 
 

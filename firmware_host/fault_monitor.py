@@ -13,17 +13,17 @@ from control.fault_kinds import make_fault
 from control.faults import Fault
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
-from control.monitors.joint_monitor import JointFacts, JointWatch
+from control.monitors.joint_monitor import JointFacts, JointMonitor
 from control.records import JOINTS, NEVER_S, BodyPose, DriveStates
 from drivers.can.can_port import BusState
 from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import error_text
 from drivers.odrive.drives import OdriveDrives
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.log_monitor import LogWatch
+from firmware_host.log.log_monitor import LogMonitor
 from firmware_host.log.recorder import LogReport
-from firmware_host.loop_monitor import LoopWatch
-from firmware_host.ticker import PERIOD_S, Beat
+from firmware_host.loop_monitor import LoopMonitor
+from firmware_host.ticker import PERIOD_S, Tick
 
 ARMING_S = 2.0  # a drive that takes longer to go into closed loop does not mean to
 REFUSED_TICKS = 3  # in a row, in each of which one bus lost a command
@@ -42,7 +42,7 @@ BUS_FAULTS = {
 }
 
 
-class Situation(NamedTuple):
+class MonitorInput(NamedTuple):
     """What the loop knows of the moment, before the mode changes."""
 
     mode: Mode
@@ -56,13 +56,13 @@ class Situation(NamedTuple):
     lease_holder: str  # who has lost it; empty: nobody
 
 
-class FaultWatch:
+class FaultMonitor:
     """Owns the watches of the joints and of the loop, and what is counted over ticks."""
 
     def __init__(self, configuration: Configuration, drives: OdriveDrives) -> None:
         self._drives = drives
         self.joints = tuple(
-            JointWatch(
+            JointMonitor(
                 joint,
                 configuration.limits,
                 span,
@@ -74,8 +74,8 @@ class FaultWatch:
             )
             for joint, span in zip(JOINTS, configuration.joint_ranges, strict=True)
         )
-        self._loop = LoopWatch(configuration.faults)
-        self._log = LogWatch(configuration.faults)
+        self._loop = LoopMonitor(configuration.faults)
+        self._log = LogMonitor(configuration.faults)
         self._longest_watchdog_s = configuration.faults.longest_watchdog_s
         self._warm_c = configuration.limits.temperature_warm_c
         self.reset()
@@ -86,7 +86,7 @@ class FaultWatch:
         self._loop.reset()
         self._log.reset()
         self._failed_sends = {name: port.failed_sends for name, port in self._drives.ports.items()}
-        self._bus_news = {name: (0, BusState.ACTIVE) for name in self._drives.ports}
+        self._bus_events = {name: (0, BusState.ACTIVE) for name in self._drives.ports}
         self._error_s = dict.fromkeys(self._drives.ports, NEVER_S)
         self._lost_frames = {name: port.lost_frames for name, port in self._drives.ports.items()}
         self._refused_ticks = dict.fromkeys(self._drives.ports, 0)
@@ -108,36 +108,36 @@ class FaultWatch:
         )
         return a, b, c, d
 
-    def update(self, beat: Beat, situation: Situation) -> list[Fault]:
+    def update(self, tick: Tick, monitor_input: MonitorInput) -> list[Fault]:
         """Everything that is wrong in this tick."""
-        found = self._loop.update(beat, situation.wall_minus_monotonic_s)
-        found += self._log.update(situation.log)
-        self._watch_buses(found, beat.now_s)
-        if situation.lease_holder:
-            text = f"{situation.lease_holder} promised to attend the robot and is gone."
+        found = self._loop.update(tick, monitor_input.wall_minus_monotonic_s)
+        found += self._log.update(monitor_input.log)
+        self._watch_buses(found, tick.now_s)
+        if monitor_input.lease_holder:
+            text = f"{monitor_input.lease_holder} promised to attend the robot and is gone."
             found.append(make_fault("lease_lost", "", text))
-        if situation.mode is Mode.BOOT and not self._drives.heard:
+        if monitor_input.mode is Mode.BOOT and not self._drives.heard:
             return found
-        self._watch_joints(found, beat, situation)
-        self._watch_trust(found, situation.mode)
-        if not situation.sent.finite:
+        self._watch_joints(found, tick, monitor_input)
+        self._watch_trust(found, monitor_input.mode)
+        if not monitor_input.sent.finite:
             found.append(make_fault("torque_not_finite", "", "A torque was not a finite number."))
-        if situation.mode is Mode.ARMING and beat.now_s - situation.mode_since_s > ARMING_S:
-            self._watch_arming(found, situation.states)
+        if monitor_input.mode is Mode.ARMING and tick.now_s - monitor_input.mode_since_s > ARMING_S:
+            self._watch_arming(found, monitor_input.states)
         self._watch_gate(found)
         for axis in self._drives.axes:
             self._watch_axis(found, axis)
-            if axis.busy_state and situation.mode not in ENERGISED:
+            if axis.busy_state and monitor_input.mode not in ENERGISED:
                 text = f"The {axis.joint} drive does something of its own: axis state {axis.busy_state}."
                 found.append(make_fault("drive_energised", axis.joint, text))
-        self._watch_pose(found, beat.now_s, situation.body)
+        self._watch_pose(found, tick.now_s, monitor_input.body)
         return found
 
     def _watch_buses(self, found: list[Fault], now_s: float) -> None:
         """A warning ends with the error frames: not every CAN driver tells that its controller has recovered."""
         for name, port in self._drives.ports.items():
-            if (port.error_frames, port.state) != self._bus_news[name]:
-                self._bus_news[name], self._error_s[name] = (port.error_frames, port.state), now_s
+            if (port.error_frames, port.state) != self._bus_events[name]:
+                self._bus_events[name], self._error_s[name] = (port.error_frames, port.state), now_s
             if port.state is BusState.OFF or (port.state and now_s - self._error_s[name] < BUS_TROUBLE_S):
                 kind, text = BUS_FAULTS[port.state]
                 found.append(make_fault(kind, name, f"The {name} bus {text}: {port.last_error or 'no word why'}."))
@@ -154,14 +154,19 @@ class FaultWatch:
                 text = f"The {name} bus lost commands in {ticks} ticks in a row: {why}."
                 found.append(make_fault("bus_refuses", name, text))
 
-    def _watch_joints(self, found: list[Fault], beat: Beat, situation: Situation) -> None:
-        mode, sent_nm = situation.mode, situation.sent.torques_nm
-        dt_s = (1 + beat.missed) * PERIOD_S
+    def _watch_joints(self, found: list[Fault], tick: Tick, monitor_input: MonitorInput) -> None:
+        mode, sent_nm = monitor_input.mode, monitor_input.sent.torques_nm
+        dt_s = (1 + tick.missed) * PERIOD_S
         for joint, axis, state, torque_nm in zip(
-            self.joints, self._drives.axes, situation.states, sent_nm, strict=True
+            self.joints, self._drives.axes, monitor_input.states, sent_nm, strict=True
         ):
             facts = JointFacts(
-                beat.now_s, dt_s, mode in ENERGISED, mode in MOVING, torque_nm, situation.freeing or mode not in HELD
+                tick.now_s,
+                dt_s,
+                mode in ENERGISED,
+                mode in MOVING,
+                torque_nm,
+                monitor_input.freeing or mode not in HELD,
             )
             found += [_explained(fault, axis) for fault in joint.update(facts, state)]
 
@@ -191,7 +196,7 @@ class FaultWatch:
         if axis.restarts != self._restarts[joint]:
             self._restarts[joint] = axis.restarts
             found.append(make_fault("drive_restarted", joint, f"The {joint} drive started anew."))
-        if axis.twins:
+        if axis.duplicates:
             found.append(make_fault("drive_twins", joint, f"Two drives send as the {joint} drive."))
         if axis.version is None:
             text = f"The {joint} drive did not tell its firmware version yet."
@@ -231,4 +236,4 @@ def _explained(fault: Fault, axis: OdriveAxis) -> Fault:
     flags = axis.state.error_flags | axis.disarm_reason
     if fault.name not in EXPLAINED or not flags:
         return fault
-    return fault._replace(sentence=f"{fault.sentence} ({error_text(flags)})")
+    return fault._replace(message=f"{fault.message} ({error_text(flags)})")

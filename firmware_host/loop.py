@@ -20,15 +20,15 @@ from control.records import NEVER_S, NO_TORQUE, BodyPose, DriveState, DriveState
 from drivers.odrive.drives import OdriveDrives
 from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.fault_monitor import FaultWatch, Situation
+from firmware_host.fault_monitor import FaultMonitor, MonitorInput
 from firmware_host.log.recorder import Recording
 from firmware_host.log.row_packing import Moment, stride_row, tick_row
 from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
-from firmware_host.loop_events import LoopNews, ModeChange
+from firmware_host.loop_events import LoopEvents, ModeChange
 from firmware_host.loop_timing import LoopTiming
 from firmware_host.mud_learning import MudLearning
 from firmware_host.operator.lease import Lease
-from firmware_host.ticker import PERIOD_S, Beat
+from firmware_host.ticker import PERIOD_S, Tick
 
 CLEARING_S = 0.5  # for the drives to report that their errors are gone
 LONGEST_STEP_TICKS = 3  # what the controller may advance at once: after a longer gap the gait goes on where it was
@@ -49,12 +49,12 @@ class Loop:
         self.pose = pose
         self.recorder = recorder
         self.lease = Lease()
-        self.news = LoopNews(recorder, configuration.motion.longest_hold_s)
+        self.events = LoopEvents(recorder, configuration.motion.longest_hold_s)
         self.timing = LoopTiming()
         self.learning = MudLearning(configuration)
         self.controller = controller_of(configuration)
         self.faults = FaultLatch()
-        self._fault_watch = FaultWatch(configuration, drives)
+        self._fault_monitor = FaultMonitor(configuration, drives)
         self._clock, self._wall_clock = clock, wall_clock
         self._ranges = configuration.joint_ranges
         self.mode = Mode.BOOT
@@ -69,25 +69,25 @@ class Loop:
         self._request, self._clear_until_s = Request.NONE, NEVER_S
         self._mode_since_s = 0.0
 
-    def tick(self, beat: Beat) -> None:
+    def tick(self, tick: Tick) -> None:
         """Everything that happens once in PERIOD_S."""
-        self.missed_ticks += beat.missed
+        self.missed_ticks += tick.missed
         self.target_before = self.controller.target
-        self.states = self.drives.read(beat.now_s)
-        self.body = self.pose.read(beat.now_s)
-        self.learning.update(beat.now_s, self.target_before.phase, self.states, self.body)
-        self._adapt(beat.now_s)
-        self.health = self._examine(beat)
-        self._change_mode(next_mode(self.mode, self._request_now(), self.health), beat.now_s)
+        self.states = self.drives.read(tick.now_s)
+        self.body = self.pose.read(tick.now_s)
+        self.learning.update(tick.now_s, self.target_before.phase, self.states, self.body)
+        self._adapt(tick.now_s)
+        self.health = self._examine(tick)
+        self._change_mode(next_mode(self.mode, self._request_now(), self.health), tick.now_s)
         self.forced = self.forced and self.mode in ENERGISED
         if self.controller.moving and self.health.reaction >= Reaction.HOLD:
-            self._end_move(beat.now_s, self.fault.sentence if self.fault else "a fault stands.")
-        step_s = min(1 + beat.missed, LONGEST_STEP_TICKS) * PERIOD_S
-        elapsed_s = (1 + beat.missed) * PERIOD_S
+            self._end_move(tick.now_s, self.fault.message if self.fault else "a fault stands.")
+        step_s = min(1 + tick.missed, LONGEST_STEP_TICKS) * PERIOD_S
+        elapsed_s = (1 + tick.missed) * PERIOD_S
         wanted = self.controller.step(step_s, self.mode, self.states, self._trusted(), elapsed_s)
         self.sent = self._limit(wanted)
-        self._command(beat.now_s)
-        self._record(beat)
+        self._command(tick.now_s)
+        self._record(tick)
 
     @property
     def fault(self) -> Fault | None:
@@ -97,24 +97,24 @@ class Loop:
     @property
     def temperatures_c(self) -> tuple[float, ...]:
         """Of the motors, measured or reckoned."""
-        return tuple(joint.winding.temperature_c for joint in self._fault_watch.joints)
+        return tuple(joint.winding.temperature_c for joint in self._fault_monitor.joints)
 
     def _adapt(self, now_s: float) -> None:
         """Once a stride, in swing, the gait changes; and where an insertion meets firm mud."""
-        closed, sentences = self.learning.step(self.controller)
-        for sentence in sentences:
-            self.news.tell(now_s, sentence)
+        closed, messages = self.learning.step(self.controller)
+        for message in messages:
+            self.events.report(now_s, message)
         for stride in closed:
             self.recorder.put(STRIDE_KIND, stride_row(now_s, stride.estimate, stride.chosen_depth_m))
 
-    def _examine(self, beat: Beat) -> Health:
+    def _examine(self, tick: Tick) -> Health:
         """Faults as data, and what else the mode depends on."""
-        present = self._fault_watch.update(beat, self._situation(beat.now_s)) + self.learning.faults
+        present = self._fault_monitor.update(tick, self._monitor_input(tick.now_s)) + self.learning.faults
         if self.controller.fault:
             present.append(self.controller.fault)
-        clearing = beat.now_s <= self._clear_until_s
-        self.faults.update(present, self.mode in ENERGISED, clearing, 1 + beat.missed)
-        self.news.tell_faults(beat.now_s, self.faults.begun, self.faults.over)
+        clearing = tick.now_s <= self._clear_until_s
+        self.faults.update(present, self.mode in ENERGISED, clearing, 1 + tick.missed)
+        self.events.tell_faults(tick.now_s, self.faults.begun, self.faults.over)
         return Health(
             drives_heard=self.mode is not Mode.BOOT or self.drives.heard,
             closed_loop=self._all_in_closed_loop(),
@@ -127,14 +127,14 @@ class Loop:
             blocking=tuple(self.faults.blocking(self.forced)),
         )
 
-    def _situation(self, now_s: float) -> Situation:
+    def _monitor_input(self, now_s: float) -> MonitorInput:
         lost_by = str(self.lease.holder) if self.lease.lost(now_s) else ""
         if lost_by and self.mode not in ENERGISED:  # nothing is left to attend to
-            self.news.tell(now_s, f"lease of {lost_by} is over")
+            self.events.report(now_s, f"lease of {lost_by} is over")
             self.lease.reset()
             if self._request is not Request.ARM:  # which must not come true for somebody who is gone
                 lost_by = ""
-        return Situation(
+        return MonitorInput(
             self.mode,
             self._mode_since_s,
             self.states,
@@ -177,14 +177,14 @@ class Loop:
     def _tell_request(self, request: Request, now_s: float, forced: bool, by: str) -> None:
         """A stop or disarm that changes nothing is not told: whoever is let in may ask for those."""
         changes = request not in (Request.STOP, Request.DISARM) or self._next(request) is not self._next(Request.NONE)
-        self.news.tell_request(now_s, request, forced, by, changes)
+        self.events.tell_request(now_s, request, forced, by, changes)
 
     def _next(self, request: Request) -> Mode:
         return next_mode(self.mode, request, self.health)
 
     def _force(self, now_s: float, forced: bool) -> None:
         overruled = self.faults.blocking() if forced else []
-        self.news.tell_overruled(now_s, overruled)
+        self.events.tell_overruled(now_s, overruled)
         self.forced = bool(overruled)
 
     def _refusal(self, request: Request, order: WalkOrder | None, forced: bool) -> str | None:
@@ -208,13 +208,13 @@ class Loop:
         """In hold as in a walk: a fault that asks for a still pose has it, and so has whoever asks to stop."""
         if self.mode is Mode.HOLD:
             self.controller.end_move()
-            self.news.tell_end_of_move(now_s, why)
+            self.events.tell_end_of_move(now_s, why)
 
     def _change_mode(self, mode: Mode, now_s: float) -> None:
         if mode is self.mode:
             return
         change = ModeChange(self.mode, mode, self.fault, self.health.rested, self.controller.is_up(self.states))
-        self.news.tell_change(now_s, change)
+        self.events.tell_change(now_s, change)
         if mode is Mode.WALKING:
             self.learning.reset(self.controller.order.depth_m)
         if mode is Mode.ARMING:
@@ -225,13 +225,13 @@ class Loop:
         self.mode, self._mode_since_s = mode, now_s
 
     def _trusted(self) -> tuple[bool, ...]:
-        return self._fault_watch.trusted if self.mode is Mode.DAMPING else ALL_TRUSTED
+        return self._fault_monitor.trusted if self.mode is Mode.DAMPING else ALL_TRUSTED
 
     def _limit(self, wanted: Torques) -> LimitedTorques:
         """One tick's slew, however long the last gap was."""
         if self.mode not in MOVING:
             return LimitedTorques(NO_TORQUE, False, True)
-        states = self._fault_watch.with_winding_heat(self.states)
+        states = self._fault_monitor.with_winding_heat(self.states)
         return apply_limits(wanted, self.sent.torques_nm, states, self.configuration.limits, self._ranges, PERIOD_S)
 
     def _command(self, now_s: float) -> None:
@@ -250,10 +250,10 @@ class Loop:
             self.drives.request_watchdogs(now_s)
         self.drives.send(self.sent.torques_nm)
 
-    def _record(self, beat: Beat) -> None:
-        tick_s = self._clock() - beat.now_s
+    def _record(self, tick: Tick) -> None:
+        tick_s = self._clock() - tick.now_s
         moment = Moment(
-            beat,
+            tick,
             tick_s,
             self.missed_ticks,
             self.mode,
@@ -265,9 +265,9 @@ class Loop:
             self.sent,
         )
         self.recorder.put(TICK_KIND, tick_row(moment))
-        if self.controller.recovery.news:
-            self.news.tell(beat.now_s, self.controller.recovery.news)
-        self.timing.update(beat.now_s, beat.late_s, beat.missed, tick_s)
+        if self.controller.recovery.events:
+            self.events.report(tick.now_s, self.controller.recovery.events)
+        self.timing.update(tick.now_s, tick.late_s, tick.missed, tick_s)
 
 
 def controller_of(configuration: Configuration) -> Controller:

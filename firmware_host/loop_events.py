@@ -13,7 +13,7 @@ from control.faults import Fault
 from control.modes import ENERGISED, Mode, Request
 from firmware_host.log.recorder import Recording
 from firmware_host.log.rows import EVENT, EVENT_KIND
-from firmware_host.operator.request_events import RequestsTold
+from firmware_host.operator.request_events import RequestEvents
 
 
 class ModeChange(NamedTuple):
@@ -24,44 +24,44 @@ class ModeChange(NamedTuple):
     flippers_up: bool
 
 
-class LoopNews:
+class LoopEvents:
     """Owns the notice, and which requests were told."""
 
     def __init__(self, recorder: Recording, longest_hold_s: float) -> None:
         self._recorder = recorder
         self._longest_hold_s = longest_hold_s
-        self.requests = RequestsTold()
+        self.requests = RequestEvents()
         self.reset()
 
     def reset(self) -> None:
         self.notice = ""
         self.requests.reset()
 
-    def tell(self, now_s: float, sentence: str) -> None:
+    def report(self, now_s: float, message: str) -> None:
         """Into the log."""
-        self._recorder.put(EVENT_KIND, EVENT.encode(now_s, sentence))
+        self._recorder.put(EVENT_KIND, EVENT.encode(now_s, message))
 
-    def _notify(self, now_s: float, sentence: str) -> None:
+    def _notify(self, now_s: float, message: str) -> None:
         """Into the log, and to whoever asks for the status."""
-        self.notice = sentence
-        self.tell(now_s, sentence)
+        self.notice = message
+        self.report(now_s, message)
 
     def tell_faults(self, now_s: float, begun: Iterable[Fault], over: Iterable[Fault]) -> None:
         for fault in begun:
-            self.tell(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault.sentence}")
+            self.report(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault.message}")
         for fault in over:
-            self.tell(now_s, f"over: {fault.name} {fault.subject}".rstrip())
+            self.report(now_s, f"over: {fault.name} {fault.subject}".rstrip())
 
     def tell_request(self, now_s: float, request: Request, forced: bool, by: str, changes: bool) -> None:
         """Once, with who asked."""
         text = f"request {request.name.lower()}{' by force' if forced else ''}{f' by {by}' if by else ''}"
-        told = self.requests.update(text, changes, now_s)
-        if told:
-            self.tell(now_s, told)
+        reported = self.requests.update(text, changes, now_s)
+        if reported:
+            self.report(now_s, reported)
 
     def tell_overruled(self, now_s: float, faults: Iterable[Fault]) -> None:
         for fault in faults:
-            self.tell(now_s, f"armed by force despite {fault.name}: {fault.sentence}")
+            self.report(now_s, f"armed by force despite {fault.name}: {fault.message}")
 
     def tell_end_of_move(self, now_s: float, why: str) -> None:
         self._notify(now_s, f"the joints stopped on their way: {why}")
@@ -69,8 +69,8 @@ class LoopNews:
     def tell_change(self, now_s: float, change: ModeChange) -> None:
         """Of the mode, and what a person should know of its cause."""
         before, after, fault = change.before, change.after, change.fault
-        because = f": {fault.sentence}" if fault else ""
-        self.tell(now_s, f"mode {before.name.lower()} to {after.name.lower()}{because}")
+        because = f": {fault.message}" if fault else ""
+        self.report(now_s, f"mode {before.name.lower()} to {after.name.lower()}{because}")
         if after in (Mode.ARMING, Mode.WALKING):
             self.notice = ""
         if fault and before in ENERGISED:

@@ -7,14 +7,14 @@ from collections import deque
 from control.fault_kinds import make_fault
 from control.faults import Fault
 from control.monitors.joint_monitor import FaultBounds
-from firmware_host.ticker import PERIOD_S, Beat
+from firmware_host.ticker import PERIOD_S, Tick
 
 MEAN_TICKS = 100
 CRAWL_TICKS = 5
 STEP_S = 0.1  # by which a clock on the wall does not drift between two ticks
 
 
-class LoopWatch:
+class LoopMonitor:
     """Owns the last stamps and the distance of the two clocks."""
 
     def __init__(self, bounds: FaultBounds) -> None:
@@ -25,30 +25,32 @@ class LoopWatch:
         self._stamps_s: deque[float] = deque(maxlen=MEAN_TICKS + 1)
         self._distance_s: float | None = None
 
-    def update(self, beat: Beat, wall_minus_monotonic_s: float) -> list[Fault]:
-        found = self._watch_beat(beat)
+    def update(self, tick: Tick, wall_minus_monotonic_s: float) -> list[Fault]:
+        found = self._watch_beat(tick)
         before_s, self._distance_s = self._distance_s, wall_minus_monotonic_s
         if before_s is not None and abs(wall_minus_monotonic_s - before_s) > STEP_S:
             step_s = wall_minus_monotonic_s - before_s
             found.append(make_fault("clock_step", "", f"The clock on the wall was set by {step_s:+.1f} s."))
         return found
 
-    def _watch_beat(self, beat: Beat) -> list[Fault]:
+    def _watch_beat(self, tick: Tick) -> list[Fault]:
         found: list[Fault] = []
-        missed_s = beat.missed * PERIOD_S
+        missed_s = tick.missed * PERIOD_S
         if missed_s > self._bounds.silence_s:
-            found.append(make_fault("loop_stalled", "", f"The loop stood still for {1e3 * beat.late_s:.0f} ms."))
+            found.append(make_fault("loop_stalled", "", f"The loop stood still for {1e3 * tick.late_s:.0f} ms."))
         elif missed_s > self._bounds.lag_s:
-            found.append(make_fault("loop_lagging", "", f"The loop missed {beat.missed} ticks in a row."))
-        elif beat.missed:
-            found.append(make_fault("loop_overrun", "", f"The loop missed {beat.missed} of its ticks."))
-        self._stamps_s.append(beat.now_s)
+            found.append(make_fault("loop_lagging", "", f"The loop missed {tick.missed} ticks in a row."))
+        elif tick.missed:
+            found.append(make_fault("loop_overrun", "", f"The loop missed {tick.missed} of its ticks."))
+        self._stamps_s.append(tick.now_s)
         if len(self._stamps_s) > CRAWL_TICKS:
-            mean_s = (beat.now_s - self._stamps_s[-1 - CRAWL_TICKS]) / CRAWL_TICKS
+            mean_s = (tick.now_s - self._stamps_s[-1 - CRAWL_TICKS]) / CRAWL_TICKS
             if mean_s > self._bounds.crawl_s:
                 found.append(make_fault("loop_crawling", "", f"The loop's ticks take {1e3 * mean_s:.0f} ms."))
         if len(self._stamps_s) > MEAN_TICKS:
-            share = (beat.now_s - self._stamps_s[0]) / (MEAN_TICKS * PERIOD_S) - 1.0
-            if share > self._bounds.lag_share:
-                found.append(make_fault("loop_lagging", "", f"The loop's ticks take {100.0 * share:.0f} % too long."))
+            fraction = (tick.now_s - self._stamps_s[0]) / (MEAN_TICKS * PERIOD_S) - 1.0
+            if fraction > self._bounds.lag_fraction:
+                found.append(
+                    make_fault("loop_lagging", "", f"The loop's ticks take {100.0 * fraction:.0f} % too long.")
+                )
         return found

@@ -24,11 +24,11 @@ class Histogram:
         if duration_us > self.max_us:
             self.max_us = duration_us
 
-    def percentile_us(self, share: float) -> float:
+    def percentile_us(self, fraction: float) -> float:
         """The duration that `share` of all did not exceed, rounded up to a microsecond."""
         if self.count == 0:
             return 0.0
-        wanted, seen = share * self.count, 0
+        wanted, seen = fraction * self.count, 0
         for place, count in enumerate(self._counts):
             seen += count
             if count and seen >= wanted:

@@ -71,20 +71,20 @@ class MudLearning:
 
     def step(self, controller: Controller) -> tuple[list[ClosedStride], list[str]]:
         """What this tick changes in the gait: the strides that closed, and sentences for the log."""
-        closed, sentences = self._close(controller) if self.reading.strides else ([], [])
+        closed, messages = self._close(controller) if self.reading.strides else ([], [])
         if self._is_firm(controller) and controller.gait.end_insertion():
-            sentences.append(f"insertion ended at {controller.gait.commanded_depth_m:.4f} m: firm mud")
-        return closed, sentences
+            messages.append(f"insertion ended at {controller.gait.commanded_depth_m:.4f} m: firm mud")
+        return closed, messages
 
     def _close(self, controller: Controller) -> tuple[list[ClosedStride], list[str]]:
-        sentences = ["another mud"] if self.estimator.belief.boundary else []
-        sentences += self._choose(controller)
+        messages = ["another mud"] if self.estimator.mud_estimate.boundary else []
+        messages += self._choose(controller)
         depth_m = controller.gait.next_depth_m
         first = self.strides_closed
         closed = [ClosedStride(first + i, estimate, depth_m) for i, estimate in enumerate(self.reading.strides)]
         self.strides_closed += len(closed)
         self.strides = (self.strides + closed)[-KEPT_STRIDES:]
-        return closed, sentences
+        return closed, messages
 
     def _choose(self, controller: Controller) -> list[str]:
         """The depth of the next stride, and its gait where the method chooses that as well."""
@@ -92,7 +92,7 @@ class MudLearning:
         if not order.adaptive:
             gait.next_depth_m = order.depth_m
             return []
-        choice = self.adaptation.step(self.estimator.belief, self.reading.strides, gait.commanded_depth_m)
+        choice = self.adaptation.step(self.estimator.mud_estimate, self.reading.strides, gait.commanded_depth_m)
         parameters = choice.gait or gait.parameters
         changes = (choice.depth_m, parameters) != (gait.next_depth_m, gait.next_parameters)
         gait.next_depth_m, gait.next_parameters = choice.depth_m, parameters

@@ -15,7 +15,7 @@ RATE_HZ = 380.0  # the rate at which the paper's robot logged and controlled
 PERIOD_S = 1.0 / RATE_HZ
 
 
-class Beat(NamedTuple):
+class Tick(NamedTuple):
     now_s: float
     late_s: float  # after the deadline that was waited for
     number: int  # of the deadline, missed ones included
@@ -39,7 +39,7 @@ class Ticker:
         self._start_s = self._clock()
         self._number = 0
 
-    def wait(self) -> Beat:
+    def wait(self) -> Tick:
         self._number += 1
         deadline_s = self._start_s + self._number * self.period_s
         now_s = self._clock()
@@ -49,4 +49,4 @@ class Ticker:
         late_s = now_s - deadline_s
         missed = int(late_s / self.period_s)
         self._number += missed
-        return Beat(now_s, late_s, self._number, missed)
+        return Tick(now_s, late_s, self._number, missed)

@@ -29,7 +29,7 @@ TICKS = 3000
 BUSES = 2
 WARM_UP_TICKS = 500
 CYCLIC = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)  # every 2 ms, so in each tick and every third once more
-TOLD = [Frame(codec.arbitration_id(node, message), bytes(8)) for message in CYCLIC for node in (0, 1)]
+REPORTED = [Frame(codec.arbitration_id(node, message), bytes(8)) for message in CYCLIC for node in (0, 1)]
 COMMANDS = [Frame(codec.arbitration_id(node, codec.SET_INPUT_TORQUE), bytes(4)) for node in (0, 1)]
 MORE_EVERY_TICKS = 3
 
@@ -78,8 +78,8 @@ class Path:
         self._far, near = open_pair()
         self._port: CanPort = kind(open_bus(near))
 
-    def tick_s(self, told: list[bytes]) -> float:
-        for encoded in told:
+    def tick_s(self, reported: list[bytes]) -> float:
+        for encoded in reported:
             self._far.send(encoded)
         start_s = perf_counter()
         frames = self._port.receive()
@@ -88,8 +88,8 @@ class Path:
         duration_s = perf_counter() - start_s
         for frame in COMMANDS:
             sent = decode_frame(self._far.recv(FRAME_LAYOUT.size))
-            if sent != frame or len(frames) != len(told):
-                raise RuntimeError(f"{sent} left and {len(frames)} frames of {len(told)} arrived")
+            if sent != frame or len(frames) != len(reported):
+                raise RuntimeError(f"{sent} left and {len(frames)} frames of {len(reported)} arrived")
         return duration_s
 
     def close(self) -> None:
@@ -101,11 +101,11 @@ def compare_paths(ticks: int = TICKS) -> dict[str, Any]:
     """Medians of a tick's reads and sends on all buses, and their ratio."""
     paths = {"python_can": Path(PythonCanPort), "own": Path(SocketcanPort)}
     durations_s: dict[str, list[float]] = {name: [] for name in paths}
-    encoded = [encode_frame(frame) for frame in TOLD]
+    encoded = [encode_frame(frame) for frame in REPORTED]
     for tick in range(-WARM_UP_TICKS, ticks):
-        told = encoded + encoded * (tick % MORE_EVERY_TICKS == 0)
+        reported = encoded + encoded * (tick % MORE_EVERY_TICKS == 0)
         for name, path in paths.items():
-            duration_s = path.tick_s(told)
+            duration_s = path.tick_s(reported)
             if tick >= 0:
                 durations_s[name].append(BUSES * duration_s)
     for path in paths.values():

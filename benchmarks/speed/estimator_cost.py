@@ -129,12 +129,12 @@ def measure_repeats(strides: int) -> dict[str, float]:
             again_us.append(1e6 * (perf_counter() - between_s) / len(again))
             new_us.append(1e6 * (between_s - start_s))
     repeats_us = (TICKS_PER_MESSAGE - 1) * median(again_us)
-    share = repeats_us / (repeats_us + median(new_us))
+    fraction = repeats_us / (repeats_us + median(new_us))
     return {
         "ticks_per_message": TICKS_PER_MESSAGE,
         "again_us": round(median(again_us), 3),
         "new_us": round(median(new_us), 3),
-        "share": round(share, 3),
+        "share": round(fraction, 3),
     }
 
 
@@ -224,14 +224,16 @@ def measure_fits(rounds: int, progress: Progress, done: float) -> dict[str, Any]
 def text_of(report: dict[str, Any]) -> str:
     repeats, memory = report["repeats"], report["memory"]
     again = f"a tick without a new message: {repeats['again_us']:.2f} us"
-    share = f"{repeats['share']:.0%} of the estimator's time where a message lasts {repeats['ticks_per_message']} ticks"
+    fraction = (
+        f"{repeats['share']:.0%} of the estimator's time where a message lasts {repeats['ticks_per_message']} ticks"
+    )
     peak = f"{memory['peak_bytes'] / 1024.0:.0f} KiB at most"
     return "\n".join(
         [
             table(_stride_rows(report["methods"])),
             "",
             f"keeping a sample for the fit (Stroke.update): {report['stroke_us']:.2f} us of it",
-            f"{again}; {share}",
+            f"{again}; {fraction}",
             f"memory over {memory['strides']} strides: {memory['growth_bytes']:+d} bytes, {peak}",
             "",
             table(fit_rows(report["fits"], report["samples"])),

@@ -38,7 +38,7 @@ from firmware_host.loop import Loop
 from firmware_host.loop_timing import Histogram
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.status_socket import StatusSocket
-from firmware_host.ticker import PERIOD_S, Beat, Ticker
+from firmware_host.ticker import PERIOD_S, Tick, Ticker
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.peer import end_with_parent
 
@@ -48,7 +48,7 @@ SETTLING_S = 2.0  # of walking, until the first stride has begun
 LONGEST_STEP_S = 15.0  # for the robot's process to start, or for a mode to come about
 TIMER_ABSTIME = 1
 PYTHON_SWITCH_INTERVAL_S = 0.005  # Python's own
-SHARES = {"p50": 0.50, "p99": 0.99, "p99.9": 0.999}
+FRACTIONS = {"p50": 0.50, "p99": 0.99, "p99.9": 0.999}
 
 
 class Timespec(ctypes.Structure):
@@ -71,7 +71,7 @@ class Punctuality:
         return {
             "beats": self.late.count,
             "missed": self.missed,
-            "late_us": {name: self.late.percentile_us(share) for name, share in SHARES.items()}
+            "late_us": {name: self.late.percentile_us(fraction) for name, fraction in FRACTIONS.items()}
             | {"max": round(self.late.max_us, 1)},
         }
 
@@ -119,23 +119,23 @@ class DaemonLoop:
         self._watchdog, self._shutdown = WatchdogFeed(SystemdNotifier("")), Shutdown()
         self.faults = 0
 
-    def beat(self, ticker: Ticker) -> Beat:
+    def tick(self, ticker: Ticker) -> Tick:
         """As in firmware_host.daemon."""
-        beat = ticker.wait()
-        self.loop.tick(beat)
-        self._status.serve(beat.now_s)
-        self._watchdog.update(beat, self.loop.mode)
-        self._shutdown.step(self.loop, beat.now_s)
-        return beat
+        tick = ticker.wait()
+        self.loop.tick(tick)
+        self._status.serve(tick.now_s)
+        self._watchdog.update(tick, self.loop.mode)
+        self._shutdown.step(self.loop, tick.now_s)
+        return tick
 
     def run(self, seconds: float, punctuality: Punctuality) -> None:
         """Raises RuntimeError where the robot does not arm."""
         self._begin_walk()
         ticker, end_s = Ticker(), time.monotonic() + seconds
-        beat = self.beat(ticker)
-        while beat.now_s < end_s:
-            beat = self.beat(ticker)
-            punctuality.add(beat.late_s, beat.missed, time.monotonic() - beat.now_s)
+        tick = self.tick(ticker)
+        while tick.now_s < end_s:
+            tick = self.tick(ticker)
+            punctuality.add(tick.late_s, tick.missed, time.monotonic() - tick.now_s)
         self.faults += self.loop.mode is not Mode.WALKING
         self.loop.request(Request.DISARM, time.monotonic())
         self._run_until(lambda: not any(state.closed_loop for state in self.loop.states))
@@ -155,7 +155,7 @@ class DaemonLoop:
     def _run_until(self, done: Callable[[], bool]) -> None:
         ticker, deadline_s = Ticker(), time.monotonic() + LONGEST_STEP_S
         while not done():
-            if self.beat(ticker).now_s > deadline_s:
+            if self.tick(ticker).now_s > deadline_s:
                 raise RuntimeError(f"the simulated robot is {self.loop.mode.name.lower()}: {self.loop.fault}")
 
 
@@ -223,7 +223,10 @@ def measure(seconds: float) -> dict[str, Any]:
 
 
 def ratios(real: dict[str, Any], bare: dict[str, Any]) -> dict[str, float]:
-    return {share: round(real["late_us"][share] / max(1.0, bare["late_us"][share]), 2) for share in ("p50", "p99")}
+    return {
+        fraction: round(real["late_us"][fraction] / max(1.0, bare["late_us"][fraction]), 2)
+        for fraction in ("p50", "p99")
+    }
 
 
 def text_of(report: dict[str, Any]) -> str:
@@ -246,7 +249,7 @@ def text_of(report: dict[str, Any]) -> str:
 
 def _row(name: str, figures: dict[str, Any]) -> list[str]:
     late = figures["late_us"]
-    return [name, *(f"{late[key]:.0f}" for key in (*SHARES, "max")), str(figures["beats"]), str(figures["missed"])]
+    return [name, *(f"{late[key]:.0f}" for key in (*FRACTIONS, "max")), str(figures["beats"]), str(figures["missed"])]
 
 
 def new_options(arguments: Sequence[str] | None) -> argparse.Namespace:

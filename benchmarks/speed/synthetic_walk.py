@@ -13,7 +13,7 @@ from typing import NamedTuple
 from control.gait.gait import Gait, GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
-from control.plate import crossing, stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.plate import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import Phase
 from estimation.joint_load import FlipperDrive, JointSample
 from firmware_host.ticker import PERIOD_S
@@ -59,7 +59,7 @@ def mud_torques_nm(sample: Sample) -> tuple[float, float]:
     plate = submerged_plate(GEOMETRY, sweep_rad, adduction_rad, SURFACE_M)
     if sample.phase is Phase.STANCE:
         sweep_nm = K_S * stance_moment_m4(GEOMETRY, plate)
-        return sweep_nm, crossing(GEOMETRY, plate, sweep_rad) * sweep_nm
+        return sweep_nm, cross_coupling(GEOMETRY, plate, sweep_rad) * sweep_nm
     k = {Phase.INSERTION: K_P, Phase.EXTRACTION: -K_E}.get(sample.phase, 0.0)
     return 0.0, k * stroke_moment_m4(GEOMETRY, plate, sweep_rad)
 

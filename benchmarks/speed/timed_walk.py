@@ -20,7 +20,7 @@ from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder, Recording
 from firmware_host.loop import Loop
-from firmware_host.ticker import PERIOD_S, RATE_HZ, Beat
+from firmware_host.ticker import PERIOD_S, RATE_HZ, Tick
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
 from simulation.harness.robot import SimulatedRobot
 from simulation.mud.track import paper_track
@@ -123,9 +123,9 @@ class TimedWalk:
         walk = self.walk
         walk.tick_number += 1
         walk.robot.advance(walk.now_s)
-        beat, closed_before = Beat(walk.now_s, 0.0, walk.tick_number, 0), walk.loop.learning.strides_closed
+        tick, closed_before = Tick(walk.now_s, 0.0, walk.tick_number, 0), walk.loop.learning.strides_closed
         start_s = perf_counter()
-        walk.loop.tick(beat)
+        walk.loop.tick(tick)
         return perf_counter() - start_s, walk.loop.learning.strides_closed > closed_before
 
     def _marked_tick(self) -> tuple[dict[str, float], bool]:

@@ -30,18 +30,18 @@ from drivers.odrive.codec import arbitration_id
 from drivers.odrive.drives import OdriveDrives
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.ticker import Beat
+from firmware_host.ticker import Tick
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 
 FRAMES_PER_TICK = 40  # three times what four drives send
 BABBLE_FRAMES = 400
-BABBLE_SHARE = 0.001
+BABBLE_FRACTION = 0.001
 BAR_KIB = 1024.0
-WARM_UP_SHARE = 0.1  # of the frames, before memory is looked at first
+WARM_UP_FRACTION = 0.1  # of the frames, before memory is looked at first
 NUMBERS = [float("nan"), float("inf"), float("-inf"), 0.0, -0.0, 1e38, -3.4e38, 1e-45, 0.5]
-TOLD = [
+REPORTED = [
     (codec.GET_ENCODER_ESTIMATES, (0.1, 0.0)),
     (codec.GET_IQ, (0.0, 0.5)),
     (codec.HEARTBEAT, (0, 1, 0, 0)),
@@ -55,7 +55,9 @@ ZERO_TORQUES = {bytes(4), bytes.fromhex("00000080")}
 
 def true_frames(node_ids: list[int]) -> list[Frame]:
     frames = [
-        Frame(arbitration_id(node, message), message.encode(*values)) for node in node_ids for message, values in TOLD
+        Frame(arbitration_id(node, message), message.encode(*values))
+        for node in node_ids
+        for message, values in REPORTED
     ]
     setting = codec.TX_SDO.encode(0, 1, 0) + codec.SDO_FLOAT.pack(0.1)
     return frames + [Frame(arbitration_id(node, codec.TX_SDO), setting) for node in node_ids]
@@ -76,7 +78,7 @@ class FrameSource:
             frame = random.choice(makers)(random.choice(self._true))
             if frame.arbitration_id == self._without:
                 continue
-            copies = BABBLE_FRAMES if random.random() < BABBLE_SHARE else 1
+            copies = BABBLE_FRAMES if random.random() < BABBLE_FRACTION else 1
             for _ in range(copies):
                 yield frame
 
@@ -117,7 +119,7 @@ class Fuzzing:
     readings_kib: list[float] = field(default_factory=list)
     left_mode: int = 0  # ticks in another mode than the one asked for
 
-    def heed_sent(self, frames: list[Frame]) -> None:
+    def on_sent(self, frames: list[Frame]) -> None:
         self.left += len(frames)
         for frame in frames:
             if is_forbidden(frame) and len(self.forbidden) < 10:
@@ -191,7 +193,7 @@ def step(walk: Lockstep, mode: Mode) -> None:
         walk.step()
         return
     walk.tick_number += 1
-    walk.loop.tick(Beat(walk.now_s, 0.0, walk.tick_number, 0))
+    walk.loop.tick(Tick(walk.now_s, 0.0, walk.tick_number, 0))
 
 
 def node_ids(configuration: Configuration) -> list[int]:
@@ -215,25 +217,25 @@ def feed(source: Iterator[Frame], far: dict[str, MockPort], fuzzing: Fuzzing) ->
 def look(fuzzing: Fuzzing, far: dict[str, MockPort], number: int, ticks: int) -> None:
     """At what left, and ten times at the memory."""
     for port in far.values():
-        fuzzing.heed_sent([frame for frame in port.receive() if is_ours(frame)])
-    if number >= WARM_UP_SHARE * ticks and number % max(1, ticks // 10) == 0:
+        fuzzing.on_sent([frame for frame in port.receive() if is_ours(frame)])
+    if number >= WARM_UP_FRACTION * ticks and number % max(1, ticks // 10) == 0:
         fuzzing.readings_kib.append(resident_kib())
 
 
 def is_ours(frame: Frame) -> bool:
     """The simulated drives speak on the same bus: theirs are answers and cyclic messages."""
-    told = {message.command for message, _ in TOLD} | {codec.TX_SDO.command}
-    return frame.is_remote or frame.arbitration_id & 0x1F not in told
+    reported = {message.command for message, _ in REPORTED} | {codec.TX_SDO.command}
+    return frame.is_remote or frame.arbitration_id & 0x1F not in reported
 
 
 def measure(frames: int, seed: int, progress: Progress) -> dict[str, Any]:
     configuration = load_example()
     freeze_garbage()
     parts: dict[str, dict[str, Any]] = {}
-    for place, (name, share, mode) in enumerate(
+    for place, (name, fraction, mode) in enumerate(
         (("drives", 0.5, None), ("boot", 0.25, Mode.BOOT), ("idle", 0.25, Mode.IDLE))
     ):
-        fuzzing, started_s, number = Fuzzing(), perf_counter(), round(share * frames)
+        fuzzing, started_s, number = Fuzzing(), perf_counter(), round(fraction * frames)
         if mode is None:
             fuzz_drives(configuration, number, fuzzing, progress, seed + place)
         else:

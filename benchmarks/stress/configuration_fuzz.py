@@ -34,8 +34,8 @@ from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 
 LONGEST_S, MOST_KIB = 1.0, 64.0 * 1024.0  # for one file
-LONGEST_SENTENCE = 1000
-IDLE_TICKS, HOLD_S, WALK_S, ARMED_SHARE = 60, 0.2, 0.8, 10
+LONGEST_MESSAGE = 1000
+IDLE_TICKS, HOLD_S, WALK_S, ARMED_FRACTION = 60, 0.2, 0.8, 10
 TRACK = Track([(1.0, MUDS["48.5"])])
 
 
@@ -64,7 +64,7 @@ def fuzz(count: int, seed: int, folder: Path, progress: Progress) -> Fuzzing:
         read = load(odd, path, found)
         if read is not None:
             found.accepted[odd.kind] += 1
-            try_out(odd, read, sum(found.accepted.values()) % ARMED_SHARE == 0, found)
+            try_out(odd, read, sum(found.accepted.values()) % ARMED_FRACTION == 0, found)
         progress.show(number, "files")
     return found
 
@@ -79,7 +79,7 @@ def load(odd: OddFile, path: Path, found: Fuzzing) -> Configuration | World | No
             load_rights(read.status)
     except ConfigurationError as problem:
         read = None
-        judge(odd, problem.problems, found)
+        evaluate(odd, problem.problems, found)
     except Exception as problem:  # noqa: BLE001  that none comes is what is measured
         read = None
         found.note(odd, f"{type(problem).__name__}: {problem}")
@@ -102,18 +102,18 @@ def _measure(odd: OddFile, duration_s: float, memory_kib: float, found: Fuzzing)
         found.note(odd, f"took {duration_s:.1f} s and {memory_kib:.0f} KiB")
 
 
-def judge(odd: OddFile, problems: list[str], found: Fuzzing) -> None:
+def evaluate(odd: OddFile, problems: list[str], found: Fuzzing) -> None:
     """A refusal in sentences, of which one names what is wrong."""
     if not problems or not all(isinstance(problem, str) and problem for problem in problems):
         found.note(odd, f"refused without a sentence: {problems!r}")
     longest = max(map(len, problems), default=0)
-    if longest > LONGEST_SENTENCE:
+    if longest > LONGEST_MESSAGE:
         found.note(odd, f"a sentence of {longest} characters")
-    told = [problem for problem in problems if problem.startswith(odd.wrong_key[:80])]
-    if not told:
+    reported = [problem for problem in problems if problem.startswith(odd.wrong_key[:80])]
+    if not reported:
         found.note(odd, f"{odd.wrong_key} is not named: {problems[:3]}")
-    elif not any(odd.bound in problem for problem in told):
-        found.note(odd, f"{odd.wrong_key}: the bound {odd.bound} is not named: {told}")
+    elif not any(odd.bound in problem for problem in reported):
+        found.note(odd, f"{odd.wrong_key}: the bound {odd.bound} is not named: {reported}")
 
 
 def try_out(odd: OddFile, read: Configuration | World, armed: bool, found: Fuzzing) -> None:

@@ -31,7 +31,7 @@ from simulation.devices.odrive import OdriveParameters
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.peer import WATCHDOG_S
 
-TOLD_S = OdriveParameters(0).current_period_s
+REPORTED_S = OdriveParameters(0).current_period_s
 TOLERANCE_S = 0.01  # between the kill and the robot's reading of what was sent before it
 WINDOW_S = 4.0 * WATCHDOG_S  # of listening
 PHASES = ("insertion", "stance", "extraction", "swing", "hold")
@@ -50,7 +50,7 @@ class Listener:
         self.reset()
 
     def reset(self) -> None:
-        self.told = dict.fromkeys(JOINTS, 0)  # messages of current
+        self.reported = dict.fromkeys(JOINTS, 0)  # messages of current
         self.pushed = dict.fromkeys(JOINTS, 0)  # of these, until the last one that was not of zero
         self.closed_loop = dict.fromkeys(JOINTS, True)
 
@@ -59,21 +59,21 @@ class Listener:
             for frame in port.receive():
                 joint = self._joints.get((bus, frame.arbitration_id >> 5))
                 if joint is not None and not frame.is_remote:
-                    self._heed(joint, frame.arbitration_id & 0x1F, frame.data)
+                    self._handle(joint, frame.arbitration_id & 0x1F, frame.data)
 
-    def _heed(self, joint: str, command: int, data: bytes) -> None:
+    def _handle(self, joint: str, command: int, data: bytes) -> None:
         if command == codec.GET_IQ.command:
-            self.told[joint] += 1
+            self.reported[joint] += 1
             if codec.GET_IQ.decode(data)[0] != 0.0:
-                self.pushed[joint] = self.told[joint]
+                self.pushed[joint] = self.reported[joint]
         elif command == codec.HEARTBEAT.command:
             self.closed_loop[joint] = codec.HEARTBEAT.decode(data)[1] == codec.AxisState.CLOSED_LOOP
 
     def listen_for(self, drive_time_s: float) -> None:
         """By the drives' own messages."""
         deadline_s = time.monotonic() + LONGEST_WAIT_S
-        end = max(self.told.values()) + round(drive_time_s / TOLD_S)
-        while min(self.told.values()) < end and time.monotonic() < deadline_s:
+        end = max(self.reported.values()) + round(drive_time_s / REPORTED_S)
+        while min(self.reported.values()) < end and time.monotonic() < deadline_s:
             self.listen()
             time.sleep(0.005)
 
@@ -142,7 +142,7 @@ def kill_once(folder: Path, number: signal.Signals, phase: str) -> dict[str, Any
         listener.reset()
         session.daemon.send_signal(number)
         listener.listen_for(WINDOW_S)
-        pushed_s = TOLD_S * max(listener.pushed.values())
+        pushed_s = REPORTED_S * max(listener.pushed.values())
         idle = not any(listener.closed_loop.values())
         woken = number is signal.SIGSTOP and _moves_when_woken(session.daemon, listener)
     finally:

@@ -221,8 +221,8 @@ class OddConfigurations:
     def _huge(self, is_world: bool) -> OddFile:
         made = self._wrong(is_world, lambda place: place.bounds is not None, lambda place: ("HUGE", ""))
         number = self._chance.choice(HUGE_NUMBERS + UNREADABLE)
-        told = made.wrong_key if number not in UNREADABLE else ""
-        return made._replace(data=made.data.replace(b'"HUGE"', number.encode()), wrong_key=told)
+        reported = made.wrong_key if number not in UNREADABLE else ""
+        return made._replace(data=made.data.replace(b'"HUGE"', number.encode()), wrong_key=reported)
 
     def _garbled(self, is_world: bool) -> OddFile:
         data = bytearray(self._text(is_world).encode())

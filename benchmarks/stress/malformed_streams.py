@@ -67,8 +67,8 @@ class OddStreams:
         cuts = sorted(self._chance.randrange(len(data) + 1) for _ in range(self._chance.randint(1, 3)))
         return [data[low:high] for low, high in zip([0, *cuts], [*cuts, len(data)], strict=True)]
 
-    def choose(self, share: float) -> bool:
-        return self._chance.random() < share
+    def choose(self, fraction: float) -> bool:
+        return self._chance.random() < fraction
 
     def _requests(self, fewest: int, most: int) -> bytes:
         count = self._chance.randint(fewest, most)

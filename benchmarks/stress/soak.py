@@ -21,13 +21,13 @@ from benchmarks.stress.soaked_loop import soak_loop
 from command_line.screen import table
 
 BAR_KIB = 1024.0
-WARM_UP_SHARE = 0.2  # of the readings
+WARM_UP_FRACTION = 0.2  # of the readings
 SHOWN = 12  # readings in the table
 
 
-def judged(part: dict[str, Any]) -> dict[str, Any]:
+def evaluated(part: dict[str, Any]) -> dict[str, Any]:
     """With what grew after the warm-up, and whether the part is sound."""
-    after = part["readings"][int(WARM_UP_SHARE * len(part["readings"])) :]
+    after = part["readings"][int(WARM_UP_FRACTION * len(part["readings"])) :]
     growth_kib = after[-1]["resident_kib"] - after[0]["resident_kib"]
     left = {name: after[-1][name] - after[0][name] for name in ("descriptors", "threads", "writer_descriptors")}
     largest_log = max(reading["log_bytes"] for reading in part["readings"])
@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if seconds > 0.0:
                 progress, place = Progress(seconds), Path(folder) / name
                 place.mkdir()
-                parts[name] = judged(soak(seconds, options.seed, place, progress))
+                parts[name] = evaluated(soak(seconds, options.seed, place, progress))
                 progress.clear()
     reached = all(part["sound"] for part in parts.values())
     bar = f"growth below {BAR_KIB:.0f} KiB, nothing left behind, no row lost, logs within their quota"

@@ -24,7 +24,7 @@ from simulation.harness.local_setup import write_local_setup
 QUOTA_BYTES, SEGMENT_BYTES = 20_000_000, 4_000_000
 ASK_S = 0.1  # between two clients
 WISHES = 10  # clients to one that attends
-FAILURE_SHARE = 1.0 / 150.0  # of the clients, so every 15 s
+FAILURE_FRACTION = 1.0 / 150.0  # of the clients, so every 15 s
 LONGEST_START_S = 60.0
 PATIENCE_LOOKS = 5  # at a joint out of its range, before somebody moves it by hand
 READINGS = 40
@@ -79,7 +79,7 @@ class Client:
         self.ask(self.attendant.wish(self.report["mode"], blocked))
 
     def step(self, number: int) -> None:
-        if self.attendant.chance.random() < FAILURE_SHARE:
+        if self.attendant.chance.random() < FAILURE_FRACTION:
             self.ask(self.attendant.failure())
         elif number % WISHES == 0:
             self.attend()

@@ -42,7 +42,7 @@ from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, clay_of_water
 from simulation.mud.track import RandomStrength, Track
 
-LOG = LogParameters(segment_bytes=8_000_000, quota_bytes=40_000_000, min_free_share=0.0, rest_hz=0.0)
+LOG = LogParameters(segment_bytes=8_000_000, quota_bytes=40_000_000, min_free_fraction=0.0, rest_hz=0.0)
 WISH_TICKS = 190  # between two wishes of the attendant
 BY_HAND_TICKS = 1900  # between two looks for joints out of their range
 FAILURE_S = 15.0  # between two failures, on average
@@ -116,7 +116,7 @@ class SoakedLoop:
         self.lease = Lease()
         calls = OperatorCalls(self.robot.loop, self.recorder, [], self._now_s)
         self.socket = StatusSocket(folder / "s", {}, load_rights(configuration.status))
-        self.socket.methods = with_failures(calls.methods, failures, self.robot.loop.news.tell, self._now_s)
+        self.socket.methods = with_failures(calls.methods, failures, self.robot.loop.events.report, self._now_s)
         self.bugs: list[str] = []
         self.socket.report_bug = self.bugs.append
         self.visitors: list[Visitor] = []

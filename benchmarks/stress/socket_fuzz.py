@@ -45,7 +45,7 @@ LONGEST_WAIT_TICKS = 1 + MOST_CLIENTS
 LONGEST_BATCH_TICKS = 600
 SAMPLES = 100_000  # of durations that are kept
 RIGHTS = Rights(readers=Group("viewers", 70), operators=Group("pilots", 71), own_uid=1)
-WITNESS = Peer(400, 2000, frozenset({71}))
+REFERENCE = Peer(400, 2000, frozenset({71}))
 PEERS = (
     Peer(500, 1000, frozenset({71})),
     Peer(501, 1001, frozenset({70})),
@@ -62,7 +62,7 @@ class Bench:
         self.robot = Lockstep(load_example(), Track([(1000.0, MUDS["48.5"])]))
         lease = Lease()
         calls = OperatorCalls(self.robot.loop, NullRecorder(), [], lambda: self.now_s)
-        self._coming = [WITNESS]
+        self._coming = [REFERENCE]
         self.socket = StatusSocket(folder / "s", {}, RIGHTS, lambda connection: self._coming.pop(0))
         self.socket.methods = self._counted(calls.methods)
         self.socket.on_hang_up = lease.hang_up
@@ -74,7 +74,7 @@ class Bench:
         self.most_calls_a_tick = self.longest_wait_ticks = self._calls = 0
         self.durations_s = array("d", bytes(8 * SAMPLES))
         self.longest_s = 0.0
-        self.witness = self._connect()
+        self.reference = self._connect()
         self.tick()
 
     def _counted(self, methods: Methods) -> Methods:
@@ -112,7 +112,7 @@ class Bench:
             senders.append(Sender(self._connect(), self.streams.next_stream(), self.streams))
         for _ in range(count):
             self.tick()
-        self._ask_witness(senders)
+        self._ask_reference(senders)
         for _ in range(LONGEST_BATCH_TICKS):
             if all(sender.is_done() for sender in senders):
                 break
@@ -122,11 +122,11 @@ class Bench:
         while self.socket.counters["clients"] > 1:
             self.tick()
 
-    def _ask_witness(self, senders: list[Sender]) -> None:
+    def _ask_reference(self, senders: list[Sender]) -> None:
         """Amid what the others send."""
         for sender in senders:
             sender.send()
-        self.witness.send(msgpack.packb([0, 1, "status", {}]))
+        self.reference.send(msgpack.packb([0, 1, "status", {}]))
         answer, waited = msgpack.Unpacker(raw=False), 0
         while not any(True for _ in answer):
             self.tick()
@@ -134,7 +134,7 @@ class Bench:
             for sender in senders:
                 sender.send()
             with suppress(BlockingIOError):
-                answer.feed(self.witness.recv(65536))
+                answer.feed(self.reference.recv(65536))
             if waited > LONGEST_BATCH_TICKS:
                 raise RuntimeError("the witness is not answered any more")
         self.longest_wait_ticks = max(self.longest_wait_ticks, waited)
@@ -148,7 +148,7 @@ class Bench:
         sender.client.close()
 
     def close(self) -> None:
-        self.witness.close()
+        self.reference.close()
         self.socket.close()
 
 

@@ -26,7 +26,7 @@ from simulation.harness.world import load_world
 
 
 def demo(options: argparse.Namespace) -> int:
-    _heed_signals()
+    _on_signals()
     refused = _refuse(options)
     if refused is not None:
         return refused
@@ -45,7 +45,7 @@ def demo(options: argparse.Namespace) -> int:
     return exit_codes.OK
 
 
-def _heed_signals() -> None:
+def _on_signals() -> None:
     """They all end the demo as Ctrl-C does."""
     for number in ENDING_SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup wants it

@@ -19,15 +19,15 @@ LEAD_M = 0.06  # the flippers are in the mud about this far ahead of the body's 
 
 def summarise(report: dict[str, Any], demonstration: Demo, log: Log, log_path: Path, plot_path: Path) -> dict[str, Any]:
     track = demonstration.track
-    stamps_s, places_m = walked_path(log)
+    stamps_s, positions_m = walked_path(log)
     strides = []
     for stride in demonstration.strides:
-        start_m = float(np.interp(stride["t_start_s"], stamps_s, places_m)) if len(stamps_s) else 0.0
+        start_m = float(np.interp(stride["t_start_s"], stamps_s, positions_m)) if len(stamps_s) else 0.0
         strides.append(stride | {"mud": track.clay_at(start_m + LEAD_M).name})
     return {
         **report["loop"],
         "strides": strides,
-        "speed_cm_s": speeds_cm_s(stamps_s, places_m, track),
+        "speed_cm_s": speeds_cm_s(stamps_s, positions_m, track),
         "dropped_rows": report["log"]["dropped"],
         "warnings": report["warnings"],
         "log": str(log_path),
@@ -42,22 +42,22 @@ def walked_path(log: Log) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
 
 
 def speeds_cm_s(
-    stamps_s: np.ndarray[Any, Any], places_m: np.ndarray[Any, Any], track: Track
+    stamps_s: np.ndarray[Any, Any], positions_m: np.ndarray[Any, Any], track: Track
 ) -> dict[str, float | None]:
     """Mean speed between the first arrival in each mud and the first arrival in the next."""
     speeds: dict[str, float | None] = {}
-    start_m = float(places_m[0]) if len(places_m) else 0.0
+    start_m = float(positions_m[0]) if len(positions_m) else 0.0
     for segment in track.segments:
-        inside = np.flatnonzero(places_m >= start_m)
-        beyond = np.flatnonzero(places_m >= segment.end_m)
+        inside = np.flatnonzero(positions_m >= start_m)
+        beyond = np.flatnonzero(positions_m >= segment.end_m)
         first = int(inside[0]) if len(inside) else -1
-        last = int(beyond[0]) if len(beyond) else len(places_m) - 1
+        last = int(beyond[0]) if len(beyond) else len(positions_m) - 1
         name = segment.clay.name
         if name in speeds:  # the same mud once more
             name = f"{name} at {start_m:.2f} m"
         speeds[name] = None
         if 0 <= first < last:
-            distance_m, duration_s = places_m[last] - places_m[first], stamps_s[last] - stamps_s[first]
+            distance_m, duration_s = positions_m[last] - positions_m[first], stamps_s[last] - stamps_s[first]
             speeds[name] = round(100.0 * float(distance_m / duration_s), 2)
         start_m = segment.end_m
     return speeds

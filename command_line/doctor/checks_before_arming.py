@@ -30,7 +30,7 @@ def desk_check(path: Path, why_no_daemon: str) -> list[dict[str, Any]]:
     try:
         configuration = load_configuration(path)
     except ConfigurationError as problem:
-        return items + [check_item("configuration", False, sentence, f"edit {path}") for sentence in problem.problems]
+        return items + [check_item("configuration", False, message, f"edit {path}") for message in problem.problems]
     items.append(check_item("configuration", True, str(path), ""))
     return items + _drive_items(configuration) + _pose_items(configuration) + _host_items(configuration)
 
@@ -66,7 +66,7 @@ def _pose_items(configuration: Configuration) -> list[dict[str, Any]]:
     while not isfinite(pose.read(time.monotonic()).x_m) and time.monotonic() < deadline_s:
         time.sleep(0.01)
     pose.close()
-    return [check_item("pose", True, pose.report().sentence, "")]
+    return [check_item("pose", True, pose.report().message, "")]
 
 
 def _host_items(configuration: Configuration) -> list[dict[str, Any]]:

@@ -46,8 +46,8 @@ def doctor(options: argparse.Namespace) -> int:
     try:
         configuration = load_configuration(options.config)
     except ConfigurationError as problem:
-        sentences = [fail("configuration", sentence, f"edit {options.config}") for sentence in problem.problems]
-        return _show([*sentences, *this_python(), _clock()], options.json)
+        messages = [fail("configuration", message, f"edit {options.config}") for message in problem.problems]
+        return _show([*messages, *this_python(), _clock()], options.json)
     socket = options.socket or Path(configuration.status.socket)
     findings = [ok("configuration", str(options.config)), *examine_all(configuration, socket, read_links(ROOT))]
     return _show(findings, options.json)
@@ -132,7 +132,7 @@ def _groups(configuration: Configuration, socket: Path) -> Iterator[Finding]:
     try:
         load_rights(configuration.status)
     except ConfigurationError as problem:
-        yield from (fail("groups", sentence, "make the group, or leave the key out") for sentence in problem.problems)
+        yield from (fail("groups", message, "make the group, or leave the key out") for message in problem.problems)
         return
     name = configuration.status.drive_group or OURS
     try:

@@ -26,7 +26,7 @@ from firmware_host.configuration.configuration import Configuration, load_config
 from firmware_host.configuration.toml_records import read_text
 
 DEFAULT_JOINTS = ("right_adduction", "right_sweep")
-LARGEST_DOUBT = 0.02  # of a torque constant that is written
+LARGEST_UNCERTAINTY = 0.02  # of a torque constant that is written
 COPY = "mudskipper.toml"
 TRUTH = "The simulated motors themselves"
 WRITE, LEAVE = "y", ""
@@ -41,9 +41,9 @@ def _calibrate(options: argparse.Namespace, desk: Desk) -> Finding:
     try:
         target = _target(options, desk, bench) if options.apply else None
         plan = _plan(options, bench.configuration)
-        readings = bench.calibrate(plan, desk.folder, desk.person, desk.show)
+        readings = bench.calibrate(plan, desk.folder, desk.operator, desk.show)
     finally:
-        logs = bench.leave(desk.folder, desk.person)
+        logs = bench.leave(desk.folder, desk.operator)
     drives = bench.configuration.drive
     fits = [
         fit
@@ -57,8 +57,8 @@ def _calibrate(options: argparse.Namespace, desk: Desk) -> Finding:
         rows = truth_rows(fits)
         tables.append((TRUTH, rows))
         sections.append(Section(TRUTH, rows=rows))
-    told = [*_remarks(plan.joints, fits, omitted), *([applied] if applied else [])]
-    text = "\n\n".join([text_of_tables(tables), *(["\n".join(told)] if told else [])])
+    reported = [*_remarks(plan.joints, fits, omitted), *([applied] if applied else [])]
+    text = "\n\n".join([text_of_tables(tables), *(["\n".join(reported)] if reported else [])])
     report = report_of(plan, readings, fits) | {"applied": applied or None}
     return Finding(report, TITLE, sections, text, logs, status)
 
@@ -122,13 +122,13 @@ def _apply(path: Path, fits: Sequence[JointFit], desk: Desk) -> str:
     changes = {key: value for fit in fits for key, value in changes_of(fit).items()}
     for fit in fits:
         if not changes_of(fit):
-            doubt = 100.0 * fit.constant_error_nm_a / fit.constant_nm_a
-            desk.person.tell(f"{fit.joint}: k_t is known to {doubt:.1f} % only, and is not written.")
+            uncertainty = 100.0 * fit.constant_error_nm_a / fit.constant_nm_a
+            desk.operator.report(f"{fit.joint}: k_t is known to {uncertainty:.1f} % only, and is not written.")
     after = changed_text(before, changes)
     if after == before:
         return f"{path} needs no change"
-    desk.person.tell(difference(before, after, str(path)))
-    if desk.person.ask(f"Write this to {path}?", {WRITE: "write it", LEAVE: "leave it"}, lambda: None) != WRITE:
+    desk.operator.report(difference(before, after, str(path)))
+    if desk.operator.ask(f"Write this to {path}?", {WRITE: "write it", LEAVE: "leave it"}, lambda: None) != WRITE:
         return f"{path} was left as it is"
     backup = replace_file(path, before, after)
     return (
@@ -140,7 +140,7 @@ def _apply(path: Path, fits: Sequence[JointFit], desk: Desk) -> str:
 def changes_of(fit: JointFit) -> dict[tuple[str, ...], float]:
     """Of the configuration's keys; nothing where the constant is too doubtful."""
     constant_nm_a, error_nm_a = fit.constant_nm_a, fit.constant_error_nm_a
-    if not 0.0 < error_nm_a <= LARGEST_DOUBT * constant_nm_a:
+    if not 0.0 < error_nm_a <= LARGEST_UNCERTAINTY * constant_nm_a:
         return {}
     changes: dict[tuple[str, ...], float] = {
         ("drive", fit.joint, "torque_constant_nm_a"): round(constant_nm_a, 5),

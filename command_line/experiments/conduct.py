@@ -12,14 +12,14 @@ from typing import Any
 
 from command_line import exit_codes
 from command_line.screen import Progress, complain, plain
-from experiments.reports.report_page import Figure, Section, numbers_told, write_report
+from experiments.reports.report_page import Figure, Section, numbers_reported, write_report
 
 Report = dict[str, Any]
 Show = Callable[[int, int], None]
 
 
-def refuse(sentence: str) -> int:
-    complain(sentence)
+def refuse(message: str) -> int:
+    complain(message)
     return exit_codes.USAGE
 
 
@@ -38,7 +38,7 @@ def conduct(
     if options.out is not None:
         written = _write(options.out, report, text, plot)
         print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
-    print(json.dumps(numbers_told(report), allow_nan=False) if options.json else text)
+    print(json.dumps(numbers_reported(report), allow_nan=False) if options.json else text)
     return exit_codes.OK
 
 

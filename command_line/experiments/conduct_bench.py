@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from command_line import exit_codes
-from command_line.experiments.terminal_prompt import AbsentPersonError, TerminalPerson
+from command_line.experiments.terminal_prompt import AbsentOperatorError, TerminalPrompt
 from command_line.screen import Progress, complain
-from experiments.reports.report_page import Section, numbers_told, write_report
+from experiments.reports.report_page import Section, numbers_reported, write_report
 from experiments.robot.bench_errors import BarredError, BenchError, EndedError, GoneError
-from experiments.robot.prompt import Person, Willing
+from experiments.robot.prompt import Operator, Willing
 from experiments.trials.notebook import NotebookError, anything_measured
 from firmware_host.configuration.file_problems import why_not
 from firmware_host.configuration.toml_records import ConfigurationError
@@ -33,7 +33,7 @@ class Desk(NamedTuple):
     """What an experiment works with."""
 
     folder: Path  # exists
-    person: Person
+    operator: Operator
     show: Show  # how much is done, of how much
 
 
@@ -69,13 +69,13 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
         return _end(folder, str(problem), exit_codes.NO_DAEMON)
     except BarredError as problem:
         return _end(folder, str(problem), exit_codes.NOT_PERMITTED)
-    except (BenchError, EndedError, CallRefusedError, AbsentPersonError) as problem:
+    except (BenchError, EndedError, CallRefusedError, AbsentOperatorError) as problem:
         return _end(folder, str(problem), exit_codes.REFUSED)
     except KeyboardInterrupt:
         return _end(folder, "interrupted", exit_codes.INTERRUPTED)
     except OSError as problem:  # such as a full disk
         return _end(folder, why_not(problem, folder), exit_codes.UNHEALTHY)
-    print(json.dumps(numbers_told(report), allow_nan=False) if options.json else finding.text)
+    print(json.dumps(numbers_reported(report), allow_nan=False) if options.json else finding.text)
     print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
     return finding.status
 
@@ -83,18 +83,20 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
 def _run(options: argparse.Namespace, folder: Path, what: str, run: Callable[[Desk], Finding]) -> Finding:
     progress = Progress(what)
 
-    def tell(sentence: str) -> None:
+    def report(message: str) -> None:
         progress.clear()
-        print(sentence, file=sys.stderr, flush=True)
+        print(message, file=sys.stderr, flush=True)
 
     try:
-        return run(Desk(folder, Willing(tell) if options.simulated else TerminalPerson(progress.clear), progress.show))
+        return run(
+            Desk(folder, Willing(report) if options.simulated else TerminalPrompt(progress.clear), progress.show)
+        )
     finally:
         progress.clear()
 
 
-def _end(folder: Path, sentence: str, status: int) -> int:
-    complain(sentence)
+def _end(folder: Path, message: str, status: int) -> int:
+    complain(message)
     if anything_measured(folder):
         complain(f"what was measured is in {folder}: the same command goes on from there")
     return status

@@ -15,7 +15,7 @@ from experiments.estimation.evaluation import (
     SINGLE_WATERS,
     WALKING_WATERS,
     Plan,
-    judge,
+    evaluate,
     report_of,
     with_layers,
 )
@@ -30,7 +30,7 @@ def estimation(options: argparse.Namespace) -> int:
         plan = plan_of(options)
     except ValueError as problem:
         return refuse(str(problem))
-    return conduct(options, "trials", lambda show: report_of(plan, judge(plan, show)), text_of, _plot)
+    return conduct(options, "trials", lambda show: report_of(plan, evaluate(plan, show)), text_of, _plot)
 
 
 def _plot(report: dict[str, Any], path: Path) -> None:

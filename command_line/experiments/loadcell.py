@@ -124,10 +124,10 @@ def _found(
     notebook = Notebook(desk.folder, plan_of_notebook(plan.settings) | {"bench": bench_name})
     missing = [trial for trial in plan.list_trials() if trial.key not in notebook.entries]
     if notebook.begun:
-        desk.person.tell(f"{len(notebook.entries)} trials are in {desk.folder} already, {len(missing)} are left")
+        desk.operator.report(f"{len(notebook.entries)} trials are in {desk.folder} already, {len(missing)} are left")
         without = sum("file" in entry and "position" not in entry for entry in notebook.entries.values())
         if options.position is not None and without:
-            desk.person.tell(f"{without} of them have no position, and keep the depth that the force tells")
+            desk.operator.report(f"{without} of them have no position, and keep the depth that the force tells")
     described = {"bench": bench_name, "port": options.port, "baud": options.baud, "format": options.format}
     if missing:
         with ExitStack() as stack:
@@ -158,8 +158,8 @@ def _measured(
     encoder = None if settings is None else _open_encoder(settings)
     if encoder is not None:
         stack.callback(encoder.close)
-    recorder = CellRecorder(port, clock, desk.person.tell, encoder)
-    bench = TrialBench(recorder, stage_of(recorder), desk.person, notebook, desk.folder, desk.show)
+    recorder = CellRecorder(port, clock, desk.operator.report, encoder)
+    bench = TrialBench(recorder, stage_of(recorder), desk.operator, notebook, desk.folder, desk.show)
     measure(bench, plan, cell)
     return {
         "port": path,
@@ -169,11 +169,11 @@ def _measured(
         "garbled_lines": port.garbled_lines,
         "last_garbled": port.last_garbled,
         "calibration": port.calibration._asdict(),
-        "position": None if encoder is None or settings is None else _told_of(encoder, settings),
+        "position": None if encoder is None or settings is None else _reported_of(encoder, settings),
     }
 
 
-def _told_of(encoder: StageEncoder, settings: StageEncoderSettings) -> dict[str, Any]:
+def _reported_of(encoder: StageEncoder, settings: StageEncoderSettings) -> dict[str, Any]:
     counted = {"rate_hz": encoder.rate_hz, "garbled_lines": encoder.counts.garbled, "breaks": encoder.breaks}
     return asdict(settings) | {"counts": encoder.counts.believed} | counted
 
@@ -181,7 +181,7 @@ def _told_of(encoder: StageEncoder, settings: StageEncoderSettings) -> dict[str,
 def _real(
     options: argparse.Namespace, desk: Desk, plan: TrialPlan, stack: ExitStack
 ) -> tuple[str, BenchClock, StageOf]:
-    return options.port, WallClock(), lambda recorder: AttendedStage(plan.settings, desk.person, recorder.drain)
+    return options.port, WallClock(), lambda recorder: AttendedStage(plan.settings, desk.operator, recorder.drain)
 
 
 def _emulated(

@@ -38,9 +38,9 @@ def open_bench(
     """`kept`: what may not change where an experiment goes on; `words`: what a person is asked to prepare."""
     notebook = Notebook(desk.folder, kept)
     if options.simulated:
-        return Bench(*simulated(), desk.person, notebook)
+        return Bench(*simulated(), desk.operator, notebook)
     robot = DaemonRobot(options.socket)
-    return Bench(robot, PromptedBed(robot, desk.person, words), desk.person, notebook)
+    return Bench(robot, PromptedBed(robot, desk.operator, words), desk.operator, notebook)
 
 
 def make_trials(
@@ -53,7 +53,7 @@ def make_trials(
         configuration = bench.robot.configuration
         run()
     finally:
-        logs = leave(bench.robot, desk.person, desk.folder)
+        logs = leave(bench.robot, desk.operator, desk.folder)
     return configuration, measured_of(bench.notebook), logs
 
 

@@ -15,11 +15,11 @@ from collections.abc import Callable, Mapping
 LOOK_S = 0.1
 
 
-class AbsentPersonError(Exception):
+class AbsentOperatorError(Exception):
     """Nobody can be asked: the input has ended."""
 
 
-class TerminalPerson:
+class TerminalPrompt:
     """A Person. Questions go to standard error, so that data can be piped."""
 
     def __init__(self, make_room: Callable[[], None] = lambda: None) -> None:
@@ -32,7 +32,7 @@ class TerminalPerson:
             said = self._hear(f"{question}\n  [{offered}] ", meanwhile).lower()
             if said in answers:
                 return said
-            self.tell(f"{said!r} is none of the answers")
+            self.report(f"{said!r} is none of the answers")
 
     def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
         while True:
@@ -43,11 +43,11 @@ class TerminalPerson:
                 number = math.nan
             if low <= number <= high:
                 return number
-            self.tell(f"{said!r} is no number from {low:g} to {high:g}")
+            self.report(f"{said!r} is no number from {low:g} to {high:g}")
 
-    def tell(self, sentence: str) -> None:
+    def report(self, message: str) -> None:
         self._make_room()
-        print(sentence, file=sys.stderr, flush=True)
+        print(message, file=sys.stderr, flush=True)
 
     def _hear(self, prompt: str, meanwhile: Callable[[], None]) -> str:
         """One line. Raises AbsentPersonError where there will be none."""
@@ -59,5 +59,5 @@ class TerminalPerson:
             meanwhile()
         line = sys.stdin.readline()
         if not line:
-            raise AbsentPersonError("the input has ended, and a person has to be asked: run it on a terminal")
+            raise AbsentOperatorError("the input has ended, and a person has to be asked: run it on a terminal")
         return line.strip()

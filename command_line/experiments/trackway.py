@@ -71,10 +71,10 @@ def _walked(plan: trackway_trials.Plan, desk: Desk, socket: Path) -> Finding:
     notebook = Notebook(desk.folder, plan.kept)
     robot = DaemonRobot(socket)
     try:
-        report = trackway_trials.run(plan, AskedTrackway(robot, desk.person), notebook, desk.show)
+        report = trackway_trials.run(plan, AskedTrackway(robot, desk.operator), notebook, desk.show)
     finally:
-        logs = leave(robot, desk.person, desk.folder)
-    return _found(report, logs, walk_figures(first_walks(plan, notebook), desk.folder, desk.person))
+        logs = leave(robot, desk.operator, desk.folder)
+    return _found(report, logs, walk_figures(first_walks(plan, notebook), desk.folder, desk.operator))
 
 
 def _found(report: dict[str, Any], logs: Sequence[Path] = (), walks: Sequence[Figure] = ()) -> Finding:
@@ -152,8 +152,8 @@ def _speeds_text(report: dict[str, Any]) -> str:
         rows.append([rule, *(_plus_minus(row[mud], "") for mud in muds), number(over["mean"], 2)])
         rows.append(["  all strides", *(_plus_minus(row[mud], "_all") for mud in muds), number(over["mean_all"], 2)])
         if rule in report["paper"]:
-            told = fmean(each["mean"] for each in report["paper"][rule].values())
-            rows.append(["  paper", *(_paper_text(report, rule, mud) for mud in muds), number(told, 2)])
+            reported = fmean(each["mean"] for each in report["paper"][rule].values())
+            rows.append(["  paper", *(_paper_text(report, rule, mud) for mud in muds), number(reported, 2)])
     trials = counted(report["settings"]["seeds"], "trial")
     return f"Table I: speed after the second stride in each mud, mean ± sd of {trials}\n{table(rows)}"
 
@@ -164,12 +164,12 @@ def _plus_minus(cell: Mapping[str, Any], which: str) -> str:
 
 
 def _paper_text(report: dict[str, Any], rule: str, mud: str) -> str:
-    told = report["paper"][rule].get(mud)
-    if told is None:
+    reported = report["paper"][rule].get(mud)
+    if reported is None:
         return "-"
     inside = report["within_one_sd"].get(rule, {}).get(mud)
     verdict = "" if inside is None else (", ours within" if inside else ", ours outside")
-    return f"{told['mean']:.1f} ± {told['sd']:.1f}{verdict}"
+    return f"{reported['mean']:.1f} ± {reported['sd']:.1f}{verdict}"
 
 
 def _failures_text(report: dict[str, Any]) -> str:
@@ -220,10 +220,10 @@ def _sweep_head(method: str) -> str:
 def _sweep_cell(settled: Mapping[str, Any]) -> str:
     failed = sum(settled["failures"].values())
     fault = ", fault" if settled["faults"] else ""
-    share = settled["share_of_best"]
+    fraction = settled["share_of_best"]
     return (
         f"{number(settled['depth_cm'], 2)} cm  {settled['mean']:5.2f}  "
-        f"{'-' if share is None else f'{100.0 * share:3.0f} %'}  {failed}/{settled['strides']}{fault}"
+        f"{'-' if fraction is None else f'{100.0 * fraction:3.0f} %'}  {failed}/{settled['strides']}{fault}"
     )
 
 

@@ -204,9 +204,9 @@ def _users(root: Path) -> set[str]:
 
 def _load_manifest(root: Path) -> dict[str, str]:
     with suppress(ValueError):
-        told = json.loads(_text_of(root / MANIFEST))
-        if isinstance(told, dict):
-            return {str(place): str(digest) for place, digest in told.items()}
+        reported = json.loads(_text_of(root / MANIFEST))
+        if isinstance(reported, dict):
+            return {str(place): str(digest) for place, digest in reported.items()}
     return {}
 
 

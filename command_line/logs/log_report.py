@@ -14,13 +14,13 @@ from command_line import exit_codes
 from command_line.logs.recorded_walk import RecordedWalk, read_walk
 from command_line.pictures.stride_choice import choose_strides
 from command_line.screen import coefficient, complain, number, watched
-from experiments.reports.report_page import PAGE, Figure, Section, numbers_told, write_report
+from experiments.reports.report_page import PAGE, Figure, Section, numbers_reported, write_report
 from experiments.trials.whole_files import copy_whole
 from firmware_host.log_reading.log_reader import Log, LogError, Watch, begin_s, log_summary, read_logs
 from firmware_host.log_reading.replay import Replay, replay_files
 from firmware_host.operator.reports import map_report, stride_report
 
-EVENTS_TOLD = 200  # the last ones
+EVENTS_REPORTED = 200  # the last ones
 SINCE = "Times are since the log's begin."
 Report = dict[str, Any]
 
@@ -30,13 +30,13 @@ def log_report(options: argparse.Namespace) -> int:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with watched() as watch:
-            report, sections = _told(options.files, watch)
+            report, sections = _reported(options.files, watch)
     except LogError as problem:
         complain(str(problem))
         return exit_codes.UNHEALTHY
     logs = [_copy(path, folder) for path in options.files]
     written = write_report(folder, report, f"Log {options.files[0].name}", sections, logs)
-    print(json.dumps(numbers_told(report), allow_nan=False) if options.json else folder / PAGE)
+    print(json.dumps(numbers_reported(report), allow_nan=False) if options.json else folder / PAGE)
     print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
     return exit_codes.OK
 
@@ -53,7 +53,7 @@ def _copy(log: Path, folder: Path) -> Path:
     return copy
 
 
-def _told(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Section]]:
+def _reported(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Section]]:
     """Raises LogError."""
     ours = read_logs(files, watch) if files[0].suffix == ".mcap" else None
     replayed = replay_files(files, watch=watch)
@@ -141,7 +141,7 @@ def _in_cm(value_m: float | None) -> str:
 
 
 def _events_section(log: Log) -> Section:
-    told = log.events[-EVENTS_TOLD:]
-    before = f" The last {len(told)} of {len(log.events)}." if len(told) < len(log.events) else ""
-    rows = [["at (s)", ""], *([f"{event['stamp_s'] - begin_s(log):.2f}", event["text"]] for event in told)]
+    reported = log.events[-EVENTS_REPORTED:]
+    before = f" The last {len(reported)} of {len(log.events)}." if len(reported) < len(log.events) else ""
+    rows = [["at (s)", ""], *([f"{event['stamp_s'] - begin_s(log):.2f}", event["text"]] for event in reported)]
     return Section("Events", SINCE + before, rows=rows)

@@ -132,7 +132,7 @@ def _walk_of_log(log: Log, configuration: Configuration, rows: slice, until_s: f
     """Strides and events count up to the walk after, at `until_s`."""
     ticks, place = log.ticks[rows], len(FLIPPERS) - 1
     start_s = float(ticks["stamp_s"][0])
-    told = [stride for stride in log.strides if start_s <= stride["stamp_s"] < until_s]
+    reported = [stride for stride in log.strides if start_s <= stride["stamp_s"] < until_s]
     events = [event for event in log.events if start_s <= event["stamp_s"] < until_s]
     summary = log_summary(log)
     return RecordedWalk(
@@ -149,7 +149,7 @@ def _walk_of_log(log: Log, configuration: Configuration, rows: slice, until_s: f
         force_x_n=ticks["force_x_n"][:, place],
         force_z_n=ticks["force_z_n"][:, place],
         body_x_m=ticks["body_x_m"],
-        strides=[_since(start_s, stride) for stride in told],
+        strides=[_since(start_s, stride) for stride in reported],
         noticed_s=[event["stamp_s"] - start_s for event in events if event["text"] == ANOTHER_MUD],
     )
 
@@ -174,10 +174,10 @@ def _read_lab(lab: LabLog, flipper: str) -> _LabReading:
     columns = (lab.stamp_s, lab.phase, lab.angle_rad, lab.current_a, lab.body_x_m)
     rows = zip(*(column.tolist() for column in columns), strict=True)
     for now_s, phase, angles_rad, currents_a, body_x_m in rows:
-        told = estimator.update(now_s, PHASES[phase], angles_rad, NO_VELOCITY, currents_a, body_x_m)
-        reading.loads.append(told.left if flipper == FLIPPERS[0] else told.right)
-        reading.strides.extend(stride for stride in told.strides if stride.flipper in lab.flippers)
-        if told.strides and estimator.belief.boundary:
+        reported = estimator.update(now_s, PHASES[phase], angles_rad, NO_VELOCITY, currents_a, body_x_m)
+        reading.loads.append(reported.left if flipper == FLIPPERS[0] else reported.right)
+        reading.strides.extend(stride for stride in reported.strides if stride.flipper in lab.flippers)
+        if reported.strides and estimator.mud_estimate.boundary:
             reading.noticed_s.append(now_s)
     return reading
 

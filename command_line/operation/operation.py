@@ -122,8 +122,8 @@ def clear(options: Options) -> int:
                 print(report["mode"])
                 return exit_codes.OK
             time.sleep(0.05)
-        sentences = [fault["sentence"] for fault in stopping_faults(report)]
-        complain(f"the cause persists: {' '.join(sentences) or report['mode']}")
+        messages = [fault["sentence"] for fault in stopping_faults(report)]
+        complain(f"the cause persists: {' '.join(messages) or report['mode']}")
         return exit_codes.REFUSED
 
     return with_daemon(options, act)

@@ -23,7 +23,7 @@ def prepare(panel: Axes, left_m: float, right_m: float, deepest_m: float, highes
     panel.plot([left_m, right_m], [0.0, 0.0], color=SURFACE, linewidth=1.4)
 
 
-def body_place_m(walk: RecordedWalk, row: int) -> float:
+def body_position_m(walk: RecordedWalk, row: int) -> float:
     """On the line between two known places where it was not measured, and zero where it never was."""
     if np.isfinite(walk.body_x_m[row]):
         return float(walk.body_x_m[row])
@@ -34,7 +34,7 @@ def body_place_m(walk: RecordedWalk, row: int) -> float:
 def view_of(walk: RecordedWalk, row: int, origin_m: float) -> SideView:
     """`origin_m`: where the beginning of the track is drawn."""
     sweep_rad, adduction_rad = float(walk.sweep_angle_rad[row]), float(walk.adduction_angle_rad[row])
-    return view_from_side(walk.geometry, sweep_rad, adduction_rad, body_place_m(walk, row) + origin_m)
+    return view_from_side(walk.geometry, sweep_rad, adduction_rad, body_position_m(walk, row) + origin_m)
 
 
 def draw_robot(panel: Axes, walk: RecordedWalk, row: int, origin_m: float) -> None:

@@ -16,7 +16,7 @@ from control.records import Phase
 
 Stride = dict[str, Any]  # a row of log_rows.STRIDE
 
-FULL_SHARE = 0.5  # of the geometric step; below it a stride slips
+FULL_FRACTION = 0.5  # of the geometric step; below it a stride slips
 MOMENTS = (  # worth a picture: how they are called, the phase, and the share of it that has passed
     ("insertion", Phase.INSERTION, 0.0),
     ("insertion ends", Phase.INSERTION, 1.0),
@@ -46,7 +46,7 @@ def outcome_of(stride: Stride, geometric_step_m: float) -> Outcome:
         return Outcome.STUCK
     if np.isnan(stride["step_m"] - geometric_step_m):
         return Outcome.UNKNOWN
-    return Outcome.SLIPPING if stride["step_m"] < FULL_SHARE * geometric_step_m else Outcome.GOOD
+    return Outcome.SLIPPING if stride["step_m"] < FULL_FRACTION * geometric_step_m else Outcome.GOOD
 
 
 def choose_strides(walk: RecordedWalk) -> list[Stride]:
@@ -85,8 +85,8 @@ def moments_of(walk: RecordedWalk, stride: Stride) -> list[Moment]:
     """Those of MOMENTS that the stride has: a log may break off before the swing has ended."""
     rows = rows_of(walk, stride)
     phase, moments = walk.phase[rows.start : rows.stop], []
-    for caption, wanted, share in MOMENTS:
+    for caption, wanted, fraction in MOMENTS:
         inside = np.flatnonzero(phase == wanted)
         if len(inside):
-            moments.append(Moment(caption, rows.start + int(inside[round(share * (len(inside) - 1))])))
+            moments.append(Moment(caption, rows.start + int(inside[round(fraction * (len(inside) - 1))])))
     return moments

@@ -20,7 +20,7 @@ from PIL import Image  # noqa: E402 - comes with matplotlib
 
 from command_line.logs.recorded_walk import RecordedWalk  # noqa: E402
 from command_line.pictures.colours import FORCE, INK, OUTCOMES, SURFACE  # noqa: E402
-from command_line.pictures.robot_sketch import body_place_m, draw_robot, draw_trail, prepare, view_of  # noqa: E402
+from command_line.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare, view_of  # noqa: E402
 from command_line.pictures.stride_choice import Outcome, Stride, outcome_of, rows_of  # noqa: E402
 from control.records import Phase  # noqa: E402
 
@@ -103,17 +103,17 @@ def _force_n(walk: RecordedWalk, row: int) -> tuple[float, float]:
 
 
 def _draw_frame(panel: Axes, walk: RecordedWalk, stride: Stride, row: int) -> None:
-    place_m = body_place_m(walk, row)
-    prepare(panel, place_m - HALF_WIDTH_M, place_m + HALF_WIDTH_M, DEEPEST_M, HIGHEST_M)
-    _draw_marks(panel, place_m)
+    position_m = body_position_m(walk, row)
+    prepare(panel, position_m - HALF_WIDTH_M, position_m + HALF_WIDTH_M, DEEPEST_M, HIGHEST_M)
+    _draw_marks(panel, position_m)
     draw_robot(panel, walk, row, 0.0)
     draw_trail(panel, walk, range(rows_of(walk, stride).start, row + 1), 0.0)
     _draw_force(panel, walk, row)
     _draw_words(panel, walk, stride, row)
 
 
-def _draw_marks(panel: Axes, place_m: float) -> None:
-    first, last = ceil((place_m - HALF_WIDTH_M) / MARK_M), floor((place_m + HALF_WIDTH_M) / MARK_M)
+def _draw_marks(panel: Axes, position_m: float) -> None:
+    first, last = ceil((position_m - HALF_WIDTH_M) / MARK_M), floor((position_m + HALF_WIDTH_M) / MARK_M)
     for number in range(first, last + 1):
         panel.plot([number * MARK_M] * 2, [-DEEPEST_M, 0.012 - DEEPEST_M], color=SURFACE, linewidth=1.2)
         place = (number * MARK_M + 0.004, 0.003 - DEEPEST_M)

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure  # noqa: E402
 
 from command_line.logs.recorded_walk import RecordedWalk  # noqa: E402
 from command_line.pictures.colours import INK, OUTCOMES  # noqa: E402
-from command_line.pictures.robot_sketch import body_place_m, draw_robot, draw_trail, prepare  # noqa: E402
+from command_line.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare  # noqa: E402
 from command_line.pictures.stride_choice import MOMENTS, Outcome, Stride, moments_of, outcome_of, rows_of  # noqa: E402
 
 DEEPEST_M, HIGHEST_M = 0.106, 0.146  # of what a row shows, below and above the surface
@@ -59,29 +59,29 @@ def _write_captions(figure: Figure, captions: Sequence[str], width_m: float, hei
 def _farthest_m(walk: RecordedWalk, stride: Stride) -> float:
     """That the body gets in a stride."""
     rows = rows_of(walk, stride)
-    return max(body_place_m(walk, row) for row in rows) - body_place_m(walk, rows.start)
+    return max(body_position_m(walk, row) for row in rows) - body_position_m(walk, rows.start)
 
 
 def _draw_row(panel: Axes, walk: RecordedWalk, stride: Stride, captions: Sequence[str]) -> None:
     """Each moment under its caption."""
     first = rows_of(walk, stride).start
-    start_m = body_place_m(walk, first)
+    start_m = body_position_m(walk, first)
     _draw_title(panel, walk, stride)
     for caption, row in moments_of(walk, stride):
         begin_m = captions.index(caption) * APART_M
         draw_robot(panel, walk, row, begin_m - start_m)
         draw_trail(panel, walk, range(first, row + 1), begin_m - start_m)
         if np.all(np.isfinite(walk.body_x_m[[first, row]])):
-            _draw_advance(panel, begin_m, body_place_m(walk, row) - start_m)
+            _draw_advance(panel, begin_m, body_position_m(walk, row) - start_m)
 
 
 def _draw_title(panel: Axes, walk: RecordedWalk, stride: Stride) -> None:
     outcome, place = outcome_of(stride, walk.geometric_step_m), (0.018 - MARGIN_M, HIGHEST_M - 0.03)
     name = "stride" if outcome is Outcome.UNKNOWN else f"{outcome} stride"
-    told = f"number {stride['index']}, {100.0 * stride['depth_m']:.1f} cm deep, at {stride['t_start_s']:.1f} s"
+    reported = f"number {stride['index']}, {100.0 * stride['depth_m']:.1f} cm deep, at {stride['t_start_s']:.1f} s"
     title = panel.annotate(name, place, weight="bold", size=15, color=OUTCOMES[outcome])
     after: dict[str, Any] = {"xycoords": (title, "data"), "xytext": (10, 0), "textcoords": "offset points"}
-    panel.annotate(told, (1, place[1]), size=12, color=INK, **after)
+    panel.annotate(reported, (1, place[1]), size=12, color=INK, **after)
 
 
 def _draw_advance(panel: Axes, start_m: float, advance_m: float) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from command_line.logs.recorded_walk import RecordedWalk, numbered_walk
 from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure
-from experiments.robot.prompt import Person
+from experiments.robot.prompt import Operator
 from experiments.trackway.trials import LoggedTime
 from experiments.trials.log_span import cut
 from firmware_host.log.log_folder import first_path, run_files
@@ -21,7 +21,7 @@ CAPTION = (
 )
 
 
-def walk_figures(walks: Mapping[str, LoggedTime], folder: Path, person: Person) -> list[Figure]:
+def walk_figures(walks: Mapping[str, LoggedTime], folder: Path, operator: Operator) -> list[Figure]:
     """Of each walk whose log is there; of another one a person is told why there is none."""
     from command_line.pictures.walk_plot import plot_walk  # matplotlib takes its time
 
@@ -30,7 +30,7 @@ def walk_figures(walks: Mapping[str, LoggedTime], folder: Path, person: Person) 
         try:
             walk = logged_walk(folder, logged)
         except LogError as problem:
-            person.tell(f"{key} is not drawn: {problem}")
+            operator.report(f"{key} is not drawn: {problem}")
         else:
             figures.append(Figure(f"figure8_{file_name(key)}", CAPTION.format(key), partial(plot_walk, walk)))
     return figures

@@ -93,9 +93,9 @@ def mud_regions(walk: RecordedWalk, track: Track | None) -> list[MudRegion]:
     ]
 
 
-def _arrival_s(walk: RecordedWalk, place_m: float) -> float:
+def _arrival_s(walk: RecordedWalk, position_m: float) -> float:
     """At the end of the walk where it never came so far."""
-    beyond = np.flatnonzero(walk.body_x_m >= place_m)
+    beyond = np.flatnonzero(walk.body_x_m >= position_m)
     return float(walk.time_s[beyond[0] if len(beyond) else -1])
 
 
@@ -139,8 +139,8 @@ def _explain_coefficients(panel: Axes, walk: RecordedWalk) -> None:
 
 def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
     """Full dots are values, triangles lower bounds, hollow ones not valid; bars are two standard errors."""
-    told = [stride for stride in walk.strides if np.isfinite(stride[name])]
-    for stride in told:
+    reported = [stride for stride in walk.strides if np.isfinite(stride[name])]
+    for stride in reported:
         colour = FLIPPERS[NAMES[stride["flipper"]]]
         panel.errorbar(
             stride["stamp_s"],
@@ -153,7 +153,7 @@ def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
             markerfacecolor=colour if stride[f"{name}_valid"] else "white",
             label="_",
         )
-    largest = max((stride[name] / 1e6 for stride in told), default=0.0)
+    largest = max((stride[name] / 1e6 for stride in reported), default=0.0)
     panel.set_ylim(0.0, FULL_VIEW * largest if largest > 0.0 else 1.0)
     if name == COEFFICIENTS[0]:
         _explain_coefficients(panel, walk)

@@ -26,10 +26,10 @@ from typing import Annotated, Literal, NamedTuple, Protocol
 
 from control.bounds import Bounds
 from control.depth.forecast import GRID_M, DepthForecast
-from control.depth.step_model import BodyDrag, Grip, step_m
+from control.depth.step_model import BodyDrag, Traction, step_m
 from control.gait.gait import GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
-from control.mud_estimate import MudBelief
+from control.mud_estimate import MudEstimate
 from control.records import StrideEstimate
 
 Method = Literal["default", "paper", "gait"]
@@ -49,8 +49,10 @@ class AdaptationParameters:
     acceleration_s: Annotated[float, Bounds(0.01, 10.0)] = 0.1  # of method "paper"
     mobilisation_n_m: Annotated[float, Bounds(10.0, 1e5)] = 250.0  # of a flipper with its servo; logs: 300 to 700
     motor_force_n: Annotated[float, Bounds(0.1, 100.0)] = 6.25  # 0.75 N·m at 0.12 m
-    lifting_share: Annotated[float, Bounds(0.1, 1.0)] = 0.95  # of that torque, which the mud may take of an extraction
-    insertion_share: Annotated[float, Bounds(0.1, 10.0)] = 0.73  # of that torque, at which an insertion ends early
+    lifting_fraction: Annotated[float, Bounds(0.1, 1.0)] = (
+        0.95  # of that torque, which the mud may take of an extraction
+    )
+    insertion_fraction: Annotated[float, Bounds(0.1, 10.0)] = 0.73  # of that torque, at which an insertion ends early
     min_sweep_deg: Annotated[float, Bounds(1.0, 60.0)] = 30.0  # these three of method "gait"
     max_sweep_deg: Annotated[float, Bounds(1.0, 60.0)] = 50.0
     swing_duration_s: Annotated[float, Bounds(0.2, 10.0)] = 0.3
@@ -72,7 +74,7 @@ class Adaptation(Protocol):
 
     def reset(self, depth_m: float) -> None: ...
 
-    def step(self, belief: MudBelief, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice: ...
+    def step(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice: ...
 
 
 def depth_grid(parameters: AdaptationParameters, geometry: FlipperGeometry, gait: GaitParameters) -> tuple[float, ...]:
@@ -106,12 +108,12 @@ class DepthAdaptation:
         self.choice = DepthChoice(depth_m, False, "start")
         self.forecast.reset()
 
-    def step(self, belief: MudBelief, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
+    def step(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
         """From the strides that just closed, the depth that they were told, and the belief after them.
 
         Where nothing is known the depth stays.
         """
-        self.forecast.update(belief, strides, walked_m)
+        self.forecast.update(mud_estimate, strides, walked_m)
         stuck = any(not stride.released for stride in strides)
         speeds = self._speeds_m_s()
         if speeds:
@@ -124,10 +126,10 @@ class DepthAdaptation:
 
     @property
     def largest_insertion_nm(self) -> float:
-        return self.parameters.insertion_share * self.forecast.lifting_torque_nm
+        return self.parameters.insertion_fraction * self.forecast.lifting_torque_nm
 
     def _that_come_out(self) -> list[float]:
-        limit_nm = self.parameters.lifting_share * self.forecast.lifting_torque_nm
+        limit_nm = self.parameters.lifting_fraction * self.forecast.lifting_torque_nm
         return [z for z in self.grid_m if self.forecast.extraction_nm(z) < limit_nm]
 
     def _speeds_m_s(self) -> dict[float, float]:
@@ -138,8 +140,8 @@ class DepthAdaptation:
             thrust_n = self.forecast.thrust_n(depth_m)
             if thrust_n is None:
                 return {}
-            grip = Grip(thrust_n, stiffness_n_m)
-            speeds[depth_m] = step_m(self.gait, length_m, drag, grip, depth_m) / self._durations_s[depth_m]
+            traction = Traction(thrust_n, stiffness_n_m)
+            speeds[depth_m] = step_m(self.gait, length_m, drag, traction, depth_m) / self._durations_s[depth_m]
         return speeds
 
     def _fastest(self, speeds: dict[float, float], reason: str) -> DepthChoice:

@@ -24,18 +24,21 @@ from math import exp, inf, isfinite, log, radians
 
 from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
-from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudBelief
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
 from control.plate import stroke_moment_m4, submerged_plate
 from control.records import StrideEstimate
 
 SHEAR_RATIO = 0.55  # k_s over k_p before any mud told both
-RATIO_DOUBT = 0.2
+RATIO_UNCERTAINTY = 0.2
 SUCTION_RATIO = 1.0  # of the hardest moment's torque over k_p Φ, where k_e is not known
 LEARNING = 0.25  # weight of a new stride in what is learned from many
-SHARES = (0.2, 1.5)  # bounds of what can be learned of each
+FRACTIONS = (0.2, 1.5)  # bounds of what can be learned of each
 RATIOS = (0.2, 1.5)
-THRUST_DOUBT, SUCTION_DOUBT = 1.0, 2.0  # standard errors: a slip costs half a step, a stuck flipper the walk
-SAG_SHARE = 0.25  # of the deepest moment's, on average over the stance
+THRUST_UNCERTAINTY, SUCTION_UNCERTAINTY = (
+    1.0,
+    2.0,
+)  # standard errors: a slip costs half a step, a stuck flipper the walk
+SAG_FRACTION = 0.25  # of the deepest moment's, on average over the stance
 GRID_M = 0.0025  # depths that are told apart; the joints do not follow more finely in mud
 
 
@@ -52,27 +55,27 @@ class DepthForecast:
         self.reset()
 
     def reset(self) -> None:
-        self.shear_ratio, self.felt_share = SHEAR_RATIO, 1.0
-        self._shares_told = 0
-        self._belief = NOTHING_KNOWN
+        self.shear_ratio, self.felt_fraction = SHEAR_RATIO, 1.0
+        self._fractions_reported = 0
+        self._mud_estimate = NOTHING_KNOWN
         self._strides: Sequence[StrideEstimate] = ()
         self._stuck_m: dict[str, float] = {}
         self._sag_m = 0.0
         self._walked_m4: dict[str, float] = {}  # Φ of each flipper's last stride
 
-    def update(self, belief: MudBelief, strides: Sequence[StrideEstimate], walked_m: float) -> None:
+    def update(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> None:
         """The strides that just closed, one of each flipper, the depth they were told, and the belief after them."""
-        self._belief, self._strides = belief, strides
+        self._mud_estimate, self._strides = mud_estimate, strides
         sags_m = [stride.depth_m + stride.surface_m - walked_m for stride in strides]
-        self._sag_m = SAG_SHARE * max(0.0, min([sag_m for sag_m in sags_m if isfinite(sag_m)], default=0.0))
-        if belief.boundary:
+        self._sag_m = SAG_FRACTION * max(0.0, min([sag_m for sag_m in sags_m if isfinite(sag_m)], default=0.0))
+        if mud_estimate.boundary:
             self._stuck_m.clear()
         for stride in strides:
             surface_m = _known(stride.surface_m)
             self._walked_m4[stride.flipper] = self._lift_moment_m4(_known(stride.depth_m) + surface_m, surface_m)
             self._remember(stride)
-            self._learn_share(stride)
-        self._learn_ratio(belief)
+            self._learn_fraction(stride)
+        self._learn_ratio(mud_estimate)
 
     def _remember(self, stride: StrideEstimate) -> None:
         reached_m = max(_known(stride.depth_m), GRID_M)
@@ -82,20 +85,20 @@ class DepthForecast:
         elif reached_m > stuck_m - GRID_M / 2.0:
             del self._stuck_m[stride.flipper]
 
-    def _learn_share(self, stride: StrideEstimate) -> None:
+    def _learn_fraction(self, stride: StrideEstimate) -> None:
         """From an extraction that told k_e and was not held: there the motor's limit, not the mud, sets the torque."""
-        told = stride.k_e.valid and not stride.k_e.at_least and isfinite(stride.surface_m)
-        if not (stride.released and told and stride.depth_m > 0.0):
+        reported = stride.k_e.valid and not stride.k_e.at_least and isfinite(stride.surface_m)
+        if not (stride.released and reported and stride.depth_m > 0.0):
             return
         whole_nm = stride.k_e.value * self._walked_m4[stride.flipper]
         if whole_nm > 0.0 and stride.extraction_torque_nm > 0.0:
-            self._shares_told += 1
-            weight = max(LEARNING, 1.0 / self._shares_told)
-            share = stride.extraction_torque_nm / whole_nm
-            self.felt_share = _within(self.felt_share * (share / self.felt_share) ** weight, SHARES)
+            self._fractions_reported += 1
+            weight = max(LEARNING, 1.0 / self._fractions_reported)
+            fraction = stride.extraction_torque_nm / whole_nm
+            self.felt_fraction = _within(self.felt_fraction * (fraction / self.felt_fraction) ** weight, FRACTIONS)
 
-    def _learn_ratio(self, belief: MudBelief) -> None:
-        k_s, k_p = belief.k_s, belief.k_p
+    def _learn_ratio(self, mud_estimate: MudEstimate) -> None:
+        k_s, k_p = mud_estimate.k_s, mud_estimate.k_p
         if k_s is None or k_p is None or k_s.at_least or k_p.at_least:
             return
         pressed = k_p.at(k_s.depth_m)[0]
@@ -110,8 +113,8 @@ class DepthForecast:
     def thrust_n(self, commanded_m: float) -> float | None:
         """Of both flippers; None where nothing is known of what the mud bears."""
         depth_m = self.reached_m(commanded_m)
-        told = [self._thrust_n(stride, depth_m) for stride in self._strides]
-        known = [thrust_n for thrust_n in told if thrust_n is not None]
+        reported = [self._thrust_n(stride, depth_m) for stride in self._strides]
+        known = [thrust_n for thrust_n in reported if thrust_n is not None]
         return 2.0 * sum(known) / len(known) if known else None
 
     def _thrust_n(self, stride: StrideEstimate, depth_m: float) -> float | None:
@@ -126,18 +129,18 @@ class DepthForecast:
 
     def _shear(self, flipper: str, submerged_m: float) -> float | None:
         """k_s, less its doubt."""
-        belief = self._belief
-        k_s, k_p = belief.k_s or belief.of(flipper).k_s, belief.k_p or belief.of(flipper).k_p
-        told = None if k_s is None else _less(k_s, submerged_m)
+        mud_estimate = self._mud_estimate
+        k_s, k_p = mud_estimate.k_s or mud_estimate.of(flipper).k_s, mud_estimate.k_p or mud_estimate.of(flipper).k_p
+        reported = None if k_s is None else _less(k_s, submerged_m)
         if k_p is None or (k_s is not None and not k_s.at_least):
-            return told
-        felt = (1.0 - THRUST_DOUBT * RATIO_DOUBT) * self.shear_ratio * _less(k_p, submerged_m)
-        return felt if told is None else max(felt, told)
+            return reported
+        felt = (1.0 - THRUST_UNCERTAINTY * RATIO_UNCERTAINTY) * self.shear_ratio * _less(k_p, submerged_m)
+        return felt if reported is None else max(felt, reported)
 
     def shear_at(self, depth_m: float) -> float:
         """k_s of the body's own pad, as the mean of the flippers; 0 where it is not known."""
-        told = [self._shear(stride.flipper, depth_m) or 0.0 for stride in self._strides]
-        return sum(told) / len(told) if told and depth_m > 0.0 else 0.0
+        reported = [self._shear(stride.flipper, depth_m) or 0.0 for stride in self._strides]
+        return sum(reported) / len(reported) if reported and depth_m > 0.0 else 0.0
 
     def extraction_nm(self, commanded_m: float) -> float:
         """For the flipper that the mud holds harder."""
@@ -150,27 +153,27 @@ class DepthForecast:
         if submerged_m <= 0.0:
             return 0.0
         moment_m4 = self._lift_moment_m4(depth_m, surface_m)
-        told_nm = self._told_nm(stride, submerged_m, moment_m4)
+        reported_nm = self._reported_nm(stride, submerged_m, moment_m4)
         if stride.released and stride.extraction_torque_nm > 0.0 and stride.depth_m > 0.0:
-            told_nm = min(told_nm, self._proven_nm(stride, moment_m4))
+            reported_nm = min(reported_nm, self._proven_nm(stride, moment_m4))
         held_nm = self.lifting_torque_nm * submerged_m / self._stuck_m.get(stride.flipper, inf)
-        return max(told_nm, held_nm)
+        return max(reported_nm, held_nm)
 
     def _proven_nm(self, stride: StrideEstimate, moment_m4: float) -> float:
         """What it took, or would take deeper if k_e did not fall with depth, as it does."""
         walked_m4 = self._walked_m4[stride.flipper]
         return stride.extraction_torque_nm * max(1.0, moment_m4 / walked_m4) if walked_m4 > 0.0 else inf
 
-    def _told_nm(self, stride: StrideEstimate, submerged_m: float, moment_m4: float) -> float:
+    def _reported_nm(self, stride: StrideEstimate, submerged_m: float, moment_m4: float) -> float:
         """By k_e, or by k_p where that is not known; by neither, all that there is below where the flipper has been."""
-        flipper = self._belief.of(stride.flipper)
-        k_e, k_p = self._belief.k_e or flipper.k_e, self._belief.k_p or flipper.k_p
-        told_nm = self.felt_share * _more(k_e, submerged_m) * moment_m4 if k_e is not None else 0.0
+        flipper = self._mud_estimate.of(stride.flipper)
+        k_e, k_p = self._mud_estimate.k_e or flipper.k_e, self._mud_estimate.k_p or flipper.k_p
+        reported_nm = self.felt_fraction * _more(k_e, submerged_m) * moment_m4 if k_e is not None else 0.0
         if k_e is not None and not k_e.at_least:
-            return told_nm
+            return reported_nm
         if k_p is not None:
-            return max(told_nm, SUCTION_RATIO * _more(k_p, submerged_m) * moment_m4)
-        return self.lifting_torque_nm if submerged_m > _known(stride.depth_m) + GRID_M else told_nm
+            return max(reported_nm, SUCTION_RATIO * _more(k_p, submerged_m) * moment_m4)
+        return self.lifting_torque_nm if submerged_m > _known(stride.depth_m) + GRID_M else reported_nm
 
     def _lift_moment_m4(self, depth_m: float, surface_m: float) -> float:
         """Φ in the pose in which the flipper is pulled out; 0 where a fitted surface puts that out of reach."""
@@ -192,12 +195,12 @@ class DepthForecast:
 
 def _less(k: Coefficient, depth_m: float) -> float:
     value, std_error = k.at(depth_m)
-    return max(0.0, value - THRUST_DOUBT * std_error)
+    return max(0.0, value - THRUST_UNCERTAINTY * std_error)
 
 
 def _more(k: Coefficient, depth_m: float) -> float:
     value, std_error = k.at(depth_m)
-    return max(0.0, value) + SUCTION_DOUBT * std_error
+    return max(0.0, value) + SUCTION_UNCERTAINTY * std_error
 
 
 def _within(value: float, bounds: tuple[float, float]) -> float:

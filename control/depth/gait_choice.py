@@ -26,14 +26,14 @@ from typing import NamedTuple
 
 from control.depth.depth_choice import AdaptationParameters, DepthChoice, body_drag, depth_grid
 from control.depth.forecast import DepthForecast
-from control.depth.step_model import Grip, Motion, carried_m, motion_of
+from control.depth.step_model import Motion, Traction, carried_m, motion_of
 from control.gait.gait import GaitParameters, stride_duration_s, swing_duration_s
 from control.geometry import FlipperGeometry
-from control.mud_estimate import MudBelief
+from control.mud_estimate import MudEstimate
 from control.records import StrideEstimate
 
 SWEEP_STEP_DEG = 5.0  # 8 mm of step
-EASY_SHARE = 0.7  # of the lifting torque, under which an extraction leaves room for a wider sweep
+EASY_FRACTION = 0.7  # of the lifting torque, under which an extraction leaves room for a wider sweep
 WIDENING_DEG = 10.0  # from one stride to the next
 
 
@@ -102,28 +102,28 @@ class GaitAdaptation:
         self._stuck: list[Candidate] = []
         self.forecast.reset()
 
-    def step(self, belief: MudBelief, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
+    def step(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
         """From the strides that just closed, the depth that they were told, and the belief after them.
 
         Where nothing is known all stays.
         """
         self._walked = self._walked._replace(depth_m=walked_m)
         self.forecast.gait = self._walked.gait
-        self.forecast.update(belief, strides, walked_m)
+        self.forecast.update(mud_estimate, strides, walked_m)
         stuck = any(not stride.released for stride in strides)
-        self._remember(stuck, belief.boundary)
+        self._remember(stuck, mud_estimate.boundary)
         steps_m = self._steps_m()
         if steps_m or stuck:
             index, reason = self._best(steps_m or [0.0] * len(self.candidates), self._widest_deg(strides))
             self._walked = self.candidates[index]
-            self.choice = self._told(steps_m[index] if steps_m else inf, "a flipper was stuck" if stuck else reason)
+            self.choice = self._reported(steps_m[index] if steps_m else inf, "a flipper was stuck" if stuck else reason)
         else:
             self.choice = self.choice._replace(reason="nothing known of the thrust, depth kept")
         return self.choice
 
     @property
     def largest_insertion_nm(self) -> float:
-        return self.parameters.insertion_share * self.forecast.lifting_torque_nm
+        return self.parameters.insertion_fraction * self.forecast.lifting_torque_nm
 
     def _remember(self, stuck: bool, boundary: bool) -> None:
         """What comes out of the mud allows again what it holds."""
@@ -138,7 +138,7 @@ class GaitAdaptation:
         """Wider than the last stride only where that left the mud easily; the narrowest where it did not leave it."""
         if any(not stride.released for stride in strides):
             return self.parameters.min_sweep_deg
-        limit_nm = EASY_SHARE * self.forecast.lifting_torque_nm
+        limit_nm = EASY_FRACTION * self.forecast.lifting_torque_nm
         easily = all(stride.extraction_torque_nm < limit_nm for stride in strides)
         widest_deg = self._walked.gait.sweep_angle_deg + (WIDENING_DEG if easily else 0.0)
         return max(widest_deg, self.parameters.min_sweep_deg)
@@ -150,12 +150,12 @@ class GaitAdaptation:
         """
         drag, stiffness_n_m = body_drag(self.parameters, self.forecast), 2.0 * self.parameters.mobilisation_n_m
         self.forecast.gait = self.candidates[0].gait
-        grips = dict[float, Grip]()
+        grips = dict[float, Traction]()
         for depth_m in self._depths_m:
             thrust_n = self.forecast.thrust_n(depth_m)
             if thrust_n is None:
                 return []
-            grips[depth_m] = Grip(thrust_n, stiffness_n_m)
+            grips[depth_m] = Traction(thrust_n, stiffness_n_m)
         return [carried_m(each.motion, drag, grips[each.depth_m]) for each in self.candidates]
 
     def _best(self, steps_m: Sequence[float], widest_deg: float) -> tuple[int, str]:
@@ -175,9 +175,9 @@ class GaitAdaptation:
         if any(stride.holds(each) for each in self._stuck):
             return False
         self.forecast.gait = stride.gait
-        limit_nm = self.parameters.lifting_share * self.forecast.lifting_torque_nm
+        limit_nm = self.parameters.lifting_fraction * self.forecast.lifting_torque_nm
         return self.forecast.extraction_nm(stride.depth_m) < limit_nm
 
-    def _told(self, promised_m: float, reason: str) -> DepthChoice:
+    def _reported(self, promised_m: float, reason: str) -> DepthChoice:
         slips = promised_m < self.geometry.flipper_length_m / 2.0
         return DepthChoice(self._walked.depth_m, slips, reason, self._walked.gait)

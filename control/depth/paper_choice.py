@@ -22,10 +22,10 @@ from control.depth.depth_choice import AdaptationParameters, DepthChoice, depth_
 from control.depth.forecast import GRID_M
 from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
-from control.mud_estimate import MudBelief
+from control.mud_estimate import MudEstimate
 from control.records import Estimate, StrideEstimate
 
-NOT_TOLD = Estimate(0.0, 0.0, 0, False)
+NOT_REPORTED = Estimate(0.0, 0.0, 0, False)
 
 
 class PaperAdaptation:
@@ -40,15 +40,15 @@ class PaperAdaptation:
 
     def reset(self, depth_m: float) -> None:
         self.choice = DepthChoice(depth_m, False, "start")
-        self._k_s = self._k_e = NOT_TOLD
+        self._k_s = self._k_e = NOT_REPORTED
         self._late_m = inf  # depth of the last stride, if a flipper was still in the mud after its extraction
         self._stuck_m = inf  # the shallowest one in this mud whose swing pulled the body back
 
-    def step(self, belief: MudBelief, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
+    def step(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
         for stride in sorted(strides, key=lambda stride: stride.flipper):  # the right one last
             self._k_s = stride.k_s if stride.k_s.valid else self._k_s
             self._k_e = stride.k_e if stride.k_e.valid else self._k_e
-        self._remember(belief, strides, walked_m)
+        self._remember(mud_estimate, strides, walked_m)
         if self._k_e.valid or self._stuck_m < inf:
             out = [depth_m for depth_m in self.grid_m if self._comes_out(depth_m)]
             depth_m = max(out, default=self.grid_m[0])
@@ -62,9 +62,9 @@ class PaperAdaptation:
         """The paper's robot goes to the depth that it chose."""
         return inf
 
-    def _remember(self, belief: MudBelief, strides: Sequence[StrideEstimate], walked_m: float) -> None:
+    def _remember(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> None:
         """The step that has just been measured holds the swing of the stride before."""
-        if belief.boundary:
+        if mud_estimate.boundary:
             self._stuck_m = inf
         if not all(stride.step_m >= self.geometry.flipper_length_m / 2.0 for stride in strides):
             self._stuck_m = min(self._stuck_m, self._late_m)

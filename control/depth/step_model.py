@@ -36,7 +36,7 @@ class BodyDrag(NamedTuple):
     mass_kg: float
 
 
-class Grip(NamedTuple):
+class Traction(NamedTuple):
     """Of both flippers together."""
 
     thrust_n: float  # at which the mud yields, or the motors do
@@ -46,9 +46,9 @@ class Grip(NamedTuple):
 Motion = tuple[tuple[float, float], ...]  # a step of time each: how far the plates swept, the share of thrust left
 
 
-def step_m(gait: GaitParameters, flipper_length_m: float, drag: BodyDrag, grip: Grip, depth_m: float) -> float:
+def step_m(gait: GaitParameters, flipper_length_m: float, drag: BodyDrag, traction: Traction, depth_m: float) -> float:
     """With the flippers at `depth_m`, from which they are pulled out at the gait's speed of extraction."""
-    return carried_m(motion_of(gait, flipper_length_m, depth_m), drag, grip)
+    return carried_m(motion_of(gait, flipper_length_m, depth_m), drag, traction)
 
 
 @lru_cache(maxsize=256)
@@ -65,15 +65,15 @@ def motion_of(gait: GaitParameters, flipper_length_m: float, depth_m: float) -> 
     return tuple(motion)
 
 
-def carried_m(motion: Motion, drag: BodyDrag, grip: Grip) -> float:
+def carried_m(motion: Motion, drag: BodyDrag, traction: Traction) -> float:
     """The body goes forward only: it slides back less than dry friction lets it."""
     dry_n, damping_n_s_m, mass_kg = drag
-    stiffness_n_m, damped = grip.stiffness_n_m, 1.0 + STEP_S * damping_n_s_m / mass_kg
-    if grip.thrust_n <= dry_n:
+    stiffness_n_m, damped = traction.stiffness_n_m, 1.0 + STEP_S * damping_n_s_m / mass_kg
+    if traction.thrust_n <= dry_n:
         return 0.0
     body_m = body_m_s = slip_m = 0.0
-    for swept_m, share in motion:
-        thrust_n = share * grip.thrust_n
+    for swept_m, fraction in motion:
+        thrust_n = fraction * traction.thrust_n
         wanted_n = stiffness_n_m * (swept_m - body_m - slip_m)
         force_n = thrust_n if wanted_n > thrust_n else max(wanted_n, -thrust_n)
         slip_m += (wanted_n - force_n) / stiffness_n_m

@@ -38,7 +38,7 @@ from control.records import FLIPPERS, DriveStates, JointTarget, JointTargets
 
 OUT_M = 0.003  # depth of the plate's lowest point up to which a flipper counts as out of the mud
 RISE_S = 0.2  # to reach the height of the swing
-AWAY_SHARE = 0.8  # of each rocking; the rest is back
+AWAY_FRACTION = 0.8  # of each rocking; the rest is back
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Recovery:
     def reset(self) -> None:
         self.attempt = 0  # under way; 0: none
         self.given_up: Sequence[str] = ()  # flippers that the last attempt has not freed
-        self.news = ""  # of this step, for the log
+        self.events = ""  # of this step, for the log
         self._waits = False
         self._time_s = 0.0  # since the wait, the attempt or the swing after it began
         self._targets: JointTargets = still((0.0, 0.0, 0.0, 0.0))
@@ -117,7 +117,7 @@ class Recovery:
 
     def step(self, dt_s: float, stuck: Sequence[str], states: DriveStates, wanted: JointTargets) -> JointTargets:
         """The gait's targets, or others while it waits for the flippers that are `stuck`."""
-        self.news = ""
+        self.events = ""
         if self._waits is not bool(stuck):
             self._waits, self._time_s = bool(stuck), 0.0
             if self.attempt:
@@ -142,16 +142,16 @@ class Recovery:
         self._time_s = 0.0
         a, b, c, d = (state.angle_rad for state in states)
         self._targets = still((a, b, c, d))
-        places_rad = dict(zip(FLIPPERS, (a, c), strict=True))
-        self._way = -1.0 if self.attempt == 1 else copysign(1.0, sum(places_rad[name] for name in stuck))
-        self.news = f"{_are_stuck(stuck)}, attempt {self.attempt} of {self.parameters.attempts}"
+        positions_rad = dict(zip(FLIPPERS, (a, c), strict=True))
+        self._way = -1.0 if self.attempt == 1 else copysign(1.0, sum(positions_rad[name] for name in stuck))
+        self.events = f"{_are_stuck(stuck)}, attempt {self.attempt} of {self.parameters.attempts}"
 
     def _pull(self, dt_s: float, stuck: Sequence[str], states: DriveStates) -> JointTargets:
         """Lift all flippers and rock the stuck ones, the same way, so that the body is not turned."""
         pulled_s = self._time_s - self.parameters.pause_s
         if pulled_s < 0.0:
             return self._targets
-        way = self._way if pulled_s / self.parameters.rock_s % 1.0 < AWAY_SHARE else -self._way
+        way = self._way if pulled_s / self.parameters.rock_s % 1.0 < AWAY_FRACTION else -self._way
         speed_rad_s = min(pulled_s / RAMP_S, 1.0) * self.parameters.lift_rad_s
         pairs = zip(FLIPPERS, self._targets[::2], self._targets[1::2], states[::2], states[1::2], strict=True)
         (a, b), (c, d) = (
@@ -177,7 +177,7 @@ class Recovery:
 
     def _leave(self, wanted: JointTargets) -> None:
         """All flippers are out."""
-        self.news = f"the flippers came out after {self.attempt} attempt{'s' if self.attempt > 1 else ''}"
+        self.events = f"the flippers came out after {self.attempt} attempt{'s' if self.attempt > 1 else ''}"
         self.attempt = 0
         self._gaps = tuple(
             Gap(target.angle_rad - gait.angle_rad, target.velocity_rad_s - gait.velocity_rad_s, duration_s)

@@ -20,7 +20,7 @@ RESTS_RAD_S = 1e-9  # far below any encoder's noise: a speed that has died away 
 FROZEN_S = 0.1  # in which not even the last bit of angle and of a speed that is not zero changes
 
 
-class EncoderWatch:
+class EncoderMonitor:
     """Owns the last message, and what the speed has summed up to since the angle last changed."""
 
     def __init__(self, jump_rad: float) -> None:
@@ -28,7 +28,7 @@ class EncoderWatch:
         self.reset()
 
     def reset(self) -> None:
-        self.sentence = ""  # about the problem that `update` has named
+        self.message = ""  # about the problem that `update` has named
         self._angle_rad, self._velocity_rad_s, self._stamp_s = UNKNOWN, UNKNOWN, NEVER_S
         self._begin_count()
 
@@ -59,7 +59,7 @@ class EncoderWatch:
         late_rad = max(abs(state.velocity_rad_s), abs(self._velocity_rad_s)) * dt_s
         if not odd_rad > self._jump_rad + late_rad:
             return ""
-        self.sentence = f"encoder jumped by {degrees(abs(step_rad)):.0f} degrees in {gap_s * 1e3:.1f} ms."
+        self.message = f"encoder jumped by {degrees(abs(step_rad)):.0f} degrees in {gap_s * 1e3:.1f} ms."
         return "encoder_jump"
 
     def _count(self, state: DriveState, gap_s: float) -> str:
@@ -71,5 +71,5 @@ class EncoderWatch:
         moved = abs(self._gone_rad) > GONE_RAD and self._gone_s > GONE_S
         if not moved and self._frozen_s <= FROZEN_S:
             return ""
-        self.sentence = "encoder stands still while the joint moves."
+        self.message = "encoder stands still while the joint moves."
         return "encoder_stuck"

@@ -14,7 +14,7 @@ from control.bounds import Bounds
 from control.fault_kinds import make_fault
 from control.faults import Fault
 from control.limits import JointLimits, JointRange
-from control.monitors.encoder_monitor import EncoderWatch
+from control.monitors.encoder_monitor import EncoderMonitor
 from control.monitors.stillness import Stillness
 from control.monitors.winding import Winding, WindingParameters
 from control.records import UNKNOWN, DriveState
@@ -23,14 +23,14 @@ MOST_SEEN_S = 0.03  # that one tick adds to any duration: a loop that stood stil
 MISSING_HEARTBEATS = 5  # in a row
 SLOW_SILENCE_S = 1.0  # of temperature and bus voltage, once they were told
 ENERGISED_S = 0.2  # two heartbeats, in which a drive that was told to go idle may say that it has not yet
-FAST_SHARE = 1.25  # of the velocity limit, above which no torque of ours drives a joint
-CURRENT_SHARE = 1.25  # of the drive's current limit
+FAST_FRACTION = 1.25  # of the velocity limit, above which no torque of ours drives a joint
+CURRENT_FRACTION = 1.25  # of the drive's current limit
 CURRENT_TICKS = 3
 STILL_RAD = 0.03
 REST_S = 0.1  # within STILL_RAD, and a joint is at rest
-SATURATED_SHARE = 0.95  # of the torque limit
+SATURATED_FRACTION = 0.95  # of the torque limit
 STALLED_S = 2.0  # longer than an insertion, a stance or an extraction of the paper's gait takes
-MISSING_SHARE = 0.3  # of the torque limit, by which the current differs from the torque that was sent
+MISSING_FRACTION = 0.3  # of the torque limit, by which the current differs from the torque that was sent
 MISSING_S = 0.1
 TWO_MESSAGES_S = 0.15  # of those that come every 0.1 s: a single odd one proves nothing
 
@@ -46,11 +46,11 @@ class FaultBounds:
     fast_s: Annotated[float, Bounds(0.003, 2.0)] = 0.0079  # 3 T faster than the velocity limit allows
     lag_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0131  # 5 T missed in a row: soft stop
     crawl_s: Annotated[float, Bounds(0.005, 2.0)] = 0.0105  # 4 T, the mean of five ticks: too seldom to brake a joint
-    lag_share: Annotated[float, Bounds(0.01, 10.0)] = 0.1  # by which 100 ticks take longer than they should
+    lag_fraction: Annotated[float, Bounds(0.01, 10.0)] = 0.1  # by which 100 ticks take longer than they should
     longest_watchdog_s: Annotated[float, Bounds(0.01, 10.0)] = 0.3  # that a drive may have
     voltage_low_v: Annotated[float, Bounds(0.0, 100.0)] = 20.0  # told; 0: never
     voltage_min_v: Annotated[float, Bounds(0.0, 100.0)] = 18.0  # soft stop
-    disk_free_share: Annotated[float, Bounds(0.0, 0.9)] = 0.05  # of the log's disk, below which nothing is armed
+    disk_free_fraction: Annotated[float, Bounds(0.0, 0.9)] = 0.05  # of the log's disk, below which nothing is armed
     disk_slow_s: Annotated[float, Bounds(0.05, 60.0)] = 2.0  # for one write
 
 
@@ -65,7 +65,7 @@ class JointFacts(NamedTuple):
     may_stand_still: bool  # whatever the torque: no stiffness, or a recovery that pulls on purpose
 
 
-class JointWatch:
+class JointMonitor:
     def __init__(
         self,
         joint: str,
@@ -83,14 +83,14 @@ class JointWatch:
         self._bounds = bounds
         self._low_rad = span.min_rad - radians(limits.position_margin_deg)
         self._high_rad = span.max_rad + radians(limits.position_margin_deg)
-        self._fast_rad_s = FAST_SHARE * limits.velocity_rad_s
-        self._encoder = EncoderWatch(bounds.jump_rad)
+        self._fast_rad_s = FAST_FRACTION * limits.velocity_rad_s
+        self._encoder = EncoderMonitor(bounds.jump_rad)
         self._stillness = Stillness(STILL_RAD)
-        self._most_a = CURRENT_SHARE * current_limit_a
+        self._most_a = CURRENT_FRACTION * current_limit_a
         self._constant_nm_a = torque_constant_nm_a
         self._heartbeat_silence_s = MISSING_HEARTBEATS * heartbeat_period_s
-        self._missing_nm = MISSING_SHARE * limits.torque_nm
-        self._saturated_nm = SATURATED_SHARE * limits.torque_nm
+        self._missing_nm = MISSING_FRACTION * limits.torque_nm
+        self._saturated_nm = SATURATED_FRACTION * limits.torque_nm
         self._nearly_hot_c = (limits.temperature_warm_c + limits.temperature_hot_c) / 2.0  # half of the torque is left
         self.reset()
 
@@ -113,8 +113,8 @@ class JointWatch:
         self._watch_heat(found, facts, state)
         return found
 
-    def _fault(self, name: str, sentence: str) -> Fault:
-        return make_fault(name, self.joint, sentence)
+    def _fault(self, name: str, message: str) -> Fault:
+        return make_fault(name, self.joint, message)
 
     # signals
 
@@ -195,7 +195,7 @@ class JointWatch:
             found.append(self._fault("joint_moving", f"The {self.joint} joint moves."))
         problem = self._encoder.update(state, facts.dt_s)
         if problem:
-            found.append(self._fault(problem, f"The {self.joint} {self._encoder.sentence}"))
+            found.append(self._fault(problem, f"The {self.joint} {self._encoder.message}"))
 
     def _out_of_range(self, angle_rad: float) -> Fault:
         low, high = degrees(self._low_rad), degrees(self._high_rad)

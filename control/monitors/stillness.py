@@ -15,16 +15,16 @@ class Stillness:
         self.reset()
 
     def reset(self) -> None:
-        self._place_rad = UNKNOWN
+        self._position_rad = UNKNOWN
         self.still_s = inf  # within the band about the place; infinite: never seen to leave one
 
     def update(self, angle_rad: float, dt_s: float) -> bool:
         """Whether the joint is still where it was, or was seen for the first time."""
-        if abs(angle_rad - self._place_rad) <= self._band_rad:
+        if abs(angle_rad - self._position_rad) <= self._band_rad:
             self.still_s += dt_s
             return True
-        first = isnan(self._place_rad) and isfinite(angle_rad)
-        self._place_rad = angle_rad
+        first = isnan(self._position_rad) and isfinite(angle_rad)
+        self._position_rad = angle_rad
         if not first:
             self.still_s = 0.0
         return first

@@ -21,7 +21,7 @@ MESSAGES_OF_A_DRIVE = (  # bytes and how often
     (TELEGRAM_BYTES, FAST_HZ),  # current
     *((TELEGRAM_BYTES, SLOW_HZ),) * 4,  # heartbeat, errors, temperature, voltage
 )
-WARN_SHARE, MOST_SHARE = 0.6, 0.8  # beyond, frames of low priority come late, and then not at all
+WARN_FRACTION, MOST_FRACTION = 0.6, 0.8  # beyond, frames of low priority come late, and then not at all
 
 
 class BusLoad(NamedTuple):

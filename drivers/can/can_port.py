@@ -77,15 +77,15 @@ class PythonCanPort(PortHealth):
                     continue
             except PORT_ERRORS as problem:  # garbage, with good frames behind it; or an interface that is down
                 failures += 1
-                if self.heed_failed_read(problem) or failures == MOST_FAILURES_PER_READ:
+                if self.on_failed_read(problem) or failures == MOST_FAILURES_PER_READ:
                     break
                 continue
             if message.is_error_frame:  # first: its class bits look like a drive's id
-                self.heed_error_frame(message.arbitration_id, bytes(message.data))
+                self.on_error_frame(message.arbitration_id, bytes(message.data))
             else:
                 frames.append(_as_frame(message, clock_s))
                 if self.state is BusState.OFF:
-                    self.heed_frame(message.is_rx)
+                    self.on_frame(message.is_rx)
         return frames
 
     def _drained(self) -> bool:
@@ -102,7 +102,7 @@ class PythonCanPort(PortHealth):
         try:
             self._bus.send(message, 0.0)
         except PORT_ERRORS as problem:  # a full transmit queue (ENOBUFS) or an interface that is gone
-            self.heed_failed_send(problem)
+            self.on_failed_send(problem)
 
     def close(self) -> None:
         with suppress(*PORT_ERRORS):  # of an adapter that is unplugged already

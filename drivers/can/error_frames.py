@@ -58,10 +58,10 @@ def decode_error_frame(class_bits: int, data: bytes) -> BusError:
         names += [name for bit, name in CONTROLLER_NAMES.items() if data[1] & bit]
     if class_bits & COUNTERS:
         names.append(f"{data[6]} transmit and {data[7]} receive errors")
-    return BusError(_told_state(class_bits, data), ", ".join(names) or f"error class 0x{class_bits:x}")
+    return BusError(_reported_state(class_bits, data), ", ".join(names) or f"error class 0x{class_bits:x}")
 
 
-def _told_state(class_bits: int, data: bytes) -> BusState | None:
+def _reported_state(class_bits: int, data: bytes) -> BusState | None:
     if class_bits & BUS_OFF:
         return BusState.OFF
     if class_bits & CONTROLLER:
@@ -79,8 +79,8 @@ def _counted_state(errors: int) -> BusState:
     return BusState.WARNING if errors >= WARNING_ERRORS else BusState.ACTIVE
 
 
-def next_state(state: BusState, class_bits: int, told: BusState | None) -> BusState:
+def next_state(state: BusState, class_bits: int, reported: BusState | None) -> BusState:
     """After an error frame that told this. Out of bus-off only a restart leads, whatever counters say."""
-    if told is None or (state is BusState.OFF and not class_bits & RESTARTED):
+    if reported is None or (state is BusState.OFF and not class_bits & RESTARTED):
         return state
-    return told
+    return reported

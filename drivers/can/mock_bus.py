@@ -44,7 +44,7 @@ class MockPort(PortHealth):
 
     def inject_error(self, class_bits: int, data: bytes = bytes(8)) -> None:
         """One of SocketCAN's error frames."""
-        self.heed_error_frame(class_bits, data)
+        self.on_error_frame(class_bits, data)
 
     def open_beside(self) -> MockPort:
         """Another node on the same bus."""

@@ -28,29 +28,29 @@ class PortHealth:
         self.last_error = ""
         self.last_send_error = ""
 
-    def heed_error_frame(self, class_bits: int, data: bytes) -> None:
+    def on_error_frame(self, class_bits: int, data: bytes) -> None:
         self.error_frames += 1
         error = decode_error_frame(class_bits, data)
         self.last_error = error.text
         self.state = next_state(self.state, class_bits, error.state)
 
-    def heed_frame(self, from_peer: bool) -> None:
+    def on_frame(self, from_peer: bool) -> None:
         """Of a port that is off."""
         if from_peer or self._gone:
             self.state, self._gone = BusState.ACTIVE, False
 
-    def heed_failed_read(self, problem: Exception) -> bool:
+    def on_failed_read(self, problem: Exception) -> bool:
         """Whether the interface is gone."""
         self.error_frames += 1
         self.last_error = _text_of(problem)
-        return self._heed_gone(problem)
+        return self._on_gone(problem)
 
-    def heed_failed_send(self, problem: Exception) -> None:
+    def on_failed_send(self, problem: Exception) -> None:
         self.failed_sends += 1
         self.last_send_error = _text_of(problem)
-        self._heed_gone(problem)
+        self._on_gone(problem)
 
-    def _heed_gone(self, problem: Exception) -> bool:
+    def _on_gone(self, problem: Exception) -> bool:
         gone = _error_number(problem) in GONE
         if gone:
             self.state, self._gone = BusState.OFF, True

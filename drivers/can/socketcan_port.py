@@ -69,16 +69,16 @@ class SocketcanPort(PortHealth):
             except BlockingIOError:
                 break
             except OSError as problem:  # what is behind it the next read takes
-                self.heed_failed_read(problem)
+                self.on_failed_read(problem)
                 break
-            frame = self._heed_frame(encoded, ancillary, clock_s)
+            frame = self._on_frame(encoded, ancillary, clock_s)
             if frame is not None:
                 frames.append(frame)
                 if self.state is BusState.OFF:
-                    self.heed_frame(not marks & socket.MSG_DONTROUTE)  # which marks what a process beside us has sent
+                    self.on_frame(not marks & socket.MSG_DONTROUTE)  # which marks what a process beside us has sent
         return frames
 
-    def _heed_frame(self, encoded: bytes, ancillary: list[tuple[int, int, bytes]], clock_s: float) -> Frame | None:
+    def _on_frame(self, encoded: bytes, ancillary: list[tuple[int, int, bytes]], clock_s: float) -> Frame | None:
         """The frame as our drives' code takes it; None where it tells of the bus, or of nothing."""
         stamp_s = NEVER_S
         for _, kind, value in ancillary:
@@ -86,21 +86,21 @@ class SocketcanPort(PortHealth):
                 seconds, nanoseconds = STAMP.unpack(value)
                 stamp_s = seconds + 1e-9 * nanoseconds + clock_s
             elif kind == SO_RXQ_OVFL:
-                self._heed_overflow(value)
+                self._on_overflow(value)
         if len(encoded) != FRAME_BYTES or encoded[LENGTH_BYTE] > DATA_MAX_BYTES:
-            self.heed_failed_read(ValueError("a frame of another length than CAN 2.0 has"))
+            self.on_failed_read(ValueError("a frame of another length than CAN 2.0 has"))
             return None
         word, length, payload = FRAME_LAYOUT.unpack(encoded)
         if not word & FLAGS:
             return Frame(word & STANDARD_MASK, payload[:length], False, False, False, stamp_s)
         if word & ERROR_FLAG:  # first: its class bits look like a drive's id
-            self.heed_error_frame(word & EXTENDED_MASK, payload[:length])
+            self.on_error_frame(word & EXTENDED_MASK, payload[:length])
             return None
         is_remote, is_extended = word & REMOTE_FLAG != 0, word & EXTENDED_FLAG != 0
         identifier = word & (EXTENDED_MASK if is_extended else STANDARD_MASK)
         return Frame(identifier, b"" if is_remote else payload[:length], is_remote, False, is_extended, stamp_s)
 
-    def _heed_overflow(self, value: bytes) -> None:
+    def _on_overflow(self, value: bytes) -> None:
         """The kernel counts from the socket's opening, modulo 2³²."""
         (count,) = COUNT.unpack(value)
         self.lost_frames += (count - self._heeded) % COUNT_RANGE
@@ -110,7 +110,7 @@ class SocketcanPort(PortHealth):
         try:
             self._socket.send(encode_frame(frame))
         except (OSError, ValueError) as problem:  # a full transmit queue (ENOBUFS) or an interface that is gone
-            self.heed_failed_send(problem)
+            self.on_failed_send(problem)
 
     def close(self) -> None:
         self._bus.shutdown()

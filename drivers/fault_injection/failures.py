@@ -21,7 +21,7 @@ from control.records import JOINTS, NEVER_S
 USUAL_S = 2.0
 SHORTEST_S, LONGEST_S = 0.01, 60.0
 LEAST_DELAY_S, MOST_DELAY_S = 0.005, 0.02  # of slow messages: two to eight ticks
-LOST_SHARE = 0.5  # of intermittent messages
+LOST_FRACTION = 0.5  # of intermittent messages
 NO_NUMBERS = (nan, inf, -inf, 3e38, -3e38)  # the last two still fit into the four bytes of a message
 
 
@@ -186,7 +186,7 @@ class Failures:
 
     def loses(self) -> bool:
         """Whether chance takes one intermittent message."""
-        return self.random.random() < LOST_SHARE
+        return self.random.random() < LOST_FRACTION
 
     def arrival_s(self) -> float:
         """When a slow message that left now is there."""

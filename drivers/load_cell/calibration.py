@@ -18,7 +18,7 @@ from drivers.load_cell.line_formats import newtons_per
 LEAST_SPAN = 20.0  # standard errors between the readings of two weights
 LEAST_APART_N = 0.05
 DRIFTING = 5.0  # standard errors between the halves of one reading
-DRIFT_SHARE = 0.002  # of the span, below which a drift matters to nobody
+DRIFT_FRACTION = 0.002  # of the span, below which a drift matters to nobody
 
 
 class CalibrationError(Exception):
@@ -89,17 +89,19 @@ def calibrate(unit: str, light: Weighing, heavy: Weighing) -> LoadCellCalibratio
 
 def remarks_on(calibration: LoadCellCalibration, light: Weighing, heavy: Weighing) -> list[str]:
     """What a person should know of it."""
-    told = []
+    reported = []
     span = abs(heavy.reading - light.reading)
     for weighing in (light, heavy):
-        if abs(weighing.drift) > max(DRIFTING * weighing.drift_std_error, DRIFT_SHARE * span):
-            told.append(
+        if abs(weighing.drift) > max(DRIFTING * weighing.drift_std_error, DRIFT_FRACTION * span):
+            reported.append(
                 f"the reading under {weighing.force_n:.3g} N drifted by {weighing.drift / calibration.per_newton:+.3g} "
                 "N while it was taken: let the weight come to rest and the amplifier warm up, then calibrate again"
             )
     if calibration.per_newton < 0.0:
-        told.append("the reading falls as the load grows: the cell is loaded the other way round, which is allowed for")
-    return told
+        reported.append(
+            "the reading falls as the load grows: the cell is loaded the other way round, which is allowed for"
+        )
+    return reported
 
 
 def of_unit(unit: str, scale: float | None) -> LoadCellCalibration | None:
@@ -115,19 +117,23 @@ def write_calibration(path: Path, calibration: LoadCellCalibration) -> None:
 def read_calibration(path: Path) -> LoadCellCalibration:
     """Raises CalibrationError, OSError."""
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
+        reported = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as problem:
         raise CalibrationError(f"{path}: not a calibration, since it is not JSON: {problem}") from problem
-    return _checked(path, told)
+    return _checked(path, reported)
 
 
-def _checked(path: Path, told: Any) -> LoadCellCalibration:
+def _checked(path: Path, reported: Any) -> LoadCellCalibration:
     names = LoadCellCalibration._fields
-    if not isinstance(told, dict) or set(told) != set(names) or not isinstance(told["unit"], str):
+    if not isinstance(reported, dict) or set(reported) != set(names) or not isinstance(reported["unit"], str):
         raise CalibrationError(f"{path}: a calibration has the keys {', '.join(names)}, and no others")
     for name in names[1:]:
-        if isinstance(told[name], bool) or not isinstance(told[name], int | float) or not isfinite(told[name]):
-            raise CalibrationError(f"{path}: {name} = {told[name]!r}: must be a number")
-    if told["per_newton"] == 0.0:
+        if (
+            isinstance(reported[name], bool)
+            or not isinstance(reported[name], int | float)
+            or not isfinite(reported[name])
+        ):
+            raise CalibrationError(f"{path}: {name} = {reported[name]!r}: must be a number")
+    if reported["per_newton"] == 0.0:
         raise CalibrationError(f"{path}: per_newton = 0: must not be zero")
-    return LoadCellCalibration(**told)
+    return LoadCellCalibration(**reported)

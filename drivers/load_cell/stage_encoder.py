@@ -27,7 +27,7 @@ class StageEncoderSettings:
 
 class Place(NamedTuple):
     stamp_s: float
-    place_m: float
+    position_m: float
 
 
 class StageEncoder:
@@ -74,7 +74,7 @@ class StageEncoder:
         lines = self.line.read(now_s)
         stamps_s = self.clock.stamps_s(len(lines), now_s)
         taken = [(stamp_s, self.counts.take(line, stamp_s)) for line, stamp_s in zip(lines, stamps_s, strict=True)]
-        places = [Place(stamp_s, place_m) for stamp_s, place_m in taken if place_m is not None]
+        places = [Place(stamp_s, position_m) for stamp_s, position_m in taken if position_m is not None]
         if places or self._heard_s is None:
             self._heard_s = now_s
         return places

@@ -22,7 +22,7 @@ from control.records import NEVER_S, UNKNOWN, DriveState
 from drivers.can.frames import Frame
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, GarbledMessageError, Message, arbitration_id
-from drivers.odrive.duplicate_node_monitor import TwinWatch
+from drivers.odrive.duplicate_node_monitor import DuplicateNodeMonitor
 
 RESTART_SILENCE_S = 0.3  # three heartbeats
 LONGEST_WATCHDOG_S = 3600.0  # a number beyond is no time-out
@@ -78,7 +78,7 @@ class OdriveAxis:
         self._endpoints = tuple(endpoints)
         self._rad_per_turn = parameters.sign * TURN_RAD
         self._torque_id = arbitration_id(parameters.node_id, codec.SET_INPUT_TORQUE)
-        self._twin_watch = TwinWatch(parameters.heartbeat_period_s)
+        self._duplicates = DuplicateNodeMonitor(parameters.heartbeat_period_s)
         self.reset()
 
     def reset(self) -> None:
@@ -93,7 +93,7 @@ class OdriveAxis:
         self.disarm_reason = 0
         self.restarts = 0
         self._starting = True  # until it was heard with a state
-        self._twin_watch.reset()
+        self._duplicates.reset()
         self._forget_settings()
 
     def _forget_settings(self) -> None:
@@ -125,8 +125,8 @@ class OdriveAxis:
         turns, turns_s = codec.GET_ENCODER_ESTIMATES.decode(data)
         _require_finite(turns + turns_s)
         if now_s - self._angle_stamp_s > RESTART_SILENCE_S:
-            self._heed_silence()
-        self._twin_watch.heed_reading(turns, self._read_s)
+            self._on_silence()
+        self._duplicates.on_reading(turns, self._read_s)
         self._angle_rad = (turns - self.parameters.zero_turn) * self._rad_per_turn
         self._velocity_rad_s = turns_s * self._rad_per_turn
         self._angle_stamp_s = now_s
@@ -137,30 +137,30 @@ class OdriveAxis:
             measured_a = 0.0
         _require_finite(measured_a)
         if now_s - self._current_stamp_s > RESTART_SILENCE_S:
-            self._heed_silence()
+            self._on_silence()
         self._current_a = self.parameters.sign * measured_a
         self._current_stamp_s = now_s
 
     def _receive_heartbeat(self, data: bytes, now_s: float) -> None:
         self._error_flags, state, _, _ = codec.HEARTBEAT.decode(data)
         if now_s - self._heartbeat_stamp_s > RESTART_SILENCE_S:
-            self._heed_silence()
+            self._on_silence()
         if state == AxisState.UNDEFINED or self._error_flags & codec.ERROR_INITIALIZING:
-            self._heed_restart()
+            self._on_restart()
         else:
             self._starting = False
-        self._twin_watch.heed_heartbeat(self._read_s, self._read_before_s)
+        self._duplicates.on_heartbeat(self._read_s, self._read_before_s)
         self.closed_loop = state == AxisState.CLOSED_LOOP
         self.busy_state = 0 if state in QUIET_STATES else state
         self._heartbeat_stamp_s = now_s
 
-    def _heed_silence(self) -> None:
+    def _on_silence(self) -> None:
         """Of one message. Only if all others were missing as long was the drive away, not if we did not listen."""
         heard_s = max(self._angle_stamp_s, self._current_stamp_s, self._heartbeat_stamp_s)
         if isfinite(heard_s) and self._read_before_s - heard_s > RESTART_SILENCE_S:
-            self._heed_restart()
+            self._on_restart()
 
-    def _heed_restart(self) -> None:
+    def _on_restart(self) -> None:
         if not self._starting:
             self.restarts += 1
         self._starting = True
@@ -211,9 +211,9 @@ class OdriveAxis:
         return self._watchdog_timeout_s if self._watchdog_enabled else 0.0
 
     @property
-    def twins(self) -> bool:
+    def duplicates(self) -> bool:
         """Two drives seem to share this id: see drivers/odrive/duplicate_node_monitor.py."""
-        return self._twin_watch.seen
+        return self._duplicates.seen
 
     @property
     def state(self) -> DriveState:

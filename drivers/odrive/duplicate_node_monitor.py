@@ -21,7 +21,7 @@ CONTRADICTIONS = 8  # one after the other
 FADING_S = 1.0  # without a contradiction, and they are forgotten
 
 
-class TwinWatch:
+class DuplicateNodeMonitor:
     def __init__(self, heartbeat_period_s: float) -> None:
         self._span_s = WITHIN_PERIODS * heartbeat_period_s
         self._earliest_s: deque[float] = deque(maxlen=HEARTBEATS)
@@ -38,7 +38,7 @@ class TwinWatch:
     def seen(self) -> bool:
         return self._frequent or self._contradictions >= CONTRADICTIONS
 
-    def heed_heartbeat(self, read_s: float, read_before_s: float) -> None:
+    def on_heartbeat(self, read_s: float, read_before_s: float) -> None:
         """Of what is read at `read_s` all came after `read_before_s`."""
         earliest_s = self._earliest_s
         self._frequent = len(earliest_s) == HEARTBEATS and read_s - earliest_s[0] < self._span_s
@@ -46,7 +46,7 @@ class TwinWatch:
         if read_s - self._contradicted_s > FADING_S:
             self._contradictions = 0
 
-    def heed_reading(self, turns: float, read_s: float) -> None:
+    def on_reading(self, turns: float, read_s: float) -> None:
         """To and fro: far from the reading before, but where the one before that was."""
         jump = turns - self._turns
         if jump > JUMP_TURNS or jump < -JUMP_TURNS:

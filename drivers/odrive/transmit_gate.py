@@ -80,9 +80,9 @@ class TransmitGate:
             return f"too far from the {before_nm:.4g} N·m before"
         return ""
 
-    def refuse(self, sentence: str) -> None:
+    def refuse(self, message: str) -> None:
         self.refused += 1
-        self.last_refusal = sentence
+        self.last_refusal = message
 
 
 class GatedPort:

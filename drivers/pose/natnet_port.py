@@ -52,7 +52,7 @@ class NatNetPort:
         self.parameters = parameters
         self._direction, self._origin_m = direction, origin_m
         self.poses = self.garbled = self.lost = 0
-        self._told = self._unseen = ""  # why the server's frames cannot be read; why the last one brought no pose
+        self._reported = self._unseen = ""  # why the server's frames cannot be read; why the last one brought no pose
         self.reset()
         try:
             self._sockets = NatNetSockets(parameters)
@@ -80,7 +80,7 @@ class NatNetPort:
             self._asked_s = now_s
             self._ask(now_s)
         for packet, sender in self._sockets.packets():
-            self._judge(packet, sender, now_s)
+            self._evaluate(packet, sender, now_s)
         if now_s - self._taken_s > STALE_S:
             return BodyPose()
         return BodyPose(self._stamp_s, self._forecast.at(now_s) - self._origin_m)
@@ -92,7 +92,7 @@ class NatNetPort:
             self._models_changed = False
             self._sockets.request(REQUEST_MODEL)
 
-    def _judge(self, packet: bytes, sender: str, now_s: float) -> None:
+    def _evaluate(self, packet: bytes, sender: str, now_s: float) -> None:
         if self.parameters.server and sender != self.parameters.server:
             self.garbled += 1
             self._strangers_s, self._stranger = now_s, sender
@@ -117,15 +117,15 @@ class NatNetPort:
             self._identity = bodies.get(self.parameters.body, self.parameters.body_id)
 
     def _take_server_info(self, packet: bytes) -> None:
-        told = decode_server_info(packet)
-        self._ticks_per_s = told.ticks_per_s
+        reported = decode_server_info(packet)
+        self._ticks_per_s = reported.ticks_per_s
         if self.parameters.version:
             return
-        readable = OLDEST <= told.version <= NEWEST
-        self._told = "" if readable else f"{told.name or 'the server'} speaks NatNet {told.version}"
-        if told.version != self._version:
-            self._version = told.version
-            self._layout = FrameLayout(told.version) if readable else None
+        readable = OLDEST <= reported.version <= NEWEST
+        self._reported = "" if readable else f"{reported.name or 'the server'} speaks NatNet {reported.version}"
+        if reported.version != self._version:
+            self._version = reported.version
+            self._layout = FrameLayout(reported.version) if readable else None
             self._delay.reset()
 
     def _take_frame(self, packet: bytes, now_s: float, layout: FrameLayout) -> None:
@@ -147,9 +147,9 @@ class NatNetPort:
 
     def _take_pose(self, body: RigidBody, exposed_s: float, sent_s: float, now_s: float) -> None:
         (x_m, y_m, z_m), (a, b, c) = body.position_m, self._direction
-        place_m = a * x_m + b * y_m + c * z_m
+        position_m = a * x_m + b * y_m + c * z_m
         self._stamp_s = min(exposed_s + self._delay.update(now_s, sent_s) - self.parameters.latency_s, now_s)
-        follows = self._forecast.add(self._stamp_s, place_m) and now_s - self._seen_s <= DOUBTED_S
+        follows = self._forecast.add(self._stamp_s, position_m) and now_s - self._seen_s <= DOUBTED_S
         self._seen_s = now_s
         self._taken_s = now_s if follows else NEVER_S
         self.poses += follows
@@ -168,9 +168,9 @@ class NatNetPort:
     def _trouble(self) -> tuple[str, str]:
         """Why no pose comes, and what to do about it."""
         parameters = self.parameters
-        if self._told:
+        if self._reported:
             return (
-                f"{self._told}; 2.6 to 4 are read here.",
+                f"{self._reported}; 2.6 to 4 are read here.",
                 "choose an older version in its streaming settings, and set pose.natnet.version to that",
             )
         if self._now_s - self._heard_s > STALE_S:

@@ -37,7 +37,7 @@ class PoseReport(NamedTuple):
     what_to_do: str = ""
 
     @property
-    def sentence(self) -> str:
+    def message(self) -> str:
         """A robot walks without a pose, and knows less: trouble is a warning."""
         counted = f"{self.source}: {self.poses} poses, {self.garbled} messages garbled, {self.lost} without the body"
         if not self.trouble:

@@ -28,7 +28,7 @@ class EncoderCounts:
         self.reset()
 
     def reset(self) -> None:
-        self._place_m = self._doubted_m = UNKNOWN
+        self._position_m = self._doubted_m = UNKNOWN
         self._stamp_s = NEVER_S
 
     def decode(self, line: bytes) -> float | None:
@@ -38,20 +38,20 @@ class EncoderCounts:
 
     def take(self, line: bytes, stamp_s: float) -> float | None:
         """The place, where it is believed."""
-        place_m = self.decode(line)
-        if place_m is None or not self._is_believed(place_m, stamp_s):
+        position_m = self.decode(line)
+        if position_m is None or not self._is_believed(position_m, stamp_s):
             self.garbled += 1
-            self._doubted_m = UNKNOWN if place_m is None else place_m
+            self._doubted_m = UNKNOWN if position_m is None else position_m
             return None
         self.believed += 1
-        self._place_m, self._stamp_s = place_m, stamp_s
-        return place_m
+        self._position_m, self._stamp_s = position_m, stamp_s
+        return position_m
 
-    def _is_believed(self, place_m: float, stamp_s: float) -> bool:
-        if not isfinite(self._place_m):
+    def _is_believed(self, position_m: float, stamp_s: float) -> bool:
+        if not isfinite(self._position_m):
             return True
-        if abs(place_m - self._place_m) <= FASTEST_M_S * (stamp_s - self._stamp_s) + SLACK_M:
+        if abs(position_m - self._position_m) <= FASTEST_M_S * (stamp_s - self._stamp_s) + SLACK_M:
             return True
-        stays = abs(place_m - self._doubted_m) <= SLACK_M
+        stays = abs(position_m - self._doubted_m) <= SLACK_M
         self.leaps += stays
         return stays

@@ -40,9 +40,9 @@ class Arrivals(NamedTuple):
 class SerialLineError(Exception):
     """The port does not open, or is gone. The text says what to do, `why` only what the system says."""
 
-    def __init__(self, sentence: str, why: str = "") -> None:
-        super().__init__(sentence)
-        self.why = why or sentence
+    def __init__(self, message: str, why: str = "") -> None:
+        super().__init__(message)
+        self.why = why or message
 
 
 class SerialLine:
@@ -85,7 +85,7 @@ class SerialLine:
     def arrivals(self, is_readable: Callable[[bytes], bool]) -> Arrivals:
         lines = list(self.recent)
         readable = sum(map(is_readable, lines))
-        return Arrivals(len(lines), readable / len(lines) if lines else 0.0, text_share(lines))
+        return Arrivals(len(lines), readable / len(lines) if lines else 0.0, text_fraction(lines))
 
     def read(self, now_s: float) -> list[bytes]:
         """All lines that have come to their end, without it, oldest first; never waits. None where it is gone."""
@@ -146,7 +146,7 @@ class SerialLine:
                 device.close()
 
 
-def text_share(lines: Iterable[bytes]) -> float:
+def text_fraction(lines: Iterable[bytes]) -> float:
     """How much of what arrives is text at all: at a wrong baud rate little is."""
     letters = b"".join(lines)
     return sum(32 <= letter < 127 or letter in b"\t\r\n" for letter in letters) / len(letters) if letters else 0.0
@@ -169,7 +169,7 @@ def open_serial(path: str, baud: int) -> Any:
 def _refusal(path: str, baud: int, problem: Exception) -> str:
     number = getattr(problem, "errno", None)
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        return f"there is no serial port {path}: {_ports_told()}"
+        return f"there is no serial port {path}: {_ports_reported()}"
     if number in (errno.EACCES, errno.EPERM):
         return (
             f"no permission to open {path}: add yourself to the group of serial ports with "
@@ -178,13 +178,13 @@ def _refusal(path: str, baud: int, problem: Exception) -> str:
     if number in (errno.EBUSY, errno.EAGAIN) or "lock" in str(problem).lower():
         return f"{path} is in use by another program, such as a serial monitor: close that one"
     if number == errno.EISDIR or f"({errno.ENOTTY}," in str(problem):  # pyserial tells it in words only
-        return f"{path} is no serial port: {_ports_told()}"
+        return f"{path} is no serial port: {_ports_reported()}"
     if isinstance(problem, ValueError):
         return f"{path} does not take {baud} baud: {problem}"
     return f"{path} does not open: {problem}"
 
 
-def _ports_told() -> str:
+def _ports_reported() -> str:
     ports = list_ports()
     if not ports:
         return "this computer sees none at all; is the device plugged in, and does its cable carry data?"

@@ -68,15 +68,15 @@ class Line(NamedTuple):
         if reading is None or reading.at_least:
             return self
         weight = 1.0 / reading.variance
-        share = weight / (self.weight + weight)
+        fraction = weight / (self.weight + weight)
         deeper, stronger = reading.log_depth - self.log_depth, reading.log_k - self.log_k
-        leverage = self.weight * share * deeper
+        leverage = self.weight * fraction * deeper
         exponent_weight = self.exponent_weight + leverage * deeper
         fading = REMEMBERED_STRIDES / (REMEMBERED_STRIDES + 1.0) if self.strides >= REMEMBERED_STRIDES else 1.0
         return Line(
             fading * (self.weight + weight),
-            self.log_k + share * stronger,
-            self.log_depth + share * deeper,
+            self.log_k + fraction * stronger,
+            self.log_depth + fraction * deeper,
             self.exponent + leverage * (stronger - self.exponent * deeper) / exponent_weight,
             min(exponent_weight, 1.0 / SURE_EXPONENT**2),
             self.strides + 1,

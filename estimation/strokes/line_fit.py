@@ -12,7 +12,7 @@ from math import inf, isfinite, sqrt
 from control.records import UNKNOWN, Estimate
 
 MIN_SAMPLES = 5
-LARGEST_DOUBT = 0.5  # a coefficient whose standard error is more than this share of it says nothing
+LARGEST_UNCERTAINTY = 0.5  # a coefficient whose standard error is more than this share of it says nothing
 
 
 class LineFit:
@@ -49,6 +49,6 @@ def _verdict(k: float, std_error: float) -> tuple[bool, str]:
         return False, "not finite"
     if k <= 0.0:
         return False, "the force does not oppose the motion"
-    if std_error > LARGEST_DOUBT * k:
+    if std_error > LARGEST_UNCERTAINTY * k:
         return False, "the samples do not follow the law"
     return True, ""

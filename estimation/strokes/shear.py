@@ -28,7 +28,7 @@ from estimation.strokes.stroke import Batch
 
 MOBILISED_M = 0.025  # in the authors' logs the force is on its plateau after 2 to 3 cm
 SLIPPING = 0.2  # of the flipper's own travel, from which a batch still slips
-QUICK_DOUBT = 0.05  # of a bound: it was borne in a quick push, and mud bears a tenth more at twice the speed
+QUICK_UNCERTAINTY = 0.05  # of a bound: it was borne in a quick push, and mud bears a tenth more at twice the speed
 STANDS = 0.8  # of the body's drag, under which the body certainly stands
 HELD = (3, 5)  # batches in a row that must have borne a bound: at most 3 cm, less where the stance is shorter
 
@@ -82,8 +82,8 @@ def slips_m(geometry: FlipperGeometry, batches: Sequence[Batch], base: Base) -> 
     fixed = base is Base.FIXED
     if not fixed and not all(isfinite(b.body_m) for b in batches):
         return None
-    places_m = [geometry.flipper_length_m * sin(b.sweep_rad) + (0.0 if fixed else b.body_m) for b in batches]
-    return [before_m - after_m for before_m, after_m in zip(places_m, places_m[1:], strict=False)]
+    positions_m = [geometry.flipper_length_m * sin(b.sweep_rad) + (0.0 if fixed else b.body_m) for b in batches]
+    return [before_m - after_m for before_m, after_m in zip(positions_m, positions_m[1:], strict=False)]
 
 
 def _yielding(geometry: FlipperGeometry, batches: Sequence[Batch], slips: list[float] | None) -> list[int]:
@@ -125,4 +125,4 @@ def _bound(case: str, reason: str, batches: Sequence[Batch], moments: Sequence[f
         return Shear(None, True, case, samples, reason)
     largest, spread = max(held)
     scatter = spread / 4.0  # of the median of five, whose range is 2.3 times their scatter
-    return Shear(OriginFit(largest, hypot(scatter, QUICK_DOUBT * largest)), True, case, samples, reason)
+    return Shear(OriginFit(largest, hypot(scatter, QUICK_UNCERTAINTY * largest)), True, case, samples, reason)

@@ -16,18 +16,18 @@ from math import cos, hypot, inf, isfinite, sqrt
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
-from control.plate import crossing, stroke_moment_m4, submerged_plate
+from control.plate import cross_coupling, stroke_moment_m4, submerged_plate
 from control.records import UNKNOWN, Estimate
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin
 from estimation.strokes.stroke import Batch
 from estimation.strokes.surface import Surface
 
-REVERSAL_SHARE = 0.25  # of the way up
+REVERSAL_FRACTION = 0.25  # of the way up
 SHORTEST_M = 1e-9  # a piece of way that is less is rounding, or none
 MIN_VERTICAL_LEVER_M = 0.03  # under it the adduction joint hardly feels an upward force
 TORQUE_REPEATABILITY = 0.032  # of a torque, as the paper measured it
-CROSSING_DOUBT = 0.25  # of what is taken off: its centre of pressure is that of the law, not the mud's
-LARGEST_DOUBT = 0.75  # of a coefficient: from there on even its 80 % interval reaches zero, and it says nothing
+CROSS_COUPLING_UNCERTAINTY = 0.25  # of what is taken off: its centre of pressure is that of the law, not the mud's
+LARGEST_UNCERTAINTY = 0.75  # of a coefficient: from there on even its 80 % interval reaches zero, and it says nothing
 TOO_SHORT = f"fewer than {MIN_BATCHES} pieces of way in the mud"
 NOT_THERE = Estimate(UNKNOWN, UNKNOWN, 0, False, TOO_SHORT)
 NOT_OUT = "the flipper did not come out"
@@ -44,7 +44,7 @@ def fit_extraction(
     geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, zero_error_n: float, start_m: float
 ) -> Estimate:
     """`start_m`: depth from which the flipper rose."""
-    deepest_m = surface.depth_m + (1.0 - REVERSAL_SHARE) * (start_m - surface.depth_m)
+    deepest_m = surface.depth_m + (1.0 - REVERSAL_FRACTION) * (start_m - surface.depth_m)
     return _fit(geometry, batches, surface, zero_error_n, -1.0, deepest_m)
 
 
@@ -61,7 +61,7 @@ def bound_extraction(geometry: FlipperGeometry, batches: Sequence[Batch], surfac
 def _borne(geometry: FlipperGeometry, batch: Batch, surface: Surface) -> float:
     plate = submerged_plate(geometry, batch.sweep_rad, batch.adduction_rad, surface.depth_m)
     moment_m4 = stroke_moment_m4(geometry, plate, batch.sweep_rad)
-    across_nm = crossing(geometry, plate, batch.sweep_rad) * batch.sweep_nm
+    across_nm = cross_coupling(geometry, plate, batch.sweep_rad) * batch.sweep_nm
     return (across_nm - batch.adduction_nm) / moment_m4 if moment_m4 > 0.0 else 0.0
 
 
@@ -91,29 +91,29 @@ def _fit(
         return NOT_THERE._replace(samples=pieces.samples, reason=UNOBSERVABLE if hidden else TOO_SHORT)
     edge_m2 = geometry.plate_width_m * geometry.plate_thickness_m
     systematic = hypot(
-        CROSSING_DOUBT * _slope(pieces.moments, pieces.crossed_nm),
+        CROSS_COUPLING_UNCERTAINTY * _slope(pieces.moments, pieces.crossed_nm),
         _slope_per_surface(fit, pieces.moments, pieces.torques, pieces.depths_m) * surface.std_error_m,
         1.5 * zero_error_n / (edge_m2 * max(pieces.depths_m)),
     )
-    return judged(fit, systematic, pieces.samples)
+    return evaluated(fit, systematic, pieces.samples)
 
 
 def _pieces(
     geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, sign: float, deepest_m: float
 ) -> _Pieces:
     moments, torques, crossed_nm, depths_m, samples, lever_m = [], [], [], [], 0, inf
-    for batch, way_m in zip(batches, ways_m(batches, surface.depth_m, deepest_m), strict=True):
+    for batch, path_m in zip(batches, ways_m(batches, surface.depth_m, deepest_m), strict=True):
         vertical_m = geometry.vertical_lever_m(batch.sweep_rad, batch.adduction_rad)
         lever_m = min(lever_m, vertical_m)
-        if way_m < SHORTEST_M or vertical_m < MIN_VERTICAL_LEVER_M:
+        if path_m < SHORTEST_M or vertical_m < MIN_VERTICAL_LEVER_M:
             continue
         plate = submerged_plate(geometry, batch.sweep_rad, batch.adduction_rad, surface.depth_m)
-        across_nm = crossing(geometry, plate, batch.sweep_rad) * batch.sweep_nm
-        root = sqrt(way_m)
+        across_nm = cross_coupling(geometry, plate, batch.sweep_rad) * batch.sweep_nm
+        root = sqrt(path_m)
         moments.append(root * stroke_moment_m4(geometry, plate, batch.sweep_rad))
         torques.append(root * sign * (batch.adduction_nm - across_nm))
         crossed_nm.append(root * across_nm)
-        depths_m.append(max(batch.travel_m - surface.depth_m, way_m / 2.0))
+        depths_m.append(max(batch.travel_m - surface.depth_m, path_m / 2.0))
         samples += batch.samples
     return _Pieces(moments, torques, crossed_nm, depths_m, samples, lever_m)
 
@@ -142,11 +142,11 @@ def _slope_per_surface(
     squares = [moment * moment for moment in moments]
     weighted = sum([square / depth_m for square, depth_m in zip(squares, depths_m, strict=True)])
     products = [torque * moment for torque, moment in zip(torques, moments, strict=True)]
-    told = sum([product / depth_m for product, depth_m in zip(products, depths_m, strict=True)])
-    return (2.0 * fit.slope * weighted - told) / sum(squares)
+    reported = sum([product / depth_m for product, depth_m in zip(products, depths_m, strict=True)])
+    return (2.0 * fit.slope * weighted - reported) / sum(squares)
 
 
-def judged(fit: OriginFit, systematic: float, samples: int) -> Estimate:
+def evaluated(fit: OriginFit, systematic: float, samples: int) -> Estimate:
     """A fit as an estimate, with all its doubt, or why it is none."""
     k = fit.slope
     std_error = hypot(fit.std_error, systematic, TORQUE_REPEATABILITY * k)
@@ -154,7 +154,7 @@ def judged(fit: OriginFit, systematic: float, samples: int) -> Estimate:
         return Estimate(UNKNOWN, UNKNOWN, samples, False, "not finite")
     if k <= 0.0:
         return Estimate(k, std_error, samples, False, "the force does not oppose the motion")
-    if std_error > LARGEST_DOUBT * k:
+    if std_error > LARGEST_UNCERTAINTY * k:
         return Estimate(k, std_error, samples, False, "the samples do not follow the law")
     return Estimate(k, std_error, samples, True)
 

@@ -53,10 +53,10 @@ def combined(surface: Surface, expected_error_m: float, sample_m: float) -> Surf
     if not surface.found:
         return surface._replace(depth_m=0.0, std_error_m=expected_error_m)
     error_m = max(hypot(surface.std_error_m, sample_m / sqrt(12.0)), SHARPEST_M)
-    told = 1.0 / (error_m * error_m)
+    reported = 1.0 / (error_m * error_m)
     expected = 1.0 / (expected_error_m * expected_error_m)
-    weight = told / (told + expected)
-    return surface._replace(depth_m=weight * surface.depth_m, std_error_m=1.0 / sqrt(told + expected))
+    weight = reported / (reported + expected)
+    return surface._replace(depth_m=weight * surface.depth_m, std_error_m=1.0 / sqrt(reported + expected))
 
 
 def find_surface(depths_m: Sequence[float], forces_n: Sequence[float]) -> Surface:
@@ -160,18 +160,18 @@ def _kink(x: Sequence[float], y: Sequence[float], border: int, kink_m: float, re
     return Surface(kink_m, error_n / slope, -slope * mean_m, sqrt(variance / border), True)
 
 
-def _mean(jump: Surface, kink: Surface, share: float) -> Surface:
+def _mean(jump: Surface, kink: Surface, fraction: float) -> Surface:
     """`share`: of the jump."""
-    rest = 1.0 - share
+    rest = 1.0 - fraction
 
-    def doubt(own: float, other: float, apart: float) -> float:
-        return sqrt(share * own * own + rest * other * other + share * rest * apart * apart)
+    def uncertainty(own: float, other: float, apart: float) -> float:
+        return sqrt(fraction * own * own + rest * other * other + fraction * rest * apart * apart)
 
     return Surface(
-        share * jump.depth_m + rest * kink.depth_m,
-        doubt(jump.std_error_m, kink.std_error_m, jump.depth_m - kink.depth_m),
-        share * jump.level_n + rest * kink.level_n,
-        doubt(jump.level_std_error_n, kink.level_std_error_n, jump.level_n - kink.level_n),
+        fraction * jump.depth_m + rest * kink.depth_m,
+        uncertainty(jump.std_error_m, kink.std_error_m, jump.depth_m - kink.depth_m),
+        fraction * jump.level_n + rest * kink.level_n,
+        uncertainty(jump.level_std_error_n, kink.level_std_error_n, jump.level_n - kink.level_n),
         True,
     )
 

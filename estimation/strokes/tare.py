@@ -47,11 +47,11 @@ class Tare:
         weight_n = -adduction_nm / rise_adduction_m
         offset_nm = sweep_nm + weight_n * rise_sweep_m
         self._n += 1
-        share = 1.0 / min(self._n, MEMORY)
+        fraction = 1.0 / min(self._n, MEMORY)
         change_n = weight_n - self._weight
-        self._weight += share * change_n
-        self._square += share * (change_n * (weight_n - self._weight) - self._square)
-        self._offset += share * (offset_nm - self._offset)
+        self._weight += fraction * change_n
+        self._square += fraction * (change_n * (weight_n - self._weight) - self._square)
+        self._offset += fraction * (offset_nm - self._offset)
 
     def take(self) -> None:
         """Before the flipper enters the mud: from here on the zero is what the air told."""
@@ -65,8 +65,8 @@ class Tare:
     def correct(self, weight_n: float, std_error_n: float) -> float:
         """By what the way down to the mud still showed, weighed against the zero; returns what it is corrected by."""
         own = self.zero.std_error_n * self.zero.std_error_n + CREEP_N * CREEP_N
-        share = own / (own + std_error_n * std_error_n)
+        fraction = own / (own + std_error_n * std_error_n)
         self.zero = self.zero._replace(
-            weight_n=self.zero.weight_n + share * weight_n, std_error_n=sqrt(own * (1.0 - share))
+            weight_n=self.zero.weight_n + fraction * weight_n, std_error_n=sqrt(own * (1.0 - fraction))
         )
-        return share * weight_n
+        return fraction * weight_n

@@ -19,7 +19,7 @@ from experiments.actuator.simulation import simulated_bench
 from experiments.actuator.weight_handling import PersonsHand
 from experiments.reports.side_by_side import side_by_side
 from experiments.robot.bench_robot import BenchRobot, disarm, leave
-from experiments.robot.prompt import GO_ON, Person, Willing
+from experiments.robot.prompt import GO_ON, Operator, Willing
 from experiments.trials.notebook import NAME, Notebook
 from firmware_host.configuration.configuration import Configuration, parse_configuration
 
@@ -35,10 +35,10 @@ class ActuatorBench(Protocol):
     @property
     def configuration(self) -> Configuration: ...
 
-    def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
+    def calibrate(self, plan: Plan, folder: Path, operator: Operator, show: Show) -> Readings:
         """Raises BenchError, NotebookError."""
 
-    def leave(self, folder: Path, person: Person) -> list[Path]:
+    def leave(self, folder: Path, operator: Operator) -> list[Path]:
         """Torque off, and the logs in the folder, however it has ended."""
 
 
@@ -52,39 +52,39 @@ class RobotBench:
     def configuration(self) -> Configuration:
         return self._robot.configuration
 
-    def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
+    def calibrate(self, plan: Plan, folder: Path, operator: Operator, show: Show) -> Readings:
         require_possible(plan, self.configuration)
-        self._let_go("The robot holds its pose", person)
-        hand, count = PersonsHand(person, plan), len(steps_of(plan))
+        self._let_go("The robot holds its pose", operator)
+        hand, count = PersonsHand(operator, plan), len(steps_of(plan))
         readings: dict[str, Mapping[str, Entry]] = {}
         for number, joint in enumerate(plan.joints):
             notebook = Notebook(folder / joint, notes_of(plan, joint))
             if notebook.begun:
-                person.tell(f"{joint}: {len(notebook.entries)} of {count} readings are there already.")
+                operator.report(f"{joint}: {len(notebook.entries)} of {count} readings are there already.")
             if len(notebook.entries) < count:
-                person.tell(FALLS)
+                operator.report(FALLS)
 
             def show_all(done: int, total: int, before: int = number) -> None:
                 show(before * total + done, len(plan.joints) * total)
 
-            readings[joint] = Calibration(self._robot, joint, plan, hand, person, notebook, show_all).run()
-            self._let_go(f"{joint} is done", person)
+            readings[joint] = Calibration(self._robot, joint, plan, hand, operator, notebook, show_all).run()
+            self._let_go(f"{joint} is done", operator)
         return readings
 
-    def _let_go(self, why: str, person: Person) -> None:
+    def _let_go(self, why: str, operator: Operator) -> None:
         """A joint is mounted with torque off, and nothing that hangs on it is dropped."""
         if self._robot.call("status")["mode"] == "hold":
             question = f"{why}. Take off what hangs and hold the flipper: torque goes off."
-            person.ask(question, {GO_ON: "it is held"}, lambda: self._robot.wait(TICK_S))
+            operator.ask(question, {GO_ON: "it is held"}, lambda: self._robot.wait(TICK_S))
             disarm(self._robot)
 
-    def leave(self, folder: Path, person: Person) -> list[Path]:
+    def leave(self, folder: Path, operator: Operator) -> list[Path]:
         """Ctrl-C in the middle may find a weight on the arm: it is asked for first, unless Ctrl-C comes again."""
         try:
             self._robot.wait(TICK_S)  # a robot that somebody has taken over is not let go of
-            self._let_go("It ends here; Ctrl-C again switches the torque off at once", person)
+            self._let_go("It ends here; Ctrl-C again switches the torque off at once", operator)
         finally:
-            logs = leave(self._robot, person, folder)
+            logs = leave(self._robot, operator, folder)
         return logs
 
 
@@ -95,7 +95,7 @@ class SimulatedBench:
         self.configuration = configuration
         self._seed = seed
 
-    def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
+    def calibrate(self, plan: Plan, folder: Path, operator: Operator, show: Show) -> Readings:
         require_possible(plan, self.configuration)
         count = len(steps_of(plan))
         joints = [partial(_simulate, self.configuration.text, joint, plan, self._seed, folder) for joint in plan.joints]
@@ -106,7 +106,7 @@ class SimulatedBench:
         outcomes = side_by_side(joints, _unseen, meanwhile=look)
         return dict(zip(plan.joints, outcomes, strict=True))
 
-    def leave(self, folder: Path, person: Person) -> list[Path]:
+    def leave(self, folder: Path, operator: Operator) -> list[Path]:
         """Nothing runs any more."""
         return sorted(folder.glob("*.mcap"))
 
@@ -140,7 +140,7 @@ def notes_of(plan: Plan, joint: str) -> dict[str, Any]:
     return {name: value for name, value in asdict(plan).items() if name not in REVISABLE} | {"joint": joint}
 
 
-def _unheard(sentence: str) -> None:
+def _unheard(message: str) -> None:
     """Many joints at once tell of every reading; their notebooks have it."""
 
 

@@ -17,10 +17,10 @@ from experiments.actuator.fit import current_per_nm
 from experiments.actuator.friction import Loop, swing
 from experiments.actuator.plan import COOL_K, READING_S, Plan, Step, largest_current_a, stays_cool, steps_of
 from experiments.actuator.reading import HeldJoint, MovedError, Reading, WarmError
-from experiments.actuator.uncertainty import Doubt, doubt_of
+from experiments.actuator.uncertainty import Uncertainty, uncertainty_of
 from experiments.actuator.weight_handling import Hand
 from experiments.robot.bench_robot import BenchError, BenchRobot, arm, face_faults, require_hold
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Person
+from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.trials.notebook import Notebook
 from firmware_host.operator.status_client import CallRefusedError
 
@@ -37,20 +37,20 @@ class Calibration:
     """Owns the course of one joint's calibration."""
 
     def __init__(
-        self, robot: BenchRobot, joint: str, plan: Plan, hand: Hand, person: Person, notebook: Notebook, show: Show
+        self, robot: BenchRobot, joint: str, plan: Plan, hand: Hand, operator: Operator, notebook: Notebook, show: Show
     ) -> None:
         self._robot = robot
         self._joint = joint
         self._plan = plan
         self._hand = hand
-        self._person = person
+        self._operator = operator
         self._notebook = notebook
         self._show = show
         self._constant_nm_a = robot.configuration.drive[joint].torque_constant_nm_a
         self._steps = steps_of(plan)
         self._held: HeldJoint | None = None
         self._faults: dict[str, int] = {}
-        self._doubts: dict[str, int] = {}
+        self._uncertainties: dict[str, int] = {}
         self._warned = False
 
     def run(self) -> Mapping[str, Any]:
@@ -83,7 +83,7 @@ class Calibration:
                 self._read(step)
         except WarmError as problem:
             self._count(step, problem)
-            self._person.tell(f"{_named(step)} was not read: {problem}.")
+            self._operator.report(f"{_named(step)} was not read: {problem}.")
             self._hand.take_off()
         except (BenchError, CallRefusedError) as problem:
             self._recover(step, problem)
@@ -103,10 +103,10 @@ class Calibration:
         """With torque on, an empty arm, and a winding that bears what comes."""
         if self._held is None or self._robot.call("status")["mode"] != "hold":
             self._held = None
-            face_faults(self._robot, self._person)
+            face_faults(self._robot, self._operator)
             self._hand.hold_level(self._joint, self._watch)
             self._cool(step)
-            arm(self._robot, self._person)
+            arm(self._robot, self._operator)
             self._hand.let_go(self._watch)
             self._held = HeldJoint(self._robot, self._joint)
         elif not self._is_cool(step):
@@ -127,7 +127,7 @@ class Calibration:
     def _cool(self, step: Step) -> None:
         if self._is_cool(step):
             return
-        self._person.tell(
+        self._operator.report(
             f"The {self._joint} winding has {self._winding_c():.0f} degrees C, too warm for {_named(step)}: waiting."
         )
         waited_s = 0.0
@@ -154,7 +154,7 @@ class Calibration:
         warm_c, winding_c = self._robot.configuration.limits.temperature_warm_c - COOL_K, self._winding_c()
         if not self._warned and winding_c > warm_c:
             self._warned = True
-            self._person.tell(f"The {self._joint} winding has {winding_c:.0f} degrees C: a weight would fall soon.")
+            self._operator.report(f"The {self._joint} winding has {winding_c:.0f} degrees C: a weight would fall soon.")
             self._hand.take_off()
 
     def _recover(self, step: Step, problem: Exception) -> None:
@@ -163,7 +163,7 @@ class Calibration:
         if status["mode"] == "hold":
             raise problem
         self._count(step, problem)
-        self._person.tell(f"{_named(step)} was not read: {str(problem).rstrip('.')}.")
+        self._operator.report(f"{_named(step)} was not read: {str(problem).rstrip('.')}.")
         self._hand.take_off()
         self._held = None
 
@@ -173,9 +173,9 @@ class Calibration:
         reading = self._settled(step)
         if reading is None:
             return
-        doubt = doubt_of(self._plan, self._notebook.entries, step, reading.current_a, self._constant_nm_a)
-        if doubt is not None:
-            self._ask_about(doubt, step, reading)
+        uncertainty = uncertainty_of(self._plan, self._notebook.entries, step, reading.current_a, self._constant_nm_a)
+        if uncertainty is not None:
+            self._ask_about(uncertainty, step, reading)
         elif step.weight_g:
             self._keep(step, reading)
         else:
@@ -192,10 +192,10 @@ class Calibration:
                 trouble = str(problem)
             answers = {GO_ON: "read it again", SKIP: "skip it"}
             question = f"{_named(step)} did not come to rest: {trouble}. Let it hang still; nothing may touch it."
-            if self._person.ask(question, answers, self._watch) == SKIP:
+            if self._operator.ask(question, answers, self._watch) == SKIP:
                 break
         self._notebook.write(step.key, {"skipped": trouble})
-        self._person.tell(f"{_named(step)} of trial {step.told_trial} is left out: {trouble}.")
+        self._operator.report(f"{_named(step)} of trial {step.reported_trial} is left out: {trouble}.")
         return None
 
     def _swung(self) -> Sequence[Loop]:
@@ -204,37 +204,39 @@ class Calibration:
         try:
             return swing(self._held)
         except MovedError as problem:
-            self._person.tell(f"friction was not measured this time: {problem}")
+            self._operator.report(f"friction was not measured this time: {problem}")
             return ()
 
-    def _ask_about(self, doubt: Doubt, step: Step, reading: Reading) -> None:
+    def _ask_about(self, uncertainty: Uncertainty, step: Step, reading: Reading) -> None:
         """Whoever only ever goes on does not go on for ever: it is kept as doubtful then."""
         answers = {GO_ON: "read it anew", KEEP: "keep it, marked as doubtful"}
-        if doubt.other_g is not None:
-            answers[OTHER] = f"it was the {doubt.other_g:g} g"
-        self._doubts[step.key] = self._doubts.get(step.key, 0) + 1
-        answer = self._person.ask(f"{_named(step)}: {doubt.sentence}", answers, self._attend)  # a reading is at stake
-        if answer == OTHER and doubt.other_g is not None:
-            self._take_as(replace(step, weight_g=doubt.other_g), reading)
-        elif answer == KEEP or self._doubts[step.key] >= MOST_REPEATS:
-            self._keep(step, reading, doubt.sentence)
+        if uncertainty.other_g is not None:
+            answers[OTHER] = f"it was the {uncertainty.other_g:g} g"
+        self._uncertainties[step.key] = self._uncertainties.get(step.key, 0) + 1
+        answer = self._operator.ask(
+            f"{_named(step)}: {uncertainty.message}", answers, self._attend
+        )  # a reading is at stake
+        if answer == OTHER and uncertainty.other_g is not None:
+            self._take_as(replace(step, weight_g=uncertainty.other_g), reading)
+        elif answer == KEEP or self._uncertainties[step.key] >= MOST_REPEATS:
+            self._keep(step, reading, uncertainty.message)
 
     def _take_as(self, step: Step, reading: Reading) -> None:
         if step.key in self._notebook.entries:
-            self._person.tell(f"{_named(step)} of trial {step.trial} was read already, and stays as it is.")
+            self._operator.report(f"{_named(step)} of trial {step.trial} was read already, and stays as it is.")
         else:
             self._keep(step, reading)
 
-    def _keep(self, step: Step, reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> None:
-        self._notebook.write(step.key, entry_of(reading, doubt, loops))
+    def _keep(self, step: Step, reading: Reading, uncertainty: str = "", loops: Sequence[Loop] = ()) -> None:
+        self._notebook.write(step.key, entry_of(reading, uncertainty, loops))
         held_nm = self._constant_nm_a * reading.current_a
-        self._person.tell(
-            f"{self._joint}, trial {step.told_trial}, {_named(step)}: {reading.current_a:+.3f} A, {held_nm:+.4f} N·m by"
+        self._operator.report(
+            f"{self._joint}, trial {step.reported_trial}, {_named(step)}: {reading.current_a:+.3f} A, {held_nm:+.4f} N·m by"
             f" the configured constant, at {degrees(reading.angle_rad):+.2f} degrees"
         )
 
 
-def entry_of(reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> dict[str, Any]:
+def entry_of(reading: Reading, uncertainty: str = "", loops: Sequence[Loop] = ()) -> dict[str, Any]:
     """As the notebook keeps it; loops are those of the empty arm."""
     entry = {
         "current_a": reading.current_a,
@@ -246,7 +248,7 @@ def entry_of(reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> d
         "above": reading.above._asdict(),
     }
     entry |= {"loops": [loop._asdict() for loop in loops]} if loops else {}
-    return entry | ({"doubt": doubt} if doubt else {})
+    return entry | ({"doubt": uncertainty} if uncertainty else {})
 
 
 def _named(step: Step) -> str:

@@ -211,5 +211,5 @@ def repeatability(loads: Sequence[Load]) -> float:
     by_weight: dict[float, list[float]] = {}
     for load in loads:
         by_weight.setdefault(load.weight_g, []).append(load.current_a)
-    shares = [stdev(currents) / abs(fmean(currents)) for currents in by_weight.values() if len(currents) > 1]
-    return fmean(shares) if shares else nan
+    fractions = [stdev(currents) / abs(fmean(currents)) for currents in by_weight.values() if len(currents) > 1]
+    return fmean(fractions) if fractions else nan

@@ -45,10 +45,10 @@ def fit_line(x: Sequence[float], y: Sequence[float]) -> Line:
     intercept = fmean(y) - slope * x_mean
     slope_square = intercept_square = 0.0
     for a, b in zip(x, y, strict=True):
-        share = (a - x_mean) / spread  # of the slope that this point makes
-        leverage = 1.0 / count + share * (a - x_mean)
+        fraction = (a - x_mean) / spread  # of the slope that this point makes
+        leverage = 1.0 / count + fraction * (a - x_mean)
         alone = (b - intercept - slope * a) / (1.0 - leverage)  # what the line of the others misses it by
-        slope_square += (share * alone) ** 2
-        intercept_square += ((1.0 / count - x_mean * share) * alone) ** 2
+        slope_square += (fraction * alone) ** 2
+        intercept_square += ((1.0 / count - x_mean * fraction) * alone) ** 2
     student = student_factor(count - 2)
     return Line(slope, intercept, student * sqrt(slope_square), student * sqrt(intercept_square), count)

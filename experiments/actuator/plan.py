@@ -20,7 +20,7 @@ from math import ceil, hypot, nan, sqrt
 from typing import Any
 
 from control.joint_pd import GRAVITY_M_S2
-from control.monitors.joint_monitor import SATURATED_SHARE
+from control.monitors.joint_monitor import SATURATED_FRACTION
 from control.monitors.winding import Winding
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
@@ -29,7 +29,7 @@ PAPER_WEIGHTS_G = (10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 600.0, 800.0)
 PAPER_TRIALS = 5
 LARGEST_ERROR = 0.2  # by which a torque constant may be known wrongly: 60/(2π KV) for 8.27/KV is 15 % of it
 READING_S = 10.0  # of a heavy weight, both approaches
-PERSON_S = 4.0  # that it hangs besides, until Enter is pressed and until it is taken off
+OPERATOR_S = 4.0  # that it hangs besides, until Enter is pressed and until it is taken off
 COOL_K = 2.0  # below limits.temperature_warm_c, above which torque fades and a heavy weight falls
 
 
@@ -70,7 +70,7 @@ class Step:
         return f"trial {self.trial}, {self.weight_g:g} g"
 
     @property
-    def told_trial(self) -> int:
+    def reported_trial(self) -> int:
         """As people count: what comes before the first pass is part of it."""
         return max(self.trial, 1)
 
@@ -104,7 +104,7 @@ def needed_nm(plan: Plan, configuration: Configuration, weight_g: float) -> floa
     """What limits.torque_nm must be at least for this weight and the arm."""
     arm = configuration.arm
     arm_nm = arm.arm_mass_kg * plan.gravity_m_s2 * arm.center_of_mass_m
-    return (plan.torque_nm(weight_g) + arm_nm) * (1.0 + LARGEST_ERROR) / SATURATED_SHARE
+    return (plan.torque_nm(weight_g) + arm_nm) * (1.0 + LARGEST_ERROR) / SATURATED_FRACTION
 
 
 def _problems(plan: Plan, configuration: Configuration) -> Iterator[str]:

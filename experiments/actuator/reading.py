@@ -119,7 +119,7 @@ class HeldJoint:
     def stroke(self, angle_rad: float, step_rad: float) -> list[Sample]:
         """What is seen on the way to there, in moves of at most this size, until it has come to rest."""
         samples = []
-        for next_rad in _way_rad(self.held_rad, angle_rad, step_rad):
+        for next_rad in _path_rad(self.held_rad, angle_rad, step_rad):
             self._robot.call("move", **{f"{self._joint}_rad": next_rad})
             self.held_rad = next_rad
             while (status := self._robot.call("status"))["moving"]:
@@ -165,7 +165,7 @@ class HeldJoint:
         """In steps that do not throw the weight about."""
         if abs(angle_rad) > HIGHEST_RAD:
             raise MovedError("the motor does not bring the arm level: does too much hang on it, or is it in the way")
-        for next_rad in _way_rad(self.held_rad, angle_rad, STEP_RAD):
+        for next_rad in _path_rad(self.held_rad, angle_rad, STEP_RAD):
             self.held_rad = next_rad
             move(self._robot, {self._joint: next_rad})
 
@@ -188,7 +188,7 @@ class HeldJoint:
         return samples
 
 
-def _way_rad(start_rad: float, end_rad: float, step_rad: float) -> Iterator[float]:
+def _path_rad(start_rad: float, end_rad: float, step_rad: float) -> Iterator[float]:
     """In equal steps of at most this size; at least one."""
     steps = max(1, ceil(abs(end_rad - start_rad) / step_rad))
     for step in range(1, steps + 1):

@@ -12,7 +12,7 @@ from experiments.actuator.fit import Entry, JointFit, repeatability
 from experiments.actuator.friction import SWING_RAD
 from experiments.actuator.plan import Plan, steps_of
 from experiments.reports.report_page import Figure, Rows, Section
-from experiments.reports.value_text import share_text, value_text
+from experiments.reports.value_text import fraction_text, value_text
 from firmware_host.operator.reports import known
 
 TITLE = "Actuator calibration"
@@ -101,8 +101,8 @@ def _joint_report(fit: JointFit) -> dict[str, Any]:
         "tare_nm": fit.tare_nm,
         "tare_spread_nm": fit.tare_spread_nm,
     }
-    told = {name: known(value) for name, value in values.items()}
-    return {"joint": fit.joint, "readings": fit.line.readings, "direction": fit.direction} | told
+    reported = {name: known(value) for name, value in values.items()}
+    return {"joint": fit.joint, "readings": fit.line.readings, "direction": fit.direction} | reported
 
 
 def left_out(plan: Plan, readings: Mapping[str, Mapping[str, Entry]]) -> list[dict[str, Any]]:
@@ -161,13 +161,13 @@ def table_of(fits: Sequence[JointFit]) -> Rows:
             f"{fit.configured_nm_a:g}",
             f"{fit.rmse_configured_nm:.4f}",
             f"{fit.rmse_fitted_nm:.4f}",
-            share_text(fit.repeatability),
+            fraction_text(fit.repeatability),
             str(fit.line.readings),
         ]
         for fit in fits
     ]
     paper = [
-        [f"paper, {kind}", "-", f"{PAPER_CONSTANT_NM_A:g}", f"{rmse_nm:.4f}", "-", share_text(PAPER_REPEATABILITY)]
+        [f"paper, {kind}", "-", f"{PAPER_CONSTANT_NM_A:g}", f"{rmse_nm:.4f}", "-", fraction_text(PAPER_REPEATABILITY)]
         for kind, rmse_nm in PAPER_RMSE_NM.items()
     ]
     return [head, *rows, *([*row, "-"] for row in paper)]
@@ -216,7 +216,7 @@ def _weight_rows(fit: JointFit) -> Rows:
         spread_nm = fit.constant_nm_a * stdev(load.current_a for load in loads) if len(loads) > 1 else nan
         torques = (f"{each:.4f}" for each in (external_nm, configured_nm, fitted_nm))
         error_mnm = round(1e3 * (fitted_nm - external_nm), 1) + 0.0  # without a minus before zero
-        spread = [f"{1e3 * spread_nm:.1f}" if isfinite(spread_nm) else "-", share_text(repeatability(loads))]
+        spread = [f"{1e3 * spread_nm:.1f}" if isfinite(spread_nm) else "-", fraction_text(repeatability(loads))]
         rows.append([f"{weight_g:g} g", str(len(loads)), *torques, f"{error_mnm:+.1f}", *spread])
     return [head, *rows]
 

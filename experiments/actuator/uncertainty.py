@@ -16,19 +16,22 @@ from experiments.actuator.plan import Plan, Step
 
 TELLING_NM = 0.05  # what lighter loads say of a constant is friction
 FRICTION_NM = 0.012  # by which any reading may miss its weight
-FITTED_SHARE, CONFIGURED_SHARE = 0.1, 0.25  # of a weight, besides, by a constant of this joint or by the configured one
+FITTED_FRACTION, CONFIGURED_FRACTION = (
+    0.1,
+    0.25,
+)  # of a weight, besides, by a constant of this joint or by the configured one
 FAR_BETTER = 3.0  # times nearer, in logarithms, is another weight of the list
-SLIPPED_SHARE = 0.3  # of the weight, at most, where it has slipped off
+SLIPPED_FRACTION = 0.3  # of the weight, at most, where it has slipped off
 
 
-class Doubt(NamedTuple):
-    sentence: str
+class Uncertainty(NamedTuple):
+    message: str
     other_g: float | None = None  # the weight that it fits far better
 
 
-def doubt_of(
+def uncertainty_of(
     plan: Plan, entries: Mapping[str, Any], step: Step, current_a: float, configured_nm_a: float
-) -> Doubt | None:
+) -> Uncertainty | None:
     """None where the reading is as it should be, or nothing is known to judge it by."""
     tare_a = tare_of(entries, step.trial)
     if tare_a is None:
@@ -38,24 +41,24 @@ def doubt_of(
     fitted = can_fit(telling)
     constant_nm_a = abs(line_of(telling).constant_nm_a) if fitted else configured_nm_a
     held_g = 1000.0 * sign * (current_a - tare_a) * constant_nm_a / (plan.gravity_m_s2 * plan.lever_m)
-    share = FITTED_SHARE if fitted else CONFIGURED_SHARE
-    if plan.torque_nm(abs(held_g - step.weight_g)) <= FRICTION_NM + share * plan.torque_nm(step.weight_g):
+    fraction = FITTED_FRACTION if fitted else CONFIGURED_FRACTION
+    if plan.torque_nm(abs(held_g - step.weight_g)) <= FRICTION_NM + fraction * plan.torque_nm(step.weight_g):
         return None
-    return _doubt(plan, step.weight_g, held_g)
+    return _uncertainty(plan, step.weight_g, held_g)
 
 
-def _doubt(plan: Plan, asked_g: float, held_g: float) -> Doubt:
+def _uncertainty(plan: Plan, asked_g: float, held_g: float) -> Uncertainty:
     reads = f"the motor holds {held_g:.0f} g"
     if not asked_g:
-        return Doubt(
+        return Uncertainty(
             f"{reads} although the arm should be empty: is something still hanging, or does it touch anything?"
         )
-    if held_g < SLIPPED_SHARE * asked_g:
-        return Doubt(f"{reads}, not {asked_g:g} g: did it slip off?")
+    if held_g < SLIPPED_FRACTION * asked_g:
+        return Uncertainty(f"{reads}, not {asked_g:g} g: did it slip off?")
     nearest_g = min(plan.weights_g, key=lambda weight_g: _distance(held_g, weight_g))
     if nearest_g != asked_g and FAR_BETTER * _distance(held_g, nearest_g) < _distance(held_g, asked_g):
-        return Doubt(f"{reads}: that is {nearest_g:g} g rather than {asked_g:g} g", nearest_g)
-    return Doubt(f"{reads}, not {asked_g:g} g: does it hang at {100.0 * plan.lever_m:g} cm, and touch nothing?")
+        return Uncertainty(f"{reads}: that is {nearest_g:g} g rather than {asked_g:g} g", nearest_g)
+    return Uncertainty(f"{reads}, not {asked_g:g} g: does it hang at {100.0 * plan.lever_m:g} cm, and touch nothing?")
 
 
 def _distance(held_g: float, weight_g: float) -> float:

@@ -10,8 +10,8 @@ from math import degrees
 from typing import Protocol
 
 from experiments.actuator.friction import SWING_RAD
-from experiments.actuator.plan import PERSON_S, Plan, Step
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Person
+from experiments.actuator.plan import OPERATOR_S, Plan, Step
+from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 
 EMPTY = (
     "take everything off the flipper, and let it rest. Keep clear of it: after its reading it swings to and fro by"
@@ -39,15 +39,15 @@ class Hand(Protocol):
 class PersonsHand:
     """A Hand."""
 
-    lingers_s = PERSON_S
+    lingers_s = OPERATOR_S
 
-    def __init__(self, person: Person, plan: Plan) -> None:
-        self._person = person
+    def __init__(self, operator: Operator, plan: Plan) -> None:
+        self._operator = operator
         self._plan = plan
 
     def hold_level(self, joint: str, meanwhile: Callable[[], None]) -> None:
         axle = "sweep" if joint.endswith("sweep") else "adduction"
-        self._person.ask(
+        self._operator.ask(
             f"Mount the robot with the {axle} axle of the {joint.split('_')[0]} flipper horizontal and the flipper out"
             " over the edge, the other joints propped within their range. Take every weight off and hold the flipper"
             " level: all four motors will hold.",
@@ -56,14 +56,14 @@ class PersonsHand:
         )
 
     def let_go(self, meanwhile: Callable[[], None]) -> None:
-        self._person.ask("The motor holds. Let go of the flipper.", {GO_ON: "done"}, meanwhile)
+        self._operator.ask("The motor holds. Let go of the flipper.", {GO_ON: "done"}, meanwhile)
 
     def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
-        trial = f"Trial {step.told_trial} of {self._plan.trials}"
+        trial = f"Trial {step.reported_trial} of {self._plan.trials}"
         what = f"hang {step.weight_g:g} g at {100.0 * self._plan.lever_m:g} cm from the axle, nothing else"
         question = f"{trial}: {what}, and let it rest." if step.weight_g else f"{trial}: {EMPTY}"
         answers = {GO_ON: "it rests", SKIP: "skip it", REDO: "redo the one before"}
-        return self._person.ask(question, answers, meanwhile)
+        return self._operator.ask(question, answers, meanwhile)
 
     def take_off(self) -> None:
-        self._person.tell("Take the weight off the flipper now.")
+        self._operator.report("Take the weight off the flipper now.")

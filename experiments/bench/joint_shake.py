@@ -87,9 +87,9 @@ def shake(stand: Stand, joint: str) -> Shake:
 def _is_punctual(stand: Stand, joint: str, law: Shake) -> bool:
     """Whether the shake came to its end without a tick that was late; one ends it at once."""
     stand.controller.law = law
-    samples = stand.run_until(lambda at: law.done or at.beat.missed > 0, LONGEST_S, f"The end of shaking {joint}")
+    samples = stand.run_until(lambda at: law.done or at.tick.missed > 0, LONGEST_S, f"The end of shaking {joint}")
     stand.controller.law = idle
-    return not samples[-1].beat.missed
+    return not samples[-1].tick.missed
 
 
 def idle(held: Torques, states: DriveStates) -> Torques:

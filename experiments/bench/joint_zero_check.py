@@ -14,7 +14,7 @@ from experiments.bench.test_rig import LOOK_S, Sample, Stand, joint_place
 
 LEVEL_DEG = 5.0  # that hands with a spirit level are off: 1 cm at the end of an arm
 LEAST_TURN_DEG = 30.0  # by which a joint is turned by somebody who means it
-OTHERS_SHARE = 0.5  # that another joint may turn with it: a hand is not a vice
+OTHERS_FRACTION = 0.5  # that another joint may turn with it: a hand is not a vice
 LYING_M = 0.02  # two flippers that lie on the same table: 1 cm of each for zero and table
 LOOKING_S = 0.3
 ZERO = "set drive.{joint}.zero_turn so that the joint reads 0 with the flipper straight out and level"
@@ -65,7 +65,7 @@ def turned(stand: Stand, joint: str) -> Readings:
     advice = mixed if other_deg > turn_deg else "turn it farther"
     yield Reading(f"{joint}: turned by hand", turn_deg, "deg", LEAST_TURN_DEG, inf, advice)
     alone = advice if other_deg > turn_deg else "turn one joint at a time"
-    yield Reading(f"{joint}: {other} turned with it", other_deg, "deg", 0.0, OTHERS_SHARE * turn_deg, alone)
+    yield Reading(f"{joint}: {other} turned with it", other_deg, "deg", 0.0, OTHERS_FRACTION * turn_deg, alone)
     span = stand.configuration.joint_ranges[place]
     low_deg, high_deg = degrees(min(angles[place] for angles in seen)), degrees(max(angles[place] for angles in seen))
     narrow = f"the limit lies beyond the stop: narrow [limits], or {ZERO.format(joint=joint)}"

@@ -8,7 +8,7 @@ tells a drive that is late from a computer on which drives are emulated and that
 from __future__ import annotations
 
 from control.records import DriveStates
-from firmware_host.ticker import PERIOD_S, Beat
+from firmware_host.ticker import PERIOD_S, Tick
 
 LATE_S = 2.0 * PERIOD_S  # age of a position or a current; drives send theirs more often than the loop ticks
 BUSY = "end what else runs on this computer, and give this program real-time priority (README, 'On the robot')"
@@ -26,18 +26,18 @@ class Lateness:
         self.missed = 0
         self.oldest_s = 0.0
 
-    def update(self, beat: Beat, states: DriveStates) -> None:
-        self.ticks += 1 + beat.missed
-        self.missed += beat.missed
-        age_s = beat.now_s - min(min(state.angle_stamp_s, state.current_stamp_s) for state in states)
+    def update(self, tick: Tick, states: DriveStates) -> None:
+        self.ticks += 1 + tick.missed
+        self.missed += tick.missed
+        age_s = tick.now_s - min(min(state.angle_stamp_s, state.current_stamp_s) for state in states)
         self.oldest_s = max(self.oldest_s, age_s)
 
     @property
-    def sentence(self) -> str:
+    def message(self) -> str:
         """Empty where all was in time."""
-        told = []
+        reported = []
         if self.missed:
-            told.append(f"this computer missed {self.missed} of {self.ticks} ticks")
+            reported.append(f"this computer missed {self.missed} of {self.ticks} ticks")
         if self.oldest_s > LATE_S:
-            told.append(f"the drives' messages were up to {1e3 * self.oldest_s:.0f} ms old")
-        return f"Meanwhile {' and '.join(told)}: {BUSY if self.missed else WIRES}." if told else ""
+            reported.append(f"the drives' messages were up to {1e3 * self.oldest_s:.0f} ms old")
+        return f"Meanwhile {' and '.join(reported)}: {BUSY if self.missed else WIRES}." if reported else ""

@@ -16,7 +16,7 @@ from control.controller import UP_RAD
 from control.records import JOINTS
 from experiments.bench.rig import SimulatedRig
 from experiments.robot.bench_robot import CLEAR, LEAVE
-from experiments.robot.prompt import GO_ON, Person
+from experiments.robot.prompt import GO_ON, Operator
 from firmware_host.ticker import PERIOD_S
 from simulation.body.plant import END_STOPS_RAD
 
@@ -61,20 +61,20 @@ class Attendant(Protocol):
 class AskedAttendant:
     """A person who is asked. `sure`: nobody asks whether the robot may move."""
 
-    def __init__(self, person: Person, sure: bool) -> None:
-        self._person = person
+    def __init__(self, operator: Operator, sure: bool) -> None:
+        self._operator = operator
         self._sure = sure
 
     def consents(self, what: str, meanwhile: Callable[[], None]) -> bool:
         if self._sure:
-            self._person.tell(what)
+            self._operator.report(what)
             return True
-        return self._person.ask(what, {GO_ON: "go on", "n": "no, end here"}, meanwhile) == GO_ON
+        return self._operator.ask(what, {GO_ON: "go on", "n": "no, end here"}, meanwhile) == GO_ON
 
     def clears(self, faults: str, meanwhile: Callable[[], None]) -> bool:
         """Also who is sure that the robot may move did not know of these."""
         answers = {CLEAR: "clear it and go on", LEAVE: "end here"}
-        return self._person.ask(f"{faults} Is the cause gone?", answers, meanwhile) == CLEAR
+        return self._operator.ask(f"{faults} Is the cause gone?", answers, meanwhile) == CLEAR
 
     def watch(self) -> None: ...
 
@@ -85,7 +85,7 @@ class AskedAttendant:
         answers = {GO_ON: "yes", "w": "the other way", "o": "another joint moved", "n": "nothing moved"}
         sights = {GO_ON: Sight.RIGHT, "w": Sight.WRONG_WAY, "o": Sight.OTHER, "n": Sight.NOTHING}
         question = f"Did the {side} flipper {WAYS[kind]} and come back, and nothing else move?"
-        return sights[self._person.ask(question, answers, meanwhile)]
+        return sights[self._operator.ask(question, answers, meanwhile)]
 
     def holds_level(self, meanwhile: Callable[[], None]) -> bool:
         return self._done("Hold both flippers level and straight out, as a spirit level has it.", meanwhile)
@@ -96,10 +96,10 @@ class AskedAttendant:
         return self._done(f"Move the {side} flipper slowly {ways}, from stop to stop and back.", meanwhile)
 
     def lets_go(self) -> None:
-        self._person.tell("Let go of the flippers, and lay them down.")
+        self._operator.report("Let go of the flippers, and lay them down.")
 
     def _done(self, what: str, meanwhile: Callable[[], None]) -> bool:
-        return self._person.ask(what, {GO_ON: "done", "s": "skip"}, meanwhile) == GO_ON
+        return self._operator.ask(what, {GO_ON: "done", "s": "skip"}, meanwhile) == GO_ON
 
 
 class AbsentAttendant:
@@ -136,7 +136,7 @@ class SimulatedAttendant:
         self._from_rad = self._farthest_rad = self._plant.angles_rad
         self._held_rad: list[float] | None = None
         self._turning = 0  # the place of the joint that is turned, along the course
-        self._course: deque[float] = deque()
+        self._profile: deque[float] = deque()
         rig.others.append(lambda _: self._hold())
 
     def consents(self, what: str, meanwhile: Callable[[], None]) -> bool:
@@ -154,7 +154,7 @@ class SimulatedAttendant:
 
     def saw(self, joint: str, meanwhile: Callable[[], None]) -> Sight:
         moved_rad = [there - here for here, there in zip(self._from_rad, self._farthest_rad, strict=True)]
-        seen = [place for place, way_rad in enumerate(moved_rad) if abs(way_rad) > SEEN_RAD]
+        seen = [place for place, path_rad in enumerate(moved_rad) if abs(path_rad) > SEEN_RAD]
         if not seen:
             return Sight.NOTHING
         if seen != [JOINTS.index(joint)]:
@@ -171,8 +171,8 @@ class SimulatedAttendant:
         stop_rad = END_STOPS_RAD[self._turning % 2]
         steps = round(TURNING_S / PERIOD_S)
         there_and_back = (*range(0, -steps, -1), *range(-steps, steps), *range(steps, -1, -1))
-        self._course.extend(stop_rad * step / steps for step in there_and_back)
-        while self._course:
+        self._profile.extend(stop_rad * step / steps for step in there_and_back)
+        while self._profile:
             meanwhile()
         return True
 
@@ -184,8 +184,8 @@ class SimulatedAttendant:
     def _hold(self) -> None:
         if self._held_rad is None:
             return
-        if self._course:
-            self._held_rad[self._turning] = self._course.popleft()
+        if self._profile:
+            self._held_rad[self._turning] = self._profile.popleft()
         left, right = self._plant.arms
         left.sweep_rad, left.adduction_rad, right.sweep_rad, right.adduction_rad = self._held_rad
         for arm in self._plant.arms:

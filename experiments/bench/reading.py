@@ -40,7 +40,7 @@ class Reading(NamedTuple):
         return f"at most {self.high:.4g}" if isfinite(self.high) else ""
 
     @property
-    def sentence(self) -> str:
+    def message(self) -> str:
         advice = f": {self.advice}" if self.advice else ""
         return f"{self.what} is {self.value_text}, must be {self.bounds_text}{advice}."
 

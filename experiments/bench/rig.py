@@ -28,7 +28,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import Loop
 from firmware_host.operator.status_client import NoDaemonError, NotPermittedError, StatusClient
-from firmware_host.ticker import PERIOD_S, Beat, Ticker
+from firmware_host.ticker import PERIOD_S, Tick, Ticker
 from simulation.body.blocks import on_blocks
 from simulation.devices.odrive import OdriveParameters
 from simulation.harness.robot import SimulatedRobot
@@ -51,7 +51,7 @@ class Rig(Protocol):
     @property
     def now_s(self) -> float: ...
 
-    def wait(self) -> Beat:
+    def wait(self) -> Tick:
         """The next tick comes."""
 
     def close(self) -> None: ...
@@ -83,10 +83,10 @@ class HardwareRig:
     def now_s(self) -> float:
         return self._now_s
 
-    def wait(self) -> Beat:
-        beat = self._ticker.wait()
-        self._now_s = beat.now_s
-        return beat
+    def wait(self) -> Tick:
+        tick = self._ticker.wait()
+        self._now_s = tick.now_s
+        return tick
 
     def close(self) -> None:
         self.loop.drives.close()
@@ -175,12 +175,12 @@ class SimulatedRig:
             ear.close()
         return Overheard(self.now_s, frames)
 
-    def wait(self) -> Beat:
+    def wait(self) -> Tick:
         self._tick_number += 1
         for other in self.others:
             other(self)
         self.robot.advance(self.now_s)
-        return Beat(self.now_s, 0.0, self._tick_number, 0)
+        return Tick(self.now_s, 0.0, self._tick_number, 0)
 
     def close(self) -> None:
         self.loop.drives.close()

@@ -80,8 +80,8 @@ def _agreement(joint: str, begun: DriveStates, samples: list[Sample], nudge: Nud
     )
     yield Reading(f"{joint}: torque that moves it", nudge.torque_nm if nudge.moved else nan, "N·m", 0.0, MOST_NM, stuck)
     contrary = f"calibrate the drive of {joint} anew: its encoder counts against its motor"
-    way_rad = moved_rad[place]
-    yield Reading(f"{joint}: way under torque", way_rad, "rad", MOVED_RAD, 0.5, contrary if way_rad < 0.0 else stuck)
+    path_rad = moved_rad[place]
+    yield Reading(f"{joint}: way under torque", path_rad, "rad", MOVED_RAD, 0.5, contrary if path_rad < 0.0 else stuck)
     fastest_rad_s = max((sample.states[place].velocity_rad_s for sample in samples), key=abs)
     yield Reading(f"{joint}: velocity with it", fastest_rad_s, "rad/s", 0.0, 20.0, contrary)
     late = samples[-round(STEP_S / PERIOD_S) :]

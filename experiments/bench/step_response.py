@@ -26,7 +26,7 @@ LEAST_WAIT_TICKS, MOST_WAIT_TICKS = 25, 45  # between two of them: for the joint
 LONGEST_TICKS = 2 * QUARTER_TICKS  # after which an answer belongs to another step
 MEDIAN_TICKS = 2  # of the delay, with which the joints' damping is stable
 WORST_TICKS = 3  # beyond, a drive counts as silent
-RATIO_SHARE = 0.1  # by which current and command may disagree
+RATIO_FRACTION = 0.1  # by which current and command may disagree
 
 
 class Pulse(NamedTuple):
@@ -80,7 +80,7 @@ def step_response(stand: Stand, joint: str, seed: int = 1) -> Readings:
     yield Reading(f"{joint}: delay of the current, worst", max(delays), "ticks", 1, WORST_TICKS, slow)
     ratio = size_ratio(samples, pulses, constant_nm_a)
     stated = f"drive.{joint}.torque_constant_nm_a must be what the drive has in motor.torque_constant"
-    yield Reading(f"{joint}: current over command", ratio, "", 1.0 - RATIO_SHARE, 1.0 + RATIO_SHARE, stated)
+    yield Reading(f"{joint}: current over command", ratio, "", 1.0 - RATIO_FRACTION, 1.0 + RATIO_FRACTION, stated)
 
 
 def delay_ticks(samples: list[Sample], place: int, step: int, constant_nm_a: float) -> float:
@@ -90,7 +90,7 @@ def delay_ticks(samples: list[Sample], place: int, step: int, constant_nm_a: flo
     for sample in samples[step + 1 : step + LONGEST_TICKS]:
         given_nm = sample.states[place].current_a * constant_nm_a
         if (given_nm > half_nm) == upward:
-            return min(sample.beat.number - samples[step].beat.number, LONGEST_TICKS)
+            return min(sample.tick.number - samples[step].tick.number, LONGEST_TICKS)
     return LONGEST_TICKS
 
 

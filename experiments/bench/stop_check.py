@@ -24,7 +24,7 @@ from experiments.bench.test_rig import Law, Sample, Stand, first_lasting
 from firmware_host.ticker import PERIOD_S
 
 SWEEPS = (0, 2)  # places in JOINTS
-FULL_SHARE = 0.9  # of the speed asked for, from which on it counts as full
+FULL_FRACTION = 0.9  # of the speed asked for, from which on it counts as full
 REST_RAD_S = 0.2
 REST_TICKS = 20  # that all of them are slow: no turning point
 SWING_RAD = radians(30.0)
@@ -60,7 +60,7 @@ def soft_stop(stand: Stand) -> Readings:
 def _in_full_stance(stand: Stand, sample: Sample) -> bool:
     full_rad_s = stand.configuration.gait.stance_speed_m_s / stand.configuration.geometry.flipper_length_m
     in_stance = stand.loop.target_before.phase is Phase.STANCE
-    return in_stance and all(abs(sample.states[place].velocity_rad_s) > FULL_SHARE * full_rad_s for place in SWEEPS)
+    return in_stance and all(abs(sample.states[place].velocity_rad_s) > FULL_FRACTION * full_rad_s for place in SWEEPS)
 
 
 def damping(stand: Stand) -> Readings:
@@ -68,7 +68,7 @@ def damping(stand: Stand) -> Readings:
         stand.move([_swept(SWING_RAD)])
         stand.controller.follow([_swept(-SWING_RAD)], FAST_RAD_S)
         last = stand.run_until(
-            lambda sample: _is_fast(sample, FULL_SHARE * FAST_RAD_S), 2.0, "The full speed of a sweep"
+            lambda sample: _is_fast(sample, FULL_FRACTION * FAST_RAD_S), 2.0, "The full speed of a sweep"
         )[-1]
         begun = measured_angles(stand.loop.states)
         stand.controller.law = lambda held, states: _brake(stand, states)
@@ -95,9 +95,9 @@ def torque_off(stand: Stand) -> Readings:
     rest_s = PERIOD_S * ticks_until(first_slow(samples), pushed[-1])
     yield Reading("torque off: until the sweep rests", rest_s, "s", 0.0, COASTING_S, "see what drives it on")
     for place, side in zip(SWEEPS, ("left", "right"), strict=True):
-        way_deg = degrees(max(abs(sample.states[place].angle_rad - begun[place].angle_rad) for sample in samples))
+        path_deg = degrees(max(abs(sample.states[place].angle_rad - begun[place].angle_rad) for sample in samples))
         yield Reading(
-            f"torque off: way of the {side} sweep", way_deg, "deg", 0.0, COASTING_DEG, "see what drives it on"
+            f"torque off: way of the {side} sweep", path_deg, "deg", 0.0, COASTING_DEG, "see what drives it on"
         )
 
 
@@ -136,8 +136,8 @@ def _sweep_readings(
     brakes = "raise the damping in [gains], and see what drives the joints on"
     yield Reading(f"{name}: until the sweep rests", rest_s, "s", 0.0, longest_s, brakes)
     for place, side in zip(SWEEPS, ("left", "right"), strict=True):
-        way_deg = degrees(max(abs(sample.states[place].angle_rad - begun[place]) for sample in samples))
-        yield Reading(f"{name}: way of the {side} sweep", way_deg, "deg", 0.0, farthest_deg, brakes)
+        path_deg = degrees(max(abs(sample.states[place].angle_rad - begun[place]) for sample in samples))
+        yield Reading(f"{name}: way of the {side} sweep", path_deg, "deg", 0.0, farthest_deg, brakes)
 
 
 def first_slow(samples: Sequence[Sample]) -> Sample | None:
@@ -149,4 +149,4 @@ def first_slow(samples: Sequence[Sample]) -> Sample | None:
 
 def ticks_until(sample: Sample | None, last: Sample) -> float:
     """From the last one before a wish, missed ones included; NaN where it never came to that."""
-    return nan if sample is None else sample.beat.number - last.beat.number
+    return nan if sample is None else sample.tick.number - last.tick.number

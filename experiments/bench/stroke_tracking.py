@@ -36,8 +36,10 @@ LAG_MS = 20.0  # beyond, the flipper is where the gait was 2 cm ago
 STRIDES = 10
 WALK_DEPTH_M = 0.02  # 2 cm above what the flippers lie on
 WALK_DEG = 8.0  # in swing and extraction, which are faster than the strokes
-MOST_MISSED_SHARE = 0.001  # of ticks: a stray one does no harm, more and the computer is too slow
-MOST_LIMITED_SHARE = 0.005  # of ticks: where two phases meet, slew and torque limit take a few; in mud they take more
+MOST_MISSED_FRACTION = 0.001  # of ticks: a stray one does no harm, more and the computer is too slow
+MOST_LIMITED_FRACTION = (
+    0.005  # of ticks: where two phases meet, slew and torque limit take a few; in mud they take more
+)
 
 
 class Tracking(NamedTuple):
@@ -108,11 +110,11 @@ def strides(stand: Stand) -> Readings:
     with stand.raised():
         missed = stand.loop.missed_ticks
         samples = walk(stand)
-        share = 100.0 * (stand.loop.missed_ticks - missed) / len(samples)
-        told = [fault.sentence for fault in stand.loop.faults.standing]
+        fraction = 100.0 * (stand.loop.missed_ticks - missed) / len(samples)
+        reported = [fault.message for fault in stand.loop.faults.standing]
     yield from _walk_readings(stand, [sample for sample in samples if sample.mode is Mode.WALKING])
-    yield Reading("walk: ticks missed", share, "%", 0.0, 100.0 * MOST_MISSED_SHARE, BUSY)
-    yield Reading("walk: faults that stand", len(told), "", 0, 0, " ".join(told))
+    yield Reading("walk: ticks missed", fraction, "%", 0.0, 100.0 * MOST_MISSED_FRACTION, BUSY)
+    yield Reading("walk: faults that stand", len(reported), "", 0, 0, " ".join(reported))
 
 
 def order_strides(stand: Stand, count: int) -> None:
@@ -137,7 +139,7 @@ def _stride_s(stand: Stand) -> float:
 def _walk_readings(stand: Stand, walked: Sequence[Sample]) -> Readings:
     limited = 100.0 * sum(sample.limited for sample in walked) / len(walked)
     narrow = "see that nothing meets the flippers; else widen [limits] or slow down the gait: the torque was cut"
-    yield Reading("walk: ticks with limited torque", limited, "%", 0.0, 100.0 * MOST_LIMITED_SHARE, narrow)
+    yield Reading("walk: ticks with limited torque", limited, "%", 0.0, 100.0 * MOST_LIMITED_FRACTION, narrow)
     most_nm = max(abs(torque_nm) for sample in walked for torque_nm in sample.sent_nm)
     yield Reading("walk: largest torque", most_nm, "N·m", 0.0, stand.configuration.limits.torque_nm, narrow)
     for joint, (max_deg, rms_deg, lag_ms) in tracking(walked).items():

@@ -19,7 +19,7 @@ from experiments.bench.lateness import Lateness
 from experiments.bench.operator import Attendant
 from experiments.bench.rig import Rig
 from experiments.robot.bench_robot import BenchError
-from firmware_host.ticker import PERIOD_S, Beat
+from firmware_host.ticker import PERIOD_S, Tick
 
 ARMING_S = 5.0  # for faults of before to be over, and for the drives to go into closed loop
 IDLING_S = 2.0
@@ -33,7 +33,7 @@ Law = Callable[[Torques, DriveStates], Torques]  # from what holds the pose to w
 class Sample(NamedTuple):
     """One tick."""
 
-    beat: Beat
+    tick: Tick
     mode: Mode
     states: DriveStates
     aim: JointTargets | None  # commanded while the states came about
@@ -92,11 +92,11 @@ class Stand:
 
     def tick(self) -> Sample:
         aim, loop = self.controller.aim, self.loop
-        beat, torque_on = self.rig.wait(), self._torque_on()
-        loop.tick(beat)
+        tick, torque_on = self.rig.wait(), self._torque_on()
+        loop.tick(tick)
         if torque_on:
-            self._heed_lateness(beat, loop.states)
-        return Sample(beat, loop.mode, loop.states, aim, loop.sent.torques_nm, loop.sent.limited)
+            self._on_lateness(tick, loop.states)
+        return Sample(tick, loop.mode, loop.states, aim, loop.sent.torques_nm, loop.sent.limited)
 
     def run_for(self, duration_s: float) -> list[Sample]:
         """Raises BenchError where a fault takes or hinders the torque."""
@@ -120,24 +120,24 @@ class Stand:
 
     def listen(self) -> Sample:
         """A tick in which nothing is sent."""
-        beat = self.rig.wait()
-        states = self.drives.read(beat.now_s)
+        tick = self.rig.wait()
+        states = self.drives.read(tick.now_s)
         if self._torque_on():
-            self._heed_lateness(beat, states)
-        return Sample(beat, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
+            self._on_lateness(tick, states)
+        return Sample(tick, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
 
     def _torque_on(self) -> bool:
         """As a drive told before this tick: it may have a fault, and a drive that is told to go idle need not obey."""
         return any(state.closed_loop for state in self.loop.states)
 
-    def _heed_lateness(self, beat: Beat, states: DriveStates) -> None:
-        self.lateness.update(beat, states)
-        self.lateness_so_far.update(beat, states)
+    def _on_lateness(self, tick: Tick, states: DriveStates) -> None:
+        self.lateness.update(tick, states)
+        self.lateness_so_far.update(tick, states)
 
     def _sound(self, sample: Sample) -> Sample:
         fault = self.loop.faults.worst
         if sample.mode in (*ENERGISED, Mode.FAULT) and fault and fault.kind.reaction >= Reaction.HOLD:
-            raise BenchError(f"{fault.name}: {_told([fault])}")
+            raise BenchError(f"{fault.name}: {_reported([fault])}")
         return sample
 
     def arm(self, law: Law | None = None) -> None:
@@ -152,7 +152,7 @@ class Stand:
             if self.tick_soundly().mode is Mode.HOLD:
                 return
             against = blocking or against
-        raise BenchError(f"Closed loop of all drives did not come within {ARMING_S:g} s. {_told(against)}".rstrip())
+        raise BenchError(f"Closed loop of all drives did not come within {ARMING_S:g} s. {_reported(against)}".rstrip())
 
     def _ask_for_torque(self) -> None:
         self._rest = measured_angles(self.loop.states)
@@ -163,15 +163,15 @@ class Stand:
     def _wait_until_armable(self) -> None:
         if self._becomes_armable():
             return
-        told = _told(self.loop.faults.blocking())
-        if told and self.attendant.clears(told, self._idle_on):
+        reported = _reported(self.loop.faults.blocking())
+        if reported and self.attendant.clears(reported, self._idle_on):
             self.loop.request(Request.CLEAR, self.rig.now_s)
             if self._becomes_armable():
                 return
         silent = ", ".join(axis.joint for axis in self.drives.axes if not axis.heard)
         unheard = f"{silent}: nothing is heard; check power, wiring and node ids."
         raise BenchError(
-            f"The robot cannot be armed: {told or (unheard if silent else f'it is in {self.loop.mode.name.lower()}.')}"
+            f"The robot cannot be armed: {reported or (unheard if silent else f'it is in {self.loop.mode.name.lower()}.')}"
         )
 
     def _becomes_armable(self) -> bool:
@@ -260,5 +260,5 @@ def joint_place(joint: str) -> int:
     return JOINTS.index(joint)
 
 
-def _told(faults: Sequence[Fault]) -> str:
+def _reported(faults: Sequence[Fault]) -> str:
     return " ".join(fault.advice for fault in faults)

@@ -19,7 +19,7 @@ PRESSING_S = 0.5
 PATIENCE_S = 0.5  # beyond the longest watchdog: then torque is taken off by command
 TELLING_S = 0.3  # for the drives to tell why
 LATE_TICKS = 3  # of the message that tells it, its way, and the tick that reads it
-GONE_SHARE = 0.5  # of the current
+GONE_FRACTION = 0.5  # of the current
 GONE_TICKS = 5  # in a row, with less than that
 
 
@@ -43,12 +43,12 @@ def let_watchdogs_trip(stand: Stand) -> tuple[list[Sample], list[Sample]]:
 
 def watchdog_times(stand: Stand) -> Readings:
     pressed, silence = let_watchdogs_trip(stand)
-    last_s = pressed[-1].beat.now_s
+    last_s = pressed[-1].tick.now_s
     late_s = LATE_TICKS * PERIOD_S
     for place, axis in enumerate(stand.drives.axes):
         timeout_s, joint = axis.watchdog_s, axis.joint
         advice = f"set enable_watchdog and watchdog_timeout of {joint}, and look for another program that feeds it"
-        idle_s = next((s.beat.now_s - last_s for s in silence if not s.states[place].closed_loop), nan)
+        idle_s = next((s.tick.now_s - last_s for s in silence if not s.states[place].closed_loop), nan)
         latest_s = timeout_s + late_s + axis.parameters.heartbeat_period_s
         yield Reading(f"{joint}: idle after the last command", idle_s, "s", timeout_s - late_s, latest_s, advice)
         if "adduction" in joint:
@@ -60,9 +60,9 @@ def watchdog_times(stand: Stand) -> Readings:
 def _gone_s(pressed: list[Sample], silence: list[Sample], place: int) -> float:
     """Until the current is less than half of what flowed, and stays so."""
     flowed_a = sum(sample.states[place].current_a for sample in pressed[-40:]) / 40.0
-    gone = [sample.states[place].current_a / flowed_a < GONE_SHARE for sample in silence]
+    gone = [sample.states[place].current_a / flowed_a < GONE_FRACTION for sample in silence]
     first = first_lasting(gone, GONE_TICKS)
-    return nan if first is None else silence[first].beat.now_s - pressed[-1].beat.now_s
+    return nan if first is None else silence[first].tick.now_s - pressed[-1].tick.now_s
 
 
 def _reasons(stand: Stand) -> Readings:
@@ -71,7 +71,7 @@ def _reasons(stand: Stand) -> Readings:
         stand.tick()
     flags = [axis.state.error_flags | axis.disarm_reason for axis in stand.drives.axes]
     stand.clear()
-    for joint, told in zip(JOINTS, flags, strict=True):
-        reason = codec.error_text(told) or "no reason"
+    for joint, reported in zip(JOINTS, flags, strict=True):
+        reason = codec.error_text(reported) or "no reason"
         advice = f"the drive tells {reason}; its watchdog must be what let go"
-        yield Reading(f"{joint}: let go by its watchdog", bool(told & codec.ERROR_WATCHDOG), "", 1, 1, advice)
+        yield Reading(f"{joint}: let go by its watchdog", bool(reported & codec.ERROR_WATCHDOG), "", 1, 1, advice)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from math import inf, isfinite, nan
 
 from control.records import JOINTS
-from drivers.can.bus_load import COMMAND_HZ, MOST_SHARE, SLOW_HZ, TORQUE_BYTES, bus_load, frame_bits
+from drivers.can.bus_load import COMMAND_HZ, MOST_FRACTION, SLOW_HZ, TORQUE_BYTES, bus_load, frame_bits
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.odrive import codec
@@ -41,8 +41,8 @@ RATES: Mapping[str, tuple[Message, float]] = {  # message and the least rate: ea
     "temperatures": (codec.GET_TEMPERATURE, SLOW_HZ / 2.0),
     "voltages": (codec.GET_BUS_VOLTAGE_CURRENT, SLOW_HZ / 2.0),
 }
-HEARTBEAT_SHARE = 0.3  # by which a rate of some ten in a second may be off; two drives of one id send twice as many
-MOST_MISSED_SHARE = 0.01  # of ticks: more, and this computer is too slow or too busy to measure with
+HEARTBEAT_FRACTION = 0.3  # by which a rate of some ten in a second may be off; two drives of one id send twice as many
+MOST_MISSED_FRACTION = 0.01  # of ticks: more, and this computer is too slow or too busy to measure with
 SETTING_UP = "see README, 'Setting up the drives'"
 
 
@@ -113,7 +113,7 @@ def message_rates(stand: Stand) -> Readings:
             advice = f"set the drive's message period; {SETTING_UP}"
             yield Reading(f"{joint}: {name}", _rate_hz(stand, drive, message), "Hz", least_hz, inf, advice)
         usual_hz = 1.0 / drive.heartbeat_period_s
-        low_hz, high_hz = (1.0 - HEARTBEAT_SHARE) * usual_hz, (1.0 + HEARTBEAT_SHARE) * usual_hz
+        low_hz, high_hz = (1.0 - HEARTBEAT_FRACTION) * usual_hz, (1.0 + HEARTBEAT_FRACTION) * usual_hz
         advice = f"correct drive.{joint}.heartbeat_period_s, or look for a second drive with this node id"
         yield Reading(f"{joint}: heartbeats", _rate_hz(stand, drive, codec.HEARTBEAT), "Hz", low_hz, high_hz, advice)
 
@@ -131,10 +131,10 @@ def loads(stand: Stand) -> Readings:
         drives = sum(drive.bus == name for drive in stand.configuration.drive.values())
         bits_s = sum(_bits(frame) for frame in overheard.frames[name]) / overheard.duration_s
         bits_s += drives * COMMAND_HZ * frame_bits(TORQUE_BYTES)[1]
-        share = bits_s / (1e3 * bus.bit_rate_kbit_s)
-        told = bus_load(drives, 1e3 * bus.bit_rate_kbit_s)
-        advice = f"its drives should make {told}: take strangers off, or raise the bit rate or the message periods"
-        yield Reading(f"{name}: load with commands", 100.0 * share, "%", 0.0, 100.0 * MOST_SHARE, advice)
+        fraction = bits_s / (1e3 * bus.bit_rate_kbit_s)
+        reported = bus_load(drives, 1e3 * bus.bit_rate_kbit_s)
+        advice = f"its drives should make {reported}: take strangers off, or raise the bit rate or the message periods"
+        yield Reading(f"{name}: load with commands", 100.0 * fraction, "%", 0.0, 100.0 * MOST_FRACTION, advice)
 
 
 def _bits(frame: Frame) -> int:
@@ -180,14 +180,14 @@ def quiet_buses(stand: Stand) -> Readings:
     wires = "check wiring, termination and bit rate; 'ip -s -d link show' tells more"
     for name, port in stand.drives.ports.items():
         lost = _trouble(port) - before[name]
-        told = port.last_error or port.last_send_error
-        yield Reading(f"{name}: errors and losses", lost, "", 0, 0, f"{told}: {wires}" if told else wires)
+        reported = port.last_error or port.last_send_error
+        yield Reading(f"{name}: errors and losses", lost, "", 0, 0, f"{reported}: {wires}" if reported else wires)
     for joint, state in zip(JOINTS, stand.loop.states, strict=True):
         advice = (
             f"{codec.error_text(state.error_flags)}: mend the cause, clear it with odrivetool or 'mudskipper clear'"
         )
         yield Reading(f"{joint}: error flags", state.error_flags, "", 0, 0, advice)
-    yield Reading("ticks missed", 100.0 * missed / len(samples), "%", 0.0, 100.0 * MOST_MISSED_SHARE, BUSY)
+    yield Reading("ticks missed", 100.0 * missed / len(samples), "%", 0.0, 100.0 * MOST_MISSED_FRACTION, BUSY)
 
 
 def _trouble(port: CanPort) -> int:

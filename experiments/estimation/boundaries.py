@@ -18,21 +18,21 @@ from simulation.body.reference_sensor import StrideTruth
 FOLLOWED = 0.2  # of the truth: half of the smallest step between the muds
 
 
-class Crossing(NamedTuple):
+class CrossCoupling(NamedTuple):
     before: str
     after: str
     flipper: str
     strides: int | None  # until it was followed; None where it was not before the next border or the end
 
 
-def crossings_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]) -> list[Crossing]:
+def crossings_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]) -> list[CrossCoupling]:
     beliefs = beliefs_of(trial, trial.configuration.estimation)
-    return [crossing for flipper in FLIPPERS for crossing in _of_flipper(flipper, trial, truths, beliefs)]
+    return [cross_coupling for flipper in FLIPPERS for cross_coupling in _of_flipper(flipper, trial, truths, beliefs)]
 
 
 def _of_flipper(
     flipper: str, trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth], beliefs: Mapping[int, Any]
-) -> list[Crossing]:
+) -> list[CrossCoupling]:
     strides = [truth for truth in trial.truths if truth.flipper == flipper and truth.index in beliefs]
     starts = [i for i in range(1, len(strides)) if strides[i].clay.name != strides[i - 1].clay.name]
     crossings = []
@@ -40,7 +40,7 @@ def _of_flipper(
         close = [_is_close(stride, truths, beliefs) for stride in strides[start:end]]
         if close:
             followed = close.index(True) + 1 if True in close else None
-            crossings.append(Crossing(strides[start - 1].clay.name, strides[start].clay.name, flipper, followed))
+            crossings.append(CrossCoupling(strides[start - 1].clay.name, strides[start].clay.name, flipper, followed))
     return crossings
 
 
@@ -52,10 +52,10 @@ def _is_close(stride: StrideTruth, truths: Mapping[tuple[str, int], LoadCellTrut
     return bool(abs(value / truths[stride.flipper, stride.index].leaning.k_p - 1.0) <= FOLLOWED)
 
 
-def boundary_rows(crossings: Sequence[Crossing]) -> list[dict[str, Any]]:
-    groups: dict[tuple[str, str], list[Crossing]] = {}
-    for crossing in crossings:
-        groups.setdefault(crossing[:2], []).append(crossing)
+def boundary_rows(crossings: Sequence[CrossCoupling]) -> list[dict[str, Any]]:
+    groups: dict[tuple[str, str], list[CrossCoupling]] = {}
+    for cross_coupling in crossings:
+        groups.setdefault(cross_coupling[:2], []).append(cross_coupling)
     return [
         {
             "from": before,

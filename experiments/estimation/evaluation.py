@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 from control.records import StrideEstimate
 from estimation.mud import EstimationParameters
-from experiments.estimation.boundaries import Crossing, boundary_rows, crossings_of
-from experiments.reports.error_table import COEFFICIENTS, Judged, error_rows, plate_rows
+from experiments.estimation.boundaries import CrossCoupling, boundary_rows, crossings_of
+from experiments.reports.error_table import COEFFICIENTS, Evaluation, error_rows, plate_rows
 from experiments.reports.side_by_side import Show, side_by_side
 from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
 from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING, Setup, Trial, run_trial, strides_of
@@ -56,7 +56,7 @@ class Plan:
     seeds: int = 10
     single_strides: int = 2
     walking_strides: int = 8
-    crossing_strides: int = 24
+    cross_coupling_strides: int = 24
     disturbances: Disturbances = LAB
     repeats: bool = True
     torque: bool = True
@@ -65,10 +65,10 @@ class Plan:
         """Trials, the longest first, so that the last ones end together."""
         seeds = range(1, self.seeds + 1)
         orders = (self.walking, self.walking[::-1])
-        crossing = [Part(WALKING, orders[seed % 2], self.crossing_strides, seed) for seed in seeds]
+        cross_coupling = [Part(WALKING, orders[seed % 2], self.cross_coupling_strides, seed) for seed in seeds]
         single = [Part(SINGLE, (clay,), self.single_strides, seed) for clay in self.single for seed in seeds]
         walking = [Part(WALKING, (clay,), self.walking_strides, seed) for clay in self.walking for seed in seeds]
-        return (crossing if len(self.walking) > 1 else []) + single + walking
+        return (cross_coupling if len(self.walking) > 1 else []) + single + walking
 
 
 class Part(NamedTuple):
@@ -81,8 +81,8 @@ class Part(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    judged: list[Judged]
-    crossings: list[Crossing]
+    evaluated: list[Evaluation]
+    crossings: list[CrossCoupling]
 
 
 def with_layers(plan: Plan, layers: Sequence[str]) -> Plan:
@@ -105,11 +105,11 @@ def methods_of(setup: Setup) -> tuple[Method, ...]:
     return *both, compensated, Method("default", f"{setup.name} without pose", False, default)
 
 
-def judge(plan: Plan, show: Show, processes: int | None = None) -> Outcome:
+def evaluate(plan: Plan, show: Show, processes: int | None = None) -> Outcome:
     """All trials of a plan, side by side."""
     outcomes = side_by_side([partial(run_part, part, plan) for part in plan.parts()], show, processes)
     return Outcome(
-        [each for outcome in outcomes for each in outcome.judged],
+        [each for outcome in outcomes for each in outcome.evaluated],
         [each for outcome in outcomes for each in outcome.crossings],
     )
 
@@ -133,26 +133,28 @@ def run_part(part: Part, plan: Plan) -> Outcome:
     return Outcome([each for method in methods_of(setup) for each in _judged(method, clay.name, trial, truths)], [])
 
 
-def _judged(method: Method, mud: str, trial: Trial, truths: dict[tuple[str, int], LoadCellTruth]) -> Iterator[Judged]:
+def _judged(
+    method: Method, mud: str, trial: Trial, truths: dict[tuple[str, int], LoadCellTruth]
+) -> Iterator[Evaluation]:
     for stride in strides_of(trial, method.parameters, method.with_pose):
         truth = truths.get((stride.flipper, stride.index))
         if truth is not None:
             yield from _beside(method, mud, stride, truth)
 
 
-def _beside(method: Method, mud: str, stride: StrideEstimate, truth: LoadCellTruth) -> Iterator[Judged]:
+def _beside(method: Method, mud: str, stride: StrideEstimate, truth: LoadCellTruth) -> Iterator[Evaluation]:
     for name in COEFFICIENTS:
         estimate, true = getattr(stride, name), getattr(truth.leaning, name)
         if isfinite(true):
             upright = getattr(truth.upright, name)
-            yield Judged(method.setup, mud, name, method.name, estimate, true, upright)
+            yield Evaluation(method.setup, mud, name, method.name, estimate, true, upright)
 
 
 def report_of(plan: Plan, outcome: Outcome) -> dict[str, Any]:
     return {
         "experiment": "estimation",
-        "errors": error_rows(outcome.judged),
-        "plates": plate_rows(outcome.judged),
+        "errors": error_rows(outcome.evaluated),
+        "plates": plate_rows(outcome.evaluated),
         "boundaries": boundary_rows(outcome.crossings),
         "settings": {
             "seeds": plan.seeds,

@@ -27,8 +27,8 @@ def plot_errors(report: dict[str, Any], path: Path) -> None:
     figure, panels = plt.subplots(len(setups), len(COEFFICIENTS), figsize=size, squeeze=False, constrained_layout=True)
     for row, setup in enumerate(setups):
         for column, name in enumerate(COEFFICIENTS):
-            told = [each for each in errors if (each["setup"], each["coefficient"]) == (setup, name)]
-            _plot_panel(panels[row][column], told)
+            reported = [each for each in errors if (each["setup"], each["coefficient"]) == (setup, name)]
+            _plot_panel(panels[row][column], reported)
             panels[row][column].set_title(f"{setup}: ${name}$", fontsize="medium")
     methods = {
         name: line for panel in panels.flat for line, name in zip(*panel.get_legend_handles_labels(), strict=True)
@@ -45,10 +45,10 @@ def _plot_panel(panel: Axes, rows: Sequence[dict[str, Any]]) -> None:
     for method, colour in COLOURS.items():
         if method == "paper compensated" and rows and rows[0]["coefficient"] != "k_s":
             continue  # it compensates k_s alone
-        told = [row for row in rows if row["method"] == method and row["median"] is not None]
-        places = [muds.index(row["mud"]) for row in told]
-        medians = [min(100.0 * row["median"], HIGHEST_PERCENT) for row in told]
-        highest = [min(100.0 * row["p95"], HIGHEST_PERCENT) for row in told]
+        reported = [row for row in rows if row["method"] == method and row["median"] is not None]
+        places = [muds.index(row["mud"]) for row in reported]
+        medians = [min(100.0 * row["median"], HIGHEST_PERCENT) for row in reported]
+        highest = [min(100.0 * row["p95"], HIGHEST_PERCENT) for row in reported]
         panel.vlines(places, medians, highest, color=colour, linewidth=2)
         panel.plot(places, medians, "o", color=colour, label=method)
     for place, mud in enumerate(muds):

@@ -20,7 +20,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import _end_safely as end_safely
 from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK_KIND
-from firmware_host.ticker import PERIOD_S, Beat
+from firmware_host.ticker import PERIOD_S, Tick
 from simulation.body.plant import Arm
 from simulation.devices.odrive import SimulatedOdrive
 from simulation.harness.lockstep import Lockstep
@@ -35,10 +35,10 @@ class CountingRecorder(NullRecorder):
     def __init__(self) -> None:
         self.ticks = 0
         self.texts: list[str] = []
-        self.told = HEALTHY
+        self.reported = HEALTHY
 
     def report(self) -> LogReport:
-        return self.told
+        return self.reported
 
     def put(self, kind_index: int, payload: bytes) -> bool:
         if kind_index == TICK_KIND:
@@ -78,11 +78,11 @@ class FaultBench(Lockstep):
 
     def _tick(self) -> None:
         for failure in self.failures.update(self.now_s):
-            self.loop.news.tell(self.now_s, end_text(failure))
+            self.loop.events.report(self.now_s, end_text(failure))
         missed, self._missed = self._missed, 0
         self.ticks_made += 1
         try:
-            self.loop.tick(Beat(self.now_s, missed * PERIOD_S, self.tick_number, missed))
+            self.loop.tick(Tick(self.now_s, missed * PERIOD_S, self.tick_number, missed))
         except Exception as problem:  # noqa: BLE001 - as in the daemon, the one place where surprises end
             self.bug, self.dead = f"{type(problem).__name__}: {problem}", True
             with redirect_stderr(StringIO()):
@@ -109,20 +109,20 @@ class FaultBench(Lockstep):
 
     def winding(self, joint: str) -> Winding:
         """The loop's own reckoning of it, which is seconds away from any heat."""
-        return self.loop._fault_watch.joints[JOINTS.index(joint)].winding
+        return self.loop._fault_monitor.joints[JOINTS.index(joint)].winding
 
-    def add_twin(self, joint: str, angle_rad: float) -> Act:
+    def add_duplicate(self, joint: str, angle_rad: float) -> Act:
         """A second drive with the id of the joint's own, on its bus: what it does in a step."""
         port = self.buses[self.loop.configuration.drive[joint].bus].open()
-        twin = SimulatedOdrive(self.drive(joint).parameters, Random(f"twin {joint}"))
-        twin.reset(self.now_s)
+        duplicate = SimulatedOdrive(self.drive(joint).parameters, Random(f"twin {joint}"))
+        duplicate.reset(self.now_s)
 
         def live() -> None:
-            twin.measure(angle_rad, 0.0)
+            duplicate.measure(angle_rad, 0.0)
             for frame in port.receive():
-                for answer in twin.receive(frame, self.now_s):
+                for answer in duplicate.receive(frame, self.now_s):
                     port.send(answer)
-            for frame in twin.cyclic_frames(self.now_s):
+            for frame in duplicate.cyclic_frames(self.now_s):
                 port.send(frame)
 
         return live

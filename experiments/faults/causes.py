@@ -91,10 +91,10 @@ def restart(bench: FaultBench, joint: str) -> Iterator[None]:
     yield
 
 
-def twin(angle_rad: float) -> Cause:
+def duplicate(angle_rad: float) -> Cause:
     @contextmanager
     def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        with bench.acting(bench.add_twin(joint, angle_rad)):
+        with bench.acting(bench.add_duplicate(joint, angle_rad)):
             yield
 
     return cause
@@ -137,7 +137,7 @@ def other_master(bench: FaultBench, joint: str) -> Iterator[None]:
 
 
 @contextmanager
-def watchdog_told_off(bench: FaultBench, joint: str) -> Iterator[None]:
+def watchdog_reported_off(bench: FaultBench, joint: str) -> Iterator[None]:
     """Read back as switched off."""
     bench.say(joint, codec.TX_SDO, 0, ENABLE_WATCHDOG_ENDPOINT, 0, value=b"\0")
     yield
@@ -210,9 +210,9 @@ def wrong_way(bench: FaultBench, joint: str) -> Iterator[None]:
     """The current that a drive tells is against the torque that it was told."""
     place, sign = JOINTS.index(joint), bench.drive(joint).parameters.sign
 
-    def tell() -> None:
+    def report() -> None:
         current_a = -copysign(4.0, bench.loop.sent.torques_nm[place]) * sign
         bench.say(joint, codec.GET_IQ, current_a, current_a)
 
-    with bench.acting(tell):
+    with bench.acting(report):
         yield

@@ -18,7 +18,7 @@ from control.monitors.joint_monitor import REST_S, STILL_RAD
 from drivers.odrive.codec import AxisState
 from experiments.faults.bench import FaultBench
 from experiments.faults.evaluation import LONGEST_STOP_S, Cell, problems
-from experiments.faults.injection import BY_NAME, TOLD_S, Way
+from experiments.faults.injection import BY_NAME, REPORTED_S, Way
 from experiments.faults.phases import bench_for, bring
 from firmware_host.ticker import PERIOD_S
 
@@ -55,7 +55,7 @@ def _live_through(way: Way, cell: Cell, random: Random) -> None:
     bring(bench, cell.phase, random)
     with way.cause(bench, cell.joint):
         watch = Watch(bench, way, cell)
-        watch.run(way.lasts_s, until_told=way.lasts_s == TOLD_S)
+        watch.run(way.lasts_s, until_reported=way.lasts_s == REPORTED_S)
     watch.run_on()
 
 
@@ -90,11 +90,11 @@ class Watch:
         self._missing_rows = bench.ticks_made - bench.rows.ticks
         self._travel_rad = 0.0
 
-    def run(self, duration_s: float, until_told: bool = False) -> None:
-        told_by = self._way.kind.bound_ticks * 2 + 10 if until_told and self._way.kind else 0
-        for _ in range(told_by or round(duration_s / PERIOD_S)):
+    def run(self, duration_s: float, until_reported: bool = False) -> None:
+        reported_by = self._way.kind.bound_ticks * 2 + 10 if until_reported and self._way.kind else 0
+        for _ in range(reported_by or round(duration_s / PERIOD_S)):
             self._step()
-            if until_told and self._cell.told_ticks is not None:
+            if until_reported and self._cell.reported_ticks is not None:
                 return
 
     def run_on(self) -> None:
@@ -130,7 +130,7 @@ class Watch:
     def _look_at_loop(self) -> None:
         cell, mode, kind = self._cell, self._bench.loop.mode, self._way.kind
         if kind is not None:
-            self._look_for_told(kind)
+            self._look_for_reported(kind)
             if cell.reaction_ticks is None and self._has_reacted(kind, mode):
                 cell.reaction_ticks = self._ticks
         if mode in (Mode.STOPPING, Mode.DAMPING) and self._stopping_since is None:
@@ -140,20 +140,20 @@ class Watch:
 
     def _has_reacted(self, kind: FaultKind, mode: Mode) -> bool:
         """Where the mode has nothing to say it counts that the fault is told."""
-        if self._only_told(kind):
-            return self._cell.told_ticks is not None
+        if self._only_reported(kind):
+            return self._cell.reported_ticks is not None
         return HARDNESS[mode] >= _needed(kind)
 
-    def _only_told(self, kind: FaultKind) -> bool:
+    def _only_reported(self, kind: FaultKind) -> bool:
         """The mode was as hard before, or the fault asks for nothing."""
         return kind.reaction < Reaction.HOLD or HARDNESS[self._mode_before] >= _needed(kind)
 
-    def _look_for_told(self, kind: FaultKind) -> None:
-        if self._cell.told_ticks is not None:
+    def _look_for_reported(self, kind: FaultKind) -> None:
+        if self._cell.reported_ticks is not None:
             return
         loop = self._bench.loop
         if any(fault.name == kind.name for fault in loop.faults.standing):
-            self._cell.told_ticks = self._ticks
+            self._cell.reported_ticks = self._ticks
             refusing = self._cell.phase == "idle" and _stands_against_arming(kind)
             if refusing and loop.request(Request.ARM, self._bench.now_s) is None:
                 self._cell.why.append("arming was not refused")
@@ -214,7 +214,7 @@ class Watch:
         cell, bench = self._cell, self._bench
         cell.mode = bench.loop.mode.name.lower()
         texts = bench.rows.texts[self._first_text :]
-        cell.told = list(dict.fromkeys(text.split()[1] for text in texts if text.startswith("fault ")))
+        cell.reported = list(dict.fromkeys(text.split()[1] for text in texts if text.startswith("fault ")))
         cell.exception = bench.bug
         cell.rows_lost = bench.ticks_made - bench.rows.ticks - self._missing_rows
         if self._steps - self._last_torque_steps > ON_THE_WAY_TICKS:

@@ -26,8 +26,8 @@ class Cell:
     reaction: str
     bound_ticks: int | None
     reaction_ticks: int | None = None
-    told_ticks: int | None = None
-    told: list[str] = field(default_factory=list)
+    reported_ticks: int | None = None
+    reported: list[str] = field(default_factory=list)
     mode: str = ""  # in the end
     peak_torque_nm: float = 0.0  # of any motor, from the cause on
     damping_torque_nm: float = 0.0  # once damping has begun
@@ -47,18 +47,18 @@ def problems(cell: Cell, way: Way) -> Iterator[str]:
     yield from cell.why
     yield from _never_right(cell, way)
     if way.fault == "none":
-        if cell.told:
-            yield f"without a cause it told of {', '.join(cell.told)}"
+        if cell.reported:
+            yield f"without a cause it told of {', '.join(cell.reported)}"
         return
     yield from _late(cell)
-    others = set(cell.told) - {cell.fault, *cell.true_too, *BRINGS.get(cell.fault, ())}
+    others = set(cell.reported) - {cell.fault, *cell.true_too, *BRINGS.get(cell.fault, ())}
     if others:
         yield f"it also told of {', '.join(sorted(others))}"
     if way.kind is None or way.kind.reaction >= Reaction.SOFT_STOP:
         yield from _not_stopped(cell)
     elif way.kind.reaction <= Reaction.WARN and cell.phase != "idle" and not _goes_on(cell, way.kind):
         yield f"a warning ended in mode {cell.mode}"
-    if way.kind and cell.fault not in cell.told:
+    if way.kind and cell.fault not in cell.reported:
         yield "the log holds no word of it"
 
 
@@ -82,8 +82,8 @@ def _late(cell: Cell) -> Iterator[str]:
         yield "no reaction"
     elif cell.reaction_ticks > bound:
         yield f"the reaction came after {counted(cell.reaction_ticks, 'tick')}, {bound} are the most"
-    if cell.told_ticks is not None and cell.told_ticks > bound:
-        yield f"told after {counted(cell.told_ticks, 'tick')}, {bound} are the most"
+    if cell.reported_ticks is not None and cell.reported_ticks > bound:
+        yield f"told after {counted(cell.reported_ticks, 'tick')}, {bound} are the most"
 
 
 def _not_stopped(cell: Cell) -> Iterator[str]:

@@ -17,6 +17,7 @@ from experiments.faults.causes import (
     always_said,
     blocked,
     drive_with,
+    duplicate,
     failing,
     given_up,
     left_closed_loop,
@@ -26,9 +27,8 @@ from experiments.faults.causes import (
     overcurrent,
     restart,
     said,
-    twin,
     watchdog_ran_out,
-    watchdog_told_off,
+    watchdog_reported_off,
     whirled,
     wrong_way,
 )
@@ -48,7 +48,7 @@ from experiments.faults.loop_causes import (
 )
 from experiments.faults.phases import EVERYWHERE, GAIT, PHASES
 
-TOLD_S = 0.0  # a cause that lasts until its fault is told
+REPORTED_S = 0.0  # a cause that lasts until its fault is told
 TURNING = {"insertion": "adduction", "stance": "sweep", "extraction": "adduction", "swing": "sweep"}
 MOVING = ("hold", *GAIT, "stopping")
 
@@ -96,12 +96,12 @@ DYING = ("hold", *GAIT, "recovery")
 WAYS: tuple[Way, ...] = (
     Way("none", nothing, 1.0, PHASES),
     # signals of a drive
-    Way("drive_late", failing("JOINT", "off"), TOLD_S, deaf=True),
-    Way("drive_quiet", failing("JOINT", "off"), TOLD_S, PHASES, deaf=True),
+    Way("drive_late", failing("JOINT", "off"), REPORTED_S, deaf=True),
+    Way("drive_quiet", failing("JOINT", "off"), REPORTED_S, PHASES, deaf=True),
     Way("drive_silent", failing("JOINT", "off"), 1.0, PHASES, deaf=True),
-    Way("position_stale", failing("JOINT.position", "off"), TOLD_S),
+    Way("position_stale", failing("JOINT.position", "off"), REPORTED_S),
     Way("position_silent", failing("JOINT.position", "off"), 1.0),
-    Way("current_stale", failing("JOINT.current", "off"), TOLD_S, PHASES),
+    Way("current_stale", failing("JOINT.current", "off"), REPORTED_S, PHASES),
     Way("current_silent", failing("JOINT.current", "off"), 1.0),
     Way("heartbeat_silent", failing("JOINT.heartbeat", "off"), 1.0),
     Way("temperature_silent", failing("JOINT.temperature", "off"), 1.5),
@@ -113,9 +113,9 @@ WAYS: tuple[Way, ...] = (
     Way("drive_energised", other_master, 1.0, ("idle",)),
     Way("drive_restarted", restart, 2.0),
     Way("drive_version", said(codec.GET_VERSION, 2, 4, 4, 58, 0, 5, 6, 0), phases=("idle", "stance")),
-    Way("drive_twins", twin(0.3), 1.6),
+    Way("drive_twins", duplicate(0.3), 1.6),
     Way("watchdog_unknown", said(codec.HEARTBEAT, codec.ERROR_INITIALIZING, 1, 0, 0), phases=("idle",)),
-    Way("watchdog_off", watchdog_told_off, phases=("idle", "stance")),
+    Way("watchdog_off", watchdog_reported_off, phases=("idle", "stance")),
     # buses
     Way("bus_warning", failing("bus.BUS", "warning")),
     Way("bus_passive", failing("bus.BUS", "passive")),
@@ -123,8 +123,8 @@ WAYS: tuple[Way, ...] = (
     Way("bus_refuses", failing("bus.BUS", "stuck"), deaf=True),
     # joints and motors
     Way("joint_position", out_of_range),
-    Way("joint_velocity", whirled(45.0), TOLD_S),
-    Way("joint_moving", whirled(2.0), TOLD_S, ("idle",)),
+    Way("joint_velocity", whirled(45.0), REPORTED_S),
+    Way("joint_moving", whirled(2.0), REPORTED_S, ("idle",)),
     Way("joint_current", always_said(codec.GET_IQ, 40.0, 40.0)),
     Way("joint_not_following", blocked, 3.0, ("hold", *GAIT)),
     Way("encoder_jump", drive_with(encoder_offset_rad=0.6), phases=PHASES),
@@ -151,7 +151,7 @@ WAYS: tuple[Way, ...] = (
     Way("pose_lost", failing("pose", "off")),
     Way("lease_lost", hung_up, phases=PHASES),
     # the log
-    Way("disk_low", writer_tells(free_share=0.02)),
+    Way("disk_low", writer_tells(free_fraction=0.02)),
     Way("log_unwritable", writer_tells(problem="Nothing can be written to the log: No space left on device.")),
     Way("disk_slow", writer_tells(slowest_write_s=5.0)),
     Way("recorder_dead", writer_tells(alive=False)),

@@ -28,10 +28,10 @@ def hung_up(bench: FaultBench, joint: str) -> Iterator[None]:
 def writer_tells(**changes: Any) -> Cause:
     @contextmanager
     def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        before = bench.rows.told
-        bench.rows.told = before._replace(**changes)
+        before = bench.rows.reported
+        bench.rows.reported = before._replace(**changes)
         yield
-        bench.rows.told = before
+        bench.rows.reported = before
 
     return cause
 

@@ -66,7 +66,7 @@ def report_of(plan: Plan, cells: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {
         "experiment": "faults",
         "cells": list(cells),
-        "faults": [_summary(name, told) for name, told in by_way.items() if told],
+        "faults": [_summary(name, reported) for name, reported in by_way.items() if reported],
         "ok": sum(cell["ok"] for cell in cells),
         "settings": {"seeds": plan.seeds, "phases": list(plan.phases)},
     }

@@ -24,7 +24,7 @@ LENGTH_M = 5.0
 HOLDING_CLAY = Clay("9 kPa", 9000.0)  # in which an insertion of 5 cm leaves the flippers stuck
 DEEP = WalkOrder(0.05, adaptive=False)
 FIRST_DEPTH_M = 0.03
-LONGEST_WAY_S = 8.0
+LONGEST_PATH_S = 8.0
 STRIDE_TICKS = {  # of the random delay into a phase of the gait: at most about two thirds of it
     Phase.INSERTION: 100,
     Phase.STANCE: 60,
@@ -109,7 +109,7 @@ def _to_recovery(bench: FaultBench, random: Random) -> None:
 
 
 def _reach(bench: FaultBench, phase: str, there: Callable[[], bool]) -> None:
-    if not bench.run_until(there, LONGEST_WAY_S):
+    if not bench.run_until(there, LONGEST_PATH_S):
         raise RuntimeError(f"never came to {phase}: {bench.loop.mode.name}, {bench.loop.fault}")
 
 

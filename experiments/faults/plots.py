@@ -66,9 +66,11 @@ def _label(row: dict[str, Any]) -> str:
 def _write_cell(panel: Axes, x: int, y: int, cells: Sequence[dict[str, Any]]) -> float:
     """The slowest reaction in ticks. Returns its share of the bound in percent; what has no bound is white."""
     ticks, bound = max((c["reaction_ticks"] or 0 for c in cells), default=0), cells[0]["bound_ticks"]
-    share = 100.0 * ticks / bound if bound else 0.0
+    fraction = 100.0 * ticks / bound if bound else 0.0
     text = str(ticks) if bound else "·"
-    panel.text(x, y, text, ha="center", va="center", fontsize=6.5, color="white" if share > DARK_PERCENT else "#333333")
+    panel.text(
+        x, y, text, ha="center", va="center", fontsize=6.5, color="white" if fraction > DARK_PERCENT else "#333333"
+    )
     if not all(cell["ok"] for cell in cells):
         panel.plot(x, y, "x", color="tab:red", markersize=11, markeredgewidth=2.0)
-    return share
+    return fraction

@@ -23,9 +23,9 @@ from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.side_by_side import Show
 from experiments.robot.bench_robot import BenchError, arm, rest, walk
 from experiments.trials.estimation_methods import DEFAULT, PAPER, method_of, strides_by_method
-from experiments.trials.mud_trials import Bench, PlannedTrial, SpoiltTrialError, conduct_trials
+from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
 from experiments.trials.notebook import Entry
-from experiments.trials.stride_profile import StrideCourse, course_of, course_of_row, course_row, thinned
+from experiments.trials.stride_profile import StrideProfile, profile_of, profile_of_row, profile_row, thinned
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log_reading.log_reader import Log
 
@@ -88,7 +88,7 @@ def run(bench: Bench, plan: Plan, show: Show) -> None:
 def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     """One trial. Raises SpoiltTrialError, BenchError."""
     robot = bench.robot
-    arm(robot, bench.person)
+    arm(robot, bench.operator)
     before_m = robot.call("status")["body_x_m"]
     walked = walk(robot, plan.depth_m, plan.strides)
     robot.wait(SETTLED_S)
@@ -98,31 +98,31 @@ def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     strides = strides_by_method(walked.strides, log, robot.configuration, plan.flipper, METHODS)
     truths = bench.bed.truths(plan.flipper)
     entry: Entry = {"mud": trial.mud, "trial": trial.number, "strides": strides, "truths": truths}
-    entry |= _told(log, strides[method_of(robot.configuration.estimation)], robot.configuration, plan.flipper)
+    entry |= _reported(log, strides[method_of(robot.configuration.estimation)], robot.configuration, plan.flipper)
     entry |= {"from_s": walked.from_s, "to_s": after["now_s"]}
-    spoilt = moved_text(before_m, after["body_x_m"], SPOILING_M)
-    if spoilt:
-        raise SpoiltTrialError(spoilt, entry)
+    invalid = moved_text(before_m, after["body_x_m"], SPOILING_M)
+    if invalid:
+        raise InvalidTrialError(invalid, entry)
     entry["remarks"] += pose_remarks(before_m, after["body_x_m"])
     return entry
 
 
-def _told(log: Log, own: Sequence[dict[str, Any]], configuration: Configuration, flipper: str) -> Entry:
+def _reported(log: Log, own: Sequence[dict[str, Any]], configuration: Configuration, flipper: str) -> Entry:
     """The first stride's course and what is to be remarked. Raises SpoiltTrialError."""
     if not own:
-        raise SpoiltTrialError(f"the daemon closed no stride of the {flipper} flipper")
-    course = course_of(log, flipper, own[0]["t_start_s"])
-    require_mud(course)
+        raise InvalidTrialError(f"the daemon closed no stride of the {flipper} flipper")
+    profile = profile_of(log, flipper, own[0]["t_start_s"])
+    require_mud(profile)
     remarks = load_remarks(log, configuration, flipper) + surface_remarks(own[0])
-    return {"course": course_row(thinned(course)), "remarks": remarks}
+    return {"course": profile_row(thinned(profile)), "remarks": remarks}
 
 
-def require_mud(course: StrideCourse) -> None:
+def require_mud(profile: StrideProfile) -> None:
     """Raises SpoiltTrialError where insertion and stance felt nothing."""
-    felt_n = [_late_mean_n(course.force_z_n, course.during(Phase.INSERTION))]
-    felt_n.append(_late_mean_n(course.force_x_n, course.during(Phase.STANCE)))
+    felt_n = [_late_mean_n(profile.force_z_n, profile.during(Phase.INSERTION))]
+    felt_n.append(_late_mean_n(profile.force_x_n, profile.during(Phase.STANCE)))
     if max(felt_n) < LEAST_N:
-        raise SpoiltTrialError(
+        raise InvalidTrialError(
             "the flipper met no mud: look whether it hangs over the mud, and how high its axes are "
             "(geometry.axis_height_m)"
         )
@@ -130,8 +130,8 @@ def require_mud(course: StrideCourse) -> None:
 
 def _late_mean_n(force_n: Any, rows: Any) -> float:
     """Over the last third of a stroke."""
-    told = force_n[rows]
-    late = told[2 * len(told) // 3 :]
+    reported = force_n[rows]
+    late = reported[2 * len(reported) // 3 :]
     late = late[np.isfinite(late)]
     return float(late.mean()) if len(late) else 0.0
 
@@ -185,8 +185,8 @@ def _beside(by_mud: Mapping[str, Sequence[Entry]], truth: TruthOfMud | None) -> 
 
 def _mud_report(mud: str, trials: Sequence[Entry], method: str, rows: Sequence[Beside]) -> dict[str, Any]:
     own = [row for row in rows if row.mud == mud and row.method == method]
-    told = {name: [row.truth.get(name) for row in own] for name in COEFFICIENTS}
-    truths = {name: [value for value in values if value is not None] for name, values in told.items()}
+    reported = {name: [row.truth.get(name) for row in own] for name in COEFFICIENTS}
+    truths = {name: [value for value in values if value is not None] for name, values in reported.items()}
     return {
         "mud": mud,
         **{name: gathered(row.stride[name] for row in own) for name in COEFFICIENTS},
@@ -198,36 +198,36 @@ def _mud_report(mud: str, trials: Sequence[Entry], method: str, rows: Sequence[B
 def _falls(muds: Sequence[Mapping[str, Any]], name: str) -> bool | None:
     """Whether more water means less, as in the paper; None where the muds are not named after their water."""
     try:
-        told = sorted((float(mud["mud"]), mud[name]["value"]) for mud in muds if mud[name]["value"] is not None)
+        reported = sorted((float(mud["mud"]), mud[name]["value"]) for mud in muds if mud[name]["value"] is not None)
     except ValueError:
         return None
-    return all(a > b for (_, a), (_, b) in zip(told, told[1:], strict=False)) if len(told) > 1 else None
+    return all(a > b for (_, a), (_, b) in zip(reported, reported[1:], strict=False)) if len(reported) > 1 else None
 
 
 def _largest_forces(trials: Sequence[Entry], method: str) -> dict[str, float | None]:
     """Mean over first strides, in N."""
     first = [trial["strides"][method][0] for trial in trials]
-    told = {
+    reported = {
         "insertion": [stride["insertion_force_n"] for stride in first],
         "stance": [stride["stance_force_n"] for stride in first],
         "extraction": [stride["extraction_force_n"] for stride in first],
     }
-    known = {name: [abs(value) for value in values if value is not None] for name, values in told.items()}
+    known = {name: [abs(value) for value in values if value is not None] for name, values in reported.items()}
     return {name: fmean(values) if values else None for name, values in known.items()}
 
 
 def _misfits(trial: Entry, configuration: Configuration, method: str) -> dict[str, float | None]:
     """What the laws leave over of the forces of one stride, root mean square in N."""
-    course, stride = course_of_row(trial["course"]), trial["strides"][method][0]
+    profile, stride = profile_of_row(trial["course"]), trial["strides"][method][0]
     laws = modelled_forces(
-        course, configuration.geometry, stride["surface_m"] or 0.0, drawn_coefficients(stride), method
+        profile, configuration.geometry, stride["surface_m"] or 0.0, drawn_coefficients(stride), method
     )
     left = {"insertion": Phase.INSERTION, "extraction": Phase.EXTRACTION}
     misfits = {
-        name: misfit_n(course.force_z_n[course.during(phase)], laws.force_z_n[course.during(phase)])
+        name: misfit_n(profile.force_z_n[profile.during(phase)], laws.force_z_n[profile.during(phase)])
         for name, phase in left.items()
     }
-    return misfits | {"stance": misfit_n(course.force_x_n, laws.force_x_n)}
+    return misfits | {"stance": misfit_n(profile.force_x_n, laws.force_x_n)}
 
 
 def drawn_coefficients(stride: Mapping[str, Any]) -> dict[str, float | None]:
@@ -237,11 +237,11 @@ def drawn_coefficients(stride: Mapping[str, Any]) -> dict[str, float | None]:
 
 def _later_strokes(by_mud: Mapping[str, Sequence[Entry]], method: str) -> dict[str, list[float]]:
     """k_s of each stride over that of the first in the same hole, mean over all trials that have both."""
-    trials = [trial["strides"][method] for told in by_mud.values() for trial in told]
+    trials = [trial["strides"][method] for reported in by_mud.values() for trial in reported]
     longest = max((len(strides) for strides in trials), default=0)
     found: dict[str, list[float]] = {}
     for name in COEFFICIENTS:
-        shares = [
+        fractions = [
             [
                 strides[number][name]["value"] / strides[0][name]["value"]
                 for strides in trials
@@ -249,5 +249,5 @@ def _later_strokes(by_mud: Mapping[str, Sequence[Entry]], method: str) -> dict[s
             ]
             for number in range(1, longest)
         ]
-        found[name] = [fmean(each) for each in shares if each]
+        found[name] = [fmean(each) for each in fractions if each]
     return found

@@ -17,12 +17,12 @@ from typing import NamedTuple
 import numpy as np
 
 from control.geometry import FlipperGeometry
-from control.plate import crossing, stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.plate import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import Phase
 from estimation.force_map import smallest_force_n
 from estimation.strokes.shear import MOBILISED_M
-from estimation.strokes.stroke_fit import REVERSAL_SHARE
-from experiments.trials.stride_profile import Floats, StrideCourse
+from estimation.strokes.stroke_fit import REVERSAL_FRACTION
+from experiments.trials.stride_profile import Floats, StrideProfile
 
 COEFFICIENT_OF = {Phase.INSERTION: "k_p", Phase.STANCE: "k_s", Phase.EXTRACTION: "k_e"}
 
@@ -44,7 +44,7 @@ class _Row(NamedTuple):
 
 
 def modelled_forces(
-    course: StrideCourse,
+    profile: StrideProfile,
     geometry: FlipperGeometry,
     surface_m: float,
     coefficients: Mapping[str, float | None],
@@ -52,37 +52,37 @@ def modelled_forces(
 ) -> ModelledForces:
     """`coefficients` in N/m³ by name; one that is None is not drawn."""
     law = _paper_force if method == "paper" else _default_force
-    forces = ModelledForces(np.full(len(course.time_s), nan), np.full(len(course.time_s), nan))
-    shown = _fitted_rows(course, geometry, surface_m)
+    forces = ModelledForces(np.full(len(profile.time_s), nan), np.full(len(profile.time_s), nan))
+    shown = _fitted_rows(profile, geometry, surface_m)
     for i in np.flatnonzero(shown).tolist():
-        phase = Phase(int(course.phase[i]))
+        phase = Phase(int(profile.phase[i]))
         k_n_m3 = coefficients.get(COEFFICIENT_OF[phase])
         if k_n_m3 is None:
             continue
         row = _Row(
             phase,
-            float(course.sweep_rad[i]),
-            float(course.adduction_rad[i]),
-            float(course.depth_m[i]) - surface_m,
-            float(course.sweep_nm[i]),
-            float(course.adduction_nm[i]),
+            float(profile.sweep_rad[i]),
+            float(profile.adduction_rad[i]),
+            float(profile.depth_m[i]) - surface_m,
+            float(profile.sweep_nm[i]),
+            float(profile.adduction_nm[i]),
         )
         force_n = law(row, geometry, surface_m, k_n_m3)
         (forces.force_x_n if phase is Phase.STANCE else forces.force_z_n)[i] = force_n
     return forces
 
 
-def _fitted_rows(course: StrideCourse, geometry: FlipperGeometry, surface_m: float) -> Floats:
+def _fitted_rows(profile: StrideProfile, geometry: FlipperGeometry, surface_m: float) -> Floats:
     """Where the coefficients are fitted, the flipper is in the mud and the loads are known."""
-    submerged_m = course.depth_m - surface_m
-    shown = np.isin(course.phase, list(COEFFICIENT_OF)) & (submerged_m > 0.0)
-    shown &= np.isfinite(course.sweep_nm) & np.isfinite(course.adduction_nm)
-    stance, extraction = course.during(Phase.STANCE), course.during(Phase.EXTRACTION)
+    submerged_m = profile.depth_m - surface_m
+    shown = np.isin(profile.phase, list(COEFFICIENT_OF)) & (submerged_m > 0.0)
+    shown &= np.isfinite(profile.sweep_nm) & np.isfinite(profile.adduction_nm)
+    stance, extraction = profile.during(Phase.STANCE), profile.during(Phase.EXTRACTION)
     if stance.any():
-        places_m = geometry.flipper_length_m * np.sin(course.sweep_rad)
-        shown &= ~stance | (places_m[stance][0] - places_m >= MOBILISED_M)
+        positions_m = geometry.flipper_length_m * np.sin(profile.sweep_rad)
+        shown &= ~stance | (positions_m[stance][0] - positions_m >= MOBILISED_M)
     if extraction.any():
-        shown &= ~extraction | (submerged_m <= (1.0 - REVERSAL_SHARE) * submerged_m[extraction][0])
+        shown &= ~extraction | (submerged_m <= (1.0 - REVERSAL_FRACTION) * submerged_m[extraction][0])
     return np.asarray(shown)
 
 
@@ -93,7 +93,7 @@ def _default_force(row: _Row, geometry: FlipperGeometry, surface_m: float, k_n_m
         sweep_nm = k_n_m3 * stance_moment_m4(geometry, plate)
     else:
         sign = 1.0 if row.phase is Phase.INSERTION else -1.0
-        across_nm = crossing(geometry, plate, row.sweep_rad) * sweep_nm
+        across_nm = cross_coupling(geometry, plate, row.sweep_rad) * sweep_nm
         adduction_nm = sign * k_n_m3 * stroke_moment_m4(geometry, plate, row.sweep_rad) + across_nm
     force_x_n, force_z_n = smallest_force_n(geometry, row.sweep_rad, row.adduction_rad, sweep_nm, adduction_nm)
     return force_x_n if row.phase is Phase.STANCE else force_z_n

@@ -31,7 +31,7 @@ from experiments.reports.mud_styles import (
 )
 from experiments.trials.mud_names import mud_text
 from experiments.trials.notebook import Entry
-from experiments.trials.stride_profile import Floats, StrideCourse, course_of_row
+from experiments.trials.stride_profile import Floats, StrideProfile, profile_of_row
 
 THIN: dict[str, Any] = {"linewidth": 1.1}
 MODELLED: dict[str, Any] = {"linewidth": 2.0, "linestyle": (0, (3, 1.5))}
@@ -39,19 +39,19 @@ MODELLED: dict[str, Any] = {"linewidth": 2.0, "linestyle": (0, (3, 1.5))}
 
 def plot_stride(trial: Entry, geometry: FlipperGeometry, method: str, path: Path) -> None:
     """Depth, angles and forces of one stride against time, with the forces of the laws: figure 4."""
-    course, stride = course_of_row(trial["course"]), trial["strides"][method][0]
-    laws = modelled_forces(course, geometry, stride["surface_m"] or 0.0, drawn_coefficients(stride), method)
+    profile, stride = profile_of_row(trial["course"]), trial["strides"][method][0]
+    laws = modelled_forces(profile, geometry, stride["surface_m"] or 0.0, drawn_coefficients(stride), method)
     figure, panels = plt.subplots(4, 1, figsize=(7.0, 8.2), sharex=True, constrained_layout=True)
-    _plot_depths(panels[0], course, stride["surface_m"] or 0.0)
-    _plot_angles(panels[1], course)
-    _plot_upward(panels[2], course, laws)
-    _plot_forward(panels[3], course, laws)
+    _plot_depths(panels[0], profile, stride["surface_m"] or 0.0)
+    _plot_angles(panels[1], profile)
+    _plot_upward(panels[2], profile, laws)
+    _plot_forward(panels[3], profile, laws)
     for letter, panel in zip("BCDE", panels, strict=True):  # the paper's A is a drawing
         panel.text(0.006, 0.94, letter, transform=panel.transAxes, va="top", fontweight="bold")
-        _shade(panel, course)
+        _shade(panel, profile)
         panel.margins(x=0.0)
     for phase, name in PHASE_NAMES.items():
-        times_s = course.time_s[course.during(phase)]
+        times_s = profile.time_s[profile.during(phase)]
         if len(times_s):
             panels[0].annotate(name, (float(times_s.mean()), 1.02), xycoords=("data", "axes fraction"), ha="center",
                                va="bottom", fontsize="small")  # fmt: skip
@@ -61,48 +61,48 @@ def plot_stride(trial: Entry, geometry: FlipperGeometry, method: str, path: Path
     plt.close(figure)
 
 
-def _shade(panel: Axes, course: StrideCourse) -> None:
+def _shade(panel: Axes, profile: StrideProfile) -> None:
     for phase, colour in PHASE_SHADES.items():
-        times_s = course.time_s[course.during(phase)]
+        times_s = profile.time_s[profile.during(phase)]
         if len(times_s):
             panel.axvspan(float(times_s[0]), float(times_s[-1]), color=colour, linewidth=0.0, zorder=0)
 
 
-def _plot_depths(panel: Axes, course: StrideCourse, surface_m: float) -> None:
-    panel.plot(course.time_s, 100.0 * course.depth_command_m, "--", color=GREY, label="$z_c$ commanded", **THIN)
-    panel.plot(course.time_s, 100.0 * course.depth_m, color=INK, label="$z$ actual", **THIN)
+def _plot_depths(panel: Axes, profile: StrideProfile, surface_m: float) -> None:
+    panel.plot(profile.time_s, 100.0 * profile.depth_command_m, "--", color=GREY, label="$z_c$ commanded", **THIN)
+    panel.plot(profile.time_s, 100.0 * profile.depth_m, color=INK, label="$z$ actual", **THIN)
     panel.axhline(100.0 * surface_m, color=GREY, linewidth=0.8, linestyle=":", label="surface found")
     panel.invert_yaxis()
     panel.set_ylabel("depth (cm)")
     panel.legend(fontsize="small", loc="center", bbox_to_anchor=(0.82, 0.62))
 
 
-def _plot_angles(panel: Axes, course: StrideCourse) -> None:
-    panel.plot(course.time_s, np.degrees(course.sweep_rad), color="tab:blue", label="sweep $\\alpha$", **THIN)
+def _plot_angles(panel: Axes, profile: StrideProfile) -> None:
+    panel.plot(profile.time_s, np.degrees(profile.sweep_rad), color="tab:blue", label="sweep $\\alpha$", **THIN)
     panel.plot(
-        course.time_s, np.degrees(course.adduction_rad), "--", color="tab:red", label="adduction $\\beta$", **THIN
+        profile.time_s, np.degrees(profile.adduction_rad), "--", color="tab:red", label="adduction $\\beta$", **THIN
     )
     panel.set_ylabel("joint angle (°)")
     panel.legend(fontsize="small", loc="center left", bbox_to_anchor=(0.06, 0.5))
 
 
-def _plot_upward(panel: Axes, course: StrideCourse, laws: ModelledForces) -> None:
-    measured_n = np.where(course.during(Phase.STANCE), np.nan, course.force_z_n)
-    panel.plot(course.time_s, measured_n, color="tab:green", label="$f_z$ measured", **THIN)
+def _plot_upward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> None:
+    measured_n = np.where(profile.during(Phase.STANCE), np.nan, profile.force_z_n)
+    panel.plot(profile.time_s, measured_n, color="tab:green", label="$f_z$ measured", **THIN)
     for phase, colour, label in (
         (Phase.INSERTION, "tab:red", "by $k_p$"),
         (Phase.EXTRACTION, "navy", "by $k_e$"),
     ):
-        modelled_n = np.where(course.during(phase), laws.force_z_n, np.nan)
-        panel.plot(course.time_s, modelled_n, color=colour, label=label, **MODELLED)
+        modelled_n = np.where(profile.during(phase), laws.force_z_n, np.nan)
+        panel.plot(profile.time_s, modelled_n, color=colour, label=label, **MODELLED)
     panel.axhline(0.0, color=GREY, linewidth=0.6)
     panel.set_ylabel("$f_z$ up (N)")
     panel.legend(fontsize="small", ncols=3, loc="upper right")
 
 
-def _plot_forward(panel: Axes, course: StrideCourse, laws: ModelledForces) -> None:
-    panel.plot(course.time_s, course.force_x_n, color="tab:blue", label="$f_x$ measured", **THIN)
-    panel.plot(course.time_s, laws.force_x_n, color="tab:red", label="by $k_s$", **MODELLED)
+def _plot_forward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> None:
+    panel.plot(profile.time_s, profile.force_x_n, color="tab:blue", label="$f_x$ measured", **THIN)
+    panel.plot(profile.time_s, laws.force_x_n, color="tab:red", label="by $k_s$", **MODELLED)
     panel.axhline(0.0, color=GREY, linewidth=0.6)
     panel.set_ylabel("$f_x$ forward (N)")
     panel.legend(fontsize="small", ncols=2, loc="upper right")
@@ -132,7 +132,7 @@ def plot_coefficients(
     plt.close(figure)
 
 
-Curve = Callable[[StrideCourse], tuple[Floats, Floats]]
+Curve = Callable[[StrideProfile], tuple[Floats, Floats]]
 
 
 def _plot_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Mapping[str, dict[str, Any]]) -> None:
@@ -144,8 +144,8 @@ def _plot_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Map
     )
     for panel, (phase, curve, across, up) in zip(panels, wanted, strict=True):
         for mud, trial in firsts.items():
-            course = course_of_row(trial["course"])
-            x, y = (column[course.during(phase)] for column in curve(course))
+            profile = profile_of_row(trial["course"])
+            x, y = (column[profile.during(phase)] for column in curve(profile))
             panel.plot(x, y, label=mud_text(mud), **line_of(looks[mud]))
         panel.axhline(0.0, color=GREY, linewidth=0.6)
         panel.set_xlabel(across)
@@ -160,13 +160,13 @@ def _plot_by_mud(
     """Mean and standard deviation over trials; a bound has an arrow up."""
     names = [mud["mud"] for mud in muds]
     for water, mud in zip(waters_of(names), muds, strict=True):
-        told, look = mud[name], looks[mud["mud"]]
-        if told["value"] is None:
+        reported, look = mud[name], looks[mud["mud"]]
+        if reported["value"] is None:
             continue
-        value, sd = PER_CM3 * told["value"], PER_CM3 * told["value"] * (told["repeatability"] or 0.0)
-        trials = [PER_CM3 * trial for trial in told["trials"]]
+        value, sd = PER_CM3 * reported["value"], PER_CM3 * reported["value"] * (reported["repeatability"] or 0.0)
+        trials = [PER_CM3 * trial for trial in reported["trials"]]
         panel.plot([water] * len(trials), trials, "_", color=GREY, markersize=12)
-        panel.errorbar(water, value, sd or None, capsize=4, ecolor=INK, linestyle="", lolims=told["at_least"],
+        panel.errorbar(water, value, sd or None, capsize=4, ecolor=INK, linestyle="", lolims=reported["at_least"],
                        **mark_of(look))  # fmt: skip
     panel.set_ylim(bottom=0.0)
     panel.set_ylabel(f"{LABELS[name]} (N/cm³)")
@@ -181,13 +181,13 @@ def _plot_beside(
     """Against a load cell's, with two standard errors, and the grey line on which both are equal."""
     largest = 0.0
     for mud in muds:
-        told, truth = mud[name], (mud["truth"] or {}).get(name)
-        if told["value"] is None or truth is None:
+        reported, truth = mud[name], (mud["truth"] or {}).get(name)
+        if reported["value"] is None or truth is None:
             continue
-        value, doubt = PER_CM3 * told["value"], 2.0 * PER_CM3 * (told["std_error"] or 0.0)
-        panel.errorbar(PER_CM3 * truth, value, doubt or None, capsize=4, ecolor=INK, linestyle="",
-                       lolims=told["at_least"], **mark_of(looks[mud["mud"]]))  # fmt: skip
-        largest = max(largest, value + doubt, PER_CM3 * truth)
+        value, uncertainty = PER_CM3 * reported["value"], 2.0 * PER_CM3 * (reported["std_error"] or 0.0)
+        panel.errorbar(PER_CM3 * truth, value, uncertainty or None, capsize=4, ecolor=INK, linestyle="",
+                       lolims=reported["at_least"], **mark_of(looks[mud["mud"]]))  # fmt: skip
+        largest = max(largest, value + uncertainty, PER_CM3 * truth)
     panel.plot([0.0, 1.1 * largest], [0.0, 1.1 * largest], color=GREY, linewidth=1.0, label="equal")
     panel.set_xlabel(f"{LABELS[name]} by load cell (N/cm³)")
     panel.set_ylabel("by the flipper (N/cm³)")

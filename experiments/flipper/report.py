@@ -35,7 +35,7 @@ WRONG_CONSTANTS = (
     "Each simulated motor's torque constant is another than the configuration has, by a draw of 3.2 %, as the paper's "
     "were. All that a joint tells is off by that in the same way: the second ± holds it, the first cannot show it."
 )
-DOUBTS = (
+UNCERTAINTIES = (
     "The first ± is one standard error by the scatter of the trials, the second what all of them have alike as far as "
     "the daemon doubts it: torque constants (3.2 %), the face's load, zero, surface. Two of both together hold what "
     "a load cell reads on the flipper's own way in 19 of 20 cases or more; to tell muds of one robot apart the first "
@@ -74,8 +74,8 @@ def sections_of(
 
 def remarked(remarks: Sequence[str]) -> list[Section]:
     """One of sentences, where there are any."""
-    told = "\n\n".join(f"{remark.rstrip('.')}." for remark in remarks)
-    return [Section("What was remarked", told)] * bool(remarks)
+    reported = "\n\n".join(f"{remark.rstrip('.')}." for remark in remarks)
+    return [Section("What was remarked", reported)] * bool(remarks)
 
 
 def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], configuration: Configuration) -> Section:
@@ -89,23 +89,23 @@ def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], config
         caption += " G to I: beside a load cell's, with two standard errors; on the grey line both are equal."
     draw = partial(plot_coefficients, report["muds"], firsts, configuration.geometry)
     figure = Figure("figure5", caption, draw)
-    return Section("Coefficients of the muds", _told(report), rows=mud_rows(report["muds"]), figures=[figure])
+    return Section("Coefficients of the muds", _reported(report), rows=mud_rows(report["muds"]), figures=[figure])
 
 
-def _told(report: Mapping[str, Any]) -> str:
+def _reported(report: Mapping[str, Any]) -> str:
     falls = {name: fell for name, fell in report["falls_with_water"].items() if fell is not None}
     paragraphs = [report["missing_truth"]] if report["missing_truth"] else []
     if falls:
         fell = ", ".join(f"{name} {'yes' if fell else 'no'}" for name, fell in falls.items())
         paragraphs.append(f"Does a coefficient fall with water from mud to mud, as in the paper? {fell}.")
-    later = {name: shares for name, shares in report["later_strokes"].items() if shares}
-    for name, shares in later.items():
-        strokes = ", ".join(f"{100.0 * share:.0f} %" for share in shares)
+    later = {name: fractions for name, fractions in report["later_strokes"].items() if fractions}
+    for name, fractions in later.items():
+        strokes = ", ".join(f"{100.0 * fraction:.0f} %" for fraction in fractions)
         paragraphs.append(f"{name} of later strides in the same hole, of the first one's: {strokes}.")
-    return "\n\n".join([*paragraphs, DOUBTS, *doubts(report["settings"])])
+    return "\n\n".join([*paragraphs, UNCERTAINTIES, *uncertainties(report["settings"])])
 
 
-def doubts(settings: Mapping[str, Any]) -> list[str]:
+def uncertainties(settings: Mapping[str, Any]) -> list[str]:
     """What is wrong with the figures beyond their scatter, to be read beside them."""
     known = [KNOWN_BIAS] * (settings["method"] == DEFAULT)
     return known + [WRONG_CONSTANTS] * settings["simulated"]

@@ -16,7 +16,7 @@ from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB, Disturbances
 from simulation.mud.track import Track
 
-PLACE_M = 0.2  # a trial's share of the mud: no stroke finds what another left
+POSITION_M = 0.2  # a trial's share of the mud: no stroke finds what another left
 STRIP_M = 100.0  # of each mud
 
 SECTIONS = f"""\
@@ -47,7 +47,7 @@ def flipper_bench(
     track = Track([(STRIP_M, clay_of_water(float(mud))) for mud in muds])
     robot, lockstep = simulated_bench(folder, bench_configuration(), track, seed, True, disturbances)
 
-    def place_m(trial: PlannedTrial, prepared: int) -> float:
-        return STRIP_M * list(muds).index(trial.mud) + PLACE_M * (prepared + 1)
+    def position_m(trial: PlannedTrial, prepared: int) -> float:
+        return STRIP_M * list(muds).index(trial.mud) + POSITION_M * (prepared + 1)
 
-    return robot, CarriedBed(robot, lockstep, place_m)
+    return robot, CarriedBed(robot, lockstep, position_m)

@@ -15,14 +15,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.loadcell.contact import Course
+from experiments.loadcell.contact import Profile
 from experiments.loadcell.curve_fit import Array
 from experiments.loadcell.motion import RATE_EXPONENT, StageSettings
 from experiments.loadcell.stage_track import StageTrack
 
-RESTING_SHARE = 0.12  # of the set speed, below which the stage rests
-LEAST_LAG_DOUBT_S = 2e-3  # from trial to trial: lines wait until they are asked for
-LEAST_RATE_DOUBT = 0.03  # mud follows the speed a millimetre late
+RESTING_FRACTION = 0.12  # of the set speed, below which the stage rests
+LEAST_LAG_UNCERTAINTY_S = 2e-3  # from trial to trial: lines wait until they are asked for
+LEAST_RATE_UNCERTAINTY = 0.03  # mud follows the speed a millimetre late
 MEDIAN_ERROR = 1.25  # times that of a mean
 HANGING_TOGETHER = 2.0  # times the standard error of independent samples
 
@@ -31,36 +31,36 @@ class Alignment(NamedTuple):
     """With one standard error each; a lag is NaN where a trial does not tell it."""
 
     lag_s: float
-    rate_share: float  # r
-    lag_doubt_s: float
-    rate_doubt: float
+    rate_fraction: float  # r
+    lag_uncertainty_s: float
+    rate_uncertainty: float
 
 
 WIDE = Alignment(0.0, 0.08, 0.03, 0.08)  # adapters and filters; 5 to 20 % a decade, as clay practice has it
 
 
-class PlacedCourse:
+class PlacedProfile:
     """Forces with the places that belong to them; the track is turned so that the stroke goes forward."""
 
-    def __init__(self, course: Course, track: StageTrack, settings: StageSettings) -> None:
-        self.course, self.settings = course, settings
+    def __init__(self, profile: Profile, track: StageTrack, settings: StageSettings) -> None:
+        self.profile, self.settings = profile, settings
         self.track = track if track.farthest_m > 0.0 else track.turned()
-        self.period_s = float(np.median(np.diff(course.times_s)))
+        self.period_s = float(np.median(np.diff(profile.times_s)))
 
-    def mean_places_m(self, lag_s: float) -> Array:
+    def mean_positions_m(self, lag_s: float) -> Array:
         """NaN where the encoder does not tell."""
-        return self.track.mean_places_m(self.course.times_s - lag_s, self.period_s)
+        return self.track.mean_positions_m(self.profile.times_s - lag_s, self.period_s)
 
     def speeds_m_s(self, lag_s: float) -> Array:
-        return self.track.speeds_m_s(self.course.times_s - lag_s, self.period_s)
+        return self.track.speeds_m_s(self.profile.times_s - lag_s, self.period_s)
 
-    def grips(self, lag_s: float, rate_share: float) -> Array:
-        return 1.0 + rate_share * self.quickness(lag_s)
+    def grips(self, lag_s: float, rate_fraction: float) -> Array:
+        return 1.0 + rate_fraction * self.quickness(lag_s)
 
     def quickness(self, lag_s: float) -> Array:
         """(v/v_0)^0.4 - 1."""
-        shares = np.maximum(np.abs(self.speeds_m_s(lag_s)) / self.settings.speed_m_s, RESTING_SHARE)
-        return np.asarray(shares**RATE_EXPONENT - 1.0, dtype=np.float64)
+        fractions = np.maximum(np.abs(self.speeds_m_s(lag_s)) / self.settings.speed_m_s, RESTING_FRACTION)
+        return np.asarray(fractions**RATE_EXPONENT - 1.0, dtype=np.float64)
 
 
 def rate_of(forces_n: Array, quickness: Array) -> Alignment:
@@ -69,26 +69,28 @@ def rate_of(forces_n: Array, quickness: Array) -> Alignment:
     (force_n, slope_n), *_ = np.linalg.lstsq(columns, forces_n, rcond=None)
     apart_n = forces_n - columns @ np.array([force_n, slope_n])
     spread = float(np.sum((quickness - np.mean(quickness)) ** 2))
-    doubt = inf
+    uncertainty = inf
     if spread > 0.0 and force_n > 0.0:
-        doubt = HANGING_TOGETHER * sqrt(float(np.mean(apart_n**2)) / spread) / float(force_n)
-    told, own = 1.0 / WIDE.rate_doubt**2, 1.0 / max(doubt, 1e-6) ** 2
-    rate = (WIDE.rate_share * told + (float(slope_n / force_n) * own if own > 0.0 else 0.0)) / (told + own)
-    return Alignment(nan, rate, inf, 1.0 / sqrt(told + own))
+        uncertainty = HANGING_TOGETHER * sqrt(float(np.mean(apart_n**2)) / spread) / float(force_n)
+    reported, own = 1.0 / WIDE.rate_uncertainty**2, 1.0 / max(uncertainty, 1e-6) ** 2
+    rate = (WIDE.rate_fraction * reported + (float(slope_n / force_n) * own if own > 0.0 else 0.0)) / (reported + own)
+    return Alignment(nan, rate, inf, 1.0 / sqrt(reported + own))
 
 
-def common_alignment(told: Sequence[Alignment]) -> Alignment:
+def common_alignment(reported: Sequence[Alignment]) -> Alignment:
     """Of all trials: the medians, and what they scatter."""
-    insertions = [each for each in told if isfinite(each.lag_s)]
-    rated = [each for each in told if not isfinite(each.lag_s)] or insertions
-    lag_s, lag_doubt_s = _common([(each.lag_s, each.lag_doubt_s) for each in insertions], WIDE[0], WIDE[2])
-    rate, rate_doubt = _common([(each.rate_share, each.rate_doubt) for each in rated], WIDE[1], WIDE[3])
-    return Alignment(lag_s, rate, max(lag_doubt_s, LEAST_LAG_DOUBT_S), max(rate_doubt, LEAST_RATE_DOUBT))
+    insertions = [each for each in reported if isfinite(each.lag_s)]
+    rated = [each for each in reported if not isfinite(each.lag_s)] or insertions
+    lag_s, lag_uncertainty_s = _common([(each.lag_s, each.lag_uncertainty_s) for each in insertions], WIDE[0], WIDE[2])
+    rate, rate_uncertainty = _common([(each.rate_fraction, each.rate_uncertainty) for each in rated], WIDE[1], WIDE[3])
+    return Alignment(
+        lag_s, rate, max(lag_uncertainty_s, LEAST_LAG_UNCERTAINTY_S), max(rate_uncertainty, LEAST_RATE_UNCERTAINTY)
+    )
 
 
-def _common(told: Sequence[tuple[float, float]], otherwise: float, doubt: float) -> tuple[float, float]:
-    if not told:
-        return otherwise, doubt
-    values, doubts = [value for value, _ in told], [each for _, each in told]
+def _common(reported: Sequence[tuple[float, float]], otherwise: float, uncertainty: float) -> tuple[float, float]:
+    if not reported:
+        return otherwise, uncertainty
+    values, uncertainties = [value for value, _ in reported], [each for _, each in reported]
     scatter = stdev(values) if len(values) > 2 else 0.0
-    return median(values), MEDIAN_ERROR * max(scatter, median(doubts)) / sqrt(len(values))
+    return median(values), MEDIAN_ERROR * max(scatter, median(uncertainties)) / sqrt(len(values))

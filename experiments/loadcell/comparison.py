@@ -46,12 +46,12 @@ def load_flipper(path: Path) -> dict[str, Any]:
     """The summary of the flipper experiment, or the folder that it is in. Raises CompareError, OSError."""
     path = path / "summary.json" if path.is_dir() else path
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
+        reported = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as problem:
         raise CompareError(f"{path} is no summary of an experiment: {problem}") from problem
-    if not isinstance(told, dict) or not isinstance(told.get("muds"), list):
+    if not isinstance(reported, dict) or not isinstance(reported.get("muds"), list):
         raise CompareError(f"{path} has no muds: give the summary.json of `mudskipper experiment flipper`")
-    return told
+    return reported
 
 
 def compared_with(flipper: Mapping[str, Any] | None, muds: Mapping[str, Mapping[str, OfMud]]) -> list[Compared]:
@@ -62,16 +62,20 @@ def compared_with(flipper: Mapping[str, Any] | None, muds: Mapping[str, Mapping[
     rows = []
     for mud, coefficients in muds.items():
         for name, truth in coefficients.items():
-            told = sensed.get(mud_key(mud), {}).get(name)
-            value, error = _sensed(told)
+            reported = sensed.get(mud_key(mud), {}).get(name)
+            value, error = _sensed(reported)
             if isfinite(value) and isfinite(truth.value):
-                at_least = isinstance(told, dict) and bool(told.get("at_least"))
+                at_least = isinstance(reported, dict) and bool(reported.get("at_least"))
                 rows.append(Compared(mud, name, value, error, truth.value, truth.std_error, at_least))
     return rows
 
 
-def _sensed(told: Any) -> tuple[float, float]:
-    if not isinstance(told, dict) or not isinstance(told.get("value"), int | float) or not told["value"] > 0.0:
+def _sensed(reported: Any) -> tuple[float, float]:
+    if (
+        not isinstance(reported, dict)
+        or not isinstance(reported.get("value"), int | float)
+        or not reported["value"] > 0.0
+    ):
         return float("nan"), float("nan")
-    error = told.get("std_error")
-    return float(told["value"]), float(error) if isinstance(error, int | float) else 0.0
+    error = reported.get("std_error")
+    return float(reported["value"]), float(error) if isinstance(error, int | float) else 0.0

@@ -11,9 +11,9 @@ from experiments.loadcell.curve_fit import Array
 
 QUIET_S = 0.4  # before a stroke, that tells zero and noise
 LEAST_NOISE_N = 1e-3
-CONTACT_NOISES, CONTACT_SHARE = 6.0, 0.03  # of the largest force
+CONTACT_NOISES, CONTACT_FRACTION = 6.0, 0.03  # of the largest force
 LEAST_FORCE_N = 0.03
-RESTLESS_SHARE = 0.05  # of the largest force, in noise, that hides the beginning
+RESTLESS_FRACTION = 0.05  # of the largest force, in noise, that hides the beginning
 SPIKE_NOISES = 12.0
 
 
@@ -21,7 +21,7 @@ class StrokeError(Exception):
     """The force's course is no such stroke; the text says what it lacks."""
 
 
-class Course(NamedTuple):
+class Profile(NamedTuple):
     """Force against time, the cell's sign turned so that the mud resists the first motion with a positive force."""
 
     times_s: Array
@@ -37,7 +37,7 @@ def noise_of(forces_n: Array) -> float:
     return max(NORMAL_MAD * float(np.median(np.abs(forces_n - np.median(forces_n)))), LEAST_NOISE_N)
 
 
-def find_contact(times_s: Array, forces_n: Array) -> Course:
+def find_contact(times_s: Array, forces_n: Array) -> Profile:
     """Raises StrokeError where nothing happens, or where it had begun already."""
     if len(times_s) < 8 or times_s[-1] - times_s[0] < 2.0 * QUIET_S:
         raise StrokeError("hardly any sample was recorded")
@@ -49,15 +49,15 @@ def find_contact(times_s: Array, forces_n: Array) -> Course:
             f"no contact: the force stayed within {largest_n:.3f} N of its zero. Does the stage reach the mud, does "
             "the cell measure along the stroke, and was the stage started in time?"
         )
-    if noise_n > RESTLESS_SHARE * largest_n:
+    if noise_n > RESTLESS_FRACTION * largest_n:
         raise StrokeError(
             f"the force was restless by {noise_n:.3f} N when the recording began: the stage was moving already, or it "
             "shakes. Start it a second or two after the recording"
         )
-    begin, level_n = _leaves_zero(times_s, forces_n, max(CONTACT_NOISES * noise_n, CONTACT_SHARE * largest_n))
+    begin, level_n = _leaves_zero(times_s, forces_n, max(CONTACT_NOISES * noise_n, CONTACT_FRACTION * largest_n))
     turned = bool(np.median(forces_n[begin : begin + 6]) < level_n)
     sign = -1.0 if turned else 1.0
-    return Course(times_s, sign * forces_n, begin, sign * level_n, noise_n, turned)
+    return Profile(times_s, sign * forces_n, begin, sign * level_n, noise_n, turned)
 
 
 def _leaves_zero(times_s: Array, forces_n: Array, bound_n: float) -> tuple[int, float]:
@@ -87,6 +87,6 @@ def without_spikes(forces_n: Array) -> Array:
     middle_n = (before + after) / 2.0
     apart_n = np.abs(forces_n[1:-1] - middle_n)
     spikes = apart_n > np.maximum(SPIKE_NOISES * usual_n, 3.0 * np.abs(after - before))
-    mended = forces_n.copy()
-    mended[1:-1][spikes] = middle_n[spikes]
-    return mended
+    fixed = forces_n.copy()
+    fixed[1:-1][spikes] = middle_n[spikes]
+    return fixed

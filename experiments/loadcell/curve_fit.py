@@ -49,9 +49,9 @@ def fit_curve(
     begun = [_search(residuals, start, FIRST_ROUNDS) for start in starts] if len(starts) > 1 else list(starts)
     place = min(begun, key=lambda place: _square(residuals, place)) if len(begun) > 1 else begun[0]
     place = _search(residuals, place, ROUNDS)
-    told, factors = residuals(place)
-    samples = told[: len(y)]
-    return CurveFit(place, _std_errors(residuals, place, told), factors, float(samples @ samples))
+    reported, factors = residuals(place)
+    samples = reported[: len(y)]
+    return CurveFit(place, _std_errors(residuals, place, reported), factors, float(samples @ samples))
 
 
 def saved_by(richer: CurveFit, plain: CurveFit, samples: int) -> float:
@@ -63,17 +63,17 @@ Residuals = Callable[[Array], tuple[Array, Array]]
 
 
 def _square(residuals: Residuals, place: Array) -> float:
-    told, _ = residuals(place)
-    return float(told @ told)
+    reported, _ = residuals(place)
+    return float(reported @ reported)
 
 
 def _search(residuals: Residuals, place: Array, rounds: int) -> Array:
     """Levenberg and Marquardt."""
-    (told, _), damping = residuals(place), 1e-2
+    (reported, _), damping = residuals(place), 1e-2
     for _ in range(rounds):
         slopes = _slopes(residuals, place)
-        normal, gradient = slopes.T @ slopes, slopes.T @ told
-        square = float(told @ told)
+        normal, gradient = slopes.T @ slopes, slopes.T @ reported
+        square = float(reported @ reported)
         for _ in range(MOST_DAMPINGS):
             step = -np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12), gradient)
             tried, _ = residuals(place + step)
@@ -82,8 +82,8 @@ def _search(residuals: Residuals, place: Array, rounds: int) -> Array:
             damping *= 4.0
         else:
             return place
-        place, told, damping = place + step, tried, 0.3 * damping
-        if square - told @ told < CONVERGED * square:
+        place, reported, damping = place + step, tried, 0.3 * damping
+        if square - reported @ reported < CONVERGED * square:
             return place
     return place
 
@@ -95,7 +95,7 @@ def _slopes(residuals: Residuals, place: Array) -> Array:
     )
 
 
-def _std_errors(residuals: Residuals, place: Array, told: Array) -> Array:
+def _std_errors(residuals: Residuals, place: Array, reported: Array) -> Array:
     slopes = _slopes(residuals, place)
-    variance = float(told @ told) / max(len(told) - 2 * len(place), 1)
+    variance = float(reported @ reported) / max(len(reported) - 2 * len(place), 1)
     return np.sqrt(np.maximum(variance * np.diag(np.linalg.pinv(slopes.T @ slopes)), 0.0))

@@ -25,11 +25,11 @@ import numpy as np
 from control.plate import submerged_part
 from estimation.strokes.origin_fit import MIN_BATCHES, student_factor
 from experiments.loadcell.alignment import Alignment
-from experiments.loadcell.contact import Course, StrokeError
+from experiments.loadcell.contact import Profile, StrokeError
 from experiments.loadcell.curve_fit import Array
 from experiments.loadcell.motion import (
     RATE_EXPONENT,
-    REVERSAL_SHARE,
+    REVERSAL_FRACTION,
     YIELD_M,
     Extraction,
     Insertion,
@@ -48,7 +48,7 @@ KINDS = (SHEAR, INSERTION)
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 SPEED_BOUND = 0.05  # from the one that was set, beyond which it is said
 SINGLE_SPEED_BOUND = 0.12  # the same of a single trial, before it is known beside the others
-RESIDUAL_NOISES, RESIDUAL_SHARE = 4.0, 0.03
+RESIDUAL_NOISES, RESIDUAL_FRACTION = 4.0, 0.03
 BLOCKS = 8  # of a steady shear, whose means tell its scatter
 UNSTEADY = 0.15  # change over a steady shear, from which it is said
 DEPTH_POWERS = {"k_p": 1.0, "k_s": 2.0, "k_e": 1.0}  # with which a depth that was set wrong enters
@@ -83,20 +83,20 @@ class Analysed:
     """One trial: what was found in it."""
 
     recorded: Recorded
-    course: Course | None = None
+    profile: Profile | None = None
     motion: Insertion | Shear | None = None
     extraction: Extraction | None = None
     coefficients: Mapping[str, Coefficient] = field(default_factory=dict)
     problem: str = ""  # why there is no coefficient
     remark: str = ""
-    shared_doubt: float = 0.0  # of speed, lag or rate, as a share, which all trials of a stage have alike
-    places_m: Array | None = None  # depths of an insertion, ways of a shear, as an encoder measured them
-    place_error_m: float = 0.0  # of them, one standard error
+    shared_uncertainty: float = 0.0  # of speed, lag or rate, as a share, which all trials of a stage have alike
+    positions_m: Array | None = None  # depths of an insertion, ways of a shear, as an encoder measured them
+    position_error_m: float = 0.0  # of them, one standard error
     alignment: Alignment | None = None  # of an encoder and the cell
 
     @property
     def is_measured(self) -> bool:
-        return self.places_m is not None
+        return self.positions_m is not None
 
     @property
     def pace(self) -> Pace | None:
@@ -131,21 +131,21 @@ def volume_m3(settings: StageSettings, depths_m: Array) -> Array:
     return plate.plate_thickness_m * np.array(areas_m2)
 
 
-def analyse_insertion(trial: Recorded, course: Course, settings: StageSettings, expected: Pace) -> Analysed:
-    motion = find_insertion(course, settings, expected)
-    told = {"k_p": _k_p(course, motion, settings)}
-    extraction, remark = None, _course_remark(course, motion)
+def analyse_insertion(trial: Recorded, profile: Profile, settings: StageSettings, expected: Pace) -> Analysed:
+    motion = find_insertion(profile, settings, expected)
+    reported = {"k_p": _k_p(profile, motion, settings)}
+    extraction, remark = None, _profile_remark(profile, motion)
     try:
-        extraction = find_extraction(course, motion, settings)
-        told["k_e"] = _k_e(course, motion, extraction, settings)
+        extraction = find_extraction(profile, motion, settings)
+        reported["k_e"] = _k_e(profile, motion, extraction, settings)
     except StrokeError as problem:
-        told["k_e"], remark = NOT_KNOWN, str(problem)
-    return Analysed(trial, course, motion, extraction, told, "", remark)
+        reported["k_e"], remark = NOT_KNOWN, str(problem)
+    return Analysed(trial, profile, motion, extraction, reported, "", remark)
 
 
-def _course_remark(course: Course, motion: Insertion) -> str:
+def _profile_remark(profile: Profile, motion: Insertion) -> str:
     largest_n = motion.jump_n + motion.rise_n
-    if motion.residual_n <= max(RESIDUAL_NOISES * course.noise_n, RESIDUAL_SHARE * largest_n):
+    if motion.residual_n <= max(RESIDUAL_NOISES * profile.noise_n, RESIDUAL_FRACTION * largest_n):
         return ""
     return (
         f"the force is {motion.residual_n:.3f} N off the course of a stage of one speed: it stuttered, was moved by "
@@ -153,26 +153,26 @@ def _course_remark(course: Course, motion: Insertion) -> str:
     )
 
 
-def _k_p(course: Course, motion: Insertion, settings: StageSettings) -> Coefficient:
-    since_s = course.times_s - motion.surface_s
+def _k_p(profile: Profile, motion: Insertion, settings: StageSettings) -> Coefficient:
+    since_s = profile.times_s - motion.surface_s
     pace, depth_m = motion.pace, settings.depth_m
-    depths_m, shares = descent(since_s, pace.speed_m_s, pace.acceleration_m_s2, depth_m)
+    depths_m, fractions = descent(since_s, pace.speed_m_s, pace.acceleration_m_s2, depth_m)
     wet = np.clip(depths_m / YIELD_M, 0.0, 1.0)
-    forces_n = course.forces_n - motion.level_n - motion.slowing_n * wet * (1.0 - shares**RATE_EXPONENT)
+    forces_n = profile.forces_n - motion.level_n - motion.slowing_n * wet * (1.0 - fractions**RATE_EXPONENT)
     shift = SHIFT * pace.speed_m_s * motion.surface_std_error_s / depth_m
-    return slope(settings, depths_m, forces_n, depth_m, hypot(shift, pace.speed_doubt))
+    return slope(settings, depths_m, forces_n, depth_m, hypot(shift, pace.speed_uncertainty))
 
 
-def _k_e(course: Course, motion: Insertion, extraction: Extraction, settings: StageSettings) -> Coefficient:
+def _k_e(profile: Profile, motion: Insertion, extraction: Extraction, settings: StageSettings) -> Coefficient:
     pace = motion.pace
-    left_s = extraction.out_s - course.times_s
+    left_s = extraction.out_s - profile.times_s
     depths_m, _ = descent(left_s, pace.speed_m_s, pace.acceleration_m_s2, settings.depth_m)
-    forces_n, to_m = extraction.level_n - course.forces_n, (1.0 - REVERSAL_SHARE) * settings.depth_m
+    forces_n, to_m = extraction.level_n - profile.forces_n, (1.0 - REVERSAL_FRACTION) * settings.depth_m
     shift = SHIFT * pace.speed_m_s * extraction.out_std_error_s / to_m
-    return slope(settings, depths_m, forces_n, to_m, hypot(shift, pace.speed_doubt))
+    return slope(settings, depths_m, forces_n, to_m, hypot(shift, pace.speed_uncertainty))
 
 
-def slope(settings: StageSettings, depths_m: Array, forces_n: Array, to_m: float, doubt: float) -> Coefficient:
+def slope(settings: StageSettings, depths_m: Array, forces_n: Array, to_m: float, uncertainty: float) -> Coefficient:
     """k of F = k V from the surface to `to_m`, samples meeting half-way. That F is not k V is no doubt: k is what least
     squares make of the mud's own course. `doubt` is that of the depths.
     """
@@ -190,9 +190,13 @@ def slope(settings: StageSettings, depths_m: Array, forces_n: Array, to_m: float
     value = float(np.sum(ways_m * volumes_m3 * forces_n)) / square
     if value <= 0.0:
         raise StrokeError("the force does not oppose the motion")
-    told = noises_n(depths_m, forces_n) * (ways_m * volumes_m3)[1:-1]
-    noise = student_factor(len(told)) * float(np.sqrt(np.sum(told * told) * len(depths_m) / len(told))) / square
-    return Coefficient(value, hypot(noise, doubt * value))
+    reported = noises_n(depths_m, forces_n) * (ways_m * volumes_m3)[1:-1]
+    noise = (
+        student_factor(len(reported))
+        * float(np.sqrt(np.sum(reported * reported) * len(depths_m) / len(reported)))
+        / square
+    )
+    return Coefficient(value, hypot(noise, uncertainty * value))
 
 
 def noises_n(depths_m: Array, forces_n: Array) -> Array:
@@ -205,15 +209,15 @@ def noises_n(depths_m: Array, forces_n: Array) -> Array:
     return np.asarray(apart_n / np.sqrt(1.0 + (1.0 - after) ** 2 + after**2))
 
 
-def analyse_shear(trial: Recorded, course: Course, settings: StageSettings) -> Analysed:
-    zero_n = -trial.zero_n if course.turned else trial.zero_n
-    motion = find_shear(course, settings, zero_n)
-    steady = (course.times_s >= motion.steady_from_s) & (course.times_s <= motion.steady_to_s)
-    forces_n = course.forces_n[steady] - zero_n
+def analyse_shear(trial: Recorded, profile: Profile, settings: StageSettings) -> Analysed:
+    zero_n = -trial.zero_n if profile.turned else trial.zero_n
+    motion = find_shear(profile, settings, zero_n)
+    steady = (profile.times_s >= motion.steady_from_s) & (profile.times_s <= motion.steady_to_s)
+    forces_n = profile.forces_n[steady] - zero_n
     moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
     error_n, remark = steadiness(forces_n)
-    told = Coefficient(float(np.mean(forces_n)) / moment_m3, error_n / moment_m3)
-    return Analysed(trial, course, motion, None, {"k_s": told}, "", remark)
+    reported = Coefficient(float(np.mean(forces_n)) / moment_m3, error_n / moment_m3)
+    return Analysed(trial, profile, motion, None, {"k_s": reported}, "", remark)
 
 
 def steadiness(forces_n: Array) -> tuple[float, str]:
@@ -224,7 +228,7 @@ def steadiness(forces_n: Array) -> tuple[float, str]:
     return student_factor(BLOCKS - 1) * stdev(blocks_n) / sqrt(BLOCKS), remark
 
 
-def bench_doubt(name: str, settings: StageSettings, depth_error_m: float, calibration_error: float) -> float:
+def bench_uncertainty(name: str, settings: StageSettings, depth_error_m: float, calibration_error: float) -> float:
     """Of a coefficient, as a share: what depth, callipers and calibration make alike in all trials."""
     depth = DEPTH_POWERS[name] * depth_error_m / settings.depth_m
     width = CALLIPERS_M / settings.plate_width_m
@@ -239,22 +243,22 @@ def of_mud(trials: Sequence[Analysed], name: str, bench: float) -> OfMud:
     valid = [trial for trial in trials if isfinite(trial.coefficients.get(name, NOT_KNOWN).value)]
     if not valid:
         return OfMud(nan, nan, (), nan)
-    told, shared = [trial.coefficients[name] for trial in valid], fmean(trial.shared_doubt for trial in valid)
-    values = [each.value for each in told]
-    mean, own = fmean(values), sqrt(fmean([each.std_error**2 for each in told]) / len(told))
+    reported, shared = [trial.coefficients[name] for trial in valid], fmean(trial.shared_uncertainty for trial in valid)
+    values = [each.value for each in reported]
+    mean, own = fmean(values), sqrt(fmean([each.std_error**2 for each in reported]) / len(reported))
     scatter = stdev(values) if len(values) > 1 else nan
-    doubt = max(own, student_factor(len(values) - 1) * scatter / sqrt(len(values))) if len(values) > 1 else own
-    return OfMud(mean, hypot(doubt, shared * mean), tuple(values), scatter / mean, bench * mean)
+    uncertainty = max(own, student_factor(len(values) - 1) * scatter / sqrt(len(values))) if len(values) > 1 else own
+    return OfMud(mean, hypot(uncertainty, shared * mean), tuple(values), scatter / mean, bench * mean)
 
 
 def depths_of(trial: Analysed, settings: StageSettings) -> Array | None:
     """The course of the depth, as found; None where it was not."""
     motion, extraction = trial.motion, trial.extraction
-    if trial.course is None or not isinstance(motion, Insertion):
+    if trial.profile is None or not isinstance(motion, Insertion):
         return None
-    if trial.places_m is not None:
-        return trial.places_m
-    times_s, depth_m, pace = trial.course.times_s, settings.depth_m, motion.pace
+    if trial.positions_m is not None:
+        return trial.positions_m
+    times_s, depth_m, pace = trial.profile.times_s, settings.depth_m, motion.pace
     down_m, _ = descent(times_s - motion.surface_s, pace.speed_m_s, pace.acceleration_m_s2, depth_m)
     if extraction is None:
         return down_m
@@ -264,7 +268,7 @@ def depths_of(trial: Analysed, settings: StageSettings) -> Array | None:
 
 def speed_remark(pace: Pace, settings: StageSettings, bound: float = SPEED_BOUND) -> str:
     ratio = pace.speed_m_s / settings.speed_m_s
-    if abs(ratio - 1.0) <= max(bound, 2.0 * pace.speed_doubt):
+    if abs(ratio - 1.0) <= max(bound, 2.0 * pace.speed_uncertainty):
         return ""
     return (
         f"the stage moved at {pace.speed_m_s:.3f} m/s, and {settings.speed_m_s:.3f} m/s was set: the depth's course is "

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.plate import submerged_part
-from experiments.loadcell.alignment import Alignment, PlacedCourse, rate_of
-from experiments.loadcell.contact import Course, StrokeError
+from experiments.loadcell.alignment import Alignment, PlacedProfile, rate_of
+from experiments.loadcell.contact import Profile, StrokeError
 from experiments.loadcell.curve_fit import Array
 from experiments.loadcell.fits import (
     NOT_KNOWN,
+    RESIDUAL_FRACTION,
     RESIDUAL_NOISES,
-    RESIDUAL_SHARE,
     SHEAR,
     SHIFT,
     Analysed,
@@ -28,47 +28,53 @@ from experiments.loadcell.fits import (
     steadiness,
     volume_m3,
 )
-from experiments.loadcell.motion import REVERSAL_SHARE, Extraction, Insertion, Pace, Shear, StageSettings
+from experiments.loadcell.motion import REVERSAL_FRACTION, Extraction, Insertion, Pace, Shear, StageSettings
 from experiments.loadcell.position import LEAST_SAMPLES, Mask, MeasuredInsertion, find_insertion, find_shear
 from experiments.loadcell.stage_track import LEAST_PLACES, StageTrack
 
 DEPTH_BOUND = 0.1  # from the depth that was set, beyond which it is said
 EVEN_DEPTHS = 60
-LAST_SHARE = 0.3
+LAST_FRACTION = 0.3
 
 
-def analyse_measured(trial: Recorded, course: Course, settings: StageSettings, expected: Alignment) -> Analysed:
+def analyse_measured(trial: Recorded, profile: Profile, settings: StageSettings, expected: Alignment) -> Analysed:
     """Raises StrokeError where the place does not tell."""
     if trial.places is None or len(trial.places.times_s) < LEAST_PLACES:
         raise StrokeError("the encoder told hardly any place")
-    placed = PlacedCourse(course, StageTrack(trial.places), settings)
+    placed = PlacedProfile(profile, StageTrack(trial.places), settings)
     return (_shear if trial.kind == SHEAR else _insertion)(trial, placed, expected)
 
 
-def _insertion(trial: Recorded, placed: PlacedCourse, expected: Alignment) -> Analysed:
-    motion, course, settings = find_insertion(placed, expected), placed.course, placed.settings
+def _insertion(trial: Recorded, placed: PlacedProfile, expected: Alignment) -> Analysed:
+    motion, profile, settings = find_insertion(placed, expected), placed.profile, placed.settings
     unsure_m = hypot(motion.surface_std_error_m, placed.track.interpolation_error_m)
-    told_n, rates = course.forces_n - motion.level_n, expected.rate_doubt * placed.quickness(motion.alignment.lag_s)
-    told = {"k_p": _slope(motion, settings, told_n, motion.down, motion.deepest_m, unsure_m, rates)}
-    extraction, remark = None, _insertion_remark(course, motion, settings)
+    reported_n, rates = (
+        profile.forces_n - motion.level_n,
+        expected.rate_uncertainty * placed.quickness(motion.alignment.lag_s),
+    )
+    reported = {"k_p": _slope(motion, settings, reported_n, motion.down, motion.deepest_m, unsure_m, rates)}
+    extraction, remark = None, _insertion_remark(profile, motion, settings)
     if np.count_nonzero(motion.up) >= LEAST_SAMPLES:
-        unsure_m = hypot(unsure_m, motion.mean_speed_m_s * motion.alignment.lag_doubt_s)
-        to_m = (1.0 - REVERSAL_SHARE) * motion.deepest_m
-        told_n = motion.up_level_n - course.forces_n
-        told["k_e"] = _slope(motion, settings, told_n, motion.up, to_m, unsure_m, rates)
+        unsure_m = hypot(unsure_m, motion.mean_speed_m_s * motion.alignment.lag_uncertainty_s)
+        to_m = (1.0 - REVERSAL_FRACTION) * motion.deepest_m
+        reported_n = motion.up_level_n - profile.forces_n
+        reported["k_e"] = _slope(motion, settings, reported_n, motion.up, to_m, unsure_m, rates)
         extraction = Extraction(motion.lift_s, motion.out_s, motion.up_level_n, nan)
     else:
-        told["k_e"], remark = NOT_KNOWN, "no extraction: the encoder did not see the plate come up. Was it drawn out?"
+        reported["k_e"], remark = (
+            NOT_KNOWN,
+            "no extraction: the encoder did not see the plate come up. Was it drawn out?",
+        )
     return Analysed(
         trial,
-        course,
+        profile,
         _as_insertion(motion),
         extraction,
-        told,
+        reported,
         remark=remark,
-        shared_doubt=_rate_doubt(motion, motion.down | motion.up, rates),
-        places_m=motion.depths_m,
-        place_error_m=unsure_m,
+        shared_uncertainty=_rate_uncertainty(motion, motion.down | motion.up, rates),
+        positions_m=motion.depths_m,
+        position_error_m=unsure_m,
         alignment=motion.alignment,
     )
 
@@ -77,7 +83,7 @@ def _by_depth(motion: MeasuredInsertion, chosen: Mask) -> NDArray[np.intp]:
     return np.flatnonzero(chosen)[np.argsort(motion.depths_m[chosen], kind="stable")]
 
 
-def _rate_doubt(motion: MeasuredInsertion, chosen: Mask, rates: Array) -> float:
+def _rate_uncertainty(motion: MeasuredInsertion, chosen: Mask, rates: Array) -> float:
     """Of k. `rates`: shares by which it is in doubt what the mud bears at each sample's speed."""
     order = _by_depth(motion, chosen)
     depths_m = motion.depths_m[order]
@@ -95,27 +101,27 @@ def _slope(
 ) -> Coefficient:
     """From the surface to `to_m`, every piece of way alike wherever the hand has rested."""
     order = _by_depth(motion, chosen)
-    depths_m, told_n = motion.depths_m[order], forces_n[order] / motion.grips[order]
-    unsure = hypot(SHIFT * unsure_m / to_m, _rate_doubt(motion, chosen, rates))
-    doubt = slope(settings, depths_m, told_n, to_m, unsure).std_error
+    depths_m, reported_n = motion.depths_m[order], forces_n[order] / motion.grips[order]
+    unsure = hypot(SHIFT * unsure_m / to_m, _rate_uncertainty(motion, chosen, rates))
+    uncertainty = slope(settings, depths_m, reported_n, to_m, unsure).std_error
     even_m = to_m * (np.arange(EVEN_DEPTHS) + 0.5) / EVEN_DEPTHS
-    even_n = np.interp(even_m, np.append(0.0, depths_m), np.append(0.0, told_n))
-    last = depths_m > depths_m[-1] - LAST_SHARE * to_m
+    even_n = np.interp(even_m, np.append(0.0, depths_m), np.append(0.0, reported_n))
+    last = depths_m > depths_m[-1] - LAST_FRACTION * to_m
     if np.count_nonzero(last) > 2:  # down to where the stage stopped, by the line of the last piece
-        line = np.polyfit(depths_m[last], told_n[last], 1)
+        line = np.polyfit(depths_m[last], reported_n[last], 1)
         even_n = np.where(even_m > depths_m[-1], np.polyval(line, even_m), even_n)
     volumes_m3 = volume_m3(settings, even_m)
-    return Coefficient(float(volumes_m3 @ even_n / (volumes_m3 @ volumes_m3)), doubt)
+    return Coefficient(float(volumes_m3 @ even_n / (volumes_m3 @ volumes_m3)), uncertainty)
 
 
-def _insertion_remark(course: Course, motion: MeasuredInsertion, settings: StageSettings) -> str:
-    largest_n = float(np.max(np.abs(course.forces_n[motion.down] - motion.level_n)))
+def _insertion_remark(profile: Profile, motion: MeasuredInsertion, settings: StageSettings) -> str:
+    largest_n = float(np.max(np.abs(profile.forces_n[motion.down] - motion.level_n)))
     if abs(motion.deepest_m / settings.depth_m - 1.0) > DEPTH_BOUND:
         return (
             f"the plate went {100.0 * motion.deepest_m:.1f} cm deep by the encoder, and {100.0 * settings.depth_m:g} "
             "cm was set: coefficients of one mud differ with the depth, or --position-step is not its way per count"
         )
-    if motion.residual_n > max(RESIDUAL_NOISES * course.noise_n, RESIDUAL_SHARE * largest_n):
+    if motion.residual_n > max(RESIDUAL_NOISES * profile.noise_n, RESIDUAL_FRACTION * largest_n):
         return (
             f"the force is {motion.residual_n:.3f} N off one that grows with the measured depth: the mud has lumps, or "
             "the encoder slips"
@@ -138,28 +144,28 @@ def _as_insertion(motion: MeasuredInsertion) -> Insertion:
     )
 
 
-def _shear(trial: Recorded, placed: PlacedCourse, expected: Alignment) -> Analysed:
-    motion, course, settings = find_shear(placed, expected.lag_s), placed.course, placed.settings
-    zero_n = -trial.zero_n if course.turned else trial.zero_n
-    felt_n, quickness = (course.forces_n - zero_n)[motion.steady], motion.quickness[motion.steady]
+def _shear(trial: Recorded, placed: PlacedProfile, expected: Alignment) -> Analysed:
+    motion, profile, settings = find_shear(placed, expected.lag_s), placed.profile, placed.settings
+    zero_n = -trial.zero_n if profile.turned else trial.zero_n
+    felt_n, quickness = (profile.forces_n - zero_n)[motion.steady], motion.quickness[motion.steady]
     ways_m = np.clip(np.gradient(motion.ways_m[motion.steady]), 1e-9, None)
-    forces_n = felt_n / (1.0 + expected.rate_share * quickness)
+    forces_n = felt_n / (1.0 + expected.rate_fraction * quickness)
     mean_n = float(np.average(forces_n, weights=ways_m))
     if mean_n <= 0.0:
         raise StrokeError("the force does not oppose the motion")
-    rate_n = mean_n * expected.rate_doubt * float(np.average(quickness, weights=ways_m))
+    rate_n = mean_n * expected.rate_uncertainty * float(np.average(quickness, weights=ways_m))
     error_n, remark = steadiness(forces_n)
     moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
-    steady_s = course.times_s[motion.steady]
+    steady_s = profile.times_s[motion.steady]
     return Analysed(
         trial,
-        course,
+        profile,
         Shear(motion.begin_s, float(steady_s[0]), float(steady_s[-1]), motion.mean_speed_m_s),
         None,
         {"k_s": Coefficient(mean_n / moment_m3, hypot(error_n, rate_n) / moment_m3)},
         remark=remark,
-        shared_doubt=abs(rate_n) / mean_n,
-        places_m=motion.ways_m,
-        place_error_m=placed.track.interpolation_error_m,
+        shared_uncertainty=abs(rate_n) / mean_n,
+        positions_m=motion.ways_m,
+        position_error_m=placed.track.interpolation_error_m,
         alignment=rate_of(felt_n, quickness),
     )

@@ -26,7 +26,7 @@ from drivers.load_cell.line_formats import COUNTS, LineFormat
 from drivers.load_cell.load_cell_port import LoadCellPort
 from experiments.loadcell.analysis import analyse
 from experiments.loadcell.comparison import Compared, compared_with
-from experiments.loadcell.fits import COEFFICIENTS, Analysed, OfMud, bench_doubt, of_mud, speed_remark
+from experiments.loadcell.fits import COEFFICIENTS, Analysed, OfMud, bench_uncertainty, of_mud, speed_remark
 from experiments.loadcell.motion import StageSettings
 from experiments.loadcell.raw import load_all
 from experiments.loadcell.recording import CellRecorder
@@ -34,7 +34,7 @@ from experiments.loadcell.trial_checks import examine_encoder, examine_lines
 from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
 from experiments.reports.side_by_side import Show
 from experiments.robot.bench_robot import BenchError
-from experiments.robot.prompt import GO_ON, Person
+from experiments.robot.prompt import GO_ON, Operator
 from experiments.trials.notebook import Notebook
 from firmware_host.operator.reports import known
 
@@ -62,11 +62,11 @@ def plan_of_notebook(settings: StageSettings) -> dict[str, Any]:
 def measure(bench: TrialBench, plan: TrialPlan, cell: CellSettings) -> None:
     """From an open port to all trials. Raises BenchError with what to do."""
     port = bench.recorder.port
-    bench.person.tell(f"listening to {port.path} at {port.baud} baud")
+    bench.operator.report(f"listening to {port.path} at {port.baud} baud")
     port.line_format = LineFormat(examine_lines(bench.recorder, cell.format_name))
-    examine_encoder(bench.recorder, bench.person, plan.settings)
+    examine_encoder(bench.recorder, bench.operator, plan.settings)
     port.calibration = settle_calibration(bench, cell)
-    heed_rate(bench.recorder, bench.person, plan.settings)
+    on_rate(bench.recorder, bench.operator, plan.settings)
     measure_all(bench, plan)
 
 
@@ -82,7 +82,7 @@ def settle_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibra
         if known is not None:
             return known
         if kept.exists():
-            bench.person.tell(f"calibration from {kept}; remove it to calibrate again")
+            bench.operator.report(f"calibration from {kept}; remove it to calibrate again")
             return read_calibration(kept)
     except CalibrationError as problem:
         raise BenchError(str(problem)) from problem
@@ -105,14 +105,14 @@ def _calibrate_anew(bench: TrialBench, unit: str, kept: Path) -> LoadCellCalibra
             weighings = [weigh(bench.stage.weigh(which), _readings(recorder)) for which in (0, 1)]
             calibration = calibrate(unit, *weighings)
         except CalibrationError as problem:
-            bench.person.tell(str(problem))
-            if bench.person.ask("Calibrate again?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
+            bench.operator.report(str(problem))
+            if bench.operator.ask("Calibrate again?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
                 raise BenchError("the load cell is not calibrated") from problem
             continue
         for remark in remarks_on(calibration, *weighings):
-            bench.person.tell(remark)
+            bench.operator.report(remark)
         write_calibration(kept, calibration)
-        bench.person.tell(
+        bench.operator.report(
             f"calibrated: {calibration.per_newton:.6g} {unit} per N, ± {100.0 * calibration.relative_error:.2g} %; "
             f"kept in {kept}"
         )
@@ -129,7 +129,7 @@ def _readings(recorder: CellRecorder) -> list[float]:
     return readings
 
 
-def heed_rate(recorder: CellRecorder, person: Person, settings: StageSettings) -> None:
+def on_rate(recorder: CellRecorder, operator: Operator, settings: StageSettings) -> None:
     """An amplifier too slow for the stroke is told first. Raises BenchError where that ends it."""
     rate_hz = recorder.port.rate_hz
     if rate_hz is None:
@@ -139,12 +139,12 @@ def heed_rate(recorder: CellRecorder, person: Person, settings: StageSettings) -
     if samples >= LEAST_SAMPLES:
         return
     slower_m_s = settings.speed_m_s * samples / LEAST_SAMPLES
-    person.tell(
+    operator.report(
         f"the amplifier sends {rate_hz:.0f} lines/s: an insertion of {duration_s:.2g} s has only {samples:.0f} samples "
         f"and wants {LEAST_SAMPLES}. Set an HX711's RATE pin high (80 samples/s), choose a faster rate of the "
         f"indicator, or move the stage at --speed {slower_m_s:.2g}"
     )
-    if person.ask("Go on all the same?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
+    if operator.ask("Go on all the same?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
         raise BenchError("stopped: the amplifier is too slow for the stroke")
 
 
@@ -170,8 +170,10 @@ def conclude(
         depth_errors_m = dict.fromkeys(COEFFICIENTS, plan.depth_error_m)
         if measured:  # but for a shear, whose depth is the one that was set
             depth_errors_m |= {"k_p": 0.0, "k_e": 0.0}
-        doubts = {name: bench_doubt(name, plan.settings, depth_errors_m[name], error) for name in COEFFICIENTS}
-        muds[mud] = {name: of_mud(of_it, name, doubt) for name, doubt in doubts.items()}
+        uncertainties = {
+            name: bench_uncertainty(name, plan.settings, depth_errors_m[name], error) for name in COEFFICIENTS
+        }
+        muds[mud] = {name: of_mud(of_it, name, uncertainty) for name, uncertainty in uncertainties.items()}
     return Results(trials, muds, list_remarks(trials, plan.settings), compared_with(compare, muds), compare or {})
 
 
@@ -180,17 +182,17 @@ def _relative_error(entry: Mapping[str, Any]) -> float:
 
 
 def list_remarks(trials: Sequence[Analysed], settings: StageSettings) -> list[str]:
-    told = [f"{trial.recorded.key}: {text}" for trial in trials for text in (trial.problem, trial.remark) if text]
+    reported = [f"{trial.recorded.key}: {text}" for trial in trials for text in (trial.problem, trial.remark) if text]
     paced = [(trial.recorded.key, trial.pace) for trial in trials if trial.pace is not None]
     by_pace = {key: remark for key, pace in paced if (remark := speed_remark(pace, settings))}
     if len(by_pace) > 3:
-        told.append(f"in {len(by_pace)} trials {next(iter(by_pace.values()))}")
+        reported.append(f"in {len(by_pace)} trials {next(iter(by_pace.values()))}")
     else:
-        told += [f"{key}: {remark}" for key, remark in by_pace.items()]
-    turned = [trial for trial in trials if trial.course is not None and trial.course.turned]
+        reported += [f"{key}: {remark}" for key, remark in by_pace.items()]
+    turned = [trial for trial in trials if trial.profile is not None and trial.profile.turned]
     if turned:
-        told.append(f"in {len(turned)} trials the cell measured the other way round; their signs are turned")
-    return told
+        reported.append(f"in {len(turned)} trials the cell measured the other way round; their signs are turned")
+    return reported
 
 
 def report_of(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mapping[str, Any]) -> dict[str, Any]:
@@ -204,7 +206,7 @@ def report_of(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mappi
             "acceleration_m_s2": known(sum(p.acceleration_m_s2 for p in paces) / len(paces)) if paces else None,
         },
         "muds": [
-            {"mud": mud, **{name: _described(told) for name, told in coefficients.items()}}
+            {"mud": mud, **{name: _described(reported) for name, reported in coefficients.items()}}
             for mud, coefficients in results.muds.items()
         ],
         "trials": [_trial_described(trial, notebook.entries[trial.recorded.key]) for trial in results.trials],
@@ -217,14 +219,14 @@ def report_of(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mappi
     }
 
 
-def _described(told: OfMud) -> dict[str, Any]:
+def _described(reported: OfMud) -> dict[str, Any]:
     return {
-        "value": known(told.value),
-        "std_error": known(told.std_error),
-        "trials_error": known(told.trials_error),
-        "shared_error": known(told.shared_error),
-        "repeatability": known(told.repeatability),
-        "trials": [known(value) for value in told.trials],
+        "value": known(reported.value),
+        "std_error": known(reported.std_error),
+        "trials_error": known(reported.trials_error),
+        "shared_error": known(reported.shared_error),
+        "repeatability": known(reported.repeatability),
+        "trials": [known(value) for value in reported.trials],
     }
 
 
@@ -235,7 +237,7 @@ def _trial_described(trial: Analysed, entry: Mapping[str, Any]) -> dict[str, Any
         **{name: {"value": known(c.value), "std_error": known(c.std_error)} for name, c in trial.coefficients.items()},
         "speed_m_s": None if trial.speed_m_s is None else known(trial.speed_m_s),
         "is_measured": trial.is_measured,
-        "place_error_m": trial.place_error_m if trial.is_measured else None,
+        "place_error_m": trial.position_error_m if trial.is_measured else None,
         "alignment": trial.alignment and {name: known(value) for name, value in trial.alignment._asdict().items()},
         "problem": trial.problem,
         "remark": trial.remark,

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
-from experiments.loadcell.contact import CONTACT_NOISES, CONTACT_SHARE, LEAST_FORCE_N, Course, StrokeError
+from experiments.loadcell.contact import CONTACT_FRACTION, CONTACT_NOISES, LEAST_FORCE_N, Profile, StrokeError
 from experiments.loadcell.curve_fit import Array, CurveFit, Prior, fit_curve, saved_by
 
 BEFORE_S, AFTER_S = 0.25, 0.2  # of the fit, around the way down
@@ -42,8 +42,8 @@ DIFFERENCE_S = 1e-4
 OUT_ROUNDS, OUT_PLACES = 3, 13  # of an ever finer search
 VALLEY = 2.0  # times the least square may be that of the first valley
 KNOTS = np.array([0.0, 1 / 6, 1 / 3, 1 / 2, 3 / 4])  # of the chain, in depths
-FALLEN_SHARE, LOW_S = 0.93, 0.2  # of a steady shear: the stage has stopped
-REVERSAL_SHARE = 0.25  # of the way up, as in the estimator
+FALLEN_FRACTION, LOW_S = 0.93, 0.2  # of a steady shear: the stage has stopped
+REVERSAL_FRACTION = 0.25  # of the way up, as in the estimator
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class StageSettings:
     depth_m: Annotated[float, Bounds(0.005, 0.2)] = 0.03
     speed_m_s: Annotated[float, Bounds(0.001, 1.0)] = 0.1
     hold_s: Annotated[float, Bounds(0.5, 60.0)] = 3.0
-    shear_way_m: Annotated[float, Bounds(0.05, 2.0)] = 0.2
+    shear_path_m: Annotated[float, Bounds(0.05, 2.0)] = 0.2
     plate_width_m: Annotated[float, Bounds(0.002, 0.5)] = 0.03
     plate_height_m: Annotated[float, Bounds(0.002, 0.5)] = 0.035
     plate_thickness_m: Annotated[float, Bounds(0.0002, 0.1)] = 0.004
@@ -73,8 +73,8 @@ class Pace(NamedTuple):
 
     speed_m_s: float
     acceleration_m_s2: float
-    speed_doubt: float
-    acceleration_doubt: float
+    speed_uncertainty: float
+    acceleration_uncertainty: float
 
 
 class Insertion(NamedTuple):
@@ -108,17 +108,17 @@ def wide_pace(settings: StageSettings) -> Pace:
     return Pace(settings.speed_m_s, 2.0, 0.15, 1.2)
 
 
-def find_insertion(course: Course, settings: StageSettings, expected: Pace) -> Insertion:
+def find_insertion(profile: Profile, settings: StageSettings, expected: Pace) -> Insertion:
     """Raises StrokeError where there are too few samples."""
-    times_s, depth_m = course.times_s, settings.depth_m
-    touched_s = times_s[course.begin]
+    times_s, depth_m = profile.times_s, settings.depth_m
+    touched_s = times_s[profile.begin]
     down = (times_s >= touched_s) & (times_s < touched_s + 2.5 * depth_m / expected.speed_m_s)
-    top_s = times_s[down][int(np.argmax(course.forces_n[down]))]
+    top_s = times_s[down][int(np.argmax(profile.forces_n[down]))]
     window = (times_s > touched_s - BEFORE_S) & (times_s < top_s + AFTER_S)
-    t, y = times_s[window], course.forces_n[window]
+    t, y = times_s[window], profile.forces_n[window]
     if np.count_nonzero((t >= touched_s) & (t <= top_s)) < 6:
         raise StrokeError("fewer than 6 samples on the way down: a faster amplifier or a slower stage is needed")
-    kink, jump = (_best_fit(t, y, touched_s, settings, expected, course.noise_n, jumps) for jumps in (False, True))
+    kink, jump = (_best_fit(t, y, touched_s, settings, expected, profile.noise_n, jumps) for jumps in (False, True))
     pays = jump.factors[JUMP] > 0.0 and saved_by(jump, kink, len(y)) > JUMP_PRICE
     return _insertion(jump if pays else kink, depth_m, len(y))
 
@@ -144,10 +144,10 @@ def _fit(
 ) -> CurveFit:
     prior = Prior(
         np.array([0.0, np.log(expected.speed_m_s), np.log(expected.acceleration_m_s2)]),
-        np.array([np.inf, expected.speed_doubt, expected.acceleration_doubt]),
+        np.array([np.inf, expected.speed_uncertainty, expected.acceleration_uncertainty]),
     )
     since_s = t - touched_s
-    starts = STARTS if expected.speed_doubt > NARROW else ((0.0, 0.0),)
+    starts = STARTS if expected.speed_uncertainty > NARROW else ((0.0, 0.0),)
     best = fit_curve(
         lambda parameters: _shapes(since_s, parameters, settings.depth_m, jumps, slows),
         y,
@@ -167,11 +167,11 @@ def _pace_of(parameters: Array, depth_m: float) -> tuple[float, float]:
 
 def _shapes(t: Array, parameters: Array, depth_m: float, jumps: bool, slows: bool) -> Array:
     speed_m_s, acceleration_m_s2 = _pace_of(parameters, depth_m)
-    depths_m, shares = descent(t - parameters[0], speed_m_s, acceleration_m_s2, depth_m)
+    depths_m, fractions = descent(t - parameters[0], speed_m_s, acceleration_m_s2, depth_m)
     wet = np.clip(depths_m / YIELD_M, 0.0, 1.0)
     rested_s = np.clip(t - parameters[0] - descent_s(speed_m_s, acceleration_m_s2, depth_m), 0.0, None)
     rest = 1.0 - np.exp(-rested_s / RELAXING_S)
-    slowing = wet * (1.0 - shares**RATE_EXPONENT)
+    slowing = wet * (1.0 - fractions**RATE_EXPONENT)
     return np.stack(  # a column of zeros gets the factor 0
         [np.ones_like(t), np.clip(depths_m, 0.0, None) / depth_m, rest, slows * slowing, jumps * wet], 1
     )
@@ -209,12 +209,12 @@ def _insertion(fit: CurveFit, depth_m: float, samples: int) -> Insertion:
     )
 
 
-def find_extraction(course: Course, insertion: Insertion, settings: StageSettings) -> Extraction:
+def find_extraction(profile: Profile, insertion: Insertion, settings: StageSettings) -> Extraction:
     """Raises StrokeError where the plate was not drawn out."""
-    times_s, forces_n = course.times_s, course.forces_n - insertion.level_n
+    times_s, forces_n = profile.times_s, profile.forces_n - insertion.level_n
     after = times_s > insertion.stop_s + 0.2
     least_n = float(np.min(forces_n[after], initial=0.0))
-    threshold_n = max(CONTACT_NOISES * course.noise_n, CONTACT_SHARE * -least_n)
+    threshold_n = max(CONTACT_NOISES * profile.noise_n, CONTACT_FRACTION * -least_n)
     if -least_n < max(threshold_n, LEAST_FORCE_N):
         raise StrokeError("no extraction: the force never pulled downward. Was the plate drawn out in time?")
     lowest = int(np.flatnonzero(after & (forces_n == least_n))[0])
@@ -254,7 +254,7 @@ def _fit_out(left_s: Array, forces_n: Array, pace: Pace, depth_m: float) -> _Out
         descent(each_s, pace.speed_m_s, pace.acceleration_m_s2, depth_m)[0]
         for each_s in (left_s, left_s + DIFFERENCE_S)
     )
-    window = (depths_m <= (1.0 - REVERSAL_SHARE) * depth_m) & (left_s > -AFTER_OUT_S)
+    window = (depths_m <= (1.0 - REVERSAL_FRACTION) * depth_m) & (left_s > -AFTER_OUT_S)
     y, columns = forces_n[window], _chain(depths_m[window], depth_m)
     factors = np.linalg.lstsq(columns, y, rcond=None)[0]
     square = float(np.mean((columns @ factors - y) ** 2))
@@ -270,18 +270,18 @@ def _chain(depths_m: Array, depth_m: float) -> Array:
     return np.stack([np.ones_like(depths_m), *lines], 1)
 
 
-def find_shear(course: Course, settings: StageSettings, zero_n: float) -> Shear:
+def find_shear(profile: Profile, settings: StageSettings, zero_n: float) -> Shear:
     """The second half of the way, less where the stage stopped early. Raises StrokeError."""
-    times_s, forces_n = course.times_s, course.forces_n - zero_n
-    begin_s = float(times_s[course.begin])
-    whole_s = settings.shear_way_m / settings.speed_m_s
+    times_s, forces_n = profile.times_s, profile.forces_n - zero_n
+    begin_s = float(times_s[profile.begin])
+    whole_s = settings.shear_path_m / settings.speed_m_s
     half = (times_s > begin_s + 0.35 * whole_s) & (times_s < begin_s + 0.5 * whole_s)
     if times_s[-1] < begin_s + 0.5 * whole_s:
         raise StrokeError("the recording ended before the force was steady")
     if np.count_nonzero(half) < 2:
         raise StrokeError("hardly a sample on the way: a faster amplifier or a slower stage is needed")
     plateau_n = float(np.median(forces_n[half]))
-    stop_s = _falls_s(times_s, forces_n < FALLEN_SHARE * plateau_n, begin_s + 0.5 * whole_s)
+    stop_s = _falls_s(times_s, forces_n < FALLEN_FRACTION * plateau_n, begin_s + 0.5 * whole_s)
     to_s = float(np.nanmin([begin_s + 0.96 * whole_s, stop_s - 0.03]))
     from_s = min(begin_s + 0.5 * whole_s, (begin_s + to_s) / 2.0)
     if np.count_nonzero((times_s >= from_s) & (times_s <= to_s)) < 8 or plateau_n < LEAST_FORCE_N:
@@ -289,7 +289,7 @@ def find_shear(course: Course, settings: StageSettings, zero_n: float) -> Shear:
             "no steady shear: the force fell again before half of the way. Was the stage started before the recording, "
             "or is its way shorter, or its speed higher, than was told?"
         )
-    return Shear(begin_s, from_s, to_s, settings.shear_way_m / (stop_s - begin_s))
+    return Shear(begin_s, from_s, to_s, settings.shear_path_m / (stop_s - begin_s))
 
 
 def _falls_s(times_s: Array, is_low: NDArray[np.bool_], from_s: float) -> float:

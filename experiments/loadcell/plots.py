@@ -23,7 +23,7 @@ from experiments.loadcell.fits import (  # noqa: E402
     depths_of,
     volume_m3,
 )
-from experiments.loadcell.motion import REVERSAL_SHARE, Insertion, Shear, StageSettings  # noqa: E402
+from experiments.loadcell.motion import REVERSAL_FRACTION, Insertion, Shear, StageSettings  # noqa: E402
 from experiments.reports.mud_styles import INK, LABELS, looks_of, mark_of  # noqa: E402
 from experiments.reports.value_text import N_CM3  # noqa: E402
 from experiments.trials.mud_names import mud_text  # noqa: E402
@@ -35,7 +35,7 @@ SHOWN_ABOVE_M = 0.01  # the mud
 DPI = 110
 
 
-def plot_mud(trials: Sequence[Analysed], told: Mapping[str, OfMud], settings: StageSettings, path: Path) -> None:
+def plot_mud(trials: Sequence[Analysed], reported: Mapping[str, OfMud], settings: StageSettings, path: Path) -> None:
     """All trials of one mud, each from its own beginning on; the model is that of the mud's coefficients."""
     figure, axes = plt.subplots(2, 2, figsize=(12.0, 7.2), constrained_layout=True, height_ratios=(1.5, 1.0))
     (vertical, shear), (depth, curve) = axes
@@ -45,13 +45,13 @@ def plot_mud(trials: Sequence[Analysed], told: Mapping[str, OfMud], settings: St
     for i, trial in enumerate(strokes):
         _plot_insertion(vertical, depth, curve, trial, settings, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
     if strokes:
-        _plot_vertical_model(vertical, curve, strokes[-1], told, settings)
+        _plot_vertical_model(vertical, curve, strokes[-1], reported, settings)
     drags = [trial for trial in trials if isinstance(trial.motion, Shear)]
     over_way = bool(drags) and all(trial.is_measured for trial in drags)
     for i, trial in enumerate(drags):
         _plot_shear(shear, trial, over_way, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
     if drags:
-        _plot_shear_model(shear, drags[-1], over_way, told["k_s"], settings)
+        _plot_shear_model(shear, drags[-1], over_way, reported["k_s"], settings)
     _name_axes(vertical, shear, depth, curve)
     _name_places(shear, depth, curve, over_way, {trial.is_measured for trial in strokes})
     figure.savefig(path, dpi=DPI)
@@ -61,11 +61,11 @@ def plot_mud(trials: Sequence[Analysed], told: Mapping[str, OfMud], settings: St
 def _plot_insertion(
     vertical: Axes, depth: Axes, curve: Axes, trial: Analysed, settings: StageSettings, colour: str, label: str
 ) -> None:
-    motion, course, depths_m = trial.motion, trial.course, depths_of(trial, settings)
-    assert isinstance(motion, Insertion) and course is not None and depths_m is not None
-    end_s = course.times_s[-1] if trial.extraction is None else trial.extraction.out_s
-    shown = (course.times_s > motion.surface_s - BEFORE_S) & (course.times_s < end_s + BEHIND_S)
-    since_s, forces_n = course.times_s[shown] - motion.surface_s, course.forces_n[shown] - motion.level_n
+    motion, profile, depths_m = trial.motion, trial.profile, depths_of(trial, settings)
+    assert isinstance(motion, Insertion) and profile is not None and depths_m is not None
+    end_s = profile.times_s[-1] if trial.extraction is None else trial.extraction.out_s
+    shown = (profile.times_s > motion.surface_s - BEFORE_S) & (profile.times_s < end_s + BEHIND_S)
+    since_s, forces_n = profile.times_s[shown] - motion.surface_s, profile.forces_n[shown] - motion.level_n
     depths_cm = 100.0 * np.where(depths_m[shown] < -SHOWN_ABOVE_M, np.nan, depths_m[shown])
     look: dict[str, Any] = {"color": colour, "linewidth": 1.0}
     vertical.plot(since_s, forces_n, label=label, **look)
@@ -75,43 +75,43 @@ def _plot_insertion(
 
 
 def _plot_vertical_model(
-    vertical: Axes, curve: Axes, trial: Analysed, told: Mapping[str, OfMud], settings: StageSettings
+    vertical: Axes, curve: Axes, trial: Analysed, reported: Mapping[str, OfMud], settings: StageSettings
 ) -> None:
     """Against time along the depths of the trial."""
-    motion, course, trial_m = trial.motion, trial.course, depths_of(trial, settings)
-    assert isinstance(motion, Insertion) and course is not None and trial_m is not None
-    since_s, even_m = course.times_s - motion.surface_s, np.linspace(0.0, settings.depth_m, 40)
+    motion, profile, trial_m = trial.motion, trial.profile, depths_of(trial, settings)
+    assert isinstance(motion, Insertion) and profile is not None and trial_m is not None
+    since_s, even_m = profile.times_s - motion.surface_s, np.linspace(0.0, settings.depth_m, 40)
     strokes = [("k_p", 1.0, 1.0, motion.surface_s, motion.stop_s)]
     if trial.extraction is not None:
-        strokes.append(("k_e", -1.0, 1.0 - REVERSAL_SHARE, trial.extraction.lift_s, trial.extraction.out_s))
-    for name, sign, share, from_s, to_s in strokes:
-        per_m3, within = sign * told[name].value, (trial_m >= 0.0) & (trial_m <= share * np.nanmax(trial_m))
-        shown = within & (course.times_s >= from_s) & (course.times_s <= to_s)
+        strokes.append(("k_e", -1.0, 1.0 - REVERSAL_FRACTION, trial.extraction.lift_s, trial.extraction.out_s))
+    for name, sign, fraction, from_s, to_s in strokes:
+        per_m3, within = sign * reported[name].value, (trial_m >= 0.0) & (trial_m <= fraction * np.nanmax(trial_m))
+        shown = within & (profile.times_s >= from_s) & (profile.times_s <= to_s)
         label = "model" if name == "k_p" else None
         vertical.plot(since_s[shown], per_m3 * volume_m3(settings, trial_m[shown]), label=label, **MODEL)
-        curve.plot(100.0 * share * even_m, per_m3 * volume_m3(settings, share * even_m), **MODEL)
+        curve.plot(100.0 * fraction * even_m, per_m3 * volume_m3(settings, fraction * even_m), **MODEL)
 
 
 def _plot_shear(panel: Axes, trial: Analysed, over_way: bool, colour: str, label: str) -> None:
-    motion, course = trial.motion, trial.course
-    assert isinstance(motion, Shear) and course is not None
-    zero_n = -trial.recorded.zero_n if course.turned else trial.recorded.zero_n
-    shown = course.times_s > motion.begin_s - BEFORE_S
-    along = _ways_cm(trial) if over_way else course.times_s - motion.begin_s
-    panel.plot(along[shown], course.forces_n[shown] - zero_n, color=colour, linewidth=1.0, label=label)
+    motion, profile = trial.motion, trial.profile
+    assert isinstance(motion, Shear) and profile is not None
+    zero_n = -trial.recorded.zero_n if profile.turned else trial.recorded.zero_n
+    shown = profile.times_s > motion.begin_s - BEFORE_S
+    along = _ways_cm(trial) if over_way else profile.times_s - motion.begin_s
+    panel.plot(along[shown], profile.forces_n[shown] - zero_n, color=colour, linewidth=1.0, label=label)
 
 
 def _ways_cm(trial: Analysed) -> Array:
-    return np.asarray(100.0 * trial.places_m) if trial.places_m is not None else np.empty(0)
+    return np.asarray(100.0 * trial.positions_m) if trial.positions_m is not None else np.empty(0)
 
 
-def _plot_shear_model(panel: Axes, trial: Analysed, over_way: bool, told: OfMud, settings: StageSettings) -> None:
-    motion, course = trial.motion, trial.course
-    assert isinstance(motion, Shear) and course is not None
+def _plot_shear_model(panel: Axes, trial: Analysed, over_way: bool, reported: OfMud, settings: StageSettings) -> None:
+    motion, profile = trial.motion, trial.profile
+    assert isinstance(motion, Shear) and profile is not None
     moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
     along = np.array([motion.steady_from_s, motion.steady_to_s])
-    along = np.interp(along, course.times_s, _ways_cm(trial)) if over_way else along - motion.begin_s
-    panel.plot(along, [told.value * moment_m3] * 2, label="model", **MODEL)
+    along = np.interp(along, profile.times_s, _ways_cm(trial)) if over_way else along - motion.begin_s
+    panel.plot(along, [reported.value * moment_m3] * 2, label="model", **MODEL)
 
 
 def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:
@@ -144,11 +144,13 @@ def plot_coefficients(muds: Mapping[str, Mapping[str, OfMud]], path: Path) -> No
     names, looks = list(muds), looks_of(list(muds))
     for panel, name in zip(panels, COEFFICIENTS, strict=True):
         for place, mud in enumerate(names):
-            told = muds[mud][name]
-            values = np.array(told.trials) / N_CM3
+            reported = muds[mud][name]
+            values = np.array(reported.trials) / N_CM3
             panel.plot(place + 0.18 + np.zeros(len(values)), values, ".", color="grey", markersize=4)
-            doubt = 2.0 * told.std_error / N_CM3
-            panel.errorbar(place, told.value / N_CM3, doubt, linestyle="", ecolor=INK, capsize=3, **mark_of(looks[mud]))
+            uncertainty = 2.0 * reported.std_error / N_CM3
+            panel.errorbar(
+                place, reported.value / N_CM3, uncertainty, linestyle="", ecolor=INK, capsize=3, **mark_of(looks[mud])
+            )
         panel.set_xticks(range(len(names)), [mud_text(name) for name in names])
         panel.set_xlim(-0.6, len(names) - 0.4)
         panel.set_ylim(0.0, None)

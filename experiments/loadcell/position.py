@@ -20,10 +20,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.loadcell.alignment import RESTING_SHARE, Alignment, PlacedCourse
+from experiments.loadcell.alignment import RESTING_FRACTION, Alignment, PlacedProfile
 from experiments.loadcell.contact import LEAST_FORCE_N, StrokeError
 from experiments.loadcell.curve_fit import Array, CurveFit, Prior, fit_curve, saved_by
-from experiments.loadcell.motion import JUMP_PRICE, KNOTS, REVERSAL_SHARE, YIELD_M
+from experiments.loadcell.motion import JUMP_PRICE, KNOTS, REVERSAL_FRACTION, YIELD_M
 
 Mask = NDArray[np.bool_]
 
@@ -33,13 +33,13 @@ AIR_M = 0.012  # above the contact, that tells the level
 BOTTOM_M = 3e-4  # above the deepest place, that counts as there
 LEAST_SAMPLES = 6  # in the mud
 LEAST_AIR = 4
-LEAST_SHARE = 0.3  # of the set depth, that an encoder on this stage must have seen
+LEAST_FRACTION = 0.3  # of the set depth, that an encoder on this stage must have seen
 ROUNDS = 3  # of choosing samples by the lag and fitting the lag to them
 LAG_STARTS_S = (-0.02, 0.0, 0.02)
 NARROW_S = 0.01
 TURNING_S, LARGEST_LAG_S = 0.01, 0.3
 PARTS = 4  # of the time of a conversion, in which a plate may meet the surface
-LAW_SHARE = 0.015  # of the largest force, by which no law is better
+LAW_FRACTION = 0.015  # of the largest force, by which no law is better
 WRONG_AXIS = "is the encoder on the axis that moves, and is --position-step its way per count?"
 
 
@@ -76,24 +76,24 @@ class _Window(NamedTuple):
     has_air: bool  # behind the way up, which tells its own level: mud that clings weighs something
 
 
-def find_insertion(placed: PlacedCourse, expected: Alignment) -> MeasuredInsertion:
+def find_insertion(placed: PlacedProfile, expected: Alignment) -> MeasuredInsertion:
     """Raises StrokeError where the encoder has not seen the stroke."""
-    wide = expected.lag_doubt_s > NARROW_S
+    wide = expected.lag_uncertainty_s > NARROW_S
     lag_s = _rough_lag_s(placed) if wide else expected.lag_s
     for round_ in range(ROUNDS if wide else 1):
         window = _window(placed, lag_s)
         shifts_s = LAG_STARTS_S if wide and round_ == 0 else (0.0,)
-        starts = [np.array([window.surface_m - YIELD_M, lag_s + shift, expected.rate_share]) for shift in shifts_s]
+        starts = [np.array([window.surface_m - YIELD_M, lag_s + shift, expected.rate_fraction]) for shift in shifts_s]
         fit = _best_fit(placed, expected, window, starts)
         lag_s = float(fit.parameters[1])
     return _insertion(placed, window, fit)
 
 
-def _rough_lag_s(placed: PlacedCourse) -> float:
+def _rough_lag_s(placed: PlacedProfile) -> float:
     """The force turns round a moment after the stage has left its lowest place; 0 where neither is to be seen."""
-    times_s, forces_n = placed.course.times_s, placed.course.forces_n - placed.course.level_n
-    places_m, lowest = placed.track.places_m(times_s), int(np.argmin(forces_n))
-    at_bottom = np.flatnonzero(places_m > np.max(places_m) - BOTTOM_M)
+    times_s, forces_n = placed.profile.times_s, placed.profile.forces_n - placed.profile.level_n
+    positions_m, lowest = placed.track.positions_m(times_s), int(np.argmin(forces_n))
+    at_bottom = np.flatnonzero(positions_m > np.max(positions_m) - BOTTOM_M)
     pushed = np.flatnonzero(forces_n[:lowest] > 0.0)
     if forces_n[lowest] > -LEAST_FORCE_N or not len(pushed):
         return 0.0
@@ -101,45 +101,47 @@ def _rough_lag_s(placed: PlacedCourse) -> float:
     return lag_s if abs(lag_s) < LARGEST_LAG_S else 0.0
 
 
-def _window(placed: PlacedCourse, lag_s: float) -> _Window:
-    places_m, speeds_m_s = placed.mean_places_m(lag_s), placed.speeds_m_s(lag_s)
-    known, order = np.isfinite(places_m), np.arange(len(places_m))
-    touched_s = placed.course.times_s[placed.course.begin]
-    surface_m = float(placed.track.places_m(np.array([touched_s - lag_s]))[0])
-    deepest_m = float(np.max(places_m[known], initial=surface_m))
-    way_m = deepest_m - surface_m
-    if way_m < LEAST_SHARE * placed.settings.depth_m:
-        raise StrokeError(f"the encoder saw {1000.0 * way_m:.1f} mm of the way into the mud: {WRONG_AXIS}")
-    at_bottom = order[known][places_m[known] > deepest_m - BOTTOM_M]
-    above = known & (places_m > surface_m - AIR_M)
-    bearing = places_m < surface_m + (1.0 - REVERSAL_SHARE) * way_m
-    resting_m_s = RESTING_SHARE * placed.settings.speed_m_s
+def _window(placed: PlacedProfile, lag_s: float) -> _Window:
+    positions_m, speeds_m_s = placed.mean_positions_m(lag_s), placed.speeds_m_s(lag_s)
+    known, order = np.isfinite(positions_m), np.arange(len(positions_m))
+    touched_s = placed.profile.times_s[placed.profile.begin]
+    surface_m = float(placed.track.positions_m(np.array([touched_s - lag_s]))[0])
+    deepest_m = float(np.max(positions_m[known], initial=surface_m))
+    path_m = deepest_m - surface_m
+    if path_m < LEAST_FRACTION * placed.settings.depth_m:
+        raise StrokeError(f"the encoder saw {1000.0 * path_m:.1f} mm of the way into the mud: {WRONG_AXIS}")
+    at_bottom = order[known][positions_m[known] > deepest_m - BOTTOM_M]
+    above = known & (positions_m > surface_m - AIR_M)
+    bearing = positions_m < surface_m + (1.0 - REVERSAL_FRACTION) * path_m
+    resting_m_s = RESTING_FRACTION * placed.settings.speed_m_s
     down, up = above & (order < at_bottom[0]), known & (order > at_bottom[-1])
-    mud = places_m > surface_m - YIELD_M  # air does not relax
-    down[down] = moving(places_m[down], speeds_m_s[down], resting_m_s, WAKING_M, mud[down])
-    up[up] = moving(-places_m[up], -speeds_m_s[up], resting_m_s, WAKING_M, mud[up])
+    mud = positions_m > surface_m - YIELD_M  # air does not relax
+    down[down] = moving(positions_m[down], speeds_m_s[down], resting_m_s, WAKING_M, mud[down])
+    up[up] = moving(-positions_m[up], -speeds_m_s[up], resting_m_s, WAKING_M, mud[up])
     up &= bearing & above
-    if np.count_nonzero(down & (places_m > surface_m)) < LEAST_SAMPLES:
+    if np.count_nonzero(down & (positions_m > surface_m)) < LEAST_SAMPLES:
         raise StrokeError(f"fewer than {LEAST_SAMPLES} samples of force and place together on the way down")
-    has_air = bool(np.count_nonzero(up & (places_m < surface_m - YIELD_M)) >= LEAST_AIR)
+    has_air = bool(np.count_nonzero(up & (positions_m < surface_m - YIELD_M)) >= LEAST_AIR)
     return _Window(down, up, surface_m, deepest_m, has_air)
 
 
-def moving(places_m: Array, speeds_m_s: Array, resting_m_s: float, waking_m: float, in_mud: Mask | bool = True) -> Mask:
+def moving(
+    positions_m: Array, speeds_m_s: Array, resting_m_s: float, waking_m: float, in_mud: Mask | bool = True
+) -> Mask:
     """Samples in which the stage goes forward, goes on, and has done so for `waking_m` since it last rested in mud."""
     goes = speeds_m_s > resting_m_s
     goes &= np.append(goes[1:], False)
-    rested_m = np.where(goes | ~np.asarray(in_mud), -np.inf, places_m)
-    return np.asarray(goes & (places_m - np.maximum.accumulate(rested_m) > waking_m))
+    rested_m = np.where(goes | ~np.asarray(in_mud), -np.inf, positions_m)
+    return np.asarray(goes & (positions_m - np.maximum.accumulate(rested_m) > waking_m))
 
 
-def _best_fit(placed: PlacedCourse, expected: Alignment, window: _Window, starts: list[Array]) -> CurveFit:
+def _best_fit(placed: PlacedProfile, expected: Alignment, window: _Window, starts: list[Array]) -> CurveFit:
     """With a jump at the surface only where it pays."""
-    y = placed.course.forces_n[window.down | window.up]
-    noise_n = max(placed.course.noise_n, LAW_SHARE * float(np.max(np.abs(y - placed.course.level_n))))
+    y = placed.profile.forces_n[window.down | window.up]
+    noise_n = max(placed.profile.noise_n, LAW_FRACTION * float(np.max(np.abs(y - placed.profile.level_n))))
     prior = Prior(
-        np.array([0.0, expected.lag_s, expected.rate_share]),
-        np.array([np.inf, expected.lag_doubt_s, expected.rate_doubt]),
+        np.array([0.0, expected.lag_s, expected.rate_fraction]),
+        np.array([np.inf, expected.lag_uncertainty_s, expected.rate_uncertainty]),
     )
     kink, jump = (
         fit_curve(partial(_shapes, placed, window, jumps), y, starts, prior, noise_n) for jumps in (False, True)
@@ -148,41 +150,41 @@ def _best_fit(placed: PlacedCourse, expected: Alignment, window: _Window, starts
     return jump if pays else kink
 
 
-def _shapes(placed: PlacedCourse, window: _Window, jumps: bool, parameters: Array) -> Array:
+def _shapes(placed: PlacedProfile, window: _Window, jumps: bool, parameters: Array) -> Array:
     """Columns: level, rise and jump of the way down, the level of the way up and its chain. What does not grow evenly
     with the depth is the mean over the parts of a conversion.
     """
-    surface_m, lag_s, rate_share = (float(each) for each in parameters)
+    surface_m, lag_s, rate_fraction = (float(each) for each in parameters)
     chosen = window.down | window.up
     down, knots_m = window.down[chosen], KNOTS * (window.deepest_m - surface_m)
-    until_s, part_s = placed.course.times_s[chosen] - lag_s, placed.period_s / PARTS
+    until_s, part_s = placed.profile.times_s[chosen] - lag_s, placed.period_s / PARTS
     columns = np.zeros((len(until_s), 2 + len(KNOTS)))
     for part in range(PARTS):
-        wet_m = np.clip(placed.track.places_m(until_s - (part + 0.5) * part_s) - surface_m, 0.0, None)
+        wet_m = np.clip(placed.track.positions_m(until_s - (part + 0.5) * part_s) - surface_m, 0.0, None)
         columns[:, 0] += wet_m / placed.settings.depth_m
         columns[:, 1] += jumps * np.clip(wet_m / YIELD_M, 0.0, 1.0)
         for knot, unit in enumerate(np.eye(len(KNOTS))[1:]):
             columns[:, 2 + knot] += np.interp(wet_m, knots_m, unit)
-    columns *= placed.grips(lag_s, rate_share)[chosen, None] / PARTS
+    columns *= placed.grips(lag_s, rate_fraction)[chosen, None] / PARTS
     columns[~down, :2] = columns[down, 2:] = 0.0
     columns[:, -1] = ~down & window.has_air
     return np.column_stack([down | (not window.has_air), columns]).astype(np.float64)
 
 
-def _insertion(placed: PlacedCourse, window: _Window, fit: CurveFit) -> MeasuredInsertion:
-    surface_m, lag_s, rate_share = (float(each) for each in fit.parameters)
-    depths_m, times_s = placed.mean_places_m(lag_s) - surface_m, placed.course.times_s
+def _insertion(placed: PlacedProfile, window: _Window, fit: CurveFit) -> MeasuredInsertion:
+    surface_m, lag_s, rate_fraction = (float(each) for each in fit.parameters)
+    depths_m, times_s = placed.mean_positions_m(lag_s) - surface_m, placed.profile.times_s
     wet = np.flatnonzero(depths_m > 0.0)
     bottom = np.flatnonzero(depths_m > np.nanmax(depths_m) - BOTTOM_M)
     down = window.down & (depths_m > 0.0)
     return MeasuredInsertion(
         depths_m=depths_m,
-        grips=placed.grips(lag_s, rate_share),
+        grips=placed.grips(lag_s, rate_fraction),
         down=down,
         up=window.up & (depths_m > 0.0),
         level_n=float(fit.factors[0]),
         up_level_n=float(fit.factors[-1 if window.has_air else 0]),
-        alignment=Alignment(lag_s, rate_share, float(fit.std_errors[1]), float(fit.std_errors[2])),
+        alignment=Alignment(lag_s, rate_fraction, float(fit.std_errors[1]), float(fit.std_errors[2])),
         surface_std_error_m=float(fit.std_errors[0]),
         residual_n=sqrt(fit.square / np.count_nonzero(window.down | window.up)),
         surface_s=float(times_s[wet[0]]),
@@ -206,20 +208,20 @@ class MeasuredShear(NamedTuple):
     mean_speed_m_s: float
 
 
-def find_shear(placed: PlacedCourse, lag_s: float) -> MeasuredShear:
+def find_shear(placed: PlacedProfile, lag_s: float) -> MeasuredShear:
     """Raises StrokeError where the encoder has not seen half of the way."""
-    ways_m, speeds_m_s, set_m = placed.mean_places_m(lag_s), placed.speeds_m_s(lag_s), placed.settings.shear_way_m
+    ways_m, speeds_m_s, set_m = placed.mean_positions_m(lag_s), placed.speeds_m_s(lag_s), placed.settings.shear_path_m
     known = np.isfinite(ways_m)
     whole_m = float(np.max(ways_m[known], initial=0.0))
     if whole_m < 0.5 * set_m:
-        told = f"the encoder saw {100.0 * whole_m:.1f} cm of {100.0 * set_m:g} cm"
-        raise StrokeError(f"{told}: did the stage stop early, {WRONG_AXIS}")
+        reported = f"the encoder saw {100.0 * whole_m:.1f} cm of {100.0 * set_m:g} cm"
+        raise StrokeError(f"{reported}: did the stage stop early, {WRONG_AXIS}")
     begin = np.flatnonzero(ways_m > 0.01 * whole_m)[0]
     steady = known.copy()
-    resting_m_s = RESTING_SHARE * placed.settings.speed_m_s
+    resting_m_s = RESTING_FRACTION * placed.settings.speed_m_s
     steady[known] = moving(ways_m[known], speeds_m_s[known], resting_m_s, WAKING_SIDEWAYS_M)
     steady &= (ways_m > whole_m / 2.0) & (ways_m < 0.99 * whole_m)
     if np.count_nonzero(steady) < 8:
         raise StrokeError("fewer than 8 samples of force and place together on the second half of the way")
     mean_m_s = _mean_speed_m_s(speeds_m_s[steady])
-    return MeasuredShear(ways_m, placed.quickness(lag_s), steady, float(placed.course.times_s[begin]), mean_m_s)
+    return MeasuredShear(ways_m, placed.quickness(lag_s), steady, float(placed.profile.times_s[begin]), mean_m_s)

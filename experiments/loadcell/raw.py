@@ -41,7 +41,7 @@ def write_places(path: Path, places: Iterable[Place]) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(PLACE_COLUMNS)
-        writer.writerows((f"{place.stamp_s:.6f}", f"{place.place_m:.8f}") for place in places)
+        writer.writerows((f"{place.stamp_s:.6f}", f"{place.position_m:.8f}") for place in places)
 
 
 def load_recorded(folder: Path, key: str, entry: dict[str, Any]) -> Recorded:
@@ -56,13 +56,13 @@ def load_recorded(folder: Path, key: str, entry: dict[str, Any]) -> Recorded:
 
 def _load_places(folder: Path, entry: dict[str, Any]) -> Places | None:
     """None where there was no encoder, or it began anew in the middle."""
-    told = entry.get("position")
-    if not told or told["breaks"] or not told["places"]:
+    reported = entry.get("position")
+    if not reported or reported["breaks"] or not reported["places"]:
         return None
-    with (folder / told["file"]).open(newline="", encoding="utf-8") as file:
+    with (folder / reported["file"]).open(newline="", encoding="utf-8") as file:
         rows = [(float(row["t_s"]), float(row["place_m"])) for row in csv.DictReader(file)]
-    times_s, places_m = np.array(rows).T
-    return Places(times_s, places_m)
+    times_s, positions_m = np.array(rows).T
+    return Places(times_s, positions_m)
 
 
 def load_all(folder: Path, notebook: Notebook) -> list[Recorded]:

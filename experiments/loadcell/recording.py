@@ -22,7 +22,7 @@ TARE_S = 1.0
 ABSENCE_S = 300.0  # for which an adapter may be away
 CONTACT_SAMPLES = 3
 AVERAGED_LIKENESS = 0.6  # of a mean over three conversions
-LEAST_TOLD, LEAST_VALUES = 40, 8  # samples, and different ones, of which fewer tell nothing
+LEAST_REPORTED, LEAST_VALUES = 40, 8  # samples, and different ones, of which fewer tell nothing
 AVERAGED = (
     "the cell's samples at rest hardly differ from one to the next: its amplifier tells means over several "
     "conversions, which smears the strokes. Set its filter to the fastest, or move the stage more slowly"
@@ -55,7 +55,7 @@ class Tare(NamedTuple):
     @property
     def is_averaged(self) -> bool:
         """By a filter in the amplifier, or what shakes the cell is slow."""
-        return self.samples >= LEAST_TOLD and self.likeness > AVERAGED_LIKENESS
+        return self.samples >= LEAST_REPORTED and self.likeness > AVERAGED_LIKENESS
 
 
 class PlaceStretch(NamedTuple):
@@ -88,11 +88,11 @@ class CellRecorder:
         self,
         port: LoadCellPort,
         clock: BenchClock,
-        tell: Callable[[str], None],
+        report: Callable[[str], None],
         encoder: StageEncoder | None = None,
     ) -> None:
         """`encoder`: of the stage; nothing waits for it."""
-        self.port, self.clock, self.tell, self.encoder = port, clock, tell, encoder
+        self.port, self.clock, self.report, self.encoder = port, clock, report, encoder
         self._places: list[Place] = []
 
     def drain(self) -> None:
@@ -121,13 +121,13 @@ class CellRecorder:
         """An adapter that was pulled out is waited for. Raises BenchError after a while."""
         if self.port.is_there:
             return
-        self.tell(f"the load cell is gone ({self.port.last_problem}): plug {self.port.path} in again")
+        self.report(f"the load cell is gone ({self.port.last_problem}): plug {self.port.path} in again")
         end_s = self.clock.now_s() + ABSENCE_S
         while not self.port.is_there:
             if self.clock.now_s() > end_s:
                 raise BenchError(f"the load cell did not come back: {self.port.last_problem}")
             self.poll()
-        self.tell("the load cell is back")
+        self.report("the load cell is back")
 
     def tare(self) -> Tare:
         """Raises BenchError where nothing comes."""
@@ -163,7 +163,7 @@ class CellRecorder:
         while self.clock.now_s() < end_s and port.is_there:
             fresh = self.poll()
             samples += fresh
-            if contact.heed(fresh):
+            if contact.handle(fresh):
                 end_s = self.clock.now_s() + stroke_s
         places, after = self._places, _counted(self.encoder)
         self._places = []
@@ -202,7 +202,7 @@ class _Contact:
         self._away = 0
         self._seen = False
 
-    def heed(self, samples: Sequence[Sample]) -> bool:
+    def handle(self, samples: Sequence[Sample]) -> bool:
         """True once, when there is contact."""
         for sample in samples:
             if not self._seen and self._is_away(sample):

@@ -45,7 +45,7 @@ COMPARED = "Flipper beside load cell; how far other plates and ways alone tell o
 
 def errors_text(muds: Mapping[str, Mapping[str, OfMud]], plan: TrialPlan) -> str:
     """What the doubts are that stand behind the values."""
-    shares = ", ".join(f"{100.0 * _largest_bench_share(muds, name):.1f} % of {name}" for name in COEFFICIENTS)
+    fractions = ", ".join(f"{100.0 * _largest_bench_fraction(muds, name):.1f} % of {name}" for name in COEFFICIENTS)
     return (
         "The first ± is one standard error of the trials: their scatter with Student's factor or what each doubts of "
         "samples, speed, surface, lag and rate, whichever is more. Two of it hold the truth in 19 of 20 cases or more, "
@@ -53,13 +53,13 @@ def errors_text(muds: Mapping[str, Mapping[str, OfMud]], plan: TrialPlan) -> str
         "not grow as V is no part of it: k is what least squares make of the mud's own course, and belongs to its "
         "depth. The second ± is what no repetition shows, since all trials "
         f"have it alike: {_depth_text(plan)}, callipers ± {1000.0 * CALLIPERS_M:g} mm on width and thickness, and the "
-        f"reading of the calibration, together at most {shares}. The weights themselves count as exact, and so does an "
+        f"reading of the calibration, together at most {fractions}. The weights themselves count as exact, and so does an "
         "amplifier that prints grams or newtons by itself. A depth that an encoder measured has no doubt of a ruler."
     )
 
 
-def _largest_bench_share(muds: Mapping[str, Mapping[str, OfMud]], name: str) -> float:
-    coefficients = [told[name] for told in muds.values()]
+def _largest_bench_fraction(muds: Mapping[str, Mapping[str, OfMud]], name: str) -> float:
+    coefficients = [reported[name] for reported in muds.values()]
     return max((each.shared_error / each.value for each in coefficients if isfinite(each.value)), default=0.0)
 
 
@@ -71,21 +71,21 @@ def comparison_text(results: Results, settings: StageSettings) -> str:
     flipper, own = results.flipper, _plate_text(asdict(settings), "plate_")
     plate = flipper.get("plate_m")
     other = _plate_text(plate, "", "") if isinstance(plate, dict) else "a plate that its summary does not tell"
-    told = (
+    reported = (
         f"On the grey line the flipper senses what the load cell measures. The load cell carried {own}, upright; the "
         f"flipper {other}, leaning. {OTHER_PLATE} What is apart beyond that is the flipper's error."
     )
     depth_m = (flipper.get("settings") or {}).get("depth_m")
     if isinstance(depth_m, int | float) and abs(depth_m - settings.depth_m) > 1e-6:
-        told += (
+        reported += (
             f"\n\nThe flipper went {100.0 * depth_m:g} cm deep and the load cell {100.0 * settings.depth_m:g} cm: "
             "coefficients of one mud differ with the depth, so these do not belong together."
         )
-    return told
+    return reported
 
 
-def _plate_text(told: Mapping[str, Any], before: str, after: str = "_m") -> str:
-    sides = [told.get(f"{before}{side}{after}") for side in ("width", "height", "thickness")]
+def _plate_text(reported: Mapping[str, Any], before: str, after: str = "_m") -> str:
+    sides = [reported.get(f"{before}{side}{after}") for side in ("width", "height", "thickness")]
     if not all(isinstance(side, int | float) for side in sides):
         return "a plate that its summary does not tell"
     width_m, height_m, thickness_m = (float(side) for side in sides if side is not None)
@@ -102,8 +102,8 @@ def sections_of(results: Results, plan: TrialPlan) -> list[Section]:
         sections.append(Section("Compared with the flipper", text, rows=rows, figures=figures))
     if results.remarks:
         sections.append(Section("What should be known", "\n\n".join(results.remarks)))
-    for mud, told in results.muds.items():
-        sections.append(_mud_section(results.trials, mud, told, plan.settings))
+    for mud, reported in results.muds.items():
+        sections.append(_mud_section(results.trials, mud, reported, plan.settings))
     return sections
 
 
@@ -116,15 +116,15 @@ def position_texts(trials: Sequence[Analysed]) -> list[str]:
         return [UNCONNECTED]
     if not aligned or not insertions:
         return [MEASURED]
-    common, worst_m = common_alignment(aligned), max(trial.place_error_m for trial in insertions)
+    common, worst_m = common_alignment(aligned), max(trial.position_error_m for trial in insertions)
     without = len(trials) - len(measured)
     alone = f" {without} trials have no place: theirs is found from the force." if without else ""
     return [
         f"{MEASURED}{alone}",
-        f"Forces are stamped {1000.0 * common.lag_s:.1f} ± {1000.0 * common.lag_doubt_s:.1f} ms later than places, as "
+        f"Forces are stamped {1000.0 * common.lag_s:.1f} ± {1000.0 * common.lag_uncertainty_s:.1f} ms later than places, as "
         "the strokes themselves tell; this and straight lines between the encoder's lines leave the depth of a sample "
         f"known to within ± {1000.0 * worst_m:.2f} mm in the worst trial. Twice as fast, the mud bears "
-        f"{100.0 * common.rate_share * (2.0**RATE_EXPONENT - 1.0):.0f} % more.",
+        f"{100.0 * common.rate_fraction * (2.0**RATE_EXPONENT - 1.0):.0f} % more.",
     ]
 
 
@@ -146,34 +146,36 @@ def _pairs(results: Results) -> list[Figure]:
     return [Figure("comparison", "Flipper against load cell, two standard errors; grey: both are equal.", draw)]
 
 
-def _mud_section(trials: Sequence[Analysed], mud: str, told: Mapping[str, OfMud], settings: StageSettings) -> Section:
+def _mud_section(
+    trials: Sequence[Analysed], mud: str, reported: Mapping[str, OfMud], settings: StageSettings
+) -> Section:
     of_it = [trial for trial in trials if trial.recorded.mud == mud]
     caption = (
         f"Mud {mud_text(mud)}: measured (solid, one colour a trial) and modelled with the mud's coefficients (red, "
         "dashed)."
     )
     name = re.sub(r"[^\w.]+", "_", f"mud_{mud}")
-    figure = Figure(name, caption, partial(_draw_mud, of_it, told, settings))
+    figure = Figure(name, caption, partial(_draw_mud, of_it, reported, settings))
     return Section(f"Mud {mud_text(mud)}", rows=trial_rows(of_it), figures=[figure])
 
 
-def _draw_mud(trials: Sequence[Analysed], told: Mapping[str, OfMud], settings: StageSettings, path: Path) -> None:
+def _draw_mud(trials: Sequence[Analysed], reported: Mapping[str, OfMud], settings: StageSettings, path: Path) -> None:
     from experiments.loadcell.plots import plot_mud
 
-    plot_mud(trials, told, settings, path)
+    plot_mud(trials, reported, settings, path)
 
 
 def coefficient_rows(muds: Mapping[str, Mapping[str, OfMud]]) -> list[list[str]]:
     head = ["mud"]
     for name in COEFFICIENTS:
         head += [f"{name} (N/cm³)", "repeatability"]
-    return [head, *([mud_text(mud), *_cells(told)] for mud, told in muds.items())]
+    return [head, *([mud_text(mud), *_cells(reported)] for mud, reported in muds.items())]
 
 
-def _cells(told: Mapping[str, OfMud]) -> list[str]:
+def _cells(reported: Mapping[str, OfMud]) -> list[str]:
     cells = []
     for name in COEFFICIENTS:
-        each = told[name]
+        each = reported[name]
         cells.append(value_text(each.value, each.trials_error, each.shared_error, per=N_CM3))
         cells.append(repeatability_text(each.repeatability, len(each.trials)))
     return cells
@@ -183,8 +185,8 @@ def trial_rows(trials: Sequence[Analysed]) -> list[list[str]]:
     head = ["trial", *(f"{name} (N/cm³)" for name in COEFFICIENTS), "speed (m/s)", "measured (cm)", "remark"]
     rows = []
     for trial in trials:
-        told = [trial.coefficients.get(name) for name in COEFFICIENTS]
-        cells = ["" if each is None else value_text(each.value, each.std_error, per=N_CM3) for each in told]
+        reported = [trial.coefficients.get(name) for name in COEFFICIENTS]
+        cells = ["" if each is None else value_text(each.value, each.std_error, per=N_CM3) for each in reported]
         speed = "-" if trial.speed_m_s is None or not isfinite(trial.speed_m_s) else f"{trial.speed_m_s:.3f}"
         label = f"{trial.recorded.kind} {trial.recorded.key.rsplit('/', 1)[-1]}"
         rows.append([label, *cells, speed, _farthest(trial), trial.problem or trial.remark])
@@ -193,9 +195,9 @@ def trial_rows(trials: Sequence[Analysed]) -> list[list[str]]:
 
 def _farthest(trial: Analysed) -> str:
     """Depth of an insertion, way of a shear."""
-    if trial.places_m is None:
+    if trial.positions_m is None:
         return "-"
-    return value_text(100.0 * float(np.nanmax(trial.places_m)), 100.0 * trial.place_error_m)
+    return value_text(100.0 * float(np.nanmax(trial.positions_m)), 100.0 * trial.position_error_m)
 
 
 def compared_rows(compared: Sequence[Compared]) -> list[list[str]]:

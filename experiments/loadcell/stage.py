@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 from drivers.load_cell.line_formats import GRAVITY_M_S2
 from experiments.loadcell.fits import INSERTION, SHEAR
 from experiments.loadcell.motion import StageSettings
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Person
+from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from simulation.test_rig.load_cell_bench import EmulatedBench
 from simulation.test_rig.plate_stage import CarriedPlate
 
@@ -57,13 +57,13 @@ class AttendedStage:
 
     patience_s = ATTENDED_PATIENCE_S
 
-    def __init__(self, settings: StageSettings, person: Person, meanwhile: Callable[[], None]) -> None:
-        self._settings, self._person, self._meanwhile = settings, person, meanwhile
+    def __init__(self, settings: StageSettings, operator: Operator, meanwhile: Callable[[], None]) -> None:
+        self._settings, self._operator, self._meanwhile = settings, operator, meanwhile
 
     def weigh(self, which: int) -> float:
         name = ("lighter one, or nothing", "heavier one, near the largest force that you expect")[which]
         question = f"Calibration: hang a known weight on the cell, the {name}, and let it rest. How many grams is it?"
-        grams = self._person.ask_number(question, 0.0, HEAVIEST_G, self._meanwhile)
+        grams = self._operator.ask_number(question, 0.0, HEAVIEST_G, self._meanwhile)
         return grams / 1000.0 * GRAVITY_M_S2
 
     def prepare(self, trial: Trial, trials: int) -> str:
@@ -73,22 +73,24 @@ class AttendedStage:
             f"it 2 cm clear above the mud, the cell {along}. Ready?"
         )
         answers = {GO_ON: "tare and go on", SKIP: "skip this trial", REDO: "the last one again"}
-        return self._person.ask(question, answers, self._meanwhile)
+        return self._operator.ask(question, answers, self._meanwhile)
 
     def lower(self) -> None:
         depth_cm = 100.0 * self._settings.depth_m
-        self._person.ask(f"Lower the plate {depth_cm:g} cm into the mud. Ready?", {GO_ON: "yes"}, self._meanwhile)
+        self._operator.ask(f"Lower the plate {depth_cm:g} cm into the mud. Ready?", {GO_ON: "yes"}, self._meanwhile)
 
     def start(self, trial: Trial) -> None:
         settings = self._settings
-        stroke = f"drag it {100.0 * settings.shear_way_m:g} cm"
+        stroke = f"drag it {100.0 * settings.shear_path_m:g} cm"
         if trial.kind == INSERTION:
             stroke = f"down to {100.0 * settings.depth_m:g} cm, hold {settings.hold_s:g} s, and up until it is clear"
-        self._person.tell(f"Recording. Start the stage in a second or two: {stroke}, at {settings.speed_m_s:g} m/s.")
+        self._operator.report(
+            f"Recording. Start the stage in a second or two: {stroke}, at {settings.speed_m_s:g} m/s."
+        )
 
     def lift(self) -> None:
         question = "Lift the plate clear of the mud, wipe it, and let go. Ready?"
-        self._person.ask(question, {GO_ON: "yes"}, self._meanwhile)
+        self._operator.ask(question, {GO_ON: "yes"}, self._meanwhile)
 
 
 class SimulatedStage:
@@ -121,7 +123,7 @@ class SimulatedStage:
         stage, settings = self._bench.stage, self._settings
         start_s = self._bench.now_s() + self._random.uniform(1.0, 1.5)
         if trial.kind == SHEAR:
-            stage.drag(start_s, settings.shear_way_m, settings.speed_m_s)
+            stage.drag(start_s, settings.shear_path_m, settings.speed_m_s)
         else:
             stage.insert(start_s, settings.depth_m, settings.speed_m_s, settings.hold_s)
 

@@ -21,16 +21,16 @@ from experiments.loadcell.raw import load_recorded, raw_name, write_places, writ
 from experiments.loadcell.recording import AVERAGED, CellRecorder, PlaceStretch, Stretch, Tare
 from experiments.loadcell.stage import Stage, Trial
 from experiments.reports.side_by_side import Show
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Person
+from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.trials.notebook import Notebook
 
 KEEP, WITHOUT = "k", "w"
 AT_ONE_SPEED = "what follows takes a stage of one speed, and none that a hand pushes"
 ALONE = "its force counts alone, which takes a stage of one speed"
 MOST_ATTEMPTS = 3  # after which Enter means to leave it
-LEAST_DRIFT_N, DRIFT_SHARE = 0.02, 0.03  # of the largest force, by which the zero may move over a trial
-GARBLED_SHARE = 0.05
-MISSING_SHARE = 0.15  # of the samples of a stroke
+LEAST_DRIFT_N, DRIFT_FRACTION = 0.02, 0.03  # of the largest force, by which the zero may move over a trial
+GARBLED_FRACTION = 0.05
+MISSING_FRACTION = 0.15  # of the samples of a stroke
 FLAT_SAMPLES = 8  # alike at the largest force: a cell that stops there without a word
 SLOW, SLOW_BY_HAND = 1.6, 3.0  # times the duration of a stroke that is recorded at least
 RESERVE_S = 1.5
@@ -55,7 +55,7 @@ class TrialBench:
 
     recorder: CellRecorder
     stage: Stage
-    person: Person
+    operator: Operator
     notebook: Notebook
     folder: Path
     show: Show
@@ -88,8 +88,8 @@ def measure(bench: TrialBench, trial: Trial, plan: TrialPlan) -> None:
         if not problems:
             return bench.notebook.write(trial.key, entry)
         for problem in problems:
-            bench.person.tell(f"{trial.key}: {problem}")
-        answer = bench.person.ask(f"{trial.key} is in doubt. What now?", _answers(attempt), bench.recorder.drain)
+            bench.operator.report(f"{trial.key}: {problem}")
+        answer = bench.operator.ask(f"{trial.key} is in doubt. What now?", _answers(attempt), bench.recorder.drain)
         if answer == KEEP:
             return bench.notebook.write(trial.key, entry | {"kept_in_spite_of": problems})
         given_up = answer == SKIP or (answer == GO_ON and attempt >= MOST_ATTEMPTS)
@@ -107,10 +107,10 @@ def _answers(attempt: int) -> dict[str, str]:
 def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tuple[dict[str, Any], list[str]]:
     """What belongs into the notebook, and what is wrong with it."""
     recorder, stage = bench.recorder, bench.stage
-    heed_encoder(bench)
+    on_encoder(bench)
     before = recorder.tare()
     if before.is_averaged and trial.number == attempt == 1:
-        bench.person.tell(f"{trial.key}: {AVERAGED}")
+        bench.operator.report(f"{trial.key}: {AVERAGED}")
     if trial.kind != INSERTION:
         stage.lower()
     stage.start(trial)
@@ -128,8 +128,8 @@ def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tu
         entry["position"] = _position_entry(place_name, recorder, stretch.position)
     recorded = load_recorded(bench.folder, trial.key, entry)
     analysed = analyse_trial(recorded, plan.settings, wide_pace(plan.settings))
-    _heed_speed(bench, analysed, plan.settings)
-    return entry, judge(analysed, stretch, before, after)
+    _on_speed(bench, analysed, plan.settings)
+    return entry, evaluate(analysed, stretch, before, after)
 
 
 def stroke_s(kind: str, settings: StageSettings, is_measured: bool = False) -> float:
@@ -137,20 +137,22 @@ def stroke_s(kind: str, settings: StageSettings, is_measured: bool = False) -> f
     slow = SLOW_BY_HAND if is_measured else SLOW
     if kind == INSERTION:
         return 2.0 * slow * settings.depth_m / settings.speed_m_s + settings.hold_s + RESERVE_S
-    return slow * settings.shear_way_m / settings.speed_m_s
+    return slow * settings.shear_path_m / settings.speed_m_s
 
 
-def heed_encoder(bench: TrialBench) -> None:
+def on_encoder(bench: TrialBench) -> None:
     """One that is gone or silent is looked after, or given up: a force says much by itself."""
     recorder, looks = bench.recorder, 0
     while recorder.encoder is not None and (trouble := _trouble_of(recorder)):
-        bench.person.tell(trouble)
+        bench.operator.report(trouble)
         answers = {GO_ON: "look again", WITHOUT: "go on by the force alone"}
-        answer = bench.person.ask("Is it back?", answers, recorder.drain) if looks < MOST_ATTEMPTS else WITHOUT
+        answer = bench.operator.ask("Is it back?", answers, recorder.drain) if looks < MOST_ATTEMPTS else WITHOUT
         if answer == WITHOUT:
             recorder.encoder.close()
             recorder.encoder = None
-            bench.person.tell(f"going on without the position, until the same command is started again: {AT_ONE_SPEED}")
+            bench.operator.report(
+                f"going on without the position, until the same command is started again: {AT_ONE_SPEED}"
+            )
         recorder.listen(LOOK_S)
         looks += 1
 
@@ -166,11 +168,11 @@ def _trouble_of(recorder: CellRecorder) -> str:
     return ""
 
 
-def _heed_speed(bench: TrialBench, analysed: Analysed, settings: StageSettings) -> None:
+def _on_speed(bench: TrialBench, analysed: Analysed, settings: StageSettings) -> None:
     """Told while the stage can still be set; nothing to repeat the trial for."""
     remark = speed_remark(analysed.pace, settings, SINGLE_SPEED_BOUND) if analysed.pace is not None else ""
     if remark:
-        bench.person.tell(f"{analysed.recorded.key}: {remark}")
+        bench.operator.report(f"{analysed.recorded.key}: {remark}")
 
 
 def _entry(
@@ -194,68 +196,70 @@ def _entry(
     }
 
 
-def _position_entry(name: str, recorder: CellRecorder, told: PlaceStretch) -> dict[str, Any]:
+def _position_entry(name: str, recorder: CellRecorder, reported: PlaceStretch) -> dict[str, Any]:
     encoder = recorder.encoder
     return {
         "file": name,
-        "places": len(told.places),
+        "places": len(reported.places),
         "rate_hz": None if encoder is None else encoder.rate_hz,
-        "garbled_lines": told.garbled_lines,
-        "drop_outs": told.drop_outs,
-        "breaks": told.breaks,
+        "garbled_lines": reported.garbled_lines,
+        "drop_outs": reported.drop_outs,
+        "breaks": reported.breaks,
     }
 
 
-def judge(analysed: Analysed, stretch: Stretch, before: Tare, after: Tare) -> list[str]:
+def evaluate(analysed: Analysed, stretch: Stretch, before: Tare, after: Tare) -> list[str]:
     """What a trial should not be kept with."""
-    told, recorded = list[str](), analysed.recorded
+    reported, recorded = list[str](), analysed.recorded
     if stretch.unpluggings:
-        told.append("the load cell was unplugged in the middle of it")
+        reported.append("the load cell was unplugged in the middle of it")
     if stretch.overloads or is_clipped(recorded.forces_n):
-        told.append(
+        reported.append(
             "the load cell was at its limit: the force is larger than it measures. Take a cell of a larger range, a "
             "smaller plate, or a lower gain of the amplifier"
         )
     lines = len(stretch.samples) + stretch.garbled_lines
-    if stretch.garbled_lines > GARBLED_SHARE * lines:
-        told.append(f"{stretch.garbled_lines} of {lines} lines were garbled: check cable and ground")
-    told += [each for each in (analysed.problem, analysed.remark) if each]
+    if stretch.garbled_lines > GARBLED_FRACTION * lines:
+        reported.append(f"{stretch.garbled_lines} of {lines} lines were garbled: check cable and ground")
+    reported += [each for each in (analysed.problem, analysed.remark) if each]
     if stretch.position is not None:
-        told += _judge_position(analysed, stretch.position)
+        reported += _evaluate_position(analysed, stretch.position)
     moved_n, largest_n = abs(after.force_n - before.force_n), _largest_n(recorded)
-    if moved_n > max(LEAST_DRIFT_N, DRIFT_SHARE * largest_n):
-        told.append(
+    if moved_n > max(LEAST_DRIFT_N, DRIFT_FRACTION * largest_n):
+        reported.append(
             f"the zero moved by {moved_n:.3f} N over the trial: something slipped, mud clings to the plate, or the "
             "cell drifts. Wipe the plate, check the mounting, let the amplifier warm up"
         )
-    missing = missing_share(analysed)
-    if missing > MISSING_SHARE:
-        told.append(f"{100.0 * missing:.0f} % of the samples of its strokes are missing: check cable and connectors")
-    return told
+    missing = missing_fraction(analysed)
+    if missing > MISSING_FRACTION:
+        reported.append(
+            f"{100.0 * missing:.0f} % of the samples of its strokes are missing: check cable and connectors"
+        )
+    return reported
 
 
-def _judge_position(analysed: Analysed, told: PlaceStretch) -> list[str]:
-    if told.breaks:
+def _evaluate_position(analysed: Analysed, reported: PlaceStretch) -> list[str]:
+    if reported.breaks:
         return ["the stage's encoder was unplugged or began anew in the middle of it: kept, " + ALONE]
-    if not told.places:
+    if not reported.places:
         return ["the stage's encoder told no place: kept, " + ALONE]
-    missing = _share_without_place(analysed)
-    if missing > MISSING_SHARE:
+    missing = _fraction_without_place(analysed)
+    if missing > MISSING_FRACTION:
         return [
             f"for {100.0 * missing:.0f} % of its strokes the stage's place is not known "
-            f"({told.garbled_lines} lines garbled, {told.drop_outs} gaps): check the encoder's cable and connectors"
+            f"({reported.garbled_lines} lines garbled, {reported.drop_outs} gaps): check the encoder's cable and connectors"
         ]
     return []
 
 
-def _share_without_place(analysed: Analysed) -> float:
-    if analysed.places_m is None or analysed.course is None:
+def _fraction_without_place(analysed: Analysed) -> float:
+    if analysed.positions_m is None or analysed.profile is None:
         return 0.0
-    times_s, shares = analysed.course.times_s, [0.0]
+    times_s, fractions = analysed.profile.times_s, [0.0]
     for begin_s, end_s in _strokes(analysed):
         inside = (times_s >= begin_s) & (times_s < end_s)
-        shares.append(float(np.mean(np.isnan(analysed.places_m[inside]))) if np.any(inside) else 0.0)
-    return max(shares)
+        fractions.append(float(np.mean(np.isnan(analysed.positions_m[inside]))) if np.any(inside) else 0.0)
+    return max(fractions)
 
 
 def _largest_n(recorded: Recorded) -> float:
@@ -270,17 +274,17 @@ def is_clipped(forces_n: np.ndarray[Any, np.dtype[np.float64]]) -> bool:
     return any(np.all(ends[i : i + FLAT_SAMPLES]) for i in np.flatnonzero(ends))
 
 
-def missing_share(analysed: Analysed) -> float:
+def missing_fraction(analysed: Analysed) -> float:
     """Of the samples that the strokes should have, where it is worst."""
-    if analysed.course is None or analysed.motion is None:
+    if analysed.profile is None or analysed.motion is None:
         return 0.0
-    times_s = analysed.course.times_s
+    times_s = analysed.profile.times_s
     period_s = float(np.median(np.diff(times_s)))
-    shares = []
+    fractions = []
     for begin_s, end_s in _strokes(analysed):
         inside = np.count_nonzero((times_s >= begin_s) & (times_s < end_s))
-        shares.append(1.0 - (inside + 1) * period_s / (end_s - begin_s))
-    return max(shares)
+        fractions.append(1.0 - (inside + 1) * period_s / (end_s - begin_s))
+    return max(fractions)
 
 
 def _strokes(analysed: Analysed) -> Iterable[tuple[float, float]]:

@@ -32,7 +32,10 @@ def truth_rows(
     head = ["mud", *(f"true {name} (N/cm³)" for name in COEFFICIENTS), *(f"{name} misses by" for name in COEFFICIENTS)]
     return [
         head,
-        *([mud_text(mud), *_true_cells(truths[mud]), *_missed(told, truths[mud])] for mud, told in muds.items()),
+        *(
+            [mud_text(mud), *_true_cells(truths[mud]), *_missed(reported, truths[mud])]
+            for mud, reported in muds.items()
+        ),
     ]
 
 
@@ -40,5 +43,5 @@ def _true_cells(truth: TrueCoefficients) -> list[str]:
     return [value_text(getattr(truth, name), per=N_CM3) for name in COEFFICIENTS]
 
 
-def _missed(told: Mapping[str, OfMud], truth: TrueCoefficients) -> list[str]:
-    return [miss_text(told[name].value, getattr(truth, name)) if name in told else "-" for name in COEFFICIENTS]
+def _missed(reported: Mapping[str, OfMud], truth: TrueCoefficients) -> list[str]:
+    return [miss_text(reported[name].value, getattr(truth, name)) if name in reported else "-" for name in COEFFICIENTS]

@@ -28,13 +28,13 @@ from typing import Any, NamedTuple
 from control.records import UNKNOWN, Estimate
 from estimation.strokes.origin_fit import student_factor
 from estimation.strokes.stroke_fit import TORQUE_REPEATABILITY
-from experiments.reports.error_table import COEFFICIENTS, Judged, error_rows
-from experiments.reports.value_text import N_CM3, repeatability_text, share_text, value_text
+from experiments.reports.error_table import COEFFICIENTS, Evaluation, error_rows
+from experiments.reports.value_text import N_CM3, fraction_text, repeatability_text, value_text
 from experiments.robot.bench_robot import BenchError
 from experiments.trials.mud_names import mud_key, mud_text
 
 PER_CM3 = 1.0 / N_CM3
-Told = Mapping[str, Any]  # an estimate as reports tell it
+Reported = Mapping[str, Any]  # an estimate as reports tell it
 TruthOfMud = dict[str, dict[str, float]]  # N/m³ by the mud's key and coefficient
 
 
@@ -47,10 +47,10 @@ class Beside(NamedTuple):
     truth: Mapping[str, float | None]
 
 
-def gathered(estimates: Iterable[Told]) -> dict[str, Any]:
+def gathered(estimates: Iterable[Reported]) -> dict[str, Any]:
     """Of one coefficient in one mud, over its trials."""
-    told = list(estimates)
-    valid = [each for each in told if each["valid"]]
+    reported = list(estimates)
+    valid = [each for each in reported if each["valid"]]
     bounds = sum(each["at_least"] for each in valid)
     held = 2 * bounds > len(valid)
     values = [] if held else [each for each in valid if not each["at_least"]]
@@ -63,18 +63,20 @@ def gathered(estimates: Iterable[Told]) -> dict[str, Any]:
         "repeatability": spread / fmean(trials) if spread is not None and fmean(trials) else None,
         "at_least": held,
         "bounds": bounds,
-        "not_valid": [each["reason"] for each in told if not each["valid"]],
+        "not_valid": [each["reason"] for each in reported if not each["valid"]],
     }
 
 
-def _errors(told: Sequence[Told], spread: float | None) -> dict[str, float | None]:
+def _errors(reported: Sequence[Reported], spread: float | None) -> dict[str, float | None]:
     """Of values; of bounds there is none. What a trial does not doubt in a number is left to the others."""
-    if spread is None or not told:
-        return {"std_error": told[0]["std_error"] if told else None, "trials_error": None, "shared_error": None}
-    doubts = [doubt for each in told if (doubt := each["std_error"]) is not None and isfinite(doubt)]
-    doubted = fmean(doubt**2 for doubt in doubts) if doubts else 0.0
-    trials_error = student_factor(len(told) - 1) * spread / sqrt(len(told))
-    alike = TORQUE_REPEATABILITY * fmean(each["value"] for each in told)
+    if spread is None or not reported:
+        return {"std_error": reported[0]["std_error"] if reported else None, "trials_error": None, "shared_error": None}
+    uncertainties = [
+        uncertainty for each in reported if (uncertainty := each["std_error"]) is not None and isfinite(uncertainty)
+    ]
+    doubted = fmean(uncertainty**2 for uncertainty in uncertainties) if uncertainties else 0.0
+    trials_error = student_factor(len(reported) - 1) * spread / sqrt(len(reported))
+    alike = TORQUE_REPEATABILITY * fmean(each["value"] for each in reported)
     shared_error = max(sqrt(max(0.0, doubted - spread**2)), alike)
     return {
         "std_error": hypot(trials_error, shared_error),
@@ -91,8 +93,8 @@ def truth_of(muds: Sequence[Mapping[str, Any]]) -> TruthOfMud:
     }
 
 
-def _is_known(told: Told | None) -> bool:
-    return bool(told and told.get("value") and not told.get("at_least"))
+def _is_known(reported: Reported | None) -> bool:
+    return bool(reported and reported.get("value") and not reported.get("at_least"))
 
 
 def load_truth(path: Path) -> TruthOfMud:
@@ -124,23 +126,23 @@ def missing_text(truth: TruthOfMud | None, muds: Iterable[str]) -> str:
     return f"The file given with --truth says nothing of {', '.join(map(mud_text, missing))}." if missing else ""
 
 
-def judged(rows: Iterable[Beside], setup: str) -> list[Judged]:
+def evaluated(rows: Iterable[Beside], setup: str) -> list[Evaluation]:
     """One for each coefficient of which there is a truth."""
     return [
-        Judged(setup, row.mud, name, row.method, estimate_of(row.stride[name]), float(truth), UNKNOWN)
+        Evaluation(setup, row.mud, name, row.method, estimate_of(row.stride[name]), float(truth), UNKNOWN)
         for row in rows
         for name in COEFFICIENTS
         if (truth := row.truth.get(name)) is not None and row.stride[name] is not None
     ]
 
 
-def estimate_of(told: Told) -> Estimate:
-    value, std_error = (UNKNOWN if told[name] is None else float(told[name]) for name in ("value", "std_error"))
-    return Estimate(value, std_error, told["samples"], told["valid"], told["reason"], told["at_least"])
+def estimate_of(reported: Reported) -> Estimate:
+    value, std_error = (UNKNOWN if reported[name] is None else float(reported[name]) for name in ("value", "std_error"))
+    return Estimate(value, std_error, reported["samples"], reported["valid"], reported["reason"], reported["at_least"])
 
 
 def error_table(rows: Iterable[Beside], setup: str) -> list[dict[str, Any]]:
-    return error_rows(judged(rows, setup))
+    return error_rows(evaluated(rows, setup))
 
 
 # as words
@@ -151,8 +153,8 @@ def coefficient_text(row: Mapping[str, Any]) -> str:
     if row["value"] is None:
         return "-"
     parts = ("std_error",) if row["trials_error"] is None else ("trials_error", "shared_error")
-    told = value_text(row["value"], *(row[part] for part in parts), per=N_CM3)
-    return f"≥ {told}" if row["at_least"] else told
+    reported = value_text(row["value"], *(row[part] for part in parts), per=N_CM3)
+    return f"≥ {reported}" if row["at_least"] else reported
 
 
 def mud_rows(muds: Sequence[Mapping[str, Any]]) -> list[list[str]]:
@@ -195,7 +197,7 @@ def _error_text(row: Mapping[str, Any]) -> str:
     """A bound is told as one, with its median share of the truth, and how many there were."""
     parts = []
     if row["median"] is not None:
-        parts.append(f"{share_text(row['median'])} ({100.0 * row['bias']:+z.0f} %)")
+        parts.append(f"{fraction_text(row['median'])} ({100.0 * row['bias']:+z.0f} %)")
     if row["bounds"]:
         parts.append(f"≥ {100.0 * row['bound_over_truth']:.0f} % of it ({row['bounds']})")
     if row["not_valid"]:

@@ -18,7 +18,7 @@ COEFFICIENTS = ("k_p", "k_s", "k_e")
 NORMAL_95 = 1.96
 
 
-class Judged(NamedTuple):
+class Evaluation(NamedTuple):
     """One coefficient of one stride, by one method, beside the truth in N/m³."""
 
     setup: str
@@ -30,10 +30,10 @@ class Judged(NamedTuple):
     upright: float  # what the paper's load cell would have read
 
 
-def error_rows(judged: Sequence[Judged]) -> list[dict[str, Any]]:
+def error_rows(evaluated: Sequence[Evaluation]) -> list[dict[str, Any]]:
     """One row for each setup, mud, coefficient and method, in the order in which they first came."""
-    groups: dict[tuple[str, str, str, str], list[Judged]] = {}
-    for each in judged:
+    groups: dict[tuple[str, str, str, str], list[Evaluation]] = {}
+    for each in evaluated:
         groups.setdefault(each[:4], []).append(each)
     return [
         dict(zip(("setup", "mud", "coefficient", "method"), key, strict=True)) | _errors(group)
@@ -41,7 +41,7 @@ def error_rows(judged: Sequence[Judged]) -> list[dict[str, Any]]:
     ]
 
 
-def _errors(group: Sequence[Judged]) -> dict[str, Any]:
+def _errors(group: Sequence[Evaluation]) -> dict[str, Any]:
     values = [each for each in group if _is_value(each)]
     bounds = [each for each in group if each.estimate.valid and each.estimate.at_least]
     ratios = np.array([each.estimate.value / each.truth for each in values])
@@ -60,22 +60,22 @@ def _errors(group: Sequence[Judged]) -> dict[str, Any]:
     }
 
 
-def _is_value(each: Judged) -> bool:
+def _is_value(each: Evaluation) -> bool:
     return each.estimate.valid and not each.estimate.at_least
 
 
-def _covers(each: Judged) -> bool:
+def _covers(each: Evaluation) -> bool:
     return abs(each.estimate.value - each.truth) <= NORMAL_95 * each.estimate.std_error
 
 
-def _holds(each: Judged) -> bool:
+def _holds(each: Evaluation) -> bool:
     return each.estimate.value - NORMAL_95 * each.estimate.std_error <= each.truth
 
 
-def plate_rows(judged: Sequence[Judged]) -> list[dict[str, Any]]:
+def plate_rows(evaluated: Sequence[Evaluation]) -> list[dict[str, Any]]:
     """How the paper's upright plate differs, and what of the default's difference from it is the plate's lean."""
-    groups: dict[tuple[str, str, str], list[Judged]] = {}
-    for each in judged:
+    groups: dict[tuple[str, str, str], list[Evaluation]] = {}
+    for each in evaluated:
         if each.method == "default" and isfinite(each.upright):
             groups.setdefault(each[:3], []).append(each)
     return [
@@ -85,18 +85,18 @@ def plate_rows(judged: Sequence[Judged]) -> list[dict[str, Any]]:
     ]
 
 
-def _plates(group: Sequence[Judged]) -> dict[str, Any]:
-    told = [each for each in group if _is_value(each)]
+def _plates(group: Sequence[Evaluation]) -> dict[str, Any]:
+    reported = [each for each in group if _is_value(each)]
     leaning = float(np.median([each.truth / each.upright for each in group]))
-    estimate = float(np.median([each.estimate.value / each.upright for each in told])) if told else None
+    estimate = float(np.median([each.estimate.value / each.upright for each in reported])) if reported else None
     return {
         "upright_over_leaning": _rounded(1.0 / leaning),
         "estimate_over_upright": None if estimate is None else _rounded(estimate),
-        "lean_share": None if estimate is None else _rounded(_lean_share(leaning - 1.0, estimate - leaning)),
+        "lean_share": None if estimate is None else _rounded(_lean_fraction(leaning - 1.0, estimate - leaning)),
     }
 
 
-def _lean_share(lean: float, error: float) -> float:
+def _lean_fraction(lean: float, error: float) -> float:
     """Of the two parts of a difference, which may cancel: the lean's among their sizes."""
     both = abs(lean) + abs(error)
     return abs(lean) / both if both > 0.0 else 0.0

@@ -24,9 +24,9 @@ LABELS = {"k_p": "$k_p$ penetration", "k_s": "$k_s$ shear", "k_e": "$k_e$ extrac
 def looks_of(muds: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Colour, line and mark of each, from dark to light."""
     colours = plt.get_cmap("viridis")
-    share = max(len(muds) - 1, 1) / 0.85
+    fraction = max(len(muds) - 1, 1) / 0.85
     return {
-        mud: {"color": colours(i / share), "linestyle": LINES[i % len(LINES)], "marker": MARKS[i % len(MARKS)]}
+        mud: {"color": colours(i / fraction), "linestyle": LINES[i % len(LINES)], "marker": MARKS[i % len(MARKS)]}
         for i, mud in enumerate(muds)
     }
 

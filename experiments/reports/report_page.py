@@ -59,7 +59,7 @@ def write_report(
     """Everything that was written. `report` becomes the summary. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     summary, page = folder / SUMMARY, folder / PAGE
-    _write(summary, json.dumps(numbers_told(report), indent=1, allow_nan=False) + "\n")
+    _write(summary, json.dumps(numbers_reported(report), indent=1, allow_nan=False) + "\n")
     pictures = [_draw(figure, folder) for section in sections for figure in section.figures]
     _write(page, _page(folder, title, sections, logs))
     return [page, summary, *pictures, *logs]
@@ -70,12 +70,12 @@ def _write(path: Path, text: str) -> None:
         beside.write_text(text, encoding="utf-8", errors="replace")  # names of any bytes
 
 
-def numbers_told(report: Any) -> Any:
+def numbers_reported(report: Any) -> Any:
     """With None for numbers that are none: JSON has no NaN, and few programs read Python's."""
     if isinstance(report, Mapping):
-        return {key: numbers_told(value) for key, value in report.items()}
+        return {key: numbers_reported(value) for key, value in report.items()}
     if isinstance(report, list | tuple):
-        return [numbers_told(value) for value in report]
+        return [numbers_reported(value) for value in report]
     return None if isinstance(report, float) and not isfinite(report) else report
 
 
@@ -97,11 +97,11 @@ def _page(folder: Path, title: str, sections: Sequence[Section], logs: Sequence[
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>\n'
         f"<style>\n{STYLE}</style></head><body>\n<h1>{escape(title)}</h1>\n"
         f'<p class="when">{made}, mudskipper {escape(software_version())}</p>\n{body}\n'
-        f"<footer>Numbers: {SUMMARY}. {_told_logs(logs)}</footer>\n</body></html>\n"
+        f"<footer>Numbers: {SUMMARY}. {_reported_logs(logs)}</footer>\n</body></html>\n"
     )
 
 
-def _told_logs(logs: Sequence[Path]) -> str:
+def _reported_logs(logs: Sequence[Path]) -> str:
     return f"Logs: {', '.join(escape(log.name) for log in logs)}." if logs else ""
 
 

@@ -18,18 +18,21 @@ def value_text(value: float | None, *errors: float | None, per: float = 1.0) -> 
     if value is None or not isfinite(value):
         return "-"
     value, most = value / per, _places(value / per, MOST)
-    doubts = [error / per for error in errors if error is not None and isfinite(error)]
-    places = [min(most, _places(doubt, OF_ERROR)) for doubt in doubts if doubt]
+    uncertainties = [error / per for error in errors if error is not None and isfinite(error)]
+    places = [min(most, _places(uncertainty, OF_ERROR)) for uncertainty in uncertainties if uncertainty]
     ends = max(places, default=_places(value, OF_VALUE))
-    told = [f"{doubt:.{min(most, _places(doubt, OF_ERROR)) if doubt else ends}f}" for doubt in doubts]
-    return " ± ".join([f"{value:.{ends}f}", *told])
+    reported = [
+        f"{uncertainty:.{min(most, _places(uncertainty, OF_ERROR)) if uncertainty else ends}f}"
+        for uncertainty in uncertainties
+    ]
+    return " ± ".join([f"{value:.{ends}f}", *reported])
 
 
-def share_text(share: float | None) -> str:
+def fraction_text(fraction: float | None) -> str:
     """In percent, to two significant digits or a thousandth; a dash where there is none."""
-    if share is None or not isfinite(share):
+    if fraction is None or not isfinite(fraction):
         return "-"
-    return f"{100.0 * share:.{min(FINEST, _places(100.0 * share, OF_ERROR))}f} %"
+    return f"{100.0 * fraction:.{min(FINEST, _places(100.0 * fraction, OF_ERROR))}f} %"
 
 
 def miss_text(value: float, true: float) -> str:
@@ -37,8 +40,8 @@ def miss_text(value: float, true: float) -> str:
     return f"{100.0 * (value / true - 1.0):+z.2f} %" if isfinite(value) else "-"
 
 
-def repeatability_text(share: float | None, trials: int) -> str:
-    return f"{share_text(share)} of {trials}"
+def repeatability_text(fraction: float | None, trials: int) -> str:
+    return f"{fraction_text(fraction)} of {trials}"
 
 
 def _places(number: float, digits: int) -> int:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 from experiments.robot.bench_errors import BenchError as BenchError  # for whoever operates one
 from experiments.robot.bench_errors import EndedError, GoneError, OverruledError
-from experiments.robot.prompt import Person
+from experiments.robot.prompt import Operator
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log_reading.log_reader import Log
 from firmware_host.operator.counted_nouns import counted
@@ -66,7 +66,7 @@ class Walked(NamedTuple):
 
 Status = dict[str, Any]
 End = TypeVar("End")
-Judge = Callable[[Status], End | None]  # None while a walk is to go on; then how it ends
+Evaluator = Callable[[Status], End | None]  # None while a walk is to go on; then how it ends
 
 
 def wait_until(robot: BenchRobot, done: Callable[[Status], bool], longest_s: float, what: str) -> Status:
@@ -81,7 +81,7 @@ def wait_until(robot: BenchRobot, done: Callable[[Status], bool], longest_s: flo
     return status
 
 
-def face_faults(robot: BenchRobot, person: Person) -> None:
+def face_faults(robot: BenchRobot, operator: Operator) -> None:
     """What keeps the torque off is told, and cleared where a person says so; nothing where nothing does.
 
     Someone has to have looked: the drive that a fault stopped may be wet, or a finger be in the flipper. Nobody on a
@@ -90,15 +90,18 @@ def face_faults(robot: BenchRobot, person: Person) -> None:
     Raises EndedError where it is to stand, BenchError where it comes back.
     """
     for _ in range(MOST_CLEARS):
-        if not (faults := _faults_told(_status_at_rest(robot))):
+        if not (faults := _faults_reported(_status_at_rest(robot))):
             return
         question = f"{faults}\nTorque stays off until this is cleared."
-        if person.ask(question, {CLEAR: "clear it and go on", LEAVE: "stop here"}, lambda: robot.wait(POLL_S)) != CLEAR:
+        if (
+            operator.ask(question, {CLEAR: "clear it and go on", LEAVE: "stop here"}, lambda: robot.wait(POLL_S))
+            != CLEAR
+        ):
             raise EndedError(
                 "the fault stands; when its cause is gone, 'mudskipper clear', then the same command again"
             )
         robot.call("clear")
-    if faults := _faults_told(_status_at_rest(robot)):
+    if faults := _faults_reported(_status_at_rest(robot)):
         raise BenchError(f"the fault comes back: {faults}")
 
 
@@ -106,30 +109,30 @@ def _status_at_rest(robot: BenchRobot) -> Status:
     """When what was about to be over by itself is."""
     status: Status = robot.call("status")
     begun_s = status["now_s"]
-    while _faults_told(status) and status["now_s"] - begun_s < GONE_S:
+    while _faults_reported(status) and status["now_s"] - begun_s < GONE_S:
         robot.wait(POLL_S)
         status = robot.call("status")
     return status
 
 
-def _faults_told(status: Status) -> str:
+def _faults_reported(status: Status) -> str:
     """Of a robot whose torque is off; empty where nothing keeps it off."""
     if status["mode"] not in ("idle", "fault"):
         return ""
     faults = [fault for fault in status["faults"] if fault["blocks_arming"]]
     if status["mode"] == "fault" and not faults:
         faults = [status["fault"]] if status["fault"] else []
-    told = [f"  {fault['sentence']} ({_for(fault['for_s'])})\n    -> {fault['what_to_do']}" for fault in faults]
+    reported = [f"  {fault['sentence']} ({_for(fault['for_s'])})\n    -> {fault['what_to_do']}" for fault in faults]
     if status["mode"] == "fault":
-        return "\n".join(["The robot is in FAULT:", *(told or [f"  {status['notice']}"])])
-    return "\n".join(["A fault stands:", *told]) if told else ""
+        return "\n".join(["The robot is in FAULT:", *(reported or [f"  {status['notice']}"])])
+    return "\n".join(["A fault stands:", *reported]) if reported else ""
 
 
 def _for(duration_s: float) -> str:
     return f"for {duration_s:.0f} s" if duration_s < 100.0 else f"for {duration_s / 60.0:.0f} min"
 
 
-def arm(robot: BenchRobot, person: Person | None = None) -> None:
+def arm(robot: BenchRobot, operator: Operator | None = None) -> None:
     """From whatever it does to holding its pose. Raises BenchError with what stands against it.
 
     A fault is for `person` to judge; where nobody is there it stands.
@@ -139,10 +142,10 @@ def arm(robot: BenchRobot, person: Person | None = None) -> None:
         status = wait_until(robot, lambda now: now["mode"] in ("hold", "idle", "fault"), ARMING_S, "coming to rest")
     if status["mode"] == "hold":
         return
-    if person is not None:
-        face_faults(robot, person)
+    if operator is not None:
+        face_faults(robot, operator)
     elif status["mode"] == "fault":
-        raise BenchError(f"{_faults_told(status)}\n'mudskipper clear' when its cause is gone")
+        raise BenchError(f"{_faults_reported(status)}\n'mudskipper clear' when its cause is gone")
     try:
         _ask_for_torque(robot)
     except (BenchError, CallRefusedError) as problem:
@@ -162,7 +165,7 @@ def _ask_for_torque(robot: BenchRobot) -> None:
         if status["mode"] != "idle" or not _blocked(status):
             break
     if status["mode"] != "hold":
-        raise BenchError(told_by(status))
+        raise BenchError(reported_by(status))
 
 
 def _blocked(status: Status) -> bool:
@@ -193,10 +196,10 @@ def move(robot: BenchRobot, angles_rad: Mapping[str, float]) -> None:
 def require_hold(status: Status) -> None:
     """Raises BenchError with the daemon's own sentence where the robot does not hold its pose."""
     if status["mode"] != "hold":
-        raise BenchError(f"the robot no longer holds its pose: {told_by(status)}")
+        raise BenchError(f"the robot no longer holds its pose: {reported_by(status)}")
 
 
-def told_by(status: Status) -> str:
+def reported_by(status: Status) -> str:
     """Why a robot is in the mode that it is in."""
     if status["notice"]:
         return str(status["notice"])
@@ -214,7 +217,7 @@ def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
     wait_until(robot, lambda now: now["mode"] != "hold", ARMING_S, "beginning to walk")  # a request waits for its tick
     after = wait_until(robot, lambda now: now["mode"] not in ("walking", "stopping"), strides * STRIDE_S, "the walk")
     if after["mode"] != "hold" or after["notice"]:
-        raise BenchError(f"the walk ended early: {told_by(after)}")
+        raise BenchError(f"the walk ended early: {reported_by(after)}")
     closed = strides_since(robot, before["strides_closed"])
     if (number := strides_made(closed)) < strides:
         raise BenchError(f"the walk ended early, after {number} of {counted(strides, 'stride')}: it was told to stop")
@@ -226,15 +229,15 @@ def strides_made(closed: Sequence[Mapping[str, Any]]) -> int:
     return len({stride["index"] for stride in closed})
 
 
-def follow_walk(robot: BenchRobot, begin: Callable[[float], Judge[End]]) -> tuple[End | None, Status]:
+def follow_walk(robot: BenchRobot, begin: Callable[[float], Evaluator[End]]) -> tuple[End | None, Status]:
     """Of a walk that was just ordered: how its judge ended it, None where it ended by itself; the last status.
 
     `begin` makes the judge when the walk has begun, by the robot's clock.
     """
     status = wait_until(robot, lambda now: now["mode"] != "hold", ARMING_S, "beginning to walk")
-    judge = begin(status["now_s"])
+    evaluate = begin(status["now_s"])
     while status["mode"] == "walking":
-        end = judge(status)
+        end = evaluate(status)
         if end is not None:
             robot.call("stop")
             return end, status
@@ -265,26 +268,26 @@ def rest(robot: BenchRobot) -> None:
     disarm(robot)
 
 
-def leave(robot: BenchRobot, person: Person, folder: Path) -> list[Path]:
+def leave(robot: BenchRobot, operator: Operator, folder: Path) -> list[Path]:
     """Torque off, all logs in the folder, the connection closed; what fails of that is told. The folder's logs."""
     try:
-        for step in (partial(_rest_told, robot, person), partial(robot.copy_logs, folder)):
+        for step in (partial(_rest_reported, robot, operator), partial(robot.copy_logs, folder)):
             try:
                 step()
             except (BenchError, CallRefusedError) as problem:
-                person.tell(str(problem))
+                operator.report(str(problem))
     finally:
         robot.close()
     return sorted(folder.glob("*.mcap"))
 
 
-def _rest_told(robot: BenchRobot, person: Person) -> None:
+def _rest_reported(robot: BenchRobot, operator: Operator) -> None:
     """Why it does not obey was told to whoever called it last; here, what that means for the robot."""
     try:
         if robot.call("status")["mode"] == "walking":
-            person.tell("the flippers are raised, then torque goes off")
+            operator.report("the flippers are raised, then torque goes off")
         rest(robot)
     except OverruledError:
-        person.tell("the robot is left as it is to whoever has taken it over")
+        operator.report("the robot is left as it is to whoever has taken it over")
     except GoneError:
-        person.tell(ALONE)
+        operator.report(ALONE)

@@ -91,7 +91,7 @@ def is_over(length_m: float, strides: Sequence[WalkedStride]) -> bool:
 
 def is_past(length_m: float, last: WalkedStride) -> bool:
     """Whether the plates go down behind the track next."""
-    return last.place_m + last.step_m >= length_m
+    return last.position_m + last.step_m >= length_m
 
 
 def is_stuck(strides: Sequence[WalkedStride]) -> bool:
@@ -147,9 +147,13 @@ def paper_report(walks: Mapping[str, Sequence[Walk]], names: Sequence[str], arm_
             rule: {figure: mean_over_muds(row, figure) for figure in ("mean", "mean_all")}
             for rule, row in cells.items()
         },
-        "paper": {rule: {mud: told._asdict() for mud, told in row.items()} for rule, row in PAPER_TABLE.items()},
+        "paper": {
+            rule: {mud: reported._asdict() for mud, reported in row.items()} for rule, row in PAPER_TABLE.items()
+        },
         "within_one_sd": {
-            rule: {mud: within_one_sd(cells[rule][mud]["mean"], told) for mud, told in PAPER_TABLE[rule].items()}
+            rule: {
+                mud: within_one_sd(cells[rule][mud]["mean"], reported) for mud, reported in PAPER_TABLE[rule].items()
+            }
             for rule in FIXED_DEPTHS_M
             if rule in cells and set(names) == set(PAPER_TABLE[rule])
         },
@@ -173,7 +177,7 @@ def _strides_of(walk: Walk, arm_m: float) -> list[dict[str, Any]]:
     return [
         {
             "mud": stride.mud,
-            "place_cm": round(100.0 * stride.place_m, 2),
+            "place_cm": round(100.0 * stride.position_m, 2),
             "depth_cm": round(100.0 * stride.depth_m, 3),
             "step_cm": round(100.0 * stride.step_m, 2),
             "duration_s": round(stride.duration_s, 3),

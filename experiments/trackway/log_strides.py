@@ -21,7 +21,7 @@ from firmware_host.log_reading.log_reader import Log
 
 NO_MUD = ""  # of a stride whose place is not known
 LEFT_SWEEP, RIGHT_SWEEP = 0, 2  # in the order of JOINTS
-SEEN_SHARE = 0.9  # of the ticks after a stance: with fewer poses, a way back may have been missed
+SEEN_FRACTION = 0.9  # of the ticks after a stance: with fewer poses, a way back may have been missed
 
 Rows = NDArray[np.void]
 Floats = NDArray[np.float64]
@@ -30,15 +30,15 @@ Floats = NDArray[np.float64]
 def walked_strides(log: Log, configuration: Configuration, mud_at: Callable[[float], str]) -> list[WalkedStride]:
     """Of all walks in the log, one after the other. `mud_at` names the mud at a place of the plates in metres."""
     now, wanted = log.ticks[:-1], log.ticks[1:]
-    places_m = now["body_x_m"] + configuration.geometry.flipper_length_m * _sweep_sines(now)
+    positions_m = now["body_x_m"] + configuration.geometry.flipper_length_m * _sweep_sines(now)
     strides = []
     for begin, end in _spans(now, wanted):
-        place_m = float(places_m[begin])
+        position_m = float(positions_m[begin])
         step_m = float(now["body_x_m"][end] - now["body_x_m"][begin])
         strides.append(
             WalkedStride(
-                mud_at(place_m) if np.isfinite(place_m) else NO_MUD,
-                place_m,
+                mud_at(position_m) if np.isfinite(position_m) else NO_MUD,
+                position_m,
                 float(now["stride_depth_m"][end - 1]),  # an insertion may end early
                 step_m,
                 float(now["stamp_s"][end] - now["stamp_s"][begin]),
@@ -70,6 +70,6 @@ def _pushed_back_m(body_m: Floats, phases: NDArray[np.uint8]) -> float:
     seen = after[np.isfinite(after)]
     if not len(after):
         return 0.0
-    if len(seen) < SEEN_SHARE * len(after):
+    if len(seen) < SEEN_FRACTION * len(after):
         return UNKNOWN
     return float(np.max(np.maximum.accumulate(seen) - seen))

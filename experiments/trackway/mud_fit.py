@@ -75,7 +75,9 @@ class Plan:
 
     def finer_grounds(self, fit: Fit) -> list[Ground]:
         dampings = [max(0.0, fit.damping_n_s_m + more) for more in self.finer_dampings_n_s_m]
-        strengths_pa = {round(told * ratio) for told in fit.strengths_pa.values() for ratio in self.finer_ratios}
+        strengths_pa = {
+            round(reported * ratio) for reported in fit.strengths_pa.values() for ratio in self.finer_ratios
+        }
         return [Ground(damping, strength_pa) for damping in dampings for strength_pa in sorted(strengths_pa)]
 
 
@@ -111,10 +113,10 @@ def walk_on(
     depths = tuple(FIXED_DEPTHS_M.values())
     keys = [(ground, depth_m) for ground in dict.fromkeys(grounds) for depth_m in depths]
     walks = [partial(fixed_speed_cm_s, *key, seed, plan.strides) for key in keys for seed in seeds]
-    told = side_by_side(walks, show, processes)
+    reported = side_by_side(walks, show, processes)
     speeds: dict[Ground, dict[float, float]] = {}
     for i, (ground, depth_m) in enumerate(keys):
-        speeds.setdefault(ground, {})[depth_m] = fmean(told[i * plan.seeds : (i + 1) * plan.seeds])
+        speeds.setdefault(ground, {})[depth_m] = fmean(reported[i * plan.seeds : (i + 1) * plan.seeds])
     return speeds
 
 
@@ -141,19 +143,21 @@ def fitted(speeds: Speeds, targets: Targets) -> Fit:
 
 def fitted_with(damping_n_s_m: float, speeds: Speeds, targets: Targets) -> Fit:
     grounds = [ground for ground in speeds if ground.damping_n_s_m == damping_n_s_m]
-    best = {mud: min(grounds, key=lambda ground: chi2_of(speeds[ground], told)) for mud, told in targets.items()}
+    best = {
+        mud: min(grounds, key=lambda ground: chi2_of(speeds[ground], reported)) for mud, reported in targets.items()
+    }
     chi2 = sum(chi2_of(speeds[ground], targets[mud]) for mud, ground in best.items())
     return Fit(damping_n_s_m, {mud: ground.strength_pa for mud, ground in best.items()}, chi2)
 
 
 def strength_range_pa(mud: str, damping_n_s_m: float, speeds: Speeds, targets: Targets) -> list[float]:
     """Of all that were walked with this damping, those whose chi² is within 1 of the least: about a standard error."""
-    told = {
+    reported = {
         ground.strength_pa: chi2_of(of_ground, targets[mud])
         for ground, of_ground in speeds.items()
         if ground.damping_n_s_m == damping_n_s_m
     }
-    near = [strength_pa for strength_pa, chi2 in told.items() if chi2 <= min(told.values()) + 1.0]
+    near = [strength_pa for strength_pa, chi2 in reported.items() if chi2 <= min(reported.values()) + 1.0]
     return [min(near), max(near)]
 
 
@@ -175,7 +179,7 @@ def _described(fit: Fit, speeds: Speeds) -> dict[str, Any]:
     return {
         "rail_damping_n_s_m": fit.damping_n_s_m,
         "strength_pa": dict(fit.strengths_pa),
-        "chi2": round(sum(chi2_of(of_mud[mud], told) for mud, told in TARGETS.items()), 3),
+        "chi2": round(sum(chi2_of(of_mud[mud], reported) for mud, reported in TARGETS.items()), 3),
         "cells": {
             rule: {mud: round(of_mud[mud][depth_m], 3) for mud in TARGETS} for rule, depth_m in FIXED_DEPTHS_M.items()
         },

@@ -66,7 +66,7 @@ def mean_speeds_cm_s(orders: Sequence[MudWalk], walks: Sequence[Walk]) -> dict[s
     for order, walk in zip(orders, walks, strict=True):
         of_mud = speeds.setdefault(order.clay.name, {})
         of_mud.setdefault(order.rule.depth_m, []).append(speed_cm_s(walk))
-    return {mud: {depth: fmean(told) for depth, told in of_mud.items()} for mud, of_mud in speeds.items()}
+    return {mud: {depth: fmean(reported) for depth, reported in of_mud.items()} for mud, of_mud in speeds.items()}
 
 
 def best_depth(speeds: Mapping[float, float]) -> dict[str, float]:

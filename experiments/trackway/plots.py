@@ -140,10 +140,10 @@ def _plot_speeds(panel: Axes, report: dict[str, Any], colours: Mapping[str, str]
 
 
 def _plot_paper(panel: Axes, places: Sequence[float], cells: Sequence[Mapping[str, Any] | None], width: float) -> None:
-    told = [(place, cell) for place, cell in zip(places, cells, strict=True) if cell]
-    if told:
-        panel.bar([place for place, _ in told], [cell["mean"] for _, cell in told], width,
-                  yerr=[cell["sd"] for _, cell in told],
+    reported = [(place, cell) for place, cell in zip(places, cells, strict=True) if cell]
+    if reported:
+        panel.bar([place for place, _ in reported], [cell["mean"] for _, cell in reported], width,
+                  yerr=[cell["sd"] for _, cell in reported],
                   color="0.85", edgecolor="0.6", ecolor="0.5", capsize=3)  # fmt: skip
 
 
@@ -170,7 +170,7 @@ def plot_sweep(report: dict[str, Any], path: Path) -> None:
     for i, (method, colour) in enumerate(colours.items()):
         beside = strengths_kpa * BESIDE ** (i - (len(colours) - 1) / 2.0)
         _plot_choice(over, rows, beside, method, colour)
-        _plot_share(below, rows, beside, method, colour, 7 if i == 0 else -12 * i)
+        _plot_fraction(below, rows, beside, method, colour, 7 if i == 0 else -12 * i)
     _name_sweep_axes(over, below, strengths_kpa)
     figure.savefig(path, dpi=110)
     plt.close(figure)
@@ -188,7 +188,7 @@ def _plot_map(figure: Any, panel: Axes, rows: Sequence[Mapping[str, Any]], stren
             (row["strength_pa"] / 1000.0, each["depth_cm"])
             for row in rows
             for each in row["constant"]
-            if _share(each["failures"].get(name, 0), each["strides"]) > 0.1
+            if _fraction(each["failures"].get(name, 0), each["strides"]) > 0.1
         ]
         panel.plot([x for x, _ in failed], [y for _, y in failed], mark, color="#ffffff90", markeredgecolor="none",
                    markersize=5, label=f"{name} in more than a tenth of the strides")  # fmt: skip
@@ -196,42 +196,44 @@ def _plot_map(figure: Any, panel: Axes, rows: Sequence[Mapping[str, Any]], stren
 
 def _edges(centres: Any, logarithmic: bool = False) -> Any:
     """Of cells around the centres."""
-    told = np.log(centres) if logarithmic else centres
-    if len(told) == 1:
-        edges = np.array([told[0] - 0.1, told[0] + 0.1])
+    reported = np.log(centres) if logarithmic else centres
+    if len(reported) == 1:
+        edges = np.array([reported[0] - 0.1, reported[0] + 0.1])
     else:
-        between = (told[1:] + told[:-1]) / 2.0
-        edges = np.concatenate([[told[0] - (between[0] - told[0])], between, [told[-1] + (told[-1] - between[-1])]])
+        between = (reported[1:] + reported[:-1]) / 2.0
+        edges = np.concatenate(
+            [[reported[0] - (between[0] - reported[0])], between, [reported[-1] + (reported[-1] - between[-1])]]
+        )
     return np.exp(edges) if logarithmic else edges
 
 
-def _share(count: int, of: int) -> float:
+def _fraction(count: int, of: int) -> float:
     return count / of if of else 0.0
 
 
 def _plot_choice(panel: Axes, rows: Sequence[Mapping[str, Any]], strengths_kpa: Any, method: str, colour: str) -> None:
-    told = [(strength, row["methods"][method]) for strength, row in zip(strengths_kpa, rows, strict=True)]
-    told = [(strength, settled) for strength, settled in told if settled["depth_cm"] is not None]
-    depths = np.array([settled["depth_cm"] for _, settled in told])
-    ranges = np.array([settled["depth_range_cm"] for _, settled in told]).reshape(-1, 2)
+    reported = [(strength, row["methods"][method]) for strength, row in zip(strengths_kpa, rows, strict=True)]
+    reported = [(strength, settled) for strength, settled in reported if settled["depth_cm"] is not None]
+    depths = np.array([settled["depth_cm"] for _, settled in reported])
+    ranges = np.array([settled["depth_range_cm"] for _, settled in reported]).reshape(-1, 2)
     look: dict[str, Any] = {"fmt": "o", "markeredgecolor": "black", "markersize": 7, "capsize": 3, "linewidth": 1.2}
-    places = [strength for strength, _ in told]
+    places = [strength for strength, _ in reported]
     panel.errorbar(places, depths, yerr=abs(ranges.T - depths), color=colour, label=f"method {method}", **look)
 
 
-def _plot_share(
+def _plot_fraction(
     panel: Axes, rows: Sequence[Mapping[str, Any]], strengths_kpa: Any, method: str, colour: str, points: int
 ) -> None:
     """Failures are written that many points above the dots."""
     settled = [row["methods"][method] for row in rows]
-    shares = [100.0 * (each["share_of_best"] or 0.0) for each in settled]
+    fractions = [100.0 * (each["share_of_best"] or 0.0) for each in settled]
     line = TEXT if colour == "white" else colour
-    panel.plot(strengths_kpa, shares, "-o", color=line, markerfacecolor=colour, markersize=6, label=method)
-    for strength, share, each in zip(strengths_kpa, shares, settled, strict=True):
+    panel.plot(strengths_kpa, fractions, "-o", color=line, markerfacecolor=colour, markersize=6, label=method)
+    for strength, fraction, each in zip(strengths_kpa, fractions, settled, strict=True):
         failed = sum(each["failures"].values())
         if failed:
             look: dict[str, Any] = {"textcoords": "offset points", "xytext": (0, points), "ha": "center"}
-            panel.annotate(f"{failed}/{each['strides']}", (strength, share), color=line, fontsize="x-small", **look)
+            panel.annotate(f"{failed}/{each['strides']}", (strength, fraction), color=line, fontsize="x-small", **look)
 
 
 def _name_sweep_axes(over: Axes, below: Axes, strengths_kpa: Any) -> None:

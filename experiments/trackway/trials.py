@@ -26,10 +26,10 @@ from experiments.robot.bench_robot import (
     disarm,
     face_faults,
     follow_walk,
-    told_by,
+    reported_by,
     wait_until,
 )
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Person
+from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.trackway.comparison import STUCK_S, paper_report
 from experiments.trackway.depth_rule import DepthRule
 from experiments.trackway.log_strides import walked_strides
@@ -57,30 +57,30 @@ class Trackway(Protocol):
     def prepare(self, trial: str) -> BenchRobot:
         """The robot at the start, the mud levelled."""
 
-    def judge(self, told: str, stopped: bool) -> str:
+    def evaluate(self, reported: str, stopped: bool) -> str:
         """GO_ON, SKIP to keep this trial out, or REDO it; `stopped` before its end."""
 
 
 class AskedTrackway:
     """A Trackway: a person's."""
 
-    def __init__(self, robot: BenchRobot, person: Person) -> None:
+    def __init__(self, robot: BenchRobot, operator: Operator) -> None:
         self._robot = robot
-        self._person = person
+        self._operator = operator
 
     def prepare(self, trial: str) -> BenchRobot:
         disarm(self._robot)
-        face_faults(self._robot, self._person)
+        face_faults(self._robot, self._operator)
         question = (
             f"{trial}. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud. Take"
             " the hands away: the robot walks next"
         )
-        self._person.ask(question, {GO_ON: "the robot may walk"}, self._meanwhile)
-        face_faults(self._robot, self._person)
+        self._operator.ask(question, {GO_ON: "the robot may walk"}, self._meanwhile)
+        face_faults(self._robot, self._operator)
         return self._robot
 
-    def judge(self, told: str, stopped: bool) -> str:
-        answer = self._person.ask(told, STOPPED if stopped else WALKED, self._meanwhile)
+    def evaluate(self, reported: str, stopped: bool) -> str:
+        answer = self._operator.ask(reported, STOPPED if stopped else WALKED, self._meanwhile)
         return {GO_ON: REDO, KEEP: GO_ON}.get(answer, answer) if stopped else answer
 
     def _meanwhile(self) -> None:
@@ -139,10 +139,10 @@ class Plan:
             for rule in self.rules:
                 yield f"{rule.name}, trial {trial}", rule
 
-    def mud_at(self, place_m: float) -> str:
+    def mud_at(self, position_m: float) -> str:
         """Where the plates go down; BEHIND the last one, and the first one also before its beginning."""
         ends_m = accumulate(mud.length_m for mud in self.muds)
-        return next((mud.name for mud, end_m in zip(self.muds, ends_m, strict=True) if place_m < end_m), BEHIND)
+        return next((mud.name for mud, end_m in zip(self.muds, ends_m, strict=True) if position_m < end_m), BEHIND)
 
 
 def run(plan: Plan, trackway: Trackway, notebook: Notebook, show: Show) -> dict[str, Any]:
@@ -160,7 +160,7 @@ def _walk_trial(plan: Plan, key: str, rule: DepthRule, trackway: Trackway, noteb
     robot = trackway.prepare(trial)
     arm_m = robot.configuration.geometry.flipper_length_m
     walk = walk_over(robot, plan, rule)
-    verdict = trackway.judge(told_of(trial, walk), walk.stopped)
+    verdict = trackway.evaluate(reported_of(trial, walk), walk.stopped)
     if verdict == REDO:
         return
     notebook.write(key, walk.entry | {"arm_m": arm_m, "skipped": verdict == SKIP, "logged": walk.logged})
@@ -176,11 +176,11 @@ def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> LoggedWalk:
     end = _follow(robot, plan, start_m)
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     if not end.why and after["mode"] != "hold":
-        end = End(told_by(after), stopped=True)
+        end = End(reported_by(after), stopped=True)
     disarm(robot)
     log = robot.record(before["now_s"], after["now_s"])
-    strides = walked_strides(log, robot.configuration, lambda place_m: plan.mud_at(place_m - start_m))
-    placed = [stride._replace(place_m=stride.place_m - start_m) for stride in strides]
+    strides = walked_strides(log, robot.configuration, lambda position_m: plan.mud_at(position_m - start_m))
+    placed = [stride._replace(position_m=stride.position_m - start_m) for stride in strides]
     logged = LoggedTime(log.metadata["run_id"], before["now_s"], after["now_s"])
     return LoggedWalk(placed, end.why, end.stopped, logged)
 
@@ -202,8 +202,8 @@ def _require_place(robot: BenchRobot) -> Status:
 def _follow(robot: BenchRobot, plan: Plan, start_m: float) -> End:
     """Until the walk is over, or has to be stopped."""
     zero_m = start_m - reach_of(robot.configuration)
-    end, status = follow_walk(robot, lambda now_s: Progress(plan, zero_m, now_s).judge)
-    return End(told_by(status), stopped=True) if end is None else end
+    end, status = follow_walk(robot, lambda now_s: Progress(plan, zero_m, now_s).evaluate)
+    return End(reported_by(status), stopped=True) if end is None else end
 
 
 def reach_of(configuration: Configuration) -> float:
@@ -220,7 +220,7 @@ class Progress:
         self._mud = plan.muds[0].name
         self._begun_s = self._entered_s = self._seen_s = now_s
 
-    def judge(self, status: Status) -> End | None:
+    def evaluate(self, status: Status) -> End | None:
         """None while the walk is to go on."""
         now_s, body_m = status["now_s"], status["body_x_m"]
         if body_m is None:
@@ -238,7 +238,7 @@ class Progress:
         return End(f"stuck in {mud or 'the end'}") if stuck else None
 
 
-def told_of(key: str, walk: Walk) -> str:
+def reported_of(key: str, walk: Walk) -> str:
     """A trial in a line."""
     seen = [stride for stride in walk.strides if stride.step_m == stride.step_m]
     speed = f"{100.0 * speed_m_s(seen):.1f} cm/s" if seen else "no stride with a pose"

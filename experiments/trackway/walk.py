@@ -30,7 +30,7 @@ class WalkedStride(NamedTuple):
     """Between the starts of two insertions."""
 
     mud: str  # that the plates went into
-    place_m: float  # of the plates along the track
+    position_m: float  # of the plates along the track
     depth_m: float  # commanded
     step_m: float
     duration_s: float
@@ -87,7 +87,7 @@ class StrideRecord:
         self._start_m, self._start_s = plant.body_m, self._lockstep.now_s
         self._furthest_m, self._pushed_back_m, self._recovered = -inf, 0.0, False
         self._depth_m = loop.controller.gait.commanded_depth_m
-        self._place_m = plant.body_m + loop.configuration.geometry.flipper_length_m * sin(plant.arms[0].sweep_rad)
+        self._position_m = plant.body_m + loop.configuration.geometry.flipper_length_m * sin(plant.arms[0].sweep_rad)
 
     def look(self) -> None:
         """Once a tick, while the robot walks."""
@@ -103,11 +103,11 @@ class StrideRecord:
 
     def _close(self, body_m: float) -> None:
         if self._number >= 0:
-            mud, duration_s = self._track.clay_at(self._place_m).name, self._lockstep.now_s - self._start_s
+            mud, duration_s = self._track.clay_at(self._position_m).name, self._lockstep.now_s - self._start_s
             step_m = body_m - self._start_m
             self.strides.append(
                 WalkedStride(
-                    mud, self._place_m, self._depth_m, step_m, duration_s, self._pushed_back_m, self._recovered
+                    mud, self._position_m, self._depth_m, step_m, duration_s, self._pushed_back_m, self._recovered
                 )
             )
         self._begin()
@@ -135,4 +135,4 @@ def walk_in(lockstep: Lockstep, track: Track, order: WalkOrder, done: Callable[[
         lockstep.step()
         record.look()
     fault = lockstep.loop.fault
-    return Walk(record.strides, fault.sentence if fault else "")
+    return Walk(record.strides, fault.message if fault else "")

@@ -40,10 +40,12 @@ def strides_by_method(
 ) -> dict[str, Strides]:
     """Of one walk and one flipper; `own` are the daemon's, of which the configured method's are taken as they are."""
     configured = method_of(configuration.estimation)
-    told = {configured: own} | {
+    reported = {configured: own} | {
         method: _replayed(log, configuration, method) for method in methods if method != configured
     }
-    return {method: [stride for stride in strides if stride["flipper"] == flipper] for method, strides in told.items()}
+    return {
+        method: [stride for stride in strides if stride["flipper"] == flipper] for method, strides in reported.items()
+    }
 
 
 def _replayed(log: Log, configuration: Configuration, method: str) -> Strides:

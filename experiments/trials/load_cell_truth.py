@@ -24,8 +24,8 @@ from simulation.test_rig.joint_cell import ArcCurve, ArcStroke, measure_arc
 from simulation.test_rig.load_cell import LoadCurve, measure_insertion, measure_shear
 
 PAPER_SPEED_M_S = 0.1  # of its load cell; for a plate that did not slip, which has no speed of its own
-SHEAR_WAY_M = 0.08
-REVERSAL_SHARE = 0.25  # of the way up, in which mud that held the plate up turns to hold it down
+SHEAR_PATH_M = 0.08
+REVERSAL_FRACTION = 0.25  # of the way up, in which mud that held the plate up turns to hold it down
 
 
 class TrueCoefficients(NamedTuple):
@@ -74,7 +74,7 @@ def _extraction(
     if not (isfinite(stroke.speed_m_s) and stroke.deepest_m > 0.0):
         return UNKNOWN
     deepest_m, speed_m_s = stroke.deepest_m, stroke.speed_m_s
-    fitted_m = (1.0 - REVERSAL_SHARE) * deepest_m
+    fitted_m = (1.0 - REVERSAL_FRACTION) * deepest_m
     if upright:
         straight = measure_insertion(stride.clay, geometry, 0.0, 0.0, deepest_m, speed_m_s, relaxation, hold_s)
         return _straight_stiffness(straight.up, -1.0, geometry, fitted_m)
@@ -94,7 +94,7 @@ def _shear(stride: StrideTruth, geometry: FlipperGeometry, upright: bool) -> flo
         return UNKNOWN
     speed_m_s = stroke.speed_m_s if isfinite(stroke.speed_m_s) else PAPER_SPEED_M_S
     adduction_rad = 0.0 if upright else stroke.adduction_rad
-    force_n = measure_shear(stride.clay, geometry, 0.0, adduction_rad, stroke.mean_depth_m, speed_m_s, SHEAR_WAY_M)
+    force_n = measure_shear(stride.clay, geometry, 0.0, adduction_rad, stroke.mean_depth_m, speed_m_s, SHEAR_PATH_M)
     return force_n / _plate(geometry, adduction_rad, stroke.mean_depth_m).depth_moment_m3
 
 

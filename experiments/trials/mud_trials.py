@@ -14,7 +14,7 @@ from functools import partial
 from typing import NamedTuple, Protocol
 
 from experiments.robot.bench_robot import BenchError, BenchRobot, disarm, face_faults, rest
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Person
+from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.trials.mud_names import mud_text
 from experiments.trials.notebook import Entry, Notebook
 
@@ -22,8 +22,8 @@ MOST_ATTEMPTS = 3
 KEEP = "k"
 LOOK_S = 0.05  # of waiting for a person, in which nobody else arms the robot
 ASKED = {GO_ON: "go on", SKIP: "leave this trial out", REDO: "measure the last one again"}
-SPOILT = {GO_ON: "repeat it", SKIP: "leave it out"}
-SPOILT_OFTEN = {GO_ON: "end here", REDO: "repeat it", SKIP: "leave it out"}
+INVALID = {GO_ON: "repeat it", SKIP: "leave it out"}
+INVALID_OFTEN = {GO_ON: "end here", REDO: "repeat it", SKIP: "leave it out"}
 KEPT = {KEEP: "keep it as it is"}
 DOUBTFUL = {GO_ON: "keep it", REDO: "measure it again", SKIP: "leave it out"}
 
@@ -40,7 +40,7 @@ class PlannedTrial(NamedTuple):
         return f"{mud_text(self.mud)}, trial {self.number} of {self.of}"
 
 
-class SpoiltTrialError(Exception):
+class InvalidTrialError(Exception):
     """A trial is worth nothing; the text says why. Where it has an entry, somebody may keep it all the same."""
 
     def __init__(self, why: str, entry: Entry | None = None) -> None:
@@ -61,15 +61,15 @@ class MudBed(Protocol):
 class PromptedBed:
     """A person's: asked for each trial, with torque off."""
 
-    def __init__(self, robot: BenchRobot, person: Person, words: Callable[[PlannedTrial], str]) -> None:
+    def __init__(self, robot: BenchRobot, operator: Operator, words: Callable[[PlannedTrial], str]) -> None:
         self._robot = robot
-        self._person = person
+        self._operator = operator
         self._words = words
 
     def prepare(self, trial: PlannedTrial) -> str:
         disarm(self._robot)
-        face_faults(self._robot, self._person)
-        return self._person.ask(f"{trial}. {self._words(trial)}", ASKED, partial(self._robot.wait, LOOK_S))
+        face_faults(self._robot, self._operator)
+        return self._operator.ask(f"{trial}. {self._words(trial)}", ASKED, partial(self._robot.wait, LOOK_S))
 
     def truths(self, flipper: str) -> Truths:
         return {}
@@ -80,7 +80,7 @@ class Bench(NamedTuple):
 
     robot: BenchRobot
     bed: MudBed
-    person: Person
+    operator: Operator
     notebook: Notebook
 
 
@@ -113,7 +113,7 @@ def _forget_last(bench: Bench, before: Sequence[PlannedTrial]) -> int:
         if before[place].key in bench.notebook.entries:
             bench.notebook.forget(before[place].key)
             return place
-    bench.person.tell("nothing was measured before this one")
+    bench.operator.report("nothing was measured before this one")
     return len(before)
 
 
@@ -121,12 +121,12 @@ def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) 
     """Measured, or left out. Raises BenchError after too many attempts."""
     try:
         entry = measure(trial)
-    except (SpoiltTrialError, BenchError) as problem:
+    except (InvalidTrialError, BenchError) as problem:
         rest(bench.robot)
-        return _is_done_with_spoilt(bench, trial, problem, attempt)
+        return _is_done_with_invalid(bench, trial, problem, attempt)
     rest(bench.robot)
     for remark in entry["remarks"]:
-        bench.person.tell(f"{trial}: {remark}")
+        bench.operator.report(f"{trial}: {remark}")
     answer = _ask(bench, "Is this trial to count?", DOUBTFUL) if entry["remarks"] else GO_ON
     if answer == GO_ON:
         bench.notebook.write(trial.key, entry)
@@ -135,14 +135,14 @@ def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) 
     return answer != REDO
 
 
-def _is_done_with_spoilt(bench: Bench, trial: PlannedTrial, problem: Exception, attempt: int) -> bool:
+def _is_done_with_invalid(bench: Bench, trial: PlannedTrial, problem: Exception, attempt: int) -> bool:
     """Left out, or kept. Raises BenchError where nobody wants it again after too many attempts."""
-    entry = problem.entry if isinstance(problem, SpoiltTrialError) else None
+    entry = problem.entry if isinstance(problem, InvalidTrialError) else None
     often = attempt >= MOST_ATTEMPTS
-    told = f"{trial} went wrong{f' {attempt} times; the last time' if often else ''}: {str(problem).rstrip('.')}."
-    answer = _ask(bench, told, (SPOILT_OFTEN if often else SPOILT) | ({} if entry is None else KEPT))
+    reported = f"{trial} went wrong{f' {attempt} times; the last time' if often else ''}: {str(problem).rstrip('.')}."
+    answer = _ask(bench, reported, (INVALID_OFTEN if often else INVALID) | ({} if entry is None else KEPT))
     if often and answer == GO_ON:
-        raise BenchError(told) from problem
+        raise BenchError(reported) from problem
     if answer == SKIP:
         _leave_out(bench, trial, [str(problem)])
     elif answer == KEEP and entry is not None:
@@ -151,7 +151,7 @@ def _is_done_with_spoilt(bench: Bench, trial: PlannedTrial, problem: Exception, 
 
 
 def _ask(bench: Bench, question: str, answers: Mapping[str, str]) -> str:
-    return bench.person.ask(question, answers, partial(bench.robot.wait, LOOK_S))
+    return bench.operator.ask(question, answers, partial(bench.robot.wait, LOOK_S))
 
 
 def _leave_out(bench: Bench, trial: PlannedTrial, why: Sequence[str] = ()) -> None:

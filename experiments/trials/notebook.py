@@ -76,7 +76,7 @@ class Notebook:
         if different:
             then, now = ({name: plan.get(name) for name in different} for plan in (begun, self.plan))
             raise NotebookError(
-                f"{self.path.parent} holds measurements with {_told(then)}, and {_told(now)} was asked for: "
+                f"{self.path.parent} holds measurements with {_reported(then)}, and {_reported(now)} was asked for: "
                 "go on with the same options, or choose another folder with --out"
             )
 
@@ -108,5 +108,5 @@ def _decode(line: bytes) -> Entry | None:
     return decoded if isinstance(decoded, dict) else None
 
 
-def _told(values: Entry) -> str:
+def _reported(values: Entry) -> str:
     return ", ".join(f"{name} = {value}" for name, value in values.items())

@@ -23,7 +23,7 @@ from experiments.trials.trial import TORQUE_ERROR
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.file_recorder import FileRecorder
 from firmware_host.ticker import PERIOD_S
-from simulation.body.reference_sensor import StrideTruth, StrokeWitness
+from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
 from simulation.devices.odrive import OdriveParameters
 from simulation.harness.lockstep import Lockstep, drives_of
@@ -36,7 +36,7 @@ class WitnessedLockstep(Lockstep):
 
     def __init__(self, configuration: Configuration, track: Track, seed: int, **rest: Any) -> None:
         super().__init__(configuration, track, seed, **rest)
-        self._witness = StrokeWitness()
+        self._reference = StrokeReference()
         self._walked = False
         self.truths: list[StrideTruth] = []
 
@@ -44,10 +44,10 @@ class WitnessedLockstep(Lockstep):
         super().step()
         walks = self.loop.mode is Mode.WALKING
         if walks and not self._walked:
-            self._witness.reset()
+            self._reference.reset()
             self.truths = []
         self._walked = walks
-        self.truths += self._witness.step(PERIOD_S, self.robot.plant, self.loop.target_before.phase)
+        self.truths += self._reference.step(PERIOD_S, self.robot.plant, self.loop.target_before.phase)
 
 
 def simulated_bench(
@@ -86,9 +86,9 @@ def drives_with_errors(
     """Motors whose constants are known as wrongly as the paper's were."""
     random = Random(f"drives {seed}")
     drives = drives_of(configuration, **drive_changes(disturbances))
-    share = TORQUE_ERROR if disturbances == LAB else 0.0
+    fraction = TORQUE_ERROR if disturbances == LAB else 0.0
     return {
-        joint: replace(drive, torque_constant_error=random.gauss(0.0, share)) if share else drive
+        joint: replace(drive, torque_constant_error=random.gauss(0.0, fraction)) if fraction else drive
         for joint, drive in drives.items()
     }
 
@@ -97,18 +97,18 @@ class CarriedBed:
     """A MudBed: the robot is carried to the place along the track that each trial has."""
 
     def __init__(
-        self, robot: LockstepRobot, lockstep: WitnessedLockstep, place_m: Callable[[PlannedTrial, int], float]
+        self, robot: LockstepRobot, lockstep: WitnessedLockstep, position_m: Callable[[PlannedTrial, int], float]
     ) -> None:
         """`place_m` of a trial, and of how many were prepared before it."""
         self._robot = robot
         self._lockstep = lockstep
-        self._place_m = place_m
+        self._position_m = position_m
         self._prepared = 0
 
     def prepare(self, trial: PlannedTrial) -> str:
         disarm(self._robot)
         plant = self._lockstep.robot.plant
-        plant.body.forward_m = self._place_m(trial, self._prepared)
+        plant.body.forward_m = self._position_m(trial, self._prepared)
         self._lockstep.robot.lend_hand()
         self._prepared += 1
         self._robot.wait(PERIOD_S)

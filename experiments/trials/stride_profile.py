@@ -24,7 +24,7 @@ KEPT_OF_STROKE, KEPT_OF_REST = 2, 20  # one row in so many
 DIGITS = 6  # behind the point: a microsecond, a micrometre, a micronewton
 
 
-class StrideCourse(NamedTuple):
+class StrideProfile(NamedTuple):
     """Times from the first row on; NaN where nothing is known."""
 
     time_s: Floats
@@ -43,14 +43,14 @@ class StrideCourse(NamedTuple):
         return np.asarray(self.phase == phase, np.bool_)
 
 
-def course_of(log: Log, flipper: str, start_s: float) -> StrideCourse:
+def profile_of(log: Log, flipper: str, start_s: float) -> StrideProfile:
     """Of the stride that was under way at `start_s`; without rows where there was none."""
     ticks, place = log.ticks, FLIPPERS.index(flipper)
     ticks = ticks[ticks["mode"] == Mode.WALKING]
     begun = np.flatnonzero(ticks["stamp_s"] >= start_s)
     rows = ticks[ticks["stride"] == ticks["stride"][begun[0]]] if len(begun) else ticks[:0]
     rows = rows[rows["stride"] >= 0]
-    return StrideCourse(
+    return StrideProfile(
         rows["stamp_s"] - (rows["stamp_s"][0] if len(rows) else 0.0),
         rows["phase"].astype(np.int64),
         rows["angle_rad"][:, 2 * place],
@@ -65,28 +65,28 @@ def course_of(log: Log, flipper: str, start_s: float) -> StrideCourse:
     )
 
 
-def slip_m(course: StrideCourse, arm_m: float) -> float:
+def slip_m(profile: StrideProfile, arm_m: float) -> float:
     """How far back through the mud the plate came in its stance; 0 where no pose tells the body's place."""
-    places_m = (course.body_m + arm_m * np.sin(course.sweep_rad))[course.during(Phase.STANCE)]
-    seen_m = places_m[np.isfinite(places_m)]
+    positions_m = (profile.body_m + arm_m * np.sin(profile.sweep_rad))[profile.during(Phase.STANCE)]
+    seen_m = positions_m[np.isfinite(positions_m)]
     return float(seen_m[0] - seen_m.min()) if len(seen_m) else 0.0
 
 
-def thinned(course: StrideCourse) -> StrideCourse:
+def thinned(profile: StrideProfile) -> StrideProfile:
     """With fewer rows, but the first of every phase."""
-    phases, numbers = course.phase, np.arange(len(course.phase))
+    phases, numbers = profile.phase, np.arange(len(profile.phase))
     period = np.where(np.isin(phases, STROKES), KEPT_OF_STROKE, KEPT_OF_REST)
     kept = (numbers % period == 0) | np.diff(phases, prepend=-1).astype(bool)
-    return StrideCourse(*(column[kept] for column in course))
+    return StrideProfile(*(column[kept] for column in profile))
 
 
-def course_row(course: StrideCourse) -> dict[str, list[float | None]]:
+def profile_row(profile: StrideProfile) -> dict[str, list[float | None]]:
     """As JSON can hold it."""
-    return row_of_columns(course._asdict())
+    return row_of_columns(profile._asdict())
 
 
-def course_of_row(row: Mapping[str, Any]) -> StrideCourse:
-    return StrideCourse(**columns_of_row(row, StrideCourse._fields))
+def profile_of_row(row: Mapping[str, Any]) -> StrideProfile:
+    return StrideProfile(**columns_of_row(row, StrideProfile._fields))
 
 
 def row_of_columns(columns: Mapping[str, NDArray[Any]]) -> dict[str, list[float | None]]:

@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 from control.controller import WalkOrder
 from control.gait.gait import SINGLE_FLIPPER, GaitParameters
-from control.mud_estimate import MudBelief
+from control.mud_estimate import MudEstimate
 from control.records import UNKNOWN, JointAngles, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
 from estimation.mud import Ages, Currents, EstimationParameters, JointVelocities, MudEstimator
 from firmware_host.configuration.configuration import Configuration, parse_configuration
 from firmware_host.ticker import PERIOD_S
-from simulation.body.reference_sensor import StrideTruth, StrokeWitness
+from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.harness.local_setup import CONFIGURATION
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.disturbances import Disturbances
@@ -89,7 +89,7 @@ def run_trial(
     lockstep = Lockstep(configuration, track, seed, disturbances=disturbances, fixed_base=setup.fixed_base)
     lockstep.arm()
     lockstep.walk(WalkOrder(setup.depth_m, adaptive=False))
-    witness, samples, truths = StrokeWitness(), list[Sample](), list[StrideTruth]()
+    reference, samples, truths = StrokeReference(), list[Sample](), list[StrideTruth]()
     held, end_s = _sample_of(lockstep), lockstep.now_s + strides * LONGEST_STRIDE_S
     while len(truths) < 2 * strides and lockstep.now_s < end_s:
         lockstep.step()
@@ -97,7 +97,7 @@ def run_trial(
         if lockstep.now_s >= held.now_s + setup.row_period_s:
             held = _sample_of(lockstep)
         samples.append(held._replace(now_s=lockstep.now_s, phase=phase))
-        truths += witness.step(PERIOD_S, lockstep.robot.plant, phase)
+        truths += reference.step(PERIOD_S, lockstep.robot.plant, phase)
     return Trial(configuration, _known_drives(configuration, torque_error, seed), samples, truths)
 
 
@@ -138,11 +138,11 @@ def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool =
     return strides
 
 
-def beliefs_of(trial: Trial, parameters: EstimationParameters) -> dict[int, MudBelief]:
+def beliefs_of(trial: Trial, parameters: EstimationParameters) -> dict[int, MudEstimate]:
     """What was believed after each stride, by its index."""
     estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters)
-    beliefs: dict[int, MudBelief] = {}
+    beliefs: dict[int, MudEstimate] = {}
     for sample in trial.samples:
         for stride in estimator.update(*sample).strides:
-            beliefs[stride.index] = estimator.belief
+            beliefs[stride.index] = estimator.mud_estimate
     return beliefs

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from control.records import Phase
-from estimation.paper import ADVANCED_M, STEADY_SHARE
+from estimation.paper import ADVANCED_M, STEADY_FRACTION
 from estimation.strokes.line_fit import LineFit
-from experiments.trials.stride_profile import StrideCourse, course_of
+from experiments.trials.stride_profile import StrideProfile, profile_of
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log_reading.log_reader import Log
 from firmware_host.operator.reports import estimate_report
@@ -30,28 +30,28 @@ def strides_with_known_surface(
 ) -> dict[str, list[dict[str, Any]]]:
     """By method, with k_s alone. `strides` are those of the default method."""
     drags_n = {KNOWN: 0.0, KNOWN_COMPENSATED: configuration.adaptation.body_drag_n}
-    courses = [course_of(log, flipper, stride["t_start_s"]) for stride in strides]
+    courses = [profile_of(log, flipper, stride["t_start_s"]) for stride in strides]
     return {
         method: [
-            dict(stride) | {"k_p": None, "k_e": None, "k_s": k_s_of(course, stride, configuration, drag_n)}
-            for course, stride in zip(courses, strides, strict=True)
+            dict(stride) | {"k_p": None, "k_e": None, "k_s": k_s_of(profile, stride, configuration, drag_n)}
+            for profile, stride in zip(courses, strides, strict=True)
         ]
         for method, drag_n in drags_n.items()
     }
 
 
 def k_s_of(
-    course: StrideCourse, stride: Mapping[str, Any], configuration: Configuration, drag_n: float
+    profile: StrideProfile, stride: Mapping[str, Any], configuration: Configuration, drag_n: float
 ) -> dict[str, Any]:
-    geometry, stance, fit = configuration.geometry, course.during(Phase.STANCE), LineFit()
-    submerged_m = course.depth_m - (stride["surface_m"] or 0.0)
-    steady = stance & (submerged_m > 0.0) & np.isfinite(course.sweep_nm)
+    geometry, stance, fit = configuration.geometry, profile.during(Phase.STANCE), LineFit()
+    submerged_m = profile.depth_m - (stride["surface_m"] or 0.0)
+    steady = stance & (submerged_m > 0.0) & np.isfinite(profile.sweep_nm)
     if stance.any():
-        steady &= np.abs(course.sweep_rad) <= STEADY_SHARE * abs(course.sweep_rad[stance][0])
+        steady &= np.abs(profile.sweep_rad) <= STEADY_FRACTION * abs(profile.sweep_rad[stance][0])
     moments_m3 = geometry.plate_width_m * submerged_m**2 / 2.0
-    forces_n = np.cos(course.sweep_rad) * course.sweep_nm / geometry.flipper_length_m
+    forces_n = np.cos(profile.sweep_rad) * profile.sweep_nm / geometry.flipper_length_m
     if drag_n and stance.any():
-        advanced = course.body_m - course.body_m[stance][0] > ADVANCED_M
+        advanced = profile.body_m - profile.body_m[stance][0] > ADVANCED_M
         forces_n = forces_n + np.where(advanced, drag_n / 2.0, 0.0)
     for moment_m3, force_n in zip(moments_m3[steady].tolist(), forces_n[steady].tolist(), strict=True):
         fit.update(moment_m3, force_n)

@@ -22,20 +22,20 @@ from experiments.robot.bench_robot import (
     Status,
     arm,
     follow_walk,
+    reported_by,
     rest,
     strides_made,
     strides_since,
-    told_by,
     wait_until,
     walk,
 )
 from experiments.trackway.trials import Mud, reach_of
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, method_of, strides_by_method
-from experiments.trials.mud_trials import Bench, PlannedTrial, SpoiltTrialError, conduct_trials
+from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
 from experiments.trials.notebook import Entry
-from experiments.trials.stride_profile import course_of, course_row, slip_m, thinned
+from experiments.trials.stride_profile import profile_of, profile_row, slip_m, thinned
 from experiments.walk.known_surface import strides_with_known_surface
-from experiments.walk.walk_profile import walk_course_of, walk_course_row
+from experiments.walk.walk_profile import walk_profile_of, walk_profile_row
 from firmware_host.log_reading.log_reader import Log
 
 MUDS = tuple(Mud(name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
@@ -123,24 +123,24 @@ def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
 
 def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     robot = bench.robot
-    arm(robot, bench.person)
+    arm(robot, bench.operator)
     before: Status = robot.call("status")
     start_m = before["body_x_m"]
     remarks = [] if start_m is not None else ["no pose is told: strides are given to the muds by their order"]
     ordered, end = _follow(bench, plan, start_m)
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     if after["mode"] != "hold":
-        raise SpoiltTrialError(told_by(after))
+        raise InvalidTrialError(reported_by(after))
     made = strides_made(strides_since(robot, before["strides_closed"]))
     log = robot.record(before["now_s"], after["now_s"])
     entry = _entry(bench, plan, trial, log, before["strides_closed"])
-    course = walk_course_row(walk_course_of(log, plan.flipper))
-    entry |= {"start_m": start_m, "course": course, "remarks": remarks + [end] * bool(end)}
+    profile = walk_profile_row(walk_profile_of(log, plan.flipper))
+    entry |= {"start_m": start_m, "course": profile, "remarks": remarks + [end] * bool(end)}
     _note_slips(entry, log, plan.flipper, robot.configuration.geometry.flipper_length_m)
     if after["notice"]:
-        raise SpoiltTrialError(after["notice"], entry)
+        raise InvalidTrialError(after["notice"], entry)
     if end is None and made < ordered:
-        raise SpoiltTrialError(f"somebody stopped the walk in stride {made + 1}", entry)
+        raise InvalidTrialError(f"somebody stopped the walk in stride {made + 1}", entry)
     return entry
 
 
@@ -148,7 +148,7 @@ def _note_slips(entry: Entry, log: Log, flipper: str, arm_m: float) -> None:
     """Into the strides of all methods, which begin at the same moments."""
     strides = list(chain.from_iterable(entry["strides"].values()))
     starts_s = {stride["t_start_s"] for stride in strides}
-    slips_m = {start_s: slip_m(course_of(log, flipper, start_s), arm_m) for start_s in starts_s}
+    slips_m = {start_s: slip_m(profile_of(log, flipper, start_s), arm_m) for start_s in starts_s}
     for stride in strides:
         stride["slip_m"] = slips_m[stride["t_start_s"]]
 
@@ -164,7 +164,7 @@ def _follow(bench: Bench, plan: Plan, start_m: float | None) -> tuple[int, str |
     ordered = strides if start_m is None else SLIPPING * strides
     robot.call("walk", depth_m=plan.depth_m, strides=ordered)
     length_m = plan.length_m - reach_m
-    end, _ = follow_walk(robot, lambda now_s: Advance(start_m, length_m, now_s).judge)
+    end, _ = follow_walk(robot, lambda now_s: Advance(start_m, length_m, now_s).evaluate)
     return ordered, end
 
 
@@ -177,7 +177,7 @@ class Advance:
         self._farthest_m = start_m or 0.0
         self._seen_s = self._advanced_s = now_s
 
-    def judge(self, status: Status) -> str | None:
+    def evaluate(self, status: Status) -> str | None:
         """None while the walk is to go on; then why it ends, or nothing at its proper end. Raises SpoiltTrialError."""
         now_s, body_m = status["now_s"], status["body_x_m"]
         if self._start_m is None:
@@ -196,36 +196,36 @@ class Advance:
 
     def _miss(self, now_s: float) -> None:
         if now_s - self._seen_s > LOST_S:
-            raise SpoiltTrialError("the body's place is not told any more: see that motion capture sees the robot")
+            raise InvalidTrialError("the body's place is not told any more: see that motion capture sees the robot")
 
 
 def require_mud(strides: Sequence[Mapping[str, Any]], flipper: str) -> None:
     """Raises SpoiltTrialError where no stride told of any."""
     if not strides:
-        raise SpoiltTrialError(f"the daemon closed no stride of the {flipper} flipper")
+        raise InvalidTrialError(f"the daemon closed no stride of the {flipper} flipper")
     if not any(stride[name]["valid"] for stride in strides for name in COEFFICIENTS):
-        raise SpoiltTrialError("no stride met mud: look how high the axes are (geometry.axis_height_m)")
+        raise InvalidTrialError("no stride met mud: look how high the axes are (geometry.axis_height_m)")
 
 
 def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float) -> Entry:
     robot = bench.robot
-    arm(robot, bench.person)
+    arm(robot, bench.operator)
     before: Status = robot.call("status")
     walked = walk(robot, depth_m, plan.soft_strides)
     log = robot.record(walked.from_s, walked.to_s)
     entry = _entry(bench, plan, trial, log, before["strides_closed"])
     own = entry["strides"][method_of(robot.configuration.estimation)]
     shown = own[min(SHOWN_STRIDE, len(own) - 1)]
-    course = thinned(course_of(log, plan.flipper, shown["t_start_s"]))
-    return entry | {"depth_m": depth_m, "course": course_row(course), "remarks": []}
+    profile = thinned(profile_of(log, plan.flipper, shown["t_start_s"]))
+    return entry | {"depth_m": depth_m, "course": profile_row(profile), "remarks": []}
 
 
 def _entry(bench: Bench, plan: Plan, trial: PlannedTrial, log: Log, closed: int) -> Entry:
     """What all walks have. Raises SpoiltTrialError."""
     robot = bench.robot
     rest(robot)  # what follows takes longer on a slow computer than the robot is left alone
-    told = strides_since(robot, closed)
-    strides = strides_by_method(told, log, robot.configuration, plan.flipper, METHODS)
+    reported = strides_since(robot, closed)
+    strides = strides_by_method(reported, log, robot.configuration, plan.flipper, METHODS)
     own = strides[method_of(robot.configuration.estimation)]
     require_mud(own, plan.flipper)
     strides |= strides_with_known_surface(strides[DEFAULT], log, robot.configuration, plan.flipper)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from experiments.flipper.report import DOUBTS, ERRORS, HEADING, TRUTHS, doubts, remarked
+from experiments.flipper.report import ERRORS, HEADING, TRUTHS, UNCERTAINTIES, remarked, uncertainties
 from experiments.reports.coefficient_table import TruthOfMud, error_text_rows, mud_rows
 from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure, Section
@@ -81,11 +81,11 @@ def _walk_section(
         )
         for walk in walks_of(plan, entries)
     ]
-    text = _told(report, configuration)
+    text = _reported(report, configuration)
     return Section("Coefficients along the way", text, rows=mud_rows(report["muds"]), figures=figures)
 
 
-def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
+def _reported(report: Mapping[str, Any], configuration: Configuration) -> str:
     gait = configuration.gait
     paragraphs = [
         f"All strides of all trials by method {method_of(configuration.estimation)}, as the daemon told. Its gait: "
@@ -98,7 +98,7 @@ def _told(report: Mapping[str, Any], configuration: Configuration) -> str:
         paragraphs.append(
             f"{counted(report['without_pose'], 'walk')} had no pose: strides are given to muds by their order."
         )
-    paragraphs += [f"{TRIALS} {DOUBTS}", *doubts(report["settings"]), TRUTHS[report["settings"]["truth"]]]
+    paragraphs += [f"{TRIALS} {UNCERTAINTIES}", *uncertainties(report["settings"]), TRUTHS[report["settings"]["truth"]]]
     return "\n\n".join([*paragraphs, report["missing_truth"]])
 
 
@@ -113,7 +113,7 @@ def _soft_section(soft: Mapping[str, Any], plan: Plan, entries: Mapping[str, Ent
         "strides; hatched: a lower bound. The paper's law stands here without its trigger at 0.5 N, which finds the "
         "surface of soft mud too deep: the surface is the default method's."
     )
-    draw = partial(plot_soft, soft, {depth: told for depth, told in walks.items() if told})
+    draw = partial(plot_soft, soft, {depth: reported for depth, reported in walks.items() if reported})
     text = ""
     if is_first:
         text = f"{FELT} {SIMULATED_DRAG}" if plan.simulated else FELT

@@ -18,11 +18,11 @@ from experiments.reports.mud_styles import DOTS_PER_INCH, GREY, INK, LABELS
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
 from experiments.trials.mud_names import mud_text
 from experiments.trials.notebook import Entry
-from experiments.trials.stride_profile import course_of_row
+from experiments.trials.stride_profile import profile_of_row
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import Plan
 from experiments.walk.report import PlacedStride
-from experiments.walk.walk_profile import WalkCourse, walk_course_of_row
+from experiments.walk.walk_profile import WalkProfile, walk_profile_of_row
 
 THIN: dict[str, Any] = {"linewidth": 0.8}
 METHOD_LOOKS: dict[str, dict[str, Any]] = {
@@ -45,37 +45,39 @@ DEPTH_LOOKS: dict[float, dict[str, Any]] = {
 
 def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[PlacedStride], reach_m: float, path: Path) -> None:
     """Place, forces and coefficients of one walk against time: figure 6."""
-    course = walk_course_of_row(walk["course"])
+    profile = walk_profile_of_row(walk["course"])
     own = [each for each in strides if each.trial == walk["trial"]]
-    begun_s = float(course.time_s[0])
-    borders_s = _borders_s(plan, walk, course, own, reach_m)
+    begun_s = float(profile.time_s[0])
+    borders_s = _borders_s(plan, walk, profile, own, reach_m)
     figure, panels = plt.subplots(6, 1, figsize=(9.0, 11.0), sharex=True, constrained_layout=True)
-    _plot_place(panels[0], walk, course, begun_s)
-    _plot_force(panels[1], course, course.force_x_n, begun_s, "$f_x$ forward (N)")
-    upward_n = np.where(course.phase == Phase.STANCE, np.nan, course.force_z_n)
-    _plot_force(panels[2], course, upward_n, begun_s, "$f_z$ up (N)")
+    _plot_place(panels[0], walk, profile, begun_s)
+    _plot_force(panels[1], profile, profile.force_x_n, begun_s, "$f_x$ forward (N)")
+    upward_n = np.where(profile.phase == Phase.STANCE, np.nan, profile.force_z_n)
+    _plot_force(panels[2], profile, upward_n, begun_s, "$f_z$ up (N)")
     for panel, name in zip(panels[3:], COEFFICIENTS, strict=True):
         _plot_coefficient(panel, plan, name, own, begun_s)
     for letter, panel in zip("ABCDEF", panels, strict=True):
         panel.set_title(letter, loc="left", fontsize="medium", fontweight="bold")
         for border_s in borders_s:
             panel.axvline(border_s - begun_s, color=INK, linewidth=1.0)
-    _name_muds(panels[0], plan, [begun_s, *borders_s, float(course.time_s[-1])], begun_s)
-    panels[0].set_xlim(0.0, float(course.time_s[-1]) - begun_s)
+    _name_muds(panels[0], plan, [begun_s, *borders_s, float(profile.time_s[-1])], begun_s)
+    panels[0].set_xlim(0.0, float(profile.time_s[-1]) - begun_s)
     panels[-1].set_xlabel("time (s)")
     figure.savefig(path, dpi=DOTS_PER_INCH)
     plt.close(figure)
 
 
-def _borders_s(plan: Plan, walk: Entry, course: WalkCourse, own: Sequence[PlacedStride], reach_m: float) -> list[float]:
+def _borders_s(
+    plan: Plan, walk: Entry, profile: WalkProfile, own: Sequence[PlacedStride], reach_m: float
+) -> list[float]:
     """When the plates first went down behind each border; by the strides' order where there is no pose."""
     found = []
     for border_m in plan.borders_m:
         if walk["start_m"] is None:
             beyond = [each.stride["t_start_s"] for each in own if each.plates_m >= border_m]
         else:
-            there = np.flatnonzero(course.body_m - walk["start_m"] + reach_m >= border_m)
-            beyond = [float(course.time_s[there[0]])] if len(there) else []
+            there = np.flatnonzero(profile.body_m - walk["start_m"] + reach_m >= border_m)
+            beyond = [float(profile.time_s[there[0]])] if len(there) else []
         found += beyond[:1]
     return found
 
@@ -86,26 +88,26 @@ def _name_muds(panel: Axes, plan: Plan, edges_s: Sequence[float], begun_s: float
         panel.annotate(mud_text(mud.name), (middle_s, 1.02), xycoords=("data", "axes fraction"), ha="center")
 
 
-def _plot_place(panel: Axes, walk: Entry, course: WalkCourse, begun_s: float) -> None:
+def _plot_place(panel: Axes, walk: Entry, profile: WalkProfile, begun_s: float) -> None:
     panel.set_ylabel("body (cm)")
     if walk["start_m"] is None:
         panel.text(0.5, 0.5, "no pose was told", transform=panel.transAxes, ha="center", color=GREY)
         return
-    panel.plot(course.time_s - begun_s, 100.0 * (course.body_m - walk["start_m"]), color=INK, linewidth=1.2)
+    panel.plot(profile.time_s - begun_s, 100.0 * (profile.body_m - walk["start_m"]), color=INK, linewidth=1.2)
 
 
-def _plot_force(panel: Axes, course: WalkCourse, force_n: Any, begun_s: float, label: str) -> None:
+def _plot_force(panel: Axes, profile: WalkProfile, force_n: Any, begun_s: float, label: str) -> None:
     """Coloured by phase, as in the paper: the line is grey outside of the strokes."""
-    time_s = course.time_s - begun_s
+    time_s = profile.time_s - begun_s
     panel.plot(time_s, force_n, color="#bbbbbb", **THIN)
     for phase, colour, style in (
         (Phase.INSERTION, "tab:blue", "-"),
         (Phase.STANCE, "tab:green", "--"),
         (Phase.EXTRACTION, "tab:orange", "-."),
     ):
-        told = np.where(course.phase == phase, force_n, np.nan)
-        if np.isfinite(told).any():
-            panel.plot(time_s, told, style, color=colour, linewidth=1.3, label=phase.name.lower())
+        reported = np.where(profile.phase == phase, force_n, np.nan)
+        if np.isfinite(reported).any():
+            panel.plot(time_s, reported, style, color=colour, linewidth=1.3, label=phase.name.lower())
     panel.set_ylabel(label)
     panel.legend(ncols=3, **LEGEND)
 
@@ -113,22 +115,22 @@ def _plot_force(panel: Axes, course: WalkCourse, force_n: Any, begun_s: float, l
 def _plot_coefficient(panel: Axes, plan: Plan, name: str, own: Sequence[PlacedStride], begun_s: float) -> None:
     """Triangles are lower bounds; the dashed lines are the load cell's."""
     methods = [method for method in METHOD_LOOKS if method != COMPENSATED or name == "k_s"]
-    told = [each for each in own if each.method in methods and each.stride[name]["valid"]]
+    reported = [each for each in own if each.method in methods and each.stride[name]["valid"]]
     truths = [each.truth.get(name) for each in own]
-    tallest = max([t for t in truths if t] or [each.stride[name]["value"] for each in told] or [1.0])
+    tallest = max([t for t in truths if t] or [each.stride[name]["value"] for each in reported] or [1.0])
     top = HEADROOM * PER_CM3 * tallest
-    for each in told:
+    for each in reported:
         estimate, look = each.stride[name], METHOD_LOOKS[each.method]
         value = PER_CM3 * estimate["value"]
-        doubt = 2.0 * PER_CM3 * estimate["std_error"] if each.method == DEFAULT else None
+        uncertainty = 2.0 * PER_CM3 * estimate["std_error"] if each.method == DEFAULT else None
         marker = "^" if estimate["at_least"] else ("$\\uparrow$" if value > top else look["marker"])
-        panel.errorbar(each.stride["t_end_s"] - begun_s, min(value, 0.97 * top), doubt, linestyle="",
+        panel.errorbar(each.stride["t_end_s"] - begun_s, min(value, 0.97 * top), uncertainty, linestyle="",
                        color=look["color"], marker=marker, markersize=6.0, linewidth=1.0)  # fmt: skip
     _plot_truth(panel, plan, name, own, begun_s)
     for method in methods:
         look = METHOD_LOOKS[method]
         panel.plot([], [], color=look["color"], marker=look["marker"], linestyle="", label=method)
-    if any(each.stride[name]["at_least"] for each in told):
+    if any(each.stride[name]["at_least"] for each in reported):
         panel.plot([], [], color=METHOD_LOOKS[DEFAULT]["color"], marker="^", linestyle="", label="at least")
     panel.set_ylim(0.0, top)
     panel.set_ylabel(f"{LABELS[name]}\n(N/cm³)")
@@ -169,11 +171,11 @@ def plot_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]], p
 
 
 def _plot_stance(panel: Axes, depth_cm: float, trial: Entry) -> None:
-    course = course_of_row(trial["course"])
-    stance = course.during(Phase.STANCE)
-    time_s = course.time_s[stance]
+    profile = profile_of_row(trial["course"])
+    stance = profile.during(Phase.STANCE)
+    time_s = profile.time_s[stance]
     look = DEPTH_LOOKS.get(depth_cm, {"color": INK})
-    panel.plot(time_s - time_s[0], course.force_x_n[stance], linewidth=1.4, label=f"z = {depth_cm:g} cm", **look)
+    panel.plot(time_s - time_s[0], profile.force_x_n[stance], linewidth=1.4, label=f"z = {depth_cm:g} cm", **look)
 
 
 def _plot_bars(panel: Axes, soft: Mapping[str, Any]) -> None:
@@ -186,8 +188,8 @@ def _plot_bars(panel: Axes, soft: Mapping[str, Any]) -> None:
             _plot_bar(panel, len(names), each["k_s"].get(method), colour or own)
             names.append(f"{words}\n{each['depth_cm']:g} cm")
     for each in deepest_first:
-        told = None if each["truth"] is None else {"value": each["truth"], "repeatability": None, "at_least": False}
-        _plot_bar(panel, len(names), told, "#d9d9d9")
+        reported = None if each["truth"] is None else {"value": each["truth"], "repeatability": None, "at_least": False}
+        _plot_bar(panel, len(names), reported, "#d9d9d9")
         names.append(f"load cell\n{each['depth_cm']:g} cm")
     panel.set_xticks(range(len(names)), names, fontsize="small")
     panel.set_ylabel("$k_s$ (N/cm³)")
@@ -196,12 +198,12 @@ def _plot_bars(panel: Axes, soft: Mapping[str, Any]) -> None:
     panel.set_title("B   $k_s$ by method", loc="left", fontsize="medium")
 
 
-def _plot_bar(panel: Axes, place: int, told: Mapping[str, Any] | None, colour: str) -> None:
-    if told is None or told["value"] is None:
+def _plot_bar(panel: Axes, place: int, reported: Mapping[str, Any] | None, colour: str) -> None:
+    if reported is None or reported["value"] is None:
         panel.text(place, 0.0, "-", ha="center", va="bottom")
         return
-    value, bound = PER_CM3 * told["value"], told["at_least"]
-    sd = value * (told["repeatability"] or 0.0)
+    value, bound = PER_CM3 * reported["value"], reported["at_least"]
+    sd = value * (reported["repeatability"] or 0.0)
     panel.bar(place, value, 0.7, color="white" if bound else colour, edgecolor=colour if bound else INK, linewidth=1.0,
               hatch="//" if bound else "")  # fmt: skip
     if sd:

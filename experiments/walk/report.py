@@ -22,12 +22,12 @@ from experiments.trackway.trials import reach_of
 from experiments.trials.estimation_methods import method_of
 from experiments.trials.mud_names import mud_text
 from experiments.trials.notebook import Entry
-from experiments.trials.stride_profile import course_of_row
+from experiments.trials.stride_profile import profile_of_row
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import SOFT_DEPTHS_M, Plan, soft_key, soft_name
 from firmware_host.configuration.configuration import Configuration
 
-Told = Mapping[str, Any]
+Reported = Mapping[str, Any]
 
 
 class PlacedStride(NamedTuple):
@@ -37,7 +37,7 @@ class PlacedStride(NamedTuple):
     method: str
     mud: str  # empty where it is not certain
     plates_m: float  # from the start of the first mud
-    stride: Told
+    stride: Reported
     truth: Mapping[str, float | None]
 
 
@@ -63,17 +63,17 @@ def placed_strides(
 
 
 def _placed(
-    plan: Plan, walk: Entry, method: str, strides: Sequence[Told], reach_m: float, truth: TruthOfMud | None
+    plan: Plan, walk: Entry, method: str, strides: Sequence[Reported], reach_m: float, truth: TruthOfMud | None
 ) -> Iterator[PlacedStride]:
     for number, stride in enumerate(strides):
-        place_m, start_m = stride["place_m"], walk["start_m"]
-        if place_m is None or start_m is None:
+        position_m, start_m = stride["place_m"], walk["start_m"]
+        if position_m is None or start_m is None:
             plates_m = plan.length_m * (number + 0.5) / len(strides)
         else:
-            plates_m = place_m - start_m + reach_m
+            plates_m = position_m - start_m + reach_m
         mud = plan.mud_at(plates_m, stride.get("slip_m", 0.0))
-        told = truth_in(truth, mud) if truth else walk["truths"].get(str(stride["index"]), {})
-        yield PlacedStride(walk["trial"], method, mud, plates_m, stride, told)
+        reported = truth_in(truth, mud) if truth else walk["truths"].get(str(stride["index"]), {})
+        yield PlacedStride(walk["trial"], method, mud, plates_m, stride, reported)
 
 
 def soft_strides(plan: Plan, entries: Mapping[str, Entry], truth: TruthOfMud | None) -> list[Beside]:
@@ -88,11 +88,11 @@ def soft_strides(plan: Plan, entries: Mapping[str, Entry], truth: TruthOfMud | N
     ]
 
 
-def _soft_truth(mud: str, walk: Entry, stride: Told, truth: TruthOfMud | None) -> Mapping[str, float | None]:
+def _soft_truth(mud: str, walk: Entry, stride: Reported, truth: TruthOfMud | None) -> Mapping[str, float | None]:
     if truth:
         return truth_in(truth, mud)
-    told: Mapping[str, float | None] = walk["truths"].get(str(stride["index"]), {})
-    return told
+    reported: Mapping[str, float | None] = walk["truths"].get(str(stride["index"]), {})
+    return reported
 
 
 def report_of(
@@ -127,8 +127,8 @@ def _mud_report(mud: str, method: str, rows: Sequence[Beside]) -> dict[str, Any]
 
 def truth_over(rows: Sequence[Beside]) -> dict[str, float]:
     """The middle one of the load cell's readings."""
-    told = {name: [row.truth.get(name) for row in rows] for name in COEFFICIENTS}
-    values = {name: [value for value in each if value is not None] for name, each in told.items()}
+    reported = {name: [row.truth.get(name) for row in rows] for name in COEFFICIENTS}
+    values = {name: [value for value in each if value is not None] for name, each in reported.items()}
     return {name: median(each) for name, each in values.items() if each}
 
 
@@ -153,8 +153,8 @@ def _thrust_n(walks: Sequence[Entry]) -> float | None:
     """Of both flippers, over the second half of the stances shown: while the body moves it is the body's drag."""
     means_n = []
     for walk in walks:
-        course = course_of_row(walk["course"])
-        force_n = course.force_x_n[course.during(Phase.STANCE)]
+        profile = profile_of_row(walk["course"])
+        force_n = profile.force_x_n[profile.during(Phase.STANCE)]
         means_n.append(2.0 * float(np.nanmean(force_n[len(force_n) // 2 :])) if np.isfinite(force_n).any() else np.nan)
     known = [mean_n for mean_n in means_n if isfinite(mean_n)]
     return fmean(known) if known else None
@@ -176,16 +176,16 @@ def _soft_beside_paper(
 ) -> list[dict[str, Any]]:
     """The paper's load cell measured at 3 cm."""
     at_3, at_5 = (soft_name(mud, depth_m) for depth_m in SOFT_DEPTHS_M)
-    told_3, told_5 = mud_text(at_3), mud_text(at_5)
+    reported_3, reported_5 = mud_text(at_3), mud_text(at_5)
     cell = truth_over([row for row in soft if row.mud == at_3]).get("k_s")
     added = _ratio(soft, at_5, KNOWN_COMPENSATED, cell)
     thrust_n = _thrust_n(soft_walks_of(plan, entries, mud, SOFT_DEPTHS_M[1]))
     return [
-        _finding(f"k_s over the load cell's at 3 cm, {told_3}", "close to 1", _ratio(soft, at_3, cell=cell)),
-        _finding(f"k_s over the load cell's at 3 cm, {told_5}", "0.5", _ratio(soft, at_5, cell=cell)),
-        _finding(f"k_s over the load cell's at 3 cm, {told_5}, with drag", "better", added),
-        _finding(f"k_s over the load cell's at 5 cm, {told_5}", "-", _ratio(soft, at_5)),
-        _finding(f"thrust of both flippers in stance, {told_5} (N)", f"{PAPER_DRAG_N:g}", thrust_n),
+        _finding(f"k_s over the load cell's at 3 cm, {reported_3}", "close to 1", _ratio(soft, at_3, cell=cell)),
+        _finding(f"k_s over the load cell's at 3 cm, {reported_5}", "0.5", _ratio(soft, at_5, cell=cell)),
+        _finding(f"k_s over the load cell's at 3 cm, {reported_5}, with drag", "better", added),
+        _finding(f"k_s over the load cell's at 5 cm, {reported_5}", "-", _ratio(soft, at_5)),
+        _finding(f"thrust of both flippers in stance, {reported_5} (N)", f"{PAPER_DRAG_N:g}", thrust_n),
     ]
 
 

@@ -14,7 +14,7 @@ from simulation.mud.disturbances import LAB, Disturbances
 from simulation.mud.track import Track
 
 BEHIND_M = 0.5  # the last mud goes on behind its end, so that no stride meets the next copy
-PLACE_M, STRIP_M = 2.0, 1000.0  # of a walk in soft mud, of each such mud
+POSITION_M, STRIP_M = 2.0, 1000.0  # of a walk in soft mud, of each such mud
 SECTIONS = f"[estimation]\nsurface_error_m = {LAB.surface_sd_m}  # as an operator would see it\n"
 
 
@@ -37,10 +37,10 @@ def walking_bench(
         motion_capture=OF_THE_PAPER,
     )
 
-    def place_m(trial: PlannedTrial, prepared: int) -> float:
+    def position_m(trial: PlannedTrial, prepared: int) -> float:
         if trial.key.startswith("walk/"):
             return prepared * sum(lengths_m)
         strip = next(i for i, mud in enumerate(plan.soft) if trial.key.startswith(f"soft {mud} "))
-        return copies * sum(lengths_m) + STRIP_M * strip + PLACE_M * (prepared + 1)
+        return copies * sum(lengths_m) + STRIP_M * strip + POSITION_M * (prepared + 1)
 
-    return robot, CarriedBed(robot, lockstep, place_m)
+    return robot, CarriedBed(robot, lockstep, position_m)

@@ -16,7 +16,7 @@ from firmware_host.log_reading.log_reader import Log
 KEPT = 5  # one row in so many
 
 
-class WalkCourse(NamedTuple):
+class WalkProfile(NamedTuple):
     """Times by the robot's clock; NaN where nothing is known."""
 
     time_s: Floats
@@ -26,10 +26,10 @@ class WalkCourse(NamedTuple):
     force_z_n: Floats
 
 
-def walk_course_of(log: Log, flipper: str) -> WalkCourse:
+def walk_profile_of(log: Log, flipper: str) -> WalkProfile:
     place = FLIPPERS.index(flipper)
     rows = log.ticks[log.ticks["mode"] == Mode.WALKING][::KEPT]
-    return WalkCourse(
+    return WalkProfile(
         rows["stamp_s"],
         rows["phase"].astype(np.int64),
         rows["body_x_m"],
@@ -38,10 +38,10 @@ def walk_course_of(log: Log, flipper: str) -> WalkCourse:
     )
 
 
-def walk_course_row(course: WalkCourse) -> dict[str, list[float | None]]:
+def walk_profile_row(profile: WalkProfile) -> dict[str, list[float | None]]:
     """As JSON can hold it."""
-    return row_of_columns(course._asdict())
+    return row_of_columns(profile._asdict())
 
 
-def walk_course_of_row(row: Mapping[str, Any]) -> WalkCourse:
-    return WalkCourse(**columns_of_row(row, WalkCourse._fields))
+def walk_profile_of_row(row: Mapping[str, Any]) -> WalkProfile:
+    return WalkProfile(**columns_of_row(row, WalkProfile._fields))

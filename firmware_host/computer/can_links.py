@@ -15,7 +15,7 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from drivers.can.bus_load import MOST_SHARE, WARN_SHARE, bus_load
+from drivers.can.bus_load import MOST_FRACTION, WARN_FRACTION, bus_load
 from firmware_host.computer.findings import Finding, fail, ok, warn
 from firmware_host.configuration.configuration import BusParameters
 
@@ -55,13 +55,13 @@ def parse_links(text: str) -> dict[str, CanLink]:
 
 
 def _parse_link(link: dict[str, Any]) -> CanLink:
-    told, flags = _record(link, "linkinfo"), link.get("flags")
-    details = _record(told, "info_data")
+    reported, flags = _record(link, "linkinfo"), link.get("flags")
+    details = _record(reported, "info_data")
     timing = _record(details, "bittiming")
     return CanLink(
         name=str(link.get("ifname", "")),
         up=isinstance(flags, list) and "UP" in flags,
-        kind=str(told.get("info_kind", "")),
+        kind=str(reported.get("info_kind", "")),
         state=str(details.get("state", "")),
         bit_rate_bit_s=int(_number(timing.get("bitrate"), 0.0)),
         sample_point=_number(timing.get("sample_point"), nan),
@@ -87,8 +87,8 @@ def read_links(root: Path = Path("/")) -> dict[str, CanLink]:
     """By name: as iproute2 tells, else as /sys does."""
     with suppress(OSError, subprocess.SubprocessError):
         command = ["ip", "-details", "-json", "link", "show"]
-        told = subprocess.run(command, capture_output=True, text=True, timeout=5.0, check=True).stdout
-        return parse_links(told)
+        reported = subprocess.run(command, capture_output=True, text=True, timeout=5.0, check=True).stdout
+        return parse_links(reported)
     return read_sys_links(root)
 
 
@@ -154,6 +154,6 @@ def examine_load(name: str, bus: BusParameters, drives: int, link: CanLink | Non
     load = bus_load(drives, bit_s)
     identity, said = f"load.{name}", f"{drives} drives will take {load} of {bit_s / 1000:g} kbit/s"
     fix = "raise the bit rate of interface and drives to 1 Mbit/s, or put two drives on a bus of their own"
-    if load.most > MOST_SHARE:
+    if load.most > MOST_FRACTION:
         return fail(identity, said, fix)
-    return warn(identity, said, fix) if load.most > WARN_SHARE else ok(identity, said)
+    return warn(identity, said, fix) if load.most > WARN_FRACTION else ok(identity, said)

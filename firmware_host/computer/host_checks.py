@@ -110,14 +110,14 @@ def examine_governor(names: set[str]) -> Finding:
 
 
 def examine_processor(cpu: int, isolated: set[int], present: int) -> Finding:
-    told = f"isolated: {', '.join(map(str, sorted(isolated))) or 'none'}"
+    reported = f"isolated: {', '.join(map(str, sorted(isolated))) or 'none'}"
     if cpu < 0:
-        return ok("processors", f"{present}, the loop runs on any; {told}")
+        return ok("processors", f"{present}, the loop runs on any; {reported}")
     if cpu >= present > 0:
         return fail("processors", f"loop.cpu = {cpu}, but there are {present}", "correct loop.cpu")
     if cpu in isolated:
-        return ok("processors", f"the loop has {cpu} for itself; {told}")
-    return warn("processors", f"the loop shares {cpu} with everything; {told}", f"isolcpus={cpu} for the kernel")
+        return ok("processors", f"the loop has {cpu} for itself; {reported}")
+    return warn("processors", f"the loop shares {cpu} with everything; {reported}", f"isolcpus={cpu} for the kernel")
 
 
 def examine_interrupts(priority: int, threads: list[Thread]) -> Finding:
@@ -143,7 +143,7 @@ def examine_storage(root: Path, log: LogParameters, writer: Account, daemon_runs
         yield examine_mount(mount)
     place = root / folder.absolute().relative_to("/")
     try:
-        yield examine_space(free_space(place), log.min_free_share)
+        yield examine_space(free_space(place), log.min_free_fraction)
     except OSError as problem:
         yield fail("disk", f"{folder}: {problem.strerror}", "mount it")
     yield examine_folder(place, writer)
@@ -164,13 +164,13 @@ def examine_mount(mount: Mount) -> Finding:
     return ok("file_system", text)
 
 
-def examine_space(space: FreeSpace, least_share: float) -> Finding:
-    text = f"{space.free_bytes / 1e9:.1f} GB free, {100.0 * space.free_share:.0f} %"
+def examine_space(space: FreeSpace, least_fraction: float) -> Finding:
+    text = f"{space.free_bytes / 1e9:.1f} GB free, {100.0 * space.free_fraction:.0f} %"
     if space.free_bytes == 0:
         return fail("disk", "the disk is full", "free some of it")
-    if space.free_share < least_share:
-        fix = "free some of it, or lower log.min_free_share"
-        return warn("disk", f"{text}: less than log.min_free_share, so old logs are removed", fix)
+    if space.free_fraction < least_fraction:
+        fix = "free some of it, or lower log.min_free_fraction"
+        return warn("disk", f"{text}: less than log.min_free_fraction, so old logs are removed", fix)
     return ok("disk", text)
 
 

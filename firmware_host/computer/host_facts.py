@@ -50,8 +50,8 @@ def read_text(path: Path) -> str:
 
 
 def is_realtime(root: Path) -> bool:
-    told = read_text(root / "sys/kernel/realtime") == "1"
-    return told or "PREEMPT_RT" in read_text(root / "proc/sys/kernel/version").replace("PREEMPT RT", "PREEMPT_RT")
+    reported = read_text(root / "sys/kernel/realtime") == "1"
+    return reported or "PREEMPT_RT" in read_text(root / "proc/sys/kernel/version").replace("PREEMPT RT", "PREEMPT_RT")
 
 
 def kernel_text(root: Path) -> str:

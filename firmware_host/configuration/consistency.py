@@ -69,9 +69,9 @@ def _drive_problems(configuration: Configuration) -> Iterator[str]:
             yield f"drive.{joint}.bus = {drive.bus!r}: no such bus; there is {known}"
         if drive.sign == 0:
             yield f"drive.{joint}.sign = 0: must be 1 or -1"
-        twin = places.setdefault((drive.bus, drive.node_id), joint)
-        if twin != joint:
-            yield f"drive.{joint}.node_id = {drive.node_id}: {twin} has the same on bus {drive.bus!r}"
+        duplicate = places.setdefault((drive.bus, drive.node_id), joint)
+        if duplicate != joint:
+            yield f"drive.{joint}.node_id = {drive.node_id}: {duplicate} has the same on bus {drive.bus!r}"
 
 
 def _friction_problems(configuration: Configuration) -> Iterator[str]:

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from control.bounds import Bounds
 
-LONGEST_SENTENCE = 400  # characters
+LONGEST_MESSAGE = 400  # characters
 LARGEST_FILE_BYTES = 1_000_000  # hundreds of times those of a robot or a world
 
 
@@ -33,10 +33,10 @@ class ConfigurationError(Exception):
         super().__init__("\n".join(self.problems))
 
 
-def _readable(sentence: str) -> str:
-    if len(sentence) > LONGEST_SENTENCE:
-        sentence = f"{sentence[: LONGEST_SENTENCE // 2]} [...] {sentence[-LONGEST_SENTENCE // 2 :]}"
-    return sentence if sentence.isprintable() else "".join(map(_printable, sentence))
+def _readable(message: str) -> str:
+    if len(message) > LONGEST_MESSAGE:
+        message = f"{message[: LONGEST_MESSAGE // 2]} [...] {message[-LONGEST_MESSAGE // 2 :]}"
+    return message if message.isprintable() else "".join(map(_printable, message))
 
 
 def _printable(character: str) -> str:
@@ -100,7 +100,7 @@ class RecordReader:
         try:
             checked = self._model.model_validate(document)
         except ValidationError as problem:
-            raise ConfigurationError([_sentence(error) for error in problem.errors()]) from problem
+            raise ConfigurationError([_message(error) for error in problem.errors()]) from problem
         return _values(self._hints, checked)
 
 
@@ -189,7 +189,7 @@ def shown(value: Any) -> str:
         return "beyond all size"
 
 
-def _sentence(error: Any) -> str:
+def _message(error: Any) -> str:
     """`limits.torque_nm = 9.0: must be at most 5.0`."""
     key, value = _key(error["loc"]), shown(error["input"])
     bounds = error.get("ctx", {})

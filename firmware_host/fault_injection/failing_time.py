@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from drivers.fault_injection.failures import Failure, FailureKind, Failures, end_text
-from firmware_host.ticker import Beat
+from firmware_host.ticker import Tick
 
 STALL_S = 0.03  # eleven ticks: longer than a drive may be silent
 SLOW_TICK_S = 0.004  # one and a half ticks
@@ -18,7 +18,7 @@ CLOCK_STEP_S = 3600.0
 
 
 class Beats(Protocol):
-    def wait(self) -> Beat: ...
+    def wait(self) -> Tick: ...
 
 
 class Stalls:
@@ -46,28 +46,28 @@ class FailingTicker:
         self,
         ticker: Beats,
         failures: Failures,
-        tell: Callable[[float, str], None],
+        report: Callable[[float, str], None],
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._ticker = ticker
         self._failures = failures
         self._stalls = Stalls(failures)
-        self._tell = tell
+        self._report = report
         self._sleep = sleep
 
-    def wait(self) -> Beat:
+    def wait(self) -> Tick:
         stall_s = self._stalls.next_s()
         if stall_s:
             self._sleep(stall_s)
-        beat = self._ticker.wait()
-        for failure in self._failures.update(beat.now_s):
-            self._tell(beat.now_s, end_text(failure))
-        return beat
+        tick = self._ticker.wait()
+        for failure in self._failures.update(tick.now_s):
+            self._report(tick.now_s, end_text(failure))
+        return tick
 
 
-def failing_ticker(ticker: Beats, failures: Failures | None, tell: Callable[[float, str], None]) -> Beats:
+def failing_ticker(ticker: Beats, failures: Failures | None, report: Callable[[float, str], None]) -> Beats:
     """The ticker as it is, where nothing may fail."""
-    return ticker if failures is None else FailingTicker(ticker, failures, tell)
+    return ticker if failures is None else FailingTicker(ticker, failures, report)
 
 
 class FailingClock:

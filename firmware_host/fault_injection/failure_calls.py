@@ -19,7 +19,7 @@ LONGEST_NAME = 64
 FORBIDDEN = "nothing may fail on purpose here: set failures.allowed = true in the configuration, and start again"
 OK, ALL = "ok", "all"
 
-Tell = Callable[[float, str], None]
+Report = Callable[[float, str], None]
 Method = Callable[[dict[str, Any], Caller], Any]
 
 
@@ -28,7 +28,7 @@ def failures_of(configuration: Configuration) -> Failures | None:
     return Failures(configuration.bus) if configuration.failures.allowed else None
 
 
-def with_failures(methods: Methods, failures: Failures | None, tell: Tell, clock: Callable[[], float]) -> Methods:
+def with_failures(methods: Methods, failures: Failures | None, report: Report, clock: Callable[[], float]) -> Methods:
     """The methods of a daemon, and those that make it fail; the others as they are where nothing may."""
     if failures is None:
         return {
@@ -36,7 +36,7 @@ def with_failures(methods: Methods, failures: Failures | None, tell: Tell, clock
             "fail": _refuse,
             "failures": lambda params, caller: {"allowed": False, "failing": [], "table": []},
         }
-    calls = FailureCalls(failures, tell, clock)
+    calls = FailureCalls(failures, report, clock)
     added: Methods = {"fail": calls.fail, "failures": lambda params, caller: calls.failures()}
     changed: Methods = {
         "status": lambda params, caller: calls.in_status(methods["status"](params, caller)),
@@ -50,9 +50,9 @@ def _refuse(params: dict[str, Any], caller: Caller) -> Any:
 
 
 class FailureCalls:
-    def __init__(self, failures: Failures, tell: Tell, clock: Callable[[], float]) -> None:
+    def __init__(self, failures: Failures, report: Report, clock: Callable[[], float]) -> None:
         self._failures = failures
-        self._tell = tell
+        self._report = report
         self._clock = clock
 
     def fail(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
@@ -69,7 +69,7 @@ class FailureCalls:
         if refused:
             raise RefusedError(refused)
         now_s = self._clock()
-        self._tell(now_s, begin_text(component, kind, for_s, who))  # first: it may be the log that fails
+        self._report(now_s, begin_text(component, kind, for_s, who))  # first: it may be the log that fails
         self._failures.begin(component, kind, now_s, for_s)
 
     def _end(self, component: str) -> None:
@@ -77,7 +77,7 @@ class FailureCalls:
             raise RefusedError(self._failures.refusal(component, OK))
         failure = self._failures.end(component)
         for each in self._failures.end_all() if component == ALL else [failure] if failure else []:
-            self._tell(self._clock(), end_text(each))
+            self._report(self._clock(), end_text(each))
 
     def failures(self) -> dict[str, Any]:
         """What fails, and all that could."""
@@ -89,9 +89,9 @@ class FailureCalls:
         return {"allowed": True, "failing": self._failing(), "table": table}
 
     def _failing(self) -> list[dict[str, Any]]:
-        return [self._report(failure) for failure in self._failures.active]
+        return [self._described(failure) for failure in self._failures.active]
 
-    def _report(self, failure: Failure) -> dict[str, Any]:
+    def _described(self, failure: Failure) -> dict[str, Any]:
         return {
             "component": failure.component,
             "kind": str(failure.kind),

@@ -47,7 +47,7 @@ class _Buffer:
         self.unwritten += piece
         self.length += len(piece)
 
-    def tell(self) -> int:
+    def report(self) -> int:
         return self.length
 
     def flush(self) -> None:

@@ -27,7 +27,7 @@ LAST_BYTES = b"\x89MCAP0\r\n"  # of every whole MCAP file
 
 
 class FreeSpace(NamedTuple):
-    free_share: float
+    free_fraction: float
     free_bytes: int
 
 
@@ -112,12 +112,12 @@ def free_space(folder: Path) -> FreeSpace:
     return FreeSpace(disk.f_bavail / max(1, disk.f_blocks), disk.f_bavail * disk.f_frsize)
 
 
-def free_logs(folder: Path, quota_bytes: int, min_free_share: float, most: int = 4) -> Iterator[FreedLog]:
+def free_logs(folder: Path, quota_bytes: int, min_free_fraction: float, most: int = 4) -> Iterator[FreedLog]:
     """Remove the oldest finished logs, one by one, while the logs or the disk hold too much. Raises OSError."""
     used = sum(_size(path) for path in stored_files(folder))
     for oldest in removable_logs(folder)[:most]:
         too_much = 0 < quota_bytes < used
-        if not too_much and free_space(folder).free_share >= min_free_share:
+        if not too_much and free_space(folder).free_fraction >= min_free_fraction:
             return
         freed = remove_log(oldest)
         used -= freed.size

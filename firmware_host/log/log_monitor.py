@@ -12,7 +12,7 @@ from firmware_host.log.recorder import LogReport
 from firmware_host.operator.counted_nouns import counted
 
 
-class LogWatch:
+class LogMonitor:
     """Owns the number of rows lost so far."""
 
     def __init__(self, bounds: FaultBounds) -> None:
@@ -28,8 +28,8 @@ class LogWatch:
             found.append(make_fault("recorder_dead", "", "The log's writer has died: nothing is recorded."))
         elif report.problem:
             found.append(make_fault("log_unwritable", "", report.problem))
-        if report.free_share < self._bounds.disk_free_share:
-            text = f"The log's disk has {100.0 * report.free_share:.1f} % free ({report.free_bytes / 1e6:.0f} MB)."
+        if report.free_fraction < self._bounds.disk_free_fraction:
+            text = f"The log's disk has {100.0 * report.free_fraction:.1f} % free ({report.free_bytes / 1e6:.0f} MB)."
             found.append(make_fault("disk_low", "", text))
         if report.slowest_write_s > self._bounds.disk_slow_s:
             found.append(make_fault("disk_slow", "", f"The log's disk took {report.slowest_write_s:.1f} s to write."))

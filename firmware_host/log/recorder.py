@@ -44,7 +44,7 @@ class LogReport(NamedTuple):
     alive: bool  # the writer
     dropped: int  # rows, by the full pipe and by the writer
     problem: str  # a sentence, or empty
-    free_share: float  # of the disk
+    free_fraction: float  # of the disk
     free_bytes: int
     slowest_write_s: float  # of the last ten seconds, as far as it has come
 
@@ -218,7 +218,7 @@ def _decode_report(said: dict[str, Any]) -> tuple[Path, LogReport]:
         alive=True,
         dropped=int(said["dropped"]),
         problem=str(said["problem"]),
-        free_share=float(said["free_share"]),
+        free_fraction=float(said["free_share"]),
         free_bytes=int(said["free_bytes"]),
         slowest_write_s=float(said["slowest_write_s"]),
     )

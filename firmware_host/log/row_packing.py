@@ -9,13 +9,13 @@ from control.modes import Mode
 from control.records import BodyPose, DriveStates, GaitTarget, StrideEstimate
 from estimation.mud import MudReading
 from firmware_host.log.rows import STRIDE, TICK
-from firmware_host.ticker import Beat
+from firmware_host.ticker import Tick
 
 
 class Moment(NamedTuple):
     """All that one tick knew and did."""
 
-    beat: Beat
+    tick: Tick
     tick_s: float
     missed_ticks: int
     mode: Mode
@@ -28,12 +28,12 @@ class Moment(NamedTuple):
 
 
 def tick_row(moment: Moment) -> bytes:
-    beat, target, sent = moment.beat, moment.target, moment.sent
+    tick, target, sent = moment.tick, moment.target, moment.sent
     a, b, c, d = moment.states
     left, right = moment.reading.left, moment.reading.right
-    now_s = beat.now_s
+    now_s = tick.now_s
     return TICK.encode(
-        now_s, beat.late_s, moment.tick_s,
+        now_s, tick.late_s, moment.tick_s,
         a.angle_rad, b.angle_rad, c.angle_rad, d.angle_rad,
         a.velocity_rad_s, b.velocity_rad_s, c.velocity_rad_s, d.velocity_rad_s,
         a.current_a, b.current_a, c.current_a, d.current_a,
@@ -44,7 +44,7 @@ def tick_row(moment: Moment) -> bytes:
         left.force_x_n, right.force_x_n, left.force_z_n, right.force_z_n, left.depth_m, right.depth_m,
         target.depth_m, moment.stride_depth_m, moment.body.x_m,
         a.temperature_c, b.temperature_c, c.temperature_c, d.temperature_c,
-        beat.number, moment.missed_ticks, target.stride, moment.mode, target.phase, sent.limited,
+        tick.number, moment.missed_ticks, target.stride, moment.mode, target.phase, sent.limited,
     )  # fmt: skip
 
 
@@ -55,7 +55,7 @@ def stride_row(now_s: float, stride: StrideEstimate, chosen_depth_m: float) -> b
         k_p.value, k_p.std_error, k_s.value, k_s.std_error, k_e.value, k_e.std_error,
         stride.surface_m, stride.surface_std_error_m, stride.depth_m,
         stride.insertion_force_n, stride.stance_force_n, stride.extraction_force_n,
-        stride.step_m, stride.place_m, stride.tare_n, stride.tare_drift_n, stride.extraction_torque_nm,
+        stride.step_m, stride.position_m, stride.tare_n, stride.tare_drift_n, stride.extraction_torque_nm,
         chosen_depth_m,
         stride.index, k_p.samples, k_s.samples, k_e.samples,
         0 if stride.flipper == "left" else 1,

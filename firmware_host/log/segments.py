@@ -86,7 +86,7 @@ class LogSegments:
         except OSError as error:
             self._give_up(error, unwritten=len(rows) - (self._file.rows - before))
         else:
-            self._heed_slowness(self._file)
+            self._on_slowness(self._file)
 
     def _event(self, text: str) -> tuple[int, bytes]:
         return EVENT_KIND, EVENT.encode(self._latest_stamp_s, text)
@@ -157,7 +157,7 @@ class LogSegments:
         self._full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         self._retry_s = time.monotonic() + RETRY_S
 
-    def _heed_slowness(self, file: LogFile) -> None:
+    def _on_slowness(self, file: LogFile) -> None:
         self.slowest_s, file.slowest_s = max(self.slowest_s, file.slowest_s), 0.0
 
     def _rotate(self, rows: Rows) -> None:
@@ -178,7 +178,7 @@ class LogSegments:
             return
         try:
             self.path = self._file.finish()
-            self._heed_slowness(self._file)
+            self._on_slowness(self._file)
             self._file = None
         except OSError as error:
             self._give_up(error)
@@ -193,12 +193,12 @@ class LogSegments:
 
     def _make_room(self) -> None:
         """On a disk that was full: the oldest log gives way at once, where logs may be freed, as long as that helps."""
-        may_free = self._parameters.quota_bytes > 0 or self._parameters.min_free_share > 0.0
+        may_free = self._parameters.quota_bytes > 0 or self._parameters.min_free_fraction > 0.0
         if self._full and self._folder is not None and may_free and self._freeing_helps:
             for oldest in removable_logs(self._folder)[:1]:
                 before = free_space(self._folder).free_bytes
                 freed = remove_log(oldest)
-                self._freed.append(_told_of(freed))
+                self._freed.append(_reported_of(freed))
                 self._freeing_helps = free_space(self._folder).free_bytes > before
         self._full = False
 
@@ -206,10 +206,10 @@ class LogSegments:
         if self._folder is None or time.monotonic() < self._freeing_s:
             return
         self._freeing_s = time.monotonic() + FREEING_INTERVAL_S
-        quota_bytes, share = self._parameters.quota_bytes, self._parameters.min_free_share
+        quota_bytes, fraction = self._parameters.quota_bytes, self._parameters.min_free_fraction
         with suppress(OSError):  # what cannot be freed shows as a disk without room
-            for freed in free_logs(self._folder, quota_bytes, share):
-                self._write([self._event(_told_of(freed))])
+            for freed in free_logs(self._folder, quota_bytes, fraction):
+                self._write([self._event(_reported_of(freed))])
 
     def _start_recovery(self) -> None:
         """Of what others, or this run before its disk failed, have left: in a process of its own."""
@@ -224,5 +224,5 @@ class LogSegments:
             self._recovery = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
 
 
-def _told_of(freed: FreedLog) -> str:
+def _reported_of(freed: FreedLog) -> str:
     return f"room for logs: {freed.name} was freed, {freed.size} bytes"

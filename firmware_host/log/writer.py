@@ -31,7 +31,7 @@ GATHER_S = 0.05  # asleep between batches, the writer is not woken by every row,
 IDLE_MS = 200  # without rows: what is in memory still has to be flushed
 REPORT_INTERVAL_S = 1.0
 LATELY = 10  # reports for which a slow write is remembered
-LONGEST_SENTENCE = 1000  # of a report, which has to go into the pipe in one piece
+LONGEST_MESSAGE = 1000  # of a report, which has to go into the pipe in one piece
 
 Rows = list[tuple[int, bytes]]  # index in ROW_KINDS, payload
 
@@ -62,8 +62,8 @@ class Reporter:
         report = {
             "path": str(log.path),
             "dropped": log.dropped,
-            "problem": log.problem[:LONGEST_SENTENCE],
-            "free_share": space.free_share,
+            "problem": log.problem[:LONGEST_MESSAGE],
+            "free_share": space.free_fraction,
             "free_bytes": space.free_bytes,
             "slowest_write_s": max(self._slowest_s, default=0.0),
         }

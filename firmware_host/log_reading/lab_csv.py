@@ -55,7 +55,7 @@ STATE_OF_PHASE = {
 }
 PUSHING = (Phase.STANCE, Phase.INSERTION, Phase.STANCE, Phase.INSERTION)  # when each of JOINTS works on mud
 
-CLIP_SHARE, CLIPPED_ROWS = 0.9995, 200  # rows at the largest current that make it a limit: half a second of them
+CLIP_FRACTION, CLIPPED_ROWS = 0.9995, 200  # rows at the largest current that make it a limit: half a second of them
 BACKWARDS_S = 1.0  # rows written out of order by less are kept as they are
 FROZEN_S, LEAP_M = 0.5, 0.02  # a pose that stands still so long and then leaps so far was lost, not measured
 
@@ -202,7 +202,7 @@ def _find_limit_a(current_a: Floats) -> float:
     """The largest current, where one joint shows exactly that again and again: a clip, and no peak."""
     size_a = np.nan_to_num(np.abs(current_a))
     peak_a = float(size_a.max(initial=0.0))
-    at_peak = size_a >= CLIP_SHARE * peak_a
+    at_peak = size_a >= CLIP_FRACTION * peak_a
     return peak_a if peak_a > 0.0 and int(at_peak.sum(axis=0).max()) >= CLIPPED_ROWS else math.inf
 
 

@@ -156,8 +156,8 @@ def main() -> None:
         os.nice(5)
     folder = Path(sys.argv[1])
 
-    def say(sentence: str) -> None:
-        print(sentence, file=sys.stderr, flush=True)
+    def say(message: str) -> None:
+        print(message, file=sys.stderr, flush=True)
 
     for recovered in recover_all(folder, say):
         say(f"{recovered.path}: {recovered.note}")

@@ -32,7 +32,7 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
     lines["log"] = log_text
     pose = loop.pose.report()
     if pose.source:
-        lines["pose"] = pose.sentence
+        lines["pose"] = pose.message
     faults = [fault for fault in loop.faults.standing if fault.check != "pose" or not pose.trouble]  # which says more
     for fault in faults:
         lines.setdefault(fault.check, "")
@@ -46,13 +46,13 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
 
 def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> dict[str, Any]:
     if unheard:
-        told_as_well = (fault.sentence for fault in faults)
-        return check_item(identity, False, "; ".join([text, *told_as_well]), HEARING) | {"mandatory": True}
+        reported_as_well = (fault.message for fault in faults)
+        return check_item(identity, False, "; ".join([text, *reported_as_well]), HEARING) | {"mandatory": True}
     blocking = [fault for fault in faults if fault.kind.blocks is not Blocks.NO]
-    told = blocking or list(faults)
-    sentences = " ".join(fault.sentence for fault in told)
-    fixes = "; ".join(dict.fromkeys(fault.kind.what_to_do for fault in told))
-    text = sentences if blocking else f"warning: {sentences}" if told else text
+    reported = blocking or list(faults)
+    messages = " ".join(fault.message for fault in reported)
+    fixes = "; ".join(dict.fromkeys(fault.kind.what_to_do for fault in reported))
+    text = messages if blocking else f"warning: {messages}" if reported else text
     item = check_item(identity, not blocking, text, fixes)
     return item | {"mandatory": any(fault.kind.blocks is Blocks.ALWAYS for fault in blocking)}
 

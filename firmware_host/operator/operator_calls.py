@@ -20,7 +20,7 @@ from firmware_host.loop import Loop
 from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.lease import LONGEST_S, SHORTEST_S
-from firmware_host.operator.reports import belief_report, known, map_report, stride_report
+from firmware_host.operator.reports import known, map_report, mud_estimate_report, stride_report
 from firmware_host.operator.status_socket import Methods, RefusedError
 from firmware_host.software_version import software_version
 from firmware_host.ticker import PERIOD_S
@@ -76,8 +76,8 @@ class OperatorCalls:
             "fault": _fault(loop),
             "faults": [_fault_report(loop, fault) for fault in loop.faults.standing],
             "forced": loop.forced,
-            "notice": loop.news.notice,
-            "untold_requests": loop.news.requests.untold,
+            "notice": loop.events.notice,
+            "untold_requests": loop.events.requests.untold,
             "lease": str(loop.lease.holder) if loop.lease.held else None,
             "phase": loop.target_before.phase.name.lower(),
             "stride": loop.target_before.stride,
@@ -86,7 +86,7 @@ class OperatorCalls:
             "pose": loop.pose.report()._asdict(),
             "drives": [self._drive(place) for place in range(len(JOINTS))],
             "strides_closed": loop.learning.strides_closed,
-            "mud": belief_report(loop.learning.estimator.belief),
+            "mud": mud_estimate_report(loop.learning.estimator.mud_estimate),
             "loop": loop.timing.summary(),
             "warnings": self._warnings,
             "bus": self._bus(),
@@ -100,7 +100,7 @@ class OperatorCalls:
             "dropped": report.dropped,
             "writer_alive": report.alive,
             "problem": report.problem,
-            "free_share": known(report.free_share),
+            "free_share": known(report.free_fraction),
             "slowest_write_s": known(report.slowest_write_s),
         }
 
@@ -183,8 +183,8 @@ class OperatorCalls:
                 raise RefusedError(f"{joint}_rad = {angle_rad:g}: must be from {low:.3f} to {high:.3f}")
         self._accept(_against_moving(loop))
         way = ", ".join(f"{joint} to {angle_rad:.4f} rad" for joint, angle_rad in angles_rad.items())
-        loop.news.tell(self._clock(), f"move {way} by {caller}")
-        loop.news.notice = ""
+        loop.events.report(self._clock(), f"move {way} by {caller}")
+        loop.events.notice = ""
         loop.controller.move([angles_rad.get(joint) for joint in JOINTS])
         return "accepted"
 
@@ -197,14 +197,14 @@ class OperatorCalls:
         begins, now_s = self._lease.holder != caller, self._clock()
         self._accept(self._lease.renew(caller, now_s, for_s))
         if begins:
-            self._loop.news.tell(now_s, f"lease taken by {caller}")
+            self._loop.events.report(now_s, f"lease taken by {caller}")
 
     def release(self, params: dict[str, Any], caller: Caller) -> str:
         """End one's own lease, or whoever's was lost."""
         begun = self._lease.holder is not None
         self._accept(self._lease.release(caller))
         if begun:
-            self._loop.news.tell(self._clock(), f"lease released by {caller}")
+            self._loop.events.report(self._clock(), f"lease released by {caller}")
         return "accepted"
 
     def _as_holder(self, method: Method, params: dict[str, Any], caller: Caller) -> str:
@@ -216,7 +216,7 @@ class OperatorCalls:
         for_s = _lease_time(params, "lease_s") if "lease_s" in params else None
         answer = method({name: value for name, value in params.items() if name not in AS_HOLDER}, caller)
         if self._lease.held and self._lease.holder != caller:
-            self._loop.news.tell(self._clock(), f"lease of {self._lease.holder} taken over by {caller}")
+            self._loop.events.report(self._clock(), f"lease of {self._lease.holder} taken over by {caller}")
             self._lease.oust(caller)
         if for_s is not None:
             self._promise(caller, for_s)
@@ -251,7 +251,7 @@ def _fault_report(loop: Loop, fault: Fault) -> dict[str, Any]:
     return {
         "name": fault.name,
         "subject": fault.subject,
-        "sentence": fault.sentence,
+        "sentence": fault.message,
         "what_to_do": kind.what_to_do,
         "for_s": loop.faults.age_ticks(fault) * PERIOD_S,
         "reaction": kind.reaction.name.lower(),
@@ -263,7 +263,7 @@ def _against_moving(loop: Loop) -> str | None:
     """Why joints that are held should stay where they are, or None."""
     if loop.controller.cut_short:
         return "the flippers may be in the mud: 'mudskipper stop' raises them first"
-    return loop.fault.sentence if loop.fault else None
+    return loop.fault.message if loop.fault else None
 
 
 def _joint_angles(params: dict[str, Any]) -> dict[str, float]:

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
-from control.mud_estimate import Coefficient, MudBelief
+from control.mud_estimate import Coefficient, MudEstimate
 from control.records import FLIPPERS, Estimate, StrideEstimate
 from estimation.mud_map import Mapped, MapRow
 
@@ -31,10 +31,13 @@ def estimate_report(estimate: Estimate) -> dict[str, Any]:
     }
 
 
+JSON_NAMES = {"position_m": "place_m"}  # scripts read the older name
+
+
 def stride_report(stride: StrideEstimate) -> dict[str, Any]:
     """A stride as `replay --json` and the status socket tell it; k in N/m³."""
     report = {
-        name: known(value) if isinstance(value, float) else value
+        JSON_NAMES.get(name, name): known(value) if isinstance(value, float) else value
         for name, value in asdict(stride).items()
         if name not in COEFFICIENTS
     }
@@ -48,20 +51,20 @@ def coefficient_report(coefficient: Coefficient | Mapped | None) -> dict[str, An
     return {name: known(value) if isinstance(value, float) else value for name, value in coefficient._asdict().items()}
 
 
-def belief_report(belief: MudBelief) -> dict[str, Any]:
+def mud_estimate_report(mud_estimate: MudEstimate) -> dict[str, Any]:
     """Both flippers together, and each apart."""
-    together = {name: coefficient_report(getattr(belief, name)) for name in COEFFICIENTS}
+    together = {name: coefficient_report(getattr(mud_estimate, name)) for name in COEFFICIENTS}
     apart = {
-        flipper: {name: coefficient_report(getattr(belief.of(flipper), name)) for name in COEFFICIENTS}
+        flipper: {name: coefficient_report(getattr(mud_estimate.of(flipper), name)) for name in COEFFICIENTS}
         for flipper in FLIPPERS
     }
-    return together | apart | {"boundary": belief.boundary}
+    return together | apart | {"boundary": mud_estimate.boundary}
 
 
 def map_report(rows: Sequence[MapRow]) -> list[dict[str, Any]]:
     """Along the track, one row for each piece of it that a stride told of."""
     return [
-        {"place_m": row.place_m} | {name: coefficient_report(getattr(row, name)) for name in COEFFICIENTS}
+        {"place_m": row.position_m} | {name: coefficient_report(getattr(row, name)) for name in COEFFICIENTS}
         for row in rows
     ]
 

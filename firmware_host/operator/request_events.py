@@ -12,7 +12,7 @@ PERIOD_S = 1.0
 MOST_KEPT = 64  # texts, each of which names who asked
 
 
-class RequestsTold:
+class RequestEvents:
     """Owns when each was told last."""
 
     def __init__(self) -> None:
@@ -21,16 +21,16 @@ class RequestsTold:
     def reset(self) -> None:
         self.untold = 0  # since the start
         self._before = 0  # since the last one that was told
-        self._told_s: dict[str, float] = {}
+        self._reported_s: dict[str, float] = {}
 
     def update(self, text: str, changes: bool, now_s: float) -> str:
         """The sentence for the log, or nothing."""
-        if not changes or now_s - self._told_s.get(text, -inf) < PERIOD_S:
+        if not changes or now_s - self._reported_s.get(text, -inf) < PERIOD_S:
             self.untold += 1
             self._before += 1
             return ""
-        if len(self._told_s) >= MOST_KEPT:
-            self._told_s.clear()
-        self._told_s[text] = now_s
+        if len(self._reported_s) >= MOST_KEPT:
+            self._reported_s.clear()
+        self._reported_s[text] = now_s
         before, self._before = self._before, 0
         return f"{text}; {before} before it changed nothing or came again" if before else text

@@ -45,7 +45,7 @@ class StatusSocket:
         """Raises AlreadyServedError, or OSError where the path cannot be bound."""
         self.path = path
         self.methods = methods
-        self.report_bug: Callable[[str], None] = lambda sentence: None
+        self.report_bug: Callable[[str], None] = lambda message: None
         self.on_hang_up: Callable[[Caller], None] = lambda caller: None  # may come twice
         self.spares: Callable[[Caller], bool] = lambda caller: False  # whose end would stop the robot
         self._rights = rights or load_rights(StatusParameters())
@@ -101,11 +101,11 @@ class StatusSocket:
         client.watched = select.EPOLLIN
         return self._poll.register(connection.fileno(), client.watched)
 
-    def _turn_away(self, connection: socket.socket, sentence: str) -> None:
+    def _turn_away(self, connection: socket.socket, message: str) -> None:
         self._not_permitted += 1
         connection.setblocking(False)
         with connection, suppress(OSError):  # it may be gone already
-            connection.send(msgpack.packb([RESPONSE, None, sentence, None]))
+            connection.send(msgpack.packb([RESPONSE, None, message, None]))
 
     def _make_room(self, newcomer: Peer) -> None:
         """The user with the most connections loses the one that is still for longest; among equals the less trusted."""
@@ -174,9 +174,9 @@ class StatusSocket:
             self.report_bug(f"{method} failed: {type(problem).__name__}: {problem}")
             return client.send([RESPONSE, number, f"{method} failed: this is a bug, the log says more", None])
 
-    def _reject(self, client: Client, sentence: str) -> None:
+    def _reject(self, client: Client, message: str) -> None:
         self._garbled += 1
-        client.send([RESPONSE, None, sentence, None])
+        client.send([RESPONSE, None, message, None])
         client.closing = True
 
     def _settle(self, descriptor: int) -> None:

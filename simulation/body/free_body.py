@@ -133,21 +133,21 @@ class BellyQuarter:
         self._print_m = self._stiffness_n_m = 0.0
         self.pressed = False
 
-    def step(self, clay: Clay, grip: float, depth_m: float, sinking_m_s: float) -> float:
+    def step(self, clay: Clay, traction: float, depth_m: float, sinking_m_s: float) -> float:
         """Force up. The damping is half of critical."""
         if depth_m <= 0.0:
             self.reset()
             return 0.0
         slow_n = BEARING_FACTOR * clay.strength_at_pa(depth_m) * self.area_m2
         stiffness_n_m = min(slow_n / YIELD_M, self.mass_kg * LARGEST_RAD_S**2)
-        elastic_n = min(stiffness_n_m * self._strain_m(stiffness_n_m, depth_m), grip * slow_n)
+        elastic_n = min(stiffness_n_m * self._strain_m(stiffness_n_m, depth_m), traction * slow_n)
         floating_n = UNIT_WEIGHT_N_M3 * self.area_m2 * depth_m
         self.pressed = elastic_n > 0.0
         if not self.pressed:
             return floating_n
         self._print_m = depth_m - elastic_n / stiffness_n_m
         damping_n = sqrt(stiffness_n_m * self.mass_kg) * sinking_m_s
-        return floating_n + min(max(elastic_n + damping_n, 0.0), grip * slow_n)
+        return floating_n + min(max(elastic_n + damping_n, 0.0), traction * slow_n)
 
     def _strain_m(self, stiffness_n_m: float, depth_m: float) -> float:
         """Of the mud above its print. Where the mud becomes stiffer the force stays, as it does along a plate."""
@@ -243,8 +243,8 @@ class FreeBody:
             corner_m = in_world(axes, corner)
             clay = self.track.clay_at(self.forward_m + corner_m[0])
             _, rising_m_s = self._speeds_m_s(axes, corner_m)
-            grip = rate_factor(hypot(sliding_m_s, rising_m_s))
-            upward_n = quarter.step(clay, grip, -self.height_m - corner_m[2], -rising_m_s)
+            traction = rate_factor(hypot(sliding_m_s, rising_m_s))
+            upward_n = quarter.step(clay, traction, -self.height_m - corner_m[2], -rising_m_s)
             yield load_at(axes, corner_m, 0.0, upward_n)
             if quarter.pressed:
                 sticking_n += ADHESION * clay.strength_pa * quarter.area_m2

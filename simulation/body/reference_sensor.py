@@ -73,7 +73,7 @@ class StrokeSums:
 
     def reset(self) -> None:
         self._ticks = 0
-        self._sweep = self._adduction = self._depths_m = self._speed_m2_s = self._way_m = 0.0
+        self._sweep = self._adduction = self._depths_m = self._speed_m2_s = self._path_m = 0.0
         self._deepest_m = UNKNOWN
 
     def update(self, dt_s: float, sight: Sight) -> None:
@@ -87,7 +87,7 @@ class StrokeSums:
         speed_m_s = -sight.forward_m_s if self.phase is Phase.STANCE else sight.speed_m_s
         if self.phase is not Phase.STANCE or speed_m_s > SLIPPING_M_S:
             self._speed_m2_s += dt_s * speed_m_s * speed_m_s
-            self._way_m += dt_s * speed_m_s
+            self._path_m += dt_s * speed_m_s
 
     def truth(self) -> StrokeTruth:
         if not self._ticks:
@@ -96,13 +96,13 @@ class StrokeSums:
             self._sweep / self._ticks,
             self._adduction / self._ticks,
             self._deepest_m,
-            self._speed_m2_s / self._way_m if self._way_m > 0.0 else UNKNOWN,
-            self._way_m if self.phase is Phase.STANCE else UNKNOWN,
+            self._speed_m2_s / self._path_m if self._path_m > 0.0 else UNKNOWN,
+            self._path_m if self.phase is Phase.STANCE else UNKNOWN,
             self._depths_m / self._ticks,
         )
 
 
-class FlipperWitness:
+class FlipperReference:
     """Owns what was seen of one flipper in the stride under way."""
 
     def __init__(self, flipper: str) -> None:
@@ -130,11 +130,11 @@ class FlipperWitness:
         return StrideTruth(self.flipper, index, clay, surface_m, insertion, stance, extraction)
 
 
-class StrokeWitness:
+class StrokeReference:
     """Owns the count of strides, and which strokes of the one under way were seen."""
 
     def __init__(self) -> None:
-        self._flippers = [FlipperWitness(flipper) for flipper in FLIPPERS]
+        self._flippers = [FlipperReference(flipper) for flipper in FLIPPERS]
         self.reset()
 
     def reset(self) -> None:

@@ -57,7 +57,7 @@ class OdriveParameters:
     heartbeat_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.1
     slow_period_s: Annotated[float, Bounds(0.001, 10.0)] = 0.1  # error, temperature, bus voltage
     message_delay_s: Annotated[float, Bounds(0.0, 0.05)] = 0.0  # longest
-    repeated_share: Annotated[float, Bounds(0.0, 0.99)] = 0.0  # of the messages of angle, and of current
+    repeated_fraction: Annotated[float, Bounds(0.0, 0.99)] = 0.0  # of the messages of angle, and of current
     velocity_gain_nm_s_turn: Annotated[float, Bounds(0.0, 100.0)] = 1.0 / 6.0  # ODrive's default vel_gain, in the clamp
     velocity_noise_rad_s: Annotated[float, Bounds(0.0, 5.0)] = 0.0  # of the drive's estimate
     temperature_c: Annotated[float, Bounds(-50.0, 200.0)] = 30.0
@@ -88,7 +88,7 @@ class SimulatedOdrive:
         self._turns = self._turns_s = 0.0
         self._boots_until_s = NEVER_S
         self._initializing = False
-        self._told: dict[Message, Frame] = {}
+        self._reported: dict[Message, Frame] = {}
         self._late.reset()
         periods = self.parameters
         self._schedule: list[tuple[float, tuple[Message, ...]]] = [
@@ -190,7 +190,7 @@ class SimulatedOdrive:
             self._disarm(codec.ERROR_WATCHDOG)
         torque_nm = 0.0
         if self.axis_state is AxisState.CLOSED_LOOP and self._modes == (codec.TORQUE_CONTROL, codec.PASSTHROUGH):
-            torque_nm = self._reckoned_nm(now_s) * (1.0 + parameters.torque_constant_error)
+            torque_nm = self._computed_nm(now_s) * (1.0 + parameters.torque_constant_error)
         else:
             self._current_a = 0.0
         self._stepped_s = now_s
@@ -198,7 +198,7 @@ class SimulatedOdrive:
             torque_nm += self._cogging_nm()
         return parameters.sign * torque_nm
 
-    def _reckoned_nm(self, now_s: float) -> float:
+    def _computed_nm(self, now_s: float) -> float:
         """What the drive believes to exert: clamped as it clamps, and as far as the current has come."""
         parameters = self.parameters
         gain, limit = self._velocity_gain_nm_s_turn, self._velocity_limit_turn_s
@@ -240,15 +240,15 @@ class SimulatedOdrive:
             if self._due_s[place] <= now_s:  # held up for longer than a period: the lost ones are not made up for
                 self._due_s[place] = now_s + period_s
             for message in messages:
-                repeating = self.parameters.repeated_share and message in REPEATED
+                repeating = self.parameters.repeated_fraction and message in REPEATED
                 yield self._perhaps_old(message, now_s) if repeating else self._frame(message, now_s)
 
     def _perhaps_old(self, message: Message, now_s: float) -> Frame:
         """What the frame before told once more, where the drive has nothing else to tell."""
-        told = self._told.get(message)
-        if told is not None and self._random.random() < self.parameters.repeated_share:
-            return told._replace(stamp_s=now_s)
-        self._told[message] = frame = self._frame(message, now_s)
+        reported = self._reported.get(message)
+        if reported is not None and self._random.random() < self.parameters.repeated_fraction:
+            return reported._replace(stamp_s=now_s)
+        self._reported[message] = frame = self._frame(message, now_s)
         return frame
 
     def _frame(self, message: Message, stamp_s: float = NEVER_S) -> Frame:
@@ -260,11 +260,11 @@ class SimulatedOdrive:
         if parameters.encoder_noise_rad:
             wrong_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
         turns = self._turns + parameters.sign * wrong_rad / TURN_RAD
-        told_turns = round(turns * parameters.encoder_counts) / parameters.encoder_counts
+        reported_turns = round(turns * parameters.encoder_counts) / parameters.encoder_counts
         turns_s = self._turns_s
         if parameters.velocity_noise_rad_s:
             turns_s += self._random.gauss(0.0, parameters.velocity_noise_rad_s) / TURN_RAD
-        return codec.GET_ENCODER_ESTIMATES.encode(told_turns, turns_s)
+        return codec.GET_ENCODER_ESTIMATES.encode(reported_turns, turns_s)
 
     def _iq(self) -> bytes:
         noise_a = self.parameters.current_noise_a

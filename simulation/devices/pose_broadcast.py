@@ -69,8 +69,8 @@ class NatNetLine:
 
     def send(self, frame: CameraFrame) -> None:
         a, b, c = self._direction
-        place_m = frame.x_m + self._origin_m
-        self.server.add(RecordedPose(frame.exposed_s, (a * place_m, b * place_m, c * place_m)))
+        position_m = frame.x_m + self._origin_m
+        self.server.add(RecordedPose(frame.exposed_s, (a * position_m, b * position_m, c * position_m)))
 
     def step(self, now_s: float) -> None:
         self.server.step(now_s)

@@ -21,16 +21,16 @@ class RailEncoderEmulator:
         self._files: tuple[int, ...] = ()
         self.plug_in()
 
-    def plug_in(self, place_m: float = 0.0) -> None:
+    def plug_in(self, position_m: float = 0.0) -> None:
         """A counter begins at zero, wherever it is."""
-        self._zero_m = place_m
+        self._zero_m = position_m
         self._files = os.openpty()
         tty.setraw(self._files[1])
         os.set_blocking(self._files[0], False)
         self.device.symlink_to(os.ttyname(self._files[1]))
 
-    def send(self, place_m: float) -> None:
-        self.write(f"{self.label}{round((place_m - self._zero_m) / self.metres_per_count)}{self.line_end}".encode())
+    def send(self, position_m: float) -> None:
+        self.write(f"{self.label}{round((position_m - self._zero_m) / self.metres_per_count)}{self.line_end}".encode())
 
     def write(self, data: bytes) -> None:
         """Whatever a bad contact makes of a line."""

@@ -34,7 +34,7 @@ class TalkerParameters:
     burst_s: Annotated[float, Bounds(0.0, 0.2)] = 0.016  # of the adapter's latency timer
     drop_out_rate_hz: Annotated[float, Bounds(0.0, 10.0)] = 0.0
     drop_out_s: Annotated[float, Bounds(0.0, 10.0)] = 0.2
-    garbled_share: Annotated[float, Bounds(0.0, 1.0)] = 0.0
+    garbled_fraction: Annotated[float, Bounds(0.0, 1.0)] = 0.0
 
 
 class SerialTalker:
@@ -102,10 +102,10 @@ class SerialTalker:
         if self._random.random() < self.parameters.drop_out_rate_hz / self.parameters.rate_hz:
             self._silent_until_s = at_s + self.parameters.drop_out_s
         if self.is_plugged_in and at_s >= self._silent_until_s:
-            self.waiting += self._spoilt(line)
+            self.waiting += self._invalid(line)
 
-    def _spoilt(self, line: bytes) -> bytes:
-        if self._random.random() < self.parameters.garbled_share:
+    def _invalid(self, line: bytes) -> bytes:
+        if self._random.random() < self.parameters.garbled_fraction:
             place = self._random.randrange(max(1, len(line) - 2))
             line = line[:place] + bytes([self._random.randrange(128, 256)]) + line[place + 1 :]
         opened_at = SPEEDS.get(termios.tcgetattr(self._slave)[5])

@@ -70,16 +70,16 @@ timeout = 1
 late_s = 0.5
 quiet_s = 0.5
 silence_s = 0.5
-disk_free_share = 0.0
+disk_free_fraction = 0.0
 jump_rad = 2.0
 fast_s = 0.2
 lag_s = 0.5
-lag_share = 1.0
+lag_fraction = 1.0
 crawl_s = 0.5
 
 [log]
 directory = {logs}
-min_free_share = 0.0  # a full disk of a desk is no reason to free anybody's logs
+min_free_fraction = 0.0  # a full disk of a desk is no reason to free anybody's logs
 
 [status]
 socket = {status}

@@ -22,7 +22,7 @@ from firmware_host.fault_injection.failing_recorder import failing_recorder
 from firmware_host.fault_injection.failing_time import Stalls, failing_clock
 from firmware_host.log.recorder import NullRecorder, Recording
 from firmware_host.loop import Loop
-from firmware_host.ticker import PERIOD_S, Beat
+from firmware_host.ticker import PERIOD_S, Tick
 from simulation.body.free_body import BodyShape
 from simulation.body.plant import PlantParameters
 from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters, SimulatedPose
@@ -112,15 +112,15 @@ class Lockstep:
         self.tick_number += 1 + missed
         self.robot.advance(self.now_s)
         for failure in self.failures.update(self.now_s):
-            self.loop.news.tell(self.now_s, end_text(failure))
-        self.loop.tick(Beat(self.now_s, missed * PERIOD_S, self.tick_number, missed))
+            self.loop.events.report(self.now_s, end_text(failure))
+        self.loop.tick(Tick(self.now_s, missed * PERIOD_S, self.tick_number, missed))
 
     def fail(self, component: str, kind: str, for_s: float = USUAL_S) -> None:
         """From the next tick on. Raises RuntimeError where it is refused."""
         refused = "no failures were given" if self._sound else self.failures.refusal(component, kind, for_s)
         if refused:
             raise RuntimeError(refused)
-        self.loop.news.tell(self.now_s, begin_text(component, kind, for_s, "lockstep"))
+        self.loop.events.report(self.now_s, begin_text(component, kind, for_s, "lockstep"))
         self.failures.begin(component, kind, self.now_s, for_s)
 
     def run_for(self, duration_s: float) -> None:

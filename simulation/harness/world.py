@@ -32,7 +32,7 @@ from simulation.mud.stones import Stone
 from simulation.mud.track import LEVEL, UNIFORM, RandomStrength, Ridges, Track
 
 STRONGEST_PA = 50e3  # of a segment and of its layers: ten times the paper's stiffest mud
-SAME_PLACE_M = 1e-9
+SAME_POSITION_M = 1e-9
 
 FIXED_OF_ROBOT = frozenset({"geometry", "arm_mass", "disturbances", "fixed_base"})
 FIXED_OF_DRIVE = frozenset({"node_id", "sign", "zero_turn", "torque_constant_nm_a"})
@@ -146,7 +146,7 @@ def _border_problems(segments: list[dict[str, Any]]) -> Iterator[str]:
     expected_m, where = 0.0, "where the track begins"
     for place, segment in enumerate(segments, 1):
         start_m, end_m = _number(segment, "start_m"), _number(segment, "end_m")
-        if abs(start_m - expected_m) > SAME_PLACE_M:
+        if abs(start_m - expected_m) > SAME_POSITION_M:
             wrong = "overlap" if start_m < expected_m else "gap"
             yield f"segment {place}.start_m = {start_m:g}: must be {expected_m:g}, {where}, without {wrong}"
         if end_m <= start_m:
@@ -210,5 +210,5 @@ def _drive_problems(document: Mapping[str, Any]) -> Iterator[str]:
     for source, names in DRIVE_FIELDS.items():
         if _number(disturbances, source) > 0.0:
             for name in drives.keys() & set(names):
-                told = f"disturbances.{source} = {disturbances[source]}"
-                yield f"drives.{name} = {shown(drives[name])}: must not stand beside {told}"
+                reported = f"disturbances.{source} = {disturbances[source]}"
+                yield f"drives.{name} = {shown(drives[name])}: must not stand beside {reported}"

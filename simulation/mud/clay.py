@@ -82,13 +82,13 @@ class Clay(NamedTuple):
 
     def mean_strength_pa(self, from_m: float, to_m: float) -> float:
         """Between two depths."""
-        share = 1.0
+        fraction = 1.0
         for layer in self.layers:
             top_m = layer.top_m if layer.top_m > from_m else from_m
             bottom_m = layer.bottom_m if layer.bottom_m < to_m else to_m
             if bottom_m > top_m:
-                share += (layer.factor - 1.0) * (bottom_m - top_m) / (to_m - from_m)
-        return share * self.strength_pa
+                fraction += (layer.factor - 1.0) * (bottom_m - top_m) / (to_m - from_m)
+        return fraction * self.strength_pa
 
 
 def _lateral_n(strength_pa: float, depth_m: float, width_m: float) -> float:

@@ -30,10 +30,10 @@ from control.bounds import Bounds
 from control.geometry import FlipperGeometry
 
 STROKE_M = 0.005
-SAME_PLACE_M = 0.015
+SAME_POSITION_M = 0.015
 CLINGING_SPREAD = 0.4
 CLINGING_ABOVE_EDGE_M = 0.015
-REMOULDED_SHARE = 0.5  # of the strength that can be lost
+REMOULDED_FRACTION = 0.5  # of the strength that can be lost
 REMOULDING_RATE = 0.4  # per stroke
 
 
@@ -107,24 +107,24 @@ class StrokeHistory:
         self._in_mud = False
         self._entered_m = self._deepest_m = 0.0
 
-    def step(self, lowest_m: float, place_m: float) -> None:
+    def step(self, lowest_m: float, position_m: float) -> None:
         """`lowest_m`: depth of the plate's lowest point below the track's own surface; `place_m` along the track."""
         submerged_m = lowest_m - self.surface_m
         if submerged_m > 0.0:
             if not self._in_mud:
-                self._enter(place_m)
+                self._enter(position_m)
             self._deepest_m = max(self._deepest_m, submerged_m)
         elif self._in_mud:
             self._leave()
         elif lowest_m <= self._next_surface_m:  # the surface does not rise over a plate that has just left
             self.surface_m = self._next_surface_m
 
-    def _enter(self, place_m: float) -> None:
+    def _enter(self, position_m: float) -> None:
         self._in_mud = True
-        self._entered_m, self._deepest_m = place_m, 0.0
-        earlier = sum(abs(place_m - worked_m) <= SAME_PLACE_M for worked_m in self._worked_m)
-        lost_share = REMOULDED_SHARE * (1.0 - exp(-REMOULDING_RATE * earlier))
-        self.firmness = 1.0 - self.disturbances.remoulding * lost_share
+        self._entered_m, self._deepest_m = position_m, 0.0
+        earlier = sum(abs(position_m - worked_m) <= SAME_POSITION_M for worked_m in self._worked_m)
+        lost_fraction = REMOULDED_FRACTION * (1.0 - exp(-REMOULDING_RATE * earlier))
+        self.firmness = 1.0 - self.disturbances.remoulding * lost_fraction
 
     def _leave(self) -> None:
         self._in_mud = False

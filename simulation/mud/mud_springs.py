@@ -35,7 +35,7 @@ class Instant(NamedTuple):
 
     dt_s: float
     clay: Clay
-    grip: float
+    traction: float
     attitude: Attitude
     twist: Twist
 
@@ -45,15 +45,15 @@ class Instant(NamedTuple):
 # and the mud's strength there.
 Strip = tuple[float, float, float, float]
 
-Share = TypeVar("Share", float, complex)
+Fraction = TypeVar("Fraction", float, complex)
 
 
-def kept(share: Share, before_n: float, now_n: float) -> Share:
+def kept(fraction: Fraction, before_n: float, now_n: float) -> Fraction:
     """What is left of a strain when the yield force, and with it the stiffness, has changed.
 
     Mud that comes anew is not strained: the force stays. Mud that goes takes its force along: the strain stays.
     """
-    return share if now_n <= before_n else share * (before_n / now_n)
+    return fraction if now_n <= before_n else fraction * (before_n / now_n)
 
 
 def submerged_strips(submerged_m: float, strip_m: float, per_upward: float, clay: Clay) -> list[Strip]:
@@ -75,19 +75,19 @@ def submerged_strips(submerged_m: float, strip_m: float, per_upward: float, clay
     return strips
 
 
-class Springs(Generic[Share]):
+class Springs(Generic[Fraction]):
     """Owns how far the mud of some pieces is strained, as shares of the slow yield forces, and these forces."""
 
-    def __init__(self, unstrained: list[Share]) -> None:
-        self._unstrained: list[Share] = unstrained
+    def __init__(self, unstrained: list[Fraction]) -> None:
+        self._unstrained: list[Fraction] = unstrained
         self.reset()
 
     def reset(self) -> None:
-        self._shares: list[Share] = list(self._unstrained)
-        self._limits_n = [0.0] * len(self._shares)
+        self._fractions: list[Fraction] = list(self._unstrained)
+        self._limits_n = [0.0] * len(self._fractions)
 
     def fade(self, left: float) -> None:
-        self._shares = [share * left for share in self._shares]
+        self._fractions = [fraction * left for fraction in self._fractions]
 
 
 class PressedColumn(Springs[float]):
@@ -103,11 +103,11 @@ class PressedColumn(Springs[float]):
         self, instant: Instant, strips: list[Strip], breadth_m: float, speed_m_s: float, per_upward_s: float
     ) -> tuple[float, float]:
         """Force against a motion that grows by `per_upward_s` upward, and its moment."""
-        clay, grip, layered = instant.clay, instant.grip, bool(instant.clay.layers)
+        clay, traction, layered = instant.clay, instant.traction, bool(instant.clay.layers)
         rise_per_m = lateral_rise_per_m(clay.strength_pa, self.profile_width_m)
         pressed_n_m, per_yield = clay.strength_pa * breadth_m, instant.dt_s / self.yield_m
         moved, per_m = per_yield * speed_m_s, per_yield * per_upward_s
-        shares, limits_n = self._shares, self._limits_n
+        fractions, limits_n = self._fractions, self._limits_n
         force_n = moment_nm = 0.0
         for place, (above_edge_m, depth_m, covered_m, strength_pa) in enumerate(strips):
             if layered:
@@ -115,11 +115,13 @@ class PressedColumn(Springs[float]):
                 pressed_n_m = strength_pa * breadth_m
             factor = SURFACE_FACTOR + rise_per_m * depth_m
             limit_n = (factor if factor < DEEP_FACTOR else DEEP_FACTOR) * pressed_n_m * covered_m
-            share = kept(shares[place], limits_n[place], limit_n) - moved - per_m * above_edge_m
-            shares[place] = share = -grip if share < -grip else grip if share > grip else share
+            fraction = kept(fractions[place], limits_n[place], limit_n) - moved - per_m * above_edge_m
+            fractions[place] = fraction = (
+                -traction if fraction < -traction else traction if fraction > traction else fraction
+            )
             limits_n[place] = limit_n
-            force_n += share * limit_n
-            moment_nm += share * limit_n * above_edge_m
+            force_n += fraction * limit_n
+            moment_nm += fraction * limit_n * above_edge_m
         limits_n[len(strips) :] = [0.0] * (STRIPS - len(strips))
         return force_n, moment_nm
 
@@ -137,21 +139,21 @@ class RubbedColumn(Springs[complex]):
 
         `breadth_m`: of all surfaces that mud sticks to.
         """
-        clay, grip, layered = instant.clay, instant.grip, bool(instant.clay.layers)
+        clay, traction, layered = instant.clay, instant.traction, bool(instant.clay.layers)
         sticking_n_m, per_yield = ADHESION * clay.strength_pa * breadth_m, instant.dt_s / LENGTHWAYS_YIELD_M
         moved, per_m = per_yield * velocity_m_s, per_yield * per_upward_s
-        shares, limits_n = self._shares, self._limits_n
+        fractions, limits_n = self._fractions, self._limits_n
         force_n, moment_nm = 0j, 0.0
         for place, (above_edge_m, _, covered_m, strength_pa) in enumerate(strips):
             if layered:
                 sticking_n_m = ADHESION * strength_pa * breadth_m
             limit_n = sticking_n_m * covered_m
-            share = kept(shares[place], limits_n[place], limit_n) - moved - per_m * above_edge_m
-            stretch = abs(share)
-            shares[place] = share = share if stretch <= grip else share * (grip / stretch)
+            fraction = kept(fractions[place], limits_n[place], limit_n) - moved - per_m * above_edge_m
+            stretch = abs(fraction)
+            fractions[place] = fraction = fraction if stretch <= traction else fraction * (traction / stretch)
             limits_n[place] = limit_n
-            force_n += share * limit_n
-            moment_nm += share.real * limit_n * above_edge_m
+            force_n += fraction * limit_n
+            moment_nm += fraction.real * limit_n * above_edge_m
         limits_n[len(strips) :] = [0.0] * (STRIPS - len(strips))
         return force_n, moment_nm
 
@@ -163,19 +165,19 @@ class LowerEdge(Springs[float]):
         super().__init__([0.0, 0.0])
         self.thickness_m = thickness_m
 
-    def step(self, instant: Instant, places_m: tuple[float, float], wet_m: float) -> tuple[float, float]:
+    def step(self, instant: Instant, positions_m: tuple[float, float], wet_m: float) -> tuple[float, float]:
         """Force upward, and its moment outward."""
         clay, attitude, twist = instant.clay, instant.attitude, instant.twist
         force_n = moment_nm = 0.0
-        for half, outward_m in enumerate(places_m):
+        for half, outward_m in enumerate(positions_m):
             depth_m = attitude.depth_m + attitude.per_outward * outward_m
             suction = DEEP_FACTOR / BEARING_FACTOR * min(depth_m / SUCTION_FADE_M, 1.0)
             moved_m = instant.dt_s * (twist.upward_m_s + twist.upward_per_outward_s * outward_m)
             strength_pa = clay.strength_at_pa(depth_m) if clay.layers else clay.strength_pa
             limit_n = BEARING_FACTOR * strength_pa * self.thickness_m * wet_m / 2.0
-            share = kept(self._shares[half], self._limits_n[half], limit_n) - moved_m / LENGTHWAYS_YIELD_M
-            self._shares[half] = share = min(max(share, -suction * instant.grip), instant.grip)
+            fraction = kept(self._fractions[half], self._limits_n[half], limit_n) - moved_m / LENGTHWAYS_YIELD_M
+            self._fractions[half] = fraction = min(max(fraction, -suction * instant.traction), instant.traction)
             self._limits_n[half] = limit_n
-            force_n += share * limit_n
-            moment_nm += share * limit_n * outward_m
+            force_n += fraction * limit_n
+            moment_nm += fraction * limit_n * outward_m
         return force_n, moment_nm

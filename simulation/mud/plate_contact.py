@@ -89,12 +89,12 @@ class PlateContact:
         """The sum over all pieces."""
         half_m = self.size.width_m / 2.0
         wet_m, middle_m = wet_edge_m(instant.attitude, self.size.width_m)
-        places_m = (middle_m - GAUSS * wet_m, middle_m + GAUSS * wet_m)
-        inner = self._step_column(instant, self._inner, places_m[0], wet_m / 2.0)
-        outer = self._step_column(instant, self._outer, places_m[1], wet_m / 2.0)
+        positions_m = (middle_m - GAUSS * wet_m, middle_m + GAUSS * wet_m)
+        inner = self._step_column(instant, self._inner, positions_m[0], wet_m / 2.0)
+        outer = self._step_column(instant, self._outer, positions_m[1], wet_m / 2.0)
         inner_n, inner_nm = self._step_side(instant, self._inner_side, -half_m)
         outer_n, outer_nm = self._step_side(instant, self._outer_side, half_m)
-        edge_n, edge_nm = self._edge.step(instant, places_m, wet_m)
+        edge_n, edge_nm = self._edge.step(instant, positions_m, wet_m)
         n, r, s, n_u, n_s, r_s, s_u = [a + b for a, b in zip(inner, outer, strict=True)]
         return Wrench(n, r + inner_n + outer_n, s + edge_n, n_u, n_s, r_s + inner_nm + outer_nm, s_u + edge_nm)
 

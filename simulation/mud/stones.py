@@ -43,17 +43,17 @@ class Stone:
     end_m: Annotated[float, Bounds(0.0, 1000.0)]
     top_m: Annotated[float, Bounds(0.0, 1.0)]  # below the mud's nominal height
 
-    def holds(self, place_m: float, depth_m: float) -> bool:
-        return depth_m > self.top_m and self.start_m < place_m < self.end_m
+    def holds(self, position_m: float, depth_m: float) -> bool:
+        return depth_m > self.top_m and self.start_m < position_m < self.end_m
 
-    def behind_m(self, face: Face, place_m: float, depth_m: float) -> float:
+    def behind_m(self, face: Face, position_m: float, depth_m: float) -> float:
         """How far a point in the stone is behind one of its faces."""
         if face is Face.TOP:
             return depth_m - self.top_m
-        return place_m - self.start_m if face is Face.REAR else self.end_m - place_m
+        return position_m - self.start_m if face is Face.REAR else self.end_m - position_m
 
-    def nearest_face(self, place_m: float, depth_m: float) -> Face:
-        return min(Face, key=lambda face: self.behind_m(face, place_m, depth_m))
+    def nearest_face(self, position_m: float, depth_m: float) -> Face:
+        return min(Face, key=lambda face: self.behind_m(face, position_m, depth_m))
 
 
 class Push(NamedTuple):
@@ -94,23 +94,23 @@ class StoneContact:
         self._touched: tuple[Stone, Face] | None = None
         self._behind_m = 0.0
 
-    def step(self, dt_s: float, place_m: float, depth_m: float) -> Push:
+    def step(self, dt_s: float, position_m: float, depth_m: float) -> Push:
         """`place_m` along the track and `depth_m` below the nominal height, both of the edge."""
-        if self._touched is None or not self._touched[0].holds(place_m, depth_m):
-            self._look(place_m, depth_m)
+        if self._touched is None or not self._touched[0].holds(position_m, depth_m):
+            self._look(position_m, depth_m)
         if self._touched is None:
             return NO_PUSH
         stone, face = self._touched
-        before_m, self._behind_m = self._behind_m, stone.behind_m(face, place_m, depth_m)
+        before_m, self._behind_m = self._behind_m, stone.behind_m(face, position_m, depth_m)
         speed_m_s = (self._behind_m - before_m) / dt_s
         force_n = max(STIFFNESS_N_M * self._behind_m + DAMPING_N_S_M * speed_m_s, 0.0)
         if face is Face.TOP:
             return Push(0.0, force_n)
         return Push(-force_n if face is Face.REAR else force_n, 0.0)
 
-    def _look(self, place_m: float, depth_m: float) -> None:
+    def _look(self, position_m: float, depth_m: float) -> None:
         """Whether the edge is in a stone, and through which face it came."""
         self.reset()
         for stone in self.stones:
-            if stone.holds(place_m, depth_m):
-                self._touched = (stone, stone.nearest_face(place_m, depth_m))
+            if stone.holds(position_m, depth_m):
+                self._touched = (stone, stone.nearest_face(position_m, depth_m))

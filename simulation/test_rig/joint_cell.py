@@ -60,11 +60,11 @@ class JointCell:
 
     def move(self, to_depth_m: float, speed_m_s: float) -> ArcCurve:
         """Down or up, in whole steps of depth."""
-        from_m, way_m = self._depth_m, to_depth_m - self._depth_m
-        steps = max(1, round(abs(way_m) / STEP_M))
+        from_m, path_m = self._depth_m, to_depth_m - self._depth_m
+        steps = max(1, round(abs(path_m) / STEP_M))
         curve = ArcCurve([], [], [])
         for step in range(1, steps + 1):
-            self._depth_m = from_m + way_m * step / steps
+            self._depth_m = from_m + path_m * step / steps
             curve.moments_nm.append(self._turn(self._angle_at_rad(self._depth_m), speed_m_s))
             curve.moments_m4.append(self._leverage_m4())
             curve.depths_m.append(self._depth_m)
@@ -81,9 +81,9 @@ class JointCell:
     def _turn(self, angle_rad: float, speed_m_s: float) -> float:
         geometry, turn_rad = self._geometry, angle_rad - self._adduction_rad
         unit = twist_of(geometry, self._sweep_rad, 0.0, 1.0, 0.0)
-        way_m = abs(turn_rad) * hypot(unit.normal_m_s, unit.outward_m_s, unit.upward_m_s)
+        path_m = abs(turn_rad) * hypot(unit.normal_m_s, unit.outward_m_s, unit.upward_m_s)
         self._adduction_rad = angle_rad
-        return self._step(way_m / speed_m_s, turn_rad)
+        return self._step(path_m / speed_m_s, turn_rad)
 
     def _step(self, dt_s: float, turn_rad: float) -> float:
         geometry, sweep_rad = self._geometry, self._sweep_rad

@@ -70,9 +70,9 @@ class LoadCell:
 
     def lower(self, to_depth_m: float, speed_m_s: float) -> LoadCurve:
         """Or raise: straight to a depth, in whole steps."""
-        way_m = to_depth_m - self.depth_m
-        steps = max(1, ceil(abs(way_m) / (speed_m_s * STEP_S)))
-        return self._record(steps, -way_m / (steps * STEP_S))
+        path_m = to_depth_m - self.depth_m
+        steps = max(1, ceil(abs(path_m) / (speed_m_s * STEP_S)))
+        return self._record(steps, -path_m / (steps * STEP_S))
 
     def hold(self, hold_s: float) -> LoadCurve:
         return self._record(round(hold_s / STEP_S), 0.0)

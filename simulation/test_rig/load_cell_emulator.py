@@ -57,11 +57,11 @@ class EmulatedAmplifier(SerialTalker):
     def _line(self, force_n: float, at_s: float) -> bytes:
         amplifier = self.amplifier
         overloaded = abs(force_n) > amplifier.range_n
-        style, told = amplifier.style, max(min(force_n, 1e6), -1e6)
+        style, reported = amplifier.style, max(min(force_n, 1e6), -1e6)
         if style == "indicator":
-            return b"OL,GS,+-------kg\r\n" if overloaded else f"ST,GS,{told / 9.80665:+09.5f}kg\r\n".encode()
+            return b"OL,GS,+-------kg\r\n" if overloaded else f"ST,GS,{reported / 9.80665:+09.5f}kg\r\n".encode()
         if style == "newtons":
-            return b"OL\r\n" if overloaded else f"Load: {told:.4f} N\r\n".encode()
+            return b"OL\r\n" if overloaded else f"Load: {reported:.4f} N\r\n".encode()
         end = 2**23 - 1 if force_n * amplifier.counts_per_newton > 0.0 else -(2**23)
         counts = round(amplifier.zero_counts + amplifier.counts_per_newton * force_n)
         counts = end if overloaded else max(-(2**23), min(counts, 2**23 - 1))

@@ -34,7 +34,7 @@ class CarriedPlate(Protocol):
 class Drive(NamedTuple):
     """One straight motion of the stage; `way_m` forward or upward, `pause_s` after it."""
 
-    way_m: float
+    path_m: float
     speed_m_s: float
     pause_s: float = 0.0
     sideways: bool = False
@@ -77,8 +77,8 @@ class PlateStage:
 
     def insert(self, start_s: float, depth_m: float, speed_m_s: float, hold_s: float) -> None:
         """Down from above the mud, hold, and up again."""
-        way_m = LIFTED_M + depth_m
-        self._drive(start_s, [Drive(-way_m, speed_m_s, hold_s), Drive(way_m, speed_m_s)], self.parameters.hand)
+        path_m = LIFTED_M + depth_m
+        self._drive(start_s, [Drive(-path_m, speed_m_s, hold_s), Drive(path_m, speed_m_s)], self.parameters.hand)
 
     def lower(self, start_s: float, depth_m: float) -> None:
         self._drive(start_s, [Drive(self.plate.depth_m - depth_m, GUIDE_SPEED_M_S)])
@@ -86,8 +86,8 @@ class PlateStage:
     def lift(self, start_s: float) -> None:
         self._drive(start_s, [Drive(LIFTED_M + self.plate.depth_m, GUIDE_SPEED_M_S)])
 
-    def drag(self, start_s: float, way_m: float, speed_m_s: float) -> None:
-        self._drive(start_s, [Drive(-way_m, speed_m_s, sideways=True)], self.parameters.hand)
+    def drag(self, start_s: float, path_m: float, speed_m_s: float) -> None:
+        self._drive(start_s, [Drive(-path_m, speed_m_s, sideways=True)], self.parameters.hand)
 
     def _drive(self, start_s: float, drives: Sequence[Drive], hand: HandParameters | None = None) -> None:
         self._forget_drives()
@@ -99,17 +99,17 @@ class PlateStage:
 
     def _motion_of(self, drive: Drive, hand: HandParameters | None) -> Motion:
         if hand is not None:
-            return HandMotion(abs(drive.way_m), hand, self._random)
-        return RampedMotion(abs(drive.way_m), drive.speed_m_s, self.parameters.acceleration_m_s2)
+            return HandMotion(abs(drive.path_m), hand, self._random)
+        return RampedMotion(abs(drive.path_m), drive.speed_m_s, self.parameters.acceleration_m_s2)
 
     def _forget_drives(self) -> None:
-        self._travelled_m += sum(drive.way_m for _, drive, _ in self._drives)
+        self._travelled_m += sum(drive.path_m for _, drive, _ in self._drives)
         self._drives = []
 
     def travelled_m(self, at_s: float) -> float:
         """Of the stage along its rail, forward and upward: what an encoder on it counts. `at_s` may lie behind."""
         return self._travelled_m + sum(
-            _place_m(start_s, drive, motion, at_s) for start_s, drive, motion in self._drives
+            _position_m(start_s, drive, motion, at_s) for start_s, drive, motion in self._drives
         )
 
     @property
@@ -136,7 +136,7 @@ class PlateStage:
         forward_m = upward_m = 0.0
         if drive is not None:
             wanted = drive[1]
-            moved_m = _place_m(*drive, self._time_s) - _place_m(*drive, before_s)
+            moved_m = _position_m(*drive, self._time_s) - _position_m(*drive, before_s)
             forward_m, upward_m = (moved_m, 0.0) if wanted.sideways else (0.0, moved_m)
         forward_n, upward_n = self.plate.step(dt_s, forward_m / dt_s, upward_m / dt_s)
         self.force_n = self.hung_n + (forward_n if self.along_sideways else upward_n)
@@ -152,6 +152,6 @@ class PlateStage:
         return min((start_s for start_s, _, _ in self._drives if start_s > now_s), default=float("inf"))
 
 
-def _place_m(start_s: float, drive: Drive, motion: Motion, now_s: float) -> float:
-    way_m = motion.way_m(now_s - start_s)
-    return way_m if drive.way_m > 0.0 else -way_m
+def _position_m(start_s: float, drive: Drive, motion: Motion, now_s: float) -> float:
+    path_m = motion.path_m(now_s - start_s)
+    return path_m if drive.path_m > 0.0 else -path_m

@@ -26,10 +26,10 @@ class EmulatedStageEncoder(SerialTalker):
     """Owns which place is its zero. `place_m`, told a time, is where the stage is then."""
 
     def __init__(
-        self, place_m: Callable[[float], float], parameters: StageEncoderParameters, link: Path, seed: int = 1
+        self, position_m: Callable[[float], float], parameters: StageEncoderParameters, link: Path, seed: int = 1
     ) -> None:
         self.encoder = parameters
-        self.place_m = place_m
+        self.position_m = position_m
         self._zero_m: float | None = None
         super().__init__(self._count, parameters, link, Random(seed))
 
@@ -38,7 +38,7 @@ class EmulatedStageEncoder(SerialTalker):
         super().plug_in()
 
     def _count(self, at_s: float) -> bytes:
-        place_m = self.place_m(at_s)
+        position_m = self.position_m(at_s)
         if self._zero_m is None:
-            self._zero_m = place_m
-        return f"{self.encoder.label}{round((place_m - self._zero_m) / self.encoder.metres_per_count)}\r\n".encode()
+            self._zero_m = position_m
+        return f"{self.encoder.label}{round((position_m - self._zero_m) / self.encoder.metres_per_count)}\r\n".encode()

@@ -20,20 +20,20 @@ class Motion(Protocol):
 
     duration_s: float
 
-    def way_m(self, time_s: float) -> float:
+    def path_m(self, time_s: float) -> float:
         """Since the beginning; before it none, after the end all."""
 
 
 class RampedMotion:
     """Along a trapezoid of speed, or a triangle where the way is short."""
 
-    def __init__(self, way_m: float, speed_m_s: float, acceleration_m_s2: float) -> None:
-        self._end_m, self._acceleration_m_s2 = way_m, acceleration_m_s2
-        self._peak_m_s = min(speed_m_s, sqrt(way_m * acceleration_m_s2))
+    def __init__(self, path_m: float, speed_m_s: float, acceleration_m_s2: float) -> None:
+        self._end_m, self._acceleration_m_s2 = path_m, acceleration_m_s2
+        self._peak_m_s = min(speed_m_s, sqrt(path_m * acceleration_m_s2))
         self._ramp_s = self._peak_m_s / acceleration_m_s2
-        self.duration_s = way_m / self._peak_m_s + self._ramp_s if self._peak_m_s else 0.0
+        self.duration_s = path_m / self._peak_m_s + self._ramp_s if self._peak_m_s else 0.0
 
-    def way_m(self, time_s: float) -> float:
+    def path_m(self, time_s: float) -> float:
         if time_s <= 0.0:
             return 0.0
         left_s = max(0.0, self.duration_s - time_s)
@@ -51,7 +51,7 @@ class HandParameters:
     acceleration_m_s2: Annotated[float, Bounds(0.1, 50.0)] = 4.0
     shortest_m: Annotated[float, Bounds(0.001, 0.1)] = 0.002  # of one speed
     longest_m: Annotated[float, Bounds(0.001, 0.1)] = 0.01
-    rest_share: Annotated[float, Bounds(0.0, 1.0)] = 0.25  # of the changes of speed, a rest before the next
+    rest_fraction: Annotated[float, Bounds(0.0, 1.0)] = 0.25  # of the changes of speed, a rest before the next
     shortest_rest_s: Annotated[float, Bounds(0.0, 5.0)] = 0.05
     longest_rest_s: Annotated[float, Bounds(0.0, 5.0)] = 0.5
 
@@ -60,7 +60,7 @@ class _Knot(NamedTuple):
     """From a moment on, at a constant acceleration."""
 
     time_s: float
-    place_m: float
+    position_m: float
     speed_m_s: float
     acceleration_m_s2: float
 
@@ -68,16 +68,16 @@ class _Knot(NamedTuple):
 class HandMotion:
     """Uneven, and another one each time."""
 
-    def __init__(self, way_m: float, hand: HandParameters, random: Random) -> None:
-        self._end_m, self._hand = way_m, hand
+    def __init__(self, path_m: float, hand: HandParameters, random: Random) -> None:
+        self._end_m, self._hand = path_m, hand
         self._knots = [_Knot(0.0, 0.0, 0.0, 0.0)]
-        while self._place_m() < way_m - 1e-9:
+        while self._position_m() < path_m - 1e-9:
             self._push(random)
         self.duration_s = self._knots[-1].time_s
         self._times_s = [knot.time_s for knot in self._knots]
 
-    def _place_m(self) -> float:
-        return self._knots[-1].place_m
+    def _position_m(self) -> float:
+        return self._knots[-1].position_m
 
     def _push(self, random: Random) -> None:
         """To another speed and some way at it, or all that is left."""
@@ -85,41 +85,45 @@ class HandMotion:
         speed_m_s = random.uniform(hand.slowest_m_s, hand.fastest_m_s)
         at_it_m = random.uniform(hand.shortest_m, hand.longest_m)
         braking_m = hand.fastest_m_s**2 / (2.0 * hand.acceleration_m_s2)
-        if self._end_m - self._place_m() < at_it_m + 3.0 * braking_m:
+        if self._end_m - self._position_m() < at_it_m + 3.0 * braking_m:
             self._finish(speed_m_s)
             return
         self._change(speed_m_s)
         self._go_on(at_it_m)
-        if random.random() < hand.rest_share:
+        if random.random() < hand.rest_fraction:
             self._change(0.0)
             rest_s = random.uniform(hand.shortest_rest_s, hand.longest_rest_s)
             self._knots.append(self._knots[-1]._replace(time_s=self._knots[-1].time_s + rest_s))
 
     def _finish(self, speed_m_s: float) -> None:
         """At most as fast as still comes to a stand at the end."""
-        a, before_m_s, left_m = self._hand.acceleration_m_s2, self._knots[-1].speed_m_s, self._end_m - self._place_m()
+        a, before_m_s, left_m = (
+            self._hand.acceleration_m_s2,
+            self._knots[-1].speed_m_s,
+            self._end_m - self._position_m(),
+        )
         speed_m_s = min(speed_m_s, sqrt(a * left_m + before_m_s**2 / 2.0))
         self._change(speed_m_s)
-        self._go_on(max(0.0, self._end_m - self._place_m() - speed_m_s**2 / (2.0 * a)))
+        self._go_on(max(0.0, self._end_m - self._position_m() - speed_m_s**2 / (2.0 * a)))
         self._change(0.0)
-        self._knots[-1] = self._knots[-1]._replace(place_m=self._end_m)
+        self._knots[-1] = self._knots[-1]._replace(position_m=self._end_m)
 
     def _change(self, to_m_s: float) -> None:
-        time_s, place_m, speed_m_s, _ = self._knots[-1]
+        time_s, position_m, speed_m_s, _ = self._knots[-1]
         lasts_s = abs(to_m_s - speed_m_s) / self._hand.acceleration_m_s2
         if lasts_s:
-            self._knots[-1] = _Knot(time_s, place_m, speed_m_s, (to_m_s - speed_m_s) / lasts_s)
-            self._knots.append(_Knot(time_s + lasts_s, place_m + lasts_s * (speed_m_s + to_m_s) / 2.0, to_m_s, 0.0))
+            self._knots[-1] = _Knot(time_s, position_m, speed_m_s, (to_m_s - speed_m_s) / lasts_s)
+            self._knots.append(_Knot(time_s + lasts_s, position_m + lasts_s * (speed_m_s + to_m_s) / 2.0, to_m_s, 0.0))
 
-    def _go_on(self, way_m: float) -> None:
-        time_s, place_m, speed_m_s, _ = self._knots[-1]
-        self._knots.append(_Knot(time_s + way_m / speed_m_s, place_m + way_m, speed_m_s, 0.0))
+    def _go_on(self, path_m: float) -> None:
+        time_s, position_m, speed_m_s, _ = self._knots[-1]
+        self._knots.append(_Knot(time_s + path_m / speed_m_s, position_m + path_m, speed_m_s, 0.0))
 
-    def way_m(self, time_s: float) -> float:
+    def path_m(self, time_s: float) -> float:
         if time_s <= 0.0:
             return 0.0
         if time_s >= self.duration_s:
             return self._end_m
-        begin_s, place_m, speed_m_s, acceleration_m_s2 = self._knots[bisect_right(self._times_s, time_s) - 1]
+        begin_s, position_m, speed_m_s, acceleration_m_s2 = self._knots[bisect_right(self._times_s, time_s) - 1]
         since_s = time_s - begin_s
-        return place_m + since_s * (speed_m_s + acceleration_m_s2 * since_s / 2.0)
+        return position_m + since_s * (speed_m_s + acceleration_m_s2 * since_s / 2.0)

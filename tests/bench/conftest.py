@@ -25,10 +25,10 @@ from tests.bench.staged_bench import (
     SKIPPED,
     BenchReport,
     StagedBench,
-    UncapturedPerson,
+    UncapturedOperator,
+    reported_of_file,
     stage_name,
     stage_of,
-    told_of_file,
 )
 from tests.folders import EXAMPLE_CONFIGURATION
 
@@ -61,7 +61,7 @@ def opened(request: pytest.FixtureRequest) -> Iterator[Stand | str]:
         configuration = load_configuration(path)
         rig, attendant = open_rig(request.config, on_channels(configuration, options.can or []))
     except (ConfigurationError, BenchError) as problem:
-        yield told_of_file(path, problem.problems) if isinstance(problem, ConfigurationError) else str(problem)
+        yield reported_of_file(path, problem.problems) if isinstance(problem, ConfigurationError) else str(problem)
         return
     robot |= {"robot": configuration.robot.name, "warnings": list(rig.warnings)}
     stand = Stand(rig, attendant)
@@ -95,7 +95,7 @@ def attendant_at(config: pytest.Config) -> Attendant:
     if capture is not None:
         capture.resume()
     if somebody:
-        return AskedAttendant(UncapturedPerson(config), config.option.yes)
+        return AskedAttendant(UncapturedOperator(config), config.option.yes)
     if config.option.yes:
         return AbsentAttendant()
     raise BenchError("The robot will move, and nobody can be asked: run this on a terminal, or with --yes.")
@@ -148,24 +148,28 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     try:
         return (yield)
     except BenchError as problem:
-        told = str(problem)
-    pytest.fail(told, pytrace=False)  # out here pytest tells it once
+        reported = str(problem)
+    pytest.fail(reported, pytrace=False)  # out here pytest tells it once
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    told = yield
-    if told.when == "teardown" or not told.passed:
+    reported = yield
+    if reported.when == "teardown" or not reported.passed:
         report = report_of(item.config)
-        report.worsen(told.outcome, why_of(told))
-        if told.when == "teardown":
+        report.worsen(reported.outcome, why_of(reported))
+        if reported.when == "teardown":
             report.end()
-    return told
+    return reported
 
 
-def why_of(told: pytest.TestReport) -> str:
+def why_of(reported: pytest.TestReport) -> str:
     """Of one that was skipped, pytest has a place before its reason, which begins with a word of pytest's own."""
-    return told.longrepr[2].removeprefix("Skipped: ") if isinstance(told.longrepr, tuple) else told.longreprtext
+    return (
+        reported.longrepr[2].removeprefix("Skipped: ")
+        if isinstance(reported.longrepr, tuple)
+        else reported.longreprtext
+    )
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:

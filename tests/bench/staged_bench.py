@@ -10,7 +10,7 @@ from typing import Any, Concatenate, ParamSpec
 
 import pytest
 
-from command_line.experiments.terminal_prompt import AbsentPersonError, TerminalPerson
+from command_line.experiments.terminal_prompt import AbsentOperatorError, TerminalPrompt
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Stand
 from experiments.robot.bench_robot import BenchError
@@ -37,7 +37,7 @@ def stage_name(stage: int) -> str:
     return f"stage {stage}, {STAGES[stage - 1]}"
 
 
-def told_of_file(path: Path, problems: Iterable[str]) -> str:
+def reported_of_file(path: Path, problems: Iterable[str]) -> str:
     """Each behind the file's name, once."""
     named = f"{path}: "
     return "\n".join(named + problem.removeprefix(named) for problem in problems)
@@ -128,8 +128,8 @@ class BenchReport:
             yield from ((f"{test['test']}, before it was measured anew: {why}", True) for why in test["spoiled"])
         for number, name in enumerate(STAGES, 1):
             outcome = self.outcome_of(number)
-            told = self._reason(number) if outcome == SKIPPED else self._omissions(number)
-            yield f"stage {number}, {name}: {outcome}{told}", outcome == PASSED
+            reported = self._reason(number) if outcome == SKIPPED else self._omissions(number)
+            yield f"stage {number}, {name}: {outcome}{reported}", outcome == PASSED
 
     def _reason(self, stage: int) -> str:
         """What was told first; why a test failed stands above."""
@@ -158,8 +158,8 @@ class StagedBench:
         """
         for left in reversed(range(MOST_MEASURED)):
             readings = self._readings(measure(self.stand, *arguments, **named))
-            late = self.stand.lateness.sentence
-            wrong = [reading.sentence for reading in readings if not reading.good]
+            late = self.stand.lateness.message
+            wrong = [reading.message for reading in readings if not reading.good]
             if not (wrong and late and left):
                 break
             self.report.spoil(" ".join([*wrong, late]))
@@ -170,35 +170,35 @@ class StagedBench:
 
     def _readings(self, measured: Readings) -> list[Reading]:
         self.stand.lateness.reset()
-        told: list[Reading] = []
+        reported: list[Reading] = []
         try:
             for reading in measured:
-                told.append(reading)
+                reported.append(reading)
         except BenchError as problem:
-            for reading in told:
+            for reading in reported:
                 self.report.keep(reading)
-            raise BenchError(f"{problem} {self.stand.lateness.sentence}".rstrip()) from None
-        return told
+            raise BenchError(f"{problem} {self.stand.lateness.message}".rstrip()) from None
+        return reported
 
 
-class UncapturedPerson:
+class UncapturedOperator:
     """A person on the terminal, from whom pytest holds neither questions nor answers back."""
 
     def __init__(self, config: pytest.Config) -> None:
         self._capture = config.pluginmanager.getplugin("capturemanager")
-        self._person = TerminalPerson()
+        self._operator = TerminalPrompt()
 
     def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
         with self._on_terminal():
-            return self._person.ask(f"\n{question}", answers, meanwhile)
+            return self._operator.ask(f"\n{question}", answers, meanwhile)
 
     def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
         with self._on_terminal():
-            return self._person.ask_number(f"\n{question}", low, high, meanwhile)
+            return self._operator.ask_number(f"\n{question}", low, high, meanwhile)
 
-    def tell(self, sentence: str) -> None:
+    def report(self, message: str) -> None:
         with self._on_terminal():
-            self._person.tell(f"\n{sentence}")
+            self._operator.report(f"\n{message}")
 
     @contextmanager
     def _on_terminal(self) -> Iterator[None]:
@@ -208,7 +208,7 @@ class UncapturedPerson:
         self._capture.suspend(in_=True)
         try:
             yield
-        except AbsentPersonError as problem:
+        except AbsentOperatorError as problem:
             pytest.skip(str(problem))
         finally:
             self._capture.resume()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
-from command_line.experiments.terminal_prompt import TerminalPerson
+from command_line.experiments.terminal_prompt import TerminalPrompt
 from command_line.main import main
 
 FLIPPER = ["experiment", "flipper", "--simulated", "--mud", "49.5", "--trials", "1"]
@@ -122,7 +122,7 @@ def test_a_question_does_not_begin_in_the_middle_of_a_line(
     os.write(sink, b"\n")
     with open(source) as typed:
         monkeypatch.setattr(sys, "stdin", typed)
-        person = TerminalPerson(lambda: print("<room>", end="", file=sys.stderr))
-        person.ask("Ready?", {"": "yes"}, lambda: None)
+        operator = TerminalPrompt(lambda: print("<room>", end="", file=sys.stderr))
+        operator.ask("Ready?", {"": "yes"}, lambda: None)
     os.close(sink)
     assert capsys.readouterr().err.startswith("<room>Ready?")

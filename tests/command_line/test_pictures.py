@@ -155,10 +155,10 @@ def test_the_plot_shows_the_logs_own_numbers(two_walks: Path, figure: Figure) ->
 @pytest.mark.parametrize("name", ["k_p", "k_s", "k_e"])
 def test_bars_of_a_coefficient_are_two_standard_errors(two_walks: Path, figure: Figure, name: str) -> None:
     walk = read_walk(two_walks, 1)
-    told = [stride for stride in walk.strides if np.isfinite(stride[name])]
+    reported = [stride for stride in walk.strides if np.isfinite(stride[name])]
     containers: Sequence[Any] = panel(figure, f"${name}$").containers
-    assert len(told) == len(containers) > 1
-    for stride, container in zip(told, containers, strict=True):
+    assert len(reported) == len(containers) > 1
+    for stride, container in zip(reported, containers, strict=True):
         ((_, low), (_, high)) = container.lines[2][0].get_segments()[0]
         assert (high + low) / 2.0 == pytest.approx(stride[name] / 1e6)
         assert (high - low) / 4.0 == pytest.approx(stride[f"{name}_std_error"] / 1e6)
@@ -222,11 +222,11 @@ def test_muds_are_shaded_where_the_robot_said_so(two_walks: Path) -> None:
 
 def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(two_walks: Path) -> None:
     walk = read_walk(two_walks, 1)
-    place_m = np.linspace(0.0, 0.5, len(walk.time_s))
+    position_m = np.linspace(0.0, 0.5, len(walk.time_s))
     track = Track([(0.1, MUDS["48.5"]), (0.3, MUDS["53.1"]), (0.3, Clay("900 Pa", 900.0)), (0.3, MUDS["48.5"])])
-    regions = mud_regions(walk._replace(body_x_m=place_m), track)
+    regions = mud_regions(walk._replace(body_x_m=position_m), track)
     assert [name for *_, name in regions] == ["w = 48.5 %", "w = 53.1 %", "900 Pa"]  # the last was not reached
-    borders_s = np.interp([0.0, 0.1, 0.4, 0.5], place_m, walk.time_s)
+    borders_s = np.interp([0.0, 0.1, 0.4, 0.5], position_m, walk.time_s)
     np.testing.assert_allclose([start for start, *_ in regions], borders_s[:3], atol=0.003)  # one tick
     assert regions[-1][1] == walk.time_s[-1]
 
@@ -263,8 +263,8 @@ def test_a_walk_that_there_is_not_is_refused(command: str, log: Path, capsys: py
 def test_a_stride_that_there_is_not_is_refused_with_those_there_are(
     log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    sentence = refusal(capsys, "film", str(log), "--walk", "1", "--stride", "0", "--stride", "2")
-    assert "--stride 2: this walk has 0 to 1" in sentence
+    message = refusal(capsys, "film", str(log), "--walk", "1", "--stride", "0", "--stride", "2")
+    assert "--stride 2: this walk has 0 to 1" in message
 
 
 @pytest.mark.parametrize(("command", "name"), [("plot", "x.gif"), ("film", "x.mp4"), ("film", "x"), ("plot", "")])

@@ -83,9 +83,11 @@ def test_a_configuration_that_is_no_toml_is_refused_by_file_and_line(
     status = program([*others, "robot.toml"] if command == "mudskipperd" else [*arguments, "robot.toml"])
     assert status == (exit_codes.UNHEALTHY if command in ("check", "doctor") else exit_codes.CONFIGURATION)
     printed = capsys.readouterr()
-    told = " ".join((printed.out + printed.err).split())
-    assert "robot.toml: not a TOML file: Expected '=' after a key in a key/value pair (at line 2, column 11)" in told
-    assert "mend it there: " in told
+    reported = " ".join((printed.out + printed.err).split())
+    assert (
+        "robot.toml: not a TOML file: Expected '=' after a key in a key/value pair (at line 2, column 11)" in reported
+    )
+    assert "mend it there: " in reported
 
 
 def test_a_status_before_all_drives_are_heard_names_those_that_are_not() -> None:
@@ -107,9 +109,9 @@ def test_a_zero_has_no_sign(value: float | None, text: str) -> None:
     [(True, False, "1.235 ± 0.046"), (True, True, "≥ 1.235 ± 0.046"), (False, True, "(≥ 1.235 ± 0.046)")],
 )
 def test_an_estimate_is_told_with_its_doubt_and_what_is_wrong_with_it(valid: bool, at_least: bool, text: str) -> None:
-    told = {"value": 1.23456e6, "std_error": 4.56e4, "valid": valid, "at_least": at_least}
-    assert coefficient(told) == text
-    assert coefficient(told | {"value": None}) == "-"
+    reported = {"value": 1.23456e6, "std_error": 4.56e4, "valid": valid, "at_least": at_least}
+    assert coefficient(reported) == text
+    assert coefficient(reported | {"value": None}) == "-"
 
 
 @pytest.mark.parametrize(

@@ -10,38 +10,42 @@ import numpy as np
 from control.depth.depth_choice import AdaptationParameters
 from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
-from control.mud_estimate import Coefficient, FlipperBelief, MudBelief
+from control.mud_estimate import Coefficient, FlipperEstimate, MudEstimate
 from control.records import FLIPPERS, Estimate, StrideEstimate
 
 GEOMETRY, GAIT, PARAMETERS = FlipperGeometry(), GaitParameters(), AdaptationParameters()
 MOTOR_FORCE_N, LIFTING_NM = 6.25, 0.75
-NOT_TOLD = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
+NOT_REPORTED = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
 
 
-def told(
-    value: float, doubt: float = 0.0, depth_m: float = 0.03, exponent: float = 0.0, exponent_doubt: float = 0.0
+def reported(
+    value: float,
+    uncertainty: float = 0.0,
+    depth_m: float = 0.03,
+    exponent: float = 0.0,
+    exponent_uncertainty: float = 0.0,
 ) -> Coefficient:
     """By the paper's own law (one k at every depth), unless an exponent is given."""
-    return Coefficient(value, doubt, depth_m, exponent, exponent_doubt, 8)
+    return Coefficient(value, uncertainty, depth_m, exponent, exponent_uncertainty, 8)
 
 
 def bound(value: float, depth_m: float = 0.03) -> Coefficient:
-    return told(value, depth_m=depth_m)._replace(at_least=True)
+    return reported(value, depth_m=depth_m)._replace(at_least=True)
 
 
 def measured(value: float, at_least: bool = False) -> Estimate:
     return Estimate(value, 0.01 * value, 20, True, at_least=at_least)
 
 
-def believed(k_s: Coefficient | None, k_e: Coefficient | None = None, k_p: Coefficient | None = None) -> MudBelief:
+def believed(k_s: Coefficient | None, k_e: Coefficient | None = None, k_p: Coefficient | None = None) -> MudEstimate:
     """By both flippers alike."""
-    flipper = FlipperBelief(k_p, k_s, k_e)
-    return MudBelief(k_p, k_s, k_e, flipper, flipper)
+    flipper = FlipperEstimate(k_p, k_s, k_e)
+    return MudEstimate(k_p, k_s, k_e, flipper, flipper)
 
 
-def apart(left: FlipperBelief, right: FlipperBelief) -> MudBelief:
+def apart(left: FlipperEstimate, right: FlipperEstimate) -> MudEstimate:
     """Flippers in two muds."""
-    return MudBelief(left=left, right=right)
+    return MudEstimate(left=left, right=right)
 
 
 def stride(
@@ -49,10 +53,10 @@ def stride(
     depth_m: float = 0.03,
     released: bool = True,
     surface_m: float = 0.0,
-    k_s: Estimate = NOT_TOLD,
-    k_e: Estimate = NOT_TOLD,
+    k_s: Estimate = NOT_REPORTED,
+    k_e: Estimate = NOT_REPORTED,
     extraction_nm: float = nan,
-    k_p: Estimate = NOT_TOLD,
+    k_p: Estimate = NOT_REPORTED,
 ) -> StrideEstimate:
     return StrideEstimate(
         flipper=flipper,
@@ -106,5 +110,5 @@ def lift_m4(depth_m: float, surface_m: float = 0.0) -> float:
     rear_rad = -np.radians(GAIT.sweep_angle_deg)
     _, u, s, piece_m2 = plate_pieces(rear_rad, depth_m, surface_m)
     volume_m3 = GEOMETRY.plate_thickness_m * u.size * piece_m2
-    way_m = np.hypot(GEOMETRY.flipper_length_m + np.mean(u), GEOMETRY.drop_m - np.mean(s)) * np.cos(rear_rad)
-    return volume_m3 * float(way_m)
+    path_m = np.hypot(GEOMETRY.flipper_length_m + np.mean(u), GEOMETRY.drop_m - np.mean(s)) * np.cos(rear_rad)
+    return volume_m3 * float(path_m)

@@ -90,8 +90,8 @@ def test_the_torque_after_arming_is_a_ramp_from_nothing() -> None:
     whole = torques[-1]
     assert whole[1] > 0.01  # the arm's weight
     for tick, torque in enumerate(torques, start=1):
-        share = min(1.0, tick * TICK_S / 0.5)
-        assert torque == pytest.approx([share * each for each in whole], abs=1e-12)
+        fraction = min(1.0, tick * TICK_S / 0.5)
+        assert torque == pytest.approx([fraction * each for each in whole], abs=1e-12)
 
 
 def test_the_ramp_starts_again_after_every_arming() -> None:
@@ -294,8 +294,8 @@ def test_the_rest_of_a_joint_that_nobody_sees_is_not_waited_for() -> None:
 def test_a_joint_that_moves_once_more_is_waited_for_anew() -> None:
     controller = weightless()
     for tick in range(1, 220):
-        place_s = 1.0 if tick >= 100 else 0.0
-        controller.step(TICK_S, Mode.DAMPING, turning_at((0.1, 0.0, 0.0, 0.0), place_s))
+        position_s = 1.0 if tick >= 100 else 0.0
+        controller.step(TICK_S, Mode.DAMPING, turning_at((0.1, 0.0, 0.0, 0.0), position_s))
         assert not (controller.settled and tick < 100 + SETTLED_S / TICK_S)
     assert controller.settled
 

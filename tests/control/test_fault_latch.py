@@ -114,19 +114,19 @@ def test_a_fault_that_comes_and_goes_is_one_fault() -> None:
 
 def test_news_is_told_in_one_tick_only() -> None:
     latch = FaultLatch()
-    told = []
+    reported = []
     for tick in range(200):
         latch.update([LATE, HOT] if tick < 3 else [], False)
-        told.append((latch.begun, latch.over))
-    assert told[0] == ([LATE, HOT], [])
-    assert told[2 + A_WHILE] == ([], [LATE, HOT])
-    assert sum(len(begun) + len(over) for begun, over in told) == 4
+        reported.append((latch.begun, latch.over))
+    assert reported[0] == ([LATE, HOT], [])
+    assert reported[2 + A_WHILE] == ([], [LATE, HOT])
+    assert sum(len(begun) + len(over) for begun, over in reported) == 4
 
 
 def test_the_sentence_is_that_of_the_last_time_and_the_news_that_of_the_first() -> None:
     latch = FaultLatch()
     latch.update([LATE], False)
-    later = LATE._replace(sentence="No position came for 9 ms.")
+    later = LATE._replace(message="No position came for 9 ms.")
     latch.update([later], False)
     assert (latch.begun, latch.standing) == ([], [later])
 
@@ -191,7 +191,7 @@ class Oracle(RuleBasedStateMachine):
         self.now = 0
         self.last_seen: dict[Fault, int] = {}  # of those that stand
         self.met_torque: set[Fault] = set()
-        self.news: dict[Fault, int] = dict.fromkeys(ALL, 0)  # begun less over
+        self.events: dict[Fault, int] = dict.fromkeys(ALL, 0)  # begun less over
 
     @rule(
         present=st.lists(st.sampled_from(ALL), unique=True, max_size=4),
@@ -219,9 +219,9 @@ class Oracle(RuleBasedStateMachine):
         assert sorted(self.latch.begun) == sorted(begun)
         assert sorted(self.latch.over) == sorted(over)
         for fault in self.latch.begun:
-            self.news[fault] += 1
+            self.events[fault] += 1
         for fault in self.latch.over:
-            self.news[fault] -= 1
+            self.events[fault] -= 1
 
     def ends(self, fault: Fault, energised: bool, clearing: bool) -> bool:
         gone_for_a_while = self.now - self.last_seen[fault] > 50
@@ -240,7 +240,7 @@ class Oracle(RuleBasedStateMachine):
         assert set(self.latch.standing) == standing
         assert self.latch.reaction == max((fault.kind.reaction for fault in standing), default=Reaction.NONE)
         assert set(self.latch.blocking()) == {fault for fault in standing if fault.kind.blocks is not Blocks.NO}
-        assert self.news == {fault: int(fault in standing) for fault in ALL}
+        assert self.events == {fault: int(fault in standing) for fault in ALL}
 
 
 TestAgainstAModel = Oracle.TestCase

@@ -151,11 +151,11 @@ def test_deepest_and_reachable_agree_at_the_edge(geometry: FlipperGeometry, swee
 
 @given(geometries, st.floats(1.0, 60.0), st.floats(-1.0, 1.0))
 def test_the_deepest_depth_can_be_held_over_the_whole_sweep(
-    geometry: FlipperGeometry, sweep_deg: float, share: float
+    geometry: FlipperGeometry, sweep_deg: float, fraction: float
 ) -> None:
     deepest = geometry.deepest_m(sweep_deg)
     assume(geometry.is_reachable(radians(sweep_deg), deepest - 1e-9))
-    assert geometry.is_reachable(share * radians(sweep_deg), deepest - 1e-9)
+    assert geometry.is_reachable(fraction * radians(sweep_deg), deepest - 1e-9)
 
 
 def test_an_arm_shorter_than_the_least_lever_reaches_no_depth_below_its_axis() -> None:

@@ -78,9 +78,9 @@ def test_the_torque_limit_cuts_exactly_at_its_bound() -> None:
 
 @given(finite_limits, st.floats(allow_nan=False), st.floats(-1.0, 1.0), states, st.floats(0.0, 0.1))
 def test_limits_never_let_more_than_the_torque_limit_out(
-    limits: JointLimits, wanted: float, share: float, joint: DriveState, dt: float
+    limits: JointLimits, wanted: float, fraction: float, joint: DriveState, dt: float
 ) -> None:
-    torque = limited_torque_nm(wanted, share * limits.torque_nm, joint, limits, SPAN, dt)
+    torque = limited_torque_nm(wanted, fraction * limits.torque_nm, joint, limits, SPAN, dt)
     assert abs(torque) <= limits.torque_nm * (1.0 + ROUNDING)
 
 
@@ -98,9 +98,9 @@ def test_the_slew_rate_binds_exactly_one_step_from_the_previous_torque() -> None
 
 @given(finite_limits, st.floats(allow_nan=False), st.floats(-1.0, 1.0), states, st.floats(0.0, 0.1))
 def test_limits_never_exceed_the_slew_rate(
-    limits: JointLimits, wanted: float, share: float, joint: DriveState, dt: float
+    limits: JointLimits, wanted: float, fraction: float, joint: DriveState, dt: float
 ) -> None:
-    previous = share * limits.torque_nm
+    previous = fraction * limits.torque_nm
     torque = limited_torque_nm(wanted, previous, joint, limits, SPAN, dt)
     assert abs(torque - previous) <= limits.torque_rate_nm_s * dt * (1.0 + ROUNDING) + 1e-15 * limits.torque_nm
 
@@ -154,9 +154,9 @@ def test_each_joint_has_its_own_range() -> None:
 def test_torque_that_speeds_a_joint_up_fades_out_over_the_last_fifth_of_the_velocity_limit(side: float) -> None:
     fade_start = (1.0 - VELOCITY_FADE) * LIMITS.velocity_rad_s
     for velocity in np.linspace(0.0, 20.0, 4001):
-        share = np.interp(velocity, [fade_start, LIMITS.velocity_rad_s], [1.0, 0.0])
+        fraction = np.interp(velocity, [fade_start, LIMITS.velocity_rad_s], [1.0, 0.0])
         moving = state(velocity_rad_s=side * float(velocity))
-        assert settled_nm(side * 9.0, moving) == pytest.approx(side * 0.75 * share, abs=1e-12)
+        assert settled_nm(side * 9.0, moving) == pytest.approx(side * 0.75 * fraction, abs=1e-12)
         assert settled_nm(-side * 9.0, moving) == -side * 0.75
 
 
@@ -178,10 +178,10 @@ def test_the_velocity_fade_has_no_step_at_its_ends() -> None:
 
 def test_torque_derates_from_warm_to_nothing_when_hot() -> None:
     for temperature in np.linspace(0.0, 150.0, 3001):
-        share = np.interp(temperature, [70.0, 90.0], [1.0, 0.0])
+        fraction = np.interp(temperature, [70.0, 90.0], [1.0, 0.0])
         warm = state(temperature_c=float(temperature))
-        assert settled_nm(9.0, warm) == pytest.approx(0.75 * share, abs=1e-12)
-        assert settled_nm(-9.0, warm) == pytest.approx(-0.75 * share, abs=1e-12)
+        assert settled_nm(9.0, warm) == pytest.approx(0.75 * fraction, abs=1e-12)
+        assert settled_nm(-9.0, warm) == pytest.approx(-0.75 * fraction, abs=1e-12)
     assert settled_nm(9.0, state(temperature_c=90.0)) == 0.0
     assert settled_nm(9.0, state(temperature_c=nextafter(90.0, 0.0))) > 0.0
     assert settled_nm(9.0, state(temperature_c=70.0)) == 0.75
@@ -248,8 +248,8 @@ def test_limited_is_told_exactly_when_something_changed(
 
 
 @given(four_torques(st.floats(-0.75, 0.75)), four_torques(st.floats(-1.0, 1.0)))
-def test_a_torque_within_every_bound_passes_unchanged(wanted: Torques, shares: Torques) -> None:
-    a, b, c, d = (torque + 0.99 * share * SLEW_NM for torque, share in zip(wanted, shares, strict=True))
+def test_a_torque_within_every_bound_passes_unchanged(wanted: Torques, fractions: Torques) -> None:
+    a, b, c, d = (torque + 0.99 * fraction * SLEW_NM for torque, fraction in zip(wanted, fractions, strict=True))
     sent = apply_limits(wanted, (a, b, c, d), STILL, LIMITS, RANGES, TICK_S)
     assert sent == LimitedTorques(wanted, False, True)
 

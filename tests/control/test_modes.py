@@ -198,10 +198,10 @@ def test_a_request_is_refused_exactly_where_it_could_change_nothing() -> None:
 
 def test_a_refusal_tells_the_cause_where_there_is_one() -> None:
     blocked = WELL._replace(blocking=(OF_REACTION[Reaction.NONE], OF_REACTION[Reaction.WARN]))
-    sentence = refusal(Mode.IDLE, Request.ARM, blocked)
-    assert sentence == f"{OF_REACTION[Reaction.NONE].sentence} {OF_REACTION[Reaction.WARN].sentence}"
+    message = refusal(Mode.IDLE, Request.ARM, blocked)
+    assert message == f"{OF_REACTION[Reaction.NONE].message} {OF_REACTION[Reaction.WARN].message}"
     held = faulty(Reaction.HOLD)
-    assert refusal(Mode.HOLD, Request.WALK, held) == OF_REACTION[Reaction.HOLD].sentence
+    assert refusal(Mode.HOLD, Request.WALK, held) == OF_REACTION[Reaction.HOLD].message
 
 
 @pytest.mark.parametrize("mode", Mode)
@@ -212,6 +212,6 @@ def test_stop_and_disarm_are_never_refused(mode: Mode) -> None:
 
 
 def test_a_refusal_is_a_sentence_that_says_what_to_do() -> None:
-    sentences = {refusal(mode, Request.WALK, WELL) for mode in Mode} - {None}
-    assert len(sentences) == len(Mode) - 1
-    assert all(sentence and " " in sentence for sentence in sentences)
+    messages = {refusal(mode, Request.WALK, WELL) for mode in Mode} - {None}
+    assert len(messages) == len(Mode) - 1
+    assert all(message and " " in message for message in messages)

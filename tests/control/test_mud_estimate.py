@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 
 KNOWN = Coefficient(0.6e6, 0.03e6, 0.03, -0.5, 0.3, 8)
 depths = st.floats(0.005, 0.2)
@@ -65,9 +65,9 @@ def test_no_number_makes_it_raise(numbers: tuple[float, float, float, float, flo
 
 
 def test_a_belief_tells_the_flippers_apart() -> None:
-    belief = MudBelief(left=FlipperBelief(k_s=KNOWN), right=FlipperBelief(k_e=KNOWN))
-    assert belief.of("left") == FlipperBelief(None, KNOWN, None)
-    assert belief.of("right") == FlipperBelief(None, None, KNOWN)
+    mud_estimate = MudEstimate(left=FlipperEstimate(k_s=KNOWN), right=FlipperEstimate(k_e=KNOWN))
+    assert mud_estimate.of("left") == FlipperEstimate(None, KNOWN, None)
+    assert mud_estimate.of("right") == FlipperEstimate(None, None, KNOWN)
 
 
 def test_nothing_known_is_nothing_at_all() -> None:

@@ -17,7 +17,7 @@ from control.geometry import FlipperGeometry
 from control.plate import (
     DRY,
     SubmergedPlate,
-    crossing,
+    cross_coupling,
     stance_moment_m4,
     stroke_moment_m4,
     submerged_part,
@@ -46,13 +46,13 @@ class Pose(NamedTuple):
     geometry: FlipperGeometry
     sweep_rad: float
     adduction_rad: float
-    share: float
+    fraction: float
 
     @property
     def surface_m(self) -> float:
         g, lean = self.geometry, abs(cos(self.sweep_rad) * sin(self.adduction_rad))
         extent_m = g.plate_width_m * lean + g.plate_height_m * cos(self.adduction_rad)
-        return g.depth_m(self.sweep_rad, self.adduction_rad) - self.share * extent_m
+        return g.depth_m(self.sweep_rad, self.adduction_rad) - self.fraction * extent_m
 
     def plate(self) -> SubmergedPlate:
         return submerged_plate(self.geometry, self.sweep_rad, self.adduction_rad, self.surface_m)
@@ -148,8 +148,8 @@ def clipped(corners: Sequence[Point], height: Callable[[Point], Fraction]) -> li
     for before, here in zip([corners[-1], *corners[:-1]], corners, strict=True):
         a, b = height(before), height(here)
         if (a < 0) != (b < 0):
-            share = a / (a - b)
-            kept.append((before[0] + share * (here[0] - before[0]), before[1] + share * (here[1] - before[1])))
+            fraction = a / (a - b)
+            kept.append((before[0] + fraction * (here[0] - before[0]), before[1] + fraction * (here[1] - before[1])))
         if b >= 0:
             kept.append(here)
     return kept
@@ -275,7 +275,7 @@ def test_crossing_is_the_ratio_of_the_torques_of_the_triangles_pressure(pose: Po
     adduction = -sine * (g.drop_m * values[3] - values[5])
     sweep_error = g.flipper_length_m * error[3] + error[4]
     adduction_error = abs(sine) * (g.drop_m * error[3] + error[5])
-    ratio = crossing(g, plate, pose.sweep_rad)
+    ratio = cross_coupling(g, plate, pose.sweep_rad)
     if stance_moment_m4(g, plate) > 0.0:
         assert abs(ratio * sweep - adduction) <= abs(ratio) * sweep_error + adduction_error
     else:
@@ -352,11 +352,11 @@ def test_the_moments_grow_with_depth_as_the_wet_area_says(pose: Pose, deeper_m: 
 
 @given(geometries, sweeps, adductions, st.floats(-0.8, 1.5))
 def test_a_mirrored_sweep_has_the_same_moments_and_the_opposite_crossing(
-    geometry: FlipperGeometry, sweep: float, adduction: float, share: float
+    geometry: FlipperGeometry, sweep: float, adduction: float, fraction: float
 ) -> None:
-    front, back = (Pose(geometry, side * sweep, adduction, share) for side in (1.0, -1.0))
+    front, back = (Pose(geometry, side * sweep, adduction, fraction) for side in (1.0, -1.0))
     assert front.plate() == back.plate()
-    ratios = [crossing(geometry, pose.plate(), pose.sweep_rad) for pose in (front, back)]
+    ratios = [cross_coupling(geometry, pose.plate(), pose.sweep_rad) for pose in (front, back)]
     assert ratios[0] == -ratios[1]
 
 
@@ -374,4 +374,4 @@ def test_moments_scale_with_the_fourth_power_of_length(pose: Pose, times: float)
     assert stance_moment_m4(larger, large) == times**4 * stance_moment_m4(pose.geometry, small)
     stroke_m4 = stroke_moment_m4(pose.geometry, small, pose.sweep_rad)
     assert stroke_moment_m4(larger, large, pose.sweep_rad) == times**4 * stroke_m4
-    assert crossing(larger, large, pose.sweep_rad) == crossing(pose.geometry, small, pose.sweep_rad)
+    assert cross_coupling(larger, large, pose.sweep_rad) == cross_coupling(pose.geometry, small, pose.sweep_rad)

@@ -50,7 +50,7 @@ def port(kernel: socket.socket, request: pytest.FixtureRequest) -> Iterator[CanP
     opened.close()
 
 
-def tell(kernel: socket.socket, *frames: Frame) -> None:
+def report(kernel: socket.socket, *frames: Frame) -> None:
     for frame in frames:
         kernel.send(encode_frame(frame))
 
@@ -61,13 +61,13 @@ def ids(port: CanPort) -> list[int]:
 
 def test_error_frames_make_the_state_and_are_not_passed_on(port: CanPort, kernel: socket.socket) -> None:
     assert port.state is BusState.ACTIVE
-    tell(kernel, ENCODER, WARNING, ENCODER)
+    report(kernel, ENCODER, WARNING, ENCODER)
     assert ids(port) == [0x009, 0x009]
     assert (port.state, port.error_frames, port.last_error) == (BusState.WARNING, 1, "transmit warning")
-    tell(kernel, OFF)
+    report(kernel, OFF)
     assert ids(port) == []
     assert (port.state, port.error_frames, port.last_error) == (BusState.OFF, 2, "bus-off")
-    tell(kernel, RESTARTED)
+    report(kernel, RESTARTED)
     port.receive()
     assert (port.state, port.error_frames) == (BusState.ACTIVE, 3)
 
@@ -75,7 +75,7 @@ def test_error_frames_make_the_state_and_are_not_passed_on(port: CanPort, kernel
 def test_a_peer_s_frame_ends_bus_off_but_no_warning(port: CanPort, kernel: socket.socket) -> None:
     states = []
     for frames in ((WARNING, ENCODER), (ENCODER, OFF), (ENCODER,)):
-        tell(kernel, *frames)
+        report(kernel, *frames)
         port.receive()
         states.append(port.state)
     assert states == [BusState.WARNING, BusState.OFF, BusState.ACTIVE]
@@ -83,7 +83,7 @@ def test_a_peer_s_frame_ends_bus_off_but_no_warning(port: CanPort, kernel: socke
 
 def test_a_frame_of_a_process_beside_us_does_not_end_bus_off() -> None:
     class Local(can.BusABC):
-        told = [
+        reported = [
             can.Message(arbitration_id=0x040, is_error_frame=True, is_extended_id=False, data=bytes(8)),
             can.Message(arbitration_id=0x009, is_rx=False, is_extended_id=False),
         ]
@@ -92,7 +92,7 @@ def test_a_frame_of_a_process_beside_us_does_not_end_bus_off() -> None:
             super().__init__(channel="local")
 
         def recv(self, timeout: float | None = None) -> can.Message | None:
-            return self.told.pop(0) if self.told else None
+            return self.reported.pop(0) if self.reported else None
 
         def send(self, msg: can.Message, timeout: float | None = None) -> None: ...
 
@@ -174,7 +174,7 @@ def test_no_broadcast_manager_is_asked_for(kernel: socket.socket, monkeypatch: p
     monkeypatch.setattr(socketcan.SocketcanBus, "_send_periodic_internal", refuse)
     opened = open_port("socketcan", "can0", {})
     opened.send(ENCODER)
-    tell(kernel, ENCODER)
+    report(kernel, ENCODER)
     assert ids(opened) == [0x009]
     opened.close()
 

@@ -43,7 +43,7 @@ class Bench:
         wait_until(lambda: stepped(self.adapter).heard_lines == OPENING_LINES)
         self.settle()
 
-    def tell(self, *frames: Frame) -> None:
+    def report(self, *frames: Frame) -> None:
         for frame in frames:
             self.node.send(frame)
         self.adapter.step()
@@ -123,7 +123,7 @@ def test_python_can_opens_the_adapter_at_its_bit_rate(bench: Bench) -> None:
 
 
 def test_frames_pass_in_both_directions(bench: Bench) -> None:
-    bench.tell(*FRAMES)
+    bench.report(*FRAMES)
     assert bench.receive() == FRAMES
     for frame in FRAMES:
         bench.send(frame)
@@ -134,7 +134,7 @@ def test_frames_pass_in_both_directions(bench: Bench) -> None:
 def test_answers_between_frames_do_not_keep_any_of_them_back(bench: Bench) -> None:
     for _ in range(20):
         bench.send(FRAMES[0])
-        bench.tell(FRAMES[1])
+        bench.report(FRAMES[1])
     assert bench.receive() == [FRAMES[1]] * 20
 
 
@@ -179,7 +179,7 @@ def test_no_noise_on_the_line_raises(noise: bytes) -> None:
     bench.write(noise + b"\r")
     for _ in range(4):  # each ends after MOST_FAILURES_PER_READ
         bench.receive()
-    bench.tell(FRAMES[0])
+    bench.report(FRAMES[0])
     assert bench.receive() == [FRAMES[0]]
     bench.port.close()
     bench.adapter.unplug()

@@ -158,7 +158,7 @@ SPOILS = [
 ]
 
 
-def spoilt(stroke: Phase, spoil: Callable[[list[Row]], list[Row]]) -> list[Row]:
+def invalid(stroke: Phase, spoil: Callable[[list[Row]], list[Row]]) -> list[Row]:
     """A walk whose every stroke of one kind is spoilt."""
     rows, result, batch = walk(), list[Row](), list[Row]()
     for row in rows:
@@ -176,7 +176,7 @@ def spoilt(stroke: Phase, spoil: Callable[[list[Row]], list[Row]]) -> list[Row]:
 def test_a_spoilt_stroke_gives_no_number_for_a_value(
     stroke: Phase, spoil: Callable[[list[Row]], list[Row]], method: Method
 ) -> None:
-    strides = fed(new_estimator(method), spoilt(stroke, spoil))
+    strides = fed(new_estimator(method), invalid(stroke, spoil))
     assert len(strides) == STRIDES
     assert_honest(strides)
     for stride in strides:
@@ -186,7 +186,7 @@ def test_a_spoilt_stroke_gives_no_number_for_a_value(
 
 @pytest.mark.parametrize("stroke", COEFFICIENT)
 def test_a_stroke_that_is_left_out_closes_no_stride(stroke: Phase, method: Method) -> None:
-    assert fed(new_estimator(method), spoilt(stroke, lambda rows: [])) == []
+    assert fed(new_estimator(method), invalid(stroke, lambda rows: [])) == []
 
 
 @pytest.mark.parametrize("stroke", COEFFICIENT)
@@ -199,28 +199,28 @@ def test_a_stroke_that_runs_backward_gives_nothing_or_the_law_that_its_pairs_sti
         return [(row[0], *other[1:]) for row, other in zip(rows, rows[::-1], strict=True)]
 
     good = getattr(fed(new_estimator(method), walk())[0], COEFFICIENT[stroke]).value
-    strides = fed(new_estimator(method), spoilt(stroke, backward))
+    strides = fed(new_estimator(method), invalid(stroke, backward))
     assert_honest(strides)
     for stride in strides:
         estimate = getattr(stride, COEFFICIENT[stroke])
         assert not estimate.valid or estimate.at_least or estimate.value == pytest.approx(good, rel=0.25)
 
 
-def stuck(share: float) -> Callable[[list[Row]], list[Row]]:
+def stuck(fraction: float) -> Callable[[list[Row]], list[Row]]:
     """The sweep motor gives its 10 A all along, and the flipper stops after that share of the stance."""
 
     def spoil(rows: list[Row]) -> list[Row]:
-        stop = rows[int(share * len(rows))][2:4]
+        stop = rows[int(fraction * len(rows))][2:4]
         return [(*row[:2], *(row[2:4] if row[2] > stop[0] else stop), -10.0, 0.0) for row in rows]
 
     return spoil
 
 
 @pytest.mark.parametrize("share", [0.05, 0.1, 0.2])
-def test_a_motor_at_its_limit_that_never_moved_the_mud_gives_a_bound(share: float) -> None:
+def test_a_motor_at_its_limit_that_never_moved_the_mud_gives_a_bound(fraction: float) -> None:
     """The mud bore 10 A where the walk's yields at 9: it is at least so much stronger."""
     good = fed(new_estimator("default"), walk())[0].k_s.value
-    for stride in fed(new_estimator("default"), spoilt(Phase.STANCE, stuck(share))):
+    for stride in fed(new_estimator("default"), invalid(Phase.STANCE, stuck(fraction))):
         assert stride.k_s.reason
         assert not stride.k_s.valid or stride.k_s.at_least
         assert not stride.k_s.valid or stride.k_s.value == pytest.approx(good * 10.0 / 9.0, rel=0.25)
@@ -228,7 +228,7 @@ def test_a_motor_at_its_limit_that_never_moved_the_mud_gives_a_bound(share: floa
 
 def test_a_motor_at_its_limit_that_moved_the_mud_for_a_while_gives_what_the_mud_bore() -> None:
     good = fed(new_estimator("default"), walk())[0].k_s.value
-    for stride in fed(new_estimator("default"), spoilt(Phase.STANCE, stuck(0.6))):
+    for stride in fed(new_estimator("default"), invalid(Phase.STANCE, stuck(0.6))):
         assert stride.k_s.valid
         assert stride.k_s.value == pytest.approx(good * 10.0 / 9.0, rel=0.15)
 

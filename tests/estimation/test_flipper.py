@@ -21,7 +21,7 @@ from control.gait.recovery import OUT_M, is_in_mud, lowest_m
 from control.geometry import FlipperGeometry
 from control.joint_friction import JointFriction
 from control.joint_pd import ArmMass
-from control.plate import crossing, stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.plate import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import NO_LOAD, Estimate, GaitTarget, Phase, StrideEstimate
 from estimation.flipper import CLINGING_M, FlipperEstimator
 from estimation.force_map import smallest_force_n
@@ -45,7 +45,7 @@ class Mud(NamedTuple):
     k_s: float = 0.6e6
     k_e: float = 0.7e6
     surface_m: float = 0.0
-    face_share: float = 0.0  # of the stance's load that the face also bears in insertion and extraction
+    face_fraction: float = 0.0  # of the stance's load that the face also bears in insertion and extraction
     weight_n: float = 0.0  # clings to the flipper
     offset_nm: float = 0.0  # of the sweep motor
 
@@ -121,13 +121,13 @@ def mud_torques_nm(moment: Moment, mud: Mud) -> tuple[float, float]:
     plate = submerged_plate(GEOMETRY, moment.sweep_rad, moment.adduction_rad, mud.surface_m)
     stance_nm = mud.k_s * stance_moment_m4(GEOMETRY, plate)
     stroke_m4 = stroke_moment_m4(GEOMETRY, plate, moment.sweep_rad)
-    share, k = {
-        Phase.INSERTION: (mud.face_share, mud.k_p),
+    fraction, k = {
+        Phase.INSERTION: (mud.face_fraction, mud.k_p),
         Phase.STANCE: (1.0, 0.5 * mud.k_p),  # whatever holds a flipper up in stance: it must not matter
-        Phase.EXTRACTION: (-mud.face_share, -mud.k_e),
+        Phase.EXTRACTION: (-mud.face_fraction, -mud.k_e),
     }.get(moment.phase, (0.0, 0.0))
-    sweep_nm = share * stance_nm
-    return sweep_nm, k * stroke_m4 + crossing(GEOMETRY, plate, moment.sweep_rad) * sweep_nm
+    sweep_nm = fraction * stance_nm
+    return sweep_nm, k * stroke_m4 + cross_coupling(GEOMETRY, plate, moment.sweep_rad) * sweep_nm
 
 
 def clinging_torques_nm(moment: Moment, mud: Mud) -> tuple[float, float]:
@@ -185,7 +185,7 @@ def ratios(stride: StrideEstimate, mud: Mud) -> list[float]:
     return [each.value / truth for each, truth in zip(coefficients(stride), mud[:3], strict=True)]
 
 
-def doubts(stride: StrideEstimate) -> list[float]:
+def uncertainties(stride: StrideEstimate) -> list[float]:
     return [each.std_error / each.value for each in coefficients(stride)]
 
 
@@ -201,7 +201,7 @@ def test_where_the_surface_is_known_shear_and_extraction_are_found(
     """0.1 %: batches of 6 mm on a law that is not quite a line. 1 % for k_e: what bends in the insertion also leaves a
     level of up to 10 mN for the zero, and a tick of the quick extraction is 3 % of its ramp's sine.
     """
-    mud = MUD._replace(face_share=0.3)
+    mud = MUD._replace(face_fraction=0.3)
     stride = one(rows_of(motion(depth_m, gait), mud, drive), estimator(drive, KNOWN_M))
     assert stride.k_s.valid and stride.k_e.valid
     assert stride.k_s.value == pytest.approx(mud.k_s, rel=1e-3)
@@ -265,28 +265,28 @@ def test_gravity_inertia_and_friction_left_in_would_be_taken_for_mud() -> None:
 
 
 @pytest.mark.parametrize("face_share", [-0.3, 0.15, 0.3])
-def test_a_load_on_the_face_changes_nothing_but_the_surface_that_is_found(face_share: float) -> None:
+def test_a_load_on_the_face_changes_nothing_but_the_surface_that_is_found(face_fraction: float) -> None:
     """At -30 % to 30 % of the stance's load it would change k_p by up to 14 % and k_e by as much, were it not taken
     off; where the force begins to rise it blurs by a few tenths of a millimetre, which the doubt covers.
     """
     plain, faced = (
-        one(rows_of(motion(), MUD._replace(face_share=share)), estimator(surface_error_m=0.05))
-        for share in (0.0, face_share)
+        one(rows_of(motion(), MUD._replace(face_fraction=fraction)), estimator(surface_error_m=0.05))
+        for fraction in (0.0, face_fraction)
     )
     assert faced.k_p.value == pytest.approx(MUD.k_p, abs=2.0 * faced.k_p.std_error)
     late = [(each.surface_m / each.depth_m) for each in (plain, faced)]
-    corrected = [each.k_p.value * (1.0 - share) ** 1.5 for each, share in zip((plain, faced), late, strict=True)]
+    corrected = [each.k_p.value * (1.0 - fraction) ** 1.5 for each, fraction in zip((plain, faced), late, strict=True)]
     assert corrected[1] == pytest.approx(corrected[0], rel=0.01)  # the square of the surfaces' difference
 
 
 def test_a_load_on_the_face_adds_to_the_doubt() -> None:
     """By a quarter of what is taken off: 2.8 % beside the 3.2 % of the torque constant."""
     plain, faced = (
-        one(rows_of(motion(), MUD._replace(face_share=share)), estimator(surface_error_m=KNOWN_M))
-        for share in (0.0, 0.3)
+        one(rows_of(motion(), MUD._replace(face_fraction=fraction)), estimator(surface_error_m=KNOWN_M))
+        for fraction in (0.0, 0.3)
     )
-    assert doubts(plain)[2] < 0.035
-    assert doubts(faced)[2] > 0.04
+    assert uncertainties(plain)[2] < 0.035
+    assert uncertainties(faced)[2] > 0.04
 
 
 def test_at_five_centimetres_and_thirty_degrees_the_way_above_is_observed() -> None:
@@ -378,14 +378,14 @@ def test_messages_that_last_several_ticks_change_value_and_doubt_little(ticks: i
 @pytest.mark.parametrize("field", ["angle_rad", "current_a"])
 def test_samples_that_are_not_finite_are_skipped(joint: str, field: str, bad: float) -> None:
     rows = rows_of(motion(), MUD, HEAVY)
-    between = [each for row in rows for each in (row, _spoilt(row, joint, field, bad))]
+    between = [each for row in rows for each in (row, _invalid(row, joint, field, bad))]
     assert repr(one(between, estimator(HEAVY))) == repr(one(rows, estimator(HEAVY)))
-    assert estimator().update(*_spoilt(rows[0], joint, field, bad)) == (NO_LOAD, None)
+    assert estimator().update(*_invalid(rows[0], joint, field, bad)) == (NO_LOAD, None)
 
 
-def _spoilt(row: Row, joint: str, field: str, bad: float) -> Row:
-    spoilt = getattr(row, joint)._replace(**{field: bad})
-    return row._replace(sweep=spoilt) if joint == "sweep" else row._replace(adduction=spoilt)
+def _invalid(row: Row, joint: str, field: str, bad: float) -> Row:
+    invalid = getattr(row, joint)._replace(**{field: bad})
+    return row._replace(sweep=invalid) if joint == "sweep" else row._replace(adduction=invalid)
 
 
 @pytest.mark.parametrize("lost", [5, 20])
@@ -438,7 +438,7 @@ def drawn(seed: int) -> tuple[Mud, StrideEstimate]:
     constant, a quarter of what crosses over from a face that bears 20 %, current noise; and mud that clings.
     """
     random = np.random.default_rng(seed)
-    mud = Mud(surface_m=random.normal(0.0, 0.001), face_share=0.2, weight_n=random.uniform(0.3, 1.0))
+    mud = Mud(surface_m=random.normal(0.0, 0.001), face_fraction=0.2, weight_n=random.uniform(0.3, 1.0))
     constants = WEIGHTLESS[1:3] * (1.0 + random.normal(0.0, 0.032, 2))
     known = WEIGHTLESS._replace(sweep_constant_nm_a=constants[0], adduction_constant_nm_a=constants[1])
     return mud, one(noisy(rows_of(motion(), mud), seed), estimator(known))
@@ -448,9 +448,9 @@ def test_the_interval_of_95_percent_covers_the_truth_about_as_often_as_it_says()
     """Of 300 strides: k_p 98 %, k_s 94 %, k_e 93 %. A true 95 % would read 92.2 to 97.4 % in 49 of 50 such tests; 88
     and 99.5 % are where intervals would be half as wide or twice as wide as they should be.
     """
-    told = [drawn(seed) for seed in range(300)]
+    reported = [drawn(seed) for seed in range(300)]
     for place in range(3):
-        pairs = [(coefficients(stride)[place], mud[place]) for mud, stride in told]
+        pairs = [(coefficients(stride)[place], mud[place]) for mud, stride in reported]
         assert sum(each.valid for each, _ in pairs) >= 297
         hits = [abs(each.value - truth) <= 1.96 * each.std_error for each, truth in pairs if each.valid]
         assert 0.88 <= np.mean(hits) <= 0.995
@@ -460,17 +460,17 @@ def test_no_coefficient_is_biased_by_more_than_half_its_doubt() -> None:
     """The bent law makes 3 to 5 %, a whole doubt; the surface's nominal height, which is weighed against it, and the
     face, whose load rises with depth squared, take most of that back. Of 100 strides a mean errs by a tenth.
     """
-    told = [drawn(seed) for seed in range(100)]
+    reported = [drawn(seed) for seed in range(100)]
     scores = [
         [(each.value - truth) / each.std_error for each, truth in zip(coefficients(stride), mud[:3], strict=True)]
-        for mud, stride in told
+        for mud, stride in reported
     ]
     assert np.abs(np.mean(scores, axis=0)).max() < 0.5
 
 
 def test_more_noise_makes_more_doubt() -> None:
     rows = rows_of(motion())
-    little, some, much = (doubts(one(noisy(rows, 1, noise_a))) for noise_a in (0.05, 0.3, 1.0))
+    little, some, much = (uncertainties(one(noisy(rows, 1, noise_a))) for noise_a in (0.05, 0.3, 1.0))
     assert all(a < b for a, b in zip(little, some, strict=True))
     assert all(a < b for a, b in zip(some, much, strict=True))
 
@@ -518,16 +518,16 @@ def test_a_stance_that_sticks_below_the_limit_is_not_called_saturated() -> None:
     assert one(rows, estimator(WEIGHTLESS._replace(current_limit_a=50.0))).stance == "body"
 
 
-def carried(rows: Sequence[Row], share: float) -> list[Row]:
+def carried(rows: Sequence[Row], fraction: float) -> list[Row]:
     """The body advances by a share of what the flipper goes back in stance: the rest is slip."""
     front_m, lifted = LENGTH_M * sin(radians(30.0)), (Phase.SWING, Phase.INSERTION)
     ways_m = [0.0 if row.phase in lifted else front_m - LENGTH_M * sin(row.sweep.angle_rad) for row in rows]
-    return [row._replace(body_m=share * way_m) for row, way_m in zip(rows, ways_m, strict=True)]
+    return [row._replace(body_m=fraction * path_m) for row, path_m in zip(rows, ways_m, strict=True)]
 
 
 @pytest.mark.parametrize(("share", "case"), [(0.0, "yield"), (0.5, "mixed"), (0.97, "body")])
-def test_the_place_of_the_body_tells_what_gave_way(share: float, case: str) -> None:
-    stride = one(carried(rows_of(motion()), share), estimator(surface_error_m=KNOWN_M, base=Base.FREE))
+def test_the_place_of_the_body_tells_what_gave_way(fraction: float, case: str) -> None:
+    stride = one(carried(rows_of(motion()), fraction), estimator(surface_error_m=KNOWN_M, base=Base.FREE))
     assert stride.stance == case
     assert stride.k_s.at_least is (case == "body")
     assert stride.k_s.value == pytest.approx(MUD.k_s, rel=2e-3)  # these rows carry the mud's whole strength anyway
@@ -537,7 +537,7 @@ def test_without_a_pose_the_stance_is_unknown_and_the_shear_strength_a_bound() -
     lost = [row._replace(body_m=nan) for row in rows_of(motion(), MUD.times(3.0))]
     stride = one(lost, estimator(base=Base.FREE))
     assert stride.stance == "unknown" and stride.k_s.at_least
-    assert not isfinite(stride.step_m) and not isfinite(stride.place_m)
+    assert not isfinite(stride.step_m) and not isfinite(stride.position_m)
 
 
 def test_step_and_place_are_the_bodys() -> None:
@@ -549,7 +549,7 @@ def test_step_and_place_are_the_bodys() -> None:
     for before, after in pairwise(strides):
         assert after.step_m == pytest.approx(0.05 * (after.t_end_s - before.t_end_s))
     ended_s = [a.now_s for a, b in pairwise(rows) if a.phase is Phase.INSERTION is not b.phase]
-    assert [stride.place_m for stride in strides] == pytest.approx([7.0 + 0.05 * now_s for now_s in ended_s])
+    assert [stride.position_m for stride in strides] == pytest.approx([7.0 + 0.05 * now_s for now_s in ended_s])
 
 
 # loads

@@ -286,7 +286,7 @@ def loads_of_a_driven_arm(message_s: float, known: bool) -> list[float]:
     times_s = TICK_S * np.arange(401)
     speeds_rad_s = np.concatenate([[0.0], np.cumsum(TICK_S * (torques_nm + MUD_NM) / 0.0006)])
     angles_rad = np.concatenate([[0.0], np.cumsum(TICK_S * (speeds_rad_s[:-1] + speeds_rad_s[1:]) / 2.0)])
-    loads, told = JointLoads(GEOMETRY, drive), list[float]()
+    loads, reported = JointLoads(GEOMETRY, drive), list[float]()
     for tick in range(5, 400):
         now_s = float(times_s[tick])
         angle_s, current_s = (now_s - (now_s - shift_s) % message_s for shift_s in (0.0003, 0.0008))
@@ -301,8 +301,8 @@ def loads_of_a_driven_arm(message_s: float, known: bool) -> list[float]:
         )
         load = loads.update(JointSample(0.0, 0.0, 0.0, angle_s, current_s), sample)
         if load is not None and tick > 10:
-            told.append(load.adduction_nm)
-    return told
+            reported.append(load.adduction_nm)
+    return reported
 
 
 def test_a_load_is_found_beside_torques_that_are_held_from_tick_to_tick() -> None:

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudBelief
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
 from control.records import FLIPPERS, Estimate, StrideEstimate
 from estimation.knowledge import CHANGE, FLIPPER_SPREAD, PAIR_CHANGE, SHEAR_LAW, STROKE_LAW, MudKnowledge
 from estimation.strokes.depth_line import (
@@ -28,11 +28,11 @@ from estimation.strokes.depth_line import (
 from tests.control import made_up_muds
 
 K_P, K_S, K_E = 1.0e6, 0.6e6, 1.1e6
-TOLD = 0.03  # relative standard error of a stride in these tests, where there is any
-NOT_TOLD = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
+REPORTED = 0.03  # relative standard error of a stride in these tests, where there is any
+NOT_REPORTED = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
 
 
-def told(value: float, relative: float = 0.0) -> Estimate:
+def reported(value: float, relative: float = 0.0) -> Estimate:
     return Estimate(value, relative * value, 50, True)
 
 
@@ -41,29 +41,31 @@ def bound(value: float, relative: float = 0.0) -> Estimate:
 
 
 def stride(
-    k_p: Estimate = NOT_TOLD,
-    k_s: Estimate = NOT_TOLD,
-    k_e: Estimate = NOT_TOLD,
+    k_p: Estimate = NOT_REPORTED,
+    k_s: Estimate = NOT_REPORTED,
+    k_e: Estimate = NOT_REPORTED,
     depth_m: float = 0.03,
     flipper: str = "left",
 ) -> StrideEstimate:
     return made_up_muds.stride(flipper, depth_m, k_p=k_p, k_s=k_s, k_e=k_e)
 
 
-def after(*strides: StrideEstimate) -> MudBelief:
+def after(*strides: StrideEstimate) -> MudEstimate:
     return walked(MudKnowledge(), *strides)
 
 
-def walked(knowledge: MudKnowledge, *strides: StrideEstimate) -> MudBelief:
+def walked(knowledge: MudKnowledge, *strides: StrideEstimate) -> MudEstimate:
     """One stride at a time; the last belief."""
-    belief = knowledge.belief
+    mud_estimate = knowledge.mud_estimate
     for each in strides:
-        belief = knowledge.update([each])
-    return belief
+        mud_estimate = knowledge.update([each])
+    return mud_estimate
 
 
 def telling(estimates: dict[str, Estimate]) -> StrideEstimate:
-    return stride(estimates.get("k_p", NOT_TOLD), estimates.get("k_s", NOT_TOLD), estimates.get("k_e", NOT_TOLD))
+    return stride(
+        estimates.get("k_p", NOT_REPORTED), estimates.get("k_s", NOT_REPORTED), estimates.get("k_e", NOT_REPORTED)
+    )
 
 
 def found(coefficient: Coefficient | None) -> Coefficient:
@@ -120,31 +122,31 @@ class TestOneMud:
     @given(st.lists(st.tuples(st.floats(0.95, 1.05), st.floats(0.0, 0.3)), min_size=1, max_size=8))
     def test_strides_are_merged_by_their_precision(self, rows: list[tuple[float, float]]) -> None:
         for name in ("k_p", "k_s", "k_e"):
-            belief = after(*(telling({name: told(1e6 * value, relative)}) for value, relative in rows))
+            mud_estimate = after(*(telling({name: reported(1e6 * value, relative)}) for value, relative in rows))
             weights = [1.0 / (relative**2 + REPEATABILITY**2) for _, relative in rows]
             mean = float(np.average([log(value) for value, _ in rows], weights=weights))
-            merged = found(getattr(belief, name))
+            merged = found(getattr(mud_estimate, name))
             assert merged.value == pytest.approx(1e6 * exp(mean))
             assert merged.std_error / merged.value == pytest.approx(1.0 / sqrt(sum(weights)))
             assert merged.depth_m == pytest.approx(0.03)
-            assert (merged.strides, merged.at_least, belief.boundary) == (len(rows), False, False)
+            assert (merged.strides, merged.at_least, mud_estimate.boundary) == (len(rows), False, False)
 
     def test_one_stride_is_doubted_by_its_own_error_and_the_repeatability(self) -> None:
-        only = found(after(stride(k_s=told(K_S, 0.06))).k_s)
+        only = found(after(stride(k_s=reported(K_S, 0.06))).k_s)
         assert only.std_error / only.value == pytest.approx(0.10)
 
     def test_on_one_mud_the_doubt_narrows_to_eight_strides_worth_and_no_further(self) -> None:
         knowledge = MudKnowledge()
-        doubts = []
+        uncertainties = []
         for _ in range(100):
-            k_s = found(knowledge.update([stride(k_s=told(K_S))]).k_s)
-            doubts.append(k_s.std_error / k_s.value)
+            k_s = found(knowledge.update([stride(k_s=reported(K_S))]).k_s)
+            uncertainties.append(k_s.std_error / k_s.value)
         expected = [REPEATABILITY / sqrt(min(count, REMEMBERED_STRIDES)) for count in range(1, 101)]
-        assert doubts == pytest.approx(expected)
+        assert uncertainties == pytest.approx(expected)
 
     def test_a_stride_that_hardly_knows_does_not_push_out_those_that_do(self) -> None:
-        known = [stride(k_s=told(K_S))] * 20
-        before, later = found(after(*known).k_s), found(after(*known, stride(k_s=told(1.3 * K_S, 0.5))).k_s)
+        known = [stride(k_s=reported(K_S))] * 20
+        before, later = found(after(*known).k_s), found(after(*known, stride(k_s=reported(1.3 * K_S, 0.5))).k_s)
         assert later.value == pytest.approx(before.value, rel=0.01)
         assert later.std_error <= 1.07 * before.std_error
 
@@ -153,9 +155,9 @@ class TestOneMud:
         k_s, boundaries = K_S, 0
         for _ in range(60):
             k_s *= 0.99
-            boundaries += knowledge.update([stride(k_s=told(k_s))]).boundary
+            boundaries += knowledge.update([stride(k_s=reported(k_s))]).boundary
         assert boundaries == 0
-        assert found(knowledge.belief.k_s).value == pytest.approx(k_s, rel=0.09)
+        assert found(knowledge.mud_estimate.k_s).value == pytest.approx(k_s, rel=0.09)
 
     def test_the_doubt_covers_the_truth_about_95_times_in_a_hundred(self) -> None:
         covered = runs = 0
@@ -163,7 +165,7 @@ class TestOneMud:
             mud = Mud(seed)
             for _ in range(3):
                 mud.walk()
-            for flipper in (mud.knowledge.belief.left, mud.knowledge.belief.right):
+            for flipper in (mud.knowledge.mud_estimate.left, mud.knowledge.mud_estimate.right):
                 k_p = found(flipper.k_p)
                 covered += abs(log(k_p.value / K_P)) <= 2.0 * k_p.std_error / k_p.value
                 runs += 1
@@ -172,11 +174,11 @@ class TestOneMud:
     def test_reset_forgets_everything(self) -> None:
         knowledge = MudKnowledge()
         depths_m = [0.03, 0.05] * 6
-        walked(knowledge, *(stride(told(K_P), told(K_S), told(K_E), depth_m) for depth_m in depths_m))
+        walked(knowledge, *(stride(reported(K_P), reported(K_S), reported(K_E), depth_m) for depth_m in depths_m))
         knowledge.reset()
-        assert knowledge.belief == NOTHING_KNOWN
-        assert walked(knowledge, stride(k_s=told(1.0))) == NOTHING_KNOWN
-        assert walked(knowledge, stride(told(K_S))) == after(stride(told(K_S)))
+        assert knowledge.mud_estimate == NOTHING_KNOWN
+        assert walked(knowledge, stride(k_s=reported(1.0))) == NOTHING_KNOWN
+        assert walked(knowledge, stride(reported(K_S))) == after(stride(reported(K_S)))
 
 
 class Mud:
@@ -188,46 +190,46 @@ class Mud:
         self.exponent, self.depths_m = exponent, list(depths_m)
         self.scale_p = self.scale_s = 1.0
 
-    def walk(self) -> MudBelief:
+    def walk(self) -> MudEstimate:
         depth_m = float(self.random.choice(self.depths_m))
         return self.knowledge.update([self.stride(flipper, depth_m) for flipper in FLIPPERS])
 
     def stride(self, flipper: str, depth_m: float) -> StrideEstimate:
-        scatter = np.exp(sqrt(REPEATABILITY**2 + TOLD**2) * self.random.standard_normal(3)).tolist()
+        scatter = np.exp(sqrt(REPEATABILITY**2 + REPORTED**2) * self.random.standard_normal(3)).tolist()
         law = (depth_m / 0.03) ** self.exponent
         return stride(
-            told(K_P * self.scale_p * law * scatter[0], TOLD),
-            told(K_S * self.scale_s * law * scatter[1], TOLD),
-            told(K_E * self.scale_p * law * scatter[2], TOLD),
+            reported(K_P * self.scale_p * law * scatter[0], REPORTED),
+            reported(K_S * self.scale_s * law * scatter[1], REPORTED),
+            reported(K_E * self.scale_p * law * scatter[2], REPORTED),
             depth_m,
             flipper,
         )
 
 
 class Following(NamedTuple):
-    told: float  # share of the walks in which a boundary was told within two strides of it
+    reported: float  # share of the walks in which a boundary was told within two strides of it
     nearer: float  # share of the flippers that believed the new mud rather than the old after two strides
-    doubt: float  # median of their relative standard error
+    uncertainty: float  # median of their relative standard error
 
 
 def following(step_s: float, step_p: float, walks: int = 400, strides_before: int = 12) -> Following:
     """Of k_s behind a boundary."""
-    boundaries, errors, doubts = 0, [], []
+    boundaries, errors, uncertainties = 0, [], []
     for seed in range(walks):
         mud = Mud(seed)
         for _ in range(strides_before):
             mud.walk()
         mud.scale_s, mud.scale_p = step_s, step_p
         boundaries += any([mud.walk().boundary for _ in range(2)])
-        for flipper in (mud.knowledge.belief.left, mud.knowledge.belief.right):
+        for flipper in (mud.knowledge.mud_estimate.left, mud.knowledge.mud_estimate.right):
             k_s = found(flipper.k_s)
             errors.append(abs(log(k_s.value / (K_S * step_s))))
-            doubts.append(k_s.std_error / k_s.value)
+            uncertainties.append(k_s.std_error / k_s.value)
     nearer = np.mean(np.array(errors) < abs(log(step_s)) / 2.0)
-    return Following(boundaries / walks, float(nearer), float(np.median(doubts)))
+    return Following(boundaries / walks, float(nearer), float(np.median(uncertainties)))
 
 
-def told_on_uniform_mud(walks: int, strides: int, depths_m: Sequence[float]) -> float:
+def reported_on_uniform_mud(walks: int, strides: int, depths_m: Sequence[float]) -> float:
     """Share of the strides of the robot (of both flippers) that were called a boundary where there is none."""
     muds = [Mud(seed, depths_m=depths_m) for seed in range(walks)]
     return sum(mud.walk().boundary for mud in muds for _ in range(strides)) / (walks * strides)
@@ -239,58 +241,58 @@ class TestBoundaries:
     def test_on_uniform_mud_less_than_one_stride_in_twenty_is_called_a_boundary(
         self, walks: int, strides: int, depths_m: tuple[float, ...]
     ) -> None:
-        assert told_on_uniform_mud(walks, strides, depths_m) < 0.05
+        assert reported_on_uniform_mud(walks, strides, depths_m) < 0.05
 
     @pytest.mark.parametrize("step", [0.5, 0.6, 0.7, 1.43, 1.67, 2.0])
     def test_a_boundary_of_30_percent_and_more_is_followed_within_two_strides(self, step: float) -> None:
         both, only_k_s = following(step, step), following(step, 1.0)
-        assert both.told >= 0.995 and both.nearer >= 0.98
-        assert only_k_s.told >= 0.99 and only_k_s.nearer >= 0.97
-        assert both.doubt == pytest.approx(sqrt((REPEATABILITY**2 + TOLD**2) / 2.0), rel=0.01)
+        assert both.reported >= 0.995 and both.nearer >= 0.98
+        assert only_k_s.reported >= 0.99 and only_k_s.nearer >= 0.97
+        assert both.uncertainty == pytest.approx(sqrt((REPEATABILITY**2 + REPORTED**2) / 2.0), rel=0.01)
 
     @pytest.mark.parametrize("step", [0.8, 1.25])
     def test_a_boundary_of_20_percent_is_told_within_two_strides_and_mostly_followed(self, step: float) -> None:
         both, only_k_s = following(step, step), following(step, 1.0)
-        assert both.told >= 0.97 and both.nearer >= 0.78
-        assert only_k_s.told >= 0.9 and only_k_s.nearer >= 0.6
+        assert both.reported >= 0.97 and both.nearer >= 0.78
+        assert only_k_s.reported >= 0.9 and only_k_s.nearer >= 0.6
 
     @pytest.mark.parametrize("step", [0.5, 0.7, 0.8, 1.25, 1.43, 2.0])
     @pytest.mark.parametrize("name", ["k_p", "k_s"])
     def test_without_scatter_the_first_stride_of_another_mud_stands_alone_and_the_second_joins_it(
         self, name: str, step: float
     ) -> None:
-        old, new = telling({name: told(1e6)}), telling({name: told(1e6 * step)})
+        old, new = telling({name: reported(1e6)}), telling({name: reported(1e6 * step)})
         knowledge = MudKnowledge()
         assert not walked(knowledge, *[old] * 12).boundary
         for strides, boundary in ((1, True), (2, False), (3, False)):
-            belief = walked(knowledge, new)
-            k = getattr(belief, name)
+            mud_estimate = walked(knowledge, new)
+            k = getattr(mud_estimate, name)
             assert is_value(k, 1e6 * step)
-            assert (found(k).strides, belief.boundary) == (strides, boundary)
+            assert (found(k).strides, mud_estimate.boundary) == (strides, boundary)
 
     def test_a_change_is_told_from_2_6_standard_deviations_on(self) -> None:
-        known = [stride(k_s=told(K_S))] * 8
+        known = [stride(k_s=reported(K_S))] * 8
         deviation = sqrt(REPEATABILITY**2 + REPEATABILITY**2 / 8.0)
         for sign in (-1.0, 1.0):
-            assert after(*known, stride(k_s=told(K_S * exp(sign * (CHANGE + 0.01) * deviation)))).boundary
-            assert not after(*known, stride(k_s=told(K_S * exp(sign * (CHANGE - 0.01) * deviation)))).boundary
+            assert after(*known, stride(k_s=reported(K_S * exp(sign * (CHANGE + 0.01) * deviation)))).boundary
+            assert not after(*known, stride(k_s=reported(K_S * exp(sign * (CHANGE - 0.01) * deviation)))).boundary
 
     def test_two_strides_that_each_might_be_chance_are_none_together(self) -> None:
         deviation = sqrt(REPEATABILITY**2 / 2.0 + REPEATABILITY**2 / 8.0)
         for sign in (-1.0, 1.0):
             knowledge = MudKnowledge()
-            new = stride(k_s=told(K_S * exp(sign * (PAIR_CHANGE + 0.01) * deviation)))
-            assert not walked(knowledge, *[stride(k_s=told(K_S))] * 8, new).boundary
-            belief = walked(knowledge, new)
-            assert belief.boundary
-            assert found(belief.k_s).strides == 2
-            assert found(belief.k_s).value == pytest.approx(new.k_s.value)
+            new = stride(k_s=reported(K_S * exp(sign * (PAIR_CHANGE + 0.01) * deviation)))
+            assert not walked(knowledge, *[stride(k_s=reported(K_S))] * 8, new).boundary
+            mud_estimate = walked(knowledge, new)
+            assert mud_estimate.boundary
+            assert found(mud_estimate.k_s).strides == 2
+            assert found(mud_estimate.k_s).value == pytest.approx(new.k_s.value)
 
     def test_after_one_wild_stride_the_next_one_brings_the_memory_back(self) -> None:
-        known = [stride(told(K_P), told(K_S), told(K_E))] * 5
+        known = [stride(reported(K_P), reported(K_S), reported(K_E))] * 5
         for factor in (0.01, 0.5, 2.0, 50.0):
             knowledge = MudKnowledge()
-            wild = walked(knowledge, *known, stride(told(K_P), told(K_S * factor), told(K_E)))
+            wild = walked(knowledge, *known, stride(reported(K_P), reported(K_S * factor), reported(K_E)))
             assert wild.boundary
             assert found(wild.k_s).value == pytest.approx(K_S * factor)
             back = walked(knowledge, known[0])
@@ -298,110 +300,114 @@ class TestBoundaries:
 
     def test_an_alarm_that_the_next_stride_does_not_confirm_is_taken_back(self) -> None:
         knowledge = MudKnowledge()
-        known, odd, next_one = (stride(k_s=told(K_S * exp(off))) for off in (0.0, 0.225, 0.03))
+        known, odd, next_one = (stride(k_s=reported(K_S * exp(off))) for off in (0.0, 0.225, 0.03))
         assert walked(knowledge, *[known] * 8, odd).boundary
-        belief = walked(knowledge, next_one)
-        assert not belief.boundary
-        assert found(belief.k_s).strides == 10
-        assert found(belief.k_s).value == pytest.approx(K_S, rel=0.035)
+        mud_estimate = walked(knowledge, next_one)
+        assert not mud_estimate.boundary
+        assert found(mud_estimate.k_s).strides == 10
+        assert found(mud_estimate.k_s).value == pytest.approx(K_S, rel=0.035)
 
     def test_every_stride_in_another_mud_is_a_boundary_of_its_own(self) -> None:
         knowledge = MudKnowledge()
-        walked(knowledge, *[stride(k_s=told(K_S))] * 5)
+        walked(knowledge, *[stride(k_s=reported(K_S))] * 5)
         for k_s in (2e6, 0.2e6, 5e6):
-            belief = walked(knowledge, stride(k_s=told(k_s)))
-            assert belief.boundary
-            assert found(belief.k_s).value == pytest.approx(k_s)
+            mud_estimate = walked(knowledge, stride(k_s=reported(k_s)))
+            assert mud_estimate.boundary
+            assert found(mud_estimate.k_s).value == pytest.approx(k_s)
 
     @pytest.mark.parametrize(("changed", "also"), [("k_p", "k_s"), ("k_p", "k_e"), ("k_s", "k_p"), ("k_s", "k_e")])
     def test_what_tells_another_mud_makes_the_others_forget(self, changed: str, also: str) -> None:
-        known = {"k_p": told(K_P), "k_s": told(K_S), "k_e": told(K_E)}
-        new = known | {changed: told(2.0 * known[changed].value), also: told(1.05 * known[also].value)}
+        known = {"k_p": reported(K_P), "k_s": reported(K_S), "k_e": reported(K_E)}
+        new = known | {changed: reported(2.0 * known[changed].value), also: reported(1.05 * known[also].value)}
         knowledge = MudKnowledge()
         first = walked(knowledge, *[telling(known)] * 8, telling(new))
         assert (found(getattr(first, also)).strides, first.boundary) == (1, True)
         second = walked(knowledge, telling(new))
         assert found(getattr(second, also)).strides == 2
         assert found(getattr(second, also)).value == pytest.approx(1.05 * known[also].value)
-        silent = walked(MudKnowledge(), *[telling(known)] * 8, telling(new | {also: NOT_TOLD}))
+        silent = walked(MudKnowledge(), *[telling(known)] * 8, telling(new | {also: NOT_REPORTED}))
         assert getattr(silent, also) is None
 
     def test_suction_that_changes_alone_is_forgotten_alone(self) -> None:
-        known, sticky = (stride(told(K_P), told(K_S), told(k_e)) for k_e in (K_E, 2.0 * K_E))
+        known, sticky = (stride(reported(K_P), reported(K_S), reported(k_e)) for k_e in (K_E, 2.0 * K_E))
         knowledge = MudKnowledge()
-        belief = walked(knowledge, *[known] * 8, sticky, sticky)
-        assert not belief.boundary
-        assert (found(belief.k_p).strides, found(belief.k_s).strides, found(belief.k_e).strides) == (10, 10, 2)
-        assert found(belief.k_e).value == pytest.approx(2.0 * K_E)
+        mud_estimate = walked(knowledge, *[known] * 8, sticky, sticky)
+        assert not mud_estimate.boundary
+        assert (found(mud_estimate.k_p).strides, found(mud_estimate.k_s).strides, found(mud_estimate.k_e).strides) == (
+            10,
+            10,
+            2,
+        )
+        assert found(mud_estimate.k_e).value == pytest.approx(2.0 * K_E)
 
     def test_what_was_silent_in_two_new_muds_is_not_remembered_from_the_first(self) -> None:
         knowledge = MudKnowledge()
-        walked(knowledge, *[stride(told(K_P), told(K_S))] * 4)
+        walked(knowledge, *[stride(reported(K_P), reported(K_S))] * 4)
         for k_p in (3.0 * K_P, 0.3 * K_P, 3.0 * K_P):
-            belief = walked(knowledge, stride(told(k_p)))
-            assert belief.k_s is None
+            mud_estimate = walked(knowledge, stride(reported(k_p)))
+            assert mud_estimate.k_s is None
 
     def test_a_stride_that_tells_neither_k_p_nor_k_s_settles_no_alarm(self) -> None:
         knowledge = MudKnowledge()
-        alarmed = walked(knowledge, *[stride(told(K_P))] * 8, stride(told(2.0 * K_P)))
-        assert walked(knowledge, stride(k_e=told(K_E)), stride()).k_p == alarmed.k_p
-        assert found(walked(knowledge, stride(told(K_P))).k_p).strides == 9
+        alarmed = walked(knowledge, *[stride(reported(K_P))] * 8, stride(reported(2.0 * K_P)))
+        assert walked(knowledge, stride(k_e=reported(K_E)), stride()).k_p == alarmed.k_p
+        assert found(walked(knowledge, stride(reported(K_P))).k_p).strides == 9
 
     def test_an_alarm_is_not_taken_back_by_a_coefficient_that_did_not_raise_it(self) -> None:
-        known, changed = stride(told(K_P), told(K_S)), stride(told(2.0 * K_P), told(K_S))
-        belief = after(*[known] * 8, changed, stride(k_s=told(K_S)))
-        assert found(belief.k_p).value == pytest.approx(2.0 * K_P)
+        known, changed = stride(reported(K_P), reported(K_S)), stride(reported(2.0 * K_P), reported(K_S))
+        mud_estimate = after(*[known] * 8, changed, stride(k_s=reported(K_S)))
+        assert found(mud_estimate.k_p).value == pytest.approx(2.0 * K_P)
 
     def test_the_other_flipper_does_not_forget(self) -> None:
         knowledge = MudKnowledge()
         for _ in range(8):
-            knowledge.update([stride(told(K_P), flipper=flipper) for flipper in FLIPPERS])
-        belief = knowledge.update([stride(told(3.0 * K_P)), stride(told(K_P), flipper="right")])
-        assert belief.boundary
-        assert (found(belief.left.k_p).strides, found(belief.right.k_p).strides) == (1, 9)
+            knowledge.update([stride(reported(K_P), flipper=flipper) for flipper in FLIPPERS])
+        mud_estimate = knowledge.update([stride(reported(3.0 * K_P)), stride(reported(K_P), flipper="right")])
+        assert mud_estimate.boundary
+        assert (found(mud_estimate.left.k_p).strides, found(mud_estimate.right.k_p).strides) == (1, 9)
 
 
 class TestBothFlippers:
-    def believed(self, left: Estimate, right: Estimate, strides: int = 8, depth_m: float = 0.03) -> MudBelief:
+    def believed(self, left: Estimate, right: Estimate, strides: int = 8, depth_m: float = 0.03) -> MudEstimate:
         knowledge = MudKnowledge()
         for _ in range(strides):
             rows = [stride(left), stride(right, depth_m=depth_m, flipper="right")]
-            knowledge.update([row for row in rows if row.k_p is not NOT_TOLD])
-        return knowledge.belief
+            knowledge.update([row for row in rows if row.k_p is not NOT_REPORTED])
+        return knowledge.mud_estimate
 
     def test_where_they_agree_they_are_merged_by_precision(self) -> None:
-        belief = self.believed(told(K_P), told(1.02 * K_P, 0.1), strides=1)
+        mud_estimate = self.believed(reported(K_P), reported(1.02 * K_P, 0.1), strides=1)
         variances = np.array([REPEATABILITY**2, REPEATABILITY**2 + 0.1**2])
-        together = found(belief.k_p)
+        together = found(mud_estimate.k_p)
         assert together.value == pytest.approx(K_P * exp(np.average([0.0, log(1.02)], weights=1.0 / variances)))
         assert together.std_error / together.value == pytest.approx(sqrt(1.0 / np.sum(1.0 / variances)))
         assert together.strides == 2
 
     def test_a_difference_beyond_their_doubts_stays_in_the_doubt(self) -> None:
-        apart, alike = (found(self.believed(told(K_P), told(k)).k_p) for k in (1.18 * K_P, K_P))
+        apart, alike = (found(self.believed(reported(K_P), reported(k)).k_p) for k in (1.18 * K_P, K_P))
         assert apart.std_error / apart.value == pytest.approx(log(1.18) / 2.0, rel=0.01)
         assert alike.std_error / alike.value == pytest.approx(REPEATABILITY / 4.0)
 
     def test_in_two_muds_there_is_no_such_thing_as_the_mud(self) -> None:
         spread = CHANGE * sqrt(2.0 * REPEATABILITY**2 / 8.0 + 2.0 * FLIPPER_SPREAD**2)
-        near, far = (self.believed(told(K_P), told(K_P * exp(spread + off))) for off in (-0.001, 0.001))
+        near, far = (self.believed(reported(K_P), reported(K_P * exp(spread + off))) for off in (-0.001, 0.001))
         assert near.k_p is not None
         assert far.k_p is None
         assert found(far.left.k_p).value == pytest.approx(K_P)
         assert found(far.right.k_p).value == pytest.approx(K_P * exp(spread + 0.001))
 
     def test_one_that_knows_speaks_for_both(self) -> None:
-        assert self.believed(told(K_P), NOT_TOLD).k_p == after(*[stride(told(K_P))] * 8).left.k_p
-        assert found(self.believed(NOT_TOLD, told(K_P)).k_p).value == pytest.approx(K_P)
+        assert self.believed(reported(K_P), NOT_REPORTED).k_p == after(*[stride(reported(K_P))] * 8).left.k_p
+        assert found(self.believed(NOT_REPORTED, reported(K_P)).k_p).value == pytest.approx(K_P)
 
     def test_they_are_compared_at_one_depth(self) -> None:
-        deeper = told(K_P * (0.05 / 0.03) ** STROKE_LAW.exponent)
-        together = found(self.believed(told(K_P), deeper, depth_m=0.05).k_p)
+        deeper = reported(K_P * (0.05 / 0.03) ** STROKE_LAW.exponent)
+        together = found(self.believed(reported(K_P), deeper, depth_m=0.05).k_p)
         assert together.depth_m == pytest.approx(sqrt(0.03 * 0.05))
         assert together.at(0.03)[0] == pytest.approx(K_P)
 
     def test_the_depth_laws_doubt_does_not_shrink_by_being_told_twice(self) -> None:
-        together = found(self.believed(told(K_P), told(K_P)).k_p)
+        together = found(self.believed(reported(K_P), reported(K_P)).k_p)
         assert (together.exponent, together.exponent_std_error) == pytest.approx(STROKE_LAW)
 
     def test_of_two_bounds_the_lower_holds_for_both(self) -> None:
@@ -409,10 +415,13 @@ class TestBothFlippers:
         assert is_bound(self.believed(bound(2.0 * K_P), bound(K_P)).k_p, K_P)
 
     def test_a_value_stands_for_both_unless_the_others_bound_is_above_it(self) -> None:
-        for belief in (self.believed(told(K_P), bound(1.1 * K_P)), self.believed(bound(1.1 * K_P), told(K_P))):
-            assert is_value(belief.k_p, K_P)
-        assert self.believed(told(K_P), bound(2.0 * K_P)).k_p is None
-        assert self.believed(bound(2.0 * K_P), told(K_P)).k_p is None
+        for mud_estimate in (
+            self.believed(reported(K_P), bound(1.1 * K_P)),
+            self.believed(bound(1.1 * K_P), reported(K_P)),
+        ):
+            assert is_value(mud_estimate.k_p, K_P)
+        assert self.believed(reported(K_P), bound(2.0 * K_P)).k_p is None
+        assert self.believed(bound(2.0 * K_P), reported(K_P)).k_p is None
 
 
 class TestLowerBounds:
@@ -427,40 +436,40 @@ class TestLowerBounds:
         assert found(after(stride(k_s=bound(K_S)._replace(valid=False))).k_s).at_least
 
     def test_a_bound_does_not_change_a_remembered_value(self) -> None:
-        known = [stride(k_s=told(K_S))] * 4
+        known = [stride(k_s=reported(K_S))] * 4
         for factor in (0.1, 0.9, 1.1):
-            belief = after(*known, stride(k_s=bound(factor * K_S)))
-            assert belief.k_s == after(*known).k_s
-            assert not belief.boundary
+            mud_estimate = after(*known, stride(k_s=bound(factor * K_S)))
+            assert mud_estimate.k_s == after(*known).k_s
+            assert not mud_estimate.boundary
 
     def test_a_bound_well_above_the_remembered_value_tells_a_stronger_mud(self) -> None:
-        known = stride(told(K_P), told(K_S), told(K_E))
-        belief = after(*[known] * 8, stride(k_s=bound(1.5 * K_S)))
-        assert belief.boundary
-        assert is_bound(belief.k_s, 1.5 * K_S)
-        assert belief.k_p is None and belief.k_e is None
+        known = stride(reported(K_P), reported(K_S), reported(K_E))
+        mud_estimate = after(*[known] * 8, stride(k_s=bound(1.5 * K_S)))
+        assert mud_estimate.boundary
+        assert is_bound(mud_estimate.k_s, 1.5 * K_S)
+        assert mud_estimate.k_p is None and mud_estimate.k_e is None
 
     def test_a_stronger_mud_told_by_a_bound_is_kept_until_a_value_comes(self) -> None:
         knowledge = MudKnowledge()
-        walked(knowledge, *[stride(told(K_P), told(K_S))] * 8)
+        walked(knowledge, *[stride(reported(K_P), reported(K_S))] * 8)
         for _ in range(3):
-            belief = walked(knowledge, stride(told(K_P), bound(1.5 * K_S)))
-            assert is_bound(belief.k_s, 1.5 * K_S)
-        belief = walked(knowledge, stride(told(K_P), NOT_TOLD))
-        assert found(belief.k_s).value == pytest.approx(1.5 * K_S)
-        belief = walked(knowledge, stride(told(K_P), told(1.8 * K_S)))
-        assert is_value(belief.k_s, 1.8 * K_S)
+            mud_estimate = walked(knowledge, stride(reported(K_P), bound(1.5 * K_S)))
+            assert is_bound(mud_estimate.k_s, 1.5 * K_S)
+        mud_estimate = walked(knowledge, stride(reported(K_P), NOT_REPORTED))
+        assert found(mud_estimate.k_s).value == pytest.approx(1.5 * K_S)
+        mud_estimate = walked(knowledge, stride(reported(K_P), reported(1.8 * K_S)))
+        assert is_value(mud_estimate.k_s, 1.8 * K_S)
 
     def test_a_stronger_mud_told_by_a_bound_is_not_taken_back_by_silence(self) -> None:
-        known = stride(told(K_P), told(K_S))
-        belief = after(*[known] * 8, stride(told(K_P), bound(1.5 * K_S)), stride(told(K_P)))
-        assert is_bound(belief.k_s, 1.5 * K_S)
+        known = stride(reported(K_P), reported(K_S))
+        mud_estimate = after(*[known] * 8, stride(reported(K_P), bound(1.5 * K_S)), stride(reported(K_P)))
+        assert is_bound(mud_estimate.k_s, 1.5 * K_S)
 
     def test_a_wild_bound_is_taken_back_by_a_value_that_fits_the_memory(self) -> None:
-        known = [stride(k_s=told(K_S))] * 8
-        belief = after(*known, stride(k_s=bound(3.0 * K_S)), known[0])
-        assert is_value(belief.k_s, K_S)
-        assert found(belief.k_s).strides == 9
+        known = [stride(k_s=reported(K_S))] * 8
+        mud_estimate = after(*known, stride(k_s=bound(3.0 * K_S)), known[0])
+        assert is_value(mud_estimate.k_s, K_S)
+        assert found(mud_estimate.k_s).strides == 9
 
     def test_the_greatest_bound_that_a_second_stride_bears_out_is_kept(self) -> None:
         def kept(*factors: float) -> Coefficient | None:
@@ -480,36 +489,38 @@ class TestLowerBounds:
 
     def test_a_boundary_that_only_two_strides_tell_leaves_the_bound_of_the_last_one(self) -> None:
         deviation = sqrt(REPEATABILITY**2 / 2.0 + REPEATABILITY**2 / 8.0)
-        new_k_p = told(K_P * exp(-(PAIR_CHANGE + 0.01) * deviation))
+        new_k_p = reported(K_P * exp(-(PAIR_CHANGE + 0.01) * deviation))
         knowledge = MudKnowledge()
-        walked(knowledge, *[stride(told(K_P), bound(K_S))] * 8, stride(new_k_p, bound(0.6 * K_S)))
-        belief = walked(knowledge, stride(new_k_p))
-        assert belief.boundary
-        assert is_bound(belief.k_s, 0.6 * K_S)
-        valued = [stride(told(K_P), told(K_S))] * 8
+        walked(knowledge, *[stride(reported(K_P), bound(K_S))] * 8, stride(new_k_p, bound(0.6 * K_S)))
+        mud_estimate = walked(knowledge, stride(new_k_p))
+        assert mud_estimate.boundary
+        assert is_bound(mud_estimate.k_s, 0.6 * K_S)
+        valued = [stride(reported(K_P), reported(K_S))] * 8
         assert is_bound(after(*valued, stride(new_k_p, bound(0.6 * K_S)), stride(new_k_p)).k_s, 0.6 * K_S)
 
     def test_bounds_of_before_a_value_came_are_not_remembered_behind_it(self) -> None:
         deviation = sqrt(REPEATABILITY**2 / 2.0 + REPEATABILITY**2 / 8.0)
-        new_k_p = told(K_P * exp(-(PAIR_CHANGE + 0.01) * deviation))
-        known = [stride(told(K_P), bound(0.9 * K_S)), *[stride(told(K_P), told(K_S))] * 7]
+        new_k_p = reported(K_P * exp(-(PAIR_CHANGE + 0.01) * deviation))
+        known = [stride(reported(K_P), bound(0.9 * K_S)), *[stride(reported(K_P), reported(K_S))] * 7]
         assert after(*known, stride(new_k_p), stride(new_k_p)).k_s is None
 
     def test_a_bound_is_forgotten_where_k_p_tells_another_mud(self) -> None:
         knowledge = MudKnowledge()
-        walked(knowledge, *[stride(told(K_P), bound(K_S))] * 4)
-        assert walked(knowledge, stride(told(0.4 * K_P))).k_s is None
-        assert found(walked(knowledge, stride(told(0.4 * K_P), bound(0.3 * K_S))).k_s).value == pytest.approx(0.3 * K_S)
+        walked(knowledge, *[stride(reported(K_P), bound(K_S))] * 4)
+        assert walked(knowledge, stride(reported(0.4 * K_P))).k_s is None
+        assert found(walked(knowledge, stride(reported(0.4 * K_P), bound(0.3 * K_S))).k_s).value == pytest.approx(
+            0.3 * K_S
+        )
 
 
 class TestDepthLaw:
     def test_before_any_stride_in_another_depth_the_law_is_the_prior(self) -> None:
-        belief = after(*[stride(told(K_P), told(K_S), told(K_E))] * 10)
-        for k, law in ((belief.k_p, STROKE_LAW), (belief.k_s, SHEAR_LAW), (belief.k_e, STROKE_LAW)):
+        mud_estimate = after(*[stride(reported(K_P), reported(K_S), reported(K_E))] * 10)
+        for k, law in ((mud_estimate.k_p, STROKE_LAW), (mud_estimate.k_s, SHEAR_LAW), (mud_estimate.k_e, STROKE_LAW)):
             assert (found(k).exponent, found(k).exponent_std_error) == pytest.approx(law)
 
     def test_the_clay_models_third_is_within_what_the_prior_doubts(self) -> None:
-        k, std_error = found(after(*[stride(k_s=told(K_S))] * 8).k_s).at(0.05)
+        k, std_error = found(after(*[stride(k_s=reported(K_S))] * 8).k_s).at(0.05)
         assert abs(K_S * 2.0 / 3.0 - k) < 2.0 * std_error
 
     @pytest.mark.parametrize("exponent", [-0.8, -0.2])
@@ -519,7 +530,7 @@ class TestDepthLaw:
             mud = Mud(seed, exponent, depths_m=(0.025, 0.03, 0.05))
             for _ in range(40):
                 mud.walk()
-            learned.append(found(mud.knowledge.belief.right.k_s))
+            learned.append(found(mud.knowledge.mud_estimate.right.k_s))
         assert np.mean([k.exponent for k in learned]) == pytest.approx(exponent, abs=0.06)
         assert all(SURE_EXPONENT * 0.999 <= k.exponent_std_error < 0.13 for k in learned)
 
@@ -529,23 +540,23 @@ class TestDepthLaw:
             mud = Mud(seed, -0.8, depths_m=(0.025, 0.03, 0.035))
             for _ in range(10):
                 mud.walk()
-            k, std_error = found(mud.knowledge.belief.left.k_p).at(0.05)
+            k, std_error = found(mud.knowledge.mud_estimate.left.k_p).at(0.05)
             within += abs(K_P * (0.05 / 0.03) ** -0.8 - k) <= 2.0 * std_error
         assert within >= 0.93 * 200
 
     def test_another_depth_is_no_other_mud(self) -> None:
         for exponent in (-0.9, 0.0):
-            deeper = stride(told(K_P * (0.05 / 0.03) ** exponent), depth_m=0.05)
-            assert not after(*[stride(told(K_P))] * 8, deeper).boundary
+            deeper = stride(reported(K_P * (0.05 / 0.03) ** exponent), depth_m=0.05)
+            assert not after(*[stride(reported(K_P))] * 8, deeper).boundary
 
     def test_at_a_boundary_the_exponent_stays_with_at_least_half_its_first_doubt(self) -> None:
         mud = Mud(3, -0.9, depths_m=(0.02, 0.03, 0.06))
         for _ in range(40):
             mud.walk()
-        before = found(mud.knowledge.belief.left.k_s)
+        before = found(mud.knowledge.mud_estimate.left.k_s)
         mud.scale_s = mud.scale_p = 0.25
         mud.walk()
-        behind = found(mud.knowledge.belief.left.k_s)
+        behind = found(mud.knowledge.mud_estimate.left.k_s)
         assert behind.strides == 1
         assert behind.exponent == pytest.approx(before.exponent, abs=0.02)
         assert before.exponent_std_error < 0.13
@@ -571,7 +582,7 @@ NONSENSE = [
 ]
 numbers = st.floats() | st.floats(1e4, 1e8)
 anything = st.builds(Estimate, numbers, numbers, st.integers(), st.booleans(), st.just(""), st.booleans())
-sound = st.builds(told, st.floats(1e4, 1e8), st.floats(0.0, 0.6)) | st.just(NOT_TOLD)
+sound = st.builds(reported, st.floats(1e4, 1e8), st.floats(0.0, 0.6)) | st.just(NOT_REPORTED)
 estimates = anything | sound
 depths = st.floats() | st.floats(0.005, 0.06)
 any_stride = st.builds(stride, estimates, estimates, estimates, depths, st.sampled_from(["left", "right", "tail", ""]))
@@ -581,19 +592,19 @@ class TestBadInput:
     @pytest.mark.parametrize("nonsense", NONSENSE)
     @pytest.mark.parametrize("at_least", [False, True])
     def test_nonsense_that_is_called_valid_changes_nothing(self, nonsense: Estimate, at_least: bool) -> None:
-        known = [stride(told(K_P), told(K_S), told(K_E))] * 3
+        known = [stride(reported(K_P), reported(K_S), reported(K_E))] * 3
         odd = nonsense._replace(at_least=at_least)
         assert after(*known, stride(odd, odd, odd)) == after(*known)
         assert after(stride(odd, odd, odd)) == NOTHING_KNOWN
 
     @pytest.mark.parametrize("depth_m", [nan, inf, -inf, 0.0, -0.01, 1e-9, 0.004, 1e9])
     def test_a_depth_that_cannot_be_teaches_nothing(self, depth_m: float) -> None:
-        known = [stride(told(K_P), told(K_S), told(K_E))] * 3
-        assert after(*known, stride(told(K_P), told(K_S), bound(9 * K_E), depth_m)) == after(*known)
+        known = [stride(reported(K_P), reported(K_S), reported(K_E))] * 3
+        assert after(*known, stride(reported(K_P), reported(K_S), bound(9 * K_E), depth_m)) == after(*known)
 
     def test_an_estimate_that_is_not_valid_is_no_reading(self) -> None:
-        assert reading_of(told(K_P)._replace(valid=False), 0.03) is None
-        assert reading_of(told(K_P), 0.03) is not None
+        assert reading_of(reported(K_P)._replace(valid=False), 0.03) is None
+        assert reading_of(reported(K_P), 0.03) is not None
 
     @given(st.lists(st.lists(any_stride, max_size=3), max_size=12))
     def test_whatever_comes_every_belief_is_a_finite_positive_number_or_none(
@@ -601,8 +612,8 @@ class TestBadInput:
     ) -> None:
         knowledge = MudKnowledge()
         for strides in walk:
-            belief = knowledge.update(strides)
-            for k in (*belief[:3], *belief.left, *belief.right):
+            mud_estimate = knowledge.update(strides)
+            for k in (*mud_estimate[:3], *mud_estimate.left, *mud_estimate.right):
                 assert k is None or all(isfinite(number) for number in k)
                 assert k is None or (k.value > 0.0 and k.std_error > 0.0 and k.strides > 0)
 
@@ -610,17 +621,17 @@ class TestBadInput:
     def test_whatever_came_two_strides_in_a_mud_bring_its_coefficients(self, walk: list[StrideEstimate]) -> None:
         knowledge = MudKnowledge()
         walked(knowledge, *walk)
-        sure = [stride(told(K_P), told(K_S), told(K_E))] * 2
+        sure = [stride(reported(K_P), reported(K_S), reported(K_E))] * 2
         for k, truth in zip(walked(knowledge, *sure).left, (K_P, K_S, K_E), strict=True):
             assert abs(log(found(k).at(0.03)[0] / truth)) < 0.35
 
     def test_no_strides_and_flippers_that_do_not_exist_teach_nothing(self) -> None:
         knowledge = MudKnowledge()
-        before = walked(knowledge, stride(told(K_P)))
+        before = walked(knowledge, stride(reported(K_P)))
         assert knowledge.update([]) == before
-        assert knowledge.update([stride(told(9 * K_P), flipper="tail")]) == before
+        assert knowledge.update([stride(reported(9 * K_P), flipper="tail")]) == before
 
     def test_a_boundary_is_told_once(self) -> None:
         knowledge = MudKnowledge()
-        assert walked(knowledge, *[stride(told(K_P))] * 4, stride(told(4 * K_P))).boundary
+        assert walked(knowledge, *[stride(reported(K_P))] * 4, stride(reported(4 * K_P))).boundary
         assert not knowledge.update([]).boundary

@@ -76,9 +76,9 @@ def test_each_flipper_is_told_what_it_would_be_told_alone(method: Method) -> Non
     alone = {flipper: flipper_estimator(flipper, method) for flipper in FLIPPERS}
     for a, b in zip(left, right, strict=True):
         reading = update(mud, a, b)
-        told = [alone[flipper].update(*sample) for flipper, sample in (("left", a), ("right", b))]
-        assert repr(reading[:2]) == repr((told[0][0], told[1][0]))
-        assert repr(reading.strides) == repr(tuple(stride for _, stride in told if stride is not None))
+        reported = [alone[flipper].update(*sample) for flipper, sample in (("left", a), ("right", b))]
+        assert repr(reading[:2]) == repr((reported[0][0], reported[1][0]))
+        assert repr(reading.strides) == repr(tuple(stride for _, stride in reported if stride is not None))
 
 
 def test_both_strides_close_with_one_sample() -> None:
@@ -111,7 +111,7 @@ def test_each_joint_has_its_own_torque_constant(method: Method) -> None:
 def test_without_any_sample_nothing_is_said() -> None:
     reading = MudReading()
     assert (reading.left, reading.right, reading.strides) == (NO_LOAD, NO_LOAD, ())
-    assert estimator().belief == NOTHING_KNOWN
+    assert estimator().mud_estimate == NOTHING_KNOWN
 
 
 # the configured method
@@ -147,31 +147,35 @@ def test_the_default_gets_base_drag_and_surface_error(fixed_base: bool, base: Ba
 def test_belief_is_that_of_the_strides_so_far() -> None:
     mud = estimator()
     for a, b in zip(walk(1), walk(2), strict=True):
-        before, reading = mud.belief, update(mud, a, b)
+        before, reading = mud.mud_estimate, update(mud, a, b)
         if not reading.strides:
-            assert mud.belief is before
-    for flipper in (mud.belief.left, mud.belief.right):
+            assert mud.mud_estimate is before
+    for flipper in (mud.mud_estimate.left, mud.mud_estimate.right):
         assert flipper.k_p is not None and flipper.k_s is not None and flipper.k_e is not None
         assert flipper.k_p.strides == STRIDES
-    assert mud.belief.k_p is not None
-    assert mud.belief.k_p.value == pytest.approx(K_P, rel=0.1)  # 3 to 5 % by the surface, see test_flipper
+    assert mud.mud_estimate.k_p is not None
+    assert mud.mud_estimate.k_p.value == pytest.approx(K_P, rel=0.1)  # 3 to 5 % by the surface, see test_flipper
 
 
 def test_the_belief_of_both_is_between_those_of_each() -> None:
     mud = estimator()
     strides_of(mud, walk(1), walk(2))
-    assert mud.belief.k_p is not None and mud.belief.left.k_p is not None and mud.belief.right.k_p is not None
-    low, high = sorted((mud.belief.left.k_p.value, mud.belief.right.k_p.value))
-    assert low <= mud.belief.k_p.value <= high
-    assert mud.belief.k_p.std_error < mud.belief.left.k_p.std_error
+    assert (
+        mud.mud_estimate.k_p is not None
+        and mud.mud_estimate.left.k_p is not None
+        and mud.mud_estimate.right.k_p is not None
+    )
+    low, high = sorted((mud.mud_estimate.left.k_p.value, mud.mud_estimate.right.k_p.value))
+    assert low <= mud.mud_estimate.k_p.value <= high
+    assert mud.mud_estimate.k_p.std_error < mud.mud_estimate.left.k_p.std_error
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
 def test_the_papers_strides_are_remembered_like_ours(method: Method) -> None:
     mud = estimator(method)
     strides_of(mud, walk(1), walk(2))
-    assert mud.belief.left.k_p is not None
-    assert mud.belief.left.k_p.strides == STRIDES
+    assert mud.mud_estimate.left.k_p is not None
+    assert mud.mud_estimate.left.k_p.strides == STRIDES
 
 
 def test_the_map_holds_both_flippers_strides_at_the_bodys_place() -> None:
@@ -181,14 +185,14 @@ def test_the_map_holds_both_flippers_strides_at_the_bodys_place() -> None:
     rows = mud.map.rows()
     assert len(rows) == STRIDES
     closed_m = [0.1 * stride.t_end_s for stride in strides if stride.flipper == "left"]
-    assert [row.place_m for row in rows] == pytest.approx(closed_m, abs=PIECE_M / 2.0)
+    assert [row.position_m for row in rows] == pytest.approx(closed_m, abs=PIECE_M / 2.0)
     assert [row.k_p.strides for row in rows if row.k_p is not None] == [2] * STRIDES
 
 
 def test_without_a_pose_there_is_a_belief_and_no_map() -> None:
     mud = estimator()
     strides_of(mud, walk(1), walk(2), speed_m_s=nan)
-    assert mud.belief.k_p is not None
+    assert mud.mud_estimate.k_p is not None
     assert mud.map.rows() == ()
 
 
@@ -196,13 +200,13 @@ def test_without_a_pose_there_is_a_belief_and_no_map() -> None:
 def test_a_reset_forgets_strides_belief_and_map(method: Method) -> None:
     mud = estimator(method)
     first = strides_of(mud, walk(1), walk(2), speed_m_s=0.1)
-    belief, rows = mud.belief, mud.map.rows()
-    assert belief != NOTHING_KNOWN and rows
+    mud_estimate, rows = mud.mud_estimate, mud.map.rows()
+    assert mud_estimate != NOTHING_KNOWN and rows
     mud.reset()
-    assert mud.belief == NOTHING_KNOWN
+    assert mud.mud_estimate == NOTHING_KNOWN
     assert mud.map.rows() == ()
     assert repr(strides_of(mud, walk(1), walk(2), speed_m_s=0.1)) == repr(first)
-    assert (mud.belief, mud.map.rows()) == (belief, rows)
+    assert (mud.mud_estimate, mud.map.rows()) == (mud_estimate, rows)
 
 
 # ages: when a message was measured
@@ -227,7 +231,7 @@ def swayed(tick: int, age_s: float) -> tuple[float, float, float]:
     )
 
 
-def load_of_a_free_arm_nm(angle_ages_s: Ages, current_ages_s: Ages, told: bool) -> list[float]:
+def load_of_a_free_arm_nm(angle_ages_s: Ages, current_ages_s: Ages, reported: bool) -> list[float]:
     """Largest load of each joint, of arms that sway in the air: what moves them is all inertia, so there is none.
 
     `told`: whether the estimator knows the ages.
@@ -240,7 +244,7 @@ def load_of_a_free_arm_nm(angle_ages_s: Ages, current_ages_s: Ages, told: bool) 
         currents = [
             inertia * swayed(tick, age_s)[2] / 0.083 for inertia, age_s in zip(inertias, current_ages_s, strict=True)
         ]
-        ages = (angle_ages_s, current_ages_s) if told else (FRESH, FRESH)
+        ages = (angle_ages_s, current_ages_s) if reported else (FRESH, FRESH)
         reading = mud.update(now_s, Phase.REST, four(angles), four(speeds), four(currents), 0.0, *ages)
         loads = [getattr(load, name) for load in reading[:2] for name in ("sweep_torque_nm", "adduction_torque_nm")]
         if tick > 1:  # two samples tell an acceleration
@@ -260,17 +264,17 @@ BOTH_OLD: tuple[Ages, Ages] = ((0.0, 0.002, 0.001, 0.0005), (0.002, 0.0005, 0.0,
 
 @pytest.mark.parametrize("ages", [(FRESH, FRESH), ANGLES_OLD, CURRENTS_OLD, BOTH_OLD])
 def test_messages_of_any_age_tell_the_load_of_fresh_ones(ages: tuple[Ages, Ages]) -> None:
-    assert max(load_of_a_free_arm_nm(*ages, told=True)) < 1e-9 * LARGEST_NM
+    assert max(load_of_a_free_arm_nm(*ages, reported=True)) < 1e-9 * LARGEST_NM
 
 
 @pytest.mark.parametrize("ages", [ANGLES_OLD, BOTH_OLD])
 def test_ages_that_are_not_told_would_be_taken_for_mud(ages: tuple[Ages, Ages]) -> None:
     """A millisecond of 5 Hz is 3 % of the inertia."""
-    assert max(load_of_a_free_arm_nm(*ages, told=False)) > 0.03 * LARGEST_NM
+    assert max(load_of_a_free_arm_nm(*ages, reported=False)) > 0.03 * LARGEST_NM
 
 
 def test_a_current_that_is_younger_than_the_command_which_it_answers_needs_no_age() -> None:
-    assert max(load_of_a_free_arm_nm(*CURRENTS_OLD, told=False)) < 1e-9 * LARGEST_NM
+    assert max(load_of_a_free_arm_nm(*CURRENTS_OLD, reported=False)) < 1e-9 * LARGEST_NM
 
 
 def test_ages_change_nothing_where_nothing_moves() -> None:

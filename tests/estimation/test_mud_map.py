@@ -12,23 +12,23 @@ from estimation.mud_map import MOST_PIECES, PIECE_M, Mapped, MudMap
 from estimation.strokes.depth_line import REPEATABILITY
 from tests.control import made_up_muds
 
-NOT_TOLD = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
+NOT_REPORTED = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
 
 
-def told(value: float, relative: float = 0.0, at_least: bool = False) -> Estimate:
+def reported(value: float, relative: float = 0.0, at_least: bool = False) -> Estimate:
     return Estimate(value, relative * value, 50, True, "", at_least)
 
 
 def stride(
-    k_p: Estimate = NOT_TOLD, k_s: Estimate = NOT_TOLD, k_e: Estimate = NOT_TOLD, depth_m: float = 0.03
+    k_p: Estimate = NOT_REPORTED, k_s: Estimate = NOT_REPORTED, k_e: Estimate = NOT_REPORTED, depth_m: float = 0.03
 ) -> StrideEstimate:
     return made_up_muds.stride("left", depth_m, k_p=k_p, k_s=k_s, k_e=k_e)
 
 
-def mapped(*strides: StrideEstimate, place_m: float = 0.01) -> MudMap:
+def mapped(*strides: StrideEstimate, position_m: float = 0.01) -> MudMap:
     mud_map = MudMap()
     for each in strides:
-        mud_map.update(place_m, [each])
+        mud_map.update(position_m, [each])
     return mud_map
 
 
@@ -41,7 +41,7 @@ def only(mud_map: MudMap) -> Mapped:
 
 @given(st.lists(st.tuples(st.floats(0.9, 1.1), st.floats(0.1, 0.5), st.floats(0.02, 0.05)), min_size=1, max_size=30))
 def test_a_piece_holds_the_weighted_mean_of_its_strides(rows: list[tuple[float, float, float]]) -> None:
-    piece = only(mapped(*(stride(k_s=told(1e6 * value, relative), depth_m=z) for value, relative, z in rows)))
+    piece = only(mapped(*(stride(k_s=reported(1e6 * value, relative), depth_m=z) for value, relative, z in rows)))
     weights = np.array([1.0 / (relative**2 + REPEATABILITY**2) for _, relative, _ in rows])
     assert piece.value == pytest.approx(1e6 * exp(np.average([log(value) for value, _, _ in rows], weights=weights)))
     assert piece.depth_m == pytest.approx(exp(np.average([log(z) for _, _, z in rows], weights=weights)))
@@ -51,14 +51,14 @@ def test_a_piece_holds_the_weighted_mean_of_its_strides(rows: list[tuple[float, 
 
 def test_strides_that_differ_by_more_than_their_doubts_widen_it_by_their_scatter() -> None:
     factors = [0.5, 0.6, 1.5, 1.9]
-    piece = only(mapped(*(stride(k_s=told(1e6 * factor)) for factor in factors)))
+    piece = only(mapped(*(stride(k_s=reported(1e6 * factor)) for factor in factors)))
     scatter = float(np.std(np.log(factors), ddof=1)) / sqrt(len(factors))
     assert piece.std_error / piece.value == pytest.approx(scatter)
     assert scatter > 3.0 * REPEATABILITY / 2.0
 
 
 def test_every_coefficient_has_its_own_place_in_the_row() -> None:
-    (row,) = mapped(stride(told(1e6), NOT_TOLD, told(2e6))).rows()
+    (row,) = mapped(stride(reported(1e6), NOT_REPORTED, reported(2e6))).rows()
     assert row.k_s is None
     assert row.k_p is not None and row.k_p.value == pytest.approx(1e6)
     assert row.k_e is not None and row.k_e.value == pytest.approx(2e6)
@@ -66,59 +66,59 @@ def test_every_coefficient_has_its_own_place_in_the_row() -> None:
 
 def test_both_flippers_of_a_stride_count() -> None:
     mud_map = MudMap()
-    mud_map.update(0.01, [stride(k_s=told(1e6)), stride(k_s=told(1.1e6))])
+    mud_map.update(0.01, [stride(k_s=reported(1e6)), stride(k_s=reported(1.1e6))])
     assert only(mud_map).strides == 2
 
 
 def test_pieces_are_five_centimetres_long_and_told_in_the_order_of_places() -> None:
     mud_map = MudMap()
-    for place_m in (0.12, -0.01, 0.04, 0.06, 0.001, 0.0999):
-        mud_map.update(place_m, [stride(k_s=told(1e6))])
+    for position_m in (0.12, -0.01, 0.04, 0.06, 0.001, 0.0999):
+        mud_map.update(position_m, [stride(k_s=reported(1e6))])
     rows = mud_map.rows()
-    assert [row.place_m for row in rows] == pytest.approx([-0.025, 0.025, 0.075, 0.125])
+    assert [row.position_m for row in rows] == pytest.approx([-0.025, 0.025, 0.075, 0.125])
     assert [row.k_s.strides for row in rows if row.k_s] == [1, 2, 2, 1]
 
 
 def test_a_boundary_of_muds_stands_where_it_was_walked_over() -> None:
     mud_map = MudMap()
     for step in range(40):
-        place_m = 0.04 + 0.05 * step
-        mud_map.update(place_m, [stride(k_s=told(1e6 if place_m < 1.0 else 0.2e6))])
-    values = {round(row.place_m, 3): row.k_s.value for row in mud_map.rows() if row.k_s}
+        position_m = 0.04 + 0.05 * step
+        mud_map.update(position_m, [stride(k_s=reported(1e6 if position_m < 1.0 else 0.2e6))])
+    values = {round(row.position_m, 3): row.k_s.value for row in mud_map.rows() if row.k_s}
     assert values[0.975] == pytest.approx(1e6)
     assert values[1.025] == pytest.approx(0.2e6)
 
 
 @pytest.mark.parametrize("place_m", [nan, inf, -inf, 1.7e308])
-def test_a_stride_without_a_place_is_on_no_map(place_m: float) -> None:
-    assert mapped(stride(k_s=told(1e6)), place_m=place_m).rows() == ()
+def test_a_stride_without_a_place_is_on_no_map(position_m: float) -> None:
+    assert mapped(stride(k_s=reported(1e6)), position_m=position_m).rows() == ()
 
 
 @pytest.mark.parametrize(
     "odd",
     [
         stride(),
-        stride(k_s=told(nan)),
-        stride(k_s=told(-1.0)),
-        stride(k_s=told(inf)),
+        stride(k_s=reported(nan)),
+        stride(k_s=reported(-1.0)),
+        stride(k_s=reported(inf)),
         stride(k_s=Estimate(1e6, nan, 9, True)),
-        stride(k_s=told(1e6), depth_m=nan),
-        stride(k_s=told(1e6)._replace(valid=False)),
+        stride(k_s=reported(1e6), depth_m=nan),
+        stride(k_s=reported(1e6)._replace(valid=False)),
     ],
 )
 def test_a_stride_that_tells_nothing_leaves_no_trace(odd: StrideEstimate) -> None:
     assert mapped(odd).rows() == ()
-    known = stride(k_s=told(1e6))
+    known = stride(k_s=reported(1e6))
     assert mapped(known, odd).rows() == mapped(known).rows()
 
 
 def test_a_bound_stands_only_until_a_value_comes() -> None:
-    low, high = stride(k_s=told(1e6, at_least=True)), stride(k_s=told(1.5e6, at_least=True))
+    low, high = stride(k_s=reported(1e6, at_least=True)), stride(k_s=reported(1.5e6, at_least=True))
     for strides in ((low, high), (high, low)):
         piece = only(mapped(*strides))
         assert piece.at_least
         assert piece.value == pytest.approx(1.5e6)
-    value = stride(k_s=told(1.2e6))
+    value = stride(k_s=reported(1.2e6))
     for order in ((low, high, value), (low, value, high), (value, low, high)):
         piece = only(mapped(*order))
         assert (piece.strides, piece.at_least) == (1, False)
@@ -128,16 +128,16 @@ def test_a_bound_stands_only_until_a_value_comes() -> None:
 def test_a_long_walk_gives_up_the_pieces_that_were_walked_on_longest_ago() -> None:
     mud_map = MudMap()
     for number in range(MOST_PIECES):
-        mud_map.update((number + 0.5) * PIECE_M, [stride(k_s=told(1e6))])
-    mud_map.update(0.5 * PIECE_M, [stride(k_s=told(1e6))])  # back at the first one
+        mud_map.update((number + 0.5) * PIECE_M, [stride(k_s=reported(1e6))])
+    mud_map.update(0.5 * PIECE_M, [stride(k_s=reported(1e6))])  # back at the first one
     for number in range(MOST_PIECES, MOST_PIECES + 3):
-        mud_map.update((number + 0.5) * PIECE_M, [stride(k_s=told(1e6))])
-    places = [round(row.place_m / PIECE_M - 0.5) for row in mud_map.rows()]
+        mud_map.update((number + 0.5) * PIECE_M, [stride(k_s=reported(1e6))])
+    places = [round(row.position_m / PIECE_M - 0.5) for row in mud_map.rows()]
     assert places == [0, *range(4, MOST_PIECES + 3)]
 
 
 def test_reset_empties_the_map() -> None:
-    mud_map = mapped(stride(k_s=told(1e6)))
+    mud_map = mapped(stride(k_s=reported(1e6)))
     mud_map.reset()
     assert mud_map.rows() == ()
 
@@ -149,8 +149,8 @@ anything = st.builds(Estimate, numbers, numbers, st.integers(), st.booleans(), s
 @given(st.lists(st.tuples(st.floats(), anything, st.floats() | st.floats(0.01, 0.06)), max_size=20))
 def test_whatever_comes_the_map_holds_positive_numbers(walk: list[tuple[float, Estimate, float]]) -> None:
     mud_map = MudMap()
-    for place_m, estimate, depth_m in walk:
-        mud_map.update(place_m, [stride(estimate, estimate, estimate, depth_m)])
+    for position_m, estimate, depth_m in walk:
+        mud_map.update(position_m, [stride(estimate, estimate, estimate, depth_m)])
     for row in mud_map.rows():
         assert row.k_s is not None
         assert all(0.0 < number < inf for number in row.k_s[:4])

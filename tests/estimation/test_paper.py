@@ -19,7 +19,7 @@ from control.joint_pd import ArmMass
 from control.records import NO_LOAD, FlipperLoad, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive, JointSample
 from estimation.mud import EstimationParameters, MudEstimator
-from estimation.paper import MOBILISED_M, STEADY_SHARE, SURFACE_FORCE_N, PaperEstimator
+from estimation.paper import MOBILISED_M, STEADY_FRACTION, SURFACE_FORCE_N, PaperEstimator
 
 TICK_S = 1.0 / 380.0
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
@@ -209,7 +209,7 @@ def test_forces_and_durations_of_the_stride_are_told() -> None:
 
 
 def test_the_force_outside_of_the_steady_part_of_stance_does_not_count() -> None:
-    law, steady_rad = law_of(MUD), STEADY_SHARE * radians(30.0)
+    law, steady_rad = law_of(MUD), STEADY_FRACTION * radians(30.0)
     samples = motion()
 
     def slow_to_mobilise(sample: Sample) -> Force:
@@ -373,17 +373,19 @@ def test_half_of_the_drag_is_added_while_the_body_advances() -> None:
     """At 0.2 m/s it has advanced by 2 mm long before the steady part of stance."""
     samples, drag_n = triggered(motion(), MUD), 2.5
     plain = one(samples)
-    told = one(advancing(samples, 0.2), PaperEstimator("left", GEOMETRY, DRIVE, drag_n))
+    reported = one(advancing(samples, 0.2), PaperEstimator("left", GEOMETRY, DRIVE, drag_n))
     added_n_m3 = drag_n / 2.0 / (WIDTH_M * plain.depth_m**2 / 2.0)
-    assert told.k_s.value == pytest.approx(MUD.k_s + added_n_m3, rel=1e-3)  # the deepest sample is 1 µm below the rest
-    assert (told.k_p, told.k_e) == (plain.k_p, plain.k_e)
+    assert reported.k_s.value == pytest.approx(
+        MUD.k_s + added_n_m3, rel=1e-3
+    )  # the deepest sample is 1 µm below the rest
+    assert (reported.k_p, reported.k_e) == (plain.k_p, plain.k_e)
 
 
 @pytest.mark.parametrize("speed_m_s", [0.0, -0.2, nan])
 def test_no_drag_is_added_where_the_body_does_not_advance(speed_m_s: float) -> None:
     samples = triggered(motion(), MUD)
-    told = one(advancing(samples, speed_m_s), PaperEstimator("left", GEOMETRY, DRIVE, 2.5))
-    assert told.k_s == one(samples).k_s
+    reported = one(advancing(samples, speed_m_s), PaperEstimator("left", GEOMETRY, DRIVE, 2.5))
+    assert reported.k_s == one(samples).k_s
 
 
 def test_without_compensation_no_drag_is_added() -> None:

@@ -70,7 +70,7 @@ def feel_by_hand(
     seed: int,
     hand: HandParameters | None = None,
     lag_s: float = 0.012,
-    place_rate_hz: float = 100.0,
+    position_rate_hz: float = 100.0,
     jitter_s: float = 0.0015,
     count_m: float = 1e-5,
 ) -> Recorded:
@@ -81,15 +81,15 @@ def feel_by_hand(
     stage.place_over(plate, kind == SHEAR)
     _start(stage, plate, kind, random.uniform(1.0, 1.3), 0.1)
     felt = _heard(stage, kind, seed, random, 80.0, 0.008, 0.0)
-    times_s = np.arange(0.003, stage.ends_s + 1.05, 1.0 / place_rate_hz)
-    places_m = count_m * np.round([stage.travelled_m(float(t)) / count_m for t in times_s])
-    told = Places(_jittered(times_s, jitter_s, random), places_m)
-    return felt._replace(times_s=_jittered(felt.times_s, jitter_s, random) + lag_s, places=told)
+    times_s = np.arange(0.003, stage.ends_s + 1.05, 1.0 / position_rate_hz)
+    positions_m = count_m * np.round([stage.travelled_m(float(t)) / count_m for t in times_s])
+    reported = Places(_jittered(times_s, jitter_s, random), positions_m)
+    return felt._replace(times_s=_jittered(felt.times_s, jitter_s, random) + lag_s, places=reported)
 
 
 def _jittered(times_s: Array, jitter_s: float, random: Random) -> Array:
-    told = [t + random.gauss(0.0, jitter_s) for t in times_s]
-    return np.asarray(np.maximum.accumulate(told) + 1e-9 * np.arange(len(told)))
+    reported = [t + random.gauss(0.0, jitter_s) for t in times_s]
+    return np.asarray(np.maximum.accumulate(reported) + 1e-9 * np.arange(len(reported)))
 
 
 def _start(stage: PlateStage, plate: CarriedPlate, kind: str, start_s: float, speed_m_s: float) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from control.modes import Mode
 from control.records import Phase
 from experiments.robot.lockstep_robot import simulated_configuration
-from experiments.trials.stride_profile import StrideCourse
+from experiments.trials.stride_profile import StrideProfile
 from firmware_host.log_reading.log_reader import Log, tick_type
 
 CONFIGURATION = simulated_configuration()
@@ -33,19 +33,19 @@ def make_log(*ticks: NDArray[np.void]) -> Log:
 
 
 def make_estimate(value: float | None = 1e6, **others: Any) -> dict[str, Any]:
-    told = {"value": value, "std_error": 0.05e6, "samples": 9, "valid": value is not None, "reason": ""}
-    return told | {"at_least": False} | others
+    reported = {"value": value, "std_error": 0.05e6, "samples": 9, "valid": value is not None, "reason": ""}
+    return reported | {"at_least": False} | others
 
 
 def make_stride(**others: Any) -> dict[str, Any]:
     return {name: make_estimate() for name in ("k_p", "k_s", "k_e")} | {"index": 0, "surface_m": 0.0} | others
 
 
-def make_course(phase: Phase, sweeps_deg: list[float], depths_m: list[float], **others: list[float]) -> StrideCourse:
+def make_profile(phase: Phase, sweeps_deg: list[float], depths_m: list[float], **others: list[float]) -> StrideProfile:
     """In the pose that puts the edge at each depth."""
     count = len(depths_m)
     sweeps_rad = [radians(sweep_deg) for sweep_deg in sweeps_deg]
-    columns: dict[str, Any] = {name: np.zeros(count) for name in StrideCourse._fields} | {
+    columns: dict[str, Any] = {name: np.zeros(count) for name in StrideProfile._fields} | {
         "time_s": 0.01 * np.arange(count),
         "phase": np.full(count, int(phase)),
         "sweep_rad": np.array(sweeps_rad),
@@ -54,4 +54,4 @@ def make_course(phase: Phase, sweeps_deg: list[float], depths_m: list[float], **
         ),
         "depth_m": np.array(depths_m),
     }
-    return StrideCourse(**(columns | {name: np.array(values) for name, values in others.items()}))
+    return StrideProfile(**(columns | {name: np.array(values) for name, values in others.items()}))

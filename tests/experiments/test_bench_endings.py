@@ -24,7 +24,7 @@ from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 
-PERSON = Willing(lambda sentence: None)
+OPERATOR = Willing(lambda message: None)
 ARMED_S = 0.01  # and closed loop of all drives not there yet
 
 
@@ -65,7 +65,7 @@ def robot(tmp_path: Path) -> Iterator[InterruptedRobot]:
 
 
 def experiment(robot: InterruptedRobot) -> None:
-    arm(robot, PERSON)
+    arm(robot, OPERATOR)
     move(robot, {"left_adduction": 0.1})
     walk(robot, 0.03, 1)
 
@@ -86,7 +86,7 @@ def test_ctrl_c_wherever_an_experiment_waits_ends_it_with_raised_flippers(
     robot.waits_left = place
     with pytest.raises(KeyboardInterrupt):
         experiment(robot)
-    leave(robot, PERSON, tmp_path)
+    leave(robot, OPERATOR, tmp_path)
     modes = read_log(tmp_path / "log.mcap").ticks["mode"]
     assert modes[-1] not in ENERGISED
     if Mode.WALKING in modes:
@@ -95,7 +95,7 @@ def test_ctrl_c_wherever_an_experiment_waits_ends_it_with_raised_flippers(
 
 def hold_in_stance(robot: InterruptedRobot) -> None:
     """A current that is late for a moment holds the walk where it is, in the mud."""
-    arm(robot, PERSON)
+    arm(robot, OPERATOR)
     robot.call("walk", depth_m=0.03)
     loop = robot.lockstep.loop
     assert robot.lockstep.run_until(lambda: loop.target_before.phase is Phase.STANCE, 10.0)
@@ -116,14 +116,14 @@ def test_flippers_that_a_fault_holds_in_the_mud_are_raised_before_the_torque_goe
 
 
 def test_the_next_trial_begins_after_a_fault_of_the_last_one(robot: InterruptedRobot) -> None:
-    arm(robot, PERSON)
+    arm(robot, OPERATOR)
     robot.lockstep.robot.restart_drive(0)
     with pytest.raises(BenchError):
         walk(robot, 0.03, 1)
     rest(robot)
     robot.wait(3.0)
-    face_faults(robot, PERSON)
-    arm(robot, PERSON)
+    face_faults(robot, OPERATOR)
+    arm(robot, OPERATOR)
     assert robot.call("status")["mode"] == "hold"
 
 

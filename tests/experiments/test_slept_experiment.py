@@ -79,9 +79,9 @@ def test_a_robot_that_somebody_armed_meanwhile_is_left_to_them(
     robot = DaemonRobot(Path("x"))
     daemon.lapse(mode, [])
     daemon.overruled = overruled
-    told = "taken over: uid 3" if overruled else "somebody has armed the robot while this program slept"
+    reported = "taken over: uid 3" if overruled else "somebody has armed the robot while this program slept"
     for method in ("arm", "disarm", "stop"):
-        with pytest.raises(OverruledError, match=told):
+        with pytest.raises(OverruledError, match=reported):
             robot.call(method)
     with pytest.raises(OverruledError):
         robot.wait(0.0)

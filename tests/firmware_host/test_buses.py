@@ -160,7 +160,7 @@ def test_a_bus_that_vanishes_in_operation_is_a_fault_and_when_it_is_back_the_rob
     plug.pull()
     plug.run(robot, 6.0)
     assert mode_of(robot) is Mode.FAULT
-    names = {fault.name: fault.sentence for fault in robot.loop.faults.standing}
+    names = {fault.name: fault.message for fault in robot.loop.faults.standing}
     assert "there is no such interface" in names["bus_off"]
     plug.plug_in()
     plug.run(robot, 2.0 * RETRY_S)

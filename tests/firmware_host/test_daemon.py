@@ -12,7 +12,7 @@ from drivers.odrive.codec import SET_AXIS_STATE, AxisState
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, _end_safely
-from firmware_host.ticker import Beat
+from firmware_host.ticker import Tick
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
@@ -43,7 +43,7 @@ def test_a_shutdown_in_a_walk_raises_the_flippers_and_idles_the_drives(robot: Lo
     shutdown.ask(15, None)
     assert run_shutdown(robot, shutdown)
     assert states_of(robot) == [AxisState.IDLE] * 4
-    assert robot.loop.news.notice == ""  # it would say if they had stayed in the mud
+    assert robot.loop.events.notice == ""  # it would say if they had stayed in the mud
 
 
 def test_a_shutdown_that_nobody_wants_does_nothing(robot: Lockstep) -> None:
@@ -139,5 +139,5 @@ def test_only_a_loop_that_makes_more_than_it_misses_feeds_the_watchdog(missed: i
     notices = Notices()
     feed = WatchdogFeed(notices)
     for number in range(NOTIFY_TICKS):
-        feed.update(Beat(0.0, 0.0, number, missed), Mode.IDLE)
+        feed.update(Tick(0.0, 0.0, number, missed), Mode.IDLE)
     assert (notices.sent == ["WATCHDOG=1"]) is fed

@@ -18,9 +18,16 @@ from drivers.can.mock_bus import MockBus, MockPort
 from drivers.odrive.axis import OdriveAxis, Version
 from drivers.odrive.drives import OdriveDrives
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.fault_monitor import ARMING_S, BUS_TROUBLE_S, POSE_FORGOTTEN_S, REFUSED_TICKS, FaultWatch, Situation
+from firmware_host.fault_monitor import (
+    ARMING_S,
+    BUS_TROUBLE_S,
+    POSE_FORGOTTEN_S,
+    REFUSED_TICKS,
+    FaultMonitor,
+    MonitorInput,
+)
 from firmware_host.log.recorder import HEALTHY
-from firmware_host.ticker import PERIOD_S, Beat
+from firmware_host.ticker import PERIOD_S, Tick
 
 START_S = 100.0
 KNOWN = Version(0, 6, 11)
@@ -34,7 +41,7 @@ class Bench:
         self.drives = OdriveDrives(configuration.drive, self.ports, configuration.limits)
         for axis in self.drives.axes:
             tell_settings(axis)
-        self.watch = FaultWatch(configuration, self.drives)
+        self.watch = FaultMonitor(configuration, self.drives)
         self.tick_number = 0
 
     @property
@@ -52,8 +59,8 @@ class Bench:
         states = states or self.states()
         self.tick_number += 1
         sent = LimitedTorques(NO_TORQUE, False, True)
-        situation = Situation(mode, START_S, states, BodyPose(), sent, False, 0.0, HEALTHY, "")
-        return self.watch.update(Beat(self.now_s, 0.0, self.tick_number, 0), situation._replace(**changes))
+        monitor_input = MonitorInput(mode, START_S, states, BodyPose(), sent, False, 0.0, HEALTHY, "")
+        return self.watch.update(Tick(self.now_s, 0.0, self.tick_number, 0), monitor_input._replace(**changes))
 
 
 def tell_settings(axis: OdriveAxis, version: Version | None = KNOWN, watchdog_s: float = 0.1) -> None:
@@ -67,7 +74,7 @@ def bench(configuration: Configuration) -> Bench:
     return Bench(configuration)
 
 
-def told(faults: Sequence[Fault]) -> list[tuple[str, str]]:
+def reported(faults: Sequence[Fault]) -> list[tuple[str, str]]:
     return [(fault.name, fault.subject) for fault in faults]
 
 
@@ -79,13 +86,13 @@ def test_where_all_is_well_there_is_no_fault(bench: Bench, mode: Mode) -> None:
 
 @pytest.mark.parametrize("place", range(4))
 def test_each_joint_is_watched_under_its_own_name(bench: Bench, place: int) -> None:
-    assert told(bench.tick(states=bench.states(place, angle_rad=2.0))) == [("joint_position", JOINTS[place])]
+    assert reported(bench.tick(states=bench.states(place, angle_rad=2.0))) == [("joint_position", JOINTS[place])]
 
 
 def test_joints_have_their_own_ranges(bench: Bench) -> None:
     below = bench.tick(states=bench.states(0, angle_rad=-1.4)), bench.tick(states=bench.states(1, angle_rad=-1.4))
-    assert [told(faults) for faults in below][0] == [("joint_position", "left_sweep")]
-    assert ("joint_position", "left_adduction") not in told(below[1])
+    assert [reported(faults) for faults in below][0] == [("joint_position", "left_sweep")]
+    assert ("joint_position", "left_adduction") not in reported(below[1])
 
 
 def test_before_all_drives_were_heard_joints_are_not_judged(bench: Bench) -> None:
@@ -105,7 +112,7 @@ def test_a_bus_tells_its_state_with_the_last_error(bench: Bench, state: BusState
     bench.ports["right"].last_error = "no acknowledgement"
     (fault,) = bench.tick()
     assert (fault.name, fault.subject) == (name, "right")
-    assert fault.sentence.startswith("The right bus ") and fault.sentence.endswith(": no acknowledgement.")
+    assert fault.message.startswith("The right bus ") and fault.message.endswith(": no acknowledgement.")
 
 
 def test_every_state_of_a_bus_but_active_is_a_fault(bench: Bench) -> None:
@@ -118,7 +125,7 @@ def test_frames_that_were_lost_on_their_way_in_are_told_once(bench: Bench) -> No
     bench.ports["right"].lost_frames += 7
     (fault,) = bench.tick()
     assert (fault.name, fault.subject) == ("frames_lost", "right")
-    assert fault.sentence.startswith("7 frames of the right bus were lost")
+    assert fault.message.startswith("7 frames of the right bus were lost")
     assert bench.tick() == []
 
 
@@ -128,8 +135,8 @@ def test_a_bus_that_loses_commands_in_three_ticks_in_a_row_is_a_fault(bench: Ben
         bench.ports["left"].failed_sends += 2
         bench.ports["left"].last_send_error = "No buffer space available"
         found.append(bench.tick())
-    assert [told(each) for each in found] == [[]] * (REFUSED_TICKS - 1) + [[("bus_refuses", "left")]] * 3
-    assert found[2][0].sentence == "The left bus lost commands in 3 ticks in a row: No buffer space available."
+    assert [reported(each) for each in found] == [[]] * (REFUSED_TICKS - 1) + [[("bus_refuses", "left")]] * 3
+    assert found[2][0].message == "The left bus lost commands in 3 ticks in a row: No buffer space available."
     assert bench.tick() == []
     assert KINDS["bus_refuses"].bound_ticks > REFUSED_TICKS + 1
 
@@ -153,14 +160,14 @@ def test_commands_that_were_lost_before_the_watch_began_do_not_count(configurati
 
 
 def test_a_torque_that_was_no_number_is_told(bench: Bench) -> None:
-    assert told(bench.tick(sent=LimitedTorques(NO_TORQUE, True, False))) == [("torque_not_finite", "")]
+    assert reported(bench.tick(sent=LimitedTorques(NO_TORQUE, True, False))) == [("torque_not_finite", "")]
 
 
 def test_a_command_that_the_gate_refuses_is_told_once(bench: Bench) -> None:
     gate = bench.drives.gate
     gate.refused += 2
     gate.last_refusal = "A torque was refused."
-    assert [(fault.name, fault.sentence) for fault in bench.tick()] == [("command_refused", "A torque was refused.")]
+    assert [(fault.name, fault.message) for fault in bench.tick()] == [("command_refused", "A torque was refused.")]
     assert bench.tick() == []
 
 
@@ -169,22 +176,22 @@ def test_a_drive_that_does_not_arm_is_told_after_two_seconds_and_only_while_armi
     while not (found := bench.tick(Mode.ARMING, bench.states(2, closed_loop=False))):
         ticks += 1
         assert ticks < 1000
-    assert told(found) == [("arming_failed", "right_sweep")]
+    assert reported(found) == [("arming_failed", "right_sweep")]
     assert ticks == pytest.approx(ARMING_S / PERIOD_S, abs=1)
     assert ticks < KINDS["arming_failed"].bound_ticks
-    assert told(bench.tick(Mode.HOLD, bench.states(2, closed_loop=False))) == [("drive_disarmed", "right_sweep")]
+    assert reported(bench.tick(Mode.HOLD, bench.states(2, closed_loop=False))) == [("drive_disarmed", "right_sweep")]
 
 
 def test_a_drive_that_left_closed_loop_says_why(bench: Bench) -> None:
     bench.drives.axes[2].disarm_reason = 0x1000000
     (fault,) = bench.tick(states=bench.states(2, closed_loop=False))
-    assert fault.sentence == "The right_sweep drive left closed loop by itself. (watchdog expired)"
+    assert fault.message == "The right_sweep drive left closed loop by itself. (watchdog expired)"
 
 
 def test_other_faults_do_not_borrow_a_drives_words(bench: Bench) -> None:
     bench.drives.axes[0].disarm_reason = 0x1000000
     (fault,) = bench.tick(states=bench.states(0, angle_rad=2.0))
-    assert "watchdog" not in fault.sentence
+    assert "watchdog" not in fault.message
 
 
 @pytest.mark.parametrize(
@@ -199,7 +206,7 @@ def test_other_faults_do_not_borrow_a_drives_words(bench: Bench) -> None:
 def test_firmware_is_known_or_a_fault(bench: Bench, version: Version | None, expected: str | None) -> None:
     tell_settings(bench.drives.axes[0], version)
     found = bench.tick(Mode.IDLE, bench.states())
-    assert [(fault.name, fault.sentence) for fault in found] == ([("drive_version", expected)] if expected else [])
+    assert [(fault.name, fault.message) for fault in found] == ([("drive_version", expected)] if expected else [])
 
 
 @pytest.mark.parametrize(
@@ -210,9 +217,9 @@ def test_firmware_is_known_or_a_fault(bench: Bench, version: Version | None, exp
         (0.31, "watchdog_off", "The left_sweep drive's watchdog waits for 0.31 s; 0.3 s is the most."),
     ],
 )
-def test_a_watchdog_is_known_and_on_and_quick(bench: Bench, watchdog_s: float, name: str, sentence: str) -> None:
+def test_a_watchdog_is_known_and_on_and_quick(bench: Bench, watchdog_s: float, name: str, message: str) -> None:
     tell_settings(bench.drives.axes[0], watchdog_s=watchdog_s)
-    assert [(fault.name, fault.sentence) for fault in bench.tick()] == [(name, sentence)]
+    assert [(fault.name, fault.message) for fault in bench.tick()] == [(name, message)]
     tell_settings(bench.drives.axes[0], watchdog_s=0.3)
     assert bench.tick() == []
 
@@ -220,14 +227,14 @@ def test_a_watchdog_is_known_and_on_and_quick(bench: Bench, watchdog_s: float, n
 def test_a_restart_is_told_once(bench: Bench) -> None:
     assert bench.tick() == []
     bench.drives.axes[3].restarts += 1
-    assert told(bench.tick()) == [("drive_restarted", "right_adduction")]
+    assert reported(bench.tick()) == [("drive_restarted", "right_adduction")]
     assert bench.tick() == []
 
 
 def test_two_drives_under_one_id_are_told_while_they_seem_so(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(OdriveAxis, "twins", property(lambda axis: axis.joint == "left_adduction"))
+    monkeypatch.setattr(OdriveAxis, "duplicates", property(lambda axis: axis.joint == "left_adduction"))
     for _ in range(3):
-        assert told(bench.tick()) == [("drive_twins", "left_adduction")]
+        assert reported(bench.tick()) == [("drive_twins", "left_adduction")]
 
 
 # the body's place
@@ -240,7 +247,7 @@ def test_a_place_that_was_never_told_is_not_missed(bench: Bench) -> None:
 def test_a_place_that_is_lost_is_told_until_it_is_back_or_forgotten(bench: Bench) -> None:
     known = BodyPose(START_S, 0.5)
     assert bench.tick(body=known) == []
-    assert told(bench.tick()) == [("pose_lost", "")]
+    assert reported(bench.tick()) == [("pose_lost", "")]
     assert bench.tick(body=known) == []
     lost = [bool(bench.tick()) for _ in range(round(POSE_FORGOTTEN_S / PERIOD_S) + 10)]
     assert sum(lost) == pytest.approx(POSE_FORGOTTEN_S / PERIOD_S, abs=2)
@@ -249,7 +256,7 @@ def test_a_place_that_is_lost_is_told_until_it_is_back_or_forgotten(bench: Bench
 
 def test_who_lost_the_lease_is_named(bench: Bench) -> None:
     (fault,) = bench.tick(lease_holder="the operator's tablet")
-    assert (fault.name, fault.sentence) == (
+    assert (fault.name, fault.message) == (
         "lease_lost",
         "the operator's tablet promised to attend the robot and is gone.",
     )
@@ -275,13 +282,13 @@ def test_an_encoder_that_is_silent_is_trusted_again_with_its_next_message(bench:
 
 
 def test_currents_say_nothing_against_an_encoder(bench: Bench) -> None:
-    assert told(bench.tick(states=bench.states(0, current_stamp_s=0.0))) == [("current_silent", "left_sweep")]
+    assert reported(bench.tick(states=bench.states(0, current_stamp_s=0.0))) == [("current_silent", "left_sweep")]
     assert bench.watch.trusted == (True, True, True, True)
 
 
 def test_an_encoder_that_jumped_is_not_trusted_until_torque_is_off(bench: Bench) -> None:
     bench.tick()
-    assert told(bench.tick(states=bench.states(2, angle_rad=0.5))) == [("encoder_jump", "right_sweep")]
+    assert reported(bench.tick(states=bench.states(2, angle_rad=0.5))) == [("encoder_jump", "right_sweep")]
     for _ in range(100):
         assert bench.tick(Mode.DAMPING, bench.states(2, angle_rad=0.5)) == []
         assert bench.watch.trusted == (True, True, False, True)
@@ -296,8 +303,8 @@ def test_the_limits_see_the_windings_heat_once_it_matters(bench: Bench) -> None:
     states = bench.states()
     assert bench.watch.with_winding_heat(states) is states
     bench.watch.joints[1].winding.temperature_c = 75.0
-    told_c = [state.temperature_c for state in bench.watch.with_winding_heat(states)]
-    assert told_c == [30.0, 75.0, 30.0, 30.0]
+    reported_c = [state.temperature_c for state in bench.watch.with_winding_heat(states)]
+    assert reported_c == [30.0, 75.0, 30.0, 30.0]
     assert bench.watch.with_winding_heat(states)[1]._replace(temperature_c=25.0) == states[1]
 
 
@@ -313,7 +320,7 @@ def test_a_joint_in_a_recovery_is_not_asked_to_follow_and_one_that_walks_is(benc
 
     assert ticks(Mode.WALKING, True) == []
     assert ticks(Mode.DAMPING, False) == []
-    assert set(told(ticks(Mode.WALKING, False))) == {("joint_not_following", "left_sweep")}
+    assert set(reported(ticks(Mode.WALKING, False))) == {("joint_not_following", "left_sweep")}
 
 
 @pytest.mark.parametrize("state", [BusState.WARNING, BusState.PASSIVE])
@@ -333,5 +340,5 @@ def test_trouble_of_a_bus_is_over_without_further_error_frames_and_one_that_is_o
 
 def test_a_drive_that_calibrates_stands_against_arming_and_is_no_fault_in_a_walk(bench: Bench) -> None:
     bench.drives.axes[2].busy_state = 4
-    assert ("drive_energised", JOINTS[2]) in told(bench.tick(Mode.IDLE))
+    assert ("drive_energised", JOINTS[2]) in reported(bench.tick(Mode.IDLE))
     assert bench.tick(Mode.WALKING) == []

@@ -107,8 +107,8 @@ def test_strides_of_changing_sweep_still_tell_every_coefficient(configuration: C
     lockstep = walked(configuration, 2000.0, "gait")
     estimates = [stride.estimate for stride in lockstep.loop.learning.strides]
     assert all(each.k_p.valid and each.k_e.valid and each.k_s.valid for each in estimates)
-    told = [each.k_p.value for each in estimates]
-    assert max(told) < 1.5 * min(told)  # a fifth by depth (the k-law is not the clay's), and noise
+    reported = [each.k_p.value for each in estimates]
+    assert max(reported) < 1.5 * min(reported)  # a fifth by depth (the k-law is not the clay's), and noise
 
 
 def test_a_fixed_depth_is_walked_as_configured_whatever_the_method(configuration: Configuration) -> None:

@@ -17,7 +17,7 @@ from firmware_host.configuration.configuration import Configuration, parse_confi
 from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE_KIND, TICK_KIND
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.ticker import PERIOD_S, Beat
+from firmware_host.ticker import PERIOD_S, Tick
 from simulation.devices.odrive import SimulatedOdrive
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
@@ -192,7 +192,7 @@ def test_a_loop_that_stood_still_lets_go(robot: Lockstep) -> None:
     robot.run_for(1.7)
     robot.tick_number += 200
     robot.robot.advance(robot.now_s)
-    robot.loop.tick(Beat(robot.now_s, 200 * PERIOD_S, robot.tick_number, 199))
+    robot.loop.tick(Tick(robot.now_s, 200 * PERIOD_S, robot.tick_number, 199))
     assert robot.loop.mode is Mode.FAULT
     assert "loop_stalled" in {fault.name for fault in robot.loop.faults.standing}
     assert robot.loop.sent.torques_nm == NO_TORQUE
@@ -205,7 +205,7 @@ def test_the_slew_limit_does_not_grow_with_missed_ticks(robot: Lockstep) -> None
     before_nm = robot.loop.sent.torques_nm
     robot.tick_number += 8
     robot.robot.advance(robot.now_s)
-    robot.loop.tick(Beat(robot.now_s, 8 * PERIOD_S, robot.tick_number, 7))
+    robot.loop.tick(Tick(robot.now_s, 8 * PERIOD_S, robot.tick_number, 7))
     largest_nm = robot.loop.configuration.limits.torque_rate_nm_s * PERIOD_S
     for before, after in zip(before_nm, robot.loop.sent.torques_nm, strict=True):
         assert abs(after - before) <= largest_nm + 1e-12
@@ -223,7 +223,7 @@ def test_a_bus_that_takes_no_commands_is_a_fault(robot: Lockstep) -> None:
     port.send = fail  # type: ignore[method-assign]
     robot.run_for(10 * PERIOD_S)
     assert robot.loop.fault is not None and robot.loop.fault.name == "bus_refuses"
-    assert "No buffer space" in robot.loop.fault.sentence
+    assert "No buffer space" in robot.loop.fault.message
 
 
 def test_flippers_that_stay_in_the_mud_are_told(configuration: Configuration) -> None:
@@ -231,14 +231,14 @@ def test_flippers_that_stay_in_the_mud_are_told(configuration: Configuration) ->
     robot.arm()
     robot.walk(WalkOrder(0.05, False))
     robot.run_until(lambda: robot.loop.target_before.phase is Phase.STANCE, 5.0)
-    for share in range(1, 101):  # deeper than the torque could have pushed them, without a jump
+    for fraction in range(1, 101):  # deeper than the torque could have pushed them, without a jump
         for arm in robot.robot.plant.arms:
             deep_rad = configuration.geometry.adduction_rad(arm.sweep_rad, 0.05)
-            arm.adduction_rad += (deep_rad - arm.adduction_rad) * share / 100.0
+            arm.adduction_rad += (deep_rad - arm.adduction_rad) * fraction / 100.0
         robot.step()
     robot.loop.request(Request.STOP, robot.now_s)
     assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 5.0)
-    assert robot.loop.news.notice == "the flippers did not come out of the mud"
+    assert robot.loop.events.notice == "the flippers did not come out of the mud"
 
 
 def test_requests_that_do_not_fit_are_refused_with_what_to_do(robot: Lockstep) -> None:
@@ -258,7 +258,7 @@ def test_a_drive_error_ends_in_fault_with_the_drives_own_words(robot: Lockstep) 
     robot.robot.drives[2]._disarm(ERROR_WATCHDOG)
     assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
     assert robot.loop.fault is not None
-    assert "right_sweep" in robot.loop.fault.sentence and "watchdog expired" in robot.loop.fault.sentence
+    assert "right_sweep" in robot.loop.fault.message and "watchdog expired" in robot.loop.fault.message
     robot.run_for(0.02)
     assert not energised_drives(robot)
 
@@ -293,7 +293,7 @@ def test_a_silent_drive_is_a_fault_within_its_bound(configuration: Configuration
         robot.step()
         ticks += 1
     assert ticks <= configuration.faults.silence_s * 380 + 2
-    assert robot.loop.fault is not None and "right_adduction" in robot.loop.fault.sentence
+    assert robot.loop.fault is not None and "right_adduction" in robot.loop.fault.message
 
 
 def test_a_torque_that_is_no_number_never_leaves(robot: Lockstep) -> None:
@@ -341,7 +341,7 @@ def test_a_missed_tick_costs_no_place_in_the_gait(robot: Lockstep) -> None:
     before = robot.loop.controller.gait._time_s
     robot.tick_number += 3
     robot.robot.advance(robot.now_s)
-    robot.loop.tick(Beat(robot.now_s, 0.0, robot.tick_number, 2))
+    robot.loop.tick(Tick(robot.now_s, 0.0, robot.tick_number, 2))
     assert robot.loop.controller.gait._time_s - before == pytest.approx(3 * PERIOD_S)
 
 
@@ -368,8 +368,8 @@ def test_a_log_that_is_lost_is_told(robot: Lockstep) -> None:
     recorder = recorder_of(robot)
     recorder.health = HEALTHY._replace(alive=False)
     robot.step()
-    told = OperatorCalls(robot.loop, recorder, [], lambda: robot.now_s).status({})
-    assert told["fault"]["name"] == "recorder_dead" and not told["log"]["writer_alive"]
+    reported = OperatorCalls(robot.loop, recorder, [], lambda: robot.now_s).status({})
+    assert reported["fault"]["name"] == "recorder_dead" and not reported["log"]["writer_alive"]
 
 
 def test_nothing_cancels_a_clear_that_waits_for_the_drives(robot: Lockstep) -> None:

@@ -6,8 +6,8 @@ import pytest
 
 from control.fault_kinds import make_fault
 from control.modes import Mode, Request
-from firmware_host.loop_events import LoopNews, ModeChange
-from tests.kept_events import EventRecorder
+from firmware_host.loop_events import LoopEvents, ModeChange
+from tests.recorded_events import EventRecorder
 
 FAULT = make_fault("lease_lost", "", "Anna is gone.")
 
@@ -18,27 +18,27 @@ def recorder() -> EventRecorder:
 
 
 @pytest.fixture
-def news(recorder: EventRecorder) -> LoopNews:
-    return LoopNews(recorder, longest_hold_s=60.0)
+def events(recorder: EventRecorder) -> LoopEvents:
+    return LoopEvents(recorder, longest_hold_s=60.0)
 
 
 def change(before: Mode, after: Mode, faulty: bool = False, rested: bool = False, up: bool = True) -> ModeChange:
     return ModeChange(before, after, FAULT if faulty else None, rested, up)
 
 
-def test_a_change_of_mode_is_told_with_its_cause(news: LoopNews, recorder: EventRecorder) -> None:
-    news.tell_change(1.0, change(Mode.WALKING, Mode.STOPPING, faulty=True))
+def test_a_change_of_mode_is_told_with_its_cause(events: LoopEvents, recorder: EventRecorder) -> None:
+    events.tell_change(1.0, change(Mode.WALKING, Mode.STOPPING, faulty=True))
     assert recorder.texts == ["mode walking to stopping: Anna is gone."]
-    assert news.notice.startswith("stopped by lease_lost: Anna is gone. ")
+    assert events.notice.startswith("stopped by lease_lost: Anna is gone. ")
 
 
 @pytest.mark.parametrize("mode", [Mode.ARMING, Mode.WALKING])
-def test_a_notice_stands_until_the_robot_is_moved_again(news: LoopNews, mode: Mode) -> None:
-    news.tell_end_of_move(1.0, "stop was asked for.")
-    news.tell_change(2.0, change(Mode.HOLD, Mode.IDLE))
-    assert news.notice == "the joints stopped on their way: stop was asked for."
-    news.tell_change(3.0, change(Mode.IDLE, mode))
-    assert news.notice == ""
+def test_a_notice_stands_until_the_robot_is_moved_again(events: LoopEvents, mode: Mode) -> None:
+    events.tell_end_of_move(1.0, "stop was asked for.")
+    events.tell_change(2.0, change(Mode.HOLD, Mode.IDLE))
+    assert events.notice == "the joints stopped on their way: stop was asked for."
+    events.tell_change(3.0, change(Mode.IDLE, mode))
+    assert events.notice == ""
 
 
 @pytest.mark.parametrize(
@@ -49,25 +49,25 @@ def test_a_notice_stands_until_the_robot_is_moved_again(news: LoopNews, mode: Mo
     ],
 )
 def test_what_a_person_should_know_is_in_the_log_as_well(
-    news: LoopNews, recorder: EventRecorder, changed: ModeChange, notice: str
+    events: LoopEvents, recorder: EventRecorder, changed: ModeChange, notice: str
 ) -> None:
-    news.tell_change(1.0, changed)
-    assert news.notice.startswith(notice)
-    assert recorder.texts[1:] == [news.notice]
+    events.tell_change(1.0, changed)
+    assert events.notice.startswith(notice)
+    assert recorder.texts[1:] == [events.notice]
 
 
 @pytest.mark.parametrize(
     "changed", [change(Mode.HOLD, Mode.IDLE), change(Mode.STOPPING, Mode.HOLD), change(Mode.BOOT, Mode.IDLE, True)]
 )
-def test_usual_changes_and_faults_without_torque_leave_no_notice(news: LoopNews, changed: ModeChange) -> None:
-    news.tell_change(1.0, changed)
-    assert news.notice == ""
+def test_usual_changes_and_faults_without_torque_leave_no_notice(events: LoopEvents, changed: ModeChange) -> None:
+    events.tell_change(1.0, changed)
+    assert events.notice == ""
 
 
-def test_a_reset_forgets_the_notice_and_which_requests_were_told(news: LoopNews, recorder: EventRecorder) -> None:
+def test_a_reset_forgets_the_notice_and_which_requests_were_told(events: LoopEvents, recorder: EventRecorder) -> None:
     for _ in range(2):
-        news.tell_end_of_move(1.0, "a fault stands.")
-        news.tell_request(1.0, Request.STOP, False, "anna", True)
-        news.reset()
-    assert (news.notice, news.requests.untold) == ("", 0)
+        events.tell_end_of_move(1.0, "a fault stands.")
+        events.tell_request(1.0, Request.STOP, False, "anna", True)
+        events.reset()
+    assert (events.notice, events.requests.untold) == ("", 0)
     assert recorder.about("request") == ["request stop by anna"] * 2

@@ -27,7 +27,7 @@ from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
-from tests.kept_events import EventRecorder
+from tests.recorded_events import EventRecorder
 
 WALK = WalkOrder(0.03, adaptive=False)
 MOMENTS = ("holding", "raising", "insertion", "stance", "extraction", "swing", "stopping")
@@ -233,7 +233,7 @@ def test_a_drive_that_falls_silent_leads_to_damping_and_then_to_idle_drives(
     assert ticks[Mode.DAMPING] < ticks[Mode.FAULT] <= KINDS["drive_silent"].bound_ticks
     assert robot.loop.sent.torques_nm == NO_TORQUE
     assert all(drive.axis_state is AxisState.IDLE for drive in robot.robot.drives)
-    assert JOINTS[joint] in robot.loop.news.notice and "stopped by drive_silent" in robot.loop.news.notice
+    assert JOINTS[joint] in robot.loop.events.notice and "stopped by drive_silent" in robot.loop.events.notice
 
 
 def test_a_drive_that_falls_silent_while_arming_ends_it_without_torque(at: Copied) -> None:
@@ -327,7 +327,7 @@ def test_a_fault_that_ends_with_its_cause_ends_by_itself_but_nobody_arms(at: Cop
         assert mode_of(robot) is Mode.IDLE
         assert not any(drive.axis_state is AxisState.CLOSED_LOOP for drive in robot.robot.drives)
     assert robot.loop.fault is None
-    assert "stopped by voltage_under" in robot.loop.news.notice  # still told
+    assert "stopped by voltage_under" in robot.loop.events.notice  # still told
     assert robot.loop.request(Request.ARM, robot.now_s) is None
 
 
@@ -502,7 +502,7 @@ def test_a_robot_that_nobody_needs_lets_go_by_itself(configuration: Configuratio
 # no false alarms
 
 
-def faults_told(robot: Lockstep) -> list[str]:
+def faults_reported(robot: Lockstep) -> list[str]:
     """Since it was ready to be armed."""
     texts = texts_of(robot)
     return [text for text in texts[texts.index("request arm") :] if text.startswith("fault ")]
@@ -514,7 +514,7 @@ def test_a_walk_is_no_fault(configuration: Configuration, mud: str) -> None:
     robot.arm()
     robot.walk(WalkOrder(0.05, False, 1))
     assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 12.0)
-    assert faults_told(robot) == []
+    assert faults_reported(robot) == []
 
 
 def test_a_recovery_in_the_stiffest_clay_is_no_fault(configuration: Configuration) -> None:
@@ -523,7 +523,7 @@ def test_a_recovery_in_the_stiffest_clay_is_no_fault(configuration: Configuratio
     robot.walk(WalkOrder(0.03, False, 1))
     assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 20.0)
     assert any("attempt" in text for text in texts_of(robot))
-    assert faults_told(robot) == []
+    assert faults_reported(robot) == []
 
 
 def test_a_walk_with_a_labs_disturbances_is_no_fault(configuration: Configuration) -> None:
@@ -531,7 +531,7 @@ def test_a_walk_with_a_labs_disturbances_is_no_fault(configuration: Configuratio
     robot.arm()
     robot.walk(WalkOrder(0.03, True, 2))
     assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 15.0)
-    assert faults_told(robot) == []
+    assert faults_reported(robot) == []
 
 
 def test_disarm_is_obeyed_in_every_moment_of_a_fault(at: Copied) -> None:

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from control.fault_kinds import KINDS
 from control.faults import Fault
 from control.monitors.joint_monitor import FaultBounds
-from firmware_host.loop_monitor import CRAWL_TICKS, MEAN_TICKS, LoopWatch
-from firmware_host.ticker import PERIOD_S, Beat, Ticker
+from firmware_host.loop_monitor import CRAWL_TICKS, MEAN_TICKS, LoopMonitor
+from firmware_host.ticker import PERIOD_S, Tick, Ticker
 
 START_S = 5000.0
 DISTANCE_S = 1.7e9  # of the clock on the wall
@@ -32,16 +32,16 @@ class Clock:
 def watched(busy_s: Iterable[float]) -> list[list[Fault]]:
     """What is told at each beat of the real ticker, after work of `busy_s` before each."""
     clock = Clock()
-    ticker, watch = Ticker(clock=clock, sleep=clock.sleep), LoopWatch(FaultBounds())
-    told = []
+    ticker, watch = Ticker(clock=clock, sleep=clock.sleep), LoopMonitor(FaultBounds())
+    reported = []
     for each in busy_s:
         clock.now_s += each
-        told.append(watch.update(ticker.wait(), DISTANCE_S))
-    return told
+        reported.append(watch.update(ticker.wait(), DISTANCE_S))
+    return reported
 
 
-def names(told: Iterable[Fault]) -> list[str]:
-    return [fault.name for fault in told]
+def names(reported: Iterable[Fault]) -> list[str]:
+    return [fault.name for fault in reported]
 
 
 def missing(ticks: int) -> float:
@@ -51,9 +51,9 @@ def missing(ticks: int) -> float:
 
 def after_missing(ticks: int) -> list[list[str]]:
     """At the beat after so many missed ones, in the middle of a good run, and at those that follow."""
-    told = watched([0.001] * 200 + [missing(ticks)] + [0.001] * 250)
-    assert told[:200] == [[]] * 200
-    return [names(each) for each in told[200:]]
+    reported = watched([0.001] * 200 + [missing(ticks)] + [0.001] * 250)
+    assert reported[:200] == [[]] * 200
+    return [names(each) for each in reported[200:]]
 
 
 def test_a_good_beat_is_never_a_fault_from_the_first_tick_on() -> None:
@@ -62,9 +62,9 @@ def test_a_good_beat_is_never_a_fault_from_the_first_tick_on() -> None:
 
 @pytest.mark.parametrize("ticks", [1, 2, 4])
 def test_a_tick_that_is_missed_is_told_once_and_is_no_lag(ticks: int) -> None:
-    told = after_missing(ticks)
-    assert told[0] == ["loop_overrun"]
-    assert not any(told[1:])
+    reported = after_missing(ticks)
+    assert reported[0] == ["loop_overrun"]
+    assert not any(reported[1:])
 
 
 @pytest.mark.parametrize("ticks", [5, 9])
@@ -74,24 +74,25 @@ def test_five_in_a_row_are_a_lag(ticks: int) -> None:
 
 @pytest.mark.parametrize("ticks", [10, 11, 400])
 def test_ten_in_a_row_are_a_stall(ticks: int) -> None:
-    told = after_missing(ticks)
-    assert told[0][0] == "loop_stalled"
+    reported = after_missing(ticks)
+    assert reported[0][0] == "loop_stalled"
 
 
 def test_a_stall_is_forgotten_after_the_ticks_of_a_mean() -> None:
-    told = after_missing(400)
-    assert all("loop_lagging" in each for each in told[:MEAN_TICKS])
-    assert not any(told[MEAN_TICKS:])
+    reported = after_missing(400)
+    assert all("loop_lagging" in each for each in reported[:MEAN_TICKS])
+    assert not any(reported[MEAN_TICKS:])
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.0, False), (0.09, False), (0.12, True), (1.0, True)])
-def test_a_rate_that_is_not_kept_is_a_lag_though_no_five_are_missed(share: float, expected: bool) -> None:
-    watch = LoopWatch(FaultBounds())
-    told = [
-        watch.update(Beat(START_S + tick * PERIOD_S * (1.0 + share), 0.0, tick, 0), DISTANCE_S) for tick in range(300)
+def test_a_rate_that_is_not_kept_is_a_lag_though_no_five_are_missed(fraction: float, expected: bool) -> None:
+    watch = LoopMonitor(FaultBounds())
+    reported = [
+        watch.update(Tick(START_S + tick * PERIOD_S * (1.0 + fraction), 0.0, tick, 0), DISTANCE_S)
+        for tick in range(300)
     ]
-    assert not any(told[:MEAN_TICKS])  # a mean of fewer says nothing
-    assert [names(each) for each in told[MEAN_TICKS:]] == [["loop_lagging"] * expected] * (300 - MEAN_TICKS)
+    assert not any(reported[:MEAN_TICKS])  # a mean of fewer says nothing
+    assert [names(each) for each in reported[MEAN_TICKS:]] == [["loop_lagging"] * expected] * (300 - MEAN_TICKS)
 
 
 def test_single_missed_ticks_make_a_lag_once_they_are_more_than_a_tenth() -> None:
@@ -104,8 +105,8 @@ def test_single_missed_ticks_make_a_lag_once_they_are_more_than_a_tenth() -> Non
 
 
 def test_what_is_told_has_numbers() -> None:
-    sentences = {ticks: watched([0.0] * 5 + [missing(ticks)])[-1][0].sentence for ticks in (2, 6, 20)}
-    assert sentences == {
+    messages = {ticks: watched([0.0] * 5 + [missing(ticks)])[-1][0].message for ticks in (2, 6, 20)}
+    assert messages == {
         2: "The loop missed 2 of its ticks.",
         6: "The loop missed 6 ticks in a row.",
         20: "The loop stood still for 54 ms.",
@@ -113,9 +114,9 @@ def test_what_is_told_has_numbers() -> None:
 
 
 def stepped(step_s: float) -> list[list[str]]:
-    watch = LoopWatch(FaultBounds())
+    watch = LoopMonitor(FaultBounds())
     return [
-        names(watch.update(Beat(START_S + tick * PERIOD_S, 0.0, tick, 0), DISTANCE_S + step_s * (tick >= 50)))
+        names(watch.update(Tick(START_S + tick * PERIOD_S, 0.0, tick, 0), DISTANCE_S + step_s * (tick >= 50)))
         for tick in range(100)
     ]
 
@@ -132,10 +133,10 @@ def test_a_clock_that_is_nudged_is_not(step_s: float) -> None:
 
 def test_a_clock_that_drifts_is_not_set() -> None:
     """500 ppm, the most that ntpd lets a clock slew by."""
-    watch = LoopWatch(FaultBounds())
+    watch = LoopMonitor(FaultBounds())
     for tick in range(20000):
         now_s = START_S + tick * PERIOD_S
-        assert not watch.update(Beat(now_s, 0.0, tick, 0), DISTANCE_S + 500e-6 * now_s)
+        assert not watch.update(Tick(now_s, 0.0, tick, 0), DISTANCE_S + 500e-6 * now_s)
 
 
 def test_a_computer_that_slept_is_told_by_its_clock() -> None:
@@ -144,31 +145,31 @@ def test_a_computer_that_slept_is_told_by_its_clock() -> None:
 
 
 def test_after_a_reset_the_first_beat_is_compared_with_nothing() -> None:
-    watch = LoopWatch(FaultBounds())
+    watch = LoopMonitor(FaultBounds())
     for tick in range(200):
-        watch.update(Beat(START_S + tick * PERIOD_S, 0.0, tick, 0), DISTANCE_S)
+        watch.update(Tick(START_S + tick * PERIOD_S, 0.0, tick, 0), DISTANCE_S)
     watch.reset()
     for tick in range(150):
-        assert not watch.update(Beat(2.0 * START_S + tick * PERIOD_S, 0.0, tick, 0), 0.0)
+        assert not watch.update(Tick(2.0 * START_S + tick * PERIOD_S, 0.0, tick, 0), 0.0)
 
 
 @given(st.lists(st.floats(0.0, 0.05), max_size=150))
 def test_whatever_the_beat_a_missed_tick_is_always_told(busy_s: list[float]) -> None:
     clock = Clock()
-    ticker, watch = Ticker(clock=clock, sleep=clock.sleep), LoopWatch(FaultBounds())
+    ticker, watch = Ticker(clock=clock, sleep=clock.sleep), LoopMonitor(FaultBounds())
     for each in busy_s:
         clock.now_s += each
-        beat = ticker.wait()
-        told = names(watch.update(beat, DISTANCE_S))
-        assert told or not beat.missed
+        tick = ticker.wait()
+        reported = names(watch.update(tick, DISTANCE_S))
+        assert reported or not tick.missed
 
 
 def crawled(period_ticks: float, beats: int = 40) -> list[str]:
     """All names told of a loop whose beats come every so many ticks."""
-    watch, found = LoopWatch(FaultBounds()), []
+    watch, found = LoopMonitor(FaultBounds()), []
     for number in range(beats):
         now_s = START_S + number * period_ticks * PERIOD_S
-        found += names(watch.update(Beat(now_s, 0.0, number, 0), DISTANCE_S))
+        found += names(watch.update(Tick(now_s, 0.0, number, 0), DISTANCE_S))
     return found
 
 
@@ -179,11 +180,11 @@ def test_a_loop_that_commands_too_seldom_to_brake_a_joint_is_told_and_one_at_a_t
 
 def test_a_crawl_is_told_within_its_ticks() -> None:
     for period_ticks in (4.05, 7.0, 12.0):
-        watch = LoopWatch(FaultBounds())
+        watch = LoopMonitor(FaultBounds())
         passed = next(
             number * period_ticks
             for number in range(100)
             if "loop_crawling"
-            in names(watch.update(Beat(START_S + number * period_ticks * PERIOD_S, 0.0, number, 0), DISTANCE_S))
+            in names(watch.update(Tick(START_S + number * period_ticks * PERIOD_S, 0.0, number, 0), DISTANCE_S))
         )
         assert passed <= max(KINDS["loop_crawling"].bound_ticks, CRAWL_TICKS * period_ticks)

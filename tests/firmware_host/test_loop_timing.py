@@ -14,9 +14,9 @@ def test_percentiles_are_exact_to_a_microsecond() -> None:
     histogram = Histogram()
     for duration_s in durations_s:
         histogram.add(float(duration_s))
-    for share in (0.5, 0.99, 0.999):
-        exact_us = 1e6 * float(np.quantile(durations_s, share, method="inverted_cdf"))
-        assert histogram.percentile_us(share) == pytest.approx(exact_us, abs=1.0)
+    for fraction in (0.5, 0.99, 0.999):
+        exact_us = 1e6 * float(np.quantile(durations_s, fraction, method="inverted_cdf"))
+        assert histogram.percentile_us(fraction) == pytest.approx(exact_us, abs=1.0)
     assert histogram.max_us == pytest.approx(1e6 * durations_s.max())
 
 

@@ -56,8 +56,8 @@ def learning(configuration: Configuration) -> MudLearning:
 
 
 def step(learning: MudLearning, controller: MadeUpController) -> tuple[list[Any], list[str]]:
-    closed, sentences = learning.step(controller)  # type: ignore[arg-type]
-    return list(closed), sentences
+    closed, messages = learning.step(controller)  # type: ignore[arg-type]
+    return list(closed), messages
 
 
 def test_strides_of_both_flippers_are_numbered_through(learning: MudLearning) -> None:
@@ -109,14 +109,14 @@ def firm_ticks(learning: MudLearning, order: WalkOrder, phase: Phase, loads: lis
     target = GaitTarget(phase, 0, 0.0, 0.0, 0.02, 0.1)
     controller = MadeUpController(order, target=target)
     limit_nm = learning.adaptation.largest_insertion_nm
-    told = []
+    reported = []
     for firm in loads:
         load = NO_LOAD._replace(adduction_torque_nm=limit_nm + 0.01 if firm else limit_nm)
         learning.reading = MudReading(left=NO_LOAD, right=load)
         before = controller.gait.ended
         step(learning, controller)
-        told.append(controller.gait.ended > before)
-    return told
+        reported.append(controller.gait.ended > before)
+    return reported
 
 
 def test_an_insertion_ends_at_a_load_that_stays_and_not_at_one_odd_sample(learning: MudLearning) -> None:
@@ -137,8 +137,8 @@ def test_the_end_of_an_insertion_is_told_once(learning: MudLearning) -> None:
     controller = MadeUpController(WalkOrder(0.03))
     load = NO_LOAD._replace(adduction_torque_nm=10.0)
     learning.reading = MudReading(left=load, right=load)
-    told = [sentence for _ in range(10) for sentence in step(learning, controller)[1]]
-    assert told == ["insertion ended at 0.0300 m: firm mud"]
+    reported = [message for _ in range(10) for message in step(learning, controller)[1]]
+    assert reported == ["insertion ended at 0.0300 m: firm mud"]
 
 
 # nonsense
@@ -150,7 +150,7 @@ def test_a_coefficient_that_no_mud_has_is_told(learning: MudLearning, name: str,
     learning.reading = MudReading(strides=(stride("right", 7, **{name: Estimate(value, 1e5, 100, True)}),))
     (fault,) = learning.faults
     assert (fault.name, fault.subject) == ("estimate_wild", "right")
-    assert fault.sentence == "The right flipper's stride 7 tells nonsense."
+    assert fault.message == "The right flipper's stride 7 tells nonsense."
 
 
 @pytest.mark.parametrize("std_error", [nan, inf, LARGEST_N_M3])
@@ -182,7 +182,7 @@ def test_nonsense_never_leads_out_of_the_depths_that_may_be_chosen(
     for index, value in enumerate((nan, inf, -inf, 1e300, -1e300, 0.0)):
         wild = Estimate(value, abs(value), 100, True)
         strides = (stride("left", index, k_p=wild, k_s=wild, k_e=wild),)
-        estimator.belief = estimator._knowledge.update(strides)
+        estimator.mud_estimate = estimator._knowledge.update(strides)
         learning.reading = MudReading(strides=strides)
         step(learning, controller)
         bounds = configuration.adaptation

@@ -103,9 +103,9 @@ def test_these_sections_choose_a_source(example_text: str, section: str, chosen:
     ],
 )
 def test_what_does_not_go_together_is_refused_by_key_value_and_bound(
-    example_text: str, section: str, told: str
+    example_text: str, section: str, reported: str
 ) -> None:
-    assert any(sentence.startswith(told) for sentence in problems_of(example_text, section))
+    assert any(message.startswith(reported) for message in problems_of(example_text, section))
 
 
 def test_the_section_that_the_example_shows_is_valid(example_text: str) -> None:
@@ -170,8 +170,8 @@ def test_the_daemon_refuses_what_it_cannot_open_in_one_sentence(
         f'{before}[pose]\n{ENCODER}device = "/dev/nothing"\nmetres_per_count = 1e-5\n\n{after}', encoding="utf-8"
     )
     assert main(["--config", str(path)]) == EXIT_FAILED
-    told = capsys.readouterr().err
-    assert told == "mudskipperd: the rail encoder /dev/nothing does not open: No such file or directory\n"
+    reported = capsys.readouterr().err
+    assert reported == "mudskipperd: the rail encoder /dev/nothing does not open: No such file or directory\n"
     path.write_text(f"{before}[pose]\n{NATNET}\n{after}", encoding="utf-8")
     assert main(["--config", str(path)]) == EXIT_CONFIGURATION
 
@@ -180,14 +180,14 @@ class MadeUpSource:
     """A source that was lost, and can be opened again once."""
 
     def __init__(self) -> None:
-        self.told = PoseReport("camera", 12, 3, 4)
+        self.reported = PoseReport("camera", 12, 3, 4)
         self.gone = True
 
     def read(self, now_s: float) -> BodyPose:
         return BodyPose()
 
     def report(self) -> PoseReport:
-        return self.told
+        return self.reported
 
     def reopen(self, now_s: float) -> bool:
         self.gone, was_gone = False, self.gone
@@ -213,7 +213,7 @@ def test_check_tells_of_the_source_and_of_its_trouble_but_lets_arm(robot: Lockst
     source = robot.loop.pose = MadeUpSource()
     line = pose_line(robot)
     assert line["ok"] and line["text"] == "camera: 12 poses, 3 messages garbled, 4 without the body"
-    source.told = source.told._replace(trouble="it is dark.", what_to_do="switch on the light")
+    source.reported = source.reported._replace(trouble="it is dark.", what_to_do="switch on the light")
     line = pose_line(robot)
     assert line["ok"] and line["text"].startswith("warning: it is dark. Switch on the light. camera: 12 poses")
 

@@ -62,8 +62,8 @@ def test_a_stop_amid_fifteen_floods_waits_no_longer_than_there_are_clients(
     for _ in range(20):
         flood(flooding, data)
         served.tick()
-        person = connect(served, OPERATOR)
-        person.sendall(STOP)
+        operator = connect(served, OPERATOR)
+        operator.sendall(STOP)
         ticks = 0
         while not any(caller.peer == OPERATOR for caller in stopped):
             flood(flooding, data)
@@ -72,7 +72,7 @@ def test_a_stop_amid_fifteen_floods_waits_no_longer_than_there_are_clients(
             assert ticks < 100
         longest = max(longest, ticks)
         stopped.clear()
-        person.close()
+        operator.close()
         serve(served, 3)
     assert longest <= 1 + MOST_CLIENTS  # a tick to be let in, then its turn
 

@@ -44,9 +44,9 @@ def test_deadlines_that_were_missed_are_skipped_and_counted() -> None:
     ticker = make_ticker(clock)
     ticker.wait()
     clock.now_s += 3.4 * PERIOD_S
-    beat = ticker.wait()
-    assert (beat.missed, beat.number) == (2, 4)
-    assert beat.late_s == pytest.approx(2.4 * PERIOD_S)
+    tick = ticker.wait()
+    assert (tick.missed, tick.number) == (2, 4)
+    assert tick.late_s == pytest.approx(2.4 * PERIOD_S)
 
 
 def test_a_stall_is_not_made_up_for() -> None:
@@ -62,13 +62,13 @@ def test_a_stall_is_not_made_up_for() -> None:
 
 def test_lateness_is_told_after_the_deadline_that_was_waited_for() -> None:
     clock = FakeClock(oversleep_s=123e-6)
-    beat = make_ticker(clock).wait()
-    assert beat.late_s == pytest.approx(123e-6)
-    assert beat.missed == 0
+    tick = make_ticker(clock).wait()
+    assert tick.late_s == pytest.approx(123e-6)
+    assert tick.missed == 0
 
 
 def test_a_sleep_that_ends_early_is_continued() -> None:
     clock = FakeClock(oversleep_s=-1e-4)
-    beat = make_ticker(clock).wait()
-    assert beat.late_s >= 0.0
+    tick = make_ticker(clock).wait()
+    assert tick.late_s >= 0.0
     assert len(clock.slept_s) > 1

@@ -15,7 +15,7 @@ from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
-from tests.kept_events import EventRecorder
+from tests.recorded_events import EventRecorder
 
 SOFT_M = 0.35
 
@@ -48,7 +48,7 @@ def test_it_ends_the_insertion_before_the_mud_would_hold_it(configuration: Confi
 
 
 def test_without_that_heed_it_would_be_held(configuration: Configuration) -> None:
-    heedless = replace(configuration, adaptation=replace(configuration.adaptation, insertion_share=10.0))
+    heedless = replace(configuration, adaptation=replace(configuration.adaptation, insertion_fraction=10.0))
     phases, recorder = phases_in(firm_mud_ahead(heedless, 6000.0))
     assert Phase.RECOVERY in phases
     assert not recorder.about("insertion ended")

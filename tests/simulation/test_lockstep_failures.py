@@ -14,7 +14,7 @@ from simulation.body.plant import END_STOPS_RAD
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
-from tests.kept_events import EventRecorder
+from tests.recorded_events import EventRecorder
 
 TRACK = Track([(2.0, MUDS["48.5"])])
 
@@ -34,7 +34,7 @@ def test_a_drive_that_is_unplugged_in_a_walk_is_a_silent_drive(configuration: Co
     assert lockstep.run_until(lambda: lockstep.loop.mode is Mode.DAMPING, 0.02)
     assert lockstep.run_until(lambda: lockstep.loop.mode is Mode.FAULT, 0.1)
     assert lockstep.loop.fault is not None
-    assert lockstep.loop.fault.name == "drive_silent" and "left_sweep" in lockstep.loop.fault.sentence
+    assert lockstep.loop.fault.name == "drive_silent" and "left_sweep" in lockstep.loop.fault.message
     assert lockstep.now_s - began_s < configuration.faults.silence_s + 0.006
     assert lockstep.loop.sent.torques_nm == NO_TORQUE
 
@@ -54,11 +54,11 @@ def test_each_failure_shows_as_the_fault_that_it_is(
 ) -> None:
     lockstep = make_walking(configuration)
     lockstep.fail(component, kind)
-    told = set()
+    reported = set()
     for _ in range(114):
         lockstep.step()
-        told |= {standing.name for standing in lockstep.loop.faults.standing}
-    assert fault in told
+        reported |= {standing.name for standing in lockstep.loop.faults.standing}
+    assert fault in reported
     assert lockstep.loop.fault is not None
 
 

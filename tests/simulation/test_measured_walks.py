@@ -75,8 +75,8 @@ def capture_of(path: Path) -> Capture:
     leaps_m = np.append(np.linalg.norm(np.diff(position_m[first], axis=0), axis=1), 0.0)
     lost = np.repeat((time_s[ends - 1] - time_s[first] > FROZEN_S) & (leaps_m > LEAP_M), ends - first)
     inside = (state[1:] == STANCE) & (state[:-1] == STANCE) & ~lost[1:] & ~lost[:-1]
-    way_m = np.diff(position_m, axis=0)[inside].sum(axis=0)
-    return Capture(time_s, state, position_m, first, lost, way_m / np.linalg.norm(way_m))
+    path_m = np.diff(position_m, axis=0)[inside].sum(axis=0)
+    return Capture(time_s, state, position_m, first, lost, path_m / np.linalg.norm(path_m))
 
 
 @dataclass(frozen=True)
@@ -97,18 +97,18 @@ def walked(path: Path, latency_s: float) -> Walked:
     x, y, z = capture.direction.tolist()
     parameters = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
     estimator = MudEstimator(FlipperGeometry(), (LAB_DRIVE, LAB_DRIVE), EstimationParameters())
-    places_m, ends, steps_m = [], [], []
+    positions_m, ends, steps_m = [], [], []
     with closing(server), closing(NatNetPort(parameters, (x, y, z))) as port:
         connect(server, port)
         for row, (now_s, phase, angles_rad, currents_a) in enumerate(rows_of(lab)):
             server.step(now_s)
             body = port.read(now_s)
             reading = estimator.update(now_s, phase, angles_rad, NO_VELOCITY, currents_a, body.x_m)
-            places_m.append(body.x_m)
+            positions_m.append(body.x_m)
             ends += [row for stride in reading.strides if stride.flipper == "left"]
             steps_m += [stride.step_m for stride in reading.strides if stride.flipper == "left"]
         assert port.garbled == 0
-    return Walked(np.array(places_m), np.array(ends), np.array(steps_m))
+    return Walked(np.array(positions_m), np.array(ends), np.array(steps_m))
 
 
 def connect(server: NatNetServer, port: NatNetPort) -> None:
@@ -129,13 +129,13 @@ def rows_of(lab: LabLog) -> Iterator[tuple[float, Phase, JointAngles, Currents]]
 def test_steps_from_insertion_to_insertion_are_those_of_the_capture(path: Path, latency_s: float) -> None:
     """None is missing where the capture saw both ends, and none is made up where it did not."""
     capture, starts = capture_of(path), capture_of(path).insertions
-    true_m, told_m = np.diff(capture.x_m[starts]), np.diff(walked(path, latency_s).x_m[starts])
+    true_m, reported_m = np.diff(capture.x_m[starts]), np.diff(walked(path, latency_s).x_m[starts])
     assert len(true_m) >= 2
     seen = np.isfinite(true_m)
-    assert not np.any(np.isfinite(told_m[~seen]))
-    assert np.all(np.abs(told_m - true_m)[seen & np.isfinite(told_m)] < BOUND_M)
+    assert not np.any(np.isfinite(reported_m[~seen]))
+    assert np.all(np.abs(reported_m - true_m)[seen & np.isfinite(reported_m)] < BOUND_M)
     if latency_s == 0.0:
-        assert np.all(np.isfinite(told_m[seen]))
+        assert np.all(np.isfinite(reported_m[seen]))
 
 
 @each_latency

@@ -43,4 +43,4 @@ def test_a_drive_that_restarts_is_noticed_and_its_settings_are_asked_for_anew() 
     read_settings(walk, 2.0)
     assert [axis.restarts for axis in walk.loop.drives.axes] == [0, 1, 0, 0]
     assert axis.watchdog_s == pytest.approx(0.1)
-    assert not any(axis.twins for axis in walk.loop.drives.axes)
+    assert not any(axis.duplicates for axis in walk.loop.drives.axes)

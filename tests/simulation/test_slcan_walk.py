@@ -18,7 +18,7 @@ from drivers.odrive.drives import OdriveDrives
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import Loop
-from firmware_host.ticker import Beat
+from firmware_host.ticker import Tick
 from simulation.devices.slcan_adapter import SlcanAdapter
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
@@ -82,7 +82,7 @@ class SerialWalk(Lockstep):
         self.robot.advance(self.now_s)
         for line in self.lines.values():
             line.deliver()
-        self.loop.tick(Beat(self.now_s, 0.0, self.tick_number, 0))
+        self.loop.tick(Tick(self.now_s, 0.0, self.tick_number, 0))
 
     def close(self) -> None:
         self.loop.drives.close()
@@ -120,8 +120,8 @@ def test_an_adapter_that_is_unplugged_ends_the_walk_in_a_fault_and_in_no_traceba
     walk.run_for(0.5)
     walk.lines["left"].unplug()
     walk.run_for(2 / 380)
-    told = {fault.name for fault in walk.loop.faults.standing}
-    assert "bus_off" in told
+    reported = {fault.name for fault in walk.loop.faults.standing}
+    assert "bus_off" in reported
     assert mode_of(walk) is Mode.DAMPING
     walk.run_for(4.0)
     assert mode_of(walk) is Mode.FAULT

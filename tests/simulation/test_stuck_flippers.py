@@ -22,7 +22,7 @@ from firmware_host.ticker import PERIOD_S
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay
 from simulation.mud.track import Track
-from tests.kept_events import EventRecorder
+from tests.recorded_events import EventRecorder
 
 PARAMETERS = RecoveryParameters()
 HASTY = RecoveryParameters(attempts=2, pause_s=0.1, attempt_s=0.6)
@@ -175,7 +175,7 @@ def test_a_stop_in_a_recovery_is_obeyed(configuration: Configuration) -> None:
     robot, _ = recovering(configuration)
     assert robot.loop.request(Request.STOP, robot.now_s) is None
     assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 5.0)
-    assert robot.loop.news.notice == "the flippers did not come out of the mud"
+    assert robot.loop.events.notice == "the flippers did not come out of the mud"
 
 
 def test_targets_stay_within_the_joints_limits_and_torque_within_its_own(configuration: Configuration) -> None:

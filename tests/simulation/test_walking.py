@@ -65,7 +65,7 @@ def test_a_mud_stronger_than_the_motors_holds_the_flippers(configuration: Config
 
 
 @pytest.fixture(scope="module")
-def crossing(configuration: Configuration) -> Lockstep:
+def cross_coupling(configuration: Configuration) -> Lockstep:
     """An adaptive walk over the paper's three muds, up to their end or for 40 s."""
     lockstep = Lockstep(configuration, paper_track())
     lockstep.arm()
@@ -74,26 +74,26 @@ def crossing(configuration: Configuration) -> Lockstep:
     return lockstep
 
 
-def chosen_depths_m(crossing: Lockstep, compartment: int) -> list[float]:
+def chosen_depths_m(cross_coupling: Lockstep, compartment: int) -> list[float]:
     """Of the last strides in a compartment: the first ones there still learn."""
-    start_m, chosen, place_m = compartment * COMPARTMENT_M, [], 0.0
-    for stride in crossing.loop.learning.strides:
+    start_m, chosen, position_m = compartment * COMPARTMENT_M, [], 0.0
+    for stride in cross_coupling.loop.learning.strides:
         if stride.estimate.flipper != "left":
             continue
-        place_m += stride.estimate.step_m if isfinite(stride.estimate.step_m) else 0.0
-        if start_m + 0.3 < place_m < start_m + COMPARTMENT_M:
+        position_m += stride.estimate.step_m if isfinite(stride.estimate.step_m) else 0.0
+        if start_m + 0.3 < position_m < start_m + COMPARTMENT_M:
             chosen.append(stride.chosen_depth_m)
     return chosen
 
 
-def test_adaptation_crosses_every_mud_at_more_than_5_cm_per_second(crossing: Lockstep) -> None:
-    assert crossing.loop.mode is Mode.WALKING
-    assert crossing.robot.plant.body_m >= paper_track().length_m
-    assert crossing.robot.plant.body_m / crossing.now_s > 0.05
+def test_adaptation_crosses_every_mud_at_more_than_5_cm_per_second(cross_coupling: Lockstep) -> None:
+    assert cross_coupling.loop.mode is Mode.WALKING
+    assert cross_coupling.robot.plant.body_m >= paper_track().length_m
+    assert cross_coupling.robot.plant.body_m / cross_coupling.now_s > 0.05
 
 
-def test_adaptation_goes_deeper_in_the_soft_mud_than_in_the_stiff_one(crossing: Lockstep) -> None:
-    soft_m, stiff_m = chosen_depths_m(crossing, 1), chosen_depths_m(crossing, 2)
+def test_adaptation_goes_deeper_in_the_soft_mud_than_in_the_stiff_one(cross_coupling: Lockstep) -> None:
+    soft_m, stiff_m = chosen_depths_m(cross_coupling, 1), chosen_depths_m(cross_coupling, 2)
     assert len(soft_m) >= 2
     assert len(stiff_m) >= 2
     assert min(soft_m) > max(stiff_m) + 0.01

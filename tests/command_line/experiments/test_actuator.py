@@ -25,7 +25,7 @@ from experiments.actuator.friction import QUICK, SLOW
 from experiments.actuator.plan import Plan
 from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A
 from experiments.robot.bench_robot import BenchError
-from experiments.robot.prompt import Person, Willing
+from experiments.robot.prompt import Operator, Willing
 from experiments.trials.notebook import Notebook
 from firmware_host.configuration.configuration import load_configuration, parse_configuration
 from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
@@ -123,7 +123,7 @@ def read_plan(folder: Path) -> dict[str, object]:
 
 def run_at_terminal(bench: Bench, command: list[str], answers: list[tuple[str, str]]) -> str:  # noqa: F811
     """What was shown. Each question is answered by the first of `answers` that it holds, once."""
-    person, terminal = pty.openpty()
+    operator, terminal = pty.openpty()
     environment = os.environ | {"MUDSKIPPER_SOCKET": str(bench.socket)}
     process = subprocess.Popen(
         [sys.executable, "-m", "command_line.main", *command],
@@ -138,18 +138,18 @@ def run_at_terminal(bench: Bench, command: list[str], answers: list[tuple[str, s
     shown, fresh = "", ""
     try:
         while True:
-            chunk = os.read(person, 4096).decode(errors="replace")
+            chunk = os.read(operator, 4096).decode(errors="replace")
             shown, fresh = shown + chunk, fresh + chunk
             if fresh.rstrip(" ").endswith("]"):
                 place = next((place for place, (part, _) in enumerate(answers) if part in fresh), None)
-                os.write(person, f"{'' if place is None else answers.pop(place)[1]}\n".encode())
+                os.write(operator, f"{'' if place is None else answers.pop(place)[1]}\n".encode())
                 fresh = ""
     except OSError:  # the other end is closed: it has ended
         pass
     finally:
         process.wait(LONGEST_S)
         killer.cancel()
-        os.close(person)
+        os.close(operator)
     return shown
 
 
@@ -159,10 +159,10 @@ class Plain:
     def __init__(self, text: str) -> None:
         self.configuration = parse_configuration(text)
 
-    def calibrate(self, plan: Plan, folder: Path, person: Person, show: Show) -> Readings:
+    def calibrate(self, plan: Plan, folder: Path, operator: Operator, show: Show) -> Readings:
         raise NotImplementedError
 
-    def leave(self, folder: Path, person: Person) -> list[Path]:
+    def leave(self, folder: Path, operator: Operator) -> list[Path]:
         return []
 
 
@@ -170,8 +170,8 @@ def made_options(**values: object) -> argparse.Namespace:
     return argparse.Namespace(**({"simulated": False, "apply": True, "config": None} | values))
 
 
-def made_desk(folder: Path, told: list[str]) -> Desk:
-    return Desk(folder, Willing(told.append), lambda done, total: None)
+def made_desk(folder: Path, reported: list[str]) -> Desk:
+    return Desk(folder, Willing(reported.append), lambda done, total: None)
 
 
 def test_only_the_file_that_the_daemon_runs_with_is_changed(tmp_path: Path, example_text: str) -> None:
@@ -193,14 +193,14 @@ def test_a_file_that_may_not_be_written_is_refused_before_the_work(
 
 
 def test_a_doubtful_constant_is_not_written_and_a_good_one_is(tmp_path: Path, example_text: str) -> None:
-    path, plan, told = tmp_path / "mudskipper.toml", Plan(("right_sweep",), trials=4), list[str]()
+    path, plan, reported = tmp_path / "mudskipper.toml", Plan(("right_sweep",), trials=4), list[str]()
     path.write_text(example_text, encoding="utf-8")
     doubtful, good = (fit_joint("right_sweep", plan, made_entries(plan, noise_a=noise), 0.083) for noise in (3.0, 0.02))
     assert doubtful is not None and good is not None
-    assert "needs no change" in applied(path, [doubtful], made_desk(tmp_path, told))[0]
-    assert "is not written" in told[0] and path.read_text(encoding="utf-8") == example_text
-    assert "is changed" in applied(path, [good], made_desk(tmp_path, told))[0]
-    assert "+torque_constant_nm_a = 0.07" in told[-1]
+    assert "needs no change" in applied(path, [doubtful], made_desk(tmp_path, reported))[0]
+    assert "is not written" in reported[0] and path.read_text(encoding="utf-8") == example_text
+    assert "is changed" in applied(path, [good], made_desk(tmp_path, reported))[0]
+    assert "+torque_constant_nm_a = 0.07" in reported[-1]
     written = load_configuration(path)
     assert written.drive["right_sweep"].torque_constant_nm_a == pytest.approx(0.0719, abs=0.001)
     assert written.friction["right_sweep"].coulomb_nm == pytest.approx(good.friction_nm[0], abs=1e-4)
@@ -213,6 +213,8 @@ def test_what_cannot_be_applied_costs_no_report(tmp_path: Path, example_text: st
     entries = {key: entry | {"current_a": 2.0 * entry["current_a"]} for key, entry in made_entries(plan).items()}
     fit = fit_joint("right_sweep", plan, entries, 0.083)
     assert fit is not None
-    told, status = applied(path, [fit], made_desk(tmp_path, []))
-    assert told.startswith("nothing was applied: the configuration stays as it is") and "current_limit_a" in told
-    assert "run the same command again" in told and status == exit_codes.REFUSED
+    reported, status = applied(path, [fit], made_desk(tmp_path, []))
+    assert (
+        reported.startswith("nothing was applied: the configuration stays as it is") and "current_limit_a" in reported
+    )
+    assert "run the same command again" in reported and status == exit_codes.REFUSED

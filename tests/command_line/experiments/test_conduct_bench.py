@@ -15,7 +15,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.experiments.conduct_bench import Desk, Finding, conduct_bench
-from command_line.experiments.terminal_prompt import AbsentPersonError, TerminalPerson
+from command_line.experiments.terminal_prompt import AbsentOperatorError, TerminalPrompt
 from experiments.reports.report_page import Section
 from experiments.robot.bench_errors import BarredError, BenchError, GoneError
 from experiments.trials.notebook import Notebook
@@ -42,7 +42,7 @@ def test_an_answer_is_asked_for_until_it_is_one(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with typed(monkeypatch, "what\nS\n"):
-        assert TerminalPerson().ask("Hang 10 g on it.", ANSWERS, nothing) == "s"
+        assert TerminalPrompt().ask("Hang 10 g on it.", ANSWERS, nothing) == "s"
     said = capsys.readouterr().err
     assert said.count("Hang 10 g on it.\n  [Enter: it hangs, s: skip it, r: the last one again]") == 2
     assert "'what' is none of the answers" in said
@@ -50,7 +50,7 @@ def test_an_answer_is_asked_for_until_it_is_one(
 
 def test_a_number_is_asked_for_until_it_is_within_its_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
     with typed(monkeypatch, "many\nnan\n99\n2,5\n"):
-        assert TerminalPerson().ask_number("How far?", 1.0, 5.0, nothing) == 2.5
+        assert TerminalPrompt().ask_number("How far?", 1.0, 5.0, nothing) == 2.5
 
 
 def test_the_robot_is_looked_after_while_a_person_thinks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,7 +65,7 @@ def test_the_robot_is_looked_after_while_a_person_thinks(monkeypatch: pytest.Mon
 
     with open(source, encoding="utf-8") as stream:
         monkeypatch.setattr(sys, "stdin", stream)
-        assert TerminalPerson().ask("Well?", ANSWERS, look) == ""
+        assert TerminalPrompt().ask("Well?", ANSWERS, look) == ""
     assert len(looks) == 3
 
 
@@ -80,14 +80,14 @@ def test_an_enter_that_was_pressed_before_a_question_does_not_answer_it(monkeypa
 
     with open(terminal, encoding="utf-8") as stream:
         monkeypatch.setattr(sys, "stdin", stream)
-        assert TerminalPerson().ask("Are your hands out of the mud?", ANSWERS, look) == "s"
+        assert TerminalPrompt().ask("Are your hands out of the mud?", ANSWERS, look) == "s"
     os.close(keyboard)
     assert looks == [1]
 
 
 def test_where_nobody_can_answer_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    with typed(monkeypatch, ""), pytest.raises(AbsentPersonError, match="run it on a terminal"):
-        TerminalPerson().ask("Well?", ANSWERS, nothing)
+    with typed(monkeypatch, ""), pytest.raises(AbsentOperatorError, match="run it on a terminal"):
+        TerminalPrompt().ask("Well?", ANSWERS, nothing)
 
 
 def options(folder: Path, **changes: object) -> argparse.Namespace:
@@ -95,7 +95,7 @@ def options(folder: Path, **changes: object) -> argparse.Namespace:
 
 
 def found(desk: Desk) -> Finding:
-    desk.person.tell(desk.person.ask("Well?", ANSWERS, nothing) or "it hangs")
+    desk.operator.report(desk.operator.ask("Well?", ANSWERS, nothing) or "it hangs")
     return Finding({"experiment": "trial", "value": 1.0}, "A trial", [Section("Result", "Fine.")], "value 1.0")
 
 
@@ -109,7 +109,7 @@ def test_it_ends_in_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str])
 def test_json_alone_goes_to_standard_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def run(desk: Desk) -> Finding:
         desk.show(1, 2)
-        desk.person.tell("half of it")
+        desk.operator.report("half of it")
         return found(desk)
 
     conduct_bench(options(tmp_path, json=True), "trials", run)
@@ -134,7 +134,7 @@ def test_without_a_folder_it_makes_one_of_its_name(tmp_path: Path, monkeypatch: 
     ],
 )
 def test_what_was_measured_is_kept_whatever_ends_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], problem: BaseException, status: int, sentence: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], problem: BaseException, status: int, message: str
 ) -> None:
     def run(desk: Desk) -> Finding:
         Notebook(desk.folder, {}).write("10 g", {"torque_nm": 0.1})
@@ -142,7 +142,7 @@ def test_what_was_measured_is_kept_whatever_ends_it(
 
     assert conduct_bench(options(tmp_path), "trials", run) == status
     said = capsys.readouterr().err
-    assert sentence in said and "the same command goes on from there" in said
+    assert message in said and "the same command goes on from there" in said
     assert Notebook(tmp_path, {}).begun
 
 
@@ -159,7 +159,7 @@ def test_where_nothing_was_measured_nothing_is_said_to_be_there(
 
 def test_questions_go_where_data_does_not(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     with typed(monkeypatch, "\n"):
-        TerminalPerson().ask("Well?", ANSWERS, nothing)
+        TerminalPrompt().ask("Well?", ANSWERS, nothing)
     said = capsys.readouterr()
     assert not said.out and "Well?" in said.err
 
@@ -170,9 +170,9 @@ def test_a_disk_that_is_full_is_told_with_how_to_go_on(tmp_path: Path, capsys: p
         raise OSError(ENOSPC, "No space left on device")
 
     assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.UNHEALTHY
-    told = capsys.readouterr().err
-    assert f"{tmp_path}: No space left on device" in told
-    assert "the same command goes on from there" in told
+    reported = capsys.readouterr().err
+    assert f"{tmp_path}: No space left on device" in reported
+    assert "the same command goes on from there" in reported
 
 
 def test_another_plan_is_not_told_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

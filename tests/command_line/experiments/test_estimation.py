@@ -36,44 +36,44 @@ def one_stride(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def no_trials(monkeypatch: pytest.MonkeyPatch) -> None:
-    def judge(*arguments: Any) -> None:
+    def evaluate(*arguments: Any) -> None:
         raise AssertionError("it must be refused before any trial")
 
-    monkeypatch.setattr(command_line.experiments.estimation, "judge", judge)
+    monkeypatch.setattr(command_line.experiments.estimation, "evaluate", evaluate)
 
 
 # what is refused
 
 
 def test_without_a_simulated_load_cell_there_is_no_truth(capsys: pytest.CaptureFixture[str], no_trials: None) -> None:
-    sentence = refusal(capsys, "experiment", "estimation")
-    assert sentence.startswith("mudskipper: ")
-    assert "--simulated" in sentence
+    message = refusal(capsys, "experiment", "estimation")
+    assert message.startswith("mudskipper: ")
+    assert "--simulated" in message
 
 
 @pytest.mark.parametrize("layers", ["fog", "noise,fog", "none,noise"])
 def test_a_layer_that_there_is_not_is_named(layers: str, capsys: pytest.CaptureFixture[str], no_trials: None) -> None:
-    sentence = refusal(capsys, *COMMAND, "--layers", layers)
-    assert repr("none" if "none" in layers else "fog") in sentence
-    assert "clinging" in sentence
+    message = refusal(capsys, *COMMAND, "--layers", layers)
+    assert repr("none" if "none" in layers else "fog") in message
+    assert "clinging" in message
 
 
 @pytest.mark.parametrize("percent", ["43.9", "56.1", "-1", "nan", "inf"])
 def test_a_water_content_out_of_range_is_named_with_the_range(
     percent: str, capsys: pytest.CaptureFixture[str], no_trials: None
 ) -> None:
-    sentence = refusal(capsys, *COMMAND, f"--mud={percent}")
-    assert f"{percent} %" in sentence
-    assert "44 to 56" in sentence
+    message = refusal(capsys, *COMMAND, f"--mud={percent}")
+    assert f"{percent} %" in message
+    assert "44 to 56" in message
 
 
 @pytest.mark.parametrize("strength", ["49", "50001", "-1", "nan", "inf"])
 def test_a_strength_out_of_bounds_is_named_with_its_bounds(
     strength: str, capsys: pytest.CaptureFixture[str], no_trials: None
 ) -> None:
-    sentence = refusal(capsys, *COMMAND, f"--strength={strength}")
-    assert f"{strength}: " in sentence
-    assert "50 to 50000 Pa" in sentence
+    message = refusal(capsys, *COMMAND, f"--strength={strength}")
+    assert f"{strength}: " in message
+    assert "50 to 50000 Pa" in message
 
 
 @pytest.mark.parametrize(
@@ -109,11 +109,11 @@ def planned(monkeypatch: pytest.MonkeyPatch, *options: str) -> Plan:
     """The plan that the command would have run."""
     plans = list[Plan]()
 
-    def judge(plan: Plan, *arguments: Any) -> None:
+    def evaluate(plan: Plan, *arguments: Any) -> None:
         plans.append(plan)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(command_line.experiments.estimation, "judge", judge)
+    monkeypatch.setattr(command_line.experiments.estimation, "evaluate", evaluate)
     assert main([*COMMAND, *options]) == exit_codes.INTERRUPTED
     return plans[0]
 

@@ -30,8 +30,8 @@ FLIPPER = {
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
     status = main(arguments)
-    told = capsys.readouterr()
-    return status, told.out, told.err
+    reported = capsys.readouterr()
+    return status, reported.out, reported.err
 
 
 @pytest.fixture(scope="module")
@@ -46,15 +46,15 @@ def report(folder: Path) -> dict[str, Any]:
     with redirect_stdout(printed):
         status = main([*SHORT, "--out", str(folder / "out"), "--compare", str(folder / "flipper.json")])
     assert status == exit_codes.OK
-    told: dict[str, Any] = json.loads(printed.getvalue())
-    return told
+    reported: dict[str, Any] = json.loads(printed.getvalue())
+    return reported
 
 
 def test_the_true_coefficients_stand_beside_those_of_a_simulated_mud(report: dict[str, Any]) -> None:
-    (told,) = report["muds"]
+    (reported,) = report["muds"]
     truth = report["truth"]["48.6"]
     for name in ("k_p", "k_s", "k_e"):
-        assert told[name]["value"] == pytest.approx(truth[name], rel=0.03)
+        assert reported[name]["value"] == pytest.approx(truth[name], rel=0.03)
     shear_n = measure_shear(clay_of_water(48.6), PAPER_PLATE, 0.0, 0.0, 0.03, 0.1)
     assert truth["k_s"] == pytest.approx(shear_n / (0.03 * 0.03**2 / 2.0), rel=1e-3)
 
@@ -86,28 +86,30 @@ def test_the_flipper_stands_beside_it_where_it_has_a_value(report: dict[str, Any
 
 def test_whoever_reads_the_ratio_reads_of_both_plates_and_depths(report: dict[str, Any], folder: Path) -> None:
     page = (folder / "out" / "report.html").read_text()
-    for told in (
+    for reported in (
         "3 x 3.5 cm, 4 mm thick, upright",
         "2.5 x 7 cm, 4 mm thick, leaning",
         "went 4 cm deep",
         "8 to 12 % more true k_p",
     ):
-        assert told in page
+        assert reported in page
 
 
 def test_what_all_trials_have_alike_is_part_of_the_doubt(report: dict[str, Any]) -> None:
     (mud,) = report["muds"]
-    told = mud["k_s"]
-    assert told["shared_error"] == pytest.approx(2.0 * 0.5 / 30.0 * told["value"], rel=0.01)
-    assert told["std_error"] == pytest.approx((told["trials_error"] ** 2 + told["shared_error"] ** 2) ** 0.5)
+    reported = mud["k_s"]
+    assert reported["shared_error"] == pytest.approx(2.0 * 0.5 / 30.0 * reported["value"], rel=0.01)
+    assert reported["std_error"] == pytest.approx(
+        (reported["trials_error"] ** 2 + reported["shared_error"] ** 2) ** 0.5
+    )
 
 
 def test_another_mud_is_added_to_what_is_there(
     report: dict[str, Any], folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status, data, told = run(capsys, *SHORT, "--mud", "50.3", "--out", str(folder / "out"))
+    status, data, reported = run(capsys, *SHORT, "--mud", "50.3", "--out", str(folder / "out"))
     assert status == exit_codes.OK
-    assert "2 trials are in" in told and "2 are left" in told
+    assert "2 trials are in" in reported and "2 are left" in reported
     muds = {mud["mud"]: mud for mud in json.loads(data)["muds"]}
     assert muds["48.6"]["k_p"]["value"] == pytest.approx(report["muds"][0]["k_p"]["value"], rel=0.03)
     assert muds["50.3"]["k_p"]["value"] < muds["48.6"]["k_p"]["value"]
@@ -116,9 +118,9 @@ def test_another_mud_is_added_to_what_is_there(
 def test_another_depth_in_the_same_folder_is_refused(
     report: dict[str, Any], folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status, _, told = run(capsys, *SHORT, "--depth", "2", "--out", str(folder / "out"))
+    status, _, reported = run(capsys, *SHORT, "--depth", "2", "--out", str(folder / "out"))
     assert status == exit_codes.REFUSED
-    assert "depth_m" in told and "--out" in told
+    assert "depth_m" in reported and "--out" in reported
 
 
 @pytest.mark.parametrize(
@@ -138,11 +140,11 @@ def test_another_depth_in_the_same_folder_is_refused(
     ],
 )
 def test_what_cannot_be_is_refused_at_once(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], sentence: str
+    capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
-    status, _, told = run(capsys, "experiment", "loadcell", *arguments)
+    status, _, reported = run(capsys, "experiment", "loadcell", *arguments)
     assert status == exit_codes.USAGE
-    assert sentence in told
+    assert message in reported
 
 
 @pytest.mark.parametrize(
@@ -156,9 +158,9 @@ def test_an_argument_out_of_bounds_is_refused(arguments: list[str], capsys: pyte
 
 def test_a_port_that_there_is_not_ends_with_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     port = str(tmp_path / "ttyNONE")
-    status, _, told = run(capsys, "experiment", "loadcell", "--port", port, "--out", str(tmp_path / "out"))
+    status, _, reported = run(capsys, "experiment", "loadcell", "--port", port, "--out", str(tmp_path / "out"))
     assert status == exit_codes.REFUSED
-    assert f"there is no serial port {port}" in told
+    assert f"there is no serial port {port}" in reported
 
 
 @pytest.mark.parametrize("text", ["", "[1]", '{"muds": 3}'])
@@ -169,8 +171,8 @@ def test_a_file_that_is_no_summary_is_refused_by_its_name(tmp_path: Path, text: 
 
 
 def test_muds_are_compared_by_what_their_names_mean() -> None:
-    told = OfMud(1.0e6, 1e4, (1.0e6,), 0.0)
-    muds = {"48.6": dict.fromkeys(("k_p", "k_s", "k_e"), told), "Pond": {"k_p": told}}
+    reported = OfMud(1.0e6, 1e4, (1.0e6,), 0.0)
+    muds = {"48.6": dict.fromkeys(("k_p", "k_s", "k_e"), reported), "Pond": {"k_p": reported}}
     flipper = {
         "muds": [{"mud": "48.60 %", "k_p": {"value": 2e6, "std_error": 0}}, {"mud": "pond", "k_p": {"value": -1}}]
     }
@@ -186,9 +188,9 @@ def test_a_simulated_hand_with_an_encoder_finds_the_mud_as_well(
     status, data, _ = run(capsys, *SHORT, "--position", "--seed", "3", "--out", str(tmp_path / "out"))
     assert status == exit_codes.OK
     report = json.loads(data)
-    (told,), truth = report["muds"], report["truth"]["48.6"]
+    (reported,), truth = report["muds"], report["truth"]["48.6"]
     for name in ("k_p", "k_s", "k_e"):
-        assert told[name]["value"] == pytest.approx(truth[name], rel=0.03)
+        assert reported[name]["value"] == pytest.approx(truth[name], rel=0.03)
     assert all(trial["is_measured"] and trial["position"]["breaks"] == 0 for trial in report["trials"])
     page = (tmp_path / "out" / "report.html").read_text()
     assert "place came from an encoder" in page and "known to within" in page
@@ -199,7 +201,7 @@ def test_an_encoder_s_port_that_there_is_not_ends_with_a_sentence(
 ) -> None:
     cell = EmulatedAmplifier(lambda _: 0.0, AmplifierParameters(), tmp_path / "cell")
     ports = ["--port", str(tmp_path / "cell"), "--position", str(tmp_path / "none"), "--position-step", "10"]
-    status, _, told = run(capsys, "experiment", "loadcell", *ports, "--out", str(tmp_path / "out"))
+    status, _, reported = run(capsys, "experiment", "loadcell", *ports, "--out", str(tmp_path / "out"))
     cell.close()
     assert status == exit_codes.REFUSED
-    assert "the stage's encoder: there is no serial port" in told and "go on without --position" in told
+    assert "the stage's encoder: there is no serial port" in reported and "go on without --position" in reported

@@ -68,8 +68,8 @@ def test_without_simulation_there_are_no_muds(name: str, capsys: pytest.CaptureF
 def test_a_method_that_there_is_not_is_named_with_those_that_there_are(
     name: str, capsys: pytest.CaptureFixture[str], no_walks: None
 ) -> None:
-    sentence = refusal(capsys, "experiment", name, "--simulated", "--method", "paper", "--method", "fog")
-    assert "'fog': must be one of default, paper" in sentence
+    message = refusal(capsys, "experiment", name, "--simulated", "--method", "paper", "--method", "fog")
+    assert "'fog': must be one of default, paper" in message
 
 
 @pytest.mark.parametrize(
@@ -242,6 +242,6 @@ def test_a_person_gets_fitted_beside_present_values(capsys: pytest.CaptureFixtur
     ],
 )
 def test_muds_and_their_lengths_are_given_where_they_count(
-    arguments: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str], no_walks: None
+    arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str], no_walks: None
 ) -> None:
-    assert sentence in refusal(capsys, "experiment", "trackway", *arguments)
+    assert message in refusal(capsys, "experiment", "trackway", *arguments)

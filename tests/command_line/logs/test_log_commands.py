@@ -50,9 +50,9 @@ def test_replay_json_has_the_promised_keys(walk: Path) -> None:
 
 
 def test_log_info_counts(walk: Path) -> None:
-    told = json.loads(run("log", "info", str(walk), "--json").stdout)
-    assert told["robot"] == "test" and told["complete"] is True
-    assert told["missed_ticks"] == 0 and told["strides"] == 4
+    reported = json.loads(run("log", "info", str(walk), "--json").stdout)
+    assert reported["robot"] == "test" and reported["complete"] is True
+    assert reported["missed_ticks"] == 0 and reported["strides"] == 4
     assert "ticks" in run("log", "info", str(walk)).stdout
 
 
@@ -106,8 +106,8 @@ def test_segments_of_a_run_are_drawn_and_counted_as_one_log(walk: Path, tmp_path
     assert np.array_equal(whole.sweep_angle_rad, joined.sweep_angle_rad)
     assert (repr(joined.strides), joined.cut) == (repr(whole.strides), "")
     assert run("plot", *paths, "--out", str(tmp_path / "walk.png")).stderr == ""
-    told = json.loads(run("log", "info", *paths, "--json").stdout)
-    assert told["strides"] == 4
+    reported = json.loads(run("log", "info", *paths, "--json").stdout)
+    assert reported["strides"] == 4
 
 
 def test_a_walk_over_a_border_is_told(walk: Path, tmp_path: Path) -> None:

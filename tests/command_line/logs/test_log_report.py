@@ -42,7 +42,7 @@ def test_the_page_shows_every_walk_stride_and_event(
     assert (folder / "two.mcap").read_bytes() == two_walks.read_bytes()
 
 
-def told_pages(log: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str, Sequence[Sequence[str]]]]:
+def reported_pages(log: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str, Sequence[Sequence[str]]]]:
     """What a page would show, without its pictures."""
     pages: list[Section] = []
 
@@ -61,14 +61,14 @@ def test_people_are_told_times_since_the_log_s_begin_however_long_the_computer_i
     def read_later(path: Path, *_: object) -> Log:
         return after(read_log(path), UPTIME_S)
 
-    before = told_pages(two_walks, monkeypatch)
+    before = reported_pages(two_walks, monkeypatch)
     capsys.readouterr()
     assert main(["replay", str(two_walks)]) == exit_codes.OK
     strides = capsys.readouterr().out
     for module in (log_report, recorded_walk, replay):
         monkeypatch.setattr(module, "read_log", read_later, raising=False)
     monkeypatch.setattr(log_report, "read_logs", lambda paths, watch: read_later(paths[0]))
-    assert told_pages(two_walks, monkeypatch) == before
+    assert reported_pages(two_walks, monkeypatch) == before
     capsys.readouterr()
     assert main(["replay", str(two_walks)]) == exit_codes.OK
     assert capsys.readouterr().out == strides

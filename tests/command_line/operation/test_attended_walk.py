@@ -42,8 +42,8 @@ class EndingWalk(StatusClient):
         return self.reports.pop(0) if method == "status" else "accepted"
 
 
-def report(mode: str, sentence: str = "", notice: str = "", reaction: str = "hold") -> dict[str, Any]:
-    fault = {"sentence": sentence, "reaction": reaction} if sentence else None
+def report(mode: str, message: str = "", notice: str = "", reaction: str = "hold") -> dict[str, Any]:
+    fault = {"sentence": message, "reaction": reaction} if message else None
     return {"mode": mode, "fault": fault, "notice": notice, "stride": 0, "phase": "swing", "depth_m": 0, "body_x_m": 0}
 
 

@@ -80,11 +80,11 @@ def test_a_thin_plate_shows_its_face_by_the_sine_of_the_sweep(sweep_rad: float, 
     """Its normal (cos α, -sin α cos β, -sin α sin β): what is seen along y is the face times sin α cos β, of the part
     in the mud too, whose area control/plate.py integrates.
     """
-    outline, share = view_from_side(SHEET, sweep_rad, adduction_rad).plate, abs(sin(sweep_rad)) * cos(adduction_rad)
+    outline, fraction = view_from_side(SHEET, sweep_rad, adduction_rad).plate, abs(sin(sweep_rad)) * cos(adduction_rad)
     face_m2 = SHEET.plate_width_m * SHEET.plate_height_m
     in_mud_m2 = submerged_plate(SHEET, sweep_rad, adduction_rad).area_m2
-    assert area_m2(outline) == pytest.approx(share * face_m2, abs=1e-12)
-    assert area_m2(below(outline, 0.0)) == pytest.approx(share * in_mud_m2, abs=1e-12)
+    assert area_m2(outline) == pytest.approx(fraction * face_m2, abs=1e-12)
+    assert area_m2(below(outline, 0.0)) == pytest.approx(fraction * in_mud_m2, abs=1e-12)
 
 
 @given(SWEEPS, ADDUCTIONS)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.scripted_operator import ScriptedOperator
 
 from command_line.pictures.walk_figures import logged_walk, walk_figures
 from experiments.trackway.trials import LoggedTime
@@ -17,7 +18,6 @@ from firmware_host.log_reading.log_reader import read_log
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from tests.recorded_walks import walk_and_hold
-from tests.scripted_person import ScriptedPerson
 
 
 @pytest.fixture
@@ -48,10 +48,10 @@ def test_each_walk_is_drawn_alone_also_where_segments_between_them_are_missing(
         assert walk.time_s[-1] == pytest.approx(logged.to_s - logged.from_s, abs=0.3)
         assert np.all(np.diff(walk.time_s) < 0.01) and walk.walks == 1 and not walk.cut
     assert (len(first.own_strides), len(second.own_strides)) == (1, 2)
-    person = ScriptedPerson()
+    operator = ScriptedOperator()
     gone = LoggedTime("another", 0.0, 1.0)
-    (figure,) = walk_figures({"3 cm, trial 1": walks[1], "5 cm, trial 1": gone}, tmp_path, person)
+    (figure,) = walk_figures({"3 cm, trial 1": walks[1], "5 cm, trial 1": gone}, tmp_path, operator)
     assert figure.name == "figure8_3_cm__trial_1" and figure.caption.startswith("3 cm, trial 1, as figure 8 B to E")
-    assert person.told == [f"5 cm, trial 1 is not drawn: its log is not in {tmp_path}"]
+    assert operator.reported == [f"5 cm, trial 1 is not drawn: its log is not in {tmp_path}"]
     figure.draw(tmp_path / "figure8.png")
     assert (tmp_path / "figure8.png").stat().st_size > 10_000

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from control.depth.depth_choice import AdaptationParameters, DepthAdaptation, DepthChoice
 from control.depth.forecast import GRID_M, DepthForecast
-from control.depth.step_model import BodyDrag, Grip, step_m
+from control.depth.step_model import BodyDrag, Traction, step_m
 from control.gait.gait import GaitParameters
-from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.records import StrideEstimate
 from tests.control.made_up_muds import (
     GAIT,
@@ -25,25 +25,27 @@ from tests.control.made_up_muds import (
     both,
     bound,
     lift_m4,
+    reported,
     stride,
     thrust_m3,
-    told,
 )
 
 DEPTHS_M = [0.015 + 0.0025 * i for i in range(15)]
 BEARABLE_NM = 0.95 * LIFTING_NM
-FIRM, SOFT, BOTTOMLESS = told(1.2e6), told(0.3e6), told(0.01e6)
-LOOSE, STICKY = told(0.3e6), told(1.5e6)
+FIRM, SOFT, BOTTOMLESS = reported(1.2e6), reported(0.3e6), reported(0.01e6)
+LOOSE, STICKY = reported(0.3e6), reported(1.5e6)
 
 
 def adapted(parameters: AdaptationParameters = PARAMETERS) -> DepthAdaptation:
     return DepthAdaptation(parameters, GEOMETRY, GAIT)
 
 
-def chosen(belief: MudBelief, strides: list[StrideEstimate] | None = None, commanded_m: float = 0.03) -> DepthChoice:
+def chosen(
+    mud_estimate: MudEstimate, strides: list[StrideEstimate] | None = None, commanded_m: float = 0.03
+) -> DepthChoice:
     adaptation = adapted()
     adaptation.reset(commanded_m)
-    return adaptation.step(belief, both() if strides is None else strides, adaptation.choice.depth_m)
+    return adaptation.step(mud_estimate, both() if strides is None else strides, adaptation.choice.depth_m)
 
 
 def duration_s(depth_m: float) -> float:
@@ -55,17 +57,17 @@ def duration_s(depth_m: float) -> float:
 def promised_m(thrust_n: float, k_s: float, depth_m: float) -> float:
     """The step where the pad of 1.5 cm drags 2 cm deep through the same mud."""
     drag = BodyDrag(2.5 + k_s * 0.015 * 0.02**2 / 2.0, 6.0, 1.0)
-    return step_m(GAIT, 0.12, drag, Grip(thrust_n, 2.0 * 250.0), depth_m)
+    return step_m(GAIT, 0.12, drag, Traction(thrust_n, 2.0 * 250.0), depth_m)
 
 
-def forecast(belief: MudBelief, strides: list[StrideEstimate], commanded_m: float = 0.03) -> DepthForecast:
+def forecast(mud_estimate: MudEstimate, strides: list[StrideEstimate], commanded_m: float = 0.03) -> DepthForecast:
     forecast = DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N)
-    forecast.update(belief, strides, commanded_m)
+    forecast.update(mud_estimate, strides, commanded_m)
     return forecast
 
 
-def steps_m(told: DepthForecast) -> dict[float, float]:
-    return {z: promised_m(told.thrust_n(z) or 0.0, told.shear_at(0.02), z) for z in DEPTHS_M}
+def steps_m(reported: DepthForecast) -> dict[float, float]:
+    return {z: promised_m(reported.thrust_n(z) or 0.0, reported.shear_at(0.02), z) for z in DEPTHS_M}
 
 
 def same_depth(depth_m: float) -> object:
@@ -87,11 +89,11 @@ class TestTheFastestDepth:
     def test_it_promises_the_highest_speed_of_all_that_come_out(
         self, k_s: float, k_e: float, m_s: float, m_e: float, strides: list[StrideEstimate]
     ) -> None:
-        belief = believed(told(k_s, exponent=m_s), told(k_e, exponent=m_e))
-        known = forecast(belief, strides)
+        mud_estimate = believed(reported(k_s, exponent=m_s), reported(k_e, exponent=m_e))
+        known = forecast(mud_estimate, strides)
         out = {z: step / duration_s(z) for z, step in steps_m(known).items() if known.extraction_nm(z) < BEARABLE_NM}
         assume(out and max(out.values()) > 0.0)
-        choice = chosen(belief, strides)
+        choice = chosen(mud_estimate, strides)
         best_m = max(out, key=lambda depth_m: out[depth_m])
         assert choice.depth_m == same_depth(best_m) or out[best_m] == pytest.approx(
             next(speed for z, speed in out.items() if abs(z - choice.depth_m) < 1e-9)
@@ -101,8 +103,8 @@ class TestTheFastestDepth:
         """6 cm. At 5 cm, in muds that grow firmer in steps of 1 %, which is at most 3 mm of step."""
         slipping, walking = list[float](), list[float]()
         for k_s in 0.06e6 * 1.01 ** np.arange(60):
-            belief = believed(told(k_s), LOOSE)
-            choice, promised = chosen(belief), steps_m(forecast(belief, both()))[DEPTHS_M[-1]]
+            mud_estimate = believed(reported(k_s), LOOSE)
+            choice, promised = chosen(mud_estimate), steps_m(forecast(mud_estimate, both()))[DEPTHS_M[-1]]
             assert choice.depth_m == same_depth(0.05)
             (slipping if choice.slips else walking).append(promised)
         assert 0.057 < max(slipping) < 0.06 <= min(walking) < 0.063
@@ -111,8 +113,8 @@ class TestTheFastestDepth:
     def test_it_slips_by_what_is_promised_of_the_chosen_depth(
         self, k_s: float, k_e: float, strides: list[StrideEstimate]
     ) -> None:
-        belief = believed(told(k_s), told(k_e))
-        choice, steps = chosen(belief, strides), steps_m(forecast(belief, strides))
+        mud_estimate = believed(reported(k_s), reported(k_e))
+        choice, steps = chosen(mud_estimate, strides), steps_m(forecast(mud_estimate, strides))
         promised = next(step for z, step in steps.items() if abs(z - choice.depth_m) < 1e-9)
         assume(abs(promised - 0.06) > 1e-9)
         assert choice.slips == (promised < 0.06)
@@ -125,20 +127,20 @@ class TestTheFastestDepth:
 
     def test_mud_that_grows_sticky_is_walked_shallower(self) -> None:
         adaptation = adapted()
-        before, after = (adaptation.step(believed(told(0.1e6), k_e), both(nan), 0.03) for k_e in (LOOSE, STICKY))
+        before, after = (adaptation.step(believed(reported(0.1e6), k_e), both(nan), 0.03) for k_e in (LOOSE, STICKY))
         assert after.depth_m < before.depth_m
 
     @pytest.mark.parametrize("k_e", [1.1e6, 1.3e6, 1.6e6])
     def test_where_deeper_is_faster_it_goes_as_deep_as_it_comes_out_of(self, k_e: float) -> None:
-        depth_m = chosen(believed(told(0.1e6), told(k_e)), both(nan)).depth_m
+        depth_m = chosen(believed(reported(0.1e6), reported(k_e)), both(nan)).depth_m
         assert k_e * lift_m4(depth_m) < BEARABLE_NM <= k_e * lift_m4(depth_m + GRID_M)
 
     def test_where_nothing_comes_out_the_shallowest_is_taken(self) -> None:
-        soft, firm = chosen(believed(SOFT, told(20e6))), chosen(believed(told(1.5e6), told(20e6)))
+        soft, firm = chosen(believed(SOFT, reported(20e6))), chosen(believed(reported(1.5e6), reported(20e6)))
         assert soft == DepthChoice(0.015, True, "extraction")
         assert firm.depth_m == 0.015
 
-    @pytest.mark.parametrize(("k_e", "expected_m"), [(LOOSE, 0.05), (told(1.5e6), 0.035)])
+    @pytest.mark.parametrize(("k_e", "expected_m"), [(LOOSE, 0.05), (reported(1.5e6), 0.035)])
     def test_where_no_depth_promises_a_step_the_deepest_that_comes_out_is_taken(
         self, k_e: Coefficient, expected_m: float
     ) -> None:
@@ -181,8 +183,8 @@ class TestWhatIsNotKnown:
 
     def test_the_insertion_alone_is_enough_to_choose(self) -> None:
         """By k_s of 0.55 times k_p, less a fifth."""
-        told_by_insertion = chosen(believed(None, LOOSE, told(0.3e6 / 0.44)))
-        assert told_by_insertion == chosen(believed(SOFT, LOOSE))
+        reported_by_insertion = chosen(believed(None, LOOSE, reported(0.3e6 / 0.44)))
+        assert reported_by_insertion == chosen(believed(SOFT, LOOSE))
 
     def test_an_extraction_without_any_k_e_allows_one_step_deeper_than_it_was(self) -> None:
         assert chosen(believed(BOTTOMLESS), both(0.03)).depth_m == same_depth(0.0325)
@@ -193,7 +195,7 @@ class TestWhatIsNotKnown:
         assert chosen(NOTHING_KNOWN, [lost]).depth_m == PARAMETERS.initial_depth_m
 
 
-class TestDoubt:
+class TestUncertainty:
     """Within muds through which the motors can pull the pad: beyond 1.5 N/cm³ its own drag outgrows them."""
 
     fractions = st.tuples(*[st.floats(0.0, 1.0)] * 2)
@@ -203,7 +205,8 @@ class TestDoubt:
         self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float]
     ) -> None:
         sure, doubtful = (
-            chosen(believed(told(k_s, share * k_s, exponent=exponent), told(k_e))) for share in sorted(pair)
+            chosen(believed(reported(k_s, fraction * k_s, exponent=exponent), reported(k_e)))
+            for fraction in sorted(pair)
         )
         assert doubtful.depth_m >= sure.depth_m
         assert doubtful.slips >= sure.slips
@@ -213,7 +216,8 @@ class TestDoubt:
         self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float]
     ) -> None:
         sure, doubtful = (
-            chosen(believed(told(k_s), told(k_e, share * k_e, exponent=exponent))) for share in sorted(pair)
+            chosen(believed(reported(k_s), reported(k_e, fraction * k_e, exponent=exponent)))
+            for fraction in sorted(pair)
         )
         assert doubtful.depth_m <= sure.depth_m
 
@@ -221,27 +225,31 @@ class TestDoubt:
     def test_suction_learned_elsewhere_is_doubted_the_more_the_less_its_depth_law_is_known(
         self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float], depth_m: float
     ) -> None:
-        sure, doubtful = (chosen(believed(told(k_s), told(k_e, 0.0, depth_m, exponent, m))) for m in sorted(pair))
+        sure, doubtful = (
+            chosen(believed(reported(k_s), reported(k_e, 0.0, depth_m, exponent, m))) for m in sorted(pair)
+        )
         assert doubtful.depth_m <= sure.depth_m
 
     def test_one_standard_error_of_thrust_and_two_of_suction_count(self) -> None:
-        assert chosen(believed(told(0.4e6, 0.1e6), LOOSE)) == chosen(believed(SOFT, LOOSE))
-        assert chosen(believed(told(0.1e6), told(0.5e6, 0.4e6))) == chosen(believed(told(0.1e6), told(1.3e6)))
-        assert chosen(believed(SOFT, LOOSE)).depth_m > chosen(believed(told(0.4e6), LOOSE)).depth_m
+        assert chosen(believed(reported(0.4e6, 0.1e6), LOOSE)) == chosen(believed(SOFT, LOOSE))
+        assert chosen(believed(reported(0.1e6), reported(0.5e6, 0.4e6))) == chosen(
+            believed(reported(0.1e6), reported(1.3e6))
+        )
+        assert chosen(believed(SOFT, LOOSE)).depth_m > chosen(believed(reported(0.4e6), LOOSE)).depth_m
 
     def test_mud_that_reads_softer_in_deeper_strides_is_walked_deeper(self) -> None:
-        depths_m = [chosen(believed(told(0.25e6, exponent=m), LOOSE)).depth_m for m in (0.0, -0.4, -0.8)]
+        depths_m = [chosen(believed(reported(0.25e6, exponent=m), LOOSE)).depth_m for m in (0.0, -0.4, -0.8)]
         assert depths_m == sorted(depths_m)
         assert depths_m[0] < depths_m[-1]
 
 
 class TestStuck:
-    SINKING = believed(told(0.08e6), LOOSE)  # the deeper, the faster
+    SINKING = believed(reported(0.08e6), LOOSE)  # the deeper, the faster
 
     @pytest.mark.parametrize("depth_m", [0.0225, 0.0325, 0.04, 0.05])
     @pytest.mark.parametrize("k_s", [FIRM, SOFT, BOTTOMLESS, None])
     def test_a_stuck_flipper_goes_shallower_than_where_it_stuck(self, depth_m: float, k_s: Coefficient | None) -> None:
-        choice = chosen(believed(k_s, told(1.0)), both(depth_m, released=False), depth_m)
+        choice = chosen(believed(k_s, reported(1.0)), both(depth_m, released=False), depth_m)
         assert choice.depth_m < 0.95 * depth_m
         assert choice.reason == "a flipper was stuck"
 
@@ -297,7 +305,7 @@ class TestTwoMuds:
 
     @given(shears, suctions, suctions)
     def test_the_flipper_that_the_mud_holds_harder_decides(self, k_s: float, one: float, other: float) -> None:
-        flippers = [FlipperBelief(None, told(k_s), told(k_e)) for k_e in (one, other)]
+        flippers = [FlipperEstimate(None, reported(k_s), reported(k_e)) for k_e in (one, other)]
         alone = [chosen(apart(flipper, flipper)).depth_m for flipper in flippers]
         together = {chosen(apart(*flippers)).depth_m, chosen(apart(*flippers[::-1])).depth_m}
         assert together == {min(alone)}
@@ -306,8 +314,8 @@ class TestTwoMuds:
     def test_their_thrusts_add_up(self, one: float, other: float) -> None:
         """Below the motors' limit at every depth: 6.25 N bear 0.15 N/cm³ at 5 cm."""
         one, other = one / 2.0, other / 2.0
-        mean = believed(told((one + other) / 2.0), LOOSE)
-        two = apart(FlipperBelief(None, told(one), LOOSE), FlipperBelief(None, told(other), LOOSE))
+        mean = believed(reported((one + other) / 2.0), LOOSE)
+        two = apart(FlipperEstimate(None, reported(one), LOOSE), FlipperEstimate(None, reported(other), LOOSE))
         assert chosen(two).depth_m == chosen(mean).depth_m
 
 
@@ -332,10 +340,10 @@ class Clay(NamedTuple):
     def k_e(self, depth_m: float) -> float:
         return self.suction_n(depth_m) / (0.025 * 0.004 * depth_m)
 
-    def belief(self) -> MudBelief:
+    def mud_estimate(self) -> MudEstimate:
         """As it would be learned from strides between 3 and 4 cm."""
         k_s, k_e = (
-            told(k(0.035), depth_m=0.035, exponent=log(k(0.04) / k(0.03)) / log(4.0 / 3.0))
+            reported(k(0.035), depth_m=0.035, exponent=log(k(0.04) / k(0.03)) / log(4.0 / 3.0))
             for k in (self.k_s, self.k_e)
         )
         return believed(k_s, k_e)
@@ -345,7 +353,7 @@ class TestMuds:
     CLAYS = [Clay(strength_pa) for strength_pa in np.geomspace(300.0, 6000.0, 25)]
 
     def test_the_softer_the_clay_the_deeper_the_stride(self) -> None:
-        depths_m = [chosen(clay.belief()).depth_m for clay in self.CLAYS]
+        depths_m = [chosen(clay.mud_estimate()).depth_m for clay in self.CLAYS]
         assert depths_m == sorted(depths_m, reverse=True)
         assert depths_m[0] == same_depth(0.05)
         assert depths_m[-1] == 0.015
@@ -356,7 +364,7 @@ class TestMuds:
         carries the body loses up to 6 % by that. Left out is clay in which every depth slips or sticks.
         """
         for clay in self.CLAYS:
-            choice = chosen(clay.belief())
+            choice = chosen(clay.mud_estimate())
             if choice.slips or choice.reason != "fastest":
                 continue
             speeds = {}
@@ -368,7 +376,7 @@ class TestMuds:
             assert taken > 0.94 * max(speeds.values())
 
     def test_only_bottomless_clay_slips(self) -> None:
-        slipping = [clay.strength_pa for clay in self.CLAYS if chosen(clay.belief()).slips]
+        slipping = [clay.strength_pa for clay in self.CLAYS if chosen(clay.mud_estimate()).slips]
         assert slipping == [clay.strength_pa for clay in self.CLAYS[: len(slipping)]]
         assert 300.0 <= slipping[-1] < 700.0
 
@@ -378,17 +386,22 @@ class TestMuds:
         depths_m = []
         for _ in range(6):
             depth_m = adaptation.choice.depth_m
-            depths_m.append(adaptation.step(clay.belief(), both(depth_m, extraction_nm=0.2), depth_m).depth_m)
+            depths_m.append(adaptation.step(clay.mud_estimate(), both(depth_m, extraction_nm=0.2), depth_m).depth_m)
         assert len(set(depths_m[1:])) == 1
 
 
 numbers = st.floats() | st.floats(-0.1, 0.1) | st.sampled_from([0.0, 0.03, 1e6])
 anything = st.builds(Coefficient, *[numbers] * 5, st.just(3), st.booleans())
 plausible = st.builds(
-    told, st.floats(0.0, 1e8), st.floats(0.0, 1e7), st.floats(0.005, 0.06), st.floats(-1.5, 0.5), st.floats(0.0, 0.5)
+    reported,
+    st.floats(0.0, 1e8),
+    st.floats(0.0, 1e7),
+    st.floats(0.005, 0.06),
+    st.floats(-1.5, 0.5),
+    st.floats(0.0, 0.5),
 )
 coefficients = plausible | anything | st.none()
-beliefs = st.builds(MudBelief, *[coefficients] * 3, *[st.builds(FlipperBelief, *[coefficients] * 3)] * 2)
+beliefs = st.builds(MudEstimate, *[coefficients] * 3, *[st.builds(FlipperEstimate, *[coefficients] * 3)] * 2)
 strides = st.builds(
     stride,
     st.sampled_from(["left", "right"]),
@@ -402,17 +415,17 @@ pairs = st.lists(strides, min_size=1, max_size=2)
 class TestRange:
     @given(st.lists(st.tuples(beliefs, pairs), max_size=5))
     def test_the_depth_stays_within_its_bounds_and_within_reach(
-        self, walk: list[tuple[MudBelief, list[StrideEstimate]]]
+        self, walk: list[tuple[MudEstimate, list[StrideEstimate]]]
     ) -> None:
         adaptation = adapted()
-        for belief, pair in walk:
-            choice = adaptation.step(belief, pair, adaptation.choice.depth_m)
+        for mud_estimate, pair in walk:
+            choice = adaptation.step(mud_estimate, pair, adaptation.choice.depth_m)
             assert PARAMETERS.min_depth_m <= choice.depth_m <= PARAMETERS.max_depth_m
             assert GEOMETRY.is_reachable(radians(GAIT.sweep_angle_deg), choice.depth_m)
 
     @given(st.floats(5.0, 45.0), st.floats(0.02, 0.2), beliefs, pairs)
     def test_a_greatest_depth_out_of_reach_is_never_chosen(
-        self, sweep_deg: float, max_depth_m: float, belief: MudBelief, pair: list[StrideEstimate]
+        self, sweep_deg: float, max_depth_m: float, mud_estimate: MudEstimate, pair: list[StrideEstimate]
     ) -> None:
         gait, parameters = GaitParameters(sweep_angle_deg=sweep_deg), AdaptationParameters(max_depth_m=max_depth_m)
         adaptation = DepthAdaptation(parameters, GEOMETRY, gait)
@@ -420,7 +433,7 @@ class TestRange:
         adaptation.reset(parameters.min_depth_m)
         assert (
             parameters.min_depth_m
-            <= adaptation.step(belief, pair, adaptation.choice.depth_m).depth_m
+            <= adaptation.step(mud_estimate, pair, adaptation.choice.depth_m).depth_m
             <= max_depth_m + 1e-9
         )
 
@@ -433,8 +446,8 @@ class TestRange:
         assert DEPTHS_M[-1] == same_depth(PARAMETERS.max_depth_m)
 
     @given(st.floats(0.01, 0.05), st.integers(0, 12), st.floats(0.01, 0.99))
-    def test_the_grid_never_passes_its_greatest_depth(self, low_m: float, steps: int, share: float) -> None:
-        high_m = low_m + (steps + share) * GRID_M
+    def test_the_grid_never_passes_its_greatest_depth(self, low_m: float, steps: int, fraction: float) -> None:
+        high_m = low_m + (steps + fraction) * GRID_M
         assume(high_m < GEOMETRY.deepest_m(30.0))
         grid_m = adapted(AdaptationParameters(min_depth_m=low_m, max_depth_m=high_m)).grid_m
         assert len(grid_m) == steps + 1

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from control.depth.forecast import DepthForecast
-from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.records import Estimate, StrideEstimate
 from tests.control.made_up_muds import (
     GAIT,
@@ -23,24 +23,24 @@ from tests.control.made_up_muds import (
     bound,
     lift_m4,
     measured,
+    reported,
     stride,
     thrust_m3,
-    told,
 )
 
 PIECES = 1e-3
 DEPTHS_M = (0.015, 0.02, 0.03, 0.04, 0.05)
-SOFT, FIRM = told(0.2e6), told(0.6e6)
+SOFT, FIRM = reported(0.2e6), reported(0.6e6)
 
 
 def forecast(
-    belief: MudBelief, strides: list[StrideEstimate] | None = None, commanded_m: float | None = None
+    mud_estimate: MudEstimate, strides: list[StrideEstimate] | None = None, commanded_m: float | None = None
 ) -> DepthForecast:
     """After one stride, which went as deep as it was told unless that is given."""
     forecast = DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N)
     strides = both() if strides is None else strides
     reached_m = [stride.depth_m + stride.surface_m for stride in strides]
-    forecast.update(belief, strides, min(reached_m, default=0.03) if commanded_m is None else commanded_m)
+    forecast.update(mud_estimate, strides, min(reached_m, default=0.03) if commanded_m is None else commanded_m)
     return forecast
 
 
@@ -48,41 +48,43 @@ class TestThrust:
     @pytest.mark.parametrize("depth_m", DEPTHS_M)
     def test_a_mud_that_yielded_bears_its_k_s_times_the_depth_moment_of_both_plates(self, depth_m: float) -> None:
         expected_n = 2.0 * 0.12e6 * thrust_m3(depth_m)
-        assert forecast(believed(told(0.12e6))).thrust_n(depth_m) == pytest.approx(expected_n, rel=PIECES)
+        assert forecast(believed(reported(0.12e6))).thrust_n(depth_m) == pytest.approx(expected_n, rel=PIECES)
 
     @pytest.mark.parametrize("depth_m", DEPTHS_M)
     def test_what_was_learned_of_the_depth_law_carries_it_to_other_depths(self, depth_m: float) -> None:
         k_s = 0.12e6 * (depth_m / 0.025) ** -0.8
-        learned = believed(told(0.12e6, depth_m=0.025, exponent=-0.8))
+        learned = believed(reported(0.12e6, depth_m=0.025, exponent=-0.8))
         assert forecast(learned).thrust_n(depth_m) == pytest.approx(2.0 * k_s * thrust_m3(depth_m), rel=PIECES)
 
     def test_no_flipper_pushes_harder_than_its_motor(self) -> None:
-        assert forecast(believed(told(3e6))).thrust_n(0.05) == 2.0 * MOTOR_FORCE_N
-        two_muds = apart(FlipperBelief(None, told(3e6)), FlipperBelief(None, told(0.1e6)))
+        assert forecast(believed(reported(3e6))).thrust_n(0.05) == 2.0 * MOTOR_FORCE_N
+        two_muds = apart(FlipperEstimate(None, reported(3e6)), FlipperEstimate(None, reported(0.1e6)))
         expected_n = MOTOR_FORCE_N + 0.1e6 * thrust_m3(0.05)
         assert forecast(two_muds).thrust_n(0.05) == pytest.approx(expected_n, rel=PIECES)
 
     def test_it_is_less_by_one_standard_error(self) -> None:
-        assert forecast(believed(told(0.3e6, 0.1e6))).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
+        assert forecast(believed(reported(0.3e6, 0.1e6))).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
 
     def test_the_doubt_about_the_depth_law_counts_away_from_where_it_was_learned(self) -> None:
-        doubtful, sure = (forecast(believed(told(0.1e6, exponent_doubt=doubt))) for doubt in (0.3, 0.0))
-        share = 1.0 - 0.3 * log(0.05 / 0.03)
-        for depth_m, expected in ((0.03, 1.0), (0.05, share)):
+        doubtful, sure = (
+            forecast(believed(reported(0.1e6, exponent_uncertainty=uncertainty))) for uncertainty in (0.3, 0.0)
+        )
+        fraction = 1.0 - 0.3 * log(0.05 / 0.03)
+        for depth_m, expected in ((0.03, 1.0), (0.05, fraction)):
             assert doubtful.thrust_n(depth_m) == pytest.approx(expected * (sure.thrust_n(depth_m) or nan))
 
     def test_more_doubt_than_value_bears_nothing(self) -> None:
-        assert forecast(believed(told(0.1e6, 0.2e6))).thrust_n(0.03) == 0.0
+        assert forecast(believed(reported(0.1e6, 0.2e6))).thrust_n(0.03) == 0.0
 
     def test_the_mean_of_the_flippers_counts_for_each(self) -> None:
-        two_muds = apart(FlipperBelief(None, SOFT), FlipperBelief(None, told(0.4e6)))
-        expected_n = forecast(believed(told(0.3e6))).thrust_n(0.03)
+        two_muds = apart(FlipperEstimate(None, SOFT), FlipperEstimate(None, reported(0.4e6)))
+        expected_n = forecast(believed(reported(0.3e6))).thrust_n(0.03)
         assert forecast(two_muds).thrust_n(0.03) == pytest.approx(expected_n)
 
     def test_the_flipper_that_knows_speaks_for_the_one_that_does_not(self) -> None:
-        knows, knows_not = FlipperBelief(None, SOFT), FlipperBelief()
-        for belief in (apart(knows, knows_not), apart(knows_not, knows)):
-            assert forecast(belief).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
+        knows, knows_not = FlipperEstimate(None, SOFT), FlipperEstimate()
+        for mud_estimate in (apart(knows, knows_not), apart(knows_not, knows)):
+            assert forecast(mud_estimate).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
 
     def test_nothing_is_forecast_where_nothing_is_known(self) -> None:
         assert forecast(NOTHING_KNOWN).thrust_n(0.03) is None
@@ -96,23 +98,25 @@ class TestMudThatHeld:
 
     def test_the_insertion_tells_what_a_mud_bears_that_never_yielded(self) -> None:
         """By the ratio 0.55, less its doubt of a fifth."""
-        alone, derived = believed(None, None, told(0.5e6)), believed(told(0.8 * 0.55 * 0.5e6))
+        alone, derived = believed(None, None, reported(0.5e6)), believed(reported(0.8 * 0.55 * 0.5e6))
         assert forecast(alone).thrust_n(0.03) == pytest.approx(forecast(derived).thrust_n(0.03))
 
     @pytest.mark.parametrize(("least", "k_p", "bears"), [(0.3e6, 0.5e6, 0.3e6), (0.1e6, 0.5e6, 0.22e6)])
     def test_of_bound_and_insertion_the_larger_holds(self, least: float, k_p: float, bears: float) -> None:
-        belief = believed(bound(least), None, told(k_p))
-        assert forecast(belief).thrust_n(0.03) == pytest.approx(forecast(believed(told(bears))).thrust_n(0.03))
+        mud_estimate = believed(bound(least), None, reported(k_p))
+        assert forecast(mud_estimate).thrust_n(0.03) == pytest.approx(
+            forecast(believed(reported(bears))).thrust_n(0.03)
+        )
 
     def test_a_bound_alone_bears_itself(self) -> None:
         assert forecast(believed(bound(0.2e6))).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
 
     def test_a_k_s_that_was_told_by_value_needs_no_insertion(self) -> None:
-        belief = believed(SOFT, None, told(9e6))
-        assert forecast(belief).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
+        mud_estimate = believed(SOFT, None, reported(9e6))
+        assert forecast(mud_estimate).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
 
     def test_the_doubt_about_the_insertion_counts(self) -> None:
-        doubtful, sure = believed(None, None, told(0.5e6, 0.2e6)), believed(None, None, told(0.3e6))
+        doubtful, sure = believed(None, None, reported(0.5e6, 0.2e6)), believed(None, None, reported(0.3e6))
         assert forecast(doubtful).thrust_n(0.03) == pytest.approx(forecast(sure).thrust_n(0.03))
 
 
@@ -121,63 +125,63 @@ class TestRatio:
     def test_every_stride_that_tells_both_takes_a_quarter_of_the_way_to_the_truth(self, truth: float) -> None:
         learning = forecast(NOTHING_KNOWN)
         for strides in range(1, 30):
-            learning.update(believed(told(truth * 0.7e6), None, told(0.7e6)), both(), 0.03)
+            learning.update(believed(reported(truth * 0.7e6), None, reported(0.7e6)), both(), 0.03)
             left = log(0.55 / truth) * 0.75**strides
             assert log(learning.shear_ratio / truth) == pytest.approx(left, abs=1e-12)
 
     def test_both_are_compared_at_the_same_depth(self) -> None:
-        shallow = told(1.0e6, depth_m=0.02, exponent=-0.5)
-        learning = forecast(believed(told(0.55e6 * (0.04 / 0.02) ** -0.5, depth_m=0.04), None, shallow))
+        shallow = reported(1.0e6, depth_m=0.02, exponent=-0.5)
+        learning = forecast(believed(reported(0.55e6 * (0.04 / 0.02) ** -0.5, depth_m=0.04), None, shallow))
         assert learning.shear_ratio == pytest.approx(0.55)
 
     @pytest.mark.parametrize(("truth", "nearest"), [(30.0, 1.5), (0.001, 0.2)])
     def test_nonsense_is_believed_only_so_far(self, truth: float, nearest: float) -> None:
         learning = forecast(NOTHING_KNOWN)
         for _ in range(30):
-            learning.update(believed(told(truth * 0.7e6), None, told(0.7e6)), both(), 0.03)
+            learning.update(believed(reported(truth * 0.7e6), None, reported(0.7e6)), both(), 0.03)
         assert learning.shear_ratio == nearest
 
-    @pytest.mark.parametrize("k_s", [bound(0.7e6), None, told(nan), told(0.0)])
-    @pytest.mark.parametrize("k_p", [bound(0.7e6), None, told(nan), told(0.0)])
+    @pytest.mark.parametrize("k_s", [bound(0.7e6), None, reported(nan), reported(0.0)])
+    @pytest.mark.parametrize("k_p", [bound(0.7e6), None, reported(nan), reported(0.0)])
     def test_bounds_and_gaps_teach_nothing(self, k_s: Coefficient | None, k_p: Coefficient | None) -> None:
         assert forecast(believed(k_s, None, k_p)).shear_ratio == 0.55
-        assert forecast(believed(k_s, None, told(0.7e6))).shear_ratio == 0.55
-        assert forecast(believed(told(0.7e6), None, k_p)).shear_ratio == 0.55
+        assert forecast(believed(k_s, None, reported(0.7e6))).shear_ratio == 0.55
+        assert forecast(believed(reported(0.7e6), None, k_p)).shear_ratio == 0.55
 
 
-class TestFeltShare:
+class TestFeltFraction:
     WHOLE_NM = 0.6e6 * lift_m4(0.03)
 
-    def told_by(self, *shares: float) -> DepthForecast:
+    def reported_by(self, *fractions: float) -> DepthForecast:
         learning = DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N)
-        for share in shares:
-            extraction = stride(k_e=measured(0.6e6), extraction_nm=share * self.WHOLE_NM)
-            learning.update(believed(None, told(0.6e6)), [extraction], 0.03)
+        for fraction in fractions:
+            extraction = stride(k_e=measured(0.6e6), extraction_nm=fraction * self.WHOLE_NM)
+            learning.update(believed(None, reported(0.6e6)), [extraction], 0.03)
         return learning
 
     def test_before_any_extraction_the_whole_torque_is_expected(self) -> None:
-        assert forecast(believed(None, told(0.6e6))).felt_share == 1.0
+        assert forecast(believed(None, reported(0.6e6))).felt_fraction == 1.0
 
     def test_the_first_extraction_is_believed_fully(self) -> None:
-        assert self.told_by(0.6).felt_share == pytest.approx(0.6, rel=PIECES)
+        assert self.reported_by(0.6).felt_fraction == pytest.approx(0.6, rel=PIECES)
 
     def test_the_first_four_count_alike_and_later_ones_a_quarter(self) -> None:
-        shares = [0.5, 0.8, 0.7, 0.9]
+        fractions = [0.5, 0.8, 0.7, 0.9]
         mean = 1.0
-        for share in shares:
-            mean *= share**0.25
-        assert self.told_by(0.5, 0.8).felt_share == pytest.approx(sqrt(0.5 * 0.8), rel=PIECES)
-        assert self.told_by(*shares).felt_share == pytest.approx(mean, rel=PIECES)
-        assert self.told_by(*shares, 0.6).felt_share == pytest.approx(mean**0.75 * 0.6**0.25, rel=PIECES)
+        for fraction in fractions:
+            mean *= fraction**0.25
+        assert self.reported_by(0.5, 0.8).felt_fraction == pytest.approx(sqrt(0.5 * 0.8), rel=PIECES)
+        assert self.reported_by(*fractions).felt_fraction == pytest.approx(mean, rel=PIECES)
+        assert self.reported_by(*fractions, 0.6).felt_fraction == pytest.approx(mean**0.75 * 0.6**0.25, rel=PIECES)
 
     @pytest.mark.parametrize("truth", [0.4, 0.7, 1.2])
     def test_it_comes_to_the_truth_from_both_sides(self, truth: float) -> None:
         for start in (0.3, 1.4):
-            assert self.told_by(start, *[truth] * 30).felt_share == pytest.approx(truth, rel=2.0 * PIECES)
+            assert self.reported_by(start, *[truth] * 30).felt_fraction == pytest.approx(truth, rel=2.0 * PIECES)
 
     @pytest.mark.parametrize(("share", "nearest"), [(9.0, 1.5), (0.01, 0.2)])
-    def test_nonsense_is_believed_only_so_far(self, share: float, nearest: float) -> None:
-        assert self.told_by(share).felt_share == nearest
+    def test_nonsense_is_believed_only_so_far(self, fraction: float, nearest: float) -> None:
+        assert self.reported_by(fraction).felt_fraction == nearest
 
     @pytest.mark.parametrize(
         "teaches_nothing",
@@ -195,60 +199,60 @@ class TestFeltShare:
         ],
     )
     def test_an_extraction_that_did_not_tell_teaches_nothing(self, teaches_nothing: StrideEstimate) -> None:
-        assert forecast(NOTHING_KNOWN, [teaches_nothing]).felt_share == 1.0
+        assert forecast(NOTHING_KNOWN, [teaches_nothing]).felt_fraction == 1.0
 
     def test_the_surface_that_the_flipper_met_counts(self) -> None:
         whole_nm = 0.6e6 * lift_m4(0.04, 0.01)
         sunk = stride(surface_m=0.01, k_e=measured(0.6e6), extraction_nm=0.7 * whole_nm)
-        assert forecast(NOTHING_KNOWN, [sunk]).felt_share == pytest.approx(0.7, rel=PIECES)
+        assert forecast(NOTHING_KNOWN, [sunk]).felt_fraction == pytest.approx(0.7, rel=PIECES)
 
 
 class TestExtraction:
     @pytest.mark.parametrize("depth_m", DEPTHS_M)
     def test_the_torque_is_k_e_times_the_lift_moment_and_two_standard_errors(self, depth_m: float) -> None:
-        for k_e, doubt in ((0.4e6, 0.0), (0.2e6, 0.1e6)):
-            found = forecast(believed(None, told(k_e, doubt)), both(nan)).extraction_nm(depth_m)
+        for k_e, uncertainty in ((0.4e6, 0.0), (0.2e6, 0.1e6)):
+            found = forecast(believed(None, reported(k_e, uncertainty)), both(nan)).extraction_nm(depth_m)
             assert found == pytest.approx(0.4e6 * lift_m4(depth_m), rel=PIECES)
 
     def test_the_share_that_was_felt_counts(self) -> None:
         felt = [stride(k_e=measured(0.6e6), extraction_nm=0.5 * 0.6e6 * lift_m4(0.03))]
-        found = forecast(believed(None, told(0.6e6)), felt).extraction_nm(0.05)
+        found = forecast(believed(None, reported(0.6e6)), felt).extraction_nm(0.05)
         assert found == pytest.approx(0.5 * 0.6e6 * lift_m4(0.05), rel=2.0 * PIECES)
 
     def test_the_flipper_that_the_mud_holds_harder_decides(self) -> None:
-        loose, sticky = FlipperBelief(None, None, told(0.3e6)), FlipperBelief(None, None, told(0.9e6))
-        for belief in (apart(loose, sticky), apart(sticky, loose)):
-            assert forecast(belief).extraction_nm(0.03) == forecast(apart(sticky, sticky)).extraction_nm(0.03)
+        loose, sticky = FlipperEstimate(None, None, reported(0.3e6)), FlipperEstimate(None, None, reported(0.9e6))
+        for mud_estimate in (apart(loose, sticky), apart(sticky, loose)):
+            assert forecast(mud_estimate).extraction_nm(0.03) == forecast(apart(sticky, sticky)).extraction_nm(0.03)
 
     def test_a_flipper_that_came_out_proves_every_shallower_depth(self) -> None:
-        proven = forecast(believed(None, told(2e6)), both(0.035, extraction_nm=0.3))
+        proven = forecast(believed(None, reported(2e6)), both(0.035, extraction_nm=0.3))
         assert proven.extraction_nm(0.03) == proven.extraction_nm(0.035) == 0.3
 
     def test_deeper_it_proves_a_torque_in_proportion_to_the_lift_moment(self) -> None:
         """For k_e falls with depth; a belief of less than that holds."""
         for k_e, expected_nm in ((2e6, 0.3 * lift_m4(0.045) / lift_m4(0.035)), (0.1e6, 0.1e6 * lift_m4(0.045))):
-            proven = forecast(believed(None, told(k_e)), both(0.035, extraction_nm=0.3))
+            proven = forecast(believed(None, reported(k_e)), both(0.035, extraction_nm=0.3))
             assert proven.extraction_nm(0.045) == pytest.approx(expected_nm, rel=2.0 * PIECES)
 
     def test_where_k_e_is_not_known_k_p_stands_for_it(self) -> None:
         for k_e in (None, bound(0.1e6)):
-            belief = believed(None, k_e)._replace(k_p=told(0.5e6, 0.1e6))
-            found = forecast(belief, both(0.02)).extraction_nm(0.04)
+            mud_estimate = believed(None, k_e)._replace(k_p=reported(0.5e6, 0.1e6))
+            found = forecast(mud_estimate, both(0.02)).extraction_nm(0.04)
             assert found == pytest.approx(0.7e6 * lift_m4(0.04), rel=PIECES)
 
     def test_a_proof_never_makes_an_extraction_harder_than_the_mud(self) -> None:
-        proven = forecast(believed(None, told(0.2e6)), both(0.05, extraction_nm=0.5))
+        proven = forecast(believed(None, reported(0.2e6)), both(0.05, extraction_nm=0.5))
         assert proven.extraction_nm(0.02) == pytest.approx(0.2e6 * lift_m4(0.02), rel=PIECES)
 
     def test_a_flipper_that_stuck_proves_nothing_by_its_torque(self) -> None:
         """At half the depth it is held by half of all the torque, and by what is believed where that is more."""
         stuck = both(0.04, released=False, extraction_nm=0.1)
         for k_e, expected_nm in ((2e6, 2e6 * lift_m4(0.02)), (0.5e6, LIFTING_NM / 2.0)):
-            found = forecast(believed(None, told(k_e)), stuck).extraction_nm(0.02)
+            found = forecast(believed(None, reported(k_e)), stuck).extraction_nm(0.02)
             assert found == pytest.approx(expected_nm, rel=PIECES)
 
     def test_a_k_e_below_zero_is_none_but_keeps_its_doubt(self) -> None:
-        found = forecast(believed(None, told(-0.4e6, 0.2e6)), both(nan)).extraction_nm(0.03)
+        found = forecast(believed(None, reported(-0.4e6, 0.2e6)), both(nan)).extraction_nm(0.03)
         assert found == pytest.approx(0.4e6 * lift_m4(0.03), rel=PIECES)
 
     @pytest.mark.parametrize("k_e", [None, bound(0.1e6)])
@@ -268,12 +272,12 @@ class TestExtraction:
         assert forecast(believed(None), both(nan, extraction_nm=0.1)).extraction_nm(0.015) == LIFTING_NM
 
     def test_above_the_surface_nothing_holds(self) -> None:
-        sunk = forecast(believed(None, told(9e6)), both(surface_m=0.03))
+        sunk = forecast(believed(None, reported(9e6)), both(surface_m=0.03))
         assert sunk.extraction_nm(0.03) == sunk.extraction_nm(0.02) == 0.0
 
 
 class TestStuck:
-    LOOSE = believed(None, told(1.0))  # whatever holds is the memory
+    LOOSE = believed(None, reported(1.0))  # whatever holds is the memory
 
     def after(self, *strides: list[StrideEstimate]) -> DepthForecast:
         remembering = DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N)
@@ -332,7 +336,7 @@ class TestHowDeepTheFlippersGo:
         assert sagged.thrust_n(0.02) == pytest.approx(expected_n, rel=PIECES)
 
     def test_the_sag_also_has_to_come_out(self) -> None:
-        sagged = forecast(believed(None, told(0.4e6)), both(0.038), 0.03)
+        sagged = forecast(believed(None, reported(0.4e6)), both(0.038), 0.03)
         assert sagged.extraction_nm(0.03) == pytest.approx(0.4e6 * lift_m4(0.032), rel=PIECES)
 
     def test_sag_is_measured_from_the_nominal_surface(self) -> None:
@@ -349,7 +353,7 @@ class TestHowDeepTheFlippersGo:
     def test_they_go_no_deeper_than_the_arm_reaches_at_the_ends_of_the_sweep(self) -> None:
         """Where its vertical lever is still 1 cm: √((l cos α)² + h² - 1 cm²) - H."""
         deepest_m = sqrt((0.12**2) * 0.75 + 0.05**2 - 0.01**2) - 0.0645
-        far = forecast(believed(told(0.1e6), told(0.4e6)), both(0.09), 0.03)
+        far = forecast(believed(reported(0.1e6), reported(0.4e6)), both(0.09), 0.03)
         assert far.reached_m(0.04) == far.reached_m(0.3) == pytest.approx(deepest_m)
         assert far.thrust_n(0.3) == pytest.approx(2.0 * 0.1e6 * thrust_m3(deepest_m), rel=PIECES)
         assert far.extraction_nm(0.3) == pytest.approx(0.4e6 * lift_m4(deepest_m), rel=PIECES)
@@ -358,7 +362,7 @@ class TestHowDeepTheFlippersGo:
 class TestSurface:
     @pytest.mark.parametrize("surface_m", [-0.01, 0.0075])
     def test_thrust_and_suction_are_those_of_the_plate_under_the_surface(self, surface_m: float) -> None:
-        learned = believed(told(0.12e6, exponent=-0.8), told(0.4e6, exponent=-0.4))
+        learned = believed(reported(0.12e6, exponent=-0.8), reported(0.4e6, exponent=-0.4))
         found = forecast(learned, both(0.02, surface_m=surface_m))
         submerged_m = 0.035 - surface_m
         k_s, k_e = 0.12e6 * (submerged_m / 0.03) ** -0.8, 0.4e6 * (submerged_m / 0.03) ** -0.4
@@ -374,19 +378,19 @@ class TestSurface:
         assert forecast(believed(SOFT), pair).thrust_n(0.03) == pytest.approx(expected_n, rel=PIECES)
 
     def test_a_surface_that_is_not_known_is_the_nominal_one(self) -> None:
-        belief = believed(SOFT, told(0.4e6))
-        unknown, nominal = forecast(belief, both(surface_m=nan)), forecast(belief, both())
+        mud_estimate = believed(SOFT, reported(0.4e6))
+        unknown, nominal = forecast(mud_estimate, both(surface_m=nan)), forecast(mud_estimate, both())
         assert unknown.thrust_n(0.04) == nominal.thrust_n(0.04)
         assert unknown.extraction_nm(0.04) == nominal.extraction_nm(0.04)
 
 
 class TestPad:
     def test_the_mud_at_the_pad_is_the_mean_of_what_the_flippers_know(self) -> None:
-        two_muds = apart(FlipperBelief(None, told(0.2e6, 0.05e6)), FlipperBelief(None, told(0.4e6)))
+        two_muds = apart(FlipperEstimate(None, reported(0.2e6, 0.05e6)), FlipperEstimate(None, reported(0.4e6)))
         assert forecast(two_muds).shear_at(0.02) == pytest.approx((0.15e6 + 0.4e6) / 2.0)
 
     def test_it_follows_the_depth_law(self) -> None:
-        learned = believed(told(0.2e6, exponent=-1.0))
+        learned = believed(reported(0.2e6, exponent=-1.0))
         assert forecast(learned).shear_at(0.02) == pytest.approx(0.3e6)
 
     def test_it_is_none_where_there_is_no_pad_or_nothing_is_known(self) -> None:
@@ -399,8 +403,8 @@ estimates = st.builds(measured, numbers) | st.builds(
     Estimate, numbers, numbers, st.just(9), st.booleans(), st.just(""), st.booleans()
 )
 coefficients = st.none() | st.builds(Coefficient, *[numbers] * 5, st.just(3), st.booleans())
-flipper_beliefs = st.builds(FlipperBelief, *[coefficients] * 3)
-beliefs = st.builds(MudBelief, *[coefficients] * 3, flipper_beliefs, flipper_beliefs, st.booleans())
+flipper_beliefs = st.builds(FlipperEstimate, *[coefficients] * 3)
+beliefs = st.builds(MudEstimate, *[coefficients] * 3, flipper_beliefs, flipper_beliefs, st.booleans())
 flippers = st.sampled_from(["left", "right"])
 strides = st.builds(stride, flippers, numbers, st.booleans(), numbers, estimates, estimates, numbers)
 
@@ -411,16 +415,16 @@ strides = st.builds(stride, flippers, numbers, st.booleans(), numbers, estimates
     st.floats(0.005, 0.2),
 )
 def test_nothing_that_is_believed_or_measured_raises(
-    walk: list[tuple[MudBelief, list[StrideEstimate]]], depth_m: float
+    walk: list[tuple[MudEstimate, list[StrideEstimate]]], depth_m: float
 ) -> None:
     survivor = DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N)
-    for belief, pair in walk:
-        survivor.update(belief, pair, depth_m)
+    for mud_estimate, pair in walk:
+        survivor.update(mud_estimate, pair, depth_m)
         survivor.thrust_n(depth_m)
         survivor.shear_at(depth_m)
         survivor.extraction_nm(depth_m)
         assert 0.2 <= survivor.shear_ratio <= 1.5
-        assert 0.2 <= survivor.felt_share <= 1.5
+        assert 0.2 <= survivor.felt_fraction <= 1.5
         assert depth_m <= survivor.reached_m(depth_m) or survivor.reached_m(depth_m) == GEOMETRY.deepest_m(30.0)
 
 

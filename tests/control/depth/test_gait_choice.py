@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from control.depth.depth_choice import AdaptationParameters, DepthChoice, body_drag
 from control.depth.forecast import DepthForecast
 from control.depth.gait_choice import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptation, quickest
-from control.depth.step_model import Grip, step_m
+from control.depth.step_model import Traction, step_m
 from control.gait.gait import Gait, GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.limits import JointLimits
-from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperBelief, MudBelief
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.plate import stroke_moment_m4, submerged_plate
 from control.records import Estimate, StrideEstimate
 from tests.control.made_up_muds import both
@@ -22,17 +22,17 @@ from tests.control.made_up_muds import both
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 PARAMETERS = AdaptationParameters(method="gait")
 LIFTING_NM = PARAMETERS.motor_force_n * GEOMETRY.flipper_length_m
-NOT_TOLD = Estimate(nan, nan, 0, False, "not told")
+NOT_REPORTED = Estimate(nan, nan, 0, False, "not told")
 
 
-def told(value: float, at_least: bool = False) -> Coefficient:
+def reported(value: float, at_least: bool = False) -> Coefficient:
     return Coefficient(value, 0.05 * value, 0.03, 0.0, 0.1, 8, at_least)
 
 
-def believed(k_s: float, k_e: float, boundary: bool = False) -> MudBelief:
+def believed(k_s: float, k_e: float, boundary: bool = False) -> MudEstimate:
     """By both flippers alike; a mud that never yielded has a k_s of this or more."""
-    flipper = FlipperBelief(None, told(k_s), told(k_e))
-    return MudBelief(None, told(k_s), told(k_e), flipper, flipper, boundary)
+    flipper = FlipperEstimate(None, reported(k_s), reported(k_e))
+    return MudEstimate(None, reported(k_s), reported(k_e), flipper, flipper, boundary)
 
 
 FIRM, SOFT, STICKY = believed(2.0e6, 0.5e6), believed(0.2e6, 0.1e6), believed(2.0e6, 2.5e6)
@@ -53,15 +53,15 @@ def sweep_deg(choice: DepthChoice) -> float:
     return choice.gait.sweep_angle_deg
 
 
-def settled(belief: MudBelief, count: int = 5) -> DepthChoice:
+def settled(mud_estimate: MudEstimate, count: int = 5) -> DepthChoice:
     adaptation = adapted()
     for _ in range(count):
-        choice = adaptation.step(belief, strides(), adaptation.choice.depth_m)
+        choice = adaptation.step(mud_estimate, strides(), adaptation.choice.depth_m)
     return choice
 
 
 def brute_force(
-    belief: MudBelief, closed: list[StrideEstimate], walked: GaitParameters, widest_deg: float
+    mud_estimate: MudEstimate, closed: list[StrideEstimate], walked: GaitParameters, widest_deg: float
 ) -> list[tuple[float, float, float]]:
     """(speed, depth, sweep) of every pair that comes out, the fastest first."""
     found = []
@@ -69,17 +69,17 @@ def brute_force(
         deg = PARAMETERS.min_sweep_deg + i * SWEEP_STEP_DEG
         gait = replace(GAIT, sweep_angle_deg=deg, swing_duration_s=PARAMETERS.swing_duration_s)
         forecast = DepthForecast(GEOMETRY, walked, PARAMETERS.motor_force_n)
-        forecast.update(belief, closed, PARAMETERS.initial_depth_m)
+        forecast.update(mud_estimate, closed, PARAMETERS.initial_depth_m)
         forecast.gait = gait
         drag = body_drag(PARAMETERS, forecast)
         for j in range(15):
             depth_m = 0.015 + 0.0025 * j
             if depth_m > GEOMETRY.deepest_m(deg) or deg > widest_deg:
                 continue
-            if forecast.extraction_nm(depth_m) >= PARAMETERS.lifting_share * LIFTING_NM:
+            if forecast.extraction_nm(depth_m) >= PARAMETERS.lifting_fraction * LIFTING_NM:
                 continue
-            grip = Grip(forecast.thrust_n(depth_m) or 0.0, 2.0 * PARAMETERS.mobilisation_n_m)
-            carried_m = step_m(gait, GEOMETRY.flipper_length_m, drag, grip, depth_m)
+            traction = Traction(forecast.thrust_n(depth_m) or 0.0, 2.0 * PARAMETERS.mobilisation_n_m)
+            carried_m = step_m(gait, GEOMETRY.flipper_length_m, drag, traction, depth_m)
             found.append((carried_m / stride_duration_s(gait, GEOMETRY, depth_m), depth_m, deg))
     return sorted(found, reverse=True)
 
@@ -98,10 +98,10 @@ def test_it_takes_the_fastest_of_all_pairs_that_come_out(
     """A stride of 1.5 cm came out and told its k_e, which the last one felt with some share of it."""
     felt = Estimate(k_e, 0.05 * k_e, 50, True)
     closed = [replace(each, k_e=felt) for each in strides(torque_nm=torque_nm, depth_m=0.015, surface_m=surface_m)]
-    walked, belief = replace(GAIT, sweep_angle_deg=walked_deg), believed(k_s, k_e)
-    choice = GaitAdaptation(PARAMETERS, GEOMETRY, walked).step(belief, closed, 0.03)
+    walked, mud_estimate = replace(GAIT, sweep_angle_deg=walked_deg), believed(k_s, k_e)
+    choice = GaitAdaptation(PARAMETERS, GEOMETRY, walked).step(mud_estimate, closed, 0.03)
     easily = torque_nm < 0.7 * LIFTING_NM
-    pairs = brute_force(belief, closed, walked, walked_deg + (WIDENING_DEG if easily else 0.0))
+    pairs = brute_force(mud_estimate, closed, walked, walked_deg + (WIDENING_DEG if easily else 0.0))
     if not pairs or pairs[0][0] == 0.0:
         assert choice.reason == ("thrust" if pairs else "extraction")
         assert choice.depth_m == pytest.approx(max((depth_m for _, depth_m, _ in pairs), default=0.015))
@@ -116,15 +116,15 @@ def test_the_torque_of_an_extraction_is_that_of_the_pose_at_its_own_rear(deg: fl
     parameters = replace(PARAMETERS, min_depth_m=0.02, max_depth_m=0.02, initial_depth_m=0.02)
     rear_rad = -radians(deg)
     plate = submerged_plate(GEOMETRY, rear_rad, GEOMETRY.adduction_rad(rear_rad, 0.02))
-    limit_nm = parameters.lifting_share * LIFTING_NM
+    limit_nm = parameters.lifting_fraction * LIFTING_NM
     just = limit_nm / stroke_moment_m4(GEOMETRY, plate, rear_rad) / 1.1  # two standard errors of 5 %
-    for share, comes_out in ((0.999, True), (1.001, False)):
+    for fraction, comes_out in ((0.999, True), (1.001, False)):
         narrowed = replace(parameters, min_sweep_deg=deg, max_sweep_deg=deg)
         adaptation = GaitAdaptation(narrowed, GEOMETRY, replace(GAIT, sweep_angle_deg=40.0))
-        k_e = Coefficient(share * just, 0.05 * share * just, 0.02, 0.0, 0.0, 8)
-        flipper = FlipperBelief(None, told(2e6), k_e)
+        k_e = Coefficient(fraction * just, 0.05 * fraction * just, 0.02, 0.0, 0.0, 8)
+        flipper = FlipperEstimate(None, reported(2e6), k_e)
         choice = adaptation.step(
-            MudBelief(None, told(2e6), k_e, flipper, flipper), strides(depth_m=nan), adaptation.choice.depth_m
+            MudEstimate(None, reported(2e6), k_e, flipper, flipper), strides(depth_m=nan), adaptation.choice.depth_m
         )
         assert (choice.reason == "fastest") is comes_out
 

@@ -17,12 +17,12 @@ from control.records import Estimate, StrideEstimate
 from tests.control.made_up_muds import (
     GAIT,
     GEOMETRY,
-    NOT_TOLD,
+    NOT_REPORTED,
     PARAMETERS,
     believed,
     measured,
+    reported,
     stride,
-    told,
 )
 
 OUT = "deepest that comes out"
@@ -60,7 +60,7 @@ class TestDepth:
         """In round numbers: 2 N/cm³ · 1 cm² · 3 cm = 6 N."""
         for motor_force_n, depth_m in ((6.0 + 1e-9, 0.03), (6.0 - 1e-9, 0.0275)):
             parameters = AdaptationParameters(motor_force_n=motor_force_n)
-            choice = adapted(parameters).step(NOTHING_KNOWN, alike(NOT_TOLD, measured(2.0e6)), 0.03)
+            choice = adapted(parameters).step(NOTHING_KNOWN, alike(NOT_REPORTED, measured(2.0e6)), 0.03)
             assert choice.depth_m == pytest.approx(depth_m)
 
     def test_where_nothing_comes_out_it_is_the_shallowest(self) -> None:
@@ -68,13 +68,13 @@ class TestDepth:
         assert chosen(measured(1e6), measured(5e6)) == DepthChoice(0.015, True, "extraction")
 
     def test_a_weak_mud_is_not_walked_deeper_than_allowed(self) -> None:
-        assert chosen(NOT_TOLD, measured(1.0)).depth_m == pytest.approx(PARAMETERS.max_depth_m)
+        assert chosen(NOT_REPORTED, measured(1.0)).depth_m == pytest.approx(PARAMETERS.max_depth_m)
 
     @given(st.floats(1e4, 1e7), st.floats(0.0, 5e6))
-    def test_doubt_and_what_is_believed_from_many_strides_are_not_asked(self, k_e: float, doubt: float) -> None:
-        doubtful = measured(k_e)._replace(std_error=doubt)
-        choice = adapted().step(believed(told(3e6), told(9e6)), alike(NOT_TOLD, doubtful), 0.03)
-        assert choice == chosen(NOT_TOLD, measured(k_e))
+    def test_doubt_and_what_is_believed_from_many_strides_are_not_asked(self, k_e: float, uncertainty: float) -> None:
+        doubtful = measured(k_e)._replace(std_error=uncertainty)
+        choice = adapted().step(believed(reported(3e6), reported(9e6)), alike(NOT_REPORTED, doubtful), 0.03)
+        assert choice == chosen(NOT_REPORTED, measured(k_e))
 
 
 class TestSlip:
@@ -97,7 +97,7 @@ class TestSlip:
         assert not strong.slips
 
     def test_without_a_k_s_it_does_not_claim_to_slip(self) -> None:
-        assert chosen(NOT_TOLD, measured(1e6)).slips is False
+        assert chosen(NOT_REPORTED, measured(1e6)).slips is False
 
     def test_inertia_is_mass_times_arc_over_acceleration_and_stance_time(self) -> None:
         """Of 2 kg at 0.2 m/s within 0.2 s: 2 kg · α l / (0.2 s · t_s) = 1 N, so up to 3.5 N / 59.5 cm³ it slips."""
@@ -145,8 +145,8 @@ class TestMemory:
         adaptation = adapted()
         adaptation.reset(0.04)
         kept = DepthChoice(0.04, False, "no k_e known, depth kept")
-        assert adaptation.step(NOTHING_KNOWN, alike(measured(1e6), NOT_TOLD), adaptation.choice.depth_m) == kept
-        assert adaptation.step(believed(told(1e6), told(1e6)), [], adaptation.choice.depth_m) == kept
+        assert adaptation.step(NOTHING_KNOWN, alike(measured(1e6), NOT_REPORTED), adaptation.choice.depth_m) == kept
+        assert adaptation.step(believed(reported(1e6), reported(1e6)), [], adaptation.choice.depth_m) == kept
 
     def test_a_reset_forgets_and_starts_at_its_depth(self) -> None:
         adaptation = adapted()

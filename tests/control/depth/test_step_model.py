@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from control.depth import step_model
-from control.depth.step_model import BodyDrag, Grip, coast_m, step_m
+from control.depth.step_model import BodyDrag, Traction, coast_m, step_m
 from control.gait.gait import RAMP_S, GaitParameters
 
 Array = NDArray[np.float64]
@@ -70,11 +70,11 @@ def finely_m(gait: GaitParameters) -> Array:
 
 
 def coarsely_m(gait: GaitParameters) -> Array:
-    return np.array([step_m(gait, LENGTH_M, drag, Grip(*grip), depth_m) for *grip, drag, depth_m in CASES])
+    return np.array([step_m(gait, LENGTH_M, drag, Traction(*traction), depth_m) for *traction, drag, depth_m in CASES])
 
 
 def promised_m(thrust_n: float, stiffness_n_m: float = 500.0, drag: BodyDrag = RAIL, depth_m: float = 0.03) -> float:
-    return step_m(WALKING, LENGTH_M, drag, Grip(thrust_n, stiffness_n_m), depth_m)
+    return step_m(WALKING, LENGTH_M, drag, Traction(thrust_n, stiffness_n_m), depth_m)
 
 
 class TestAgainstFineSteps:
@@ -95,16 +95,16 @@ class TestAgainstFineSteps:
         assert off_m.max() < 0.001 * top_speed_m_s(gait)
 
     def test_the_cases_hold_steps_of_every_length(self) -> None:
-        shares = finely_m(WALKING) / LENGTH_M
-        assert np.histogram(shares, [0.0, 0.01, 0.25, 0.5, 0.75, 1.0, 2.0])[0].min() > 5
+        fractions = finely_m(WALKING) / LENGTH_M
+        assert np.histogram(fractions, [0.0, 0.01, 0.25, 0.5, 0.75, 1.0, 2.0])[0].min() > 5
 
 
 class TestLimits:
     @given(st.floats(0.01, 12.5), st.floats(0.0, 1.0), st.floats(0.0, 50.0), st.floats(20.0, 5000.0))
     def test_thrust_below_dry_drag_moves_nothing(
-        self, dry_n: float, share: float, damping_n_s_m: float, stiffness_n_m: float
+        self, dry_n: float, fraction: float, damping_n_s_m: float, stiffness_n_m: float
     ) -> None:
-        assert promised_m(share * dry_n, stiffness_n_m, BodyDrag(dry_n, damping_n_s_m, 1.0)) == 0.0
+        assert promised_m(fraction * dry_n, stiffness_n_m, BodyDrag(dry_n, damping_n_s_m, 1.0)) == 0.0
 
     @given(st.floats(0.5, 8.0), st.floats(0.0, 20.0), st.tuples(*[st.floats(0.5, 12.5)] * 2), st.floats(200.0, 1000.0))
     def test_more_thrust_never_shortens_a_step_that_stays_behind_the_arms(

@@ -117,9 +117,9 @@ def test_the_edge_swings_forward_above_the_mud() -> None:
 
 
 @given(st.floats(0.001, 20.0), st.floats(0.0, 1.0))
-def test_smooth_progress_is_half_a_path_after_half_its_time_and_symmetric(duration: float, share: float) -> None:
-    fraction, rate = smooth_progress(share * duration, duration)
-    mirrored, mirrored_rate = smooth_progress(duration - share * duration, duration)
+def test_smooth_progress_is_half_a_path_after_half_its_time_and_symmetric(duration: float, fraction: float) -> None:
+    fraction, rate = smooth_progress(fraction * duration, duration)
+    mirrored, mirrored_rate = smooth_progress(duration - fraction * duration, duration)
     assert -1e-15 <= fraction <= 1.0 + 1e-15
     assert fraction + mirrored == pytest.approx(1.0, abs=1e-9)
     assert rate == pytest.approx(mirrored_rate, rel=1e-6, abs=1e-6 / duration)
@@ -135,8 +135,8 @@ def test_smooth_progress_rests_before_the_start_and_after_the_end(duration: floa
 
 
 @given(st.floats(0.01, 20.0), st.floats(0.01, 0.99))
-def test_smooth_progress_moves_at_the_rate_that_it_tells(duration: float, share: float) -> None:
-    time, step = share * duration, 1e-5 * duration
+def test_smooth_progress_moves_at_the_rate_that_it_tells(duration: float, fraction: float) -> None:
+    time, step = fraction * duration, 1e-5 * duration
     difference = smooth_progress(time + step, duration)[0] - smooth_progress(time - step, duration)[0]
     _, rate = smooth_progress(time, duration)
     assert difference / (2.0 * step) == pytest.approx(rate, rel=1e-4, abs=1e-4 / duration)
@@ -210,11 +210,11 @@ def test_the_place_in_the_stride_depends_on_the_time_only_and_not_on_the_ticks(s
         stepped = gait.step(dt)
     at_once = other.step(sum(steps))
     duration = stride_duration_s(WALKING, GEOMETRY, 0.04)
-    assert stepped.stride + gait_share(stepped) == pytest.approx(at_once.stride + gait_share(at_once), abs=2e-4)
+    assert stepped.stride + gait_fraction(stepped) == pytest.approx(at_once.stride + gait_fraction(at_once), abs=2e-4)
     assert stepped.stride in (floor(sum(steps) / duration - 1e-9), floor(sum(steps) / duration + 1e-9))
 
 
-def gait_share(target: GaitTarget) -> float:
+def gait_fraction(target: GaitTarget) -> float:
     """A number from 0 to 1 that grows through the stride: paths covered, each phase a quarter."""
     sweep = (radians(30.0) - target.sweep_rad) / radians(60.0)
     depth = (target.depth_m + 0.0145) / (0.04 + 0.0145)
@@ -295,8 +295,10 @@ def swept(changes: dict[float, GaitParameters], duration_s: float, dt_s: float =
     for _ in range(round(duration_s / dt_s)):
         if seen and seen[-1].phase is Phase.SWING and seen[-1].stride == 0:
             swing_ticks += 1
-            for share in [share for share in waiting if swing_ticks * dt_s >= share * WALKING.swing_duration_s]:
-                gait.next_parameters = waiting.pop(share)
+            for fraction in [
+                fraction for fraction in waiting if swing_ticks * dt_s >= fraction * WALKING.swing_duration_s
+            ]:
+                gait.next_parameters = waiting.pop(fraction)
         seen.append(gait.step(dt_s))
     return seen
 
@@ -340,12 +342,12 @@ def test_a_gait_told_late_in_the_swing_is_that_of_the_stride_after_the_next() ->
 
 
 def test_a_gait_whose_next_stride_is_never_set_walks_bit_for_bit_the_same() -> None:
-    free, told = Gait(WALKING, GEOMETRY), Gait(WALKING, GEOMETRY)
+    free, reported = Gait(WALKING, GEOMETRY), Gait(WALKING, GEOMETRY)
     free.reset(0.03)
-    told.reset(0.03)
+    reported.reset(0.03)
     for _ in range(3000):
-        told.next_parameters = replace(WALKING)  # equal, and another object
-        assert told.step(TICK_S) == free.step(TICK_S)
+        reported.next_parameters = replace(WALKING)  # equal, and another object
+        assert reported.step(TICK_S) == free.step(TICK_S)
 
 
 def test_a_reset_forgets_the_gait_of_the_next_stride() -> None:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from control.controller import Controller, MotionParameters, WalkOrder
 from control.gait.gait import PROTOCOLS, GaitParameters, stride_duration_s
 from control.gait.joint_path import still
-from control.gait.recovery import AWAY_SHARE, OUT_M, Gap, Recovery, RecoveryParameters, is_in_mud, lowest_m
+from control.gait.recovery import AWAY_FRACTION, OUT_M, Gap, Recovery, RecoveryParameters, is_in_mud, lowest_m
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains
 from control.limits import JointRange
@@ -37,7 +37,7 @@ class Moment(NamedTuple):
     target: GaitTarget
     joints: JointTargets
     attempt: int
-    news: str
+    events: str
     angles_rad: tuple[float, ...]  # measured when the targets were chosen
 
 
@@ -82,18 +82,18 @@ class MadeUpRobot:
         torques_nm = self.controller.step(TICK_S, mode, self.states)
         wanted_rad = [angle + torque for angle, torque in zip(before_rad, torques_nm, strict=True)]
         target = self.controller.target
-        self._time(target.phase, self.recovery.news)
+        self._time(target.phase, self.recovery.events)
         for place, flipper in enumerate(BOTH):
             if self.waited_s and flipper in self.hold(self):
                 wanted_rad[2 * place : 2 * place + 2] = before_rad[2 * place : 2 * place + 2]
         a, b, c, d = wanted_rad
         self.angles_rad = (a, b, c, d)
         if target.stride >= 0:
-            news, attempt = self.recovery.news, self.recovery.attempt
-            self.moments.append(Moment(target, self.recovery.given, attempt, news, before_rad))
+            events, attempt = self.recovery.events, self.recovery.attempt
+            self.moments.append(Moment(target, self.recovery.given, attempt, events, before_rad))
 
-    def _time(self, phase: Phase, news: str) -> None:
-        self.attempt_s = 0.0 if news else self.attempt_s + TICK_S
+    def _time(self, phase: Phase, events: str) -> None:
+        self.attempt_s = 0.0 if events else self.attempt_s + TICK_S
         begun = phase is Phase.EXTRACTION or (self.waited_s > 0.0 and phase in (Phase.PAUSE, Phase.RECOVERY))
         self.waited_s = self.waited_s + TICK_S if begun else 0.0
 
@@ -107,8 +107,8 @@ class MadeUpRobot:
         return [phase for phase, _ in groupby(moment.target.phase for moment in self.moments)]
 
     @property
-    def news(self) -> list[str]:
-        return [moment.news for moment in self.moments if moment.news]
+    def events(self) -> list[str]:
+        return [moment.events for moment in self.moments if moment.events]
 
     def in_attempt(self, attempt: int) -> list[Moment]:
         return [moment for moment in self.moments if moment.attempt == attempt]
@@ -159,7 +159,7 @@ def test_a_flipper_that_comes_out_within_the_grace_is_only_waited_for(gait: Gait
 
     robot = MadeUpRobot(hold, gait=gait).walk(2.0 * stride_duration_s(gait, GEOMETRY, DEPTH_M))
     assert Phase.RECOVERY not in robot.phases
-    assert robot.news == []
+    assert robot.events == []
     assert Phase.SWING in robot.phases
     assert TICK_S * sum(moment.target.stride == 0 for moment in robot.moments) == pytest.approx(
         stride_duration_s(gait, GEOMETRY, DEPTH_M) + late_s - extraction_s, abs=3.0 * TICK_S
@@ -175,10 +175,10 @@ def test_a_flipper_that_stays_in_is_given_up_after_the_last_attempt_in_bounded_t
     fault = robot.controller.fault
     assert fault is not None
     assert fault.name == "flipper_stuck"
-    assert "right flipper" in fault.sentence
-    assert "after 3 attempts" in fault.sentence
+    assert "right flipper" in fault.message
+    assert "after 3 attempts" in fault.message
     assert robot.phases == [Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.RECOVERY]
-    assert robot.news == [f"the right flipper is stuck, attempt {n} of 3" for n in (1, 2, 3)]
+    assert robot.events == [f"the right flipper is stuck, attempt {n} of 3" for n in (1, 2, 3)]
 
 
 def test_a_flipper_that_comes_out_at_the_second_attempt_swings_and_walks_on() -> None:
@@ -187,7 +187,7 @@ def test_a_flipper_that_comes_out_at_the_second_attempt_swings_and_walks_on() ->
     assert robot.phases[:6] == [
         Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.RECOVERY, Phase.SWING, Phase.INSERTION,
     ]  # fmt: skip
-    assert robot.news == [
+    assert robot.events == [
         "both flippers are stuck, attempt 1 of 3",
         "both flippers are stuck, attempt 2 of 3",
         "the flippers came out after 2 attempts",
@@ -218,7 +218,7 @@ def test_stopping_ends_a_recovery_and_forgets_it() -> None:
     robot = MadeUpRobot(everybody).walk(3.0)
     assert robot.recovery.attempt == 1
     robot.step(Mode.STOPPING)
-    assert (robot.recovery.attempt, robot.recovery.news, robot.recovery.given_up) == (0, "", ())
+    assert (robot.recovery.attempt, robot.recovery.events, robot.recovery.given_up) == (0, "", ())
     assert robot.controller.fault is None
 
 
@@ -249,7 +249,7 @@ def test_the_first_attempt_pulls_to_the_rear_and_the_others_away_from_the_middle
         reached = max(way * (way * 60.0 - sweep_deg), 0.0)  # the joint's limit
         assert max(pulled) == pytest.approx(min(PARAMETERS.lead_deg, reached))
         assert min(pulled) == pytest.approx(-PARAMETERS.lead_deg)
-        assert sum(lead_deg > 0.0 for lead_deg in pulled) / len(pulled) == pytest.approx(AWAY_SHARE, abs=0.1)
+        assert sum(lead_deg > 0.0 for lead_deg in pulled) / len(pulled) == pytest.approx(AWAY_FRACTION, abs=0.1)
 
 
 def test_the_sweep_rocks_as_often_as_its_parameter_says() -> None:
@@ -317,7 +317,7 @@ def test_targets_stay_within_the_joints_limits(margin_deg: float) -> None:
     lifts = JointRange(radians(-75.0), 0.0)
     wild = RecoveryParameters(lift_rad_s=5.0, rock_s=2.0, lead_deg=45.0)
     robot = MadeUpRobot(until_attempt(3), wild, (sweeps, lifts, sweeps, lifts)).walk(LONGEST_S + 1.0)
-    assert "the flippers came out after 3 attempts" in robot.news
+    assert "the flippers came out after 3 attempts" in robot.events
     for moment in robot.moments:
         for joint, span in zip(moment.joints, (sweeps, lifts, sweeps, lifts), strict=True):
             assert span.min_rad - 1e-9 <= joint.angle_rad <= span.max_rad + 1e-9
@@ -331,7 +331,7 @@ def test_targets_stay_within_the_joints_limits(margin_deg: float) -> None:
 def test_targets_and_their_velocities_are_continuous_from_recovery_through_swing(attempt: int, after_s: float) -> None:
     """Gap and swing ask for 130 rad/s² at most, so an angle is the mean velocity's way to 0.1 mrad."""
     robot = MadeUpRobot(until_attempt(attempt, after_s=after_s)).walk(LONGEST_S + 3.0)
-    begin = next(i for i, moment in enumerate(robot.moments) if moment.news.startswith("the flippers came out"))
+    begin = next(i for i, moment in enumerate(robot.moments) if moment.events.startswith("the flippers came out"))
     end = next(i for i, moment in enumerate(robot.moments) if moment.target.stride == 1)
     assert {moment.target.phase for moment in robot.moments[begin:end]} == {Phase.SWING}
     assert max(abs(joint.velocity_rad_s) for joint in robot.moments[begin - 1].joints) > 0.1
@@ -369,12 +369,12 @@ def test_a_gap_fades_from_itself_to_nothing(angle_rad: float, velocity_rad_s: fl
 
 @given(angles, angles, st.floats(0.05, 2.0), st.floats(0.01, 0.99))
 def test_the_velocity_of_a_gap_is_its_derivative(
-    angle_rad: float, velocity_rad_s: float, duration_s: float, share: float
+    angle_rad: float, velocity_rad_s: float, duration_s: float, fraction: float
 ) -> None:
     gap, step_s = Gap(angle_rad, velocity_rad_s, duration_s), 1e-5 * duration_s
-    early, late = (gap.after(share * duration_s + offset_s) for offset_s in (-step_s, step_s))
+    early, late = (gap.after(fraction * duration_s + offset_s) for offset_s in (-step_s, step_s))
     slope = (late.angle_rad - early.angle_rad) / (2.0 * step_s)
-    assert gap.after(share * duration_s).velocity_rad_s == pytest.approx(slope, abs=1e-4)
+    assert gap.after(fraction * duration_s).velocity_rad_s == pytest.approx(slope, abs=1e-4)
 
 
 # what is out

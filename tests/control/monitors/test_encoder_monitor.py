@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from control.monitors.encoder_monitor import FROZEN_S, GONE_RAD, GONE_S, EncoderWatch
+from control.monitors.encoder_monitor import FROZEN_S, GONE_RAD, GONE_S, EncoderMonitor
 from control.records import DriveState
 
 PERIOD_S = 0.002
@@ -18,9 +18,9 @@ COUNT_RAD = 2.0 * pi / 16384
 Messages = Iterable[tuple[float, float]]
 
 
-def told(messages: Messages, encoder: EncoderWatch | None = None) -> list[tuple[int, str]]:
+def reported(messages: Messages, encoder: EncoderMonitor | None = None) -> list[tuple[int, str]]:
     """(number of the message, fault) of all that were found."""
-    encoder, found = encoder or EncoderWatch(JUMP_RAD), []
+    encoder, found = encoder or EncoderMonitor(JUMP_RAD), []
     for number, (angle_rad, velocity_rad_s) in enumerate(messages):
         state = DriveState(angle_rad=angle_rad, velocity_rad_s=velocity_rad_s, angle_stamp_s=number * PERIOD_S)
         problem = encoder.update(state, TICK_S)
@@ -34,55 +34,55 @@ def hanging(velocity_rad_s: float, messages: int) -> Iterator[tuple[float, float
 
 
 def test_the_first_message_is_no_jump_wherever_it_is() -> None:
-    assert told([(2.9, 0.0), (2.9, 0.0)]) == []
+    assert reported([(2.9, 0.0), (2.9, 0.0)]) == []
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 @pytest.mark.parametrize("velocity_rad_s", [0.0, 5.0, -16.0])
 def test_a_jump_begins_beyond_what_the_drives_own_speed_explains(sign: float, velocity_rad_s: float) -> None:
-    way_rad, slack_rad = velocity_rad_s * PERIOD_S, JUMP_RAD + abs(velocity_rad_s) * TICK_S
+    path_rad, slack_rad = velocity_rad_s * PERIOD_S, JUMP_RAD + abs(velocity_rad_s) * TICK_S
     for beyond_rad, expected in ((-1e-9, []), (1e-9, [(1, "encoder_jump")])):
-        step_rad = way_rad + sign * (slack_rad + beyond_rad)
-        assert told([(0.0, velocity_rad_s), (step_rad, velocity_rad_s)]) == expected
+        step_rad = path_rad + sign * (slack_rad + beyond_rad)
+        assert reported([(0.0, velocity_rad_s), (step_rad, velocity_rad_s)]) == expected
 
 
 def test_a_magnet_that_slips_at_rest_is_told() -> None:
-    assert told([(0.1, 0.0)] * 5 + [(0.2, 0.0)] * 5) == [(5, "encoder_jump")]
+    assert reported([(0.1, 0.0)] * 5 + [(0.2, 0.0)] * 5) == [(5, "encoder_jump")]
 
 
 def test_readings_that_leap_about_a_joint_at_rest_are_told_again_and_again() -> None:
     random = Random(3)
-    found = told((random.uniform(-0.1, 0.1), 0.0) for _ in range(200))
+    found = reported((random.uniform(-0.1, 0.1), 0.0) for _ in range(200))
     assert len(found) > 50
 
 
 @pytest.mark.parametrize(("gap_s", "expected"), [(0.029, "encoder_jump"), (0.031, "")])
 def test_after_a_long_gap_a_joint_may_be_anywhere(gap_s: float, expected: str) -> None:
-    encoder = EncoderWatch(JUMP_RAD)
+    encoder = EncoderMonitor(JUMP_RAD)
     assert encoder.update(DriveState(angle_rad=0.0, velocity_rad_s=0.0, angle_stamp_s=0.0), TICK_S) == ""
     assert encoder.update(DriveState(angle_rad=0.75, velocity_rad_s=0.0, angle_stamp_s=gap_s), TICK_S) == expected
 
 
 def test_after_a_short_gap_a_joint_may_be_where_its_speed_took_it() -> None:
-    encoder = EncoderWatch(JUMP_RAD)
+    encoder = EncoderMonitor(JUMP_RAD)
     assert encoder.update(DriveState(angle_rad=0.0, velocity_rad_s=15.0, angle_stamp_s=0.0), TICK_S) == ""
     assert encoder.update(DriveState(angle_rad=0.3, velocity_rad_s=15.0, angle_stamp_s=0.02), TICK_S) == ""
 
 
 def test_a_stamp_that_goes_back_is_no_jump_by_itself() -> None:
-    encoder = EncoderWatch(JUMP_RAD)
+    encoder = EncoderMonitor(JUMP_RAD)
     encoder.update(DriveState(angle_rad=0.0, velocity_rad_s=0.0, angle_stamp_s=1.0), TICK_S)
     assert encoder.update(DriveState(angle_rad=0.01, velocity_rad_s=0.0, angle_stamp_s=0.5), TICK_S) == ""
 
 
 def test_the_same_message_is_judged_once() -> None:
-    encoder, state = EncoderWatch(JUMP_RAD), DriveState(angle_rad=0.3, velocity_rad_s=9.0, angle_stamp_s=1.0)
+    encoder, state = EncoderMonitor(JUMP_RAD), DriveState(angle_rad=0.3, velocity_rad_s=9.0, angle_stamp_s=1.0)
     assert {encoder.update(state, TICK_S) for _ in range(1000)} == {""}
 
 
 @pytest.mark.parametrize("velocity_rad_s", [-5.0, -0.5, -1e-3, 1e-6, 0.5, 5.0])
 def test_an_angle_that_hangs_is_told_by_the_way_of_its_speed_or_by_a_speed_without_noise(velocity_rad_s: float) -> None:
-    found = told(hanging(velocity_rad_s, 60))
+    found = reported(hanging(velocity_rad_s, 60))
     expected_s = min(max(GONE_RAD / abs(velocity_rad_s), GONE_S), FROZEN_S)
     assert {problem for _, problem in found} == {"encoder_stuck"}
     assert found[0][0] * PERIOD_S == pytest.approx(expected_s, abs=1.5 * PERIOD_S)
@@ -90,16 +90,16 @@ def test_an_angle_that_hangs_is_told_by_the_way_of_its_speed_or_by_a_speed_witho
 
 def test_a_joint_at_rest_whose_drive_tells_no_speed_at_all_is_not_stuck() -> None:
     """ODrive tells 0 below a bound."""
-    assert told(hanging(0.0, 30000)) == []
+    assert reported(hanging(0.0, 30000)) == []
 
 
 def test_a_speed_that_has_died_away_to_its_last_bit_is_rest() -> None:
-    assert told(hanging(2.4e-17, 1000)) == []
+    assert reported(hanging(2.4e-17, 1000)) == []
 
 
 def test_the_noise_of_a_speed_at_rest_is_no_way() -> None:
     random = Random(1)
-    assert told((0.3, random.gauss(0.0, 0.1)) for _ in range(30000)) == []
+    assert reported((0.3, random.gauss(0.0, 0.1)) for _ in range(30000)) == []
 
 
 def test_a_slow_joint_of_few_counts_is_not_stuck() -> None:
@@ -108,7 +108,7 @@ def test_a_slow_joint_of_few_counts_is_not_stuck() -> None:
     for speed_rad_s in (0.001, 0.01, 0.1, 3.0):
         angles = (speed_rad_s * number * PERIOD_S for number in range(3000))
         messages = ((round(a / COUNT_RAD) * COUNT_RAD, speed_rad_s + random.gauss(0.0, 1e-4)) for a in angles)
-        assert told(messages) == [], speed_rad_s
+        assert reported(messages) == [], speed_rad_s
 
 
 def test_a_quick_joint_whose_drive_repeats_itself_now_and_then_is_not_stuck() -> None:
@@ -118,11 +118,11 @@ def test_a_quick_joint_whose_drive_repeats_itself_now_and_then_is_not_stuck() ->
         if random.random() > 0.3:
             shown = (sin(phase), 2.0 * pi * cos(phase))
         messages.append(shown)
-    assert told(messages) == []
+    assert reported(messages) == []
 
 
 def test_reset_forgets_the_last_message() -> None:
-    encoder = EncoderWatch(JUMP_RAD)
-    told(hanging(0.4, 30), encoder)
+    encoder = EncoderMonitor(JUMP_RAD)
+    reported(hanging(0.4, 30), encoder)
     encoder.reset()
-    assert told([(-2.0, 0.0)], encoder) == []
+    assert reported([(-2.0, 0.0)], encoder) == []

@@ -14,13 +14,13 @@ from control.faults import Reaction
 from control.limits import JointLimits, JointRange
 from control.monitors.joint_monitor import (
     CURRENT_TICKS,
+    MISSING_FRACTION,
     MISSING_S,
-    MISSING_SHARE,
     SLOW_SILENCE_S,
     TWO_MESSAGES_S,
     FaultBounds,
     JointFacts,
-    JointWatch,
+    JointMonitor,
 )
 from control.monitors.winding import WindingParameters
 from control.records import NEVER_S, DriveState
@@ -58,19 +58,19 @@ SEVERITY = [
 ]
 
 
-def make_watch() -> JointWatch:
-    return JointWatch(JOINT, LIMITS, SPAN, BOUNDS, WindingParameters(), CURRENT_LIMIT_A, 0.083)
+def make_watch() -> JointMonitor:
+    return JointMonitor(JOINT, LIMITS, SPAN, BOUNDS, WindingParameters(), CURRENT_LIMIT_A, 0.083)
 
 
 def facts(now_s: float = START_S, **changes: Any) -> JointFacts:
     return JointFacts(now_s, TICK_S, True, True, 0.0, False)._replace(**changes)
 
 
-def seen(watch: JointWatch, state: DriveState, now_s: float = START_S, **changes: Any) -> dict[str, str]:
+def seen(watch: JointMonitor, state: DriveState, now_s: float = START_S, **changes: Any) -> dict[str, str]:
     """Sentences by name."""
     found = watch.update(facts(now_s, **changes), state)
     assert all(fault.subject == JOINT for fault in found)
-    return {fault.name: fault.sentence for fault in found}
+    return {fault.name: fault.message for fault in found}
 
 
 def names(state: DriveState, **changes: Any) -> set[str]:
@@ -78,7 +78,7 @@ def names(state: DriveState, **changes: Any) -> set[str]:
     return set(seen(make_watch(), state, **changes))
 
 
-def lasting(state: DriveState, watch: JointWatch | None = None) -> set[str]:
+def lasting(state: DriveState, watch: JointMonitor | None = None) -> set[str]:
     """What is said of one that stays so for two slow messages; before that nothing is."""
     watch = watch or make_watch()
     before = [seen(watch, state) for _ in range(TWO_MESSAGES)]
@@ -136,12 +136,12 @@ def test_a_healthy_drive_shows_no_fault() -> None:
 def test_a_signal_counts_as_gone_from_its_bound_on(
     stamps: tuple[str, ...], bound_s: float, before: str | None, after: str
 ) -> None:
-    def told(age_s: float) -> set[str]:
+    def reported(age_s: float) -> set[str]:
         stamped: dict[str, Any] = dict.fromkeys(stamps, START_S - age_s)
         return names(HEALTHY._replace(**stamped))
 
-    assert told(bound_s - BEYOND) == ({before} - {None})
-    assert told(bound_s + BEYOND) == {after}
+    assert reported(bound_s - BEYOND) == ({before} - {None})
+    assert reported(bound_s + BEYOND) == {after}
 
 
 @given(
@@ -151,7 +151,7 @@ def test_a_signal_counts_as_gone_from_its_bound_on(
 def test_of_two_silences_the_hardest_is_told_and_more_silence_is_never_milder(
     position_s: float, current_s: float
 ) -> None:
-    def told(position_age_s: float, current_age_s: float) -> int:
+    def reported(position_age_s: float, current_age_s: float) -> int:
         found = names(HEALTHY._replace(angle_stamp_s=START_S - position_age_s, current_stamp_s=START_S - current_age_s))
         assert len(found - {"current_silent"}) <= 1
         return max((SEVERITY.index(name) for name in found), default=-1)
@@ -159,9 +159,9 @@ def test_of_two_silences_the_hardest_is_told_and_more_silence_is_never_milder(
     def reaction(place: int) -> Reaction:
         return KINDS[SEVERITY[place]].reaction if place >= 0 else Reaction.NONE
 
-    here = reaction(told(position_s, current_s))
-    assert reaction(told(position_s + 0.003, current_s)) >= here
-    assert reaction(told(position_s, current_s + 0.003)) >= here
+    here = reaction(reported(position_s, current_s))
+    assert reaction(reported(position_s + 0.003, current_s)) >= here
+    assert reaction(reported(position_s, current_s + 0.003)) >= here
 
 
 @pytest.mark.parametrize("offset_s", [0.0, 0.0003, 0.001, 0.0019])
@@ -229,13 +229,13 @@ def test_silence_is_told_with_signal_joint_and_time() -> None:
     assert late == {"current_stale": "No current came from the left_sweep drive for 20 ms."}
     gone = seen(make_watch(), HEALTHY._replace(angle_stamp_s=NEVER_S, current_stamp_s=NEVER_S))
     assert gone == {"drive_silent": "No message came from the left_sweep drive at all."}
-    beat = seen(make_watch(), HEALTHY._replace(heartbeat_stamp_s=NEVER_S))
-    assert beat == {"heartbeat_silent": "No heartbeat came from the left_sweep drive at all."}
+    tick = seen(make_watch(), HEALTHY._replace(heartbeat_stamp_s=NEVER_S))
+    assert tick == {"heartbeat_silent": "No heartbeat came from the left_sweep drive at all."}
 
 
 def test_what_is_late_is_named_by_the_older_of_the_two() -> None:
-    sentence = seen(make_watch(), HEALTHY._replace(angle_stamp_s=START_S - 0.006, current_stamp_s=START_S - 0.007))
-    assert sentence == {"drive_late": "No current came from the left_sweep drive for 7 ms."}
+    message = seen(make_watch(), HEALTHY._replace(angle_stamp_s=START_S - 0.006, current_stamp_s=START_S - 0.007))
+    assert message == {"drive_late": "No current came from the left_sweep drive for 7 ms."}
 
 
 # the drive
@@ -243,8 +243,8 @@ def test_what_is_late_is_named_by_the_older_of_the_two() -> None:
 
 @pytest.mark.parametrize("flags", [1, 0x10, 0x4000000])
 def test_any_error_flag_is_a_fault(flags: int) -> None:
-    sentence = seen(make_watch(), HEALTHY._replace(error_flags=flags))
-    assert sentence == {"drive_error": f"The left_sweep drive reports error 0x{flags:x}."}
+    message = seen(make_watch(), HEALTHY._replace(error_flags=flags))
+    assert message == {"drive_error": f"The left_sweep drive reports error 0x{flags:x}."}
 
 
 def test_a_drive_out_of_closed_loop_is_a_fault_only_where_it_is_expected_there() -> None:
@@ -263,8 +263,8 @@ def test_a_drive_in_closed_loop_unasked_is_told_once_it_had_time_to_obey() -> No
 def test_the_time_to_obey_begins_anew_with_every_obedience() -> None:
     watch = make_watch()
     for tick in range(400):
-        told = seen(watch, HEALTHY._replace(closed_loop=tick % 70 > 0), energised=False, moving=False)
-        assert "drive_energised" not in told
+        reported = seen(watch, HEALTHY._replace(closed_loop=tick % 70 > 0), energised=False, moving=False)
+        assert "drive_energised" not in reported
 
 
 @pytest.mark.parametrize(
@@ -285,8 +285,8 @@ def test_a_joint_may_be_past_its_range_by_the_margin_and_no_further(edge: float,
 
 
 def test_out_of_range_is_told_in_degrees_with_the_range() -> None:
-    (sentence,) = seen(make_watch(), HEALTHY._replace(angle_rad=radians(80.0))).values()
-    assert sentence == "The left_sweep joint is at 80.0 degrees, outside of -70 to 70."
+    (message,) = seen(make_watch(), HEALTHY._replace(angle_rad=radians(80.0))).values()
+    assert message == "The left_sweep joint is at 80.0 degrees, outside of -70 to 70."
 
 
 def test_an_angle_that_is_no_number_is_out_of_range() -> None:
@@ -319,8 +319,8 @@ def moving_ticks(speed_rad_s: float, noise_rad_s: float = 0.0, energised: bool =
     watch, random, count = make_watch(), Random(1), 0
     for tick in range(200):
         now_s = START_S + tick * TICK_S
-        told_rad_s = speed_rad_s + random.gauss(0.0, noise_rad_s)
-        state = fresh(now_s, angle_rad=speed_rad_s * tick * TICK_S, velocity_rad_s=told_rad_s, closed_loop=False)
+        reported_rad_s = speed_rad_s + random.gauss(0.0, noise_rad_s)
+        state = fresh(now_s, angle_rad=speed_rad_s * tick * TICK_S, velocity_rad_s=reported_rad_s, closed_loop=False)
         count += "joint_moving" in seen(watch, state, now_s, energised=energised, moving=False)
     return count
 
@@ -335,7 +335,7 @@ def test_a_joint_at_rest_whose_speed_is_noise_may_be_armed() -> None:
     assert moving_ticks(0.0, noise_rad_s=0.5) == 0
 
 
-def samples(watch: JointWatch, steps: Iterable[tuple[float, float]]) -> list[set[str]]:
+def samples(watch: JointMonitor, steps: Iterable[tuple[float, float]]) -> list[set[str]]:
     """Of angles that arrive at times after START_S, one in each tick."""
     return [set(seen(watch, fresh(START_S + time_s, angle_rad=angle), START_S + time_s)) for time_s, angle in steps]
 
@@ -478,7 +478,7 @@ def test_a_sensor_is_nearly_too_hot_half_way_to_its_bound_and_then_too_hot(
     assert lasting(HEALTHY._replace(temperature_c=temperature_c)) == ({expected} - {None})
 
 
-def warm_watch(winding_c: float) -> JointWatch:
+def warm_watch(winding_c: float) -> JointMonitor:
     watch = make_watch()
     watch.winding.temperature_c = winding_c
     return watch
@@ -491,9 +491,9 @@ def warm_watch(winding_c: float) -> JointWatch:
 def test_currents_guard_a_motor_whose_sensor_sees_nothing(
     measured_c: float, winding_c: float, expected: str | None
 ) -> None:
-    told = seen(warm_watch(winding_c), HEALTHY._replace(temperature_c=measured_c))
-    assert set(told) == ({expected} - {None})
-    assert all("by its currents" in sentence for sentence in told.values())
+    reported = seen(warm_watch(winding_c), HEALTHY._replace(temperature_c=measured_c))
+    assert set(reported) == ({expected} - {None})
+    assert all("by its currents" in message for message in reported.values())
 
 
 def test_a_winding_that_is_too_hot_is_not_hidden_by_a_sensor_that_is_nearly_so() -> None:
@@ -503,16 +503,16 @@ def test_a_winding_that_is_too_hot_is_not_hidden_by_a_sensor_that_is_nearly_so()
 def test_where_both_are_as_hot_the_sensor_is_believed() -> None:
     watch = warm_watch(95.0)
     for _ in range(TWO_MESSAGES + 2):
-        told = seen(watch, HEALTHY._replace(temperature_c=96.0))
-    assert told == {"motor_hot": "The left_sweep motor has 96 degrees C."}
+        reported = seen(watch, HEALTHY._replace(temperature_c=96.0))
+    assert reported == {"motor_hot": "The left_sweep motor has 96 degrees C."}
 
 
 def test_one_absurd_temperature_is_over_in_minutes() -> None:
     for absurd in (inf, 1e38):
         watch = make_watch()
         for _ in range(TWO_MESSAGES + 2):
-            told = seen(watch, HEALTHY._replace(temperature_c=absurd))
-        assert set(told) == {"motor_hot"}
+            reported = seen(watch, HEALTHY._replace(temperature_c=absurd))
+        assert set(reported) == {"motor_hot"}
         ticks = 0
         while seen(watch, HEALTHY, dt_s=1.0):
             ticks += 1
@@ -541,11 +541,9 @@ def test_no_value_makes_it_fail_and_every_fault_has_a_sentence(
     watch = make_watch()
     for tick, state in enumerate(states):
         now_s = START_S + tick * TICK_S
-        for name, sentence in seen(
-            watch, state, now_s, energised=energised, moving=moving, torque_nm=torque_nm
-        ).items():
+        for name, message in seen(watch, state, now_s, energised=energised, moving=moving, torque_nm=torque_nm).items():
             assert name in KINDS
-            assert sentence.startswith(("The left_sweep ", "No ")) and sentence.endswith((".", "C", "s."))
+            assert message.startswith(("The left_sweep ", "No ")) and message.endswith((".", "C", "s."))
         assert isfinite(watch.winding.temperature_c)
 
 
@@ -576,10 +574,10 @@ def missing_ticks(sent_nm: float, current_a: float, moving: bool = True) -> int 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_torque_is_missing_beyond_its_share_of_the_limit_and_not_before(sign: float) -> None:
-    share_nm = MISSING_SHARE * LIMITS.torque_nm
-    assert missing_ticks(sign * (share_nm + 1e-6), 0.0) is not None
-    assert missing_ticks(sign * (share_nm - 1e-6), 0.0) is None
-    assert missing_ticks(0.0, sign * (share_nm + 1e-6) / 0.083) is not None
+    fraction_nm = MISSING_FRACTION * LIMITS.torque_nm
+    assert missing_ticks(sign * (fraction_nm + 1e-6), 0.0) is not None
+    assert missing_ticks(sign * (fraction_nm - 1e-6), 0.0) is None
+    assert missing_ticks(0.0, sign * (fraction_nm + 1e-6) / 0.083) is not None
 
 
 def test_a_missing_torque_is_noticed_within_its_ticks() -> None:

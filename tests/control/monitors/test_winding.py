@@ -38,8 +38,8 @@ def test_it_begins_as_warm_as_the_room_and_stays_so_without_current() -> None:
 @pytest.mark.parametrize("current_a", [2.0, -2.0, 5.0, 9.0])
 @pytest.mark.parametrize("time_s", [1.0, 20.0, 120.0])
 def test_a_steady_current_warms_it_as_the_closed_form_says(current_a: float, time_s: float) -> None:
-    told_c = heated(current_a, round(time_s / TICK_S)).temperature_c
-    assert told_c == pytest.approx(closed_form_c(current_a, time_s), abs=0.02)
+    reported_c = heated(current_a, round(time_s / TICK_S)).temperature_c
+    assert reported_c == pytest.approx(closed_form_c(current_a, time_s), abs=0.02)
 
 
 def test_a_changing_current_warms_it_as_an_integrator_says() -> None:

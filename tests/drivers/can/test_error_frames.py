@@ -68,6 +68,6 @@ def test_any_error_frame_has_a_text_and_a_state_or_none(class_bits: int, data: b
     ],
 )
 def test_only_a_restart_leads_out_of_bus_off(
-    before: BusState, class_bits: int, told: BusState | None, after: BusState
+    before: BusState, class_bits: int, reported: BusState | None, after: BusState
 ) -> None:
-    assert next_state(before, class_bits, told) is after
+    assert next_state(before, class_bits, reported) is after

@@ -44,7 +44,7 @@ class KernelSocket(StandIn):
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self.told: list[Any] = []
+        self.reported: list[Any] = []
         self.send_problem: OSError | None = None
         self.socket_options: dict[int, Any] = {}
 
@@ -53,12 +53,12 @@ class KernelSocket(StandIn):
         self.socket_options[number] = value
 
     def recvmsg(self, *arguments: Any) -> Any:
-        if not self.told:
+        if not self.reported:
             return super().recvmsg(*arguments)
-        told = self.told.pop(0)
-        if isinstance(told, OSError):
-            raise told
-        return told
+        reported = self.reported.pop(0)
+        if isinstance(reported, OSError):
+            raise reported
+        return reported
 
     def send(self, data: Any, *flags: Any) -> int:
         if self.send_problem is not None:
@@ -75,7 +75,7 @@ class Bench:
         self.socket = near
         self.port = SocketcanPort(open_bus(near))
 
-    def tell(self, *frames: Frame) -> None:
+    def report(self, *frames: Frame) -> None:
         for frame in frames:
             self.kernel.send(encode_frame(frame))
 
@@ -123,14 +123,14 @@ def test_the_kernel_s_bytes_are_the_frames_in_both_directions(bench: Bench, enco
 
 def test_frames_keep_their_order_and_nothing_is_waited_for(bench: Bench) -> None:
     sent = [Frame(number, bytes([number])) for number in range(100)]
-    bench.tell(*sent)
+    bench.report(*sent)
     assert bench.receive() == sent
     assert bench.receive() == []
 
 
 def test_an_error_frame_is_told_apart_before_its_class_bits_look_like_an_id(bench: Bench) -> None:
     looks_like_the_encoder = Frame(0x009, bytes(8), is_error=True)
-    bench.tell(looks_like_the_encoder, ENCODER)
+    bench.report(looks_like_the_encoder, ENCODER)
     bench.kernel.send(bytes.fromhex("040000e0 08000000 0008000000000000"))  # with the bits of a remote extended frame
     assert bench.receive() == [ENCODER]
     assert (bench.port.error_frames, bench.port.state) == (2, BusState.WARNING)
@@ -138,7 +138,7 @@ def test_an_error_frame_is_told_apart_before_its_class_bits_look_like_an_id(benc
 
 def test_a_frame_says_when_it_was_on_the_bus(bench: Bench) -> None:
     before_s = time.monotonic()
-    bench.tell(ENCODER)
+    bench.report(ENCODER)
     after_s = time.monotonic()
     time.sleep(0.02)
     (frame,) = bench.port.receive()
@@ -146,7 +146,7 @@ def test_a_frame_says_when_it_was_on_the_bus(bench: Bench) -> None:
 
 
 def test_a_frame_without_a_stamp_passes_without_one(bench: Bench) -> None:
-    bench.socket.told = [(encode_frame(ENCODER), [], 0, None)]
+    bench.socket.reported = [(encode_frame(ENCODER), [], 0, None)]
     assert bench.port.receive() == [ENCODER._replace(stamp_s=NEVER_S)]
 
 
@@ -155,30 +155,30 @@ def test_the_kernel_is_asked_to_count_what_it_loses(bench: Bench) -> None:
 
 
 def test_frames_that_found_the_queue_full_are_counted_once(bench: Bench) -> None:
-    bench.socket.told = [message(ENCODER, lost=lost) for lost in (None, 3, 3)]
+    bench.socket.reported = [message(ENCODER, lost=lost) for lost in (None, 3, 3)]
     assert len(bench.port.receive()) == 3
     assert bench.port.lost_frames == 3
-    bench.socket.told = [message(ENCODER, lost=lost) for lost in (3, 10, None)]
+    bench.socket.reported = [message(ENCODER, lost=lost) for lost in (3, 10, None)]
     assert len(bench.port.receive()) == 3
     assert bench.port.lost_frames == 10
 
 
 def test_the_kernel_s_count_may_go_round(bench: Bench) -> None:
-    bench.socket.told = [message(ENCODER, lost=lost) for lost in (2**32 - 2, 1)]
+    bench.socket.reported = [message(ENCODER, lost=lost) for lost in (2**32 - 2, 1)]
     bench.port.receive()
     assert bench.port.lost_frames == 2**32 + 1
 
 
 def test_an_error_frame_tells_of_lost_frames_as_well(bench: Bench) -> None:
-    bench.socket.told = [message(OFF, lost=5)]
+    bench.socket.reported = [message(OFF, lost=5)]
     assert bench.port.receive() == []
     assert (bench.port.lost_frames, bench.port.error_frames) == (5, 1)
 
 
 def test_a_frame_of_a_process_beside_us_does_not_end_bus_off_and_one_of_a_peer_does(bench: Bench) -> None:
     states = []
-    for told in (message(OFF), message(ENCODER, marks=socket.MSG_DONTROUTE), message(ENCODER)):
-        bench.socket.told = [told]
+    for reported in (message(OFF), message(ENCODER, marks=socket.MSG_DONTROUTE), message(ENCODER)):
+        bench.socket.reported = [reported]
         bench.port.receive()
         states.append(bench.port.state)
     assert states == [BusState.OFF, BusState.OFF, BusState.ACTIVE]
@@ -218,8 +218,8 @@ def test_a_frame_that_has_no_bytes_is_a_failed_send(bench: Bench, frame: Frame) 
 
 @pytest.mark.parametrize("number", [errno.ENETDOWN, errno.ENODEV, errno.ENXIO])
 def test_an_interface_that_went_down_is_told_and_is_back_with_the_first_frame(bench: Bench, number: int) -> None:
-    bench.socket.told = [OSError(number, os.strerror(number))]
-    bench.tell(ENCODER)
+    bench.socket.reported = [OSError(number, os.strerror(number))]
+    bench.report(ENCODER)
     assert bench.receive() == []
     assert (bench.port.state, bench.port.error_frames) == (BusState.OFF, 1)
     assert bench.port.last_error == os.strerror(number)
@@ -234,14 +234,14 @@ def test_an_interface_that_went_down_is_told_and_is_back_with_the_first_frame(be
 )
 def test_garbage_of_another_size_is_counted_and_hides_nothing(bench: Bench, garbage: bytes) -> None:
     bench.kernel.send(garbage)
-    bench.tell(ENCODER)
+    bench.report(ENCODER)
     assert bench.receive() == [ENCODER]
     assert (bench.port.error_frames, bench.port.state) == (1, BusState.ACTIVE)
     assert bench.port.last_error == "a frame of another length than CAN 2.0 has"
 
 
 def test_a_babbling_node_does_not_hold_the_loop(bench: Bench) -> None:
-    bench.socket.told = [message(ENCODER)] * (MOST_FRAMES_PER_READ + 5)
+    bench.socket.reported = [message(ENCODER)] * (MOST_FRAMES_PER_READ + 5)
     assert len(bench.port.receive()) == MOST_FRAMES_PER_READ
     assert len(bench.port.receive()) == 5
 
@@ -285,7 +285,7 @@ def test_a_kernel_that_refuses_filters_only_lets_strangers_through(
 
     monkeypatch.setattr(KernelSocket, "setsockopt", refuse)
     bench.port.listen_to([0x009])
-    bench.tell(ENCODER, Frame(0x123))
+    bench.report(ENCODER, Frame(0x123))
     assert bench.receive() == [ENCODER, Frame(0x123)]
 
 

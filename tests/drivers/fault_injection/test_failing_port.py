@@ -22,7 +22,7 @@ DRIVES = {joint: DriveParameters("left" if place < 2 else "right", place) for pl
 NODES = {joint: drive.node_id for joint, drive in DRIVES.items()}
 PERIOD_S = 0.0025
 BEGIN_S, END_S, STOP_S = 0.1, 0.5, 0.7
-TOLD = (
+REPORTED = (
     codec.GET_ENCODER_ESTIMATES,
     codec.GET_IQ,
     codec.HEARTBEAT,
@@ -59,7 +59,7 @@ class Seen(NamedTuple):
     stamps_s: list[tuple[float, float]]
 
 
-def told_payload(message: codec.Message, tick: int) -> bytes:
+def reported_payload(message: codec.Message, tick: int) -> bytes:
     """A drive's message, another one in each tick."""
     if message is codec.HEARTBEAT:
         return message.encode(0, AxisState.CLOSED_LOOP, tick % 256, 0)
@@ -81,9 +81,9 @@ def run(component: str = "", kind: str = "", joints: tuple[str, ...] = JOINTS[:2
         if component and tick == round(BEGIN_S / PERIOD_S):
             assert failures.begin(component, kind, now_s, END_S - BEGIN_S) is None
         for joint in joints:
-            for message in TOLD:
+            for message in REPORTED:
                 place = arbitration_id(NODES[joint], message)
-                robot.send(Frame(place, told_payload(message, tick), stamp_s=now_s))
+                robot.send(Frame(place, reported_payload(message, tick), stamp_s=now_s))
         for frame in port.receive():
             received[frame.arbitration_id].append((tick, frame.data))
             stamps_s.append((now_s, frame.stamp_s))
@@ -109,7 +109,7 @@ def ids_of(component: str) -> set[int]:
     name, _, part = component.partition(".")
     if name == "bus":
         return set(range(0x800))
-    return {arbitration_id(NODES[name], message) for message in (PARTS[part] if part else TOLD)}
+    return {arbitration_id(NODES[name], message) for message in (PARTS[part] if part else REPORTED)}
 
 
 def commands_of(component: str, kind: str) -> set[int]:
@@ -123,7 +123,9 @@ def commands_of(component: str, kind: str) -> set[int]:
 def test_without_a_failure_everything_passes_as_it_is() -> None:
     assert SOUND.sent == SOUND.wanted and len(SOUND.sent) == 2
     ticks = round(STOP_S / PERIOD_S)
-    assert {len(told) for told in SOUND.received.values()} == {ticks} and len(SOUND.received) == 2 * len(TOLD)
+    assert {len(reported) for reported in SOUND.received.values()} == {ticks} and len(SOUND.received) == 2 * len(
+        REPORTED
+    )
     assert (SOUND.worst_state, SOUND.failed_sends, SOUND.error_frames) == (BusState.ACTIVE, 0, 0)
 
 
@@ -248,9 +250,9 @@ def test_an_error_can_come_and_go() -> None:
 
 
 def test_random_errors_are_never_none_and_leave_the_state_as_it_is() -> None:
-    told = heartbeats("garbage")
-    assert len({flags for flags, _ in told}) > 10 and all(flags for flags, _ in told)
-    assert {state for _, state in told} == {AxisState.CLOSED_LOOP}
+    reported = heartbeats("garbage")
+    assert len({flags for flags, _ in reported}) > 10 and all(flags for flags, _ in reported)
+    assert {state for _, state in reported} == {AxisState.CLOSED_LOOP}
 
 
 def test_a_garbled_heartbeat_of_a_drive_with_an_error_stays_garbled() -> None:

@@ -28,16 +28,16 @@ def readings(force_n: float, seed: int, drift: float = 0.0, per_newton: float = 
 def test_two_weights_tell_span_and_zero_within_their_standard_errors() -> None:
     for seed in range(20):
         light, heavy = weigh(0.0, readings(0.0, seed)), weigh(4.9, readings(4.9, seed + 100))
-        told = calibrate("counts", light, heavy)
-        assert abs(told.per_newton - 42000.0) < 4.0 * told.per_newton_std_error
-        assert abs(told.zero - 81000.0) < 4.0 * told.zero_std_error
-        assert told.relative_error < 0.001
-        assert remarks_on(told, light, heavy) == []
+        reported = calibrate("counts", light, heavy)
+        assert abs(reported.per_newton - 42000.0) < 4.0 * reported.per_newton_std_error
+        assert abs(reported.zero - 81000.0) < 4.0 * reported.zero_std_error
+        assert reported.relative_error < 0.001
+        assert remarks_on(reported, light, heavy) == []
 
 
 def test_a_force_is_what_was_loaded() -> None:
-    told = LoadCellCalibration("counts", -42000.0, 81000.0)
-    assert told.force_n(81000.0 - 42000.0 * 2.5) == pytest.approx(2.5)
+    reported = LoadCellCalibration("counts", -42000.0, 81000.0)
+    assert reported.force_n(81000.0 - 42000.0 * 2.5) == pytest.approx(2.5)
 
 
 def test_the_same_weight_twice_is_refused() -> None:
@@ -57,14 +57,14 @@ def test_too_few_readings_are_refused() -> None:
 
 def test_a_drift_and_a_turned_cell_are_told() -> None:
     light, heavy = weigh(0.0, readings(0.0, 1, drift=60.0)), weigh(4.9, readings(4.9, 2, per_newton=-42000.0))
-    told = remarks_on(calibrate("counts", light, heavy), light, heavy)
-    assert [("drifted" in each, "other way round" in each) for each in told] == [(True, False), (False, True)]
+    reported = remarks_on(calibrate("counts", light, heavy), light, heavy)
+    assert [("drifted" in each, "other way round" in each) for each in reported] == [(True, False), (False, True)]
 
 
 def test_a_calibration_reads_back(tmp_path: Path) -> None:
-    told = LoadCellCalibration("counts", 42000.0, 81000.0, 8.0, 30.0)
-    write_calibration(tmp_path / "cell.json", told)
-    assert read_calibration(tmp_path / "cell.json") == told
+    reported = LoadCellCalibration("counts", 42000.0, 81000.0, 8.0, 30.0)
+    write_calibration(tmp_path / "cell.json", reported)
+    assert read_calibration(tmp_path / "cell.json") == reported
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.load_cell.line_formats import LineFormat, Reading, find_format, newtons_per
-from drivers.serial.serial_line import text_share
+from drivers.serial.serial_line import text_fraction
 
 
 @pytest.mark.parametrize(
@@ -78,9 +78,9 @@ def test_the_format_of_most_lines_is_found_and_columns_are_left_to_people() -> N
 
 
 def test_noise_is_hardly_text() -> None:
-    assert text_share([b"ST,GS,+1.0kg", b"12\t13\r"]) == 1.0
-    assert text_share([b"\x00\xff\xe0\x80"]) == 0.0
-    assert text_share([]) == 0.0
+    assert text_fraction([b"ST,GS,+1.0kg", b"12\t13\r"]) == 1.0
+    assert text_fraction([b"\x00\xff\xe0\x80"]) == 0.0
+    assert text_fraction([]) == 0.0
 
 
 def test_weights_are_newtons_and_counts_are_not() -> None:

@@ -60,7 +60,7 @@ def test_reading_never_waits_where_nothing_comes(cable: Cable) -> None:
 
 
 def test_garbled_lines_are_counted_and_kept_to_be_shown(tmp_path: Path) -> None:
-    cable = Cable(tmp_path, garbled_share=0.25)
+    cable = Cable(tmp_path, garbled_fraction=0.25)
     samples = cable.run(4.0)
     port = cable.port
     assert 40 < port.garbled_lines < 120

@@ -47,18 +47,18 @@ def rail(tmp_path: Path) -> Iterator[Rail]:
 
 def test_places_come_at_the_times_they_were_taken_but_for_a_constant(rail: Rail) -> None:
     places = rail.run(3.0)[100:]
-    late_s = [place.stamp_s - place.place_m / SPEED_M_S for place in places]
+    late_s = [place.stamp_s - place.position_m / SPEED_M_S for place in places]
     assert len(places) > 190
     assert max(late_s) - min(late_s) < 0.002
     assert rail.encoder.rate_hz == pytest.approx(100.0, rel=0.01)
 
 
 def test_garbled_counts_are_counted_and_no_place(tmp_path: Path) -> None:
-    rail = Rail(tmp_path, garbled_share=0.2, label="pos")
+    rail = Rail(tmp_path, garbled_fraction=0.2, label="pos")
     rail.counter.encoder = StageEncoderParameters(label="pos=")
     places = rail.run(3.0)
     assert 20 < rail.encoder.counts.garbled < 110
-    assert all(before.place_m < after.place_m for before, after in zip(places, places[1:], strict=False))
+    assert all(before.position_m < after.position_m for before, after in zip(places, places[1:], strict=False))
     rail.close()
 
 
@@ -70,7 +70,7 @@ def test_an_encoder_that_was_away_has_another_zero_and_says_so(rail: Rail) -> No
     rail.counter.plug_in()
     places = rail.run(1.5)
     assert rail.encoder.breaks == 1
-    assert places[0].place_m < 0.5 * SPEED_M_S  # a counter begins at zero
+    assert places[0].position_m < 0.5 * SPEED_M_S  # a counter begins at zero
 
 
 def test_one_that_says_nothing_is_silent(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ class Bench:
     def axis(self) -> OdriveAxis:
         return self.drives.axes[0]
 
-    def tell(self, message: Message, *values: float, stamp_s: float = -1.0) -> None:
+    def report(self, message: Message, *values: float, stamp_s: float = -1.0) -> None:
         self.far.send(Frame(arbitration_id(0, message), message.encode(*values), stamp_s=stamp_s))
 
     def tell_setting(self, endpoint: int, value: str) -> None:
@@ -51,14 +51,14 @@ class Bench:
 
     def live(self, until_s: float, read: bool = True, drives: int = 1, turns: tuple[float, ...] = (0.0,)) -> None:
         """Encoders every 2 ms and heartbeats every 0.1 s, of as many drives, read every tick or not at all."""
-        start_s, told = self.now_s, 0
+        start_s, reported = self.now_s, 0
         for number in range(1, round((until_s - start_s) / 0.002) + 1):
             now_s = start_s + number * 0.002
             for drive in range(drives):
-                self.tell(GET_ENCODER_ESTIMATES, turns[drive % len(turns)], 0.0, stamp_s=now_s)
+                self.report(GET_ENCODER_ESTIMATES, turns[drive % len(turns)], 0.0, stamp_s=now_s)
                 if number % 50 == 25 * drive:
-                    self.tell(HEARTBEAT, 0, 1, 0, 0, stamp_s=now_s)
-                    told += 1
+                    self.report(HEARTBEAT, 0, 1, 0, 0, stamp_s=now_s)
+                    reported += 1
             if read:
                 self.read(now_s)
         self.now_s = until_s
@@ -71,13 +71,13 @@ def bench() -> Bench:
 
 def test_a_drive_that_lives_on_was_not_restarted(bench: Bench) -> None:
     bench.live(20.0)
-    assert (bench.axis.restarts, bench.axis.twins) == (0, False)
+    assert (bench.axis.restarts, bench.axis.duplicates) == (0, False)
 
 
 @pytest.mark.parametrize(("silence_s", "restarts"), [(0.29, 0), (0.32, 1), (1.0, 1), (60.0, 1)])
 def test_a_drive_heard_again_after_a_silence_was_restarted(bench: Bench, silence_s: float, restarts: int) -> None:
     bench.live(1.0)
-    bench.tell(GET_VERSION, *PRO)
+    bench.report(GET_VERSION, *PRO)
     bench.read(1.0)
     for number in range(1, round(silence_s / 0.002)):
         bench.read(1.0 + 0.002 * number)
@@ -91,27 +91,27 @@ def test_a_stall_of_ours_is_no_silence_of_the_drive(bench: Bench) -> None:
     bench.live(6.0, read=False)
     bench.read(6.0)
     bench.live(10.0)
-    assert (bench.axis.restarts, bench.axis.twins) == (0, False)
+    assert (bench.axis.restarts, bench.axis.duplicates) == (0, False)
 
 
 def test_frames_with_stamps_of_another_clock_make_no_restart_and_no_twin(bench: Bench) -> None:
     for number in range(2000):
-        bench.tell(GET_IQ, 0.0, 0.0, stamp_s=1e9 * (1 + number % 3))
+        bench.report(GET_IQ, 0.0, 0.0, stamp_s=1e9 * (1 + number % 3))
         if number % 50 == 0:
-            bench.tell(HEARTBEAT, 0, 1, 0, 0, stamp_s=-1e9 * (1 + number % 7))
+            bench.report(HEARTBEAT, 0, 1, 0, 0, stamp_s=-1e9 * (1 + number % 7))
         bench.read(0.002 * number)
-    assert (bench.axis.restarts, bench.axis.twins) == (0, False)
+    assert (bench.axis.restarts, bench.axis.duplicates) == (0, False)
 
 
 @pytest.mark.parametrize("missing", [HEARTBEAT, GET_ENCODER_ESTIMATES])
 def test_one_message_that_was_missing_alone_is_no_restart(bench: Bench, missing: Message) -> None:
     bench.live(1.0)
-    told: tuple[Message, tuple[float, ...]] = (HEARTBEAT, (0, 1, 0, 0))
+    reported: tuple[Message, tuple[float, ...]] = (HEARTBEAT, (0, 1, 0, 0))
     if missing is HEARTBEAT:
-        told = (GET_ENCODER_ESTIMATES, (0.0, 0.0))
+        reported = (GET_ENCODER_ESTIMATES, (0.0, 0.0))
     for number in range(500):
         if number % 25 == 0:
-            bench.tell(told[0], *told[1])
+            bench.report(reported[0], *reported[1])
         bench.read(1.0 + 0.002 * number)
     bench.live(3.0)
     assert bench.axis.restarts == 0
@@ -121,18 +121,18 @@ def test_one_message_that_was_missing_alone_is_no_restart(bench: Bench, missing:
 def test_a_drive_that_initialises_or_has_no_state_was_restarted_once(bench: Bench, heartbeat: tuple[int, int]) -> None:
     bench.live(0.4)
     for _ in range(3):
-        bench.tell(HEARTBEAT, *heartbeat, 0, 0)
+        bench.report(HEARTBEAT, *heartbeat, 0, 0)
         bench.read(0.5)
     assert bench.axis.restarts == 1
-    bench.tell(HEARTBEAT, 0, 1, 0, 0)
-    bench.tell(HEARTBEAT, *heartbeat, 0, 0)
+    bench.report(HEARTBEAT, 0, 1, 0, 0)
+    bench.report(HEARTBEAT, *heartbeat, 0, 0)
     bench.read(0.6)
     assert bench.axis.restarts == 2
 
 
 def test_a_drive_that_starts_with_us_was_not_restarted(bench: Bench) -> None:
     for state in (0, 0, 1):
-        bench.tell(HEARTBEAT, 1 - state, state, 0, 0)
+        bench.report(HEARTBEAT, 1 - state, state, 0, 0)
         bench.read(bench.now_s + 0.1)
     assert bench.axis.restarts == 0
 
@@ -141,17 +141,17 @@ def test_a_silence_and_initialising_after_it_are_one_restart(bench: Bench) -> No
     bench.live(1.0)
     for number in range(400):
         bench.read(1.0 + 0.002 * number)
-    bench.tell(GET_ENCODER_ESTIMATES, 0.0, 0.0)
+    bench.report(GET_ENCODER_ESTIMATES, 0.0, 0.0)
     bench.read(1.85)
     assert bench.axis.restarts == 1
-    bench.tell(HEARTBEAT, 0x1, 1, 0, 0)
+    bench.report(HEARTBEAT, 0x1, 1, 0, 0)
     bench.read(1.9)
     assert bench.axis.restarts == 1
 
 
-def seconds_until_twins(bench: Bench, drives: int, turns: tuple[float, ...]) -> float:
+def seconds_until_duplicates(bench: Bench, drives: int, turns: tuple[float, ...]) -> float:
     start_s = bench.now_s
-    while not bench.axis.twins and bench.now_s < start_s + 5.0:
+    while not bench.axis.duplicates and bench.now_s < start_s + 5.0:
         live_on(bench, drives, turns)
     return bench.now_s - start_s
 
@@ -160,41 +160,41 @@ def live_on(bench: Bench, drives: int, turns: tuple[float, ...]) -> None:
     now_s = bench.now_s + 0.002
     number = round(now_s / 0.002)
     for drive in range(drives):
-        bench.tell(GET_ENCODER_ESTIMATES, turns[drive % len(turns)], 0.0)
+        bench.report(GET_ENCODER_ESTIMATES, turns[drive % len(turns)], 0.0)
         if number % 50 == 25 * drive:
-            bench.tell(HEARTBEAT, 0, 1, 0, 0)
+            bench.report(HEARTBEAT, 0, 1, 0, 0)
     bench.read(now_s)
 
 
 def test_a_second_drive_with_the_same_reading_shows_by_its_heartbeats_within_a_second(bench: Bench) -> None:
     bench.live(2.0)
-    assert not bench.axis.twins
-    assert 0.3 < seconds_until_twins(bench, 2, (0.1, 0.1)) < 0.85
+    assert not bench.axis.duplicates
+    assert 0.3 < seconds_until_duplicates(bench, 2, (0.1, 0.1)) < 0.85
 
 
 def test_a_second_drive_elsewhere_shows_by_the_readings_within_ten_ticks(bench: Bench) -> None:
     bench.live(2.0)
-    assert seconds_until_twins(bench, 2, (0.1, 0.4)) < 10 * TICK_S
+    assert seconds_until_duplicates(bench, 2, (0.1, 0.4)) < 10 * TICK_S
 
 
 def test_twins_are_forgotten_when_one_of_them_is_taken_off(bench: Bench) -> None:
     bench.live(2.0, drives=2, turns=(0.1, 0.4))
-    assert bench.axis.twins
+    assert bench.axis.duplicates
     bench.live(5.0)
-    assert not bench.axis.twins
+    assert not bench.axis.duplicates
 
 
 @pytest.mark.parametrize("period_s", [0.02, 0.1, 0.5])
 def test_the_heartbeat_s_period_is_the_configured_one(period_s: float) -> None:
     bench = Bench(heartbeat_period_s=period_s)
     for number in range(1, 200):
-        bench.tell(HEARTBEAT, 0, 1, 0, 0)
+        bench.report(HEARTBEAT, 0, 1, 0, 0)
         bench.read(number * period_s)
-        assert not bench.axis.twins
+        assert not bench.axis.duplicates
     for number in range(1, 40):
-        bench.tell(HEARTBEAT, 0, 1, 0, 0)
+        bench.report(HEARTBEAT, 0, 1, 0, 0)
         bench.read(199 * period_s + number * period_s / 2.0)
-    assert bench.axis.twins
+    assert bench.axis.duplicates
 
 
 @pytest.mark.parametrize("stall_s", [0.05, 0.3, 1.0, 3.0, 10.0])
@@ -205,23 +205,23 @@ def test_heartbeats_that_we_fetch_late_in_a_bunch_are_no_twins(bench: Bench, sta
         bench.live(start_s + stall_s, read=False)
         bench.read(start_s + stall_s)
         bench.live(start_s + stall_s + 1.0)
-        assert (bench.axis.restarts, bench.axis.twins) == (0, False)
+        assert (bench.axis.restarts, bench.axis.duplicates) == (0, False)
 
 
 def test_heartbeats_that_an_adapter_holds_back_for_half_a_second_are_no_twins(bench: Bench) -> None:
     for number in range(1, 4000):
         now_s = number * 0.005
-        bench.tell(GET_IQ, 0.0, 0.0)
+        bench.report(GET_IQ, 0.0, 0.0)
         if number % 100 == 0:
             for _ in range(5):
-                bench.tell(HEARTBEAT, 0, 1, 0, 0)
+                bench.report(HEARTBEAT, 0, 1, 0, 0)
         bench.read(now_s)
-        assert not bench.axis.twins
+        assert not bench.axis.duplicates
 
 
 def readings(bench: Bench, turns: Iterable[float]) -> None:
     for value in turns:
-        bench.tell(GET_ENCODER_ESTIMATES, value, 0.0)
+        bench.report(GET_ENCODER_ESTIMATES, value, 0.0)
         bench.read(bench.now_s + 0.002)
 
 
@@ -231,7 +231,7 @@ def test_a_joint_that_moves_fast_or_an_encoder_that_jumps_or_tells_garbage_is_no
     readings(bench, (0.0, 0.5, 0.5, 0.5, 0.0, 0.0))
     readings(bench, (random.uniform(-1.0, 1.0) for _ in range(20000)))
     readings(bench, (random.choice([0.0, random.uniform(-1.0, 1.0)]) for _ in range(20000)))
-    assert not bench.axis.twins
+    assert not bench.axis.duplicates
 
 
 @pytest.mark.parametrize(
@@ -243,7 +243,7 @@ def test_the_watchdog_is_read_back_by_the_numbers_of_the_drive_s_build(
 ) -> None:
     bench.drives.request_watchdogs(0.0)
     assert bench.far.receive() == []  # its version is not known
-    bench.tell(GET_VERSION, *PRO)
+    bench.report(GET_VERSION, *PRO)
     bench.read(0.1)
     assert isnan(bench.axis.watchdog_s)
     bench.drives.request_watchdogs(1.0)
@@ -260,7 +260,7 @@ def test_the_watchdog_is_read_back_by_the_numbers_of_the_drive_s_build(
 
 
 def test_an_unanswered_question_for_a_watchdog_is_repeated_after_a_while(bench: Bench) -> None:
-    bench.tell(GET_VERSION, *PRO)
+    bench.report(GET_VERSION, *PRO)
     bench.read(0.1)
     asked = []
     for number in range(10):
@@ -276,7 +276,7 @@ def test_an_unanswered_question_for_a_watchdog_is_repeated_after_a_while(bench: 
 def test_a_build_whose_numbers_are_not_known_is_not_asked_and_counts_as_not_read(
     bench: Bench, version: tuple[int, ...]
 ) -> None:
-    bench.tell(GET_VERSION, *version)
+    bench.report(GET_VERSION, *version)
     bench.tell_setting(219, "01")
     bench.tell_setting(218, "cdcccc3d")
     bench.read(0.1)
@@ -288,7 +288,7 @@ def test_a_build_whose_numbers_are_not_known_is_not_asked_and_counts_as_not_read
 
 @pytest.mark.parametrize(("endpoint", "value"), [(219, "02"), (218, "0000c07f"), (218, "000080bf"), (218, "0000")])
 def test_a_setting_that_makes_no_sense_is_garbled_and_stays_unknown(bench: Bench, endpoint: int, value: str) -> None:
-    bench.tell(GET_VERSION, *PRO)
+    bench.report(GET_VERSION, *PRO)
     bench.tell_setting(219, "01")
     bench.read(0.1)
     bench.tell_setting(endpoint, value)
@@ -298,7 +298,7 @@ def test_a_setting_that_makes_no_sense_is_garbled_and_stays_unknown(bench: Bench
 
 
 def test_a_setting_that_another_program_asks_for_changes_nothing(bench: Bench) -> None:
-    bench.tell(GET_VERSION, *PRO)
+    bench.report(GET_VERSION, *PRO)
     bench.tell_setting(7, "00000000")
     bench.read(0.1)
     assert isnan(bench.axis.watchdog_s)
@@ -307,20 +307,20 @@ def test_a_setting_that_another_program_asks_for_changes_nothing(bench: Bench) -
 
 def test_a_restart_forgets_version_and_watchdog(bench: Bench) -> None:
     bench.live(0.4)
-    bench.tell(GET_VERSION, *PRO)
+    bench.report(GET_VERSION, *PRO)
     bench.tell_setting(219, "00")
     bench.read(0.5)
     assert bench.axis.watchdog_s == 0.0
-    bench.tell(HEARTBEAT, 0x1, 1, 0, 0)
+    bench.report(HEARTBEAT, 0x1, 1, 0, 0)
     bench.read(0.6)
     assert bench.axis.version is None
     assert isnan(bench.axis.watchdog_s)
 
 
 @given(st.lists(st.tuples(st.sampled_from([0x000, 0x001, 0x005, 0x009]), st.binary(max_size=8)), max_size=40))
-def test_whatever_a_drive_tells_the_watchdog_is_unknown_or_a_time(told: list[tuple[int, bytes]]) -> None:
+def test_whatever_a_drive_tells_the_watchdog_is_unknown_or_a_time(reported: list[tuple[int, bytes]]) -> None:
     bench = Bench()
-    for number, (identifier, data) in enumerate(told):
+    for number, (identifier, data) in enumerate(reported):
         bench.far.send(Frame(identifier, data))
         bench.read(0.1 * number)
         assert isnan(bench.axis.watchdog_s) or 0.0 <= bench.axis.watchdog_s <= 3600.0
@@ -335,7 +335,7 @@ def test_a_torque_that_no_bytes_hold_raises_nothing_and_becomes_zero(bench: Benc
 
 
 def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench) -> None:
-    bench.tell(GET_VERSION, *PRO)
+    bench.report(GET_VERSION, *PRO)
     bench.tell_setting(BUILD.enable, "01")
     bench.tell_setting(BUILD.timeout, "cdcccc3d")
     bench.read(0.0)
@@ -356,6 +356,6 @@ def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench
 
 def test_a_current_that_is_no_number_is_none_in_a_drive_that_lets_none_flow(bench: Bench) -> None:
     bench.live(0.5)
-    bench.tell(GET_IQ, 0.0, float("nan"))
+    bench.report(GET_IQ, 0.0, float("nan"))
     bench.read(0.6)
     assert bench.axis.state.current_a == 0.0

@@ -56,7 +56,7 @@ class Bench:
         self.far: dict[str, MockPort] = {name: bus.open() for name, bus in buses.items()}
         self.drives = OdriveDrives(parameters, {name: bus.open() for name, bus in buses.items()}, limits)
 
-    def tell(self, joint: str, message: Message, *values: float, stamp_s: float = NEVER_S) -> None:
+    def report(self, joint: str, message: Message, *values: float, stamp_s: float = NEVER_S) -> None:
         drive = self.parameters[joint]
         frame = Frame(arbitration_id(drive.node_id, message), message.encode(*values), stamp_s=stamp_s)
         self.far[drive.bus].send(frame)
@@ -64,8 +64,8 @@ class Bench:
     def tell_everything(self, now_s: float, closed_loop: bool = True) -> DriveStates:
         for joint in JOINTS:
             for message, values in SIGNALS + SLOW_SIGNALS:
-                self.tell(joint, message, *values)
-            self.tell(joint, HEARTBEAT, 0, 8 if closed_loop else 1, 0, 0)
+                self.report(joint, message, *values)
+            self.report(joint, HEARTBEAT, 0, 8 if closed_loop else 1, 0, 0)
         return self.drives.read(now_s)
 
     def sent(self) -> dict[str, list[Frame]]:
@@ -86,8 +86,8 @@ def test_a_sign_turns_angle_velocity_current_and_torque_alike(
 ) -> None:
     bench = Bench(PARAMETERS | {"left_sweep": DriveParameters("left", 0, sign=sign)}, BOUNDLESS)
     bench.drives.gate.open()
-    bench.tell("left_sweep", GET_ENCODER_ESTIMATES, turns, turns_s)
-    bench.tell("left_sweep", GET_IQ, 0.0, current_a)
+    bench.report("left_sweep", GET_ENCODER_ESTIMATES, turns, turns_s)
+    bench.report("left_sweep", GET_IQ, 0.0, current_a)
     state = bench.drives.read(1.0)[0]
     assert state.angle_rad == pytest.approx(sign * turns * 2.0 * pi)
     assert state.velocity_rad_s == pytest.approx(sign * turns_s * 2.0 * pi)
@@ -97,18 +97,18 @@ def test_a_sign_turns_angle_velocity_current_and_torque_alike(
 
 
 def test_the_zero_is_taken_off_before_the_sign(bench: Bench) -> None:
-    bench.tell("left_adduction", GET_ENCODER_ESTIMATES, 0.5, 0.0)
+    bench.report("left_adduction", GET_ENCODER_ESTIMATES, 0.5, 0.0)
     assert bench.drives.read(1.0)[1].angle_rad == pytest.approx(-0.25 * 2.0 * pi)
 
 
 def test_the_measured_current_is_taken_not_the_set_point(bench: Bench) -> None:
-    bench.tell("left_sweep", GET_IQ, 9.0, 1.5)
+    bench.report("left_sweep", GET_IQ, 9.0, 1.5)
     assert bench.drives.read(1.0)[0].current_a == 1.5
 
 
 def test_every_signal_has_its_own_stamp(bench: Bench) -> None:
     for now_s, (message, values) in enumerate(SIGNALS, start=1):
-        bench.tell("left_sweep", message, *values)
+        bench.report("left_sweep", message, *values)
         bench.drives.read(float(now_s))
     state, untold = bench.drives.read(9.0)[:2]
     assert (state.angle_stamp_s, state.current_stamp_s, state.heartbeat_stamp_s) == (1.0, 2.0, 3.0)
@@ -122,23 +122,23 @@ def test_every_signal_has_its_own_stamp(bench: Bench) -> None:
 def test_a_signal_has_the_stamp_of_its_frame_unless_that_is_of_another_clock(
     bench: Bench, frame_s: float, stamp_s: float
 ) -> None:
-    bench.tell("left_sweep", GET_IQ, 0.0, 1.0, stamp_s=frame_s)
+    bench.report("left_sweep", GET_IQ, 0.0, 1.0, stamp_s=frame_s)
     assert bench.drives.read(9.0)[0].current_stamp_s == stamp_s
 
 
 def test_the_newest_frame_wins(bench: Bench) -> None:
     for current_a in (1.0, 2.0, 3.0):
-        bench.tell("left_sweep", GET_IQ, 0.0, current_a)
+        bench.report("left_sweep", GET_IQ, 0.0, current_a)
     assert bench.drives.read(1.0)[0].current_a == 3.0
 
 
 def test_every_field_comes_from_its_message(bench: Bench) -> None:
     bench.tell_everything(1.0)
-    bench.tell("right_sweep", HEARTBEAT, 0x1000000, 1, 0, 0)
+    bench.report("right_sweep", HEARTBEAT, 0x1000000, 1, 0, 0)
     state = bench.drives.read(2.0)[2]
     assert (state.closed_loop, state.error_flags, state.heartbeat_stamp_s) == (False, 0x1000000, 2.0)
     assert (state.temperature_c, state.bus_voltage_v) == (40.0, 24.0)
-    bench.tell("right_sweep", GET_ERROR, 0x2000000, 0x1000000)
+    bench.report("right_sweep", GET_ERROR, 0x2000000, 0x1000000)
     assert bench.drives.read(3.0)[2].error_flags == 0x2000000
     assert bench.drives.axes[2].disarm_reason == 0x1000000
 
@@ -151,10 +151,10 @@ def test_a_node_id_on_the_wrong_bus_is_a_stranger(bench: Bench) -> None:
 
 
 def test_the_same_node_id_on_two_buses_is_two_drives() -> None:
-    twins = {joint: DriveParameters(joint.split("_")[0], joint.endswith("adduction")) for joint in JOINTS}
-    bench = Bench(twins)
-    bench.tell("left_sweep", GET_IQ, 0.0, 1.0)
-    bench.tell("right_sweep", GET_IQ, 0.0, 2.0)
+    duplicates = {joint: DriveParameters(joint.split("_")[0], joint.endswith("adduction")) for joint in JOINTS}
+    bench = Bench(duplicates)
+    bench.report("left_sweep", GET_IQ, 0.0, 1.0)
+    bench.report("right_sweep", GET_IQ, 0.0, 2.0)
     states = bench.drives.read(1.0)
     assert (states[0].current_a, states[2].current_a) == (1.0, 2.0)
 
@@ -235,10 +235,10 @@ def test_the_drives_are_heard_once_every_signal_of_all_has_come(bench: Bench, jo
     for other in JOINTS:
         for message, values in SIGNALS:
             if (other, message) != (joint, missing):
-                bench.tell(other, message, *values)
+                bench.report(other, message, *values)
     bench.drives.read(1.0)
     assert not bench.drives.heard
-    bench.tell(joint, missing, *dict(SIGNALS)[missing])
+    bench.report(joint, missing, *dict(SIGNALS)[missing])
     bench.drives.read(2.0)
     assert bench.drives.heard
 
@@ -297,7 +297,7 @@ def test_arming_is_repeated_after_a_while_and_only_for_drives_not_in_closed_loop
     bench.drives.arm(1.0)
     assert {name: len(frames) for name, frames in bench.sent().items()} == {"left": 10, "right": 10}
     for joint in JOINTS[:3]:
-        bench.tell(joint, HEARTBEAT, 0, 8, 0, 0)
+        bench.report(joint, HEARTBEAT, 0, 8, 0, 0)
     bench.drives.read(1.05)
     bench.drives.arm(1.0 + 0.99 * REPEAT_S)
     assert bench.silent()
@@ -320,7 +320,7 @@ def test_disarming_at_once_goes_to_all_with_zero_torque_and_idle(bench: Bench) -
 
 def test_disarming_is_repeated_for_drives_still_in_closed_loop(bench: Bench) -> None:
     bench.tell_everything(1.0, closed_loop=False)
-    bench.tell("left_adduction", HEARTBEAT, 0, 8, 0, 0)
+    bench.report("left_adduction", HEARTBEAT, 0, 8, 0, 0)
     bench.drives.read(1.0)
     for _ in range(3):
         bench.drives.disarm(1.0)
@@ -365,5 +365,5 @@ def test_a_reset_forgets_everything(bench: Bench) -> None:
 
 def test_closing_closes_the_ports(bench: Bench) -> None:
     bench.drives.close()
-    bench.tell("left_sweep", GET_IQ, 0.0, 5.0)
+    bench.report("left_sweep", GET_IQ, 0.0, 5.0)
     assert bench.drives.read(1.0)[0].current_stamp_s == NEVER_S

@@ -125,8 +125,8 @@ def test_frames_have_these_bytes(version: tuple[int, int], text: str) -> None:
 
 def test_a_server_s_information_has_these_bytes() -> None:
     payload = b"Motive".ljust(256, b"\0") + bytes.fromhex("03010200 04010000 8096980000000000 e705 01 efff2a63")
-    told = decode_server_info(b"\x01\x00" + len(payload).to_bytes(2, "little") + payload)
-    assert told == ("Motive", (4, 1), 10_000_000)
+    reported = decode_server_info(b"\x01\x00" + len(payload).to_bytes(2, "little") + payload)
+    assert reported == ("Motive", (4, 1), 10_000_000)
     old = b"Arena".ljust(256, b"\0") + bytes.fromhex("01000000 02070000")
     assert decode_server_info(encode_message(1, old)) == ("Arena", (2, 7), 0)
 

@@ -102,9 +102,9 @@ def test_the_place_now_is_told_and_when_it_was_exposed(open_laboratory: Open, ve
     """From 3.0 on a frame tells its own age; before, it has to be configured."""
     configured = {"latency_s": 0.012} if version < (3, 0) else NOTHING
     lab = open_laboratory(moving(2.0), configured, version=NatNetVersion(*version), latency_s=0.012, crowded=True)
-    told = known(lab.run(2.0))[40:]
-    assert len(told) > 600
-    for now_s, body in told:
+    reported = known(lab.run(2.0))[40:]
+    assert len(reported) > 600
+    for now_s, body in reported:
         assert body.x_m == pytest.approx(SPEED_M_S * now_s, abs=3e-4)
         assert 0.0119 < now_s - body.stamp_s < 0.012 + FRAME_S + TICK_S
     assert lab.port.report()[1:] == (lab.port.poses, 0, 1, "", "")
@@ -185,9 +185,9 @@ def test_a_pose_after_a_long_gap_or_a_leap_is_believed_when_a_second_one_follows
     lab = open_laboratory([*moving(0.5), RecordedPose(0.75, (0.3, 0.2, 1.0)), *moving(0.5, 1.5)])
     lab.run(0.74)
     assert not known(lab.run(1.5))  # the one of 0.75 s had leapt
-    told = known(lab.run(1.9))
-    assert told and all(body.x_m == pytest.approx(SPEED_M_S * now_s, abs=1e-3) for now_s, body in told)
-    assert told[0][0] >= 1.5 + FRAME_S
+    reported = known(lab.run(1.9))
+    assert reported and all(body.x_m == pytest.approx(SPEED_M_S * now_s, abs=1e-3) for now_s, body in reported)
+    assert reported[0][0] >= 1.5 + FRAME_S
 
 
 def test_a_pose_ends_when_it_is_stale(open_laboratory: Open) -> None:
@@ -243,8 +243,8 @@ def test_a_server_that_comes_back_with_another_version_is_understood(open_labora
         ({"group": GROUP, "interface": "nothing0"}, f"in group {GROUP}, port 1511 on nothing0: No such device"),
     ],
 )
-def test_an_interface_that_is_not_there_is_told(changes: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(PoseSourceError, match=sentence):
+def test_an_interface_that_is_not_there_is_told(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(PoseSourceError, match=message):
         NatNetPort(replace(NatNetParameters(server=LOOPBACK, group=""), **changes), ALONG_X)
 
 

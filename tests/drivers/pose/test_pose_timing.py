@@ -18,9 +18,9 @@ def test_the_quickest_frame_tells_what_separates_the_clocks() -> None:
     for frame in range(120 * 60):
         now_s = frame * PERIOD_S
         sent_s = now_s * (1.0 - 50e-6) - 50.0
-        told_s = sent_s + delay.update(now_s + 0.001 + chance.expovariate(1.0 / 0.004), sent_s)
+        reported_s = sent_s + delay.update(now_s + 0.001 + chance.expovariate(1.0 / 0.004), sent_s)
         if now_s > 1.0:
-            assert -0.0015 < told_s - (now_s + 0.001) < 0.001
+            assert -0.0015 < reported_s - (now_s + 0.001) < 0.001
 
 
 def test_a_clock_that_was_set_is_noticed_in_both_directions() -> None:
@@ -47,13 +47,13 @@ def test_a_forecast_misses_by_less_than_the_place_that_is_old() -> None:
     forecast, missed_m, old_m = PoseForecast(), 0.0, 0.0
     for frame in range(240):
         stamp_s = frame * PERIOD_S
-        place_m = 0.06 * sin(6.0 * stamp_s)
-        forecast.add(stamp_s, place_m)
+        position_m = 0.06 * sin(6.0 * stamp_s)
+        forecast.add(stamp_s, position_m)
         true_m = 0.06 * sin(6.0 * (stamp_s + 0.01))
         if frame > 3:
             missed_m, old_m = (
                 max(missed_m, abs(forecast.at(stamp_s + 0.01) - true_m)),
-                max(old_m, abs(place_m - true_m)),
+                max(old_m, abs(position_m - true_m)),
             )
     assert missed_m < 0.15 * old_m
 

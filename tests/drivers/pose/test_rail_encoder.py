@@ -52,8 +52,8 @@ class Rail:
             self.counter.write(data)
         return self.read_until(lambda: not self.encoder.line.is_there or self.fetched >= self.written)
 
-    def send(self, place_m: float) -> float:
-        self.counter.send(place_m)
+    def send(self, position_m: float) -> float:
+        self.counter.send(position_m)
         heard = self.heard
         return self.read_until(lambda: self.heard > heard)
 

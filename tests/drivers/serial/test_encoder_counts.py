@@ -23,8 +23,8 @@ def test_what_is_no_count_is_garbled(line: bytes) -> None:
 
 def test_a_leap_is_believed_once_it_stays_and_is_told() -> None:
     counts = EncoderCounts(1e-5)
-    told = [counts.take(line, 0.01 * i) for i, line in enumerate([b"50000", b"5000", b"50010", b"3", b"5", b"7"])]
-    assert told == [pytest.approx(0.5), None, pytest.approx(0.5001), None, pytest.approx(5e-5), pytest.approx(7e-5)]
+    reported = [counts.take(line, 0.01 * i) for i, line in enumerate([b"50000", b"5000", b"50010", b"3", b"5", b"7"])]
+    assert reported == [pytest.approx(0.5), None, pytest.approx(0.5001), None, pytest.approx(5e-5), pytest.approx(7e-5)]
     assert (counts.garbled, counts.leaps) == (2, 1)
 
 

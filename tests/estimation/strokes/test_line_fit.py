@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from control.records import Estimate
-from estimation.strokes.line_fit import LARGEST_DOUBT, MIN_SAMPLES, LineFit
+from estimation.strokes.line_fit import LARGEST_UNCERTAINTY, MIN_SAMPLES, LineFit
 
 Array = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def test_a_doubt_is_too_large_from_half_of_the_value_on() -> None:
     for noise in np.linspace(0.1, 8.0, 200):
         estimate = fitted(*noisy_line(7, 20, 1.0, float(noise)))
         if estimate.value > 0.0:
-            assert estimate.valid == (estimate.std_error <= LARGEST_DOUBT * estimate.value)
+            assert estimate.valid == (estimate.std_error <= LARGEST_UNCERTAINTY * estimate.value)
             assert (estimate.reason == "") == estimate.valid
             verdicts.add(estimate.valid)
     assert verdicts == {True, False}

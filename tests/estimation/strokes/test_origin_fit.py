@@ -31,7 +31,7 @@ def noisy(seed: int, count: int, noise: float = 0.1) -> tuple[Array, Array]:
     return x, K * x + noise * random.standard_normal(count)
 
 
-def spoilt(seed: int, count: int) -> tuple[Array, Array]:
+def invalid(seed: int, count: int) -> tuple[Array, Array]:
     """One batch in seven is far off."""
     random = np.random.default_rng(seed)
     x, y = noisy(seed, count)
@@ -65,7 +65,7 @@ def test_the_slope_is_statsmodels_huber_fit(clip: float, monkeypatch: pytest.Mon
     monkeypatch.setattr(origin_fit, "HUBER", clip)
     clipped = 0
     for seed in range(60):
-        x, y = spoilt(seed, 10 + seed)
+        x, y = invalid(seed, 10 + seed)
         start = float(np.median((y / x)[x > x.max() / 3.0]))
         scale = float(sm.robust.scale.mad(y - start * x, center=0.0))
         model = sm.RLM(y, x, M=sm.robust.norms.HuberT(clip))
@@ -105,7 +105,7 @@ def test_the_fit_is_unbiased() -> None:
 
 @pytest.mark.parametrize("scale", [1e-7, 1e-3, 1e6])
 def test_the_fit_does_not_care_about_the_unit_of_x(scale: float) -> None:
-    x, y = spoilt(1, 25)
+    x, y = invalid(1, 25)
     small, plain = fitted(scale * x, y), fitted(x, y)
     assert small.slope * scale == pytest.approx(plain.slope, rel=1e-9)
     assert small.std_error * scale == pytest.approx(plain.std_error, rel=1e-7)

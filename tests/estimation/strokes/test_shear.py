@@ -15,7 +15,17 @@ from hypothesis import strategies as st
 from control.geometry import FlipperGeometry
 from control.plate import stance_moment_m4, submerged_plate
 from estimation.strokes.origin_fit import MIN_BATCHES, fit_through_origin
-from estimation.strokes.shear import HELD, MOBILISED_M, QUICK_DOUBT, SLIPPING, STANDS, Base, Shear, find_shear, slips_m
+from estimation.strokes.shear import (
+    HELD,
+    MOBILISED_M,
+    QUICK_UNCERTAINTY,
+    SLIPPING,
+    STANDS,
+    Base,
+    Shear,
+    find_shear,
+    slips_m,
+)
 from estimation.strokes.stroke import Batch
 
 GEOMETRY = FlipperGeometry()
@@ -30,13 +40,13 @@ def moment_m4(batch: Batch, surface_m: float = 0.0) -> float:
     return stance_moment_m4(GEOMETRY, plate)
 
 
-def poses(body_share: float = 0.0, depth_m: float = DEPTH_M, count: int = COUNT) -> list[Batch]:
+def poses(body_fraction: float = 0.0, depth_m: float = DEPTH_M, count: int = COUNT) -> list[Batch]:
     """Without any load. The body advances by `body_share` of the flipper's way."""
     batches, front_m = [], LENGTH_M * sin(FRONT_RAD)
     for i in range(count):
         sweep_rad = FRONT_RAD - STEP_RAD * i
         adduction_rad = GEOMETRY.adduction_rad(sweep_rad, depth_m)
-        body_m = body_share * (front_m - LENGTH_M * sin(sweep_rad))
+        body_m = body_fraction * (front_m - LENGTH_M * sin(sweep_rad))
         batches.append(Batch(LENGTH_M * sweep_rad, sweep_rad, adduction_rad, 0.0, 0.0, body_m, False, 10, 0.5))
     return batches
 
@@ -48,10 +58,10 @@ def pressed(batches: Sequence[Batch], k_s: float = K_S, surface_m: float = 0.0) 
 
 def sheared(batches: Sequence[Batch], k_s: float = K_S, base: Base = Base.FREE) -> list[Batch]:
     """Of mud that bears the more, the farther it has been sheared, up to its strength at MOBILISED_M."""
-    way_m, loaded = 0.0, []
+    path_m, loaded = 0.0, []
     for batch, slip_m in zip(batches, [0.0, *(slips_m(GEOMETRY, batches, base) or ())], strict=True):
-        way_m += slip_m
-        loaded.append(batch._replace(sweep_nm=min(way_m / MOBILISED_M, 1.0) * k_s * moment_m4(batch)))
+        path_m += slip_m
+        loaded.append(batch._replace(sweep_nm=min(path_m / MOBILISED_M, 1.0) * k_s * moment_m4(batch)))
     return loaded
 
 
@@ -96,12 +106,12 @@ def test_what_was_borne_before_the_mud_was_mobilised_does_not_count(base: Base) 
 def test_the_strength_is_fitted_to_the_pieces_that_had_been_sheared_far_enough() -> None:
     """To just those, scattered by 2 %."""
     even = sheared(poses())
-    full = [share > (1.0 - EXACT) * K_S for share in borne(even)]
+    full = [fraction > (1.0 - EXACT) * K_S for fraction in borne(even)]
     shaken = [b._replace(sweep_nm=b.sweep_nm * (1.02 if i % 2 else 0.98)) for i, b in enumerate(even)]
-    told = [b for b, is_full in zip(shaken, full, strict=True) if is_full]
+    reported = [b for b, is_full in zip(shaken, full, strict=True) if is_full]
     shear = found(shaken)
-    assert shear.fit == fit_through_origin([moment_m4(b) for b in told], [b.sweep_nm for b in told])
-    assert shear.samples == 10 * len(told)
+    assert shear.fit == fit_through_origin([moment_m4(b) for b in reported], [b.sweep_nm for b in reported])
+    assert shear.samples == 10 * len(reported)
 
 
 def test_a_fixed_base_needs_no_pose() -> None:
@@ -133,9 +143,9 @@ def test_where_the_body_goes_along_and_the_mud_holds_there_is_a_bound() -> None:
 
 
 @pytest.mark.parametrize("body_share", [0.25, 0.5, 0.7])
-def test_where_the_plate_slips_while_the_body_advances_the_strength_is_told(body_share: float) -> None:
+def test_where_the_plate_slips_while_the_body_advances_the_strength_is_told(body_fraction: float) -> None:
     """At 70 % of 12 cm it slips 3.6 cm, so few batches are left; but they have all of the strength."""
-    shear = found(sheared(poses(body_share), base=Base.FREE))
+    shear = found(sheared(poses(body_fraction), base=Base.FREE))
     assert (shear.case, shear.at_least) == ("mixed", False)
     assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
 
@@ -152,14 +162,14 @@ def test_only_the_pieces_count_in_which_the_plate_slips() -> None:
 
 
 @pytest.mark.parametrize(("body_share", "case"), [(0.15, "yield"), (0.25, "mixed")])
-def test_up_to_a_fifth_of_the_way_the_body_counts_as_standing(body_share: float, case: str) -> None:
-    assert found(pressed(poses(body_share))).case == case
+def test_up_to_a_fifth_of_the_way_the_body_counts_as_standing(body_fraction: float, case: str) -> None:
+    assert found(pressed(poses(body_fraction))).case == case
 
 
 def test_a_plate_that_hardly_slips_is_held() -> None:
     """Over a long way it would slip MOBILISED_M all the same."""
-    share = 1.0 - 0.9 * SLIPPING
-    assert found(pressed(poses(share))).case == "body"
+    fraction = 1.0 - 0.9 * SLIPPING
+    assert found(pressed(poses(fraction))).case == "body"
 
 
 def test_a_body_that_slides_back_is_no_travel_of_the_plates() -> None:
@@ -171,11 +181,11 @@ def test_a_body_that_slides_back_is_no_travel_of_the_plates() -> None:
 
 def test_the_slip_is_the_way_back_through_the_mud() -> None:
     batches = poses(0.4)
-    told = slips_m(GEOMETRY, batches, Base.FREE)
-    assert told is not None
-    way_m = LENGTH_M * (sin(batches[0].sweep_rad) - sin(batches[-1].sweep_rad))
-    assert sum(told) == pytest.approx(0.6 * way_m)
-    assert sum(slips_m(GEOMETRY, batches, Base.FIXED) or ()) == pytest.approx(way_m)
+    reported = slips_m(GEOMETRY, batches, Base.FREE)
+    assert reported is not None
+    path_m = LENGTH_M * (sin(batches[0].sweep_rad) - sin(batches[-1].sweep_rad))
+    assert sum(reported) == pytest.approx(0.6 * path_m)
+    assert sum(slips_m(GEOMETRY, batches, Base.FIXED) or ()) == pytest.approx(path_m)
     assert slips_m(GEOMETRY, blind(batches), Base.FREE) is None
 
 
@@ -210,8 +220,8 @@ def test_between_bound_and_value_lie_the_pieces_that_a_fit_needs() -> None:
     cases = [found(pressed(poses(count=count))).case for count in range(3, COUNT + 1)]
     first = cases.index("yield")
     assert set(cases[:first]) == {"body"} and set(cases[first:]) == {"yield"}
-    way_m = LENGTH_M * (sin(FRONT_RAD) - sin(FRONT_RAD - STEP_RAD * (first + 2)))
-    assert way_m == pytest.approx(MOBILISED_M + (MIN_BATCHES - 1) * 0.006, abs=0.006)  # to one piece
+    path_m = LENGTH_M * (sin(FRONT_RAD) - sin(FRONT_RAD - STEP_RAD * (first + 2)))
+    assert path_m == pytest.approx(MOBILISED_M + (MIN_BATCHES - 1) * 0.006, abs=0.006)  # to one piece
 
 
 # without a pose
@@ -233,8 +243,8 @@ def test_above_the_bodys_drag_it_may_have_moved() -> None:
 
 
 @pytest.mark.parametrize(("share", "case"), [(0.79, "yield"), (0.81, "unknown")])
-def test_four_fifths_of_the_drag_is_the_border(share: float, case: str) -> None:
-    batches = [batch._replace(sweep_nm=share * DRAG_N / 2.0 * LENGTH_M / cos(batch.sweep_rad)) for batch in poses()]
+def test_four_fifths_of_the_drag_is_the_border(fraction: float, case: str) -> None:
+    batches = [batch._replace(sweep_nm=fraction * DRAG_N / 2.0 * LENGTH_M / cos(batch.sweep_rad)) for batch in poses()]
     assert found(blind(batches)).case == case
 
 
@@ -283,17 +293,19 @@ def test_what_all_pieces_have_borne_is_a_bound(torques_nm: list[float]) -> None:
 
 def test_the_bound_is_the_largest_that_was_borne_for_a_while() -> None:
     """Half of the strength, all of it, and half again."""
-    shares = [0.5] * 7 + [1.0] * 7 + [0.5] * 7
-    batches = [b._replace(sweep_nm=share * b.sweep_nm) for b, share in zip(pressed(poses(1.0)), shares, strict=True)]
+    fractions = [0.5] * 7 + [1.0] * 7 + [0.5] * 7
+    batches = [
+        b._replace(sweep_nm=fraction * b.sweep_nm) for b, fraction in zip(pressed(poses(1.0)), fractions, strict=True)
+    ]
     assert k_of(found(batches)) == pytest.approx(K_S, rel=EXACT)
 
 
 def test_a_bound_is_in_more_doubt_where_it_was_borne_unevenly() -> None:
     even = pressed(poses(1.0))
     uneven = [b._replace(sweep_nm=b.sweep_nm * (1.2 if i % 2 else 0.8)) for i, b in enumerate(even)]
-    doubts = [fit.std_error / fit.slope for fit in (found(even).fit, found(uneven).fit) if fit is not None]
-    assert doubts[0] == pytest.approx(QUICK_DOUBT)
-    assert doubts[1] > 1.5 * doubts[0]
+    uncertainties = [fit.std_error / fit.slope for fit in (found(even).fit, found(uneven).fit) if fit is not None]
+    assert uncertainties[0] == pytest.approx(QUICK_UNCERTAINTY)
+    assert uncertainties[1] > 1.5 * uncertainties[0]
 
 
 # no mud, nonsense
@@ -313,8 +325,10 @@ def test_pieces_above_the_surface_bear_nothing() -> None:
 
 
 @given(st.lists(st.floats(), min_size=COUNT, max_size=COUNT), st.floats(0.0, 1.0), st.floats(), st.floats())
-def test_no_torque_makes_it_raise(torques_nm: list[float], body_share: float, drag_n: float, surface_m: float) -> None:
-    batches = [batch._replace(sweep_nm=each) for batch, each in zip(poses(body_share), torques_nm, strict=True)]
+def test_no_torque_makes_it_raise(
+    torques_nm: list[float], body_fraction: float, drag_n: float, surface_m: float
+) -> None:
+    batches = [batch._replace(sweep_nm=each) for batch, each in zip(poses(body_fraction), torques_nm, strict=True)]
     for base in Base:
         for seen in (batches, blind(batches)):
             found(seen, base, drag_n, surface_m)

@@ -22,8 +22,8 @@ def row(
     return now_s, travel_m, 2.0 * travel_m, 3.0 * travel_m, 4.0 * travel_m, 5.0 * travel_m, body_m, saturated
 
 
-def even(rate_hz: float, way_m: float = 0.045, speed_m_s: float = SPEED_M_S, start_m: float = -0.0145) -> list[Row]:
-    count = round(way_m / speed_m_s * rate_hz)
+def even(rate_hz: float, path_m: float = 0.045, speed_m_s: float = SPEED_M_S, start_m: float = -0.0145) -> list[Row]:
+    count = round(path_m / speed_m_s * rate_hz)
     return [(i / rate_hz, start_m + speed_m_s * i / rate_hz) for i in range(count)]
 
 
@@ -81,7 +81,7 @@ def test_a_message_that_is_read_more_often_moves_no_mean() -> None:
 
 
 def test_a_flipper_that_stands_still_adds_to_one_batch() -> None:
-    rows = even(380.0, way_m=0.015)
+    rows = even(380.0, path_m=0.015)
     end_s, end_m = rows[-1]
     held = [*rows, *((end_s + i / 380.0, end_m) for i in range(1, 5000))]
     assert len(stroke_of(held).batches) == len(stroke_of(rows).batches)
@@ -94,7 +94,7 @@ def test_a_flipper_that_trembles_adds_to_one_batch() -> None:
 
 
 def test_a_stroke_without_end_takes_no_more_memory() -> None:
-    stroke = stroke_of(even(380.0, way_m=10.0))
+    stroke = stroke_of(even(380.0, path_m=10.0))
     assert len(stroke.batches) == LONGEST
     assert stroke.batches[-1].travel_m < (LONGEST + 10) * STEP_M
 

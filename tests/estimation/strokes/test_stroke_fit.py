@@ -9,13 +9,13 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
-from control.plate import crossing, stroke_moment_m4, submerged_plate
+from control.plate import cross_coupling, stroke_moment_m4, submerged_plate
 from control.records import Estimate
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit
 from estimation.strokes.stroke import Batch
 from estimation.strokes.stroke_fit import (
-    CROSSING_DOUBT,
-    LARGEST_DOUBT,
+    CROSS_COUPLING_UNCERTAINTY,
+    LARGEST_UNCERTAINTY,
     MIN_VERTICAL_LEVER_M,
     NOT_OUT,
     NOT_THERE,
@@ -23,9 +23,9 @@ from estimation.strokes.stroke_fit import (
     UNOBSERVABLE,
     _slope_per_surface,
     bound_extraction,
+    evaluated,
     fit_extraction,
     fit_insertion,
-    judged,
     level_free,
     ways_m,
 )
@@ -66,7 +66,7 @@ def loaded(batch: Batch, k: float, surface_m: float = 0.0, law: Law = as_the_law
     """τ₂ = k Φ and what crosses over from a face that turns the sweep joint by `face_nm`."""
     plate = submerged_plate(GEOMETRY, batch.sweep_rad, batch.adduction_rad, surface_m)
     moment_m4 = law(batch.travel_m - surface_m) * stroke_moment_m4(GEOMETRY, plate, batch.sweep_rad)
-    across_nm = crossing(GEOMETRY, plate, batch.sweep_rad) * face_nm
+    across_nm = cross_coupling(GEOMETRY, plate, batch.sweep_rad) * face_nm
     return batch._replace(sweep_nm=face_nm, adduction_nm=k * moment_m4 + across_nm)
 
 
@@ -180,7 +180,7 @@ def test_the_ways_between_two_depths_add_up_to_what_lies_between_them(
     inside_m = max(0.0, min(last_m, deepest_m) - max(first_m, shallowest_m))
     ways = ways_m(batches, shallowest_m, deepest_m)
     assert len(ways) == len(batches)
-    assert sum(max(way_m, 0.0) for way_m in ways) == pytest.approx(inside_m, abs=1e-12)
+    assert sum(max(path_m, 0.0) for path_m in ways) == pytest.approx(inside_m, abs=1e-12)
 
 
 def test_one_batch_has_no_way() -> None:
@@ -229,21 +229,21 @@ def plain_slope(surface_m: float, law: Law) -> float:
 def test_the_slope_per_surface_is_the_numeric_derivative(law: Law) -> None:
     """To 5 %: Φ falls by about Φ dδ/z, for the plate leans and its volume's middle moves."""
     numeric = (plain_slope(1e-6, law) - plain_slope(-1e-6, law)) / 2e-6
-    told = _slope_per_surface(OriginFit(plain_slope(0.0, law), 0.0), *pieces(0.0, law=law))
-    assert told == pytest.approx(numeric, rel=0.05)
+    reported = _slope_per_surface(OriginFit(plain_slope(0.0, law), 0.0), *pieces(0.0, law=law))
+    assert reported == pytest.approx(numeric, rel=0.05)
 
 
 def test_the_slope_per_surface_is_three_halves_of_slope_over_depth() -> None:
     """Of an upright plate, whose Φ is in proportion to z, in many small pieces: Σz/Σz² = 3/(2 z)."""
     depths_m = [1e-5 * (i + 0.5) for i in range(3000)]
-    told = _slope_per_surface(OriginFit(K, 0.0), depths_m, [K * depth_m for depth_m in depths_m], depths_m)
-    assert told == pytest.approx(1.5 * K / 0.03, rel=1e-3)
+    reported = _slope_per_surface(OriginFit(K, 0.0), depths_m, [K * depth_m for depth_m in depths_m], depths_m)
+    assert reported == pytest.approx(1.5 * K / 0.03, rel=1e-3)
 
 
 def systematic(estimate: Estimate) -> float:
     """What is left of the doubt beside the torque's repeatability, as a share."""
-    share = estimate.std_error / estimate.value
-    return float(np.sqrt(share * share - TORQUE_REPEATABILITY * TORQUE_REPEATABILITY))
+    fraction = estimate.std_error / estimate.value
+    return float(np.sqrt(fraction * fraction - TORQUE_REPEATABILITY * TORQUE_REPEATABILITY))
 
 
 def test_without_noise_only_the_torques_repeatability_is_left() -> None:
@@ -254,9 +254,9 @@ def test_without_noise_only_the_torques_repeatability_is_left() -> None:
 @pytest.mark.parametrize("error_m", [0.0002, 0.001])
 def test_the_doubt_of_the_surface_is_that_of_a_moved_one(error_m: float) -> None:
     """To 10 %: first order in 1 mm of 3 cm, and Φ's fall as above."""
-    told = systematic(insertion(down(), surface_at(0.0, error_m)))
+    reported = systematic(insertion(down(), surface_at(0.0, error_m)))
     deeper, higher = (insertion(down(), surface_at(sign * error_m)).value for sign in (1.0, -1.0))
-    assert told == pytest.approx((deeper - higher) / 2.0 / K, rel=0.1)
+    assert reported == pytest.approx((deeper - higher) / 2.0 / K, rel=0.1)
 
 
 def test_the_doubt_of_the_zero_allows_for_a_weight_on_the_edge() -> None:
@@ -264,30 +264,32 @@ def test_the_doubt_of_the_zero_allows_for_a_weight_on_the_edge() -> None:
     A leaning one has less lever for a weight than for its volume, so this is more than enough, by half as much again.
     """
     weight_n = 0.1
-    told = systematic(insertion(down(), zero_error_n=weight_n))
+    reported = systematic(insertion(down(), zero_error_n=weight_n))
     lifted = [
         b._replace(adduction_nm=b.adduction_nm + weight_n * GEOMETRY.vertical_lever_m(b.sweep_rad, b.adduction_rad))
         for b in down()
     ]
     truly = insertion(lifted).value / K - 1.0
-    assert truly < told < 2.0 * truly
-    assert told == pytest.approx(1.5 * weight_n / (EDGE_M2 * 0.03) / K, rel=0.03)  # the last batch's middle is higher
+    assert truly < reported < 2.0 * truly
+    assert reported == pytest.approx(
+        1.5 * weight_n / (EDGE_M2 * 0.03) / K, rel=0.03
+    )  # the last batch's middle is higher
 
 
 @pytest.mark.parametrize("face_nm", [-0.3, 0.2])
 def test_a_quarter_of_what_is_taken_off_the_face_stays_in_doubt(face_nm: float) -> None:
     unfelt = insertion([batch._replace(sweep_nm=0.0) for batch in down(face_nm=face_nm)]).value
-    told = systematic(insertion(down(face_nm=face_nm)))
-    assert told == pytest.approx(CROSSING_DOUBT * abs(unfelt / K - 1.0), rel=1e-3)
+    reported = systematic(insertion(down(face_nm=face_nm)))
+    assert reported == pytest.approx(CROSS_COUPLING_UNCERTAINTY * abs(unfelt / K - 1.0), rel=1e-3)
 
 
 def test_scatter_of_the_batches_adds_to_the_doubt() -> None:
     random = np.random.default_rng(1)
-    doubts = []
+    uncertainties = []
     for noise_nm in (0.005, 0.02):
         noisy = [b._replace(adduction_nm=b.adduction_nm + float(random.normal(0.0, noise_nm))) for b in down()]
-        doubts.append(systematic(insertion(noisy)))
-    assert 0.002 < doubts[0] < doubts[1] < 0.05
+        uncertainties.append(systematic(insertion(noisy)))
+    assert 0.002 < uncertainties[0] < uncertainties[1] < 0.05
 
 
 # what is no coefficient
@@ -303,28 +305,28 @@ def test_pieces_in_poses_without_a_vertical_lever_are_not_asked(sign: float) -> 
     batches = [loaded(batch_at(travel_m, sign * FRONT_RAD), sign * K) for travel_m in depths(end_m=0.05)[:: int(sign)]]
     blind = [batch for batch in batches if lever_m(batch) < MIN_VERTICAL_LEVER_M]
     wrong = [batch._replace(adduction_nm=9.0) if batch in blind else batch for batch in batches]
-    told, seen = ((insertion(each) if sign > 0.0 else extraction(each, start_m=0.07)) for each in (wrong, batches))
+    reported, seen = ((insertion(each) if sign > 0.0 else extraction(each, start_m=0.07)) for each in (wrong, batches))
     assert 0.0468 < min(batch.travel_m for batch in blind) < 0.0468 + STEP_M
-    assert told == seen
-    assert told.valid
-    assert told.value == pytest.approx(K, rel=EXACT)
-    assert told.samples == SAMPLES * sum(batch.travel_m > 0.0 and batch not in blind for batch in batches)
+    assert reported == seen
+    assert reported.valid
+    assert reported.value == pytest.approx(K, rel=EXACT)
+    assert reported.samples == SAMPLES * sum(batch.travel_m > 0.0 and batch not in blind for batch in batches)
 
 
 def test_a_stroke_wholly_in_poses_without_a_vertical_lever_cannot_be_observed() -> None:
     """In mud that begins 4.7 cm deep. One that ends above is as short of pieces, but not for their poses."""
     batches = [loaded(batch_at(travel_m), K, 0.047) for travel_m in depths(end_m=0.05, step_m=0.0005)]
-    told = insertion(batches, surface_at(0.047))
-    assert (told.valid, told.reason, told.samples) == (False, UNOBSERVABLE, 0)
+    reported = insertion(batches, surface_at(0.047))
+    assert (reported.valid, reported.reason, reported.samples) == (False, UNOBSERVABLE, 0)
     above = [batch for batch in batches if lever_m(batch) >= MIN_VERTICAL_LEVER_M]
     assert insertion(above, surface_at(0.047)) == NOT_THERE
 
 
 @pytest.mark.parametrize("count", range(MIN_BATCHES))
 def test_too_few_pieces_say_so(count: int) -> None:
-    told = insertion(down()[-count:] if count else [])
-    assert told == NOT_THERE._replace(samples=told.samples)
-    assert not told.valid and told.reason
+    reported = insertion(down()[-count:] if count else [])
+    assert reported == NOT_THERE._replace(samples=reported.samples)
+    assert not reported.valid and reported.reason
 
 
 def test_a_stroke_in_the_air_says_so() -> None:
@@ -332,14 +334,14 @@ def test_a_stroke_in_the_air_says_so() -> None:
 
 
 def test_a_force_along_the_motion_is_no_mud() -> None:
-    for told in (insertion(down(-K)), extraction(up(-K))):
-        assert (told.valid, told.reason) == (False, "the force does not oppose the motion")
+    for reported in (insertion(down(-K)), extraction(up(-K))):
+        assert (reported.valid, reported.reason) == (False, "the force does not oppose the motion")
 
 
 def test_a_fit_is_judged_with_all_its_doubt() -> None:
-    told = judged(OriginFit(K, 0.03 * K), 0.04 * K, 7)
-    assert told._replace(std_error=0.0) == Estimate(K, 0.0, 7, True)
-    assert told.std_error == pytest.approx(hypot(0.03, 0.04, TORQUE_REPEATABILITY) * K)
+    reported = evaluated(OriginFit(K, 0.03 * K), 0.04 * K, 7)
+    assert reported._replace(std_error=0.0) == Estimate(K, 0.0, 7, True)
+    assert reported.std_error == pytest.approx(hypot(0.03, 0.04, TORQUE_REPEATABILITY) * K)
 
 
 @pytest.mark.parametrize(
@@ -347,7 +349,7 @@ def test_a_fit_is_judged_with_all_its_doubt() -> None:
     [
         (-K, 0.01 * K, "the force does not oppose the motion"),
         (0.0, 0.01 * K, "the force does not oppose the motion"),
-        (K, 1.01 * LARGEST_DOUBT * K, "the samples do not follow the law"),
+        (K, 1.01 * LARGEST_UNCERTAINTY * K, "the samples do not follow the law"),
         (nan, 1.0, "not finite"),
         (inf, 1.0, "not finite"),
         (K, inf, "not finite"),
@@ -355,25 +357,27 @@ def test_a_fit_is_judged_with_all_its_doubt() -> None:
     ],
 )
 def test_what_is_not_believed_says_why(slope: float, std_error: float, reason: str) -> None:
-    told = judged(OriginFit(slope, std_error), 0.0, 7)
-    assert (told.valid, told.at_least, told.samples, told.reason) == (False, False, 7, reason)
-    assert isfinite(told.value) == (reason != "not finite")
+    reported = evaluated(OriginFit(slope, std_error), 0.0, 7)
+    assert (reported.valid, reported.at_least, reported.samples, reported.reason) == (False, False, 7, reason)
+    assert isfinite(reported.value) == (reason != "not finite")
 
 
 def test_up_to_half_of_itself_a_doubt_is_borne() -> None:
-    assert judged(OriginFit(K, 0.0), 0.99 * float(np.sqrt(LARGEST_DOUBT**2 - TORQUE_REPEATABILITY**2)) * K, 7).valid
+    assert evaluated(
+        OriginFit(K, 0.0), 0.99 * float(np.sqrt(LARGEST_UNCERTAINTY**2 - TORQUE_REPEATABILITY**2)) * K, 7
+    ).valid
 
 
 @example([0.0] * 28, -5e-324, 0.0)  # a piece of way whose half is nothing
 @given(st.lists(st.floats(), min_size=28, max_size=28), st.floats(-0.02, 0.02), st.floats(0.0, 1.0))
 def test_no_torque_makes_it_raise(torques_nm: list[float], surface_m: float, zero_error_n: float) -> None:
     batches = [b._replace(adduction_nm=t, sweep_nm=t / 2.0) for b, t in zip(down(), torques_nm, strict=True)]
-    for told in (
+    for reported in (
         insertion(batches, surface_at(surface_m), zero_error_n),
         extraction(batches[::-1], surface_at(surface_m), zero_error_n),
         bound_extraction(GEOMETRY, batches, surface_at(surface_m)),
     ):
-        assert isfinite(told.value + told.std_error) or not told.valid
+        assert isfinite(reported.value + reported.std_error) or not reported.valid
 
 
 # the level above the mud
@@ -395,14 +399,14 @@ def test_a_level_is_taken_off_as_of_a_straight_arm(level_nm: float) -> None:
 def test_mud_that_held_on_has_borne_at_least_so_much() -> None:
     """It rose by 6 mm: too little for a fit."""
     batches = [loaded(batch_at(travel_m, -FRONT_RAD), -K, face_nm=0.2) for travel_m in (0.03, 0.028, 0.026, 0.024)]
-    told = bound_extraction(GEOMETRY, batches, surface_at(0.0))
-    assert (told.valid, told.at_least, told.reason) == (True, True, NOT_OUT)
-    assert told.value == pytest.approx(K, rel=EXACT)
-    assert told.std_error == pytest.approx(TORQUE_REPEATABILITY * K)
-    assert told.samples == 4 * SAMPLES
+    reported = bound_extraction(GEOMETRY, batches, surface_at(0.0))
+    assert (reported.valid, reported.at_least, reported.reason) == (True, True, NOT_OUT)
+    assert reported.value == pytest.approx(K, rel=EXACT)
+    assert reported.std_error == pytest.approx(TORQUE_REPEATABILITY * K)
+    assert reported.samples == 4 * SAMPLES
 
 
 def test_what_bore_nothing_is_no_bound() -> None:
     for batches in ([], [batch_at(-0.01)], [loaded(batch_at(0.03), K)]):
-        told = bound_extraction(GEOMETRY, batches, surface_at(0.0))
-        assert not told.valid and not told.at_least
+        reported = bound_extraction(GEOMETRY, batches, surface_at(0.0))
+        assert not reported.valid and not reported.at_least

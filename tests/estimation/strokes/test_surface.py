@@ -43,26 +43,26 @@ def found(depths_m: Array, forces_n: Array) -> Surface:
 
 class Scores(NamedTuple):
     errors_mm: Array
-    told_mm: float  # standard error, on average
+    reported_mm: float  # standard error, on average
     covered: float  # share within two of them
     errors_of_k: Array
 
 
 def scores(slope_n_m: float, jump_n: float, noise_n: float, count: int, runs: int = 400) -> Scores:
     """Of mud that bears a jump and a slope, over many insertions."""
-    errors_mm, told_mm, covered, of_k = [], 0.0, 0, []
+    errors_mm, reported_mm, covered, of_k = [], 0.0, 0, []
     for seed in range(runs):
         z = depths(seed, count)
         force = np.where(z > 0.0, jump_n + slope_n_m * z, 0.0) + noise_n * noise(seed, len(z))
         surface = found(z, force)
         assert surface.found
         errors_mm.append(1000.0 * surface.depth_m)
-        told_mm += 1000.0 * surface.std_error_m / runs
+        reported_mm += 1000.0 * surface.std_error_m / runs
         covered += abs(surface.depth_m) <= 2.0 * surface.std_error_m
         below = z > surface.depth_m
         fit = fit_through_origin((z[below] - surface.depth_m).tolist(), (force[below] - surface.level_n).tolist())
         of_k.append(fit.slope / slope_n_m - 1.0 if fit else nan)
-    return Scores(np.array(errors_mm), told_mm, covered / runs, np.array(of_k))
+    return Scores(np.array(errors_mm), reported_mm, covered / runs, np.array(of_k))
 
 
 # mud whose force rises from nothing
@@ -91,7 +91,7 @@ def test_two_standard_errors_cover_the_surface_of_k_law_mud(slope_n_cm: float, n
     """Measured: 92 to 97 %, three sampling errors of 400 runs are 4 %; and no larger than they need be."""
     result = scores(100.0 * slope_n_cm, 0.0, noise_n, count)
     assert 0.88 <= result.covered <= 0.99
-    assert 0.7 <= result.told_mm / np.std(result.errors_mm) <= 1.3
+    assert 0.7 <= result.reported_mm / np.std(result.errors_mm) <= 1.3
 
 
 @pytest.mark.parametrize("shift_m", [-0.005, 0.0, 0.0007, 0.004])
@@ -122,20 +122,20 @@ def test_offsets_of_force_and_depth_only_move_the_result(
 @pytest.mark.parametrize(("slope_n_m", "jump_n"), [(100.0, 0.0), (100.0, 1.0)])
 def test_the_level_errs_as_it_says(slope_n_m: float, jump_n: float) -> None:
     """By the noise over the root of the batches above, nine or ten of them; a kink lends it a little more."""
-    errors_n, told_n = [], 0.0
+    errors_n, reported_n = [], 0.0
     for seed in range(400):
         z = depths(seed)
         surface = found(z, np.where(z > 0.0, jump_n + slope_n_m * z, 0.0) + BATCH_NOISE_N * noise(seed, len(z)))
         errors_n.append(surface.level_n)
-        told_n += surface.level_std_error_n / 400.0
-    assert told_n == pytest.approx(BATCH_NOISE_N / sqrt(9.7), rel=0.15)
-    assert np.std(errors_n) == pytest.approx(told_n, rel=0.15)
+        reported_n += surface.level_std_error_n / 400.0
+    assert reported_n == pytest.approx(BATCH_NOISE_N / sqrt(9.7), rel=0.15)
+    assert np.std(errors_n) == pytest.approx(reported_n, rel=0.15)
 
 
 def test_shapes_that_disagree_add_to_the_doubt() -> None:
     """Where a jump and a kink fit alike, two millimetres apart, there is more doubt than of either."""
-    told_mm = [scores(100.0, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200).told_mm for jump_n in (0.0, 0.2, 1.0)]
-    assert told_mm[1] > 1.3 * max(told_mm[0], told_mm[2])
+    reported_mm = [scores(100.0, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200).reported_mm for jump_n in (0.0, 0.2, 1.0)]
+    assert reported_mm[1] > 1.3 * max(reported_mm[0], reported_mm[2])
 
 
 def test_more_noise_makes_more_doubt() -> None:
@@ -156,14 +156,14 @@ def test_mud_that_jumps_begins_at_the_jump(jump_n: float, slope_n_m: float) -> N
     assert np.mean(result.errors_mm) == pytest.approx(0.0, abs=0.1 * step_mm)
     assert np.std(result.errors_mm) == pytest.approx(step_mm / sqrt(12.0), rel=0.15)
     assert result.covered >= 0.99  # an even distribution ends at √3 of its standard deviations
-    assert result.told_mm == pytest.approx(step_mm / sqrt(12.0), rel=0.1)
+    assert result.reported_mm == pytest.approx(step_mm / sqrt(12.0), rel=0.1)
 
 
 def test_a_jump_whose_border_is_in_doubt_says_so() -> None:
     """A step of four noises and no slope below: the border may be a batch aside."""
     weak, clear = (scores(1e-9, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200) for jump_n in (0.2, 1.0))
     assert np.std(weak.errors_mm) > 1.2 * np.std(clear.errors_mm)
-    assert weak.told_mm > 1.2 * clear.told_mm
+    assert weak.reported_mm > 1.2 * clear.reported_mm
     assert weak.covered > 0.92
 
 
@@ -301,10 +301,10 @@ def test_knowledge_is_added_by_its_precision(
     depth_m: float, error_m: float, expected_m: float, sample_m: float
 ) -> None:
     """As two independent normal readings: one at the depth, one at the nominal height, zero."""
-    told = 1.0 / (error_m**2 + sample_m**2 / 12.0)
+    reported = 1.0 / (error_m**2 + sample_m**2 / 12.0)
     both = combined(Surface(depth_m, error_m, 0.3, 0.1, True), expected_m, sample_m)
-    assert both.depth_m == pytest.approx(depth_m * told / (told + expected_m**-2), rel=1e-9, abs=1e-15)
-    assert both.std_error_m == pytest.approx((told + expected_m**-2) ** -0.5, rel=1e-9)
+    assert both.depth_m == pytest.approx(depth_m * reported / (reported + expected_m**-2), rel=1e-9, abs=1e-15)
+    assert both.std_error_m == pytest.approx((reported + expected_m**-2) ** -0.5, rel=1e-9)
     assert (both.level_n, both.level_std_error_n, both.found) == (0.3, 0.1, True)
 
 
@@ -326,8 +326,8 @@ def test_an_expectation_never_wins_against_good_data(depth_m: float) -> None:
 
 
 def test_slow_messages_make_the_told_surface_count_less() -> None:
-    told = Surface(0.004, 0.0003, 0.0, 0.1, True)
-    weights = [combined(told, 0.0015, sample_m).depth_m / 0.004 for sample_m in (0.0, 0.001, 0.005, 0.02)]
+    reported = Surface(0.004, 0.0003, 0.0, 0.1, True)
+    weights = [combined(reported, 0.0015, sample_m).depth_m / 0.004 for sample_m in (0.0, 0.001, 0.005, 0.02)]
     assert weights == sorted(weights, reverse=True)
     assert weights[0] > 0.95
     assert weights[-1] < 0.1

@@ -66,8 +66,8 @@ def test_the_standard_error_is_that_of_the_weights_scatter() -> None:
     zeros = [taken(level, WEIGHT_N, NOISE_NM, seed).zero for seed in range(300)]
     scatter_n = float(np.std([zero.weight_n for zero in zeros]))
     assert scatter_n == pytest.approx(per_nm * NOISE_NM / sqrt(2 * MEMORY - 1), rel=0.15)
-    told_n = float(np.mean([zero.std_error_n for zero in zeros]))
-    assert told_n == pytest.approx(per_nm * NOISE_NM / sqrt(MEMORY), rel=0.1)
+    reported_n = float(np.mean([zero.std_error_n for zero in zeros]))
+    assert reported_n == pytest.approx(per_nm * NOISE_NM / sqrt(MEMORY), rel=0.1)
     assert np.mean([zero.weight_n for zero in zeros]) == pytest.approx(WEIGHT_N, abs=4.0 * scatter_n / sqrt(300))
 
 
@@ -135,9 +135,9 @@ def test_a_correction_is_weighed_by_its_own_error_against_the_zeros(weight_n: fl
     tare = taken([(0.0, 0.1)] * 50, WEIGHT_N, NOISE_NM)
     before = tare.zero
     own = before.std_error_n**2 + CREEP_N**2
-    share = own / (own + std_error_n**2)
-    assert tare.correct(weight_n, std_error_n) == pytest.approx(share * weight_n)
-    assert tare.zero.weight_n == pytest.approx(before.weight_n + share * weight_n)
+    fraction = own / (own + std_error_n**2)
+    assert tare.correct(weight_n, std_error_n) == pytest.approx(fraction * weight_n)
+    assert tare.zero.weight_n == pytest.approx(before.weight_n + fraction * weight_n)
     assert tare.zero.std_error_n == pytest.approx((1.0 / own + 1.0 / std_error_n**2) ** -0.5)
     assert tare.zero.sweep_offset_nm == before.sweep_offset_nm
 

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.scripted_operator import ScriptedOperator
 
 from experiments.actuator.bench import FALLS, RobotBench
 from experiments.actuator.plan import Plan
 from experiments.robot.bench_errors import BenchError, GoneError, OverruledError
 from experiments.robot.bench_robot import ALONE
 from tests.experiments.still_robot import StillRobot
-from tests.scripted_person import ScriptedPerson
 
 HOLD_IT = "Take off what hangs and hold the flipper: torque goes off."
 PLAN = Plan(("right_adduction",), weights_g=(50.0,), trials=1)
@@ -39,7 +39,7 @@ class HoldingRobot(StillRobot):
             raise self.trouble
 
 
-class Impatient(ScriptedPerson):
+class Impatient(ScriptedOperator):
     """Presses Ctrl-C where a question stands."""
 
     def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
@@ -47,7 +47,7 @@ class Impatient(ScriptedPerson):
         raise KeyboardInterrupt
 
 
-class Holding(ScriptedPerson):
+class Holding(ScriptedOperator):
     """Sees that the motor holds until they do."""
 
     def __init__(self, robot: HoldingRobot) -> None:
@@ -61,54 +61,54 @@ class Holding(ScriptedPerson):
 
 def test_what_hangs_is_taken_off_before_an_interrupted_calibration_lets_go(tmp_path: Path) -> None:
     robot = HoldingRobot()
-    person = Holding(robot)
-    RobotBench(robot).leave(tmp_path, person)
-    assert len(person.asked) == 1 and person.asked[0].endswith(HOLD_IT)
+    operator = Holding(robot)
+    RobotBench(robot).leave(tmp_path, operator)
+    assert len(operator.asked) == 1 and operator.asked[0].endswith(HOLD_IT)
     assert robot.mode == "idle" and robot.closed
 
 
 def test_who_presses_ctrl_c_again_has_the_torque_off_at_once(tmp_path: Path) -> None:
-    robot, person = HoldingRobot(), Impatient()
+    robot, operator = HoldingRobot(), Impatient()
     with pytest.raises(KeyboardInterrupt):
-        RobotBench(robot).leave(tmp_path, person)
-    assert len(person.asked) == 1
+        RobotBench(robot).leave(tmp_path, operator)
+    assert len(operator.asked) == 1
     assert robot.mode == "idle" and robot.closed
 
 
 def test_of_a_robot_that_holds_nothing_nobody_is_asked(tmp_path: Path) -> None:
-    robot, person = HoldingRobot(), ScriptedPerson()
+    robot, operator = HoldingRobot(), ScriptedOperator()
     robot.mode = "idle"
-    RobotBench(robot).leave(tmp_path, person)
-    assert not person.asked and robot.closed
+    RobotBench(robot).leave(tmp_path, operator)
+    assert not operator.asked and robot.closed
 
 
 def test_a_robot_that_somebody_has_taken_over_is_not_let_go_of(tmp_path: Path) -> None:
-    robot, person = HoldingRobot(OverruledError("taken over: uid 1")), ScriptedPerson()
+    robot, operator = HoldingRobot(OverruledError("taken over: uid 1")), ScriptedOperator()
     with pytest.raises(OverruledError):
-        RobotBench(robot).leave(tmp_path, person)
-    assert not person.asked and robot.mode == "hold" and robot.closed
-    assert person.told == ["the robot is left as it is to whoever has taken it over"]
+        RobotBench(robot).leave(tmp_path, operator)
+    assert not operator.asked and robot.mode == "hold" and robot.closed
+    assert operator.reported == ["the robot is left as it is to whoever has taken it over"]
 
 
 def test_a_daemon_that_is_gone_is_told_once_and_what_the_robot_does_then(tmp_path: Path) -> None:
-    robot, person = HoldingRobot(GoneError("the daemon is gone")), ScriptedPerson()
+    robot, operator = HoldingRobot(GoneError("the daemon is gone")), ScriptedOperator()
     with pytest.raises(GoneError):
-        RobotBench(robot).leave(tmp_path, person)
-    assert person.told == [ALONE] and not person.asked
+        RobotBench(robot).leave(tmp_path, operator)
+    assert operator.reported == [ALONE] and not operator.asked
 
 
 def test_that_what_hangs_may_fall_is_told_before_a_joint_is_mounted_on_which_something_will_hang(
     tmp_path: Path,
 ) -> None:
-    robot, person = HoldingRobot(), Impatient()
+    robot, operator = HoldingRobot(), Impatient()
     robot.mode = "idle"
     with pytest.raises(KeyboardInterrupt):
-        RobotBench(robot).calibrate(PLAN, tmp_path, person, lambda done, total: None)
-    assert person.told == [FALLS] and "Mount the robot" in person.asked[0]
+        RobotBench(robot).calibrate(PLAN, tmp_path, operator, lambda done, total: None)
+    assert operator.reported == [FALLS] and "Mount the robot" in operator.asked[0]
 
 
 def test_a_robot_that_holds_already_lets_go_before_a_joint_is_mounted(tmp_path: Path) -> None:
-    robot, person = HoldingRobot(), Impatient()
+    robot, operator = HoldingRobot(), Impatient()
     with pytest.raises(KeyboardInterrupt):
-        RobotBench(robot).calibrate(PLAN, tmp_path, person, lambda done, total: None)
-    assert person.asked == [f"The robot holds its pose. {HOLD_IT}"]
+        RobotBench(robot).calibrate(PLAN, tmp_path, operator, lambda done, total: None)
+    assert operator.asked == [f"The robot holds its pose. {HOLD_IT}"]

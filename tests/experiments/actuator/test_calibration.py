@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.scripted_operator import ScriptedOperator
 
 from control.records import JOINTS
 from experiments.actuator import calibration as actuator
@@ -21,7 +22,6 @@ from experiments.robot.prompt import GO_ON, REDO, SKIP
 from experiments.trials.notebook import Notebook
 from firmware_host.configuration.configuration import Configuration
 from tests.experiments.still_robot import StillRobot
-from tests.scripted_person import ScriptedPerson
 
 JOINT = "right_adduction"
 PLAN = Plan((JOINT,), weights_g=(100.0, 200.0, 400.0), trials=2)
@@ -35,14 +35,14 @@ class ScriptedRobot(StillRobot):
 
     def __init__(self) -> None:
         super().__init__("idle")
-        self.winding_c, self.hanging_g, self.armed, self.sentence = 30.0, 0.0, 0, ""
+        self.winding_c, self.hanging_g, self.armed, self.message = 30.0, 0.0, 0, ""
 
     def call(self, method: str, **params: Any) -> Any:
         if method == "arm":
             self.mode, self.armed = "hold", self.armed + 1
         if method == "clear":
             self.mode = "idle"
-        fault = {"sentence": self.sentence, "what_to_do": "do this", "blocks_arming": False, "for_s": 3.0}
+        fault = {"sentence": self.message, "what_to_do": "do this", "blocks_arming": False, "for_s": 3.0}
         drives = [{"joint": joint, "winding_c": self.winding_c} for joint in JOINTS]
         standing: dict[str, Any] = {"mode": self.mode, "fault": fault if self.mode == "fault" else None, "notice": ""}
         standing |= {"now_s": self.now_s}
@@ -88,7 +88,7 @@ class ScriptedJoint:
 
     def read(self) -> Reading:
         if self.robot.mode != "hold":
-            raise BenchError(f"the robot no longer holds its pose: {self.robot.sentence}")
+            raise BenchError(f"the robot no longer holds its pose: {self.robot.message}")
         if self.robot.hanging_g < 0.0:
             raise MovedError("the joint swings by 3.00 degrees")
         current_a = PLAN.torque_nm(self.robot.hanging_g) / TRUE_NM_A + 0.6
@@ -111,14 +111,14 @@ class Case:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.robot = ScriptedRobot()
-        self.person = ScriptedPerson()
+        self.operator = ScriptedOperator()
         self.hand = ScriptedHand(self.robot, {})
         self.shown: list[tuple[int, int]] = []
 
     def run(self) -> Mapping[str, Any]:
         notebook = Notebook(self.folder, PLAN.notes())
         return Calibration(
-            self.robot, JOINT, PLAN, self.hand, self.person, notebook, lambda *at: self.shown.append(at)
+            self.robot, JOINT, PLAN, self.hand, self.operator, notebook, lambda *at: self.shown.append(at)
         ).run()
 
     def on(self, step: Step, *answers: Callable[[], str]) -> None:
@@ -133,9 +133,9 @@ class Case:
 
         return hang
 
-    def letting_go(self, sentence: str) -> Callable[[], str]:
+    def letting_go(self, message: str) -> Callable[[], str]:
         def fail() -> str:
-            self.robot.mode, self.robot.sentence = "fault", sentence
+            self.robot.mode, self.robot.message = "fault", message
             return GO_ON
 
         return fail
@@ -157,11 +157,11 @@ def test_everything_is_read_once_in_its_order(case: Case) -> None:
     entries = case.run()
     assert list(entries) == KEYS == case.hand.asked
     assert case.robot.armed == 1 and case.shown[0] == (0, 9) and case.shown[-1] == (9, 9)
-    assert not case.person.asked
+    assert not case.operator.asked
 
 
 def test_only_the_empty_arm_is_swung_and_not_where_something_may_hang(case: Case) -> None:
-    case.person.answers = [KEEP]
+    case.operator.answers = [KEEP]
     case.on(Step(1, 0.0), case.hanging(100.0))
     entries = case.run()
     assert [key for key, entry in entries.items() if "loops" in entry] == [Step(0, 0.0).key, Step(2, 0.0).key]
@@ -176,7 +176,7 @@ def test_an_arm_that_does_not_swing_costs_its_friction_alone(case: Case, monkeyp
     monkeypatch.setattr(actuator, "swing", blocked)
     entries = case.run()
     assert list(entries) == KEYS and not any("loops" in entry for entry in entries.values())
-    assert sum("friction was not measured" in told for told in case.person.told) == PLAN.trials + 1
+    assert sum("friction was not measured" in reported for reported in case.operator.reported) == PLAN.trials + 1
 
 
 def test_a_skipped_weight_is_noted_and_not_read(case: Case) -> None:
@@ -227,20 +227,20 @@ def test_a_daemon_that_is_gone_ends_it_and_loses_nothing(case: Case, monkeypatch
 
 
 def test_a_robot_that_lets_go_is_told_of_armed_again_and_the_weight_is_read_anew(case: Case) -> None:
-    sentence = "The right_adduction motor has 80 degrees C."
-    case.on(Step(1, 400.0), case.letting_go(sentence))
+    message = "The right_adduction motor has 80 degrees C."
+    case.on(Step(1, 400.0), case.letting_go(message))
     entries = case.run()
     assert sorted(entries) == sorted(KEYS) and case.robot.armed == 2
-    assert any("400 g was not read" in told and sentence in told for told in case.person.told)
+    assert any("400 g was not read" in reported and message in reported for reported in case.operator.reported)
     assert case.hand.asked.count(Step(1, 400.0).key) == 2
-    assert case.person.asked == [
-        f"The robot is in FAULT:\n  {sentence} (for 3 s)\n    -> do this\nTorque stays off until this is cleared."
+    assert case.operator.asked == [
+        f"The robot is in FAULT:\n  {message} (for 3 s)\n    -> do this\nTorque stays off until this is cleared."
     ]
 
 
 def test_a_person_who_leaves_a_fault_as_it_is_ends_the_calibration(case: Case) -> None:
     case.on(Step(1, 400.0), case.letting_go("The motor is wet."))
-    case.person.answers = [LEAVE]
+    case.operator.answers = [LEAVE]
     with pytest.raises(EndedError, match="the fault stands"):
         case.run()
     assert (case.robot.mode, case.robot.armed) == ("fault", 1)
@@ -248,13 +248,13 @@ def test_a_person_who_leaves_a_fault_as_it_is_ends_the_calibration(case: Case) -
 
 def test_a_robot_that_lets_go_while_a_person_thinks_is_told_at_once(case: Case) -> None:
     def doze() -> str:
-        case.robot.mode, case.robot.sentence = "fault", "The supply is low."
+        case.robot.mode, case.robot.message = "fault", "The supply is low."
         case.hand.meanwhile()
         raise AssertionError("nobody was told")
 
     case.on(Step(1, 200.0), doze)
     entries = case.run()
-    assert any("200 g was not read" in told and "supply is low" in told for told in case.person.told)
+    assert any("200 g was not read" in reported and "supply is low" in reported for reported in case.operator.reported)
     assert sorted(entries) == sorted(KEYS)
 
 
@@ -272,7 +272,7 @@ def test_a_warm_winding_is_waited_for_before_a_weight_and_not_before_a_light_one
 
     case.on(Step(1, 200.0), warm)
     case.run()
-    assert [told for told in case.person.told if "waiting" in told] == [
+    assert [reported for reported in case.operator.reported if "waiting" in reported] == [
         "The right_adduction winding has 69 degrees C, too warm for 400 g: waiting."
     ]
 
@@ -280,31 +280,31 @@ def test_a_warm_winding_is_waited_for_before_a_weight_and_not_before_a_light_one
 def test_a_weight_that_gets_too_hot_while_a_person_thinks_is_to_be_taken_off(case: Case) -> None:
     case.robot.winding_c = 69.0
     case.run()
-    assert any("a weight would fall soon" in told for told in case.person.told)
+    assert any("a weight would fall soon" in reported for reported in case.operator.reported)
 
 
 def test_weights_in_the_wrong_order_are_named_and_may_be_swapped(case: Case) -> None:
-    case.person.answers = [OTHER]
+    case.operator.answers = [OTHER]
     case.on(Step(1, 200.0), case.hanging(400.0))
     entries = case.run()
-    assert "that is 400 g rather than 200 g" in case.person.asked[0]
+    assert "that is 400 g rather than 200 g" in case.operator.asked[0]
     assert case.hand.asked.count(Step(1, 400.0).key) == 0
     assert case.hand.asked.count(Step(1, 200.0).key) == 2
     assert entries[Step(1, 400.0).key]["current_a"] > entries[Step(1, 200.0).key]["current_a"]
 
 
 def test_what_was_read_already_is_not_replaced_by_a_mistake(case: Case) -> None:
-    case.person.answers = [OTHER]
+    case.operator.answers = [OTHER]
     case.on(Step(1, 200.0), case.hanging(100.0))
     case.run()
-    assert any("100 g of trial 1 was read already" in told for told in case.person.told)
+    assert any("100 g of trial 1 was read already" in reported for reported in case.operator.reported)
 
 
 def test_a_reading_that_does_not_fit_is_read_anew_or_kept_as_doubtful(case: Case) -> None:
-    case.person.answers = [GO_ON, KEEP]
+    case.operator.answers = [GO_ON, KEEP]
     case.on(Step(2, 400.0), case.hanging(0.0), case.hanging(0.0))
     entry = case.run()[Step(2, 400.0).key]
-    assert "slip off" in entry["doubt"] and len(case.person.asked) == 2
+    assert "slip off" in entry["doubt"] and len(case.operator.asked) == 2
 
 
 def test_whoever_only_goes_on_comes_to_an_end(case: Case) -> None:
@@ -316,6 +316,6 @@ def test_whoever_only_goes_on_comes_to_an_end(case: Case) -> None:
 def test_a_trial_that_moved_is_told_and_repeated(case: Case) -> None:
     case.on(Step(1, 200.0), case.hanging(-1.0))
     entry = case.run()[Step(1, 200.0).key]
-    assert "200 g did not come to rest: the joint swings by 3.00 degrees" in case.person.asked[0]
+    assert "200 g did not come to rest: the joint swings by 3.00 degrees" in case.operator.asked[0]
     assert entry == {"skipped": "the joint swings by 3.00 degrees"}
-    assert len(case.person.asked) == actuator.MOST_REPEATS
+    assert len(case.operator.asked) == actuator.MOST_REPEATS

@@ -61,9 +61,9 @@ def test_the_line_is_that_of_an_independent_fit(sign: float) -> None:
     assert fit.line.constant_nm_a == pytest.approx(TRUE_NM_A, rel=0.01)
 
 
-def within_two(told: list[tuple[float, float]]) -> float:
+def within_two(reported: list[tuple[float, float]]) -> float:
     """The share of errors that are at most two of those that are told."""
-    return sum(abs(wrong) <= 2.0 * error for wrong, error in told) / len(told)
+    return sum(abs(wrong) <= 2.0 * error for wrong, error in reported) / len(reported)
 
 
 def test_the_told_errors_hold_what_scatter_lever_weights_and_friction_at_rest_do() -> None:

@@ -41,6 +41,6 @@ def test_two_errors_hold_the_truth_in_nineteen_of_twenty(trials: int, low: float
 
 
 def test_students_factor_is_that_of_scipy() -> None:
-    told = [student_factor(freedom) for freedom in range(1, 60)]
-    assert told == pytest.approx([student_t.ppf(0.975, freedom) / 1.96 for freedom in range(1, 60)], rel=2e-3)
+    reported = [student_factor(freedom) for freedom in range(1, 60)]
+    assert reported == pytest.approx([student_t.ppf(0.975, freedom) / 1.96 for freedom in range(1, 60)], rel=2e-3)
     assert student_factor(0) == np.inf

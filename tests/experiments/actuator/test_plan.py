@@ -39,10 +39,10 @@ def test_the_bench_of_the_simulation_bears_the_paper_s_weights() -> None:
 def test_a_weight_beyond_the_torque_limit_is_refused_with_key_value_and_bound(configuration: Configuration) -> None:
     with pytest.raises(BenchError) as refused:
         require_possible(Plan(("right_sweep",)), configuration)
-    sentence = str(refused.value)
-    assert "limits.torque_nm = 0.75: must be at least 1.25 for 800 g at 12 cm" in sentence
-    assert "set it to 1.25, current_limit_a of all drives to 18.1" in sentence  # what k_t = 0.0719 wants is 17.4
-    assert "at most 400 g of them" in sentence
+    message = str(refused.value)
+    assert "limits.torque_nm = 0.75: must be at least 1.25 for 800 g at 12 cm" in message
+    assert "set it to 1.25, current_limit_a of all drives to 18.1" in message  # what k_t = 0.0719 wants is 17.4
+    assert "at most 400 g of them" in message
     require_possible(Plan(("right_sweep",), weights_g=(100.0, 400.0)), configuration)
 
 

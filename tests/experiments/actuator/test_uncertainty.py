@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan, Step
-from experiments.actuator.uncertainty import doubt_of
+from experiments.actuator.uncertainty import uncertainty_of
 from tests.experiments.actuator.test_fit import TARE_A, TRUE_NM_A, Entries, made_entries
 
 PLAN = Plan(("right_sweep",), trials=2)
@@ -28,7 +28,7 @@ def before(step: Step, sign: float = 1.0) -> Entries:
 @pytest.mark.parametrize("weight_g", [*PAPER_WEIGHTS_G, 0.0])
 def test_the_weight_that_was_asked_for_is_not_doubted(weight_g: float, trial: int, sign: float) -> None:
     step = Step(trial, weight_g)
-    assert doubt_of(PLAN, before(step, sign), step, current_a(weight_g, sign), CONFIGURED_NM_A) is None
+    assert uncertainty_of(PLAN, before(step, sign), step, current_a(weight_g, sign), CONFIGURED_NM_A) is None
 
 
 @pytest.mark.parametrize("trial", [1, 2])
@@ -38,32 +38,35 @@ def test_another_weight_of_the_list_is_named(weight_g: float, other_g: float, tr
     if weight_g == other_g or {weight_g, other_g} == {10.0, 20.0}:
         return  # friction may be as much
     step = Step(trial, weight_g)
-    doubt = doubt_of(PLAN, before(step), step, current_a(other_g), CONFIGURED_NM_A)
-    assert doubt is not None
+    uncertainty = uncertainty_of(PLAN, before(step), step, current_a(other_g), CONFIGURED_NM_A)
+    assert uncertainty is not None
     if other_g > 0.4 * weight_g:
-        assert doubt.other_g == other_g and f"that is {other_g:g} g rather than {weight_g:g} g" in doubt.sentence
+        assert (
+            uncertainty.other_g == other_g
+            and f"that is {other_g:g} g rather than {weight_g:g} g" in uncertainty.message
+        )
 
 
 @pytest.mark.parametrize("weight_g", PAPER_WEIGHTS_G[2:])
 def test_a_weight_that_slipped_off_is_told(weight_g: float) -> None:
     step = Step(1, weight_g)
-    doubt = doubt_of(PLAN, before(step), step, current_a(0.0), CONFIGURED_NM_A)
-    assert doubt is not None and "slip off" in doubt.sentence and doubt.other_g is None
+    uncertainty = uncertainty_of(PLAN, before(step), step, current_a(0.0), CONFIGURED_NM_A)
+    assert uncertainty is not None and "slip off" in uncertainty.message and uncertainty.other_g is None
 
 
 def test_a_weight_at_another_lever_fits_nothing() -> None:
     step = Step(2, 400.0)
-    doubt = doubt_of(PLAN, before(step), step, current_a(490.0), CONFIGURED_NM_A)
-    assert doubt is not None and doubt.other_g is None
-    assert "g, not 400 g: does it hang at 12 cm" in doubt.sentence
+    uncertainty = uncertainty_of(PLAN, before(step), step, current_a(490.0), CONFIGURED_NM_A)
+    assert uncertainty is not None and uncertainty.other_g is None
+    assert "g, not 400 g: does it hang at 12 cm" in uncertainty.message
 
 
 def test_an_arm_that_is_not_empty_is_told() -> None:
     step = Step(1, 0.0)
-    doubt = doubt_of(PLAN, before(step), step, current_a(100.0), CONFIGURED_NM_A)
-    assert doubt is not None and "should be empty" in doubt.sentence
+    uncertainty = uncertainty_of(PLAN, before(step), step, current_a(100.0), CONFIGURED_NM_A)
+    assert uncertainty is not None and "should be empty" in uncertainty.message
 
 
 def test_nothing_is_doubted_before_the_empty_arm_was_read() -> None:
-    assert doubt_of(PLAN, {}, Step(0, 0.0), 3.0, CONFIGURED_NM_A) is None
-    assert doubt_of(PLAN, {}, Step(1, 400.0), 0.0, CONFIGURED_NM_A) is None
+    assert uncertainty_of(PLAN, {}, Step(0, 0.0), 3.0, CONFIGURED_NM_A) is None
+    assert uncertainty_of(PLAN, {}, Step(1, 400.0), 0.0, CONFIGURED_NM_A) is None

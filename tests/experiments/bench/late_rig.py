@@ -9,31 +9,31 @@ from random import Random
 
 from experiments.bench.rig import SimulatedRig
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.ticker import PERIOD_S, Beat
+from firmware_host.ticker import PERIOD_S, Tick
 
 
 class LateRig(SimulatedRig):
     """Punctual until `begin`."""
 
     def __init__(self, configuration: Configuration) -> None:
-        self._missing_share = self._waiting_share = 0.0  # of ticks with which it begins
+        self._missing_fraction = self._waiting_fraction = 0.0  # of ticks with which it begins
         self._longest = self._waits = 0  # ticks
         self._random = Random()
         super().__init__(configuration)
 
-    def begin(self, missing_share: float, waiting_share: float, longest: int, seed: int) -> None:
-        self._missing_share, self._waiting_share, self._longest = missing_share, waiting_share, longest
+    def begin(self, missing_fraction: float, waiting_fraction: float, longest: int, seed: int) -> None:
+        self._missing_fraction, self._waiting_fraction, self._longest = missing_fraction, waiting_fraction, longest
         self._random.seed(seed)
 
-    def wait(self) -> Beat:
-        missed = self._some(self._missing_share)
+    def wait(self) -> Tick:
+        missed = self._some(self._missing_fraction)
         self._tick_number += 1 + missed
         for other in self.others:
             other(self)
-        self._waits = self._waits - 1 if self._waits > 0 else self._some(self._waiting_share)
+        self._waits = self._waits - 1 if self._waits > 0 else self._some(self._waiting_fraction)
         if not self._waits:
             self.robot.advance(self.now_s)
-        return Beat(self.now_s, missed * PERIOD_S, self._tick_number, missed)
+        return Tick(self.now_s, missed * PERIOD_S, self._tick_number, missed)
 
-    def _some(self, share: float) -> int:
-        return self._random.randint(1, self._longest) if self._random.random() < share else 0
+    def _some(self, fraction: float) -> int:
+        return self._random.randint(1, self._longest) if self._random.random() < fraction else 0

@@ -15,7 +15,7 @@ from experiments.bench.sign_check import nudged
 from experiments.bench.test_rig import Stand
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.ticker import PERIOD_S, Beat
+from firmware_host.ticker import PERIOD_S, Tick
 from simulation.body.blocks import on_blocks
 
 
@@ -62,8 +62,8 @@ def test_a_joint_whose_encoder_hangs_goes_nowhere_and_is_told(
     readings = list(nudged(bench.stand, joint))
     assert bench.farthest_rad < farthest_rad < UNSEEN_RAD
     (reading,) = readings  # nothing more is tried on it
-    assert not reading.good and f"{joint}: answer to a shake is 0 rad" in reading.sentence
-    assert "turn it by hand while its torque is off" in reading.sentence
+    assert not reading.good and f"{joint}: answer to a shake is 0 rad" in reading.message
+    assert "turn it by hand while its torque is off" in reading.message
     assert not any(drive.torque_nm(bench.rig.now_s) > 0.01 for drive in bench.rig.robot.drives)
 
 
@@ -104,7 +104,7 @@ def test_a_late_tick_ends_a_shake_and_it_begins_anew(
     wait, ticks = bench.rig.wait, [0]
 
     def late_at(*missing: int) -> None:
-        def tick() -> Beat:
+        def tick() -> Tick:
             ticks[0] += 1
             return wait()._replace(missed=1) if ticks[0] in missing else wait()
 

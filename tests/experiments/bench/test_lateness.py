@@ -20,7 +20,7 @@ from experiments.bench.stroke_tracking import FAST_DEG, FAST_RAD_S, stroke_readi
 from experiments.bench.test_rig import Stand
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.ticker import Beat
+from firmware_host.ticker import Tick
 from simulation.body.blocks import on_blocks
 from simulation.harness.peer import track_of
 from simulation.harness.world import World
@@ -32,7 +32,7 @@ from tests.experiments.bench.late_rig import LateRig
 def patient(configuration: Configuration) -> Configuration:
     """With bounds as where drives are emulated on the same computer: what is late is no fault yet."""
     waits = {name: 0.5 for name in ("late_s", "quiet_s", "silence_s", "lag_s", "crawl_s", "fast_s")}
-    return replace(configuration, faults=replace(configuration.faults, **waits, lag_share=1.0, jump_rad=2.0))
+    return replace(configuration, faults=replace(configuration.faults, **waits, lag_fraction=1.0, jump_rad=2.0))
 
 
 @pytest.fixture
@@ -89,14 +89,14 @@ def test_what_stands_against_arming_is_told(configuration: Configuration, monkey
 
 @pytest.mark.parametrize(("missing_share", "waiting_share"), [(0.05, 0.0), (0.0, 0.1)])
 def test_the_current_before_torque_goes_off_is_seen_through_late_ticks_and_messages(
-    stand: Stand, rig: LateRig, briefly: None, missing_share: float, waiting_share: float
+    stand: Stand, rig: LateRig, briefly: None, missing_fraction: float, waiting_fraction: float
 ) -> None:
     stand.arm()
     stand.let_go()
-    rig.begin(missing_share, waiting_share, 2, 1)
-    told = by_name(torque_off(stand))
-    assert stand.lateness.sentence
-    before = [reading for what, reading in told.items() if what.endswith("current before")]
+    rig.begin(missing_fraction, waiting_fraction, 2, 1)
+    reported = by_name(torque_off(stand))
+    assert stand.lateness.message
+    before = [reading for what, reading in reported.items() if what.endswith("current before")]
     assert len(before) == 4 and all(reading.value > 3.0 * QUIET_A for reading in before)
 
 
@@ -110,10 +110,10 @@ def test_a_drive_that_keeps_its_last_torque_is_found_by_its_current(stand: Stand
         drive._fed_s = rig.now_s
 
     rig.others.append(keep)
-    told = by_name(torque_off(stand))
-    ends = {what.split(":")[0]: each for what, each in told.items() if what.endswith("until no current flows")}
+    reported = by_name(torque_off(stand))
+    ends = {what.split(":")[0]: each for what, each in reported.items() if what.endswith("until no current flows")}
     kept = ends.pop("right_sweep")
-    assert not kept.good and "does not obey 'idle'" in kept.sentence
+    assert not kept.good and "does not obey 'idle'" in kept.message
     assert len(ends) == 3 and all(reading.value <= OFF_TICKS for reading in ends.values())
 
 
@@ -133,8 +133,8 @@ def test_a_drive_is_too_slow_to_let_go_also_where_ticks_are_missed_meanwhile(
             drive.axis_state = AxisState.IDLE
 
     rig.others.append(dawdle)
-    told = by_name(torque_off(stand))
-    ends = {what.split(":")[0]: each for what, each in told.items() if what.endswith("until no current flows")}
+    reported = by_name(torque_off(stand))
+    ends = {what.split(":")[0]: each for what, each in reported.items() if what.endswith("until no current flows")}
     assert ends.pop("right_sweep").value >= 6 > OFF_TICKS
     assert all(reading.good for reading in ends.values())
     assert stand.lateness.missed  # so the bench measures anew
@@ -184,8 +184,10 @@ def test_what_was_out_of_its_bounds_stays_in_the_report_though_it_is_well_when_m
 
     bench.check(measure)
     assert readings_kept(bench)["error"].value == 5.0
-    told = r"test, before it was measured anew: error is 7 deg, must be 0 to 6: check the gains\. Meanwhile .* 3 of 4"
-    assert any(re.match(told, line) for line, good in bench.report.lines(brief=True))
+    reported = (
+        r"test, before it was measured anew: error is 7 deg, must be 0 to 6: check the gains\. Meanwhile .* 3 of 4"
+    )
+    assert any(re.match(reported, line) for line, good in bench.report.lines(brief=True))
     assert "error is 7 deg" in bench.report.as_json["tests"][0]["spoiled"][0]
 
 
@@ -198,7 +200,7 @@ def test_what_was_out_of_its_bounds_stays_in_the_report_though_it_is_well_when_m
     ],
 )
 def test_what_stays_late_is_told_with_what_is_out_of_its_bounds(
-    bench: StagedBench, missed: int, age_s: float, sentence: str
+    bench: StagedBench, missed: int, age_s: float, message: str
 ) -> None:
     measured = []
 
@@ -207,14 +209,14 @@ def test_what_stays_late_is_told_with_what_is_out_of_its_bounds(
         stand.lateness.update(*late(missed, age_s))
         yield Reading("error", 7.0, "deg", 0.0, 6.0, "check the gains")
 
-    with pytest.raises(pytest.fail.Exception, match=rf"error is 7 deg, .* check the gains\.\n.*{sentence}"):
+    with pytest.raises(pytest.fail.Exception, match=rf"error is 7 deg, .* check the gains\.\n.*{message}"):
         bench.check(measure)
     assert len(measured) == MOST_MEASURED
 
 
-def late(missed: int, age_s: float) -> tuple[Beat, DriveStates]:
+def late(missed: int, age_s: float) -> tuple[Tick, DriveStates]:
     state = DriveState(angle_stamp_s=1.0, current_stamp_s=1.0)
-    return Beat(1.0 + age_s, 0.0, 1, missed), (state, state, state, state)
+    return Tick(1.0 + age_s, 0.0, 1, missed), (state, state, state, state)
 
 
 def test_what_is_out_of_its_bounds_in_time_is_measured_once(bench: StagedBench) -> None:
@@ -250,7 +252,7 @@ def test_sums_are_made_once_torque_is_off(stand: Stand, rig: LateRig) -> None:
 def test_ticks_without_torque_may_be_late(stand: Stand, rig: LateRig) -> None:
     rig.begin(0.5, 0.0, 3, 1)
     stand.run_for(0.2)
-    assert stand.lateness.sentence == ""
+    assert stand.lateness.message == ""
     assert stand.loop.missed_ticks > 20
 
 
@@ -259,7 +261,7 @@ def test_a_pause_that_trips_the_drives_watchdogs_is_told_with_the_fault(stand: S
     rig.begin(1.0, 0.0, 400, 1)
     with pytest.raises(BenchError, match="watchdog"):
         stand.run_for(1.0)
-    assert re.search(r"this computer missed \d+ of \d+ ticks", stand.lateness.sentence)
+    assert re.search(r"this computer missed \d+ of \d+ ticks", stand.lateness.message)
 
 
 def test_a_robot_that_stands_in_mud_is_sent_onto_blocks(
@@ -268,6 +270,6 @@ def test_a_robot_that_stands_in_mud_is_sent_onto_blocks(
     """Where its strides would not be in air, and the mud would take more torque than there is."""
     monkeypatch.setattr("experiments.bench.rig.on_blocks", lambda configuration: World(track_of(["48.5"])))
     rig = SimulatedRig(patient)
-    told = by_name(rest_pose(Stand(rig, SimulatedAttendant(rig))))
-    lying = told["left flipper: edge above the axis, at rest"]
-    assert not lying.good and "put the robot on blocks" in lying.sentence
+    reported = by_name(rest_pose(Stand(rig, SimulatedAttendant(rig))))
+    lying = reported["left flipper: edge above the axis, at rest"]
+    assert not lying.good and "put the robot on blocks" in lying.message

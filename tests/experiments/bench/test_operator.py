@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from tests.scripted_operator import ScriptedOperator
 
 from control.records import JOINTS
 from experiments.bench.operator import AskedAttendant, Sight, SimulatedAttendant
 from experiments.bench.rig import SimulatedRig
 from firmware_host.configuration.configuration import Configuration
-from tests.scripted_person import ScriptedPerson
 
 
 def nothing() -> None: ...
@@ -16,29 +16,29 @@ def nothing() -> None: ...
 
 @pytest.mark.parametrize(("answer", "consents"), [("", True), ("n", False)])
 def test_nothing_moves_without_a_yes(answer: str, consents: bool) -> None:
-    person = ScriptedPerson(answer)
-    assert AskedAttendant(person, sure=False).consents("It moves.", nothing) is consents
-    assert person.asked == ["It moves."]
+    operator = ScriptedOperator(answer)
+    assert AskedAttendant(operator, sure=False).consents("It moves.", nothing) is consents
+    assert operator.asked == ["It moves."]
 
 
 def test_who_has_said_yes_is_told_and_not_asked() -> None:
-    person = ScriptedPerson("n")
-    assert AskedAttendant(person, sure=True).consents("It moves.", nothing)
-    assert (person.asked, person.told) == ([], ["It moves."])
+    operator = ScriptedOperator("n")
+    assert AskedAttendant(operator, sure=True).consents("It moves.", nothing)
+    assert (operator.asked, operator.reported) == ([], ["It moves."])
 
 
 @pytest.mark.parametrize(
     ("answer", "sight"), [("", Sight.RIGHT), ("w", Sight.WRONG_WAY), ("o", Sight.OTHER), ("n", Sight.NOTHING)]
 )
 def test_what_was_seen_is_taken_as_told(answer: str, sight: Sight) -> None:
-    person = ScriptedPerson(answer)
-    assert AskedAttendant(person, sure=True).saw("right_adduction", nothing) is sight
-    assert "the right flipper rise" in person.asked[0]
+    operator = ScriptedOperator(answer)
+    assert AskedAttendant(operator, sure=True).saw("right_adduction", nothing) is sight
+    assert "the right flipper rise" in operator.asked[0]
 
 
 @pytest.mark.parametrize(("answer", "done"), [("", True), ("s", False)])
 def test_hands_may_be_refused(answer: str, done: bool) -> None:
-    attendant = AskedAttendant(ScriptedPerson(answer, answer), sure=True)
+    attendant = AskedAttendant(ScriptedOperator(answer, answer), sure=True)
     assert attendant.holds_level(nothing) is done
     assert attendant.turns("left_sweep", nothing) is done
 

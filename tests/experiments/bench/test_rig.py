@@ -25,7 +25,7 @@ from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import BusParameters, Configuration, StatusParameters, load_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
 from simulation.harness.local_setup import write_local_setup
-from tests.bench.staged_bench import told_of_file
+from tests.bench.staged_bench import reported_of_file
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 
@@ -64,8 +64,8 @@ def test_a_refused_bench_says_why_once_and_reports_it(answering: Path, tmp_path:
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
     assert ended.returncode == 1
     assert ended.stdout.count("systemctl stop mudskipper") == 1
-    told = json.loads(report.read_text(encoding="utf-8"))
-    assert told["stages"] == {"wiring": "failed"} | dict.fromkeys(list(told["stages"])[1:], "skipped")
+    reported = json.loads(report.read_text(encoding="utf-8"))
+    assert reported["stages"] == {"wiring": "failed"} | dict.fromkeys(list(reported["stages"])[1:], "skipped")
 
 
 @pytest.mark.parametrize("text", ["[robot", "[gait]\nsweep_angle_deg = 500\nodd = 1\n"])
@@ -74,9 +74,9 @@ def test_each_problem_of_a_configuration_names_its_file_once(text: str, tmp_path
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigurationError) as caught:
         load_configuration(path)
-    told = told_of_file(path, caught.value.problems).splitlines()
-    assert len(told) == len(caught.value.problems)
-    assert all(line.startswith(f"{path}: ") and line.count("bad.toml") == 1 for line in told)
+    reported = reported_of_file(path, caught.value.problems).splitlines()
+    assert len(reported) == len(caught.value.problems)
+    assert all(line.startswith(f"{path}: ") and line.count("bad.toml") == 1 for line in reported)
 
 
 def test_a_joint_whose_encoder_counts_backwards_is_never_held(tmp_path: Path) -> None:
@@ -85,12 +85,12 @@ def test_a_joint_whose_encoder_counts_backwards_is_never_held(tmp_path: Path) ->
     flipped = ["-p", "tests.experiments.bench.flipped_encoder"]
     command = [sys.executable, "-m", "pytest", "tests/bench", *flipped, "--simulated", "--bench-report", str(report)]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
-    told = json.loads(report.read_text(encoding="utf-8"))
-    assert [test["outcome"] for test in told["tests"] if test["name"] == "signs"] == [
+    reported = json.loads(report.read_text(encoding="utf-8"))
+    assert [test["outcome"] for test in reported["tests"] if test["name"] == "signs"] == [
         *("passed", "passed", "failed", "passed"),
         *4 * ["skipped"],
     ]
-    assert set(list(told["stages"].values())[2:]) == {"skipped"}
+    assert set(list(reported["stages"].values())[2:]) == {"skipped"}
     assert float(ended.stdout.partition("fastest: ")[2].split()[0]) < 2.0
 
 
@@ -121,7 +121,7 @@ def stand(local_robot: Configuration) -> Iterator[Stand]:
 
 
 def bad(readings: Iterable[Reading]) -> list[str]:
-    return [reading.sentence for reading in readings if not reading.good]
+    return [reading.message for reading in readings if not reading.good]
 
 
 def test_on_real_buses_in_real_time_every_drive_is_heard(stand: Stand) -> None:
@@ -140,7 +140,7 @@ def test_on_real_buses_in_real_time_a_joint_is_nudged_or_the_computer_was_late_a
         assert problems or len(readings) == 4 + len(JOINTS)
     except BenchError as problem:
         problems = [str(problem)]
-    assert problems == [] or stand.lateness_so_far.sentence
+    assert problems == [] or stand.lateness_so_far.message
 
 
 def test_one_channel_for_all_makes_one_bus(configuration: Configuration) -> None:

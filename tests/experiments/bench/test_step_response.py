@@ -8,7 +8,7 @@ from control.modes import Mode
 from control.records import NO_TORQUE, DriveState, Torques
 from experiments.bench.step_response import LONGEST_TICKS, PULSE_NM, delay_ticks
 from experiments.bench.test_rig import Sample
-from firmware_host.ticker import PERIOD_S, Beat
+from firmware_host.ticker import PERIOD_S, Tick
 
 CONSTANT_NM_A = 0.083
 STEP = 2  # the sample that sends it
@@ -20,7 +20,7 @@ def made_up(answer: int, numbers: list[int]) -> list[Sample]:
     rest, following = DriveState(), DriveState(current_a=PULSE_NM / CONSTANT_NM_A)
     return [
         Sample(
-            Beat(number * PERIOD_S, 0.0, number, 0),
+            Tick(number * PERIOD_S, 0.0, number, 0),
             Mode.HOLD,
             (following if place >= answer else rest, rest, rest, rest),
             None,

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.scripted_operator import ScriptedOperator
 
 from control.records import JOINTS, NO_TORQUE
 from drivers.odrive.codec import ERROR_WATCHDOG, AxisState
@@ -21,7 +22,6 @@ from experiments.robot.bench_robot import CLEAR, LEAVE, BenchError
 from firmware_host.configuration.configuration import Configuration
 from tests.bench.bench_table import HEADS, table_lines
 from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, BenchReport, StagedBench, stage_of
-from tests.scripted_person import ScriptedPerson
 
 
 @pytest.fixture
@@ -69,9 +69,9 @@ class Asked(AskedAttendant):
     """With a person who says the same of every fault."""
 
     def __init__(self, answer: str) -> None:
-        person = ScriptedPerson(answer)
-        super().__init__(person, sure=True)
-        self.asked = person.asked
+        operator = ScriptedOperator(answer)
+        super().__init__(operator, sure=True)
+        self.asked = operator.asked
 
 
 @pytest.mark.parametrize("answer", [CLEAR, LEAVE])

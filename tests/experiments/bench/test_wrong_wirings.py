@@ -237,8 +237,8 @@ def swapped_buses(configuration: Configuration) -> SimulatedRig:
 
 @pytest.mark.parametrize("wrong", WRONG, ids=[wrong.what for wrong in WRONG])
 def test_what_is_built_wrong_is_noticed_by_the_right_stage(configuration: Configuration, wrong: Wrong) -> None:
-    stage, sentence = first_complaint(wrong.rig(configuration), wrong.begin)
-    assert (stage, wrong.advice in sentence) == (wrong.stage, True), f"{stage}: {sentence}"
+    stage, message = first_complaint(wrong.rig(configuration), wrong.begin)
+    assert (stage, wrong.advice in message) == (wrong.stage, True), f"{stage}: {message}"
 
 
 def test_every_stage_notices_something(configuration: Configuration) -> None:

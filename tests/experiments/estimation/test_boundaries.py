@@ -7,9 +7,9 @@ from typing import Any, cast
 import pytest
 
 import experiments.estimation.boundaries
-from control.mud_estimate import Coefficient, FlipperBelief, MudBelief
+from control.mud_estimate import Coefficient, FlipperEstimate, MudEstimate
 from control.records import FLIPPERS
-from experiments.estimation.boundaries import Crossing, boundary_rows, crossings_of
+from experiments.estimation.boundaries import CrossCoupling, boundary_rows, crossings_of
 from experiments.trials.load_cell_truth import LoadCellTruth, TrueCoefficients
 from experiments.trials.trial import SINGLE, Trial, configuration_of
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
@@ -19,8 +19,8 @@ DEPTH_M = 0.03
 K_P = {"soft": 1e6, "firm": 2e6}
 
 
-def crossed(strides: int | None, flipper: str = "left", before: str = "soft", after: str = "firm") -> Crossing:
-    return Crossing(before, after, flipper, strides)
+def crossed(strides: int | None, flipper: str = "left", before: str = "soft", after: str = "firm") -> CrossCoupling:
+    return CrossCoupling(before, after, flipper, strides)
 
 
 # rows
@@ -50,12 +50,12 @@ def stride(flipper: str, index: int, mud: str) -> StrideTruth:
     return StrideTruth(flipper, index, Clay(mud, 1000.0), 0.0, stroke, stroke, stroke)
 
 
-def belief(k_p: float | None, depth_m: float = DEPTH_M) -> MudBelief:
+def mud_estimate(k_p: float | None, depth_m: float = DEPTH_M) -> MudEstimate:
     """The same of both flippers."""
     if k_p is None:
-        return MudBelief()
-    one = FlipperBelief(Coefficient(k_p, 0.0, depth_m, -1.0, 0.0, 1))
-    return MudBelief(left=one, right=one)
+        return MudEstimate()
+    one = FlipperEstimate(Coefficient(k_p, 0.0, depth_m, -1.0, 0.0, 1))
+    return MudEstimate(left=one, right=one)
 
 
 @dataclass
@@ -66,9 +66,9 @@ class Walk:
     believed: Sequence[float | None]
     depth_m: float = DEPTH_M
 
-    def crossings(self, monkeypatch: pytest.MonkeyPatch) -> list[Crossing]:
+    def crossings(self, monkeypatch: pytest.MonkeyPatch) -> list[CrossCoupling]:
         truths = [stride(flipper, i, mud) for i, mud in enumerate(self.muds) for flipper in FLIPPERS]
-        beliefs = {i: belief(k_p, self.depth_m) for i, k_p in enumerate(self.believed)}
+        beliefs = {i: mud_estimate(k_p, self.depth_m) for i, k_p in enumerate(self.believed)}
         monkeypatch.setattr(experiments.estimation.boundaries, "beliefs_of", lambda trial, parameters: beliefs)
         trial = Trial(configuration_of(SINGLE), cast(Any, None), (), truths)
         return crossings_of(trial, self.cells(truths))
@@ -102,19 +102,19 @@ def test_within_a_fifth_of_the_truth_is_followed(
     sign: float, off: float, strides: int | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     walk = Walk(("soft", "firm"), (1e6, (1.0 + sign * off) * 2e6))
-    assert [crossing.strides for crossing in walk.crossings(monkeypatch)] == [strides, strides]
+    assert [cross_coupling.strides for cross_coupling in walk.crossings(monkeypatch)] == [strides, strides]
 
 
 def test_a_belief_is_asked_for_the_strides_own_depth(monkeypatch: pytest.MonkeyPatch) -> None:
     """k ∝ 1/z here: 4 million at 1.5 cm are 2 million at 3 cm."""
     walk = Walk(("soft", "firm"), (1e6, 4e6), depth_m=DEPTH_M / 2.0)
-    assert [crossing.strides for crossing in walk.crossings(monkeypatch)] == [1, 1]
+    assert [cross_coupling.strides for cross_coupling in walk.crossings(monkeypatch)] == [1, 1]
 
 
 def test_the_next_border_ends_a_crossing(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is right again behind it has not been followed before it."""
     walk = Walk(("soft", "firm", "firm", "soft", "soft"), (1e6, 1e6, 1e6, 1e6, 1e6))
-    left = [crossing for crossing in walk.crossings(monkeypatch) if crossing.flipper == "left"]
+    left = [cross_coupling for cross_coupling in walk.crossings(monkeypatch) if cross_coupling.flipper == "left"]
     assert left == [crossed(None), crossed(1, before="firm", after="soft")]
 
 

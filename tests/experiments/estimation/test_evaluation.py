@@ -18,7 +18,7 @@ from experiments.estimation.evaluation import (
     Outcome,
     Part,
     Plan,
-    judge,
+    evaluate,
     methods_of,
     report_of,
     run_part,
@@ -37,7 +37,7 @@ SHORT = Plan(single=(STRONG,), walking=(STRONG,), seeds=1, single_strides=1, wal
 @cache
 def outcome() -> Outcome:
     """Two trials: a single flipper of one stride, a walk of two."""
-    return judge(SHORT, lambda done, total: None, processes=1)
+    return evaluate(SHORT, lambda done, total: None, processes=1)
 
 
 # the plan
@@ -80,8 +80,8 @@ def test_the_plan_is_every_mud_and_seed_and_a_crossing_of_each_seed() -> None:
     assert parts[: len(crossings)] == crossings  # the longest first
     assert [(p.setup, p.seed, p.strides) for p in crossings] == [(WALKING, seed, 24) for seed in (1, 2, 3)]
     for setup, muds, strides in ((SINGLE, plan.single, 2), (WALKING, plan.walking, 8)):
-        told = {(p.muds[0], p.seed) for p in alone if p.setup == setup and p.strides == strides}
-        assert told == {(mud, seed) for mud in muds for seed in (1, 2, 3)}
+        reported = {(p.muds[0], p.seed) for p in alone if p.setup == setup and p.strides == strides}
+        assert reported == {(mud, seed) for mud in muds for seed in (1, 2, 3)}
     assert len(alone) == 3 * (5 + 3)
 
 
@@ -125,7 +125,7 @@ def test_a_walk_is_also_judged_with_the_papers_drag_and_without_a_pose() -> None
 
 def rows_of(setup: str, coefficient: str) -> dict[str, dict[str, Any]]:
     """By method."""
-    rows = error_rows(outcome().judged)
+    rows = error_rows(outcome().evaluated)
     return {row["method"]: row for row in rows if (row["setup"], row["coefficient"]) == (setup, coefficient)}
 
 
@@ -154,25 +154,25 @@ def test_where_the_walking_body_moves_the_default_gives_bounds_and_they_hold() -
 
 
 def test_each_stride_of_each_method_is_judged_once() -> None:
-    judged = outcome().judged
-    assert all(isfinite(each.truth) for each in judged)
+    evaluated = outcome().evaluated
+    assert all(isfinite(each.truth) for each in evaluated)
     for setup, methods, strides in (("single flipper", 2, 2), ("walking", 3, 4), ("walking without pose", 1, 4)):
-        told = [each for each in judged if each.setup == setup]
-        assert len(told) == methods * strides * len(COEFFICIENTS)
-    assert {each.mud for each in judged} == {"47.6"}
+        reported = [each for each in evaluated if each.setup == setup]
+        assert len(reported) == methods * strides * len(COEFFICIENTS)
+    assert {each.mud for each in evaluated} == {"47.6"}
     assert outcome().crossings == []
 
 
 def test_progress_counts_all_trials() -> None:
     shown: list[tuple[int, int]] = []
-    judge(replace(SHORT, single=(), walking_strides=1), lambda done, total: shown.append((done, total)), 1)
+    evaluate(replace(SHORT, single=(), walking_strides=1), lambda done, total: shown.append((done, total)), 1)
     assert shown == [(1, 1)]
 
 
 def test_a_trial_in_another_process_is_the_same_trial() -> None:
     part = Part(WALKING, (STRONG,), SHORT.walking_strides, 1)
-    here = run_part(part, SHORT).judged
-    assert repr(here) == repr([each for each in outcome().judged if each.setup.startswith("walking")])
+    here = run_part(part, SHORT).evaluated
+    assert repr(here) == repr([each for each in outcome().evaluated if each.setup.startswith("walking")])
 
 
 def trial_of(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
@@ -206,7 +206,7 @@ def test_a_walk_over_a_border_tells_how_soon_it_was_followed(monkeypatch: pytest
     monkeypatch.setattr(experiments.estimation.evaluation, "COMPARTMENT_M", 0.1)
     soft = clay_of_water(51.2)
     outcome = run_part(Part(WALKING, (soft, STRONG), 5, 1), with_layers(SHORT, ()))
-    assert outcome.judged == []
+    assert outcome.evaluated == []
     assert {(each.before, each.after) for each in outcome.crossings} == {("51.2", "47.6")}
     assert sorted(each.flipper for each in outcome.crossings) == ["left", "right"]
     assert all(each.strides is not None and each.strides <= 3 for each in outcome.crossings)

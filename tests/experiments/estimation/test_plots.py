@@ -9,8 +9,8 @@ from experiments.estimation.plots import plot_errors
 
 
 def row(setup: str, coefficient: str, method: str = "default", **changes: Any) -> dict[str, Any]:
-    told = {"setup": setup, "mud": "49.5", "coefficient": coefficient, "method": method}
-    return told | {"median": 0.05, "p95": 0.2, "strides": 4, "bounds": 0} | changes
+    reported = {"setup": setup, "mud": "49.5", "coefficient": coefficient, "method": method}
+    return reported | {"median": 0.05, "p95": 0.2, "strides": 4, "bounds": 0} | changes
 
 
 @pytest.mark.parametrize(

@@ -141,8 +141,8 @@ def test_a_good_cell_has_no_problem() -> None:
     ],
 )
 def test_each_thing_that_should_not_be_is_told(change: dict[str, Any], word: str) -> None:
-    (sentence,) = problems(replace(GOOD, **change), BY_NAME["drive_quiet"])
-    assert word in sentence
+    (message,) = problems(replace(GOOD, **change), BY_NAME["drive_quiet"])
+    assert word in message
 
 
 def test_the_slowest_cell_stands_for_its_fault(cells: Sequence[dict[str, Any]]) -> None:
@@ -178,6 +178,6 @@ def test_a_lease_that_is_lost_right_behind_an_arm_names_its_holder_and_arms_noth
     bench.loop.lease.hang_up("alice")
     bench.step()
     assert bench.loop.mode is Mode.IDLE
-    assert [fault.sentence for fault in bench.loop.faults.standing if fault.name == "lease_lost"] == [
+    assert [fault.message for fault in bench.loop.faults.standing if fault.name == "lease_lost"] == [
         "alice promised to attend the robot and is gone."
     ]

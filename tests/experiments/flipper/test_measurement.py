@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.scripted_operator import ScriptedOperator
 
 from control.records import Phase
 from experiments.flipper import measurement as flipper
@@ -20,13 +21,12 @@ from experiments.flipper.simulation import DRIVE, SECTIONS, bench_configuration,
 from experiments.robot.bench_robot import BenchError, leave
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.trials.estimation_methods import DEFAULT, PAPER
-from experiments.trials.mud_trials import Bench, PlannedTrial, SpoiltTrialError
+from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial
 from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.simulated_bed import CarriedBed
-from experiments.trials.stride_profile import course_of_row
+from experiments.trials.stride_profile import profile_of_row
 from experiments.trials.trial import SINGLE, configuration_of
-from tests.experiments.made_up_strides import make_course, make_estimate, make_stride
-from tests.scripted_person import ScriptedPerson
+from tests.experiments.made_up_strides import make_estimate, make_profile, make_stride
 
 MUD = "51.2"
 SHORT = Plan((MUD,), trials=1, simulated=True)
@@ -37,14 +37,14 @@ def measured() -> tuple[dict[str, Entry], list[str]]:
     """Entries of a short experiment in which the right sweep drive falls silent in the first stride, and what was
     asked.
     """
-    person = ScriptedPerson()
+    operator = ScriptedOperator()
     with TemporaryDirectory() as name:
         folder = Path(name)
         robot, bed = flipper_bench(folder, [MUD], 1)
-        bench = Bench(robot, FaultyOnce(robot, bed), person, Notebook(folder, SHORT.kept))
+        bench = Bench(robot, FaultyOnce(robot, bed), operator, Notebook(folder, SHORT.kept))
         flipper.run(bench, SHORT, lambda done, of: None)
-        leave(bench.robot, bench.person, folder)
-    return bench.notebook.entries, person.asked
+        leave(bench.robot, bench.operator, folder)
+    return bench.notebook.entries, operator.asked
 
 
 class FaultyOnce:
@@ -54,17 +54,17 @@ class FaultyOnce:
         self._bed = bed
         self._robot = robot
         self.truths = bed.truths
-        self._wait, self._spoilt = robot.wait, False
+        self._wait, self._invalid = robot.wait, False
 
     def prepare(self, trial: PlannedTrial) -> str:
-        if not self._spoilt:
+        if not self._invalid:
             self._robot.wait = self._fail_in_stance  # type: ignore[method-assign]
         return self._bed.prepare(trial)
 
     def _fail_in_stance(self, duration_s: float) -> None:
         self._wait(duration_s)
-        if not self._spoilt and self._robot.call("status")["phase"] == "insertion":
-            self._spoilt = True
+        if not self._invalid and self._robot.call("status")["phase"] == "insertion":
+            self._invalid = True
             self._robot.call("disarm")
 
 
@@ -100,13 +100,13 @@ def test_the_simulated_bench_is_that_of_the_other_experiments() -> None:
 
 @pytest.mark.parametrize(("phase", "name"), [(Phase.INSERTION, "force_z_n"), (Phase.STANCE, "force_x_n")])
 def test_a_stroke_that_feels_something_has_met_mud(phase: Phase, name: str) -> None:
-    require_mud(make_course(phase, [0.0] * 9, [0.01] * 9, **{name: [0.0] * 6 + [0.4] * 3}))
+    require_mud(make_profile(phase, [0.0] * 9, [0.01] * 9, **{name: [0.0] * 6 + [0.4] * 3}))
 
 
 def test_a_stroke_through_air_has_not() -> None:
     noise_n = list(np.tile([0.3, -0.3], 9))
-    with pytest.raises(SpoiltTrialError, match="met no mud"):
-        require_mud(make_course(Phase.INSERTION, [0.0] * 18, [0.01] * 18, force_z_n=noise_n))
+    with pytest.raises(InvalidTrialError, match="met no mud"):
+        require_mud(make_profile(Phase.INSERTION, [0.0] * 18, [0.01] * 18, force_z_n=noise_n))
 
 
 def test_a_trial_that_a_fault_ended_is_told_and_repeated() -> None:
@@ -122,19 +122,19 @@ class SlidingRobot(LockstepRobot):
     asked = 0
 
     def call(self, method: str, **params: Any) -> Any:
-        told = super().call(method, **params)
+        reported = super().call(method, **params)
         self.asked += method == "status"
-        return told | {"body_x_m": 0.06 * self.asked} if method == "status" else told
+        return reported | {"body_x_m": 0.06 * self.asked} if method == "status" else reported
 
 
 def test_a_base_that_moved_far_spoils_the_trial_that_can_still_be_kept(tmp_path: Path) -> None:
     robot, bed = flipper_bench(tmp_path, [MUD], 1)
     robot.__class__ = SlidingRobot
-    bench = Bench(robot, bed, ScriptedPerson(), Notebook(tmp_path, SHORT.kept))
+    bench = Bench(robot, bed, ScriptedOperator(), Notebook(tmp_path, SHORT.kept))
     bed.prepare(SHORT.planned[0])
-    with pytest.raises(SpoiltTrialError, match="the base moved by .* mm") as spoilt:
+    with pytest.raises(InvalidTrialError, match="the base moved by .* mm") as invalid:
         flipper.measure(bench, SHORT, SHORT.planned[0])
-    assert spoilt.value.entry is not None and spoilt.value.entry["remarks"] == []
+    assert invalid.value.entry is not None and invalid.value.entry["remarks"] == []
 
 
 # what comes of it
@@ -143,8 +143,8 @@ def test_a_base_that_moved_far_spoils_the_trial_that_can_still_be_kept(tmp_path:
 def test_the_coefficients_are_those_of_the_load_cell() -> None:
     """Within the doubt of a motor whose constant is known to 3.2 %, and the default method's own bias in k_e."""
     (mud,) = report()["muds"]
-    for name, share in (("k_p", 0.1), ("k_s", 0.1), ("k_e", 0.2)):
-        assert mud[name]["value"] == pytest.approx(mud["truth"][name], rel=share)
+    for name, fraction in (("k_p", 0.1), ("k_s", 0.1), ("k_e", 0.2)):
+        assert mud[name]["value"] == pytest.approx(mud["truth"][name], rel=fraction)
     assert mud["remarks"] == []
 
 
@@ -157,18 +157,18 @@ def test_the_daemons_strides_count_and_the_papers_method_stands_beside() -> None
 
 def test_another_load_cells_truth_takes_the_place_of_the_beds() -> None:
     truth = {MUD: {"k_p": 2e6}}
-    told = report(truth)
-    assert told["muds"][0]["truth"] == truth[MUD]
-    assert {row["coefficient"] for row in told["errors"]} == {"k_p"}
+    reported = report(truth)
+    assert reported["muds"][0]["truth"] == truth[MUD]
+    assert {row["coefficient"] for row in reported["errors"]} == {"k_p"}
 
 
 def test_the_course_kept_is_a_whole_stride_of_three_pauses() -> None:
-    course = course_of_row(next(iter(measured()[0].values()))["course"])
-    assert course.time_s[-1] == pytest.approx(12.4, abs=0.3)
-    assert {Phase(int(phase)) for phase in course.phase} == {
+    profile = profile_of_row(next(iter(measured()[0].values()))["course"])
+    assert profile.time_s[-1] == pytest.approx(12.4, abs=0.3)
+    assert {Phase(int(phase)) for phase in profile.phase} == {
         Phase.INSERTION, Phase.PAUSE, Phase.STANCE, Phase.EXTRACTION, Phase.SWING
     }  # fmt: skip
-    assert course.depth_command_m.max() == pytest.approx(0.03)
+    assert profile.depth_command_m.max() == pytest.approx(0.03)
 
 
 def test_the_law_follows_the_force_in_steady_stance() -> None:
@@ -177,26 +177,26 @@ def test_the_law_follows_the_force_in_steady_stance() -> None:
 
 
 def test_the_summary_is_json_and_has_what_other_experiments_read() -> None:
-    told = json.loads(json.dumps(report()))
-    assert told["experiment"] == "flipper"
+    reported = json.loads(json.dumps(report()))
+    assert reported["experiment"] == "flipper"
     for name in ("k_p", "k_s", "k_e"):
-        assert {"value", "std_error", "trials", "repeatability"} <= set(told["muds"][0][name])
+        assert {"value", "std_error", "trials", "repeatability"} <= set(reported["muds"][0][name])
 
 
 def entries_of(**values: list[float]) -> dict[str, Entry]:
     """k_p of trials by mud."""
-    course = next(iter(measured()[0].values()))["course"]
+    profile = next(iter(measured()[0].values()))["course"]
     return {
         f"{mud}/{number}": {
             "mud": mud,
             "trial": number,
             "strides": {DEFAULT: [make_stride(k_p=make_estimate(value), **FORCES)]},
             "truths": {},
-            "course": course,
+            "course": profile,
             "remarks": [],
         }
-        for mud, told in ((name.removeprefix("w").replace("_", "."), told) for name, told in values.items())
-        for number, value in enumerate(told, 1)
+        for mud, reported in ((name.removeprefix("w").replace("_", "."), reported) for name, reported in values.items())
+        for number, value in enumerate(reported, 1)
     }
 
 
@@ -214,44 +214,44 @@ def test_coefficients_that_fall_with_water_are_said_to() -> None:
 
 
 def test_muds_that_were_measured_before_stay_in_the_report() -> None:
-    told = report_of(Plan(("51.2",)), entries_of(w47_6=[2e6], w51_2=[1e6]), bench_configuration(), None)
-    assert [mud["mud"] for mud in told["muds"]] == ["51.2", "47.6"]
-    assert force_rows(told)[1][:2] == ["51.2 %", "2.00 (" + f"{told['misfit_n']['51.2']['insertion']:.2f})"]
+    reported = report_of(Plan(("51.2",)), entries_of(w47_6=[2e6], w51_2=[1e6]), bench_configuration(), None)
+    assert [mud["mud"] for mud in reported["muds"]] == ["51.2", "47.6"]
+    assert force_rows(reported)[1][:2] == ["51.2 %", "2.00 (" + f"{reported['misfit_n']['51.2']['insertion']:.2f})"]
 
 
 def test_later_strides_in_the_same_hole_are_told_apart() -> None:
     entries = entries_of(w47_6=[2e6])
     entries["47.6/1"]["strides"][DEFAULT].append(make_stride(k_p=make_estimate(1.6e6)))
-    told = report_of(Plan(("47.6",), strides=2), entries, bench_configuration(), None)
-    assert told["later_strokes"]["k_p"] == pytest.approx([0.8])
-    assert told["muds"][0]["k_p"]["value"] == 2e6
+    reported = report_of(Plan(("47.6",), strides=2), entries, bench_configuration(), None)
+    assert reported["later_strokes"]["k_p"] == pytest.approx([0.8])
+    assert reported["muds"][0]["k_p"]["value"] == 2e6
 
 
 def test_what_scatter_does_not_show_is_told_beside_the_coefficients() -> None:
-    configuration, entries, told = bench_configuration(), entries_of(w47_6=[2e6]), {}
+    configuration, entries, reported = bench_configuration(), entries_of(w47_6=[2e6]), {}
     for simulated in (False, True):
         plan = Plan(("47.6",), simulated=simulated)
         report = report_of(plan, entries, configuration, None)
-        told[simulated] = sections_of(report, plan, entries, configuration)[0].text
+        reported[simulated] = sections_of(report, plan, entries, configuration)[0].text
         assert text_of(report)[0][0].endswith("see the report")
-    assert KNOWN_BIAS in told[False] and WRONG_CONSTANTS not in told[False]
-    assert WRONG_CONSTANTS in told[True]
+    assert KNOWN_BIAS in reported[False] and WRONG_CONSTANTS not in reported[False]
+    assert WRONG_CONSTANTS in reported[True]
 
 
 def test_without_a_load_cell_nothing_is_said_of_errors() -> None:
     entries, plan, configuration = entries_of(w47_6=[2e6]), Plan(("47.6",)), bench_configuration()
-    told = report_of(plan, entries, configuration, None)
-    assert told["errors"] == []
-    assert "Beside the load cell" not in [each.heading for each in sections_of(told, plan, entries, configuration)]
-    assert len(text_of(told)) == 2
+    reported = report_of(plan, entries, configuration, None)
+    assert reported["errors"] == []
+    assert "Beside the load cell" not in [each.heading for each in sections_of(reported, plan, entries, configuration)]
+    assert len(text_of(reported)) == 2
 
 
 def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> None:
     configuration = bench_configuration()
     paper = replace(configuration, estimation=replace(configuration.estimation, method="paper"))
-    told = report_of(SHORT, measured()[0], paper, None)
+    reported = report_of(SHORT, measured()[0], paper, None)
     (entry,) = measured()[0].values()
-    assert told["muds"][0]["k_p"]["trials"] == [entry["strides"][PAPER][0]["k_p"]["value"]]
-    assert told["settings"]["method"] == "paper"
-    assert KNOWN_BIAS not in text_of(told)[0][0]
-    assert told["misfit_n"][MUD]["insertion"] > 0.0
+    assert reported["muds"][0]["k_p"]["trials"] == [entry["strides"][PAPER][0]["k_p"]["value"]]
+    assert reported["settings"]["method"] == "paper"
+    assert KNOWN_BIAS not in text_of(reported)[0][0]
+    assert reported["misfit_n"][MUD]["insertion"] > 0.0

@@ -5,77 +5,77 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from control.plate import crossing, stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.plate import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import Phase
 from estimation.force_map import smallest_force_n
 from experiments.flipper.modelled_force import misfit_n, modelled_forces
-from experiments.trials.stride_profile import StrideCourse
-from tests.experiments.made_up_strides import GEOMETRY, make_course
+from experiments.trials.stride_profile import StrideProfile
+from tests.experiments.made_up_strides import GEOMETRY, make_profile
 
 K = {"k_p": 1.1e6, "k_s": 0.4e6, "k_e": 1.9e6}
 DEPTHS_M = [-0.01, 0.0, 0.01, 0.02, 0.03]
 
 
-def lawful(phase: Phase, sweeps_deg: list[float], depths_m: list[float], across_nm: float = 0.0) -> StrideCourse:
+def lawful(phase: Phase, sweeps_deg: list[float], depths_m: list[float], across_nm: float = 0.0) -> StrideProfile:
     """Its loads are those of a mud with the coefficients K, and its forces the map's of them."""
-    course = make_course(phase, sweeps_deg, depths_m)
-    for i, (sweep_rad, adduction_rad) in enumerate(zip(course.sweep_rad, course.adduction_rad, strict=True)):
+    profile = make_profile(phase, sweeps_deg, depths_m)
+    for i, (sweep_rad, adduction_rad) in enumerate(zip(profile.sweep_rad, profile.adduction_rad, strict=True)):
         plate = submerged_plate(GEOMETRY, sweep_rad, adduction_rad)
-        sweep_nm, adduction_nm = across_nm, crossing(GEOMETRY, plate, sweep_rad) * across_nm
+        sweep_nm, adduction_nm = across_nm, cross_coupling(GEOMETRY, plate, sweep_rad) * across_nm
         if phase is Phase.STANCE:
             sweep_nm = K["k_s"] * stance_moment_m4(GEOMETRY, plate)
         else:
             k_n_m3 = K["k_p"] if phase is Phase.INSERTION else -K["k_e"]
             adduction_nm += k_n_m3 * stroke_moment_m4(GEOMETRY, plate, sweep_rad)
-        course.sweep_nm[i], course.adduction_nm[i] = sweep_nm, adduction_nm
+        profile.sweep_nm[i], profile.adduction_nm[i] = sweep_nm, adduction_nm
         forces_n = smallest_force_n(GEOMETRY, sweep_rad, adduction_rad, sweep_nm, adduction_nm)
-        course.force_x_n[i], course.force_z_n[i] = forces_n
-    return course
+        profile.force_x_n[i], profile.force_z_n[i] = forces_n
+    return profile
 
 
 def test_in_insertion_the_law_is_the_measured_force_from_the_surface_down() -> None:
-    course = lawful(Phase.INSERTION, [30.0] * 5, DEPTHS_M, across_nm=0.05)
-    modelled_n = modelled_forces(course, GEOMETRY, 0.0, K, "default").force_z_n
-    assert modelled_n[2:] == pytest.approx(course.force_z_n[2:])
+    profile = lawful(Phase.INSERTION, [30.0] * 5, DEPTHS_M, across_nm=0.05)
+    modelled_n = modelled_forces(profile, GEOMETRY, 0.0, K, "default").force_z_n
+    assert modelled_n[2:] == pytest.approx(profile.force_z_n[2:])
     assert np.isnan(modelled_n[0])
 
 
 def test_in_extraction_the_law_is_the_measured_force_on_the_last_three_quarters() -> None:
-    course = lawful(Phase.EXTRACTION, [-30.0] * 5, [0.03, 0.025, 0.02, 0.01, -0.01], across_nm=-0.1)
-    modelled_n = modelled_forces(course, GEOMETRY, 0.0, K, "default").force_z_n
+    profile = lawful(Phase.EXTRACTION, [-30.0] * 5, [0.03, 0.025, 0.02, 0.01, -0.01], across_nm=-0.1)
+    modelled_n = modelled_forces(profile, GEOMETRY, 0.0, K, "default").force_z_n
     assert np.isnan(modelled_n[[0, 1, 4]]).all()
-    assert modelled_n[2:4] == pytest.approx(course.force_z_n[2:4])
+    assert modelled_n[2:4] == pytest.approx(profile.force_z_n[2:4])
     assert (modelled_n[2:4] < 0.0).all()
 
 
 def test_in_stance_the_law_is_the_measured_force_once_the_mud_is_mobilised() -> None:
     """2.5 cm of sweep with an arm of 12 cm: from 30° to under 17°."""
-    course = lawful(Phase.STANCE, [30.0, 20.0, 15.0, 0.0, -30.0], [0.03] * 5)
-    modelled_n = modelled_forces(course, GEOMETRY, 0.0, K, "default").force_x_n
+    profile = lawful(Phase.STANCE, [30.0, 20.0, 15.0, 0.0, -30.0], [0.03] * 5)
+    modelled_n = modelled_forces(profile, GEOMETRY, 0.0, K, "default").force_x_n
     assert np.isnan(modelled_n[:2]).all()
-    assert modelled_n[2:] == pytest.approx(course.force_x_n[2:])
+    assert modelled_n[2:] == pytest.approx(profile.force_x_n[2:])
 
 
 def test_the_papers_laws_are_about_forces_below_the_surface_found() -> None:
     """At 3 cm under a surface that is 1 cm deep: 2 cm of an edge of 1 cm², and half of 4 cm² of a plate 2.5 cm wide."""
     surface_m = 0.01
-    inserted = make_course(Phase.INSERTION, [30.0], [0.03])
-    swept = make_course(Phase.STANCE, [30.0, 0.0], [0.03, 0.03])
-    raised = make_course(Phase.EXTRACTION, [-30.0, -30.0], [0.03, 0.02])
+    inserted = make_profile(Phase.INSERTION, [30.0], [0.03])
+    swept = make_profile(Phase.STANCE, [30.0, 0.0], [0.03, 0.03])
+    raised = make_profile(Phase.EXTRACTION, [-30.0, -30.0], [0.03, 0.02])
     assert modelled_forces(inserted, GEOMETRY, surface_m, K, "paper").force_z_n == pytest.approx([1.1e6 * 1e-4 * 0.02])
     assert modelled_forces(swept, GEOMETRY, surface_m, K, "paper").force_x_n[1] == pytest.approx(0.4e6 * 0.025 * 2e-4)
     assert modelled_forces(raised, GEOMETRY, surface_m, K, "paper").force_z_n[1] == pytest.approx(-1.9e6 * 1e-4 * 0.01)
 
 
 def test_a_coefficient_that_is_not_known_draws_nothing() -> None:
-    course = lawful(Phase.INSERTION, [30.0] * 5, DEPTHS_M)
-    assert np.isnan(modelled_forces(course, GEOMETRY, 0.0, K | {"k_p": None}, "default").force_z_n).all()
+    profile = lawful(Phase.INSERTION, [30.0] * 5, DEPTHS_M)
+    assert np.isnan(modelled_forces(profile, GEOMETRY, 0.0, K | {"k_p": None}, "default").force_z_n).all()
 
 
 def test_rows_without_a_load_draw_nothing() -> None:
-    course = lawful(Phase.INSERTION, [30.0] * 5, DEPTHS_M)
-    course.sweep_nm[3] = np.nan
-    assert np.isnan(modelled_forces(course, GEOMETRY, 0.0, K, "default").force_z_n[3])
+    profile = lawful(Phase.INSERTION, [30.0] * 5, DEPTHS_M)
+    profile.sweep_nm[3] = np.nan
+    assert np.isnan(modelled_forces(profile, GEOMETRY, 0.0, K, "default").force_z_n[3])
 
 
 def test_what_a_law_leaves_over_is_the_root_mean_square_where_it_is_drawn() -> None:

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tests.scripted_operator import ScriptedOperator
+
 from drivers.load_cell.calibration import LoadCellCalibration
 from drivers.load_cell.line_formats import LineFormat
 from drivers.load_cell.load_cell_port import LoadCellPort
@@ -23,7 +25,6 @@ from simulation.test_rig.plate_stage import CarriedPlate, StageParameters
 from simulation.test_rig.stage_encoder_emulator import StageEncoderParameters
 from simulation.test_rig.stage_motion import HandParameters
 from tests.experiments.made_up_mud import LawfulMud
-from tests.scripted_person import ScriptedPerson
 
 SETTINGS = StageSettings()
 KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
@@ -37,7 +38,7 @@ class Laboratory:
         self,
         folder: Path,
         muds: Mapping[str, CarriedPlate],
-        person: ScriptedPerson,
+        operator: ScriptedOperator,
         trials: int = 1,
         baud: int = 115200,
         amplifier: AmplifierParameters | None = None,
@@ -48,7 +49,7 @@ class Laboratory:
         encoder_baud: int = 115200,
     ) -> None:
         """With an `encoder` the stage is pushed by a hand."""
-        self.folder, self.person = folder, person
+        self.folder, self.operator = folder, operator
         if encoder is not None:
             stage = StageParameters(hand=HandParameters(), seed=seed)
         self.bench = EmulatedBench(next(iter(muds.values())), folder / "cell", amplifier, stage, seed, encoder)
@@ -59,12 +60,12 @@ class Laboratory:
         if encoder is not None:
             settings = StageEncoderSettings(str(folder / "cell_position"), encoder.metres_per_count, encoder_baud)
             self.encoder = StageEncoder(settings)
-        self.recorder = CellRecorder(self.port, self.bench, person.tell, self.encoder)
+        self.recorder = CellRecorder(self.port, self.bench, operator.report, self.encoder)
         self.plan = TrialPlan(tuple(muds), trials, SETTINGS)
         self.notebook = Notebook(folder, plan_of_notebook(SETTINGS))
         stage_of_it = SimulatedStage(SETTINGS, self.bench, muds, seed)
         self.trial_bench = TrialBench(
-            self.recorder, stage_of_it, person, self.notebook, folder, lambda done, total: None
+            self.recorder, stage_of_it, operator, self.notebook, folder, lambda done, total: None
         )
 
     def at(self, after_s: float, happen: Callable[[], None]) -> None:
@@ -92,10 +93,10 @@ def laboratories(folder: Path) -> Iterator[Make]:
     """Makes any number of them, calibrated, over mud that keeps the laws; closed at the end."""
     made: list[Laboratory] = []
 
-    def build(person: ScriptedPerson | None = None, **options: Any) -> Laboratory:
+    def build(operator: ScriptedOperator | None = None, **options: Any) -> Laboratory:
         own_folder = folder / str(len(made))
         own_folder.mkdir()
-        laboratory = Laboratory(own_folder, {"made up": LawfulMud(**KNOWN)}, person or ScriptedPerson(), **options)
+        laboratory = Laboratory(own_folder, {"made up": LawfulMud(**KNOWN)}, operator or ScriptedOperator(), **options)
         laboratory.port.calibration = COUNTS
         made.append(laboratory)
         return laboratory

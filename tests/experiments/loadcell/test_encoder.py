@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.scripted_operator import ScriptedOperator
 
-from experiments.loadcell.fits import INSERTION, bench_doubt
+from experiments.loadcell.fits import INSERTION, bench_uncertainty
 from experiments.loadcell.measurement import CellSettings
 from experiments.loadcell.raw import RAW, load_all
 from experiments.loadcell.stage import Trial
@@ -19,7 +20,6 @@ from experiments.robot.prompt import GO_ON
 from simulation.test_rig.load_cell_emulator import AmplifierParameters
 from simulation.test_rig.stage_encoder_emulator import EmulatedStageEncoder, StageEncoderParameters
 from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Laboratory, Make, laboratories
-from tests.scripted_person import ScriptedPerson
 
 
 @pytest.fixture
@@ -27,9 +27,9 @@ def make(tmp_path: Path) -> Iterator[Make]:
     with laboratories(tmp_path) as build:
 
         def with_encoder(
-            person: ScriptedPerson | None = None, encoder: dict[str, Any] | None = None, **options: Any
+            operator: ScriptedOperator | None = None, encoder: dict[str, Any] | None = None, **options: Any
         ) -> Laboratory:
-            return build(person, encoder=StageEncoderParameters(**(encoder or {})), **options)
+            return build(operator, encoder=StageEncoderParameters(**(encoder or {})), **options)
 
         yield with_encoder
 
@@ -45,39 +45,39 @@ def try_once(laboratory: Laboratory) -> list[str]:
     laboratory.recorder.listen(1.0)
     laboratory.trial_bench.stage.prepare(trial, 1)
     measure(laboratory.trial_bench, trial, laboratory.plan)
-    return laboratory.person.told
+    return laboratory.operator.reported
 
 
 def examine(laboratory: Laboratory) -> None:
     laboratory.recorder.listen(2.0)
-    examine_encoder(laboratory.recorder, laboratory.person, SETTINGS)
+    examine_encoder(laboratory.recorder, laboratory.operator, SETTINGS)
 
 
 def test_pushed_by_a_hand_the_known_coefficients_come_out(make: Make) -> None:
     laboratory = make(trials=2, seed=4)
     laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
     results = laboratory.conclude()
-    told = results.muds["made up"]
-    assert {name: each.value for name, each in told.items()} == {
+    reported = results.muds["made up"]
+    assert {name: each.value for name, each in reported.items()} == {
         name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
     }
     assert all(trial.is_measured for trial in results.trials) and results.remarks == []
-    no_ruler = bench_doubt("k_p", SETTINGS, 0.0, 0.0) * told["k_p"].value
-    assert told["k_p"].shared_error == pytest.approx(no_ruler)
+    no_ruler = bench_uncertainty("k_p", SETTINGS, 0.0, 0.0) * reported["k_p"].value
+    assert reported["k_p"].shared_error == pytest.approx(no_ruler)
     assert len(list((laboratory.folder / RAW).glob("*_position.csv"))) == 4
 
 
 def test_an_amplifier_that_tells_means_of_two_costs_less_than_three_percent(make: Make) -> None:
     laboratory = make(trials=2, seed=4, amplifier=AmplifierParameters(averaged=2))
     laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
-    told = laboratory.conclude().muds["made up"]
-    assert {name: each.value for name, each in told.items()} == {
+    reported = laboratory.conclude().muds["made up"]
+    assert {name: each.value for name, each in reported.items()} == {
         name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
     }
 
 
 def test_an_encoder_unplugged_in_a_trial_costs_its_places_and_no_force(make: Make) -> None:
-    laboratory = make(person=ScriptedPerson(KEEP))
+    laboratory = make(operator=ScriptedOperator(KEEP))
     laboratory.at(4.5, counter_of(laboratory).unplug)
     laboratory.at(6.0, counter_of(laboratory).plug_in)
     assert any("encoder was unplugged or began anew" in each for each in try_once(laboratory))
@@ -88,11 +88,11 @@ def test_an_encoder_unplugged_in_a_trial_costs_its_places_and_no_force(make: Mak
 
 
 def test_one_that_is_gone_is_asked_for_and_then_done_without(make: Make) -> None:
-    laboratory = make(person=ScriptedPerson(GO_ON, WITHOUT, KEEP))
+    laboratory = make(operator=ScriptedOperator(GO_ON, WITHOUT, KEEP))
     counter_of(laboratory).unplug()
-    told = try_once(laboratory)
-    assert [("encoder is gone" in each, "plug" in each) for each in told[:2]] == [(True, True)] * 2
-    assert told[2].startswith("going on without the position")
+    reported = try_once(laboratory)
+    assert [("encoder is gone" in each, "plug" in each) for each in reported[:2]] == [(True, True)] * 2
+    assert reported[2].startswith("going on without the position")
     assert "position" not in laboratory.notebook.entries["made up/insertion/1"]
 
 
@@ -100,17 +100,17 @@ def test_one_that_is_plugged_in_when_asked_for_goes_on(make: Make) -> None:
     laboratory = make()
     counter_of(laboratory).unplug()
     laboratory.at(1.5, counter_of(laboratory).plug_in)
-    told = try_once(laboratory)
-    assert len(told) == 1 and "encoder is gone" in told[0]
+    reported = try_once(laboratory)
+    assert len(reported) == 1 and "encoder is gone" in reported[0]
     (recorded,) = load_all(laboratory.folder, laboratory.notebook)
     assert recorded.places is not None
 
 
 def test_a_drop_out_in_the_stroke_is_told(make: Make) -> None:
-    laboratory = make(person=ScriptedPerson(KEEP))
+    laboratory = make(operator=ScriptedOperator(KEEP))
     laboratory.at(3.9, lambda: setattr(counter_of(laboratory), "line_at", lambda at_s: b""))
-    told = try_once(laboratory)
-    assert any("place is not known" in each or "the place is not used" in each for each in told)
+    reported = try_once(laboratory)
+    assert any("place is not known" in each or "the place is not used" in each for each in reported)
 
 
 def test_some_garbage_matters_to_nobody(make: Make) -> None:
@@ -139,7 +139,7 @@ def test_lines_that_are_no_counts_are_shown(make: Make) -> None:
 def test_one_too_slow_for_the_stroke_is_told(make: Make) -> None:
     laboratory = make(encoder={"rate_hz": 20.0})
     examine(laboratory)
-    assert "20 lines/s, one in 5.0 mm" in laboratory.person.told[0]
+    assert "20 lines/s, one in 5.0 mm" in laboratory.operator.reported[0]
 
 
 def test_a_cell_that_is_unplugged_does_not_cost_the_places(make: Make) -> None:

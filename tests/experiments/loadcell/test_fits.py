@@ -20,7 +20,7 @@ from experiments.loadcell.fits import (
     Analysed,
     Coefficient,
     Recorded,
-    bench_doubt,
+    bench_uncertainty,
     depths_of,
     noises_n,
     of_mud,
@@ -44,8 +44,8 @@ def look(done: int, total: int) -> None:
 
 
 def found(trials: list[Recorded]) -> dict[str, float]:
-    told = analyse(trials, SETTINGS, look)
-    return {name: of_mud(told, name, 0.0).value for name in COEFFICIENTS}
+    reported = analyse(trials, SETTINGS, look)
+    return {name: of_mud(reported, name, 0.0).value for name in COEFFICIENTS}
 
 
 @pytest.mark.parametrize(("seed", "acceleration_m_s2"), [(1, 0.6), (2, 2.0), (3, 8.0)])
@@ -62,9 +62,9 @@ def test_an_abrupt_stage_is_not_taken_for_mud_that_bears_more_when_it_is_slower(
     """Five trials of one mud alone; a ramp of one sample."""
     mud = LawfulMud(1.3e6, 0.6e6, 1.4e6)
     trials = [feel(mud, INSERTION, 4000 + i, acceleration_m_s2=8.0, noise_n=0.01) for i in range(5)]
-    told = analyse(trials, SETTINGS, look)
-    assert of_mud(told, "k_p", 0.0).value == pytest.approx(mud.k_p, rel=0.01)
-    assert of_mud(told, "k_e", 0.0).value == pytest.approx(mud.k_e, rel=0.01)
+    reported = analyse(trials, SETTINGS, look)
+    assert of_mud(reported, "k_p", 0.0).value == pytest.approx(mud.k_p, rel=0.01)
+    assert of_mud(reported, "k_e", 0.0).value == pytest.approx(mud.k_e, rel=0.01)
 
 
 @pytest.mark.parametrize(("water", "acceleration_m_s2"), [(47.6, 2.0), (51.2, 0.6)])
@@ -77,12 +77,12 @@ def test_coefficients_of_clay_are_those_of_its_noise_free_curve(water: float, ac
 def true_of_clay(water: float) -> dict[str, float]:
     """By the definitions, without any of the code that is tested."""
     clay = clay_of_water(water)
-    told = measure_insertion(clay, PAPER_PLATE, 0.0, 0.0, 0.03, 0.1, RELAXATION, 3.0)
+    reported = measure_insertion(clay, PAPER_PLATE, 0.0, 0.0, 0.03, 0.1, RELAXATION, 3.0)
     shear_n = measure_shear(clay, PAPER_PLATE, 0.0, 0.0, 0.03, 0.1)
     return {
-        "k_p": true_slope(told.down, 0.03),
+        "k_p": true_slope(reported.down, 0.03),
         "k_s": shear_n / (WIDTH_M * 0.03**2 / 2.0),
-        "k_e": -true_slope(told.up, 0.75 * 0.03),
+        "k_e": -true_slope(reported.up, 0.75 * 0.03),
     }
 
 
@@ -105,9 +105,9 @@ def test_a_trial_errs_by_about_as_much_as_it_says_though_clay_does_not_follow_th
 ) -> None:
     """Whatever moment it began: the ends of a stroke count by their way."""
     true = true_of_clay(49.5)[name]
-    told = [trial.coefficients[name] for trial in clay_trials]
-    errs = float(np.sqrt(np.mean([(each.value - true) ** 2 for each in told])))
-    says = float(np.sqrt(np.mean([each.std_error**2 for each in told])))
+    reported = [trial.coefficients[name] for trial in clay_trials]
+    errs = float(np.sqrt(np.mean([(each.value - true) ** 2 for each in reported])))
+    says = float(np.sqrt(np.mean([each.std_error**2 for each in reported])))
     assert errs < 0.006 * true
     assert says / 3.0 < errs < 1.5 * says
 
@@ -116,18 +116,19 @@ def test_the_doubt_of_a_slope_is_the_scatter_of_slopes_and_that_of_weighted_leas
     """Of a force that bends from the law; an oracle with the bend as a second column."""
     random, depths_m = np.random.default_rng(1), np.linspace(0.0, 0.03, 25)
     volumes_m3 = volume_m3(SETTINGS, depths_m)
-    told = [
-        slope(SETTINGS, depths_m, course_n(depths_m) + 0.01 * random.standard_normal(25), 0.03, 0.0) for _ in range(300)
+    reported = [
+        slope(SETTINGS, depths_m, profile_n(depths_m) + 0.01 * random.standard_normal(25), 0.03, 0.0)
+        for _ in range(300)
     ]
-    scatter = float(np.std([each.value for each in told]))
-    assert float(np.mean([each.std_error for each in told])) == pytest.approx(student_factor(23) * scatter, rel=0.1)
-    known = sm.OLS(course_n(depths_m), volumes_m3).fit()
-    assert float(np.mean([each.value for each in told])) == pytest.approx(float(known.params[0]), rel=0.02)
+    scatter = float(np.std([each.value for each in reported]))
+    assert float(np.mean([each.std_error for each in reported])) == pytest.approx(student_factor(23) * scatter, rel=0.1)
+    known = sm.OLS(profile_n(depths_m), volumes_m3).fit()
+    assert float(np.mean([each.value for each in reported])) == pytest.approx(float(known.params[0]), rel=0.02)
     assert scatter == pytest.approx(0.01 / float(np.sqrt(volumes_m3 @ volumes_m3)), rel=0.15)
     assert float(known.bse[0]) > 4.0 * scatter  # which takes the bend for scatter
 
 
-def course_n(depths_m: Array) -> Array:
+def profile_n(depths_m: Array) -> Array:
     return np.asarray(1.5 + 60.0 * depths_m)
 
 
@@ -135,15 +136,15 @@ def course_n(depths_m: Array) -> Array:
 def test_noises_are_those_of_the_samples_whatever_line_they_lie_on(turned: bool) -> None:
     random = np.random.default_rng(2)
     depths_m = np.sort(random.uniform(0.0, 0.03, 4000))[:: -1 if turned else 1]
-    told_n = noises_n(depths_m, course_n(depths_m) + 0.01 * random.standard_normal(4000))
-    assert float(np.std(told_n)) == pytest.approx(0.01, rel=0.05)
-    assert np.max(np.abs(noises_n(depths_m, course_n(depths_m)))) < 1e-9
+    reported_n = noises_n(depths_m, profile_n(depths_m) + 0.01 * random.standard_normal(4000))
+    assert float(np.std(reported_n)) == pytest.approx(0.01, rel=0.05)
+    assert np.max(np.abs(noises_n(depths_m, profile_n(depths_m)))) < 1e-9
 
 
 def test_five_trials_that_scatter_are_doubted_with_students_factor() -> None:
     trials = [Analysed(nowhere(), coefficients={"k_s": Coefficient(value, 1.0)}) for value in (1e6, 2e6, 3e6, 4e6, 5e6)]
-    told = of_mud(trials, "k_s", 0.0)
-    assert told.trials_error == pytest.approx(student_factor(4) * 5e6 / np.sqrt(10.0) / np.sqrt(5.0))
+    reported = of_mud(trials, "k_s", 0.0)
+    assert reported.trials_error == pytest.approx(student_factor(4) * 5e6 / np.sqrt(10.0) / np.sqrt(5.0))
 
 
 def nowhere() -> Recorded:
@@ -162,26 +163,26 @@ def insertion() -> Recorded:
 def test_a_cell_that_is_mounted_the_other_way_round_tells_the_same(insertion: Recorded) -> None:
     turned = one(insertion._replace(forces_n=-insertion.forces_n))
     straight = one(insertion)
-    assert turned.course is not None and turned.course.turned
-    assert turned.coefficients == {name: pytest.approx(told) for name, told in straight.coefficients.items()}
+    assert turned.profile is not None and turned.profile.turned
+    assert turned.coefficients == {name: pytest.approx(reported) for name, reported in straight.coefficients.items()}
 
 
 def test_the_depth_found_is_that_of_the_stage(insertion: Recorded) -> None:
     """Started at s, 2 cm above the mud: in it after (2 cm + v²/2a) / v, and 3 s at 3 cm."""
-    told = one(insertion)
-    depths_m = depths_of(told, SETTINGS)
-    assert depths_m is not None and told.course is not None and isinstance(told.motion, Insertion)
+    reported = one(insertion)
+    depths_m = depths_of(reported, SETTINGS)
+    assert depths_m is not None and reported.profile is not None and isinstance(reported.motion, Insertion)
     assert np.max(depths_m) == pytest.approx(0.03)
     held_s = np.count_nonzero(depths_m > 0.0299) / 80.0
     assert held_s == pytest.approx(3.0, abs=0.08)
-    assert told.motion.pace.speed_m_s == pytest.approx(0.1, rel=0.08)
+    assert reported.motion.pace.speed_m_s == pytest.approx(0.1, rel=0.08)
 
 
 def test_a_stage_slower_than_it_was_set_is_measured_and_told() -> None:
     mud = LawfulMud(**KNOWN)
-    told = analyse([feel(mud, INSERTION, seed, speed_m_s=0.08) for seed in range(4)], SETTINGS, look)
-    assert of_mud(told, "k_p", 0.0).value == pytest.approx(KNOWN["k_p"], rel=0.04)
-    for trial in told:
+    reported = analyse([feel(mud, INSERTION, seed, speed_m_s=0.08) for seed in range(4)], SETTINGS, look)
+    assert of_mud(reported, "k_p", 0.0).value == pytest.approx(KNOWN["k_p"], rel=0.04)
+    for trial in reported:
         assert trial.pace is not None
         assert trial.pace.speed_m_s == pytest.approx(0.08, rel=0.04)
         assert "0.100 m/s was set" in speed_remark(trial.pace, SETTINGS)
@@ -192,10 +193,10 @@ def test_a_stage_as_fast_as_it_was_set_is_not_remarked() -> None:
 
 
 def test_a_shear_is_read_where_the_stage_moved() -> None:
-    told = one(feel(clay_plate(49.5), SHEAR, 3, speed_m_s=0.13))  # done after three quarters of the expected time
-    assert isinstance(told.motion, Shear)
-    assert told.motion.speed_m_s == pytest.approx(0.13, rel=0.08)
-    assert told.motion.steady_to_s - told.motion.begin_s < 0.2 / 0.13 + 0.13 / 2.0  # with its ramps
+    reported = one(feel(clay_plate(49.5), SHEAR, 3, speed_m_s=0.13))  # done after three quarters of the expected time
+    assert isinstance(reported.motion, Shear)
+    assert reported.motion.speed_m_s == pytest.approx(0.13, rel=0.08)
+    assert reported.motion.steady_to_s - reported.motion.begin_s < 0.2 / 0.13 + 0.13 / 2.0  # with its ramps
 
 
 @pytest.mark.parametrize("kind", [INSERTION, SHEAR])
@@ -207,16 +208,16 @@ def test_a_trial_without_contact_says_so(kind: str) -> None:
 
 def test_a_recording_that_begins_in_the_stroke_says_so(insertion: Recorded) -> None:
     late = insertion.times_s > 1.4
-    told = one(insertion._replace(times_s=insertion.times_s[late], forces_n=insertion.forces_n[late]))
-    assert "moving already" in told.problem
+    reported = one(insertion._replace(times_s=insertion.times_s[late], forces_n=insertion.forces_n[late]))
+    assert "moving already" in reported.problem
 
 
 def test_a_plate_that_was_not_drawn_out_still_tells_its_insertion(insertion: Recorded) -> None:
     early = insertion.times_s < 4.0
-    told = one(insertion._replace(times_s=insertion.times_s[early], forces_n=insertion.forces_n[early]))
-    assert "no extraction" in told.remark
-    assert told.coefficients["k_p"].value == pytest.approx(KNOWN["k_p"], rel=0.08)
-    assert np.isnan(told.coefficients["k_e"].value)
+    reported = one(insertion._replace(times_s=insertion.times_s[early], forces_n=insertion.forces_n[early]))
+    assert "no extraction" in reported.remark
+    assert reported.coefficients["k_p"].value == pytest.approx(KNOWN["k_p"], rel=0.08)
+    assert np.isnan(reported.coefficients["k_e"].value)
 
 
 def test_ten_samples_a_second_are_too_few_for_an_insertion() -> None:
@@ -224,18 +225,18 @@ def test_ten_samples_a_second_are_too_few_for_an_insertion() -> None:
 
 
 def test_ten_samples_a_second_are_enough_for_a_shear() -> None:
-    told = one(feel(LawfulMud(**KNOWN), SHEAR, 1, rate_hz=10.0))
-    assert told.problem == ""
-    assert told.coefficients["k_s"].value == pytest.approx(KNOWN["k_s"], rel=BOUND)
+    reported = one(feel(LawfulMud(**KNOWN), SHEAR, 1, rate_hz=10.0))
+    assert reported.problem == ""
+    assert reported.coefficients["k_s"].value == pytest.approx(KNOWN["k_s"], rel=BOUND)
 
 
 def test_a_zero_that_drifts_while_nobody_starts_is_no_contact() -> None:
     times_s = np.arange(0.0, 40.0, 0.0125)
     ramp_n = np.where(times_s > 35.0, np.minimum((times_s - 35.0) * 10.0, 2.0), 0.0)
     noise_n = np.random.default_rng(1).normal(0.0, 0.005, len(times_s))
-    course = find_contact(times_s, 0.004 * times_s + ramp_n + noise_n)
-    assert times_s[course.begin] == pytest.approx(35.0, abs=0.05)
-    assert course.level_n == pytest.approx(0.14, abs=0.01)
+    profile = find_contact(times_s, 0.004 * times_s + ramp_n + noise_n)
+    assert times_s[profile.begin] == pytest.approx(35.0, abs=0.05)
+    assert profile.level_n == pytest.approx(0.14, abs=0.01)
 
 
 def test_a_spike_is_taken_out_and_an_edge_is_kept() -> None:
@@ -244,9 +245,9 @@ def test_a_spike_is_taken_out_and_an_edge_is_kept() -> None:
 
 
 def test_a_millimetre_of_depth_is_seven_per_cent_of_the_shear_and_three_of_the_others() -> None:
-    doubts = {name: bench_doubt(name, SETTINGS, 1e-3, 0.0) for name in COEFFICIENTS}
-    assert doubts == pytest.approx({"k_p": 0.035, "k_s": 0.067, "k_e": 0.035}, abs=0.003)
-    assert bench_doubt("k_s", SETTINGS, 0.0, 0.05) == pytest.approx(0.05, rel=0.01)
+    uncertainties = {name: bench_uncertainty(name, SETTINGS, 1e-3, 0.0) for name in COEFFICIENTS}
+    assert uncertainties == pytest.approx({"k_p": 0.035, "k_s": 0.067, "k_e": 0.035}, abs=0.003)
+    assert bench_uncertainty("k_s", SETTINGS, 0.0, 0.05) == pytest.approx(0.05, rel=0.01)
 
 
 def test_a_speed_beside_the_one_that_was_set_is_doubted_as_far_as_they_are_apart() -> None:
@@ -260,35 +261,40 @@ def test_a_speed_beside_the_one_that_was_set_is_doubted_as_far_as_they_are_apart
 
 
 def test_the_doubt_of_a_mud_holds_scatter_calibration_and_the_speed_that_all_share(insertion: Recorded) -> None:
-    told = [replace(one(insertion), shared_doubt=0.02) for _ in range(4)]
-    plain = of_mud([replace(each, shared_doubt=0.0) for each in told], "k_p", 0.0)
+    reported = [replace(one(insertion), shared_uncertainty=0.02) for _ in range(4)]
+    plain = of_mud([replace(each, shared_uncertainty=0.0) for each in reported], "k_p", 0.0)
     assert plain.repeatability == 0.0
-    everything = of_mud(told, "k_p", 0.03)
+    everything = of_mud(reported, "k_p", 0.03)
     assert everything.std_error**2 == pytest.approx(plain.std_error**2 + (0.02**2 + 0.03**2) * plain.value**2)
     assert of_mud([], "k_p", 0.0).trials == ()
 
 
 def test_a_mean_is_doubted_for_what_its_trials_share_and_not_for_what_the_worst_of_them_does() -> None:
     """Made-up trials, one pushed far quicker than the others: a rate that is wrong moves each by its own share."""
-    random, moves, errors, doubts = np.random.default_rng(1), np.array([0.004, 0.004, 0.004, 0.004, 0.03]), [], []
+    random, moves, errors, uncertainties = (
+        np.random.default_rng(1),
+        np.array([0.004, 0.004, 0.004, 0.004, 0.03]),
+        [],
+        [],
+    )
     for _ in range(500):
         values = 1.0 + moves * random.standard_normal() + 0.004 * random.standard_normal(5)
         trials = [
-            Analysed(nowhere(), coefficients={"k_p": Coefficient(value, hypot(move, 0.004))}, shared_doubt=move)
+            Analysed(nowhere(), coefficients={"k_p": Coefficient(value, hypot(move, 0.004))}, shared_uncertainty=move)
             for value, move in zip(values.tolist(), moves.tolist(), strict=True)
         ]
-        told = of_mud(trials, "k_p", 0.0)
-        errors.append(told.value - 1.0)
-        doubts.append(told.trials_error)
-    assert np.mean(np.abs(errors) < 2.0 * np.array(doubts)) > 0.95
-    assert np.linalg.norm(doubts) < 1.5 * np.linalg.norm(errors)
+        reported = of_mud(trials, "k_p", 0.0)
+        errors.append(reported.value - 1.0)
+        uncertainties.append(reported.trials_error)
+    assert np.mean(np.abs(errors) < 2.0 * np.array(uncertainties)) > 0.95
+    assert np.linalg.norm(uncertainties) < 1.5 * np.linalg.norm(errors)
 
 
 def test_a_stage_that_stutters_is_doubted(insertion: Recorded) -> None:
     """It stood still for 0.1 s, half-way down."""
-    told = one(insertion)
-    assert isinstance(told.motion, Insertion) and told.remark == ""
-    half_s = told.motion.surface_s + 0.15
+    reported = one(insertion)
+    assert isinstance(reported.motion, Insertion) and reported.remark == ""
+    half_s = reported.motion.surface_s + 0.15
     place = int(np.searchsorted(insertion.times_s, half_s))
     forces_n = np.insert(insertion.forces_n, place, np.full(8, insertion.forces_n[place]))
     times_s = np.concatenate([insertion.times_s, insertion.times_s[-1] + 0.0125 * np.arange(1, 9)])

@@ -28,9 +28,9 @@ KINDS = [(INSERTION, 1), (INSERTION, 2), (INSERTION, 3), (SHEAR, 4)]
 
 
 def found(trials: list[Recorded]) -> dict[str, float]:
-    told = analyse(trials, SETTINGS, lambda done, total: None)
-    assert all(trial.is_measured for trial in told)
-    return {name: of_mud(told, name, 0.0).value for name in COEFFICIENTS}
+    reported = analyse(trials, SETTINGS, lambda done, total: None)
+    assert all(trial.is_measured for trial in reported)
+    return {name: of_mud(reported, name, 0.0).value for name in COEFFICIENTS}
 
 
 def test_a_lawful_mud_s_coefficients_come_out_within_three_per_cent_however_the_hand_moves() -> None:
@@ -59,22 +59,22 @@ def one(recorded: Recorded, aligned: Alignment = WIDE) -> Analysed:
 
 def test_the_lag_between_the_devices_is_found_from_the_stroke(insertion: Recorded) -> None:
     for lag_s in (-0.05, 0.0, 0.09):
-        told = one(insertion._replace(times_s=insertion.times_s - LAG_S + lag_s))
-        assert told.alignment is not None
-        assert told.alignment.lag_s == pytest.approx(lag_s, abs=0.002)
+        reported = one(insertion._replace(times_s=insertion.times_s - LAG_S + lag_s))
+        assert reported.alignment is not None
+        assert reported.alignment.lag_s == pytest.approx(lag_s, abs=0.002)
 
 
 def test_the_depth_is_the_encoder_s_and_its_doubt_a_fraction_of_a_millimetre(insertion: Recorded) -> None:
-    told = one(insertion)
-    depths_m = depths_of(told, SETTINGS)
+    reported = one(insertion)
+    depths_m = depths_of(reported, SETTINGS)
     assert depths_m is not None
     assert np.nanmax(depths_m) == pytest.approx(0.03, abs=3e-4)
-    assert 0.0 < told.place_error_m < 3e-4
+    assert 0.0 < reported.position_error_m < 3e-4
 
 
 def test_whichever_way_the_encoder_counts_the_coefficients_are_the_same(insertion: Recorded) -> None:
     assert insertion.places is not None
-    turned = insertion._replace(places=Places(insertion.places.times_s, -insertion.places.places_m))
+    turned = insertion._replace(places=Places(insertion.places.times_s, -insertion.places.positions_m))
     assert one(turned).coefficients == {name: pytest.approx(k) for name, k in one(insertion).coefficients.items()}
 
 
@@ -90,49 +90,49 @@ def places_of(recorded: Recorded) -> tuple[Array, Array]:
 
 
 def test_an_encoder_on_another_axis_leaves_the_trial_to_the_force(insertion: Recorded) -> None:
-    times_s, places_m = places_of(insertion)
-    told = one(insertion._replace(places=Places(times_s, 0.05 * places_m)))
-    assert not told.is_measured
-    assert "is the encoder on the axis that moves" in told.remark and "--position-step" in told.remark
-    assert "k_p" in told.coefficients or told.problem
+    times_s, positions_m = places_of(insertion)
+    reported = one(insertion._replace(places=Places(times_s, 0.05 * positions_m)))
+    assert not reported.is_measured
+    assert "is the encoder on the axis that moves" in reported.remark and "--position-step" in reported.remark
+    assert "k_p" in reported.coefficients or reported.problem
 
 
 def test_a_wrong_way_per_count_is_told(insertion: Recorded) -> None:
-    times_s, places_m = places_of(insertion)
-    told = one(insertion._replace(places=Places(times_s, 2.0 * places_m)))
-    assert "6.0 cm deep by the encoder, and 3 cm was set" in told.remark
+    times_s, positions_m = places_of(insertion)
+    reported = one(insertion._replace(places=Places(times_s, 2.0 * positions_m)))
+    assert "6.0 cm deep by the encoder, and 3 cm was set" in reported.remark
 
 
 def test_a_gap_in_the_places_costs_its_own_samples_alone(insertion: Recorded) -> None:
-    times_s, places_m = places_of(insertion)
+    times_s, positions_m = places_of(insertion)
     whole = one(insertion)
     assert whole.motion is not None
-    middle_s = times_s[int(np.argmin(np.abs(places_m + 0.035)))]  # 1.5 cm deep
+    middle_s = times_s[int(np.argmin(np.abs(positions_m + 0.035)))]  # 1.5 cm deep
     kept = np.abs(times_s - middle_s) > 0.04
-    told = one(insertion._replace(places=Places(times_s[kept], places_m[kept])))
-    assert told.is_measured
-    assert told.coefficients["k_p"].value == pytest.approx(whole.coefficients["k_p"].value, rel=0.02)
+    reported = one(insertion._replace(places=Places(times_s[kept], positions_m[kept])))
+    assert reported.is_measured
+    assert reported.coefficients["k_p"].value == pytest.approx(whole.coefficients["k_p"].value, rel=0.02)
 
 
 def test_a_plate_that_was_not_drawn_out_still_tells_its_insertion(insertion: Recorded) -> None:
     early = insertion.times_s < 4.0
-    told = one(insertion._replace(times_s=insertion.times_s[early], forces_n=insertion.forces_n[early]))
-    assert "no extraction" in told.remark
-    assert np.isfinite(told.coefficients["k_p"].value) and np.isnan(told.coefficients["k_e"].value)
+    reported = one(insertion._replace(times_s=insertion.times_s[early], forces_n=insertion.forces_n[early]))
+    assert "no extraction" in reported.remark
+    assert np.isfinite(reported.coefficients["k_p"].value) and np.isnan(reported.coefficients["k_e"].value)
 
 
 def test_a_drag_that_stopped_early_is_left_to_the_force(drag: Recorded) -> None:
-    times_s, places_m = places_of(drag)
-    told = one(drag._replace(places=Places(times_s, 0.4 * places_m)))
-    assert not told.is_measured and "the encoder saw 8.0 cm of 20 cm" in told.remark
+    times_s, positions_m = places_of(drag)
+    reported = one(drag._replace(places=Places(times_s, 0.4 * positions_m)))
+    assert not reported.is_measured and "the encoder saw 8.0 cm of 20 cm" in reported.remark
 
 
 def test_how_clay_follows_the_speed_is_read_from_the_drags(drag: Recorded) -> None:
     """r = c 0.1^0.4 / (1 + c 0.1^0.4), which the mud's give of a millimetre blurs."""
     true = RATE_COEFFICIENT * 0.1**0.4 / (1.0 + RATE_COEFFICIENT * 0.1**0.4)
-    told = one(drag)
-    assert told.alignment is not None and np.isnan(told.alignment.lag_s)
-    assert told.alignment.rate_share == pytest.approx(true, abs=0.05)
+    reported = one(drag)
+    assert reported.alignment is not None and np.isnan(reported.alignment.lag_s)
+    assert reported.alignment.rate_fraction == pytest.approx(true, abs=0.05)
 
 
 @pytest.mark.parametrize(("kind", "name"), [("drag", "k_s"), ("insertion", "k_p"), ("insertion", "k_e")])
@@ -140,49 +140,51 @@ def test_a_rate_that_is_in_doubt_is_so_for_all_trials_alike(
     kind: str, name: str, request: pytest.FixtureRequest
 ) -> None:
     """No number of them takes it away."""
-    told = one(request.getfixturevalue(kind))
-    doubted = told.shared_doubt * told.coefficients[name].value
-    assert doubted > told.coefficients[name].std_error / 10.0
-    assert of_mud([told] * 100, name, 0.0).trials_error > doubted
+    reported = one(request.getfixturevalue(kind))
+    doubted = reported.shared_uncertainty * reported.coefficients[name].value
+    assert doubted > reported.coefficients[name].std_error / 10.0
+    assert of_mud([reported] * 100, name, 0.0).trials_error > doubted
 
 
 def test_a_rate_in_doubt_makes_the_doubt_of_an_insertion(insertion: Recorded) -> None:
-    sure, unsure = (one(insertion, Alignment(LAG_S, 0.1, 0.002, doubt)) for doubt in (0.01, 0.3))
+    sure, unsure = (one(insertion, Alignment(LAG_S, 0.1, 0.002, uncertainty)) for uncertainty in (0.01, 0.3))
     for name in ("k_p", "k_e"):
         assert unsure.coefficients[name].std_error > 1.2 * sure.coefficients[name].std_error
 
 
 def test_a_stage_of_one_speed_says_nothing_of_the_rate() -> None:
-    told = rate_of(np.full(50, 3.0), np.full(50, 0.01))
-    assert (told.rate_share, told.rate_doubt) == pytest.approx((WIDE.rate_share, WIDE.rate_doubt))
+    reported = rate_of(np.full(50, 3.0), np.full(50, 0.01))
+    assert (reported.rate_fraction, reported.rate_uncertainty) == pytest.approx(
+        (WIDE.rate_fraction, WIDE.rate_uncertainty)
+    )
 
 
 def test_trials_share_lag_and_rate() -> None:
     insertions = [Alignment(lag_s, 0.3, 1e-4, 0.02) for lag_s in (0.010, 0.011, 0.030)]
     drags = [Alignment(float("nan"), rate, float("inf"), 0.01) for rate in (0.1, 0.12)]
     common = common_alignment([*insertions, *drags])
-    assert (common.lag_s, common.rate_share) == pytest.approx((0.011, 0.11))
-    assert common.lag_doubt_s > 0.005  # they do not agree
+    assert (common.lag_s, common.rate_fraction) == pytest.approx((0.011, 0.11))
+    assert common.lag_uncertainty_s > 0.005  # they do not agree
     assert common_alignment([]) == WIDE
 
 
 def test_after_a_rest_samples_count_again_two_millimetres_on() -> None:
-    places_m = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0, 6.0, 7.0]) / 1000.0
+    positions_m = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0, 6.0, 7.0]) / 1000.0
     speeds_m_s = np.array([0.0, 0.1, 0.1, 0.1, 0.0, 0.0, 0.1, 0.1, 0.1, 0.1])
-    assert np.flatnonzero(moving(places_m, speeds_m_s, 0.01, 0.002)).tolist() == [8]
+    assert np.flatnonzero(moving(positions_m, speeds_m_s, 0.01, 0.002)).tolist() == [8]
     in_air = np.zeros(10, dtype=bool)
-    assert np.flatnonzero(moving(places_m, speeds_m_s, 0.01, 0.002, in_air)).tolist() == [1, 2, 6, 7, 8]
+    assert np.flatnonzero(moving(positions_m, speeds_m_s, 0.01, 0.002, in_air)).tolist() == [1, 2, 6, 7, 8]
 
 
 def test_a_slow_encoder_is_doubted_more() -> None:
-    hand = HandParameters(rest_share=0.0)
+    hand = HandParameters(rest_fraction=0.0)
     quick, slow = (
-        one(feel_by_hand(clay_plate(49.5), INSERTION, 9, hand, place_rate_hz=rate_hz)) for rate_hz in (100.0, 25.0)
+        one(feel_by_hand(clay_plate(49.5), INSERTION, 9, hand, position_rate_hz=rate_hz)) for rate_hz in (100.0, 25.0)
     )
-    assert slow.place_error_m > 1.5 * quick.place_error_m
+    assert slow.position_error_m > 1.5 * quick.position_error_m
 
 
 def test_a_measured_trial_has_no_pace_of_the_force(insertion: Recorded) -> None:
-    told = one(insertion)
-    assert told.pace is None and told.speed_m_s is not None and 0.03 < told.speed_m_s < 0.2
-    assert replace(told, places_m=None).pace is not None
+    reported = one(insertion)
+    assert reported.pace is None and reported.speed_m_s is not None and 0.03 < reported.speed_m_s < 0.2
+    assert replace(reported, positions_m=None).pace is not None

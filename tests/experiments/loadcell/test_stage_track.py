@@ -17,7 +17,7 @@ def even(times_s: Array = TIMES_S) -> StageTrack:
 
 def test_the_mean_of_an_even_motion_is_its_middle() -> None:
     until_s = np.array([0.5, 0.5037, 1.2])
-    assert even().mean_places_m(until_s, 0.0125) == pytest.approx(0.1 * (until_s - 0.00625))
+    assert even().mean_positions_m(until_s, 0.0125) == pytest.approx(0.1 * (until_s - 0.00625))
     assert even().speeds_m_s(until_s, 0.0125) == pytest.approx(0.1)
 
 
@@ -26,33 +26,33 @@ def test_straight_lines_are_off_by_no_more_than_is_said() -> None:
     times_s = np.arange(0.0, 1.0, 0.05)
     track = StageTrack(Places(times_s, 2.5 * times_s**2))
     fine_s = np.linspace(0.06, 0.94, 400)
-    off_m = np.max(np.abs(track.places_m(fine_s) - 2.5 * fine_s**2))
+    off_m = np.max(np.abs(track.positions_m(fine_s) - 2.5 * fine_s**2))
     assert off_m == pytest.approx(5.0 * 0.05**2 / 8.0, rel=0.02)
     assert off_m <= 1.01 * track.interpolation_error_m
 
 
 def test_before_after_and_in_a_gap_the_place_is_not_known() -> None:
     gone = (TIMES_S > 0.8) & (TIMES_S < 1.0)
-    told = even(TIMES_S[~gone]).mean_places_m(np.array([0.005, 0.5, 0.9, 1.005, 1.1, 2.1]), 0.0125)
-    assert np.isnan(told).tolist() == [True, False, True, True, False, True]
+    reported = even(TIMES_S[~gone]).mean_positions_m(np.array([0.005, 0.5, 0.9, 1.005, 1.1, 2.1]), 0.0125)
+    assert np.isnan(reported).tolist() == [True, False, True, True, False, True]
 
 
 def test_over_a_gap_in_which_the_stage_stood_its_place_is_known() -> None:
     gone = (TIMES_S > 0.8) & (TIMES_S < 1.0)
     track = StageTrack(Places(TIMES_S[~gone], np.minimum(TIMES_S[~gone], 0.7)))
-    assert track.mean_places_m(np.array([0.9]), 0.0125) == pytest.approx([0.7])
+    assert track.mean_positions_m(np.array([0.9]), 0.0125) == pytest.approx([0.7])
 
 
 def test_slow_lines_are_no_gaps() -> None:
     slow_s = np.arange(0.0, 2.0, 0.1)
-    assert not np.any(np.isnan(even(slow_s).mean_places_m(np.array([0.5, 1.0]), 0.0125)))
+    assert not np.any(np.isnan(even(slow_s).mean_positions_m(np.array([0.5, 1.0]), 0.0125)))
 
 
 def test_a_single_wrong_place_is_taken_out() -> None:
-    places_m = 0.1 * TIMES_S
-    places_m[70] += 0.004
-    track = StageTrack(Places(TIMES_S, places_m))
-    assert track.places_m(TIMES_S[70:71]) == pytest.approx([0.07])
+    positions_m = 0.1 * TIMES_S
+    positions_m[70] += 0.004
+    track = StageTrack(Places(TIMES_S, positions_m))
+    assert track.positions_m(TIMES_S[70:71]) == pytest.approx([0.07])
 
 
 def test_it_is_told_from_where_it_began_and_the_other_way_round() -> None:
@@ -62,5 +62,5 @@ def test_it_is_told_from_where_it_began_and_the_other_way_round() -> None:
 
 
 def test_an_abrupt_stop_is_no_leap() -> None:
-    places_m = np.minimum(0.2 * TIMES_S, 0.1)
-    assert StageTrack(Places(TIMES_S, places_m)).places_m(TIMES_S) == pytest.approx(places_m)
+    positions_m = np.minimum(0.2 * TIMES_S, 0.1)
+    assert StageTrack(Places(TIMES_S, positions_m)).positions_m(TIMES_S) == pytest.approx(positions_m)

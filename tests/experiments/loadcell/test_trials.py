@@ -9,6 +9,7 @@ from random import Random
 from statistics import fmean
 
 import pytest
+from tests.scripted_operator import ScriptedOperator
 
 from drivers.load_cell.load_cell_port import LoadCellPort
 from experiments.loadcell.fits import INSERTION, SHEAR, Analysed
@@ -18,13 +19,12 @@ from experiments.loadcell.raw import RAW, load_all
 from experiments.loadcell.recording import AVERAGED, likeness
 from experiments.loadcell.stage import AttendedStage, Trial
 from experiments.loadcell.trial_checks import examine_lines
-from experiments.loadcell.trials import KEEP, judge, measure, record
+from experiments.loadcell.trials import KEEP, evaluate, measure, record
 from experiments.robot.bench_robot import BenchError
 from experiments.robot.prompt import GO_ON, REDO, SKIP
 from simulation.test_rig.load_cell_emulator import AmplifierParameters
 from simulation.test_rig.plate_stage import StageParameters
 from tests.experiments.loadcell.loadcell_bench import COUNTS, KNOWN, SETTINGS, Laboratory, Make, laboratories
-from tests.scripted_person import ScriptedPerson
 
 
 @pytest.fixture
@@ -57,17 +57,17 @@ def try_once(laboratory: Laboratory, kind: str = INSERTION) -> list[str]:
     laboratory.recorder.listen(1.0)
     laboratory.trial_bench.stage.prepare(trial, 1)
     measure(laboratory.trial_bench, trial, laboratory.plan)
-    return laboratory.person.told
+    return laboratory.operator.reported
 
 
 def test_calibrated_with_two_weights_the_known_coefficients_come_out(make: Make) -> None:
     laboratory = make(trials=3, seed=4)
     laboratory.measure()
-    told = laboratory.conclude().muds["made up"]
-    assert {name: each.value for name, each in told.items()} == {
+    reported = laboratory.conclude().muds["made up"]
+    assert {name: each.value for name, each in reported.items()} == {
         name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
     }
-    assert [len(each.trials) for each in told.values()] == [3, 3, 3]
+    assert [len(each.trials) for each in reported.values()] == [3, 3, 3]
     assert laboratory.port.calibration.per_newton == pytest.approx(42000.0, rel=0.002)
     assert len(list((laboratory.folder / RAW).iterdir())) == 6
 
@@ -78,8 +78,8 @@ def test_an_amplifier_that_tells_means_of_four_is_told_once_and_one_that_does_no
         bench = replace(laboratory.trial_bench, stage=Idle())
         for number in (1, 2):
             record(bench, Trial("made up", INSERTION, number), laboratory.plan, 1)
-    assert [each for each in smeared.person.told if AVERAGED in each] == [f"made up/insertion/1: {AVERAGED}"]
-    assert sharp.person.told == []
+    assert [each for each in smeared.operator.reported if AVERAGED in each] == [f"made up/insertion/1: {AVERAGED}"]
+    assert sharp.operator.reported == []
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -99,17 +99,17 @@ def test_what_is_in_the_notebook_is_not_measured_again(make: Make) -> None:
     laboratory.measure()
     assert laboratory.notebook.entries == before
     assert laboratory.port.lines < lines + 400  # it listened, and no more
-    assert "calibration from" in laboratory.person.told[-1]
+    assert "calibration from" in laboratory.operator.reported[-1]
 
 
 def test_a_trial_in_which_the_cell_is_unplugged_is_repeated_and_both_are_kept(make: Make) -> None:
     laboratory = make()
     laboratory.at(4.5, laboratory.bench.amplifier.unplug)
     laboratory.at(6.5, laboratory.bench.amplifier.plug_in)
-    told = try_once(laboratory)
-    assert any("plug" in each and "in again" in each for each in told)
-    assert any("is back" in each for each in told)
-    assert any("unplugged in the middle" in each for each in told)
+    reported = try_once(laboratory)
+    assert any("plug" in each and "in again" in each for each in reported)
+    assert any("is back" in each for each in reported)
+    assert any("unplugged in the middle" in each for each in reported)
     assert laboratory.notebook.entries["made up/insertion/1"]["file"].endswith("_2.csv")
     assert len(list((laboratory.folder / RAW).iterdir())) == 2
     assert len(load_all(laboratory.folder, laboratory.notebook)) == 1
@@ -120,24 +120,24 @@ def test_a_trial_in_which_the_cell_is_unplugged_is_repeated_and_both_are_kept(ma
     [
         (AmplifierParameters(drift_n_s=0.03), None, INSERTION, "the zero moved by"),
         (AmplifierParameters(range_n=2.0), None, INSERTION, "at its limit"),
-        (AmplifierParameters(garbled_share=0.2), None, SHEAR, "lines were garbled"),
+        (AmplifierParameters(garbled_fraction=0.2), None, SHEAR, "lines were garbled"),
         (AmplifierParameters(drop_out_rate_hz=2.0, drop_out_s=0.3), None, SHEAR, "are missing"),
         (AmplifierParameters(rate_hz=10.0), None, INSERTION, "fewer than 6 samples"),
     ],
 )
 def test_a_trial_in_doubt_says_why_and_is_left_out_in_the_end(
-    make: Make, amplifier: AmplifierParameters, stage: StageParameters | None, kind: str, sentence: str
+    make: Make, amplifier: AmplifierParameters, stage: StageParameters | None, kind: str, message: str
 ) -> None:
-    laboratory = make(amplifier=amplifier, stage=stage, person=ScriptedPerson(SKIP))
-    assert any(sentence in each for each in try_once(laboratory, kind))
+    laboratory = make(amplifier=amplifier, stage=stage, operator=ScriptedOperator(SKIP))
+    assert any(message in each for each in try_once(laboratory, kind))
     (entry,) = laboratory.notebook.entries.values()
-    assert entry["skipped"] and any(sentence in each for each in entry["why"])
+    assert entry["skipped"] and any(message in each for each in entry["why"])
     assert (laboratory.folder / entry["file"]).exists()
     assert load_all(laboratory.folder, laboratory.notebook) == []
 
 
 def test_a_stage_that_nobody_starts_is_no_contact(make: Make) -> None:
-    laboratory = make(person=ScriptedPerson(KEEP))
+    laboratory = make(operator=ScriptedOperator(KEEP))
     laboratory.trial_bench.stage.start = lambda trial: None  # type: ignore[method-assign]
     assert any("no contact" in each for each in try_once(laboratory))
     assert "kept_in_spite_of" in laboratory.notebook.entries["made up/insertion/1"]
@@ -156,8 +156,8 @@ def test_a_cell_that_stays_at_its_largest_force_is_at_its_limit(make: Make) -> N
     clipped = recorded._replace(forces_n=recorded.forces_n.clip(-1.0, 1.0))
     tare = laboratory.recorder.tare()
     stretch = laboratory.recorder.record(0.01, 0.1, 0.1)
-    assert any("at its limit" in each for each in judge(Analysed(clipped), stretch, tare, tare))
-    assert judge(Analysed(recorded), stretch, tare, tare) == []
+    assert any("at its limit" in each for each in evaluate(Analysed(clipped), stretch, tare, tare))
+    assert evaluate(Analysed(recorded), stretch, tare, tare) == []
 
 
 def test_a_person_skips_one_trial_and_repeats_the_one_before(make: Make) -> None:
@@ -208,26 +208,26 @@ def test_a_cell_that_sends_nonsense_is_shown(make: Make) -> None:
 
 
 def test_an_amplifier_too_slow_for_the_stroke_is_told_before_anything_is_measured(make: Make) -> None:
-    laboratory = make(amplifier=AmplifierParameters(rate_hz=10.0), person=ScriptedPerson("q"))
+    laboratory = make(amplifier=AmplifierParameters(rate_hz=10.0), operator=ScriptedOperator("q"))
     with pytest.raises(BenchError, match="too slow"):
         laboratory.measure(CellSettings(scale_n=1.0))
-    assert "RATE pin" in laboratory.person.told[1] and "--speed 0.02" in laboratory.person.told[1]
+    assert "RATE pin" in laboratory.operator.reported[1] and "--speed 0.02" in laboratory.operator.reported[1]
     assert not laboratory.notebook.begun
 
 
 def test_weights_that_say_nothing_are_asked_for_again(make: Make) -> None:
-    laboratory = make(person=ScriptedPerson("q"))
+    laboratory = make(operator=ScriptedOperator("q"))
     laboratory.trial_bench.stage.weigh = lambda which: 2.0  # type: ignore[method-assign]
     with pytest.raises(BenchError, match="not calibrated"):
         laboratory.measure()
-    assert "both weights are" in laboratory.person.told[1]
+    assert "both weights are" in laboratory.operator.reported[1]
 
 
 def test_a_weight_that_the_cell_cannot_bear_is_told_as_one(make: Make) -> None:
-    laboratory = make(person=ScriptedPerson("q"), amplifier=AmplifierParameters(range_n=1.0))
+    laboratory = make(operator=ScriptedOperator("q"), amplifier=AmplifierParameters(range_n=1.0))
     with pytest.raises(BenchError, match="not calibrated"):
         laboratory.measure()
-    assert "overloaded by this weight" in laboratory.person.told[1]
+    assert "overloaded by this weight" in laboratory.operator.reported[1]
 
 
 def test_a_stage_at_another_speed_is_remarked_for_every_trial(make: Make) -> None:
@@ -239,8 +239,8 @@ def test_a_stage_at_another_speed_is_remarked_for_every_trial(make: Make) -> Non
         for trial in laboratory.conclude().trials
         if isinstance(trial.motion, Insertion)
     ]
-    told = list_remarks(trials, SETTINGS)
-    assert [remark.split(":")[0] for remark in told] == ["made up/insertion/1", "made up/insertion/2"]
+    reported = list_remarks(trials, SETTINGS)
+    assert [remark.split(":")[0] for remark in reported] == ["made up/insertion/1", "made up/insertion/2"]
 
 
 def test_a_cell_that_stays_away_ends_it_with_a_sentence(make: Make) -> None:
@@ -261,16 +261,16 @@ def test_a_tare_in_which_the_cell_is_unplugged_is_taken_again(make: Make) -> Non
 
 
 def test_a_person_is_asked_for_everything_that_hands_do() -> None:
-    person = ScriptedPerson(GO_ON, SKIP)
+    operator = ScriptedOperator(GO_ON, SKIP)
     drained: list[int] = []
-    stage = AttendedStage(SETTINGS, person, lambda: drained.append(1))
+    stage = AttendedStage(SETTINGS, operator, lambda: drained.append(1))
     assert stage.weigh(0) == 0.0
     assert stage.prepare(Trial("a", SHEAR, 1), 5) == GO_ON
     assert stage.prepare(Trial("a", INSERTION, 1), 5) == SKIP
     stage.lower()
     stage.lift()
     stage.start(Trial("a", INSERTION, 1))
-    assert "down to 3 cm, hold 3 s" in person.told[0]
+    assert "down to 3 cm, hold 3 s" in operator.reported[0]
     assert len(drained) == 4
 
 

@@ -28,11 +28,11 @@ from tests.experiments.made_up_strides import make_estimate, make_stride
 
 
 def test_trials_make_a_mean_with_its_error_and_scatter() -> None:
-    told = gathered(make_estimate(value) for value in (1.0e6, 1.2e6, 1.4e6))
-    assert told["value"] == pytest.approx(1.2e6)
-    assert told["trials_error"] == pytest.approx(0.2e6 / sqrt(3) * student_t.ppf(0.975, 2) / 1.96, rel=1e-3)
-    assert told["repeatability"] == pytest.approx(1 / 6)
-    assert told["trials"] == [1.0e6, 1.2e6, 1.4e6]
+    reported = gathered(make_estimate(value) for value in (1.0e6, 1.2e6, 1.4e6))
+    assert reported["value"] == pytest.approx(1.2e6)
+    assert reported["trials_error"] == pytest.approx(0.2e6 / sqrt(3) * student_t.ppf(0.975, 2) / 1.96, rel=1e-3)
+    assert reported["repeatability"] == pytest.approx(1 / 6)
+    assert reported["trials"] == [1.0e6, 1.2e6, 1.4e6]
 
 
 def test_what_the_scatter_does_not_show_of_an_estimator_s_doubt_is_shared_by_all_trials() -> None:
@@ -43,8 +43,8 @@ def test_what_the_scatter_does_not_show_of_an_estimator_s_doubt_is_shared_by_all
 
 
 def test_trials_that_scatter_more_than_was_foreseen_still_share_the_motors_doubt() -> None:
-    told = gathered(make_estimate(value, std_error=1e4) for value in (0.8e6, 1e6, 1.2e6))
-    assert told["shared_error"] == pytest.approx(0.032e6)
+    reported = gathered(make_estimate(value, std_error=1e4) for value in (0.8e6, 1e6, 1.2e6))
+    assert reported["shared_error"] == pytest.approx(0.032e6)
 
 
 def test_two_standard_errors_hold_the_truth_19_times_in_20_where_all_trials_have_one_part_of_their_error_alike() -> (
@@ -54,16 +54,16 @@ def test_two_standard_errors_hold_the_truth_19_times_in_20_where_all_trials_have
     random, held = np.random.default_rng(1), 0
     for _ in range(1000):
         values = 1e6 * (1.0 + 0.04 * random.standard_normal() + 0.04 * random.standard_normal(3))
-        told = gathered(make_estimate(float(value), std_error=0.04e6 * sqrt(2.0)) for value in values)
-        held += abs(told["value"] - 1e6) <= 2.0 * told["std_error"]
+        reported = gathered(make_estimate(float(value), std_error=0.04e6 * sqrt(2.0)) for value in values)
+        held += abs(reported["value"] - 1e6) <= 2.0 * reported["std_error"]
     assert 940 <= held <= 995
 
 
 def test_one_trial_has_the_doubt_of_its_own_estimate() -> None:
-    told = gathered([make_estimate(1e6, std_error=7e4)])
-    assert (told["value"], told["std_error"], told["repeatability"]) == (1e6, 7e4, None)
-    assert (told["trials_error"], told["shared_error"]) == (None, None)
-    assert coefficient_text(told) == "1.000 ± 0.070"
+    reported = gathered([make_estimate(1e6, std_error=7e4)])
+    assert (reported["value"], reported["std_error"], reported["repeatability"]) == (1e6, 7e4, None)
+    assert (reported["trials_error"], reported["shared_error"]) == (None, None)
+    assert coefficient_text(reported) == "1.000 ± 0.070"
 
 
 def test_bounds_do_not_mix_with_values() -> None:
@@ -88,15 +88,15 @@ def test_a_few_strides_in_which_mud_gave_way_that_mostly_holds_do_not_speak_for_
     strides = strides_in_mud_that_gives_way_at(0.95e6)
     alone = gathered(each for each in strides if not each["at_least"])
     assert alone["value"] + 2.0 * alone["trials_error"] < 1e6
-    told = gathered(strides)
-    assert (told["value"], told["at_least"], told["std_error"]) == (0.95e6, True, None)
+    reported = gathered(strides)
+    assert (reported["value"], reported["at_least"], reported["std_error"]) == (0.95e6, True, None)
 
 
 def test_mud_that_gives_way_in_most_strides_is_known_by_them() -> None:
-    told = gathered(strides_in_mud_that_gives_way_at(1.05e6))
-    assert not told["at_least"]
-    assert told["bounds"] > 10
-    assert abs(told["value"] - 1e6) < 2.0 * told["std_error"]
+    reported = gathered(strides_in_mud_that_gives_way_at(1.05e6))
+    assert not reported["at_least"]
+    assert reported["bounds"] > 10
+    assert abs(reported["value"] - 1e6) < 2.0 * reported["std_error"]
 
 
 def test_a_median_of_bounds_has_no_error() -> None:
@@ -106,14 +106,14 @@ def test_a_median_of_bounds_has_no_error() -> None:
 
 
 def test_a_trial_that_does_not_tell_its_doubt_is_not_taken_for_exact() -> None:
-    doubts = (1e5, nan, 1e5)
-    told = gathered(make_estimate(1e6 + k, std_error=doubt) for k, doubt in enumerate(doubts))
-    assert told["shared_error"] == pytest.approx(1e5, rel=1e-3)
+    uncertainties = (1e5, nan, 1e5)
+    reported = gathered(make_estimate(1e6 + k, std_error=uncertainty) for k, uncertainty in enumerate(uncertainties))
+    assert reported["shared_error"] == pytest.approx(1e5, rel=1e-3)
 
 
 def test_what_is_not_valid_counts_for_nothing_but_is_told() -> None:
-    told = gathered([make_estimate(1e6), make_estimate(None, reason="too short")])
-    assert (told["value"], told["not_valid"]) == (1e6, ["too short"])
+    reported = gathered([make_estimate(1e6), make_estimate(None, reason="too short")])
+    assert (reported["value"], reported["not_valid"]) == (1e6, ["too short"])
     nothing = gathered([make_estimate(None, reason="too short")])
     assert (nothing["value"], nothing["std_error"], nothing["trials"]) == (None, None, [])
     assert coefficient_text(nothing) == "-"
@@ -197,8 +197,8 @@ def test_a_method_that_says_nothing_of_a_coefficient_has_no_row_of_it() -> None:
 
 
 def test_a_table_of_muds_has_the_load_cell_beside() -> None:
-    told = gathered([make_estimate(1.5e6), make_estimate(1.7e6)])
-    muds = [{"mud": "47.6", "k_p": told, "k_s": told, "k_e": told, "truth": {"k_p": 1.55e6}}]
+    reported = gathered([make_estimate(1.5e6), make_estimate(1.7e6)])
+    muds = [{"mud": "47.6", "k_p": reported, "k_s": reported, "k_e": reported, "truth": {"k_p": 1.55e6}}]
     head, row = mud_rows(muds)
     assert len(head) == len(row)
     assert row[:4] == ["47.6 %", "1.600 ± 0.65 ± 0.051", "8.8 % of 2", "1.550"]

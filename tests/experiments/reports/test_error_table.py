@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 
 from control.records import Estimate
-from experiments.reports.error_table import Judged, error_rows, plate_rows
+from experiments.reports.error_table import Evaluation, error_rows, plate_rows
 
 
-def judged(
+def evaluated(
     value: float,
     std_error: float = 0.0,
     truth: float = 100.0,
@@ -19,13 +19,13 @@ def judged(
     setup: str = "walking",
     mud: str = "49.5",
     **changes: Any,
-) -> Judged:
+) -> Evaluation:
     estimate = Estimate(value, std_error, 10, **({"valid": True} | changes))
-    return Judged(setup, mud, coefficient, method, estimate, truth, upright)
+    return Evaluation(setup, mud, coefficient, method, estimate, truth, upright)
 
 
-def bound(value: float, std_error: float = 0.0, **changes: Any) -> Judged:
-    return judged(value, std_error, at_least=True, reason="it held", **changes)
+def bound(value: float, std_error: float = 0.0, **changes: Any) -> Evaluation:
+    return evaluated(value, std_error, at_least=True, reason="it held", **changes)
 
 
 def only(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -35,32 +35,32 @@ def only(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 def test_median_and_95th_percentile_are_of_the_size_of_the_error() -> None:
     """-10, 0, 20, 30 and 40 %: the 95th percentile lies four fifths of the way from 30 to 40."""
-    row = only(error_rows([judged(value) for value in (90.0, 100.0, 120.0, 130.0, 140.0)]))
+    row = only(error_rows([evaluated(value) for value in (90.0, 100.0, 120.0, 130.0, 140.0)]))
     assert (row["median"], row["p95"], row["bias"], row["strides"]) == (0.2, 0.38, 0.2, 5)
 
 
 def test_the_bias_has_a_sign() -> None:
-    assert only(error_rows([judged(value) for value in (80.0, 90.0, 150.0)]))["bias"] == -0.1
+    assert only(error_rows([evaluated(value) for value in (80.0, 90.0, 150.0)]))["bias"] == -0.1
 
 
 def test_the_error_is_relative_to_each_ones_own_truth() -> None:
-    row = only(error_rows([judged(110.0, truth=100.0), judged(220.0, truth=200.0), judged(33.0, truth=30.0)]))
+    row = only(error_rows([evaluated(110.0, truth=100.0), evaluated(220.0, truth=200.0), evaluated(33.0, truth=30.0)]))
     assert (row["median"], row["p95"], row["truth_n_m3"]) == (0.1, 0.1, 100)
 
 
 @pytest.mark.parametrize(("std_error", "coverage"), [(5.0, 0.0), (5.2, 1.0)])
 def test_the_interval_is_1_96_standard_errors_to_either_side(std_error: float, coverage: float) -> None:
     for value in (90.0, 110.0):
-        assert only(error_rows([judged(value, std_error)]))["coverage"] == coverage
+        assert only(error_rows([evaluated(value, std_error)]))["coverage"] == coverage
 
 
 def test_the_coverage_is_a_share() -> None:
-    rows = error_rows([judged(101.0, 1.0), judged(105.0, 1.0), judged(99.0, 1.0), judged(100.0, 1.0)])
+    rows = error_rows([evaluated(101.0, 1.0), evaluated(105.0, 1.0), evaluated(99.0, 1.0), evaluated(100.0, 1.0)])
     assert only(rows)["coverage"] == 0.75
 
 
 def test_bounds_have_no_error_and_are_counted_apart() -> None:
-    row = only(error_rows([judged(110.0), bound(50.0), bound(90.0), bound(130.0)]))
+    row = only(error_rows([evaluated(110.0), bound(50.0), bound(90.0), bound(130.0)]))
     assert (row["median"], row["strides"], row["bounds"]) == (0.1, 1, 3)
     assert (row["bounds_hold"], row["bound_over_truth"]) == (0.6667, 0.9)
 
@@ -77,7 +77,9 @@ def test_bounds_alone_have_neither_error_nor_coverage() -> None:
 
 def test_what_is_not_valid_is_counted_and_nothing_else() -> None:
     lost = Estimate(nan, nan, 0, False, "nothing there")
-    row = only(error_rows([judged(110.0), judged(1.0)._replace(estimate=lost), judged(1.0)._replace(estimate=lost)]))
+    row = only(
+        error_rows([evaluated(110.0), evaluated(1.0)._replace(estimate=lost), evaluated(1.0)._replace(estimate=lost)])
+    )
     assert (row["median"], row["strides"], row["not_valid"], row["bounds"]) == (0.1, 1, 2, 0)
     assert row["bounds_hold"] is None and row["bound_over_truth"] is None
 
@@ -90,11 +92,11 @@ def test_an_invalid_bound_is_no_bound() -> None:
 def test_there_is_a_row_for_each_setup_mud_coefficient_and_method_in_their_order() -> None:
     rows = error_rows(
         [
-            judged(1.0, method="paper"),
-            judged(1.0, mud="47.6"),
-            judged(1.0, method="paper"),
-            judged(1.0, coefficient="k_s"),
-            judged(1.0, setup="single flipper"),
+            evaluated(1.0, method="paper"),
+            evaluated(1.0, mud="47.6"),
+            evaluated(1.0, method="paper"),
+            evaluated(1.0, coefficient="k_s"),
+            evaluated(1.0, setup="single flipper"),
         ]
     )
     names = [(row["setup"], row["mud"], row["coefficient"], row["method"]) for row in rows]
@@ -117,17 +119,17 @@ def test_nothing_judged_is_no_row() -> None:
 
 def test_a_difference_is_shared_between_the_lean_and_the_estimate() -> None:
     """The leaning plate reads 1.25 of the upright one, the estimate 1.30: 0.25 of 0.30 is the plate's lean."""
-    row = only(plate_rows([judged(104.0)]))
+    row = only(plate_rows([evaluated(104.0)]))
     assert (row["upright_over_leaning"], row["estimate_over_upright"], row["lean_share"]) == (0.8, 1.3, 0.8333)
 
 
 def test_parts_of_a_difference_that_cancel_count_by_their_size() -> None:
     """The lean takes 0.25 more, the estimate 0.25 less again."""
-    assert only(plate_rows([judged(80.0)]))["lean_share"] == 0.5
+    assert only(plate_rows([evaluated(80.0)]))["lean_share"] == 0.5
 
 
 def test_where_plates_and_estimate_agree_nothing_is_the_leans() -> None:
-    assert only(plate_rows([judged(80.0, truth=80.0)]))["lean_share"] == 0.0
+    assert only(plate_rows([evaluated(80.0, truth=80.0)]))["lean_share"] == 0.0
 
 
 def test_bounds_say_nothing_of_the_plate() -> None:
@@ -136,8 +138,12 @@ def test_bounds_say_nothing_of_the_plate() -> None:
 
 
 def test_the_plates_are_medians_of_the_default_with_a_pose() -> None:
-    told = [judged(104.0), judged(104.0), judged(999.0, upright=1.0)]
-    others = [judged(500.0, method="paper"), judged(500.0, setup="walking without pose"), judged(500.0, upright=nan)]
-    row = only(plate_rows([*told, *others]))
+    reported = [evaluated(104.0), evaluated(104.0), evaluated(999.0, upright=1.0)]
+    others = [
+        evaluated(500.0, method="paper"),
+        evaluated(500.0, setup="walking without pose"),
+        evaluated(500.0, upright=nan),
+    ]
+    row = only(plate_rows([*reported, *others]))
     assert (row["setup"], row["mud"], row["coefficient"]) == ("walking", "49.5", "k_p")
     assert (row["upright_over_leaning"], row["estimate_over_upright"]) == (0.8, 1.3)

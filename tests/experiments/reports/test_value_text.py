@@ -6,7 +6,7 @@ from math import inf, nan
 
 import pytest
 
-from experiments.reports.value_text import share_text, value_text
+from experiments.reports.value_text import fraction_text, value_text
 
 
 @pytest.mark.parametrize(
@@ -43,11 +43,11 @@ def test_trials_that_are_all_the_same_have_an_error_of_nothing() -> None:
 
 @pytest.mark.parametrize("value", [None, nan])
 def test_where_there_is_no_value_stands_a_dash(value: float | None) -> None:
-    assert value_text(value, 0.1) == share_text(value) == "-"
+    assert value_text(value, 0.1) == fraction_text(value) == "-"
 
 
 @pytest.mark.parametrize(
     ("share", "text"), [(0.0321, "3.2 %"), (0.000321, "0.032 %"), (0.321, "32 %"), (0.0, "0.0 %"), (1e-16, "0.000 %")]
 )
-def test_a_share_is_told_in_percent_with_two_digits(share: float, text: str) -> None:
-    assert share_text(share) == text
+def test_a_share_is_told_in_percent_with_two_digits(fraction: float, text: str) -> None:
+    assert fraction_text(fraction) == text

@@ -23,9 +23,9 @@ from experiments.robot.bench_robot import (
     disarm,
     face_faults,
     move,
+    reported_by,
     require_hold,
     strides_since,
-    told_by,
     walk,
 )
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
@@ -165,7 +165,7 @@ class Decided:
     def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
         raise AssertionError("no number is wanted")
 
-    def tell(self, sentence: str) -> None: ...
+    def report(self, message: str) -> None: ...
 
 
 @pytest.fixture
@@ -179,10 +179,10 @@ def faulty(robot: LockstepRobot) -> LockstepRobot:
 
 
 def test_a_fault_is_cleared_where_a_person_says_so(faulty: LockstepRobot) -> None:
-    person = Decided(CLEAR)
-    arm(faulty, person)
+    operator = Decided(CLEAR)
+    arm(faulty, operator)
     assert faulty.call("status")["mode"] == "hold"
-    (question,) = person.asked
+    (question,) = operator.asked
     assert question.startswith("The robot is in FAULT:\n") and "right_sweep" in question and "(for 4 s)\n" in question
 
 
@@ -201,11 +201,11 @@ def test_where_nobody_is_there_a_fault_stands(faulty: LockstepRobot) -> None:
 def test_a_fault_that_comes_back_is_cleared_three_times_at_most(
     faulty: LockstepRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    call, person = faulty.call, Decided(CLEAR)
+    call, operator = faulty.call, Decided(CLEAR)
     monkeypatch.setattr(faulty, "call", lambda method, **params: None if method == "clear" else call(method, **params))
     with pytest.raises(BenchError, match="the fault comes back: The robot is in FAULT"):
-        face_faults(faulty, person)
-    assert len(person.asked) == 3
+        face_faults(faulty, operator)
+    assert len(operator.asked) == 3
 
 
 def test_of_what_is_over_by_itself_nobody_is_asked(robot: LockstepRobot) -> None:
@@ -213,9 +213,9 @@ def test_of_what_is_over_by_itself_nobody_is_asked(robot: LockstepRobot) -> None
     robot.lockstep.fail("left_sweep.position", "off", 2.0)
     robot.wait(1.9)
     assert any(fault["blocks_arming"] for fault in robot.call("status")["faults"])
-    person = Decided(LEAVE)
-    arm(robot, person)
-    assert person.asked == [] and robot.call("status")["mode"] == "hold"
+    operator = Decided(LEAVE)
+    arm(robot, operator)
+    assert operator.asked == [] and robot.call("status")["mode"] == "hold"
 
 
 @pytest.mark.parametrize(("kept", "whole"), [(45, True), (44, False), (10, False)])
@@ -223,8 +223,8 @@ def test_strides_that_the_daemon_no_longer_keeps_are_not_passed_over(
     robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch, kept: int, whole: bool
 ) -> None:
     strides = [{"number": number} for number in range(5, 50)][-kept:]
-    tell = lambda method, since: [stride for stride in strides if stride["number"] >= since][:20]  # noqa: E731
-    monkeypatch.setattr(robot, "call", tell)
+    report = lambda method, since: [stride for stride in strides if stride["number"] >= since][:20]  # noqa: E731
+    monkeypatch.setattr(robot, "call", report)
     if whole:
         assert strides_since(robot, 5) == strides
     else:
@@ -247,6 +247,6 @@ def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) 
         ("fault", "", "The left_sweep joint moves."),
     ],
 )
-def test_why_a_robot_stopped_is_told_by_its_cause(mode: str, notice: str, told: str) -> None:
+def test_why_a_robot_stopped_is_told_by_its_cause(mode: str, notice: str, reported: str) -> None:
     fault = {"sentence": "The left_sweep joint moves."}
-    assert told_by({"mode": mode, "notice": notice, "fault": fault}) == told
+    assert reported_by({"mode": mode, "notice": notice, "fault": fault}) == reported

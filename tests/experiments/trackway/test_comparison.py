@@ -22,8 +22,8 @@ from simulation.mud.track import paper_track
 NAMES = list(MUDS)
 
 
-def stride(mud: str, place_m: float = 0.0, step_m: float = 0.12, duration_s: float = 2.0) -> WalkedStride:
-    return WalkedStride(mud, place_m, 0.03, step_m, duration_s, 0.0)
+def stride(mud: str, position_m: float = 0.0, step_m: float = 0.12, duration_s: float = 2.0) -> WalkedStride:
+    return WalkedStride(mud, position_m, 0.03, step_m, duration_s, 0.0)
 
 
 # the plan
@@ -117,7 +117,7 @@ def test_the_best_constant_depth_stands_beside_it_with_the_share_of_it() -> None
 def test_only_fixed_depths_are_judged_by_the_papers_sd() -> None:
     report = made_up()
     assert report["within_one_sd"] == {
-        rule: {mud: abs(6.0 - told.mean) <= told.sd for mud, told in PAPER_TABLE[rule].items()}
+        rule: {mud: abs(6.0 - reported.mean) <= reported.sd for mud, reported in PAPER_TABLE[rule].items()}
         for rule in ("3 cm", "5 cm")
     }
     assert report["within_one_sd"]["5 cm"] == {"48.5": False, "53.1": True, "45.3": False}

@@ -35,8 +35,8 @@ class LoggedWalks(NamedTuple):
     configuration: Configuration
 
 
-def mud_at(place_m: float) -> str:
-    return TRACK.clay_at(place_m).name
+def mud_at(position_m: float) -> str:
+    return TRACK.clay_at(position_m).name
 
 
 @pytest.fixture(scope="module")
@@ -61,13 +61,13 @@ def walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration
 
 
 def test_the_log_tells_the_strides_that_the_plant_made(walks: LoggedWalks) -> None:
-    told = walked_strides(walks.log, walks.configuration, mud_at)
-    assert len(told) == len(walks.truth) == 10
-    for stride, true in zip(told, walks.truth, strict=True):
+    reported = walked_strides(walks.log, walks.configuration, mud_at)
+    assert len(reported) == len(walks.truth) == 10
+    for stride, true in zip(reported, walks.truth, strict=True):
         assert (stride.mud, stride.depth_m, stride.recovered) == (true.mud, true.depth_m, true.recovered)
         assert stride.step_m == pytest.approx(true.step_m, abs=1e-9)
         assert stride.duration_s == pytest.approx(true.duration_s, abs=1e-9)
-        assert stride.place_m == pytest.approx(true.place_m, abs=1e-3)  # a joint angle is 1 ms old
+        assert stride.position_m == pytest.approx(true.position_m, abs=1e-3)  # a joint angle is 1 ms old
         assert stride.pushed_back_m == pytest.approx(true.pushed_back_m, abs=1e-9)
         assert stride.failure(ARM_M) == true.failure(ARM_M)
 
@@ -89,47 +89,47 @@ def made_log(strides: Sequence[int], phases: Sequence[Phase], body_m: Sequence[f
 
 PHASES = (Phase.REST, Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING, Phase.INSERTION, Phase.STANCE)
 STRIDES = (-1, 0, 0, 0, 0, 1, 1)
-PLACES_M = (0.00, 0.02, 0.11, 0.08, 0.10, 0.11, 0.15)  # of the same ticks
+POSITIONS_M = (0.00, 0.02, 0.11, 0.08, 0.10, 0.11, 0.15)  # of the same ticks
 
 
 def one_stride(configuration: Configuration, body_m: Sequence[float], mode: Mode = Mode.WALKING) -> WalkedStride:
-    (stride,) = walked_strides(made_log(STRIDES, PHASES, body_m, mode), configuration, lambda place_m: "mud")
+    (stride,) = walked_strides(made_log(STRIDES, PHASES, body_m, mode), configuration, lambda position_m: "mud")
     return stride
 
 
 def test_a_stride_goes_from_one_insertion_to_the_next(configuration: Configuration) -> None:
     """A row names the target of the tick before it: the insertions begin in the first and in the fifth row."""
-    stride = one_stride(configuration, PLACES_M)
-    assert (stride.mud, stride.place_m, stride.depth_m, stride.recovered) == ("mud", 0.0, 0.03, False)
+    stride = one_stride(configuration, POSITIONS_M)
+    assert (stride.mud, stride.position_m, stride.depth_m, stride.recovered) == ("mud", 0.0, 0.03, False)
     assert (stride.step_m, stride.duration_s, stride.pushed_back_m) == pytest.approx((0.10, 0.4, 0.03))
 
 
 def test_a_stride_whose_ends_were_not_seen_has_no_length_and_no_mud(configuration: Configuration) -> None:
-    unseen = one_stride(configuration, (nan, *PLACES_M[1:]))
-    assert isnan(unseen.step_m) and isnan(unseen.place_m) and unseen.mud == ""
+    unseen = one_stride(configuration, (nan, *POSITIONS_M[1:]))
+    assert isnan(unseen.step_m) and isnan(unseen.position_m) and unseen.mud == ""
     assert unseen.pushed_back_m == pytest.approx(0.03)
-    unseen = one_stride(configuration, (*PLACES_M[:4], nan, *PLACES_M[5:]))
+    unseen = one_stride(configuration, (*POSITIONS_M[:4], nan, *POSITIONS_M[5:]))
     assert isnan(unseen.step_m) and unseen.mud == "mud"
 
 
 def test_a_way_back_that_may_have_been_missed_is_not_known(configuration: Configuration) -> None:
-    unseen = one_stride(configuration, (*PLACES_M[:3], nan, *PLACES_M[4:]))
+    unseen = one_stride(configuration, (*POSITIONS_M[:3], nan, *POSITIONS_M[4:]))
     assert isnan(unseen.pushed_back_m) and unseen.step_m == pytest.approx(0.10)
 
 
 def test_where_nobody_walks_there_are_no_strides(configuration: Configuration) -> None:
-    assert walked_strides(made_log(STRIDES, PHASES, PLACES_M, Mode.HOLD), configuration, mud_at) == []
+    assert walked_strides(made_log(STRIDES, PHASES, POSITIONS_M, Mode.HOLD), configuration, mud_at) == []
     assert walked_strides(made_log((), (), (), Mode.HOLD), configuration, mud_at) == []
 
 
 def test_a_stride_of_which_the_end_was_lost_is_not_told(configuration: Configuration) -> None:
-    log = made_log((-1, 0, 0, 0, 0, 2, 2), PHASES, PLACES_M, Mode.WALKING)
+    log = made_log((-1, 0, 0, 0, 0, 2, 2), PHASES, POSITIONS_M, Mode.WALKING)
     assert walked_strides(log, configuration, mud_at) == []
 
 
 def test_a_recovery_is_told(configuration: Configuration) -> None:
     phases = (*PHASES[:4], Phase.RECOVERY, *PHASES[5:])
-    (stride,) = walked_strides(made_log(STRIDES, phases, PLACES_M, Mode.WALKING), configuration, mud_at)
+    (stride,) = walked_strides(made_log(STRIDES, phases, POSITIONS_M, Mode.WALKING), configuration, mud_at)
     assert stride.recovered and stride.failure(ARM_M) in (RECOVERED, EXTRACTION)
 
 
@@ -146,8 +146,8 @@ def test_drop_outs_of_motion_capture_cost_strides_but_never_invent_one(
         lockstep.step()
         record.look()
     assert recorder.close(20.0)
-    told = walked_strides(read_log(tmp_path / "walk.mcap"), configuration, mud_at)
-    assert len(told) == 8
-    known = [(each, true) for each, true in zip(told, record.strides, strict=False) if not isnan(each.step_m)]
+    reported = walked_strides(read_log(tmp_path / "walk.mcap"), configuration, mud_at)
+    assert len(reported) == 8
+    known = [(each, true) for each, true in zip(reported, record.strides, strict=False) if not isnan(each.step_m)]
     assert 2 <= len(known) <= 7
     assert all(abs(each.step_m - true.step_m) < 0.003 for each, true in known)

@@ -63,7 +63,7 @@ def made_up_world(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_it_is_fitted_to_the_six_fixed_cells_and_no_adaptive_one() -> None:
-    assert {(mud, depth_m): told for mud, row in TARGETS.items() for depth_m, told in row.items()} == {
+    assert {(mud, depth_m): reported for mud, row in TARGETS.items() for depth_m, reported in row.items()} == {
         (mud, depth_m): PAPER_TABLE[rule][mud] for mud in MUDS for rule, depth_m in (("3 cm", 0.03), ("5 cm", 0.05))
     }
 
@@ -144,8 +144,8 @@ def test_more_damping_is_slower() -> None:
 
 def test_speeds_are_means_over_seeds_by_ground_and_depth() -> None:
     ground = Ground(6.0, 2800.0)
-    told = walk_on([ground, ground], Plan(seeds=2, strides=2), lambda done, total: None)
-    assert list(told) == [ground]
+    reported = walk_on([ground, ground], Plan(seeds=2, strides=2), lambda done, total: None)
+    assert list(reported) == [ground]
     alone = [fixed_speed_cm_s(ground, 0.05, seed, strides=2) for seed in (1, 2)]
-    assert told[ground][0.05] == pytest.approx(sum(alone) / 2.0)
-    assert set(told[ground]) == {0.03, 0.05}
+    assert reported[ground][0.05] == pytest.approx(sum(alone) / 2.0)
+    assert set(reported[ground]) == {0.03, 0.05}

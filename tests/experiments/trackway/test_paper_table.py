@@ -9,7 +9,7 @@ from simulation.mud.clay import MUDS
 
 
 def test_table_one_is_the_papers() -> None:
-    assert {rule: [tuple(told) for told in row.values()] for rule, row in PAPER_TABLE.items()} == {
+    assert {rule: [tuple(reported) for reported in row.values()] for rule, row in PAPER_TABLE.items()} == {
         "3 cm": [(7.6, 0.5), (2.1, 0.8), (7.2, 0.5)],
         "5 cm": [(6.6, 0.3), (5.5, 0.7), (3.0, 1.0)],
         "adaptive": [(6.4, 0.4), (5.1, 0.3), (7.2, 0.1)],
@@ -29,5 +29,7 @@ def test_fixed_depths_are_named_by_their_depth() -> None:
 
 
 def test_the_adaptive_mean_is_the_6_2_of_the_papers_text() -> None:
-    assert fmean(told.mean for told in PAPER_TABLE[ADAPTIVE].values()) == pytest.approx(6.2, abs=0.05)  # rounding
+    assert fmean(reported.mean for reported in PAPER_TABLE[ADAPTIVE].values()) == pytest.approx(
+        6.2, abs=0.05
+    )  # rounding
     assert Speed(2.1, 0.8) == PAPER_TABLE["3 cm"]["53.1"]

@@ -12,8 +12,15 @@ from experiments.trackway.plots import plot_sweep, plot_trackway
 MUDS = ("48.5", "53.1")
 
 
-def stride(mud: str, place_cm: float, failure: str = "") -> dict[str, Any]:
-    return {"mud": mud, "place_cm": place_cm, "depth_cm": 3.0, "step_cm": 11.0, "duration_s": 1.6, "failure": failure}
+def stride(mud: str, position_cm: float, failure: str = "") -> dict[str, Any]:
+    return {
+        "mud": mud,
+        "place_cm": position_cm,
+        "depth_cm": 3.0,
+        "step_cm": 11.0,
+        "duration_s": 1.6,
+        "failure": failure,
+    }
 
 
 def trackway(*rules: str, mean: float | None = 6.0) -> dict[str, Any]:

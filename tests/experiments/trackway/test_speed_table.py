@@ -20,16 +20,16 @@ def walked(*steps_m: float) -> Walk:
 
 
 def test_the_first_two_strides_in_a_mud_count_for_one_of_the_means_only() -> None:
-    told = cell([walked(0.02, 0.04, 0.10, 0.12)], "a", ARM_M)
-    assert told["mean"] == pytest.approx(22.0 / 4.0)
-    assert told["mean_all"] == pytest.approx(28.0 / 8.0)
-    assert (told["trials"], told["short_trials"], told["strides"]) == (1, 0, 4)
+    reported = cell([walked(0.02, 0.04, 0.10, 0.12)], "a", ARM_M)
+    assert reported["mean"] == pytest.approx(22.0 / 4.0)
+    assert reported["mean_all"] == pytest.approx(28.0 / 8.0)
+    assert (reported["trials"], reported["short_trials"], reported["strides"]) == (1, 0, 4)
 
 
 def test_sd_is_that_between_trials() -> None:
-    told = cell([walked(0.0, 0.0, 0.10), walked(0.0, 0.0, 0.12), walked(0.0, 0.0, 0.14)], "a", ARM_M)
-    assert (told["mean"], told["sd"]) == (6.0, 1.0)
-    assert (told["mean_all"], told["sd_all"]) == (2.0, pytest.approx(1.0 / 3.0, abs=0.001))  # rounded
+    reported = cell([walked(0.0, 0.0, 0.10), walked(0.0, 0.0, 0.12), walked(0.0, 0.0, 0.14)], "a", ARM_M)
+    assert (reported["mean"], reported["sd"]) == (6.0, 1.0)
+    assert (reported["mean_all"], reported["sd_all"]) == (2.0, pytest.approx(1.0 / 3.0, abs=0.001))  # rounded
 
 
 def test_one_trial_has_no_sd() -> None:
@@ -37,10 +37,10 @@ def test_one_trial_has_no_sd() -> None:
 
 
 def test_a_trial_of_two_strides_counts_with_both_and_is_told() -> None:
-    told = cell([walked(0.10, 0.06), walked(0.0, 0.0, 0.12)], "a", ARM_M)
-    assert told["short_trials"] == 1
-    assert told["mean"] == pytest.approx((4.0 + 6.0) / 2.0)
-    assert told["failures_after_second"] == {}
+    reported = cell([walked(0.10, 0.06), walked(0.0, 0.0, 0.12)], "a", ARM_M)
+    assert reported["short_trials"] == 1
+    assert reported["mean"] == pytest.approx((4.0 + 6.0) / 2.0)
+    assert reported["failures_after_second"] == {}
 
 
 def test_other_muds_do_not_count_and_the_second_stride_is_that_in_the_mud() -> None:
@@ -50,16 +50,22 @@ def test_other_muds_do_not_count_and_the_second_stride_is_that_in_the_mud() -> N
 
 def test_failures_are_counted_by_name_in_all_strides_and_after_the_second() -> None:
     held = stride(0.01, pushed_back_m=0.05)
-    told = cell([Walk([held, held, held, stride(0.05), stride(0.12)], "")] * 2, "a", ARM_M)
-    assert told["failures"] == {"extraction": 6, "slippage": 2}
-    assert told["failures_after_second"] == {"extraction": 2, "slippage": 2}
+    reported = cell([Walk([held, held, held, stride(0.05), stride(0.12)], "")] * 2, "a", ARM_M)
+    assert reported["failures"] == {"extraction": 6, "slippage": 2}
+    assert reported["failures_after_second"] == {"extraction": 2, "slippage": 2}
 
 
 def test_a_mud_that_no_trial_reached_has_no_speed() -> None:
-    told = cell([walked(0.1)], "b", ARM_M)
-    assert (told["mean"], told["mean_all"], told["sd"], told["trials"], told["failures"]) == (None, None, None, 0, {})
+    reported = cell([walked(0.1)], "b", ARM_M)
+    assert (reported["mean"], reported["mean_all"], reported["sd"], reported["trials"], reported["failures"]) == (
+        None,
+        None,
+        None,
+        0,
+        {},
+    )
     assert within_one_sd(None, Speed(7.6, 0.5)) is None
-    assert mean_over_muds({"a": {"mean": 5.0}, "b": told}, "mean") is None
+    assert mean_over_muds({"a": {"mean": 5.0}, "b": reported}, "mean") is None
 
 
 @pytest.mark.parametrize(("mean", "inside"), [(7.1, True), (8.1, True), (7.0, False), (8.2, False)])

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.scripted_operator import ScriptedOperator
 
 from command_line.experiments.trackway import trackway_text
 from control.modes import Mode
@@ -25,8 +26,8 @@ from experiments.trackway.trials import (
     Progress,
     first_walks,
     report_of,
+    reported_of,
     run,
-    told_of,
     walk_over,
 )
 from experiments.trackway.walk import StrideRecord, Walk, WalkedStride
@@ -38,7 +39,6 @@ from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParame
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
-from tests.scripted_person import ScriptedPerson
 
 SHORT = Plan((Mud("48.5", 0.3), Mud("53.1", 0.3)), trials=1, depths_m=(0.03,))
 TINY = Plan((Mud("48.5", 0.15),), trials=1, depths_m=(0.03,))
@@ -50,7 +50,7 @@ class SimulatedTrackway:
     def __init__(self, folder: Path, verdicts: Iterator[str], capture: MotionCaptureParameters = AT_EVERY_TICK) -> None:
         self.folder, self.verdicts, self.capture = folder, verdicts, capture
         self.prepared: list[str] = []
-        self.told: list[str] = []
+        self.reported: list[str] = []
         self.truth: list[StrideRecord] = []
 
     def prepare(self, trial: str) -> LockstepRobot:
@@ -62,8 +62,8 @@ class SimulatedTrackway:
         self.truth.append(StrideRecord(lockstep, track))
         return WatchedRobot(lockstep, recorder, self.truth[-1])
 
-    def judge(self, told: str, stopped: bool) -> str:
-        self.told.append(told)
+    def evaluate(self, reported: str, stopped: bool) -> str:
+        self.reported.append(reported)
         return next(self.verdicts)
 
 
@@ -80,7 +80,7 @@ class WatchedRobot(LockstepRobot):
             self._truth.look()
 
 
-class Leveller(ScriptedPerson):
+class Leveller(ScriptedOperator):
     """Looks whether the robot could move while hands are in the mud."""
 
     def __init__(self, robot: LockstepRobot) -> None:
@@ -95,9 +95,9 @@ class Leveller(ScriptedPerson):
 def test_torque_is_off_while_a_person_levels_mud_whatever_the_robot_did_before(tmp_path: Path) -> None:
     robot = SimulatedTrackway(tmp_path, always(GO_ON)).prepare("any")
     arm(robot)
-    person = Leveller(robot)
-    AskedTrackway(robot, person).prepare("3 cm, trial 1 of 3")
-    assert person.asked == [
+    operator = Leveller(robot)
+    AskedTrackway(robot, operator).prepare("3 cm, trial 1 of 3")
+    assert operator.asked == [
         "3 cm, trial 1 of 3. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud."
         " Take the hands away: the robot walks next"
     ]
@@ -117,12 +117,12 @@ def test_the_table_of_the_log_is_that_of_the_plant(tmp_path: Path) -> None:
     trackway = SimulatedTrackway(tmp_path, always(GO_ON))
     report = run(SHORT, trackway, Notebook(tmp_path, {}), unseen)
     assert trackway.prepared == ["3 cm, trial 1 of 1", "adaptive, trial 1 of 1"]
-    assert [told.partition(": ")[0] for told in trackway.told] == trackway.prepared
+    assert [reported.partition(": ")[0] for reported in trackway.reported] == trackway.prepared
     assert {tuple(ends) for ends in report["ends"].values()} == {("past the end",)}
     for rule, record in zip(("3 cm", "adaptive"), trackway.truth, strict=True):
-        told, true = report["walks"][rule][0], [stride for stride in record.strides if stride.place_m < 0.6]
-        assert len(told) == len(true) >= 5
-        for stride, truth in zip(told, true, strict=True):
+        reported, true = report["walks"][rule][0], [stride for stride in record.strides if stride.position_m < 0.6]
+        assert len(reported) == len(true) >= 5
+        for stride, truth in zip(reported, true, strict=True):
             assert stride["mud"] == truth.mud
             assert stride["step_cm"] == pytest.approx(100.0 * truth.step_m, abs=0.05)
             assert stride["duration_s"] == pytest.approx(truth.duration_s, abs=0.01)
@@ -171,8 +171,8 @@ def test_strides_of_which_the_pose_was_lost_are_told_and_not_counted(tmp_path: P
 @pytest.mark.parametrize(
     ("place_m", "mud"), [(-0.1, "48.5"), (0.0, "48.5"), (0.299, "48.5"), (0.3, "53.1"), (0.6, ""), (9.0, "")]
 )
-def test_a_mud_reaches_from_its_border_to_the_next(place_m: float, mud: str) -> None:
-    assert SHORT.mud_at(place_m) == mud
+def test_a_mud_reaches_from_its_border_to_the_next(position_m: float, mud: str) -> None:
+    assert SHORT.mud_at(position_m) == mud
 
 
 class DoubtedRobot(WatchedRobot):
@@ -217,9 +217,9 @@ def test_a_pose_of_the_wrong_sign_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("asked", "told"), [("stop", "told to stop"), ("disarm", "torque was switched off")])
-def test_what_somebody_else_asks_for_is_no_end_of_the_trackway(tmp_path: Path, asked: str, told: str) -> None:
+def test_what_somebody_else_asks_for_is_no_end_of_the_trackway(tmp_path: Path, asked: str, reported: str) -> None:
     walk, _ = doubted_walk(tmp_path, lambda now_s, x_m: x_m, (5.0, asked))
-    assert told in walk.fault and walk.stopped
+    assert reported in walk.fault and walk.stopped
 
 
 @pytest.mark.parametrize(
@@ -234,7 +234,7 @@ def test_what_somebody_else_asks_for_is_no_end_of_the_trackway(tmp_path: Path, a
 def test_only_what_ends_by_itself_or_comes_to_nothing_is_not_stopped(
     now_s: float, body_m: float | None, why: str, stopped: bool
 ) -> None:
-    end = Progress(SHORT, 0.0, 0.0).judge({"now_s": now_s, "body_x_m": body_m, "phase": "insertion"})
+    end = Progress(SHORT, 0.0, 0.0).evaluate({"now_s": now_s, "body_x_m": body_m, "phase": "insertion"})
     assert end and end.why.startswith(why) and end.stopped is stopped
 
 
@@ -242,7 +242,7 @@ def test_only_what_ends_by_itself_or_comes_to_nothing_is_not_stopped(
 def test_a_walk_that_was_stopped_is_walked_again_unless_a_person_says_otherwise(stopped: bool, tmp_path: Path) -> None:
     robot = SimulatedTrackway(tmp_path, always(GO_ON)).prepare("one")
     verdicts = {
-        answer: AskedTrackway(robot, ScriptedPerson(answer)).judge("one", stopped)
+        answer: AskedTrackway(robot, ScriptedOperator(answer)).evaluate("one", stopped)
         for answer in (GO_ON, SKIP, KEEP if stopped else REDO)
     }
     robot.close()
@@ -251,8 +251,8 @@ def test_a_walk_that_was_stopped_is_walked_again_unless_a_person_says_otherwise(
 
 def test_a_trial_of_one_stride_is_told_in_the_singular() -> None:
     stride = WalkedStride("48.5", 0.0, 0.03, 0.1, 2.0, 0.0)
-    assert told_of("3 cm, trial 1", Walk([stride], "")) == "3 cm, trial 1: 1 stride, 5.0 cm/s"
-    assert told_of("3 cm, trial 1", Walk([stride, stride], "")).startswith("3 cm, trial 1: 2 strides, ")
+    assert reported_of("3 cm, trial 1", Walk([stride], "")) == "3 cm, trial 1: 1 stride, 5.0 cm/s"
+    assert reported_of("3 cm, trial 1", Walk([stride, stride], "")).startswith("3 cm, trial 1: 2 strides, ")
 
 
 def test_a_table_of_which_everything_was_left_out_is_still_one(tmp_path: Path) -> None:

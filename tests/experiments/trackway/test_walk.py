@@ -97,7 +97,7 @@ def test_a_stride_lasts_from_one_insertion_to_the_next() -> None:
     (first,) = made_up.record.strides
     assert first.step_m == pytest.approx(0.08)
     assert first.duration_s == pytest.approx(0.3)
-    assert first.place_m == pytest.approx(0.02 + ARM_M * sin(radians(30.0)))
+    assert first.position_m == pytest.approx(0.02 + ARM_M * sin(radians(30.0)))
     assert (first.mud, first.depth_m) == ("firm", 0.03)
     made_up.live(2, Phase.INSERTION, 0.20)
     assert (made_up.record.strides[1].mud, made_up.record.strides[1].depth_m) == ("soft", 0.04)
@@ -136,7 +136,7 @@ def test_a_record_that_was_reset_has_no_strides() -> None:
 def walked(depth_m: float, strength_pa: float, strides: int = 3) -> Walk:
     track = Track([(100.0, Clay("mud", strength_pa))])
     rule = constant_depth(depth_m)
-    return walk(configuration_for(rule), track, rule.order, 1, lambda told: len(told) >= strides)
+    return walk(configuration_for(rule), track, rule.order, 1, lambda reported: len(reported) >= strides)
 
 
 def test_a_walk_is_as_long_as_it_was_asked_to_be_and_deterministic() -> None:
@@ -149,7 +149,7 @@ def test_a_walk_is_as_long_as_it_was_asked_to_be_and_deterministic() -> None:
 def test_strides_join_without_gaps() -> None:
     """The next place is this one and the step: the arms stand at the front of their sweep in both."""
     before, after = walked(0.03, 3000.0).strides[1:]
-    assert after.place_m - before.place_m == pytest.approx(before.step_m, abs=0.002)  # the servo's give
+    assert after.position_m - before.position_m == pytest.approx(before.step_m, abs=0.002)  # the servo's give
 
 
 def test_firm_mud_carries_soft_mud_slips_and_deep_flippers_are_held() -> None:

@@ -18,7 +18,7 @@ from control.geometry import FlipperGeometry
 from estimation.mud import EstimationParameters
 from experiments.trials.load_cell_truth import (
     PAPER_SPEED_M_S,
-    REVERSAL_SHARE,
+    REVERSAL_FRACTION,
     LoadCellTruth,
     TrueCoefficients,
     load_cell_truth,
@@ -80,19 +80,19 @@ def test_penetration_of_an_upright_plate_is_bearing_and_adhesion(depth_m: float,
     """To 1 %: along the plate mud yields after a millimetre, in which it bears less."""
     z = np.linspace(0.0, depth_m, 2001)
     forces_n = rate_factor(SPEED_M_S) * clay.strength_pa * (BEARING_FACTOR * EDGE_M2 + ADHESION * GIRTH_M * z)
-    told = truth(stride(clay, insertion=stroke(deepest_m=depth_m)))
-    assert told.upright.k_p == pytest.approx(slope(z, forces_n), rel=0.01)
+    reported = truth(stride(clay, insertion=stroke(deepest_m=depth_m)))
+    assert reported.upright.k_p == pytest.approx(slope(z, forces_n), rel=0.01)
 
 
 @pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(51.2)])
 @pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.05])
 def test_extraction_of_an_upright_plate_is_suction_and_adhesion(depth_m: float, clay: Clay) -> None:
     """To 0.2 %, steps of the carrier: over the last three quarters all mud has turned."""
-    z = np.linspace(0.0, (1.0 - REVERSAL_SHARE) * depth_m, 2001)
+    z = np.linspace(0.0, (1.0 - REVERSAL_FRACTION) * depth_m, 2001)
     suction = DEEP_FACTOR * EDGE_M2 * np.minimum(z / SUCTION_FADE_M, 1.0)
     forces_n = rate_factor(SPEED_M_S) * clay.strength_pa * (suction + ADHESION * GIRTH_M * z)
-    told = truth(stride(clay, extraction=stroke(deepest_m=depth_m)))
-    assert told.upright.k_e == pytest.approx(slope(z, forces_n), rel=2e-3)
+    reported = truth(stride(clay, extraction=stroke(deepest_m=depth_m)))
+    assert reported.upright.k_e == pytest.approx(slope(z, forces_n), rel=2e-3)
 
 
 @pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(51.2)])
@@ -101,8 +101,8 @@ def test_shear_of_an_upright_plate_is_the_pressure_on_its_face(depth_m: float, c
     """To rounding: once it has yielded the mud bears what the clay's sideways law says, at the stance's mean depth."""
     mean_m = 0.9 * depth_m
     force_n = rate_factor(SPEED_M_S) * clay.lateral_n(mean_m, GEOMETRY.plate_width_m)
-    told = truth(stride(clay, stance=stroke(deepest_m=depth_m)))
-    assert told.upright.k_s == pytest.approx(force_n / (GEOMETRY.plate_width_m * mean_m**2 / 2.0), rel=1e-6)
+    reported = truth(stride(clay, stance=stroke(deepest_m=depth_m)))
+    assert reported.upright.k_s == pytest.approx(force_n / (GEOMETRY.plate_width_m * mean_m**2 / 2.0), rel=1e-6)
 
 
 def test_firmer_mud_is_so_in_proportion_along_the_plate() -> None:
@@ -116,10 +116,10 @@ def test_firmer_mud_is_so_in_proportion_along_the_plate() -> None:
 @pytest.mark.parametrize("name", ["insertion", "stance", "extraction"])
 def test_each_coefficient_is_of_its_own_strokes_speed(name: str) -> None:
     slow, quick = (truth(with_stroke(name, stroke(speed_m_s=speed_m_s))).upright for speed_m_s in (0.05, 0.8))
-    grip = rate_factor(0.8) / rate_factor(0.05)
+    traction = rate_factor(0.8) / rate_factor(0.05)
     ratios = [b / a for a, b in zip(slow, quick, strict=True)]
     place = ("insertion", "stance", "extraction").index(name)
-    assert ratios.pop(place) == pytest.approx(grip, rel=0.01)  # the carrier's steps
+    assert ratios.pop(place) == pytest.approx(traction, rel=0.01)  # the carrier's steps
     assert ratios == [1.0, 1.0]
 
 
@@ -158,25 +158,25 @@ def arc_row(depth_m: float) -> tuple[float, float]:
 @pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.045])
 def test_along_the_flippers_arc_penetration_is_of_edge_sides_and_adhesion(depth_m: float) -> None:
     """To 2 %: mud yields after a millimetre. At no depth is the load of the face in it."""
-    told = truth(stride(insertion=leaning(depth_m))).leaning.k_p
+    reported = truth(stride(insertion=leaning(depth_m))).leaning.k_p
     moments_m4, moments_nm = np.array([arc_row(z) for z in np.linspace(0.0005, depth_m, 60)]).T
-    assert told == pytest.approx(moments_m4 @ moments_nm / (moments_m4 @ moments_m4), rel=0.02)
+    assert reported == pytest.approx(moments_m4 @ moments_nm / (moments_m4 @ moments_m4), rel=0.02)
 
 
 @pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(53.1)])
 @pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.04, 0.05])
 def test_at_any_depth_the_flippers_way_and_the_upright_plates_tell_nearly_the_same(depth_m: float, clay: Clay) -> None:
     """Straight down in the mean attitude the leaning plate's face bears a part: at 5 cm k_p was a third more."""
-    told = truth(stride(clay, insertion=leaning(depth_m), extraction=leaning(depth_m)))
-    assert 1.0 < told.leaning.k_p / told.upright.k_p < 1.07
-    assert 0.95 < told.leaning.k_e / told.upright.k_e < 1.0
+    reported = truth(stride(clay, insertion=leaning(depth_m), extraction=leaning(depth_m)))
+    assert 1.0 < reported.leaning.k_p / reported.upright.k_p < 1.07
+    assert 0.95 < reported.leaning.k_e / reported.upright.k_e < 1.0
 
 
 def test_the_surface_may_lie_below_its_nominal_height() -> None:
     """The plate leans more there, and nothing else."""
-    told = [truth(stride(insertion=leaning(), surface_m=surface_m)).leaning.k_p for surface_m in (0.0, 0.003)]
-    assert told[1] == pytest.approx(told[0], rel=0.02)
-    assert told[1] != told[0]
+    reported = [truth(stride(insertion=leaning(), surface_m=surface_m)).leaning.k_p for surface_m in (0.0, 0.003)]
+    assert reported[1] == pytest.approx(reported[0], rel=0.02)
+    assert reported[1] != reported[0]
 
 
 @pytest.mark.parametrize("depth_m", [0.03, 0.05])
@@ -184,9 +184,9 @@ def test_what_a_walk_says_of_k_p_holds_the_truth_at_any_depth(depth_m: float) ->
     setup = replace(WALKING, row_period_s=0.0, depth_m=depth_m)
     walk = run_trial(setup, Track([(10.0, clay_of_water(53.1))]), NONE, 2, 1)
     truths = {(each.flipper, each.index): truth(each).leaning.k_p for each in walk.truths}
-    told = strides_of(walk, EstimationParameters())
-    assert len(told) == 4
-    for each in told:
+    reported = strides_of(walk, EstimationParameters())
+    assert len(reported) == 4
+    for each in reported:
         assert abs(each.k_p.value - truths[each.flipper, each.index]) < 1.96 * each.k_p.std_error
 
 
@@ -203,9 +203,9 @@ def test_in_stance_the_plate_is_square_to_its_way() -> None:
 @pytest.mark.parametrize(("name", "place"), [("insertion", 0), ("stance", 1), ("extraction", 2)])
 @pytest.mark.parametrize("gone", [NEVER, stroke(deepest_m=0.0), stroke(deepest_m=-0.01)])
 def test_a_stroke_that_did_not_happen_has_no_coefficient(name: str, place: int, gone: StrokeTruth) -> None:
-    for told in truth(with_stroke(name, gone)):
-        assert isinstance(told, TrueCoefficients)
-        assert [isfinite(k) for k in told] == [i != place for i in range(3)]
+    for reported in truth(with_stroke(name, gone)):
+        assert isinstance(reported, TrueCoefficients)
+        assert [isfinite(k) for k in reported] == [i != place for i in range(3)]
 
 
 def test_a_plate_that_never_slipped_is_dragged_at_the_papers_speed() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.scripted_operator import ScriptedOperator
 
 from experiments.robot.bench_errors import EndedError
 from experiments.robot.bench_robot import CLEAR, LEAVE, BenchError, leave
@@ -13,16 +14,15 @@ from experiments.robot.prompt import GO_ON, REDO, SKIP
 from experiments.trials.mud_trials import (
     KEEP,
     Bench,
+    InvalidTrialError,
     PlannedTrial,
     PromptedBed,
-    SpoiltTrialError,
     Truths,
     conduct_trials,
     measured_of,
 )
 from experiments.trials.notebook import Entry, Notebook
 from tests.experiments.still_robot import StillRobot
-from tests.scripted_person import ScriptedPerson
 
 TRIALS = [PlannedTrial(f"47.6/{number}", "47.6", number, 3) for number in (1, 2, 3)]
 PLAN = {"experiment": "made up"}
@@ -44,8 +44,8 @@ class AskedRobot(StillRobot):
         if method in ("disarm", "stop"):
             self.mode = "idle"
         self.blocked = self.blocked and method != "clear"
-        told = {"sentence": "A drive is silent.", "for_s": 150.0, "what_to_do": "check it", "blocks_arming": True}
-        faults = [told] if self.blocked else []
+        reported = {"sentence": "A drive is silent.", "for_s": 150.0, "what_to_do": "check it", "blocks_arming": True}
+        faults = [reported] if self.blocked else []
         return {"mode": self.mode, "now_s": self.now_s, "faults": faults} if method == "status" else "accepted"
 
 
@@ -65,10 +65,10 @@ class ScriptedBed:
 class Session:
     """A bench of these, and measurements that come as they are told."""
 
-    def __init__(self, folder: Path, person: ScriptedPerson | None = None, bed: ScriptedBed | None = None) -> None:
-        self.robot, self.person, self.bed = AskedRobot(), person or ScriptedPerson(), bed or ScriptedBed()
+    def __init__(self, folder: Path, operator: ScriptedOperator | None = None, bed: ScriptedBed | None = None) -> None:
+        self.robot, self.operator, self.bed = AskedRobot(), operator or ScriptedOperator(), bed or ScriptedBed()
         self.notebook = Notebook(folder, PLAN)
-        self.bench = Bench(self.robot, self.bed, self.person, self.notebook)
+        self.bench = Bench(self.robot, self.bed, self.operator, self.notebook)
         self.measured: list[str] = []
         self.outcomes: list[Entry | BaseException] = []
         self.shown: list[tuple[int, int]] = []
@@ -129,37 +129,37 @@ def test_the_last_trial_can_be_measured_again(tmp_path: Path) -> None:
 def test_before_the_first_there_is_none_to_measure_again(tmp_path: Path) -> None:
     session = Session(tmp_path, bed=ScriptedBed(REDO)).conduct()
     assert session.measured == ALL
-    assert "nothing was measured" in session.person.told[0]
+    assert "nothing was measured" in session.operator.reported[0]
 
 
 def test_a_fault_is_told_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> None:
     session = Session(tmp_path)
     session.outcomes = [BenchError("the walk ended early: a drive is silent.")]
     session.conduct()
-    assert session.person.asked == ["47.6 %, trial 1 of 3 went wrong: the walk ended early: a drive is silent."]
+    assert session.operator.asked == ["47.6 %, trial 1 of 3 went wrong: the walk ended early: a drive is silent."]
     assert session.bed.prepared == session.measured == [ALL[0], *ALL]
 
 
 @pytest.mark.parametrize("answer", [CLEAR, LEAVE])
 def test_before_a_person_levels_mud_they_judge_the_fault_that_stands(tmp_path: Path, answer: str) -> None:
-    robot, person = AskedRobot(), ScriptedPerson(answer)
+    robot, operator = AskedRobot(), ScriptedOperator(answer)
     robot.blocked = True
-    bed = PromptedBed(robot, person, lambda trial: "Level it")
+    bed = PromptedBed(robot, operator, lambda trial: "Level it")
     if answer == CLEAR:
         assert bed.prepare(TRIALS[0]) == GO_ON
     else:
         with pytest.raises(EndedError, match="'mudskipper clear', then the same command again"):
             bed.prepare(TRIALS[0])
-    assert person.asked[0] == (
+    assert operator.asked[0] == (
         "A fault stands:\n  A drive is silent. (for 2 min)\n    -> check it\nTorque stays off until this is cleared."
     )
-    assert robot.called.count("clear") == (answer == CLEAR) and len(person.asked) == 1 + (answer == CLEAR)
+    assert robot.called.count("clear") == (answer == CLEAR) and len(operator.asked) == 1 + (answer == CLEAR)
 
 
 def test_a_trial_that_went_wrong_clears_nothing_by_itself(tmp_path: Path) -> None:
-    session = Session(tmp_path, ScriptedPerson(SKIP))
+    session = Session(tmp_path, ScriptedOperator(SKIP))
     session.robot.blocked = True
-    session.outcomes = [SpoiltTrialError("no mud")]
+    session.outcomes = [InvalidTrialError("no mud")]
     session.conduct()
     assert "clear" not in session.robot.called
 
@@ -169,12 +169,12 @@ def test_a_person_who_ends_the_experiment_is_not_asked_whether_to_repeat(tmp_pat
     session.outcomes = [{"remarks": []}, EndedError("the fault stands")]
     with pytest.raises(EndedError):
         session.conduct()
-    assert session.person.asked == [] and list(session.notebook.entries) == ALL[:1]
+    assert session.operator.asked == [] and list(session.notebook.entries) == ALL[:1]
 
 
 def test_a_spoilt_trial_can_be_left_out(tmp_path: Path) -> None:
-    session = Session(tmp_path, ScriptedPerson(SKIP))
-    session.outcomes = [SpoiltTrialError("no mud")]
+    session = Session(tmp_path, ScriptedOperator(SKIP))
+    session.outcomes = [InvalidTrialError("no mud")]
     session.conduct()
     assert list(measured_of(session.notebook)) == ALL[1:]
     assert session.notebook.left_out[ALL[0]]["why"] == ["no mud"]
@@ -184,8 +184,8 @@ def test_a_spoilt_trial_can_be_left_out(tmp_path: Path) -> None:
 def test_a_worthless_trial_is_repeated_by_enter_and_kept_by_a_key(
     tmp_path: Path, answer: str, measured: list[str]
 ) -> None:
-    session = Session(tmp_path, ScriptedPerson(answer))
-    session.outcomes = [SpoiltTrialError("the base moved by 113 mm", {"remarks": []})]
+    session = Session(tmp_path, ScriptedOperator(answer))
+    session.outcomes = [InvalidTrialError("the base moved by 113 mm", {"remarks": []})]
     assert session.conduct().measured == measured
     kept = ["the base moved by 113 mm"] if answer == KEEP else []
     assert session.notebook.entries[ALL[0]]["remarks"] == kept
@@ -193,31 +193,31 @@ def test_a_worthless_trial_is_repeated_by_enter_and_kept_by_a_key(
 
 def test_a_trial_that_left_nothing_cannot_be_kept(tmp_path: Path) -> None:
     session = Session(tmp_path)
-    session.outcomes = [SpoiltTrialError("no mud")]
+    session.outcomes = [InvalidTrialError("no mud")]
     session.conduct()
-    assert KEEP not in session.person.offered[0]
+    assert KEEP not in session.operator.offered[0]
 
 
 def test_a_robot_that_walks_on_is_stopped_before_anybody_is_asked(tmp_path: Path) -> None:
     session = Session(tmp_path)
     session.robot.mode = "walking"
-    session.outcomes = [SpoiltTrialError("the pose is lost")]
+    session.outcomes = [InvalidTrialError("the pose is lost")]
     session.conduct()
     assert session.robot.called[:2] == ["status", "stop"]
 
 
 @pytest.mark.parametrize(("answer", "kept"), [(REDO, ALL), (SKIP, ALL[1:])])
 def test_a_person_may_go_on_also_after_the_third_time(tmp_path: Path, answer: str, kept: list[str]) -> None:
-    session = Session(tmp_path, ScriptedPerson(GO_ON, GO_ON, answer))
+    session = Session(tmp_path, ScriptedOperator(GO_ON, GO_ON, answer))
     session.outcomes = [BenchError("it was told to stop") for _ in range(3)]
     session.conduct()
-    assert "went wrong 3 times; the last time: it was told to stop." in session.person.asked[-1]
+    assert "went wrong 3 times; the last time: it was told to stop." in session.operator.asked[-1]
     assert list(measured_of(session.notebook)) == kept
 
 
 def test_what_goes_wrong_three_times_ends_where_nobody_wants_it_repeated(tmp_path: Path) -> None:
     session = Session(tmp_path)
-    session.outcomes = [{"remarks": []}, *(SpoiltTrialError("no mud") for _ in range(3))]
+    session.outcomes = [{"remarks": []}, *(InvalidTrialError("no mud") for _ in range(3))]
     with pytest.raises(BenchError, match="trial 2 of 3 went wrong 3 times; the last time: no mud"):
         session.conduct()
     assert list(session.notebook.entries) == ALL[:1]
@@ -225,10 +225,10 @@ def test_what_goes_wrong_three_times_ends_where_nobody_wants_it_repeated(tmp_pat
 
 @pytest.mark.parametrize(("answer", "kept"), [(GO_ON, ALL), (SKIP, ALL[1:]), (REDO, ALL)])
 def test_a_doubtful_trial_counts_as_the_person_says(tmp_path: Path, answer: str, kept: list[str]) -> None:
-    session = Session(tmp_path, ScriptedPerson(answer))
+    session = Session(tmp_path, ScriptedOperator(answer))
     session.outcomes = [{"remarks": ["the base moved by 5.0 mm"]}]
     session.conduct()
-    assert session.person.told == ["47.6 %, trial 1 of 3: the base moved by 5.0 mm"]
+    assert session.operator.reported == ["47.6 %, trial 1 of 3: the base moved by 5.0 mm"]
     assert list(measured_of(session.notebook)) == kept
     assert len(session.measured) == (4 if answer == REDO else 3)
 
@@ -237,8 +237,8 @@ def test_a_robot_that_no_longer_answers_is_left_with_a_word(tmp_path: Path) -> N
     session = Session(tmp_path)
     session.robot.deaf = True
     (tmp_path / "old.mcap").touch()
-    assert leave(session.bench.robot, session.bench.person, tmp_path) == [tmp_path / "old.mcap"]
-    assert session.person.told == ["the daemon does not answer"]
+    assert leave(session.bench.robot, session.bench.operator, tmp_path) == [tmp_path / "old.mcap"]
+    assert session.operator.reported == ["the daemon does not answer"]
     assert session.robot.closed
 
 

@@ -8,26 +8,26 @@ import pytest
 
 from control.modes import Mode
 from control.records import Phase
-from experiments.trials.stride_profile import course_of, course_of_row, course_row, slip_m, thinned
-from experiments.walk.walk_profile import KEPT, walk_course_of, walk_course_of_row, walk_course_row
-from tests.experiments.made_up_strides import make_course, make_log, make_ticks
+from experiments.trials.stride_profile import profile_of, profile_of_row, profile_row, slip_m, thinned
+from experiments.walk.walk_profile import KEPT, walk_profile_of, walk_profile_of_row, walk_profile_row
+from tests.experiments.made_up_strides import make_log, make_profile, make_ticks
 
 STROKE = [Phase.INSERTION] * 30 + [Phase.PAUSE] * 100 + [Phase.STANCE] * 30
 
 
 def test_a_course_is_that_of_the_stride_under_way() -> None:
     log = make_log(make_ticks(STROKE, 0, 0.0), make_ticks(STROKE, 1, 2.0), make_ticks(STROKE, 2, 4.0))
-    course = course_of(log, "right", 2.5)
-    assert len(course.time_s) == len(STROKE)
-    assert course.time_s[0] == 0.0
-    assert course.phase.tolist() == [int(phase) for phase in STROKE]
+    profile = profile_of(log, "right", 2.5)
+    assert len(profile.time_s) == len(STROKE)
+    assert profile.time_s[0] == 0.0
+    assert profile.phase.tolist() == [int(phase) for phase in STROKE]
 
 
 def test_a_course_is_that_of_the_flipper_asked_for() -> None:
     ticks = make_ticks([Phase.INSERTION])
     ticks["force_z_n"] = [[1.0, 2.0]]
     ticks["angle_rad"] = [[0.1, 0.2, 0.3, 0.4]]
-    left, right = (course_of(make_log(ticks), flipper, 0.0) for flipper in ("left", "right"))
+    left, right = (profile_of(make_log(ticks), flipper, 0.0) for flipper in ("left", "right"))
     assert (left.force_z_n[0], left.sweep_rad[0], left.adduction_rad[0]) == (1.0, 0.1, 0.2)
     assert (right.force_z_n[0], right.sweep_rad[0], right.adduction_rad[0]) == (2.0, 0.3, 0.4)
 
@@ -35,17 +35,17 @@ def test_a_course_is_that_of_the_flipper_asked_for() -> None:
 def test_rows_outside_of_a_stride_are_none_of_its_course() -> None:
     raised, held = make_ticks([Phase.REST] * 3, -1), make_ticks([Phase.REST] * 3, 0, 0.5)
     held["mode"] = Mode.HOLD
-    course = course_of(make_log(raised, make_ticks(STROKE, 0, 0.1), held), "left", 0.1)
-    assert len(course.time_s) == len(STROKE)
+    profile = profile_of(make_log(raised, make_ticks(STROKE, 0, 0.1), held), "left", 0.1)
+    assert len(profile.time_s) == len(STROKE)
 
 
 def test_after_the_last_stride_there_is_no_course() -> None:
-    assert len(course_of(make_log(make_ticks(STROKE)), "left", 99.0).time_s) == 0
+    assert len(profile_of(make_log(make_ticks(STROKE)), "left", 99.0).time_s) == 0
 
 
 def test_a_plate_s_slip_is_its_way_back_in_the_world_and_not_on_the_robot() -> None:
     """It sweeps back by 6 cm of 12 while the body comes on by 2, then rests on a body that goes on."""
-    swept = make_course(Phase.STANCE, [30.0, 0.0, 0.0], [0.03] * 3, body_m=[1.0, 1.02, 1.05])
+    swept = make_profile(Phase.STANCE, [30.0, 0.0, 0.0], [0.03] * 3, body_m=[1.0, 1.02, 1.05])
     assert slip_m(swept, 0.12) == pytest.approx(0.04)
     assert slip_m(swept._replace(body_m=np.array([nan, 1.0, 1.02])), 0.12) == 0.0
     assert slip_m(swept._replace(body_m=np.full(3, nan)), 0.12) == 0.0
@@ -53,28 +53,28 @@ def test_a_plate_s_slip_is_its_way_back_in_the_world_and_not_on_the_robot() -> N
 
 
 def test_pauses_are_thinned_more_than_strokes_and_no_phase_is_lost() -> None:
-    course = course_of(make_log(make_ticks(STROKE)), "left", 0.0)
-    thin = thinned(course)
+    profile = profile_of(make_log(make_ticks(STROKE)), "left", 0.0)
+    thin = thinned(profile)
     counts = {phase: int(thin.during(phase).sum()) for phase in (Phase.INSERTION, Phase.PAUSE, Phase.STANCE)}
     assert counts == {Phase.INSERTION: 15, Phase.PAUSE: 6, Phase.STANCE: 15}
     for phase in counts:
-        assert thin.time_s[thin.during(phase)][0] == course.time_s[course.during(phase)][0]
+        assert thin.time_s[thin.during(phase)][0] == profile.time_s[profile.during(phase)][0]
 
 
 def test_a_course_is_the_same_out_of_the_notebook() -> None:
     ticks = make_ticks(STROKE)
     ticks["force_x_n"] = np.nan
-    course = course_of(make_log(ticks), "left", 0.0)
-    read = course_of_row(json.loads(json.dumps(course_row(course))))
-    for column, again in zip(course, read, strict=True):
+    profile = profile_of(make_log(ticks), "left", 0.0)
+    read = profile_of_row(json.loads(json.dumps(profile_row(profile))))
+    for column, again in zip(profile, read, strict=True):
         assert np.allclose(column, again, atol=1e-6, equal_nan=True)
     assert np.isnan(read.force_x_n).all()
 
 
 def test_a_walk_is_thin_and_the_same_out_of_the_notebook() -> None:
     log = make_log(make_ticks(STROKE, 0, 0.0), make_ticks(STROKE, 1, 2.0))
-    course = walk_course_of(log, "left")
-    assert len(course.time_s) == 2 * len(STROKE) // KEPT
-    read = walk_course_of_row(json.loads(json.dumps(walk_course_row(course))))
-    assert np.array_equal(read.phase, course.phase)
-    assert np.allclose(read.time_s, course.time_s)
+    profile = walk_profile_of(log, "left")
+    assert len(profile.time_s) == 2 * len(STROKE) // KEPT
+    read = walk_profile_of_row(json.loads(json.dumps(walk_profile_row(profile))))
+    assert np.array_equal(read.phase, profile.phase)
+    assert np.allclose(read.time_s, profile.time_s)

@@ -151,8 +151,8 @@ def test_estimators_see_the_pose_only_if_they_may() -> None:
 
 
 def test_the_estimators_strides_are_those_of_the_truth() -> None:
-    told = [(stride.flipper, stride.index) for stride in strides_of(trial(), EstimationParameters())]
-    assert told == [(truth.flipper, truth.index) for truth in trial().truths]
+    reported = [(stride.flipper, stride.index) for stride in strides_of(trial(), EstimationParameters())]
+    assert reported == [(truth.flipper, truth.index) for truth in trial().truths]
 
 
 def test_beliefs_are_those_after_each_stride() -> None:
@@ -160,7 +160,7 @@ def test_beliefs_are_those_after_each_stride() -> None:
     estimator = MudEstimator(trial().configuration.geometry, trial().drives, parameters)
     for sample in trial().samples:
         estimator.update(*sample)
-    assert beliefs_of(trial(), parameters) == {0: estimator.belief}
+    assert beliefs_of(trial(), parameters) == {0: estimator.mud_estimate}
 
 
 def test_in_a_walk_both_flippers_read_the_same_of_the_same_mud() -> None:

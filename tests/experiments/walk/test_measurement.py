@@ -10,12 +10,13 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
+from tests.scripted_operator import ScriptedOperator
 
 from experiments.flipper.report import KNOWN_BIAS, WRONG_CONSTANTS
 from experiments.robot.lockstep_robot import LockstepRobot
 from experiments.trackway.trials import Mud, reach_of
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
-from experiments.trials.mud_trials import Bench, SpoiltTrialError
+from experiments.trials.mud_trials import Bench, InvalidTrialError
 from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.simulated_bed import CarriedBed
 from experiments.walk import measurement as walk_mapping
@@ -25,7 +26,6 @@ from experiments.walk.pages import sections_of, text_of
 from experiments.walk.report import placed_strides, report_of, walks_of
 from experiments.walk.simulation import walking_bench
 from tests.experiments.made_up_strides import CONFIGURATION, make_estimate, make_stride
-from tests.scripted_person import ScriptedPerson
 
 SHORT = Plan((Mud("47.6", 0.3), Mud("51.2", 0.3)), trials=1, soft=("51.2",), soft_strides=2, simulated=True)
 TINY = Plan((Mud("47.6", 0.2),), trials=1, simulated=True)
@@ -41,7 +41,7 @@ def measured() -> dict[str, Entry]:
 
 
 def bench_of(folder: Path, plan: Plan) -> Bench:
-    return Bench(*walking_bench(folder, plan, 1), ScriptedPerson(), Notebook(folder, plan.kept))
+    return Bench(*walking_bench(folder, plan, 1), ScriptedOperator(), Notebook(folder, plan.kept))
 
 
 def report(plan: Plan = SHORT, truth: dict[str, dict[str, float]] | None = None) -> dict[str, Any]:
@@ -79,9 +79,9 @@ def test_a_plate_that_slips_back_to_a_border_or_across_it_is_in_no_mud_for_certa
 
 def test_a_walk_that_told_nothing_is_spoilt() -> None:
     nothing = make_estimate(None)
-    with pytest.raises(SpoiltTrialError, match="no stride of the left flipper"):
+    with pytest.raises(InvalidTrialError, match="no stride of the left flipper"):
         require_mud([], "left")
-    with pytest.raises(SpoiltTrialError, match="no stride met mud"):
+    with pytest.raises(InvalidTrialError, match="no stride met mud"):
         require_mud([make_stride(k_p=nothing, k_s=nothing, k_e=nothing)] * 2, "left")
     require_mud([make_stride(k_p=nothing, k_s=nothing)], "left")
 
@@ -99,10 +99,10 @@ def test_every_walk_is_kept_with_all_methods() -> None:
 def test_the_robot_stops_behind_the_last_mud() -> None:
     """Its plates were in both muds, and no stride went down more than a step behind the end."""
     placed = [each for each in placed_strides(SHORT, measured(), CONFIGURATION, None) if each.method == DEFAULT]
-    places_m = [each.plates_m for each in placed]
-    assert places_m == sorted(places_m)
-    assert 0.0 < places_m[0] < 0.1
-    assert SHORT.length_m - 0.13 < places_m[-1] < SHORT.length_m
+    positions_m = [each.plates_m for each in placed]
+    assert positions_m == sorted(positions_m)
+    assert 0.0 < positions_m[0] < 0.1
+    assert SHORT.length_m - 0.13 < positions_m[-1] < SHORT.length_m
     assert {"47.6", "51.2"} <= {each.mud for each in placed}
 
 
@@ -149,23 +149,23 @@ def test_the_papers_findings_stand_beside_ours() -> None:
 
 
 def test_another_load_cells_truth_takes_the_place_of_the_beds() -> None:
-    told = report(truth={"47.6": {"k_p": 2e6}})
-    assert told["muds"][0]["truth"] == {"k_p": 2e6}
-    assert told["muds"][1]["truth"] is None
-    assert told["missing_truth"].endswith("says nothing of 51.2 %.")
-    assert {(row["mud"], row["coefficient"]) for row in told["errors"]} == {("47.6", "k_p")}
+    reported = report(truth={"47.6": {"k_p": 2e6}})
+    assert reported["muds"][0]["truth"] == {"k_p": 2e6}
+    assert reported["muds"][1]["truth"] is None
+    assert reported["missing_truth"].endswith("says nothing of 51.2 %.")
+    assert {(row["mud"], row["coefficient"]) for row in reported["errors"]} == {("47.6", "k_p")}
 
 
 def test_the_report_is_json_with_a_table_and_a_picture_of_everything() -> None:
-    told = json.loads(json.dumps(report()))
-    assert told["experiment"] == "walk"
-    sections = sections_of(told, SHORT, measured(), CONFIGURATION, None)
+    reported = json.loads(json.dumps(report()))
+    assert reported["experiment"] == "walk"
+    sections = sections_of(reported, SHORT, measured(), CONFIGURATION, None)
     assert [f.name for section in sections for f in section.figures] == ["figure6_trial1", "figure7_51.2"]
-    title, rows = text_of(told)[0]
+    title, rows = text_of(reported)[0]
     assert title.startswith("Coefficients")
     assert rows[0][0] == "mud"
-    for doubt in (KNOWN_BIAS, WRONG_CONSTANTS):
-        assert doubt in sections[0].text
+    for uncertainty in (KNOWN_BIAS, WRONG_CONSTANTS):
+        assert uncertainty in sections[0].text
 
 
 # without a pose
@@ -177,10 +177,10 @@ class BlindRobot(LockstepRobot):
     blind_from_s = 0.0
 
     def call(self, method: str, **params: Any) -> Any:
-        told = super().call(method, **params)
-        if method == "status" and told["now_s"] >= self.blind_from_s:
-            return told | {"body_x_m": None}
-        return told
+        reported = super().call(method, **params)
+        if method == "status" and reported["now_s"] >= self.blind_from_s:
+            return reported | {"body_x_m": None}
+        return reported
 
 
 def blind(folder: Path, from_s: float) -> Bench:
@@ -200,33 +200,33 @@ def test_without_a_pose_the_robot_makes_no_more_strides_than_lead_to_the_end(tmp
     entry = measure(bench, TINY, TINY.planned[0])
     assert [remark for remark in entry["remarks"] if "no pose is told" in remark]
     assert len(entry["strides"][DEFAULT]) == 2
-    told = report_of(TINY, {"walk/1": json.loads(json.dumps(entry))}, CONFIGURATION, None)
-    assert told["without_pose"] == 1
-    assert len(told["muds"][0]["k_p"]["trials"]) == 2
+    reported = report_of(TINY, {"walk/1": json.loads(json.dumps(entry))}, CONFIGURATION, None)
+    assert reported["without_pose"] == 1
+    assert len(reported["muds"][0]["k_p"]["trials"]) == 2
 
 
 class StoppedRobot(LockstepRobot):
     """Somebody else stops its walk once a stride is over."""
 
     def call(self, method: str, **params: Any) -> Any:
-        told = super().call(method, **params)
-        if method == "status" and told["mode"] == "walking" and told["strides_closed"]:
+        reported = super().call(method, **params)
+        if method == "status" and reported["mode"] == "walking" and reported["strides_closed"]:
             super().call("stop")
-        return told
+        return reported
 
 
 def test_a_walk_that_somebody_else_stops_is_not_taken_for_a_whole_one(tmp_path: Path) -> None:
     bench = bench_of(tmp_path, TINY)
     bench.robot.__class__ = StoppedRobot
     bench.bed.prepare(TINY.planned[0])
-    with pytest.raises(SpoiltTrialError, match="somebody stopped the walk in stride 2") as spoilt:
+    with pytest.raises(InvalidTrialError, match="somebody stopped the walk in stride 2") as invalid:
         measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
-    assert spoilt.value.entry is not None and len(spoilt.value.entry["strides"][DEFAULT]) == 1
+    assert invalid.value.entry is not None and len(invalid.value.entry["strides"][DEFAULT]) == 1
 
 
 def test_by_their_order_strides_are_spread_over_the_muds_lengths() -> None:
     plan = replace(SHORT, muds=(Mud("a", 0.2), Mud("b", 0.6)))
-    entry = {"trial": 1, "start_m": None, "truths": {}, "strides": {DEFAULT: [make_stride(place_m=None)] * 4}}
+    entry = {"trial": 1, "start_m": None, "truths": {}, "strides": {DEFAULT: [make_stride(position_m=None)] * 4}}
     placed = placed_strides(plan, {"walk/1": entry}, CONFIGURATION, None)
     assert [each.mud for each in placed] == ["a", "b", "b", "b"]
     assert walks_of(plan, {"walk/1": entry, "walk/2": entry}) == [entry]
@@ -235,7 +235,7 @@ def test_by_their_order_strides_are_spread_over_the_muds_lengths() -> None:
 def test_a_pose_that_is_lost_on_the_way_spoils_the_walk(tmp_path: Path) -> None:
     bench = blind(tmp_path, 4.0)
     bench.bed.prepare(TINY.planned[0])
-    with pytest.raises(SpoiltTrialError, match="not told any more"):
+    with pytest.raises(InvalidTrialError, match="not told any more"):
         measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
 
 
@@ -249,20 +249,20 @@ def test_plates_go_down_half_an_arm_in_front() -> None:
 def looks(*seen: tuple[float, float | None, str]) -> list[str | None]:
     """What is judged of a walk of 50 cm that began at 1 m."""
     advance = Advance(1.0, 0.5, 0.0)
-    return [advance.judge({"now_s": now_s, "body_x_m": body_m, "phase": phase}) for now_s, body_m, phase in seen]
+    return [advance.evaluate({"now_s": now_s, "body_x_m": body_m, "phase": phase}) for now_s, body_m, phase in seen]
 
 
 def test_a_walk_ends_with_the_insertion_behind_the_last_mud() -> None:
-    told = looks((1.0, 1.4, "insertion"), (2.0, 1.51, "stance"), (3.0, 1.51, "insertion"))
-    assert told == [None, None, ""]
+    reported = looks((1.0, 1.4, "insertion"), (2.0, 1.51, "stance"), (3.0, 1.51, "insertion"))
+    assert reported == [None, None, ""]
 
 
 def test_a_robot_that_does_not_come_on_is_stopped_and_told_where() -> None:
-    told = looks((1.0, 1.2, "stance"), (60.0, 1.22, "swing"), (61.5, 1.22, "swing"))
-    assert told == [None, None, "the robot came no farther than 20 cm"]
+    reported = looks((1.0, 1.2, "stance"), (60.0, 1.22, "swing"), (61.5, 1.22, "swing"))
+    assert reported == [None, None, "the robot came no farther than 20 cm"]
 
 
 def test_a_place_that_is_missed_for_a_moment_is_waited_for() -> None:
     assert looks((1.0, 1.2, "stance"), (2.9, None, "stance"), (3.0, 1.3, "swing")) == [None, None, None]
-    with pytest.raises(SpoiltTrialError, match="not told any more"):
+    with pytest.raises(InvalidTrialError, match="not told any more"):
         looks((1.0, 1.2, "stance"), (3.1, None, "stance"))

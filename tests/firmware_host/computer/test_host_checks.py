@@ -224,7 +224,7 @@ def test_where_logs_go_is_judged(computer: Computer, folder: str, level: Level) 
 
 def storage(computer: Computer, folder: str, daemon_runs: bool = False) -> dict[str, Finding]:
     writer = Account("you", os.geteuid(), frozenset({os.getegid()}))
-    found = examine_storage(computer.root, LogParameters(folder, min_free_share=0.0), writer, daemon_runs)
+    found = examine_storage(computer.root, LogParameters(folder, min_free_fraction=0.0), writer, daemon_runs)
     return {finding.id: finding for finding in found}
 
 

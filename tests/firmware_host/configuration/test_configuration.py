@@ -75,43 +75,43 @@ def test_all_problems_are_told_at_once(example_text: str) -> None:
 
 def test_a_missing_drive_is_refused_by_name(example_text: str) -> None:
     text = example_text.replace("[drive.right_sweep]", "[drive.right_swep]")
-    told = "\n".join(problems_of(text))
-    assert "drive.right_sweep is missing" in told
-    assert "drive.right_swep: there is no such joint" in told
+    reported = "\n".join(problems_of(text))
+    assert "drive.right_sweep is missing" in reported
+    assert "drive.right_swep: there is no such joint" in reported
 
 
 def test_a_missing_bus_is_refused_by_name() -> None:
     text = minimal_text().replace("[bus.a]", "[bus.b]")
-    assert any("drive.left_sweep.bus = 'a': no such bus; there is b" in told for told in problems_of(text))
+    assert any("drive.left_sweep.bus = 'a': no such bus; there is b" in reported for reported in problems_of(text))
 
 
 def test_two_drives_with_one_id_on_one_bus_are_refused() -> None:
-    told = problems_of(minimal_text().replace("node_id = 3", "node_id = 2"))
-    assert told == ["drive.right_adduction.node_id = 2: right_sweep has the same on bus 'a'"]
+    reported = problems_of(minimal_text().replace("node_id = 3", "node_id = 2"))
+    assert reported == ["drive.right_adduction.node_id = 2: right_sweep has the same on bus 'a'"]
 
 
 def test_a_depth_out_of_reach_is_refused_with_the_bound(example_text: str) -> None:
-    (told,) = problems_of(changed(example_text, "max_depth_m", "0.06"))
-    assert told.startswith("adaptation.max_depth_m = 0.06: out of reach, must be at most 0.0504")
+    (reported,) = problems_of(changed(example_text, "max_depth_m", "0.06"))
+    assert reported.startswith("adaptation.max_depth_m = 0.06: out of reach, must be at most 0.0504")
 
 
 def test_a_wider_sweep_reaches_less_deep(example_text: str) -> None:
     text = changed(example_text, "sweep_angle_deg", "35.0")
-    assert any("out of reach" in told for told in problems_of(text))
+    assert any("out of reach" in reported for reported in problems_of(text))
 
 
 def test_depths_in_the_wrong_order_are_refused(example_text: str) -> None:
     text = changed(example_text, "initial_depth_m", "0.06")
-    assert any("initial_depth_m = 0.06" in sentence for sentence in problems_of(text))
-    told = problems_of(changed(changed(example_text, "min_depth_m", "0.04"), "max_depth_m", "0.035"))
-    assert any("min_depth_m = 0.04: must be at most" in sentence for sentence in told)
+    assert any("initial_depth_m = 0.06" in message for message in problems_of(text))
+    reported = problems_of(changed(changed(example_text, "min_depth_m", "0.04"), "max_depth_m", "0.035"))
+    assert any("min_depth_m = 0.04: must be at most" in message for message in reported)
 
 
 def test_joint_limits_must_leave_room_for_the_gait(example_text: str) -> None:
     text = example_text.replace("torque_nm = 0.75", "sweep_max_deg = 25.0\nadduction_min_deg = -30.0")
-    told = "\n".join(problems_of(text))
-    assert "limits.sweep_max_deg = 25.0: must be at least 30" in told
-    assert "limits.adduction_min_deg = -30.0: must be at most -57" in told
+    reported = "\n".join(problems_of(text))
+    assert "limits.sweep_max_deg = 25.0: must be at least 30" in reported
+    assert "limits.adduction_min_deg = -30.0: must be at most -57" in reported
 
 
 def test_a_sign_of_zero_is_refused(example_text: str) -> None:
@@ -120,8 +120,8 @@ def test_a_sign_of_zero_is_refused(example_text: str) -> None:
 
 @pytest.mark.parametrize("value", ['"0.75"', "true", "nan", "inf", "[0.75]"])
 def test_a_value_of_the_wrong_kind_is_refused(example_text: str, value: str) -> None:
-    (told,) = problems_of(changed(example_text, "torque_nm", value))
-    assert told.startswith("limits.torque_nm = ")
+    (reported,) = problems_of(changed(example_text, "torque_nm", value))
+    assert reported.startswith("limits.torque_nm = ")
 
 
 def test_a_protocol_is_a_preset_that_other_keys_change(example_text: str) -> None:
@@ -132,13 +132,13 @@ def test_a_protocol_is_a_preset_that_other_keys_change(example_text: str) -> Non
 
 
 def test_an_unknown_protocol_is_refused(example_text: str) -> None:
-    (told,) = problems_of(example_text.replace('"walking"', '"galloping"'))
-    assert told == "gait.protocol = 'galloping': must be one of walking, single_flipper"
+    (reported,) = problems_of(example_text.replace('"walking"', '"galloping"'))
+    assert reported == "gait.protocol = 'galloping': must be one of walking, single_flipper"
 
 
 def test_something_that_is_no_toml_names_the_line(example_text: str) -> None:
-    (told,) = problems_of("[geometry\n")
-    assert told.startswith("not a TOML file") and "line 1" in told
+    (reported,) = problems_of("[geometry\n")
+    assert reported.startswith("not a TOML file") and "line 1" in reported
 
 
 @pytest.mark.parametrize(
@@ -151,15 +151,15 @@ def test_something_that_is_no_toml_names_the_line(example_text: str) -> None:
         ("/run/mudskipper/mudskipper.sock", "", "status.socket = '': must name a socket"),
     ],
 )
-def test_texts_that_cannot_be_used_are_refused(example_text: str, old: str, new: str, told: str) -> None:
-    assert told in problems_of(example_text.replace(old, new))[0]
+def test_texts_that_cannot_be_used_are_refused(example_text: str, old: str, new: str, reported: str) -> None:
+    assert reported in problems_of(example_text.replace(old, new))[0]
 
 
 @pytest.mark.parametrize("key", ["sweep_stiffness_nm_rad", "adduction_stiffness_nm_rad"])
 def test_a_recovery_s_lead_that_does_not_reach_the_full_torque_is_refused(example_text: str, key: str) -> None:
     """0.75 N·m over 8 degrees are 5.37 N·m/rad."""
-    (told,) = problems_of(f"{example_text}\n[gains]\n{key} = 5.3\n")
-    assert told == (
+    (reported,) = problems_of(f"{example_text}\n[gains]\n{key} = 5.3\n")
+    assert reported == (
         f"gains.{key} = 5.3: must be at least 5.38, or a recovery.lead_deg = 8 does not reach limits.torque_nm = 0.75"
     )
     parse_configuration(f"{example_text}\n[gains]\n{key} = 5.38\n")
@@ -217,7 +217,7 @@ def test_a_room_in_which_every_motor_counts_as_hot_is_refused() -> None:
     parse_configuration(f"{text}\n[winding]\nroom_c = 49.0\n")
 
 
-@pytest.mark.parametrize("line", ["quiet_s = 0.0", "silence_s = nan", "lag_share = 0.0", "late_s = true"])
+@pytest.mark.parametrize("line", ["quiet_s = 0.0", "silence_s = nan", "lag_fraction = 0.0", "late_s = true"])
 def test_bounds_of_faults_have_bounds_themselves(line: str) -> None:
     problems = problems_of(f"{minimal_text()}\n[faults]\n{line}\n")
     assert any(problem.startswith(f"faults.{line.split()[0]} = ") for problem in problems)

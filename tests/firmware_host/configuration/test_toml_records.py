@@ -88,12 +88,12 @@ def test_changes_are_what_the_file_sets_and_nothing_else(text: str, changes: dic
         ("rail = []\nnote = 'x'", "note: there is no such key"),
     ],
 )
-def test_each_problem_is_told_with_key_value_and_bound(text: str, told: str) -> None:
+def test_each_problem_is_told_with_key_value_and_bound(text: str, reported: str) -> None:
     document = parse_document(text)
-    assert READER.problems(document) == [told]
+    assert READER.problems(document) == [reported]
     with pytest.raises(ConfigurationError) as caught:
         READER.read(document)
-    assert caught.value.problems == [told]
+    assert caught.value.problems == [reported]
 
 
 def test_a_right_document_has_no_problems() -> None:
@@ -103,8 +103,8 @@ def test_a_right_document_has_no_problems() -> None:
 def test_a_number_of_thousands_of_digits_is_refused_by_its_key() -> None:
     """Python reads it in hexadecimal, but does not print it."""
     document = parse_document(f"rail = []\n[beam.left]\nlength_m = 1.0\nnails = 0x{'f' * 6000}\n")
-    (told,) = READER.problems(document)
-    assert told.startswith("beam.left.nails = beyond all size: ")
+    (reported,) = READER.problems(document)
+    assert reported.startswith("beam.left.nails = beyond all size: ")
 
 
 @pytest.mark.parametrize(
@@ -116,22 +116,22 @@ def test_a_number_of_thousands_of_digits_is_refused_by_its_key() -> None:
         ('a = 1\nnote = """\n\n', "not a TOML file: Unterminated string (at the end, line 2); mend it there: "),
     ],
 )
-def test_a_file_that_cannot_be_read_is_refused_by_its_name_and_line(text: str, told: str) -> None:
+def test_a_file_that_cannot_be_read_is_refused_by_its_name_and_line(text: str, reported: str) -> None:
     with pytest.raises(ConfigurationError) as caught:
         parse_document(text, Path("/etc/robot.toml"))
     (problem,) = caught.value.problems
-    assert problem.startswith(f"/etc/robot.toml: {told}")
+    assert problem.startswith(f"/etc/robot.toml: {reported}")
 
 
 def test_of_a_long_sentence_the_key_and_the_bound_are_kept() -> None:
-    (told,) = READER.problems(parse_document(f"rail = '{'x' * 100_000}'"))
-    assert len(told) < 500
-    assert told.startswith("rail = 'xxx") and told.endswith("must be tables, each under [[rail]]")
+    (reported,) = READER.problems(parse_document(f"rail = '{'x' * 100_000}'"))
+    assert len(reported) < 500
+    assert reported.startswith("rail = 'xxx") and reported.endswith("must be tables, each under [[rail]]")
 
 
 def test_a_terminal_obeys_nothing_of_a_sentence() -> None:
-    (told,) = READER.problems(parse_document('rail = []\n"\\u001b[2J\\n" = 1'))
-    assert told == "\\x1b[2J\\n: there is no such key"
+    (reported,) = READER.problems(parse_document('rail = []\n"\\u001b[2J\\n" = 1'))
+    assert reported == "\\x1b[2J\\n: there is no such key"
 
 
 def test_a_file_beyond_all_size_is_refused_unread(tmp_path: Path) -> None:

@@ -52,9 +52,9 @@ def test_an_intermittent_log_loses_about_half_and_tells_each_gap() -> None:
     taken = put_numbers(recorder, range(200))
     failures.end_all()
     put_numbers(recorder, range(200, 201))
-    told = sum(int(text.split()[3].rstrip(",")) for text in kept.texts if text.startswith("rows missing"))
+    reported = sum(int(text.split()[3].rstrip(",")) for text in kept.texts if text.startswith("rows missing"))
     assert 60 < sum(taken) < 140
-    assert told == taken.count(False) == recorder.dropped - 2
+    assert reported == taken.count(False) == recorder.dropped - 2
 
 
 def test_a_writer_that_died_by_itself_stays_dead() -> None:
@@ -71,7 +71,7 @@ def test_the_log_s_report_tells_what_fails_and_what_it_lost(kind: str, alive: bo
     failures.begin("log", kind, 0.0)
     refused = put_numbers(recorder, range(20)).count(False)
     report = recorder.report()
-    assert (report.alive, report.dropped, report.free_share) == (alive, 2 + refused, kept.report().free_share)
+    assert (report.alive, report.dropped, report.free_fraction) == (alive, 2 + refused, kept.report().free_fraction)
     assert refused and "on purpose" in report.problem and kind in report.problem
     failures.end_all()
     assert recorder.report() == kept.report()._replace(dropped=2 + refused)

@@ -14,7 +14,7 @@ from firmware_host.fault_injection.failing_time import (
     failing_clock,
     failing_ticker,
 )
-from firmware_host.ticker import PERIOD_S, Beat, Ticker
+from firmware_host.ticker import PERIOD_S, Tick, Ticker
 
 
 class TurnedClock:
@@ -31,12 +31,12 @@ class TurnedClock:
 class Bench:
     def __init__(self) -> None:
         self.clock, self.failures = TurnedClock(), Failures(())
-        self.told: list[tuple[float, str]] = []
+        self.reported: list[tuple[float, str]] = []
         ticker = Ticker(PERIOD_S, self.clock.read, self.clock.sleep)
-        tell = lambda now_s, text: self.told.append((now_s, text))  # noqa: E731
-        self.ticker = FailingTicker(ticker, self.failures, tell, self.clock.sleep)
+        report = lambda now_s, text: self.reported.append((now_s, text))  # noqa: E731
+        self.ticker = FailingTicker(ticker, self.failures, report, self.clock.sleep)
 
-    def wait(self, ticks: int) -> list[Beat]:
+    def wait(self, ticks: int) -> list[Tick]:
         return [self.ticker.wait() for _ in range(ticks)]
 
 
@@ -46,7 +46,7 @@ def bench() -> Bench:
 
 
 def test_without_a_failure_no_beat_is_missed(bench: Bench) -> None:
-    assert all(beat.missed == 0 and beat.late_s < 1e-9 for beat in bench.wait(100))
+    assert all(tick.missed == 0 and tick.late_s < 1e-9 for tick in bench.wait(100))
 
 
 def test_a_stuck_loop_stands_still_once(bench: Bench) -> None:
@@ -54,29 +54,29 @@ def test_a_stuck_loop_stands_still_once(bench: Bench) -> None:
     bench.failures.begin("loop", "stuck", bench.clock.now_s, 1.0)
     first, *others = bench.wait(100)
     assert (first.missed + 1) * PERIOD_S <= STALL_S < (first.missed + 2) * PERIOD_S
-    assert all(beat.missed == 0 for beat in others)
+    assert all(tick.missed == 0 for tick in others)
 
 
 def test_a_loop_can_be_made_to_stand_still_again(bench: Bench) -> None:
     for _ in range(2):
         bench.failures.begin("loop", "stuck", bench.clock.now_s, 1.0)
-        assert [beat.missed > 0 for beat in bench.wait(5)] == [True, False, False, False, False]
+        assert [tick.missed > 0 for tick in bench.wait(5)] == [True, False, False, False, False]
 
 
 def test_a_slow_loop_lags_until_its_time_is_over(bench: Bench) -> None:
     bench.wait(10)
     begin_s = bench.clock.now_s
     bench.failures.begin("loop", "slow", begin_s, 1.0)
-    slow = [beat for beat in bench.wait(300) if beat.now_s < begin_s + 1.0]
+    slow = [tick for tick in bench.wait(300) if tick.now_s < begin_s + 1.0]
     mean_s = (slow[-1].now_s - begin_s) / len(slow)
     assert SLOW_TICK_S <= mean_s < 2.0 * PERIOD_S
-    assert all(beat.missed == 0 for beat in bench.wait(100))
+    assert all(tick.missed == 0 for tick in bench.wait(100))
 
 
 def test_the_end_of_a_failure_is_told_in_its_tick(bench: Bench) -> None:
     bench.failures.begin("pose", "off", bench.clock.now_s, 0.02)
     bench.wait(20)
-    ((now_s, text),) = bench.told
+    ((now_s, text),) = bench.reported
     assert text == "end of failing on purpose: pose off"
     assert 100.02 <= now_s < 100.02 + PERIOD_S
 

@@ -22,10 +22,10 @@ MIA = Caller(1, Peer(7, 1000, frozenset()), Level.DRIVE)
 class Bench:
     def __init__(self, failures: Failures | None) -> None:
         self.now_s = 10.0
-        self.told: list[tuple[float, str, bool]] = []  # when, what, and whether anything failed then
+        self.reported: list[tuple[float, str, bool]] = []  # when, what, and whether anything failed then
         self.failures = failures
         self.failing_at_disarm: list[str] = []
-        self.methods = with_failures(self._plain(), failures, self._tell, lambda: self.now_s)
+        self.methods = with_failures(self._plain(), failures, self._report, lambda: self.now_s)
 
     def _plain(self) -> Methods:
         return {"status": self._status, "disarm": self._disarm, "arm": self._arm}
@@ -40,8 +40,8 @@ class Bench:
         self.failing_at_disarm = list(self.failures.failing) if self.failures else []
         return "accepted"
 
-    def _tell(self, now_s: float, text: str) -> None:
-        self.told.append((now_s, text, bool(self.failures and self.failures.failing)))
+    def _report(self, now_s: float, text: str) -> None:
+        self.reported.append((now_s, text, bool(self.failures and self.failures.failing)))
 
     def fail(self, component: str, kind: str, **others: Any) -> Any:
         return self.methods["fail"]({"component": component, "kind": kind, **others}, MIA)
@@ -60,7 +60,7 @@ def test_a_failure_begins_bounded_and_is_told_before_it_does(bench: Bench) -> No
         "remaining_s": 2.0,
         "does": "the log's writer looks dead and takes no row",
     }
-    assert bench.told == [(10.0, "failing on purpose: log off for 2 s, asked by uid 1000 (process 7)", False)]
+    assert bench.reported == [(10.0, "failing on purpose: log off for 2 s, asked by uid 1000 (process 7)", False)]
 
 
 def test_what_fails_is_shown_in_the_status(bench: Bench) -> None:
@@ -77,7 +77,7 @@ def test_one_or_all_can_be_ended_by_hand_and_each_end_is_told(bench: Bench) -> N
         bench.fail(component, "stuck")
     assert [each["component"] for each in bench.fail("log", "ok")] == ["pose", "loop"]
     assert bench.fail("all", "ok") == []
-    assert [text for _, text, _ in bench.told[3:]] == [
+    assert [text for _, text, _ in bench.reported[3:]] == [
         "end of failing on purpose: log stuck",
         "end of failing on purpose: pose stuck",
         "end of failing on purpose: loop stuck",
@@ -86,14 +86,14 @@ def test_one_or_all_can_be_ended_by_hand_and_each_end_is_told(bench: Bench) -> N
 
 def test_ending_what_does_not_fail_is_fine_and_told_nowhere(bench: Bench) -> None:
     assert bench.fail("pose", "ok") == [] and bench.fail("all", "ok") == []
-    assert bench.told == []
+    assert bench.reported == []
 
 
 def test_a_disarm_ends_every_failure_before_it_is_done(bench: Bench) -> None:
     bench.fail("left_sweep.command", "off")
     assert bench.methods["disarm"]({}, MIA) == "accepted"
     assert bench.failing_at_disarm == []
-    assert bench.told[-1][1] == "end of failing on purpose: left_sweep.command off"
+    assert bench.reported[-1][1] == "end of failing on purpose: left_sweep.command off"
 
 
 def test_the_other_methods_are_as_they_were(bench: Bench) -> None:
@@ -129,7 +129,7 @@ def test_the_list_holds_all_that_can_fail(bench: Bench) -> None:
 def test_nonsense_is_refused_with_a_sentence(bench: Bench, params: dict[str, Any], said: str) -> None:
     with pytest.raises(RefusedError, match=said):
         bench.methods["fail"](params, MIA)
-    assert bench.failures is not None and not bench.failures.failing and bench.told == []
+    assert bench.failures is not None and not bench.failures.failing and bench.reported == []
 
 
 def test_where_it_is_not_allowed_nothing_fails_and_the_key_is_named() -> None:

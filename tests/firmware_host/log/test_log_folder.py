@@ -103,7 +103,9 @@ def test_a_log_of_the_same_name_is_not_replaced(tmp_path: Path) -> None:
 
 
 def test_free_space_is_known_before_the_folder_is_made(tmp_path: Path) -> None:
-    assert free_space(tmp_path / "none" / "yet").free_share == pytest.approx(free_space(tmp_path).free_share, abs=0.05)
+    assert free_space(tmp_path / "none" / "yet").free_fraction == pytest.approx(
+        free_space(tmp_path).free_fraction, abs=0.05
+    )
 
 
 def test_the_newest_finished_log_is_never_freed(tmp_path: Path) -> None:

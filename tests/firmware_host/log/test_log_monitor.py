@@ -6,14 +6,14 @@ import pytest
 
 from control.faults import Blocks, Reaction
 from control.monitors.joint_monitor import FaultBounds
-from firmware_host.log.log_monitor import LogWatch
+from firmware_host.log.log_monitor import LogMonitor
 from firmware_host.log.recorder import HEALTHY, LogReport
 
-BOUNDS = FaultBounds(disk_free_share=0.05, disk_slow_s=2.0)
+BOUNDS = FaultBounds(disk_free_fraction=0.05, disk_slow_s=2.0)
 
 
 def names(report: LogReport) -> list[str]:
-    return [fault.name for fault in LogWatch(BOUNDS).update(report)]
+    return [fault.name for fault in LogMonitor(BOUNDS).update(report)]
 
 
 def test_a_healthy_log_is_no_fault() -> None:
@@ -36,9 +36,9 @@ def test_each_bound_has_two_sides(well: dict[str, object], ill: dict[str, object
 
 
 def test_rows_are_told_lost_when_they_are_lost_and_not_for_ever() -> None:
-    watch = LogWatch(BOUNDS)
+    watch = LogMonitor(BOUNDS)
     lost = HEALTHY._replace(dropped=7)
-    assert "7 rows" in watch.update(lost)[0].sentence
+    assert "7 rows" in watch.update(lost)[0].message
     assert watch.update(lost) == []
     assert len(watch.update(HEALTHY._replace(dropped=8))) == 1
 
@@ -48,13 +48,13 @@ def test_rows_that_a_dead_writer_does_not_take_are_no_second_fault() -> None:
 
 
 def test_a_log_that_may_not_be_written_is_not_answered_with_an_advice_about_space() -> None:
-    (fault,) = LogWatch(BOUNDS).update(HEALTHY._replace(problem="logs: Permission denied."))
+    (fault,) = LogMonitor(BOUNDS).update(HEALTHY._replace(problem="logs: Permission denied."))
     assert "permissions" in fault.kind.what_to_do and "quota" not in fault.kind.what_to_do
 
 
 def test_no_trouble_of_the_log_stops_a_robot_and_what_cannot_be_written_stands_against_arming() -> None:
     ill = LogReport(True, 3, "No space left on device.", 0.0, 0, 9.0)
-    faults = LogWatch(BOUNDS).update(ill) + LogWatch(BOUNDS).update(HEALTHY._replace(alive=False))
+    faults = LogMonitor(BOUNDS).update(ill) + LogMonitor(BOUNDS).update(HEALTHY._replace(alive=False))
     assert {fault.kind.reaction for fault in faults} == {Reaction.WARN}
     against = {fault.name for fault in faults if fault.kind.blocks is Blocks.UNLESS_FORCED}
     assert against == {"disk_low", "log_unwritable", "recorder_dead"}

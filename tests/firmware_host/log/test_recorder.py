@@ -315,7 +315,7 @@ def look(recorder: Recorder) -> LogReport:
 def test_the_writer_reports_the_disk(recorder: Recorder) -> None:
     wait_until(lambda: look(recorder).free_bytes < HEALTHY.free_bytes)
     report, disk = look(recorder), os.statvfs(recorder.path)
-    assert report.free_share == pytest.approx(disk.f_bavail / disk.f_blocks, abs=0.05)
+    assert report.free_fraction == pytest.approx(disk.f_bavail / disk.f_blocks, abs=0.05)
     assert (report.alive, report.dropped, report.problem) == (True, 0, "")
     assert 0.0 <= report.slowest_write_s < LONGEST_S
     os.kill(recorder.writer_pid, signal.SIGKILL)

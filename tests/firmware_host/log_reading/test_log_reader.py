@@ -252,9 +252,9 @@ def test_rows_of_another_layout_are_refused(tmp_path: Path) -> None:
     path = write_foreign(tmp_path / "old.mcap", [make_tick(0)], ros_text="float64 stamp_s\n")
     with pytest.raises(
         LayoutError, match=r"old\.mcap: rows of /tick have another layout than this version's; "
-    ) as told:
+    ) as reported:
         read_log(path)
-    assert "recover" not in str(told.value)  # which cannot help
+    assert "recover" not in str(reported.value)  # which cannot help
 
 
 def test_other_comments_are_no_other_layout(tmp_path: Path) -> None:

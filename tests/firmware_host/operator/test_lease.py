@@ -58,8 +58,10 @@ def test_a_holder_that_has_released_it_may_hang_up() -> None:
 def test_a_second_one_is_told_who_holds_it() -> None:
     lease = Lease()
     lease.renew("anna", 10.0, HALF_S)
-    told = lease.renew("ben", 10.1, HALF_S) or ""
-    assert told.startswith("anna operates the robot: wait until that program has ended, or has been silent for 0.4 s, ")
+    reported = lease.renew("ben", 10.1, HALF_S) or ""
+    assert reported.startswith(
+        "anna operates the robot: wait until that program has ended, or has been silent for 0.4 s, "
+    )
     assert lease.release("ben") == "anna holds the lease"
     assert lease.lost(10.51)  # which was not renewed by that
 

@@ -18,7 +18,7 @@ from firmware_host.ticker import PERIOD_S
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
-from tests.kept_events import EventRecorder
+from tests.recorded_events import EventRecorder
 
 ANNA = Caller(1, Peer(77, 1000, frozenset({71})), Level.DRIVE)
 BEN = Caller(2, Peer(78, 1001, frozenset({71})), Level.DRIVE)
@@ -66,11 +66,11 @@ def test_whoever_asks_for_something_is_named_in_the_log(armed: Robot) -> None:
 def test_a_stop_that_changes_nothing_does_not_fill_the_log_but_is_counted(armed: Robot) -> None:
     armed.ask("disarm")
     armed.steps.step()
-    told = len(armed.events.texts)
+    reported = len(armed.events.texts)
     for _ in range(50):
         assert armed.ask("stop", BEN) == armed.ask("disarm", BEN) == "accepted"
         armed.steps.step()
-    assert not armed.events.about("request")[2:] and len(armed.events.texts) - told <= 2  # the mode, a lease
+    assert not armed.events.about("request")[2:] and len(armed.events.texts) - reported <= 2  # the mode, a lease
     assert armed.ask("status")["untold_requests"] == 100
     armed.ask("arm")
     assert armed.events.texts[-1].startswith("request arm by uid 1000 (process 77); 100 before it")
@@ -325,8 +325,8 @@ def test_flippers_that_may_be_in_the_mud_are_raised_before_they_are_moved(armed:
         ({"right_adduction_rad": -3.0}, "right_adduction_rad = -3: must be from"),
     ],
 )
-def test_a_move_to_nowhere_is_refused_with_its_reason(armed: Robot, angles_rad: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(RefusedError, match=sentence):
+def test_a_move_to_nowhere_is_refused_with_its_reason(armed: Robot, angles_rad: dict[str, Any], message: str) -> None:
+    with pytest.raises(RefusedError, match=message):
         armed.ask("move", **angles_rad)
     assert not armed.ask("status")["moving"]
 

@@ -202,13 +202,13 @@ ODD = st.one_of(
 def test_valid_requests_are_answered_whatever_comes_after(
     served: Served, odd: list[bytes], valid: int, cut: int
 ) -> None:
-    client, witness = connect(served), connect(served)
+    client, reference = connect(served), connect(served)
     data = b"".join(VALID[:valid] + odd)
     answers = ask(served, client, data[:cut]) if cut else []
     with contextlib.suppress(BrokenPipeError):
         answers += ask(served, client, data[cut:])
     assert [[1, n, None, {"a": n}] for n in range(valid)] == answers[:valid]
-    assert ask(served, witness, VALID[1]) == [[1, 1, None, {"a": 1}]]
+    assert ask(served, reference, VALID[1]) == [[1, 1, None, {"a": 1}]]
     client.close()
-    witness.close()
+    reference.close()
     serve(served, 6)

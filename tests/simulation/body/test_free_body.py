@@ -39,7 +39,7 @@ AREA_M2 = SHAPE.length_m * SHAPE.width_m
 WEIGHT_N = MASS_KG * 9.81
 NO_PAD = DragPad(0.0, 0.0)
 FREE = PlantParameters(free_body=True)
-PLACES_M = [(u, s) for u in (-0.0125, 0.0, 0.0125) for s in (0.0, 0.07)]  # corners, and the middles between them
+POSITIONS_M = [(u, s) for u in (-0.0125, 0.0, 0.0125) for s in (0.0, 0.07)]  # corners, and the middles between them
 TURNS = st.floats(-0.6, 0.6)
 RATES = st.floats(-3.0, 3.0)
 SIDES = st.sampled_from([1.0, -1.0])
@@ -76,8 +76,8 @@ def plate_in_body(sweep_rad: float, adduction_rad: float, side: float) -> np.nda
     """Columns: the plate's n, r, s, and the crossing of the joints' axes, y to the left for either flipper."""
     ca, sa = np.cos(sweep_rad), np.sin(sweep_rad)
     tilted = turned(adduction_rad, 0.0) @ np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])
-    crossing = np.array([[AHEAD_M], [SHAPE.width_m / 2.0], [0.0]])
-    plate: np.ndarray = np.diag([1.0, side, 1.0]) @ np.hstack([tilted, crossing])
+    cross_coupling = np.array([[AHEAD_M], [SHAPE.width_m / 2.0], [0.0]])
+    plate: np.ndarray = np.diag([1.0, side, 1.0]) @ np.hstack([tilted, cross_coupling])
     return plate
 
 
@@ -86,8 +86,8 @@ def point_in_world(state: np.ndarray, side: float, u: float, s: float) -> np.nda
     forward_m, height_m, roll_rad, pitch_rad, sweep_rad, adduction_rad = state
     plate = plate_in_body(sweep_rad, adduction_rad, side)
     way = np.array([0.0, GEOMETRY.flipper_length_m + u, s - GEOMETRY.drop_m, 1.0])
-    place_m: np.ndarray = np.array([forward_m, 0.0, height_m]) + turned(roll_rad, pitch_rad) @ plate @ way
-    return place_m
+    position_m: np.ndarray = np.array([forward_m, 0.0, height_m]) + turned(roll_rad, pitch_rad) @ plate @ way
+    return position_m
 
 
 def body_in(state: np.ndarray, rates: np.ndarray) -> FreeBody:
@@ -107,9 +107,9 @@ def test_a_carried_plate_is_as_deep_as_rotation_matrices_say(state: np.ndarray, 
     attitude = carried_attitude(GEOMETRY, carriage, state[4], state[5], 0.004)
     if attitude.per_upward == LEAST_UPRIGHT:  # lies flat, which no plate in this model does
         return
-    for u, s in PLACES_M:
-        told_m = attitude.depth_m + attitude.per_outward * u - attitude.per_upward * s
-        assert told_m == pytest.approx(-point_in_world(state, side, u, s)[2] - 0.004)
+    for u, s in POSITIONS_M:
+        reported_m = attitude.depth_m + attitude.per_outward * u - attitude.per_upward * s
+        assert reported_m == pytest.approx(-point_in_world(state, side, u, s)[2] - 0.004)
 
 
 def test_a_plate_on_a_tipped_body_never_lies_flat() -> None:
@@ -126,15 +126,15 @@ def test_a_carried_plate_moves_as_differences_of_its_places_say(
 ) -> None:
     twist = carried_twist(GEOMETRY, body_in(state, rates).carriages[side < 0.0], *state[4:], *rates[4:])
     plate, moved_s = turned(*state[2:4]) @ plate_in_body(state[4], state[5], side), 1e-6
-    for u, s in PLACES_M:
+    for u, s in POSITIONS_M:
         ahead_m, behind_m = (point_in_world(state + way * moved_s * rates, side, u, s) for way in (1.0, -1.0))
         velocity_m_s = (ahead_m - behind_m) / (2.0 * moved_s)
-        told_m_s = (
+        reported_m_s = (
             twist.normal_m_s + twist.normal_per_outward_s * u + twist.normal_per_upward_s * s,
             twist.outward_m_s + twist.outward_per_upward_s * s,
             twist.upward_m_s + twist.upward_per_outward_s * u,
         )
-        assert told_m_s == pytest.approx([float(velocity_m_s @ plate[:, way]) for way in range(3)], abs=1e-7)
+        assert reported_m_s == pytest.approx([float(velocity_m_s @ plate[:, way]) for way in range(3)], abs=1e-7)
 
 
 @given(STATES, SPEEDS, SIDES, st.tuples(*[st.floats(-10.0, 10.0)] * 7))

@@ -190,11 +190,11 @@ def test_the_body_comes_to_rest_after_a_push() -> None:
     for arm in plant.arms:
         arm.contact = ConstantThrust(plant.parameters.geometry)
     run(plant, 5.0)
-    places_m = []
+    positions_m = []
     for _ in range(200):
         plant.step(STEP_S, NO_TORQUE)
-        places_m.append(plant.body_m)
-    assert max(places_m) - min(places_m) < 1e-4
+        positions_m.append(plant.body_m)
+    assert max(positions_m) - min(positions_m) < 1e-4
 
 
 def test_a_quarter_of_the_step_gives_the_same_push() -> None:

@@ -11,7 +11,7 @@ from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import PERIOD_S
 from simulation.body.plant import Plant, PlantParameters
-from simulation.body.reference_sensor import StrideTruth, StrokeTruth, StrokeWitness
+from simulation.body.reference_sensor import StrideTruth, StrokeReference, StrokeTruth
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import Disturbances
@@ -29,9 +29,9 @@ def make_plant(depth_m: float = 0.03) -> Plant:
     return plant
 
 
-def watch(witness: StrokeWitness, plant: Plant, *phases: Phase) -> list[StrideTruth]:
+def watch(reference: StrokeReference, plant: Plant, *phases: Phase) -> list[StrideTruth]:
     """One tick in each phase."""
-    return [truth for phase in phases for truth in witness.step(DT_S, plant, phase)]
+    return [truth for phase in phases for truth in reference.step(DT_S, plant, phase)]
 
 
 def is_unseen(stroke: StrokeTruth) -> bool:
@@ -39,36 +39,36 @@ def is_unseen(stroke: StrokeTruth) -> bool:
 
 
 def test_a_stride_of_each_flipper_closes_when_swing_begins() -> None:
-    witness, plant = StrokeWitness(), make_plant()
-    assert watch(witness, plant, Phase.SWING, *STRIDE[:3]) == []
-    closed = watch(witness, plant, Phase.SWING)
+    reference, plant = StrokeReference(), make_plant()
+    assert watch(reference, plant, Phase.SWING, *STRIDE[:3]) == []
+    closed = watch(reference, plant, Phase.SWING)
     assert [(truth.flipper, truth.index) for truth in closed] == [("left", 0), ("right", 0)]
-    assert watch(witness, plant, Phase.SWING) == []
-    assert [truth.index for truth in watch(witness, plant, *STRIDE)] == [1, 1]
+    assert watch(reference, plant, Phase.SWING) == []
+    assert [truth.index for truth in watch(reference, plant, *STRIDE)] == [1, 1]
 
 
 def test_pauses_between_the_strokes_do_not_close_a_stride() -> None:
     pause = Phase.PAUSE
     phases = (Phase.INSERTION, pause, Phase.STANCE, pause, Phase.EXTRACTION, pause)
-    witness, plant = StrokeWitness(), make_plant()
-    assert watch(witness, plant, *phases) == []
-    assert len(watch(witness, plant, Phase.SWING)) == 2
+    reference, plant = StrokeReference(), make_plant()
+    assert watch(reference, plant, *phases) == []
+    assert len(watch(reference, plant, Phase.SWING)) == 2
 
 
 def test_a_stride_with_a_recovery_closes_once_and_the_recovery_is_no_stroke() -> None:
     strides = []
     for phases in (STRIDE[:3], (*STRIDE[:3], Phase.RECOVERY)):
-        witness, plant = StrokeWitness(), make_plant()
-        assert watch(witness, plant, *phases) == []
-        strides.append(watch(witness, plant, Phase.SWING))
-        assert watch(witness, plant, Phase.SWING) == []
+        reference, plant = StrokeReference(), make_plant()
+        assert watch(reference, plant, *phases) == []
+        strides.append(watch(reference, plant, Phase.SWING))
+        assert watch(reference, plant, Phase.SWING) == []
     assert len(strides[0]) == len(strides[1]) == 2
     assert repr(strides[0]) == repr(strides[1])
 
 
 def test_an_insertion_closes_a_stride_too() -> None:
-    witness, plant = StrokeWitness(), make_plant()
-    assert len(watch(witness, plant, *STRIDE[:3], Phase.INSERTION)) == 2
+    reference, plant = StrokeReference(), make_plant()
+    assert len(watch(reference, plant, *STRIDE[:3], Phase.INSERTION)) == 2
 
 
 @pytest.mark.parametrize(
@@ -81,18 +81,18 @@ def test_an_insertion_closes_a_stride_too() -> None:
     ],
 )
 def test_strides_that_are_cut_short_do_not_count(phases: tuple[Phase, ...]) -> None:
-    witness, plant = StrokeWitness(), make_plant()
-    assert watch(witness, plant, *phases) == []
-    assert [truth.index for truth in watch(witness, plant, *STRIDE)] == [0, 0]
+    reference, plant = StrokeReference(), make_plant()
+    assert watch(reference, plant, *phases) == []
+    assert [truth.index for truth in watch(reference, plant, *STRIDE)] == [0, 0]
 
 
 def test_means_are_those_of_the_part_in_the_mud_and_the_depth_is_the_greatest() -> None:
-    witness, plant = StrokeWitness(), make_plant()
+    reference, plant = StrokeReference(), make_plant()
     arm, geometry = plant.arms[0], plant.parameters.geometry
     for sweep_rad, depth_m in ((0.9, -0.01), (0.2, 0.01), (0.4, 0.04), (0.6, 0.02)):
         arm.sweep_rad, arm.adduction_rad = sweep_rad, geometry.adduction_rad(sweep_rad, depth_m)
-        watch(witness, plant, Phase.INSERTION)
-    left, _ = watch(witness, plant, *STRIDE[1:])
+        watch(reference, plant, Phase.INSERTION)
+    left, _ = watch(reference, plant, *STRIDE[1:])
     assert left.insertion.sweep_rad == pytest.approx(0.4)
     expected_rad = sum(geometry.adduction_rad(*pose) for pose in ((0.2, 0.01), (0.4, 0.04), (0.6, 0.02))) / 3.0
     assert left.insertion.adduction_rad == pytest.approx(expected_rad)
@@ -101,7 +101,7 @@ def test_means_are_those_of_the_part_in_the_mud_and_the_depth_is_the_greatest() 
 
 
 def test_the_speed_is_that_of_the_edge_through_the_mud_the_body_s_included() -> None:
-    witness, plant = StrokeWitness(), make_plant()
+    reference, plant = StrokeReference(), make_plant()
     arm, geometry = plant.arms[1], plant.parameters.geometry
     arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s, plant.body.forward_m_s = 0.4, -0.8, 0.1
     jacobian = geometry.jacobian(arm.sweep_rad, arm.adduction_rad)
@@ -110,20 +110,20 @@ def test_the_speed_is_that_of_the_edge_through_the_mud_the_body_s_included() -> 
         0.4 * jacobian.y_sweep - 0.8 * jacobian.y_adduction,
         0.4 * jacobian.z_sweep - 0.8 * jacobian.z_adduction,
     )
-    _, right = watch(witness, plant, *STRIDE)
+    _, right = watch(reference, plant, *STRIDE)
     assert right.insertion.speed_m_s == pytest.approx(sum(part**2 for part in velocity_m_s) ** 0.5)
     assert right.extraction.speed_m_s == pytest.approx(right.insertion.speed_m_s)
 
 
 def test_in_stance_only_backward_slip_counts() -> None:
-    witness, plant = StrokeWitness(), make_plant()
-    watch(witness, plant, Phase.INSERTION)
+    reference, plant = StrokeReference(), make_plant()
+    watch(reference, plant, Phase.INSERTION)
     length_m = plant.parameters.geometry.flipper_length_m
     for slip_m_s in (0.1, 0.3, 0.019, -0.5):
         plant.arms[0].sweep_velocity_rad_s = -(slip_m_s + 0.2) / length_m
         plant.body.forward_m_s = 0.2
-        watch(witness, plant, Phase.STANCE)
-    left, right = watch(witness, plant, Phase.EXTRACTION, Phase.SWING)
+        watch(reference, plant, Phase.STANCE)
+    left, right = watch(reference, plant, Phase.EXTRACTION, Phase.SWING)
     assert left.stance.speed_m_s == pytest.approx(0.1 * 0.25 + 0.3 * 0.75)  # of each place its own: by its way
     assert left.stance.slip_m == pytest.approx(DT_S * 0.4)
     assert isnan(right.stance.speed_m_s)  # it went forward with the body
@@ -131,18 +131,18 @@ def test_in_stance_only_backward_slip_counts() -> None:
 
 
 def test_a_flipper_in_the_air_has_no_strokes_to_repeat() -> None:
-    witness, plant = StrokeWitness(), make_plant(-0.01)
-    left, right = watch(witness, plant, *STRIDE)
+    reference, plant = StrokeReference(), make_plant(-0.01)
+    left, right = watch(reference, plant, *STRIDE)
     assert all(is_unseen(stroke) for stroke in (left.insertion, left.stance, left.extraction, right.stance))
 
 
 def test_clay_and_surface_are_those_that_the_flipper_met_first() -> None:
-    witness, plant = StrokeWitness(), make_plant()
+    reference, plant = StrokeReference(), make_plant()
     arm = plant.arms[0]
     arm.clay, arm.history.surface_m = Clay("remoulded", 1234.0), 0.002
-    watch(witness, plant, Phase.INSERTION)
+    watch(reference, plant, Phase.INSERTION)
     arm.clay, arm.history.surface_m = Clay("next", 2000.0), -0.001
-    left, right = watch(witness, plant, Phase.STANCE, Phase.EXTRACTION, Phase.SWING)
+    left, right = watch(reference, plant, Phase.STANCE, Phase.EXTRACTION, Phase.SWING)
     assert (left.clay, left.surface_m) == (Clay("remoulded", 1234.0), 0.002)
     assert (right.clay, right.surface_m) == (MUDS["48.5"], 0.0)
     assert left.insertion.deepest_m == pytest.approx(0.028)
@@ -150,31 +150,31 @@ def test_clay_and_surface_are_those_that_the_flipper_met_first() -> None:
 
 def test_depths_and_surface_are_those_of_the_ridge_that_the_flipper_met() -> None:
     """A crest of 4 mm lies under a flipper that stands straight out, with the body a quarter of a ridge ahead."""
-    witness, plant = StrokeWitness(), make_plant()
+    reference, plant = StrokeReference(), make_plant()
     plant.track = Track([(1.0, MUDS["48.5"])], ridges=Ridges(0.004, 0.2))
     for arm in plant.arms:
         arm.track = plant.track
         arm.step(1e-9, 0.05, 0.0, 0.0, 0.0)  # so short that nothing moves
-    left, _ = watch(witness, plant, *STRIDE)
+    left, _ = watch(reference, plant, *STRIDE)
     assert left.surface_m == pytest.approx(-0.004)
     assert left.insertion.deepest_m == pytest.approx(0.03 + 0.004)
 
 
 def test_a_reset_witness_counts_from_zero() -> None:
-    witness, plant = StrokeWitness(), make_plant()
-    watch(witness, plant, *STRIDE, Phase.INSERTION, Phase.STANCE)
-    witness.reset()
-    assert watch(witness, plant, Phase.EXTRACTION, Phase.SWING) == []
-    assert [truth.index for truth in watch(witness, plant, *STRIDE)] == [0, 0]
+    reference, plant = StrokeReference(), make_plant()
+    watch(reference, plant, *STRIDE, Phase.INSERTION, Phase.STANCE)
+    reference.reset()
+    assert watch(reference, plant, Phase.EXTRACTION, Phase.SWING) == []
+    assert [truth.index for truth in watch(reference, plant, *STRIDE)] == [0, 0]
 
 
 def witnessed(lockstep: Lockstep, depth_m: float, seconds: float) -> list[StrideTruth]:
     lockstep.arm()
     lockstep.walk(WalkOrder(depth_m, adaptive=False))
-    witness, truths = StrokeWitness(), []
+    reference, truths = StrokeReference(), []
     for _ in range(round(seconds / PERIOD_S)):
         lockstep.step()
-        truths += witness.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target_before.phase)
+        truths += reference.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target_before.phase)
     return truths
 
 

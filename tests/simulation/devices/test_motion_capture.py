@@ -120,12 +120,12 @@ def test_a_pose_that_is_lost_for_six_frames_is_none() -> None:
 
 def test_the_loop_sees_120_places_a_second_where_it_is_told_so(configuration: Configuration) -> None:
     seen: dict[MotionCaptureParameters, set[float]] = {AT_EVERY_TICK: set(), OF_THE_PAPER: set()}
-    for parameters, places_m in seen.items():
+    for parameters, positions_m in seen.items():
         lockstep = Lockstep(configuration, TRACK, motion_capture=parameters)
         lockstep.arm()
         lockstep.walk(WalkOrder(0.03))
         for _ in range(380):
             lockstep.step()
-            places_m.add(lockstep.loop.body.x_m)
+            positions_m.add(lockstep.loop.body.x_m)
     assert len(seen[AT_EVERY_TICK]) == 380
     assert len(seen[OF_THE_PAPER]) in (120, 121)  # the second may begin between two frames

@@ -46,7 +46,7 @@ def make_drive(**changes: float) -> SimulatedOdrive:
     return SimulatedOdrive(OdriveParameters(NODE, **changes), Random(1))  # type: ignore[arg-type]
 
 
-def tell(drive: SimulatedOdrive, message: Message, *values: float, now_s: float = 0.0) -> None:
+def report(drive: SimulatedOdrive, message: Message, *values: float, now_s: float = 0.0) -> None:
     assert drive.receive(Frame(arbitration_id(NODE, message), message.encode(*values)), now_s) == []
 
 
@@ -60,9 +60,9 @@ def make_armed_drive(
     velocity_limit_turn_s: float = 100.0, current_limit_a: float = 100.0, **changes: float
 ) -> SimulatedOdrive:
     drive = make_drive(**changes)
-    tell(drive, SET_CONTROLLER_MODE, 1, 1)
-    tell(drive, SET_LIMITS, velocity_limit_turn_s, current_limit_a)
-    tell(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP)
+    report(drive, SET_CONTROLLER_MODE, 1, 1)
+    report(drive, SET_LIMITS, velocity_limit_turn_s, current_limit_a)
+    report(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP)
     return drive
 
 
@@ -72,18 +72,18 @@ def cyclic_frames(drive: SimulatedOdrive, duration_s: float) -> list[Frame]:
 
 def test_a_drive_is_idle_and_without_torque_after_power_on() -> None:
     drive = make_drive()
-    tell(drive, SET_CONTROLLER_MODE, 1, 1)
-    tell(drive, SET_INPUT_TORQUE, 0.2)
+    report(drive, SET_CONTROLLER_MODE, 1, 1)
+    report(drive, SET_INPUT_TORQUE, 0.2)
     assert drive.torque_nm(0.0) == 0.0
     assert ask(drive, HEARTBEAT)[:2] == (0, AxisState.IDLE)
 
 
 def test_an_armed_drive_exerts_what_it_is_told_until_it_is_idle() -> None:
     drive = make_armed_drive()
-    tell(drive, SET_INPUT_TORQUE, 0.25)
+    report(drive, SET_INPUT_TORQUE, 0.25)
     assert drive.torque_nm(0.0) == 0.25
     assert ask(drive, HEARTBEAT)[:2] == (0, AxisState.CLOSED_LOOP)
-    tell(drive, SET_AXIS_STATE, AxisState.IDLE)
+    report(drive, SET_AXIS_STATE, AxisState.IDLE)
     assert drive.torque_nm(0.0) == 0.0
     assert ask(drive, HEARTBEAT)[:2] == (0, AxisState.IDLE)
 
@@ -91,40 +91,40 @@ def test_an_armed_drive_exerts_what_it_is_told_until_it_is_idle() -> None:
 @pytest.mark.parametrize("modes", [(3, 1), (1, 6), (2, 2)])
 def test_modes_other_than_torque_passthrough_exert_nothing_here(modes: tuple[int, int]) -> None:
     drive = make_armed_drive()
-    tell(drive, SET_CONTROLLER_MODE, *modes)
-    tell(drive, SET_INPUT_TORQUE, 0.25)
+    report(drive, SET_CONTROLLER_MODE, *modes)
+    report(drive, SET_INPUT_TORQUE, 0.25)
     assert drive.torque_nm(0.0) == 0.0
 
 
 def test_an_emergency_stop_is_latched_until_errors_are_cleared() -> None:
     drive = make_armed_drive()
-    tell(drive, SET_INPUT_TORQUE, 0.25)
-    tell(drive, ESTOP)
+    report(drive, SET_INPUT_TORQUE, 0.25)
+    report(drive, ESTOP)
     assert drive.torque_nm(0.0) == 0.0
-    tell(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP)
+    report(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP)
     assert ask(drive, HEARTBEAT)[:2] == (ERROR_ESTOP, AxisState.IDLE)
     assert ask(drive, GET_ERROR) == (ERROR_ESTOP, ERROR_ESTOP)
-    tell(drive, CLEAR_ERRORS, 0)
+    report(drive, CLEAR_ERRORS, 0)
     assert ask(drive, GET_ERROR) == (0, ERROR_ESTOP)
-    tell(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP)
+    report(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP)
     assert ask(drive, HEARTBEAT)[:2] == (0, AxisState.CLOSED_LOOP)
     assert ask(drive, GET_ERROR) == (0, 0)
 
 
 def test_the_watchdog_cuts_the_torque_when_commands_stop() -> None:
     drive = make_armed_drive(watchdog_s=0.1)
-    tell(drive, SET_INPUT_TORQUE, 0.25, now_s=1.0)
+    report(drive, SET_INPUT_TORQUE, 0.25, now_s=1.0)
     assert drive.torque_nm(1.0999) == 0.25
     assert drive.torque_nm(1.1001) == 0.0
     assert ask(drive, GET_ERROR) == (ERROR_WATCHDOG, ERROR_WATCHDOG)
-    tell(drive, SET_INPUT_TORQUE, 0.25, now_s=1.2)
+    report(drive, SET_INPUT_TORQUE, 0.25, now_s=1.2)
     assert drive.torque_nm(1.2) == 0.0
 
 
 def test_the_watchdog_is_fed_by_torque_commands() -> None:
     drive = make_armed_drive(watchdog_s=0.1)
     for step in range(20):
-        tell(drive, SET_INPUT_TORQUE, 0.25, now_s=step * 0.09)
+        report(drive, SET_INPUT_TORQUE, 0.25, now_s=step * 0.09)
         assert drive.torque_nm(step * 0.09) == 0.25
 
 
@@ -141,7 +141,7 @@ def test_the_velocity_limit_clamps_torque_silently(turns_s: float, largest_nm: f
     drive = make_armed_drive(velocity_limit_turn_s=2.0)  # pitfall: 0.333 N·m at rest with ODrive's defaults
     drive.measure(0.0, turns_s * 2.0 * pi)
     for wanted_nm, given_nm in ((1.0, largest_nm), (-1.0, least_nm), (0.1, 0.1)):
-        tell(drive, SET_INPUT_TORQUE, wanted_nm)
+        report(drive, SET_INPUT_TORQUE, wanted_nm)
         assert drive.torque_nm(0.0) == pytest.approx(given_nm)
     assert ask(drive, GET_ERROR) == (0, 0)
 
@@ -149,7 +149,7 @@ def test_the_velocity_limit_clamps_torque_silently(turns_s: float, largest_nm: f
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_current_limit_bounds_torque_both_ways(sign: int) -> None:
     drive = make_armed_drive(current_limit_a=5.0, current_noise_a=0.0)
-    tell(drive, SET_INPUT_TORQUE, sign * 3.0)
+    report(drive, SET_INPUT_TORQUE, sign * 3.0)
     assert drive.torque_nm(0.0) == pytest.approx(sign * 5.0 * 0.083)
     assert ask(drive, GET_IQ) == pytest.approx((sign * 5.0, sign * 5.0))
 
@@ -160,14 +160,14 @@ def test_the_smaller_one_of_the_motor_s_clip_and_the_bus_s_limit_holds(
 ) -> None:
     drive = make_armed_drive(current_limit_a=bus_a, motor_current_limit_a=motor_a, current_noise_a=0.0)
     for sign in (1.0, -1.0):
-        tell(drive, SET_INPUT_TORQUE, sign * 3.0)
+        report(drive, SET_INPUT_TORQUE, sign * 3.0)
         assert drive.torque_nm(0.0) == pytest.approx(sign * given_a * 0.083)
         assert ask(drive, GET_IQ)[1] == pytest.approx(sign * given_a)
 
 
 def test_a_mirrored_motor_turns_angle_velocity_and_torque() -> None:
     drive = make_armed_drive(sign=-1, zero_turn=0.25)
-    tell(drive, SET_INPUT_TORQUE, 0.2)
+    report(drive, SET_INPUT_TORQUE, 0.2)
     assert drive.torque_nm(0.0) == pytest.approx(-0.2)
     drive.measure(pi / 2.0, pi)
     assert ask(drive, GET_ENCODER_ESTIMATES) == (0.0, -0.5)
@@ -220,7 +220,7 @@ def test_other_nodes_extended_ids_and_unknown_requests_are_not_answered() -> Non
 
 def test_the_current_is_noisy_as_stated_around_the_true_one() -> None:
     drive = make_armed_drive(current_noise_a=0.2)
-    tell(drive, SET_INPUT_TORQUE, 3.0 * 0.083)
+    report(drive, SET_INPUT_TORQUE, 3.0 * 0.083)
     drive.torque_nm(0.0)
     currents_a = np.array([ask(drive, GET_IQ) for _ in range(4000)])
     assert currents_a[:, 0] == pytest.approx(3.0)
@@ -249,20 +249,20 @@ def test_random_frames_never_raise_and_leave_a_finite_torque(frames: list[Frame]
 )
 def test_commands_of_another_length_change_nothing(message: Message, size: int) -> None:
     drive = make_armed_drive()
-    tell(drive, SET_INPUT_TORQUE, 0.25)
+    report(drive, SET_INPUT_TORQUE, 0.25)
     drive.receive(Frame(arbitration_id(NODE, message), bytes(size)), 0.0)
     assert drive.torque_nm(0.0) == 0.25
 
 
 def test_a_torque_that_is_no_number_is_ignored() -> None:
     drive = make_armed_drive()
-    tell(drive, SET_INPUT_TORQUE, float("nan"))
+    report(drive, SET_INPUT_TORQUE, float("nan"))
     assert isfinite(drive.torque_nm(0.0))
 
 
 def test_a_motor_with_another_constant_exerts_another_torque_and_reports_the_believed_current() -> None:
     drive = make_armed_drive(torque_constant_error=-0.1, current_noise_a=0.0)
-    tell(drive, SET_INPUT_TORQUE, 0.3)
+    report(drive, SET_INPUT_TORQUE, 0.3)
     assert drive.torque_nm(0.0) == pytest.approx(0.27)
     assert ask(drive, GET_IQ)[1] == pytest.approx(0.3 / 0.083)
 
@@ -284,7 +284,7 @@ def test_cogging_has_the_stated_amplitude_and_number_per_turn_and_gives_no_energ
 
 def test_cogging_adds_to_what_the_motor_is_told_and_is_not_reported() -> None:
     drive = make_armed_drive(cogging_nm=0.02, cogging_phase_deg=90.0, current_noise_a=0.0)
-    tell(drive, SET_INPUT_TORQUE, 0.3)
+    report(drive, SET_INPUT_TORQUE, 0.3)
     assert drive.torque_nm(0.0) == pytest.approx(0.28)
     assert ask(drive, GET_IQ)[1] == pytest.approx(0.3 / 0.083)
 
@@ -292,7 +292,7 @@ def test_cogging_adds_to_what_the_motor_is_told_and_is_not_reported() -> None:
 @pytest.mark.parametrize("step_s", [0.001, 0.0001])
 def test_current_follows_its_command_with_the_stated_time_constant_at_any_step(step_s: float) -> None:
     drive = make_armed_drive(current_lag_s=0.01, watchdog_s=0.0)
-    tell(drive, SET_INPUT_TORQUE, 0.3)
+    report(drive, SET_INPUT_TORQUE, 0.3)
     for step in range(round(0.02 / step_s)):
         torque_nm = drive.torque_nm((step + 1) * step_s)
     assert torque_nm == pytest.approx(0.3 * (1.0 - exp(-2.0)))
@@ -300,11 +300,11 @@ def test_current_follows_its_command_with_the_stated_time_constant_at_any_step(s
 
 def test_a_lagging_current_is_the_one_that_is_reported_and_falls_at_once_when_the_power_is_cut() -> None:
     drive = make_armed_drive(current_lag_s=0.01, current_noise_a=0.0)
-    tell(drive, SET_INPUT_TORQUE, 0.3)
+    report(drive, SET_INPUT_TORQUE, 0.3)
     torque_nm = drive.torque_nm(0.005)
     assert 0.0 < torque_nm < 0.2
     assert ask(drive, GET_IQ)[1] == pytest.approx(torque_nm / 0.083)
-    tell(drive, ESTOP)
+    report(drive, ESTOP)
     assert drive.torque_nm(0.006) == 0.0
     assert ask(drive, GET_IQ)[1] == 0.0
 
@@ -325,12 +325,12 @@ def test_encoder_noise_is_as_stated_and_comes_in_whole_counts() -> None:
 
 
 def test_the_cogging_is_where_the_joint_is_not_where_the_encoder_reads_it() -> None:
-    told_nm = []
+    reported_nm = []
     for offset_rad in (0.0, 0.01):
         drive = make_drive(cogging_nm=0.02, encoder_offset_rad=offset_rad)
         drive.measure(0.01, 0.0)
-        told_nm.append(drive.torque_nm(0.0))
-    assert told_nm[0] == told_nm[1] != 0.0
+        reported_nm.append(drive.torque_nm(0.0))
+    assert reported_nm[0] == reported_nm[1] != 0.0
 
 
 def test_late_messages_keep_their_order_and_number_and_tell_of_an_earlier_moment() -> None:
@@ -348,7 +348,7 @@ def test_late_messages_keep_their_order_and_number_and_tell_of_an_earlier_moment
 
 
 def test_the_stated_share_of_messages_repeats_the_one_before_to_the_last_bit() -> None:
-    drive, payloads = make_drive(repeated_share=0.6), []
+    drive, payloads = make_drive(repeated_fraction=0.6), []
     for step in range(10000):
         drive.measure(step / 1000.0, 0.0)
         payloads += [
@@ -361,11 +361,11 @@ def test_the_stated_share_of_messages_repeats_the_one_before_to_the_last_bit() -
 
 
 def test_a_heartbeat_is_never_an_old_one() -> None:
-    drive = make_drive(repeated_share=0.99)
+    drive = make_drive(repeated_fraction=0.99)
     cyclic_frames(drive, 0.5)
-    tell(drive, ESTOP)
+    report(drive, ESTOP)
     beats = [frame for frame in drive.cyclic_frames(10.0) if frame.arbitration_id == arbitration_id(NODE, HEARTBEAT)]
-    assert [HEARTBEAT.decode(beat.data)[0] for beat in beats] == [ERROR_ESTOP]
+    assert [HEARTBEAT.decode(tick.data)[0] for tick in beats] == [ERROR_ESTOP]
 
 
 def test_what_is_off_draws_nothing() -> None:
@@ -373,7 +373,7 @@ def test_what_is_off_draws_nothing() -> None:
     assert cyclic_frames(plain, 0.5) == cyclic_frames(dressed, 0.5)
 
 
-def told_setting(drive: SimulatedOdrive, endpoint: int) -> bytes:
+def reported_setting(drive: SimulatedOdrive, endpoint: int) -> bytes:
     question = Frame(arbitration_id(NODE, RX_SDO), RX_SDO.encode(0, endpoint, 0))
     (answer,) = drive.receive(question, 0.0)
     assert answer.arbitration_id == arbitration_id(NODE, TX_SDO)
@@ -384,8 +384,8 @@ def told_setting(drive: SimulatedOdrive, endpoint: int) -> bytes:
 @pytest.mark.parametrize(("watchdog_s", "enabled", "timeout"), [(0.1, "01", "cdcccc3d"), (0.0, "00", "00000000")])
 def test_the_watchdog_s_settings_are_told_byte_for_byte(watchdog_s: float, enabled: str, timeout: str) -> None:
     drive = make_drive(watchdog_s=watchdog_s)
-    assert told_setting(drive, 2) == bytes.fromhex(enabled)
-    assert told_setting(drive, 1) == bytes.fromhex(timeout)
+    assert reported_setting(drive, 2) == bytes.fromhex(enabled)
+    assert reported_setting(drive, 1) == bytes.fromhex(timeout)
 
 
 @pytest.mark.parametrize("data", ["01 02 00 00", "00 03 00 00", "00 02 00", "00 02 00 00 00", ""])
@@ -396,12 +396,12 @@ def test_no_other_parameter_is_told_and_none_is_written(data: str) -> None:
 def test_a_drive_that_restarts_is_silent_and_deaf_then_tells_once_that_it_initialises() -> None:
     drive = make_armed_drive()
     drive.measure(1.0, 0.0)
-    tell(drive, SET_INPUT_TORQUE, 0.25, now_s=5.0)
+    report(drive, SET_INPUT_TORQUE, 0.25, now_s=5.0)
     drive.restart(5.0)
     assert drive.torque_nm(5.001) == 0.0
     assert not any(list(drive.cyclic_frames(5.0 + step / 1000.0)) for step in range(round(1000 * BOOT_S)))
     assert drive.receive(Frame(arbitration_id(NODE, GET_VERSION), is_remote=True), 5.5) == []
-    tell(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP, now_s=5.9)
+    report(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP, now_s=5.9)
     frames = [frame for step in range(400) for frame in drive.cyclic_frames(5.0 + BOOT_S + step / 1000.0)]
     heartbeats = [HEARTBEAT.decode(frame.data)[:2] for frame in frames if frame.arbitration_id & 0x1F == 0x01]
     assert heartbeats == [(ERROR_INITIALIZING, AxisState.IDLE)] + [(0, AxisState.IDLE)] * (len(heartbeats) - 1)
@@ -413,10 +413,10 @@ def test_a_drive_that_restarts_is_silent_and_deaf_then_tells_once_that_it_initia
 def test_a_drive_that_was_restarted_has_forgotten_its_mode() -> None:
     drive = make_armed_drive()
     drive.restart(0.0)
-    tell(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP, now_s=2.0)
-    tell(drive, SET_INPUT_TORQUE, 0.25, now_s=2.0)
+    report(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP, now_s=2.0)
+    report(drive, SET_INPUT_TORQUE, 0.25, now_s=2.0)
     assert drive.torque_nm(2.0) == 0.0
-    tell(drive, SET_CONTROLLER_MODE, 1, 1, now_s=2.0)
+    report(drive, SET_CONTROLLER_MODE, 1, 1, now_s=2.0)
     assert drive.torque_nm(2.0) == 0.25
 
 

@@ -135,10 +135,10 @@ def test_a_late_camera_that_tells_how_late_it_is_biases_no_bound(configuration: 
     late = strides_of(Lockstep(robot_of, track, motion_capture=MotionCaptureParameters(120.0, latency_s=0.02)))
     robot = Lockstep(robot_of, track)
     with closing(StreamedPose(robot.robot.plant, 0.02)) as robot.loop.pose:
-        told = strides_of(robot)
-    assert len(exact) == len(late) == len(told) == 4
+        reported = strides_of(robot)
+    assert len(exact) == len(late) == len(reported) == 4
     assert all(stride.k_s.at_least for stride in exact)
     assert not any(stride.k_s.at_least for stride in late)
     assert any(one.k_s.value < 0.95 * true.k_s.value for one, true in zip(late, exact, strict=True))
-    for one, true in zip(told, exact, strict=True):
+    for one, true in zip(reported, exact, strict=True):
         assert one.k_s.at_least and one.k_s.value == pytest.approx(true.k_s.value, rel=0.01)

@@ -76,7 +76,7 @@ def test_it_walks_with_everything_that_can_be_wrong_with_its_joints_and_its_pose
         encoder_offset_rad=0.01,
         encoder_noise_rad=0.0002,
         message_delay_s=0.001,
-        repeated_share=0.2,
+        repeated_fraction=0.2,
     )
     cameras = MotionCaptureParameters(rate_hz=120.0, latency_s=0.01, dropouts_per_s=0.3)
     plant = plant_of(configuration, joint_coulomb_nm=0.01)
@@ -156,7 +156,7 @@ def test_a_silent_drive_is_a_fault_and_all_torques_are_zero(
     assert lockstep.run_until(lambda: lockstep.loop.mode is Mode.FAULT, 0.1)
     assert lockstep.loop.fault is not None
     assert lockstep.loop.fault.name == "drive_silent"
-    assert joint in lockstep.loop.fault.sentence
+    assert joint in lockstep.loop.fault.message
     assert lockstep.loop.sent.torques_nm == NO_TORQUE
     lockstep.step()
     assert all(drive.axis_state is AxisState.IDLE for drive in lockstep.robot.drives)
@@ -167,8 +167,8 @@ def test_a_drive_that_disarms_itself_is_a_fault_that_can_be_cleared(holding: Loc
     holding.robot.drives[2]._disarm(ERROR_WATCHDOG)
     assert holding.run_until(lambda: holding.loop.mode is Mode.FAULT, 0.2)
     assert holding.loop.fault is not None
-    assert "right_sweep" in holding.loop.fault.sentence
-    assert "watchdog expired" in holding.loop.fault.sentence
+    assert "right_sweep" in holding.loop.fault.message
+    assert "watchdog expired" in holding.loop.fault.message
     holding.run_for(0.2)
     holding.loop.request(Request.CLEAR, holding.now_s)
     assert holding.run_until(lambda: holding.loop.mode is Mode.IDLE, 0.5)

@@ -152,14 +152,14 @@ def test_a_mud_by_its_water_is_the_paper_s() -> None:
         (SECOND + LAYER.replace("3.0", "20"), "segment 2.layer 1.factor = 20: must be at most 17.9 in mud of 2800 Pa"),
     ],
 )
-def test_what_cannot_be_is_refused_with_key_value_and_bound(added: str, told: str) -> None:
+def test_what_cannot_be_is_refused_with_key_value_and_bound(added: str, reported: str) -> None:
     before = added + SHORTEST if added.startswith("stone =") else SHORTEST + added
-    assert problems_of(before) == [told]
+    assert problems_of(before) == [reported]
 
 
 def test_a_track_begins_at_its_beginning() -> None:
-    (told,) = problems_of(SHORTEST.replace("start_m = 0", "start_m = 0.1"))
-    assert told == "segment 1.start_m = 0.1: must be 0, where the track begins, without gap"
+    (reported,) = problems_of(SHORTEST.replace("start_m = 0", "start_m = 0.1"))
+    assert reported == "segment 1.start_m = 0.1: must be 0, where the track begins, without gap"
 
 
 def test_a_world_without_mud_is_refused() -> None:
@@ -176,10 +176,10 @@ def test_all_problems_are_told_at_once_whatever_their_kind() -> None:
         + LAYER.replace("0.02", "0.0")
         + STONE.replace("0.3", "0.1")
     )
-    told = problems_of(wrong)
+    reported = problems_of(wrong)
     for key in ("depth_m", "segment 1.strength_pa", "segment 2.start_m", "segment 2.layer 1.bottom_m", "stone 1.end_m"):
-        assert sum(sentence.startswith((f"{key} ", f"{key}:")) for sentence in told) == 1
-    assert len(told) == 5
+        assert sum(message.startswith((f"{key} ", f"{key}:")) for message in reported) == 1
+    assert len(reported) == 5
 
 
 def test_the_strongest_mud_may_be_reached_by_a_layer_and_not_surpassed() -> None:
@@ -288,5 +288,5 @@ def test_a_world_of_a_track_alone_changes_nothing() -> None:
 
 
 def test_a_whole_number_beyond_all_floats_is_refused_by_its_key() -> None:
-    told = problems_of(SHORTEST + SECOND.replace("1.0", "1" + "0" * 400))
-    assert [problem.split(" = ")[0] for problem in told] == ["segment 2.end_m"]
+    reported = problems_of(SHORTEST + SECOND.replace("1.0", "1" + "0" * 400))
+    assert [problem.split(" = ")[0] for problem in reported] == ["segment 2.end_m"]

@@ -42,16 +42,16 @@ def test_the_sideways_force_in_layers_is_the_sum_of_the_pressure(depth_m: float,
     pressures_pa = strengths_pa * np.minimum(3.0 + 17.5e3 * z / strengths_pa + 0.5 * z / width_m, 9.0)
     slices_n = width_m * pressures_pa * np.diff(edges_m)
     # Three borders, each within half a slice of the dense sum's.
-    doubt_n = 1.5 * width_m * 9.0 * 4500.0 * depth_m / 4000
-    assert CRUSTED.lateral_n(depth_m, width_m) == pytest.approx(slices_n.sum(), abs=doubt_n)
+    uncertainty_n = 1.5 * width_m * 9.0 * 4500.0 * depth_m / 4000
+    assert CRUSTED.lateral_n(depth_m, width_m) == pytest.approx(slices_n.sum(), abs=uncertainty_n)
 
 
 @given(st.floats(0.0, 0.06), st.floats(1e-4, 0.06))
 def test_the_mean_strength_of_layers_is_the_mean_of_the_strengths_in_them(from_m: float, span_m: float) -> None:
     z = from_m + span_m * (np.arange(4000) + 0.5) / 4000
     strengths_pa = [CRUSTED.strength_at_pa(depth_m) for depth_m in z]
-    doubt_pa = 1.5 * (4500.0 - 600.0) / 4000  # three borders, each within half a piece of the dense sum's
-    assert CRUSTED.mean_strength_pa(from_m, from_m + span_m) == pytest.approx(np.mean(strengths_pa), abs=doubt_pa)
+    uncertainty_pa = 1.5 * (4500.0 - 600.0) / 4000  # three borders, each within half a piece of the dense sum's
+    assert CRUSTED.mean_strength_pa(from_m, from_m + span_m) == pytest.approx(np.mean(strengths_pa), abs=uncertainty_pa)
 
 
 def test_a_layer_begins_at_its_top_and_ends_at_its_bottom() -> None:

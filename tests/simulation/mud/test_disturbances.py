@@ -18,7 +18,7 @@ from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import PERIOD_S
 from simulation.body.plant import Arm
-from simulation.body.reference_sensor import StrideTruth, StrokeWitness
+from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.disturbances import (
@@ -36,15 +36,15 @@ GEOMETRY = FlipperGeometry()
 SOFT = Track([(5.0, MUDS["53.1"])])
 
 
-def stroke(history: StrokeHistory, depth_m: float = 0.03, place_m: float = 0.0) -> None:
+def stroke(history: StrokeHistory, depth_m: float = 0.03, position_m: float = 0.0) -> None:
     """From the air down to a depth and up again."""
     for lowest_m in (-0.014, 0.5 * depth_m, depth_m, 0.5 * depth_m, -0.014, -0.014):
-        history.step(lowest_m, place_m)
+        history.step(lowest_m, position_m)
 
 
-def lowered(history: StrokeHistory, place_m: float = 0.0) -> StrokeHistory:
-    history.step(-0.014, place_m)
-    history.step(0.02, place_m)
+def lowered(history: StrokeHistory, position_m: float = 0.0) -> StrokeHistory:
+    history.step(-0.014, position_m)
+    history.step(0.02, position_m)
     return history
 
 
@@ -138,18 +138,18 @@ def test_a_share_of_remoulding_softens_by_that_share() -> None:
 
 
 @pytest.mark.parametrize(("place_m", "earlier"), [(0.0, 1), (0.014, 1), (-0.014, 1), (0.016, 0), (-0.12, 0)])
-def test_the_same_place_ends_after_a_centimetre_and_a_half(place_m: float, earlier: int) -> None:
+def test_the_same_place_ends_after_a_centimetre_and_a_half(position_m: float, earlier: int) -> None:
     history = StrokeHistory(Disturbances(remoulding=1.0), 1)
     stroke(history)
-    assert lowered(history, place_m).firmness == pytest.approx(0.5 + 0.5 * exp(-0.4 * earlier))
+    assert lowered(history, position_m).firmness == pytest.approx(0.5 + 0.5 * exp(-0.4 * earlier))
 
 
 def test_a_place_is_where_the_flipper_came_in_and_its_mud_stays_the_same_through_the_stroke() -> None:
     history = StrokeHistory(Disturbances(remoulding=1.0), 1)
     stroke(history)
     history.step(0.02, 0.0)
-    for place_m in (0.0, -0.02, -0.06):  # as a flipper that slips
-        history.step(0.02, place_m)
+    for position_m in (0.0, -0.02, -0.06):  # as a flipper that slips
+        history.step(0.02, position_m)
         assert history.firmness == pytest.approx(0.5 + 0.5 * exp(-0.4))
     history.step(-0.014, -0.06)
     assert lowered(history, -0.06).firmness == 1.0
@@ -206,10 +206,10 @@ def single_flipper(configuration: Configuration, disturbances: Disturbances, tra
 
 
 def truths_of(lockstep: Lockstep, seconds: float) -> list[StrideTruth]:
-    witness, truths = StrokeWitness(), []
+    reference, truths = StrokeReference(), []
     for _ in range(round(seconds / PERIOD_S)):
         lockstep.step()
-        truths += witness.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target_before.phase)
+        truths += reference.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target_before.phase)
     return truths
 
 

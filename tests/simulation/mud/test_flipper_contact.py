@@ -28,7 +28,7 @@ SWEEPS = st.floats(-0.6, 0.6)
 ADDUCTIONS = st.floats(-1.2, 0.3)
 DEPTHS = st.floats(0.005, 0.045)
 SPEEDS = st.floats(-3.0, 3.0)
-PLACES_M = [(u, s) for u in (-0.0125, 0.0, 0.0125) for s in (0.0, 0.07)]  # corners, and the middles between them
+POSITIONS_M = [(u, s) for u in (-0.0125, 0.0, 0.0125) for s in (0.0, 0.07)]  # corners, and the middles between them
 
 
 def in_world(adduction_rad: float, x: float, y: float, z: float) -> np.ndarray:
@@ -37,7 +37,7 @@ def in_world(adduction_rad: float, x: float, y: float, z: float) -> np.ndarray:
     return np.array([x, cb * y - sb * z, sb * y + cb * z])
 
 
-def place_m(sweep_rad: float, adduction_rad: float, outward_m: float, above_edge_m: float) -> np.ndarray:
+def position_m(sweep_rad: float, adduction_rad: float, outward_m: float, above_edge_m: float) -> np.ndarray:
     """Of a point on the plate, from the crossing of the axes."""
     arm_m = GEOMETRY.flipper_length_m + outward_m
     return in_world(adduction_rad, arm_m * sin(sweep_rad), arm_m * cos(sweep_rad), above_edge_m - GEOMETRY.drop_m)
@@ -62,14 +62,14 @@ def hold(
 @given(SWEEPS, ADDUCTIONS)
 def test_the_attitude_tells_the_depth_of_every_point_of_the_plate(sweep_rad: float, adduction_rad: float) -> None:
     attitude = attitude_of(GEOMETRY, sweep_rad, adduction_rad, surface_m=0.004)
-    for u, s in PLACES_M:
-        depth_m = -GEOMETRY.axis_height_m - 0.004 - place_m(sweep_rad, adduction_rad, u, s)[2]
+    for u, s in POSITIONS_M:
+        depth_m = -GEOMETRY.axis_height_m - 0.004 - position_m(sweep_rad, adduction_rad, u, s)[2]
         assert attitude.depth_m + attitude.per_outward * u - attitude.per_upward * s == pytest.approx(depth_m)
 
 
 @given(SWEEPS, ADDUCTIONS)
 def test_the_lowest_point_is_the_lower_one_of_the_two_lower_corners(sweep_rad: float, adduction_rad: float) -> None:
-    corners_m = [place_m(sweep_rad, adduction_rad, u, 0.0)[2] for u in (-0.0125, 0.0125)]
+    corners_m = [position_m(sweep_rad, adduction_rad, u, 0.0)[2] for u in (-0.0125, 0.0125)]
     lowest = lowest_m(GEOMETRY, sweep_rad, adduction_rad)
     assert lowest == pytest.approx(-GEOMETRY.axis_height_m - min(corners_m))
 
@@ -84,18 +84,18 @@ def test_the_twist_is_the_motion_of_every_point_of_the_plate(
         in_world(adduction_rad, sin(sweep_rad), cos(sweep_rad), 0.0),
         in_world(adduction_rad, 0.0, 0.0, 1.0),
     )
-    for u, s in PLACES_M:
+    for u, s in POSITIONS_M:
         ahead_m, behind_m = (
-            place_m(sweep_rad + way * sweep_rad_s * moved_s, adduction_rad + way * adduction_rad_s * moved_s, u, s)
+            position_m(sweep_rad + way * sweep_rad_s * moved_s, adduction_rad + way * adduction_rad_s * moved_s, u, s)
             for way in (1.0, -1.0)
         )
         velocity_m_s = (ahead_m - behind_m) / (2.0 * moved_s) + np.array([body_m_s, 0.0, 0.0])
-        told_m_s = (
+        reported_m_s = (
             twist.normal_m_s + twist.normal_per_outward_s * u + twist.normal_per_upward_s * s,
             twist.outward_m_s + twist.outward_per_upward_s * s,
             twist.upward_m_s + twist.upward_per_outward_s * u,
         )
-        assert told_m_s == pytest.approx([float(velocity_m_s @ way) for way in directions], abs=1e-8)
+        assert reported_m_s == pytest.approx([float(velocity_m_s @ way) for way in directions], abs=1e-8)
 
 
 @given(SWEEPS, SPEEDS, SPEEDS, st.floats(-1.0, 1.0), st.tuples(*[st.floats(-10.0, 10.0)] * 7))

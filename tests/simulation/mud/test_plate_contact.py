@@ -60,10 +60,10 @@ def yielded_n(attitude: Attitude, clay: Clay, velocity_m_s: tuple[float, float, 
 
     def strength_pa(depths_m: np.ndarray) -> np.ndarray:
         """Times the rate factor."""
-        share = np.ones_like(depths_m)
+        fraction = np.ones_like(depths_m)
         for layer in clay.layers:
-            share = np.where((depths_m >= layer.top_m) & (depths_m < layer.bottom_m), layer.factor, share)
-        return rate_factor(speed_m_s) * clay.strength_pa * np.where(depths_m > 0.0, share, 0.0)
+            fraction = np.where((depths_m >= layer.top_m) & (depths_m < layer.bottom_m), layer.factor, fraction)
+        return rate_factor(speed_m_s) * clay.strength_pa * np.where(depths_m > 0.0, fraction, 0.0)
 
     def pressure_pa(depths_m: np.ndarray, width_m: float) -> np.ndarray:
         """N_p s_u = min(3 s_u + γ ζ + J s_u ζ/b, 9 s_u), which is 0 above the mud."""
@@ -276,12 +276,12 @@ def test_sideways_loads_build_up_as_in_the_logs() -> None:
 
 @given(ATTITUDES, st.lists(TWISTS, min_size=1, max_size=5))
 def test_outward_and_inward_are_mirror_images(attitude: Attitude, twists: list[Twist]) -> None:
-    plate, twin = PlateContact(SIZE), PlateContact(SIZE)
+    plate, duplicate = PlateContact(SIZE), PlateContact(SIZE)
     mirrored = attitude._replace(per_outward=-attitude.per_outward)
     signs = (1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0)
     for twist in twists:
         wrench = move(plate, twist, 0.01, attitude)
-        image = move(twin, Twist(*(sign * part for sign, part in zip(signs, twist, strict=True))), 0.01, mirrored)
+        image = move(duplicate, Twist(*(sign * part for sign, part in zip(signs, twist, strict=True))), 0.01, mirrored)
         assert image == pytest.approx([sign * part for sign, part in zip(signs, wrench, strict=True)], abs=1e-9)
 
 
@@ -430,8 +430,8 @@ def test_a_plate_that_comes_in_obliquely_is_loaded_from_its_corner_on_without_a_
 
 @given(ATTITUDES)
 def test_the_wet_part_of_the_edge_is_the_part_below_the_surface(attitude: Attitude) -> None:
-    places_m = SIZE.width_m * ((np.arange(2000) + 0.5) / 2000 - 0.5)
-    wet_m = places_m[attitude.depth_m + attitude.per_outward * places_m > 0.0]
+    positions_m = SIZE.width_m * ((np.arange(2000) + 0.5) / 2000 - 0.5)
+    wet_m = positions_m[attitude.depth_m + attitude.per_outward * positions_m > 0.0]
     if not len(wet_m):
         assert lowest_point_m(attitude, SIZE.width_m) <= 0.5 * SIZE.width_m / 2000
         return

@@ -20,9 +20,9 @@ STONE = Stone(0.10, 0.16, 0.02)
 def pushed(*places: tuple[float, float]) -> tuple[float, float]:
     """The push at the last of some (place, depth), each held for long enough that nothing moves any more."""
     contact, push = StoneContact([STONE]), NO_PUSH
-    for place_m, depth_m in places:
+    for position_m, depth_m in places:
         for _ in range(2):
-            push = contact.step(DT_S, place_m, depth_m)
+            push = contact.step(DT_S, position_m, depth_m)
     return push
 
 
@@ -82,9 +82,9 @@ def test_a_reset_contact_has_met_no_stone() -> None:
 
 
 @given(st.floats(0.028, 2.0), st.floats(0.01, 3.0), st.floats(0.0, 1.0))
-def test_what_falls_on_a_stone_comes_back_slower(mass_kg: float, speed_m_s: float, start_share: float) -> None:
+def test_what_falls_on_a_stone_comes_back_slower(mass_kg: float, speed_m_s: float, start_fraction: float) -> None:
     """From the sweep inertia of an arm at its plate up to a body; wherever within a step it arrives."""
-    contact, depth_m = StoneContact([STONE]), STONE.top_m - start_share * speed_m_s * DT_S
+    contact, depth_m = StoneContact([STONE]), STONE.top_m - start_fraction * speed_m_s * DT_S
     velocity_m_s, deepest_m = speed_m_s, -inf
     for _ in range(400):
         depth_m += DT_S * velocity_m_s

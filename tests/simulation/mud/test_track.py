@@ -38,9 +38,9 @@ def test_ridges_rise_from_the_start_and_repeat_after_their_wavelength() -> None:
     assert heights_m == pytest.approx([0.0, 0.004, 0.0, -0.004, 0.0, 0.004])
 
 
-def strengths_pa(parameters: RandomStrength, places_m: np.ndarray) -> np.ndarray:
+def strengths_pa(parameters: RandomStrength, positions_m: np.ndarray) -> np.ndarray:
     track = Track(LONG, random_strength=parameters)
-    return np.array([track.clay_at(float(x_m)).strength_pa for x_m in places_m])
+    return np.array([track.clay_at(float(x_m)).strength_pa for x_m in positions_m])
 
 
 def test_random_strength_has_the_mean_and_the_spread_that_were_asked_for() -> None:
@@ -65,10 +65,10 @@ def test_random_strength_forgets_itself_over_its_correlation_length() -> None:
 
 
 def test_random_strength_is_the_same_for_a_seed_in_whatever_order_it_is_looked_at() -> None:
-    parameters, places_m = RandomStrength(0.3, 0.1, 3), np.linspace(-0.5, 5.0, 200)
-    forward, backward = strengths_pa(parameters, places_m), strengths_pa(parameters, places_m[::-1])
+    parameters, positions_m = RandomStrength(0.3, 0.1, 3), np.linspace(-0.5, 5.0, 200)
+    forward, backward = strengths_pa(parameters, positions_m), strengths_pa(parameters, positions_m[::-1])
     assert forward.tolist() == backward[::-1].tolist()
-    assert forward.tolist() != strengths_pa(RandomStrength(0.3, 0.1, 4), places_m).tolist()
+    assert forward.tolist() != strengths_pa(RandomStrength(0.3, 0.1, 4), positions_m).tolist()
 
 
 def test_random_strength_has_no_outliers_beyond_three_deviations() -> None:

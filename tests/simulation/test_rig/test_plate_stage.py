@@ -20,24 +20,24 @@ class Air:
         self.reset()
 
     def reset(self) -> None:
-        self.depth_m = self.way_m = 0.0
+        self.depth_m = self.path_m = 0.0
 
     def step(self, dt_s: float, forward_m_s: float, upward_m_s: float) -> tuple[float, float]:
         self.depth_m -= dt_s * upward_m_s
-        self.way_m += dt_s * forward_m_s
-        return self.way_m, self.depth_m
+        self.path_m += dt_s * forward_m_s
+        return self.path_m, self.depth_m
 
 
 @given(st.floats(0.001, 0.5), st.floats(0.005, 0.5), st.floats(0.1, 20.0))
-def test_a_ramped_way_ends_where_and_when_it_should(way_m: float, speed_m_s: float, acceleration: float) -> None:
-    motion = RampedMotion(way_m, speed_m_s, acceleration)
+def test_a_ramped_way_ends_where_and_when_it_should(path_m: float, speed_m_s: float, acceleration: float) -> None:
+    motion = RampedMotion(path_m, speed_m_s, acceleration)
     duration_s = motion.duration_s
-    assert motion.way_m(0.0) == 0.0
-    assert motion.way_m(duration_s) == pytest.approx(way_m)
-    assert motion.way_m(duration_s / 2.0) == pytest.approx(way_m / 2.0)
+    assert motion.path_m(0.0) == 0.0
+    assert motion.path_m(duration_s) == pytest.approx(path_m)
+    assert motion.path_m(duration_s / 2.0) == pytest.approx(path_m / 2.0)
     step_s = 1e-4 * duration_s
-    steps = [motion.way_m(i * 100 * step_s + step_s) for i in range(100)]
-    before = [motion.way_m(i * 100 * step_s) for i in range(100)]
+    steps = [motion.path_m(i * 100 * step_s + step_s) for i in range(100)]
+    before = [motion.path_m(i * 100 * step_s) for i in range(100)]
     speeds = [(b - a) / step_s for a, b in zip(before, steps, strict=True)]
     assert min(speeds) >= 0.0 and max(speeds) <= speed_m_s * (1.0 + 1e-6)
 
@@ -66,7 +66,7 @@ def test_lowering_and_lifting_end_at_their_depths_and_a_drag_goes_backward() -> 
     assert air.depth_m == pytest.approx(0.03)
     stage.drag(2.0, 0.2, 0.1)
     stage.mean_force_n(5.0)
-    assert (air.way_m, stage.force_n) == pytest.approx((-0.2, -0.2))
+    assert (air.path_m, stage.force_n) == pytest.approx((-0.2, -0.2))
     stage.lift(5.0)
     stage.mean_force_n(7.0)
     assert air.depth_m == pytest.approx(-LIFTED_M)
@@ -84,19 +84,19 @@ def test_the_cell_reads_the_mean_since_the_last_time_and_what_hangs_on_it() -> N
 
 
 @given(st.floats(0.003, 0.3), st.integers(0, 10**6))
-def test_a_hand_goes_all_its_way_forward_and_never_faster_than_it_can(way_m: float, seed: int) -> None:
+def test_a_hand_goes_all_its_way_forward_and_never_faster_than_it_can(path_m: float, seed: int) -> None:
     hand = HandParameters()
-    motion = HandMotion(way_m, hand, Random(seed))
+    motion = HandMotion(path_m, hand, Random(seed))
     step_s = motion.duration_s / 500.0
-    places_m = [motion.way_m(i * step_s) for i in range(501)]
-    assert (places_m[0], places_m[-1]) == (0.0, way_m)
-    speeds_m_s = [(after - before) / step_s for before, after in pairwise(places_m)]
+    positions_m = [motion.path_m(i * step_s) for i in range(501)]
+    assert (positions_m[0], positions_m[-1]) == (0.0, path_m)
+    speeds_m_s = [(after - before) / step_s for before, after in pairwise(positions_m)]
     assert min(speeds_m_s) >= -1e-9 and max(speeds_m_s) <= 1.01 * hand.fastest_m_s
 
 
 def test_a_hand_stutters_and_rests() -> None:
     motion = HandMotion(0.2, HandParameters(), Random(3))
-    speeds_m_s = [100.0 * (motion.way_m(i / 100.0) - motion.way_m((i - 1) / 100.0)) for i in range(10, 150)]
+    speeds_m_s = [100.0 * (motion.path_m(i / 100.0) - motion.path_m((i - 1) / 100.0)) for i in range(10, 150)]
     assert sum(speed < 1e-6 for speed in speeds_m_s) > 5
     assert max(speeds_m_s) > 2.0 * 0.06
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 
-class ScriptedPerson:
+class ScriptedOperator:
     """A Person who answers with what is left of `answers`, then with the first answer that there is."""
 
     def __init__(self, *answers: str) -> None:
         self.answers = list(answers)
         self.asked: list[str] = []
         self.offered: list[Mapping[str, str]] = []
-        self.told: list[str] = []
+        self.reported: list[str] = []
 
     def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
         self.asked.append(question)
@@ -26,5 +26,5 @@ class ScriptedPerson:
         self.asked.append(question)
         return low
 
-    def tell(self, sentence: str) -> None:
-        self.told.append(sentence)
+    def report(self, message: str) -> None:
+        self.reported.append(message)
