@@ -1,9 +1,14 @@
-"""Imports only point down: the folders' layers, read from the source with `ast`."""
+"""Imports only point down, between folders and between modules; read from the source with `ast`."""
+
+from __future__ import annotations
 
 import ast
 import sys
 import tomllib
+from collections import Counter
 from collections.abc import Iterator
+from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -19,65 +24,111 @@ LAYERS = [
     ("command_line",),
 ]
 HEIGHT = {package: height for height, layer in enumerate(LAYERS) for package in layer}
+MOST_MODULES = 14  # in one folder
 
 
 def imports(source: str, package: str) -> set[str]:
-    """The top-level packages that a module names in any import, wherever in the file it stands."""
+    """Every module that a source names in an import, wherever in the file the import stands."""
     found = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[0] for alias in node.names}
+            found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            found.add(package if node.level else (node.module or "").split(".")[0])
+            module = package if node.level else node.module or ""
+            found |= {module, *(f"{module}.{alias.name}" for alias in node.names)}
     return found
 
 
 def allowed(package: str, imported: str) -> bool:
-    if imported == package or imported in sys.stdlib_module_names:
+    top = imported.split(".")[0]
+    if top == package or top in sys.stdlib_module_names:
         return True
-    if imported not in HEIGHT:  # a library
+    if top not in HEIGHT:  # a library
         return package != "control"
-    if (package, imported) == ("simulation", "estimation"):  # made-up mud must not be judged by what fits it
+    if (package, top) == ("simulation", "estimation"):  # the simulated mud must not know the fits that are tried on it
         return False
-    return HEIGHT[imported] < HEIGHT[package]
+    return HEIGHT[top] < HEIGHT[package]
 
 
-def modules() -> Iterator[tuple[str, Path]]:
-    for package in HEIGHT:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            yield package, path
+@cache
+def sources() -> dict[str, str]:
+    """The source of every module of the product, by its dotted name."""
+    return {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts): path.read_text(encoding="utf-8")
+        for package in HEIGHT
+        for path in sorted((ROOT / package).rglob("*.py"))
+    }
+
+
+def imported_modules(module: str) -> set[str]:
+    """The product's own modules that a module imports."""
+    return imports(sources()[module], module.split(".")[0]) & sources().keys() - {module}
+
+
+def circle(edges: dict[str, set[str]]) -> list[str]:
+    """One circle of a graph, or nothing."""
+    try:
+        TopologicalSorter(edges).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def room(module: str) -> str:
+    return module.rpartition(".")[0]
+
+
+def sibling_rooms() -> dict[str, set[str]]:
+    """For each folder within a package, the folders next to it that it imports from."""
+    edges: dict[str, set[str]] = {}
+    for module in sources():
+        for imported in imported_modules(module):
+            rooms = room(module), room(imported)
+            if rooms[0] != rooms[1] and all("." in each for each in rooms) and room(rooms[0]) == room(rooms[1]):
+                edges.setdefault(rooms[0], set()).add(rooms[1])
+    return edges
+
+
+def folders() -> Iterator[tuple[Path, int]]:
+    skipped = {"tests", "build"}
+    paths = [path.relative_to(ROOT) for path in ROOT.rglob("*.py") if path.name != "__init__.py"]
+    kept = [path for path in paths if path.parts[0] not in skipped and not path.parts[0].startswith(".")]
+    yield from Counter(path.parent for path in kept).items()
 
 
 def test_every_installed_package_has_its_layer() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     included = project["tool"]["setuptools"]["packages"]["find"]["include"]
     assert {pattern.removesuffix("*") for pattern in included} == set(HEIGHT)
-    assert all((path.parent / "__init__.py").exists() for _, path in modules())
-
-
-def test_what_experiments_share_knows_none_of_them() -> None:
-    shared = {path.stem for path in (ROOT / "experiments").glob("*.py")}
-    wrong = {
-        f"{path.name} imports {node.module}"
-        for path in (ROOT / "experiments").glob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("experiments.")
-        if (node.module or "").split(".")[1] not in shared
-    }
-    assert not wrong
+    assert all((path.parent / "__init__.py").exists() for package in HEIGHT for path in (ROOT / package).rglob("*.py"))
 
 
 @pytest.mark.parametrize("package", HEIGHT)
 def test_imports_only_point_down(package: str) -> None:
-    paths = [path for owner, path in modules() if owner == package]
-    assert paths
     wrong = {
-        f"{path.relative_to(ROOT)} imports {name}"
-        for path in paths
-        for name in imports(path.read_text(encoding="utf-8"), package)
+        f"{module} imports {name}"
+        for module, source in sources().items()
+        if module.split(".")[0] == package
+        for name in imports(source, package)
         if not allowed(package, name)
     }
     assert not wrong
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    assert not circle({module: imported_modules(module) for module in sources()})
+
+
+def test_no_sibling_folders_import_each_other_in_a_circle() -> None:
+    assert not circle(sibling_rooms())
+
+
+def test_no_import_hides_from_the_interpreter() -> None:
+    assert not [module for module, source in sources().items() if "TYPE_CHECKING" in source]
+
+
+def test_no_folder_is_overfull() -> None:
+    assert not {str(folder): count for folder, count in folders() if count > MOST_MODULES}
 
 
 @pytest.mark.parametrize(
@@ -105,9 +156,14 @@ def test_an_import_that_points_up_is_noticed(package: str, line: str) -> None:
         ("control", "from . import records"),
         ("estimation", "import numpy as np"),
         ("drivers", "from control.records import JOINTS"),
-        ("simulation", "from firmware_host.ticker import PERIOD_S"),
+        ("simulation", "from firmware_host.ticker import Tick"),
         ("command_line", "import estimation.mud"),
     ],
 )
 def test_an_import_that_points_down_is_allowed(package: str, line: str) -> None:
     assert all(allowed(package, name) for name in imports(line, package))
+
+
+def test_a_circle_is_noticed() -> None:
+    assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}})
+    assert not circle({"a": {"b", "c"}, "b": {"c"}, "c": set()})
