@@ -95,8 +95,8 @@ def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration
     plot_path = options.out / log_path.with_suffix(".png").name
     summary = summarise(report, demonstration, log, log_path, plot_path)
     print(f"\n{summary_text(summary)}\nDrawing ...", flush=True)
-    from command_line.logs.recorded_walk import read_walk
-    from command_line.pictures.walk_plot import plot_walk  # matplotlib takes its time; the walk must not wait for it
+    from experiments.pictures.recorded_walk import read_walk
+    from experiments.pictures.walk_plot import plot_walk  # matplotlib takes its time; the walk must not wait for it
 
     plot_walk(read_walk(log_path), plot_path, demonstration.track)
     print(f"plot     {plot_path}")

@@ -12,7 +12,6 @@ from typing import Any
 
 from command_line.experiments.conduct import conduct, refuse
 from command_line.experiments.conduct_bench import Desk, Finding, conduct_bench
-from command_line.pictures.walk_figures import walk_figures
 from command_line.screen import number, plain, table
 from experiments.reports.report_page import Figure, Section
 from experiments.robot.bench_robot import leave
@@ -23,6 +22,7 @@ from experiments.trackway import trials as trackway_trials
 from experiments.trackway.mud_fit import cells_beside_paper
 from experiments.trackway.paper_table import ADAPTIVE, PAPER_TABLE
 from experiments.trackway.trials import AskedTrackway, first_walks
+from experiments.trackway.walk_figures import walk_figures
 from experiments.trials.mud_names import mud_label, mud_name
 from experiments.trials.notebook import Notebook
 from firmware_host.operator.counted_nouns import counted

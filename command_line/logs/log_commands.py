@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 from command_line import exit_codes
-from command_line.logs.recorded_walk import RecordedWalk, read_walk
-from command_line.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line, watched
+from experiments.pictures.recorded_walk import RecordedWalk, read_walk
+from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of
 from firmware_host.configuration.configuration import ConfigurationError, load_configuration
 from firmware_host.log.log_folder import ACTIVE, DONE
 from firmware_host.log_reading.lab_csv import write_lab_csv
@@ -70,7 +70,7 @@ def plot(options: Options) -> int:
         return exit_codes.UNHEALTHY
     if not walk.strides:
         complain("no complete stride in this log")
-    from command_line.pictures.walk_plot import plot_walk  # matplotlib takes its time
+    from experiments.pictures.walk_plot import plot_walk  # matplotlib takes its time
 
     plot_walk(walk, path)
     print(f"written  {path}")
@@ -92,7 +92,7 @@ def film(options: Options) -> int:
     if moving:
         _draw_film(walk, strides, path)
     else:
-        from command_line.pictures.stride_strip import draw_strip
+        from experiments.pictures.stride_strip import draw_strip
 
         draw_strip(walk, strides, path)
     names = [f"{outcome_of(stride, walk.geometric_step_m)} {stride['index']}" for stride in strides]
@@ -147,7 +147,7 @@ def _chosen_strides(options: Options, walk: RecordedWalk, moving: bool) -> list[
 
 
 def _draw_film(walk: RecordedWalk, strides: list[Stride], path: Path) -> None:
-    from command_line.pictures.stride_film import draw_film
+    from experiments.pictures.stride_film import draw_film
 
     progress = Progress("frames")
     try:

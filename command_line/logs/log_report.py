@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from command_line import exit_codes
-from command_line.logs.recorded_walk import RecordedWalk, read_walk
-from command_line.pictures.stride_choice import choose_strides
 from command_line.screen import coefficient, complain, number, watched
+from experiments.pictures.recorded_walk import RecordedWalk, read_walk
+from experiments.pictures.stride_choice import choose_strides
 from experiments.reports.report_page import PAGE, Figure, Section, numbers_reported, write_report
 from experiments.trials.whole_files import copy_whole
 from firmware_host.log_reading.log_reader import Log, LogError, Watch, begin_s, log_summary, read_logs
@@ -93,7 +93,7 @@ def _walk_sections(files: Sequence[Path], watch: Watch) -> list[Section]:
 
 
 def _walk_section(walk: RecordedWalk, count: int) -> Section:
-    from command_line.pictures.walk_plot import plot_walk  # matplotlib takes its time
+    from experiments.pictures.walk_plot import plot_walk  # matplotlib takes its time
 
     begun = f"It begins {walk.begun_s:.2f} s after the log. Its pictures count from there, as 'mudskipper plot' does."
     missing = f"Not in this log: {', '.join(walk.missing)}." if walk.missing else ""
@@ -105,7 +105,7 @@ def _walk_section(walk: RecordedWalk, count: int) -> Section:
 
 
 def _draw_strip(walk: RecordedWalk, path: Path) -> None:
-    from command_line.pictures.stride_strip import draw_strip
+    from experiments.pictures.stride_strip import draw_strip
 
     draw_strip(walk, choose_strides(walk), path)
 

@@ -18,14 +18,14 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import command_line.logs.log_commands
-import command_line.pictures.stride_film
+import experiments.pictures.stride_film
 from command_line import exit_codes
-from command_line.logs.recorded_walk import RecordedWalk, read_walk
 from command_line.main import main
-from command_line.pictures.colours import OUTCOMES
-from command_line.pictures.stride_choice import Outcome, duration_s, rows_of
-from command_line.pictures.stride_film import FRAMES_PER_S, film_frames
-from command_line.pictures.walk_plot import mud_regions, plot_walk
+from experiments.pictures.colours import OUTCOMES
+from experiments.pictures.recorded_walk import RecordedWalk, read_walk
+from experiments.pictures.stride_choice import Outcome, duration_s, rows_of
+from experiments.pictures.stride_film import FRAMES_PER_S, film_frames
+from experiments.pictures.walk_plot import mud_regions, plot_walk
 from firmware_host.log_reading.lab_csv import write_lab_csv
 from firmware_host.log_reading.log_reader import read_log
 from simulation.mud.clay import MUDS, Clay
@@ -302,7 +302,7 @@ def test_a_film_without_end_is_refused(
     log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(command_line.logs.log_commands, "LONGEST_FILM_S", 2.0)
-    monkeypatch.setattr(command_line.pictures.stride_film, "FRAMES_PER_S", 2)
+    monkeypatch.setattr(experiments.pictures.stride_film, "FRAMES_PER_S", 2)
     out = str(log.with_suffix(".gif"))
     assert "choose with --stride" in refusal(capsys, "film", str(log), "--walk", "1", "--out", out)
     assert main(["film", str(log), "--walk", "1", "--out", out, "--stride", "1"]) == exit_codes.OK
@@ -328,7 +328,7 @@ def test_without_matplotlib_a_sentence_says_what_to_install(command: tuple[str, 
 
 
 def test_another_missing_module_is_no_matter_of_pictures(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "command_line.pictures.walk_plot", raising=False)
+    monkeypatch.delitem(sys.modules, "experiments.pictures.walk_plot", raising=False)
     monkeypatch.setitem(sys.modules, "simulation.mud.track", None)
     with pytest.raises(ModuleNotFoundError):
         main(["plot", str(log)])

@@ -15,8 +15,8 @@ import pytest
 from mcap.reader import make_reader
 
 from command_line import exit_codes, screen
-from command_line.logs.recorded_walk import read_walk
 from command_line.main import main
+from experiments.pictures.recorded_walk import read_walk
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files
 from firmware_host.log.log_parameters import ONE_FILE

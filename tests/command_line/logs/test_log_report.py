@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from command_line import exit_codes
-from command_line.logs import log_report, recorded_walk
+from command_line.logs import log_report
 from command_line.main import main
+from experiments.pictures import recorded_walk
 from experiments.reports.report_page import Section
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.file_recorder import FileRecorder

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from tests.scripted_operator import ScriptedOperator
 
 from control.records import JOINTS
 from experiments.bench.operator import AskedAttendant, Sight, SimulatedAttendant
 from experiments.bench.rig import SimulatedRig
 from firmware_host.configuration.configuration import Configuration
+from tests.scripted_operator import ScriptedOperator
 
 
 def nothing() -> None: ...

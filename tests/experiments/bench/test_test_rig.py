@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.scripted_operator import ScriptedOperator
 
 from control.records import JOINTS, NO_TORQUE
 from drivers.odrive.codec import ERROR_WATCHDOG, AxisState
@@ -22,6 +21,7 @@ from experiments.robot.bench_robot import CLEAR, LEAVE, BenchError
 from firmware_host.configuration.configuration import Configuration
 from tests.bench.bench_table import HEADS, table_lines
 from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, BenchReport, StagedBench, stage_of
+from tests.scripted_operator import ScriptedOperator
 
 
 @pytest.fixture

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.scripted_operator import ScriptedOperator
 
 from control.records import Phase
 from experiments.flipper import measurement as flipper
@@ -27,6 +26,7 @@ from experiments.trials.simulated_bed import CarriedBed
 from experiments.trials.stride_profile import profile_of_row
 from experiments.trials.trial import SINGLE, configuration_of
 from tests.experiments.made_up_strides import make_estimate, make_profile, make_stride
+from tests.scripted_operator import ScriptedOperator
 
 MUD = "51.2"
 SHORT = Plan((MUD,), trials=1, simulated=True)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.scripted_operator import ScriptedOperator
 
 from command_line.experiments.trackway import trackway_text
 from control.modes import Mode
@@ -39,6 +38,7 @@ from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParame
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from tests.scripted_operator import ScriptedOperator
 
 SHORT = Plan((Mud("48.5", 0.3), Mud("53.1", 0.3)), trials=1, depths_m=(0.03,))
 TINY = Plan((Mud("48.5", 0.15),), trials=1, depths_m=(0.03,))

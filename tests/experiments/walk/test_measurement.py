@@ -10,7 +10,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
-from tests.scripted_operator import ScriptedOperator
 
 from experiments.flipper.report import KNOWN_BIAS, WRONG_CONSTANTS
 from experiments.robot.lockstep_robot import LockstepRobot
@@ -26,6 +25,7 @@ from experiments.walk.pages import sections_of, text_of
 from experiments.walk.report import placed_strides, report_of, walks_of
 from experiments.walk.simulation import walking_bench
 from tests.experiments.made_up_strides import CONFIGURATION, make_estimate, make_stride
+from tests.scripted_operator import ScriptedOperator
 
 SHORT = Plan((Mud("47.6", 0.3), Mud("51.2", 0.3)), trials=1, soft=("51.2",), soft_strides=2, simulated=True)
 TINY = Plan((Mud("47.6", 0.2),), trials=1, simulated=True)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from command_line.logs.recorded_walk import RecordedWalk, numbered_walk
+from experiments.pictures.recorded_walk import RecordedWalk, numbered_walk
 from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure
 from experiments.robot.prompt import Operator
@@ -23,7 +23,7 @@ CAPTION = (
 
 def walk_figures(walks: Mapping[str, LoggedTime], folder: Path, operator: Operator) -> list[Figure]:
     """Of each walk whose log is there; of another one a person is told why there is none."""
-    from command_line.pictures.walk_plot import plot_walk  # matplotlib takes its time
+    from experiments.pictures.walk_plot import plot_walk  # matplotlib takes its time
 
     figures = []
     for key, logged in walks.items():

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from command_line.logs.recorded_walk import RecordedWalk
 from control.records import Phase
+from experiments.pictures.recorded_walk import RecordedWalk
 
 Stride = dict[str, Any]  # a row of log_rows.STRIDE
 

@@ -18,10 +18,10 @@ import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend wi
 import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 
-from command_line.logs.recorded_walk import RecordedWalk  # noqa: E402
-from command_line.pictures.colours import FAINT, FLIPPERS, FORWARD, INK, MUDS, OUTCOMES, SURFACE, UP  # noqa: E402
-from command_line.pictures.stride_choice import Outcome, outcome_of  # noqa: E402
 from control.records import FLIPPERS as NAMES  # noqa: E402
+from experiments.pictures.colours import FAINT, FLIPPERS, FORWARD, INK, MUDS, OUTCOMES, SURFACE, UP  # noqa: E402
+from experiments.pictures.recorded_walk import RecordedWalk  # noqa: E402
+from experiments.pictures.stride_choice import Outcome, outcome_of  # noqa: E402
 from experiments.trials.mud_names import mud_label  # noqa: E402
 from simulation.mud.track import Track  # noqa: E402
 

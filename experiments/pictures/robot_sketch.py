@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Rectangle
 
-from command_line.logs.recorded_walk import RecordedWalk
-from command_line.pictures.colours import BODY, FAINT, FLIPPERS, INK, MUD, SURFACE, TRAIL
-from command_line.pictures.side_view import SideView, view_from_side
+from experiments.pictures.colours import BODY, FAINT, FLIPPERS, INK, MUD, SURFACE, TRAIL
+from experiments.pictures.recorded_walk import RecordedWalk
+from experiments.pictures.side_view import SideView, view_from_side
 
 BODY_LENGTH_M, BODY_HEIGHT_M, CORNER_M = 0.13, 0.052, 0.018  # no log knows the body
 EYE_M = 0.0045

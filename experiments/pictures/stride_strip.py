@@ -16,10 +16,10 @@ import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 
-from command_line.logs.recorded_walk import RecordedWalk  # noqa: E402
-from command_line.pictures.colours import INK, OUTCOMES  # noqa: E402
-from command_line.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare  # noqa: E402
-from command_line.pictures.stride_choice import MOMENTS, Outcome, Stride, moments_of, outcome_of, rows_of  # noqa: E402
+from experiments.pictures.colours import INK, OUTCOMES  # noqa: E402
+from experiments.pictures.recorded_walk import RecordedWalk  # noqa: E402
+from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare  # noqa: E402
+from experiments.pictures.stride_choice import MOMENTS, Outcome, Stride, moments_of, outcome_of, rows_of  # noqa: E402
 
 DEEPEST_M, HIGHEST_M = 0.106, 0.146  # of what a row shows, below and above the surface
 APART_M = 0.235  # from one moment to the next

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from command_line.pictures.stride_choice import Outcome
+from experiments.pictures.stride_choice import Outcome
 
 INK = "#33302c"
 FAINT = "#8c867d"  # what only helps the eye

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from command_line.logs.recorded_walk import read_walk
 from control.controller import WalkOrder
 from control.modes import Mode
+from experiments.pictures.recorded_walk import read_walk
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder
 from firmware_host.log.rows import EVENT, EVENT_KIND

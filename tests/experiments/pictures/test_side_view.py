@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from command_line.pictures.side_view import Point, convex_hull, view_from_side
 from control.geometry import FlipperGeometry
 from control.plate import submerged_plate
+from experiments.pictures.side_view import Point, convex_hull, view_from_side
 from simulation.mud.flipper_contact import lowest_m
 
 GEOMETRY = FlipperGeometry()

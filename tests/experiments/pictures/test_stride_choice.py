@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from command_line.logs.recorded_walk import RecordedWalk
-from command_line.pictures.stride_choice import (
+from control.geometry import FlipperGeometry
+from control.records import Phase
+from experiments.pictures.recorded_walk import RecordedWalk
+from experiments.pictures.stride_choice import (
     Outcome,
     choose_strides,
     duration_s,
@@ -17,8 +19,6 @@ from command_line.pictures.stride_choice import (
     outcome_of,
     rows_of,
 )
-from control.geometry import FlipperGeometry
-from control.records import Phase
 
 STROKES = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING)
 ROWS = 10  # of each phase, 0.1 s apart

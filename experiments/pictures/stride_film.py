@@ -18,11 +18,11 @@ import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from PIL import Image  # noqa: E402 - comes with matplotlib
 
-from command_line.logs.recorded_walk import RecordedWalk  # noqa: E402
-from command_line.pictures.colours import FORCE, INK, OUTCOMES, SURFACE  # noqa: E402
-from command_line.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare, view_of  # noqa: E402
-from command_line.pictures.stride_choice import Outcome, Stride, outcome_of, rows_of  # noqa: E402
 from control.records import Phase  # noqa: E402
+from experiments.pictures.colours import FORCE, INK, OUTCOMES, SURFACE  # noqa: E402
+from experiments.pictures.recorded_walk import RecordedWalk  # noqa: E402
+from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare, view_of  # noqa: E402
+from experiments.pictures.stride_choice import Outcome, Stride, outcome_of, rows_of  # noqa: E402
 
 FRAMES_PER_S = 20  # GIF counts in hundredths of a second
 DEEPEST_M, HIGHEST_M, HALF_WIDTH_M = 0.085, 0.135, 0.25

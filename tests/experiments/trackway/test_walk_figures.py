@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.scripted_operator import ScriptedOperator
 
-from command_line.pictures.walk_figures import logged_walk, walk_figures
 from experiments.trackway.trials import LoggedTime
+from experiments.trackway.walk_figures import logged_walk, walk_figures
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.log_folder import DONE, first_path, log_files
 from firmware_host.log.log_parameters import LogParameters
@@ -18,6 +17,7 @@ from firmware_host.log_reading.log_reader import read_log
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from tests.recorded_walks import walk_and_hold
+from tests.scripted_operator import ScriptedOperator
 
 
 @pytest.fixture
