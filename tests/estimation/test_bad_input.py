@@ -216,7 +216,7 @@ def stuck(fraction: float) -> Callable[[list[Row]], list[Row]]:
     return spoil
 
 
-@pytest.mark.parametrize("share", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("fraction", [0.05, 0.1, 0.2])
 def test_a_motor_at_its_limit_that_never_moved_the_mud_gives_a_bound(fraction: float) -> None:
     """The mud bore 10 A where the walk's yields at 9: it is at least so much stronger."""
     good = fed(new_estimator("default"), walk())[0].k_s.value

@@ -264,7 +264,7 @@ def test_gravity_inertia_and_friction_left_in_would_be_taken_for_mud() -> None:
         assert abs(stride.k_e.value / MUD.k_e - 1.0) > 0.03
 
 
-@pytest.mark.parametrize("face_share", [-0.3, 0.15, 0.3])
+@pytest.mark.parametrize("face_fraction", [-0.3, 0.15, 0.3])
 def test_a_load_on_the_face_changes_nothing_but_the_surface_that_is_found(face_fraction: float) -> None:
     """At -30 % to 30 % of the stance's load it would change k_p by up to 14 % and k_e by as much, were it not taken
     off; where the force begins to rise it blurs by a few tenths of a millimetre, which the doubt covers.
@@ -525,7 +525,7 @@ def carried(rows: Sequence[Row], fraction: float) -> list[Row]:
     return [row._replace(body_m=fraction * path_m) for row, path_m in zip(rows, ways_m, strict=True)]
 
 
-@pytest.mark.parametrize(("share", "case"), [(0.0, "yield"), (0.5, "mixed"), (0.97, "body")])
+@pytest.mark.parametrize(("fraction", "case"), [(0.0, "yield"), (0.5, "mixed"), (0.97, "body")])
 def test_the_place_of_the_body_tells_what_gave_way(fraction: float, case: str) -> None:
     stride = one(carried(rows_of(motion()), fraction), estimator(surface_error_m=KNOWN_M, base=Base.FREE))
     assert stride.stance == case

@@ -89,7 +89,7 @@ def test_a_boundary_of_muds_stands_where_it_was_walked_over() -> None:
     assert values[1.025] == pytest.approx(0.2e6)
 
 
-@pytest.mark.parametrize("place_m", [nan, inf, -inf, 1.7e308])
+@pytest.mark.parametrize("position_m", [nan, inf, -inf, 1.7e308])
 def test_a_stride_without_a_place_is_on_no_map(position_m: float) -> None:
     assert mapped(stride(k_s=reported(1e6)), position_m=position_m).rows() == ()
 

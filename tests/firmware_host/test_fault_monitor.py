@@ -210,7 +210,7 @@ def test_firmware_is_known_or_a_fault(bench: Bench, version: Version | None, exp
 
 
 @pytest.mark.parametrize(
-    ("watchdog_s", "name", "sentence"),
+    ("watchdog_s", "name", "message"),
     [
         (nan, "watchdog_unknown", "The left_sweep drive's watchdog was not read back."),
         (0.0, "watchdog_off", "The left_sweep drive's watchdog is off."),

@@ -84,7 +84,7 @@ def test_a_stall_is_forgotten_after_the_ticks_of_a_mean() -> None:
     assert not any(reported[MEAN_TICKS:])
 
 
-@pytest.mark.parametrize(("share", "expected"), [(0.0, False), (0.09, False), (0.12, True), (1.0, True)])
+@pytest.mark.parametrize(("fraction", "expected"), [(0.0, False), (0.09, False), (0.12, True), (1.0, True)])
 def test_a_rate_that_is_not_kept_is_a_lag_though_no_five_are_missed(fraction: float, expected: bool) -> None:
     watch = LoopMonitor(FaultBounds())
     reported = [

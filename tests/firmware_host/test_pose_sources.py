@@ -68,7 +68,7 @@ def test_these_sections_choose_a_source(example_text: str, section: str, chosen:
 
 
 @pytest.mark.parametrize(
-    ("section", "told"),
+    ("section", "reported"),
     [
         ('source = "gps"', "pose.source = 'gps': should be"),
         ('source = "socket"', "pose.socket = '': must name a socket where pose.source = 'socket'"),

@@ -126,7 +126,7 @@ def test_without_a_folder_it_makes_one_of_its_name(tmp_path: Path, monkeypatch: 
 
 
 @pytest.mark.parametrize(
-    ("problem", "status", "sentence"),
+    ("problem", "status", "message"),
     [
         (BenchError("the robot no longer holds"), exit_codes.REFUSED, "the robot no longer holds"),
         (BarredError("only for members"), exit_codes.NOT_PERMITTED, "only for members"),

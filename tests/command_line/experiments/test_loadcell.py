@@ -124,7 +124,7 @@ def test_another_depth_in_the_same_folder_is_refused(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "sentence"),
+    ("arguments", "message"),
     [
         ([], "--port"),
         (["--simulated", "--mud", "clay"], "water content"),

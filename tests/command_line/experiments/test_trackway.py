@@ -234,7 +234,7 @@ def test_a_person_gets_fitted_beside_present_values(capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.parametrize(
-    ("arguments", "sentence"),
+    ("arguments", "message"),
     [
         (("--compartment", "0.5"), "--compartment is for --simulated"),
         (("--simulated", "--mud", "48.5"), "--mud is for a real trackway"),

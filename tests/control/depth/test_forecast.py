@@ -179,7 +179,7 @@ class TestFeltFraction:
         for start in (0.3, 1.4):
             assert self.reported_by(start, *[truth] * 30).felt_fraction == pytest.approx(truth, rel=2.0 * PIECES)
 
-    @pytest.mark.parametrize(("share", "nearest"), [(9.0, 1.5), (0.01, 0.2)])
+    @pytest.mark.parametrize(("fraction", "nearest"), [(9.0, 1.5), (0.01, 0.2)])
     def test_nonsense_is_believed_only_so_far(self, fraction: float, nearest: float) -> None:
         assert self.reported_by(fraction).felt_fraction == nearest
 

@@ -54,7 +54,7 @@ def test_any_error_frame_has_a_text_and_a_state_or_none(class_bits: int, data: b
 
 
 @pytest.mark.parametrize(
-    ("before", "class_bits", "told", "after"),
+    ("before", "class_bits", "reported", "after"),
     [
         (ACTIVE, 0x004, WARNING, WARNING),
         (PASSIVE, 0x004, ACTIVE, ACTIVE),

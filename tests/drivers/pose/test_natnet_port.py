@@ -236,7 +236,7 @@ def test_a_server_that_comes_back_with_another_version_is_understood(open_labora
 
 
 @pytest.mark.parametrize(
-    ("changes", "sentence"),
+    ("changes", "message"),
     [
         ({"interface": "nothing0"}, "NatNet cannot be received from 127.0.0.1 on nothing0: No such device"),
         ({"interface": "192.0.2.1"}, "on 192.0.2.1: Cannot assign requested address"),

@@ -142,7 +142,7 @@ def test_where_the_body_goes_along_and_the_mud_holds_there_is_a_bound() -> None:
     assert shear.samples == 10 * COUNT
 
 
-@pytest.mark.parametrize("body_share", [0.25, 0.5, 0.7])
+@pytest.mark.parametrize("body_fraction", [0.25, 0.5, 0.7])
 def test_where_the_plate_slips_while_the_body_advances_the_strength_is_told(body_fraction: float) -> None:
     """At 70 % of 12 cm it slips 3.6 cm, so few batches are left; but they have all of the strength."""
     shear = found(sheared(poses(body_fraction), base=Base.FREE))
@@ -161,7 +161,7 @@ def test_only_the_pieces_count_in_which_the_plate_slips() -> None:
     assert k_of(shear) == pytest.approx(K_S, rel=0.02)  # the border's batch has half of either
 
 
-@pytest.mark.parametrize(("body_share", "case"), [(0.15, "yield"), (0.25, "mixed")])
+@pytest.mark.parametrize(("body_fraction", "case"), [(0.15, "yield"), (0.25, "mixed")])
 def test_up_to_a_fifth_of_the_way_the_body_counts_as_standing(body_fraction: float, case: str) -> None:
     assert found(pressed(poses(body_fraction))).case == case
 
@@ -242,7 +242,7 @@ def test_above_the_bodys_drag_it_may_have_moved() -> None:
     assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
 
 
-@pytest.mark.parametrize(("share", "case"), [(0.79, "yield"), (0.81, "unknown")])
+@pytest.mark.parametrize(("fraction", "case"), [(0.79, "yield"), (0.81, "unknown")])
 def test_four_fifths_of_the_drag_is_the_border(fraction: float, case: str) -> None:
     batches = [batch._replace(sweep_nm=fraction * DRAG_N / 2.0 * LENGTH_M / cos(batch.sweep_rad)) for batch in poses()]
     assert found(blind(batches)).case == case

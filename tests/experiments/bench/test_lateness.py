@@ -87,7 +87,7 @@ def test_what_stands_against_arming_is_told(configuration: Configuration, monkey
         stand.arm()
 
 
-@pytest.mark.parametrize(("missing_share", "waiting_share"), [(0.05, 0.0), (0.0, 0.1)])
+@pytest.mark.parametrize(("missing_fraction", "waiting_fraction"), [(0.05, 0.0), (0.0, 0.1)])
 def test_the_current_before_torque_goes_off_is_seen_through_late_ticks_and_messages(
     stand: Stand, rig: LateRig, briefly: None, missing_fraction: float, waiting_fraction: float
 ) -> None:
@@ -192,7 +192,7 @@ def test_what_was_out_of_its_bounds_stays_in_the_report_though_it_is_well_when_m
 
 
 @pytest.mark.parametrize(
-    ("missed", "age_s", "sentence"),
+    ("missed", "age_s", "message"),
     [
         (3, 0.0, r"Meanwhile this computer missed 3 of 4 ticks: end what else runs on this computer"),
         (0, 0.04, r"Meanwhile the drives' messages were up to 40 ms old: see stage 1"),

@@ -116,7 +116,7 @@ def test_a_trial_in_which_the_cell_is_unplugged_is_repeated_and_both_are_kept(ma
 
 
 @pytest.mark.parametrize(
-    ("amplifier", "stage", "kind", "sentence"),
+    ("amplifier", "stage", "kind", "message"),
     [
         (AmplifierParameters(drift_n_s=0.03), None, INSERTION, "the zero moved by"),
         (AmplifierParameters(range_n=2.0), None, INSERTION, "at its limit"),

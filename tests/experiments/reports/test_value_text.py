@@ -47,7 +47,8 @@ def test_where_there_is_no_value_stands_a_dash(value: float | None) -> None:
 
 
 @pytest.mark.parametrize(
-    ("share", "text"), [(0.0321, "3.2 %"), (0.000321, "0.032 %"), (0.321, "32 %"), (0.0, "0.0 %"), (1e-16, "0.000 %")]
+    ("fraction", "text"),
+    [(0.0321, "3.2 %"), (0.000321, "0.032 %"), (0.321, "32 %"), (0.0, "0.0 %"), (1e-16, "0.000 %")],
 )
 def test_a_share_is_told_in_percent_with_two_digits(fraction: float, text: str) -> None:
     assert fraction_text(fraction) == text

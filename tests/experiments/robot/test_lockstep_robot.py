@@ -240,7 +240,7 @@ def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) 
 
 
 @pytest.mark.parametrize(
-    ("mode", "notice", "told"),
+    ("mode", "notice", "reported"),
     [
         ("idle", "", "its torque was switched off"),
         ("idle", "the lease was lost", "the lease was lost"),

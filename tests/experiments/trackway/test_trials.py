@@ -169,7 +169,7 @@ def test_strides_of_which_the_pose_was_lost_are_told_and_not_counted(tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("place_m", "mud"), [(-0.1, "48.5"), (0.0, "48.5"), (0.299, "48.5"), (0.3, "53.1"), (0.6, ""), (9.0, "")]
+    ("position_m", "mud"), [(-0.1, "48.5"), (0.0, "48.5"), (0.299, "48.5"), (0.3, "53.1"), (0.6, ""), (9.0, "")]
 )
 def test_a_mud_reaches_from_its_border_to_the_next(position_m: float, mud: str) -> None:
     assert SHORT.mud_at(position_m) == mud
@@ -216,7 +216,7 @@ def test_a_pose_of_the_wrong_sign_is_told(tmp_path: Path) -> None:
     assert "turn pose.axis" in walk.fault
 
 
-@pytest.mark.parametrize(("asked", "told"), [("stop", "told to stop"), ("disarm", "torque was switched off")])
+@pytest.mark.parametrize(("asked", "reported"), [("stop", "told to stop"), ("disarm", "torque was switched off")])
 def test_what_somebody_else_asks_for_is_no_end_of_the_trackway(tmp_path: Path, asked: str, reported: str) -> None:
     walk, _ = doubted_walk(tmp_path, lambda now_s, x_m: x_m, (5.0, asked))
     assert reported in walk.fault and walk.stopped

@@ -142,7 +142,7 @@ def test_something_that_is_no_toml_names_the_line(example_text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "reported"),
     [
         ('name = "mudskipper"', 'name = "../../x"', "robot.name = '../../x': must be 1 to 64"),
         ('name = "mudskipper"', 'name = ""', "robot.name = '': must be 1 to 64"),

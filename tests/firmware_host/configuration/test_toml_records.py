@@ -74,7 +74,7 @@ def test_changes_are_what_the_file_sets_and_nothing_else(text: str, changes: dic
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         ("", "rail is missing"),
         ("rail = 1", "rail = 1: must be tables, each under [[rail]]"),
@@ -108,7 +108,7 @@ def test_a_number_of_thousands_of_digits_is_refused_by_its_key() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         (f"note = {'9' * 5000}", "not a TOML file that can be read: a number or a date is beyond all size"),
         (f"note = {'[' * 20_000}", "not a TOML file that can be read: it is nested too deep"),

@@ -313,7 +313,7 @@ def test_flippers_that_may_be_in_the_mud_are_raised_before_they_are_moved(armed:
 
 
 @pytest.mark.parametrize(
-    ("angles_rad", "sentence"),
+    ("angles_rad", "message"),
     [
         ({}, "no joint is named: at least one of left_sweep_rad"),
         ({"tail_rad": 0.1}, "'tail_rad' is no joint's angle"),

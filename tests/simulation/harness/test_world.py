@@ -104,7 +104,7 @@ def test_a_mud_by_its_water_is_the_paper_s() -> None:
 
 
 @pytest.mark.parametrize(
-    ("added", "told"),
+    ("added", "reported"),
     [
         ("[ridge]\n", "ridge: there is no such key"),
         ("[ridges]\namplitude = 1\n", "ridges.amplitude: there is no such key"),

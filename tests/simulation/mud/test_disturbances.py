@@ -137,7 +137,7 @@ def test_a_share_of_remoulding_softens_by_that_share() -> None:
     assert lowered(history).firmness == pytest.approx(1.0 - 0.25 * (1.0 - exp(-0.4)))
 
 
-@pytest.mark.parametrize(("place_m", "earlier"), [(0.0, 1), (0.014, 1), (-0.014, 1), (0.016, 0), (-0.12, 0)])
+@pytest.mark.parametrize(("position_m", "earlier"), [(0.0, 1), (0.014, 1), (-0.014, 1), (0.016, 0), (-0.12, 0)])
 def test_the_same_place_ends_after_a_centimetre_and_a_half(position_m: float, earlier: int) -> None:
     history = StrokeHistory(Disturbances(remoulding=1.0), 1)
     stroke(history)
