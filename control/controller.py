@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import radians
 from typing import Annotated, NamedTuple
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 from control.fault_kinds import make_fault
 from control.faults import Fault
 from control.gait.gait import Gait, GaitParameters
@@ -37,9 +37,15 @@ from control.records import (
 class MotionParameters:
     """Of everything that is not the gait."""
 
-    path_speed_rad_s: Annotated[float, Bounds(0.05, 10.0)] = 1.0
-    fade_in_s: Annotated[float, Bounds(0.0, 10.0)] = 0.5  # stiffness after arming
-    longest_hold_s: Annotated[float, Bounds(0.0, 86400.0)] = 600.0  # then torque goes off by itself; 0: never
+    path_speed_rad_s: Annotated[
+        float, Bounds(0.05, 10.0), Meaning("of joints that move to a pose outside of the gait")
+    ] = 1.0
+    fade_in_s: Annotated[
+        float, Bounds(0.0, 10.0), Meaning("in which stiffness rises to its full value after arming")
+    ] = 0.5
+    longest_hold_s: Annotated[
+        float, Bounds(0.0, 86400.0), Meaning("after which torque goes off by itself; 0: never")
+    ] = 600.0
 
 
 UP_RAD = 0.12  # from level: the edge of a 12 cm arm is then 1.4 cm lower, still out of the mud

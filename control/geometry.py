@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from math import asin, atan2, cos, hypot, radians, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 
 MIN_LEVER_M = 0.01  # below it the adduction joint moves the plate sideways, not down: refuse to command it
 
@@ -36,12 +36,18 @@ class Jacobian(NamedTuple):
 
 @dataclass(frozen=True)
 class FlipperGeometry:
-    flipper_length_m: Annotated[float, Bounds(0.02, 1.0)] = 0.120
-    drop_m: Annotated[float, Bounds(0.0, 0.5)] = 0.050
-    axis_height_m: Annotated[float, Bounds(0.0, 1.0)] = 0.0645
-    plate_width_m: Annotated[float, Bounds(0.002, 0.5)] = 0.025
-    plate_thickness_m: Annotated[float, Bounds(0.0002, 0.1)] = 0.004
-    plate_height_m: Annotated[float, Bounds(0.002, 0.5)] = 0.070
+    flipper_length_m: Annotated[
+        float, Bounds(0.02, 1.0), Meaning("sweep axis to the middle of the plate, along the arm")
+    ] = 0.120
+    drop_m: Annotated[float, Bounds(0.0, 0.5), Meaning("arm to the plate's lower edge")] = 0.050
+    axis_height_m: Annotated[float, Bounds(0.0, 1.0), Meaning("adduction axis above the mud's nominal surface")] = (
+        0.0645
+    )
+    plate_width_m: Annotated[float, Bounds(0.002, 0.5), Meaning("plate's extent along the arm")] = 0.025
+    plate_thickness_m: Annotated[float, Bounds(0.0002, 0.1), Meaning("plate's extent fore and aft")] = 0.004
+    plate_height_m: Annotated[float, Bounds(0.002, 0.5), Meaning("plate's extent from its lower to its upper edge")] = (
+        0.070
+    )
 
     @property
     def clearance_m(self) -> float:

@@ -13,18 +13,18 @@ from dataclasses import dataclass
 from math import radians, sin, tanh
 from typing import Annotated
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 
 SLOW_RAD_S = 0.05  # below it dry friction may point either way
 
 
 @dataclass(frozen=True)
 class JointFriction:
-    coulomb_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
-    viscous_nm_s: Annotated[float, Bounds(0.0, 0.1)] = 0.0
-    cogging_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
-    cogging_per_turn: Annotated[int, Bounds(0, 1000)] = 0
-    cogging_phase_deg: Annotated[float, Bounds(-360.0, 360.0)] = 0.0
+    coulomb_nm: Annotated[float, Bounds(0.0, 0.5), Meaning("dry friction, against the motion")] = 0.0
+    viscous_nm_s: Annotated[float, Bounds(0.0, 0.1), Meaning("friction that grows with speed", "N·m·s/rad")] = 0.0
+    cogging_nm: Annotated[float, Bounds(0.0, 0.5), Meaning("amplitude of the torque of the magnets")] = 0.0
+    cogging_per_turn: Annotated[int, Bounds(0, 1000), Meaning("periods of the cogging in one turn", "1/turn")] = 0
+    cogging_phase_deg: Annotated[float, Bounds(-360.0, 360.0), Meaning("of the cogging at joint angle zero")] = 0.0
 
     def torque_nm(self, angle_rad: float, velocity_rad_s: float) -> float:
         cogging_rad = self.cogging_per_turn * angle_rad + radians(self.cogging_phase_deg)

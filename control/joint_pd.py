@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import cos, sin
 from typing import Annotated
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 from control.records import DriveState, DriveStates, JointTarget, JointTargets, Torques
 
 GRAVITY_M_S2 = 9.81
@@ -19,20 +19,26 @@ GRAVITY_M_S2 = 9.81
 class JointGains:
     """At 380 Hz with samples up to 2 ms old, damping over arm inertia should stay under about 150 1/s."""
 
-    sweep_stiffness_nm_rad: Annotated[float, Bounds(0.0, 200.0)] = 8.0
-    sweep_damping_nm_s_rad: Annotated[float, Bounds(0.0, 5.0)] = 0.06
-    adduction_stiffness_nm_rad: Annotated[float, Bounds(0.0, 200.0)] = 10.0
-    adduction_damping_nm_s_rad: Annotated[float, Bounds(0.0, 5.0)] = 0.08
+    sweep_stiffness_nm_rad: Annotated[float, Bounds(0.0, 200.0), Meaning("PD stiffness of the sweep joints")] = 8.0
+    sweep_damping_nm_s_rad: Annotated[float, Bounds(0.0, 5.0), Meaning("PD damping of the sweep joints")] = 0.06
+    adduction_stiffness_nm_rad: Annotated[
+        float, Bounds(0.0, 200.0), Meaning("PD stiffness of the adduction joints")
+    ] = 10.0
+    adduction_damping_nm_s_rad: Annotated[float, Bounds(0.0, 5.0), Meaning("PD damping of the adduction joints")] = 0.08
 
 
 @dataclass(frozen=True)
 class ArmMass:
     """Of one flipper arm with all that its adduction joint lifts: a point on the arm, and inertia about the axes."""
 
-    arm_mass_kg: Annotated[float, Bounds(0.0, 20.0)] = 0.08
-    center_of_mass_m: Annotated[float, Bounds(0.0, 1.0)] = 0.06  # from the axes, along the arm
-    sweep_inertia_kg_m2: Annotated[float, Bounds(1e-5, 1.0)] = 0.0004  # arm and plate of PLA, rotor of a 60 mm motor
-    adduction_inertia_kg_m2: Annotated[float, Bounds(1e-5, 1.0)] = 0.0006  # the same, and the sweep motor at the axis
+    arm_mass_kg: Annotated[float, Bounds(0.0, 20.0), Meaning("everything that one adduction joint lifts")] = 0.08
+    center_of_mass_m: Annotated[float, Bounds(0.0, 1.0), Meaning("from the axes, along the arm")] = 0.06
+    sweep_inertia_kg_m2: Annotated[float, Bounds(1e-5, 1.0), Meaning("about the sweep axis")] = (
+        0.0004  # arm and plate of PLA, rotor of a 60 mm motor
+    )
+    adduction_inertia_kg_m2: Annotated[float, Bounds(1e-5, 1.0), Meaning("about the adduction axis")] = (
+        0.0006  # the same, and the sweep motor at the axis
+    )
 
     def gravity_torques_nm(self, sweep_rad: float, adduction_rad: float) -> tuple[float, float]:
         """What gravity does to (sweep, adduction): -∂/∂q of m g r cos α sin β."""

@@ -24,7 +24,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple, Protocol
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Traction, step_m
 from control.gait.gait import GaitParameters, stride_duration_s
@@ -37,25 +37,39 @@ Method = Literal["default", "paper", "gait"]
 
 @dataclass(frozen=True)
 class AdaptationParameters:
-    method: Method = "default"
-    initial_depth_m: Annotated[float, Bounds(0.005, 0.2)] = 0.03
-    min_depth_m: Annotated[float, Bounds(0.005, 0.2)] = 0.015
-    max_depth_m: Annotated[float, Bounds(0.005, 0.2)] = 0.05
-    body_drag_n: Annotated[float, Bounds(0.01, 100.0)] = 2.5  # the paper's, without the pad
-    body_damping_n_s_m: Annotated[float, Bounds(0.0, 1000.0)] = 6.0  # how that grows with speed
-    pad_width_m: Annotated[float, Bounds(0.0, 0.5)] = 0.015
-    pad_depth_m: Annotated[float, Bounds(0.0, 0.5)] = 0.02
-    body_mass_kg: Annotated[float, Bounds(0.05, 100.0)] = 1.0
-    acceleration_s: Annotated[float, Bounds(0.01, 10.0)] = 0.1  # of method "paper"
-    mobilisation_n_m: Annotated[float, Bounds(10.0, 1e5)] = 250.0  # of a flipper with its servo; logs: 300 to 700
-    motor_force_n: Annotated[float, Bounds(0.1, 100.0)] = 6.25  # 0.75 N·m at 0.12 m
-    lifting_fraction: Annotated[float, Bounds(0.1, 1.0)] = (
-        0.95  # of that torque, which the mud may take of an extraction
+    method: Annotated[Method, Meaning("how the next stride is chosen: depth, the paper's rule, or depth and gait")] = (
+        "default"
     )
-    insertion_fraction: Annotated[float, Bounds(0.1, 10.0)] = 0.73  # of that torque, at which an insertion ends early
-    min_sweep_deg: Annotated[float, Bounds(1.0, 60.0)] = 30.0  # these three of method "gait"
-    max_sweep_deg: Annotated[float, Bounds(1.0, 60.0)] = 50.0
-    swing_duration_s: Annotated[float, Bounds(0.2, 10.0)] = 0.3
+    initial_depth_m: Annotated[float, Bounds(0.005, 0.2), Meaning("insertion depth of the first stride")] = 0.03
+    min_depth_m: Annotated[float, Bounds(0.005, 0.2), Meaning("shallowest insertion")] = 0.015
+    max_depth_m: Annotated[float, Bounds(0.005, 0.2), Meaning("deepest insertion")] = 0.05
+    body_drag_n: Annotated[float, Bounds(0.01, 100.0), Meaning("on the body at rest, without the pad")] = (
+        2.5  # the paper's
+    )
+    body_damping_n_s_m: Annotated[float, Bounds(0.0, 1000.0), Meaning("growth of the body's drag with its speed")] = 6.0
+    pad_width_m: Annotated[float, Bounds(0.0, 0.5), Meaning("of the pad that the body slides on, across the track")] = (
+        0.015
+    )
+    pad_depth_m: Annotated[float, Bounds(0.0, 0.5), Meaning("of the pad in the mud")] = 0.02
+    body_mass_kg: Annotated[float, Bounds(0.05, 100.0), Meaning("of the whole robot")] = 1.0
+    acceleration_s: Annotated[
+        float, Bounds(0.01, 10.0), Meaning("time to reach the stance's speed, in method paper")
+    ] = 0.1
+    mobilisation_n_m: Annotated[float, Bounds(10.0, 1e5), Meaning("stiffness of a flipper with its servo")] = (
+        250.0  # logs: 300 to 700
+    )
+    motor_force_n: Annotated[float, Bounds(0.1, 100.0), Meaning("that a motor can exert at the plate")] = (
+        6.25  # 0.75 N·m at 0.12 m
+    )
+    lifting_fraction: Annotated[
+        float, Bounds(0.1, 1.0), Meaning("of the motor's torque that the mud may take in an extraction")
+    ] = 0.95
+    insertion_fraction: Annotated[
+        float, Bounds(0.1, 10.0), Meaning("of the motor's torque at which an insertion ends early")
+    ] = 0.73
+    min_sweep_deg: Annotated[float, Bounds(1.0, 60.0), Meaning("narrowest sweep that method gait chooses")] = 30.0
+    max_sweep_deg: Annotated[float, Bounds(1.0, 60.0), Meaning("widest sweep that method gait chooses")] = 50.0
+    swing_duration_s: Annotated[float, Bounds(0.2, 10.0), Meaning("of the swing in method gait")] = 0.3
 
 
 class DepthChoice(NamedTuple):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from math import cos, pi, radians, sin
 from typing import Annotated, NamedTuple
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 from control.geometry import FlipperGeometry
 from control.records import GaitTarget, Phase
 
@@ -22,13 +22,19 @@ RAMP_S = 0.05  # to reach full speed: half the authors' 0.1 s acceleration time,
 
 @dataclass(frozen=True)
 class GaitParameters:
-    sweep_angle_deg: Annotated[float, Bounds(1.0, 60.0)] = 30.0  # the stance sweeps from plus to minus this
-    insertion_speed_m_s: Annotated[float, Bounds(0.005, 1.0)] = 0.1
-    stance_speed_m_s: Annotated[float, Bounds(0.005, 2.0)] = 0.5
-    extraction_speed_m_s: Annotated[float, Bounds(0.005, 2.0)] = 0.5
-    swing_speed_m_s: Annotated[float, Bounds(0.005, 2.0)] = 0.5
-    swing_duration_s: Annotated[float, Bounds(0.0, 10.0)] = 0.8  # the authors' robot; 0 follows swing_speed_m_s
-    pause_s: Annotated[float, Bounds(0.0, 60.0)] = 0.0  # after insertion, stance and extraction
+    sweep_angle_deg: Annotated[float, Bounds(1.0, 60.0), Meaning("the stance sweeps from plus to minus this angle")] = (
+        30.0
+    )
+    insertion_speed_m_s: Annotated[float, Bounds(0.005, 1.0), Meaning("of the plate's lower edge, downward")] = 0.1
+    stance_speed_m_s: Annotated[float, Bounds(0.005, 2.0), Meaning("of the plate along its arc, backward")] = 0.5
+    extraction_speed_m_s: Annotated[float, Bounds(0.005, 2.0), Meaning("of the plate's lower edge, upward")] = 0.5
+    swing_speed_m_s: Annotated[
+        float, Bounds(0.005, 2.0), Meaning("of the plate along its arc, where swing_duration_s is 0")
+    ] = 0.5
+    swing_duration_s: Annotated[float, Bounds(0.0, 10.0), Meaning("0 derives it from swing_speed_m_s")] = (
+        0.8  # the authors' robot
+    )
+    pause_s: Annotated[float, Bounds(0.0, 60.0), Meaning("after insertion, after stance and after extraction")] = 0.0
 
 
 # Section II-B of the paper's experiments with a fixed base: slow everywhere, the mud relaxes between phases.

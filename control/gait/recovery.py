@@ -29,7 +29,7 @@ from dataclasses import dataclass
 from math import copysign, cos, radians, sin
 from typing import Annotated, NamedTuple
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 from control.gait.gait import RAMP_S, GaitParameters, swing_duration_s
 from control.gait.joint_path import still
 from control.geometry import FlipperGeometry
@@ -43,15 +43,21 @@ AWAY_FRACTION = 0.8  # of each rocking; the rest is back
 
 @dataclass(frozen=True)
 class RecoveryParameters:
-    attempts: Annotated[int, Bounds(0, 20)] = 3  # 0: the stride does not wait, as on the paper's robot
-    grace_s: Annotated[float, Bounds(0.0, 5.0)] = (
-        0.3  # at full torque, for joints that follow late: by up to 0.2 s in simulated clay
+    attempts: Annotated[
+        int,
+        Bounds(0, 20),
+        Meaning("to free a stuck flipper before it is a fault; 0: swing does not wait for it", "count"),
+    ] = 3
+    grace_s: Annotated[float, Bounds(0.0, 5.0), Meaning("at full torque before the first attempt")] = (
+        0.3  # joints follow late, by up to 0.2 s in simulated clay
     )
-    pause_s: Annotated[float, Bounds(0.0, 30.0)] = 0.3  # without pull, before each attempt
-    attempt_s: Annotated[float, Bounds(0.1, 30.0)] = 4.0
-    lift_rad_s: Annotated[float, Bounds(0.05, 5.0)] = 1.0
-    rock_s: Annotated[float, Bounds(0.02, 2.0)] = 0.1  # to and fro with the sweep
-    lead_deg: Annotated[float, Bounds(0.5, 45.0)] = 8.0  # of targets: times the stiffness, the full torque
+    pause_s: Annotated[float, Bounds(0.0, 30.0), Meaning("without pull, before each attempt")] = 0.3
+    attempt_s: Annotated[float, Bounds(0.1, 30.0), Meaning("of one attempt")] = 4.0
+    lift_rad_s: Annotated[float, Bounds(0.05, 5.0), Meaning("speed at which the adduction target rises")] = 1.0
+    rock_s: Annotated[float, Bounds(0.02, 2.0), Meaning("one movement of the sweep to and fro")] = 0.1
+    lead_deg: Annotated[
+        float, Bounds(0.5, 45.0), Meaning("of the targets ahead of the joints; times the stiffness, the full torque")
+    ] = 8.0
 
 
 def lowest_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> float:

@@ -93,6 +93,6 @@ def test_dry_friction_keeps_its_bound_at_any_velocity(velocity: float) -> None:
 
 @pytest.mark.parametrize("field", ["coulomb_nm", "viscous_nm_s", "cogging_nm", "cogging_per_turn"])
 def test_no_motor_can_be_configured_to_spend_less_than_nothing(field: str) -> None:
-    (bounds,) = get_type_hints(JointFriction, include_extras=True)[field].__metadata__
+    bounds, _ = get_type_hints(JointFriction, include_extras=True)[field].__metadata__
     assert bounds.minimum == 0.0
     assert getattr(NO_FRICTION, field) == 0.0
