@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from math import inf, nan
 from random import Random
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
+from control.bounds import Meaning
 from control.records import JOINTS, NEVER_S
 
 USUAL_S = 2.0
@@ -27,7 +28,7 @@ NO_NUMBERS = (nan, inf, -inf, 3e38, -3e38)  # the last two still fit into the fo
 
 @dataclass(frozen=True)
 class FailureParameters:
-    allowed: bool = False  # whether `mudskipper fail` may make parts of this robot fail
+    allowed: Annotated[bool, Meaning("whether `mudskipper fail` may make parts of this robot fail")] = False
 
 
 class FailureKind(StrEnum):

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from math import isfinite, isnan, nan, pi
 from typing import Annotated, NamedTuple, Protocol
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 from control.records import NEVER_S, UNKNOWN, DriveState
 from drivers.can.frames import Frame
 from drivers.odrive import codec
@@ -33,25 +33,33 @@ QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)
 
 @dataclass(frozen=True)
 class DriveParameters:
-    bus: str
-    node_id: Annotated[int, Bounds(0, 62)]
-    sign: Annotated[int, Bounds(-1, 1)] = 1  # -1 for a mirrored motor; 0 is refused
-    zero_turn: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0  # encoder reading at joint angle zero
-    torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0)] = 0.083  # 60 / (2π · 115 rpm/V), as in the paper
-    velocity_limit_turn_s: Annotated[float, Bounds(0.1, 200.0)] = 4.0  # also bounds torque: see `prepare`
-    velocity_gain_nm_s_turn: Annotated[float, Bounds(0.01, 20.0)] = 0.5
-    current_limit_a: Annotated[float, Bounds(0.1, 200.0)] = 12.0
-    heartbeat_period_s: Annotated[float, Bounds(0.01, 1.0)] = 0.1  # as set on the drive, of which this is the default
+    bus: Annotated[str, Meaning("name of a [bus.NAME] section")]
+    node_id: Annotated[int, Bounds(0, 62), Meaning("on that bus", "id")]
+    sign: Annotated[
+        int, Bounds(-1, 1), Meaning("-1 for a mirrored motor: turns angle, velocity, current and torque round", "±1")
+    ] = 1  # 0 is refused
+    zero_turn: Annotated[float, Bounds(-1000.0, 1000.0), Meaning("encoder reading at joint angle zero")] = 0.0
+    torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0), Meaning("torque per current")] = (
+        0.083  # 60 / (2π · 115 rpm/V), as in the paper
+    )
+    velocity_limit_turn_s: Annotated[
+        float, Bounds(0.1, 200.0), Meaning("of the drive; together with the gain it also limits torque")
+    ] = 4.0
+    velocity_gain_nm_s_turn: Annotated[
+        float, Bounds(0.01, 20.0), Meaning("with which the drive cuts torque above the velocity limit")
+    ] = 0.5
+    current_limit_a: Annotated[float, Bounds(0.1, 200.0), Meaning("of the drive")] = 12.0
+    heartbeat_period_s: Annotated[float, Bounds(0.01, 1.0), Meaning("as set on the drive")] = 0.1  # its default
 
 
 @dataclass(frozen=True)
 class WatchdogEndpoints:
     """Numbers of two parameters in one build of ODrive's firmware, out of its flat_endpoints.json."""
 
-    firmware: str  # "0.6.11"
-    hardware: str  # "4.4.58": product line, version and variant
-    enable: Annotated[int, Bounds(1, 65535)]  # of axis0.config.enable_watchdog
-    timeout: Annotated[int, Bounds(1, 65535)]  # of axis0.config.watchdog_timeout
+    firmware: Annotated[str, Meaning("version of the firmware, such as 0.6.11")]
+    hardware: Annotated[str, Meaning("product line, version and variant, such as 4.4.58")]
+    enable: Annotated[int, Bounds(1, 65535), Meaning("number of axis0.config.enable_watchdog", "parameter id")]
+    timeout: Annotated[int, Bounds(1, 65535), Meaning("number of axis0.config.watchdog_timeout", "parameter id")]
 
 
 class Version(NamedTuple):

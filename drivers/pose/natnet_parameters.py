@@ -5,21 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 from drivers.pose.natnet_codec import NEWEST, OLDEST, NatNetVersion
 
 
 @dataclass(frozen=True)
 class NatNetParameters:
-    server: str = ""  # address of the computer that runs the motion capture; empty: nothing is asked from it
-    interface: str = ""  # on which frames arrive, by name or address; empty: any
-    group: str = "239.255.42.99"  # that the server multicasts to; empty: it sends to this computer alone
-    port: Annotated[int, Bounds(1, 65535)] = 1511  # of the multicast frames
-    command_port: Annotated[int, Bounds(1, 65535)] = 1510  # at which the server takes requests
-    version: str = ""  # of the protocol, such as "4.1"; empty: the server tells it
-    body: str = ""  # name of the rigid body; empty: by its id
-    body_id: Annotated[int, Bounds(0, 2**31 - 1)] = 0  # its streaming id; 0: the first one
-    latency_s: Annotated[float, Bounds(0.0, 0.2)] = 0.0  # of every frame, besides what it tells itself
+    server: Annotated[str, Meaning("address of the motion-capture computer; empty: no request is sent to it")] = ""
+    interface: Annotated[str, Meaning("where frames arrive, by name or address; empty: any")] = ""
+    group: Annotated[str, Meaning("multicast address of the frames; empty: unicast to this computer")] = "239.255.42.99"
+    port: Annotated[int, Bounds(1, 65535), Meaning("of the multicast frames", "UDP port")] = 1511
+    command_port: Annotated[int, Bounds(1, 65535), Meaning("at which the server takes requests", "UDP port")] = 1510
+    version: Annotated[str, Meaning("of the protocol, such as 4.1; empty: the server reports it")] = ""
+    body: Annotated[str, Meaning("name of the rigid body; empty: chosen by body_id")] = ""
+    body_id: Annotated[int, Bounds(0, 2**31 - 1), Meaning("streaming id of the rigid body; 0: the first one", "id")] = 0
+    latency_s: Annotated[float, Bounds(0.0, 0.2), Meaning("of every frame, in addition to what the frame reports")] = (
+        0.0
+    )
 
 
 def parse_version(text: str) -> NatNetVersion | None:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 from control.records import NEVER_S, BodyPose
 from drivers.pose.pose_port import STALE_S, PoseReport, PoseSourceError
 from drivers.serial.encoder_counts import EncoderCounts
@@ -23,10 +23,14 @@ RETRY_S = 1.0  # between tries to open a device that is gone
 
 @dataclass(frozen=True)
 class RailEncoderParameters:
-    device: str = ""  # such as /dev/serial/by-id/..., which stays the same wherever it is plugged in
-    bit_rate: Annotated[int, Bounds(300, 4_000_000)] = 115_200
-    metres_per_count: Annotated[float, Bounds(-1.0, 1.0)] = 0.0  # negative where counts fall on the way ahead
-    label: str = ""  # that a line begins with
+    device: Annotated[
+        str, Meaning("serial port; a name under /dev/serial/by-id stays the same wherever it is plugged in")
+    ] = ""
+    bit_rate: Annotated[int, Bounds(300, 4_000_000), Meaning("of the serial line", "bit/s")] = 115_200
+    metres_per_count: Annotated[
+        float, Bounds(-1.0, 1.0), Meaning("negative where counts fall on the way forward", "m/count")
+    ] = 0.0
+    label: Annotated[str, Meaning("with which each line begins")] = ""
 
 
 class RailEncoder:
