@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, MudEstimate
 from control.records import FLIPPERS, NO_LOAD, FlipperLoad, JointAngles, Phase, StrideEstimate
@@ -32,10 +32,12 @@ Method = Literal["default", "paper"]
 
 @dataclass(frozen=True)
 class EstimationParameters:
-    method: Method = "default"
-    fixed_base: bool = False  # the flippers hang from a bench: all their travel shears mud
-    surface_error_m: Annotated[float, Bounds(0.0001, 0.05)] = 0.001  # of the mud's nominal height, at one stride
-    paper_compensation: bool = False  # method "paper" adds that drag while the body advances
+    method: Annotated[Method, Meaning("default regresses in torque space; paper is the published method")] = "default"
+    fixed_base: Annotated[bool, Meaning("the flippers hang from a bench: all their travel shears mud")] = False
+    surface_error_m: Annotated[
+        float, Bounds(0.0001, 0.05), Meaning("std_error of the mud's nominal height at one stride")
+    ] = 0.001
+    paper_compensation: Annotated[bool, Meaning("method paper adds the body's drag while the body advances")] = False
 
 
 class MudReading(NamedTuple):
