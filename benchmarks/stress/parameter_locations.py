@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 from firmware_host.configuration.toml_records import ChangesOf
 
 
@@ -33,6 +33,8 @@ def places_of(hint: Any, document: Any, default: Any, path: tuple[str | int, ...
     elif extras and isinstance(extras[0], Bounds):
         kinds = [kind for kind in (get_args(get_args(hint)[0]) or get_args(hint)) if kind in (int, float)]
         yield Place(path, kinds[0], extras[0], default)
+    elif extras and isinstance(extras[-1], Meaning):
+        yield from places_of(get_args(hint)[0], document, default, path)
     elif is_dataclass(hint) and isinstance(hint, type):
         yield from fields_of(hint, document, default, path)
     elif get_origin(hint) is Literal or hint in (str, bool):

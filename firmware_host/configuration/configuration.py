@@ -12,7 +12,7 @@ from math import radians
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from control.bounds import Bounds
+from control.bounds import Bounds, Meaning
 from control.controller import MotionParameters
 from control.depth.depth_choice import AdaptationParameters
 from control.gait.gait import PROTOCOLS, GaitParameters
@@ -40,43 +40,56 @@ EXIT_CONFIGURATION = 78  # EX_CONFIG of sysexits.h; systemd is told not to resta
 
 @dataclass(frozen=True)
 class RobotIdentity:
-    name: str = "mudskipper"
+    name: Annotated[str, Meaning("in the logs and their file names")] = "mudskipper"
 
 
 @dataclass(frozen=True)
 class BusParameters:
     """Any python-can interface; `options` go to it as they are."""
 
-    interface: str
-    channel: str
-    options: dict[str, str | int | float | bool] = field(default_factory=dict)
-    bit_rate_kbit_s: Annotated[int, Bounds(10, 1000)] = 1000  # of its drives, by which `doctor` judges the interface
+    interface: Annotated[str, Meaning("python-can interface, such as socketcan")]
+    channel: Annotated[str, Meaning("of the interface, such as can0")]
+    options: Annotated[
+        dict[str, str | int | float | bool], Meaning("further arguments of the python-can interface")
+    ] = field(default_factory=dict)
+    bit_rate_kbit_s: Annotated[
+        int, Bounds(10, 1000), Meaning("of the drives on the bus; `doctor` compares the interface with it")
+    ] = 1000
 
 
 @dataclass(frozen=True)
 class LoopParameters:
-    priority: Annotated[int, Bounds(0, 99)] = 45  # SCHED_FIFO, under the interrupt threads' 50; 0: none
-    cpu: Annotated[int, Bounds(-1, 1023)] = -1  # to run on; -1: any
-    lock_memory: bool = True
-    wait_for_bus: bool = False  # start without a bus that does not open, and try again every second; else end
+    priority: Annotated[int, Bounds(0, 99), Meaning("SCHED_FIFO; 0: none", "1")] = 45  # under the interrupt threads' 50
+    cpu: Annotated[int, Bounds(-1, 1023), Meaning("to run on; -1: any", "CPU number")] = -1
+    lock_memory: Annotated[bool, Meaning("keep the process in RAM")] = True
+    wait_for_bus: Annotated[
+        bool, Meaning("start without a bus that does not open and retry every second; false: exit")
+    ] = False
 
 
 @dataclass(frozen=True)
 class StatusParameters:
-    socket: str = "/run/mudskipper/mudskipper.sock"
-    anyone_may_stop: bool = True  # whoever has an account here; else nobody outside these two groups
-    read_group: str = ""  # who may see how the robot is; empty: the daemon's own group
-    drive_group: str = ""  # who may operate it, and see; empty: the daemon's own group
+    socket: Annotated[str, Meaning("path of the Unix socket for operators")] = "/run/mudskipper/mudskipper.sock"
+    anyone_may_stop: Annotated[
+        bool, Meaning("every local account may stop and disarm; false: the two groups below")
+    ] = True
+    read_group: Annotated[str, Meaning("may see the status; empty: the daemon's own group")] = ""
+    drive_group: Annotated[str, Meaning("may operate the robot, and see; empty: the daemon's own group")] = ""
 
 
 @dataclass(frozen=True)
 class PoseParameters:
     """Where the body's place along the track is known from."""
 
-    source: Literal["", "none", "socket", "natnet", "rail_encoder"] = ""  # empty: the socket where one is named
-    socket: str = ""  # where a motion-capture bridge sends the place
-    axis: object = "x"  # of motion capture's frame, along the track: x, -z, or three numbers
-    origin_m: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0  # along the axis, or of the encoder, where x is zero
+    source: Annotated[
+        Literal["", "none", "socket", "natnet", "rail_encoder"],
+        Meaning("of the body's position; empty: the socket where one is named"),
+    ] = ""
+    socket: Annotated[str, Meaning("path at which a motion-capture bridge sends the position")] = ""
+    axis: Annotated[object, Meaning("of motion capture's frame, along the track: x, -z, or three numbers")] = "x"
+    origin_m: Annotated[
+        float, Bounds(-1000.0, 1000.0), Meaning("along that axis, or of the encoder, where the robot's x is zero")
+    ] = 0.0
     natnet: NatNetParameters = NatNetParameters()
     rail_encoder: RailEncoderParameters = RailEncoderParameters()
 

@@ -128,8 +128,9 @@ def _checked_hint(hint: Any) -> Any:
     if changes := _changes(hint):
         return _model_of(changes.record, changes.without)
     if get_origin(hint) is Annotated:
-        kind, bounds = get_args(hint)
-        return Annotated[kind, Field(ge=bounds.minimum, le=bounds.maximum)] if isinstance(bounds, Bounds) else hint
+        kind, *extras = get_args(hint)
+        bounds = next((extra for extra in extras if isinstance(extra, Bounds)), None)
+        return Annotated[kind, Field(ge=bounds.minimum, le=bounds.maximum)] if bounds else kind
     record = _record_in(hint)
     if get_origin(hint) is dict and record:
         return dict[str, _model_of(record)]  # type: ignore[misc]

@@ -6,13 +6,11 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.bounds import Bounds
 from control.gait.gait import SINGLE_FLIPPER
 from control.records import JOINTS
 from firmware_host.configuration.configuration import (
@@ -259,23 +257,6 @@ def test_any_value_anywhere_is_accepted_or_refused_by_name(key: str, value: str)
         parse_configuration(f"{key} = {value}\n{minimal_text()}")
     except ConfigurationError as problem:
         assert problem.problems and all(problem.problems)
-
-
-def test_every_number_has_bounds() -> None:
-    """A float or int in any record that a file fills carries the bounds that the reader enforces."""
-    from dataclasses import fields, is_dataclass
-    from typing import get_args, get_type_hints
-
-    from drivers.odrive.drives import DriveParameters
-
-    records: list[Any] = [hint for hint in get_type_hints(Configuration).values() if is_dataclass(hint)]
-    for record in [*records, DriveParameters]:
-        hints = get_type_hints(record, include_extras=True)
-        for item in fields(record):
-            hint = hints[item.name]
-            plain = hint if not get_args(hint) else get_args(hint)[0]
-            if plain in (int, float):
-                assert any(isinstance(extra, Bounds) for extra in get_args(hint)), f"{record.__name__}.{item.name}"
 
 
 def test_the_daemon_refuses_with_status_78_and_no_traceback(tmp_path: Path, example_text: str) -> None:
