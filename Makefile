@@ -1,42 +1,56 @@
-# `make` lists what there is. Everything lives in .venv; nothing else on the machine is touched.
+# `make help` lists the targets. Everything is installed into .venv; nothing else on this machine changes.
 
 PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
+SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --nitpicky --quiet
 
-# Tests of a robot in real time, or whose order counts: one after the other, and beside nothing else.
-IN_PEACE := bench $(addprefix command_line/,experiments/test_actuator.py operation/test_attended_walk.py demo/test_demo.py doctor/test_doctor.py operation/test_failing.py operation/test_operation.py test_permission.py) $(addprefix experiments/,bench/test_rig.py robot/test_daemon_robot.py)
+# These tests run a robot in real time or depend on their order: they run one after the other, with nothing next to them.
+SERIAL := bench $(addprefix command_line/,experiments/test_actuator.py operation/test_attended_walk.py demo/test_demo.py doctor/test_doctor.py operation/test_failing.py operation/test_operation.py test_permission.py) $(addprefix experiments/,bench/test_rig.py robot/test_daemon_robot.py)
 
-# A test that hangs is ended, and told with the place where it hung.
-ENDED_HUNG := -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
+# Ends a test that hangs, and prints where it hangs.
+PYTEST := $(BIN)/python -m pytest -q --durations=10 -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
 
-.PHONY: help setup demo test test-vm mutants lint clean
+.PHONY: help setup demo test test-vm mutants lint docs docs-links man clean
 
-help:  ## this list
-	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+help:  ## list the targets
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
-setup: .venv/setup  ## the environment, with all that running and plotting need
+setup: .venv/setup  ## install what running and plotting need into .venv
 
-demo: .venv/setup  ## a simulated robot walks over three muds, in real time
+demo: .venv/setup  ## walk a simulated robot over three muds, in real time
 	@$(BIN)/mudskipper demo $(ARGS)
 
-test: .venv/test  ## every test, without network
-	$(BIN)/python -m pytest -q $(ENDED_HUNG) --numprocesses 2 --dist loadfile $(addprefix --ignore=tests/,$(IN_PEACE)) $(ARGS)
-	$(BIN)/python -m pytest -q $(ENDED_HUNG) --simulated $(addprefix tests/,$(IN_PEACE)) $(ARGS)
+test: .venv/test  ## run all tests without network: first in parallel, then those in real time
+	@$(PYTEST) --numprocesses 2 --dist loadfile $(addprefix --ignore=tests/,$(SERIAL)) $(ARGS); parallel=$$?; \
+	$(PYTEST) --simulated $(addprefix tests/,$(SERIAL)) $(ARGS); serial=$$?; \
+	echo "exit status: parallel tests $$parallel, real-time tests $$serial"; \
+	test $$parallel -eq 0 -a $$serial -eq 0
 
-test-vm: .venv/test  ## the daemon under systemd on a real kernel, in a virtual machine
+test-vm: .venv/test  ## run the daemon under systemd on a real kernel, in a virtual machine
 	@$(BIN)/python -m virtual_machine.installed_robot
 	$(BIN)/python -m pytest -v virtual_machine $(ARGS)
 
-mutants: .venv/test  ## change the transmit gate in 204 places; its tests must notice each
+mutants: .venv/test  ## change the transmit gate in 204 places; its tests must notice each change
 	$(BIN)/python -m tests.drivers.odrive.gate_mutants
 
-lint: .venv/test  ## ruff and mypy --strict
+lint: .venv/test .venv/docs  ## run ruff and mypy --strict
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
 
-clean:  ## remove the environment and what was built
+docs: .venv/docs  ## build the documentation into build/docs; a warning is an error
+	@$(SPHINX) -b html docs build/docs
+	@echo "open build/docs/index.html"
+
+docs-links: .venv/docs  ## check the external links of the documentation; needs the Internet
+	@$(SPHINX) -b linkcheck docs build/links
+
+man: .venv/docs  ## build the manual page build/man/mudskipper.1
+	@$(SPHINX) -b man docs build/man
+	@echo "man -l build/man/mudskipper.1"
+
+clean:  ## remove the environment and everything that was built
 	rm -rf .venv .virtual_machine build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 .venv/setup: pyproject.toml
@@ -48,4 +62,9 @@ clean:  ## remove the environment and what was built
 .venv/test: .venv/setup
 	@echo "Installing what the tests need ..."
 	@$(PIP) --editable ".[plots,serial,test]"
+	@touch $@
+
+.venv/docs: .venv/setup
+	@echo "Installing what the documentation needs ..."
+	@$(PIP) --editable ".[plots,serial,docs]"
 	@touch $@

@@ -1,24 +1,21 @@
-"""What the parsers of all commands share: how a command is added, and where the daemon is found."""
+"""Adds commands to the parser. All commands share this, and the options that find the daemon."""
 
 from __future__ import annotations
 
 import argparse
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TypeAlias
 
 DEFAULT_SOCKET = "/run/mudskipper/mudskipper.sock"
 DEFAULT_CONFIG = "/etc/mudskipper/mudskipper.toml"
-if TYPE_CHECKING:
-    Commands = argparse._SubParsersAction[argparse.ArgumentParser]  # which is generic for type checkers alone
-else:
-    Commands = argparse._SubParsersAction
+Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # generic for type checkers alone
 
 
-def add(commands: Commands, name: str, place: str, text: str) -> argparse.ArgumentParser:
-    """`place` is `module.function` of this package, imported when the command is used."""
+def add(commands: Commands, name: str, function: str, text: str) -> argparse.ArgumentParser:
+    """Adds a command that runs `function`, named as `module.function` below this package and imported on use."""
     command = commands.add_parser(name, help=text, description=text)
-    command.set_defaults(place=place)
+    command.set_defaults(function=function)
     return command
 
 
@@ -27,5 +24,10 @@ def add_socket(parser: argparse.ArgumentParser) -> None:
         "--socket",
         type=Path,
         default=Path(os.environ.get("MUDSKIPPER_SOCKET", DEFAULT_SOCKET)),
-        help="of the daemon (default: $MUDSKIPPER_SOCKET or %(default)s)",
+        help="Unix socket of the daemon (default: $MUDSKIPPER_SOCKET or %(default)s)",
     )
+
+
+def add_json(*parsers: argparse.ArgumentParser) -> None:
+    for parser in parsers:
+        parser.add_argument("--json", action="store_true", help="print JSON for programs")

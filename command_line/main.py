@@ -1,5 +1,6 @@
-"""`mudskipper`, the command that people type. Each sub-command is loaded only when it is used, so `status` starts at
-once.
+"""Parses the command line of `mudskipper` and runs the command.
+
+The module of a command is imported only when the command is used, so `status` starts fast.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from io import TextIOWrapper
 from pathlib import Path
+from typing import NoReturn
 
 from command_line import exit_codes
-from command_line.commands import DEFAULT_CONFIG, Commands, add, add_socket
+from command_line.commands import DEFAULT_CONFIG, Commands, add, add_json, add_socket
 from command_line.experiments.experiment_commands import add_experiments
 from command_line.option_types import between, depth_cm, finite, folder, joint_angle, picture, whole
 from command_line.screen import complain
@@ -21,19 +23,52 @@ from firmware_host.configuration.file_problems import why_not
 
 METHODS = ("default", "paper")  # of estimation
 PICTURE_MODULES = ("matplotlib", "PIL")  # an extra of this package
-COUNT = whole(0, 100000)  # of strides, or one of them
+COUNT = whole(0, 100000)
+SEVERAL_FILES = "log of this project; several files are the segments of one run"
+ANY_LOG = "log of this project, its segments, or a CSV file of the paper's authors"
+
+
+class PrintVersion(argparse.Action):
+    """Prints the installed version and ends."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from firmware_host.software_version import software_version  # slow to import, and seldom wanted
+
+        print(f"mudskipper {software_version()}")
+        parser.exit()
+
+
+class PrintCompletion(argparse.Action):
+    """Prints a completion script for a shell and ends."""
+
+    def __call__(self, parser: argparse.ArgumentParser, _: object, shell: object, __: object = None) -> NoReturn:
+        import shtab
+
+        print(shtab.complete(parser, str(shell)))
+        parser.exit()
 
 
 def build_parser() -> argparse.ArgumentParser:
+    statuses = ", ".join(f"{status} {meaning}" for status, meaning in exit_codes.MEANINGS.items())
     parser = argparse.ArgumentParser(
         prog="mudskipper",
         description="Operates a robot that crawls over mud on two flippers.",
-        epilog="Exit status: 0 done, 1 unhealthy, 2 usage, 3 no daemon, 4 not permitted, 5 refused, 78 configuration,"
-        " 124 timed out, 130 interrupted.",
+        epilog=f"Exit status: {statuses}.",
+    )
+    parser.add_argument("--version", action=PrintVersion, nargs=0, help="print the version and exit")
+    parser.add_argument(
+        "--print-completion",
+        action=PrintCompletion,
+        choices=("bash", "zsh", "tcsh"),
+        help="print a completion script for this shell and exit",
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="command")
     _add_operation(commands)
+    _add_fail(commands)
+    _add_installation(commands)
     _add_simulation(commands)
+    _add_replay(commands)
+    _add_pictures(commands)
     _add_logs(commands)
     add_experiments(commands)
     return parser
@@ -41,165 +76,136 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _add_operation(commands: Commands) -> None:
     described = {
-        "status": "How the robot is.",
-        "watch": "The status, again and again, until Ctrl-C.",
-        "arm": "Switch torque on; the robot holds its pose.",
-        "walk": "Walk, with the depth adapted to the mud or fixed.",
-        "move": "Take joints slowly to other angles, while the robot holds its pose.",
-        "stop": "End a walk: raise the flippers and hold.",
-        "disarm": "Switch torque off, at once, in any state.",
-        "clear": "Clear a fault and the drives' errors.",
-        "check": "What stands between this robot and a walk.",
+        "status": "Print the state of the robot.",
+        "watch": "Print the status again and again until Ctrl-C.",
+        "arm": "Switch torque on. The robot holds its present pose.",
+        "walk": "Walk, with a fixed depth or one that adapts to the mud.",
+        "move": "Move joints slowly to other angles while the robot holds its pose.",
+        "stop": "End the walk, raise the flippers and hold the pose.",
+        "disarm": "Switch torque off at once, in any state.",
+        "clear": "Clear a fault and the errors of the drives.",
+        "check": "List what prevents the robot from being armed, and what to do about it.",
     }
     parsers = {name: add(commands, name, f"operation.operation.{name}", text) for name, text in described.items()}
-    parsers["fail"] = _add_fail(commands)
     for parser in parsers.values():
         add_socket(parser)
-    for name in ("status", "check", "fail"):
-        parsers[name].add_argument("--json", action="store_true", help="for machines")
+    add_json(parsers["status"], parsers["check"])
     parsers["watch"].add_argument(
-        "--period", type=between(0.05, 3600.0), default=0.5, metavar="S", help="between two looks"
+        "--period", type=between(0.05, 3600.0, "s"), default=0.5, metavar="S", help="seconds between two prints"
     )
-    parsers["arm"].add_argument("--force", action="store_true", help="against what 'check' does not call mandatory")
-    depth = parsers["walk"].add_mutually_exclusive_group()
-    depth.add_argument("--depth", type=depth_cm, metavar="CM", help="the same in every stride")
-    depth.add_argument("--adaptive", action="store_true", help="chosen from the mud, once a stride (default)")
-    parsers["walk"].add_argument("--strides", type=COUNT, default=0, metavar="N", help="then stop (default: go on)")
-    parsers["walk"].add_argument("--attended", action="store_true", help="stay; the robot stops when this ends")
+    parsers["arm"].add_argument("--force", action="store_true", help="overrule failed checks that are not mandatory")
     parsers["move"].add_argument("angles", type=joint_angle, nargs="+", metavar="JOINT=DEG", help="left_sweep=10 ...")
+    parsers["check"].add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG), help="used without a daemon")
+    _add_walk_options(parsers["walk"])
     for name in ("arm", "walk", "move"):
-        text = "from a program that holds the robot's lease, which stays out then"
-        parsers[name].add_argument("--take-over", action="store_true", help=text)
-    parsers["check"].add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
-    _add_installation(commands)
+        parsers[name].add_argument(
+            "--take-over", action="store_true", help="take the lease from a program that holds it"
+        )
+
+
+def _add_walk_options(walk: argparse.ArgumentParser) -> None:
+    depth = walk.add_mutually_exclusive_group()
+    depth.add_argument("--depth", type=depth_cm, metavar="CM", help="insertion depth of every stride")
+    depth.add_argument("--adaptive", action="store_true", help="choose the depth from the mud once a stride (default)")
+    walk.add_argument("--strides", type=COUNT, default=0, metavar="N", help="stop after N strides (default: go on)")
+    walk.add_argument("--attended", action="store_true", help="stay connected; the robot stops when this command ends")
+
+
+def _add_fail(commands: Commands) -> None:
+    fail = add(commands, "fail", "operation.failing.fail", "Make a part of the robot fail on purpose, where allowed.")
+    add_socket(fail)
+    add_json(fail)
+    fail.add_argument("component", nargs="?", help="left_sweep, bus.left, pose ..., or all")
+    fail.add_argument("kind", nargs="?", help="off, stuck, garbage, slow, intermittent ..., or ok to end the failure")
+    fail.add_argument("--for", type=finite, default=2.0, metavar="S", dest="seconds", help="seconds until it ends")
+    fail.add_argument("--list", action="store_true", help="list what can fail, how, and what fails now")
 
 
 def _add_installation(commands: Commands) -> None:
-    doctor = add(
-        commands, "doctor", "doctor.doctor.doctor", "The computer and its buses, line by line, with what to do."
-    )
+    doctor = add(commands, "doctor", "doctor.doctor.doctor", "Check this computer and its buses, line by line.")
     doctor.add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG))
-    doctor.add_argument("--json", action="store_true", help="for machines")
+    add_json(doctor)
     socket = os.environ.get("MUDSKIPPER_SOCKET")
-    doctor.add_argument("--socket", type=Path, default=Path(socket) if socket else None, help="of the daemon")
+    doctor.add_argument("--socket", type=Path, default=Path(socket) if socket else None, help="socket of the daemon")
     install = add(
-        commands, "install", "install.installation.install", "Set up this computer's service, network and users."
+        commands, "install", "install.installation.install", "Set up the service, network and users of this computer."
     )
     uninstall = add(
-        commands, "uninstall", "install.installation.uninstall", "Take that back; configuration and logs stay."
+        commands, "uninstall", "install.installation.uninstall", "Undo the installation; configuration and logs stay."
     )
     uninstall.add_argument("--purge", action="store_true", help="remove configuration, logs and user too")
     for parser in (install, uninstall):
         parser.add_argument("--dry-run", action="store_true", help="only show what would be done")
-        parser.add_argument("--root", type=Path, default=Path("/"), metavar="DIR", help="of another system's files")
-
-
-def _add_fail(commands: Commands) -> argparse.ArgumentParser:
-    fail = add(
-        commands, "fail", "operation.failing.fail", "Make a part of the robot fail on purpose, where that is allowed."
-    )
-    fail.add_argument("component", nargs="?", help="what fails, such as left_sweep, bus.left, pose; or all")
-    fail.add_argument("kind", nargs="?", help="off, stuck, garbage, slow, intermittent ..., or ok to end it")
-    fail.add_argument("--for", type=finite, default=2.0, metavar="S", dest="seconds", help="then it ends by itself")
-    fail.add_argument(
-        "--list", action="store_true", help="what can fail, how, and what fails already; with --json also what it does"
-    )
-    return fail
+        parser.add_argument("--root", type=Path, default=Path("/"), metavar="DIR", help="root folder of another system")
 
 
 def _add_simulation(commands: Commands) -> None:
-    demo = add(commands, "demo", "demo.demo.demo", "A simulated robot walks over three muds, in real time.")
-    demo.add_argument("--json", type=Path, metavar="PATH", help="write the summary there too")
+    demo = add(commands, "demo", "demo.demo.demo", "Walk a simulated robot over three muds, in real time.")
+    demo.add_argument("--json", type=Path, metavar="PATH", help="also write the summary to this file")
     demo.add_argument("--out", type=folder, default=Path("mudskipper-demo"), metavar="DIR", help="for log and plot")
     demo.add_argument("--seed", type=int, default=1)
-    demo.add_argument("--depth", type=depth_cm, metavar="CM", help="fixed instead of adaptive")
-    demo.add_argument("--world", type=Path, metavar="FILE", help="describes the ground, instead of three muds")
-    simulate = add(commands, "simulate", "simulate.simulate", "The simulated robot alone, on a bus, until Ctrl-C.")
-    simulate.add_argument("--bus", default="robot", metavar="NAME", help="of the local bus (default: %(default)s)")
-    simulate.add_argument("--config", type=Path, help="on the buses of this configuration instead")
+    demo.add_argument("--depth", type=depth_cm, metavar="CM", help="fixed insertion depth (default: adaptive)")
+    demo.add_argument("--world", type=Path, metavar="FILE", help="describes the ground (default: three muds)")
+    simulate = add(commands, "simulate", "simulate.simulate", "Simulate the robot on a bus until Ctrl-C.")
+    simulate.add_argument("--bus", default="robot", metavar="NAME", help="of the local bus")
+    simulate.add_argument("--config", type=Path, help="use the buses of this configuration")
     ground = simulate.add_mutually_exclusive_group()
     ground.add_argument("--mud", action="append", metavar="W", help="water content, repeatable: 48.5, 53.1, 45.3")
-    ground.add_argument("--world", type=Path, metavar="FILE", help="describes the ground, and more")
-    ground.add_argument("--on-blocks", action="store_true", help="for the bench: without mud, the flippers in air")
+    ground.add_argument("--world", type=Path, metavar="FILE", help="describes the ground and more")
+    ground.add_argument("--on-blocks", action="store_true", help="no mud: the flippers move in air, for the bench")
     simulate.add_argument("--seed", type=int, default=1)
 
 
-def _add_logs(commands: Commands) -> None:
-    replay = add(
-        commands, "replay", "logs.log_commands.replay", "The estimator over a recorded log: ours, or the authors' CSV."
-    )
-    replay.add_argument("files", type=Path, nargs="+", metavar="FILE", help="several are segments of one run")
-    replay.add_argument("--json", action="store_true")
-    replay.add_argument("--config", type=Path, help="instead of the one in the log")
-    replay.add_argument("--method", choices=METHODS, help="of estimation, instead of the configured one")
-    _add_pictures(commands)
-    log = commands.add_parser("log", help="Look into logs, and look after them.")
-    actions = log.add_subparsers(dest="action", required=True, metavar="action")
-    _add_log_folder(actions)
-    _add_log_contents(actions)
+def _add_replay(commands: Commands) -> None:
+    replay = add(commands, "replay", "logs.log_commands.replay", "Run the estimator over a recorded log.")
+    replay.add_argument("files", type=Path, nargs="+", metavar="FILE", help=ANY_LOG)
+    add_json(replay)
+    replay.add_argument("--config", type=Path, help="use this configuration (default: the one in the log)")
+    replay.add_argument("--method", choices=METHODS, help="estimate by this method (default: the configured one)")
 
 
 def _add_pictures(commands: Commands) -> None:
-    plot = add(
-        commands, "plot", "logs.log_commands.plot", "A walk against time: forces, coefficients, depth, place and steps."
-    )
-    film = add(
-        commands, "film", "logs.log_commands.film", "Strides seen from the side: as a strip of pictures, or moving."
-    )
+    plot = add(commands, "plot", "logs.log_commands.plot", "Draw a walk against time: forces, coefficients, depth.")
+    film = add(commands, "film", "logs.log_commands.film", "Draw strides from the side, as a strip or a film.")
     plot.add_argument("--out", type=picture(".png", ".svg", ".pdf"), metavar="PNG", help="or .svg, .pdf")
     film.add_argument("--out", type=picture(".png", ".gif"), metavar="FILE", help=".png for a strip, .gif for a film")
-    film.add_argument("--stride", action="append", type=COUNT, metavar="N", help="as replay counts them, repeatable")
+    film.add_argument("--stride", action="append", type=COUNT, metavar="N", help="number in the replay, repeatable")
     for parser in (plot, film):
-        parser.add_argument(
-            "files",
-            type=Path,
-            nargs="+",
-            metavar="FILE",
-            help="our log, segments of one run, or the authors' CSV",
-        )
-        parser.add_argument("--walk", type=COUNT, default=0, metavar="N", help="of the log's walks (default: the last)")
+        parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help=ANY_LOG)
+        parser.add_argument("--walk", type=COUNT, default=0, metavar="N", help="number of the walk (default: the last)")
 
 
-def _add_log_contents(actions: Commands) -> None:
-    info = add(actions, "info", "logs.log_commands.info", "What a log holds.")
-    info.add_argument("files", type=Path, nargs="+", metavar="FILE", help="several are segments of one run")
-    info.add_argument("--json", action="store_true")
-    report = add(actions, "report", "logs.log_report.log_report", "What a log tells, as one page with its pictures.")
-    report.add_argument(
-        "files", type=Path, nargs="+", metavar="FILE", help="our log, its segments, or the authors' CSV"
-    )
+def _add_logs(commands: Commands) -> None:
+    log = commands.add_parser("log", help="Read and manage logs.")
+    actions = log.add_subparsers(dest="action", required=True, metavar="action")
+    info = add(actions, "info", "logs.log_commands.info", "Print what a log contains.")
+    info.add_argument("files", type=Path, nargs="+", metavar="FILE", help=SEVERAL_FILES)
+    report = add(actions, "report", "logs.log_report.log_report", "Write a log as one page with pictures.")
+    report.add_argument("files", type=Path, nargs="+", metavar="FILE", help=ANY_LOG)
     report.add_argument("--out", type=folder, metavar="DIR", help="(default: a folder named after the log)")
-    report.add_argument("--json", action="store_true", help="its numbers on standard output")
-    export = add(actions, "export", "logs.log_commands.export", "A log in the columns of the authors' plotter.")
+    export = add(actions, "export", "logs.log_commands.export", "Write a log in the columns of the authors' plotter.")
     export.add_argument("file", type=Path)
-    export.add_argument("--csv", action="store_true", required=True, help="the format; there is one so far")
+    export.add_argument("--csv", action="store_true", required=True, help="the format; CSV is the only one")
     export.add_argument("--out", type=Path, help="file to write (default: standard output)")
-
-
-def _add_log_folder(actions: Commands) -> None:
-    listing = add(actions, "list", "logs.log_folder_commands.list_logs", "The logs, and what room is left.")
+    preserve = add(actions, "preserve", "logs.log_folder_commands.preserve_log", "Exclude logs from the quota.")
+    preserve.add_argument("files", type=Path, nargs="+", metavar="FILE")
+    preserve.add_argument("--undo", action="store_true", help="include them again")
+    listing = add(actions, "list", "logs.log_folder_commands.list_logs", "List the logs and the room that is left.")
     listing.add_argument("folder", type=Path, nargs="?", help="of the logs (default: the configured one)")
-    recover = add(
-        actions, "recover", "logs.log_folder_commands.recover", "Logs whose writer was cut off, put in order."
-    )
+    recover = add(actions, "recover", "logs.log_folder_commands.recover", "Repair logs whose writer was interrupted.")
     recover.add_argument("places", type=Path, nargs="*", metavar="FILE|DIR", help="(default: the configured folder)")
     for parser in (listing, recover):
         parser.add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG), help="names the folder")
-        parser.add_argument("--json", action="store_true", help="for machines")
-    preserve = add(
-        actions, "preserve", "logs.log_folder_commands.preserve_log", "Keep a log when older ones are freed."
-    )
-    preserve.add_argument("files", type=Path, nargs="+", metavar="FILE")
-    preserve.add_argument("--undo", action="store_true", help="let it be freed again")
+    add_json(info, report, listing, recover)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal that knows no ± or ³ shows a question mark
+            stream.reconfigure(errors="replace")  # a terminal without ± or ³ shows a question mark
     try:
         options = build_parser().parse_args(arguments)
-        module, function = options.place.rsplit(".", 1)
+        module, function = options.function.rsplit(".", 1)
         run: Callable[[argparse.Namespace], int] = getattr(import_module(f"command_line.{module}"), function)
         return run(options)
     except KeyboardInterrupt:
@@ -209,7 +215,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         complain("pictures need matplotlib: install mudskipper with its extra 'plots'")
         return exit_codes.UNHEALTHY
-    except BrokenPipeError:  # the reader of our output, such as `head`, has seen enough
+    except BrokenPipeError:  # the reader of the output, such as `head`, has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return exit_codes.OK
     except OSError as problem:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from command_line import exit_codes
+from command_line.json_output import with_schema
 from command_line.screen import Progress, complain, plain
 from experiments.reports.report_page import Figure, Section, numbers_reported, write_report
 
@@ -33,12 +34,15 @@ def conduct(
     """`what` there is progress in; `plot` draws the report to a file."""
     if options.out is not None:
         options.out.mkdir(parents=True, exist_ok=True)  # what cannot be is refused before the minutes of work
-    report = _run(what, run)
+    report = with_schema(f"experiment-{options.name}", _run(what, run))
     text = text_of(report)
     if options.out is not None:
         written = _write(options.out, report, text, plot)
         print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
-    print(json.dumps(numbers_reported(report), allow_nan=False) if options.json else text)
+    if options.json:
+        print(json.dumps(numbers_reported(report), allow_nan=False))
+    else:
+        print(text)
     return exit_codes.OK
 
 

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 from command_line import exit_codes
 from command_line.experiments.terminal_prompt import AbsentOperatorError, TerminalPrompt
+from command_line.json_output import with_schema
 from command_line.screen import Progress, complain
 from experiments.reports.report_page import Section, numbers_reported, write_report
 from experiments.robot.bench_errors import BarredError, BenchError, EndedError, GoneError
@@ -58,6 +59,7 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
         finding = _run(options, folder, what, run)
         title = f"{finding.title} (simulated)" if options.simulated else finding.title
         report = finding.report | {"simulated": bool(options.simulated)}
+        report = with_schema(f"experiment-{options.name}", report)
         written = write_report(folder, report, title, finding.sections, finding.logs)
     except ConfigurationError as problem:
         complain(*problem.problems)
@@ -75,7 +77,10 @@ def conduct_bench(options: argparse.Namespace, what: str, run: Callable[[Desk], 
         return _end(folder, "interrupted", exit_codes.INTERRUPTED)
     except OSError as problem:  # such as a full disk
         return _end(folder, why_not(problem, folder), exit_codes.UNHEALTHY)
-    print(json.dumps(numbers_reported(report), allow_nan=False) if options.json else finding.text)
+    if options.json:
+        print(json.dumps(numbers_reported(report), allow_nan=False))
+    else:
+        print(finding.text)
     print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
     return finding.status
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from pathlib import Path
 
 from command_line import exit_codes
+from command_line.json_output import print_json
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of
@@ -44,7 +44,7 @@ def _show_replay(replayed: Replay, as_json: bool) -> None:
     strides = [stride_report(stride) for stride in replayed.strides]
     if as_json:
         report = {"strides": strides, "map": map_report(replayed.map), "flippers": replayed.flippers}
-        print(json.dumps(report | {"complete": replayed.complete}))
+        print_json("replay", report | {"complete": replayed.complete})
         return
     print(f"{STRIDE_HEAD}  {'f_z in':>7} {'f_x':>6} {'f_z out':>7}\n{STRIDE_UNITS}  {'(N)':>7} {'(N)':>6} {'(N)':>7}")
     for report, stride in zip(strides, replayed.strides, strict=True):
@@ -164,7 +164,7 @@ def info(options: Options) -> int:
         complain(str(problem))
         return exit_codes.UNHEALTHY
     if options.json:
-        print(json.dumps(summary))
+        print_json("log-info", summary)
     else:
         for name, value in summary.items():
             print(f"{name:16} {value}")

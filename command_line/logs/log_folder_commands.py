@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from mcap.exceptions import McapError
 from mcap.reader import make_reader
 
 from command_line import exit_codes
+from command_line.json_output import print_json
 from command_line.screen import PATIENCE_S, Progress, complain, number, size_text, table
 from firmware_host.configuration.configuration import ConfigurationError, load_configuration
 from firmware_host.log.log_folder import (
@@ -54,7 +54,10 @@ def list_logs(options: Options) -> int:
         "disk_bytes": disk_bytes(folder),
         "free_bytes": space.free_bytes,
     }
-    print(json.dumps(report) if options.json else _listing(report))
+    if options.json:
+        print_json("log-list", report)
+    else:
+        print(_listing(report))
     return exit_codes.OK
 
 
@@ -123,7 +126,7 @@ def recover(options: Options) -> int:
     recovered, resisted = _recover_each(paths, named)
     if options.json:
         logs = [{"path": str(log.path), "rows": log.rows, "lost": log.lost, "note": log.note} for log in recovered]
-        print(json.dumps({"recovered": logs, "problems": resisted}))
+        print_json("log-recover", {"recovered": logs, "problems": resisted})
     else:
         for log in recovered:
             print(f"{log.path}: {log.note}")

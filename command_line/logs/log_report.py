@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from functools import partial
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from command_line import exit_codes
+from command_line.json_output import print_json
 from command_line.screen import coefficient, complain, number, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import choose_strides
@@ -36,7 +36,10 @@ def log_report(options: argparse.Namespace) -> int:
         return exit_codes.UNHEALTHY
     logs = [_copy(path, folder) for path in options.files]
     written = write_report(folder, report, f"Log {options.files[0].name}", sections, logs)
-    print(json.dumps(numbers_reported(report), allow_nan=False) if options.json else folder / PAGE)
+    if options.json:
+        print_json("log-report", numbers_reported(report))
+    else:
+        print(folder / PAGE)
     print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
     return exit_codes.OK
 

@@ -91,7 +91,7 @@ def test_where_nobody_can_answer_that_is_told(monkeypatch: pytest.MonkeyPatch) -
 
 
 def options(folder: Path, **changes: object) -> argparse.Namespace:
-    return argparse.Namespace(**({"out": folder, "json": False, "simulated": True, "name": "trial"} | changes))
+    return argparse.Namespace(**({"out": folder, "json": False, "simulated": True, "name": "walk"} | changes))
 
 
 def found(desk: Desk) -> Finding:
@@ -114,7 +114,12 @@ def test_json_alone_goes_to_standard_output(tmp_path: Path, capsys: pytest.Captu
 
     conduct_bench(options(tmp_path, json=True), "trials", run)
     said = capsys.readouterr()
-    assert json.loads(said.out) == {"experiment": "trial", "value": 1.0, "simulated": True}
+    assert json.loads(said.out) == {
+        "schema": "experiment-walk/1",
+        "experiment": "trial",
+        "value": 1.0,
+        "simulated": True,
+    }
     assert said.err.splitlines()[0] == "half of it"  # no bar of progress either, where nobody watches
     assert not {"\033", "\r"} & set(said.err)
 
@@ -122,7 +127,7 @@ def test_json_alone_goes_to_standard_output(tmp_path: Path, capsys: pytest.Captu
 def test_without_a_folder_it_makes_one_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     conduct_bench(options(tmp_path, out=None), "trials", found)
-    assert (tmp_path / "mudskipper-trial" / "report.html").exists()
+    assert (tmp_path / "mudskipper-walk" / "report.html").exists()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,27 @@
+"""Configures Sphinx: MyST Markdown, the furo theme, and the reference pages that are written from the code."""
+
+import os
+import sys
+from importlib.metadata import version as installed_version
+from pathlib import Path
+
+DOCS = Path(__file__).parent
+sys.path.insert(0, str(DOCS.parent))
+os.environ.pop("MUDSKIPPER_SOCKET", None)  # a default of the command line, which the pages show
+
+from docs.generate.pages import write_pages  # noqa: E402 - it needs the path above
+
+write_pages(DOCS / "reference")
+
+project = "mudskipper"
+author = "the mudskipper project"
+release = version = installed_version("mudskipper")
+extensions = ["myst_parser", "sphinx_copybutton"]
+myst_enable_extensions = ["deflist", "dollarmath"]
+myst_heading_anchors = 4
+exclude_patterns = ["generate"]
+html_theme = "furo"
+html_title = f"mudskipper {release}"
+copybutton_prompt_text = "$ "
+man_pages = [("reference/command_line", "mudskipper", "operates a robot that crawls over mud", "", 1)]
+linkcheck_anchors = False  # GitHub renders its anchors with scripts
