@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from math import isfinite
 from typing import Any
 
+from experiments.reports.text_tables import number
 from experiments.reports.value_text import N_CM3, value_text
 
 RED, GREEN, YELLOW, BOLD, PLAIN = "\033[31m", "\033[32m", "\033[33m", "\033[1m", "\033[0m"
@@ -23,24 +22,6 @@ def coloured(text: str, colour: str) -> str:
     if not sys.stdout.isatty() or "NO_COLOR" in os.environ:
         return text
     return f"{colour}{text}{PLAIN}"
-
-
-def plain(text: str) -> str:
-    """Without its colours."""
-    return re.sub(r"\033\[\d+m", "", text)
-
-
-def table(rows: Sequence[Sequence[str]]) -> str:
-    """Columns as wide as their widest cell, the first row as the head."""
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-    )
-
-
-def number(value: float | None, digits: int = 3) -> str:
-    """A dash where nothing is known."""
-    return "-" if value is None or not isfinite(value) else f"{value:z.{digits}f}"
 
 
 def size_text(size: float) -> str:

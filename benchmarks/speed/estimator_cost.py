@@ -35,12 +35,12 @@ from benchmarks.speed.synthetic_walk import (
     motion,
     stride_samples,
 )
-from command_line.screen import table
 from control.plate import stroke_moment_m4, submerged_plate
 from control.records import Phase, StrideEstimate
 from estimation.flipper import STEPS_M, FlipperEstimator
 from estimation.paper import PaperEstimator
 from estimation.strokes.stroke import Stroke
+from experiments.reports.text_tables import table
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.ticker import PERIOD_S
 

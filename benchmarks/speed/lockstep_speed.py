@@ -15,8 +15,8 @@ from typing import Any
 
 from benchmarks.example_robot import load_example
 from benchmarks.report import Progress, new_parser, print_report, verdict
-from command_line.screen import table
 from control.controller import WalkOrder
+from experiments.reports.text_tables import table
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 

@@ -23,11 +23,11 @@ from threading import Event, Thread
 from typing import Any
 
 from benchmarks.report import Progress, new_parser, print_report, verdict
-from command_line.screen import table
 from control.controller import WalkOrder
 from control.modes import Mode, Request
 from drivers.odrive.drives import OdriveDrives
 from drivers.pose.pose_port import PosePort
+from experiments.reports.text_tables import table
 from firmware_host.buses import open_ports
 from firmware_host.computer.realtime import SWITCH_INTERVAL_S, prepare_loop
 from firmware_host.computer.sd_notify import SystemdNotifier

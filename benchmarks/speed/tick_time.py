@@ -27,7 +27,7 @@ from benchmarks.speed.can_paths import BAR_RATIO, compare_paths
 from benchmarks.speed.stage_marks import MEANINGS
 from benchmarks.speed.timed_walk import TimedWalk
 from benchmarks.speed.wirings import VARIANTS
-from command_line.screen import table
+from experiments.reports.text_tables import table
 from firmware_host.log.recorder import Recorder
 
 BAR_US = 200.0

@@ -20,7 +20,6 @@ from typing import Any
 from benchmarks.example_robot import load_example
 from benchmarks.report import Progress, new_parser, print_report, verdict
 from benchmarks.stress.resources import resident_kib
-from command_line.screen import table
 from control.modes import Mode
 from control.records import JOINTS
 from drivers.can.frames import Frame
@@ -28,6 +27,7 @@ from drivers.can.mock_bus import MockBus, MockPort
 from drivers.odrive import codec
 from drivers.odrive.codec import arbitration_id
 from drivers.odrive.drives import OdriveDrives
+from experiments.reports.text_tables import table
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Tick

@@ -21,9 +21,9 @@ from typing import Any
 
 from benchmarks.report import Progress, new_parser, print_report, verdict
 from benchmarks.stress.log_kills import start
-from command_line.screen import table
 from control.records import JOINTS
 from drivers.odrive import codec
+from experiments.reports.text_tables import table
 from firmware_host.buses import open_ports
 from firmware_host.configuration.configuration import load_configuration
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient

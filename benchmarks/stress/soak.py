@@ -18,7 +18,7 @@ from typing import Any
 from benchmarks.report import Progress, new_parser, print_report, verdict
 from benchmarks.stress.soaked_daemon import soak_daemon
 from benchmarks.stress.soaked_loop import soak_loop
-from command_line.screen import table
+from experiments.reports.text_tables import table
 
 BAR_KIB = 1024.0
 WARM_UP_FRACTION = 0.2  # of the readings

@@ -17,7 +17,7 @@ from command_line import exit_codes
 from command_line.demo.demo_summary import summarise, summary_text
 from command_line.demo.demonstration import ENDING_SIGNALS, Demo, DemoError, InterruptedDemoError, running_demo
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
-from experiments.trials.mud_names import mud_text
+from experiments.reports.mud_names import mud_text
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.log_folder import DONE, log_files, present_path
 from firmware_host.log_reading.log_reader import LogError, read_log

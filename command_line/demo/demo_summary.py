@@ -9,7 +9,7 @@ import numpy as np
 
 from command_line.demo.demonstration import Demo
 from control.modes import Mode
-from experiments.trials.mud_names import mud_text
+from experiments.reports.mud_names import mud_text
 from firmware_host.log_reading.log_reader import Log
 from firmware_host.operator.counted_nouns import counted
 from simulation.mud.track import Track

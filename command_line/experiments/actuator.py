@@ -8,10 +8,8 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from command_line import exit_codes
 from command_line.commands import DEFAULT_CONFIG
-from command_line.experiments.conduct_bench import Desk, Finding, conduct_bench
-from command_line.experiments.mud_bench import text_of_tables
+from command_line.experiments.conduct import conduct_bench
 from control.joint_pd import GRAVITY_M_S2
 from experiments.actuator.bench import ActuatorBench, RobotBench, SimulatedBench
 from experiments.actuator.configuration_change import changed_text, difference, replace_file
@@ -20,8 +18,10 @@ from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan
 from experiments.actuator.report import TITLE, left_out, report_of, sections_of, text_of
 from experiments.actuator.simulation import bench_configuration, truth_rows
 from experiments.reports.report_page import Section
+from experiments.reports.text_tables import text_of_tables
 from experiments.robot.bench_robot import BenchError
 from experiments.robot.daemon_robot import DaemonRobot
+from experiments.trials.session import Ending, Finding, Session
 from firmware_host.configuration.configuration import Configuration, load_configuration
 from firmware_host.configuration.toml_records import read_text
 
@@ -36,21 +36,21 @@ def run_actuator(options: argparse.Namespace) -> int:
     return conduct_bench(options, "readings", partial(_calibrate, options))
 
 
-def _calibrate(options: argparse.Namespace, desk: Desk) -> Finding:
+def _calibrate(options: argparse.Namespace, session: Session) -> Finding:
     bench = _bench(options)
     try:
-        target = _target(options, desk, bench) if options.apply else None
+        target = _target(options, session, bench) if options.apply else None
         plan = _plan(options, bench.configuration)
-        readings = bench.calibrate(plan, desk.folder, desk.operator, desk.show)
+        readings = bench.calibrate(plan, session.folder, session.operator, session.show)
     finally:
-        logs = bench.leave(desk.folder, desk.operator)
+        logs = bench.leave(session.folder, session.operator)
     drives = bench.configuration.drive
     fits = [
         fit
         for joint in plan.joints
         if (fit := fit_joint(joint, plan, readings[joint], drives[joint].torque_constant_nm_a)) is not None
     ]
-    applied, status = _applied(target, fits, desk) if target else ("", exit_codes.OK)
+    applied, ending = _applied(target, fits, session) if target else ("", Ending.DONE)
     omitted = len(left_out(plan, readings))
     tables, sections = text_of(fits), sections_of(plan, readings, fits)
     if options.simulated:
@@ -60,7 +60,7 @@ def _calibrate(options: argparse.Namespace, desk: Desk) -> Finding:
     reported = [*_remarks(plan.joints, fits, omitted), *([applied] if applied else [])]
     text = "\n\n".join([text_of_tables(tables), *(["\n".join(reported)] if reported else [])])
     report = report_of(plan, readings, fits) | {"applied": applied or None}
-    return Finding(report, TITLE, sections, text, logs, status)
+    return Finding(report, TITLE, sections, text, logs, ending)
 
 
 def _bench(options: argparse.Namespace) -> ActuatorBench:
@@ -95,10 +95,10 @@ def _remarks(joints: Sequence[str], fits: Sequence[JointFit], omitted: int) -> l
     return remarks
 
 
-def _target(options: argparse.Namespace, desk: Desk, bench: ActuatorBench) -> Path:
+def _target(options: argparse.Namespace, session: Session, bench: ActuatorBench) -> Path:
     """The file that is to be changed, refused before the work where that cannot be. Raises BenchError."""
     if options.simulated:
-        copy: Path = desk.folder / COPY
+        copy: Path = session.folder / COPY
         copy.write_text(bench.configuration.text, encoding="utf-8")
         return copy
     path: Path = options.config or Path(DEFAULT_CONFIG)
@@ -109,26 +109,26 @@ def _target(options: argparse.Namespace, desk: Desk, bench: ActuatorBench) -> Pa
     return path
 
 
-def _applied(path: Path, fits: Sequence[JointFit], desk: Desk) -> tuple[str, int]:
-    """What was done, and the exit status. A file that cannot be changed costs no report."""
+def _applied(path: Path, fits: Sequence[JointFit], session: Session) -> tuple[str, Ending]:
+    """What was done, and how the experiment ends. A file that cannot be changed costs no report."""
     try:
-        return _apply(path, fits, desk), exit_codes.OK
+        return _apply(path, fits, session), Ending.DONE
     except BenchError as problem:
-        return f"nothing was applied: {problem}", exit_codes.REFUSED
+        return f"nothing was applied: {problem}", Ending.REFUSED
 
 
-def _apply(path: Path, fits: Sequence[JointFit], desk: Desk) -> str:
+def _apply(path: Path, fits: Sequence[JointFit], session: Session) -> str:
     before = read_text(path)
     changes = {key: value for fit in fits for key, value in changes_of(fit).items()}
     for fit in fits:
         if not changes_of(fit):
             uncertainty = 100.0 * fit.constant_error_nm_a / fit.constant_nm_a
-            desk.operator.report(f"{fit.joint}: k_t is known to {uncertainty:.1f} % only, and is not written.")
+            session.operator.report(f"{fit.joint}: k_t is known to {uncertainty:.1f} % only, and is not written.")
     after = changed_text(before, changes)
     if after == before:
         return f"{path} needs no change"
-    desk.operator.report(difference(before, after, str(path)))
-    if desk.operator.ask(f"Write this to {path}?", {WRITE: "write it", LEAVE: "leave it"}, lambda: None) != WRITE:
+    session.operator.report(difference(before, after, str(path)))
+    if session.operator.ask(f"Write this to {path}?", {WRITE: "write it", LEAVE: "leave it"}, lambda: None) != WRITE:
         return f"{path} was left as it is"
     backup = replace_file(path, before, after)
     return (

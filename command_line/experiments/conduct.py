@@ -1,4 +1,8 @@
-"""Conducting an experiment: a place for its results first, then the work with its progress, then report and picture."""
+"""Runs an experiment from the command line: folder, progress and prompts before it, report and exit status after it.
+
+An interrupted experiment stops its robot first. Its folder holds the trials that it measured, and the same command
+continues from there.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +10,29 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
-from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from command_line import exit_codes
+from command_line.experiments.terminal_prompt import TerminalPrompt
 from command_line.json_output import with_schema
-from command_line.screen import Progress, complain, plain
-from experiments.reports.report_page import Figure, Section, numbers_reported, write_report
+from command_line.screen import Progress, complain
+from experiments.reports.report_page import to_json, write_report
+from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, EndedError
+from experiments.robot.prompt import AutomaticOperator
+from experiments.trials.notebook import NotebookError, anything_measured
+from experiments.trials.session import Ending, Finding, Session, Show
+from firmware_host.configuration.file_problems import why_not
+from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.operator.status_client import CallRefusedError
 
-Report = dict[str, Any]
-Show = Callable[[int, int], None]
+EXIT_STATUS = {
+    Ending.DONE: exit_codes.OK,
+    Ending.UNHEALTHY: exit_codes.UNHEALTHY,
+    Ending.REFUSED: exit_codes.REFUSED,
+}
+Result = TypeVar("Result")
 
 
 def refuse(message: str) -> int:
@@ -24,37 +40,75 @@ def refuse(message: str) -> int:
     return exit_codes.USAGE
 
 
-def conduct(
-    options: argparse.Namespace,
-    what: str,
-    run: Callable[[Show], Report],
-    text_of: Callable[[Report], str],
-    plot: Callable[[Report, Path], None] | None = None,
-) -> int:
-    """`what` there is progress in; `plot` draws the report to a file."""
+def conduct(options: argparse.Namespace, unit: str, run: Callable[[Show], Finding]) -> int:
+    """Run a computed experiment, which writes files only with --out. `unit` names what the progress bar counts."""
     if options.out is not None:
-        options.out.mkdir(parents=True, exist_ok=True)  # what cannot be is refused before the minutes of work
-    report = with_schema(f"experiment-{options.name}", _run(what, run))
-    text = text_of(report)
+        options.out.mkdir(parents=True, exist_ok=True)  # an impossible folder is refused before minutes of work
+    finding = _run(unit, lambda progress: run(progress.show))
+    report = with_schema(f"experiment-{options.name}", to_json(finding.report))
     if options.out is not None:
-        written = _write(options.out, report, text, plot)
-        print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
-    if options.json:
-        print(json.dumps(numbers_reported(report), allow_nan=False))
-    else:
-        print(text)
-    return exit_codes.OK
+        _print_written(write_report(options.out, report, finding.title, finding.sections))
+    print(json.dumps(report, allow_nan=False) if options.json else finding.text)
+    return EXIT_STATUS[finding.ending]
 
 
-def _run(what: str, run: Callable[[Show], Report]) -> Report:
-    progress = Progress(what)
+def conduct_bench(options: argparse.Namespace, unit: str, run: Callable[[Session], Finding]) -> int:
+    """Run an experiment that has a folder and an operator. `run` leaves the robot at rest, however it ends."""
+    if find_spec("matplotlib") is None:  # missing plots are reported before the hours of measuring
+        raise ModuleNotFoundError(name="matplotlib")
+    folder: Path = options.out or Path(f"mudskipper-{options.name}")
+    folder.mkdir(parents=True, exist_ok=True)
     try:
-        return run(progress.show)
+        finding = _run(unit, lambda progress: run(_session(options, folder, progress)))
+        title = f"{finding.title} (simulated)" if options.simulated else finding.title
+        report = with_schema(
+            f"experiment-{options.name}", to_json(finding.report) | {"simulated": bool(options.simulated)}
+        )
+        written = write_report(folder, report, title, finding.sections, finding.logs)
+    except ConfigurationError as problem:
+        complain(*problem.problems)
+        return exit_codes.CONFIGURATION
+    except NotebookError as problem:
+        complain(str(problem))
+        return exit_codes.REFUSED
+    except (BenchError, EndedError, CallRefusedError, KeyboardInterrupt, OSError) as problem:
+        return _end_early(folder, problem)
+    print(json.dumps(report, allow_nan=False) if options.json else finding.text)
+    _print_written(written)
+    return EXIT_STATUS[finding.ending]
+
+
+def _run(unit: str, run: Callable[[Progress], Result]) -> Result:
+    progress = Progress(unit)
+    try:
+        return run(progress)
     finally:
         progress.clear()
 
 
-def _write(folder: Path, report: Report, text: str, plot: Callable[[Report, Path], None] | None) -> list[Path]:
-    name = report["experiment"]
-    figures = [] if plot is None else [Figure(name, "", partial(plot, report))]
-    return write_report(folder, report, f"Experiment: {name}", [Section("Result", screen=plain(text), figures=figures)])
+def _session(options: argparse.Namespace, folder: Path, progress: Progress) -> Session:
+    prompt = TerminalPrompt(progress.clear)
+    if options.simulated:
+        return Session(folder, AutomaticOperator(prompt.report), progress.show)
+    return Session(folder, prompt, progress.show, getattr(options, "socket", None))
+
+
+def _print_written(paths: list[Path]) -> None:
+    print(f"written  {', '.join(map(str, paths))}", file=sys.stderr)
+
+
+def _end_early(folder: Path, problem: BaseException) -> int:
+    message, status = str(problem), exit_codes.REFUSED
+    match problem:
+        case DaemonLostError():
+            status = exit_codes.NO_DAEMON
+        case AccessDeniedError():
+            status = exit_codes.NOT_PERMITTED
+        case KeyboardInterrupt():
+            message, status = "interrupted", exit_codes.INTERRUPTED
+        case OSError():  # such as a full disk
+            message, status = why_not(problem, folder), exit_codes.UNHEALTHY
+    complain(message)
+    if anything_measured(folder):
+        complain(f"the measurements so far are in {folder}; the same command continues from there")
+    return status

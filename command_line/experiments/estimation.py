@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from command_line.experiments.conduct import conduct, refuse
-from command_line.screen import number, table
 from experiments.estimation.evaluation import (
     LAYERS,
     SINGLE_WATERS,
@@ -19,7 +19,9 @@ from experiments.estimation.evaluation import (
     report_of,
     with_layers,
 )
-from experiments.trials.mud_names import mud_text
+from experiments.reports.mud_names import mud_text
+from experiments.reports.text_tables import number, table
+from experiments.trials.session import Finding, screen_finding
 from simulation.mud.clay import Clay, clay_of_water
 
 
@@ -30,7 +32,11 @@ def estimation(options: argparse.Namespace) -> int:
         plan = plan_of(options)
     except ValueError as problem:
         return refuse(str(problem))
-    return conduct(options, "trials", lambda show: report_of(plan, evaluate(plan, show)), text_of, _plot)
+    return conduct(options, "trials", lambda show: _finding(report_of(plan, evaluate(plan, show))))
+
+
+def _finding(report: dict[str, Any]) -> Finding:
+    return screen_finding("estimation", report, text_of(report), partial(_plot, report))
 
 
 def _plot(report: dict[str, Any], path: Path) -> None:

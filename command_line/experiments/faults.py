@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from command_line import exit_codes
 from command_line.experiments.conduct import conduct, refuse
-from command_line.screen import GREEN, RED, coloured, number, table
 from experiments.faults import matrix as faults
 from experiments.faults.phases import PHASES
-from experiments.reports.side_by_side import Show
+from experiments.reports.text_tables import number, table
+from experiments.trials.session import Ending, Finding, screen_finding
 
 
 def run_faults(options: argparse.Namespace) -> int:
@@ -27,14 +27,12 @@ def run_faults(options: argparse.Namespace) -> int:
         return refuse(str(problem))
     if not plan.places:
         return refuse("none of these faults can come about in these phases")
-    seen: list[dict[str, Any]] = []
+    return conduct(options, "cells", lambda show: _finding(faults.run(plan, show)))
 
-    def run(show: Show) -> dict[str, Any]:
-        seen.append(faults.run(plan, show))
-        return seen[0]
 
-    conduct(options, "cells", run, faults_text, _plot)
-    return exit_codes.OK if seen[0]["ok"] == len(seen[0]["cells"]) else exit_codes.UNHEALTHY
+def _finding(report: dict[str, Any]) -> Finding:
+    ending = Ending.DONE if report["ok"] == len(report["cells"]) else Ending.UNHEALTHY
+    return screen_finding("faults", report, faults_text(report), partial(_plot, report), ending)
 
 
 def _plot(report: dict[str, Any], path: Path) -> None:
@@ -74,4 +72,4 @@ def _failed(report: dict[str, Any]) -> list[str]:
 
 def _verdict(report: dict[str, Any]) -> str:
     ok, cells = report["ok"], len(report["cells"])
-    return coloured(f"{ok} of {cells} cells ok", GREEN if ok == cells else RED)
+    return f"{ok} of {cells} cells ok"

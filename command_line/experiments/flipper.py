@@ -5,14 +5,15 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from command_line.experiments.conduct import refuse
-from command_line.experiments.conduct_bench import Desk, Finding, conduct_bench
-from command_line.experiments.mud_bench import SEED, make_trials, open_bench, text_of_tables, why_not_simulated
+from command_line.experiments.conduct import conduct_bench, refuse
 from experiments.flipper import measurement as flipper
 from experiments.flipper.report import sections_of, text_of
 from experiments.flipper.simulation import flipper_bench
-from experiments.reports.coefficient_table import load_truth
-from experiments.trials.mud_names import mud_name
+from experiments.reports.mud_names import mud_name
+from experiments.reports.text_tables import text_of_tables
+from experiments.trials.mud_trials import SEED, make_trials, open_bench, why_not_simulated
+from experiments.trials.session import Finding, Session
+from experiments.trials.truth_file import load_truth
 
 PREPARE = (
     "Torque is off and the flippers have come down. Level the mud to its nominal height and give the flipper a fresh "
@@ -35,14 +36,14 @@ def run_flipper(options: argparse.Namespace) -> int:
     refused = why_not_simulated(plan.muds) if options.simulated else None
     if refused:
         return refuse(refused)
-    return conduct_bench(options, "trials", lambda desk: _find(options, plan, desk))
+    return conduct_bench(options, "trials", lambda session: _find(options, plan, session))
 
 
-def _find(options: argparse.Namespace, plan: flipper.Plan, desk: Desk) -> Finding:
+def _find(options: argparse.Namespace, plan: flipper.Plan, session: Session) -> Finding:
     truth = load_truth(options.truth) if options.truth else None
-    simulated = partial(flipper_bench, desk.folder, plan.muds, SEED)
-    bench = open_bench(options, desk, plan.kept, simulated, lambda trial: PREPARE)
-    configuration, entries, logs = make_trials(bench, desk, lambda: flipper.run(bench, plan, desk.show))
+    simulated = partial(flipper_bench, session.folder, plan.muds, SEED)
+    bench = open_bench(session, plan.kept, simulated, lambda trial: PREPARE)
+    configuration, entries, logs = make_trials(bench, session, lambda: flipper.run(bench, plan, session.show))
     report = flipper.report_of(plan, entries, configuration, truth) | {"left_out": bench.notebook.left_out}
     sections = sections_of(report, plan, entries, configuration)
     return Finding(report, "A single flipper through muds", sections, text_of_tables(text_of(report)), logs)

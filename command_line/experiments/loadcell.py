@@ -11,9 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from command_line.experiments.conduct import refuse
-from command_line.experiments.conduct_bench import Desk, Finding, conduct_bench
-from command_line.experiments.mud_bench import text_of_tables
+from command_line.experiments.conduct import conduct_bench, refuse
 from drivers.load_cell.calibration import LoadCellCalibration
 from drivers.load_cell.line_formats import AUTO, COUNTS, NUMBER, UNITS, LineFormat
 from drivers.load_cell.load_cell_port import LoadCellPort
@@ -37,8 +35,10 @@ from experiments.loadcell.trial_checks import OR_WITHOUT
 from experiments.loadcell.trials import TrialBench, TrialPlan
 from experiments.loadcell.truth import clay_truth, truth_rows
 from experiments.reports.report_page import Section
+from experiments.reports.text_tables import text_of_tables
 from experiments.robot.bench_robot import BenchError
 from experiments.trials.notebook import Notebook
+from experiments.trials.session import Finding, Session
 from simulation.test_rig.load_cell_bench import EmulatedBench, clay_plate, position_link
 from simulation.test_rig.load_cell_emulator import AmplifierParameters
 from simulation.test_rig.plate_stage import StageParameters
@@ -60,7 +60,7 @@ def loadcell(options: argparse.Namespace) -> int:
         flipper = None if options.compare is None else load_flipper(options.compare)
     except (ValueError, CompareError) as problem:
         return refuse(str(problem))
-    return conduct_bench(options, "trials", lambda desk: _found(options, desk, plan, cell, flipper))
+    return conduct_bench(options, "trials", lambda session: _found(options, session, plan, cell, flipper))
 
 
 def plan_of(options: argparse.Namespace) -> TrialPlan:
@@ -118,21 +118,23 @@ def encoder_of(options: argparse.Namespace, emulated: str) -> StageEncoderSettin
 
 
 def _found(
-    options: argparse.Namespace, desk: Desk, plan: TrialPlan, cell: CellSettings, flipper: dict[str, Any] | None
+    options: argparse.Namespace, session: Session, plan: TrialPlan, cell: CellSettings, flipper: dict[str, Any] | None
 ) -> Finding:
     bench_name = "simulated" if options.simulated else "load cell"
-    notebook = Notebook(desk.folder, plan_of_notebook(plan.settings) | {"bench": bench_name})
+    notebook = Notebook(session.folder, plan_of_notebook(plan.settings) | {"bench": bench_name})
     missing = [trial for trial in plan.list_trials() if trial.key not in notebook.entries]
     if notebook.begun:
-        desk.operator.report(f"{len(notebook.entries)} trials are in {desk.folder} already, {len(missing)} are left")
+        session.operator.report(
+            f"{len(notebook.entries)} trials are in {session.folder} already, {len(missing)} are left"
+        )
         without = sum("file" in entry and "position" not in entry for entry in notebook.entries.values())
         if options.position is not None and without:
-            desk.operator.report(f"{without} of them have no position, and keep the depth that the force tells")
+            session.operator.report(f"{without} of them have no position, and keep the depth that the force tells")
     described = {"bench": bench_name, "port": options.port, "baud": options.baud, "format": options.format}
     if missing:
         with ExitStack() as stack:
-            described |= _measured(options, desk, plan, cell, notebook, stack)
-    results = conclude(desk.folder, notebook, plan, flipper, desk.show)
+            described |= _measured(options, session, plan, cell, notebook, stack)
+    results = conclude(session.folder, notebook, plan, flipper, session.show)
     if not results.trials:
         raise BenchError("no trial was kept, so there is nothing to conclude")
     truths = {mud: clay_truth(_water(mud), plan.settings) for mud in results.muds} if options.simulated else {}
@@ -144,22 +146,27 @@ def _found(
         sections = [*sections, Section("The simulated muds themselves", f"{TRUTH}.", rows=rows)]
         tables.append((TRUTH, rows))
     text = "\n\n".join([text_of_tables(tables), *results.remarks])
-    return Finding(report, TITLE, sections, text, [desk.folder / RAW])
+    return Finding(report, TITLE, sections, text, [session.folder / RAW])
 
 
 def _measured(
-    options: argparse.Namespace, desk: Desk, plan: TrialPlan, cell: CellSettings, notebook: Notebook, stack: ExitStack
+    options: argparse.Namespace,
+    session: Session,
+    plan: TrialPlan,
+    cell: CellSettings,
+    notebook: Notebook,
+    stack: ExitStack,
 ) -> dict[str, Any]:
     """All trials that are missing; what the cell turned out to be."""
-    path, clock, stage_of = (_emulated if options.simulated else _real)(options, desk, plan, stack)
+    path, clock, stage_of = (_emulated if options.simulated else _real)(options, session, plan, stack)
     port = _open(path, options.baud, cell)
     stack.callback(port.close)
     settings = encoder_of(options, str(position_link(Path(path))))
     encoder = None if settings is None else _open_encoder(settings)
     if encoder is not None:
         stack.callback(encoder.close)
-    recorder = CellRecorder(port, clock, desk.operator.report, encoder)
-    bench = TrialBench(recorder, stage_of(recorder), desk.operator, notebook, desk.folder, desk.show)
+    recorder = CellRecorder(port, clock, session.operator.report, encoder)
+    bench = TrialBench(recorder, stage_of(recorder), session.operator, notebook, session.folder, session.show)
     measure(bench, plan, cell)
     return {
         "port": path,
@@ -179,13 +186,13 @@ def _reported_of(encoder: StageEncoder, settings: StageEncoderSettings) -> dict[
 
 
 def _real(
-    options: argparse.Namespace, desk: Desk, plan: TrialPlan, stack: ExitStack
+    options: argparse.Namespace, session: Session, plan: TrialPlan, stack: ExitStack
 ) -> tuple[str, BenchClock, StageOf]:
-    return options.port, WallClock(), lambda recorder: AttendedStage(plan.settings, desk.operator, recorder.drain)
+    return options.port, WallClock(), lambda recorder: AttendedStage(plan.settings, session.operator, recorder.drain)
 
 
 def _emulated(
-    options: argparse.Namespace, desk: Desk, plan: TrialPlan, stack: ExitStack
+    options: argparse.Namespace, session: Session, plan: TrialPlan, stack: ExitStack
 ) -> tuple[str, BenchClock, StageOf]:
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mudskipper-")))
     plates = {mud: clay_plate(_water(mud), plan.settings.plate) for mud in plan.muds}

@@ -10,10 +10,10 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
-from command_line.experiments.conduct import conduct, refuse
-from command_line.experiments.conduct_bench import Desk, Finding, conduct_bench
-from command_line.screen import number, plain, table
+from command_line.experiments.conduct import conduct, conduct_bench, refuse
+from experiments.reports.mud_names import mud_label, mud_name
 from experiments.reports.report_page import Figure, Section
+from experiments.reports.text_tables import number, table
 from experiments.robot.bench_robot import leave
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.trackway import comparison as trackway
@@ -23,8 +23,8 @@ from experiments.trackway.mud_fit import cells_beside_paper
 from experiments.trackway.paper_table import ADAPTIVE, PAPER_TABLE
 from experiments.trackway.trials import AskedTrackway, first_walks
 from experiments.trackway.walk_figures import walk_figures
-from experiments.trials.mud_names import mud_label, mud_name
 from experiments.trials.notebook import Notebook
+from experiments.trials.session import Finding, Session, screen_finding
 from firmware_host.operator.counted_nouns import counted
 
 WALKS_AND_TABLE = (
@@ -49,7 +49,7 @@ def run_trackway(options: argparse.Namespace) -> int:
         compartment_m=options.compartment or trackway.Plan.compartment_m,
     )
     return conduct_bench(
-        options, "walks", lambda desk: _found(trackway.run(plan, Notebook(desk.folder, plan.kept), desk.show))
+        options, "walks", lambda session: _found(trackway.run(plan, Notebook(session.folder, plan.kept), session.show))
     )
 
 
@@ -64,23 +64,24 @@ def _walk_at_the_bench(options: argparse.Namespace) -> int:
     if len({mud.name for mud in muds}) < len(muds):
         return refuse("--mud: each needs a name of its own")
     plan = trackway_trials.Plan(muds, options.trials or trackway_trials.Plan.trials)
-    return conduct_bench(options, "walks", lambda desk: _walked(plan, desk, options.socket))
+    return conduct_bench(options, "walks", lambda session: _walked(plan, session))
 
 
-def _walked(plan: trackway_trials.Plan, desk: Desk, socket: Path) -> Finding:
-    notebook = Notebook(desk.folder, plan.kept)
-    robot = DaemonRobot(socket)
+def _walked(plan: trackway_trials.Plan, session: Session) -> Finding:
+    notebook = Notebook(session.folder, plan.kept)
+    assert session.socket is not None
+    robot = DaemonRobot(session.socket)
     try:
-        report = trackway_trials.run(plan, AskedTrackway(robot, desk.operator), notebook, desk.show)
+        report = trackway_trials.run(plan, AskedTrackway(robot, session.operator), notebook, session.show)
     finally:
-        logs = leave(robot, desk.operator, desk.folder)
-    return _found(report, logs, walk_figures(first_walks(plan, notebook), desk.folder, desk.operator))
+        logs = leave(robot, session.operator, session.folder)
+    return _found(report, logs, walk_figures(first_walks(plan, notebook), session.folder, session.operator))
 
 
 def _found(report: dict[str, Any], logs: Sequence[Path] = (), walks: Sequence[Figure] = ()) -> Finding:
     text = trackway_text(report)
     figure = Figure("trackway", WALKS_AND_TABLE, partial(_plot_trackway, report))
-    sections = [Section("Table I", screen=plain(text), figures=[figure])]
+    sections = [Section("Table I", screen=text, figures=[figure])]
     sections += [Section("Along the way", "Of each gait the first walk that counts.", figures=walks)] * bool(walks)
     return Finding(report, "The trackway: Table I of the paper", sections, text, logs)
 
@@ -97,14 +98,22 @@ def run_sweep(options: argparse.Namespace) -> int:
         plan.method_walks()
     except ValueError as problem:
         return refuse(str(problem))
-    return conduct(options, "walks", lambda show: depth_sweep.run(plan, show), sweep_text, _plot_sweep)
+    return conduct(options, "walks", lambda show: _sweep_finding(depth_sweep.run(plan, show)))
+
+
+def _sweep_finding(report: dict[str, Any]) -> Finding:
+    return screen_finding(report["experiment"], report, sweep_text(report), partial(_plot_sweep, report))
 
 
 def run_mud_fit(options: argparse.Namespace) -> int:
     if not options.simulated:
         return refuse(SIMULATED_ONLY)
     plan = mud_fit.Plan(seeds=options.seeds)
-    return conduct(options, "walks", lambda show: mud_fit.run(plan, show), fit_text)
+    return conduct(options, "walks", lambda show: _fit_finding(mud_fit.run(plan, show)))
+
+
+def _fit_finding(report: dict[str, Any]) -> Finding:
+    return screen_finding(report["experiment"], report, fit_text(report))
 
 
 def _unique(names: list[str] | None) -> list[str]:

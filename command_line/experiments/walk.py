@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from command_line.experiments.conduct import refuse
-from command_line.experiments.conduct_bench import Desk, Finding, conduct_bench
-from command_line.experiments.mud_bench import SEED, make_trials, open_bench, text_of_tables, why_not_simulated
-from experiments.reports.coefficient_table import load_truth
+from command_line.experiments.conduct import conduct_bench, refuse
+from experiments.reports.mud_names import mud_name
+from experiments.reports.text_tables import text_of_tables
 from experiments.trackway.trials import Mud
-from experiments.trials.mud_names import mud_name
-from experiments.trials.mud_trials import PlannedTrial
+from experiments.trials.mud_trials import SEED, PlannedTrial, make_trials, open_bench, why_not_simulated
+from experiments.trials.session import Finding, Session
+from experiments.trials.truth_file import load_truth
 from experiments.walk import measurement as walk_mapping
 from experiments.walk.pages import sections_of, text_of
 from experiments.walk.report import report_of
@@ -46,13 +46,13 @@ def run_walk(options: argparse.Namespace) -> int:
     refused = why_not_simulated(names) if options.simulated else None
     if refused:
         return refuse(refused)
-    return conduct_bench(options, "trials", lambda desk: _find(options, plan, desk))
+    return conduct_bench(options, "trials", lambda session: _find(options, plan, session))
 
 
-def _find(options: argparse.Namespace, plan: walk_mapping.Plan, desk: Desk) -> Finding:
+def _find(options: argparse.Namespace, plan: walk_mapping.Plan, session: Session) -> Finding:
     truth = load_truth(options.truth) if options.truth else None
-    bench = open_bench(options, desk, plan.kept, partial(walking_bench, desk.folder, plan, SEED), _words)
-    configuration, entries, logs = make_trials(bench, desk, lambda: walk_mapping.run(bench, plan, desk.show))
+    bench = open_bench(session, plan.kept, partial(walking_bench, session.folder, plan, SEED), _words)
+    configuration, entries, logs = make_trials(bench, session, lambda: walk_mapping.run(bench, plan, session.show))
     report = report_of(plan, entries, configuration, truth) | {"left_out": bench.notebook.left_out}
     sections = sections_of(report, plan, entries, configuration, truth)
     return Finding(report, "The walking robot over several muds", sections, text_of_tables(text_of(report)), logs)

@@ -11,7 +11,8 @@ from mcap.reader import make_reader
 
 from command_line import exit_codes
 from command_line.json_output import print_json
-from command_line.screen import PATIENCE_S, Progress, complain, number, size_text, table
+from command_line.screen import PATIENCE_S, Progress, complain, size_text
+from experiments.reports.text_tables import number, table
 from firmware_host.configuration.configuration import ConfigurationError, load_configuration
 from firmware_host.log.log_folder import (
     BROKEN,

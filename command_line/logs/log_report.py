@@ -11,11 +11,12 @@ from typing import Any
 
 from command_line import exit_codes
 from command_line.json_output import print_json
-from command_line.screen import coefficient, complain, number, watched
+from command_line.screen import coefficient, complain, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import choose_strides
-from experiments.reports.report_page import PAGE, Figure, Section, numbers_reported, write_report
-from experiments.trials.whole_files import copy_whole
+from experiments.reports.report_page import PAGE, Figure, Section, to_json, write_report
+from experiments.reports.text_tables import number
+from experiments.reports.whole_files import copy_whole
 from firmware_host.log_reading.log_reader import Log, LogError, Watch, begin_s, log_summary, read_logs
 from firmware_host.log_reading.replay import Replay, replay_files
 from firmware_host.operator.reports import map_report, stride_report
@@ -37,7 +38,7 @@ def log_report(options: argparse.Namespace) -> int:
     logs = [_copy(path, folder) for path in options.files]
     written = write_report(folder, report, f"Log {options.files[0].name}", sections, logs)
     if options.json:
-        print_json("log-report", numbers_reported(report))
+        print_json("log-report", to_json(report))
     else:
         print(folder / PAGE)
     print(f"written  {', '.join(map(str, written))}", file=sys.stderr)

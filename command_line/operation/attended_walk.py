@@ -11,7 +11,8 @@ import time
 from typing import Any
 
 from command_line import exit_codes
-from command_line.screen import complain, number
+from command_line.screen import complain
+from experiments.reports.text_tables import number
 from firmware_host.operator.status_client import CallRefusedError, StatusClient
 
 PROMISE_S = 1.0

@@ -8,7 +8,8 @@ from typing import Any
 
 from command_line import exit_codes
 from command_line.operation.operation import with_daemon
-from command_line.screen import complain, table
+from command_line.screen import complain
+from experiments.reports.text_tables import table
 from firmware_host.operator.status_client import StatusClient
 
 

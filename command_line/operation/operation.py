@@ -11,7 +11,8 @@ from typing import Any
 
 from command_line import exit_codes
 from command_line.operation.attended_walk import MILD, attend
-from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain, number, table
+from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain
+from experiments.reports.text_tables import number, table
 from firmware_host.operator.counted_nouns import counted
 from firmware_host.operator.rpc import FOR_MEMBERS
 from firmware_host.operator.status_client import (

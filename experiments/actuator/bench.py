@@ -17,10 +17,10 @@ from experiments.actuator.fit import Entry
 from experiments.actuator.plan import Plan, require_possible, steps_of
 from experiments.actuator.simulation import simulated_bench
 from experiments.actuator.weight_handling import PersonsHand
-from experiments.reports.side_by_side import side_by_side
 from experiments.robot.bench_robot import BenchRobot, disarm, leave
-from experiments.robot.prompt import GO_ON, Operator, Willing
+from experiments.robot.prompt import GO_ON, AutomaticOperator, Operator
 from experiments.trials.notebook import NAME, Notebook
+from experiments.trials.parallel_trials import run_parallel
 from firmware_host.configuration.configuration import Configuration, parse_configuration
 
 FALLS = (
@@ -103,7 +103,7 @@ class SimulatedBench:
         def look() -> None:
             show(sum(_readings_in(folder / joint / NAME) for joint in plan.joints), count * len(joints))
 
-        outcomes = side_by_side(joints, _unseen, meanwhile=look)
+        outcomes = run_parallel(joints, _unseen, meanwhile=look)
         return dict(zip(plan.joints, outcomes, strict=True))
 
     def leave(self, folder: Path, operator: Operator) -> list[Path]:
@@ -116,7 +116,7 @@ def _simulate(text: str, joint: str, plan: Plan, seed: int, folder: Path) -> dic
     notebook = Notebook(folder / joint, notes_of(plan, joint))
     robot, hand = simulated_bench(configuration, joint, plan, seed, _new_log(folder, joint))
     try:
-        entries = Calibration(robot, joint, plan, hand, Willing(_unheard), notebook, _unseen).run()
+        entries = Calibration(robot, joint, plan, hand, AutomaticOperator(_unheard), notebook, _unseen).run()
     finally:
         robot.close()
     return dict(entries)
@@ -128,7 +128,7 @@ def _readings_in(notebook: Path) -> int:
 
 
 def _new_log(folder: Path, joint: str) -> Path:
-    """Beside those of earlier attempts."""
+    """ComparedStride those of earlier attempts."""
     number = 1
     while (log := folder / f"{joint}-{number}.mcap").exists():
         number += 1

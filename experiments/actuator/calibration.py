@@ -19,7 +19,7 @@ from experiments.actuator.plan import COOL_K, READING_S, Plan, Step, largest_cur
 from experiments.actuator.reading import HeldJoint, MovedError, Reading, WarmError
 from experiments.actuator.uncertainty import Uncertainty, uncertainty_of
 from experiments.actuator.weight_handling import Hand
-from experiments.robot.bench_robot import BenchError, BenchRobot, arm, face_faults, require_hold
+from experiments.robot.bench_robot import BenchError, BenchRobot, arm, ask_to_clear_faults, require_hold
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.trials.notebook import Notebook
 from firmware_host.operator.status_client import CallRefusedError
@@ -103,7 +103,7 @@ class Calibration:
         """With torque on, an empty arm, and a winding that bears what comes."""
         if self._held is None or self._robot.call("status")["mode"] != "hold":
             self._held = None
-            face_faults(self._robot, self._operator)
+            ask_to_clear_faults(self._robot, self._operator)
             self._hand.hold_level(self._joint, self._watch)
             self._cool(step)
             arm(self._robot, self._operator)
@@ -231,8 +231,8 @@ class Calibration:
         self._notebook.write(step.key, entry_of(reading, uncertainty, loops))
         held_nm = self._constant_nm_a * reading.current_a
         self._operator.report(
-            f"{self._joint}, trial {step.reported_trial}, {_named(step)}: {reading.current_a:+.3f} A, {held_nm:+.4f} N·m by"
-            f" the configured constant, at {degrees(reading.angle_rad):+.2f} degrees"
+            f"{self._joint}, trial {step.reported_trial}, {_named(step)}: {reading.current_a:+.3f} A,"
+            f" {held_nm:+.4f} N·m by the configured constant, at {degrees(reading.angle_rad):+.2f} degrees"
         )
 
 

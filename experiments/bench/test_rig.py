@@ -170,9 +170,8 @@ class Stand:
                 return
         silent = ", ".join(axis.joint for axis in self.drives.axes if not axis.heard)
         unheard = f"{silent}: nothing is heard; check power, wiring and node ids."
-        raise BenchError(
-            f"The robot cannot be armed: {reported or (unheard if silent else f'it is in {self.loop.mode.name.lower()}.')}"
-        )
+        mode = f"it is in {self.loop.mode.name.lower()}."
+        raise BenchError(f"The robot cannot be armed: {reported or (unheard if silent else mode)}")
 
     def _becomes_armable(self) -> bool:
         for _ in range(round(ARMING_S / PERIOD_S)):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from control.records import FLIPPERS
 from experiments.trials.load_cell_truth import LoadCellTruth
-from experiments.trials.trial import Trial, beliefs_of
+from experiments.trials.trial import Trial, mud_estimates
 from simulation.body.reference_sensor import StrideTruth
 
 FOLLOWED = 0.2  # of the truth: half of the smallest step between the muds
@@ -26,7 +26,7 @@ class CrossCoupling(NamedTuple):
 
 
 def crossings_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]) -> list[CrossCoupling]:
-    beliefs = beliefs_of(trial, trial.configuration.estimation)
+    beliefs = mud_estimates(trial, trial.configuration.estimation)
     return [cross_coupling for flipper in FLIPPERS for cross_coupling in _of_flipper(flipper, trial, truths, beliefs)]
 
 

@@ -17,8 +17,9 @@ from control.records import StrideEstimate
 from estimation.mud import EstimationParameters
 from experiments.estimation.boundaries import CrossCoupling, boundary_rows, crossings_of
 from experiments.reports.error_table import COEFFICIENTS, Evaluation, error_rows, plate_rows
-from experiments.reports.side_by_side import Show, side_by_side
 from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
+from experiments.trials.parallel_trials import run_parallel
+from experiments.trials.session import Show
 from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING, Setup, Trial, run_trial, strides_of
 from simulation.mud.clay import Clay, clay_of_water
 from simulation.mud.disturbances import LAB, NONE, Disturbances
@@ -107,7 +108,7 @@ def methods_of(setup: Setup) -> tuple[Method, ...]:
 
 def evaluate(plan: Plan, show: Show, processes: int | None = None) -> Outcome:
     """All trials of a plan, side by side."""
-    outcomes = side_by_side([partial(run_part, part, plan) for part in plan.parts()], show, processes)
+    outcomes = run_parallel([partial(run_part, part, plan) for part in plan.parts()], show, processes)
     return Outcome(
         [each for outcome in outcomes for each in outcome.evaluated],
         [each for outcome in outcomes for each in outcome.crossings],

@@ -12,7 +12,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
 from matplotlib.axes import Axes  # noqa: E402
 
-from experiments.trials.mud_names import mud_text  # noqa: E402
+from experiments.reports.mud_names import mud_text  # noqa: E402
 
 COLOURS = {"default": "tab:blue", "paper": "tab:red", "paper compensated": "tab:orange"}
 COEFFICIENTS = ("k_p", "k_s", "k_e")

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 from experiments.faults.cell import run_cell
 from experiments.faults.injection import BY_NAME, WAYS
 from experiments.faults.phases import PHASES
-from experiments.reports.side_by_side import Show, side_by_side
+from experiments.trials.parallel_trials import run_parallel
+from experiments.trials.session import Show
 
 FAULTS = tuple(dict.fromkeys(way.fault for way in WAYS))
 
@@ -55,7 +56,7 @@ class Plan:
 def run(plan: Plan, show: Show, processes: int | None = None) -> dict[str, Any]:
     """The report. The longest cells begin first, so that the last ones end together."""
     places = sorted(plan.places, key=lambda place: -BY_NAME[place.way].lasts_s - PHASES.index(place.phase))
-    cells = side_by_side([partial(run_cell, *place) for place in places], show, processes)
+    cells = run_parallel([partial(run_cell, *place) for place in places], show, processes)
     order = {place: i for i, place in enumerate(plan.places)}
     cells = [cell for _, cell in sorted(zip(places, cells, strict=True), key=lambda pair: order[pair[0]])]
     return report_of(plan, cells)

@@ -18,14 +18,15 @@ import numpy as np
 from control.records import Phase
 from experiments.flipper.base_watch import SPOILING_M, load_remarks, moved_text, pose_remarks, surface_remarks
 from experiments.flipper.modelled_force import misfit_n, modelled_forces
-from experiments.reports.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text, truth_in
+from experiments.reports.coefficient_table import ComparedStride, error_table, gather_coefficient
 from experiments.reports.error_table import COEFFICIENTS
-from experiments.reports.side_by_side import Show
 from experiments.robot.bench_robot import BenchError, arm, rest, walk
-from experiments.trials.estimation_methods import DEFAULT, PAPER, method_of, strides_by_method
+from experiments.trials.estimation_methods import DEFAULT, PAPER, configured_method, strides_by_method
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
 from experiments.trials.notebook import Entry
-from experiments.trials.stride_profile import StrideProfile, profile_of, profile_of_row, profile_row, thinned
+from experiments.trials.session import Show
+from experiments.trials.stride_profile import StrideProfile, profile_from_row, profile_of, profile_row, thinned
+from experiments.trials.truth_file import TruthOfMud, missing_text, truth_in
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log_reading.log_reader import Log
 
@@ -98,7 +99,9 @@ def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     strides = strides_by_method(walked.strides, log, robot.configuration, plan.flipper, METHODS)
     truths = bench.bed.truths(plan.flipper)
     entry: Entry = {"mud": trial.mud, "trial": trial.number, "strides": strides, "truths": truths}
-    entry |= _reported(log, strides[method_of(robot.configuration.estimation)], robot.configuration, plan.flipper)
+    entry |= _reported(
+        log, strides[configured_method(robot.configuration.estimation)], robot.configuration, plan.flipper
+    )
     entry |= {"from_s": walked.from_s, "to_s": after["now_s"]}
     invalid = moved_text(before_m, after["body_x_m"], SPOILING_M)
     if invalid:
@@ -143,7 +146,7 @@ def report_of(
     plan: Plan, entries: Mapping[str, Entry], configuration: Configuration, truth: TruthOfMud | None
 ) -> dict[str, Any]:
     """`truth`: another experiment's; without it that of the bed, where it has one."""
-    method = method_of(configuration.estimation)
+    method = configured_method(configuration.estimation)
     by_mud = {mud: trials for mud in muds_of(plan, entries) if (trials := trials_of(mud, entries))}
     rows = list(_beside(by_mud, truth))
     muds = [_mud_report(mud, trials, method, rows) for mud, trials in by_mud.items()]
@@ -173,9 +176,9 @@ def trials_of(mud: str, entries: Mapping[str, Entry]) -> list[Entry]:
     return sorted((entry for entry in entries.values() if entry["mud"] == mud), key=lambda entry: int(entry["trial"]))
 
 
-def _beside(by_mud: Mapping[str, Sequence[Entry]], truth: TruthOfMud | None) -> list[Beside]:
+def _beside(by_mud: Mapping[str, Sequence[Entry]], truth: TruthOfMud | None) -> list[ComparedStride]:
     return [
-        Beside(mud, method, strides[0], truth_in(truth, mud) if truth else trial["truths"].get("0", {}))
+        ComparedStride(mud, method, strides[0], truth_in(truth, mud) if truth else trial["truths"].get("0", {}))
         for mud, trials in by_mud.items()
         for trial in trials
         for method, strides in trial["strides"].items()
@@ -183,13 +186,13 @@ def _beside(by_mud: Mapping[str, Sequence[Entry]], truth: TruthOfMud | None) -> 
     ]
 
 
-def _mud_report(mud: str, trials: Sequence[Entry], method: str, rows: Sequence[Beside]) -> dict[str, Any]:
+def _mud_report(mud: str, trials: Sequence[Entry], method: str, rows: Sequence[ComparedStride]) -> dict[str, Any]:
     own = [row for row in rows if row.mud == mud and row.method == method]
     reported = {name: [row.truth.get(name) for row in own] for name in COEFFICIENTS}
     truths = {name: [value for value in values if value is not None] for name, values in reported.items()}
     return {
         "mud": mud,
-        **{name: gathered(row.stride[name] for row in own) for name in COEFFICIENTS},
+        **{name: gather_coefficient(row.stride[name] for row in own) for name in COEFFICIENTS},
         "truth": {name: fmean(values) for name, values in truths.items() if values} or None,
         "remarks": [remark for trial in trials for remark in trial["remarks"]],
     }
@@ -218,7 +221,7 @@ def _largest_forces(trials: Sequence[Entry], method: str) -> dict[str, float | N
 
 def _misfits(trial: Entry, configuration: Configuration, method: str) -> dict[str, float | None]:
     """What the laws leave over of the forces of one stride, root mean square in N."""
-    profile, stride = profile_of_row(trial["course"]), trial["strides"][method][0]
+    profile, stride = profile_from_row(trial["course"]), trial["strides"][method][0]
     laws = modelled_forces(
         profile, configuration.geometry, stride["surface_m"] or 0.0, drawn_coefficients(stride), method
     )

@@ -16,6 +16,7 @@ from experiments.flipper.measurement import drawn_coefficients
 from experiments.flipper.modelled_force import ModelledForces, modelled_forces
 from experiments.reports.coefficient_table import PER_CM3
 from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import (
     DOTS_PER_INCH,
     GREY,
@@ -29,9 +30,8 @@ from experiments.reports.mud_styles import (
     mark_of,
     waters_of,
 )
-from experiments.trials.mud_names import mud_text
 from experiments.trials.notebook import Entry
-from experiments.trials.stride_profile import Floats, StrideProfile, profile_of_row
+from experiments.trials.stride_profile import Floats, StrideProfile, profile_from_row
 
 THIN: dict[str, Any] = {"linewidth": 1.1}
 MODELLED: dict[str, Any] = {"linewidth": 2.0, "linestyle": (0, (3, 1.5))}
@@ -39,7 +39,7 @@ MODELLED: dict[str, Any] = {"linewidth": 2.0, "linestyle": (0, (3, 1.5))}
 
 def plot_stride(trial: Entry, geometry: FlipperGeometry, method: str, path: Path) -> None:
     """Depth, angles and forces of one stride against time, with the forces of the laws: figure 4."""
-    profile, stride = profile_of_row(trial["course"]), trial["strides"][method][0]
+    profile, stride = profile_from_row(trial["course"]), trial["strides"][method][0]
     laws = modelled_forces(profile, geometry, stride["surface_m"] or 0.0, drawn_coefficients(stride), method)
     figure, panels = plt.subplots(4, 1, figsize=(7.0, 8.2), sharex=True, constrained_layout=True)
     _plot_depths(panels[0], profile, stride["surface_m"] or 0.0)
@@ -144,7 +144,7 @@ def _plot_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Map
     )
     for panel, (phase, curve, across, up) in zip(panels, wanted, strict=True):
         for mud, trial in firsts.items():
-            profile = profile_of_row(trial["course"])
+            profile = profile_from_row(trial["course"])
             x, y = (column[profile.during(phase)] for column in curve(profile))
             panel.plot(x, y, label=mud_text(mud), **line_of(looks[mud]))
         panel.axhline(0.0, color=GREY, linewidth=0.6)

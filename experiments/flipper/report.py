@@ -9,10 +9,10 @@ from typing import Any
 from experiments.flipper.measurement import AUTHORS_MUD, AUTHORS_N, Plan, muds_of, trials_of
 from experiments.loadcell.comparison import OTHER_PLATE
 from experiments.reports.coefficient_table import error_text_rows, mud_rows
+from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure, Section
 from experiments.trials.estimation_methods import DEFAULT
-from experiments.trials.mud_names import mud_text
 from experiments.trials.mud_trials import left_out_texts
 from experiments.trials.notebook import Entry
 from firmware_host.configuration.configuration import Configuration

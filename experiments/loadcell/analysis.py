@@ -19,7 +19,7 @@ from experiments.loadcell.contact import Profile, StrokeError, find_contact, wit
 from experiments.loadcell.fits import SHEAR, SHIFT, Analysed, Recorded, analyse_insertion, analyse_shear
 from experiments.loadcell.measured import analyse_measured
 from experiments.loadcell.motion import Insertion, Pace, StageSettings, wide_pace
-from experiments.reports.side_by_side import Show
+from experiments.trials.session import Show
 
 LEAST_SPEED_UNCERTAINTY, LEAST_RAMP_UNCERTAINTY = 0.005, 0.1  # of a stage, from trial to trial
 SET_SPEED_UNCERTAINTY = 0.01  # of a stage's controller

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from experiments.loadcell.fits import OfMud
-from experiments.trials.mud_names import mud_key
+from experiments.reports.mud_names import mud_key
 
 OTHER_PLATE = (
     "A load cell's plate is upright and goes down straight; a flipper's leans and goes along an arc, and in clay a "

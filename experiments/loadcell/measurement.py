@@ -32,10 +32,10 @@ from experiments.loadcell.raw import load_all
 from experiments.loadcell.recording import CellRecorder
 from experiments.loadcell.trial_checks import examine_encoder, examine_lines
 from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
-from experiments.reports.side_by_side import Show
 from experiments.robot.bench_robot import BenchError
 from experiments.robot.prompt import GO_ON, Operator
 from experiments.trials.notebook import Notebook
+from experiments.trials.session import Show
 from firmware_host.operator.reports import known
 
 CALIBRATION = "calibration.json"

@@ -24,9 +24,9 @@ from experiments.loadcell.fits import (  # noqa: E402
     volume_m3,
 )
 from experiments.loadcell.motion import REVERSAL_FRACTION, Insertion, Shear, StageSettings  # noqa: E402
+from experiments.reports.mud_names import mud_text  # noqa: E402
 from experiments.reports.mud_styles import INK, LABELS, looks_of, mark_of  # noqa: E402
 from experiments.reports.value_text import N_CM3  # noqa: E402
-from experiments.trials.mud_names import mud_text  # noqa: E402
 
 COLOURS = ("tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:cyan")
 MODEL: dict[str, Any] = {"color": "tab:red", "linestyle": (0, (5, 2)), "linewidth": 1.8, "zorder": 5}

@@ -18,9 +18,9 @@ from experiments.loadcell.fits import CALLIPERS_M, COEFFICIENTS, Analysed, OfMud
 from experiments.loadcell.measurement import Results
 from experiments.loadcell.motion import RATE_EXPONENT, Insertion, StageSettings
 from experiments.loadcell.trials import TrialPlan
+from experiments.reports.mud_names import mud_text
 from experiments.reports.report_page import Figure, Section
 from experiments.reports.value_text import N_CM3, repeatability_text, value_text
-from experiments.trials.mud_names import mud_text
 
 TITLE = "Ground truth of mud from a load cell"
 METHOD = (
@@ -53,8 +53,9 @@ def errors_text(muds: Mapping[str, Mapping[str, OfMud]], plan: TrialPlan) -> str
         "not grow as V is no part of it: k is what least squares make of the mud's own course, and belongs to its "
         "depth. The second ± is what no repetition shows, since all trials "
         f"have it alike: {_depth_text(plan)}, callipers ± {1000.0 * CALLIPERS_M:g} mm on width and thickness, and the "
-        f"reading of the calibration, together at most {fractions}. The weights themselves count as exact, and so does an "
-        "amplifier that prints grams or newtons by itself. A depth that an encoder measured has no doubt of a ruler."
+        f"reading of the calibration, together at most {fractions}. The weights themselves count as exact, and so "
+        "does an amplifier that prints grams or newtons by itself. A depth that an encoder "
+        "measured has no doubt of a ruler."
     )
 
 
@@ -121,8 +122,9 @@ def position_texts(trials: Sequence[Analysed]) -> list[str]:
     alone = f" {without} trials have no place: theirs is found from the force." if without else ""
     return [
         f"{MEASURED}{alone}",
-        f"Forces are stamped {1000.0 * common.lag_s:.1f} ± {1000.0 * common.lag_uncertainty_s:.1f} ms later than places, as "
-        "the strokes themselves tell; this and straight lines between the encoder's lines leave the depth of a sample "
+        f"Forces are stamped {1000.0 * common.lag_s:.1f} ± {1000.0 * common.lag_uncertainty_s:.1f} ms later than "
+        "places, as the strokes themselves tell; this and straight lines between the encoder's lines leave the depth of "
+        "a sample "
         f"known to within ± {1000.0 * worst_m:.2f} mm in the worst trial. Twice as fast, the mud bears "
         f"{100.0 * common.rate_fraction * (2.0**RATE_EXPONENT - 1.0):.0f} % more.",
     ]

@@ -70,8 +70,8 @@ def examine_encoder(recorder: CellRecorder, operator: Operator, settings: StageS
         label = encoder.settings.label
         reported = f"a label {label!r} and a whole number" if label else "a whole number"
         raise BenchError(
-            f"the lines on {path} are not {reported}, but such as {shown(list(encoder.line.recent))}: give what they begin "
-            f"with as --position-label, make the counter send its count alone, {OR_WITHOUT}"
+            f"the lines on {path} are not {reported}, but such as {shown(list(encoder.line.recent))}: give what they "
+            f"begin with as --position-label, make the counter send its count alone, {OR_WITHOUT}"
         )
     between_m = settings.speed_m_s / (encoder.rate_hz or 1.0)
     if LEAST_PLACES * between_m > settings.depth_m:

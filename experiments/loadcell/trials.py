@@ -20,9 +20,9 @@ from experiments.loadcell.motion import Insertion, Shear, StageSettings, wide_pa
 from experiments.loadcell.raw import load_recorded, raw_name, write_places, write_samples
 from experiments.loadcell.recording import AVERAGED, CellRecorder, PlaceStretch, Stretch, Tare
 from experiments.loadcell.stage import Stage, Trial
-from experiments.reports.side_by_side import Show
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.trials.notebook import Notebook
+from experiments.trials.session import Show
 
 KEEP, WITHOUT = "k", "w"
 AT_ONE_SPEED = "what follows takes a stage of one speed, and none that a hand pushes"
@@ -247,7 +247,8 @@ def _evaluate_position(analysed: Analysed, reported: PlaceStretch) -> list[str]:
     if missing > MISSING_FRACTION:
         return [
             f"for {100.0 * missing:.0f} % of its strokes the stage's place is not known "
-            f"({reported.garbled_lines} lines garbled, {reported.drop_outs} gaps): check the encoder's cable and connectors"
+            f"({reported.garbled_lines} lines garbled, {reported.drop_outs} gaps): check the encoder's cable "
+            "and connectors"
         ]
     return []
 

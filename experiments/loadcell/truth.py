@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from control.records import UNKNOWN
 from experiments.loadcell.fits import COEFFICIENTS, OfMud
 from experiments.loadcell.motion import StageSettings
+from experiments.reports.mud_names import mud_text
 from experiments.reports.value_text import N_CM3, miss_text, value_text
 from experiments.trials.load_cell_truth import TrueCoefficients, true_coefficients
-from experiments.trials.mud_names import mud_text
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.mud.clay import clay_of_water
 from simulation.test_rig.load_cell_bench import RELAXATION

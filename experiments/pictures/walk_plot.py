@@ -22,7 +22,7 @@ from control.records import FLIPPERS as NAMES  # noqa: E402
 from experiments.pictures.colours import FAINT, FLIPPERS, FORWARD, INK, MUDS, OUTCOMES, SURFACE, UP  # noqa: E402
 from experiments.pictures.recorded_walk import RecordedWalk  # noqa: E402
 from experiments.pictures.stride_choice import Outcome, outcome_of  # noqa: E402
-from experiments.trials.mud_names import mud_label  # noqa: E402
+from experiments.reports.mud_names import mud_label  # noqa: E402
 from simulation.mud.track import Track  # noqa: E402
 
 WIDTH_IN, PANEL_IN, DOTS_PER_INCH = 10.0, 1.55, 120

@@ -18,10 +18,8 @@ few in which mud gave way that mostly holds are those that met less of it, or pu
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from math import hypot, isfinite, sqrt
-from pathlib import Path
 from statistics import fmean, median, stdev
 from typing import Any, NamedTuple
 
@@ -29,16 +27,14 @@ from control.records import UNKNOWN, Estimate
 from estimation.strokes.origin_fit import student_factor
 from estimation.strokes.stroke_fit import TORQUE_REPEATABILITY
 from experiments.reports.error_table import COEFFICIENTS, Evaluation, error_rows
+from experiments.reports.mud_names import mud_text
 from experiments.reports.value_text import N_CM3, fraction_text, repeatability_text, value_text
-from experiments.robot.bench_robot import BenchError
-from experiments.trials.mud_names import mud_key, mud_text
 
 PER_CM3 = 1.0 / N_CM3
 Reported = Mapping[str, Any]  # an estimate as reports tell it
-TruthOfMud = dict[str, dict[str, float]]  # N/m³ by the mud's key and coefficient
 
 
-class Beside(NamedTuple):
+class ComparedStride(NamedTuple):
     """One stride's estimates by one method, and what a load cell reads there."""
 
     mud: str
@@ -47,7 +43,7 @@ class Beside(NamedTuple):
     truth: Mapping[str, float | None]
 
 
-def gathered(estimates: Iterable[Reported]) -> dict[str, Any]:
+def gather_coefficient(estimates: Iterable[Reported]) -> dict[str, Any]:
     """Of one coefficient in one mud, over its trials."""
     reported = list(estimates)
     valid = [each for each in reported if each["valid"]]
@@ -85,48 +81,7 @@ def _errors(reported: Sequence[Reported], spread: float | None) -> dict[str, flo
     }
 
 
-def truth_of(muds: Sequence[Mapping[str, Any]]) -> TruthOfMud:
-    """The values of a summary's muds. A bound is no truth."""
-    return {
-        mud_key(mud["mud"]): {name: mud[name]["value"] for name in COEFFICIENTS if _is_known(mud.get(name))}
-        for mud in muds
-    }
-
-
-def _is_known(reported: Reported | None) -> bool:
-    return bool(reported and reported.get("value") and not reported.get("at_least"))
-
-
-def load_truth(path: Path) -> TruthOfMud:
-    """Out of another experiment's summary.json, or the folder that it is in. Raises BenchError."""
-    path = path / "summary.json" if path.is_dir() else path
-    try:
-        truth = truth_of(json.loads(path.read_text(encoding="utf-8"))["muds"])
-        numbers = [value for mud in truth.values() for value in mud.values()]
-        if not all(isinstance(value, int | float) and value > 0.0 for value in numbers):
-            raise ValueError("coefficients must be numbers above 0")
-    except OSError as problem:
-        raise BenchError(f"--truth {path}: {problem.strerror}") from problem
-    except (ValueError, KeyError, TypeError, AttributeError) as problem:
-        raise BenchError(
-            f"--truth {path} is no summary with coefficients of muds ({problem}): "
-            "give the summary.json of 'mudskipper experiment loadcell'"
-        ) from problem
-    return truth
-
-
-def truth_in(truth: TruthOfMud, mud: str) -> dict[str, float]:
-    """Of one mud, however its name is written; empty where there is none."""
-    return truth.get(mud_key(mud), {})
-
-
-def missing_text(truth: TruthOfMud | None, muds: Iterable[str]) -> str:
-    """Of which muds another experiment's truth says nothing; empty where it says something of all, or there is none."""
-    missing = [mud for mud in muds if truth is not None and mud_key(mud) not in truth]
-    return f"The file given with --truth says nothing of {', '.join(map(mud_text, missing))}." if missing else ""
-
-
-def evaluated(rows: Iterable[Beside], setup: str) -> list[Evaluation]:
+def evaluated(rows: Iterable[ComparedStride], setup: str) -> list[Evaluation]:
     """One for each coefficient of which there is a truth."""
     return [
         Evaluation(setup, row.mud, name, row.method, estimate_of(row.stride[name]), float(truth), UNKNOWN)
@@ -141,7 +96,7 @@ def estimate_of(reported: Reported) -> Estimate:
     return Estimate(value, std_error, reported["samples"], reported["valid"], reported["reason"], reported["at_least"])
 
 
-def error_table(rows: Iterable[Beside], setup: str) -> list[dict[str, Any]]:
+def error_table(rows: Iterable[ComparedStride], setup: str) -> list[dict[str, Any]]:
     return error_rows(evaluated(rows, setup))
 
 
@@ -149,7 +104,7 @@ def error_table(rows: Iterable[Beside], setup: str) -> list[dict[str, Any]]:
 
 
 def coefficient_text(row: Mapping[str, Any]) -> str:
-    """Of `gathered`, in N/cm³: the trials' part of the doubt and the one that they share, or that of a single one."""
+    """Format a gathered coefficient in N/cm³, with its two parts of the error, or the one of a single trial."""
     if row["value"] is None:
         return "-"
     parts = ("std_error",) if row["trials_error"] is None else ("trials_error", "shared_error")

@@ -8,14 +8,15 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from datetime import UTC, datetime
 from html import escape
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from experiments.trials.whole_files import whole_file
+from experiments.reports.text_tables import Rows as Rows
+from experiments.reports.whole_files import whole_file
 from firmware_host.software_version import software_version
 
 PAGE, SUMMARY = "report.html", "summary.json"
@@ -33,8 +34,6 @@ figure { margin: 1em 0; break-inside: avoid } img { max-width: 100% }
 figcaption, footer, .when { color: #444; font-size: 0.9em } footer { margin-top: 3em; border-top: 1px solid #ccc }
 @media print { body { margin: 0; max-width: none } h2 { break-after: avoid } pre { white-space: pre-wrap } }
 """
-
-Rows = Sequence[Sequence[str]]
 
 
 @dataclass(frozen=True)
@@ -54,12 +53,12 @@ class Section:
 
 
 def write_report(
-    folder: Path, report: dict[str, Any], title: str, sections: Sequence[Section], logs: Sequence[Path] = ()
+    folder: Path, report: Any, title: str, sections: Sequence[Section], logs: Sequence[Path] = ()
 ) -> list[Path]:
     """Everything that was written. `report` becomes the summary. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     summary, page = folder / SUMMARY, folder / PAGE
-    _write(summary, json.dumps(numbers_reported(report), indent=1, allow_nan=False) + "\n")
+    _write(summary, json.dumps(to_json(report), indent=1, allow_nan=False) + "\n")
     pictures = [_draw(figure, folder) for section in sections for figure in section.figures]
     _write(page, _page(folder, title, sections, logs))
     return [page, summary, *pictures, *logs]
@@ -70,12 +69,19 @@ def _write(path: Path, text: str) -> None:
         beside.write_text(text, encoding="utf-8", errors="replace")  # names of any bytes
 
 
-def numbers_reported(report: Any) -> Any:
-    """With None for numbers that are none: JSON has no NaN, and few programs read Python's."""
+def to_json(report: Any) -> Any:
+    """Turn records into mappings by field name, and NaN into None, since JSON has no NaN.
+
+    A field of a dataclass with `metadata={"key": ...}` has that key, a named tuple those of its fields.
+    """
+    if is_dataclass(report) and not isinstance(report, type):
+        return {each.metadata.get("key", each.name): to_json(getattr(report, each.name)) for each in fields(report)}
+    if isinstance(report, tuple) and hasattr(report, "_asdict"):
+        report = report._asdict()
     if isinstance(report, Mapping):
-        return {key: numbers_reported(value) for key, value in report.items()}
+        return {key: to_json(value) for key, value in report.items()}
     if isinstance(report, list | tuple):
-        return [numbers_reported(value) for value in report]
+        return [to_json(value) for value in report]
     return None if isinstance(report, float) and not isfinite(report) else report
 
 

@@ -7,15 +7,15 @@ class BenchError(Exception):
     """The experiment cannot go on."""
 
 
-class GoneError(BenchError):
+class DaemonLostError(BenchError):
     """The daemon does not answer: nothing more can be asked of the robot."""
 
 
-class BarredError(BenchError):
+class AccessDeniedError(BenchError):
     """The daemon does not do this for whoever calls."""
 
 
-class OverruledError(BenchError):
+class RobotInUseError(BenchError):
     """Somebody else operates the robot."""
 
 

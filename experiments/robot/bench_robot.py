@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from experiments.robot.bench_errors import BenchError as BenchError  # for whoever operates one
-from experiments.robot.bench_errors import EndedError, GoneError, OverruledError
+from experiments.robot.bench_errors import DaemonLostError, EndedError, RobotInUseError
 from experiments.robot.prompt import Operator
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log_reading.log_reader import Log
@@ -56,7 +56,7 @@ class BenchRobot(Protocol):
         """Torque off, connection closed. Never raises what `call` may raise."""
 
 
-class Walked(NamedTuple):
+class CompletedWalk(NamedTuple):
     """A walk that ended with all its strides, and when it was, by the robot's clock."""
 
     strides: list[dict[str, Any]]  # as the status socket tells them, of both flippers
@@ -81,11 +81,11 @@ def wait_until(robot: BenchRobot, done: Callable[[Status], bool], longest_s: flo
     return status
 
 
-def face_faults(robot: BenchRobot, operator: Operator) -> None:
+def ask_to_clear_faults(robot: BenchRobot, operator: Operator) -> None:
     """What keeps the torque off is told, and cleared where a person says so; nothing where nothing does.
 
     Someone has to have looked: the drive that a fault stopped may be wet, or a finger be in the flipper. Nobody on a
-    terminal is an error of its own, so the fault stands then. Willing clears: behind it is a simulated robot.
+    terminal is an error of its own, so the fault stands then. AutomaticOperator clears: behind it is a simulated robot.
 
     Raises EndedError where it is to stand, BenchError where it comes back.
     """
@@ -143,7 +143,7 @@ def arm(robot: BenchRobot, operator: Operator | None = None) -> None:
     if status["mode"] == "hold":
         return
     if operator is not None:
-        face_faults(robot, operator)
+        ask_to_clear_faults(robot, operator)
     elif status["mode"] == "fault":
         raise BenchError(f"{_faults_reported(status)}\n'mudskipper clear' when its cause is gone")
     try:
@@ -210,7 +210,7 @@ def reported_by(status: Status) -> str:
     return "it was told to stop" if status["mode"] == "stopping" else f"it is in {status['mode']}"
 
 
-def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
+def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> CompletedWalk:
     """From hold to hold, at a fixed depth, or at chosen ones for None. Raises BenchError where a fault ends it."""
     before = robot.call("status")
     robot.call("walk", strides=strides, **({} if depth_m is None else {"depth_m": depth_m}))
@@ -218,13 +218,13 @@ def walk(robot: BenchRobot, depth_m: float | None, strides: int) -> Walked:
     after = wait_until(robot, lambda now: now["mode"] not in ("walking", "stopping"), strides * STRIDE_S, "the walk")
     if after["mode"] != "hold" or after["notice"]:
         raise BenchError(f"the walk ended early: {reported_by(after)}")
-    closed = strides_since(robot, before["strides_closed"])
-    if (number := strides_made(closed)) < strides:
+    closed = fetch_strides(robot, before["strides_closed"])
+    if (number := count_strides(closed)) < strides:
         raise BenchError(f"the walk ended early, after {number} of {counted(strides, 'stride')}: it was told to stop")
-    return Walked(closed, before["now_s"], after["now_s"])
+    return CompletedWalk(closed, before["now_s"], after["now_s"])
 
 
-def strides_made(closed: Sequence[Mapping[str, Any]]) -> int:
+def count_strides(closed: Sequence[Mapping[str, Any]]) -> int:
     """Each by both flippers."""
     return len({stride["index"] for stride in closed})
 
@@ -246,7 +246,7 @@ def follow_walk(robot: BenchRobot, begin: Callable[[float], Evaluator[End]]) -> 
     return None, status
 
 
-def strides_since(robot: BenchRobot, number: int) -> list[dict[str, Any]]:
+def fetch_strides(robot: BenchRobot, number: int) -> list[dict[str, Any]]:
     """All that closed from `number` on. Raises BenchError where the daemon no longer keeps the first of them."""
     found: list[dict[str, Any]] = []
     while fetched := robot.call("strides", since=number + len(found)):
@@ -287,7 +287,7 @@ def _rest_reported(robot: BenchRobot, operator: Operator) -> None:
         if robot.call("status")["mode"] == "walking":
             operator.report("the flippers are raised, then torque goes off")
         rest(robot)
-    except OverruledError:
+    except RobotInUseError:
         operator.report("the robot is left as it is to whoever has taken it over")
-    except GoneError:
+    except DaemonLostError:
         operator.report(ALONE)

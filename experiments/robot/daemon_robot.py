@@ -14,10 +14,9 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from experiments.robot.bench_errors import BarredError, BenchError, GoneError, OverruledError
+from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, RobotInUseError
 from experiments.robot.bench_robot import ENERGISED, UNDER_WAY, Status
-from experiments.trials.log_copies import copy_since
-from experiments.trials.log_span import cut
+from experiments.robot.log_copies import copy_since, cut_log
 from firmware_host.configuration.configuration import Configuration, ConfigurationError, parse_configuration
 from firmware_host.configuration.file_problems import why_not
 from firmware_host.log.log_folder import run_files
@@ -45,9 +44,9 @@ class DaemonRobot:
         try:
             self._client = StatusClient(socket)
         except NoDaemonError as problem:
-            raise GoneError(f"{problem}. {START_IT}") from problem
+            raise DaemonLostError(f"{problem}. {START_IT}") from problem
         except NotPermittedError as problem:
-            raise BarredError(str(problem)) from problem
+            raise AccessDeniedError(str(problem)) from problem
         self._renewed_s = -inf
         self._seen_s = inf  # the robot's clock, as last told
         self._used_s = inf  # by it, since when this program has moved the robot or read its log
@@ -92,16 +91,16 @@ class DaemonRobot:
         try:
             answer = self._client.call(method, **params)
         except NoDaemonError as problem:
-            raise GoneError(str(problem)) from problem
+            raise DaemonLostError(str(problem)) from problem
         except NotPermittedError as problem:
-            raise BarredError(str(problem)) from problem
+            raise AccessDeniedError(str(problem)) from problem
         if method in MOTIONS:  # and was not refused
             self._used_s = min(self._used_s, self._seen_s)
         return answer
 
     def wait(self, duration_s: float) -> None:
         if self._ousted:
-            raise OverruledError(self._ousted)
+            raise RobotInUseError(self._ousted)
         end_s = time.monotonic() + duration_s
         while (left_s := end_s - time.monotonic()) > 0.0:
             time.sleep(min(left_s, RENEWAL_S))
@@ -114,7 +113,7 @@ class DaemonRobot:
     def _promise(self) -> None:
         """Refused where the lease was lost, which the status tells, and where another program operates the robot.
 
-        Raises OverruledError for that.
+        Raises RobotInUseError for that.
         """
         self._renewed_s = time.monotonic()
         self._require_alone()
@@ -128,14 +127,14 @@ class DaemonRobot:
 
     def _require_alone(self) -> None:
         if self._ousted:
-            raise OverruledError(self._ousted)
+            raise RobotInUseError(self._ousted)
         status = self.call("status")
         self._seen_s = status["now_s"]
         if status["lease"] not in (None, self._name):
-            raise OverruledError(f"{status['lease']} operates the robot: wait until it has ended, then begin again")
+            raise RobotInUseError(f"{status['lease']} operates the robot: wait until it has ended, then begin again")
         if self._name and status["lease"] is None and status["mode"] in ENERGISED and not _winds_up(status):
             self._ousted = self._why_ousted()
-            raise OverruledError(self._ousted)
+            raise RobotInUseError(self._ousted)
 
     def _why_ousted(self) -> str:
         """A lease that is had for the asking has only lapsed: it is given back at once, the robot left as it is."""
@@ -151,7 +150,7 @@ class DaemonRobot:
             log = self._read_since(from_s)
             return log if log is not None and len(log.ticks) and log.ticks["stamp_s"][-1] >= to_s else None
 
-        log = cut(self._awaited(written), from_s, to_s)
+        log = cut_log(self._awaited(written), from_s, to_s)
         self._used_s = min(self._used_s, from_s)
         return log
 
@@ -236,7 +235,7 @@ def _files_of(log: Path) -> list[Path]:
     try:
         return run_files(log)
     except PermissionError as problem:
-        raise BarredError(
+        raise AccessDeniedError(
             f"you may operate the robot, but not read its log, which every experiment does: have root add you to the"
             f" group of {problem.filename}, then log in again"
         ) from problem

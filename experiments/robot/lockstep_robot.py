@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from experiments.trials.log_span import cut
+from experiments.robot.log_copies import cut_log
 from firmware_host.configuration.configuration import Configuration, parse_configuration
 from firmware_host.log.file_recorder import FileRecorder
 from firmware_host.log_reading.log_reader import Log, read_log
@@ -59,7 +59,7 @@ class LockstepRobot:
         assert self._log is not None
         if self._recorder.writer_alive:
             self._recorder.flush()
-        return cut(read_log(self._log), from_s, to_s)
+        return cut_log(read_log(self._log), from_s, to_s)
 
     def copy_logs(self, folder: Path) -> list[Path]:
         """Ends the log, which otherwise `close` does."""

@@ -19,7 +19,7 @@ class Operator(Protocol):
         """Something that a person should know."""
 
 
-class Willing:
+class AutomaticOperator:
     """Does everything at once and is always content: the person at a simulated bench."""
 
     def __init__(self, report: Callable[[str], None]) -> None:

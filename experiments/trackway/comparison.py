@@ -14,7 +14,6 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
-from experiments.reports.side_by_side import Show, side_by_side
 from experiments.trackway.depth_rule import DepthRule, chosen_by, configuration_for, constant_depth, walk_by
 from experiments.trackway.one_mud import (
     CONSTANT_STRIDES,
@@ -29,6 +28,8 @@ from experiments.trackway.paper_table import ADAPTIVE, FIXED_DEPTHS_M, PAPER_TAB
 from experiments.trackway.speed_table import cell, mean_over_muds, within_one_sd
 from experiments.trackway.walk import Walk, WalkedStride, walk_of
 from experiments.trials.notebook import Notebook
+from experiments.trials.parallel_trials import run_parallel
+from experiments.trials.session import Show
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import COMPARTMENT_M, Track
@@ -104,7 +105,7 @@ def run(plan: Plan, notebook: Notebook, show: Show, processes: int | None = None
     orders = plan.walks()
     left = [key for key in orders if key not in notebook.entries]
     walked = len(orders) - len(left)
-    side_by_side(
+    run_parallel(
         [orders[key] for key in left],
         lambda done, _: show(walked + done, len(orders)),
         processes,

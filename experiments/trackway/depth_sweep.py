@@ -12,7 +12,6 @@ from functools import partial
 from statistics import fmean, median
 from typing import Any
 
-from experiments.reports.side_by_side import Show, side_by_side
 from experiments.trackway.depth_rule import METHODS, chosen_by, configuration_for
 from experiments.trackway.one_mud import (
     CONSTANT_STRIDES,
@@ -28,6 +27,8 @@ from experiments.trackway.one_mud import (
 )
 from experiments.trackway.speed_table import failures
 from experiments.trackway.walk import Walk
+from experiments.trials.parallel_trials import run_parallel
+from experiments.trials.session import Show
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB
 
@@ -53,16 +54,16 @@ class Plan:
         ]
 
 
-Walked = tuple[MudWalk, Walk]
+CompletedWalk = tuple[MudWalk, Walk]
 
 
 def run(plan: Plan, show: Show, processes: int | None = None) -> dict[str, Any]:
     orders = plan.method_walks() + constant_walks(plan.clays(), plan.depths_m, plan.seeds)  # the longest first
-    walks = side_by_side([partial(run_mud_walk, order) for order in orders], show, processes)
+    walks = run_parallel([partial(run_mud_walk, order) for order in orders], show, processes)
     return report_of(plan, list(zip(orders, walks, strict=True)))
 
 
-def report_of(plan: Plan, walked: Sequence[Walked]) -> dict[str, Any]:
+def report_of(plan: Plan, walked: Sequence[CompletedWalk]) -> dict[str, Any]:
     return {
         "experiment": "sweep",
         "strengths": [_of_strength(clay, [w for w in walked if w[0].clay == clay]) for clay in plan.clays()],
@@ -76,7 +77,7 @@ def report_of(plan: Plan, walked: Sequence[Walked]) -> dict[str, Any]:
     }
 
 
-def _of_strength(clay: Clay, walked: Sequence[Walked]) -> dict[str, Any]:
+def _of_strength(clay: Clay, walked: Sequence[CompletedWalk]) -> dict[str, Any]:
     constant = [(order, walk) for order, walk in walked if not order.rule.method]
     speeds = mean_speeds_cm_s(*zip(*constant, strict=True))[clay.name]
     best = best_depth(speeds)

@@ -25,11 +25,12 @@ from functools import partial
 from statistics import fmean
 from typing import Any, NamedTuple
 
-from experiments.reports.side_by_side import Show, side_by_side
 from experiments.trackway.depth_rule import configuration_for, constant_depth
 from experiments.trackway.one_mud import CONSTANT_STRIDES, ENDLESS_M, has, speed_cm_s
 from experiments.trackway.paper_table import FIXED_DEPTHS_M, PAPER_TABLE, Speed
 from experiments.trackway.walk import walk_in
+from experiments.trials.parallel_trials import run_parallel
+from experiments.trials.session import Show
 from simulation.body.plant import PlantParameters
 from simulation.harness.lockstep import Lockstep, plant_of
 from simulation.mud.clay import MUDS, Clay
@@ -113,7 +114,7 @@ def walk_on(
     depths = tuple(FIXED_DEPTHS_M.values())
     keys = [(ground, depth_m) for ground in dict.fromkeys(grounds) for depth_m in depths]
     walks = [partial(fixed_speed_cm_s, *key, seed, plan.strides) for key in keys for seed in seeds]
-    reported = side_by_side(walks, show, processes)
+    reported = run_parallel(walks, show, processes)
     speeds: dict[Ground, dict[float, float]] = {}
     for i, (ground, depth_m) in enumerate(keys):
         speeds.setdefault(ground, {})[depth_m] = fmean(reported[i * plan.seeds : (i + 1) * plan.seeds])

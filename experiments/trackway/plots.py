@@ -15,9 +15,9 @@ import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 
+from experiments.reports.mud_names import mud_label  # noqa: E402
 from experiments.trackway.paper_table import ADAPTIVE  # noqa: E402
 from experiments.trackway.walk import EXTRACTION, SLIPPAGE  # noqa: E402
-from experiments.trials.mud_names import mud_label  # noqa: E402
 
 COLOURS = {"3 cm": "tab:green", "5 cm": "tab:orange", ADAPTIVE: "tab:blue"}  # as in the paper
 OTHERS = ("tab:red", "tab:purple", "tab:brown")

@@ -15,7 +15,6 @@ from itertools import accumulate
 from math import radians, sin
 from typing import Any, NamedTuple, Protocol
 
-from experiments.reports.side_by_side import Show
 from experiments.robot.bench_robot import (
     RAISING_S,
     UNDER_WAY,
@@ -23,8 +22,8 @@ from experiments.robot.bench_robot import (
     BenchRobot,
     Status,
     arm,
+    ask_to_clear_faults,
     disarm,
-    face_faults,
     follow_walk,
     reported_by,
     wait_until,
@@ -36,6 +35,7 @@ from experiments.trackway.log_strides import walked_strides
 from experiments.trackway.paper_table import ADAPTIVE, FIXED_DEPTHS_M
 from experiments.trackway.walk import Walk, speed_m_s, walk_of
 from experiments.trials.notebook import Notebook
+from experiments.trials.session import Show
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.counted_nouns import counted
 
@@ -70,13 +70,13 @@ class AskedTrackway:
 
     def prepare(self, trial: str) -> BenchRobot:
         disarm(self._robot)
-        face_faults(self._robot, self._operator)
+        ask_to_clear_faults(self._robot, self._operator)
         question = (
             f"{trial}. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud. Take"
             " the hands away: the robot walks next"
         )
         self._operator.ask(question, {GO_ON: "the robot may walk"}, self._meanwhile)
-        face_faults(self._robot, self._operator)
+        ask_to_clear_faults(self._robot, self._operator)
         return self._robot
 
     def evaluate(self, reported: str, stopped: bool) -> str:

@@ -9,9 +9,9 @@ from pathlib import Path
 from experiments.pictures.recorded_walk import RecordedWalk, numbered_walk
 from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure
+from experiments.robot.log_copies import cut_log
 from experiments.robot.prompt import Operator
 from experiments.trackway.trials import LoggedTime
-from experiments.trials.log_span import cut
 from firmware_host.log.log_folder import first_path, run_files
 from firmware_host.log_reading.log_reader import LogError, read_log, read_logs
 
@@ -40,7 +40,7 @@ def logged_walk(folder: Path, logged: LoggedTime) -> RecordedWalk:
     """From those segments alone that hold it: between two others some may be missing. Raises LogError."""
     run, from_s, to_s = logged
     segments = run_files(folder / first_path(folder, run).name)
-    held = [path for path in segments if len(cut(read_log(path, from_s=from_s), from_s, to_s).ticks)]
+    held = [path for path in segments if len(cut_log(read_log(path, from_s=from_s), from_s, to_s).ticks)]
     if not held:
         raise LogError(f"its log is not in {folder}")
-    return numbered_walk(held[0], cut(read_logs(held, from_s=from_s), from_s, to_s))
+    return numbered_walk(held[0], cut_log(read_logs(held, from_s=from_s), from_s, to_s))

@@ -22,13 +22,13 @@ DEFAULT, PAPER, COMPENSATED = "default", "paper", "paper compensated"
 Strides = list[dict[str, Any]]
 
 
-def method_of(parameters: EstimationParameters) -> str:
+def configured_method(parameters: EstimationParameters) -> str:
     """The name of what a configuration asks for."""
     compensated = parameters.method == "paper" and parameters.paper_compensation
     return COMPENSATED if compensated else parameters.method
 
 
-def parameters_of(parameters: EstimationParameters, method: str) -> EstimationParameters:
+def with_method(parameters: EstimationParameters, method: str) -> EstimationParameters:
     """By another method, all else as it was."""
     if method == DEFAULT:
         return replace(parameters, method="default")
@@ -39,7 +39,7 @@ def strides_by_method(
     own: Strides, log: Log, configuration: Configuration, flipper: str, methods: Sequence[str]
 ) -> dict[str, Strides]:
     """Of one walk and one flipper; `own` are the daemon's, of which the configured method's are taken as they are."""
-    configured = method_of(configuration.estimation)
+    configured = configured_method(configuration.estimation)
     reported = {configured: own} | {
         method: _replayed(log, configuration, method) for method in methods if method != configured
     }
@@ -49,5 +49,5 @@ def strides_by_method(
 
 
 def _replayed(log: Log, configuration: Configuration, method: str) -> Strides:
-    other = replace(configuration, estimation=parameters_of(configuration.estimation, method))
+    other = replace(configuration, estimation=with_method(configuration.estimation, method))
     return [stride_report(stride) for stride in replay_log(Path("log"), log, other).strides]

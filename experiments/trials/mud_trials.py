@@ -9,16 +9,22 @@ not asked for again. Torque is off whenever hands may be in the mud.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from experiments.robot.bench_robot import BenchError, BenchRobot, disarm, face_faults, rest
+from experiments.reports.mud_names import mud_text
+from experiments.robot.bench_robot import BenchError, BenchRobot, ask_to_clear_faults, disarm, leave, rest
+from experiments.robot.daemon_robot import DaemonRobot
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
-from experiments.trials.mud_names import mud_text
 from experiments.trials.notebook import Entry, Notebook
+from experiments.trials.session import Session
+from firmware_host.configuration.configuration import Configuration
+from simulation.mud.clay import clay_of_water
 
 MOST_ATTEMPTS = 3
+SEED = 1  # of a simulated bench
 KEEP = "k"
 LOOK_S = 0.05  # of waiting for a person, in which nobody else arms the robot
 ASKED = {GO_ON: "go on", SKIP: "leave this trial out", REDO: "measure the last one again"}
@@ -61,15 +67,15 @@ class MudBed(Protocol):
 class PromptedBed:
     """A person's: asked for each trial, with torque off."""
 
-    def __init__(self, robot: BenchRobot, operator: Operator, words: Callable[[PlannedTrial], str]) -> None:
+    def __init__(self, robot: BenchRobot, operator: Operator, instructions: Callable[[PlannedTrial], str]) -> None:
         self._robot = robot
         self._operator = operator
-        self._words = words
+        self._instructions = instructions
 
     def prepare(self, trial: PlannedTrial) -> str:
         disarm(self._robot)
-        face_faults(self._robot, self._operator)
-        return self._operator.ask(f"{trial}. {self._words(trial)}", ASKED, partial(self._robot.wait, LOOK_S))
+        ask_to_clear_faults(self._robot, self._operator)
+        return self._operator.ask(f"{trial}. {self._instructions(trial)}", ASKED, partial(self._robot.wait, LOOK_S))
 
     def truths(self, flipper: str) -> Truths:
         return {}
@@ -158,7 +164,49 @@ def _leave_out(bench: Bench, trial: PlannedTrial, why: Sequence[str] = ()) -> No
     bench.notebook.write(trial.key, {"skipped": True, "why": list(why)})
 
 
-def measured_of(notebook: Notebook) -> dict[str, Entry]:
+def why_not_simulated(muds: Iterable[str]) -> str | None:
+    """Return a message where one of these muds cannot be simulated."""
+    try:
+        [clay_of_water(float(mud)) for mud in muds]
+    except ValueError as problem:
+        return f"--mud: simulated muds are named after their water in percent: {problem}"
+    return None
+
+
+def open_bench(
+    session: Session,
+    plan: Entry,
+    simulated: Callable[[], tuple[BenchRobot, MudBed]],
+    instructions: Callable[[PlannedTrial], str],
+) -> Bench:
+    """Connect to the daemon's robot, or make a simulated one.
+
+    `plan` is the notebook's: options that must be the same when an experiment continues. `instructions` say how the
+    operator prepares a trial.
+    """
+    notebook = Notebook(session.folder, plan)
+    if session.socket is None:
+        return Bench(*simulated(), session.operator, notebook)
+    robot = DaemonRobot(session.socket)
+    return Bench(robot, PromptedBed(robot, session.operator, instructions), session.operator, notebook)
+
+
+def make_trials(
+    bench: Bench, session: Session, run: Callable[[], None]
+) -> tuple[Configuration, dict[str, Entry], list[Path]]:
+    """Return the robot's configuration, the entries that count, and the logs; leave the robot at rest in any case.
+
+    Raises BenchError where no entry counts.
+    """
+    try:
+        configuration = bench.robot.configuration
+        run()
+    finally:
+        logs = leave(bench.robot, session.operator, session.folder)
+    return configuration, counted_entries(bench.notebook), logs
+
+
+def counted_entries(notebook: Notebook) -> dict[str, Entry]:
     """The trials that count. Raises BenchError for an experiment that has nothing to report."""
     left_out = notebook.left_out
     measured = {key: entry for key, entry in notebook.entries.items() if key not in left_out}

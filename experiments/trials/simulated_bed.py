@@ -31,7 +31,7 @@ from simulation.mud.disturbances import LAB, Disturbances, drive_changes
 from simulation.mud.track import Track
 
 
-class WitnessedLockstep(Lockstep):
+class ReferenceLockstep(Lockstep):
     """Owns what the flippers truly did since the last walk began."""
 
     def __init__(self, configuration: Configuration, track: Track, seed: int, **rest: Any) -> None:
@@ -58,11 +58,11 @@ def simulated_bench(
     fixed_base: bool,
     disturbances: Disturbances,
     motion_capture: MotionCaptureParameters = AT_EVERY_TICK,
-) -> tuple[LockstepRobot, WitnessedLockstep]:
+) -> tuple[LockstepRobot, ReferenceLockstep]:
     """A robot with its log in `folder`, which may hold those of earlier ones."""
     recorder = FileRecorder(_new_log(folder), configuration)
     drives = drives_with_errors(configuration, disturbances, seed)
-    lockstep = WitnessedLockstep(
+    lockstep = ReferenceLockstep(
         configuration,
         track,
         seed,
@@ -97,7 +97,7 @@ class CarriedBed:
     """A MudBed: the robot is carried to the place along the track that each trial has."""
 
     def __init__(
-        self, robot: LockstepRobot, lockstep: WitnessedLockstep, position_m: Callable[[PlannedTrial, int], float]
+        self, robot: LockstepRobot, lockstep: ReferenceLockstep, position_m: Callable[[PlannedTrial, int], float]
     ) -> None:
         """`place_m` of a trial, and of how many were prepared before it."""
         self._robot = robot

@@ -85,7 +85,7 @@ def profile_row(profile: StrideProfile) -> dict[str, list[float | None]]:
     return row_of_columns(profile._asdict())
 
 
-def profile_of_row(row: Mapping[str, Any]) -> StrideProfile:
+def profile_from_row(row: Mapping[str, Any]) -> StrideProfile:
     return StrideProfile(**columns_of_row(row, StrideProfile._fields))
 
 

@@ -138,7 +138,7 @@ def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool =
     return strides
 
 
-def beliefs_of(trial: Trial, parameters: EstimationParameters) -> dict[int, MudEstimate]:
+def mud_estimates(trial: Trial, parameters: EstimationParameters) -> dict[int, MudEstimate]:
     """What was believed after each stride, by its index."""
     estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters)
     beliefs: dict[int, MudEstimate] = {}

@@ -15,24 +15,24 @@ from math import ceil
 from typing import Any
 
 from experiments.reports.error_table import COEFFICIENTS
-from experiments.reports.side_by_side import Show
 from experiments.robot.bench_robot import (
     RAISING_S,
     UNDER_WAY,
     Status,
     arm,
+    count_strides,
+    fetch_strides,
     follow_walk,
     reported_by,
     rest,
-    strides_made,
-    strides_since,
     wait_until,
     walk,
 )
 from experiments.trackway.trials import Mud, reach_of
-from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, method_of, strides_by_method
+from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, configured_method, strides_by_method
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
 from experiments.trials.notebook import Entry
+from experiments.trials.session import Show
 from experiments.trials.stride_profile import profile_of, profile_row, slip_m, thinned
 from experiments.walk.known_surface import strides_with_known_surface
 from experiments.walk.walk_profile import walk_profile_of, walk_profile_row
@@ -131,7 +131,7 @@ def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     if after["mode"] != "hold":
         raise InvalidTrialError(reported_by(after))
-    made = strides_made(strides_since(robot, before["strides_closed"]))
+    made = count_strides(fetch_strides(robot, before["strides_closed"]))
     log = robot.record(before["now_s"], after["now_s"])
     entry = _entry(bench, plan, trial, log, before["strides_closed"])
     profile = walk_profile_row(walk_profile_of(log, plan.flipper))
@@ -214,7 +214,7 @@ def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float)
     walked = walk(robot, depth_m, plan.soft_strides)
     log = robot.record(walked.from_s, walked.to_s)
     entry = _entry(bench, plan, trial, log, before["strides_closed"])
-    own = entry["strides"][method_of(robot.configuration.estimation)]
+    own = entry["strides"][configured_method(robot.configuration.estimation)]
     shown = own[min(SHOWN_STRIDE, len(own) - 1)]
     profile = thinned(profile_of(log, plan.flipper, shown["t_start_s"]))
     return entry | {"depth_m": depth_m, "course": profile_row(profile), "remarks": []}
@@ -224,9 +224,9 @@ def _entry(bench: Bench, plan: Plan, trial: PlannedTrial, log: Log, closed: int)
     """What all walks have. Raises SpoiltTrialError."""
     robot = bench.robot
     rest(robot)  # what follows takes longer on a slow computer than the robot is left alone
-    reported = strides_since(robot, closed)
+    reported = fetch_strides(robot, closed)
     strides = strides_by_method(reported, log, robot.configuration, plan.flipper, METHODS)
-    own = strides[method_of(robot.configuration.estimation)]
+    own = strides[configured_method(robot.configuration.estimation)]
     require_mud(own, plan.flipper)
     strides |= strides_with_known_surface(strides[DEFAULT], log, robot.configuration, plan.flipper)
     return {"trial": trial.number, "strides": strides, "truths": bench.bed.truths(plan.flipper)}

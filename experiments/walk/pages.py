@@ -7,14 +7,15 @@ from functools import partial
 from typing import Any
 
 from experiments.flipper.report import ERRORS, HEADING, TRUTHS, UNCERTAINTIES, remarked, uncertainties
-from experiments.reports.coefficient_table import TruthOfMud, error_text_rows, mud_rows
+from experiments.reports.coefficient_table import error_text_rows, mud_rows
+from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure, Section
 from experiments.trackway.trials import reach_of
-from experiments.trials.estimation_methods import method_of
-from experiments.trials.mud_names import mud_text
+from experiments.trials.estimation_methods import configured_method
 from experiments.trials.mud_trials import left_out_texts
 from experiments.trials.notebook import Entry
+from experiments.trials.truth_file import TruthOfMud
 from experiments.walk.measurement import SOFT_DEPTHS_M, Plan
 from experiments.walk.report import placed_strides, soft_walks_of, walks_of
 from firmware_host.configuration.configuration import Configuration
@@ -88,8 +89,8 @@ def _walk_section(
 def _reported(report: Mapping[str, Any], configuration: Configuration) -> str:
     gait = configuration.gait
     paragraphs = [
-        f"All strides of all trials by method {method_of(configuration.estimation)}, as the daemon told. Its gait: "
-        f"insertion at {gait.insertion_speed_m_s:g} m/s, stance at {gait.stance_speed_m_s:g} m/s, pauses of "
+        f"All strides of all trials by method {configured_method(configuration.estimation)}, as the daemon told. Its "
+        f"gait: insertion at {gait.insertion_speed_m_s:g} m/s, stance at {gait.stance_speed_m_s:g} m/s, pauses of "
         f"{gait.pause_s:g} s.",
         f"Left out of tables, since their plate came too near to a border, or went down behind the last mud: "
         f"{counted(report['at_a_border'], 'stride')}.",

@@ -14,11 +14,11 @@ from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
 from experiments.reports.coefficient_table import PER_CM3
 from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import DOTS_PER_INCH, GREY, INK, LABELS
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
-from experiments.trials.mud_names import mud_text
 from experiments.trials.notebook import Entry
-from experiments.trials.stride_profile import profile_of_row
+from experiments.trials.stride_profile import profile_from_row
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import Plan
 from experiments.walk.report import PlacedStride
@@ -171,7 +171,7 @@ def plot_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]], p
 
 
 def _plot_stance(panel: Axes, depth_cm: float, trial: Entry) -> None:
-    profile = profile_of_row(trial["course"])
+    profile = profile_from_row(trial["course"])
     stance = profile.during(Phase.STANCE)
     time_s = profile.time_s[stance]
     look = DEPTH_LOOKS.get(depth_cm, {"color": INK})

@@ -16,13 +16,14 @@ import numpy as np
 
 from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
-from experiments.reports.coefficient_table import Beside, TruthOfMud, error_table, gathered, missing_text, truth_in
+from experiments.reports.coefficient_table import ComparedStride, error_table, gather_coefficient
 from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.mud_names import mud_text
 from experiments.trackway.trials import reach_of
-from experiments.trials.estimation_methods import method_of
-from experiments.trials.mud_names import mud_text
+from experiments.trials.estimation_methods import configured_method
 from experiments.trials.notebook import Entry
-from experiments.trials.stride_profile import profile_of_row
+from experiments.trials.stride_profile import profile_from_row
+from experiments.trials.truth_file import TruthOfMud, missing_text, truth_in
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import SOFT_DEPTHS_M, Plan, soft_key, soft_name
 from firmware_host.configuration.configuration import Configuration
@@ -76,10 +77,10 @@ def _placed(
         yield PlacedStride(walk["trial"], method, mud, plates_m, stride, reported)
 
 
-def soft_strides(plan: Plan, entries: Mapping[str, Entry], truth: TruthOfMud | None) -> list[Beside]:
+def soft_strides(plan: Plan, entries: Mapping[str, Entry], truth: TruthOfMud | None) -> list[ComparedStride]:
     """Of all walks in soft muds. The first stride of each starts from a standing body and is left out."""
     return [
-        Beside(soft_name(mud, depth_m), method, stride, _soft_truth(mud, walk, stride, truth))
+        ComparedStride(soft_name(mud, depth_m), method, stride, _soft_truth(mud, walk, stride, truth))
         for mud in plan.soft
         for depth_m in SOFT_DEPTHS_M
         for walk in soft_walks_of(plan, entries, mud, depth_m)
@@ -98,9 +99,9 @@ def _soft_truth(mud: str, walk: Entry, stride: Reported, truth: TruthOfMud | Non
 def report_of(
     plan: Plan, entries: Mapping[str, Entry], configuration: Configuration, truth: TruthOfMud | None
 ) -> dict[str, Any]:
-    method = method_of(configuration.estimation)
+    method = configured_method(configuration.estimation)
     placed = placed_strides(plan, entries, configuration, truth)
-    certain = [Beside(each.mud, each.method, each.stride, each.truth) for each in placed if each.mud]
+    certain = [ComparedStride(each.mud, each.method, each.stride, each.truth) for each in placed if each.mud]
     soft = soft_strides(plan, entries, truth)
     return {
         "experiment": "walk",
@@ -116,29 +117,31 @@ def report_of(
     }
 
 
-def _mud_report(mud: str, method: str, rows: Sequence[Beside]) -> dict[str, Any]:
+def _mud_report(mud: str, method: str, rows: Sequence[ComparedStride]) -> dict[str, Any]:
     own = [row for row in rows if (row.mud, row.method) == (mud, method)]
     return {
         "mud": mud,
-        **{name: gathered(row.stride[name] for row in own) for name in COEFFICIENTS},
+        **{name: gather_coefficient(row.stride[name] for row in own) for name in COEFFICIENTS},
         "truth": truth_over(own) or None,
     }
 
 
-def truth_over(rows: Sequence[Beside]) -> dict[str, float]:
+def truth_over(rows: Sequence[ComparedStride]) -> dict[str, float]:
     """The middle one of the load cell's readings."""
     reported = {name: [row.truth.get(name) for row in rows] for name in COEFFICIENTS}
     values = {name: [value for value in each if value is not None] for name, each in reported.items()}
     return {name: median(each) for name, each in values.items() if each}
 
 
-def _soft_report(plan: Plan, entries: Mapping[str, Entry], mud: str, strides: Sequence[Beside]) -> list[dict[str, Any]]:
+def _soft_report(
+    plan: Plan, entries: Mapping[str, Entry], mud: str, strides: Sequence[ComparedStride]
+) -> list[dict[str, Any]]:
     """k_s by depth and method, beside the load cell's."""
     return [
         {
             "depth_cm": 100.0 * depth_m,
             "k_s": {
-                method: gathered(row.stride["k_s"] for row in own if row.method == method)
+                method: gather_coefficient(row.stride["k_s"] for row in own if row.method == method)
                 for method in dict.fromkeys(row.method for row in own)
             },
             "truth": truth_over(own).get("k_s"),
@@ -153,7 +156,7 @@ def _thrust_n(walks: Sequence[Entry]) -> float | None:
     """Of both flippers, over the second half of the stances shown: while the body moves it is the body's drag."""
     means_n = []
     for walk in walks:
-        profile = profile_of_row(walk["course"])
+        profile = profile_from_row(walk["course"])
         force_n = profile.force_x_n[profile.during(Phase.STANCE)]
         means_n.append(2.0 * float(np.nanmean(force_n[len(force_n) // 2 :])) if np.isfinite(force_n).any() else np.nan)
     known = [mean_n for mean_n in means_n if isfinite(mean_n)]
@@ -161,7 +164,7 @@ def _thrust_n(walks: Sequence[Entry]) -> float | None:
 
 
 def _beside_paper(
-    plan: Plan, entries: Mapping[str, Entry], certain: Sequence[Beside], soft: Sequence[Beside]
+    plan: Plan, entries: Mapping[str, Entry], certain: Sequence[ComparedStride], soft: Sequence[ComparedStride]
 ) -> list[dict[str, Any]]:
     """What the paper tells in words or numbers, and ours by its law with the surface known."""
     rows = [
@@ -172,7 +175,7 @@ def _beside_paper(
 
 
 def _soft_beside_paper(
-    plan: Plan, entries: Mapping[str, Entry], mud: str, soft: Sequence[Beside]
+    plan: Plan, entries: Mapping[str, Entry], mud: str, soft: Sequence[ComparedStride]
 ) -> list[dict[str, Any]]:
     """The paper's load cell measured at 3 cm."""
     at_3, at_5 = (soft_name(mud, depth_m) for depth_m in SOFT_DEPTHS_M)
@@ -193,7 +196,7 @@ def _finding(what: str, paper: str, ours: float | None) -> dict[str, Any]:
     return {"what": what, "paper": paper, "ours": ours}
 
 
-def _ratio(rows: Sequence[Beside], mud: str, method: str = KNOWN, cell: float | None = None) -> float | None:
+def _ratio(rows: Sequence[ComparedStride], mud: str, method: str = KNOWN, cell: float | None = None) -> float | None:
     """Median of k_s over what the load cell reads there, or over `cell`."""
     own = [row for row in rows if (row.mud, row.method) == (mud, method) and row.stride["k_s"]["valid"]]
     ratios = [row.stride["k_s"]["value"] / truth for row in own if (truth := cell or row.truth.get("k_s"))]

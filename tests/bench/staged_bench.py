@@ -10,9 +10,10 @@ from typing import Any, Concatenate, ParamSpec
 
 import pytest
 
-from command_line.experiments.terminal_prompt import AbsentOperatorError, TerminalPrompt
+from command_line.experiments.terminal_prompt import TerminalPrompt
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Stand
+from experiments.robot.bench_errors import EndedError
 from experiments.robot.bench_robot import BenchError
 from tests.bench.bench_table import table_lines
 
@@ -208,7 +209,7 @@ class UncapturedOperator:
         self._capture.suspend(in_=True)
         try:
             yield
-        except AbsentOperatorError as problem:
+        except EndedError as problem:
             pytest.skip(str(problem))
         finally:
             self._capture.resume()

@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 
 from command_line import exit_codes
-from command_line.experiments import conduct_bench as bench
+from command_line.experiments import conduct as bench
 from command_line.main import main
 from command_line.operation import operation
-from command_line.screen import coefficient, number
+from command_line.screen import coefficient
 from control.records import JOINTS
+from experiments.reports.text_tables import number
 from firmware_host import daemon
 from firmware_host.operator.status_client import DroppedError
 from tests.command_line.command_lines import failure, refusal

@@ -15,16 +15,16 @@ from control.modes import ENERGISED, Mode
 from control.monitors.joint_monitor import FaultBounds
 from control.records import Phase
 from drivers.fault_injection.failures import Failures
-from experiments.robot.bench_robot import BenchError, arm, face_faults, leave, move, rest, walk
+from experiments.robot.bench_robot import BenchError, arm, ask_to_clear_faults, leave, move, rest, walk
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.robot.prompt import Willing
+from experiments.robot.prompt import AutomaticOperator
 from firmware_host.log.file_recorder import FileRecorder
 from firmware_host.log_reading.log_reader import read_log
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 
-OPERATOR = Willing(lambda message: None)
+OPERATOR = AutomaticOperator(lambda message: None)
 ARMED_S = 0.01  # and closed loop of all drives not there yet
 
 
@@ -122,7 +122,7 @@ def test_the_next_trial_begins_after_a_fault_of_the_last_one(robot: InterruptedR
         walk(robot, 0.03, 1)
     rest(robot)
     robot.wait(3.0)
-    face_faults(robot, OPERATOR)
+    ask_to_clear_faults(robot, OPERATOR)
     arm(robot, OPERATOR)
     assert robot.call("status")["mode"] == "hold"
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from experiments.robot import daemon_robot
-from experiments.robot.bench_errors import BarredError, OverruledError
+from experiments.robot.bench_errors import AccessDeniedError, RobotInUseError
 from experiments.robot.daemon_robot import DaemonRobot
 from firmware_host.operator.status_client import CallRefusedError
 from tests.experiments.made_up_strides import make_log, make_ticks
@@ -64,7 +64,7 @@ def test_who_may_not_read_the_log_is_refused_before_anything_moves_and_leaves_no
         raise PermissionError(errno.EACCES, "Permission denied", "/logs")
 
     monkeypatch.setattr(daemon_robot, "run_files", refuse)
-    with pytest.raises(BarredError, match="not read its log, .* have root add you to the group of /logs"):
+    with pytest.raises(AccessDeniedError, match="not read its log, .* have root add you to the group of /logs"):
         DaemonRobot(Path("x"))
     assert set(daemon.called) == {"status", "lease", "release"} and daemon.closed
     assert daemon.lease is None
@@ -81,9 +81,9 @@ def test_a_robot_that_somebody_armed_meanwhile_is_left_to_them(
     daemon.overruled = overruled
     reported = "taken over: uid 3" if overruled else "somebody has armed the robot while this program slept"
     for method in ("arm", "disarm", "stop"):
-        with pytest.raises(OverruledError, match=reported):
+        with pytest.raises(RobotInUseError, match=reported):
             robot.call(method)
-    with pytest.raises(OverruledError):
+    with pytest.raises(RobotInUseError):
         robot.wait(0.0)
     robot.close()
     assert set(daemon.called) <= {"status", "lease", "release"} and daemon.lease is None

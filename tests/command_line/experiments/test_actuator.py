@@ -16,7 +16,6 @@ import pytest
 from command_line import exit_codes
 from command_line.experiments.actuator import _applied as applied
 from command_line.experiments.actuator import _target as target_of
-from command_line.experiments.conduct_bench import Desk
 from command_line.main import main
 from experiments.actuator.bench import Readings
 from experiments.actuator.calibration import Show
@@ -25,8 +24,9 @@ from experiments.actuator.friction import QUICK, SLOW
 from experiments.actuator.plan import Plan
 from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A
 from experiments.robot.bench_robot import BenchError
-from experiments.robot.prompt import Operator, Willing
+from experiments.robot.prompt import AutomaticOperator, Operator
 from experiments.trials.notebook import Notebook
+from experiments.trials.session import Ending, Session
 from firmware_host.configuration.configuration import load_configuration, parse_configuration
 from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
 from tests.experiments.actuator.test_fit import made_entries
@@ -170,8 +170,8 @@ def made_options(**values: object) -> argparse.Namespace:
     return argparse.Namespace(**({"simulated": False, "apply": True, "config": None} | values))
 
 
-def made_desk(folder: Path, reported: list[str]) -> Desk:
-    return Desk(folder, Willing(reported.append), lambda done, total: None)
+def made_desk(folder: Path, reported: list[str]) -> Session:
+    return Session(folder, AutomaticOperator(reported.append), lambda done, total: None)
 
 
 def test_only_the_file_that_the_daemon_runs_with_is_changed(tmp_path: Path, example_text: str) -> None:
@@ -213,8 +213,8 @@ def test_what_cannot_be_applied_costs_no_report(tmp_path: Path, example_text: st
     entries = {key: entry | {"current_a": 2.0 * entry["current_a"]} for key, entry in made_entries(plan).items()}
     fit = fit_joint("right_sweep", plan, entries, 0.083)
     assert fit is not None
-    reported, status = applied(path, [fit], made_desk(tmp_path, []))
+    reported, ending = applied(path, [fit], made_desk(tmp_path, []))
     assert (
         reported.startswith("nothing was applied: the configuration stays as it is") and "current_limit_a" in reported
     )
-    assert "run the same command again" in reported and status == exit_codes.REFUSED
+    assert "run the same command again" in reported and ending is Ending.REFUSED

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.scripted_operator import ScriptedOperator
 
 from experiments.actuator.bench import FALLS, RobotBench
 from experiments.actuator.plan import Plan
-from experiments.robot.bench_errors import BenchError, GoneError, OverruledError
+from experiments.robot.bench_errors import BenchError, DaemonLostError, RobotInUseError
 from experiments.robot.bench_robot import ALONE
 from tests.experiments.still_robot import StillRobot
+from tests.scripted_operator import ScriptedOperator
 
 HOLD_IT = "Take off what hangs and hold the flipper: torque goes off."
 PLAN = Plan(("right_adduction",), weights_g=(50.0,), trials=1)
@@ -83,16 +83,16 @@ def test_of_a_robot_that_holds_nothing_nobody_is_asked(tmp_path: Path) -> None:
 
 
 def test_a_robot_that_somebody_has_taken_over_is_not_let_go_of(tmp_path: Path) -> None:
-    robot, operator = HoldingRobot(OverruledError("taken over: uid 1")), ScriptedOperator()
-    with pytest.raises(OverruledError):
+    robot, operator = HoldingRobot(RobotInUseError("taken over: uid 1")), ScriptedOperator()
+    with pytest.raises(RobotInUseError):
         RobotBench(robot).leave(tmp_path, operator)
     assert not operator.asked and robot.mode == "hold" and robot.closed
     assert operator.reported == ["the robot is left as it is to whoever has taken it over"]
 
 
 def test_a_daemon_that_is_gone_is_told_once_and_what_the_robot_does_then(tmp_path: Path) -> None:
-    robot, operator = HoldingRobot(GoneError("the daemon is gone")), ScriptedOperator()
-    with pytest.raises(GoneError):
+    robot, operator = HoldingRobot(DaemonLostError("the daemon is gone")), ScriptedOperator()
+    with pytest.raises(DaemonLostError):
         RobotBench(robot).leave(tmp_path, operator)
     assert operator.reported == [ALONE] and not operator.asked
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.scripted_operator import ScriptedOperator
 
 from control.records import JOINTS
 from experiments.actuator import calibration as actuator
@@ -22,6 +21,7 @@ from experiments.robot.prompt import GO_ON, REDO, SKIP
 from experiments.trials.notebook import Notebook
 from firmware_host.configuration.configuration import Configuration
 from tests.experiments.still_robot import StillRobot
+from tests.scripted_operator import ScriptedOperator
 
 JOINT = "right_adduction"
 PLAN = Plan((JOINT,), weights_g=(100.0, 200.0, 400.0), trials=2)

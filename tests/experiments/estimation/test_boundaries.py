@@ -69,7 +69,7 @@ class Walk:
     def crossings(self, monkeypatch: pytest.MonkeyPatch) -> list[CrossCoupling]:
         truths = [stride(flipper, i, mud) for i, mud in enumerate(self.muds) for flipper in FLIPPERS]
         beliefs = {i: mud_estimate(k_p, self.depth_m) for i, k_p in enumerate(self.believed)}
-        monkeypatch.setattr(experiments.estimation.boundaries, "beliefs_of", lambda trial, parameters: beliefs)
+        monkeypatch.setattr(experiments.estimation.boundaries, "mud_estimates", lambda trial, parameters: beliefs)
         trial = Trial(configuration_of(SINGLE), cast(Any, None), (), truths)
         return crossings_of(trial, self.cells(truths))
 

@@ -21,7 +21,7 @@ from experiments.faults.injection import BY_NAME, WAYS, Way
 from experiments.faults.loop_causes import bug_in, nothing
 from experiments.faults.matrix import FAULTS, Place, Plan, report_of
 from experiments.faults.phases import PHASES, bench_for
-from experiments.reports.side_by_side import side_by_side
+from experiments.trials.parallel_trials import run_parallel
 
 
 def one_place_of_each_fault() -> list[Place]:
@@ -34,7 +34,7 @@ def one_place_of_each_fault() -> list[Place]:
 
 @pytest.fixture(scope="module")
 def cells() -> Sequence[dict[str, Any]]:
-    return side_by_side([partial(run_cell, *place) for place in one_place_of_each_fault()], lambda done, of: None)
+    return run_parallel([partial(run_cell, *place) for place in one_place_of_each_fault()], lambda done, of: None)
 
 
 def test_every_kind_of_fault_is_caused_in_some_way() -> None:

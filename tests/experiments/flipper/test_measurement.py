@@ -23,7 +23,7 @@ from experiments.trials.estimation_methods import DEFAULT, PAPER
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial
 from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.simulated_bed import CarriedBed
-from experiments.trials.stride_profile import profile_of_row
+from experiments.trials.stride_profile import profile_from_row
 from experiments.trials.trial import SINGLE, configuration_of
 from tests.experiments.made_up_strides import make_estimate, make_profile, make_stride
 from tests.scripted_operator import ScriptedOperator
@@ -163,7 +163,7 @@ def test_another_load_cells_truth_takes_the_place_of_the_beds() -> None:
 
 
 def test_the_course_kept_is_a_whole_stride_of_three_pauses() -> None:
-    profile = profile_of_row(next(iter(measured()[0].values()))["course"])
+    profile = profile_from_row(next(iter(measured()[0].values()))["course"])
     assert profile.time_s[-1] == pytest.approx(12.4, abs=0.3)
     assert {Phase(int(phase)) for phase in profile.phase} == {
         Phase.INSERTION, Phase.PAUSE, Phase.STANCE, Phase.EXTRACTION, Phase.SWING

@@ -7,8 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tests.scripted_operator import ScriptedOperator
-
 from drivers.load_cell.calibration import LoadCellCalibration
 from drivers.load_cell.line_formats import LineFormat
 from drivers.load_cell.load_cell_port import LoadCellPort
@@ -25,6 +23,7 @@ from simulation.test_rig.plate_stage import CarriedPlate, StageParameters
 from simulation.test_rig.stage_encoder_emulator import StageEncoderParameters
 from simulation.test_rig.stage_motion import HandParameters
 from tests.experiments.made_up_mud import LawfulMud
+from tests.scripted_operator import ScriptedOperator
 
 SETTINGS = StageSettings()
 KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}

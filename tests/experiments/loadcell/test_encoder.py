@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.scripted_operator import ScriptedOperator
 
 from experiments.loadcell.fits import INSERTION, bench_uncertainty
 from experiments.loadcell.measurement import CellSettings
@@ -20,6 +19,7 @@ from experiments.robot.prompt import GO_ON
 from simulation.test_rig.load_cell_emulator import AmplifierParameters
 from simulation.test_rig.stage_encoder_emulator import EmulatedStageEncoder, StageEncoderParameters
 from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Laboratory, Make, laboratories
+from tests.scripted_operator import ScriptedOperator
 
 
 @pytest.fixture

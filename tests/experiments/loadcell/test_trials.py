@@ -9,7 +9,6 @@ from random import Random
 from statistics import fmean
 
 import pytest
-from tests.scripted_operator import ScriptedOperator
 
 from drivers.load_cell.load_cell_port import LoadCellPort
 from experiments.loadcell.fits import INSERTION, SHEAR, Analysed
@@ -25,6 +24,7 @@ from experiments.robot.prompt import GO_ON, REDO, SKIP
 from simulation.test_rig.load_cell_emulator import AmplifierParameters
 from simulation.test_rig.plate_stage import StageParameters
 from tests.experiments.loadcell.loadcell_bench import COUNTS, KNOWN, SETTINGS, Laboratory, Make, laboratories
+from tests.scripted_operator import ScriptedOperator
 
 
 @pytest.fixture

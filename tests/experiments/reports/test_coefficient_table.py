@@ -12,23 +12,21 @@ import pytest
 from scipy.stats import t as student_t
 
 from experiments.reports.coefficient_table import (
-    Beside,
+    ComparedStride,
     coefficient_text,
     error_table,
     error_text_rows,
-    gathered,
-    load_truth,
-    missing_text,
+    gather_coefficient,
     mud_rows,
-    truth_in,
 )
+from experiments.reports.mud_names import mud_name
 from experiments.robot.bench_robot import BenchError
-from experiments.trials.mud_names import mud_name
+from experiments.trials.truth_file import load_truth, missing_text, truth_in
 from tests.experiments.made_up_strides import make_estimate, make_stride
 
 
 def test_trials_make_a_mean_with_its_error_and_scatter() -> None:
-    reported = gathered(make_estimate(value) for value in (1.0e6, 1.2e6, 1.4e6))
+    reported = gather_coefficient(make_estimate(value) for value in (1.0e6, 1.2e6, 1.4e6))
     assert reported["value"] == pytest.approx(1.2e6)
     assert reported["trials_error"] == pytest.approx(0.2e6 / sqrt(3) * student_t.ppf(0.975, 2) / 1.96, rel=1e-3)
     assert reported["repeatability"] == pytest.approx(1 / 6)
@@ -37,13 +35,13 @@ def test_trials_make_a_mean_with_its_error_and_scatter() -> None:
 
 def test_what_the_scatter_does_not_show_of_an_estimator_s_doubt_is_shared_by_all_trials() -> None:
     """Of 10 % in all, trials that scatter by 6 % share 8 %."""
-    scattered = gathered(make_estimate(value, std_error=1e5) for value in (0.94e6, 1e6, 1.06e6))
+    scattered = gather_coefficient(make_estimate(value, std_error=1e5) for value in (0.94e6, 1e6, 1.06e6))
     assert scattered["shared_error"] == pytest.approx(8e4)
     assert scattered["std_error"] ** 2 == pytest.approx(scattered["trials_error"] ** 2 + 8e4**2)
 
 
 def test_trials_that_scatter_more_than_was_foreseen_still_share_the_motors_doubt() -> None:
-    reported = gathered(make_estimate(value, std_error=1e4) for value in (0.8e6, 1e6, 1.2e6))
+    reported = gather_coefficient(make_estimate(value, std_error=1e4) for value in (0.8e6, 1e6, 1.2e6))
     assert reported["shared_error"] == pytest.approx(0.032e6)
 
 
@@ -54,22 +52,22 @@ def test_two_standard_errors_hold_the_truth_19_times_in_20_where_all_trials_have
     random, held = np.random.default_rng(1), 0
     for _ in range(1000):
         values = 1e6 * (1.0 + 0.04 * random.standard_normal() + 0.04 * random.standard_normal(3))
-        reported = gathered(make_estimate(float(value), std_error=0.04e6 * sqrt(2.0)) for value in values)
+        reported = gather_coefficient(make_estimate(float(value), std_error=0.04e6 * sqrt(2.0)) for value in values)
         held += abs(reported["value"] - 1e6) <= 2.0 * reported["std_error"]
     assert 940 <= held <= 995
 
 
 def test_one_trial_has_the_doubt_of_its_own_estimate() -> None:
-    reported = gathered([make_estimate(1e6, std_error=7e4)])
+    reported = gather_coefficient([make_estimate(1e6, std_error=7e4)])
     assert (reported["value"], reported["std_error"], reported["repeatability"]) == (1e6, 7e4, None)
     assert (reported["trials_error"], reported["shared_error"]) == (None, None)
     assert coefficient_text(reported) == "1.000 ± 0.070"
 
 
 def test_bounds_do_not_mix_with_values() -> None:
-    mixed = gathered([make_estimate(1e6), make_estimate(9e6, at_least=True)])
+    mixed = gather_coefficient([make_estimate(1e6), make_estimate(9e6, at_least=True)])
     assert (mixed["value"], mixed["at_least"], mixed["bounds"]) == (1e6, False, 1)
-    bounds = gathered(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
+    bounds = gather_coefficient(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
     assert (bounds["value"], bounds["at_least"], bounds["bounds"]) == (2e6, True, 3)
     assert coefficient_text(bounds).startswith("≥ 2.00")
 
@@ -86,35 +84,37 @@ def strides_in_mud_that_gives_way_at(limit: float) -> list[dict[str, Any]]:
 def test_a_few_strides_in_which_mud_gave_way_that_mostly_holds_do_not_speak_for_it() -> None:
     """Alone they would tell 7 % too little, and their scatter would not show it."""
     strides = strides_in_mud_that_gives_way_at(0.95e6)
-    alone = gathered(each for each in strides if not each["at_least"])
+    alone = gather_coefficient(each for each in strides if not each["at_least"])
     assert alone["value"] + 2.0 * alone["trials_error"] < 1e6
-    reported = gathered(strides)
+    reported = gather_coefficient(strides)
     assert (reported["value"], reported["at_least"], reported["std_error"]) == (0.95e6, True, None)
 
 
 def test_mud_that_gives_way_in_most_strides_is_known_by_them() -> None:
-    reported = gathered(strides_in_mud_that_gives_way_at(1.05e6))
+    reported = gather_coefficient(strides_in_mud_that_gives_way_at(1.05e6))
     assert not reported["at_least"]
     assert reported["bounds"] > 10
     assert abs(reported["value"] - 1e6) < 2.0 * reported["std_error"]
 
 
 def test_a_median_of_bounds_has_no_error() -> None:
-    bounds = gathered(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
+    bounds = gather_coefficient(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
     assert bounds["std_error"] is bounds["trials_error"] is bounds["shared_error"] is None
     assert coefficient_text(bounds) == "≥ 2.000"
 
 
 def test_a_trial_that_does_not_tell_its_doubt_is_not_taken_for_exact() -> None:
     uncertainties = (1e5, nan, 1e5)
-    reported = gathered(make_estimate(1e6 + k, std_error=uncertainty) for k, uncertainty in enumerate(uncertainties))
+    reported = gather_coefficient(
+        make_estimate(1e6 + k, std_error=uncertainty) for k, uncertainty in enumerate(uncertainties)
+    )
     assert reported["shared_error"] == pytest.approx(1e5, rel=1e-3)
 
 
 def test_what_is_not_valid_counts_for_nothing_but_is_told() -> None:
-    reported = gathered([make_estimate(1e6), make_estimate(None, reason="too short")])
+    reported = gather_coefficient([make_estimate(1e6), make_estimate(None, reason="too short")])
     assert (reported["value"], reported["not_valid"]) == (1e6, ["too short"])
-    nothing = gathered([make_estimate(None, reason="too short")])
+    nothing = gather_coefficient([make_estimate(None, reason="too short")])
     assert (nothing["value"], nothing["std_error"], nothing["trials"]) == (None, None, [])
     assert coefficient_text(nothing) == "-"
 
@@ -185,19 +185,19 @@ def test_errors_are_those_of_values_and_bounds_are_told_as_bounds() -> None:
         make_stride(k_p=make_estimate(1.1e6), k_s=make_estimate(0.8e6, at_least=True)),
         make_stride(k_p=make_estimate(1.3e6), k_s=make_estimate(0.6e6, at_least=True)),
     ]
-    errors = error_table((Beside("49.5", "default", stride, truth) for stride in strides), "walking")
+    errors = error_table((ComparedStride("49.5", "default", stride, truth) for stride in strides), "walking")
     (row,) = error_text_rows(errors)[1:]
     assert row == ["49.5 %", "default", "20 % (+20 %)", "≥ 70 % of it (2)", "-", "2"]
 
 
 def test_a_method_that_says_nothing_of_a_coefficient_has_no_row_of_it() -> None:
     stride = make_stride(k_p=None, k_e=None)
-    errors = error_table([Beside("49.5", "law", stride, {"k_p": 1e6, "k_s": 1e6, "k_e": 1e6})], "walking")
+    errors = error_table([ComparedStride("49.5", "law", stride, {"k_p": 1e6, "k_s": 1e6, "k_e": 1e6})], "walking")
     assert [row["coefficient"] for row in errors] == ["k_s"]
 
 
 def test_a_table_of_muds_has_the_load_cell_beside() -> None:
-    reported = gathered([make_estimate(1.5e6), make_estimate(1.7e6)])
+    reported = gather_coefficient([make_estimate(1.5e6), make_estimate(1.7e6)])
     muds = [{"mud": "47.6", "k_p": reported, "k_s": reported, "k_e": reported, "truth": {"k_p": 1.55e6}}]
     head, row = mud_rows(muds)
     assert len(head) == len(row)
@@ -206,6 +206,6 @@ def test_a_table_of_muds_has_the_load_cell_beside() -> None:
 
 
 def test_methods_of_one_mud_stand_together() -> None:
-    rows = [Beside(mud, method, make_stride(), {"k_p": 1e6}) for method in ("one", "two") for mud in ("b", "a")]
+    rows = [ComparedStride(mud, method, make_stride(), {"k_p": 1e6}) for method in ("one", "two") for mud in ("b", "a")]
     table = error_text_rows(error_table(rows, "walking"))
     assert [row[:2] for row in table[1:]] == [["b", "one"], ["b", "two"], ["a", "one"], ["a", "two"]]

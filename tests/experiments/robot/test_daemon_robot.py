@@ -14,7 +14,7 @@ import pytest
 from command_line import exit_codes
 from control.controller import UP_RAD
 from control.modes import Mode
-from experiments.robot.bench_errors import OverruledError
+from experiments.robot.bench_errors import RobotInUseError
 from experiments.robot.bench_robot import BenchError, arm, disarm, move, walk
 from experiments.robot.daemon_robot import DaemonRobot
 from firmware_host.log_reading.log_reader import read_log
@@ -27,7 +27,7 @@ def run_beside(robot: DaemonRobot, bench: Bench, *arguments: str) -> subprocess.
     """A command in another terminal, while the experiment waits and renews its lease."""
     with ThreadPoolExecutor(1) as terminals:
         command = terminals.submit(bench.run, *arguments)
-        with suppress(OverruledError):
+        with suppress(RobotInUseError):
             while not command.done():
                 robot.wait(0.05)
         return command.result()

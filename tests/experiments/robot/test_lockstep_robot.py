@@ -20,12 +20,12 @@ from experiments.robot.bench_robot import (
     LEAVE,
     BenchError,
     arm,
+    ask_to_clear_faults,
     disarm,
-    face_faults,
+    fetch_strides,
     move,
     reported_by,
     require_hold,
-    strides_since,
     walk,
 )
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
@@ -157,7 +157,7 @@ class Decided:
         self.asked: list[str] = []
 
     def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
-        assert set(answers) == {CLEAR, LEAVE} and next(iter(answers)) == CLEAR  # which Willing takes
+        assert set(answers) == {CLEAR, LEAVE} and next(iter(answers)) == CLEAR  # which AutomaticOperator takes
         self.asked.append(question)
         meanwhile()
         return self.answer
@@ -204,7 +204,7 @@ def test_a_fault_that_comes_back_is_cleared_three_times_at_most(
     call, operator = faulty.call, Decided(CLEAR)
     monkeypatch.setattr(faulty, "call", lambda method, **params: None if method == "clear" else call(method, **params))
     with pytest.raises(BenchError, match="the fault comes back: The robot is in FAULT"):
-        face_faults(faulty, operator)
+        ask_to_clear_faults(faulty, operator)
     assert len(operator.asked) == 3
 
 
@@ -226,10 +226,10 @@ def test_strides_that_the_daemon_no_longer_keeps_are_not_passed_over(
     report = lambda method, since: [stride for stride in strides if stride["number"] >= since][:20]  # noqa: E731
     monkeypatch.setattr(robot, "call", report)
     if whole:
-        assert strides_since(robot, 5) == strides
+        assert fetch_strides(robot, 5) == strides
     else:
         with pytest.raises(BenchError, match="more strides than the daemon keeps"):
-            strides_since(robot, 5)
+            fetch_strides(robot, 5)
 
 
 def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) -> None:

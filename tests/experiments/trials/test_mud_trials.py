@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.scripted_operator import ScriptedOperator
 
 from experiments.robot.bench_errors import EndedError
 from experiments.robot.bench_robot import CLEAR, LEAVE, BenchError, leave
@@ -19,10 +18,11 @@ from experiments.trials.mud_trials import (
     PromptedBed,
     Truths,
     conduct_trials,
-    measured_of,
+    counted_entries,
 )
 from experiments.trials.notebook import Entry, Notebook
 from tests.experiments.still_robot import StillRobot
+from tests.scripted_operator import ScriptedOperator
 
 TRIALS = [PlannedTrial(f"47.6/{number}", "47.6", number, 3) for number in (1, 2, 3)]
 PLAN = {"experiment": "made up"}
@@ -110,7 +110,7 @@ def test_an_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
 
 def test_a_trial_that_is_left_out_is_written_down_and_not_asked_for_again(tmp_path: Path) -> None:
     session = Session(tmp_path, bed=ScriptedBed(GO_ON, SKIP)).conduct()
-    assert list(measured_of(session.notebook)) == [ALL[0], ALL[2]]
+    assert list(counted_entries(session.notebook)) == [ALL[0], ALL[2]]
     again = Session(tmp_path).conduct()
     assert again.bed.prepared == [] and again.notebook.left_out == {ALL[1]: {"skipped": True, "why": []}}
 
@@ -176,7 +176,7 @@ def test_a_spoilt_trial_can_be_left_out(tmp_path: Path) -> None:
     session = Session(tmp_path, ScriptedOperator(SKIP))
     session.outcomes = [InvalidTrialError("no mud")]
     session.conduct()
-    assert list(measured_of(session.notebook)) == ALL[1:]
+    assert list(counted_entries(session.notebook)) == ALL[1:]
     assert session.notebook.left_out[ALL[0]]["why"] == ["no mud"]
 
 
@@ -212,7 +212,7 @@ def test_a_person_may_go_on_also_after_the_third_time(tmp_path: Path, answer: st
     session.outcomes = [BenchError("it was told to stop") for _ in range(3)]
     session.conduct()
     assert "went wrong 3 times; the last time: it was told to stop." in session.operator.asked[-1]
-    assert list(measured_of(session.notebook)) == kept
+    assert list(counted_entries(session.notebook)) == kept
 
 
 def test_what_goes_wrong_three_times_ends_where_nobody_wants_it_repeated(tmp_path: Path) -> None:
@@ -229,7 +229,7 @@ def test_a_doubtful_trial_counts_as_the_person_says(tmp_path: Path, answer: str,
     session.outcomes = [{"remarks": ["the base moved by 5.0 mm"]}]
     session.conduct()
     assert session.operator.reported == ["47.6 %, trial 1 of 3: the base moved by 5.0 mm"]
-    assert list(measured_of(session.notebook)) == kept
+    assert list(counted_entries(session.notebook)) == kept
     assert len(session.measured) == (4 if answer == REDO else 3)
 
 
@@ -244,4 +244,4 @@ def test_a_robot_that_no_longer_answers_is_left_with_a_word(tmp_path: Path) -> N
 
 def test_an_experiment_of_which_nothing_is_left_ends_with_a_word(tmp_path: Path) -> None:
     with pytest.raises(BenchError, match="nothing was measured"):
-        measured_of(Session(tmp_path, bed=ScriptedBed(SKIP, SKIP, SKIP)).conduct().notebook)
+        counted_entries(Session(tmp_path, bed=ScriptedBed(SKIP, SKIP, SKIP)).conduct().notebook)

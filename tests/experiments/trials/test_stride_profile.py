@@ -8,7 +8,7 @@ import pytest
 
 from control.modes import Mode
 from control.records import Phase
-from experiments.trials.stride_profile import profile_of, profile_of_row, profile_row, slip_m, thinned
+from experiments.trials.stride_profile import profile_from_row, profile_of, profile_row, slip_m, thinned
 from experiments.walk.walk_profile import KEPT, walk_profile_of, walk_profile_of_row, walk_profile_row
 from tests.experiments.made_up_strides import make_log, make_profile, make_ticks
 
@@ -65,7 +65,7 @@ def test_a_course_is_the_same_out_of_the_notebook() -> None:
     ticks = make_ticks(STROKE)
     ticks["force_x_n"] = np.nan
     profile = profile_of(make_log(ticks), "left", 0.0)
-    read = profile_of_row(json.loads(json.dumps(profile_row(profile))))
+    read = profile_from_row(json.loads(json.dumps(profile_row(profile))))
     for column, again in zip(profile, read, strict=True):
         assert np.allclose(column, again, atol=1e-6, equal_nan=True)
     assert np.isnan(read.force_x_n).all()

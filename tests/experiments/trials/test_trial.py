@@ -18,8 +18,8 @@ from experiments.trials.trial import (
     Sample,
     Setup,
     Trial,
-    beliefs_of,
     configuration_of,
+    mud_estimates,
     run_trial,
     strides_of,
 )
@@ -160,7 +160,7 @@ def test_beliefs_are_those_after_each_stride() -> None:
     estimator = MudEstimator(trial().configuration.geometry, trial().drives, parameters)
     for sample in trial().samples:
         estimator.update(*sample)
-    assert beliefs_of(trial(), parameters) == {0: estimator.mud_estimate}
+    assert mud_estimates(trial(), parameters) == {0: estimator.mud_estimate}
 
 
 def test_in_a_walk_both_flippers_read_the_same_of_the_same_mud() -> None:

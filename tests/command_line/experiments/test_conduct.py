@@ -14,11 +14,12 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
-from command_line.experiments.conduct_bench import Desk, Finding, conduct_bench
-from command_line.experiments.terminal_prompt import AbsentOperatorError, TerminalPrompt
+from command_line.experiments.conduct import conduct_bench
+from command_line.experiments.terminal_prompt import TerminalPrompt
 from experiments.reports.report_page import Section
-from experiments.robot.bench_errors import BarredError, BenchError, GoneError
+from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, EndedError
 from experiments.trials.notebook import Notebook
+from experiments.trials.session import Finding, Session
 
 ANSWERS = {"": "it hangs", "s": "skip it", "r": "the last one again"}
 
@@ -86,7 +87,7 @@ def test_an_enter_that_was_pressed_before_a_question_does_not_answer_it(monkeypa
 
 
 def test_where_nobody_can_answer_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    with typed(monkeypatch, ""), pytest.raises(AbsentOperatorError, match="run it on a terminal"):
+    with typed(monkeypatch, ""), pytest.raises(EndedError, match="run it on a terminal"):
         TerminalPrompt().ask("Well?", ANSWERS, nothing)
 
 
@@ -94,8 +95,8 @@ def options(folder: Path, **changes: object) -> argparse.Namespace:
     return argparse.Namespace(**({"out": folder, "json": False, "simulated": True, "name": "walk"} | changes))
 
 
-def found(desk: Desk) -> Finding:
-    desk.operator.report(desk.operator.ask("Well?", ANSWERS, nothing) or "it hangs")
+def found(session: Session) -> Finding:
+    session.operator.report(session.operator.ask("Well?", ANSWERS, nothing) or "it hangs")
     return Finding({"experiment": "trial", "value": 1.0}, "A trial", [Section("Result", "Fine.")], "value 1.0")
 
 
@@ -107,10 +108,10 @@ def test_it_ends_in_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str])
 
 
 def test_json_alone_goes_to_standard_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def run(desk: Desk) -> Finding:
-        desk.show(1, 2)
-        desk.operator.report("half of it")
-        return found(desk)
+    def run(session: Session) -> Finding:
+        session.show(1, 2)
+        session.operator.report("half of it")
+        return found(session)
 
     conduct_bench(options(tmp_path, json=True), "trials", run)
     said = capsys.readouterr()
@@ -134,15 +135,15 @@ def test_without_a_folder_it_makes_one_of_its_name(tmp_path: Path, monkeypatch: 
     ("problem", "status", "message"),
     [
         (BenchError("the robot no longer holds"), exit_codes.REFUSED, "the robot no longer holds"),
-        (BarredError("only for members"), exit_codes.NOT_PERMITTED, "only for members"),
+        (AccessDeniedError("only for members"), exit_codes.NOT_PERMITTED, "only for members"),
         (KeyboardInterrupt(), exit_codes.INTERRUPTED, "interrupted"),
     ],
 )
 def test_what_was_measured_is_kept_whatever_ends_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], problem: BaseException, status: int, message: str
 ) -> None:
-    def run(desk: Desk) -> Finding:
-        Notebook(desk.folder, {}).write("10 g", {"torque_nm": 0.1})
+    def run(session: Session) -> Finding:
+        Notebook(session.folder, {}).write("10 g", {"torque_nm": 0.1})
         raise problem
 
     assert conduct_bench(options(tmp_path), "trials", run) == status
@@ -154,9 +155,9 @@ def test_what_was_measured_is_kept_whatever_ends_it(
 def test_where_nothing_was_measured_nothing_is_said_to_be_there(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def run(desk: Desk) -> Finding:
-        Notebook(desk.folder, {})
-        raise GoneError("no daemon answers")
+    def run(session: Session) -> Finding:
+        Notebook(session.folder, {})
+        raise DaemonLostError("no daemon answers")
 
     assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.NO_DAEMON
     assert capsys.readouterr().err.strip().endswith("no daemon answers")
@@ -170,8 +171,8 @@ def test_questions_go_where_data_does_not(monkeypatch: pytest.MonkeyPatch, capsy
 
 
 def test_a_disk_that_is_full_is_told_with_how_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def run(desk: Desk) -> Finding:
-        Notebook(desk.folder, {}).write("one", {})
+    def run(session: Session) -> Finding:
+        Notebook(session.folder, {}).write("one", {})
         raise OSError(ENOSPC, "No space left on device")
 
     assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.UNHEALTHY
@@ -183,8 +184,8 @@ def test_a_disk_that_is_full_is_told_with_how_to_go_on(tmp_path: Path, capsys: p
 def test_another_plan_is_not_told_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Notebook(tmp_path, {"depth_m": 0.03}).write("one", {})
 
-    def run(desk: Desk) -> Finding:
-        Notebook(desk.folder, {"depth_m": 0.05})
+    def run(session: Session) -> Finding:
+        Notebook(session.folder, {"depth_m": 0.05})
         raise AssertionError("it is refused")
 
     assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.REFUSED

@@ -12,7 +12,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.trials.log_copies import copy_since
+from experiments.robot.log_copies import copy_since
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, first_path, run_files, segment_path

@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from experiments.trials.whole_files import copy_whole
+import numpy as np
+
+from experiments.reports.whole_files import copy_whole
 from firmware_host.log.log_folder import present_path
-from firmware_host.log_reading.log_reader import read_log
+from firmware_host.log_reading.log_reader import Log, read_log
 from firmware_host.log_reading.recovery import recover_log
 
 
@@ -44,3 +46,13 @@ def _copy(log: Path, copy: Path) -> Path:
     if not read_log(copy).complete:
         recover_log(copy)
     return copy
+
+
+def cut_log(log: Log, from_s: float, to_s: float) -> Log:
+    """Return the rows between two times by the robot's clock."""
+    stamps_s = log.ticks["stamp_s"]
+    return log._replace(
+        ticks=log.ticks[np.searchsorted(stamps_s, from_s) : np.searchsorted(stamps_s, to_s, side="right")],
+        strides=[row for row in log.strides if from_s <= row["stamp_s"] <= to_s],
+        events=[row for row in log.events if from_s <= row["stamp_s"] <= to_s],
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.trials.mud_names import mud_key, mud_label, mud_name, mud_text
+from experiments.reports.mud_names import mud_key, mud_label, mud_name, mud_text
 
 
 @pytest.mark.parametrize("name", ["wet", "w", "bay=3", "watery clay", "kaolin 2", "1500 Pa"])

@@ -10,12 +10,13 @@ from contextlib import contextmanager
 from multiprocessing import active_children
 from typing import TypeVar
 
+from experiments.trials.session import Show
+
 LOOK_S = 0.5
 Outcome = TypeVar("Outcome")
-Show = Callable[[int, int], None]  # how many of how many are done
 
 
-def side_by_side(
+def run_parallel(
     trials: Sequence[Callable[[], Outcome]],
     show: Show,
     processes: int | None = None,

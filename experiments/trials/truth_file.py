@@ -1,0 +1,55 @@
+"""True coefficients of muds, taken from the summary of another experiment, such as a load cell's."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.mud_names import mud_key, mud_text
+from experiments.robot.bench_errors import BenchError
+
+TruthOfMud = dict[str, dict[str, float]]  # N/m³ by the mud's key and coefficient
+
+
+def truth_by_mud(muds: Sequence[Mapping[str, Any]]) -> TruthOfMud:
+    """Return the known coefficients of each mud of a summary. A lower bound is no truth."""
+    return {
+        mud_key(mud["mud"]): {name: mud[name]["value"] for name in COEFFICIENTS if _is_known(mud.get(name))}
+        for mud in muds
+    }
+
+
+def _is_known(coefficient: Mapping[str, Any] | None) -> bool:
+    return bool(coefficient and coefficient.get("value") and not coefficient.get("at_least"))
+
+
+def load_truth(path: Path) -> TruthOfMud:
+    """Read another experiment's summary.json, or the one in a folder. Raises BenchError."""
+    path = path / "summary.json" if path.is_dir() else path
+    try:
+        truth = truth_by_mud(json.loads(path.read_text(encoding="utf-8"))["muds"])
+        numbers = [value for mud in truth.values() for value in mud.values()]
+        if not all(isinstance(value, int | float) and value > 0.0 for value in numbers):
+            raise ValueError("coefficients must be numbers above 0")
+    except OSError as problem:
+        raise BenchError(f"--truth {path}: {problem.strerror}") from problem
+    except (ValueError, KeyError, TypeError, AttributeError) as problem:
+        raise BenchError(
+            f"--truth {path} is no summary with coefficients of muds ({problem}): "
+            "give the summary.json of 'mudskipper experiment loadcell'"
+        ) from problem
+    return truth
+
+
+def truth_in(truth: TruthOfMud, mud: str) -> dict[str, float]:
+    """Return the coefficients of one mud, however its name is written; nothing for an unknown mud."""
+    return truth.get(mud_key(mud), {})
+
+
+def missing_text(truth: TruthOfMud | None, muds: Iterable[str]) -> str:
+    """Name the muds that a truth file lacks; return nothing where it lacks none or there is no file."""
+    missing = [mud for mud in muds if truth is not None and mud_key(mud) not in truth]
+    return f"The file given with --truth says nothing of {', '.join(map(mud_text, missing))}." if missing else ""
