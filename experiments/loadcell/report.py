@@ -123,8 +123,8 @@ def position_texts(trials: Sequence[Analysed]) -> list[str]:
     return [
         f"{MEASURED}{alone}",
         f"Forces are stamped {1000.0 * common.lag_s:.1f} ± {1000.0 * common.lag_uncertainty_s:.1f} ms later than "
-        "places, as the strokes themselves tell; this and straight lines between the encoder's lines leave the depth of "
-        "a sample "
+        "places, as the strokes themselves tell; this and straight lines between the encoder's lines leave the depth "
+        "of a sample "
         f"known to within ± {1000.0 * worst_m:.2f} mm in the worst trial. Twice as fast, the mud bears "
         f"{100.0 * common.rate_fraction * (2.0**RATE_EXPONENT - 1.0):.0f} % more.",
     ]

@@ -47,7 +47,7 @@ class _Buffer:
         self.unwritten += piece
         self.length += len(piece)
 
-    def report(self) -> int:
+    def tell(self) -> int:
         return self.length
 
     def flush(self) -> None:
