@@ -1,4 +1,4 @@
-"""Conducting an experiment at the bench: what a person is asked and told, and how it ends."""
+"""Conducting an experiment: prompts on the terminal, the report, and how each ending is reported."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_an_enter_that_was_pressed_before_a_question_does_not_answer_it(monkeypa
 
 
 def test_where_nobody_can_answer_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    with typed(monkeypatch, ""), pytest.raises(EndedError, match="run it on a terminal"):
+    with typed(monkeypatch, ""), pytest.raises(EndedError, match="run this on a terminal"):
         TerminalPrompt().ask("Well?", ANSWERS, nothing)
 
 
@@ -148,7 +148,7 @@ def test_what_was_measured_is_kept_whatever_ends_it(
 
     assert conduct_bench(options(tmp_path), "trials", run) == status
     said = capsys.readouterr().err
-    assert message in said and "the same command goes on from there" in said
+    assert message in said and "the same command continues from there" in said
     assert Notebook(tmp_path, {}).begun
 
 
@@ -178,7 +178,7 @@ def test_a_disk_that_is_full_is_told_with_how_to_go_on(tmp_path: Path, capsys: p
     assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.UNHEALTHY
     reported = capsys.readouterr().err
     assert f"{tmp_path}: No space left on device" in reported
-    assert "the same command goes on from there" in reported
+    assert "the same command continues from there" in reported
 
 
 def test_another_plan_is_not_told_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
