@@ -81,8 +81,9 @@ class RowList(NullRecorder):
         super().__init__()
         self.rows: list[tuple[int, bytes]] = []
 
-    def put(self, kind: int, row: bytes) -> None:
-        self.rows.append((kind, row))
+    def put(self, kind_index: int, payload: bytes) -> bool:
+        self.rows.append((kind_index, payload))
+        return True
 
 
 def record_lockstep(folder: Path) -> None:

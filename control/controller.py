@@ -22,14 +22,18 @@ from control.joint_pd import ArmMass, JointGains, damping_torques_nm, joint_torq
 from control.modes import MOVING, Mode
 from control.monitors.stillness import Stillness
 from control.records import (
+    JOINTS,
     NO_TORQUE,
     DriveStates,
     GaitTarget,
     JointAngles,
+    Joints,
     JointTarget,
     JointTargets,
     Phase,
     Torques,
+    same_for_all,
+    same_for_both,
 )
 
 
@@ -55,7 +59,7 @@ DAMPING_S = 3.0  # longest, for joints that do not come to rest
 SETTLED_S = 0.3  # that all joints have to rest
 SETTLED_RAD = 0.02  # and stay where they are to within
 DAMPING_NM = 0.4  # at most, of each joint: half of what the motors may do
-ALL_TRUSTED = (True, True, True, True)
+ALL_TRUSTED = same_for_all(True)
 
 
 class WalkOrder(NamedTuple):
@@ -65,7 +69,7 @@ class WalkOrder(NamedTuple):
 
 
 def measured_angles(states: DriveStates) -> JointAngles:
-    return states[0].angle_rad, states[1].angle_rad, states[2].angle_rad, states[3].angle_rad
+    return states.map(lambda state: state.angle_rad)
 
 
 RESTING = GaitTarget(Phase.REST, -1, 0.0, 0.0, 0.0, 0.0)
@@ -95,12 +99,12 @@ class Controller:
         self._mode = Mode.IDLE
         self._path: JointPath | None = None
         self._move: JointPath | None = None  # to another pose, in hold
-        self._pose: JointTargets = still((0.0, 0.0, 0.0, 0.0))
+        self._pose: JointTargets = still(same_for_all(0.0))
         self._fade = 0.0
         self._up = False
         self._waited_s = 0.0  # since the path that ends a walk arrived
         self.cut_short = False  # the pose that is held is one out of a walk, perhaps in the mud
-        self._stillness = tuple(Stillness(SETTLED_RAD) for _ in range(4))
+        self._stillness = [Stillness(SETTLED_RAD) for _ in JOINTS]
         self._since_s = self._resting_s = 0.0  # the mode began, all joints rest
         self.target = RESTING
 
@@ -136,9 +140,9 @@ class Controller:
 
     def move(self, angles: Sequence[float | None]) -> None:
         """In hold, take these joints slowly there, in the order of JOINTS; None: where it is held."""
-        held = tuple(target.angle_rad for target in self._pose)
-        a, b, c, d = (there if there is not None else here for there, here in zip(angles, held, strict=True))
-        self._move = JointPath((held[0], held[1], held[2], held[3]), [(a, b, c, d)], self.motion.path_speed_rad_s)
+        held = self._pose.map(lambda target: target.angle_rad)
+        there = Joints(*(angle if angle is not None else here for angle, here in zip(angles, held, strict=True)))
+        self._move = JointPath(held, [there], self.motion.path_speed_rad_s)
 
     @property
     def fault(self) -> Fault | None:
@@ -147,14 +151,14 @@ class Controller:
         return _held_by_the_mud(held, self.recovery.parameters.attempts) if held else None
 
     def is_up(self, states: DriveStates) -> bool:
-        return all(abs(states[joint].angle_rad) < UP_RAD for joint in (1, 3))
+        return abs(states.left_adduction.angle_rad) < UP_RAD and abs(states.right_adduction.angle_rad) < UP_RAD
 
     def step(
         self,
         dt_s: float,
         mode: Mode,
         states: DriveStates,
-        trusted: tuple[bool, ...] = ALL_TRUSTED,
+        trusted: Joints[bool] = ALL_TRUSTED,
         elapsed_s: float = 0.0,
     ) -> Torques:
         """Torques wanted of the four joints; `target` then says where in the stride they belong to.
@@ -177,7 +181,7 @@ class Controller:
             self._waited_s += elapsed_s
         return joint_torques_nm(self._targets(dt_s, mode, states), states, self.gains, self.mass, self._fade)
 
-    def _damp(self, elapsed_s: float, states: DriveStates, trusted: tuple[bool, ...]) -> Torques:
+    def _damp(self, elapsed_s: float, states: DriveStates, trusted: Joints[bool]) -> Torques:
         still = [each.update(state.angle_rad, elapsed_s) for each, state in zip(self._stillness, states, strict=True)]
         rests = all(quiet or not trust for quiet, trust in zip(still, trusted, strict=True))
         self._resting_s = self._resting_s + elapsed_s if rests else 0.0
@@ -205,11 +209,11 @@ class Controller:
 
     def _raised(self, angles: JointAngles) -> JointAngles:
         """Arms level: the lower edge clears the mud by H - h."""
-        return angles[0], 0.0, angles[2], 0.0
+        return angles._replace(left_adduction=0.0, right_adduction=0.0)
 
     def _path_to_start(self, here: JointAngles) -> JointPath:
         front = radians(self.gait.parameters.sweep_angle_deg)
-        way_points = [self._raised(here), (front, 0.0, front, 0.0)]
+        way_points = [self._raised(here), same_for_both(front, 0.0)]
         return JointPath(here, way_points, self.motion.path_speed_rad_s)
 
     def _targets(self, dt_s: float, mode: Mode, states: DriveStates) -> JointTargets:
@@ -246,7 +250,7 @@ class Controller:
             target.sweep_rad, angle_rad, target.sweep_velocity_rad_s, target.depth_velocity_m_s
         )
         adduction = JointTarget(angle_rad, velocity_rad_s)
-        return sweep, adduction, sweep, adduction
+        return same_for_both(sweep, adduction)
 
 
 def _held_by_the_mud(flippers: Sequence[str], attempts: int) -> Fault:

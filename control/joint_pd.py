@@ -10,7 +10,15 @@ from math import cos, sin
 from typing import Annotated
 
 from control.bounds import Bounds, Meaning
-from control.records import DriveState, DriveStates, JointTarget, JointTargets, Torques
+from control.records import (
+    DriveState,
+    DriveStates,
+    Joints,
+    JointTarget,
+    JointTargets,
+    Torques,
+    same_for_both,
+)
 
 GRAVITY_M_S2 = 9.81
 
@@ -57,19 +65,21 @@ def joint_torques_nm(
     targets: JointTargets, states: DriveStates, gains: JointGains, mass: ArmMass, fade: float
 ) -> Torques:
     """Of all four joints; `fade` goes from 0 to 1 after arming, so that nothing jerks."""
-    left = _flipper_torques_nm(targets[0], targets[1], states[0], states[1], gains, mass)
-    right = _flipper_torques_nm(targets[2], targets[3], states[2], states[3], gains, mass)
-    return fade * left[0], fade * left[1], fade * right[0], fade * right[1]
+    left_sweep, left_adduction, right_sweep, right_adduction = states  # cheaper on every tick than `states.left`
+    left = _flipper_torques_nm(targets.left_sweep, targets.left_adduction, left_sweep, left_adduction, gains, mass)
+    right = _flipper_torques_nm(targets.right_sweep, targets.right_adduction, right_sweep, right_adduction, gains, mass)
+    return Joints(fade * left[0], fade * left[1], fade * right[0], fade * right[1])
 
 
-def damping_torques_nm(states: DriveStates, gains: JointGains, trusted: tuple[bool, ...], largest_nm: float) -> Torques:
+def damping_torques_nm(states: DriveStates, gains: JointGains, trusted: Joints[bool], largest_nm: float) -> Torques:
     """Of four joints that are braked and not held: τ = -d ω, at most `largest_nm`, and none by an untrusted encoder."""
-    dampings = (gains.sweep_damping_nm_s_rad, gains.adduction_damping_nm_s_rad) * 2
-    a, b, c, d = (
-        min(max(-damping * state.velocity_rad_s, -largest_nm), largest_nm) if trust else 0.0
-        for damping, state, trust in zip(dampings, states, trusted, strict=True)
+    dampings = same_for_both(gains.sweep_damping_nm_s_rad, gains.adduction_damping_nm_s_rad)
+    return Joints(
+        *(
+            min(max(-damping * state.velocity_rad_s, -largest_nm), largest_nm) if trust else 0.0
+            for damping, state, trust in zip(dampings, states, trusted, strict=True)
+        )
     )
-    return a, b, c, d
 
 
 def _flipper_torques_nm(

@@ -12,7 +12,7 @@ from math import isfinite
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds, Meaning
-from control.records import DriveState, DriveStates, Torques
+from control.records import DriveState, DriveStates, Joints, Torques
 
 VELOCITY_FADE = 0.2  # torque that speeds a joint up fades out over this last part of the velocity limit
 
@@ -94,7 +94,7 @@ def apply_limits(
     previous_nm: Torques,
     states: DriveStates,
     limits: JointLimits,
-    ranges: tuple[JointRange, JointRange, JointRange, JointRange],
+    ranges: Joints[JointRange],
     dt_s: float,
 ) -> LimitedTorques:
     """See the module. Anything that is not a finite number, wanted or measured, turns all four torques to zero."""
@@ -105,5 +105,5 @@ def apply_limits(
         for wanted, previous, state, span in zip(wanted_nm, previous_nm, states, ranges, strict=True)
     )
     if not isfinite(a + b + c + d):
-        return LimitedTorques((0.0, 0.0, 0.0, 0.0), True, False)
-    return LimitedTorques((a, b, c, d), (a, b, c, d) != wanted_nm, True)
+        return LimitedTorques(Joints(0.0, 0.0, 0.0, 0.0), True, False)
+    return LimitedTorques(Joints(a, b, c, d), (a, b, c, d) != wanted_nm, True)

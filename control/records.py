@@ -8,14 +8,66 @@ seconds of the monotonic clock. A value that was never measured is NaN, a stamp 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
-JOINTS = ("left_sweep", "left_adduction", "right_sweep", "right_adduction")
+T = TypeVar("T")
+U = TypeVar("U")
+
 FLIPPERS = ("left", "right")
 NEVER_S = float("-inf")
 UNKNOWN = float("nan")
+
+
+class FlipperJoints(NamedTuple, Generic[T]):
+    """One value for each joint of one flipper."""
+
+    sweep: T
+    adduction: T
+
+
+class Joints(NamedTuple, Generic[T]):
+    """One value for each joint of the robot: `states.left.adduction`, or `states.left_adduction`.
+
+    It iterates in the order of JOINTS. The four values are stored flat and not as two pairs because the loop, the
+    gate and the log iterate over all joints several times a tick.
+    """
+
+    left_sweep: T
+    left_adduction: T
+    right_sweep: T
+    right_adduction: T
+
+    @property
+    def left(self) -> FlipperJoints[T]:
+        return FlipperJoints(self.left_sweep, self.left_adduction)
+
+    @property
+    def right(self) -> FlipperJoints[T]:
+        return FlipperJoints(self.right_sweep, self.right_adduction)
+
+    def map(self, function: Callable[[T], U]) -> Joints[U]:
+        """Apply a function to the value of each joint."""
+        return Joints(*map(function, self))
+
+    def of(self, joint: str) -> T:
+        """Return the value of the joint with this name, one of JOINTS."""
+        return self[JOINTS.index(joint)]
+
+
+JOINTS = Joints._fields
+
+
+def same_for_all(value: T) -> Joints[T]:
+    """Give every joint the same value."""
+    return Joints(value, value, value, value)
+
+
+def same_for_both(sweep: T, adduction: T) -> Joints[T]:
+    """Give both flippers the same values."""
+    return Joints(sweep, adduction, sweep, adduction)
 
 
 class Phase(IntEnum):
@@ -50,9 +102,9 @@ class DriveState(NamedTuple):
     bus_voltage_stamp_s: float = NEVER_S
 
 
-DriveStates = tuple[DriveState, DriveState, DriveState, DriveState]  # in the order of JOINTS
-Torques = tuple[float, float, float, float]  # N·m, in the order of JOINTS
-NO_TORQUE: Torques = (0.0, 0.0, 0.0, 0.0)
+DriveStates = Joints[DriveState]
+Torques = Joints[float]  # N·m
+NO_TORQUE: Torques = same_for_all(0.0)
 
 
 class JointTarget(NamedTuple):
@@ -60,8 +112,8 @@ class JointTarget(NamedTuple):
     velocity_rad_s: float
 
 
-JointTargets = tuple[JointTarget, JointTarget, JointTarget, JointTarget]  # in the order of JOINTS
-JointAngles = tuple[float, float, float, float]  # rad, in the order of JOINTS
+JointTargets = Joints[JointTarget]
+JointAngles = Joints[float]  # rad
 
 
 class GaitTarget(NamedTuple):

@@ -14,7 +14,7 @@ from control.faults import Fault
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
 from control.monitors.joint_monitor import JointFacts, JointMonitor
-from control.records import JOINTS, NEVER_S, BodyPose, DriveStates
+from control.records import JOINTS, NEVER_S, BodyPose, DriveStates, Joints
 from drivers.can.can_port import BusState
 from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import error_text
@@ -94,7 +94,7 @@ class FaultMonitor:
         self._refused_commands = self._drives.gate.refused
         self._pose_stamp_s: float | None = None
         self._broken: set[str] = set()  # encoders, until torque is off
-        self.trusted: tuple[bool, ...] = ALL_TRUSTED  # of the joints' encoders
+        self.trusted: Joints[bool] = ALL_TRUSTED  # of the joints' encoders
 
     def with_winding_heat(self, states: DriveStates) -> DriveStates:
         """With the temperatures that the watches believe, where one is warm enough for the limits to heed it."""
@@ -102,11 +102,12 @@ class FaultMonitor:
             state.temperature_c > self._warm_c for state in states
         ):
             return states
-        a, b, c, d = (
-            state._replace(temperature_c=joint.winding.temperature_c)
-            for joint, state in zip(self.joints, states, strict=True)
+        return Joints(
+            *(
+                state._replace(temperature_c=joint.winding.temperature_c)
+                for joint, state in zip(self.joints, states, strict=True)
+            )
         )
-        return a, b, c, d
 
     def update(self, tick: Tick, monitor_input: MonitorInput) -> list[Fault]:
         """Everything that is wrong in this tick."""
@@ -176,7 +177,7 @@ class FaultMonitor:
             self._broken.clear()
         self._broken.update(fault.subject for fault in found if fault.name in BROKEN)
         blind = self._broken.union(fault.subject for fault in found if fault.name in BLIND)
-        self.trusted = tuple(joint not in blind for joint in JOINTS) if blind else ALL_TRUSTED
+        self.trusted = Joints(*(joint not in blind for joint in JOINTS)) if blind else ALL_TRUSTED
 
     def _watch_arming(self, found: list[Fault], states: DriveStates) -> None:
         for joint, state in zip(JOINTS, states, strict=True):

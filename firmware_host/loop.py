@@ -16,7 +16,17 @@ from control.faults import Fault, Reaction
 from control.gait.recovery import Recovery
 from control.limits import LimitedTorques, apply_limits
 from control.modes import ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
-from control.records import NEVER_S, NO_TORQUE, BodyPose, DriveState, DriveStates, GaitTarget, Torques
+from control.records import (
+    NEVER_S,
+    NO_TORQUE,
+    BodyPose,
+    DriveState,
+    DriveStates,
+    GaitTarget,
+    Joints,
+    Torques,
+    same_for_all,
+)
 from drivers.odrive.drives import OdriveDrives
 from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
@@ -58,7 +68,7 @@ class Loop:
         self._clock, self._wall_clock = clock, wall_clock
         self._ranges = configuration.joint_ranges
         self.mode = Mode.BOOT
-        self.states: DriveStates = (DriveState(), DriveState(), DriveState(), DriveState())
+        self.states: DriveStates = same_for_all(DriveState())
         self.body = BodyPose()
         self.sent = LimitedTorques(NO_TORQUE, False, True)
         self.health = Health()
@@ -224,7 +234,7 @@ class Loop:
             self.drives.disarm(now_s, at_once=True)
         self.mode, self._mode_since_s = mode, now_s
 
-    def _trusted(self) -> tuple[bool, ...]:
+    def _trusted(self) -> Joints[bool]:
         return self._fault_monitor.trusted if self.mode is Mode.DAMPING else ALL_TRUSTED
 
     def _limit(self, wanted: Torques) -> LimitedTorques:

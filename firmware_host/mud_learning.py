@@ -11,7 +11,7 @@ from typing import NamedTuple
 from control.controller import Controller
 from control.fault_kinds import make_fault
 from control.faults import Fault
-from control.records import BodyPose, DriveStates, Estimate, Phase, StrideEstimate
+from control.records import BodyPose, DriveStates, Estimate, Joints, Phase, StrideEstimate
 from estimation.mud import MudEstimator, MudReading
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.depth_methods import adaptation_of, choice_text
@@ -56,7 +56,7 @@ class MudLearning:
         self.reading = self.estimator.update(
             now_s,
             phase,
-            (a.angle_rad, b.angle_rad, c.angle_rad, d.angle_rad),
+            Joints(a.angle_rad, b.angle_rad, c.angle_rad, d.angle_rad),
             (a.velocity_rad_s, b.velocity_rad_s, c.velocity_rad_s, d.velocity_rad_s),
             (a.current_a, b.current_a, c.current_a, d.current_a),
             body.x_m,

@@ -21,7 +21,7 @@ from benchmarks.example_robot import load_example
 from benchmarks.report import Progress, new_parser, print_report, verdict
 from benchmarks.stress.resources import resident_kib
 from control.modes import Mode
-from control.records import JOINTS
+from control.records import JOINTS, Joints
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus, MockPort
 from drivers.odrive import codec
@@ -155,7 +155,7 @@ def fuzz_drives(configuration: Configuration, frames: int, fuzzing: Fuzzing, pro
             drives.request_versions(now_s)
             drives.request_watchdogs(now_s)
             drives.disarm(now_s)
-            drives.send((0.0, 0.0, 0.0, 0.0))
+            drives.send(Joints(0.0, 0.0, 0.0, 0.0))
         except Exception as problem:  # noqa: BLE001  that none comes is what is measured
             fuzzing.exceptions.append(repr(problem))
         look(fuzzing, far, number, frames // FRAMES_PER_TICK)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from control.gait.gait import smooth_progress
-from control.records import JointAngles, JointTarget, JointTargets
+from control.records import JointAngles, Joints, JointTarget, JointTargets
 
 SHORTEST_LEG_S = 0.1
 
@@ -39,14 +39,14 @@ class JointPath:
             return still(self._points[-1])
         fraction, rate = smooth_progress(self._time_s, self._durations_s[self._leg])
         start, end = self._points[self._leg], self._points[self._leg + 1]
-        a, b, c, d = (
-            JointTarget(from_rad + (to_rad - from_rad) * fraction, (to_rad - from_rad) * rate)
-            for from_rad, to_rad in zip(start, end, strict=True)
+        return Joints(
+            *(
+                JointTarget(from_rad + (to_rad - from_rad) * fraction, (to_rad - from_rad) * rate)
+                for from_rad, to_rad in zip(start, end, strict=True)
+            )
         )
-        return a, b, c, d
 
 
 def still(angles: JointAngles) -> JointTargets:
     """Targets that hold a pose."""
-    a, b, c, d = angles
-    return JointTarget(a, 0.0), JointTarget(b, 0.0), JointTarget(c, 0.0), JointTarget(d, 0.0)
+    return angles.map(lambda angle_rad: JointTarget(angle_rad, 0.0))

@@ -34,7 +34,7 @@ from control.gait.gait import RAMP_S, GaitParameters, swing_duration_s
 from control.gait.joint_path import still
 from control.geometry import FlipperGeometry
 from control.limits import JointRange
-from control.records import FLIPPERS, DriveStates, JointTarget, JointTargets
+from control.records import FLIPPERS, DriveStates, Joints, JointTarget, JointTargets, same_for_all, same_for_both
 
 OUT_M = 0.003  # depth of the plate's lowest point up to which a flipper counts as out of the mud
 RISE_S = 0.2  # to reach the height of the swing
@@ -95,13 +95,13 @@ class Recovery:
         parameters: RecoveryParameters,
         geometry: FlipperGeometry,
         gait: GaitParameters,
-        ranges: tuple[JointRange, JointRange, JointRange, JointRange],
+        ranges: Joints[JointRange],
     ) -> None:
         self.parameters = parameters
         self.geometry = geometry
         self._ranges = ranges
         swing_s = swing_duration_s(gait, geometry)
-        self._fade_s = (swing_s, min(RISE_S, swing_s), swing_s, min(RISE_S, swing_s))
+        self._fade_s = same_for_both(swing_s, min(RISE_S, swing_s))
         self.reset()
 
     def reset(self) -> None:
@@ -110,7 +110,7 @@ class Recovery:
         self.events = ""  # of this step, for the log
         self._waits = False
         self._time_s = 0.0  # since the wait, the attempt or the swing after it began
-        self._targets: JointTargets = still((0.0, 0.0, 0.0, 0.0))
+        self._targets: JointTargets = still(same_for_all(0.0))
         self._way = -1.0  # the way of the sweep: 1 forward, -1 to the rear
         self._gaps: tuple[Gap, ...] = ()
 
@@ -118,8 +118,11 @@ class Recovery:
         """The flippers in the mud, or none where the gait does not wait for them."""
         if not self.parameters.attempts:
             return ()
-        pairs = zip(FLIPPERS, states[::2], states[1::2], strict=True)
-        return tuple(name for name, sweep, lift in pairs if is_in_mud(self.geometry, sweep.angle_rad, lift.angle_rad))
+        return tuple(
+            flipper
+            for flipper, (sweep, lift) in zip(FLIPPERS, (states.left, states.right), strict=True)
+            if is_in_mud(self.geometry, sweep.angle_rad, lift.angle_rad)
+        )
 
     def step(self, dt_s: float, stuck: Sequence[str], states: DriveStates, wanted: JointTargets) -> JointTargets:
         """The gait's targets, or others while it waits for the flippers that are `stuck`."""
@@ -146,9 +149,9 @@ class Recovery:
             return
         self.attempt += 1
         self._time_s = 0.0
-        a, b, c, d = (state.angle_rad for state in states)
-        self._targets = still((a, b, c, d))
-        positions_rad = dict(zip(FLIPPERS, (a, c), strict=True))
+        angles_rad = states.map(lambda state: state.angle_rad)
+        self._targets = still(angles_rad)
+        positions_rad = {"left": angles_rad.left_sweep, "right": angles_rad.right_sweep}
         self._way = -1.0 if self.attempt == 1 else copysign(1.0, sum(positions_rad[name] for name in stuck))
         self.events = f"{_are_stuck(stuck)}, attempt {self.attempt} of {self.parameters.attempts}"
 
@@ -159,26 +162,24 @@ class Recovery:
             return self._targets
         way = self._way if pulled_s / self.parameters.rock_s % 1.0 < AWAY_FRACTION else -self._way
         speed_rad_s = min(pulled_s / RAMP_S, 1.0) * self.parameters.lift_rad_s
-        pairs = zip(FLIPPERS, self._targets[::2], self._targets[1::2], states[::2], states[1::2], strict=True)
-        (a, b), (c, d) = (
-            (
-                self._before(way, sweep.angle_rad) if name in stuck else sweep_target,
-                self._raised(dt_s * speed_rad_s, dt_s, lift_target, lift.angle_rad),
-            )
-            for name, sweep_target, lift_target, sweep, lift in pairs
+        step_rad, targets = dt_s * speed_rad_s, self._targets
+        self._targets = Joints(
+            self._before(way, states.left_sweep.angle_rad) if "left" in stuck else targets.left_sweep,
+            self._raised(step_rad, dt_s, targets.left_adduction, states.left_adduction.angle_rad),
+            self._before(way, states.right_sweep.angle_rad) if "right" in stuck else targets.right_sweep,
+            self._raised(step_rad, dt_s, targets.right_adduction, states.right_adduction.angle_rad),
         )
-        self._targets = a, b, c, d
         return self._targets
 
     def _before(self, way: float, here_rad: float) -> JointTarget:
         """Full torque, up to the joint's limit."""
-        return JointTarget(_within(here_rad + way * radians(self.parameters.lead_deg), *self._ranges[0]), 0.0)
+        return JointTarget(_within(here_rad + way * radians(self.parameters.lead_deg), *self._ranges.left_sweep), 0.0)
 
     def _raised(self, step_rad: float, dt_s: float, target: JointTarget, here_rad: float) -> JointTarget:
         """One step on the way to a level arm, close to where the joint is and within its limits."""
         lead_rad = radians(self.parameters.lead_deg)
         angle_rad = _within(0.0, target.angle_rad - step_rad, target.angle_rad + step_rad)
-        angle_rad = _within(_within(angle_rad, here_rad - lead_rad, here_rad + lead_rad), *self._ranges[1])
+        angle_rad = _within(_within(angle_rad, here_rad - lead_rad, here_rad + lead_rad), *self._ranges.left_adduction)
         return JointTarget(angle_rad, _within((angle_rad - target.angle_rad) / dt_s, -step_rad / dt_s, step_rad / dt_s))
 
     def _leave(self, wanted: JointTargets) -> None:
@@ -197,11 +198,12 @@ class Recovery:
         rests = [gap.after(self._time_s) for gap in self._gaps]
         if self._time_s >= max(self._fade_s):
             self._gaps = ()
-        a, b, c, d = (
-            JointTarget(_within(gait.angle_rad + rest.angle_rad, *span), gait.velocity_rad_s + rest.velocity_rad_s)
-            for gait, rest, span in zip(wanted, rests, self._ranges, strict=True)
+        return Joints(
+            *(
+                JointTarget(_within(gait.angle_rad + rest.angle_rad, *span), gait.velocity_rad_s + rest.velocity_rad_s)
+                for gait, rest, span in zip(wanted, rests, self._ranges, strict=True)
+            )
         )
-        return a, b, c, d
 
 
 def _within(value: float, low: float, high: float) -> float:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 
 from control.limits import JointLimits
-from control.records import JOINTS, NEVER_S, DriveStates, Torques
+from control.records import JOINTS, NEVER_S, DriveStates, Joints, Torques
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.odrive.axis import DriveParameters as DriveParameters  # for whoever configures drives
@@ -74,7 +74,7 @@ class OdriveDrives:
                 except GarbledMessageError:
                     self.garbled_frames += 1
         a, b, c, d = self.axes
-        return a.state, b.state, c.state, d.state
+        return Joints(a.state, b.state, c.state, d.state)
 
     def _receivers_on(self, bus: str) -> dict[int, Callable[[bytes, float], None]]:
         table: dict[int, Callable[[bytes, float], None]] = {}

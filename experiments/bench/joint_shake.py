@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from math import nan
 
-from control.records import NO_TORQUE, DriveStates, Torques
+from control.records import NO_TORQUE, DriveStates, Joints, Torques
 from experiments.bench.reading import Reading
 from experiments.bench.test_rig import Stand, joint_place
 from experiments.robot.bench_robot import BenchError
@@ -69,7 +69,7 @@ class Shake:
             return NO_TORQUE
         torque_nm = -self._torque_nm if HALF_TICKS <= tick < 3 * HALF_TICKS else self._torque_nm
         a, b, c, d = (torque_nm if place == self._place else 0.0 for place in range(4))
-        return a, b, c, d
+        return Joints(a, b, c, d)
 
 
 def shake(stand: Stand, joint: str) -> Shake:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from math import degrees, inf
 
 from control.controller import measured_angles
-from control.records import JOINTS, JointAngles
+from control.records import JOINTS, JointAngles, Joints
 from experiments.bench.reading import Reading, Readings, left_out
 from experiments.bench.stroke_tracking import WALK_DEPTH_M
 from experiments.bench.test_rig import LOOK_S, Sample, Stand, joint_place
@@ -79,4 +79,4 @@ def _angles(sample: Sample) -> JointAngles:
 
 def _mean_angles(samples: list[Sample]) -> JointAngles:
     a, b, c, d = (sum(angles) / len(samples) for angles in zip(*map(_angles, samples), strict=True))
-    return a, b, c, d
+    return Joints(a, b, c, d)

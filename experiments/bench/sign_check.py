@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import nan, radians
 
 from control.controller import measured_angles
-from control.records import JOINTS, NO_TORQUE, DriveStates, Torques
+from control.records import JOINTS, NO_TORQUE, DriveStates, JointAngles, Joints, Torques
 from experiments.bench.joint_shake import answer, idle, shake
 from experiments.bench.operator import WAYS, Sight
 from experiments.bench.reading import Reading, Readings, left_out
@@ -48,7 +48,7 @@ class Nudge:
             self.torque_nm += STEP_NM
         self._ticks += 1
         a, b, c, d = (self.torque_nm if place == self.place else 0.0 for place in range(4))
-        return a, b, c, d
+        return Joints(a, b, c, d)
 
 
 def nudged(stand: Stand, joint: str) -> Readings:
@@ -96,7 +96,7 @@ def _agreement(joint: str, begun: DriveStates, samples: list[Sample], nudge: Nud
 def gently(held: Torques, states: DriveStates) -> Torques:
     """A law: what holds the pose, as far as a tiny torque can."""
     a, b, c, d = (min(max(torque_nm, -MOST_NM), MOST_NM) for torque_nm in held)
-    return a, b, c, d
+    return Joints(a, b, c, d)
 
 
 def shown(stand: Stand, joint: str) -> Readings:
@@ -119,6 +119,5 @@ def shown(stand: Stand, joint: str) -> Readings:
     yield Reading(what, sight is Sight.RIGHT, "", 1, 1, sight.value.format(joint=joint))
 
 
-def _with(angles: tuple[float, float, float, float], place: int, more_rad: float) -> tuple[float, float, float, float]:
-    a, b, c, d = (angle + more_rad * (place == other) for other, angle in enumerate(angles))
-    return a, b, c, d
+def _with(angles: JointAngles, place: int, more_rad: float) -> JointAngles:
+    return Joints(*(angle + more_rad * (place == other) for other, angle in enumerate(angles)))

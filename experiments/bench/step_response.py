@@ -14,7 +14,7 @@ from random import Random
 from statistics import median
 from typing import NamedTuple
 
-from control.records import NO_TORQUE, DriveStates, Torques
+from control.records import NO_TORQUE, DriveStates, Joints, Torques
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Sample, Stand, joint_place
 
@@ -52,7 +52,7 @@ class Pulses:
         pulse_nm = self._pulse_nm(self._tick)
         self._tick += 1
         a, b, c, d = (pulse_nm if place == self.place else 0.0 for place in range(4))
-        return a, b, c, d
+        return Joints(a, b, c, d)
 
     def _pulse_nm(self, tick: int) -> float:
         for begins, sign in self.schedule:

@@ -16,7 +16,7 @@ from math import degrees, nan, radians
 from control.controller import ALL_TRUSTED, DAMPING_NM, RAISING_S, SOFT_STOP_S, measured_angles
 from control.joint_pd import damping_torques_nm
 from control.modes import Mode, Request
-from control.records import DriveStates, JointAngles, Phase, Torques
+from control.records import DriveStates, JointAngles, Joints, Phase, Torques
 from drivers.odrive.axis import OdriveAxis
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.stroke_tracking import FAST_RAD_S, order_strides
@@ -84,7 +84,7 @@ def _brake(stand: Stand, states: DriveStates) -> Torques:
 def torque_off(stand: Stand) -> Readings:
     stand.rise()
     sweep, adduction = STARTING
-    stand.move([(sweep, adduction, sweep, adduction)])
+    stand.move([Joints(sweep, adduction, sweep, adduction)])
     stand.controller.law = push(stand)
     pushed = stand.run_for(PUSH_TICKS * PERIOD_S)
     begun = stand.loop.states
@@ -104,7 +104,7 @@ def torque_off(stand: Stand) -> Readings:
 def push(stand: Stand) -> Law:
     """Forward and up, by the same current in each motor."""
     a, b, c, d = (PUSH_A * axis.parameters.torque_constant_nm_a for axis in stand.drives.axes)
-    return lambda held, states: (a, b, c, d)
+    return lambda held, states: Joints(a, b, c, d)
 
 
 def _off_readings(axis: OdriveAxis, pushed: Sequence[Sample], samples: Sequence[Sample], place: int) -> Readings:
@@ -122,7 +122,7 @@ def _off_readings(axis: OdriveAxis, pushed: Sequence[Sample], samples: Sequence[
 
 
 def _swept(sweep_rad: float) -> JointAngles:
-    return sweep_rad, 0.0, sweep_rad, 0.0
+    return Joints(sweep_rad, 0.0, sweep_rad, 0.0)
 
 
 def _is_fast(sample: Sample, speed_rad_s: float) -> bool:

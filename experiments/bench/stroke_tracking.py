@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from control.controller import WalkOrder
 from control.gait.gait import stride_duration_s
 from control.modes import Mode, Request
-from control.records import JOINTS, JointAngles
+from control.records import JOINTS, JointAngles, Joints
 from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Sample, Stand
@@ -53,9 +53,9 @@ class Tracking(NamedTuple):
 def stroke(stand: Stand, speed_rad_s: float) -> list[Sample]:
     """All joints to and fro about level."""
     sweep, adduction = STROKE
-    front: JointAngles = (sweep, adduction, sweep, adduction)
-    back: JointAngles = (-sweep, -adduction, -sweep, -adduction)
-    samples = stand.move([front, back] * STROKES + [(0.0, 0.0, 0.0, 0.0)], speed_rad_s)
+    front: JointAngles = Joints(sweep, adduction, sweep, adduction)
+    back: JointAngles = Joints(-sweep, -adduction, -sweep, -adduction)
+    samples = stand.move([front, back] * STROKES + [Joints(0.0, 0.0, 0.0, 0.0)], speed_rad_s)
     stand.run_for(0.3)
     return samples
 

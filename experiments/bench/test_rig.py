@@ -14,7 +14,7 @@ from control.controller import ALL_TRUSTED, Controller, measured_angles
 from control.faults import Fault, Reaction
 from control.gait.joint_path import JointPath, still
 from control.modes import ENERGISED, Mode, Request
-from control.records import JOINTS, DriveStates, JointAngles, JointTargets, Torques
+from control.records import JOINTS, DriveStates, JointAngles, Joints, JointTargets, Torques, same_for_all
 from experiments.bench.lateness import Lateness
 from experiments.bench.operator import Attendant
 from experiments.bench.rig import Rig
@@ -25,7 +25,7 @@ ARMING_S = 5.0  # for faults of before to be over, and for the drives to go into
 IDLING_S = 2.0
 LOOK_S = 0.1  # while a person does something
 GOODBYE_FRAMES = 5  # to each drive, where nothing else helps
-LEVEL: JointAngles = (0.0, 0.0, 0.0, 0.0)
+LEVEL: JointAngles = same_for_all(0.0)
 
 Law = Callable[[Torques, DriveStates], Torques]  # from what holds the pose to what is wanted in its place
 
@@ -50,7 +50,7 @@ class BenchController(Controller):
     def follow(self, way_points: Sequence[JointAngles], speed_rad_s: float) -> None:
         """In hold, from the pose that is held through others."""
         a, b, c, d = (target.angle_rad for target in self._pose)
-        self._move = JointPath((a, b, c, d), way_points, speed_rad_s)
+        self._move = JointPath(Joints(a, b, c, d), way_points, speed_rad_s)
 
     def hold(self, angles: JointAngles) -> None:
         self._move, self._pose = None, still(angles)
@@ -60,7 +60,7 @@ class BenchController(Controller):
         dt_s: float,
         mode: Mode,
         states: DriveStates,
-        trusted: tuple[bool, ...] = ALL_TRUSTED,
+        trusted: Joints[bool] = ALL_TRUSTED,
         elapsed_s: float = 0.0,
     ) -> Torques:
         torques_nm = super().step(dt_s, mode, states, trusted, elapsed_s)

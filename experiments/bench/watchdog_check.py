@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import nan
 
-from control.records import JOINTS, DriveStates, Torques
+from control.records import JOINTS, DriveStates, Joints, Torques
 from drivers.odrive import codec
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Sample, Stand, first_lasting
@@ -25,7 +25,7 @@ GONE_TICKS = 5  # in a row, with less than that
 
 def press(held: Torques, states: DriveStates) -> Torques:
     """A law: down, with the adduction motors alone."""
-    return 0.0, -PRESSING_NM, 0.0, -PRESSING_NM
+    return Joints(0.0, -PRESSING_NM, 0.0, -PRESSING_NM)
 
 
 def let_watchdogs_trip(stand: Stand) -> tuple[list[Sample], list[Sample]]:

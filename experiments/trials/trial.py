@@ -14,7 +14,7 @@ from typing import NamedTuple
 from control.controller import WalkOrder
 from control.gait.gait import SINGLE_FLIPPER, GaitParameters
 from control.mud_estimate import MudEstimate
-from control.records import UNKNOWN, JointAngles, Phase, StrideEstimate
+from control.records import UNKNOWN, JointAngles, Joints, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
 from estimation.mud import Ages, Currents, EstimationParameters, JointVelocities, MudEstimator
 from firmware_host.configuration.configuration import Configuration, parse_configuration
@@ -119,7 +119,7 @@ def _sample_of(lockstep: Lockstep) -> Sample:
     return Sample(
         now_s,
         lockstep.loop.target_before.phase,
-        (a.angle_rad, b.angle_rad, c.angle_rad, d.angle_rad),
+        Joints(a.angle_rad, b.angle_rad, c.angle_rad, d.angle_rad),
         (a.velocity_rad_s, b.velocity_rad_s, c.velocity_rad_s, d.velocity_rad_s),
         (a.current_a, b.current_a, c.current_a, d.current_a),
         lockstep.loop.body.x_m,

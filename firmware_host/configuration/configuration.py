@@ -23,7 +23,7 @@ from control.joint_pd import ArmMass, JointGains
 from control.limits import JointLimits, JointRange
 from control.monitors.joint_monitor import FaultBounds
 from control.monitors.winding import WindingParameters
-from control.records import JOINTS
+from control.records import JOINTS, Joints, same_for_both
 from drivers.fault_injection.failures import FailureParameters
 from drivers.odrive.axis import DriveParameters, WatchdogEndpoints
 from drivers.pose.natnet_parameters import NatNetParameters
@@ -124,9 +124,8 @@ class Configuration:
     text: str = ""  # the file itself, which goes into every log
 
     @property
-    def torque_constants_nm_a(self) -> tuple[float, float, float, float]:
-        a, b, c, d = (self.drive[joint].torque_constant_nm_a for joint in JOINTS)
-        return a, b, c, d
+    def torque_constants_nm_a(self) -> Joints[float]:
+        return Joints(*(self.drive[joint].torque_constant_nm_a for joint in JOINTS))
 
     @property
     def flipper_drives(self) -> tuple[FlipperDrive, FlipperDrive]:
@@ -147,11 +146,11 @@ class Configuration:
         )
 
     @property
-    def joint_ranges(self) -> tuple[JointRange, JointRange, JointRange, JointRange]:
+    def joint_ranges(self) -> Joints[JointRange]:
         limits = self.limits
         sweep = JointRange(radians(limits.sweep_min_deg), radians(limits.sweep_max_deg))
         adduction = JointRange(radians(limits.adduction_min_deg), radians(limits.adduction_max_deg))
-        return sweep, adduction, sweep, adduction
+        return same_for_both(sweep, adduction)
 
 
 _READER = RecordReader(Configuration, without={"text"})

@@ -20,7 +20,7 @@ from typing import Annotated
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
-from control.records import JointAngles, Torques
+from control.records import JointAngles, Joints, Torques
 from simulation.body.bench_mount import BenchMount
 from simulation.body.carriage import Carriage
 from simulation.body.free_body import BodyShape, FreeBody
@@ -245,12 +245,12 @@ class Plant:
     @property
     def angles_rad(self) -> JointAngles:
         left, right = self.arms
-        return left.sweep_rad, left.adduction_rad, right.sweep_rad, right.adduction_rad
+        return Joints(left.sweep_rad, left.adduction_rad, right.sweep_rad, right.adduction_rad)
 
     @property
     def velocities_rad_s(self) -> JointAngles:
         left, right = self.arms
-        return (
+        return Joints(
             left.sweep_velocity_rad_s,
             left.adduction_velocity_rad_s,
             right.sweep_velocity_rad_s,
@@ -260,7 +260,7 @@ class Plant:
     def step(self, dt_s: float, torques_nm: Torques) -> None:
         (left, right), body = self.arms, self.body
         left_carriage, right_carriage = body.carriages
-        left.step(dt_s, body.forward_m, body.forward_m_s, torques_nm[0], torques_nm[1], left_carriage)
-        right.step(dt_s, body.forward_m, body.forward_m_s, torques_nm[2], torques_nm[3], right_carriage)
+        left.step(dt_s, body.forward_m, body.forward_m_s, *torques_nm.left, left_carriage)
+        right.step(dt_s, body.forward_m, body.forward_m_s, *torques_nm.right, right_carriage)
         if not self.parameters.fixed_base:
             body.step(dt_s, left, right)

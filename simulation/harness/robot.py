@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from random import Random
 
-from control.records import JOINTS, Torques
+from control.records import JOINTS, Joints, Torques
 from drivers.can.can_port import CanPort
 from simulation.body.plant import STEP_S, Plant, PlantParameters
 from simulation.devices.odrive import OdriveParameters, SimulatedOdrive
@@ -50,7 +50,7 @@ class SimulatedRobot:
         while self.now_s + STEP_S <= until_s:
             self.now_s += STEP_S
             a, b, c, d = self.drives
-            torques: Torques = (
+            torques: Torques = Joints(
                 a.torque_nm(self.now_s), b.torque_nm(self.now_s), c.torque_nm(self.now_s), d.torque_nm(self.now_s)
             )  # fmt: skip
             self.plant.step(STEP_S, torques)

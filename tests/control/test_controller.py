@@ -22,17 +22,17 @@ from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains
 from control.limits import JointRange
 from control.modes import MOVING, Mode
-from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, Phase, Torques
+from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, Joints, Phase, Torques, same_for_both
 from tests.control.made_up_states import states_at
 
 TICK_S = 1.0 / 380.0
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
-POSE = (0.2, -0.4, 0.3, -0.5)
-RAISED = (0.2, 0.0, 0.3, 0.0)
-FRONT = (radians(30.0), 0.0, radians(30.0), 0.0)
+POSE = Joints(0.2, -0.4, 0.3, -0.5)
+RAISED = Joints(0.2, 0.0, 0.3, 0.0)
+FRONT = Joints(radians(30.0), 0.0, radians(30.0), 0.0)
 SPRING = JointGains(1.0, 0.0, 1.0, 0.0)  # torque = wanted angle - measured angle
 DAMPER = JointGains(0.0, 1.0, 0.0, 1.0)  # torque = wanted velocity - measured velocity
-RANGES = 2 * (JointRange(radians(-60.0), radians(60.0)), JointRange(radians(-75.0), radians(45.0)))
+RANGES = same_for_both(JointRange(radians(-60.0), radians(60.0)), JointRange(radians(-75.0), radians(45.0)))
 STILL_MODES = sorted(set(Mode) - MOVING)
 
 
@@ -49,7 +49,7 @@ def wanted_pose(controller: Controller, mode: Mode, pose: JointAngles = POSE) ->
     a, b, c, d = (
         torque + angle for torque, angle in zip(controller.step(TICK_S, mode, states_at(pose)), pose, strict=True)
     )
-    return a, b, c, d
+    return Joints(a, b, c, d)
 
 
 def path_to_the_gait(controller: Controller) -> list[JointAngles]:
@@ -66,14 +66,14 @@ def test_modes_that_may_not_move_want_exactly_nothing(mode: Mode) -> None:
     for before in sorted(MOVING):
         for _ in range(10):
             controller.step(TICK_S, before, states_at(POSE))
-        assert controller.step(TICK_S, mode, states_at((1.0, 1.0, 1.0, 1.0))) == NO_TORQUE
+        assert controller.step(TICK_S, mode, states_at(Joints(1.0, 1.0, 1.0, 1.0))) == NO_TORQUE
         assert controller.target is RESTING
 
 
 def test_hold_keeps_the_pose_that_was_measured_when_it_began() -> None:
     controller = weightless()
     assert wanted_pose(controller, Mode.HOLD, POSE) == pytest.approx(POSE)
-    assert wanted_pose(controller, Mode.HOLD, (0.0, 0.0, 0.0, 0.0)) == pytest.approx(POSE)
+    assert wanted_pose(controller, Mode.HOLD, Joints(0.0, 0.0, 0.0, 0.0)) == pytest.approx(POSE)
 
 
 def test_arming_again_holds_the_new_pose() -> None:
@@ -188,7 +188,7 @@ def test_stopping_raises_the_flippers_where_they_are_and_hold_keeps_them_there()
     assert poses[0] == pytest.approx(POSE, abs=1e-3)
     assert all((pose[0], pose[2]) == pytest.approx((POSE[0], POSE[2])) for pose in poses)
     assert poses[-1] == pytest.approx(RAISED)
-    sagged = (0.1, -0.1, 0.1, -0.1)
+    sagged = Joints(0.1, -0.1, 0.1, -0.1)
     assert wanted_pose(controller, Mode.HOLD, sagged) == pytest.approx(RAISED)
     assert wanted_pose(controller, Mode.HOLD, sagged) == pytest.approx(RAISED)
 
@@ -239,10 +239,10 @@ def turning_at(velocities: tuple[float, ...], for_s: float = 0.0) -> DriveStates
         DriveState(angle_rad=angle + velocity * for_s, velocity_rad_s=velocity)
         for angle, velocity in zip(POSE, velocities, strict=True)
     )
-    return a, b, c, d
+    return Joints(a, b, c, d)
 
 
-def ticks_until_settled(velocities: tuple[float, ...], trusted: tuple[bool, ...] = ALL_TRUSTED) -> int:
+def ticks_until_settled(velocities: tuple[float, ...], trusted: Joints[bool] = ALL_TRUSTED) -> int:
     controller = weightless()
     for tick in range(1, 2000):
         controller.step(TICK_S, Mode.DAMPING, turning_at(velocities, tick * TICK_S), trusted)
@@ -251,7 +251,7 @@ def ticks_until_settled(velocities: tuple[float, ...], trusted: tuple[bool, ...]
     raise AssertionError("it never settled")
 
 
-REST = (0.0, 0.0, 0.0, 0.0)
+REST = Joints(0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("before", [Mode.HOLD, Mode.WALKING, Mode.STOPPING])
@@ -272,7 +272,7 @@ def test_damping_brakes_each_joint_and_never_with_more_than_its_share() -> None:
 
 def test_a_joint_whose_encoder_is_not_trusted_is_not_damped() -> None:
     controller = weightless(JointGains())
-    torques = controller.step(TICK_S, Mode.DAMPING, turning_at((2.0, nan, 2.0, 2.0)), (False, False, True, True))
+    torques = controller.step(TICK_S, Mode.DAMPING, turning_at((2.0, nan, 2.0, 2.0)), Joints(False, False, True, True))
     assert torques == pytest.approx((0.0, 0.0, -0.12, -0.16))
 
 
@@ -287,7 +287,7 @@ def test_joints_that_do_not_rest_are_given_up_in_bounded_time(velocities: tuple[
 
 
 def test_the_rest_of_a_joint_that_nobody_sees_is_not_waited_for() -> None:
-    ticks = ticks_until_settled((nan, 5.0, 0.0, 0.0), (False, False, True, True))
+    ticks = ticks_until_settled((nan, 5.0, 0.0, 0.0), Joints(False, False, True, True))
     assert ticks == pytest.approx(SETTLED_S / TICK_S, abs=1)
 
 
@@ -317,7 +317,7 @@ def test_a_walk_that_a_fault_holds_stays_at_the_measured_pose_with_its_whole_sti
     path_to_the_gait(controller)
     for _ in range(300):
         wanted_pose(controller, Mode.WALKING)
-    here = (0.35, -0.6, 0.25, -0.7)
+    here = Joints(0.35, -0.6, 0.25, -0.7)
     assert wanted_pose(controller, Mode.HOLD, here) == pytest.approx(here)
     assert wanted_pose(controller, Mode.HOLD, POSE) == pytest.approx(here)
 
@@ -368,11 +368,11 @@ def stopping_ticks(pose: JointAngles) -> int:
 
 @pytest.mark.parametrize("low_rad", [-0.2, -0.7, -1.3])
 def test_flippers_that_the_mud_keeps_are_waited_for_but_not_long(low_rad: float) -> None:
-    ticks = stopping_ticks((0.0, low_rad, 0.0, low_rad))
+    ticks = stopping_ticks(Joints(0.0, low_rad, 0.0, low_rad))
     assert ticks * TICK_S == pytest.approx(RAISING_S - low_rad, abs=0.15)
     assert ticks * TICK_S < SOFT_STOP_S
 
 
 def test_a_stop_never_takes_longer_than_a_soft_stop_may() -> None:
     """Also on a path that is too long for it: of an arm that was turned far up by hand."""
-    assert stopping_ticks((0.0, 3.0, 0.0, 3.0)) * TICK_S == pytest.approx(SOFT_STOP_S, abs=0.01)
+    assert stopping_ticks(Joints(0.0, 3.0, 0.0, 3.0)) * TICK_S == pytest.approx(SOFT_STOP_S, abs=0.01)

@@ -9,23 +9,23 @@ from hypothesis import strategies as st
 
 from control.gait.joint_path import still
 from control.joint_pd import ArmMass, JointGains, damping_torques_nm, joint_torques_nm, pd_torque_nm
-from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, JointTarget
+from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, Joints, JointTarget, same_for_all
 from tests.control.made_up_states import states_at
 
 WEIGHTLESS = ArmMass(arm_mass_kg=0.0)
 angles = st.floats(-pi / 2, pi / 2)
-poses = st.tuples(angles, angles, angles, angles)
+poses = st.builds(Joints, angles, angles, angles, angles)
 speeds = st.floats(-100.0, 100.0)
 speeds_of_four = st.tuples(speeds, speeds, speeds, speeds)
 gains_of_any_size = st.builds(JointGains, *[st.floats(0.0, 5.0)] * 4)
-trusts = st.tuples(st.booleans(), st.booleans(), st.booleans(), st.booleans())
-ALL = (True, True, True, True)
+trusts = st.builds(Joints, *[st.booleans()] * 4)
+ALL = same_for_all(True)
 masses = st.builds(ArmMass, arm_mass_kg=st.floats(0.0, 20.0), center_of_mass_m=st.floats(0.0, 1.0))
 
 
 def turning(velocities: tuple[float, ...]) -> DriveStates:
     a, b, c, d = (DriveState(angle_rad=0.3, velocity_rad_s=velocity) for velocity in velocities)
-    return a, b, c, d
+    return Joints(a, b, c, d)
 
 
 def potential_energy_j(mass: ArmMass, sweep_rad: float, adduction_rad: float) -> float:
@@ -56,7 +56,7 @@ def test_an_arm_at_its_target_gets_exactly_what_balances_gravity(mass: ArmMass, 
 
 
 def test_a_level_arm_is_held_up_by_its_weight_times_its_lever() -> None:
-    level = (0.0, 0.0, 0.0, 0.0)
+    level = Joints(0.0, 0.0, 0.0, 0.0)
     torques = joint_torques_nm(still(level), states_at(level), JointGains(), ArmMass(0.5, 0.1), 1.0)
     assert torques == pytest.approx((0.0, 0.4905, 0.0, 0.4905))
 
@@ -66,9 +66,7 @@ def test_each_joint_is_pushed_toward_its_own_target_with_its_own_gains(joint: in
     gains = JointGains(8.0, 0.06, 10.0, 0.08)
     target = [JointTarget(0.0, 0.0)] * 4
     target[joint] = JointTarget(0.1, 2.0)
-    torques = joint_torques_nm(
-        (target[0], target[1], target[2], target[3]), states_at((0.0, 0.0, 0.0, 0.0)), gains, WEIGHTLESS, 1.0
-    )
+    torques = joint_torques_nm(Joints(*target), states_at(same_for_all(0.0)), gains, WEIGHTLESS, 1.0)
     expected = [0.0] * 4
     expected[joint] = (0.8 + 0.12) if joint % 2 == 0 else (1.0 + 0.16)
     assert torques == pytest.approx(expected)
@@ -95,7 +93,7 @@ def test_the_fade_scales_every_torque_alike(target: JointAngles, pose: JointAngl
 
 @given(speeds_of_four, gains_of_any_size, trusts, st.floats(0.0, 5.0))
 def test_damping_never_gives_a_joint_energy(
-    velocities: tuple[float, float, float, float], gains: JointGains, trusted: tuple[bool, ...], largest_nm: float
+    velocities: tuple[float, float, float, float], gains: JointGains, trusted: Joints[bool], largest_nm: float
 ) -> None:
     torques = damping_torques_nm(turning(velocities), gains, trusted, largest_nm)
     for torque_nm, velocity in zip(torques, velocities, strict=True):
@@ -105,7 +103,7 @@ def test_damping_never_gives_a_joint_energy(
 
 @given(speeds_of_four, gains_of_any_size, trusts)
 def test_joints_are_damped_in_proportion_to_their_speed_where_their_encoder_is_trusted(
-    velocities: tuple[float, float, float, float], gains: JointGains, trusted: tuple[bool, ...]
+    velocities: tuple[float, float, float, float], gains: JointGains, trusted: Joints[bool]
 ) -> None:
     torques = damping_torques_nm(turning(velocities), gains, trusted, 1e9)
     dampings = (gains.sweep_damping_nm_s_rad, gains.adduction_damping_nm_s_rad) * 2
@@ -120,10 +118,10 @@ def test_damping_is_capped_from_both_sides() -> None:
 
 
 def test_a_damped_joint_does_not_feel_where_it_is() -> None:
-    states = states_at((1.0, -1.0, 0.5, -0.5))
+    states = states_at(Joints(1.0, -1.0, 0.5, -0.5))
     assert damping_torques_nm(states, JointGains(), ALL, 0.4) == NO_TORQUE
 
 
 def test_the_speed_of_an_encoder_that_is_not_trusted_may_be_anything() -> None:
-    torques = damping_torques_nm(turning((nan, 1e300, 2.0, nan)), JointGains(), (False, False, True, False), 0.4)
+    torques = damping_torques_nm(turning((nan, 1e300, 2.0, nan)), JointGains(), Joints(False, False, True, False), 0.4)
     assert torques == pytest.approx((0.0, 0.0, -0.12, 0.0))

@@ -15,13 +15,13 @@ from control.limits import (
     apply_limits,
     limited_torque_nm,
 )
-from control.records import NO_TORQUE, DriveState, DriveStates, Torques
+from control.records import NO_TORQUE, DriveState, DriveStates, Joints, Torques, same_for_all
 
 LIMITS = JointLimits()
 TICK_S = 1.0 / 380.0
 SLEW_NM = LIMITS.torque_rate_nm_s * TICK_S
 SPAN = JointRange(radians(-60.0), radians(60.0))
-RANGES = (SPAN, SPAN, SPAN, SPAN)
+RANGES = same_for_all(SPAN)
 ROUNDING = 1e-12
 
 torques = st.floats(-2.0, 2.0)
@@ -41,14 +41,14 @@ finite_limits = st.builds(
 
 
 def four_torques(each: st.SearchStrategy[float]) -> st.SearchStrategy[Torques]:
-    return st.tuples(each, each, each, each)
+    return st.builds(Joints, each, each, each, each)
 
 
 def state(angle_rad: float = 0.0, velocity_rad_s: float = 0.0, temperature_c: float = 25.0) -> DriveState:
     return DriveState(angle_rad=angle_rad, velocity_rad_s=velocity_rad_s, temperature_c=temperature_c)
 
 
-STILL: DriveStates = (state(), state(), state(), state())
+STILL: DriveStates = Joints(state(), state(), state(), state())
 
 
 def settled_nm(wanted_nm: float, joint: DriveState) -> float:
@@ -60,9 +60,7 @@ def limited_like(joint: int, wanted_nm: float, measured: DriveState) -> LimitedT
     """All joints at rest without torque but one."""
     wanted, drives = list(NO_TORQUE), list(STILL)
     wanted[joint], drives[joint] = wanted_nm, measured
-    a, b, c, d = wanted
-    e, f, g, h = drives
-    return apply_limits((a, b, c, d), NO_TORQUE, (e, f, g, h), LIMITS, RANGES, TICK_S)
+    return apply_limits(Joints(*wanted), NO_TORQUE, Joints(*drives), LIMITS, RANGES, TICK_S)
 
 
 # torque
@@ -108,7 +106,7 @@ def test_limits_never_exceed_the_slew_rate(
 def test_full_torque_is_reached_after_its_ratio_to_the_slew_step() -> None:
     sent = NO_TORQUE
     for tick in range(1, 4):
-        sent = apply_limits((9.0, 9.0, 9.0, 9.0), sent, STILL, LIMITS, RANGES, TICK_S).torques_nm
+        sent = apply_limits(Joints(9.0, 9.0, 9.0, 9.0), sent, STILL, LIMITS, RANGES, TICK_S).torques_nm
         assert sent == pytest.approx([min(0.75, tick * SLEW_NM)] * 4)
 
 
@@ -139,11 +137,11 @@ def test_beyond_the_range_outward_torque_only_shrinks_and_is_gone_within_the_sle
 
 
 def test_each_joint_has_its_own_range() -> None:
-    ranges = (JointRange(-1.0, 1.0), JointRange(-2.0, 2.0), JointRange(-3.0, 3.0), JointRange(-4.0, 4.0))
-    pushed = (0.1, 0.1, 0.1, 0.1)
+    ranges = Joints(JointRange(-1.0, 1.0), JointRange(-2.0, 2.0), JointRange(-3.0, 3.0), JointRange(-4.0, 4.0))
+    pushed = same_for_all(0.1)
     for joint, angle in enumerate((0.5, 1.5, 2.5, 3.5)):
         here = state(angle)
-        sent = apply_limits(pushed, pushed, (here, here, here, here), LIMITS, ranges, 1.0).torques_nm
+        sent = apply_limits(pushed, pushed, Joints(here, here, here, here), LIMITS, ranges, 1.0).torques_nm
         assert sent == tuple(0.0 if other < joint else 0.1 for other in range(4))
 
 
@@ -209,7 +207,7 @@ def test_one_torque_that_is_not_finite_turns_all_four_to_zero(joint: int, bad: f
     wanted = [0.1, 0.1, 0.1, 0.1]
     wanted[joint] = bad
     a, b, c, d = wanted
-    sent = apply_limits((a, b, c, d), (0.7, -0.7, 0.7, -0.7), STILL, LIMITS, RANGES, TICK_S)
+    sent = apply_limits(Joints(a, b, c, d), Joints(0.7, -0.7, 0.7, -0.7), STILL, LIMITS, RANGES, TICK_S)
     assert sent == LimitedTorques(NO_TORQUE, True, False)
 
 
@@ -223,7 +221,7 @@ def test_one_measurement_that_is_not_finite_turns_all_four_to_zero(joint: int, b
 @given(
     four_torques(st.floats()),
     four_torques(previous_torques),
-    st.tuples(*[st.builds(DriveState, st.floats(), st.floats(), temperature_c=st.floats())] * 4),
+    st.builds(Joints, *[st.builds(DriveState, st.floats(), st.floats(), temperature_c=st.floats())] * 4),
     st.floats(0.0, 1.0),
 )
 def test_what_leaves_is_always_finite_and_says_so_when_it_had_to_give_up(
@@ -239,7 +237,7 @@ def test_what_leaves_is_always_finite_and_says_so_when_it_had_to_give_up(
 # the flag
 
 
-@given(four_torques(torques), four_torques(previous_torques), st.tuples(states, states, states, states))
+@given(four_torques(torques), four_torques(previous_torques), st.builds(Joints, states, states, states, states))
 def test_limited_is_told_exactly_when_something_changed(
     wanted: Torques, previous: Torques, measured: DriveStates
 ) -> None:
@@ -250,7 +248,7 @@ def test_limited_is_told_exactly_when_something_changed(
 @given(four_torques(st.floats(-0.75, 0.75)), four_torques(st.floats(-1.0, 1.0)))
 def test_a_torque_within_every_bound_passes_unchanged(wanted: Torques, fractions: Torques) -> None:
     a, b, c, d = (torque + 0.99 * fraction * SLEW_NM for torque, fraction in zip(wanted, fractions, strict=True))
-    sent = apply_limits(wanted, (a, b, c, d), STILL, LIMITS, RANGES, TICK_S)
+    sent = apply_limits(wanted, Joints(a, b, c, d), STILL, LIMITS, RANGES, TICK_S)
     assert sent == LimitedTorques(wanted, False, True)
 
 

@@ -12,7 +12,7 @@ import pytest
 from benchmarks.speed.synthetic_walk import DRIVE, GEOMETRY, K_P, Sample, later, stride_samples
 from control.joint_pd import ArmMass
 from control.mud_estimate import NOTHING_KNOWN
-from control.records import FLIPPERS, NO_LOAD, Phase, StrideEstimate
+from control.records import FLIPPERS, NO_LOAD, Joints, Phase, StrideEstimate, same_for_all
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import FlipperDrive
 from estimation.mud import FRESH, PAPER_DRAG_N, Ages, EstimationParameters, Method, MudEstimator, MudReading
@@ -39,7 +39,7 @@ def update(mud: MudEstimator, left: Sample, right: Sample, body_x_m: float = 0.0
     a, b, c, d = (joint.angle_rad for joint in joints)
     e, f, g, h = (joint.velocity_rad_s for joint in joints)
     i, j, k, l = (joint.current_a for joint in joints)  # noqa: E741
-    return mud.update(left.now_s, left.phase, (a, b, c, d), (e, f, g, h), (i, j, k, l), body_x_m)
+    return mud.update(left.now_s, left.phase, Joints(a, b, c, d), (e, f, g, h), (i, j, k, l), body_x_m)
 
 
 def strides_of(
@@ -103,7 +103,14 @@ def test_each_joint_has_its_own_torque_constant(method: Method) -> None:
     weightless = ArmMass(0.0, 0.0, 0.0, 0.0)
     drives = (FlipperDrive(weightless, 0.05, 0.06), FlipperDrive(weightless, 0.07, 0.08))
     mud = MudEstimator(GEOMETRY, drives, EstimationParameters(method=method))
-    reading = mud.update(0.0, Phase.REST, (0.0,) * 4, (0.0,) * 4, (1.0, 2.0, 3.0, 4.0), 0.0)
+    reading = mud.update(
+        0.0,
+        Phase.REST,
+        same_for_all(0.0),
+        (0.0,) * 4,
+        (1.0, 2.0, 3.0, 4.0),
+        0.0,
+    )
     torques = [getattr(load, name) for load in reading[:2] for name in ("sweep_torque_nm", "adduction_torque_nm")]
     assert torques == pytest.approx([-0.05, -0.12, -0.21, -0.32])
 
@@ -252,9 +259,8 @@ def load_of_a_free_arm_nm(angle_ages_s: Ages, current_ages_s: Ages, reported: bo
     return largest_nm
 
 
-def four(values: Sequence[float]) -> tuple[float, float, float, float]:
-    a, b, c, d = values
-    return a, b, c, d
+def four(values: Sequence[float]) -> Joints[float]:
+    return Joints(*values)
 
 
 ANGLES_OLD: tuple[Ages, Ages] = ((0.001, 0.0005, 0.0, 0.002), FRESH)
@@ -279,7 +285,7 @@ def test_a_current_that_is_younger_than_the_command_which_it_answers_needs_no_ag
 
 def test_ages_change_nothing_where_nothing_moves() -> None:
     mud = estimator()
-    standing = ((0.1, 0.2, 0.3, 0.4), (0.0,) * 4, (1.0, 2.0, 3.0, 4.0))
+    standing = (Joints(0.1, 0.2, 0.3, 0.4), (0.0, 0.0, 0.0, 0.0), (1.0, 2.0, 3.0, 4.0))
     fresh = mud.update(0.0, Phase.REST, *standing, 0.0)
     mud.reset()
     old = mud.update(0.0, Phase.REST, *standing, 0.0, (0.01,) * 4, (0.02,) * 4)

@@ -16,7 +16,7 @@ from control.gait.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_durat
 from control.gait.recovery import OUT_M, lowest_m
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
-from control.records import NO_LOAD, FlipperLoad, Phase, StrideEstimate
+from control.records import NO_LOAD, FlipperLoad, Joints, Phase, StrideEstimate, same_for_all
 from estimation.joint_load import FlipperDrive, JointSample
 from estimation.mud import EstimationParameters, MudEstimator
 from estimation.paper import MOBILISED_M, STEADY_FRACTION, SURFACE_FORCE_N, PaperEstimator
@@ -565,7 +565,7 @@ def both(left: list[Sample], right: list[Sample]) -> list[StrideEstimate]:
         reading = mud.update(
             a.now_s,
             a.phase,
-            (a.sweep_rad, a.adduction_rad, b.sweep_rad, b.adduction_rad),
+            Joints(a.sweep_rad, a.adduction_rad, b.sweep_rad, b.adduction_rad),
             (a.sweep_velocity_rad_s, a.adduction_velocity_rad_s, b.sweep_velocity_rad_s, b.adduction_velocity_rad_s),
             (a.sweep_current_a, a.adduction_current_a, b.sweep_current_a, b.adduction_current_a),
             0.0,
@@ -593,6 +593,13 @@ def test_each_joint_has_its_own_torque_constant() -> None:
     constants = (0.05, 0.06, 0.07, 0.08)
     drives = (FlipperDrive(WEIGHTLESS, *constants[:2]), FlipperDrive(WEIGHTLESS, *constants[2:]))
     mud = MudEstimator(GEOMETRY, drives, EstimationParameters(method="paper"))
-    reading = mud.update(0.0, Phase.REST, (0.0,) * 4, (0.0,) * 4, (1.0, 1.0, 1.0, 1.0), 0.0)
+    reading = mud.update(
+        0.0,
+        Phase.REST,
+        same_for_all(0.0),
+        (0.0,) * 4,
+        (1.0, 1.0, 1.0, 1.0),
+        0.0,
+    )
     torques = [getattr(load, name) for load in reading[:2] for name in ("sweep_torque_nm", "adduction_torque_nm")]
     assert torques == [-constant for constant in constants]

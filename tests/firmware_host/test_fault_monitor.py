@@ -12,7 +12,7 @@ from control.fault_kinds import KINDS
 from control.faults import Fault
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, Mode
-from control.records import JOINTS, NO_TORQUE, BodyPose, DriveState, DriveStates
+from control.records import JOINTS, NO_TORQUE, BodyPose, DriveState, DriveStates, Joints, same_for_all
 from drivers.can.can_port import BusState
 from drivers.can.mock_bus import MockBus, MockPort
 from drivers.odrive.axis import OdriveAxis, Version
@@ -53,7 +53,7 @@ class Bench:
         now_s = self.now_s + PERIOD_S
         well = DriveState(0.1, 0.0, now_s, 0.0, now_s, True, 0, now_s, 25.0, now_s, 24.0)
         a, b, c, d = (well._replace(**changes) if joint == place else well for joint in range(4))
-        return a, b, c, d
+        return Joints(a, b, c, d)
 
     def tick(self, mode: Mode = Mode.HOLD, states: DriveStates | None = None, **changes: Any) -> list[Fault]:
         states = states or self.states()
@@ -96,7 +96,7 @@ def test_joints_have_their_own_ranges(bench: Bench) -> None:
 
 
 def test_before_all_drives_were_heard_joints_are_not_judged(bench: Bench) -> None:
-    nothing = (DriveState(), DriveState(), DriveState(), DriveState())
+    nothing = same_for_all(DriveState())
     assert bench.tick(Mode.BOOT, nothing) == []
 
 
@@ -309,7 +309,7 @@ def test_the_limits_see_the_windings_heat_once_it_matters(bench: Bench) -> None:
 
 
 def test_a_joint_in_a_recovery_is_not_asked_to_follow_and_one_that_walks_is(bench: Bench) -> None:
-    full = LimitedTorques((0.75, 0.0, 0.0, 0.0), False, True)
+    full = LimitedTorques(Joints(0.75, 0.0, 0.0, 0.0), False, True)
 
     def ticks(mode: Mode, freeing: bool) -> list[Fault]:
         found: list[Fault] = []

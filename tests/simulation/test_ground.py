@@ -6,7 +6,7 @@ from random import Random
 import pytest
 
 from control.controller import WalkOrder
-from control.records import NO_TORQUE
+from control.records import NO_TORQUE, Joints
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import STEP_S, Arm, Plant, PlantParameters
 from simulation.harness.lockstep import Lockstep
@@ -20,7 +20,7 @@ from simulation.mud.track import LEVEL, RandomStrength, Ridges, Track
 def press(plant: Plant, lift_nm: float) -> Plant:
     """With the same torque for a second."""
     for _ in range(1000):
-        plant.step(STEP_S, (0.0, lift_nm, 0.0, lift_nm))
+        plant.step(STEP_S, Joints(0.0, lift_nm, 0.0, lift_nm))
     return plant
 
 
@@ -52,7 +52,7 @@ def test_a_flipper_that_sweeps_against_a_stone_is_held_and_pushes_the_robot(swee
     arm.sweep_rad, arm.adduction_rad = 0.3, geometry.adduction_rad(0.3, 0.03)
     for _ in range(2000):
         hold_nm = 20.0 * (geometry.adduction_rad(arm.sweep_rad, 0.03) - arm.adduction_rad)
-        plant.step(STEP_S, (sweep_nm, hold_nm - 0.2 * arm.adduction_velocity_rad_s, 0.0, 0.0))
+        plant.step(STEP_S, Joints(sweep_nm, hold_nm - 0.2 * arm.adduction_velocity_rad_s, 0.0, 0.0))
     behind_m = stone.end_m - geometry.flipper_length_m * sin(arm.sweep_rad)
     assert 0.0 < behind_m < 0.001
     # F l cos α but for what the soup holds and for the arm's weight, which is 0.01 N·m on the sweep joint.

@@ -117,9 +117,9 @@ def test_the_edge_swings_forward_above_the_mud() -> None:
 
 
 @given(st.floats(0.001, 20.0), st.floats(0.0, 1.0))
-def test_smooth_progress_is_half_a_path_after_half_its_time_and_symmetric(duration: float, fraction: float) -> None:
-    fraction, rate = smooth_progress(fraction * duration, duration)
-    mirrored, mirrored_rate = smooth_progress(duration - fraction * duration, duration)
+def test_smooth_progress_is_half_a_path_after_half_its_time_and_symmetric(duration: float, elapsed: float) -> None:
+    fraction, rate = smooth_progress(elapsed * duration, duration)
+    mirrored, mirrored_rate = smooth_progress(duration - elapsed * duration, duration)
     assert -1e-15 <= fraction <= 1.0 + 1e-15
     assert fraction + mirrored == pytest.approx(1.0, abs=1e-9)
     assert rate == pytest.approx(mirrored_rate, rel=1e-6, abs=1e-6 / duration)

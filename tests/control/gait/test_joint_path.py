@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.gait.joint_path import SHORTEST_LEG_S, JointPath, still
-from control.records import JointAngles, JointTargets
+from control.records import JointAngles, Joints, JointTargets
 
 TICK_S = 1.0 / 380.0
 angles = st.floats(-1.5, 1.5)
-poses = st.tuples(angles, angles, angles, angles)
+poses = st.builds(Joints, angles, angles, angles, angles)
 speeds = st.floats(0.5, 10.0)
 
 
@@ -25,7 +25,7 @@ def walked(path: JointPath) -> list[JointTargets]:
 
 
 def angles_of(targets: JointTargets) -> JointAngles:
-    return targets[0].angle_rad, targets[1].angle_rad, targets[2].angle_rad, targets[3].angle_rad
+    return Joints(targets[0].angle_rad, targets[1].angle_rad, targets[2].angle_rad, targets[3].angle_rad)
 
 
 @given(poses, poses, speeds)
@@ -84,8 +84,8 @@ def test_every_target_is_finite(
 
 
 def test_way_points_are_passed_one_after_the_other() -> None:
-    raised, front = (0.4, 0.0, 0.4, 0.0), (0.5, 0.0, 0.5, 0.0)
-    steps = walked(JointPath((0.4, -0.6, 0.4, -0.6), [raised, front], 1.0))
+    raised, front = Joints(0.4, 0.0, 0.4, 0.0), Joints(0.5, 0.0, 0.5, 0.0)
+    steps = walked(JointPath(Joints(0.4, -0.6, 0.4, -0.6), [raised, front], 1.0))
     lifting = [step for step in steps if step[0].angle_rad == 0.4]
     sweeping = [step for step in steps if step[0].angle_rad > 0.4]
     assert steps == lifting + sweeping
@@ -94,7 +94,7 @@ def test_way_points_are_passed_one_after_the_other() -> None:
 
 
 def test_velocities_are_the_derivatives_of_the_angles() -> None:
-    path, dt = JointPath((0.0, -0.6, 0.2, 0.4), [(0.5, 0.0, 0.1, 0.4)], 1.0), 1e-4
+    path, dt = JointPath(Joints(0.0, -0.6, 0.2, 0.4), [Joints(0.5, 0.0, 0.1, 0.4)], 1.0), 1e-4
     steps = []
     while not path.finished:
         steps.append(path.step(dt))
@@ -105,6 +105,6 @@ def test_velocities_are_the_derivatives_of_the_angles() -> None:
 
 
 def test_a_path_without_points_is_finished_at_once() -> None:
-    path = JointPath((0.1, 0.2, 0.3, 0.4), [], 1.0)
+    path = JointPath(Joints(0.1, 0.2, 0.3, 0.4), [], 1.0)
     assert path.finished
-    assert path.step(TICK_S) == still((0.1, 0.2, 0.3, 0.4))
+    assert path.step(TICK_S) == still(Joints(0.1, 0.2, 0.3, 0.4))

@@ -20,7 +20,16 @@ from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains
 from control.limits import JointRange
 from control.modes import Mode
-from control.records import DriveState, DriveStates, GaitTarget, JointTargets, Phase
+from control.records import (
+    DriveState,
+    DriveStates,
+    GaitTarget,
+    Joints,
+    JointTargets,
+    Phase,
+    same_for_all,
+    same_for_both,
+)
 from tests.control.made_up_states import states_at
 
 TICK_S = 1.0 / 380.0
@@ -28,7 +37,7 @@ DEPTH_M = 0.04
 GEOMETRY, GAIT, PARAMETERS = FlipperGeometry(), GaitParameters(), RecoveryParameters()
 REAR_RAD = -radians(GAIT.sweep_angle_deg)
 SWEEPS, ADDUCTIONS = JointRange(radians(-60.0), radians(60.0)), JointRange(radians(-75.0), radians(45.0))
-RANGES = (SWEEPS, ADDUCTIONS, SWEEPS, ADDUCTIONS)
+RANGES = same_for_both(SWEEPS, ADDUCTIONS)
 BOTH = ("left", "right")
 LONGEST_S = PARAMETERS.grace_s + PARAMETERS.attempts * (PARAMETERS.pause_s + PARAMETERS.attempt_s)
 
@@ -59,7 +68,7 @@ class MadeUpRobot:
         self,
         hold: Hold,
         parameters: RecoveryParameters = PARAMETERS,
-        ranges: tuple[JointRange, JointRange, JointRange, JointRange] = RANGES,
+        ranges: Joints[JointRange] = RANGES,
         gait: GaitParameters = GAIT,
     ) -> None:
         self.hold = hold
@@ -68,7 +77,7 @@ class MadeUpRobot:
         mass = ArmMass(arm_mass_kg=0.0)
         self.controller = Controller(gait, GEOMETRY, stiff, mass, MotionParameters(10.0, 0.0), self.recovery)
         self.controller.order = WalkOrder(DEPTH_M, adaptive=False)
-        self.angles_rad = (0.0, 0.0, 0.0, 0.0)
+        self.angles_rad = same_for_all(0.0)
         self.moments: list[Moment] = []
         self.waited_s = 0.0  # since the extraction began
         self.attempt_s = 0.0  # since the attempt under way began
@@ -86,8 +95,7 @@ class MadeUpRobot:
         for place, flipper in enumerate(BOTH):
             if self.waited_s and flipper in self.hold(self):
                 wanted_rad[2 * place : 2 * place + 2] = before_rad[2 * place : 2 * place + 2]
-        a, b, c, d = wanted_rad
-        self.angles_rad = (a, b, c, d)
+        self.angles_rad = Joints(*wanted_rad)
         if target.stride >= 0:
             events, attempt = self.recovery.events, self.recovery.attempt
             self.moments.append(Moment(target, self.recovery.given, attempt, events, before_rad))
@@ -210,8 +218,8 @@ def test_an_angle_that_nobody_knows_is_not_waited_for() -> None:
     lost, inside = DriveState(angle_rad=nan), DriveState(angle_rad=-0.6)
     level = DriveState(angle_rad=0.0)
     recovery = Recovery(PARAMETERS, GEOMETRY, GAIT, RANGES)
-    assert recovery.stuck((level, lost, level, inside)) == ("right",)
-    assert recovery.stuck((lost, level, level, level)) == ()
+    assert recovery.stuck(Joints(level, lost, level, inside)) == ("right",)
+    assert recovery.stuck(Joints(lost, level, level, level)) == ()
 
 
 def test_stopping_ends_a_recovery_and_forgets_it() -> None:
@@ -229,9 +237,9 @@ def attempts_at(sweep_deg: float, lead_deg: float = PARAMETERS.lead_deg) -> list
     """The targets of each attempt at a left flipper that nothing moves."""
     recovery = Recovery(replace(PARAMETERS, lead_deg=lead_deg), GEOMETRY, GAIT, RANGES)
     free, given = DriveState(angle_rad=0.0), list[list[JointTargets]]()
-    states = (DriveState(angle_rad=radians(sweep_deg)), DriveState(angle_rad=-0.6), free, free)
+    states = Joints(DriveState(angle_rad=radians(sweep_deg)), DriveState(angle_rad=-0.6), free, free)
     while not recovery.given_up:
-        targets = recovery.step(TICK_S, ("left",), states, still((REAR_RAD, 0.0, REAR_RAD, 0.0)))
+        targets = recovery.step(TICK_S, ("left",), states, still(Joints(REAR_RAD, 0.0, REAR_RAD, 0.0)))
         if recovery.attempt > len(given):
             given.append([])
         if recovery.attempt:
@@ -269,15 +277,15 @@ def test_every_attempt_lifts() -> None:
 
 def test_a_flipper_that_is_out_stays_where_it_is() -> None:
     for targets in attempts_at(10.0):
-        assert {each[2:] for each in targets} == {still((0.0, 0.0, 0.0, 0.0))[2:]}
+        assert {each[2:] for each in targets} == {still(Joints(0.0, 0.0, 0.0, 0.0))[2:]}
 
 
 def test_both_flippers_go_the_same_way_also_from_both_sides_of_the_middle() -> None:
     recovery = Recovery(PARAMETERS, GEOMETRY, GAIT, RANGES)
     down, left, right = DriveState(angle_rad=-0.6), DriveState(angle_rad=0.2), DriveState(angle_rad=-0.1)
-    targets = still((0.0, 0.0, 0.0, 0.0))
+    targets = still(Joints(0.0, 0.0, 0.0, 0.0))
     while recovery.attempt < 2 or targets[0].angle_rad == pytest.approx(left.angle_rad):
-        targets = recovery.step(TICK_S, BOTH, (left, down, right, down), still((0.0, 0.0, 0.0, 0.0)))
+        targets = recovery.step(TICK_S, BOTH, Joints(left, down, right, down), still(Joints(0.0, 0.0, 0.0, 0.0)))
     lead_rad = radians(PARAMETERS.lead_deg)
     assert targets[0].angle_rad == pytest.approx(left.angle_rad + lead_rad)
     assert targets[2].angle_rad == pytest.approx(right.angle_rad + lead_rad)
@@ -316,10 +324,10 @@ def test_targets_stay_within_the_joints_limits(margin_deg: float) -> None:
     sweeps = JointRange(radians(-30.0 - margin_deg), radians(30.0 + margin_deg))
     lifts = JointRange(radians(-75.0), 0.0)
     wild = RecoveryParameters(lift_rad_s=5.0, rock_s=2.0, lead_deg=45.0)
-    robot = MadeUpRobot(until_attempt(3), wild, (sweeps, lifts, sweeps, lifts)).walk(LONGEST_S + 1.0)
+    robot = MadeUpRobot(until_attempt(3), wild, same_for_both(sweeps, lifts)).walk(LONGEST_S + 1.0)
     assert "the flippers came out after 3 attempts" in robot.events
     for moment in robot.moments:
-        for joint, span in zip(moment.joints, (sweeps, lifts, sweeps, lifts), strict=True):
+        for joint, span in zip(moment.joints, same_for_both(sweeps, lifts), strict=True):
             assert span.min_rad - 1e-9 <= joint.angle_rad <= span.max_rad + 1e-9
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.records import JOINTS
+from control.records import JOINTS, Joints
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.odrive.axis import OdriveAxis, WatchdogEndpoints
@@ -329,7 +329,7 @@ def test_whatever_a_drive_tells_the_watchdog_is_unknown_or_a_time(reported: list
 @pytest.mark.parametrize("torque_nm", [nan, 1e300, -1e300, float("inf")])
 def test_a_torque_that_no_bytes_hold_raises_nothing_and_becomes_zero(bench: Bench, torque_nm: float) -> None:
     bench.drives.gate.open()
-    bench.drives.send((torque_nm, 0.0, 0.0, 0.0))
+    bench.drives.send(Joints(torque_nm, 0.0, 0.0, 0.0))
     assert {frame.data for frame in bench.far.receive()} <= {bytes(4), bytes.fromhex("00000080")}
     assert bench.drives.gate.refused == 1
 

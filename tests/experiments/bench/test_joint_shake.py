@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from control.joint_pd import ArmMass
-from control.records import JOINTS, DriveState
+from control.records import JOINTS, DriveState, same_for_all
 from experiments.bench.joint_shake import FIRST_NM, HALF_TICKS, SHAKE_TICKS, UNSEEN_RAD, Shake, shake
 from experiments.bench.operator import SimulatedAttendant
 from experiments.bench.rig import SimulatedRig
@@ -120,9 +120,15 @@ def test_a_late_tick_ends_a_shake_and_it_begins_anew(
 
 def test_a_shake_leaves_a_free_joint_at_rest_where_it_was() -> None:
     law, given_nm_s = Shake(0, 1, 0.003), []
-    states = (DriveState(angle_rad=0.0),) * 4
+    states = same_for_all(DriveState(angle_rad=0.0))
     while not law.done:
-        given_nm_s.append(law((0.0,) * 4, states)[0] * PERIOD_S)
+        given_nm_s.append(
+            law(
+                same_for_all(0.0),
+                states,
+            )[0]
+            * PERIOD_S
+        )
     assert sum(given_nm_s) == pytest.approx(0.0, abs=1e-12)
     assert max(given_nm_s) == pytest.approx(FIRST_NM * PERIOD_S) and len(given_nm_s) > SHAKE_TICKS == 4 * HALF_TICKS
     way = speed = 0.0

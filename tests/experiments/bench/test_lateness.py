@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from control.modes import Request
-from control.records import DriveState, DriveStates
+from control.records import DriveState, DriveStates, same_for_all
 from drivers.odrive.codec import AxisState
 from experiments.bench.joint_zero_check import rest_pose
 from experiments.bench.lateness import LATE_S
@@ -216,7 +216,7 @@ def test_what_stays_late_is_told_with_what_is_out_of_its_bounds(
 
 def late(missed: int, age_s: float) -> tuple[Tick, DriveStates]:
     state = DriveState(angle_stamp_s=1.0, current_stamp_s=1.0)
-    return Tick(1.0 + age_s, 0.0, 1, missed), (state, state, state, state)
+    return Tick(1.0 + age_s, 0.0, 1, missed), same_for_all(state)
 
 
 def test_what_is_out_of_its_bounds_in_time_is_measured_once(bench: StagedBench) -> None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 from control.modes import Mode
-from control.records import NO_TORQUE, DriveState, Torques
+from control.records import NO_TORQUE, DriveState, Joints, Torques
 from experiments.bench.step_response import LONGEST_TICKS, PULSE_NM, delay_ticks
 from experiments.bench.test_rig import Sample
 from firmware_host.ticker import PERIOD_S, Tick
 
 CONSTANT_NM_A = 0.083
 STEP = 2  # the sample that sends it
-SENT: Torques = (PULSE_NM, 0.0, 0.0, 0.0)
+SENT: Torques = Joints(PULSE_NM, 0.0, 0.0, 0.0)
 
 
 def made_up(answer: int, numbers: list[int]) -> list[Sample]:
@@ -22,7 +22,7 @@ def made_up(answer: int, numbers: list[int]) -> list[Sample]:
         Sample(
             Tick(number * PERIOD_S, 0.0, number, 0),
             Mode.HOLD,
-            (following if place >= answer else rest, rest, rest, rest),
+            Joints(following if place >= answer else rest, rest, rest, rest),
             None,
             SENT if place >= STEP else NO_TORQUE,
             False,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from control.records import JOINTS, NO_TORQUE
+from control.records import JOINTS, NO_TORQUE, Joints
 from drivers.odrive.codec import ERROR_WATCHDOG, AxisState
 from experiments.bench.joint_zero_check import level_pose, turned
 from experiments.bench.operator import AbsentAttendant, AskedAttendant, SimulatedAttendant
@@ -108,7 +108,7 @@ def test_a_drive_that_does_not_let_go_is_told(bench: StagedBench, rig: Simulated
 
 
 def test_what_holds_gently_never_exceeds_a_tiny_torque(bench: StagedBench) -> None:
-    held = (1.0, -1.0, 0.1, -0.1)
+    held = Joints(1.0, -1.0, 0.1, -0.1)
     assert gently(held, bench.stand.loop.states) == (MOST_NM, -MOST_NM, 0.1, -0.1)
 
 

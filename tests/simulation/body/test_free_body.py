@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from control.controller import WalkOrder
 from control.geometry import FlipperGeometry
-from control.records import NO_TORQUE
+from control.records import NO_TORQUE, Joints
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.carriage import LEAST_UPRIGHT, carried_attitude, carried_twist
 from simulation.body.free_body import (
@@ -308,7 +308,7 @@ def test_both_flippers_pushed_down_in_front_lift_the_nose_and_behind_the_tail() 
         for arm in plant.arms:
             arm.sweep_rad, arm.adduction_rad = sweep_rad, GEOMETRY.adduction_rad(sweep_rad, 0.0)
         for _ in range(300):
-            plant.step(STEP_S, (0.0, -0.7, 0.0, -0.7))
+            plant.step(STEP_S, Joints(0.0, -0.7, 0.0, -0.7))
         pitches_rad.append(plant.motion.pitch_rad)  # a positive pitch lowers the nose
     assert pitches_rad[0] < -0.02
     assert pitches_rad[1] > 0.02
@@ -319,7 +319,7 @@ def test_both_flippers_pushed_down_beside_the_body_lift_it() -> None:
     body = plant.body
     assert isinstance(body, FreeBody)
     for _ in range(400):
-        plant.step(STEP_S, (0.0, -1.0, 0.0, -1.0))
+        plant.step(STEP_S, Joints(0.0, -1.0, 0.0, -1.0))
     assert body.height_m > body.shape.axis_above_belly_m  # clear of the mud
     carried_n = sum(load.upward_n for load in body.flipper_loads(axes_of(0.0, 0.0), *plant.arms))
     assert carried_n == pytest.approx(body.mass_kg * 9.81, rel=0.05)  # it still rocks by that much on the plates
@@ -330,7 +330,7 @@ def test_both_flippers_pushed_down_beside_the_body_lift_it() -> None:
 def test_one_flipper_pushed_down_raises_its_own_side(side: int) -> None:
     plant = Plant(FREE, Track([(9.0, MUDS["45.3"])]))
     for _ in range(200):
-        plant.step(STEP_S, (0.0, -0.5, 0.0, 0.1) if side == 0 else (0.0, 0.1, 0.0, -0.5))
+        plant.step(STEP_S, Joints(0.0, -0.5, 0.0, 0.1) if side == 0 else Joints(0.0, 0.1, 0.0, -0.5))
     assert (1.0 if side == 0 else -1.0) * plant.motion.roll_rad > 0.02
 
 
@@ -349,7 +349,7 @@ def test_equal_strokes_left_and_right_never_roll_it() -> None:
     plant = Plant(FREE, Track([(9.0, MUDS["48.5"])]))
     for torques_nm in ((0.0, -0.3), (-0.6, -0.1), (0.0, 0.6), (0.1, 0.05)) * 2:
         for _ in range(200):
-            plant.step(STEP_S, (*torques_nm, *torques_nm))
+            plant.step(STEP_S, Joints(*torques_nm, *torques_nm))
             assert (plant.motion.roll_rad, plant.motion.roll_rad_s) == (0.0, 0.0)
     assert plant.body_m > 0.004
 
@@ -359,7 +359,7 @@ def test_a_reset_brings_everything_back() -> None:
     for _ in range(2):
         for torques_nm in ((0.0, -0.3), (-0.6, -0.1), (0.0, 0.6)):
             for _ in range(200):
-                plant.step(STEP_S, (*torques_nm, 0.0, 0.0))
+                plant.step(STEP_S, Joints(*torques_nm, 0.0, 0.0))
         places.append((plant.body_m, plant.motion, plant.angles_rad))
         plant.reset()
     assert places[0] == places[1]

@@ -7,7 +7,7 @@ from random import Random
 import pytest
 
 from control.joint_pd import ArmMass
-from control.records import NO_TORQUE
+from control.records import NO_TORQUE, Joints
 from simulation.body.carriage import Carriage
 from simulation.body.plant import END_STOPS_RAD, STEP_S, Plant, PlantParameters
 from simulation.body.rail_body import DRAG_STIFFNESS_N_M
@@ -97,7 +97,7 @@ def test_a_hanging_arm_swings_with_the_period_of_a_pendulum() -> None:
 def test_the_arms_stop_at_their_end_stops(sign: float) -> None:
     plant = make_air_plant()
     for _ in range(1000):
-        plant.step(STEP_S, (sign * 0.5, sign * 0.5, sign * 0.5, sign * 0.5))
+        plant.step(STEP_S, Joints(sign * 0.5, sign * 0.5, sign * 0.5, sign * 0.5))
     sweep_rad, adduction_rad = (sign * stop for stop in END_STOPS_RAD)
     assert plant.angles_rad == (sweep_rad, adduction_rad, sweep_rad, adduction_rad)
     assert plant.velocities_rad_s == (0.0, 0.0, 0.0, 0.0)
@@ -129,10 +129,10 @@ def test_dry_friction_slows_an_arm_down_evenly_until_it_stands() -> None:
 def test_dry_friction_holds_a_joint_until_more_torque_turns_it_and_takes_its_share_then(sign: float) -> None:
     plant = make_air_plant(DRY)
     for _ in range(100):
-        plant.step(STEP_S, (sign * 0.0199, sign * 0.0199, 0.0, 0.0))
+        plant.step(STEP_S, Joints(sign * 0.0199, sign * 0.0199, 0.0, 0.0))
     assert plant.angles_rad == (0.0, 0.0, 0.0, 0.0)
     for _ in range(10):
-        plant.step(STEP_S, (sign * 0.03, sign * 0.03, 0.0, 0.0))
+        plant.step(STEP_S, Joints(sign * 0.03, sign * 0.03, 0.0, 0.0))
     rates_rad_s = [sign * 0.01 * 0.01 / inertia_kg_m2 for inertia_kg_m2 in (0.0004, 0.0006)]
     assert plant.velocities_rad_s == pytest.approx((*rates_rad_s, 0.0, 0.0))
 
@@ -154,7 +154,7 @@ def test_unpowered_flippers_rest_on_the_mud_and_the_body_stays() -> None:
 def test_left_and_right_are_alike() -> None:
     plant = Plant(PlantParameters(), TRACK)
     for _ in range(500):
-        plant.step(STEP_S, (-0.7, -0.3, -0.7, -0.3))
+        plant.step(STEP_S, Joints(-0.7, -0.3, -0.7, -0.3))
     assert plant.angles_rad[:2] == plant.angles_rad[2:]
     assert plant.arms[0].force == plant.arms[1].force
 
@@ -166,7 +166,7 @@ def test_one_flipper_alone_moves_and_pushes(side: int) -> None:
     pushing.thrust_n = 20.0
     plant.arms[side].contact = pushing
     for _ in range(100):
-        plant.step(STEP_S, (0.01, 0.06, 0.0, 0.0) if side == 0 else (0.0, 0.0, 0.01, 0.06))
+        plant.step(STEP_S, Joints(0.01, 0.06, 0.0, 0.0) if side == 0 else Joints(0.0, 0.0, 0.01, 0.06))
     own_rad, other_rad = (plant.angles_rad[2 * place : 2 * place + 2] for place in (side, 1 - side))
     assert own_rad[0] > 0.0 == other_rad[0]
     assert own_rad[1] > 0.0 > other_rad[1]  # the other one falls
@@ -204,7 +204,7 @@ def test_a_quarter_of_the_step_gives_the_same_push() -> None:
         plant = Plant(PlantParameters(), TRACK)
         for sweep_nm, lift_nm, seconds in ((0.0, -0.4, 0.5), (-0.5, -0.4, 0.25), (0.0, 0.6, 0.3)):
             for _ in range(round(seconds / dt_s)):
-                plant.step(dt_s, (sweep_nm, lift_nm, sweep_nm, lift_nm))
+                plant.step(dt_s, Joints(sweep_nm, lift_nm, sweep_nm, lift_nm))
         ends_m.append(plant.body_m)
     assert ends_m[0] > 0.02
     assert ends_m[1] == pytest.approx(ends_m[0], rel=0.03)
@@ -216,7 +216,7 @@ def row(plant: Plant, strides: int = 2) -> list[float]:
     for _ in range(strides):
         for torques_nm in ((0.0, -0.2), (-0.6, -0.1), (0.0, 0.6), (0.1, 0.05)):
             for _ in range(300):
-                plant.step(STEP_S, (*torques_nm, *torques_nm))
+                plant.step(STEP_S, Joints(*torques_nm, *torques_nm))
             ends += [plant.body_m, *plant.angles_rad]
     return ends
 
@@ -279,7 +279,7 @@ def test_an_arm_tells_the_clay_under_its_flipper_as_firm_as_it_was_left() -> Non
     for _ in range(3):
         for direction in (1.0, -2.0):
             for _ in range(300):
-                plant.step(STEP_S, (0.0, direction * torques_nm[1], 0.0, direction * torques_nm[3]))
+                plant.step(STEP_S, Joints(0.0, direction * torques_nm[1], 0.0, direction * torques_nm[3]))
             if direction > 0.0:
                 strengths_pa.append(plant.arms[0].clay.strength_pa)
     assert strengths_pa == pytest.approx([500.0 + 500.0 * exp(-0.4 * earlier) for earlier in range(3)])
