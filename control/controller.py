@@ -12,8 +12,7 @@ from math import radians
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds, Meaning
-from control.fault_kinds import make_fault
-from control.faults import Fault
+from control.faults import Fault, FaultKind
 from control.gait.gait import Gait, GaitParameters
 from control.gait.joint_path import JointPath, still
 from control.gait.recovery import Recovery
@@ -254,8 +253,5 @@ class Controller:
 
 
 def _held_by_the_mud(flippers: Sequence[str], attempts: int) -> Fault:
-    """Of flippers that a recovery has given up."""
-    one = len(flippers) == 1
-    held = f"The {flippers[0]} flipper is" if one else "Both flippers are"
-    message = f"{held} stuck in the mud after {attempts} attempt{'s' if attempts > 1 else ''}."
-    return make_fault("flipper_stuck", flippers[0] if one else "", message)
+    """The fault of flippers that a recovery has given up; its subject is empty if both are stuck."""
+    return FaultKind.FLIPPER_STUCK.fault(flippers[0] if len(flippers) == 1 else "", attempts=attempts)

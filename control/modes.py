@@ -146,31 +146,25 @@ ACCEPTED_IN: dict[Request, frozenset[Mode]] = {
     Request.DISARM: frozenset(Mode),
     Request.CLEAR: frozenset({Mode.FAULT, Mode.IDLE}),
 }
-WHAT_TO_DO: dict[Mode, str] = {
-    Mode.BOOT: "not every drive was heard yet; see 'mudskipper check'",
-    Mode.IDLE: "the drives are idle; 'mudskipper arm' first",
-    Mode.ARMING: "the drives are being armed; try again in a moment",
-    Mode.HOLD: "the robot already holds its pose",
-    Mode.WALKING: "the robot walks; 'mudskipper stop' first",
-    Mode.STOPPING: "the robot is stopping; try again in a moment",
-    Mode.FAULT: "a fault stands; read 'mudskipper status', then 'mudskipper clear'",
-    Mode.DAMPING: "a fault lets the joints sink; wait until they rest",
-}
 
 
-def refusal(mode: Mode, request: Request, health: Health) -> str | None:
-    """Why a request would change nothing now, as a sentence; None where it is accepted."""
-    if request is Request.CLEAR and mode is Mode.HOLD:
-        return "nothing to clear: the robot holds its pose"
+class Refusal(NamedTuple):
+    """Why a request would change nothing in this mode."""
+
+    mode: Mode
+    request: Request
+    faults: tuple[Fault, ...] = ()  # the faults that prevent it; without any, the mode does
+
+
+def refusal(mode: Mode, request: Request, health: Health) -> Refusal | None:
+    """None if the request is accepted."""
     if mode not in ACCEPTED_IN.get(request, Mode):
-        return WHAT_TO_DO[mode]
-    if request is Request.ARM and not _well(health):
-        return _against(health)
-    if request is Request.WALK and health.reaction >= Reaction.HOLD:
-        return _against(health)
-    return None
-
-
-def _against(health: Health) -> str:
+        return Refusal(mode, request)
+    prevented = {
+        Request.ARM: not _well(health),
+        Request.WALK: health.reaction >= Reaction.HOLD,
+    }.get(request, False)
+    if not prevented:
+        return None
     faults = health.blocking or ((health.worst,) if health.worst else ())
-    return " ".join(fault.message for fault in faults) or WHAT_TO_DO[Mode.BOOT]
+    return Refusal(mode if faults else Mode.BOOT, request, faults)

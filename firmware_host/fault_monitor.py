@@ -9,8 +9,7 @@ from math import isnan
 from typing import NamedTuple
 
 from control.controller import ALL_TRUSTED
-from control.fault_kinds import make_fault
-from control.faults import Fault
+from control.faults import Fault, FaultKind
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
 from control.monitors.joint_monitor import JointFacts, JointMonitor
@@ -30,15 +29,15 @@ REFUSED_TICKS = 3  # in a row, in each of which one bus lost a command
 FIRMWARE = (0, 6)  # major and minor version whose messages the codec knows
 BUS_TROUBLE_S = 2.0  # after the last error frame
 POSE_FORGOTTEN_S = 10.0  # a motion capture that was switched off on purpose
-BROKEN = frozenset({"encoder_jump", "encoder_stuck"})  # told in some ticks, true in all of them
-BLIND = frozenset({"position_stale", "position_silent", "drive_quiet", "drive_silent"})
-EXPLAINED = frozenset({"drive_error", "drive_disarmed"})  # by the drive's own words
+BROKEN = frozenset({FaultKind.ENCODER_JUMP, FaultKind.ENCODER_STUCK})  # they show in some ticks, and last
+BLIND = frozenset({FaultKind.POSITION_STALE, FaultKind.POSITION_SILENT, FaultKind.DRIVE_QUIET, FaultKind.DRIVE_SILENT})
+EXPLAINED = frozenset({FaultKind.DRIVE_ERROR, FaultKind.DRIVE_DISARMED})  # by the drive's own error text
 
 
 BUS_FAULTS = {
-    BusState.WARNING: ("bus_warning", "meets many errors"),
-    BusState.PASSIVE: ("bus_passive", "meets so many errors that its controller is passive"),
-    BusState.OFF: ("bus_off", "is off"),
+    BusState.WARNING: FaultKind.BUS_WARNING,
+    BusState.PASSIVE: FaultKind.BUS_PASSIVE,
+    BusState.OFF: FaultKind.BUS_OFF,
 }
 
 
@@ -115,22 +114,21 @@ class FaultMonitor:
         found += self._log.update(monitor_input.log)
         self._watch_buses(found, tick.now_s)
         if monitor_input.lease_holder:
-            text = f"{monitor_input.lease_holder} promised to attend the robot and is gone."
-            found.append(make_fault("lease_lost", "", text))
+            found.append(FaultKind.LEASE_LOST.fault(holder=monitor_input.lease_holder))
         if monitor_input.mode is Mode.BOOT and not self._drives.heard:
             return found
         self._watch_joints(found, tick, monitor_input)
         self._watch_trust(found, monitor_input.mode)
         if not monitor_input.sent.finite:
-            found.append(make_fault("torque_not_finite", "", "A torque was not a finite number."))
+            found.append(FaultKind.TORQUE_NOT_FINITE.fault())
         if monitor_input.mode is Mode.ARMING and tick.now_s - monitor_input.mode_since_s > ARMING_S:
             self._watch_arming(found, monitor_input.states)
         self._watch_gate(found)
         for axis in self._drives.axes:
             self._watch_axis(found, axis)
             if axis.busy_state and monitor_input.mode not in ENERGISED:
-                text = f"The {axis.joint} drive does something of its own: axis state {axis.busy_state}."
-                found.append(make_fault("drive_energised", axis.joint, text))
+                activity = f"in axis state {axis.busy_state}"
+                found.append(FaultKind.DRIVE_ENERGISED.fault(axis.joint, activity=activity))
         self._watch_pose(found, tick.now_s, monitor_input.body)
         return found
 
@@ -140,20 +138,17 @@ class FaultMonitor:
             if (port.error_frames, port.state) != self._bus_events[name]:
                 self._bus_events[name], self._error_s[name] = (port.error_frames, port.state), now_s
             if port.state is BusState.OFF or (port.state and now_s - self._error_s[name] < BUS_TROUBLE_S):
-                kind, text = BUS_FAULTS[port.state]
-                found.append(make_fault(kind, name, f"The {name} bus {text}: {port.last_error or 'no word why'}."))
+                found.append(BUS_FAULTS[port.state].fault(name, reason=port.last_error or "the reason is unknown"))
             lost_frames = port.lost_frames - self._lost_frames[name]
             if lost_frames:
                 self._lost_frames[name] = port.lost_frames
-                text = f"{lost_frames} frames of the {name} bus were lost: they came faster than they were read."
-                found.append(make_fault("frames_lost", name, text))
+                found.append(FaultKind.FRAMES_LOST.fault(name, frames=lost_frames))
             lost = port.failed_sends > self._failed_sends[name]
             self._refused_ticks[name] = self._refused_ticks[name] + 1 if lost else 0
             self._failed_sends[name] = port.failed_sends
             if self._refused_ticks[name] >= REFUSED_TICKS:
                 ticks, why = self._refused_ticks[name], port.last_send_error
-                text = f"The {name} bus lost commands in {ticks} ticks in a row: {why}."
-                found.append(make_fault("bus_refuses", name, text))
+                found.append(FaultKind.BUS_REFUSES.fault(name, ticks=ticks, reason=why))
 
     def _watch_joints(self, found: list[Fault], tick: Tick, monitor_input: MonitorInput) -> None:
         mode, sent_nm = monitor_input.mode, monitor_input.sent.torques_nm
@@ -175,37 +170,33 @@ class FaultMonitor:
         """What breaks an encoder shows in some ticks only, silence in all of its own."""
         if mode not in ENERGISED:
             self._broken.clear()
-        self._broken.update(fault.subject for fault in found if fault.name in BROKEN)
-        blind = self._broken.union(fault.subject for fault in found if fault.name in BLIND)
+        self._broken.update(fault.subject for fault in found if fault.kind in BROKEN)
+        blind = self._broken.union(fault.subject for fault in found if fault.kind in BLIND)
         self.trusted = Joints(*(joint not in blind for joint in JOINTS)) if blind else ALL_TRUSTED
 
     def _watch_arming(self, found: list[Fault], states: DriveStates) -> None:
         for joint, state in zip(JOINTS, states, strict=True):
             if not state.closed_loop:
-                text = f"The {joint} drive did not go into closed loop within {ARMING_S:g} s."
-                found.append(make_fault("arming_failed", joint, text))
+                found.append(FaultKind.ARMING_FAILED.fault(joint, longest_s=ARMING_S))
 
     def _watch_gate(self, found: list[Fault]) -> None:
         gate = self._drives.gate
         if gate.refused > self._refused_commands:
             self._refused_commands = gate.refused
-            found.append(make_fault("command_refused", "", gate.last_refusal))
+            found.append(FaultKind.COMMAND_REFUSED.fault(reason=gate.last_refusal))
 
     def _watch_axis(self, found: list[Fault], axis: OdriveAxis) -> None:
         """What a drive tells of itself beside its signals."""
         joint = axis.joint
         if axis.restarts != self._restarts[joint]:
             self._restarts[joint] = axis.restarts
-            found.append(make_fault("drive_restarted", joint, f"The {joint} drive started anew."))
+            found.append(FaultKind.DRIVE_RESTARTED.fault(joint))
         if axis.duplicates:
-            found.append(make_fault("drive_twins", joint, f"Two drives send as the {joint} drive."))
-        if axis.version is None:
-            text = f"The {joint} drive did not tell its firmware version yet."
-            found.append(make_fault("drive_version", joint, text))
-        elif (axis.version.major, axis.version.minor) != FIRMWARE:
-            version = ".".join(map(str, axis.version))
-            text = f"The {joint} drive runs firmware {version}; 0.6 is supported."
-            found.append(make_fault("drive_version", joint, text))
+            found.append(FaultKind.DUPLICATE_NODE_ID.fault(joint))
+        if axis.version is None or (axis.version.major, axis.version.minor) != FIRMWARE:
+            version = ".".join(map(str, axis.version)) if axis.version else "unknown"
+            supported = ".".join(map(str, FIRMWARE))
+            found.append(FaultKind.DRIVE_VERSION.fault(joint, version=version, supported=supported))
         self._watch_watchdog(found, joint, axis.watchdog_s)
 
     def _watch_watchdog(self, found: list[Fault], joint: str, watchdog_s: float) -> None:
@@ -213,28 +204,23 @@ class FaultMonitor:
         if 0.0 < watchdog_s <= self._longest_watchdog_s:
             return
         if isnan(watchdog_s):
-            text = f"The {joint} drive's watchdog was not read back."
-            found.append(make_fault("watchdog_unknown", joint, text))
-        elif watchdog_s == 0.0:
-            found.append(make_fault("watchdog_off", joint, f"The {joint} drive's watchdog is off."))
+            found.append(FaultKind.WATCHDOG_UNKNOWN.fault(joint))
         else:
-            text = (
-                f"The {joint} drive's watchdog waits for {watchdog_s:g} s; {self._longest_watchdog_s:g} s is the most."
-            )
-            found.append(make_fault("watchdog_off", joint, text))
+            setting = f"set to {watchdog_s:g} s" if watchdog_s else "off"
+            found.append(FaultKind.WATCHDOG_OFF.fault(joint, setting=setting, longest_s=self._longest_watchdog_s))
 
     def _watch_pose(self, found: list[Fault], now_s: float, body: BodyPose) -> None:
         if body.stamp_s > float("-inf"):
             self._pose_stamp_s = now_s
         elif self._pose_stamp_s is not None:
-            found.append(make_fault("pose_lost", "", "The body's place is not told any more."))
+            found.append(FaultKind.POSE_LOST.fault())
             if now_s - self._pose_stamp_s > POSE_FORGOTTEN_S:
                 self._pose_stamp_s = None
 
 
 def _explained(fault: Fault, axis: OdriveAxis) -> Fault:
-    """With the drive's own words for its errors."""
+    """The fault with the drive's own error text as its reason."""
     flags = axis.state.error_flags | axis.disarm_reason
-    if fault.name not in EXPLAINED or not flags:
+    if fault.kind not in EXPLAINED or not flags:
         return fault
-    return fault._replace(message=f"{fault.message} ({error_text(flags)})")
+    return fault.with_values(reason=error_text(flags))

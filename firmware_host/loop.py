@@ -37,7 +37,9 @@ from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
 from firmware_host.loop_events import LoopEvents, ModeChange
 from firmware_host.loop_timing import LoopTiming
 from firmware_host.mud_learning import MudLearning
+from firmware_host.operator.fault_texts import fault_message
 from firmware_host.operator.lease import Lease
+from firmware_host.operator.refusal_texts import refusal_text
 from firmware_host.ticker import PERIOD_S, Tick
 
 CLEARING_S = 0.5  # for the drives to report that their errors are gone
@@ -91,7 +93,7 @@ class Loop:
         self._change_mode(next_mode(self.mode, self._request_now(), self.health), tick.now_s)
         self.forced = self.forced and self.mode in ENERGISED
         if self.controller.moving and self.health.reaction >= Reaction.HOLD:
-            self._end_move(tick.now_s, self.fault.message if self.fault else "a fault stands.")
+            self._end_move(tick.now_s, fault_message(self.fault) if self.fault else "a fault is present.")
         step_s = min(1 + tick.missed, LONGEST_STEP_TICKS) * PERIOD_S
         elapsed_s = (1 + tick.missed) * PERIOD_S
         wanted = self.controller.step(step_s, self.mode, self.states, self._trusted(), elapsed_s)
@@ -203,7 +205,8 @@ class Loop:
         if order is not None and not self._reaches(order.depth_m):
             return f"depth {order.depth_m:g} m: out of the flippers' reach over the sweep"
         health = self.health._replace(blocking=tuple(self.faults.blocking(forced)))
-        return refusal(self.mode, request, health)
+        refused = refusal(self.mode, request, health)
+        return refusal_text(refused) if refused else None
 
     def _reaches(self, depth_m: float) -> bool:
         return 0.0 < depth_m <= self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)

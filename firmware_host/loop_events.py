@@ -13,6 +13,7 @@ from control.faults import Fault
 from control.modes import ENERGISED, Mode, Request
 from firmware_host.log.recorder import Recording
 from firmware_host.log.rows import EVENT, EVENT_KIND
+from firmware_host.operator.fault_texts import fault_advice, fault_message
 from firmware_host.operator.request_events import RequestEvents
 
 
@@ -48,7 +49,7 @@ class LoopEvents:
 
     def tell_faults(self, now_s: float, begun: Iterable[Fault], over: Iterable[Fault]) -> None:
         for fault in begun:
-            self.report(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault.message}")
+            self.report(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault_message(fault)}")
         for fault in over:
             self.report(now_s, f"over: {fault.name} {fault.subject}".rstrip())
 
@@ -61,7 +62,7 @@ class LoopEvents:
 
     def tell_overruled(self, now_s: float, faults: Iterable[Fault]) -> None:
         for fault in faults:
-            self.report(now_s, f"armed by force despite {fault.name}: {fault.message}")
+            self.report(now_s, f"armed by force despite {fault.name}: {fault_message(fault)}")
 
     def tell_end_of_move(self, now_s: float, why: str) -> None:
         self._notify(now_s, f"the joints stopped on their way: {why}")
@@ -69,12 +70,12 @@ class LoopEvents:
     def tell_change(self, now_s: float, change: ModeChange) -> None:
         """Of the mode, and what a person should know of its cause."""
         before, after, fault = change.before, change.after, change.fault
-        because = f": {fault.message}" if fault else ""
+        because = f": {fault_message(fault)}" if fault else ""
         self.report(now_s, f"mode {before.name.lower()} to {after.name.lower()}{because}")
         if after in (Mode.ARMING, Mode.WALKING):
             self.notice = ""
         if fault and before in ENERGISED:
-            self.notice = f"stopped by {fault.name}: {fault.advice}"
+            self.notice = f"stopped by {fault.name}: {fault_advice(fault)}"
         if before is Mode.HOLD and after is Mode.IDLE and change.rested:
             held_s = self._longest_hold_s
             self._notify(now_s, f"the pose was held for {held_s:g} s without a request: torque went off by itself")

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from control.fault_kinds import make_fault
-from control.faults import Fault
+from control.faults import Fault, FaultKind
 from control.monitors.joint_monitor import FaultBounds
 from firmware_host.ticker import PERIOD_S, Tick
 
@@ -30,27 +29,26 @@ class LoopMonitor:
         before_s, self._distance_s = self._distance_s, wall_minus_monotonic_s
         if before_s is not None and abs(wall_minus_monotonic_s - before_s) > STEP_S:
             step_s = wall_minus_monotonic_s - before_s
-            found.append(make_fault("clock_step", "", f"The clock on the wall was set by {step_s:+.1f} s."))
+            found.append(FaultKind.CLOCK_STEP.fault(step_s=step_s))
         return found
 
     def _watch_beat(self, tick: Tick) -> list[Fault]:
         found: list[Fault] = []
         missed_s = tick.missed * PERIOD_S
         if missed_s > self._bounds.silence_s:
-            found.append(make_fault("loop_stalled", "", f"The loop stood still for {1e3 * tick.late_s:.0f} ms."))
+            found.append(FaultKind.LOOP_STALLED.fault(late_ms=1e3 * tick.late_s))
         elif missed_s > self._bounds.lag_s:
-            found.append(make_fault("loop_lagging", "", f"The loop missed {tick.missed} ticks in a row."))
+            found.append(FaultKind.LOOP_LAGGING.fault(extent=f"{tick.missed} ticks in a row were missed"))
         elif tick.missed:
-            found.append(make_fault("loop_overrun", "", f"The loop missed {tick.missed} of its ticks."))
+            found.append(FaultKind.LOOP_OVERRUN.fault(missed=tick.missed))
         self._stamps_s.append(tick.now_s)
         if len(self._stamps_s) > CRAWL_TICKS:
             mean_s = (tick.now_s - self._stamps_s[-1 - CRAWL_TICKS]) / CRAWL_TICKS
             if mean_s > self._bounds.crawl_s:
-                found.append(make_fault("loop_crawling", "", f"The loop's ticks take {1e3 * mean_s:.0f} ms."))
+                found.append(FaultKind.LOOP_CRAWLING.fault(tick_ms=1e3 * mean_s))
         if len(self._stamps_s) > MEAN_TICKS:
             fraction = (tick.now_s - self._stamps_s[0]) / (MEAN_TICKS * PERIOD_S) - 1.0
             if fraction > self._bounds.lag_fraction:
-                found.append(
-                    make_fault("loop_lagging", "", f"The loop's ticks take {100.0 * fraction:.0f} % too long.")
-                )
+                extent = f"its ticks take {100.0 * fraction:.0f} % too long"
+                found.append(FaultKind.LOOP_LAGGING.fault(extent=extent))
         return found

@@ -9,8 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from control.controller import Controller
-from control.fault_kinds import make_fault
-from control.faults import Fault
+from control.faults import Fault, FaultKind
 from control.records import BodyPose, DriveStates, Estimate, Joints, Phase, StrideEstimate
 from estimation.mud import MudEstimator, MudReading
 from firmware_host.configuration.configuration import Configuration
@@ -110,12 +109,7 @@ class MudLearning:
     def faults(self) -> list[Fault]:
         """Coefficients of this tick's strides that no mud has."""
         wild = [stride for stride in self.reading.strides if any(map(_is_wild, (stride.k_p, stride.k_s, stride.k_e)))]
-        return [
-            make_fault(
-                "estimate_wild", each.flipper, f"The {each.flipper} flipper's stride {each.index} tells nonsense."
-            )
-            for each in wild
-        ]
+        return [FaultKind.ESTIMATE_WILD.fault(each.flipper, stride=each.index) for each in wild]
 
 
 def _is_wild(estimate: Estimate) -> bool:

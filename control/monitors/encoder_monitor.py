@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from math import degrees
 
+from control.faults import Fault, FaultKind
 from control.records import NEVER_S, UNKNOWN, DriveState
 
 GONE_RAD = 0.03  # by the joint's own speed, while its angle stayed the same to the last bit
@@ -23,46 +24,45 @@ FROZEN_S = 0.1  # in which not even the last bit of angle and of a speed that is
 class EncoderMonitor:
     """Owns the last message, and what the speed has summed up to since the angle last changed."""
 
-    def __init__(self, jump_rad: float) -> None:
+    def __init__(self, joint: str, jump_rad: float) -> None:
+        self._joint = joint
         self._jump_rad = jump_rad
         self.reset()
 
     def reset(self) -> None:
-        self.message = ""  # about the problem that `update` has named
         self._angle_rad, self._velocity_rad_s, self._stamp_s = UNKNOWN, UNKNOWN, NEVER_S
         self._begin_count()
 
     def _begin_count(self) -> None:
         self._gone_s = self._gone_rad = self._frozen_s = 0.0
 
-    def update(self, state: DriveState, dt_s: float) -> str:
-        """Name of a fault, or nothing. `dt_s`: what a stamp may be late by."""
+    def update(self, state: DriveState, dt_s: float) -> Fault | None:
+        """The fault that a new position shows, if any. A stamp may be late by `dt_s`."""
         if state.angle_stamp_s == self._stamp_s:
-            return ""
+            return None
         gap_s = max(state.angle_stamp_s - self._stamp_s, 0.0)
         if state.angle_rad == self._angle_rad:
-            problem = self._count(state, gap_s)
+            fault = self._count(state, gap_s)
         else:
-            problem = self._measure(state, gap_s, dt_s)
+            fault = self._measure(state, gap_s, dt_s)
             self._begin_count()
         self._angle_rad, self._velocity_rad_s, self._stamp_s = (
             state.angle_rad, state.velocity_rad_s, state.angle_stamp_s
         )  # fmt: skip
-        return problem
+        return fault
 
-    def _measure(self, state: DriveState, gap_s: float, dt_s: float) -> str:
+    def _measure(self, state: DriveState, gap_s: float, dt_s: float) -> Fault | None:
         """By how much the way differs from that of the mean speed, beyond what a late stamp makes of the higher one."""
         if gap_s > LONGEST_GAP_S:  # also that before the first one
-            return ""
+            return None
         step_rad = state.angle_rad - self._angle_rad
         odd_rad = abs(step_rad - (state.velocity_rad_s + self._velocity_rad_s) / 2.0 * gap_s)
         late_rad = max(abs(state.velocity_rad_s), abs(self._velocity_rad_s)) * dt_s
         if not odd_rad > self._jump_rad + late_rad:
-            return ""
-        self.message = f"encoder jumped by {degrees(abs(step_rad)):.0f} degrees in {gap_s * 1e3:.1f} ms."
-        return "encoder_jump"
+            return None
+        return FaultKind.ENCODER_JUMP.fault(self._joint, step_deg=degrees(abs(step_rad)), gap_ms=gap_s * 1e3)
 
-    def _count(self, state: DriveState, gap_s: float) -> str:
+    def _count(self, state: DriveState, gap_s: float) -> Fault | None:
         """With its sign, since a speed at rest is noise about zero."""
         self._gone_s += gap_s
         self._gone_rad += state.velocity_rad_s * gap_s
@@ -70,6 +70,5 @@ class EncoderMonitor:
         self._frozen_s = self._frozen_s + gap_s if frozen else 0.0
         moved = abs(self._gone_rad) > GONE_RAD and self._gone_s > GONE_S
         if not moved and self._frozen_s <= FROZEN_S:
-            return ""
-        self.message = "encoder stands still while the joint moves."
-        return "encoder_stuck"
+            return None
+        return FaultKind.ENCODER_STUCK.fault(self._joint)

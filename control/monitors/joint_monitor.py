@@ -11,8 +11,7 @@ from math import degrees, isfinite, radians
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds, Meaning
-from control.fault_kinds import make_fault
-from control.faults import Fault
+from control.faults import Fault, FaultKind
 from control.limits import JointLimits, JointRange
 from control.monitors.encoder_monitor import EncoderMonitor
 from control.monitors.stillness import Stillness
@@ -94,7 +93,7 @@ class JointMonitor:
         self._low_rad = span.min_rad - radians(limits.position_margin_deg)
         self._high_rad = span.max_rad + radians(limits.position_margin_deg)
         self._fast_rad_s = FAST_FRACTION * limits.velocity_rad_s
-        self._encoder = EncoderMonitor(bounds.jump_rad)
+        self._encoder = EncoderMonitor(joint, bounds.jump_rad)
         self._stillness = Stillness(STILL_RAD)
         self._most_a = CURRENT_FRACTION * current_limit_a
         self._constant_nm_a = torque_constant_nm_a
@@ -123,8 +122,8 @@ class JointMonitor:
         self._watch_heat(found, facts, state)
         return found
 
-    def _fault(self, name: str, message: str) -> Fault:
-        return make_fault(name, self.joint, message)
+    def _fault(self, kind: FaultKind, **values: float | str) -> Fault:
+        return kind.fault(self.joint, **values)
 
     # signals
 
@@ -133,49 +132,44 @@ class JointMonitor:
         position_s, current_s = now_s - state.angle_stamp_s, now_s - state.current_stamp_s
         if position_s > bounds.late_s or current_s > bounds.late_s:
             found.append(self._late(position_s, current_s))
-            if current_s > bounds.silence_s and found[-1].name in ("drive_quiet", "position_stale"):
-                found.append(self._silence("current_silent", "current", current_s))
+            if current_s > bounds.silence_s and found[-1].kind in (FaultKind.DRIVE_QUIET, FaultKind.POSITION_STALE):
+                found.append(self._fault(FaultKind.CURRENT_SILENT, age_s=current_s))
         if now_s - state.heartbeat_stamp_s > self._heartbeat_silence_s:
-            found.append(self._silence("heartbeat_silent", "heartbeat", now_s - state.heartbeat_stamp_s))
+            found.append(self._fault(FaultKind.HEARTBEAT_SILENT, age_s=now_s - state.heartbeat_stamp_s))
         if isfinite(state.temperature_stamp_s) and now_s - state.temperature_stamp_s > SLOW_SILENCE_S:
-            found.append(self._silence("temperature_silent", "temperature", now_s - state.temperature_stamp_s))
+            found.append(self._fault(FaultKind.TEMPERATURE_SILENT, age_s=now_s - state.temperature_stamp_s))
         if isfinite(state.bus_voltage_stamp_s) and now_s - state.bus_voltage_stamp_s > SLOW_SILENCE_S:
-            found.append(self._silence("voltage_silent", "bus voltage", now_s - state.bus_voltage_stamp_s))
+            found.append(self._fault(FaultKind.VOLTAGE_SILENT, age_s=now_s - state.bus_voltage_stamp_s))
 
     def _late(self, position_s: float, current_s: float) -> Fault:
         """The hardest of what two ages say: both signals gone, one of them, or a frame that is late."""
         bounds = self._bounds
         both_s = min(position_s, current_s)
         if both_s > bounds.silence_s:
-            return self._silence("drive_silent", "message", both_s)
+            return self._fault(FaultKind.DRIVE_SILENT, age_s=both_s)
         if position_s > bounds.silence_s:
-            return self._silence("position_silent", "position", position_s)
+            return self._fault(FaultKind.POSITION_SILENT, age_s=position_s)
         if both_s > bounds.quiet_s:
-            return self._silence("drive_quiet", "message", both_s)
+            return self._fault(FaultKind.DRIVE_QUIET, age_s=both_s)
         if position_s > bounds.quiet_s:
-            return self._silence("position_stale", "position", position_s)
+            return self._fault(FaultKind.POSITION_STALE, age_s=position_s)
         if current_s > bounds.silence_s:
-            return self._silence("current_silent", "current", current_s)
+            return self._fault(FaultKind.CURRENT_SILENT, age_s=current_s)
         if current_s > bounds.quiet_s:
-            return self._silence("current_stale", "current", current_s)
-        return self._silence(
-            "drive_late", "position" if position_s > current_s else "current", max(position_s, current_s)
-        )
-
-    def _silence(self, name: str, signal: str, age_s: float) -> Fault:
-        ago = f"for {age_s * 1e3:.0f} ms" if isfinite(age_s) else "at all"
-        return self._fault(name, f"No {signal} came from the {self.joint} drive {ago}.")
+            return self._fault(FaultKind.CURRENT_STALE, age_s=current_s)
+        signal = "position" if position_s > current_s else "current"
+        return self._fault(FaultKind.DRIVE_LATE, signal=signal, age_s=max(position_s, current_s))
 
     # the drive's own state
 
     def _watch_drive(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
         if state.error_flags:
-            found.append(self._fault("drive_error", f"The {self.joint} drive reports error 0x{state.error_flags:x}."))
+            found.append(self._fault(FaultKind.DRIVE_ERROR, flags=f"0x{state.error_flags:x}"))
         if facts.moving and not state.closed_loop:
-            found.append(self._fault("drive_disarmed", f"The {self.joint} drive left closed loop by itself."))
+            found.append(self._fault(FaultKind.DRIVE_DISARMED))
         self._energised_s = self._energised_s + facts.dt_s if state.closed_loop and not facts.energised else 0.0
         if self._energised_s > ENERGISED_S:
-            found.append(self._fault("drive_energised", f"The {self.joint} drive is in closed loop, unasked."))
+            found.append(self._fault(FaultKind.DRIVE_ENERGISED, activity="in closed loop"))
         if state.bus_voltage_v < self._bounds.voltage_low_v or self._low_s:
             self._watch_voltage(found, facts, state.bus_voltage_v)
 
@@ -184,10 +178,9 @@ class JointMonitor:
         self._low_s = self._low_s + facts.dt_s if voltage_v < bounds.voltage_low_v else 0.0
         self._under_s = self._under_s + facts.dt_s if voltage_v < bounds.voltage_min_v else 0.0
         if self._under_s > TWO_MESSAGES_S:
-            text = f"The {self.joint} drive has {voltage_v:.1f} V; {bounds.voltage_min_v:g} V are the least."
-            found.append(self._fault("voltage_under", text))
+            found.append(self._fault(FaultKind.VOLTAGE_UNDER, voltage_v=voltage_v, least_v=bounds.voltage_min_v))
         elif self._low_s > TWO_MESSAGES_S:
-            found.append(self._fault("voltage_low", f"The {self.joint} drive has only {voltage_v:.1f} V."))
+            found.append(self._fault(FaultKind.VOLTAGE_LOW, voltage_v=voltage_v))
 
     # motion
 
@@ -197,34 +190,33 @@ class JointMonitor:
             found.append(self._out_of_range(angle_rad))
         self._fast_s = self._fast_s + facts.dt_s if velocity_rad_s > self._fast_rad_s else 0.0
         if self._fast_s > max(self._bounds.fast_s - facts.dt_s / 2.0, 0.0):
-            text = f"The {self.joint} joint turns at {velocity_rad_s:.0f} rad/s."
-            found.append(self._fault("joint_velocity", text))
+            limit_rad_s = self._limits.velocity_rad_s
+            kind = FaultKind.JOINT_VELOCITY
+            found.append(self._fault(kind, velocity_rad_s=velocity_rad_s, limit_rad_s=limit_rad_s))
         if not self._stillness.update(angle_rad, facts.dt_s):
             self._stalled_s = 0.0
         if self._stillness.still_s < REST_S and not facts.energised:
-            found.append(self._fault("joint_moving", f"The {self.joint} joint moves."))
-        problem = self._encoder.update(state, facts.dt_s)
-        if problem:
-            found.append(self._fault(problem, f"The {self.joint} {self._encoder.message}"))
+            found.append(self._fault(FaultKind.JOINT_MOVING))
+        encoder_fault = self._encoder.update(state, facts.dt_s)
+        if encoder_fault:
+            found.append(encoder_fault)
 
     def _out_of_range(self, angle_rad: float) -> Fault:
         low, high = degrees(self._low_rad), degrees(self._high_rad)
-        text = f"The {self.joint} joint is at {degrees(angle_rad):.1f} degrees, outside of {low:.0f} to {high:.0f}."
-        return self._fault("joint_position", text)
+        return self._fault(FaultKind.JOINT_POSITION, angle_deg=degrees(angle_rad), low_deg=low, high_deg=high)
 
     # load
 
     def _watch_load(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
         self._current_ticks = self._current_ticks + 1 if abs(state.current_a) > self._most_a else 0
         if self._current_ticks >= CURRENT_TICKS:
-            text = f"The {self.joint} motor takes {abs(state.current_a):.1f} A."
-            found.append(self._fault("joint_current", text))
+            current_a = abs(state.current_a)
+            found.append(self._fault(FaultKind.JOINT_CURRENT, current_a=current_a, limit_a=self._most_a))
         self._watch_torque(found, facts, state)
         pushed = abs(facts.torque_nm) >= self._saturated_nm > 0.0 and not facts.may_stand_still
         self._stalled_s = self._stalled_s + facts.dt_s if pushed else 0.0
         if self._stalled_s > STALLED_S:
-            text = f"The {self.joint} joint stands still at full torque for {self._stalled_s:.1f} s."
-            found.append(self._fault("joint_not_following", text))
+            found.append(self._fault(FaultKind.JOINT_NOT_FOLLOWING, stalled_s=self._stalled_s))
 
     def _watch_torque(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
         """A drive that is told to exert a torque and does not: a frozen current, lost commands, a silent clamp."""
@@ -232,8 +224,8 @@ class JointMonitor:
         self._missing_s = self._missing_s + facts.dt_s if differs and facts.moving else 0.0
         if self._missing_s > MISSING_S:
             given_nm = state.current_a * self._constant_nm_a
-            text = f"The {self.joint} motor gives {given_nm:.2f} N·m in place of {facts.torque_nm:.2f}."
-            found.append(self._fault("torque_missing", text))
+            kind = FaultKind.TORQUE_MISSING
+            found.append(self._fault(kind, measured_nm=given_nm, commanded_nm=facts.torque_nm))
 
     # heat
 
@@ -250,7 +242,8 @@ class JointMonitor:
             return
         hot = winding_c >= self._limits.temperature_hot_c
         by_sensor = measured_c >= (self._limits.temperature_hot_c if hot else self._nearly_hot_c)
-        what, how = ("motor", "") if by_sensor else ("winding", ", by its currents")
-        temperature_c = measured_c if by_sensor else winding_c
-        text = f"The {self.joint} motor has {temperature_c:.0f} degrees C{how}."
-        found.append(self._fault(f"{what}_hot" if hot else f"{what}_overheating", text))
+        if by_sensor:
+            kind = FaultKind.MOTOR_HOT if hot else FaultKind.MOTOR_OVERHEATING
+        else:
+            kind = FaultKind.WINDING_HOT if hot else FaultKind.WINDING_OVERHEATING
+        found.append(self._fault(kind, temperature_c=measured_c if by_sensor else winding_c))

@@ -21,6 +21,7 @@ from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Sample, Stand
 from experiments.robot.bench_robot import BenchError
+from firmware_host.operator.fault_texts import fault_message
 from firmware_host.ticker import PERIOD_S
 
 Vector = NDArray[np.float64]
@@ -111,7 +112,7 @@ def strides(stand: Stand) -> Readings:
         missed = stand.loop.missed_ticks
         samples = walk(stand)
         fraction = 100.0 * (stand.loop.missed_ticks - missed) / len(samples)
-        reported = [fault.message for fault in stand.loop.faults.standing]
+        reported = [fault_message(fault) for fault in stand.loop.faults.standing]
     yield from _walk_readings(stand, [sample for sample in samples if sample.mode is Mode.WALKING])
     yield Reading("walk: ticks missed", fraction, "%", 0.0, 100.0 * MOST_MISSED_FRACTION, BUSY)
     yield Reading("walk: faults that stand", len(reported), "", 0, 0, " ".join(reported))

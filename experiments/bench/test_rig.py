@@ -19,6 +19,7 @@ from experiments.bench.lateness import Lateness
 from experiments.bench.operator import Attendant
 from experiments.bench.rig import Rig
 from experiments.robot.bench_robot import BenchError
+from firmware_host.operator.fault_texts import fault_advice
 from firmware_host.ticker import PERIOD_S, Tick
 
 ARMING_S = 5.0  # for faults of before to be over, and for the drives to go into closed loop
@@ -260,4 +261,4 @@ def joint_place(joint: str) -> int:
 
 
 def _reported(faults: Sequence[Fault]) -> str:
-    return " ".join(fault.advice for fault in faults)
+    return " ".join(fault_advice(fault) for fault in faults)

@@ -1,6 +1,6 @@
 """Every way to every fault, and the phases in which it is made: at least one way for each kind of fault.
 
-Beside the kinds of control/fault_kinds.py there is a daemon that dies, hangs or meets a bug in each stage of its tick,
+Beside the kinds of control/faults.py there is a daemon that dies, hangs or meets a bug in each stage of its tick,
 and nothing at all, as the control group.
 """
 
@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from control.fault_kinds import KINDS
-from control.faults import FaultKind
+from control.faults import FAULT_KINDS, FaultKind
 from control.records import JOINTS
 from drivers.odrive import codec
 from experiments.faults.causes import (
@@ -78,7 +77,7 @@ class Way:
 
     @property
     def kind(self) -> FaultKind | None:
-        return KINDS.get(self.fault)
+        return FAULT_KINDS.get(self.fault)
 
 
 BUGS = {
@@ -113,7 +112,7 @@ WAYS: tuple[Way, ...] = (
     Way("drive_energised", other_master, 1.0, ("idle",)),
     Way("drive_restarted", restart, 2.0),
     Way("drive_version", said(codec.GET_VERSION, 2, 4, 4, 58, 0, 5, 6, 0), phases=("idle", "stance")),
-    Way("drive_twins", duplicate(0.3), 1.6),
+    Way("duplicate_node_id", duplicate(0.3), 1.6),
     Way("watchdog_unknown", said(codec.HEARTBEAT, codec.ERROR_INITIALIZING, 1, 0, 0), phases=("idle",)),
     Way("watchdog_off", watchdog_reported_off, phases=("idle", "stance")),
     # buses
@@ -183,7 +182,7 @@ BRINGS: dict[str, tuple[str, ...]] = {
     "heartbeat_silent": ("drive_energised",),
     "drive_error": ("drive_disarmed", "torque_missing"),
     "drive_restarted": AWAY,
-    "drive_twins": (
+    "duplicate_node_id": (
         "encoder_jump",
         "joint_moving",
         "drive_disarmed",

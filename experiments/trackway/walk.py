@@ -17,6 +17,7 @@ from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.operator.fault_texts import fault_message
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.disturbances import NONE, Disturbances
 from simulation.mud.track import Track
@@ -135,4 +136,4 @@ def walk_in(lockstep: Lockstep, track: Track, order: WalkOrder, done: Callable[[
         lockstep.step()
         record.look()
     fault = lockstep.loop.fault
-    return Walk(record.strides, fault.message if fault else "")
+    return Walk(record.strides, fault_message(fault) if fault else "")

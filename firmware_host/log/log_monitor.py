@@ -5,11 +5,9 @@ None of it stops a robot that moves; a log that cannot be written stands against
 
 from __future__ import annotations
 
-from control.fault_kinds import make_fault
-from control.faults import Fault
+from control.faults import Fault, FaultKind
 from control.monitors.joint_monitor import FaultBounds
 from firmware_host.log.recorder import LogReport
-from firmware_host.operator.counted_nouns import counted
 
 
 class LogMonitor:
@@ -25,15 +23,15 @@ class LogMonitor:
     def update(self, report: LogReport) -> list[Fault]:
         found: list[Fault] = []
         if not report.alive:
-            found.append(make_fault("recorder_dead", "", "The log's writer has died: nothing is recorded."))
+            found.append(FaultKind.RECORDER_DEAD.fault())
         elif report.problem:
-            found.append(make_fault("log_unwritable", "", report.problem))
+            found.append(FaultKind.LOG_UNWRITABLE.fault(reason=report.problem))
         if report.free_fraction < self._bounds.disk_free_fraction:
-            text = f"The log's disk has {100.0 * report.free_fraction:.1f} % free ({report.free_bytes / 1e6:.0f} MB)."
-            found.append(make_fault("disk_low", "", text))
+            percent, free_mb = 100.0 * report.free_fraction, report.free_bytes / 1e6
+            found.append(FaultKind.DISK_LOW.fault(free_percent=percent, free_mb=free_mb))
         if report.slowest_write_s > self._bounds.disk_slow_s:
-            found.append(make_fault("disk_slow", "", f"The log's disk took {report.slowest_write_s:.1f} s to write."))
+            found.append(FaultKind.DISK_SLOW.fault(write_s=report.slowest_write_s))
         if report.alive and report.dropped > self._dropped:
-            found.append(make_fault("rows_lost", "", f"The log lost {counted(report.dropped, 'row')} so far."))
+            found.append(FaultKind.ROWS_LOST.fault(rows=report.dropped))
         self._dropped = report.dropped
         return found

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from math import degrees, isfinite
 from typing import Any
 
-from control.faults import Blocks, Fault
+from control.faults import Blocks, Fault, FaultKind
 from control.records import DriveState
 from drivers.odrive.axis import OdriveAxis
 from firmware_host.loop import Loop
+from firmware_host.operator.fault_texts import fault_message, what_to_do
 from firmware_host.operator.reports import check_item
 
 HEARING = "check its power, wiring, node id and cyclic message periods (README, 'Setting up the drives')"
@@ -33,12 +34,14 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
     pose = loop.pose.report()
     if pose.source:
         lines["pose"] = pose.message
-    faults = [fault for fault in loop.faults.standing if fault.check != "pose" or not pose.trouble]  # which says more
+    faults = loop.faults.standing
+    if pose.trouble:  # the pose source's own text says more
+        faults = [fault for fault in faults if fault.kind is not FaultKind.POSE_LOST]
     for fault in faults:
-        lines.setdefault(fault.check, "")
+        lines.setdefault(fault.check_line, "")
     unheard = {f"drive.{axis.joint}" for axis in loop.drives.axes if not axis.heard}
     items = [
-        _line(identity, text, [fault for fault in faults if fault.check == identity], identity in unheard)
+        _line(identity, text, [fault for fault in faults if fault.check_line == identity], identity in unheard)
         for identity, text in lines.items()
     ]
     return items + [check_item("realtime", True, f"warning: {warning}", "") for warning in warnings]
@@ -46,12 +49,12 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
 
 def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> dict[str, Any]:
     if unheard:
-        reported_as_well = (fault.message for fault in faults)
+        reported_as_well = (fault_message(fault) for fault in faults)
         return check_item(identity, False, "; ".join([text, *reported_as_well]), HEARING) | {"mandatory": True}
     blocking = [fault for fault in faults if fault.kind.blocks is not Blocks.NO]
     reported = blocking or list(faults)
-    messages = " ".join(fault.message for fault in reported)
-    fixes = "; ".join(dict.fromkeys(fault.kind.what_to_do for fault in reported))
+    messages = " ".join(fault_message(fault) for fault in reported)
+    fixes = "; ".join(dict.fromkeys(what_to_do(fault) for fault in reported))
     text = messages if blocking else f"warning: {messages}" if reported else text
     item = check_item(identity, not blocking, text, fixes)
     return item | {"mandatory": any(fault.kind.blocks is Blocks.ALWAYS for fault in blocking)}

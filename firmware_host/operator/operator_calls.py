@@ -19,6 +19,7 @@ from firmware_host.log.recorder import Recording
 from firmware_host.loop import Loop
 from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.operator.connection import Caller
+from firmware_host.operator.fault_texts import fault_message, what_to_do
 from firmware_host.operator.lease import LONGEST_S, SHORTEST_S
 from firmware_host.operator.reports import known, map_report, mud_estimate_report, stride_report
 from firmware_host.operator.status_socket import Methods, RefusedError
@@ -251,8 +252,8 @@ def _fault_report(loop: Loop, fault: Fault) -> dict[str, Any]:
     return {
         "name": fault.name,
         "subject": fault.subject,
-        "sentence": fault.message,
-        "what_to_do": kind.what_to_do,
+        "sentence": fault_message(fault),
+        "what_to_do": what_to_do(fault),
         "for_s": loop.faults.age_ticks(fault) * PERIOD_S,
         "reaction": kind.reaction.name.lower(),
         "blocks_arming": kind.blocks is not Blocks.NO,
@@ -263,7 +264,7 @@ def _against_moving(loop: Loop) -> str | None:
     """Why joints that are held should stay where they are, or None."""
     if loop.controller.cut_short:
         return "the flippers may be in the mud: 'mudskipper stop' raises them first"
-    return loop.fault.message if loop.fault else None
+    return fault_message(loop.fault) if loop.fault else None
 
 
 def _joint_angles(params: dict[str, Any]) -> dict[str, float]:

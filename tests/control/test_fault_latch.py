@@ -5,13 +5,12 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from control.fault_kinds import KINDS, make_fault
 from control.fault_latch import GOOD_TICKS, FaultLatch
-from control.faults import Blocks, Clears, Fault, Reaction
+from control.faults import FAULT_KINDS, Blocks, Clears, Fault, Reaction
 
 
 def fault_of(name: str, subject: str = "left_sweep") -> Fault:
-    return make_fault(name, subject, KINDS[name].meaning)
+    return FAULT_KINDS[name].fault(subject)
 
 
 LATE, STALE, HOT = fault_of("drive_late"), fault_of("current_stale"), fault_of("motor_overheating", "right_sweep")
@@ -126,7 +125,7 @@ def test_news_is_told_in_one_tick_only() -> None:
 def test_the_sentence_is_that_of_the_last_time_and_the_news_that_of_the_first() -> None:
     latch = FaultLatch()
     latch.update([LATE], False)
-    later = LATE._replace(message="No position came for 9 ms.")
+    later = LATE.with_values(age_s=0.009)
     latch.update([later], False)
     assert (latch.begun, latch.standing) == ([], [later])
 

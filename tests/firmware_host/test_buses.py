@@ -21,6 +21,7 @@ from firmware_host import buses
 from firmware_host.buses import BusError, open_bus, open_ports, reopening_ports
 from firmware_host.configuration.configuration import BusParameters, Configuration
 from firmware_host.daemon import reopen_buses
+from firmware_host.operator.fault_texts import fault_message
 from firmware_host.operator.status_client import NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.lockstep import Lockstep
@@ -160,7 +161,7 @@ def test_a_bus_that_vanishes_in_operation_is_a_fault_and_when_it_is_back_the_rob
     plug.pull()
     plug.run(robot, 6.0)
     assert mode_of(robot) is Mode.FAULT
-    names = {fault.name: fault.message for fault in robot.loop.faults.standing}
+    names = {fault.name: fault_message(fault) for fault in robot.loop.faults.standing}
     assert "there is no such interface" in names["bus_off"]
     plug.plug_in()
     plug.run(robot, 2.0 * RETRY_S)

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from control.fault_kinds import KINDS
-from control.faults import Fault
+from control.faults import FAULT_KINDS, Fault, FaultKind
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, Mode
 from control.records import JOINTS, NO_TORQUE, BodyPose, DriveState, DriveStates, Joints, same_for_all
@@ -111,8 +110,7 @@ def test_a_bus_tells_its_state_with_the_last_error(bench: Bench, state: BusState
     bench.ports["right"].state = state
     bench.ports["right"].last_error = "no acknowledgement"
     (fault,) = bench.tick()
-    assert (fault.name, fault.subject) == (name, "right")
-    assert fault.message.startswith("The right bus ") and fault.message.endswith(": no acknowledgement.")
+    assert fault == FAULT_KINDS[name].fault("right", reason="no acknowledgement")
 
 
 def test_every_state_of_a_bus_but_active_is_a_fault(bench: Bench) -> None:
@@ -124,8 +122,7 @@ def test_every_state_of_a_bus_but_active_is_a_fault(bench: Bench) -> None:
 def test_frames_that_were_lost_on_their_way_in_are_told_once(bench: Bench) -> None:
     bench.ports["right"].lost_frames += 7
     (fault,) = bench.tick()
-    assert (fault.name, fault.subject) == ("frames_lost", "right")
-    assert fault.message.startswith("7 frames of the right bus were lost")
+    assert fault == FaultKind.FRAMES_LOST.fault("right", frames=7)
     assert bench.tick() == []
 
 
@@ -136,9 +133,9 @@ def test_a_bus_that_loses_commands_in_three_ticks_in_a_row_is_a_fault(bench: Ben
         bench.ports["left"].last_send_error = "No buffer space available"
         found.append(bench.tick())
     assert [reported(each) for each in found] == [[]] * (REFUSED_TICKS - 1) + [[("bus_refuses", "left")]] * 3
-    assert found[2][0].message == "The left bus lost commands in 3 ticks in a row: No buffer space available."
+    assert found[2] == [FaultKind.BUS_REFUSES.fault("left", ticks=3, reason="No buffer space available")]
     assert bench.tick() == []
-    assert KINDS["bus_refuses"].bound_ticks > REFUSED_TICKS + 1
+    assert FaultKind.BUS_REFUSES.bound_ticks > REFUSED_TICKS + 1
 
 
 def test_two_ticks_of_lost_commands_again_and_again_are_none(bench: Bench) -> None:
@@ -167,7 +164,7 @@ def test_a_command_that_the_gate_refuses_is_told_once(bench: Bench) -> None:
     gate = bench.drives.gate
     gate.refused += 2
     gate.last_refusal = "A torque was refused."
-    assert [(fault.name, fault.message) for fault in bench.tick()] == [("command_refused", "A torque was refused.")]
+    assert bench.tick() == [FaultKind.COMMAND_REFUSED.fault(reason="A torque was refused.")]
     assert bench.tick() == []
 
 
@@ -178,48 +175,49 @@ def test_a_drive_that_does_not_arm_is_told_after_two_seconds_and_only_while_armi
         assert ticks < 1000
     assert reported(found) == [("arming_failed", "right_sweep")]
     assert ticks == pytest.approx(ARMING_S / PERIOD_S, abs=1)
-    assert ticks < KINDS["arming_failed"].bound_ticks
+    assert ticks < FaultKind.ARMING_FAILED.bound_ticks
     assert reported(bench.tick(Mode.HOLD, bench.states(2, closed_loop=False))) == [("drive_disarmed", "right_sweep")]
 
 
 def test_a_drive_that_left_closed_loop_says_why(bench: Bench) -> None:
     bench.drives.axes[2].disarm_reason = 0x1000000
     (fault,) = bench.tick(states=bench.states(2, closed_loop=False))
-    assert fault.message == "The right_sweep drive left closed loop by itself. (watchdog expired)"
+    assert fault == FaultKind.DRIVE_DISARMED.fault("right_sweep", reason="watchdog expired")
 
 
 def test_other_faults_do_not_borrow_a_drives_words(bench: Bench) -> None:
     bench.drives.axes[0].disarm_reason = 0x1000000
     (fault,) = bench.tick(states=bench.states(0, angle_rad=2.0))
-    assert "watchdog" not in fault.message
+    assert "reason" not in dict(fault.values)
 
 
 @pytest.mark.parametrize(
     ("version", "expected"),
     [
-        (None, "The left_sweep drive did not tell its firmware version yet."),
-        (Version(0, 5, 6), "The left_sweep drive runs firmware 0.5.6; 0.6 is supported."),
-        (Version(1, 6, 0), "The left_sweep drive runs firmware 1.6.0; 0.6 is supported."),
+        (None, "unknown"),
+        (Version(0, 5, 6), "0.5.6"),
+        (Version(1, 6, 0), "1.6.0"),
         (Version(0, 6, 0), None),
     ],
 )
 def test_firmware_is_known_or_a_fault(bench: Bench, version: Version | None, expected: str | None) -> None:
     tell_settings(bench.drives.axes[0], version)
     found = bench.tick(Mode.IDLE, bench.states())
-    assert [(fault.name, fault.message) for fault in found] == ([("drive_version", expected)] if expected else [])
+    fault = FaultKind.DRIVE_VERSION.fault("left_sweep", version=expected or "", supported="0.6")
+    assert found == ([fault] if expected else [])
 
 
 @pytest.mark.parametrize(
-    ("watchdog_s", "name", "message"),
+    ("watchdog_s", "expected"),
     [
-        (nan, "watchdog_unknown", "The left_sweep drive's watchdog was not read back."),
-        (0.0, "watchdog_off", "The left_sweep drive's watchdog is off."),
-        (0.31, "watchdog_off", "The left_sweep drive's watchdog waits for 0.31 s; 0.3 s is the most."),
+        (nan, FaultKind.WATCHDOG_UNKNOWN.fault("left_sweep")),
+        (0.0, FaultKind.WATCHDOG_OFF.fault("left_sweep", setting="off", longest_s=0.3)),
+        (0.31, FaultKind.WATCHDOG_OFF.fault("left_sweep", setting="set to 0.31 s", longest_s=0.3)),
     ],
 )
-def test_a_watchdog_is_known_and_on_and_quick(bench: Bench, watchdog_s: float, name: str, message: str) -> None:
+def test_a_watchdog_is_known_and_on_and_quick(bench: Bench, watchdog_s: float, expected: Fault) -> None:
     tell_settings(bench.drives.axes[0], watchdog_s=watchdog_s)
-    assert [(fault.name, fault.message) for fault in bench.tick()] == [(name, message)]
+    assert bench.tick() == [expected]
     tell_settings(bench.drives.axes[0], watchdog_s=0.3)
     assert bench.tick() == []
 
@@ -234,7 +232,7 @@ def test_a_restart_is_told_once(bench: Bench) -> None:
 def test_two_drives_under_one_id_are_told_while_they_seem_so(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(OdriveAxis, "duplicates", property(lambda axis: axis.joint == "left_adduction"))
     for _ in range(3):
-        assert reported(bench.tick()) == [("drive_twins", "left_adduction")]
+        assert reported(bench.tick()) == [("duplicate_node_id", "left_adduction")]
 
 
 # the body's place
@@ -256,10 +254,7 @@ def test_a_place_that_is_lost_is_told_until_it_is_back_or_forgotten(bench: Bench
 
 def test_who_lost_the_lease_is_named(bench: Bench) -> None:
     (fault,) = bench.tick(lease_holder="the operator's tablet")
-    assert (fault.name, fault.message) == (
-        "lease_lost",
-        "the operator's tablet promised to attend the robot and is gone.",
-    )
+    assert fault == FaultKind.LEASE_LOST.fault(holder="the operator's tablet")
 
 
 # trust in encoders

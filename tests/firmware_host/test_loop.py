@@ -16,6 +16,7 @@ from drivers.odrive.codec import ERROR_WATCHDOG, SET_INPUT_TORQUE, AxisState
 from firmware_host.configuration.configuration import Configuration, parse_configuration
 from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE_KIND, TICK_KIND
+from firmware_host.operator.fault_texts import fault_message
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.ticker import PERIOD_S, Tick
 from simulation.devices.odrive import SimulatedOdrive
@@ -223,7 +224,7 @@ def test_a_bus_that_takes_no_commands_is_a_fault(robot: Lockstep) -> None:
     port.send = fail  # type: ignore[method-assign]
     robot.run_for(10 * PERIOD_S)
     assert robot.loop.fault is not None and robot.loop.fault.name == "bus_refuses"
-    assert "No buffer space" in robot.loop.fault.message
+    assert "No buffer space" in fault_message(robot.loop.fault)
 
 
 def test_flippers_that_stay_in_the_mud_are_told(configuration: Configuration) -> None:
@@ -258,7 +259,7 @@ def test_a_drive_error_ends_in_fault_with_the_drives_own_words(robot: Lockstep) 
     robot.robot.drives[2]._disarm(ERROR_WATCHDOG)
     assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
     assert robot.loop.fault is not None
-    assert "right_sweep" in robot.loop.fault.message and "watchdog expired" in robot.loop.fault.message
+    assert "right_sweep" in fault_message(robot.loop.fault) and "watchdog expired" in fault_message(robot.loop.fault)
     robot.run_for(0.02)
     assert not energised_drives(robot)
 
@@ -293,7 +294,7 @@ def test_a_silent_drive_is_a_fault_within_its_bound(configuration: Configuration
         robot.step()
         ticks += 1
     assert ticks <= configuration.faults.silence_s * 380 + 2
-    assert robot.loop.fault is not None and "right_adduction" in robot.loop.fault.message
+    assert robot.loop.fault is not None and "right_adduction" in fault_message(robot.loop.fault)
 
 
 def test_a_torque_that_is_no_number_never_leaves(robot: Lockstep) -> None:

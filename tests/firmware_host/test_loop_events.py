@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from control.fault_kinds import make_fault
+from control.faults import FaultKind
 from control.modes import Mode, Request
 from firmware_host.loop_events import LoopEvents, ModeChange
 from tests.recorded_events import EventRecorder
 
-FAULT = make_fault("lease_lost", "", "Anna is gone.")
+FAULT = FaultKind.LEASE_LOST.fault(holder="Anna")
 
 
 @pytest.fixture
@@ -28,8 +28,8 @@ def change(before: Mode, after: Mode, faulty: bool = False, rested: bool = False
 
 def test_a_change_of_mode_is_told_with_its_cause(events: LoopEvents, recorder: EventRecorder) -> None:
     events.tell_change(1.0, change(Mode.WALKING, Mode.STOPPING, faulty=True))
-    assert recorder.texts == ["mode walking to stopping: Anna is gone."]
-    assert events.notice.startswith("stopped by lease_lost: Anna is gone. ")
+    assert recorder.texts == ["mode walking to stopping: Anna held the lease and did not renew it."]
+    assert events.notice.startswith("stopped by lease_lost: Anna held the lease and did not renew it. ")
 
 
 @pytest.mark.parametrize("mode", [Mode.ARMING, Mode.WALKING])

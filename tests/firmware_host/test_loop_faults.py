@@ -12,8 +12,7 @@ from dataclasses import replace
 import pytest
 
 from control.controller import SOFT_STOP_S, WalkOrder
-from control.fault_kinds import KINDS
-from control.faults import Clears, Reaction
+from control.faults import FAULT_KINDS, Clears, FaultKind, Reaction
 from control.modes import ENERGISED, HELD, Mode, Request
 from control.records import JOINTS, NO_TORQUE, Phase
 from drivers.can.can_port import BusState
@@ -176,7 +175,7 @@ def ticks_until(robot: Lockstep, name: str, longest: int) -> int:
 @pytest.mark.parametrize("name", CAUSES)
 def test_every_cause_is_met_by_its_reaction_within_its_ticks(at: Copied, name: str) -> None:
     for moment in ("holding", "stance", "stopping"):
-        robot, kind = at(moment), KINDS[name]
+        robot, kind = at(moment), FAULT_KINDS[name]
         CAUSES[name](robot)
         ticks_until(robot, name, kind.bound_ticks)
         assert mode_of(robot) in AFTER[kind.reaction], moment
@@ -187,7 +186,7 @@ def test_every_cause_is_met_by_its_reaction_within_its_ticks(at: Copied, name: s
 def test_a_drive_that_starts_anew_is_told_within_its_ticks_and_needs_a_clear(at: Copied) -> None:
     robot = at("stance")
     robot.robot.drives[1].restart(robot.now_s)
-    ticks_until(robot, "drive_restarted", KINDS["drive_restarted"].bound_ticks)
+    ticks_until(robot, "drive_restarted", FaultKind.DRIVE_RESTARTED.bound_ticks)
     robot.run_for(2.0)
     assert mode_of(robot) is Mode.FAULT
     by_hand = {fault.name for fault in robot.loop.faults.standing if fault.kind.clears is Clears.BY_HAND}
@@ -204,7 +203,7 @@ def test_a_drive_that_somebody_else_arms_is_told_within_its_ticks(at: Copied) ->
     drive.receive = lambda frame, now_s: []  # type: ignore[method-assign]
     altered(watchdog_s=0.0)(robot)
     drive.axis_state = AxisState.CLOSED_LOOP
-    ticks_until(robot, "drive_energised", KINDS["drive_energised"].bound_ticks)
+    ticks_until(robot, "drive_energised", FaultKind.DRIVE_ENERGISED.bound_ticks)
     assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
 
 
@@ -213,7 +212,7 @@ def test_a_place_that_is_lost_is_told_within_its_ticks_and_the_walk_goes_on(at: 
     pose = robot.loop.pose
     assert isinstance(pose, SimulatedPose)
     pose._capture.step = lambda now_s, plant: iter(())  # type: ignore[method-assign]
-    ticks_until(robot, "pose_lost", KINDS["pose_lost"].bound_ticks)
+    ticks_until(robot, "pose_lost", FaultKind.POSE_LOST.bound_ticks)
     robot.run_for(0.5)
     assert mode_of(robot) is Mode.WALKING
 
@@ -229,8 +228,8 @@ def test_a_drive_that_falls_silent_leads_to_damping_and_then_to_idle_drives(
     for tick in range(1, 20):
         robot.step()
         ticks.setdefault(mode_of(robot), tick)
-    assert ticks[Mode.DAMPING] <= KINDS["drive_quiet"].bound_ticks
-    assert ticks[Mode.DAMPING] < ticks[Mode.FAULT] <= KINDS["drive_silent"].bound_ticks
+    assert ticks[Mode.DAMPING] <= FaultKind.DRIVE_QUIET.bound_ticks
+    assert ticks[Mode.DAMPING] < ticks[Mode.FAULT] <= FaultKind.DRIVE_SILENT.bound_ticks
     assert robot.loop.sent.torques_nm == NO_TORQUE
     assert all(drive.axis_state is AxisState.IDLE for drive in robot.robot.drives)
     assert JOINTS[joint] in robot.loop.events.notice and "stopped by drive_silent" in robot.loop.events.notice
@@ -242,7 +241,7 @@ def test_a_drive_that_falls_silent_while_arming_ends_it_without_torque(at: Copie
     robot.step()
     assert mode_of(robot) is Mode.ARMING
     mute(robot, 2)
-    for _ in range(KINDS["drive_silent"].bound_ticks):
+    for _ in range(FaultKind.DRIVE_SILENT.bound_ticks):
         robot.step()
         assert robot.loop.sent.torques_nm == NO_TORQUE
     assert mode_of(robot) is Mode.FAULT
@@ -271,7 +270,7 @@ def test_damping_never_speeds_a_joint_up(at: Copied, moment: str) -> None:
 def test_a_joint_whose_encoder_jumped_gets_no_torque_until_the_drives_are_idle(at: Copied) -> None:
     robot = at("stance")
     altered(0, encoder_offset_rad=-0.4)(robot)
-    ticks_until(robot, "encoder_jump", KINDS["encoder_jump"].bound_ticks)
+    ticks_until(robot, "encoder_jump", FaultKind.ENCODER_JUMP.bound_ticks)
     assert mode_of(robot) is Mode.DAMPING
     robot.run_for(3 * PERIOD_S)
     torques = []
@@ -287,7 +286,7 @@ def test_a_joint_whose_encoder_jumped_gets_no_torque_until_the_drives_are_idle(a
 def test_after_a_soft_stop_the_flippers_are_up_and_the_drives_idle(at: Copied, moment: str) -> None:
     robot = at(moment)
     altered(bus_voltage_v=17.0)(robot)
-    ticks_until(robot, "voltage_under", KINDS["voltage_under"].bound_ticks)
+    ticks_until(robot, "voltage_under", FaultKind.VOLTAGE_UNDER.bound_ticks)
     assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, SOFT_STOP_S + 0.2)
     assert all(abs(robot.robot.plant.angles_rad[joint]) < UP_RAD for joint in (1, 3))
     robot.step()
@@ -299,7 +298,7 @@ def test_a_soft_stop_in_mud_that_keeps_the_flippers_ends_in_time_as_well(at: Cop
     for arm in robot.robot.plant.arms:
         arm.track = Track([(5.0, Clay("40 kPa", 40e3))])
     altered(bus_voltage_v=17.0)(robot)
-    ticks_until(robot, "voltage_under", KINDS["voltage_under"].bound_ticks)
+    ticks_until(robot, "voltage_under", FaultKind.VOLTAGE_UNDER.bound_ticks)
     assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, SOFT_STOP_S + 0.2)
     assert robot.robot.plant.angles_rad[1] < -UP_RAD
 
@@ -310,7 +309,7 @@ def test_a_worse_fault_in_a_soft_stop_is_heeded_at_once(at: Copied) -> None:
     robot.run_for(0.2)
     assert mode_of(robot) is Mode.STOPPING
     mute(robot, 0)
-    robot.run_for(KINDS["drive_silent"].bound_ticks * PERIOD_S)
+    robot.run_for(FaultKind.DRIVE_SILENT.bound_ticks * PERIOD_S)
     assert mode_of(robot) is Mode.FAULT
 
 
@@ -433,7 +432,7 @@ def test_force_where_nothing_is_to_be_overruled_is_none(at: Copied) -> None:
 def test_what_is_mandatory_is_never_overruled(at: Copied, name: str) -> None:
     robot = at("idle")
     CAUSES[name](robot)
-    ticks_until(robot, name, KINDS[name].bound_ticks)
+    ticks_until(robot, name, FAULT_KINDS[name].bound_ticks)
     assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
     robot.run_for(0.1)
     assert mode_of(robot) is Mode.IDLE
@@ -446,7 +445,7 @@ def test_what_is_mandatory_is_never_overruled(at: Copied, name: str) -> None:
 def hold_by_a_fault(robot: Lockstep) -> None:
     """The currents of one drive are lost for five ticks, more than it takes, less than what stops."""
     mute(robot, 1, codec.GET_IQ)
-    ticks_until(robot, "current_stale", KINDS["current_stale"].bound_ticks)
+    ticks_until(robot, "current_stale", FaultKind.CURRENT_STALE.bound_ticks)
     unmute(robot, 1)
 
 
@@ -538,7 +537,7 @@ def test_disarm_is_obeyed_in_every_moment_of_a_fault(at: Copied) -> None:
     for name in ("voltage_under", "bus_refuses", "current_stale"):
         robot = at("stance")
         CAUSES[name](robot)
-        ticks_until(robot, name, KINDS[name].bound_ticks)
+        ticks_until(robot, name, FAULT_KINDS[name].bound_ticks)
         assert mode_of(robot) in ENERGISED
         assert robot.loop.request(Request.DISARM, robot.now_s) is None
         robot.step()

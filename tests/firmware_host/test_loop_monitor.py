@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.fault_kinds import KINDS
-from control.faults import Fault
+from control.faults import Fault, FaultKind
 from control.monitors.joint_monitor import FaultBounds
 from firmware_host.loop_monitor import CRAWL_TICKS, MEAN_TICKS, LoopMonitor
+from firmware_host.operator.fault_texts import fault_message
 from firmware_host.ticker import PERIOD_S, Tick, Ticker
 
 START_S = 5000.0
@@ -105,10 +105,10 @@ def test_single_missed_ticks_make_a_lag_once_they_are_more_than_a_tenth() -> Non
 
 
 def test_what_is_told_has_numbers() -> None:
-    messages = {ticks: watched([0.0] * 5 + [missing(ticks)])[-1][0].message for ticks in (2, 6, 20)}
+    messages = {ticks: fault_message(watched([0.0] * 5 + [missing(ticks)])[-1][0]) for ticks in (2, 6, 20)}
     assert messages == {
         2: "The loop missed 2 of its ticks.",
-        6: "The loop missed 6 ticks in a row.",
+        6: "The loop lags: 6 ticks in a row were missed.",
         20: "The loop stood still for 54 ms.",
     }
 
@@ -187,4 +187,4 @@ def test_a_crawl_is_told_within_its_ticks() -> None:
             if "loop_crawling"
             in names(watch.update(Tick(START_S + number * period_ticks * PERIOD_S, 0.0, number, 0), DISTANCE_S))
         )
-        assert passed <= max(KINDS["loop_crawling"].bound_ticks, CRAWL_TICKS * period_ticks)
+        assert passed <= max(FaultKind.LOOP_CRAWLING.bound_ticks, CRAWL_TICKS * period_ticks)

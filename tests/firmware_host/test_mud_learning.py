@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from control.controller import WalkOrder
+from control.faults import FaultKind
 from control.gait.gait import GaitParameters
 from control.records import NO_LOAD, Estimate, GaitTarget, Phase, StrideEstimate
 from estimation.mud import MudReading
@@ -149,8 +150,7 @@ def test_the_end_of_an_insertion_is_told_once(learning: MudLearning) -> None:
 def test_a_coefficient_that_no_mud_has_is_told(learning: MudLearning, name: str, value: float) -> None:
     learning.reading = MudReading(strides=(stride("right", 7, **{name: Estimate(value, 1e5, 100, True)}),))
     (fault,) = learning.faults
-    assert (fault.name, fault.subject) == ("estimate_wild", "right")
-    assert fault.message == "The right flipper's stride 7 tells nonsense."
+    assert fault == FaultKind.ESTIMATE_WILD.fault("right", stride=7)
 
 
 @pytest.mark.parametrize("std_error", [nan, inf, LARGEST_N_M3])

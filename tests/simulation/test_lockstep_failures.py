@@ -10,6 +10,7 @@ from control.records import NO_TORQUE, Phase
 from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder
+from firmware_host.operator.fault_texts import fault_message
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
@@ -34,7 +35,7 @@ def test_a_drive_that_is_unplugged_in_a_walk_is_a_silent_drive(configuration: Co
     assert lockstep.run_until(lambda: lockstep.loop.mode is Mode.DAMPING, 0.02)
     assert lockstep.run_until(lambda: lockstep.loop.mode is Mode.FAULT, 0.1)
     assert lockstep.loop.fault is not None
-    assert lockstep.loop.fault.name == "drive_silent" and "left_sweep" in lockstep.loop.fault.message
+    assert lockstep.loop.fault.name == "drive_silent" and "left_sweep" in fault_message(lockstep.loop.fault)
     assert lockstep.now_s - began_s < configuration.faults.silence_s + 0.006
     assert lockstep.loop.sent.torques_nm == NO_TORQUE
 

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.fault_kinds import KINDS
-from control.faults import Reaction
+from control.faults import FAULT_KINDS, FaultKind, Reaction
 from control.limits import JointLimits, JointRange
 from control.monitors.joint_monitor import (
     CURRENT_TICKS,
@@ -24,6 +23,7 @@ from control.monitors.joint_monitor import (
 )
 from control.monitors.winding import WindingParameters
 from control.records import NEVER_S, DriveState
+from firmware_host.operator.fault_texts import exact_message
 
 JOINT = "left_sweep"
 TICK_S = 1.0 / 380.0
@@ -70,7 +70,7 @@ def seen(watch: JointMonitor, state: DriveState, now_s: float = START_S, **chang
     """Sentences by name."""
     found = watch.update(facts(now_s, **changes), state)
     assert all(fault.subject == JOINT for fault in found)
-    return {fault.name: fault.message for fault in found}
+    return {fault.name: exact_message(fault) for fault in found}
 
 
 def names(state: DriveState, **changes: Any) -> set[str]:
@@ -157,7 +157,7 @@ def test_of_two_silences_the_hardest_is_told_and_more_silence_is_never_milder(
         return max((SEVERITY.index(name) for name in found), default=-1)
 
     def reaction(place: int) -> Reaction:
-        return KINDS[SEVERITY[place]].reaction if place >= 0 else Reaction.NONE
+        return FAULT_KINDS[SEVERITY[place]].reaction if place >= 0 else Reaction.NONE
 
     here = reaction(reported(position_s, current_s))
     assert reaction(reported(position_s + 0.003, current_s)) >= here
@@ -184,7 +184,7 @@ def test_silence_is_noticed_within_its_ticks_wherever_between_two_messages_it_be
         return fresh(now_s, **dict.fromkeys(stamps, last_message_s(now_s, START_S, MESSAGE_S, offset_s)))
 
     earliest = {"drive_late": 2, "drive_quiet": 3, "position_stale": 3, "current_stale": 3}.get(name, 9)
-    assert earliest <= ticks_until(name, state_at) <= KINDS[name].bound_ticks
+    assert earliest <= ticks_until(name, state_at) <= FAULT_KINDS[name].bound_ticks
 
 
 @pytest.mark.parametrize(
@@ -195,7 +195,7 @@ def test_slow_signals_that_end_are_noticed_within_their_ticks(name: str, stamp: 
     def state_at(now_s: float) -> DriveState:
         return fresh(now_s, **{stamp: last_message_s(now_s, START_S, 0.1, offset_s)})
 
-    assert KINDS[name].bound_ticks - 42 <= ticks_until(name, state_at) <= KINDS[name].bound_ticks
+    assert FAULT_KINDS[name].bound_ticks - 42 <= ticks_until(name, state_at) <= FAULT_KINDS[name].bound_ticks
 
 
 def test_messages_every_two_milliseconds_are_never_late_whatever_their_phase_to_the_ticks() -> None:
@@ -257,7 +257,7 @@ def test_a_drive_in_closed_loop_unasked_is_told_once_it_had_time_to_obey() -> No
     watch = make_watch()
     unasked = [tick for tick in range(200) if "drive_energised" in seen(watch, HEALTHY, energised=False, moving=False)]
     assert unasked[0] == pytest.approx(0.2 / TICK_S, abs=1)
-    assert unasked[0] + 38 + 2 <= KINDS["drive_energised"].bound_ticks  # a heartbeat tells of it
+    assert unasked[0] + 38 + 2 <= FaultKind.DRIVE_ENERGISED.bound_ticks  # a heartbeat tells of it
 
 
 def test_the_time_to_obey_begins_anew_with_every_obedience() -> None:
@@ -305,7 +305,7 @@ def test_a_joint_is_too_fast_from_a_quarter_over_its_limit_on(sign: float) -> No
     assert ticks_at(bound) == [set()] * 10
     fast = [{"joint_velocity"}] * (10 - FAST_TICKS + 1)
     assert ticks_at(bound + BEYOND) == [set()] * (FAST_TICKS - 1) + fast
-    assert KINDS["joint_velocity"].bound_ticks > FAST_TICKS + 1
+    assert FaultKind.JOINT_VELOCITY.bound_ticks > FAST_TICKS + 1
 
 
 def test_two_fast_samples_again_and_again_are_no_fault() -> None:
@@ -394,7 +394,7 @@ def test_a_joint_that_stands_still_at_full_torque_does_not_follow() -> None:
     for torque_nm in (LIMITS.torque_nm, 0.95 * LIMITS.torque_nm + BEYOND, -LIMITS.torque_nm):
         ticks = stalled_ticks(torque_nm, 0.0)
         assert ticks == pytest.approx(760, abs=2)
-        assert ticks is not None and ticks <= KINDS["joint_not_following"].bound_ticks
+        assert ticks is not None and ticks <= FaultKind.JOINT_NOT_FOLLOWING.bound_ticks
 
 
 @pytest.mark.parametrize(
@@ -452,7 +452,7 @@ def test_a_motor_takes_too_much_from_a_quarter_over_its_limit_on(sign: float) ->
 
     assert ticks_at(1.25 * CURRENT_LIMIT_A) == [False] * 6
     assert ticks_at(1.25 * CURRENT_LIMIT_A + BEYOND) == [False] * (CURRENT_TICKS - 1) + [True] * (7 - CURRENT_TICKS)
-    assert KINDS["joint_current"].bound_ticks > CURRENT_TICKS + 1
+    assert FaultKind.JOINT_CURRENT.bound_ticks > CURRENT_TICKS + 1
 
 
 # heat
@@ -542,7 +542,7 @@ def test_no_value_makes_it_fail_and_every_fault_has_a_sentence(
     for tick, state in enumerate(states):
         now_s = START_S + tick * TICK_S
         for name, message in seen(watch, state, now_s, energised=energised, moving=moving, torque_nm=torque_nm).items():
-            assert name in KINDS
+            assert name in FAULT_KINDS
             assert message.startswith(("The left_sweep ", "No ")) and message.endswith((".", "C", "s."))
         assert isfinite(watch.winding.temperature_c)
 
@@ -583,7 +583,7 @@ def test_a_torque_is_missing_beyond_its_share_of_the_limit_and_not_before(sign: 
 def test_a_missing_torque_is_noticed_within_its_ticks() -> None:
     ticks = missing_ticks(0.7, 0.0)
     assert ticks is not None
-    assert MISSING_S / TICK_S <= ticks <= KINDS["torque_missing"].bound_ticks
+    assert MISSING_S / TICK_S <= ticks <= FaultKind.TORQUE_MISSING.bound_ticks
 
 
 def test_no_torque_is_missed_of_a_drive_that_is_not_in_closed_loop() -> None:

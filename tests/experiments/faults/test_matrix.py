@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from control.fault_kinds import KINDS
+from control.faults import FaultKind
 from control.modes import Mode, Request
 from experiments.faults.bench import FaultBench
 from experiments.faults.cell import run_cell
@@ -38,14 +38,14 @@ def cells() -> Sequence[dict[str, Any]]:
 
 
 def test_every_kind_of_fault_is_caused_in_some_way() -> None:
-    assert set(KINDS) <= set(FAULTS)
+    assert set(FaultKind) <= set(FAULTS)
 
 
 def test_the_whole_table_is_large_and_reaches_every_phase() -> None:
     places = Plan().places
     assert len(places) >= 300 and len(set(places)) == len(places)
     assert {place.phase for place in places} == set(PHASES)
-    assert {way.fault for way in WAYS} - set(KINDS) == {"none", "daemon_killed", "daemon_hung", "bug_in_the_tick"}
+    assert {way.fault for way in WAYS} - set(FaultKind) == {"none", "daemon_killed", "daemon_hung", "bug_in_the_tick"}
 
 
 def test_every_fault_once_is_answered_as_its_kind_says(cells: Sequence[dict[str, Any]]) -> None:
@@ -178,6 +178,4 @@ def test_a_lease_that_is_lost_right_behind_an_arm_names_its_holder_and_arms_noth
     bench.loop.lease.hang_up("alice")
     bench.step()
     assert bench.loop.mode is Mode.IDLE
-    assert [fault.message for fault in bench.loop.faults.standing if fault.name == "lease_lost"] == [
-        "alice promised to attend the robot and is gone."
-    ]
+    assert FaultKind.LEASE_LOST.fault(holder="alice") in bench.loop.faults.standing

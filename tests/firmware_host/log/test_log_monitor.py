@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from control.faults import Blocks, Reaction
+from control.faults import Blocks, FaultKind, Reaction
 from control.monitors.joint_monitor import FaultBounds
 from firmware_host.log.log_monitor import LogMonitor
 from firmware_host.log.recorder import HEALTHY, LogReport
@@ -38,18 +38,13 @@ def test_each_bound_has_two_sides(well: dict[str, object], ill: dict[str, object
 def test_rows_are_told_lost_when_they_are_lost_and_not_for_ever() -> None:
     watch = LogMonitor(BOUNDS)
     lost = HEALTHY._replace(dropped=7)
-    assert "7 rows" in watch.update(lost)[0].message
+    assert watch.update(lost) == [FaultKind.ROWS_LOST.fault(rows=7)]
     assert watch.update(lost) == []
     assert len(watch.update(HEALTHY._replace(dropped=8))) == 1
 
 
 def test_rows_that_a_dead_writer_does_not_take_are_no_second_fault() -> None:
     assert names(HEALTHY._replace(alive=False, dropped=9)) == ["recorder_dead"]
-
-
-def test_a_log_that_may_not_be_written_is_not_answered_with_an_advice_about_space() -> None:
-    (fault,) = LogMonitor(BOUNDS).update(HEALTHY._replace(problem="logs: Permission denied."))
-    assert "permissions" in fault.kind.what_to_do and "quota" not in fault.kind.what_to_do
 
 
 def test_no_trouble_of_the_log_stops_a_robot_and_what_cannot_be_written_stands_against_arming() -> None:

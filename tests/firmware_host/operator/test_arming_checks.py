@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from control.fault_kinds import KINDS, make_fault
-from control.faults import Blocks, FaultKind, Reaction
+from control.faults import FAULT_KINDS, Blocks, FaultKind, Reaction
 from control.modes import Mode, Request
 from control.records import JOINTS
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.arming_checks import arming_checks
+from firmware_host.operator.fault_texts import FAULT_TEXTS, fault_message
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
@@ -29,9 +29,7 @@ def ready(configuration: Configuration) -> Lockstep:
 
 def lines_of(robot: Lockstep, *names: str, warnings: tuple[str, ...] = ()) -> dict[str, dict[str, Any]]:
     """With these faults alone."""
-    faults = [
-        make_fault(name, SUBJECTS.get(KINDS[name].check, ""), f"{KINDS[name].meaning} ({name})") for name in names
-    ]
+    faults = [FAULT_KINDS[name].fault(SUBJECTS.get(FAULT_KINDS[name].part, "")) for name in names]
     robot.loop.faults.reset()
     robot.loop.faults.update(faults, False)
     items = arming_checks(robot.loop, "logs/a.mcap", warnings)
@@ -53,24 +51,24 @@ def test_of_a_robot_that_is_ready_every_line_is_good(ready: Lockstep) -> None:
     assert "380" in lines["loop"]["text"]
 
 
-@pytest.mark.parametrize("kind", KINDS.values(), ids=list(KINDS))
+@pytest.mark.parametrize("kind", FaultKind, ids=str)
 def test_a_line_fails_exactly_where_its_fault_stands_against_arming(ready: Lockstep, kind: FaultKind) -> None:
-    lines = lines_of(ready, kind.name)
-    line = lines[make_fault(kind.name, SUBJECTS.get(kind.check, ""), "").check]
+    lines = lines_of(ready, kind)
+    line = lines[kind.fault(SUBJECTS.get(kind.part, "")).check_line]
     assert line["ok"] == (kind.blocks is Blocks.NO)
     assert line["mandatory"] == (kind.blocks is Blocks.ALWAYS)
-    assert f"({kind.name})" in line["text"]
+    assert FAULT_TEXTS[kind].meaning in line["text"]
     assert line["text"].startswith("warning: ") == line["ok"]
-    assert line["fix"] == ("" if line["ok"] else kind.what_to_do)
+    assert line["fix"] == ("" if line["ok"] else FAULT_TEXTS[kind].what_to_do)
     assert all(each["ok"] for identity, each in lines.items() if identity != line["id"])
 
 
-@pytest.mark.parametrize("kind", KINDS.values(), ids=list(KINDS))
+@pytest.mark.parametrize("kind", FaultKind, ids=str)
 @pytest.mark.parametrize("forced", [False, True])
 def test_the_check_and_a_refused_arm_agree(ready: Lockstep, kind: FaultKind, forced: bool) -> None:
-    fault = make_fault(kind.name, SUBJECTS.get(kind.check, ""), kind.meaning)
+    fault = kind.fault(SUBJECTS.get(kind.part, ""))
     loop = ready.loop
-    lines = lines_of(ready, kind.name)
+    lines = lines_of(ready, kind)
     loop.faults.update([fault], False)
     loop.health = loop.health._replace(worst=loop.faults.worst)
     against = [line for line in lines.values() if not line["ok"] and (line["mandatory"] or not forced)]
@@ -79,14 +77,15 @@ def test_the_check_and_a_refused_arm_agree(ready: Lockstep, kind: FaultKind, for
     loop.faults.reset()
     loop.health = loop.health._replace(worst=None)
     assert (refused is not None) == bool(against)
-    assert refused is None or refused == kind.meaning
+    assert refused is None or refused == fault_message(fault)
 
 
 def test_of_several_faults_in_one_line_those_that_block_are_told_and_each_advice_once(ready: Lockstep) -> None:
     line = lines_of(ready, "drive_late", "drive_silent", "drive_version", "heartbeat_silent")["drive.left_sweep"]
-    assert "(drive_late)" not in line["text"]
-    assert all(f"({name})" in line["text"] for name in ("drive_silent", "drive_version", "heartbeat_silent"))
-    assert line["fix"] == f"{KINDS['drive_silent'].what_to_do}; {KINDS['drive_version'].what_to_do}"
+    shown = [kind for kind in FaultKind if FAULT_TEXTS[kind].meaning in line["text"]]
+    assert shown == [FaultKind.DRIVE_SILENT, FaultKind.HEARTBEAT_SILENT, FaultKind.DRIVE_VERSION]
+    fixes = (FAULT_TEXTS[kind].what_to_do for kind in (FaultKind.DRIVE_SILENT, FaultKind.DRIVE_VERSION))
+    assert line["fix"] == "; ".join(fixes)
 
 
 def test_a_mandatory_fault_beside_one_that_is_not_makes_the_line_mandatory(ready: Lockstep) -> None:

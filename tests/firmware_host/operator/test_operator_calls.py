@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from control.fault_kinds import make_fault
+from control.faults import FaultKind
 from control.modes import Mode
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.connection import Caller
@@ -78,7 +78,7 @@ def test_a_stop_that_changes_nothing_does_not_fill_the_log_but_is_counted(armed:
 
 def test_an_arm_by_force_is_told_with_who_asked(robot: Robot) -> None:
     robot.steps.run_for(2.0)
-    fault = make_fault("log_unwritable", "", "It cannot be written.")
+    fault = FaultKind.LOG_UNWRITABLE.fault(reason="No space left")
     robot.steps.loop.faults.update([fault], False)
     robot.ask("arm", force=True)
     assert robot.events.about("request") == ["request arm by force by uid 1000 (process 77)"]

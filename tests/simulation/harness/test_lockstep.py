@@ -10,6 +10,7 @@ from control.records import JOINTS, NO_TORQUE
 from drivers.can.frames import Frame
 from drivers.odrive.codec import ERROR_WATCHDOG, AxisState
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.operator.fault_texts import fault_message
 from simulation.devices.motion_capture import MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
 from simulation.mud.clay import MUDS
@@ -156,7 +157,7 @@ def test_a_silent_drive_is_a_fault_and_all_torques_are_zero(
     assert lockstep.run_until(lambda: lockstep.loop.mode is Mode.FAULT, 0.1)
     assert lockstep.loop.fault is not None
     assert lockstep.loop.fault.name == "drive_silent"
-    assert joint in lockstep.loop.fault.message
+    assert joint in fault_message(lockstep.loop.fault)
     assert lockstep.loop.sent.torques_nm == NO_TORQUE
     lockstep.step()
     assert all(drive.axis_state is AxisState.IDLE for drive in lockstep.robot.drives)
@@ -167,8 +168,8 @@ def test_a_drive_that_disarms_itself_is_a_fault_that_can_be_cleared(holding: Loc
     holding.robot.drives[2]._disarm(ERROR_WATCHDOG)
     assert holding.run_until(lambda: holding.loop.mode is Mode.FAULT, 0.2)
     assert holding.loop.fault is not None
-    assert "right_sweep" in holding.loop.fault.message
-    assert "watchdog expired" in holding.loop.fault.message
+    assert "right_sweep" in fault_message(holding.loop.fault)
+    assert "watchdog expired" in fault_message(holding.loop.fault)
     holding.run_for(0.2)
     holding.loop.request(Request.CLEAR, holding.now_s)
     assert holding.run_until(lambda: holding.loop.mode is Mode.IDLE, 0.5)

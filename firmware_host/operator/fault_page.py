@@ -1,4 +1,6 @@
-"""docs/faults.md, written from the tables that the robot obeys: `python -m control.fault_page > docs/faults.md`.
+"""Writes docs/faults.md from the tables that the robot obeys.
+
+`python -m firmware_host.operator.fault_page > docs/faults.md`
 
 The diagram is Mermaid's, one arrow for each pair of modes, the causes in the table's order.
 """
@@ -7,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from control.fault_kinds import KINDS
 from control.faults import Blocks, Clears, FaultKind, Reaction
 from control.modes import TRANSITIONS, Mode
+from firmware_host.operator.fault_texts import FAULT_TEXTS
 
 REACTIONS = {
     Reaction.NONE: "nothing; it only stands against arming",
@@ -28,7 +30,8 @@ ENDS = {
 HEAD = """\
 # Faults and modes
 
-Written from `control/fault_kinds.py` and `control/modes.py` by `python -m control.fault_page`; a test compares.
+Written from `control/faults.py`, `control/modes.py` and `firmware_host/operator/fault_texts.py` by
+`python -m firmware_host.operator.fault_page`; a test compares.
 """
 RULES = """\
 The first cause in each mode counts. Nothing arms by itself: after a fault, a clear or a restart a person arms again.
@@ -77,19 +80,19 @@ def _faults() -> Iterator[str]:
     yield ""
     yield "| fault | what it means | reaction | ticks | against arming | ends | what to do |"
     yield "|---|---|---|---|---|---|---|"
-    for kind in KINDS.values():
+    for kind in FaultKind:
         yield _row(kind)
 
 
 def _row(kind: FaultKind) -> str:
     cells = (
-        f"`{kind.name}`",
-        kind.meaning,
+        f"`{kind}`",
+        FAULT_TEXTS[kind].meaning,
         _words(kind.reaction),
         str(kind.bound_ticks),
         BLOCKS[kind.blocks],
         ENDS[kind.clears],
-        kind.what_to_do,
+        FAULT_TEXTS[kind].what_to_do,
     )
     return f"| {' | '.join(cells)} |"
 

@@ -1,0 +1,276 @@
+"""What people read about each fault: what it means, what happened this time, and what to do.
+
+A message is a template over the fault's subject and measured values. A fault that carries a `reason`, such as a
+drive's own error text or an operating system's, shows it at the end of its message.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+from typing import NamedTuple
+
+from control.faults import Fault, FaultKind
+
+WIRING = "check its power, wiring, node id and message periods (see 'Set up the drives' in the documentation)"
+FIX = "fix the cause, then 'mudskipper clear'"
+COOL = "let it cool; walk less deep or slower"
+REPORT = "this is a bug: keep the log, report it, and restart the daemon"
+WIRES = "check wiring, termination and bit rate; 'ip -s -d link show' shows the error counters"
+BUSY = "end other programs on this computer; 'mudskipper check' shows real-time warnings"
+ENCODER = "check encoder, magnet and cable, then 'mudskipper clear'"
+
+
+class FaultText(NamedTuple):
+    meaning: str  # the fault in general, for the documentation
+    message: str | Callable[[Fault], str]  # what happened, a template over `subject` and the fault's values
+    what_to_do: str  # continues a sentence: no capital letter, no full stop
+
+
+def _silence(signal: str) -> Callable[[Fault], str]:
+    """The message about a signal that does not arrive; an infinite age says that it never did."""
+
+    def message(fault: Fault) -> str:
+        age_s = float(dict(fault.values)["age_s"])
+        how_long = f"for {age_s * 1e3:.0f} ms" if isfinite(age_s) else "at all"
+        return f"No {signal} came from the {fault.subject} drive {how_long}."
+
+    return message
+
+
+def _late(fault: Fault) -> str:
+    return _silence(str(dict(fault.values)["signal"]))(fault)
+
+
+def _stuck(fault: Fault) -> str:
+    attempts = dict(fault.values)["attempts"]
+    flippers = f"The {fault.subject} flipper is" if fault.subject else "Both flippers are"
+    return f"{flippers} stuck in the mud after {attempts} attempt{'' if attempts == 1 else 's'}."
+
+
+FAULT_TEXTS: dict[FaultKind, FaultText] = {
+    FaultKind.DRIVE_LATE: FaultText("Position or current is older than two ticks.", _late, WIRING),
+    FaultKind.DRIVE_QUIET: FaultText("Neither position nor current came for three ticks.", _silence("message"), WIRING),
+    FaultKind.DRIVE_SILENT: FaultText("Neither position nor current came for ten ticks.", _silence("message"), WIRING),
+    FaultKind.POSITION_STALE: FaultText("No position came for three ticks.", _silence("position"), WIRING),
+    FaultKind.POSITION_SILENT: FaultText("No position came for ten ticks.", _silence("position"), WIRING),
+    FaultKind.CURRENT_STALE: FaultText("No current came for three ticks.", _silence("current"), WIRING),
+    FaultKind.CURRENT_SILENT: FaultText("No current came for ten ticks.", _silence("current"), WIRING),
+    FaultKind.HEARTBEAT_SILENT: FaultText("No heartbeat came for 0.5 s.", _silence("heartbeat"), WIRING),
+    FaultKind.TEMPERATURE_SILENT: FaultText("No temperature came for 1 s.", _silence("temperature"), WIRING),
+    FaultKind.VOLTAGE_SILENT: FaultText("No bus voltage came for 1 s.", _silence("bus voltage"), WIRING),
+    FaultKind.DRIVE_ERROR: FaultText("A drive reports an error.", "The {subject} drive reports error {flags}.", FIX),
+    FaultKind.DRIVE_DISARMED: FaultText(
+        "A drive left closed loop by itself.", "The {subject} drive left closed loop by itself.", FIX
+    ),
+    FaultKind.DRIVE_ENERGISED: FaultText(
+        "A drive is energised although the robot is not armed.",
+        "The {subject} drive is {activity} although the robot is not armed.",
+        "end other programs that command it, or 'mudskipper disarm'",
+    ),
+    FaultKind.DRIVE_RESTARTED: FaultText(
+        "A drive restarted.",
+        "The {subject} drive restarted.",
+        "check its supply and its joint's angle, then 'mudskipper clear'",
+    ),
+    FaultKind.DRIVE_VERSION: FaultText(
+        "A drive's firmware is unknown or not supported.",
+        "The {subject} drive's firmware is {version}; {supported} is supported.",
+        "install a supported firmware",
+    ),
+    FaultKind.DUPLICATE_NODE_ID: FaultText(
+        "Two drives on a bus send under one node id.",
+        "Two drives send under the node id of the {subject} drive.",
+        "give every drive on a bus a node id of its own, one at a time",
+    ),
+    FaultKind.WATCHDOG_UNKNOWN: FaultText(
+        "A drive's watchdog settings could not be read back.",
+        "The {subject} drive's watchdog settings were not read back.",
+        "see 'Set up the drives' in the documentation, or arm with --force",
+    ),
+    FaultKind.WATCHDOG_OFF: FaultText(
+        "A drive's watchdog is off or too slow.",
+        "The {subject} drive's watchdog is {setting}; it must trip within {longest_s:g} s.",
+        "set enable_watchdog and watchdog_timeout = 0.1 on the drive, and save",
+    ),
+    FaultKind.ARMING_FAILED: FaultText(
+        "A drive did not go into closed loop.",
+        "The {subject} drive did not go into closed loop within {longest_s:g} s.",
+        FIX,
+    ),
+    FaultKind.BUS_WARNING: FaultText(
+        "A bus controller counts many errors.", "The {subject} bus has many errors.", WIRES
+    ),
+    FaultKind.BUS_PASSIVE: FaultText(
+        "A bus controller is error-passive.", "The {subject} bus has so many errors that it is error-passive.", WIRES
+    ),
+    FaultKind.BUS_OFF: FaultText("A bus controller has left the bus.", "The {subject} bus is off.", WIRES),
+    FaultKind.BUS_REFUSES: FaultText(
+        "Commands were lost in three ticks in a row.",
+        "The {subject} bus lost commands in {ticks} ticks in a row.",
+        WIRES,
+    ),
+    FaultKind.FRAMES_LOST: FaultText(
+        "Frames came faster than they were read.",
+        "{frames} frames of the {subject} bus were lost: they came faster than they were read.",
+        BUSY,
+    ),
+    FaultKind.JOINT_POSITION: FaultText(
+        "A joint is outside of its range.",
+        "The {subject} joint is at {angle_deg:.1f} degrees, outside of {low_deg:.0f} to {high_deg:.0f}.",
+        "move it back by hand, then 'mudskipper clear'",
+    ),
+    FaultKind.JOINT_VELOCITY: FaultText(
+        "A joint is faster than its limit allows.",
+        "The {subject} joint turns at {velocity_rad_s:.0f} rad/s; the limit is {limit_rad_s:.0f} rad/s.",
+        FIX,
+    ),
+    FaultKind.JOINT_MOVING: FaultText(
+        "A joint moves while torque is off.",
+        "The {subject} joint moves while torque is off.",
+        "wait until it is at rest",
+    ),
+    FaultKind.JOINT_CURRENT: FaultText(
+        "A motor takes more current than its limit.",
+        "The {subject} motor takes {current_a:.1f} A; the limit is {limit_a:.1f} A.",
+        "check current limits and torque constant, then 'mudskipper clear'",
+    ),
+    FaultKind.JOINT_NOT_FOLLOWING: FaultText(
+        "A joint stands still at full torque for 2 s.",
+        "The {subject} joint stands still at full torque for {stalled_s:.1f} s.",
+        "free the joint, then 'mudskipper clear'",
+    ),
+    FaultKind.ENCODER_JUMP: FaultText(
+        "A position jumped farther than a joint can move.",
+        "The {subject} encoder jumped by {step_deg:.0f} degrees in {gap_ms:.1f} ms.",
+        ENCODER,
+    ),
+    FaultKind.ENCODER_STUCK: FaultText(
+        "A position stands still while the joint moves.",
+        "The {subject} encoder stands still while the joint moves.",
+        ENCODER,
+    ),
+    FaultKind.TORQUE_MISSING: FaultText(
+        "A motor's current does not fit its torque command for 0.1 s.",
+        "The {subject} motor gives {measured_nm:.2f} N·m in place of {commanded_nm:.2f} N·m.",
+        "check the drive's limits, its torque constant and cables, then 'mudskipper clear'",
+    ),
+    FaultKind.MOTOR_OVERHEATING: FaultText(
+        "A motor is nearly too hot.", "The {subject} motor has {temperature_c:.0f} degrees C.", COOL
+    ),
+    FaultKind.MOTOR_HOT: FaultText(
+        "A motor is too hot.", "The {subject} motor has {temperature_c:.0f} degrees C.", COOL
+    ),
+    FaultKind.WINDING_OVERHEATING: FaultText(
+        "A winding is nearly too hot, estimated from its currents.",
+        "The {subject} motor's winding has {temperature_c:.0f} degrees C, estimated from its currents.",
+        COOL,
+    ),
+    FaultKind.WINDING_HOT: FaultText(
+        "A winding is too hot, estimated from its currents.",
+        "The {subject} motor's winding has {temperature_c:.0f} degrees C, estimated from its currents.",
+        COOL,
+    ),
+    FaultKind.VOLTAGE_LOW: FaultText(
+        "The supply voltage is low.",
+        "The {subject} drive has only {voltage_v:.1f} V.",
+        "charge or change the battery",
+    ),
+    FaultKind.VOLTAGE_UNDER: FaultText(
+        "The supply voltage is too low.",
+        "The {subject} drive has {voltage_v:.1f} V; the minimum is {least_v:g} V.",
+        "charge or change the battery",
+    ),
+    FaultKind.FLIPPER_STUCK: FaultText(
+        "The mud keeps a flipper after every attempt to free it.",
+        _stuck,
+        "free it by hand, then 'mudskipper clear', and walk less deep",
+    ),
+    FaultKind.TORQUE_NOT_FINITE: FaultText(
+        "A torque was not a finite number.", "A torque was not a finite number.", REPORT
+    ),
+    FaultKind.COMMAND_REFUSED: FaultText(
+        "The transmit gate refused a command.", "The transmit gate refused a command.", REPORT
+    ),
+    FaultKind.LOOP_OVERRUN: FaultText("The loop missed a tick.", "The loop missed {missed} of its ticks.", BUSY),
+    FaultKind.LOOP_LAGGING: FaultText(
+        "The loop missed six ticks in a row, or a tenth of a hundred.",
+        "The loop lags: {extent}.",
+        BUSY,
+    ),
+    FaultKind.LOOP_CRAWLING: FaultText(
+        "Commands leave too seldom to brake a joint.", "The loop's ticks take {tick_ms:.0f} ms.", BUSY
+    ),
+    FaultKind.LOOP_STALLED: FaultText("The loop stood still.", "The loop stood still for {late_ms:.0f} ms.", BUSY),
+    FaultKind.CLOCK_STEP: FaultText(
+        "The computer's wall clock was set.",
+        "The computer's wall clock was set by {step_s:+.1f} s.",
+        "do nothing: control uses another clock; dates in the log may jump",
+    ),
+    FaultKind.ESTIMATE_WILD: FaultText(
+        "An estimated coefficient is beyond what any mud has.",
+        "Stride {stride} of the {subject} flipper gave a coefficient beyond what any mud has.",
+        "look at the strides in the log; the next depth is the first one of the walk",
+    ),
+    FaultKind.POSE_LOST: FaultText(
+        "The body's position is no longer reported.",
+        "The body's position is no longer reported.",
+        "check the motion capture and its bridge",
+    ),
+    FaultKind.LEASE_LOST: FaultText(
+        "The program that held the lease disconnected or did not renew it.",
+        "{holder} held the lease and did not renew it.",
+        "make the robot safe, then arm again",
+    ),
+    FaultKind.DISK_LOW: FaultText(
+        "The log's disk is nearly full.",
+        "The log's disk has {free_percent:.1f} % free ({free_mb:.0f} MB).",
+        "free space on the log's disk, or lower log.quota_bytes",
+    ),
+    FaultKind.LOG_UNWRITABLE: FaultText(
+        "The log cannot be written.",
+        "The log cannot be written.",
+        "fix what the message names: the log's folder, its permissions, or its disk",
+    ),
+    FaultKind.DISK_SLOW: FaultText(
+        "The log's disk is slow.", "One write to the log's disk took {write_s:.1f} s.", "use another card or disk"
+    ),
+    FaultKind.RECORDER_DEAD: FaultText(
+        "The log's writer has died: nothing is recorded.",
+        "The log's writer has died: nothing is recorded.",
+        "restart the daemon",
+    ),
+    FaultKind.ROWS_LOST: FaultText(
+        "The log lost rows.", "The log has lost {rows} rows so far.", "use another card or disk"
+    ),
+}
+
+
+def fault_message(fault: Fault) -> str:
+    """What happened, as whole sentences.
+
+    A fault without the values that its message shows is described in general: no text may stop the loop.
+    """
+    text = FAULT_TEXTS[fault.kind]
+    try:
+        return exact_message(fault)
+    except (KeyError, ValueError):
+        return f"{text.meaning} ({fault.subject})" if fault.subject else text.meaning
+
+
+def exact_message(fault: Fault) -> str:
+    """The message with its values; raises KeyError or ValueError if one is missing or is no number."""
+    template, values = FAULT_TEXTS[fault.kind].message, dict(fault.values)
+    message = template(fault) if callable(template) else template.format(subject=fault.subject, **values)
+    reason = str(values.get("reason", "")).rstrip(".")
+    return f"{message.rstrip('.')}: {reason}." if reason else message
+
+
+def what_to_do(fault: Fault) -> str:
+    return FAULT_TEXTS[fault.kind].what_to_do
+
+
+def fault_advice(fault: Fault) -> str:
+    """What happened, and what to do."""
+    to_do = what_to_do(fault)
+    return f"{fault_message(fault)} {to_do[:1].upper()}{to_do[1:]}."
