@@ -314,7 +314,7 @@ def test_firmware_of_another_family_is_not_armed(configuration: Configuration, m
     robot = Lockstep(configuration, FIRM)
     robot.run_for(1.0)
     refused = robot.loop.request(Request.ARM, robot.now_s)
-    assert refused is not None and "firmware 0.5.6" in refused
+    assert refused is not None and "firmware is 0.5.6" in refused
 
 
 def test_garbage_on_the_bus_is_counted_and_changes_nothing(configuration: Configuration) -> None:

@@ -23,7 +23,7 @@ def test_a_healthy_log_is_no_fault() -> None:
 @pytest.mark.parametrize(
     ("well", "ill", "name"),
     [
-        ({"free_share": 0.05}, {"free_share": 0.0499}, "disk_low"),
+        ({"free_fraction": 0.05}, {"free_fraction": 0.0499}, "disk_low"),
         ({"slowest_write_s": 2.0}, {"slowest_write_s": 2.01}, "disk_slow"),
         ({"problem": ""}, {"problem": "The log's disk is read-only."}, "log_unwritable"),
         ({"alive": True}, {"alive": False}, "recorder_dead"),
