@@ -1,12 +1,12 @@
 """The robot's mechanics: two arms with two joints each, and a body on a rail, on a fixed base or free.
 
-Arms have a constant inertia about each joint, the gravity of a level body and friction; their mass is small beside
-the body's, so they do not throw it about. Viscous friction grows with speed; Coulomb's, off at 0, takes a constant
-torque as long as a joint turns and holds it where less than that would turn it. It is solved for the velocity at the
-end of a step, which it brings to zero but never turns round, so a joint sticks and steps of any length are stable.
-What earlier strokes left behind is each arm's own history, off by default. Semi-implicit Euler at STEP_S: the
-stiffest spring, mud along a plate 5 cm deep in the stiffest of the paper's muds, makes the arm swing at about
-400 rad/s.
+Arms have a constant inertia about each joint, the gravity of a level body, and friction. Their mass is small compared
+with the body's, so their acceleration does not move the body. Viscous friction grows with speed. Coulomb friction, off
+at 0, opposes a turning joint with a constant torque and holds a resting one against less than that. It is solved for
+the velocity at the end of a step, which it brings to zero but never reverses, so a joint sticks and steps of any length
+are stable. The effects of earlier strokes are each arm's own history, off by default. The integrator is semi-implicit
+Euler at STEP_S: the stiffest spring, mud along a plate 5 cm deep in the stiffest of the paper's muds, makes the arm
+swing at about 400 rad/s.
 """
 
 from __future__ import annotations
@@ -25,9 +25,16 @@ from simulation.body.bench_mount import BenchMount
 from simulation.body.carriage import Carriage
 from simulation.body.free_body import BodyShape, FreeBody
 from simulation.body.rail_body import Body, BodyMotion, DragPad, RailBody
-from simulation.mud.clay import Clay
 from simulation.mud.disturbances import NONE, Disturbances, StrokeHistory, clinging_torques_nm
-from simulation.mud.flipper_contact import NO_CONTACT, ContactForce, FlipperContact, contact_force, lowest_m
+from simulation.mud.flipper_contact import (
+    NO_CONTACT,
+    ArmMotion,
+    ContactForce,
+    FlipperContact,
+    attitude_of,
+    contact_force,
+)
+from simulation.mud.rigid_plate import Attitude, lowest_point_m
 from simulation.mud.stones import NO_PUSH, StoneContact, push_wrench
 from simulation.mud.track import Track
 
@@ -52,7 +59,7 @@ class PlantParameters:
     body: BodyShape = BodyShape()
 
     def __post_init__(self) -> None:
-        """Raises ValueError for what cannot be."""
+        """Raises ValueError where the options contradict each other."""
         if self.fixed_base and self.free_body:
             raise ValueError("a body on a fixed base cannot be free")
 
@@ -75,12 +82,11 @@ class Arm:
         self.history.reset()
         self.relief_m = self.track.surface_m(0.0)
         self.put_back()
-        self.carriage: Carriage | None = None
         self.force = NO_CONTACT
         self.clay = self.track.clay_at(0.0)
 
     def put_back(self) -> None:
-        """As a person does it by hand: straight out, the plate's edge on the mud; level on a bench.
+        """Moves the arm as an operator does by hand: straight out, the plate's edge on the mud; level on a bench.
 
         The mud remembers its strokes.
         """
@@ -109,21 +115,15 @@ class Arm:
         if self.mount:
             self._step_on_bench(self.mount, dt_s, sweep_nm, lift_nm)
             return
-        self.carriage = carriage
-        self._look_at_mud(body_m)
-        self.force = self.contact.step(
-            dt_s,
-            self.clay,
-            self.sweep_rad,
-            self.adduction_rad,
-            self.sweep_velocity_rad_s,
-            self.adduction_velocity_rad_s,
-            body_m_s,
-            self.surface_m,
-            carriage,
-        )
+        sweep_rad, adduction_rad, geometry = self.sweep_rad, self.adduction_rad, self.parameters.geometry
+        attitude = attitude_of(geometry, sweep_rad, adduction_rad, carriage=carriage)
+        edge_m = body_m + geometry.flipper_length_m * sin(sweep_rad)
+        self._meet_mud(edge_m, attitude)
+        rates = self.sweep_velocity_rad_s, self.adduction_velocity_rad_s
+        motion = ArmMotion(sweep_rad, adduction_rad, *rates, body_m_s)
+        self.force = self.contact.step(dt_s, self.clay, motion, attitude.below(self.surface_m), carriage)
         if self.stones:
-            self._meet_stones(self.stones, dt_s, body_m)
+            self._meet_stones(self.stones, dt_s, edge_m, attitude)
         load_sweep_nm, load_lift_nm = self._load_nm()
         mass = self.parameters.arm_mass
         self._move(
@@ -144,31 +144,28 @@ class Arm:
         lift_nm += gravity_lift_nm - friction_nm_s * self.adduction_velocity_rad_s
         self._move(dt_s, sweep_nm, lift_nm, *mount.inertias_kg_m2(mass))
 
-    def _look_at_mud(self, body_m: float) -> None:
-        """Which clay is under the flipper, as firm as earlier strokes have left it, and how high."""
-        geometry = self.parameters.geometry
-        edge_m = body_m + geometry.flipper_length_m * sin(self.sweep_rad)
+    def _meet_mud(self, edge_m: float, attitude: Attitude) -> None:
+        """Finds the clay under the flipper, its remaining firmness after earlier strokes, and its height."""
         self.relief_m = self.track.surface_m(edge_m)
         if self._disturbed:
-            deepest_m = lowest_m(geometry, self.sweep_rad, self.adduction_rad, self.carriage)
+            deepest_m = lowest_point_m(attitude, self.parameters.geometry.plate_width_m)
             self.history.step(deepest_m - self.relief_m, edge_m)
         clay, firmness = self.track.clay_at(edge_m), self.history.firmness
-        self.clay = clay if firmness == 1.0 else Clay(clay.name, firmness * clay.strength_pa, clay.layers)
+        self.clay = clay if firmness == 1.0 else clay.scaled(firmness)
 
-    def _meet_stones(self, stones: StoneContact, dt_s: float, body_m: float) -> None:
+    def _meet_stones(self, stones: StoneContact, dt_s: float, edge_m: float, attitude: Attitude) -> None:
         geometry, sweep_rad, adduction_rad = self.parameters.geometry, self.sweep_rad, self.adduction_rad
-        edge_m = body_m + geometry.flipper_length_m * sin(sweep_rad)
-        push = stones.step(dt_s, edge_m, lowest_m(geometry, sweep_rad, adduction_rad, self.carriage))
+        push = stones.step(dt_s, edge_m, lowest_point_m(attitude, geometry.plate_width_m))
         if push is not NO_PUSH:
             pushed = contact_force(geometry, sweep_rad, push_wrench(geometry, sweep_rad, adduction_rad, push))
             self.force = ContactForce(*map(add, self.force, pushed))
 
     def _load_nm(self) -> tuple[float, float]:
-        """Of mud, clinging mud, gravity and friction on (sweep, adduction)."""
-        parameters = self.parameters
+        """Returns the torque of mud, clinging mud, gravity and friction on (sweep, adduction)."""
+        parameters, force = self.parameters, self.force
         sweep_nm, lift_nm = parameters.arm_mass.gravity_torques_nm(self.sweep_rad, self.adduction_rad)
-        sweep_nm += self.force.sweep_nm - parameters.joint_friction_nm_s * self.sweep_velocity_rad_s
-        lift_nm += self.force.adduction_nm - parameters.joint_friction_nm_s * self.adduction_velocity_rad_s
+        sweep_nm += force.sweep_nm - parameters.joint_friction_nm_s * self.sweep_velocity_rad_s
+        lift_nm += force.adduction_nm - parameters.joint_friction_nm_s * self.adduction_velocity_rad_s
         weight_n = self.history.clinging_n
         if weight_n:
             hanging = clinging_torques_nm(parameters.geometry, self.sweep_rad, self.adduction_rad, weight_n)
@@ -194,7 +191,7 @@ class Arm:
 
 
 def _slowed(velocity_rad_s: float, loss_rad_s: float) -> float:
-    """By dry friction, at most to a halt."""
+    """Dry friction slows the joint, at most to a halt."""
     return copysign(max(abs(velocity_rad_s) - loss_rad_s, 0.0), velocity_rad_s)
 
 
@@ -231,7 +228,7 @@ class Plant:
 
     @property
     def body_m(self) -> float:
-        """The body's place along the track."""
+        """The body's position along the track."""
         return self.body.forward_m
 
     @property

@@ -1,20 +1,21 @@
 """A motor drive as the bus sees it: ODrive CANSimple 0.6, byte for byte.
 
-Axis state machine (idle, closed loop), error word with disarm reason, watchdog, torque mode with the velocity-limit
-clamp and the current limits, cyclic messages, requests by remote frame. What no drive tells stands between it and the
-joint, each off at 0. The motor's true constant differs from the one that the drive reckons with; current follows its
-command with a first-order lag; magnets pull towards detents at any current. The encoder has steps, noise and an
-offset, the current noise. Messages arrive late by evenly drawn times, though in order, and some tell their old values
-again.
+It has the axis state machine (idle, closed loop), the error word with the disarm reason, the watchdog, torque mode with
+the velocity-limit clamp and the current limits, cyclic messages, and requests by remote frame.
 
-Cogging is the slope of an energy that repeats n times a turn, so it takes as much as it gives, and no pure sine:
+Between the drive and the joint lie imperfections that no drive reports, each off at 0. The motor's true torque constant
+differs from the drive's value; current follows its command with a first-order lag; magnets pull towards detents at any
+current. The encoder has steps, noise and an offset; the current has noise. Messages arrive in order, late by uniformly
+drawn times, and some repeat their old values.
 
-    τ = -A [sin(n θ + φ) + 0.25 sin(2 (n θ + φ))]         the second harmonic is made up, the first is what is stated
+Cogging is the slope of an energy that repeats n times a turn, so over a turn it does no work. It is no pure sine:
+
+    τ = -A [sin(n θ + φ) + 0.25 sin(2 (n θ + φ))]         the second harmonic is an assumption
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from math import exp, inf, isfinite, pi, radians, sin
@@ -33,6 +34,7 @@ SECOND_HARMONIC = 0.25
 REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
 VERSION_FIELDS = (2, 0, 0, 0, 0, 6, 11, 0)  # protocol 2, no real board, firmware 0.6.11
 WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = 1, 2  # of hardware 0.0.0, which no real board has
+TORQUE_MODES = (codec.TORQUE_CONTROL, codec.PASSTHROUGH)
 BOOT_S = 1.0  # silence of a drive that restarts
 
 
@@ -41,15 +43,15 @@ class OdriveParameters:
     node_id: Annotated[int, Bounds(0, 62)]
     sign: Annotated[int, Bounds(-1, 1)] = 1
     zero_turn: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0
-    torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0)] = 0.083  # that the drive reckons with
-    torque_constant_error: Annotated[float, Bounds(-0.5, 0.5)] = 0.0  # share by which the true one is larger
+    torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0)] = 0.083  # in the drive's own settings
+    torque_constant_error: Annotated[float, Bounds(-0.5, 0.5)] = 0.0  # fraction by which the true one is larger
     cogging_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
     cogging_per_turn: Annotated[int, Bounds(1, 1000)] = 84  # 12 slots and 14 magnets, as many small motors have
     cogging_phase_deg: Annotated[float, Bounds(-360.0, 360.0)] = 0.0
     current_lag_s: Annotated[float, Bounds(0.0, 0.1)] = 0.0  # time constant
     current_noise_a: Annotated[float, Bounds(0.0, 10.0)] = 0.1
     encoder_counts: Annotated[int, Bounds(16, 16777216)] = 16384
-    encoder_offset_rad: Annotated[float, Bounds(-pi, pi)] = 0.0  # what the joint is read to be beyond where it is
+    encoder_offset_rad: Annotated[float, Bounds(-pi, pi)] = 0.0  # reported minus true angle of the joint
     encoder_noise_rad: Annotated[float, Bounds(0.0, 0.1)] = 0.0
     watchdog_s: Annotated[float, Bounds(0.0, 60.0)] = 0.1  # 0: off, as ODrives are delivered
     encoder_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
@@ -66,21 +68,22 @@ class OdriveParameters:
 
 
 class SimulatedOdrive:
-    """Owns one drive's state. Angles and torques at this border are the joint's; turns and signs stay inside."""
+    """Owns one drive's state. Callers use the joint's angles and torques; turns and signs stay inside."""
 
     def __init__(self, parameters: OdriveParameters, random: Random) -> None:
         self.parameters = parameters
         self._random = random
         self._late = LateMessages(random)
+        self._ids = {message: arbitration_id(parameters.node_id, message) for message in self._PAYLOADS}
         self.reset(0.0)
 
     def reset(self, now_s: float) -> None:
-        """As after power-on."""
+        """Restores the state after power-on."""
         self.axis_state = AxisState.IDLE
         self.errors = self.disarm_reason = 0
         self._setpoint_nm = 0.0  # at the motor
         self._modes = (0, 0)
-        self._velocity_limit_turn_s, self._current_limit_a = 2.0, 10.0  # ODrive's defaults
+        self._set_limits(2.0, 10.0)  # ODrive's defaults
         self._velocity_gain_nm_s_turn = self.parameters.velocity_gain_nm_s_turn
         self._fed_s = now_s
         self._current_a = 0.0
@@ -99,9 +102,10 @@ class SimulatedOdrive:
         ]
         # Boards are switched on at different moments: their messages do not come all at once.
         self._due_s = [now_s + period_s * self._random.random() for period_s, _ in self._schedule]
+        self._next_due_s = min(self._due_s)
 
     def restart(self, now_s: float) -> None:
-        """As by a dip in its supply: it is deaf and silent for BOOT_S, then tells once that it initialises."""
+        """Restarts as after a supply dip: deaf and silent for BOOT_S, then one heartbeat reports the initialisation."""
         turns, turns_s = self._turns, self._turns_s
         self.reset(now_s + BOOT_S)
         self._turns, self._turns_s = turns, turns_s
@@ -110,7 +114,7 @@ class SimulatedOdrive:
         self._initializing = True
 
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
-        """Obey one frame of the bus; the answers it calls for."""
+        """Executes one frame of the bus and returns the answers to it."""
         node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & 0x1F
         if frame.is_extended or node_id != self.parameters.node_id or now_s < self._boots_until_s:
             return []
@@ -118,7 +122,7 @@ class SimulatedOdrive:
             return [self._frame(message) for message in self._PAYLOADS if message.command == command]
         if command == codec.RX_SDO.command:
             return self._read_parameter(frame.data)
-        with suppress(GarbledMessageError):  # a drive ignores what it cannot read
+        with suppress(GarbledMessageError):  # a drive ignores malformed messages
             self._obey(command, frame.data, now_s)
         return []
 
@@ -140,7 +144,7 @@ class SimulatedOdrive:
             self._disarm(codec.ERROR_ESTOP)
 
     def _read_parameter(self, data: bytes) -> list[Frame]:
-        """The watchdog's settings are the only parameters here, and none can be written."""
+        """Answers reads of the watchdog's settings, the only parameters of this drive; none can be written."""
         try:
             opcode, endpoint, _ = codec.RX_SDO.decode(data)
         except GarbledMessageError:
@@ -168,7 +172,9 @@ class SimulatedOdrive:
     def _set_limits(self, velocity_turn_s: float, current_a: float) -> None:
         if not isfinite(velocity_turn_s + current_a):
             raise GarbledMessageError("not a finite number")
-        self._velocity_limit_turn_s, self._current_limit_a = velocity_turn_s, current_a
+        self._velocity_limit_turn_s = velocity_turn_s
+        largest_a = min(current_a, self.parameters.motor_current_limit_a)
+        self._largest_nm = largest_a * self.parameters.torque_constant_nm_a
 
     def _change_state(self, state: int, now_s: float) -> None:
         if state == AxisState.CLOSED_LOOP and not self.errors:
@@ -184,12 +190,12 @@ class SimulatedOdrive:
         self.disarm_reason = reason
 
     def torque_nm(self, now_s: float) -> float:
-        """At the joint, as the motor exerts it now."""
+        """Returns the torque that the motor exerts at the joint now."""
         parameters = self.parameters
         if self.axis_state is AxisState.CLOSED_LOOP and 0.0 < parameters.watchdog_s < now_s - self._fed_s:
             self._disarm(codec.ERROR_WATCHDOG)
         torque_nm = 0.0
-        if self.axis_state is AxisState.CLOSED_LOOP and self._modes == (codec.TORQUE_CONTROL, codec.PASSTHROUGH):
+        if self.axis_state is AxisState.CLOSED_LOOP and self._modes == TORQUE_MODES:
             torque_nm = self._computed_nm(now_s) * (1.0 + parameters.torque_constant_error)
         else:
             self._current_a = 0.0
@@ -199,12 +205,10 @@ class SimulatedOdrive:
         return parameters.sign * torque_nm
 
     def _computed_nm(self, now_s: float) -> float:
-        """What the drive believes to exert: clamped as it clamps, and as far as the current has come."""
-        parameters = self.parameters
-        gain, limit = self._velocity_gain_nm_s_turn, self._velocity_limit_turn_s
-        torque_nm = min(max(self._setpoint_nm, (-limit - self._turns_s) * gain), (limit - self._turns_s) * gain)
-        largest_a = min(self._current_limit_a, parameters.motor_current_limit_a)
-        largest_nm = largest_a * parameters.torque_constant_nm_a
+        """Returns the torque by the drive's own torque constant, after its clamps and the lag of the current."""
+        parameters, largest_nm = self.parameters, self._largest_nm
+        gain, limit, turns_s = self._velocity_gain_nm_s_turn, self._velocity_limit_turn_s, self._turns_s
+        torque_nm = min(max(self._setpoint_nm, (-limit - turns_s) * gain), (limit - turns_s) * gain)
         torque_nm = min(max(torque_nm, -largest_nm), largest_nm)
         if parameters.current_lag_s:
             before_nm = self._current_a * parameters.torque_constant_nm_a
@@ -213,38 +217,36 @@ class SimulatedOdrive:
         return torque_nm
 
     def _cogging_nm(self) -> float:
-        """At the motor, by its true angle."""
+        """Returns the torque at the motor, from its true angle."""
         parameters = self.parameters
         angle = parameters.cogging_per_turn * TURN_RAD * self._turns + radians(parameters.cogging_phase_deg)
         return -parameters.cogging_nm * (sin(angle) + SECOND_HARMONIC * sin(2.0 * angle))
 
     def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
-        """Take in where the joint is."""
+        """Takes over the joint's true angle and velocity."""
         parameters = self.parameters
         self._turns = parameters.sign * angle_rad / TURN_RAD + parameters.zero_turn
         self._turns_s = parameters.sign * velocity_rad_s / TURN_RAD
 
-    def cyclic_frames(self, now_s: float) -> Iterator[Frame]:
-        """The messages that have come due, or what arrives of them."""
-        frames = self._due_frames(now_s)
+    def cyclic_frames(self, now_s: float) -> Iterable[Frame]:
+        """Returns the messages that have come due, or have arrived by now where they are delayed."""
+        frames = self._due_frames(now_s) if now_s >= self._next_due_s else ()
         longest_s = self.parameters.message_delay_s
         return self._late.update(frames, now_s, longest_s) if longest_s else frames
 
     def _due_frames(self, now_s: float) -> Iterator[Frame]:
-        if now_s < self._boots_until_s:
-            return
         for place, (period_s, messages) in enumerate(self._schedule):
             if now_s < self._due_s[place]:
                 continue
             self._due_s[place] += period_s
-            if self._due_s[place] <= now_s:  # held up for longer than a period: the lost ones are not made up for
+            if self._due_s[place] <= now_s:  # delayed by more than a period: lost messages are not sent later
                 self._due_s[place] = now_s + period_s
             for message in messages:
                 repeating = self.parameters.repeated_fraction and message in REPEATED
-                yield self._perhaps_old(message, now_s) if repeating else self._frame(message, now_s)
+                yield self._new_or_repeated_frame(message, now_s) if repeating else self._frame(message, now_s)
+        self._next_due_s = min(self._due_s)
 
-    def _perhaps_old(self, message: Message, now_s: float) -> Frame:
-        """What the frame before told once more, where the drive has nothing else to tell."""
+    def _new_or_repeated_frame(self, message: Message, now_s: float) -> Frame:
         reported = self._reported.get(message)
         if reported is not None and self._random.random() < self.parameters.repeated_fraction:
             return reported._replace(stamp_s=now_s)
@@ -252,14 +254,14 @@ class SimulatedOdrive:
         return frame
 
     def _frame(self, message: Message, stamp_s: float = NEVER_S) -> Frame:
-        return Frame(arbitration_id(self.parameters.node_id, message), self._PAYLOADS[message](self), stamp_s=stamp_s)
+        return Frame(self._ids[message], self._PAYLOADS[message](self), stamp_s=stamp_s)
 
     def _encoder(self) -> bytes:
         parameters = self.parameters
-        wrong_rad = parameters.encoder_offset_rad
+        error_rad = parameters.encoder_offset_rad
         if parameters.encoder_noise_rad:
-            wrong_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
-        turns = self._turns + parameters.sign * wrong_rad / TURN_RAD
+            error_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
+        turns = self._turns + parameters.sign * error_rad / TURN_RAD
         reported_turns = round(turns * parameters.encoder_counts) / parameters.encoder_counts
         turns_s = self._turns_s
         if parameters.velocity_noise_rad_s:

@@ -131,7 +131,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as problem:
         print(f"the body's place cannot be told from here: {problem.strerror or problem}", file=sys.stderr)
         return 1
-    signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.lend_hand())
+    signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.request_put_back())
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
     take_precedence()

@@ -1,7 +1,7 @@
-"""The simulated robot as a peer on the bus: plant and drives, stepped to any moment in time.
+"""The simulated robot as a peer on the bus: plant and drives, stepped to any time.
 
-It knows frames only. In real time a process steps it to the present; in tests the daemon's own tick steps it to the
-tick's moment. Deterministic for a seed.
+It exchanges frames only. In real time a process steps it to the present; in tests the daemon's own tick steps it to
+the tick's time. The same seed gives the same result.
 """
 
 from __future__ import annotations
@@ -30,55 +30,52 @@ class SimulatedRobot:
         start_s: float = 0.0,
     ) -> None:
         random = Random(seed)
-        self.plant = Plant(plant, track, Random(f"mud {seed}"))  # the drives' draws are none of its
-        self.drives = tuple(SimulatedOdrive(drives[joint], random) for joint in JOINTS)
-        self._ports = dict(ports)
+        self.plant = Plant(plant, track, Random(f"mud {seed}"))  # independent of the drives' draws
+        self.drives = Joints(*(SimulatedOdrive(drives[joint], random) for joint in JOINTS))
         self._port_of_drive = tuple(ports[bus_of_joint[joint]] for joint in JOINTS)
+        self._drives_on = [
+            (port, [drive for drive, own in zip(self.drives, self._port_of_drive, strict=True) if own is port])
+            for port in ports.values()
+        ]
         self.now_s = start_s
-        self._hand_wanted = False
+        self._put_back_requested = False
         for drive in self.drives:
             drive.reset(start_s)
         self._measure()
 
     def advance(self, until_s: float) -> None:
-        """Obey the frames that have arrived, then live on until `until_s`, sending what comes due."""
-        self._obey()
-        if self._hand_wanted:
-            self._hand_wanted = False
+        """Executes the frames that have arrived, then simulates until `until_s` and sends messages as they come due."""
+        self._execute_frames()
+        if self._put_back_requested:
+            self._put_back_requested = False
             for arm in self.plant.arms:
                 arm.put_back()
+        a, b, c, d = self.drives
         while self.now_s + STEP_S <= until_s:
-            self.now_s += STEP_S
-            a, b, c, d = self.drives
-            torques: Torques = Joints(
-                a.torque_nm(self.now_s), b.torque_nm(self.now_s), c.torque_nm(self.now_s), d.torque_nm(self.now_s)
-            )  # fmt: skip
+            self.now_s = now_s = self.now_s + STEP_S
+            torques: Torques = Joints(a.torque_nm(now_s), b.torque_nm(now_s), c.torque_nm(now_s), d.torque_nm(now_s))
             self.plant.step(STEP_S, torques)
             self._measure()
-            self._report()
+            for drive, port in zip(self.drives, self._port_of_drive, strict=True):
+                for frame in drive.cyclic_frames(now_s):
+                    port.send(frame)
 
-    def lend_hand(self) -> None:
-        """A person moves the flippers back, at the next moment between two steps: a signal handler may call this."""
-        self._hand_wanted = True
+    def request_put_back(self) -> None:
+        """Puts the flippers back as an operator does by hand, before the next step: safe in a signal handler."""
+        self._put_back_requested = True
 
-    def restart_drive(self, place: int) -> None:
-        """The drive of the joint at this place in JOINTS loses its supply for a moment."""
-        self.drives[place].restart(self.now_s)
+    def restart_drive(self, joint: int) -> None:
+        """Interrupts the supply of one drive for a moment. `joint`: its index in JOINTS."""
+        self.drives[joint].restart(self.now_s)
 
-    def _obey(self) -> None:
-        for port in self._ports.values():
+    def _execute_frames(self) -> None:
+        for port, drives in self._drives_on:
             for frame in port.receive():
-                for drive, drive_port in zip(self.drives, self._port_of_drive, strict=True):
-                    if drive_port is port:
-                        for answer in drive.receive(frame, self.now_s):
-                            port.send(answer)
+                for drive in drives:
+                    for answer in drive.receive(frame, self.now_s):
+                        port.send(answer)
 
     def _measure(self) -> None:
         plant = self.plant
         for drive, angle_rad, velocity_rad_s in zip(self.drives, plant.angles_rad, plant.velocities_rad_s, strict=True):
             drive.measure(angle_rad, velocity_rad_s)
-
-    def _report(self) -> None:
-        for drive, port in zip(self.drives, self._port_of_drive, strict=True):
-            for frame in drive.cyclic_frames(self.now_s):
-                port.send(frame)

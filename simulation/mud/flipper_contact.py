@@ -1,8 +1,8 @@
-"""One flipper in clay: its joints' motion as the plate's, and the plate's forces as torques and thrust.
+"""One flipper in clay: the motion of its joints as the plate's motion, and the plate's forces as torques and thrust.
 
 The plate hangs under the arm, normal n in the direction of the sweep, in-plane directions r (outward along the arm)
 and s (up along the plate). In the frame that tilts with adduction, the point u outward and s up from the middle of
-the lower edge stands at ((l + u) sin α, (l + u) cos α, s - h) and moves with
+the lower edge lies at ((l + u) sin α, (l + u) cos α, s - h) and moves with
 
     v_n = (l + u) α' + X' cos α - (h - s) sin α β'    v_r = X' sin α + (h - s) cos α β'    v_s = (l + u) cos α β'
 
@@ -19,7 +19,17 @@ from control.geometry import FlipperGeometry
 from simulation.body.carriage import Carriage, carried_attitude, carried_twist
 from simulation.mud.clay import Clay
 from simulation.mud.plate_contact import PlateContact
-from simulation.mud.rigid_plate import Attitude, PlateSize, Twist, Wrench, lowest_point_m
+from simulation.mud.rigid_plate import Attitude, PlateSize, Twist, Wrench
+
+
+class ArmMotion(NamedTuple):
+    """Angles and velocities of one arm's joints, and the forward speed of the body that carries it."""
+
+    sweep_rad: float
+    adduction_rad: float
+    sweep_rad_s: float = 0.0
+    adduction_rad_s: float = 0.0
+    body_m_s: float = 0.0
 
 
 class ContactForce(NamedTuple):
@@ -39,25 +49,23 @@ def plate_size(geometry: FlipperGeometry) -> PlateSize:
     return PlateSize(geometry.plate_width_m, geometry.plate_height_m, geometry.plate_thickness_m)
 
 
-def attitude_of(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, surface_m: float = 0.0) -> Attitude:
+def attitude_of(
+    geometry: FlipperGeometry,
+    sweep_rad: float,
+    adduction_rad: float,
+    surface_m: float = 0.0,
+    carriage: Carriage | None = None,
+) -> Attitude:
+    """`surface_m`: how far the mud's surface lies below its nominal height; `carriage`: of a body off its rail."""
+    if carriage is not None:
+        return carried_attitude(geometry, carriage, sweep_rad, adduction_rad, surface_m)
     depth_m = geometry.depth_m(sweep_rad, adduction_rad) - surface_m
     return Attitude(depth_m, -cos(sweep_rad) * sin(adduction_rad), cos(adduction_rad))
 
 
-def lowest_m(
-    geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, carriage: Carriage | None = None
-) -> float:
-    """Depth of the plate's lower corner below the mud's nominal surface."""
-    attitude = attitude_of(geometry, sweep_rad, adduction_rad)
-    if carriage is not None:
-        attitude = carried_attitude(geometry, carriage, sweep_rad, adduction_rad, 0.0)
-    return lowest_point_m(attitude, geometry.plate_width_m)
-
-
-def twist_of(
-    geometry: FlipperGeometry, sweep_rad: float, sweep_rad_s: float, adduction_rad_s: float, body_m_s: float
-) -> Twist:
-    """Of the plate's motion through the mud. (It is the same whatever the adduction angle.)"""
+def twist_of(geometry: FlipperGeometry, motion: ArmMotion) -> Twist:
+    """Returns the plate's motion through the mud, which is the same at any adduction angle."""
+    sweep_rad, _, sweep_rad_s, adduction_rad_s, body_m_s = motion
     length_m, drop_m, sa, ca = geometry.flipper_length_m, geometry.drop_m, sin(sweep_rad), cos(sweep_rad)
     return Twist(
         length_m * sweep_rad_s + body_m_s * ca - drop_m * sa * adduction_rad_s,
@@ -73,16 +81,17 @@ def twist_of(
 def contact_force(geometry: FlipperGeometry, sweep_rad: float, wrench: Wrench) -> ContactForce:
     """The transpose of `twist_of`: torques and thrust do the same work on joints and body as the mud on the plate."""
     length_m, drop_m, sa, ca = geometry.flipper_length_m, geometry.drop_m, sin(sweep_rad), cos(sweep_rad)
-    across_nm = drop_m * wrench.normal_n - wrench.normal_upward_nm
-    outward_nm = drop_m * wrench.outward_n - wrench.outward_upward_nm
-    lifting_nm = length_m * wrench.upward_n + wrench.upward_outward_nm
+    normal_n, outward_n, upward_n, normal_outward_nm, normal_upward_nm, outward_upward_nm, upward_outward_nm = wrench
+    across_nm = drop_m * normal_n - normal_upward_nm
+    outward_nm = drop_m * outward_n - outward_upward_nm
+    lifting_nm = length_m * upward_n + upward_outward_nm
     return ContactForce(
-        length_m * wrench.normal_n + wrench.normal_outward_nm,
+        length_m * normal_n + normal_outward_nm,
         ca * (outward_nm + lifting_nm) - sa * across_nm,
-        ca * wrench.normal_n + sa * wrench.outward_n,
-        wrench.normal_n,
-        wrench.outward_n,
-        wrench.upward_n,
+        ca * normal_n + sa * outward_n,
+        normal_n,
+        outward_n,
+        upward_n,
         -sa * (outward_nm + lifting_nm) - ca * across_nm,
     )
 
@@ -98,29 +107,11 @@ class FlipperContact:
         self.plate.reset()
 
     def step(
-        self,
-        dt_s: float,
-        clay: Clay,
-        sweep_rad: float,
-        adduction_rad: float,
-        sweep_velocity_rad_s: float,
-        adduction_velocity_rad_s: float,
-        body_velocity_m_s: float,
-        surface_m: float = 0.0,
-        carriage: Carriage | None = None,
+        self, dt_s: float, clay: Clay, motion: ArmMotion, attitude: Attitude, carriage: Carriage | None = None
     ) -> ContactForce:
-        """`surface_m`: how far the mud's surface lies below its nominal height; `carriage`: of a body off its rail."""
-        geometry = self.geometry
-        if carriage is None:
-            attitude = attitude_of(geometry, sweep_rad, adduction_rad, surface_m)
-        else:
-            attitude = carried_attitude(geometry, carriage, sweep_rad, adduction_rad, surface_m)
+        """`attitude`: of the plate in its mud, below the surface that this flipper meets."""
         if self.plate.leaves(attitude):  # as in swing: nothing else to compute
             return NO_CONTACT
-        if carriage is None:
-            twist = twist_of(geometry, sweep_rad, sweep_velocity_rad_s, adduction_velocity_rad_s, body_velocity_m_s)
-        else:
-            twist = carried_twist(
-                geometry, carriage, sweep_rad, adduction_rad, sweep_velocity_rad_s, adduction_velocity_rad_s
-            )
-        return contact_force(geometry, sweep_rad, self.plate.step(dt_s, clay, attitude, twist))
+        geometry = self.geometry
+        twist = twist_of(geometry, motion) if carriage is None else carried_twist(geometry, carriage, *motion[:4])
+        return contact_force(geometry, motion.sweep_rad, self.plate.step(dt_s, clay, attitude, twist))

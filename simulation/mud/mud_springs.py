@@ -1,12 +1,13 @@
-"""The mud beside a plate, piece by piece: springs that slide at their yield force, an anchored elastic-plastic contact.
+"""The mud around a plate, piece by piece: springs that slide at their yield force, an anchored elastic-plastic contact.
 
-A spring's stiffness is that of slow mud, whatever the speed: only its yield follows the rate. A piece that goes
-deeper meets unstrained mud, so its force stays while its stiffness rises; one that comes up loses force with
-stiffness. Both make the mud passive: at no moment has it given more work than it was given (test_plate_contact).
+The state of a spring is the fraction of its slow yield force that it carries. Its stiffness is that of slow mud at any
+speed; only its yield follows the rate. A piece that goes deeper meets unstrained mud: its force stays while its yield
+force and its stiffness rise, so the fraction falls. A piece that comes up loses force with stiffness: the fraction
+stays. Both make the mud passive: it never returns more work than it received (tests/simulation/mud).
 
-How far mud moves before it yields at 0.1 m/s: the authors' logs show a sideways load of a fifth of the yield force
-after 3.6 mm of sideways motion in insertion, and a plateau after two to three centimetres with the servo's give
-included, so SIDEWAYS_YIELD_M is 15 mm. Along the plate and under its edge it yields within a millimetre or two, as
+The yield distances at 0.1 m/s come from the authors' logs. They show a sideways load of a fifth of the yield force
+after 3.6 mm of sideways motion in insertion, and a plateau after two to three centimetres with the servo's compliance
+included, so SIDEWAYS_YIELD_M is 15 mm. Along the plate and under its edge mud yields within a millimetre or two, as
 thin layers do.
 """
 
@@ -28,36 +29,28 @@ from simulation.mud.rigid_plate import Attitude, Twist
 SIDEWAYS_YIELD_M = 0.015
 LENGTHWAYS_YIELD_M = 0.001
 STRIPS = 7
+DRY_N = [0.0] * STRIPS  # the yield forces of strips above the mud
 
 
-class Instant(NamedTuple):
-    """One step of a plate in mud. `grip`: by how much its speed raises the yield."""
+class PlateStep(NamedTuple):
+    """One time step of a plate in mud. `rate`: the factor by which the plate's speed raises the yield."""
 
     dt_s: float
     clay: Clay
-    traction: float
+    rate: float
     attitude: Attitude
     twist: Twist
 
 
-# The submerged part of one strip of a column, a bare tuple since there are twenty in each step:
-# the height of its middle above the lower edge, the depth of that, how much of the strip is covered,
-# and the mud's strength there.
+# The submerged part of one strip of a column, a bare tuple because each step has twenty of them: the height of its
+# middle above the lower edge, the depth of that middle, the submerged height, and the mud's strength there.
 Strip = tuple[float, float, float, float]
 
 Fraction = TypeVar("Fraction", float, complex)
 
 
-def kept(fraction: Fraction, before_n: float, now_n: float) -> Fraction:
-    """What is left of a strain when the yield force, and with it the stiffness, has changed.
-
-    Mud that comes anew is not strained: the force stays. Mud that goes takes its force along: the strain stays.
-    """
-    return fraction if now_n <= before_n else fraction * (before_n / now_n)
-
-
 def submerged_strips(submerged_m: float, strip_m: float, per_upward: float, clay: Clay) -> list[Strip]:
-    """Of a column that is in the mud up to `submerged_m` above the lower edge."""
+    """Returns the strips of a column that is in the mud up to `submerged_m` above the lower edge."""
     strips, strength_pa, layers = [], clay.strength_pa, clay.layers
     for strip in range(STRIPS):
         low_m = strip * strip_m
@@ -76,7 +69,7 @@ def submerged_strips(submerged_m: float, strip_m: float, per_upward: float, clay
 
 
 class Springs(Generic[Fraction]):
-    """Owns how far the mud of some pieces is strained, as shares of the slow yield forces, and these forces."""
+    """Owns the strain of some pieces of mud, as fractions of their slow yield forces, and these forces."""
 
     def __init__(self, unstrained: list[Fraction]) -> None:
         self._unstrained: list[Fraction] = unstrained
@@ -86,12 +79,12 @@ class Springs(Generic[Fraction]):
         self._fractions: list[Fraction] = list(self._unstrained)
         self._limits_n = [0.0] * len(self._fractions)
 
-    def fade(self, left: float) -> None:
-        self._fractions = [fraction * left for fraction in self._fractions]
+    def fade(self, remaining: float) -> None:
+        self._fractions = [fraction * remaining for fraction in self._fractions]
 
 
 class PressedColumn(Springs[float]):
-    """The mud that a column of strips is pressed into."""
+    """The mud that a column of strips presses on."""
 
     def __init__(self, profile_width_m: float, yield_m: float) -> None:
         """`profile_width_m`: of the whole body, for the pressure law."""
@@ -100,12 +93,13 @@ class PressedColumn(Springs[float]):
         self.yield_m = yield_m
 
     def step(
-        self, instant: Instant, strips: list[Strip], breadth_m: float, speed_m_s: float, per_upward_s: float
+        self, step: PlateStep, strips: list[Strip], breadth_m: float, speed_m_s: float, per_upward_s: float
     ) -> tuple[float, float]:
-        """Force against a motion that grows by `per_upward_s` upward, and its moment."""
-        clay, traction, layered = instant.clay, instant.traction, bool(instant.clay.layers)
+        """Returns the force against a motion that grows by `per_upward_s` upward, and its moment."""
+        dt_s, clay, rate, _, _ = step
+        layered, per_yield = bool(clay.layers), dt_s / self.yield_m
         rise_per_m = lateral_rise_per_m(clay.strength_pa, self.profile_width_m)
-        pressed_n_m, per_yield = clay.strength_pa * breadth_m, instant.dt_s / self.yield_m
+        pressed_n_m = clay.strength_pa * breadth_m
         moved, per_m = per_yield * speed_m_s, per_yield * per_upward_s
         fractions, limits_n = self._fractions, self._limits_n
         force_n = moment_nm = 0.0
@@ -115,14 +109,16 @@ class PressedColumn(Springs[float]):
                 pressed_n_m = strength_pa * breadth_m
             factor = SURFACE_FACTOR + rise_per_m * depth_m
             limit_n = (factor if factor < DEEP_FACTOR else DEEP_FACTOR) * pressed_n_m * covered_m
-            fraction = kept(fractions[place], limits_n[place], limit_n) - moved - per_m * above_edge_m
-            fractions[place] = fraction = (
-                -traction if fraction < -traction else traction if fraction > traction else fraction
-            )
-            limits_n[place] = limit_n
-            force_n += fraction * limit_n
-            moment_nm += fraction * limit_n * above_edge_m
-        limits_n[len(strips) :] = [0.0] * (STRIPS - len(strips))
+            fraction, before_n = fractions[place], limits_n[place]
+            if limit_n > before_n:
+                fraction *= before_n / limit_n
+            fraction = fraction - moved - per_m * above_edge_m
+            fraction = -rate if fraction < -rate else rate if fraction > rate else fraction
+            fractions[place], limits_n[place] = fraction, limit_n
+            load_n = fraction * limit_n
+            force_n += load_n
+            moment_nm += load_n * above_edge_m
+        limits_n[len(strips) :] = DRY_N[len(strips) :]
         return force_n, moment_nm
 
 
@@ -133,14 +129,15 @@ class RubbedColumn(Springs[complex]):
         super().__init__([0j] * STRIPS)
 
     def step(
-        self, instant: Instant, strips: list[Strip], breadth_m: float, velocity_m_s: complex, per_upward_s: float
+        self, step: PlateStep, strips: list[Strip], breadth_m: float, velocity_m_s: complex, per_upward_s: float
     ) -> tuple[complex, float]:
-        """Force against a motion whose outward part grows by `per_upward_s` upward, and that part's moment.
+        """Returns the force against a motion whose outward part grows by `per_upward_s` upward, and that part's moment.
 
         `breadth_m`: of all surfaces that mud sticks to.
         """
-        clay, traction, layered = instant.clay, instant.traction, bool(instant.clay.layers)
-        sticking_n_m, per_yield = ADHESION * clay.strength_pa * breadth_m, instant.dt_s / LENGTHWAYS_YIELD_M
+        dt_s, clay, rate, _, _ = step
+        layered, per_yield = bool(clay.layers), dt_s / LENGTHWAYS_YIELD_M
+        sticking_n_m = ADHESION * clay.strength_pa * breadth_m
         moved, per_m = per_yield * velocity_m_s, per_yield * per_upward_s
         fractions, limits_n = self._fractions, self._limits_n
         force_n, moment_nm = 0j, 0.0
@@ -148,13 +145,17 @@ class RubbedColumn(Springs[complex]):
             if layered:
                 sticking_n_m = ADHESION * strength_pa * breadth_m
             limit_n = sticking_n_m * covered_m
-            fraction = kept(fractions[place], limits_n[place], limit_n) - moved - per_m * above_edge_m
+            fraction, before_n = fractions[place], limits_n[place]
+            if limit_n > before_n:
+                fraction *= before_n / limit_n
+            fraction = fraction - moved - per_m * above_edge_m
             stretch = abs(fraction)
-            fractions[place] = fraction = fraction if stretch <= traction else fraction * (traction / stretch)
-            limits_n[place] = limit_n
+            if stretch > rate:
+                fraction *= rate / stretch
+            fractions[place], limits_n[place] = fraction, limit_n
             force_n += fraction * limit_n
             moment_nm += fraction.real * limit_n * above_edge_m
-        limits_n[len(strips) :] = [0.0] * (STRIPS - len(strips))
+        limits_n[len(strips) :] = DRY_N[len(strips) :]
         return force_n, moment_nm
 
 
@@ -165,19 +166,21 @@ class LowerEdge(Springs[float]):
         super().__init__([0.0, 0.0])
         self.thickness_m = thickness_m
 
-    def step(self, instant: Instant, positions_m: tuple[float, float], wet_m: float) -> tuple[float, float]:
-        """Force upward, and its moment outward."""
-        clay, attitude, twist = instant.clay, instant.attitude, instant.twist
+    def step(self, step: PlateStep, positions_m: tuple[float, float], wet_m: float) -> tuple[float, float]:
+        """Returns the force upward, and its moment outward."""
+        dt_s, clay, rate, attitude, twist = step
+        fractions, limits_n = self._fractions, self._limits_n
         force_n = moment_nm = 0.0
         for half, outward_m in enumerate(positions_m):
             depth_m = attitude.depth_m + attitude.per_outward * outward_m
             suction = DEEP_FACTOR / BEARING_FACTOR * min(depth_m / SUCTION_FADE_M, 1.0)
-            moved_m = instant.dt_s * (twist.upward_m_s + twist.upward_per_outward_s * outward_m)
-            strength_pa = clay.strength_at_pa(depth_m) if clay.layers else clay.strength_pa
-            limit_n = BEARING_FACTOR * strength_pa * self.thickness_m * wet_m / 2.0
-            fraction = kept(self._fractions[half], self._limits_n[half], limit_n) - moved_m / LENGTHWAYS_YIELD_M
-            self._fractions[half] = fraction = min(max(fraction, -suction * instant.traction), instant.traction)
-            self._limits_n[half] = limit_n
+            moved_m = dt_s * (twist.upward_m_s + twist.upward_per_outward_s * outward_m)
+            limit_n = BEARING_FACTOR * clay.strength_at_pa(depth_m) * self.thickness_m * wet_m / 2.0
+            fraction, before_n = fractions[half], limits_n[half]
+            if limit_n > before_n:
+                fraction *= before_n / limit_n
+            fraction = min(max(fraction - moved_m / LENGTHWAYS_YIELD_M, -suction * rate), rate)
+            fractions[half], limits_n[half] = fraction, limit_n
             force_n += fraction * limit_n
             moment_nm += fraction * limit_n * outward_m
         return force_n, moment_nm

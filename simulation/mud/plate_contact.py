@@ -1,15 +1,15 @@
 """A rigid rectangular plate in clay, integrated over its surface in three dimensions.
 
 The plate is cut into strips along its height and two columns across the wet part of its lower edge, at its Gauss
-points. Every piece below the mud's surface is held as by a spring that slides at its yield force (mud_springs.py)
+points. A spring that slides at its yield force holds every piece below the mud's surface (mud_springs.py):
 
     faces         across: N_p(ζ) s_u, both faces together      along: a s_u on each face and narrow side, as a vector
     narrow sides  N_p(ζ) s_u for a body as wide as the plate is thick, half of it on each
     lower edge    down N_c s_u, up 9 s_u with suction fading near the surface
 
-with the strength s_u at its own depth ζ (a strip's is the mean over its height), times the rate factor of the plate's
-speed. The laws and their constants are those of the clay. Adhesion does not depend on pressure (undrained), so across
-and along are independent. Whatever leans, crosses over or pulls sideways comes out of the sum.
+with the strength s_u at the depth of the piece (for a strip, the mean over its height), times the rate factor of the
+plate's speed. The laws and their constants are those of the clay. Adhesion does not depend on pressure (undrained), so
+across and along are independent. Lean, cross-coupling and lateral pull follow from the sum.
 
 At rest loads relax: they fade by up to `relaxation` within half a second, and motion loads the springs again.
 """
@@ -24,8 +24,8 @@ from simulation.mud.mud_springs import (
     LENGTHWAYS_YIELD_M,
     SIDEWAYS_YIELD_M,
     STRIPS,
-    Instant,
     LowerEdge,
+    PlateStep,
     PressedColumn,
     RubbedColumn,
     Strip,
@@ -47,7 +47,7 @@ class Column(NamedTuple):
 
 
 class PlateContact:
-    """Owns the contact of one plate, and for how long it has been at rest."""
+    """Owns the contact of one plate, and how far the mud around it has come to rest."""
 
     def __init__(self, size: PlateSize, relaxation: float = 0.0) -> None:
         self.size = size
@@ -68,7 +68,7 @@ class PlateContact:
         self._touched = False
 
     def leaves(self, attitude: Attitude) -> bool:
-        """Whether the plate is clear of the mud, which then forgets it."""
+        """Returns whether the plate is clear of the mud; the mud then forgets it."""
         if lowest_point_m(attitude, self.size.width_m) > 0.0:
             return False
         if self._touched:
@@ -82,49 +82,49 @@ class PlateContact:
         speed_m_s = sqrt(twist.normal_m_s**2 + twist.outward_m_s**2 + twist.upward_m_s**2)
         if self.relaxation:
             self._relax(dt_s, speed_m_s)
-        instant = Instant(dt_s, clay, rate_factor(speed_m_s), attitude, twist)
-        return self._wrench(instant)
+        return self._wrench(PlateStep(dt_s, clay, rate_factor(speed_m_s), attitude, twist))
 
-    def _wrench(self, instant: Instant) -> Wrench:
-        """The sum over all pieces."""
+    def _wrench(self, step: PlateStep) -> Wrench:
+        """Returns the sum over all pieces."""
         half_m = self.size.width_m / 2.0
-        wet_m, middle_m = wet_edge_m(instant.attitude, self.size.width_m)
+        wet_m, middle_m = wet_edge_m(step.attitude, self.size.width_m)
         positions_m = (middle_m - GAUSS * wet_m, middle_m + GAUSS * wet_m)
-        inner = self._step_column(instant, self._inner, positions_m[0], wet_m / 2.0)
-        outer = self._step_column(instant, self._outer, positions_m[1], wet_m / 2.0)
-        inner_n, inner_nm = self._step_side(instant, self._inner_side, -half_m)
-        outer_n, outer_nm = self._step_side(instant, self._outer_side, half_m)
-        edge_n, edge_nm = self._edge.step(instant, positions_m, wet_m)
+        inner = self._step_column(step, self._inner, positions_m[0], wet_m / 2.0)
+        outer = self._step_column(step, self._outer, positions_m[1], wet_m / 2.0)
+        inner_n, inner_nm = self._step_side(step, self._inner_side, -half_m)
+        outer_n, outer_nm = self._step_side(step, self._outer_side, half_m)
+        edge_n, edge_nm = self._edge.step(step, positions_m, wet_m)
         n, r, s, n_u, n_s, r_s, s_u = [a + b for a, b in zip(inner, outer, strict=True)]
         return Wrench(n, r + inner_n + outer_n, s + edge_n, n_u, n_s, r_s + inner_nm + outer_nm, s_u + edge_nm)
 
     def _relax(self, dt_s: float, speed_m_s: float) -> None:
-        """At rest towards a share of the load; motion forgets the rest, and its way loads the springs again."""
+        """Fades the load at rest. Motion forgets the rest, and the distance it covers loads the springs again."""
         before = self._rested
         if speed_m_s >= RESTING_M_S:
             self._rested *= exp(-speed_m_s * dt_s / WAKING_M)
             return
         self._rested += (1.0 - before) * (1.0 - exp(-dt_s / RELAXATION_S))
-        left = (1.0 - self.relaxation * self._rested) / (1.0 - self.relaxation * before)
+        remaining = (1.0 - self.relaxation * self._rested) / (1.0 - self.relaxation * before)
         for part in self._parts:
-            part.fade(left)
+            part.fade(remaining)
 
-    def _strips(self, instant: Instant, outward_m: float) -> list[Strip]:
-        attitude = instant.attitude
-        submerged_m = (attitude.depth_m + attitude.per_outward * outward_m) / attitude.per_upward
-        return submerged_strips(submerged_m, self._strip_m, attitude.per_upward, instant.clay)
+    def _strips(self, step: PlateStep, outward_m: float) -> list[Strip]:
+        depth_m, per_outward, per_upward = step.attitude
+        submerged_m = (depth_m + per_outward * outward_m) / per_upward
+        return submerged_strips(submerged_m, self._strip_m, per_upward, step.clay)
 
-    def _step_column(self, instant: Instant, column: Column, outward_m: float, breadth_m: float) -> Wrench:
-        v_n, v_r, v_s, n_u, n_s, r_s, s_u = instant.twist
-        strips = self._strips(instant, outward_m)
-        normal_n, normal_nm = column.pressed.step(instant, strips, breadth_m, v_n + n_u * outward_m, n_s)
+    def _step_column(self, step: PlateStep, column: Column, outward_m: float, breadth_m: float) -> tuple[float, ...]:
+        """Returns the column's part of the wrench."""
+        v_n, v_r, v_s, n_u, n_s, r_s, s_u = step.twist
+        strips = self._strips(step, outward_m)
+        normal_n, normal_nm = column.pressed.step(step, strips, breadth_m, v_n + n_u * outward_m, n_s)
         sticky_m = 2.0 * breadth_m + self.size.thickness_m
-        along_n, outward_nm = column.rubbed.step(instant, strips, sticky_m, complex(v_r, v_s + s_u * outward_m), r_s)
+        along_n, outward_nm = column.rubbed.step(step, strips, sticky_m, complex(v_r, v_s + s_u * outward_m), r_s)
         up_n = along_n.imag
-        return Wrench(normal_n, along_n.real, up_n, normal_n * outward_m, normal_nm, outward_nm, up_n * outward_m)
+        return normal_n, along_n.real, up_n, normal_n * outward_m, normal_nm, outward_nm, up_n * outward_m
 
-    def _step_side(self, instant: Instant, side: PressedColumn, outward_m: float) -> tuple[float, float]:
-        """Force outward, and its moment upward."""
-        strips, twist = self._strips(instant, outward_m), instant.twist
+    def _step_side(self, step: PlateStep, side: PressedColumn, outward_m: float) -> tuple[float, float]:
+        """Returns the force outward, and its moment upward."""
+        strips, twist = self._strips(step, outward_m), step.twist
         breadth_m = self.size.thickness_m / 2.0
-        return side.step(instant, strips, breadth_m, twist.outward_m_s, twist.outward_per_upward_s)
+        return side.step(step, strips, breadth_m, twist.outward_m_s, twist.outward_per_upward_s)

@@ -1,4 +1,4 @@
-"""A rigid rectangular plate in its own directions: where it is in the mud, how it moves, what force the mud lays on it.
+"""A rigid rectangular plate in its own directions: its attitude in the mud, its motion, and the mud's force on it.
 
 The directions are the normal n, outward r along the lower edge and upward s along the plate's height; the middle of the
 lower edge is the point that everything is counted from.
@@ -22,14 +22,18 @@ class Attitude(NamedTuple):
     per_outward: float
     per_upward: float
 
+    def below(self, surface_m: float) -> Attitude:
+        """Counts depth from a surface that lies `surface_m` lower."""
+        return Attitude(self.depth_m - surface_m, self.per_outward, self.per_upward)
+
 
 def lowest_point_m(attitude: Attitude, width_m: float) -> float:
-    """Depth of the lower edge's lower corner."""
+    """Returns the depth of the lower edge's lower corner."""
     return attitude.depth_m + abs(attitude.per_outward) * width_m / 2.0
 
 
 def wet_edge_m(attitude: Attitude, width_m: float) -> tuple[float, float]:
-    """Width of the submerged part of the lower edge, which the waterline cuts, and how far outward its middle is."""
+    """Returns the width of the submerged part of the lower edge, and how far outward its middle is."""
     half_m = width_m / 2.0
     if attitude.depth_m >= abs(attitude.per_outward) * half_m:
         return width_m, 0.0
@@ -52,7 +56,7 @@ class Twist(NamedTuple):
 
 
 class Wrench(NamedTuple):
-    """Force of the mud on the plate and its moments: `normal_outward_nm` is the sum of normal force times the way
+    """Force of the mud on the plate and its moments: `normal_outward_nm` is the sum of normal force times the distance
     outward from the middle of the lower edge, and so on.
     """
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from control.geometry import FlipperGeometry
 from control.plate import stroke_moment_m4, submerged_plate
 from simulation.mud.clay import Clay
-from simulation.mud.flipper_contact import attitude_of, contact_force, plate_size, twist_of
+from simulation.mud.flipper_contact import ArmMotion, attitude_of, contact_force, plate_size, twist_of
 from simulation.mud.plate_contact import PlateContact
 
 STEP_M = 0.0001
@@ -80,7 +80,7 @@ class JointCell:
 
     def _turn(self, angle_rad: float, speed_m_s: float) -> float:
         geometry, turn_rad = self._geometry, angle_rad - self._adduction_rad
-        unit = twist_of(geometry, self._sweep_rad, 0.0, 1.0, 0.0)
+        unit = twist_of(geometry, ArmMotion(self._sweep_rad, angle_rad, adduction_rad_s=1.0))
         path_m = abs(turn_rad) * hypot(unit.normal_m_s, unit.outward_m_s, unit.upward_m_s)
         self._adduction_rad = angle_rad
         return self._step(path_m / speed_m_s, turn_rad)
@@ -88,7 +88,7 @@ class JointCell:
     def _step(self, dt_s: float, turn_rad: float) -> float:
         geometry, sweep_rad = self._geometry, self._sweep_rad
         attitude = attitude_of(geometry, sweep_rad, self._adduction_rad, self._surface_m)
-        twist = twist_of(geometry, sweep_rad, 0.0, turn_rad / dt_s, 0.0)
+        twist = twist_of(geometry, ArmMotion(sweep_rad, self._adduction_rad, adduction_rad_s=turn_rad / dt_s))
         wrench = self._plate.step(dt_s, self._clay, attitude, twist)
         within = wrench._replace(normal_n=0.0, normal_outward_nm=0.0, normal_upward_nm=0.0)
         return contact_force(geometry, sweep_rad, within).adduction_nm

@@ -7,12 +7,14 @@ import pytest
 
 from control.controller import WalkOrder
 from control.records import NO_TORQUE, Joints
+from control.geometry import FlipperGeometry
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import STEP_S, Arm, Plant, PlantParameters
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay, Layer
 from simulation.mud.disturbances import Disturbances
-from simulation.mud.flipper_contact import ContactForce, lowest_m
+from simulation.mud.flipper_contact import ContactForce, attitude_of
+from simulation.mud.rigid_plate import lowest_point_m
 from simulation.mud.stones import Stone
 from simulation.mud.track import LEVEL, RandomStrength, Ridges, Track
 
@@ -31,6 +33,10 @@ def pressed_arm(track: Track, lift_nm: float) -> Arm:
 
 def depth_m(arm: Arm) -> float:
     return lowest_m(arm.parameters.geometry, arm.sweep_rad, arm.adduction_rad)
+
+
+def lowest_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> float:
+    return lowest_point_m(attitude_of(geometry, sweep_rad, adduction_rad), geometry.plate_width_m)
 
 
 @pytest.mark.parametrize("lift_nm", [-0.2, -0.75, -1.66])

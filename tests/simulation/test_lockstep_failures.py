@@ -117,7 +117,7 @@ def test_joints_at_their_stops_are_moved_back_by_hand_and_the_robot_arms_again(c
     assert (abs(arms[0].sweep_rad), abs(arms[0].adduction_rad)) == END_STOPS_RAD
     for by_hand in (False, True):
         if by_hand:
-            lockstep.robot.lend_hand()
+            lockstep.robot.request_put_back()
             lockstep.run_for(0.5)
         lockstep.loop.request(Request.CLEAR, lockstep.now_s)
         lockstep.run_for(1.0)

@@ -29,7 +29,7 @@ from simulation.body.plant import STEP_S, Plant, PlantParameters
 from simulation.body.rail_body import DragPad
 from simulation.harness.lockstep import Lockstep, plant_of
 from simulation.mud.clay import MUDS, Clay, rate_factor
-from simulation.mud.flipper_contact import NO_CONTACT, ContactForce, attitude_of, contact_force, twist_of
+from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, ContactForce, attitude_of, contact_force, twist_of
 from simulation.mud.rigid_plate import Wrench
 from simulation.mud.track import Track
 
@@ -162,7 +162,9 @@ def test_a_level_body_carries_its_flippers_as_a_rail_does(
         attitude = carried_attitude(GEOMETRY, carriage, sweep_rad, adduction_rad, 0.0)
         assert attitude == pytest.approx(attitude_of(GEOMETRY, sweep_rad, adduction_rad))
         twist = carried_twist(GEOMETRY, carriage, sweep_rad, adduction_rad, sweep_rad_s, adduction_rad_s)
-        assert twist == pytest.approx(twist_of(GEOMETRY, sweep_rad, sweep_rad_s, adduction_rad_s, body_m_s))
+        assert twist == pytest.approx(
+            twist_of(GEOMETRY, ArmMotion(sweep_rad, adduction_rad, sweep_rad_s, adduction_rad_s, body_m_s))
+        )
 
 
 @given(TURNS, TURNS, st.tuples(*[st.floats(-0.2, 0.2)] * 3), RATES, RATES)

@@ -13,7 +13,8 @@ from simulation.body.plant import END_STOPS_RAD, STEP_S, Plant, PlantParameters
 from simulation.body.rail_body import DRAG_STIFFNESS_N_M
 from simulation.mud.clay import MUDS, Clay, rate_factor
 from simulation.mud.disturbances import LAB, Disturbances
-from simulation.mud.flipper_contact import NO_CONTACT, ContactForce, FlipperContact
+from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, ContactForce, FlipperContact
+from simulation.mud.rigid_plate import Attitude
 from simulation.mud.track import Track
 
 TRACK = Track([(1.0, MUDS["48.5"])])
@@ -27,16 +28,7 @@ class ConstantThrust(FlipperContact):
     thrust_n = 0.0
 
     def step(
-        self,
-        dt_s: float,
-        clay: Clay,
-        sweep_rad: float,
-        adduction_rad: float,
-        sweep_velocity_rad_s: float,
-        adduction_velocity_rad_s: float,
-        body_velocity_m_s: float,
-        surface_m: float = 0.0,
-        carriage: Carriage | None = None,
+        self, dt_s: float, clay: Clay, motion: ArmMotion, attitude: Attitude, carriage: Carriage | None = None
     ) -> ContactForce:
         return NO_CONTACT._replace(thrust_n=self.thrust_n)
 

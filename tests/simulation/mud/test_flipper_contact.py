@@ -11,15 +11,15 @@ from control.geometry import FlipperGeometry
 from simulation.mud.clay import MUDS, rate_factor
 from simulation.mud.flipper_contact import (
     NO_CONTACT,
+    ArmMotion,
     ContactForce,
     FlipperContact,
     attitude_of,
     contact_force,
-    lowest_m,
     plate_size,
     twist_of,
 )
-from simulation.mud.rigid_plate import Wrench
+from simulation.mud.rigid_plate import Wrench, lowest_point_m
 
 GEOMETRY = FlipperGeometry()
 CLAY = MUDS["48.5"]
@@ -55,7 +55,8 @@ def hold(
     adduction_rad = GEOMETRY.adduction_rad(sweep_rad, depth_m)
     force = NO_CONTACT
     for _ in range(round(seconds / DT_S)):
-        force = contact.step(DT_S, CLAY, sweep_rad, adduction_rad, *velocities, surface_m)
+        attitude = attitude_of(GEOMETRY, sweep_rad, adduction_rad, surface_m)
+        force = contact.step(DT_S, CLAY, ArmMotion(sweep_rad, adduction_rad, *velocities), attitude)
     return force
 
 
@@ -70,7 +71,7 @@ def test_the_attitude_tells_the_depth_of_every_point_of_the_plate(sweep_rad: flo
 @given(SWEEPS, ADDUCTIONS)
 def test_the_lowest_point_is_the_lower_one_of_the_two_lower_corners(sweep_rad: float, adduction_rad: float) -> None:
     corners_m = [position_m(sweep_rad, adduction_rad, u, 0.0)[2] for u in (-0.0125, 0.0125)]
-    lowest = lowest_m(GEOMETRY, sweep_rad, adduction_rad)
+    lowest = lowest_point_m(attitude_of(GEOMETRY, sweep_rad, adduction_rad), GEOMETRY.plate_width_m)
     assert lowest == pytest.approx(-GEOMETRY.axis_height_m - min(corners_m))
 
 
@@ -78,7 +79,7 @@ def test_the_lowest_point_is_the_lower_one_of_the_two_lower_corners(sweep_rad: f
 def test_the_twist_is_the_motion_of_every_point_of_the_plate(
     sweep_rad: float, adduction_rad: float, sweep_rad_s: float, adduction_rad_s: float, body_m_s: float
 ) -> None:
-    twist, moved_s = twist_of(GEOMETRY, sweep_rad, sweep_rad_s, adduction_rad_s, body_m_s), 1e-6
+    twist, moved_s = twist_of(GEOMETRY, ArmMotion(sweep_rad, 0.0, sweep_rad_s, adduction_rad_s, body_m_s)), 1e-6
     directions = (
         in_world(adduction_rad, cos(sweep_rad), -sin(sweep_rad), 0.0),
         in_world(adduction_rad, sin(sweep_rad), cos(sweep_rad), 0.0),
@@ -102,7 +103,10 @@ def test_the_twist_is_the_motion_of_every_point_of_the_plate(
 def test_torques_and_thrust_do_the_work_that_the_mud_does_on_the_plate(
     sweep_rad: float, sweep_rad_s: float, adduction_rad_s: float, body_m_s: float, parts: tuple[float, ...]
 ) -> None:
-    wrench, twist = Wrench(*parts), twist_of(GEOMETRY, sweep_rad, sweep_rad_s, adduction_rad_s, body_m_s)
+    wrench, twist = (
+        Wrench(*parts),
+        twist_of(GEOMETRY, ArmMotion(sweep_rad, 0.0, sweep_rad_s, adduction_rad_s, body_m_s)),
+    )
     force = contact_force(GEOMETRY, sweep_rad, wrench)
     power_w = force.sweep_nm * sweep_rad_s + force.adduction_nm * adduction_rad_s + force.thrust_n * body_m_s
     assert power_w == pytest.approx(sum(a * b for a, b in zip(wrench, twist, strict=True)), abs=1e-9)
@@ -164,15 +168,9 @@ def test_a_closed_cycle_of_motion_takes_energy_and_never_has_given_any(
         sweep_rad_s = rate_rad_s * sweep_amplitude_rad * cos(angle)
         adduction_rad_s = -rate_rad_s * 0.2 * sin(angle + shift_rad)
         body_m_s = rate_rad_s * body_amplitude_m * cos(angle)
-        force = contact.step(
-            dt_s,
-            CLAY,
-            sweep_amplitude_rad * sin(angle),
-            middle_rad + 0.2 * cos(angle + shift_rad),
-            sweep_rad_s,
-            adduction_rad_s,
-            body_m_s,
-        )
+        angles_rad = sweep_amplitude_rad * sin(angle), middle_rad + 0.2 * cos(angle + shift_rad)
+        motion = ArmMotion(*angles_rad, sweep_rad_s, adduction_rad_s, body_m_s)
+        force = contact.step(dt_s, CLAY, motion, attitude_of(GEOMETRY, *angles_rad))
         power_w = force.sweep_nm * sweep_rad_s + force.adduction_nm * adduction_rad_s + force.thrust_n * body_m_s
         given_j += power_w * dt_s
         assert given_j < 1e-9
@@ -193,7 +191,8 @@ def test_there_is_no_force_above_the_mud_and_the_memory_is_lost_there() -> None:
     contact = FlipperContact(GEOMETRY)
     held = hold(contact, 0.0, 0.03, (0.5, 0.0, 0.0), 0.1)
     assert held.normal_n < 0.0
-    assert contact.step(DT_S, CLAY, 0.0, 0.0, 1.0, 1.0, 1.0) == NO_CONTACT
+    above = attitude_of(GEOMETRY, 0.0, 0.0)
+    assert contact.step(DT_S, CLAY, ArmMotion(0.0, 0.0, 1.0, 1.0, 1.0), above) == NO_CONTACT
     assert hold(contact, 0.0, 0.03, (0.0, 0.0, 0.0), DT_S) == pytest.approx(NO_CONTACT)
 
 
