@@ -109,7 +109,7 @@ class CarriedBed:
         disarm(self._robot)
         plant = self._lockstep.robot.plant
         plant.body.forward_m = self._position_m(trial, self._prepared)
-        self._lockstep.robot.lend_hand()
+        self._lockstep.robot.request_put_back()
         self._prepared += 1
         self._robot.wait(PERIOD_S)
         return GO_ON

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from control.geometry import FlipperGeometry
 from control.plate import submerged_plate
 from experiments.pictures.side_view import Point, convex_hull, view_from_side
-from simulation.mud.flipper_contact import lowest_m
+from simulation.mud.flipper_contact import attitude_of
+from simulation.mud.rigid_plate import lowest_point_m
 
 GEOMETRY = FlipperGeometry()
 SHEET = replace(GEOMETRY, plate_thickness_m=0.0)
@@ -90,7 +91,9 @@ def test_a_thin_plate_shows_its_face_by_the_sine_of_the_sweep(sweep_rad: float, 
 @given(SWEEPS, ADDUCTIONS)
 def test_the_lowest_corner_is_as_deep_as_the_simulator_has_it(sweep_rad: float, adduction_rad: float) -> None:
     outline = view_from_side(SHEET, sweep_rad, adduction_rad).plate
-    assert -min(z_m for _, z_m in outline) == pytest.approx(lowest_m(SHEET, sweep_rad, adduction_rad), abs=1e-12)
+    assert -min(z_m for _, z_m in outline) == pytest.approx(
+        lowest_point_m(attitude_of(SHEET, sweep_rad, adduction_rad), SHEET.plate_width_m), abs=1e-12
+    )
 
 
 def test_a_plate_straight_below_the_shoulder_is_seen_by_its_edge() -> None:

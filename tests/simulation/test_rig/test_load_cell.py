@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
 from simulation.mud.clay import MUDS, Clay, Layer, rate_factor
-from simulation.mud.flipper_contact import NO_CONTACT, FlipperContact, attitude_of
+from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, FlipperContact, attitude_of
 from simulation.test_rig.load_cell import LoadCell, measure_insertion, measure_shear
 
 GEOMETRY = FlipperGeometry()
@@ -101,9 +101,9 @@ def test_an_upright_plate_is_dragged_at_the_limit_of_the_clay(speed_m_s: float) 
 @pytest.mark.parametrize("sweep_rad", [0.0, 0.4, -0.4])
 def test_a_body_that_is_pushed_back_drags_its_flipper_with_the_same_force(sweep_rad: float) -> None:
     adduction_rad, force = lowered_rad(sweep_rad), NO_CONTACT
-    contact = FlipperContact(GEOMETRY)
+    contact, attitude = FlipperContact(GEOMETRY), attitude_of(GEOMETRY, sweep_rad, adduction_rad)
     for _ in range(1000):
-        force = contact.step(0.001, CLAY, sweep_rad, adduction_rad, 0.0, 0.0, -0.1)
+        force = contact.step(0.001, CLAY, ArmMotion(sweep_rad, adduction_rad, body_m_s=-0.1), attitude)
     shear_n = measure_shear(CLAY, GEOMETRY, sweep_rad, adduction_rad, 0.03, 0.1)
     assert force.thrust_n == pytest.approx(shear_n)
 
