@@ -9,7 +9,7 @@ import pytest
 
 from control.controller import WalkOrder
 from control.modes import Mode, Request
-from control.records import NO_TORQUE, Phase
+from control.records import NO_TORQUE, Phase, same_for_all
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
 from drivers.odrive.codec import ERROR_WATCHDOG, SET_INPUT_TORQUE, AxisState
@@ -138,7 +138,7 @@ def test_disarm_idles_drives_even_before_all_are_heard(configuration: Configurat
     robot = Lockstep(configuration, FIRM)
     running = robot.robot.drives[0]
     running.axis_state = AxisState.CLOSED_LOOP
-    robot.robot.drives = (running,) * 4
+    robot.robot.drives = same_for_all(running)
     robot.run_for(0.02)
     assert robot.loop.mode is Mode.BOOT
     assert robot.loop.request(Request.DISARM, robot.now_s) is None
@@ -150,7 +150,7 @@ def test_a_drive_found_in_closed_loop_is_idled_before_all_are_heard(configuratio
     robot = Lockstep(configuration, FIRM)
     running = robot.robot.drives[0]
     running.axis_state = AxisState.CLOSED_LOOP
-    robot.robot.drives = (running,) * 4
+    robot.robot.drives = same_for_all(running)
     robot.run_for(0.2)
     assert robot.loop.mode is Mode.BOOT
     assert running.axis_state is AxisState.IDLE
@@ -278,7 +278,7 @@ def test_a_fault_is_latched_until_somebody_clears_it(robot: Lockstep) -> None:
 def test_clearing_does_not_help_while_the_cause_lasts(configuration: Configuration) -> None:
     robot = Lockstep(configuration, FIRM)
     robot.arm()
-    robot.robot.drives = (robot.robot.drives[0],) * 4  # three boards are gone
+    robot.robot.drives = same_for_all(robot.robot.drives[0])  # three boards are gone
     assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
     robot.loop.request(Request.CLEAR, robot.now_s)
     robot.run_for(1.0)

@@ -6,8 +6,8 @@ from random import Random
 import pytest
 
 from control.controller import WalkOrder
-from control.records import NO_TORQUE, Joints
 from control.geometry import FlipperGeometry
+from control.records import NO_TORQUE, Joints
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import STEP_S, Arm, Plant, PlantParameters
 from simulation.harness.lockstep import Lockstep
