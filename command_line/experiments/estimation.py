@@ -19,6 +19,7 @@ from experiments.estimation.evaluation import (
     report_of,
     with_layers,
 )
+from experiments.reports.error_table import PlateRow
 from experiments.reports.mud_names import mud_text
 from experiments.reports.text_tables import number, table
 from experiments.trials.session import Finding, screen_finding
@@ -64,31 +65,31 @@ def text_of(report: dict[str, Any]) -> str:
     head = ["setup", "mud", "", "method", "median", "p95", "bias", "in 95 %", "strides", "bounds", "hold", "not valid"]
     rows = [
         [
-            row["setup"],
-            mud_text(row["mud"]),
-            row["coefficient"],
-            row["method"],
-            *(_percent(row[name]) for name in ("median", "p95", "bias", "coverage")),
-            str(row["strides"]),
-            str(row["bounds"]),
-            _percent(row["bounds_hold"]),
-            str(row["not_valid"]),
+            row.setup,
+            mud_text(row.mud),
+            row.coefficient,
+            row.method,
+            *(_percent(getattr(row, name)) for name in ("median", "p95", "bias", "coverage")),
+            str(row.strides),
+            str(row.bounds),
+            _percent(row.bounds_hold),
+            str(row.not_valid),
         ]
         for row in report["errors"]
     ]
     return "\n\n".join([table([head, *rows]), _plates_text(report["plates"]), _boundaries_text(report["boundaries"])])
 
 
-def _plates_text(plates: Sequence[dict[str, Any]]) -> str:
+def _plates_text(plates: Sequence[PlateRow]) -> str:
     head = ["setup", "mud", "", "upright / leaning plate", "estimate / upright", "share of the lean"]
     rows = [
         [
-            row["setup"],
-            mud_text(row["mud"]),
-            row["coefficient"],
-            number(row["upright_over_leaning"]),
-            number(row["estimate_over_upright"]),
-            _percent(row["lean_share"]),
+            row.setup,
+            mud_text(row.mud),
+            row.coefficient,
+            number(row.upright_over_leaning),
+            number(row.estimate_over_upright),
+            _percent(row.lean_fraction),
         ]
         for row in plates
     ]

@@ -12,6 +12,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
 from matplotlib.axes import Axes  # noqa: E402
 
+from experiments.reports.error_table import ErrorRow  # noqa: E402
 from experiments.reports.mud_names import mud_text  # noqa: E402
 
 COLOURS = {"default": "tab:blue", "paper": "tab:red", "paper compensated": "tab:orange"}
@@ -22,12 +23,12 @@ HIGHEST_PERCENT = 150.0  # what lies above is drawn at the edge
 def plot_errors(report: dict[str, Any], path: Path) -> None:
     """Median and 95th percentile of the error by setup, coefficient, mud and method."""
     errors = report["errors"]
-    setups = list(dict.fromkeys(row["setup"] for row in errors))
+    setups = list(dict.fromkeys(row.setup for row in errors))
     size = (4.0 * len(COEFFICIENTS), 2.8 * len(setups))
     figure, panels = plt.subplots(len(setups), len(COEFFICIENTS), figsize=size, squeeze=False, constrained_layout=True)
     for row, setup in enumerate(setups):
         for column, name in enumerate(COEFFICIENTS):
-            reported = [each for each in errors if (each["setup"], each["coefficient"]) == (setup, name)]
+            reported = [each for each in errors if (each.setup, each.coefficient) == (setup, name)]
             _plot_panel(panels[row][column], reported)
             panels[row][column].set_title(f"{setup}: ${name}$", fontsize="medium")
     methods = {
@@ -40,21 +41,19 @@ def plot_errors(report: dict[str, Any], path: Path) -> None:
     plt.close(figure)
 
 
-def _plot_panel(panel: Axes, rows: Sequence[dict[str, Any]]) -> None:
-    muds = list(dict.fromkeys(row["mud"] for row in rows))
+def _plot_panel(panel: Axes, rows: Sequence[ErrorRow]) -> None:
+    muds = list(dict.fromkeys(row.mud for row in rows))
     for method, colour in COLOURS.items():
-        if method == "paper compensated" and rows and rows[0]["coefficient"] != "k_s":
+        if method == "paper compensated" and rows and rows[0].coefficient != "k_s":
             continue  # it compensates k_s alone
-        reported = [row for row in rows if row["method"] == method and row["median"] is not None]
-        places = [muds.index(row["mud"]) for row in reported]
-        medians = [min(100.0 * row["median"], HIGHEST_PERCENT) for row in reported]
-        highest = [min(100.0 * row["p95"], HIGHEST_PERCENT) for row in reported]
+        reported = [row for row in rows if row.method == method and row.median is not None]
+        places = [muds.index(row.mud) for row in reported]
+        medians = [min(100.0 * (row.median or 0.0), HIGHEST_PERCENT) for row in reported]
+        highest = [min(100.0 * (row.p95 or 0.0), HIGHEST_PERCENT) for row in reported]
         panel.vlines(places, medians, highest, color=colour, linewidth=2)
         panel.plot(places, medians, "o", color=colour, label=method)
     for place, mud in enumerate(muds):
-        if any(
-            row["mud"] == mud and row["method"] == "default" and row["bounds"] and not row["strides"] for row in rows
-        ):
+        if any(row.mud == mud and row.method == "default" and row.bounds and not row.strides for row in rows):
             panel.text(place, 2.0, "bounds", ha="center", color=COLOURS["default"], fontsize="small")
     _scale(panel, muds)
 

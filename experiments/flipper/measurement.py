@@ -18,7 +18,12 @@ import numpy as np
 from control.records import Phase
 from experiments.flipper.base_watch import SPOILING_M, load_remarks, moved_text, pose_remarks, surface_remarks
 from experiments.flipper.modelled_force import misfit_n, modelled_forces
-from experiments.reports.coefficient_table import ComparedStride, error_table, gather_coefficient
+from experiments.reports.coefficient_table import (
+    ComparedStride,
+    MudSummary,
+    error_table,
+    gather_coefficients,
+)
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.robot.bench_robot import BenchError, arm, rest, walk
 from experiments.trials.estimation_methods import DEFAULT, PAPER, configured_method, strides_by_method
@@ -67,6 +72,11 @@ class Plan:
             for mud in self.muds
             for number in range(1, self.trials + 1)
         ]
+
+
+@dataclass(frozen=True)
+class FlipperMud(MudSummary):
+    remarks: Sequence[str]
 
 
 def require_fixed_base(configuration: Configuration) -> None:
@@ -186,22 +196,22 @@ def _beside(by_mud: Mapping[str, Sequence[Entry]], truth: TruthOfMud | None) -> 
     ]
 
 
-def _mud_report(mud: str, trials: Sequence[Entry], method: str, rows: Sequence[ComparedStride]) -> dict[str, Any]:
+def _mud_report(mud: str, trials: Sequence[Entry], method: str, rows: Sequence[ComparedStride]) -> FlipperMud:
     own = [row for row in rows if row.mud == mud and row.method == method]
     reported = {name: [row.truth.get(name) for row in own] for name in COEFFICIENTS}
     truths = {name: [value for value in values if value is not None] for name, values in reported.items()}
-    return {
-        "mud": mud,
-        **{name: gather_coefficient(row.stride[name] for row in own) for name in COEFFICIENTS},
-        "truth": {name: fmean(values) for name, values in truths.items() if values} or None,
-        "remarks": [remark for trial in trials for remark in trial["remarks"]],
-    }
+    return FlipperMud(
+        mud=mud,
+        **gather_coefficients([row.stride for row in own]),
+        truth={name: fmean(values) for name, values in truths.items() if values} or None,
+        remarks=[remark for trial in trials for remark in trial["remarks"]],
+    )
 
 
-def _falls(muds: Sequence[Mapping[str, Any]], name: str) -> bool | None:
+def _falls(muds: Sequence[FlipperMud], name: str) -> bool | None:
     """Whether more water means less, as in the paper; None where the muds are not named after their water."""
     try:
-        reported = sorted((float(mud["mud"]), mud[name]["value"]) for mud in muds if mud[name]["value"] is not None)
+        reported = sorted((float(mud.mud), value) for mud in muds if (value := mud.coefficient(name).value) is not None)
     except ValueError:
         return None
     return all(a > b for (_, a), (_, b) in zip(reported, reported[1:], strict=False)) if len(reported) > 1 else None

@@ -14,7 +14,7 @@ from control.geometry import FlipperGeometry
 from control.records import Phase
 from experiments.flipper.measurement import drawn_coefficients
 from experiments.flipper.modelled_force import ModelledForces, modelled_forces
-from experiments.reports.coefficient_table import PER_CM3
+from experiments.reports.coefficient_table import PER_CM3, MudSummary
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import (
@@ -112,13 +112,13 @@ def _plot_forward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> 
 
 
 def plot_coefficients(
-    muds: Sequence[Mapping[str, Any]], firsts: Mapping[str, Entry], geometry: FlipperGeometry, path: Path
+    muds: Sequence[MudSummary], firsts: Mapping[str, Entry], geometry: FlipperGeometry, path: Path
 ) -> None:
     """Above the forces of one trial a mud, then the coefficients, and beside a load cell's where there is one."""
-    beside = any(mud["truth"] for mud in muds)
+    beside = any(mud.truth for mud in muds)
     rows = 3 if beside else 2
     figure, panels = plt.subplots(rows, 3, figsize=(11.0, 3.3 * rows + 0.5), constrained_layout=True)
-    looks = looks_of([mud["mud"] for mud in muds])
+    looks = looks_of([mud.mud for mud in muds])
     _plot_curves(panels[0], firsts, looks)
     for column, name in enumerate(COEFFICIENTS):
         _plot_by_mud(panels[1][column], muds, name, looks)
@@ -154,19 +154,17 @@ def _plot_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Map
             panel.invert_xaxis()  # as the flipper goes
 
 
-def _plot_by_mud(
-    panel: Axes, muds: Sequence[Mapping[str, Any]], name: str, looks: Mapping[str, dict[str, Any]]
-) -> None:
+def _plot_by_mud(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapping[str, dict[str, Any]]) -> None:
     """Mean and standard deviation over trials; a bound has an arrow up."""
-    names = [mud["mud"] for mud in muds]
+    names = [mud.mud for mud in muds]
     for water, mud in zip(waters_of(names), muds, strict=True):
-        reported, look = mud[name], looks[mud["mud"]]
-        if reported["value"] is None:
+        gathered, look = mud.coefficient(name), looks[mud.mud]
+        if gathered.value is None:
             continue
-        value, sd = PER_CM3 * reported["value"], PER_CM3 * reported["value"] * (reported["repeatability"] or 0.0)
-        trials = [PER_CM3 * trial for trial in reported["trials"]]
+        value, sd = PER_CM3 * gathered.value, PER_CM3 * gathered.value * (gathered.repeatability or 0.0)
+        trials = [PER_CM3 * trial for trial in gathered.trials]
         panel.plot([water] * len(trials), trials, "_", color=GREY, markersize=12)
-        panel.errorbar(water, value, sd or None, capsize=4, ecolor=INK, linestyle="", lolims=reported["at_least"],
+        panel.errorbar(water, value, sd or None, capsize=4, ecolor=INK, linestyle="", lolims=gathered.at_least,
                        **mark_of(look))  # fmt: skip
     panel.set_ylim(bottom=0.0)
     panel.set_ylabel(f"{LABELS[name]} (N/cm³)")
@@ -175,18 +173,16 @@ def _plot_by_mud(
         panel.set_xticks(range(len(names)), names)
 
 
-def _plot_beside(
-    panel: Axes, muds: Sequence[Mapping[str, Any]], name: str, looks: Mapping[str, dict[str, Any]]
-) -> None:
+def _plot_beside(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapping[str, dict[str, Any]]) -> None:
     """Against a load cell's, with two standard errors, and the grey line on which both are equal."""
     largest = 0.0
     for mud in muds:
-        reported, truth = mud[name], (mud["truth"] or {}).get(name)
-        if reported["value"] is None or truth is None:
+        gathered, truth = mud.coefficient(name), (mud.truth or {}).get(name)
+        if gathered.value is None or truth is None:
             continue
-        value, uncertainty = PER_CM3 * reported["value"], 2.0 * PER_CM3 * (reported["std_error"] or 0.0)
+        value, uncertainty = PER_CM3 * gathered.value, 2.0 * PER_CM3 * (gathered.std_error or 0.0)
         panel.errorbar(PER_CM3 * truth, value, uncertainty or None, capsize=4, ecolor=INK, linestyle="",
-                       lolims=reported["at_least"], **mark_of(looks[mud["mud"]]))  # fmt: skip
+                       lolims=gathered.at_least, **mark_of(looks[mud.mud]))  # fmt: skip
         largest = max(largest, value + uncertainty, PER_CM3 * truth)
     panel.plot([0.0, 1.1 * largest], [0.0, 1.1 * largest], color=GREY, linewidth=1.0, label="equal")
     panel.set_xlabel(f"{LABELS[name]} by load cell (N/cm³)")

@@ -68,7 +68,7 @@ def sections_of(
         sections.append(_errors(report))
     sections.append(_forces(report))
     sections.append(_strides(firsts, configuration, method))
-    remarks = [f"{mud_text(mud['mud'])}: {remark}" for mud in report["muds"] for remark in mud["remarks"]]
+    remarks = [f"{mud_text(mud.mud)}: {remark}" for mud in report["muds"] for remark in mud.remarks]
     return sections + remarked([*remarks, *left_out_texts(report.get("left_out", {}))])
 
 
@@ -85,7 +85,7 @@ def _coefficients(report: Mapping[str, Any], firsts: Mapping[str, Entry], config
         "Figure 5 of the paper. A to C: force of one trial a mud. D to F: coefficients, mean and standard deviation "
         "over the trials, which are the grey dashes."
     )
-    if any(mud["truth"] for mud in report["muds"]):
+    if any(mud.truth for mud in report["muds"]):
         caption += " G to I: beside a load cell's, with two standard errors; on the grey line both are equal."
     draw = partial(plot_coefficients, report["muds"], firsts, configuration.geometry)
     figure = Figure("figure5", caption, draw)

@@ -1,24 +1,16 @@
-"""The coefficients of muds, gathered over trials, and beside a load cell's: what summaries hold and tables show.
+"""Coefficients of muds over several trials, compared with a load cell's: the records of a summary, and its tables.
 
-A summary has `muds`, a list of objects with the name of the mud and for each of k_p, k_s, k_e in N/m³:
+Two standard errors contain the truth in about 19 of 20 cases. Muds that one robot measured are compared by the error
+of the trials alone, since the shared error moves all of them alike.
 
-    value          mean over the trials that gave a value
-    std_error      of that mean, of everything that is known to err; of a single one, what its estimator doubts
-    trials_error   the part of it that the trials' own scatter tells, with Student's factor; null for a single one
-    shared_error   the part that all trials have alike: what their estimator doubts beyond their scatter, and at the
-                   least that of a torque (the motors' constants); null for a single one
-    trials         their values, one by one
-    repeatability  their standard deviation over their mean; null for a single one
-
-Two standard errors hold the truth in about 19 of 20 cases. Muds of one robot are told apart by the trials' part alone.
-
-Where more trials tell a lower bound than a value the mud's is a bound as well (`at_least`), the middle one of all: the
-few in which mud gave way that mostly holds are those that met less of it, or pushed harder, than anybody knows.
+A mud whose trials report more lower bounds than values has a bound as well (`at_least`): the median of all trials. The
+few trials in which such a mud yielded met less resistance, or pushed harder, than anybody knows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from math import hypot, isfinite, sqrt
 from statistics import fmean, median, stdev
 from typing import Any, NamedTuple
@@ -26,16 +18,16 @@ from typing import Any, NamedTuple
 from control.records import UNKNOWN, Estimate
 from estimation.strokes.origin_fit import student_factor
 from estimation.strokes.stroke_fit import TORQUE_REPEATABILITY
-from experiments.reports.error_table import COEFFICIENTS, Evaluation, error_rows
+from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, error_rows
 from experiments.reports.mud_names import mud_text
 from experiments.reports.value_text import N_CM3, fraction_text, repeatability_text, value_text
 
 PER_CM3 = 1.0 / N_CM3
-Reported = Mapping[str, Any]  # an estimate as reports tell it
+EstimateReport = Mapping[str, Any]  # an estimate as the daemon reports it: value, std_error, valid, at_least, ...
 
 
 class ComparedStride(NamedTuple):
-    """One stride's estimates by one method, and what a load cell reads there."""
+    """The estimates of one stride by one method, and a load cell's readings in N/m³."""
 
     mud: str
     method: str
@@ -43,46 +35,77 @@ class ComparedStride(NamedTuple):
     truth: Mapping[str, float | None]
 
 
-def gather_coefficient(estimates: Iterable[Reported]) -> dict[str, Any]:
-    """Of one coefficient in one mud, over its trials."""
-    reported = list(estimates)
-    valid = [each for each in reported if each["valid"]]
+@dataclass(frozen=True)
+class GatheredCoefficient:
+    """One coefficient of one mud over its trials, in N/m³; None where nothing is known."""
+
+    value: float | None  # mean over the trials with a value
+    std_error: float | None  # of that mean, with every known error; of a single trial, its estimator's
+    trials_error: float | None  # from the scatter of the trials, with Student's factor; None for a single one
+    shared_error: float | None  # alike in all trials, at least that of a torque constant; None for a single one
+    trials: Sequence[float]
+    repeatability: float | None  # standard deviation of the trials over their mean; None for a single one
+    at_least: bool  # the value is a lower bound
+    bounds: int  # trials that report a lower bound
+    not_valid: Sequence[str]  # why trials report nothing
+
+
+@dataclass(frozen=True)
+class MudSummary:
+    """All coefficients of one mud, and a load cell's."""
+
+    mud: str
+    k_p: GatheredCoefficient
+    k_s: GatheredCoefficient
+    k_e: GatheredCoefficient
+    truth: Mapping[str, float] | None
+
+    def coefficient(self, name: str) -> GatheredCoefficient:
+        return {"k_p": self.k_p, "k_s": self.k_s, "k_e": self.k_e}[name]
+
+
+def gather_coefficient(estimates: Iterable[EstimateReport]) -> GatheredCoefficient:
+    """Combine the trials of one coefficient in one mud."""
+    reports = list(estimates)
+    valid = [each for each in reports if each["valid"]]
     bounds = sum(each["at_least"] for each in valid)
-    held = 2 * bounds > len(valid)
-    values = [] if held else [each for each in valid if not each["at_least"]]
+    at_least = 2 * bounds > len(valid)
+    values = [] if at_least else [each for each in valid if not each["at_least"]]
     trials = [each["value"] for each in values or valid]
     spread = stdev(trials) if len(trials) > 1 else None
-    return {
-        "value": (median(trials) if held else fmean(trials)) if trials else None,
-        **_errors(values, spread),
-        "trials": trials,
-        "repeatability": spread / fmean(trials) if spread is not None and fmean(trials) else None,
-        "at_least": held,
-        "bounds": bounds,
-        "not_valid": [each["reason"] for each in reported if not each["valid"]],
-    }
+    std_error, trials_error, shared_error = _errors(values, spread)
+    return GatheredCoefficient(
+        value=(median(trials) if at_least else fmean(trials)) if trials else None,
+        std_error=std_error,
+        trials_error=trials_error,
+        shared_error=shared_error,
+        trials=trials,
+        repeatability=spread / fmean(trials) if spread is not None and fmean(trials) else None,
+        at_least=at_least,
+        bounds=bounds,
+        not_valid=[each["reason"] for each in reports if not each["valid"]],
+    )
 
 
-def _errors(reported: Sequence[Reported], spread: float | None) -> dict[str, float | None]:
-    """Of values; of bounds there is none. What a trial does not doubt in a number is left to the others."""
-    if spread is None or not reported:
-        return {"std_error": reported[0]["std_error"] if reported else None, "trials_error": None, "shared_error": None}
-    uncertainties = [
-        uncertainty for each in reported if (uncertainty := each["std_error"]) is not None and isfinite(uncertainty)
-    ]
-    doubted = fmean(uncertainty**2 for uncertainty in uncertainties) if uncertainties else 0.0
-    trials_error = student_factor(len(reported) - 1) * spread / sqrt(len(reported))
-    alike = TORQUE_REPEATABILITY * fmean(each["value"] for each in reported)
-    shared_error = max(sqrt(max(0.0, doubted - spread**2)), alike)
-    return {
-        "std_error": hypot(trials_error, shared_error),
-        "trials_error": trials_error,
-        "shared_error": shared_error,
-    }
+def gather_coefficients(strides: Sequence[Mapping[str, Any]]) -> dict[str, GatheredCoefficient]:
+    """Combine the strides of all trials, coefficient by coefficient."""
+    return {name: gather_coefficient(stride[name] for stride in strides) for name in COEFFICIENTS}
 
 
-def evaluated(rows: Iterable[ComparedStride], setup: str) -> list[Evaluation]:
-    """One for each coefficient of which there is a truth."""
+def _errors(values: Sequence[EstimateReport], spread: float | None) -> tuple[float | None, float | None, float | None]:
+    """Return the standard error, and its parts from the trials and shared by them; bounds have none."""
+    if spread is None or not values:
+        return (values[0]["std_error"] if values else None), None, None
+    known = [error for each in values if (error := each["std_error"]) is not None and isfinite(error)]
+    estimated = fmean(error**2 for error in known) if known else 0.0
+    trials_error = student_factor(len(values) - 1) * spread / sqrt(len(values))
+    alike = TORQUE_REPEATABILITY * fmean(each["value"] for each in values)
+    shared_error = max(sqrt(max(0.0, estimated - spread**2)), alike)
+    return hypot(trials_error, shared_error), trials_error, shared_error
+
+
+def evaluate_strides(rows: Iterable[ComparedStride], setup: str) -> list[Evaluation]:
+    """Evaluate every coefficient that has a true value."""
     return [
         Evaluation(setup, row.mud, name, row.method, estimate_of(row.stride[name]), float(truth), UNKNOWN)
         for row in rows
@@ -91,70 +114,64 @@ def evaluated(rows: Iterable[ComparedStride], setup: str) -> list[Evaluation]:
     ]
 
 
-def estimate_of(reported: Reported) -> Estimate:
-    value, std_error = (UNKNOWN if reported[name] is None else float(reported[name]) for name in ("value", "std_error"))
-    return Estimate(value, std_error, reported["samples"], reported["valid"], reported["reason"], reported["at_least"])
+def estimate_of(report: EstimateReport) -> Estimate:
+    value, std_error = (UNKNOWN if report[name] is None else float(report[name]) for name in ("value", "std_error"))
+    return Estimate(value, std_error, report["samples"], report["valid"], report["reason"], report["at_least"])
 
 
-def error_table(rows: Iterable[ComparedStride], setup: str) -> list[dict[str, Any]]:
-    return error_rows(evaluated(rows, setup))
+def error_table(rows: Iterable[ComparedStride], setup: str) -> list[ErrorRow]:
+    return error_rows(evaluate_strides(rows, setup))
 
 
-# as words
+# tables for people
 
 
-def coefficient_text(row: Mapping[str, Any]) -> str:
-    """Format a gathered coefficient in N/cm³, with its two parts of the error, or the one of a single trial."""
-    if row["value"] is None:
+def coefficient_text(gathered: GatheredCoefficient) -> str:
+    """Format in N/cm³, with the errors of the trials and the shared one, or the one error of a single trial."""
+    if gathered.value is None:
         return "-"
-    parts = ("std_error",) if row["trials_error"] is None else ("trials_error", "shared_error")
-    reported = value_text(row["value"], *(row[part] for part in parts), per=N_CM3)
-    return f"≥ {reported}" if row["at_least"] else reported
+    errors = (gathered.trials_error, gathered.shared_error)
+    errors = (gathered.std_error, None) if gathered.trials_error is None else errors
+    text = value_text(gathered.value, *errors, per=N_CM3)
+    return f"≥ {text}" if gathered.at_least else text
 
 
-def mud_rows(muds: Sequence[Mapping[str, Any]]) -> list[list[str]]:
-    """A table with its head: each mud's coefficients, and the load cell's beside them where there is one."""
+def mud_rows(muds: Sequence[MudSummary]) -> list[list[str]]:
+    """List each mud's coefficients with their repeatability and the load cell's."""
     head = ["mud"]
     for name in COEFFICIENTS:
         head += [f"{name} (N/cm³)", "repeatability", "load cell"]
-    rows = [head]
-    for mud in muds:
-        cells = [mud_text(mud["mud"])]
-        for name in COEFFICIENTS:
-            truth = (mud.get("truth") or {}).get(name)
-            cells += [
-                coefficient_text(mud[name]),
-                repeatability_text(mud[name]["repeatability"], len(mud[name]["trials"])),
-            ]
-            cells.append(value_text(truth, per=N_CM3))
-        rows.append(cells)
-    return rows
+    return [head, *([mud_text(mud.mud), *_mud_cells(mud)] for mud in muds)]
 
 
-def error_text_rows(errors: Sequence[Mapping[str, Any]]) -> list[list[str]]:
-    """A table with its head: the median error of each coefficient by mud and method, muds one after the other."""
+def _mud_cells(mud: MudSummary) -> list[str]:
+    cells = []
+    for name in COEFFICIENTS:
+        gathered = mud.coefficient(name)
+        cells += [coefficient_text(gathered), repeatability_text(gathered.repeatability, len(gathered.trials))]
+        cells.append(value_text((mud.truth or {}).get(name), per=N_CM3))
+    return cells
+
+
+def error_text_rows(errors: Sequence[ErrorRow]) -> list[list[str]]:
+    """List the median error of each coefficient by mud and method, mud by mud."""
     head = ["mud", "method", *(f"{name} error" for name in COEFFICIENTS), "strides"]
-    muds = list(dict.fromkeys(row["mud"] for row in errors))
-    keys = sorted(dict.fromkeys((row["mud"], row["method"]) for row in errors), key=lambda key: muds.index(key[0]))
+    muds = list(dict.fromkeys(row.mud for row in errors))
+    keys = sorted(dict.fromkeys((row.mud, row.method) for row in errors), key=lambda key: muds.index(key[0]))
     rows = [head]
     for key in keys:
-        own = {row["coefficient"]: row for row in errors if (row["mud"], row["method"]) == key}
+        own = {row.coefficient: row for row in errors if (row.mud, row.method) == key}
         cells = [_error_text(own[name]) if name in own else "-" for name in COEFFICIENTS]
-        rows.append([mud_text(key[0]), key[1], *cells, str(max(_strides(row) for row in own.values()))])
+        rows.append([mud_text(key[0]), key[1], *cells, str(max(row.all_strides for row in own.values()))])
     return rows
 
 
-def _strides(row: Mapping[str, Any]) -> int:
-    return int(row["strides"] + row["bounds"] + row["not_valid"])
-
-
-def _error_text(row: Mapping[str, Any]) -> str:
-    """A bound is told as one, with its median share of the truth, and how many there were."""
+def _error_text(row: ErrorRow) -> str:
     parts = []
-    if row["median"] is not None:
-        parts.append(f"{fraction_text(row['median'])} ({100.0 * row['bias']:+z.0f} %)")
-    if row["bounds"]:
-        parts.append(f"≥ {100.0 * row['bound_over_truth']:.0f} % of it ({row['bounds']})")
-    if row["not_valid"]:
-        parts.append(f"nothing ({row['not_valid']})")
+    if row.median is not None and row.bias is not None:
+        parts.append(f"{fraction_text(row.median)} ({100.0 * row.bias:+z.0f} %)")
+    if row.bounds and row.bound_over_truth is not None:
+        parts.append(f"≥ {100.0 * row.bound_over_truth:.0f} % of it ({row.bounds})")
+    if row.not_valid:
+        parts.append(f"nothing ({row.not_valid})")
     return ", ".join(parts) or "-"

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 
 from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
-from experiments.reports.coefficient_table import PER_CM3
+from experiments.reports.coefficient_table import PER_CM3, GatheredCoefficient
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import DOTS_PER_INCH, GREY, INK, LABELS
@@ -185,11 +185,10 @@ def _plot_bars(panel: Axes, soft: Mapping[str, Any]) -> None:
     for method, (words, colour) in BARS.items():
         for each in deepest_first[:1] if method == KNOWN_COMPENSATED else deepest_first:
             own = DEPTH_LOOKS.get(each["depth_cm"], {"color": INK})["color"]
-            _plot_bar(panel, len(names), each["k_s"].get(method), colour or own)
+            _plot_gathered(panel, len(names), each["k_s"].get(method), colour or own)
             names.append(f"{words}\n{each['depth_cm']:g} cm")
     for each in deepest_first:
-        reported = None if each["truth"] is None else {"value": each["truth"], "repeatability": None, "at_least": False}
-        _plot_bar(panel, len(names), reported, "#d9d9d9")
+        _plot_bar(panel, len(names), each["truth"], "#d9d9d9")
         names.append(f"load cell\n{each['depth_cm']:g} cm")
     panel.set_xticks(range(len(names)), names, fontsize="small")
     panel.set_ylabel("$k_s$ (N/cm³)")
@@ -198,12 +197,21 @@ def _plot_bars(panel: Axes, soft: Mapping[str, Any]) -> None:
     panel.set_title("B   $k_s$ by method", loc="left", fontsize="medium")
 
 
-def _plot_bar(panel: Axes, place: int, reported: Mapping[str, Any] | None, colour: str) -> None:
-    if reported is None or reported["value"] is None:
+def _plot_gathered(panel: Axes, place: int, gathered: GatheredCoefficient | None, colour: str) -> None:
+    if gathered is None:
+        _plot_bar(panel, place, None, colour)
+    else:
+        _plot_bar(panel, place, gathered.value, colour, gathered.repeatability or 0.0, gathered.at_least)
+
+
+def _plot_bar(
+    panel: Axes, place: int, value_n_m3: float | None, colour: str, repeatability: float = 0.0, bound: bool = False
+) -> None:
+    if value_n_m3 is None:
         panel.text(place, 0.0, "-", ha="center", va="bottom")
         return
-    value, bound = PER_CM3 * reported["value"], reported["at_least"]
-    sd = value * (reported["repeatability"] or 0.0)
+    value = PER_CM3 * value_n_m3
+    sd = value * repeatability
     panel.bar(place, value, 0.7, color="white" if bound else colour, edgecolor=colour if bound else INK, linewidth=1.0,
               hatch="//" if bound else "")  # fmt: skip
     if sd:

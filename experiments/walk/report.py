@@ -16,7 +16,13 @@ import numpy as np
 
 from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
-from experiments.reports.coefficient_table import ComparedStride, error_table, gather_coefficient
+from experiments.reports.coefficient_table import (
+    ComparedStride,
+    MudSummary,
+    error_table,
+    gather_coefficient,
+    gather_coefficients,
+)
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
 from experiments.trackway.trials import reach_of
@@ -117,13 +123,13 @@ def report_of(
     }
 
 
-def _mud_report(mud: str, method: str, rows: Sequence[ComparedStride]) -> dict[str, Any]:
+def _mud_report(mud: str, method: str, rows: Sequence[ComparedStride]) -> MudSummary:
     own = [row for row in rows if (row.mud, row.method) == (mud, method)]
-    return {
-        "mud": mud,
-        **{name: gather_coefficient(row.stride[name] for row in own) for name in COEFFICIENTS},
-        "truth": truth_over(own) or None,
-    }
+    return MudSummary(
+        mud=mud,
+        **gather_coefficients([row.stride for row in own]),
+        truth=truth_over(own) or None,
+    )
 
 
 def truth_over(rows: Sequence[ComparedStride]) -> dict[str, float]:

@@ -19,6 +19,7 @@ import command_line.experiments.estimation
 from command_line import exit_codes
 from command_line.main import main
 from experiments.estimation.evaluation import Plan
+from experiments.reports.error_table import ErrorRow, PlateRow
 from simulation.mud.clay import MUDS, Clay
 from tests.command_line.command_lines import refusal
 from tests.waiting import LONGEST_S
@@ -171,12 +172,12 @@ def test_a_person_gets_a_table_of_errors_plates_and_boundaries(capsys: pytest.Ca
 
 
 def test_dashes_stand_where_nothing_was_told() -> None:
-    row: dict[str, Any] = {"setup": "walking", "mud": "49.5", "coefficient": "k_s", "method": "default"}
-    row |= {"median": None, "p95": None}
-    row |= {"bias": None, "coverage": None, "strides": 0, "bounds": 4, "bounds_hold": 1.0, "not_valid": 0}
+    row = ErrorRow(
+        "walking", "49.5", "k_s", "default", None, None, None, None,
+        strides=0, bounds=4, bounds_hold=1.0, bound_over_truth=0.8, not_valid=0, truth_n_m3=1000000,
+    )  # fmt: skip
     border = {"from": "49.5", "to": "51.2", "crossings": 2, "within_two": 0.5, "most_strides": "never"}
-    plate: dict[str, Any] = {"setup": "walking", "mud": "49.5", "coefficient": "k_s", "upright_over_leaning": 0.9}
-    plate |= {"estimate_over_upright": None, "lean_share": None}
+    plate = PlateRow("walking", "49.5", "k_s", 0.9, None, None)
     errors, plates, boundaries = command_line.experiments.estimation.text_of(
         {"errors": [row], "plates": [plate], "boundaries": [border]}
     ).split("\n\n")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -17,6 +16,7 @@ from experiments.flipper import measurement as flipper
 from experiments.flipper.measurement import Plan, report_of, require_fixed_base, require_mud
 from experiments.flipper.report import KNOWN_BIAS, WRONG_CONSTANTS, force_rows, sections_of, text_of
 from experiments.flipper.simulation import DRIVE, SECTIONS, bench_configuration, flipper_bench
+from experiments.reports.report_page import to_json
 from experiments.robot.bench_robot import BenchError, leave
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.trials.estimation_methods import DEFAULT, PAPER
@@ -144,22 +144,22 @@ def test_the_coefficients_are_those_of_the_load_cell() -> None:
     """Within the doubt of a motor whose constant is known to 3.2 %, and the default method's own bias in k_e."""
     (mud,) = report()["muds"]
     for name, fraction in (("k_p", 0.1), ("k_s", 0.1), ("k_e", 0.2)):
-        assert mud[name]["value"] == pytest.approx(mud["truth"][name], rel=fraction)
-    assert mud["remarks"] == []
+        assert mud.coefficient(name).value == pytest.approx(mud.truth[name], rel=fraction)
+    assert mud.remarks == []
 
 
 def test_the_daemons_strides_count_and_the_papers_method_stands_beside() -> None:
     (entry,) = measured()[0].values()
     assert list(entry["strides"]) == [DEFAULT, PAPER]
-    assert report()["muds"][0]["k_s"]["trials"] == [entry["strides"][DEFAULT][0]["k_s"]["value"]]
-    assert {row["method"] for row in report()["errors"]} == {DEFAULT, PAPER}
+    assert report()["muds"][0].k_s.trials == [entry["strides"][DEFAULT][0]["k_s"]["value"]]
+    assert {row.method for row in report()["errors"]} == {DEFAULT, PAPER}
 
 
 def test_another_load_cells_truth_takes_the_place_of_the_beds() -> None:
     truth = {MUD: {"k_p": 2e6}}
     reported = report(truth)
-    assert reported["muds"][0]["truth"] == truth[MUD]
-    assert {row["coefficient"] for row in reported["errors"]} == {"k_p"}
+    assert reported["muds"][0].truth == truth[MUD]
+    assert {row.coefficient for row in reported["errors"]} == {"k_p"}
 
 
 def test_the_course_kept_is_a_whole_stride_of_three_pauses() -> None:
@@ -177,7 +177,7 @@ def test_the_law_follows_the_force_in_steady_stance() -> None:
 
 
 def test_the_summary_is_json_and_has_what_other_experiments_read() -> None:
-    reported = json.loads(json.dumps(report()))
+    reported = to_json(report())
     assert reported["experiment"] == "flipper"
     for name in ("k_p", "k_s", "k_e"):
         assert {"value", "std_error", "trials", "repeatability"} <= set(reported["muds"][0][name])
@@ -215,7 +215,7 @@ def test_coefficients_that_fall_with_water_are_said_to() -> None:
 
 def test_muds_that_were_measured_before_stay_in_the_report() -> None:
     reported = report_of(Plan(("51.2",)), entries_of(w47_6=[2e6], w51_2=[1e6]), bench_configuration(), None)
-    assert [mud["mud"] for mud in reported["muds"]] == ["51.2", "47.6"]
+    assert [mud.mud for mud in reported["muds"]] == ["51.2", "47.6"]
     assert force_rows(reported)[1][:2] == ["51.2 %", "2.00 (" + f"{reported['misfit_n']['51.2']['insertion']:.2f})"]
 
 
@@ -224,7 +224,7 @@ def test_later_strides_in_the_same_hole_are_told_apart() -> None:
     entries["47.6/1"]["strides"][DEFAULT].append(make_stride(k_p=make_estimate(1.6e6)))
     reported = report_of(Plan(("47.6",), strides=2), entries, bench_configuration(), None)
     assert reported["later_strokes"]["k_p"] == pytest.approx([0.8])
-    assert reported["muds"][0]["k_p"]["value"] == 2e6
+    assert reported["muds"][0].k_p.value == 2e6
 
 
 def test_what_scatter_does_not_show_is_told_beside_the_coefficients() -> None:
@@ -251,7 +251,7 @@ def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> Non
     paper = replace(configuration, estimation=replace(configuration.estimation, method="paper"))
     reported = report_of(SHORT, measured()[0], paper, None)
     (entry,) = measured()[0].values()
-    assert reported["muds"][0]["k_p"]["trials"] == [entry["strides"][PAPER][0]["k_p"]["value"]]
+    assert reported["muds"][0].k_p.trials == [entry["strides"][PAPER][0]["k_p"]["value"]]
     assert reported["settings"]["method"] == "paper"
     assert KNOWN_BIAS not in text_of(reported)[0][0]
     assert reported["misfit_n"][MUD]["insertion"] > 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from math import nan, sqrt
+from math import hypot, nan, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from scipy.stats import t as student_t
 
 from experiments.reports.coefficient_table import (
     ComparedStride,
+    MudSummary,
     coefficient_text,
     error_table,
     error_text_rows,
@@ -27,22 +28,23 @@ from tests.experiments.made_up_strides import make_estimate, make_stride
 
 def test_trials_make_a_mean_with_its_error_and_scatter() -> None:
     reported = gather_coefficient(make_estimate(value) for value in (1.0e6, 1.2e6, 1.4e6))
-    assert reported["value"] == pytest.approx(1.2e6)
-    assert reported["trials_error"] == pytest.approx(0.2e6 / sqrt(3) * student_t.ppf(0.975, 2) / 1.96, rel=1e-3)
-    assert reported["repeatability"] == pytest.approx(1 / 6)
-    assert reported["trials"] == [1.0e6, 1.2e6, 1.4e6]
+    assert reported.value == pytest.approx(1.2e6)
+    assert reported.trials_error == pytest.approx(0.2e6 / sqrt(3) * student_t.ppf(0.975, 2) / 1.96, rel=1e-3)
+    assert reported.repeatability == pytest.approx(1 / 6)
+    assert reported.trials == [1.0e6, 1.2e6, 1.4e6]
 
 
 def test_what_the_scatter_does_not_show_of_an_estimator_s_doubt_is_shared_by_all_trials() -> None:
     """Of 10 % in all, trials that scatter by 6 % share 8 %."""
     scattered = gather_coefficient(make_estimate(value, std_error=1e5) for value in (0.94e6, 1e6, 1.06e6))
-    assert scattered["shared_error"] == pytest.approx(8e4)
-    assert scattered["std_error"] ** 2 == pytest.approx(scattered["trials_error"] ** 2 + 8e4**2)
+    assert scattered.shared_error == pytest.approx(8e4)
+    assert scattered.std_error is not None and scattered.trials_error is not None
+    assert scattered.std_error == pytest.approx(hypot(scattered.trials_error, 8e4))
 
 
 def test_trials_that_scatter_more_than_was_foreseen_still_share_the_motors_doubt() -> None:
     reported = gather_coefficient(make_estimate(value, std_error=1e4) for value in (0.8e6, 1e6, 1.2e6))
-    assert reported["shared_error"] == pytest.approx(0.032e6)
+    assert reported.shared_error == pytest.approx(0.032e6)
 
 
 def test_two_standard_errors_hold_the_truth_19_times_in_20_where_all_trials_have_one_part_of_their_error_alike() -> (
@@ -53,22 +55,23 @@ def test_two_standard_errors_hold_the_truth_19_times_in_20_where_all_trials_have
     for _ in range(1000):
         values = 1e6 * (1.0 + 0.04 * random.standard_normal() + 0.04 * random.standard_normal(3))
         reported = gather_coefficient(make_estimate(float(value), std_error=0.04e6 * sqrt(2.0)) for value in values)
-        held += abs(reported["value"] - 1e6) <= 2.0 * reported["std_error"]
+        assert reported.value is not None and reported.std_error is not None
+        held += abs(reported.value - 1e6) <= 2.0 * reported.std_error
     assert 940 <= held <= 995
 
 
 def test_one_trial_has_the_doubt_of_its_own_estimate() -> None:
     reported = gather_coefficient([make_estimate(1e6, std_error=7e4)])
-    assert (reported["value"], reported["std_error"], reported["repeatability"]) == (1e6, 7e4, None)
-    assert (reported["trials_error"], reported["shared_error"]) == (None, None)
+    assert (reported.value, reported.std_error, reported.repeatability) == (1e6, 7e4, None)
+    assert (reported.trials_error, reported.shared_error) == (None, None)
     assert coefficient_text(reported) == "1.000 ± 0.070"
 
 
 def test_bounds_do_not_mix_with_values() -> None:
     mixed = gather_coefficient([make_estimate(1e6), make_estimate(9e6, at_least=True)])
-    assert (mixed["value"], mixed["at_least"], mixed["bounds"]) == (1e6, False, 1)
+    assert (mixed.value, mixed.at_least, mixed.bounds) == (1e6, False, 1)
     bounds = gather_coefficient(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
-    assert (bounds["value"], bounds["at_least"], bounds["bounds"]) == (2e6, True, 3)
+    assert (bounds.value, bounds.at_least, bounds.bounds) == (2e6, True, 3)
     assert coefficient_text(bounds).startswith("≥ 2.00")
 
 
@@ -85,21 +88,23 @@ def test_a_few_strides_in_which_mud_gave_way_that_mostly_holds_do_not_speak_for_
     """Alone they would tell 7 % too little, and their scatter would not show it."""
     strides = strides_in_mud_that_gives_way_at(0.95e6)
     alone = gather_coefficient(each for each in strides if not each["at_least"])
-    assert alone["value"] + 2.0 * alone["trials_error"] < 1e6
+    assert alone.value is not None and alone.trials_error is not None
+    assert alone.value + 2.0 * alone.trials_error < 1e6
     reported = gather_coefficient(strides)
-    assert (reported["value"], reported["at_least"], reported["std_error"]) == (0.95e6, True, None)
+    assert (reported.value, reported.at_least, reported.std_error) == (0.95e6, True, None)
 
 
 def test_mud_that_gives_way_in_most_strides_is_known_by_them() -> None:
     reported = gather_coefficient(strides_in_mud_that_gives_way_at(1.05e6))
-    assert not reported["at_least"]
-    assert reported["bounds"] > 10
-    assert abs(reported["value"] - 1e6) < 2.0 * reported["std_error"]
+    assert not reported.at_least
+    assert reported.bounds > 10
+    assert reported.value is not None and reported.std_error is not None
+    assert abs(reported.value - 1e6) < 2.0 * reported.std_error
 
 
 def test_a_median_of_bounds_has_no_error() -> None:
     bounds = gather_coefficient(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
-    assert bounds["std_error"] is bounds["trials_error"] is bounds["shared_error"] is None
+    assert bounds.std_error is bounds.trials_error is bounds.shared_error is None
     assert coefficient_text(bounds) == "≥ 2.000"
 
 
@@ -108,14 +113,14 @@ def test_a_trial_that_does_not_tell_its_doubt_is_not_taken_for_exact() -> None:
     reported = gather_coefficient(
         make_estimate(1e6 + k, std_error=uncertainty) for k, uncertainty in enumerate(uncertainties)
     )
-    assert reported["shared_error"] == pytest.approx(1e5, rel=1e-3)
+    assert reported.shared_error == pytest.approx(1e5, rel=1e-3)
 
 
 def test_what_is_not_valid_counts_for_nothing_but_is_told() -> None:
     reported = gather_coefficient([make_estimate(1e6), make_estimate(None, reason="too short")])
-    assert (reported["value"], reported["not_valid"]) == (1e6, ["too short"])
+    assert (reported.value, reported.not_valid) == (1e6, ["too short"])
     nothing = gather_coefficient([make_estimate(None, reason="too short")])
-    assert (nothing["value"], nothing["std_error"], nothing["trials"]) == (None, None, [])
+    assert (nothing.value, nothing.std_error, nothing.trials) == (None, None, [])
     assert coefficient_text(nothing) == "-"
 
 
@@ -193,12 +198,12 @@ def test_errors_are_those_of_values_and_bounds_are_told_as_bounds() -> None:
 def test_a_method_that_says_nothing_of_a_coefficient_has_no_row_of_it() -> None:
     stride = make_stride(k_p=None, k_e=None)
     errors = error_table([ComparedStride("49.5", "law", stride, {"k_p": 1e6, "k_s": 1e6, "k_e": 1e6})], "walking")
-    assert [row["coefficient"] for row in errors] == ["k_s"]
+    assert [row.coefficient for row in errors] == ["k_s"]
 
 
 def test_a_table_of_muds_has_the_load_cell_beside() -> None:
     reported = gather_coefficient([make_estimate(1.5e6), make_estimate(1.7e6)])
-    muds = [{"mud": "47.6", "k_p": reported, "k_s": reported, "k_e": reported, "truth": {"k_p": 1.55e6}}]
+    muds = [MudSummary("47.6", k_p=reported, k_s=reported, k_e=reported, truth={"k_p": 1.55e6})]
     head, row = mud_rows(muds)
     assert len(head) == len(row)
     assert row[:4] == ["47.6 %", "1.600 ± 0.65 ± 0.051", "8.8 % of 2", "1.550"]

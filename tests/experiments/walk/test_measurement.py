@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from experiments.flipper.report import KNOWN_BIAS, WRONG_CONSTANTS
+from experiments.reports.report_page import to_json
 from experiments.robot.lockstep_robot import LockstepRobot
 from experiments.trackway.trials import Mud, reach_of
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
@@ -118,15 +119,15 @@ def test_in_soft_mud_a_plate_slips_back_by_half_of_its_stance_and_more() -> None
 def test_the_coefficients_are_those_of_the_load_cell_or_bounds_below_it() -> None:
     strong, soft = report()["muds"]
     for mud in (strong, soft):
-        assert mud["k_p"]["value"] == pytest.approx(mud["truth"]["k_p"], rel=0.12)
-    assert strong["k_s"]["at_least"]
-    assert strong["k_s"]["value"] < strong["truth"]["k_s"]
+        assert mud.k_p.value == pytest.approx(mud.truth["k_p"], rel=0.12)
+    assert strong.k_s.at_least
+    assert strong.k_s.value < strong.truth["k_s"]
 
 
 def test_without_compensation_firm_mud_seems_softer_and_less_so_with_it() -> None:
     """As the paper found."""
-    rows = [row for row in report()["errors"] if (row["mud"], row["coefficient"]) == ("47.6", "k_s")]
-    biases = {row["method"]: row["bias"] for row in rows}
+    rows = [row for row in report()["errors"] if (row.mud, row.coefficient) == ("47.6", "k_s")]
+    biases = {row.method: row.bias for row in rows}
     assert biases[KNOWN] < biases[KNOWN_COMPENSATED] < 0.0
     assert biases[PAPER] < biases[COMPENSATED] < 0.0
 
@@ -150,15 +151,15 @@ def test_the_papers_findings_stand_beside_ours() -> None:
 
 def test_another_load_cells_truth_takes_the_place_of_the_beds() -> None:
     reported = report(truth={"47.6": {"k_p": 2e6}})
-    assert reported["muds"][0]["truth"] == {"k_p": 2e6}
-    assert reported["muds"][1]["truth"] is None
+    assert reported["muds"][0].truth == {"k_p": 2e6}
+    assert reported["muds"][1].truth is None
     assert reported["missing_truth"].endswith("says nothing of 51.2 %.")
-    assert {(row["mud"], row["coefficient"]) for row in reported["errors"]} == {("47.6", "k_p")}
+    assert {(row.mud, row.coefficient) for row in reported["errors"]} == {("47.6", "k_p")}
 
 
 def test_the_report_is_json_with_a_table_and_a_picture_of_everything() -> None:
-    reported = json.loads(json.dumps(report()))
-    assert reported["experiment"] == "walk"
+    reported = report()
+    assert to_json(reported)["experiment"] == "walk"
     sections = sections_of(reported, SHORT, measured(), CONFIGURATION, None)
     assert [f.name for section in sections for f in section.figures] == ["figure6_trial1", "figure7_51.2"]
     title, rows = text_of(reported)[0]
@@ -202,7 +203,7 @@ def test_without_a_pose_the_robot_makes_no_more_strides_than_lead_to_the_end(tmp
     assert len(entry["strides"][DEFAULT]) == 2
     reported = report_of(TINY, {"walk/1": json.loads(json.dumps(entry))}, CONFIGURATION, None)
     assert reported["without_pose"] == 1
-    assert len(reported["muds"][0]["k_p"]["trials"]) == 2
+    assert len(reported["muds"][0].k_p.trials) == 2
 
 
 class StoppedRobot(LockstepRobot):
@@ -226,7 +227,7 @@ def test_a_walk_that_somebody_else_stops_is_not_taken_for_a_whole_one(tmp_path: 
 
 def test_by_their_order_strides_are_spread_over_the_muds_lengths() -> None:
     plan = replace(SHORT, muds=(Mud("a", 0.2), Mud("b", 0.6)))
-    entry = {"trial": 1, "start_m": None, "truths": {}, "strides": {DEFAULT: [make_stride(position_m=None)] * 4}}
+    entry = {"trial": 1, "start_m": None, "truths": {}, "strides": {DEFAULT: [make_stride(place_m=None)] * 4}}
     placed = placed_strides(plan, {"walk/1": entry}, CONFIGURATION, None)
     assert [each.mud for each in placed] == ["a", "b", "b", "b"]
     assert walks_of(plan, {"walk/1": entry, "walk/2": entry}) == [entry]
