@@ -9,9 +9,9 @@ DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS.parent))
 os.environ.pop("MUDSKIPPER_SOCKET", None)  # a default of the command line, which the pages show
 
-from docs.generate.pages import write_pages  # noqa: E402 - it needs the path above
+from docs.generate.pages import write_tables  # noqa: E402 - it needs the path above
 
-write_pages(DOCS / "reference")
+write_tables(DOCS / "reference" / "generated")
 
 project = "mudskipper"
 author = "the mudskipper project"
@@ -19,7 +19,7 @@ release = version = installed_version("mudskipper")
 extensions = ["myst_parser", "sphinx_copybutton"]
 myst_enable_extensions = ["deflist", "dollarmath"]
 myst_heading_anchors = 4
-exclude_patterns = ["generate"]
+exclude_patterns = ["generate", "reference/generated"]
 html_theme = "furo"
 html_title = f"mudskipper {release}"
 copybutton_prompt_text = "$ "

@@ -11,16 +11,16 @@ from command_line.main import build_parser
 from docs.generate.markdown import code, table
 
 
-def command_line_page() -> Iterator[str]:
+def commands() -> Iterator[str]:
     os.environ["COLUMNS"] = "100"  # the width of a usage line
     parser = build_parser()
-    yield "# Command line"
-    yield ""
-    yield "Data goes to standard output and messages to standard error. Colours appear only on a terminal."
     yield from _options(parser)
     yield from _commands(parser)
-    yield "## Exit status"
-    yield from table(("status", "meaning"), [(str(status), meaning) for status, meaning in exit_codes.MEANINGS.items()])
+
+
+def exit_statuses() -> Iterator[str]:
+    rows = [(str(status), meaning) for status, meaning in exit_codes.MEANINGS.items()]
+    yield from table(("status", "meaning"), rows)
 
 
 def _commands(parser: argparse.ArgumentParser) -> Iterator[str]:

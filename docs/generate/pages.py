@@ -1,7 +1,7 @@
-"""Writes every reference page that follows from the code, before Sphinx reads the folder.
+"""Writes the tables of the reference pages that follow from the code, before Sphinx reads the folder.
 
-The pages are not checked in: a command, a configuration key, a fault or a log field is described where it is defined,
-and nowhere else.
+They are not checked in: a command, a configuration key, a fault or a log field is described where it is defined, and
+nowhere else. The pages of docs/reference include them.
 """
 
 from __future__ import annotations
@@ -9,16 +9,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from docs.generate.command_line import command_line_page
+from docs.generate.command_line import commands, exit_statuses
+from docs.generate.configuration import sections
+from docs.generate.faults import failures, faults, modes, reactions
+from docs.generate.log import topics
 
-PAGES: dict[str, Callable[[], Iterator[str]]] = {
-    "command_line": command_line_page,
+TABLES: dict[str, Callable[[], Iterator[str]]] = {
+    "commands": commands,
+    "exit_statuses": exit_statuses,
+    "configuration": sections,
+    "modes": modes,
+    "reactions": reactions,
+    "faults": faults,
+    "failures": failures,
+    "log": topics,
 }
 
 
-def write_pages(folder: Path) -> None:
-    """Writes the pages that changed, so that Sphinx rebuilds no other."""
-    for name, page in PAGES.items():
-        path, text = folder / f"{name}.md", "\n".join(page()) + "\n"
-        if not path.exists() or path.read_text(encoding="utf-8") != text:
-            path.write_text(text, encoding="utf-8")
+def write_tables(folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    for name, lines in TABLES.items():
+        (folder / f"{name}.md").write_text("\n".join(lines()) + "\n", encoding="utf-8")

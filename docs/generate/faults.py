@@ -1,0 +1,56 @@
+"""Writes faults, modes and deliberate failures from the tables that the robot obeys."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from control.faults import Blocks, Clears, FaultKind, Reaction
+from control.modes import TRANSITIONS, Mode
+from docs.generate.markdown import code, table
+from drivers.fault_injection.failures import EFFECTS
+from firmware_host.operator.fault_texts import FAULT_TEXTS
+
+REACTIONS = {
+    Reaction.NONE: "nothing; the fault only prevents arming",
+    Reaction.WARN: "`status`, `check` and the log report it",
+    Reaction.HOLD: "a walk ends where it is and the robot holds its pose; it refuses to walk until the fault is over",
+    Reaction.SOFT_STOP: "the flippers rise, for at most 3 s, then the drives go idle",
+    Reaction.DAMPING: "at most 0.4 N·m of damping and no stiffness, until the joints rest or for 3 s; then idle drives",
+    Reaction.DRIVES_IDLE: "zero torque and idle drives in the same tick",
+}
+BLOCKS = {Blocks.NO: "no", Blocks.UNLESS_FORCED: "unless forced", Blocks.ALWAYS: "yes"}
+ENDS = {Clears.WHEN_GONE: "when gone", Clears.BY_HAND: "`clear`", Clears.BY_RESTART: "restart"}
+
+
+def reactions() -> Iterator[str]:
+    yield from table(("reaction", "what happens"), [(_name(reaction), text) for reaction, text in REACTIONS.items()])
+
+
+def modes() -> Iterator[str]:
+    rows = [(mode.name, row.cause.text, row.target.name) for mode in Mode for row in TRANSITIONS if mode in row.sources]
+    yield from table(("mode", "cause", "next mode"), rows)
+
+
+def faults() -> Iterator[str]:
+    rows = [
+        (
+            code(kind),
+            FAULT_TEXTS[kind].meaning,
+            _name(kind.reaction),
+            str(kind.bound_ticks),
+            BLOCKS[kind.blocks],
+            ENDS[kind.clears],
+            FAULT_TEXTS[kind].what_to_do,
+        )
+        for kind in FaultKind
+    ]
+    yield from table(("fault", "meaning", "reaction", "ticks", "prevents arming", "ends", "what to do"), rows)
+
+
+def failures() -> Iterator[str]:
+    rows = [(code(part), code(kind), effect) for part, kinds in EFFECTS.items() for kind, effect in kinds.items()]
+    yield from table(("component", "kind", "effect"), rows)
+
+
+def _name(reaction: Reaction) -> str:
+    return reaction.name.lower().replace("_", " ")
