@@ -19,7 +19,7 @@ WORDS = {
     errno.ENOENT: "there is no such device; plug it in, or correct its channel in the configuration",
     errno.EACCES: "this user may not use it; join the group that owns it, such as dialout",
     errno.EAFNOSUPPORT: "this kernel has no CAN; try 'modprobe can-raw'",
-    errno.ENETDOWN: "the interface is down; bring it up as in the README, 'On the robot'",
+    errno.ENETDOWN: "the interface is down; bring it up as in docs/how-to/install.md",
 }
 
 

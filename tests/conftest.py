@@ -40,7 +40,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(scope="session")
 def example_text() -> str:
-    """The configuration that the README tells a robot's owner to start from."""
+    """Returns the configuration from which the owner of a robot starts."""
     return (ROOT / "systemd" / "mudskipper.toml").read_text(encoding="utf-8")
 
 

@@ -1,4 +1,4 @@
-"""The disk of a robot: the base system, with the project installed by the very commands of the README.
+"""The disk of a robot: the base system, with the project installed by the commands of docs/how-to/install.md.
 
 They run in the disk's folder while no systemd runs there: `systemctl enable` works so, and what only asks a running
 system to look again (udevadm, networkctl) is answered by `true`, since the first boot looks anyway.
@@ -26,7 +26,8 @@ from virtual_machine.base_system import (
 )
 
 GUEST_FILES = Path(__file__).parent / "guest"
-HEADINGS = ("## On the robot", "### Without CAN hardware")  # of the README, whose commands are run
+GUIDE = "docs/how-to/install.md"
+HEADINGS = ("## On the robot", "## Without CAN hardware")  # of the guide, whose commands are run
 DONE_ALREADY = ("apt install", "git clone")  # by base_system.py, and by a copy of this working tree
 WANTS_A_RUNNING_ROBOT = ("systemctl status", "mudskipper ")
 DISK_MIB = 1500
@@ -45,7 +46,7 @@ def installed_robot() -> Disk:
     disk = Disk(STORE / "robot.ext4", STORE / "kernel", STORE / "initramfs")
     key, mark = _key(archive), STORE / "robot.key"
     if not mark.exists() or mark.read_text(encoding="utf-8") != key:
-        print("Installing the project as the README tells (half a minute) ...", flush=True)
+        print("Installing the project by the guide's commands (half a minute) ...", flush=True)
         mark.unlink(missing_ok=True)
         _make_disk(archive, disk)
         mark.write_text(key, encoding="utf-8")
@@ -85,21 +86,21 @@ def _owned_by_root(member: tarfile.TarInfo) -> tarfile.TarInfo:
 
 def installation() -> str:
     """The script that runs in the disk's folder."""
-    lines = [line for heading in HEADINGS for line in _readme_commands(heading)]
+    lines = [line for heading in HEADINGS for line in _guide_commands(heading)]
     wanted = [line for line in lines if not line.startswith((*DONE_ALREADY, *WANTS_A_RUNNING_ROBOT))]
     before = (GUEST_FILES / "before_installation.sh").read_text(encoding="utf-8")
     after = (GUEST_FILES / "after_installation.sh").read_text(encoding="utf-8")
     # `&&` inside a line must not hide a failure: sh -e does not stop for the first part of one.
-    checked = [f"{{ {line.split('  #')[0]}; }} || {{ echo 'README: {line}' >&2; exit 1; }}" for line in wanted]
+    checked = [f"{{ {line.split('  #')[0]}; }} || {{ echo 'guide: {line}' >&2; exit 1; }}" for line in wanted]
     return "\n".join(["set -eu", before, "cd /opt/mudskipper/src/systemd", *checked, after, ""])
 
 
-def _readme_commands(heading: str) -> Iterator[str]:
+def _guide_commands(heading: str) -> Iterator[str]:
     """The lines of the first shell block below a heading."""
-    _, found, below = (PROJECT / "README.md").read_text(encoding="utf-8").partition(f"\n{heading}\n")
+    _, found, below = (PROJECT / GUIDE).read_text(encoding="utf-8").partition(f"\n{heading}\n")
     _, begun, rest = below.partition("```sh\n")
     if not found or not begun:
-        raise BuildError(f"README.md has no commands below {heading!r}: the image is installed by them.")
+        raise BuildError(f"{GUIDE} has no commands below {heading!r}: the image is installed by them.")
     yield from (line for line in rest.partition("```")[0].splitlines() if line.strip())
 
 

@@ -11,7 +11,7 @@ from firmware_host.ticker import RATE_HZ
 from virtual_machine.robot import Robot
 
 LISTENING_S = 2
-DRIVE_HZ = {GET_ENCODER_ESTIMATES.command: 500.0, GET_IQ.command: 500.0, HEARTBEAT.command: 10.0}  # README's setting up
+DRIVE_HZ = {GET_ENCODER_ESTIMATES.command: 500.0, GET_IQ.command: 500.0, HEARTBEAT.command: 10.0}  # by the guide
 NODES = {"vcan0": (0, 1), "vcan1": (2, 3)}
 GARBAGE = (
     *("123#", "7FF#1122334455667788", "00000123#DEADBEEF", "1FFFFFFF#FF"),  # nobody's

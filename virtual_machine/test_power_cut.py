@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 
 from virtual_machine.robot import LOGS, Robot
 
-MISSING_S = 2.0  # at the log's end: README, "On the robot"
+MISSING_S = 2.0  # at the end of the log, as docs/how-to/install.md says
 TICKS = "/tick"
 
 

@@ -39,7 +39,7 @@ def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
     try:
         ports = open_ports(configuration.bus)
     except BusError as problem:
-        return [check_item("bus", False, str(problem), "bring the interface up: README, 'On the robot'")]
+        return [check_item("bus", False, str(problem), "bring the interface up: docs/how-to/install.md")]
     drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
     deadline_s = time.monotonic() + LISTENING_S
     while not drives.heard and time.monotonic() < deadline_s:

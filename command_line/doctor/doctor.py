@@ -105,7 +105,7 @@ def examine_daemon(status: dict[str, Any], version: str, longest_watchdog_s: flo
 
 
 def _examine_watchdog(identity: str, watchdog_s: float | None, longest_s: float) -> Finding:
-    setting = "README, 'Setting up the drives'"
+    setting = "docs/how-to/odrive.md"
     if watchdog_s is None:
         return warn(identity, "not read back: the drive is silent, or its firmware's numbers are not known", setting)
     if watchdog_s == 0.0:

@@ -53,7 +53,7 @@ def problem_with_place(places: Sequence[Path]) -> str:
     """Why the service could not be started out of these; empty where it could."""
     for place in places:
         if any(place.is_relative_to(hidden) for hidden in HIDDEN):
-            return f"{place} is hidden from the service; install into an environment below /opt: README, 'On the robot'"
+            return f"{place} is hidden from the service; install into an environment below /opt: docs/how-to/install.md"
     if not (places[0] / "bin" / "mudskipperd").exists():
         return f"there is no mudskipperd in {places[0]}/bin: install the package there with pip first"
     return ""

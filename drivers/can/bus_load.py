@@ -2,7 +2,7 @@
 
 A data frame with an 11-bit identifier and n bytes is 47 + 8 n bits long, its three bits of rest included; stuffing adds
 at most one bit in four of the 34 + 8 n that it covers (ISO 11898-1). The true load lies between. Rates are those that
-the README has set on every drive, and one torque command a tick.
+docs/how-to/odrive.md sets on every drive, and one torque command a tick.
 """
 
 from __future__ import annotations

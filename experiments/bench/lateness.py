@@ -11,7 +11,7 @@ from control.records import DriveStates
 from firmware_host.ticker import PERIOD_S, Tick
 
 LATE_S = 2.0 * PERIOD_S  # age of a position or a current; drives send theirs more often than the loop ticks
-BUSY = "end what else runs on this computer, and give this program real-time priority (README, 'On the robot')"
+BUSY = "end what else runs on this computer, and give this program real-time priority (docs/how-to/install.md)"
 WIRES = "see stage 1, and where the drives are emulated, end what else runs on this computer"
 
 

@@ -43,7 +43,7 @@ RATES: Mapping[str, tuple[Message, float]] = {  # message and the least rate: ea
 }
 HEARTBEAT_FRACTION = 0.3  # by which a rate of some ten in a second may be off; two drives of one id send twice as many
 MOST_MISSED_FRACTION = 0.01  # of ticks: more, and this computer is too slow or too busy to measure with
-SETTING_UP = "see README, 'Setting up the drives'"
+SETTING_UP = "see docs/how-to/odrive.md"
 
 
 def ids_heard(stand: Stand) -> Readings:

@@ -238,7 +238,7 @@ def examine_python(version: tuple[int, ...], owners: dict[str, list[str]]) -> It
     strangers = {name: sorted(set(owners.get(name, [])) - {OURS}) for name in PACKAGES}
     found = [f"{name} of {', '.join(others)}" for name, others in strangers.items() if others]
     if found:
-        fix = "give the daemon an environment of its own: README, 'On the robot'"
+        fix = "give the daemon an environment of its own: docs/how-to/install.md"
         yield fail("packages", f"other software brings packages of the same name: {'; '.join(found)}", fix)
     else:
         yield ok("packages", "no other software has packages of the same name")

@@ -17,7 +17,7 @@ from firmware_host.loop import Loop
 from firmware_host.operator.fault_texts import fault_message, what_to_do
 from firmware_host.operator.reports import check_item
 
-HEARING = "check its power, wiring, node id and cyclic message periods (README, 'Setting up the drives')"
+HEARING = "check its power, wiring, node id and cyclic message periods (docs/how-to/odrive.md)"
 SIGNALS = ("position", "current", "heartbeat")
 
 

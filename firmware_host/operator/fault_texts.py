@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
 
-WIRING = "check its power, wiring, node id and message periods (see 'Set up the drives' in the documentation)"
+WIRING = "check its power, wiring, node id and message periods (docs/how-to/odrive.md)"
 FIX = "fix the cause, then 'mudskipper clear'"
 COOL = "let it cool; walk less deep or slower"
 REPORT = "this is a bug: keep the log, report it, and restart the daemon"
@@ -86,7 +86,7 @@ FAULT_TEXTS: dict[FaultKind, FaultText] = {
     FaultKind.WATCHDOG_UNKNOWN: FaultText(
         "A drive's watchdog settings could not be read back.",
         "The {subject} drive's watchdog settings were not read back.",
-        "see 'Set up the drives' in the documentation, or arm with --force",
+        "see docs/how-to/odrive.md, or arm with --force",
     ),
     FaultKind.WATCHDOG_OFF: FaultText(
         "A drive's watchdog is off or too slow.",

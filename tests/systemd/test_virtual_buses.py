@@ -1,4 +1,4 @@
-"""The same installation on buses inside the kernel: what the README changes for them fits together."""
+"""The same installation on buses inside the kernel: the guide's changes for them fit together."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from firmware_host.configuration.configuration import load_configuration
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
-from virtual_machine.installed_robot import installation
+from virtual_machine.installed_robot import GUIDE, installation
 
 SYSTEMD = ROOT / "systemd"
 BUSES = {"vcan0", "vcan1"}
@@ -20,9 +20,9 @@ BUSES = {"vcan0", "vcan1"}
 
 @pytest.fixture
 def edited(tmp_path: Path) -> Path:
-    """Copies of configuration and unit after the README's own `sed`."""
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    (line,) = [line for line in readme.splitlines() if line.startswith("sed -i ")]
+    """Copies of configuration and unit after the guide's own `sed`."""
+    guide = (ROOT / GUIDE).read_text(encoding="utf-8")
+    (line,) = [line for line in guide.splitlines() if line.startswith("sed -i ")]
     program, in_place, expression, *paths = shlex.split(line)
     assert {Path(path).name for path in paths} == {"mudskipper.toml", "mudskipper.service"}
     for path in paths:
@@ -53,7 +53,7 @@ def test_the_network_files_make_them_and_bring_them_up() -> None:
     assert "RequiredForOnline=no" in network
 
 
-def test_the_virtual_machine_is_installed_by_the_readme_s_commands() -> None:
+def test_the_virtual_machine_is_installed_by_the_guide_s_commands() -> None:
     script = installation()
     for part in ("pip install /opt/mudskipper/src", "mudskipper install", "80-vcan.network", "sed -i"):
         assert part in script

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import re
-
 import pytest
 
 from control.records import JOINTS, NEVER_S
 from drivers.fault_injection.failures import EFFECTS, LONGEST_S, FailureKind, Failures
-from tests.folders import ROOT
 
-README = ROOT / "README.md"
 BUSES = ("left", "right")
 
 
@@ -40,13 +36,6 @@ def test_the_table_shows_every_component_with_every_kind_that_is_accepted(failur
     accepted = {(c, k) for c in failures.families for k in FailureKind if failures.refusal(c, k) is None}
     assert shown == accepted
     assert len(shown) == sum(len(EFFECTS[family]) for family in failures.families.values())
-
-
-def test_the_readme_shows_the_same_table() -> None:
-    text = README.read_text(encoding="utf-8")
-    rows = re.findall(r"^\| `(JOINT[.\w]*|bus\.NAME|pose|log|loop|clock)` \| (.*) \|$", text, re.MULTILINE)
-    shown = {component: {FailureKind(kind) for kind in re.findall(r"`([\w-]+)`", kinds)} for component, kinds in rows}
-    assert shown == {family: set(effects) for family, effects in EFFECTS.items()}
 
 
 @pytest.mark.parametrize(
