@@ -8,7 +8,7 @@ from functools import partial
 from command_line.experiments.conduct import conduct_bench, refuse
 from experiments.reports.mud_names import mud_name
 from experiments.reports.text_tables import text_of_tables
-from experiments.trackway.trials import Mud
+from experiments.trackway.bench import Mud
 from experiments.trials.mud_trials import SEED, PlannedTrial, make_trials, open_bench, why_not_simulated
 from experiments.trials.session import Finding, Session
 from experiments.trials.truth_file import load_truth

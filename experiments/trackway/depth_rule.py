@@ -1,7 +1,7 @@
-"""How a walking robot comes to its insertion depth: one for all strides, or chosen by a method of adaptation.
+"""How a walking robot comes to its insertion depth: one depth for all strides, or chosen by a method of adaptation.
 
-A constant depth and the method "paper" are the paper's robot, the latter with the paper's estimator. Every other
-method is this project's robot, with all that it has.
+A constant depth and the method "paper" are walked by the paper's robot, with the paper's estimator. Every other method
+is walked by this project's robot with all of its features.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ PAPER = "paper"
 
 class DepthRule(NamedTuple):
     name: str
-    depth_m: float  # of every stride; of the first one where a method chooses
+    depth_m: float  # of every stride; of the first stride where a method chooses
     method: str = ""  # empty: constant
 
     @property
@@ -38,7 +38,7 @@ def constant_depth(depth_m: float) -> DepthRule:
 
 
 def chosen_by(method: str, name: str = "") -> DepthRule:
-    """Raises ValueError for a method that there is not."""
+    """Raises ValueError for an unknown method."""
     if method not in METHODS:
         raise ValueError(f"method {method!r}: must be one of {', '.join(METHODS)}")
     return DepthRule(name or method, configuration_of(WALKING).adaptation.initial_depth_m, method)
@@ -54,7 +54,7 @@ def configuration_for(rule: DepthRule) -> Configuration:
 
 
 def _papers_robot(configuration: Configuration) -> Configuration:
-    """Its estimator; its gait does not wait for a flipper that the mud holds."""
+    """Use the paper's estimator, and a gait that does not wait for a flipper stuck in the mud."""
     return replace(
         configuration,
         estimation=replace(configuration.estimation, method="paper"),
@@ -63,5 +63,5 @@ def _papers_robot(configuration: Configuration) -> Configuration:
 
 
 def walk_by(rule: DepthRule, track: Track, seed: int, done: Callable[[Sequence[WalkedStride]], bool]) -> Walk:
-    """In the mud and with the drives of the authors' logs."""
+    """Walk until `done`, with the disturbances of mud and drives in the authors' logs."""
     return walk(configuration_for(rule), track, rule.order, seed, done, LAB)

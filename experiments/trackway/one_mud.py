@@ -1,12 +1,13 @@
-"""Walks in one endless mud, a given number of strides long: how fast each constant depth is, and which is the best.
+"""Walks in one endless mud, a given number of strides long: the speed of each constant depth, and the best depth.
 
-The first stride starts from a standing body on untouched ground and is not counted; an adaptive robot, which learns
-the mud in its first strides, is judged from the third on.
+The first stride starts from a standing body on untouched ground and is not counted. An adaptive robot learns the mud in
+its first two strides and is evaluated from the third on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from statistics import fmean
 from typing import NamedTuple
@@ -19,11 +20,11 @@ from simulation.mud.track import Track
 ENDLESS_M = 100.0
 CONSTANT_STRIDES = 7
 STARTING, LEARNING = 1, 2  # strides that are not counted
-SHALLOWEST_M, DEEPEST_M = 0.015, 0.05  # as far as the adaptation may go
+SHALLOWEST_M, DEEPEST_M = 0.015, 0.05  # the range of the adaptation
 
 
 class MudWalk(NamedTuple):
-    """What to walk."""
+    """An order for one walk."""
 
     clay: Clay
     rule: DepthRule
@@ -31,17 +32,25 @@ class MudWalk(NamedTuple):
     strides: int = CONSTANT_STRIDES
 
 
+@dataclass(frozen=True)
+class BestDepth:
+    """The fastest constant depth and its speed in cm/s."""
+
+    depth_cm: float
+    mean: float
+
+
 def run_mud_walk(order: MudWalk) -> Walk:
     track = Track([(ENDLESS_M, order.clay)])
-    return walk_by(order.rule, track, order.seed, partial(has, order.strides))
+    return walk_by(order.rule, track, order.seed, partial(has_strides, order.strides))
 
 
-def has(count: int, strides: Sequence[WalkedStride]) -> bool:
+def has_strides(count: int, strides: Sequence[WalkedStride]) -> bool:
     return len(strides) >= count
 
 
 def speed_cm_s(walk: Walk, skipped: int = STARTING) -> float:
-    """Without its first strides; 0 where a fault ended it within them."""
+    """Return the speed without the first strides; 0 where a fault ended the walk within them."""
     counted = walk.strides[skipped:]
     return 100.0 * speed_m_s(counted) if counted else 0.0
 
@@ -61,15 +70,13 @@ def constant_walks(clays: Iterable[Clay], depths: Sequence[float], seeds: int) -
 
 
 def mean_speeds_cm_s(orders: Sequence[MudWalk], walks: Sequence[Walk]) -> dict[str, dict[float, float]]:
-    """By mud and depth in metres, over the seeds."""
+    """Average over the seeds, by mud and depth in metres."""
     speeds: dict[str, dict[float, list[float]]] = {}
     for order, walk in zip(orders, walks, strict=True):
-        of_mud = speeds.setdefault(order.clay.name, {})
-        of_mud.setdefault(order.rule.depth_m, []).append(speed_cm_s(walk))
-    return {mud: {depth: fmean(reported) for depth, reported in of_mud.items()} for mud, of_mud in speeds.items()}
+        speeds.setdefault(order.clay.name, {}).setdefault(order.rule.depth_m, []).append(speed_cm_s(walk))
+    return {mud: {depth: fmean(values) for depth, values in by_depth.items()} for mud, by_depth in speeds.items()}
 
 
-def best_depth(speeds: Mapping[float, float]) -> dict[str, float]:
-    """The fastest constant depth and its speed."""
+def best_depth(speeds: Mapping[float, float]) -> BestDepth:
     depth_m = max(speeds, key=lambda each: speeds[each])
-    return {"depth_cm": round(100.0 * depth_m, 4), "mean": round(speeds[depth_m], 3)}
+    return BestDepth(round(100.0 * depth_m, 4), round(speeds[depth_m], 3))

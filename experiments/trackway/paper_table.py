@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 
-class Speed(NamedTuple):
-    """Over trials, in cm/s."""
+@dataclass(frozen=True)
+class Speed:
+    """The mean and the standard deviation of a speed over trials, in cm/s."""
 
     mean: float
     sd: float

@@ -1,9 +1,9 @@
-"""One simulated walk, stride by stride: how far, how long, in which mud, and what went wrong.
+"""One simulated walk, stride by stride: step, duration, mud and failure of each.
 
-The truth comes from the plant, not from the robot's own estimates: the body's way from the start of one insertion to
-the next, and the mud in which the plates went down. Two failures have names, after the paper's section III-D: a
-stride slips that advances by less than half an arm (the bound in the authors' optimiser); a flipper is held where the
-body is pushed back after the extraction, since the plates are still in the mud when they swing forward.
+The truth comes from the plant, not from the robot's own estimates: the distance of the body from the start of one
+insertion to the next, and the mud in which the plates went down. Two failures have names, after the paper's section
+III-D. SLIPPAGE: the stride advances by less than half an arm (the bound in the authors' optimiser). EXTRACTION: the
+body is pushed back after the extraction, because the plates are still in the mud when they swing forward.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from simulation.mud.disturbances import NONE, Disturbances
 from simulation.mud.track import Track
 
 SLIPPAGE, EXTRACTION, RECOVERED = "slippage", "extraction", "recovered"
-PUSHED_BACK_M = 0.01  # more than a flipper that comes out moves the body
+PUSHED_BACK_M = 0.01  # a flipper that comes out of the mud moves the body by less
 AFTER_STANCE = frozenset({Phase.EXTRACTION, Phase.SWING})
 
 
 class WalkedStride(NamedTuple):
-    """Between the starts of two insertions."""
+    """From the start of one insertion to the start of the next."""
 
-    mud: str  # that the plates went into
+    mud: str  # in which the plates went down
     position_m: float  # of the plates along the track
     depth_m: float  # commanded
     step_m: float
     duration_s: float
-    pushed_back_m: float  # the body's way back after the extraction
-    recovered: bool = False  # a flipper was stuck and had to be freed
+    pushed_back_m: float  # distance of the body backwards after the extraction
+    recovered: bool = False  # a flipper was stuck, and a recovery pulled it out
 
     def failure(self, arm_m: float) -> str:
-        """Its name, or an empty string."""
+        """Return the name of the failure, or an empty string. `arm_m` is the length of a flipper."""
         if self.pushed_back_m > PUSHED_BACK_M:
             return EXTRACTION
         if self.recovered:
@@ -50,14 +50,14 @@ class WalkedStride(NamedTuple):
 @dataclass(frozen=True)
 class Walk:
     strides: Sequence[WalkedStride]
-    fault: str  # that ended it, in a sentence; else empty
+    fault: str  # the message of the fault that ended it; else empty
 
     def in_mud(self, mud: str) -> list[WalkedStride]:
         return [stride for stride in self.strides if stride.mud == mud]
 
     @property
     def entry(self) -> dict[str, Any]:
-        """For a notebook."""
+        """The entry of this walk in a notebook."""
         return {"strides": [stride._asdict() for stride in self.strides], "fault": self.fault}
 
 
@@ -66,12 +66,12 @@ def walk_of(entry: Mapping[str, Any]) -> Walk:
 
 
 def speed_m_s(strides: Sequence[WalkedStride]) -> float:
-    """Of at least one stride."""
+    """Return the distance over the time of at least one stride."""
     return sum(stride.step_m for stride in strides) / sum(stride.duration_s for stride in strides)
 
 
 class StrideRecord:
-    """Owns the strides of a walk so far, and what was seen of the one under way."""
+    """Owns the strides of a walk so far, and the measurements of the stride under way."""
 
     def __init__(self, lockstep: Lockstep, track: Track) -> None:
         self._lockstep = lockstep
@@ -81,20 +81,20 @@ class StrideRecord:
     def reset(self) -> None:
         self.strides: list[WalkedStride] = []
         self._number = -1
-        self._begin()
+        self._start_stride()
 
-    def _begin(self) -> None:
+    def _start_stride(self) -> None:
         plant, loop = self._lockstep.robot.plant, self._lockstep.loop
         self._start_m, self._start_s = plant.body_m, self._lockstep.now_s
         self._furthest_m, self._pushed_back_m, self._recovered = -inf, 0.0, False
         self._depth_m = loop.controller.gait.commanded_depth_m
         self._position_m = plant.body_m + loop.configuration.geometry.flipper_length_m * sin(plant.arms[0].sweep_rad)
 
-    def look(self) -> None:
-        """Once a tick, while the robot walks."""
+    def update(self) -> None:
+        """Call once a tick while the robot walks."""
         target, body_m = self._lockstep.loop.controller.target, self._lockstep.robot.plant.body_m
         if target.stride != self._number:
-            self._close(body_m)
+            self._finish_stride(body_m)
             self._number = target.stride
         self._depth_m = self._lockstep.loop.controller.gait.commanded_depth_m  # an insertion may end early
         self._recovered = self._recovered or target.phase is Phase.RECOVERY
@@ -102,16 +102,22 @@ class StrideRecord:
             self._furthest_m = max(self._furthest_m, body_m)
             self._pushed_back_m = max(self._pushed_back_m, self._furthest_m - body_m)
 
-    def _close(self, body_m: float) -> None:
+    def _finish_stride(self, body_m: float) -> None:
         if self._number >= 0:
             mud, duration_s = self._track.clay_at(self._position_m).name, self._lockstep.now_s - self._start_s
             step_m = body_m - self._start_m
             self.strides.append(
                 WalkedStride(
-                    mud, self._position_m, self._depth_m, step_m, duration_s, self._pushed_back_m, self._recovered
+                    mud=mud,
+                    position_m=self._position_m,
+                    depth_m=self._depth_m,
+                    step_m=step_m,
+                    duration_s=duration_s,
+                    pushed_back_m=self._pushed_back_m,
+                    recovered=self._recovered,
                 )
             )
-        self._begin()
+        self._start_stride()
 
 
 def walk(
@@ -122,18 +128,18 @@ def walk(
     done: Callable[[Sequence[WalkedStride]], bool],
     disturbances: Disturbances = NONE,
 ) -> Walk:
-    """Until `done` with the strides so far, or a fault. Raises RuntimeError where the robot does not start."""
+    """Walk until `done` accepts the strides so far, or a fault. Raises RuntimeError where the robot does not start."""
     lockstep = Lockstep(configuration, track, seed, disturbances=disturbances)
     lockstep.arm()
     return walk_in(lockstep, track, order, done)
 
 
 def walk_in(lockstep: Lockstep, track: Track, order: WalkOrder, done: Callable[[Sequence[WalkedStride]], bool]) -> Walk:
-    """As `walk`, of a robot that is armed."""
+    """Walk like `walk`, with a robot that is armed already."""
     lockstep.walk(order)
     record = StrideRecord(lockstep, track)
     while lockstep.loop.mode is Mode.WALKING and not done(record.strides):
         lockstep.step()
-        record.look()
+        record.update()
     fault = lockstep.loop.fault
     return Walk(record.strides, fault_message(fault) if fault else "")

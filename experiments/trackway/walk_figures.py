@@ -1,4 +1,4 @@
-"""The walks of an experiment against time, out of the logs in its folder: the paper's figure 8 B to E."""
+"""Figures of an experiment's walks against time, from the logs in its folder: the paper's figure 8 B to E."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure
 from experiments.robot.log_copies import cut_log
 from experiments.robot.prompt import Operator
-from experiments.trackway.trials import LoggedTime
+from experiments.trackway.bench import LoggedTime
 from firmware_host.log.log_folder import first_path, run_files
 from firmware_host.log_reading.log_reader import LogError, read_log, read_logs
 
 CAPTION = (
-    "{}, as figure 8 B to E of the paper: forces, coefficients and depth, then place and steps, against time. Muds are"
-    " shaded where the robot noticed another one; 'mudskipper plot' draws the same of any walk."
+    "{}, as figure 8 B to E of the paper: forces, coefficients and depth, then position and steps, against time. The"
+    " shade changes where the robot noticed another mud; 'mudskipper plot' draws the same of any walk."
 )
 
 
 def walk_figures(walks: Mapping[str, LoggedTime], folder: Path, operator: Operator) -> list[Figure]:
-    """Of each walk whose log is there; of another one a person is told why there is none."""
+    """Make the figure of each walk whose log is there, and tell the operator why another walk has none."""
     from experiments.pictures.walk_plot import plot_walk  # matplotlib takes its time
 
     figures = []
@@ -37,7 +37,7 @@ def walk_figures(walks: Mapping[str, LoggedTime], folder: Path, operator: Operat
 
 
 def logged_walk(folder: Path, logged: LoggedTime) -> RecordedWalk:
-    """From those segments alone that hold it: between two others some may be missing. Raises LogError."""
+    """Read a walk from the segments of its log that hold it; others may be missing. Raises LogError."""
     run, from_s, to_s = logged
     segments = run_files(folder / first_path(folder, run).name)
     held = [path for path in segments if len(cut_log(read_log(path, from_s=from_s), from_s, to_s).ticks)]

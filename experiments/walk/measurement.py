@@ -28,7 +28,7 @@ from experiments.robot.bench_robot import (
     wait_until,
     walk,
 )
-from experiments.trackway.trials import Mud, reach_of
+from experiments.trackway.bench import Mud, reach_of
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, configured_method, strides_by_method
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
 from experiments.trials.notebook import Entry

@@ -11,7 +11,7 @@ from experiments.reports.coefficient_table import error_text_rows, mud_rows
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure, Section
-from experiments.trackway.trials import reach_of
+from experiments.trackway.bench import reach_of
 from experiments.trials.estimation_methods import configured_method
 from experiments.trials.mud_trials import left_out_texts
 from experiments.trials.notebook import Entry

@@ -25,7 +25,7 @@ from experiments.reports.coefficient_table import (
 )
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
-from experiments.trackway.trials import reach_of
+from experiments.trackway.bench import reach_of
 from experiments.trials.estimation_methods import configured_method
 from experiments.trials.notebook import Entry
 from experiments.trials.stride_profile import profile_from_row

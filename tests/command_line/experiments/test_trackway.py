@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,23 +11,25 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.trackway import comparison as trackway
-from experiments.trackway import depth_sweep, mud_fit
+from experiments.mud_fit import mud_fit
+from experiments.sweep import sweep
+from experiments.trackway import simulation
 from experiments.trackway.depth_rule import METHODS
 from experiments.trackway.one_mud import constant_walks
 from experiments.trackway.paper_table import ADAPTIVE
 from experiments.trackway.walk import Walk, WalkedStride
 from experiments.trials.notebook import Notebook
+from experiments.trials.session import Show
 from simulation.mud.clay import MUDS
 from tests.command_line.command_lines import failure, refusal
 
-MODULES = {"trackway": trackway, "sweep": depth_sweep, "mud-fit": mud_fit}
+MODULES = {"trackway": simulation, "sweep": sweep, "mud-fit": mud_fit}
 NAMES = list(MODULES)
 
 
 @pytest.fixture(autouse=True)
 def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where results go that nobody named a place for."""
+    """Results without --out go to a folder of the test."""
     monkeypatch.chdir(tmp_path)
 
 
@@ -44,28 +45,26 @@ def no_walks(monkeypatch: pytest.MonkeyPatch) -> None:
 # what is refused
 
 
-def test_without_a_daemon_nobody_walks_over_a_real_trackway(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, no_walks: None
-) -> None:
+def test_a_real_trackway_needs_a_daemon(capsys: pytest.CaptureFixture[str], tmp_path: Path, no_walks: None) -> None:
     status = main(["experiment", "trackway", "--socket", str(tmp_path / "none"), "--out", str(tmp_path)])
     assert status == exit_codes.NO_DAEMON
     assert "no daemon answers" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("arguments", [("--method", "paper"), ("--mud", "soft", "--mud", "soft")])
-def test_what_a_real_trackway_cannot_have_is_refused(
+def test_options_of_the_simulation_are_refused_for_a_real_trackway(
     arguments: tuple[str, str], capsys: pytest.CaptureFixture[str], no_walks: None
 ) -> None:
     assert arguments[0] in refusal(capsys, "experiment", "trackway", *arguments)
 
 
 @pytest.mark.parametrize("name", ["sweep", "mud-fit"])
-def test_without_simulation_there_are_no_muds(name: str, capsys: pytest.CaptureFixture[str], no_walks: None) -> None:
+def test_sweep_and_fit_run_in_simulation_only(name: str, capsys: pytest.CaptureFixture[str], no_walks: None) -> None:
     assert "--simulated" in refusal(capsys, "experiment", name)
 
 
 @pytest.mark.parametrize("name", ["trackway", "sweep"])
-def test_a_method_that_there_is_not_is_named_with_those_that_there_are(
+def test_an_unknown_method_is_refused_with_the_known_ones(
     name: str, capsys: pytest.CaptureFixture[str], no_walks: None
 ) -> None:
     message = refusal(capsys, "experiment", name, "--simulated", "--method", "paper", "--method", "fog")
@@ -83,14 +82,14 @@ def test_a_method_that_there_is_not_is_named_with_those_that_there_are(
         ("mud-fit", "--seeds", "1001"),
     ],
 )
-def test_other_nonsense_is_wrong_usage(
+def test_a_value_out_of_range_is_refused(
     arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str], no_walks: None
 ) -> None:
     assert arguments[1] in refusal(capsys, "experiment", *arguments, "--simulated")
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_place_that_cannot_be_written_is_noticed_before_the_work(
+def test_an_impossible_output_folder_is_refused_before_the_work(
     name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, no_walks: None
 ) -> None:
     (tmp_path / "file").write_text("")
@@ -116,7 +115,7 @@ def planned(monkeypatch: pytest.MonkeyPatch, name: str, *options: str) -> Any:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_by_default_it_is_the_experiments_own_plan(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_default_plan_is_the_experiments_own(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert planned(monkeypatch, name) == MODULES[name].Plan()
 
 
@@ -141,36 +140,36 @@ def stride(mud: str, step_m: float = 0.12) -> WalkedStride:
     return WalkedStride(mud, 1.8, 0.03, step_m, 2.0, 0.0)
 
 
-def run_trackway(plan: trackway.Plan, notebook: Notebook, show: Callable[[int, int], None]) -> dict[str, Any]:
+def run_trackway(plan: simulation.Plan, notebook: Notebook, show: Show) -> simulation.SimulatedReport:
     """6 cm/s everywhere; one trial slips in the second stride of the second mud, and never sees the third."""
     whole = Walk([stride(mud) for mud in MUDS for _ in range(4)], "")
     short = Walk([stride("48.5")] * 4 + [stride("53.1"), stride("53.1", 0.02)], "")
     walks = {rule.name: [whole] * (plan.seeds - 1) + [short] for rule in plan.rules}
-    return trackway.report_of(plan, walks, {mud: {0.0275: 8.0} for mud in MUDS})
+    return simulation.report_of(plan, walks, {mud: {0.0275: 8.0} for mud in MUDS})
 
 
-def run_sweep(plan: depth_sweep.Plan, show: Callable[[int, int], None]) -> dict[str, Any]:
+def run_sweep(plan: sweep.Plan, show: Show) -> sweep.SweepReport:
     plan = replace(plan, depths_m=(0.03,))
     orders = plan.method_walks() + constant_walks(plan.clays(), plan.depths_m, plan.seeds)
-    return depth_sweep.report_of(plan, [(order, Walk([stride("mud")] * 4, "")) for order in orders])
+    return sweep.report_of(plan, [(order, Walk([stride("mud")] * 4, "")) for order in orders])
 
 
-def run_fit(plan: mud_fit.Plan, show: Callable[[int, int], None]) -> dict[str, Any]:
+def run_fit(plan: mud_fit.Plan, show: Show) -> mud_fit.MudFitReport:
     today = mud_fit.present()
     grounds = [mud_fit.Ground(today.damping_n_s_m, strength_pa) for strength_pa in today.strengths_pa.values()]
     return mud_fit.report_of(plan, {ground: {0.03: 7.0, 0.05: 5.0} for ground in grounds}, today)
 
 
 @pytest.fixture
-def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def synthetic(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)  # results go to a folder here unless another is named
-    for module, run in ((trackway, run_trackway), (depth_sweep, run_sweep), (mud_fit, run_fit)):
+    for module, run in ((simulation, run_trackway), (sweep, run_sweep), (mud_fit, run_fit)):
         monkeypatch.setattr(module, "run", run)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_json_is_one_object_and_is_written_too(
-    name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, made_up: None
+    name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, synthetic: None
 ) -> None:
     out = tmp_path / "made" / "here"
     assert main(["experiment", name, "--simulated", "--json", "--out", str(out)]) == exit_codes.OK
@@ -182,17 +181,17 @@ def test_json_is_one_object_and_is_written_too(
 
 
 @pytest.mark.parametrize("name", ["trackway", "sweep"])
-def test_the_walks_are_drawn(name: str, tmp_path: Path, made_up: None) -> None:
+def test_the_walks_are_drawn(name: str, tmp_path: Path, synthetic: None) -> None:
     assert main(["experiment", name, "--simulated", "--out", str(tmp_path)]) == exit_codes.OK
     assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_simulated_trackway_leaves_a_page_that_says_so_also_where_no_folder_is_named(made_up: None) -> None:
+def test_a_simulated_trackway_leaves_a_page_that_says_so_also_where_no_folder_is_named(synthetic: None) -> None:
     assert main(["experiment", "trackway", "--simulated"]) == exit_codes.OK
     assert "Table I of the paper (simulated)</h1>" in Path("mudskipper-trackway/report.html").read_text("utf-8")
 
 
-def test_the_trackways_json_has_the_promised_keys(capsys: pytest.CaptureFixture[str], made_up: None) -> None:
+def test_the_trackways_json_has_its_documented_keys(capsys: pytest.CaptureFixture[str], synthetic: None) -> None:
     main(["experiment", "trackway", "--simulated", "--json"])
     report = json.loads(capsys.readouterr().out)
     assert list(report["table"]) == ["3 cm", "5 cm", "adaptive"]
@@ -202,7 +201,7 @@ def test_the_trackways_json_has_the_promised_keys(capsys: pytest.CaptureFixture[
     assert report["best_constant_depth"]["48.5"] == {"depth_cm": 2.75, "mean": 8.0}
 
 
-def test_a_person_gets_table_one_beside_the_papers(capsys: pytest.CaptureFixture[str], made_up: None) -> None:
+def test_the_screen_shows_table_one_next_to_the_papers(capsys: pytest.CaptureFixture[str], synthetic: None) -> None:
     main(["experiment", "trackway", "--simulated", "--seeds", "3"])
     speeds, failed, best, short = capsys.readouterr().out.split("\n\n")
     lines = [" ".join(line.split()) for line in speeds.splitlines()]
@@ -211,11 +210,11 @@ def test_a_person_gets_table_one_beside_the_papers(capsys: pytest.CaptureFixture
     assert "none of 12" in failed and "1 (0) slippage of 10" in failed
     assert "2 past the end, 1 stuck in 53.1" in failed
     assert best.splitlines()[2].split()[:3] == ["depth", "2.75", "cm"]
-    assert short.strip().endswith("3 times.")
+    assert short.strip().endswith("all counted: 3 times.")
 
 
-def test_a_person_gets_each_strength_and_where_the_methods_settle(
-    capsys: pytest.CaptureFixture[str], made_up: None
+def test_the_screen_shows_each_strength_and_where_the_methods_settle(
+    capsys: pytest.CaptureFixture[str], synthetic: None
 ) -> None:
     main(["experiment", "sweep", "--simulated", "--strength", "500", "--strength", "1500"])
     lines = capsys.readouterr().out.splitlines()
@@ -223,7 +222,7 @@ def test_a_person_gets_each_strength_and_where_the_methods_settle(
     assert all(line.count("100 %") == len(METHODS) and "0/4" in line for line in lines[2:])
 
 
-def test_a_person_gets_fitted_beside_present_values(capsys: pytest.CaptureFixture[str], made_up: None) -> None:
+def test_the_screen_shows_fitted_next_to_present_values(capsys: pytest.CaptureFixture[str], synthetic: None) -> None:
     main(["experiment", "mud-fit", "--simulated"])
     values, cells, damping = capsys.readouterr().out.split("\n\n")
     assert f"{MUDS['48.5'].strength_pa:.0f} Pa" in values

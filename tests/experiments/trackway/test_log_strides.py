@@ -1,4 +1,4 @@
-"""The strides of a walk, read back from its log, against what the plant did."""
+"""The strides of a walk read back from its log, compared with the plant."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def mud_at(position_m: float) -> str:
 
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> LoggedWalks:
-    """Two walks one after the other, in one log; in the second flippers are held, and no swing waits for it."""
+    """Two walks one after the other, in one log; in the second one flippers get stuck, and no swing waits for them."""
     path = tmp_path_factory.mktemp("log") / "walks.mcap"
     held = replace(configuration, recovery=replace(configuration.recovery, attempts=0))
     recorder = Recorder(path, held.text, {"robot": "test"})
@@ -53,14 +53,14 @@ def walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration
         record = StrideRecord(lockstep, TRACK)
         while lockstep.loop.mode is Mode.WALKING:
             lockstep.step()
-            record.look()
+            record.update()
         truth += record.strides[:5]  # the sixth is the tick in which the walk ended
         lockstep.run_until(lambda: lockstep.loop.mode is Mode.HOLD, 5.0)
     assert recorder.close(20.0) and recorder.dropped == 0
     return LoggedWalks(read_log(path), truth, held)
 
 
-def test_the_log_tells_the_strides_that_the_plant_made(walks: LoggedWalks) -> None:
+def test_the_log_gives_the_strides_that_the_plant_made(walks: LoggedWalks) -> None:
     reported = walked_strides(walks.log, walks.configuration, mud_at)
     assert len(reported) == len(walks.truth) == 10
     for stride, true in zip(reported, walks.truth, strict=True):
@@ -72,15 +72,15 @@ def test_the_log_tells_the_strides_that_the_plant_made(walks: LoggedWalks) -> No
         assert stride.failure(ARM_M) == true.failure(ARM_M)
 
 
-def test_the_walks_hold_what_is_to_be_told(walks: LoggedWalks) -> None:
+def test_the_walks_have_both_muds_and_both_depths_and_a_failure(walks: LoggedWalks) -> None:
     """Or the comparison says nothing."""
     assert {stride.mud for stride in walks.truth} == {"soft", "firm"}
     assert EXTRACTION in {stride.failure(ARM_M) for stride in walks.truth}
     assert {stride.depth_m for stride in walks.truth} == set(DEPTHS_M)
 
 
-def made_log(strides: Sequence[int], phases: Sequence[Phase], body_m: Sequence[float], mode: Mode) -> Log:
-    """A tick every 0.1 s; `strides` and `phases` as rows of the log hold them: of the tick before."""
+def synthetic_log(strides: Sequence[int], phases: Sequence[Phase], body_m: Sequence[float], mode: Mode) -> Log:
+    """A tick every 0.1 s; as in a log, `strides` and `phases` are those of the tick before."""
     ticks = np.zeros(len(strides), dtype=tick_type())
     ticks["stamp_s"], ticks["mode"] = 0.1 * np.arange(len(strides)), mode
     ticks["stride"], ticks["phase"], ticks["body_x_m"], ticks["stride_depth_m"] = strides, phases, body_m, 0.03
@@ -93,7 +93,7 @@ POSITIONS_M = (0.00, 0.02, 0.11, 0.08, 0.10, 0.11, 0.15)  # of the same ticks
 
 
 def one_stride(configuration: Configuration, body_m: Sequence[float], mode: Mode = Mode.WALKING) -> WalkedStride:
-    (stride,) = walked_strides(made_log(STRIDES, PHASES, body_m, mode), configuration, lambda position_m: "mud")
+    (stride,) = walked_strides(synthetic_log(STRIDES, PHASES, body_m, mode), configuration, lambda position_m: "mud")
     return stride
 
 
@@ -104,7 +104,7 @@ def test_a_stride_goes_from_one_insertion_to_the_next(configuration: Configurati
     assert (stride.step_m, stride.duration_s, stride.pushed_back_m) == pytest.approx((0.10, 0.4, 0.03))
 
 
-def test_a_stride_whose_ends_were_not_seen_has_no_length_and_no_mud(configuration: Configuration) -> None:
+def test_a_stride_without_a_pose_at_its_ends_has_no_length_and_no_mud(configuration: Configuration) -> None:
     unseen = one_stride(configuration, (nan, *POSITIONS_M[1:]))
     assert isnan(unseen.step_m) and isnan(unseen.position_m) and unseen.mud == ""
     assert unseen.pushed_back_m == pytest.approx(0.03)
@@ -112,28 +112,28 @@ def test_a_stride_whose_ends_were_not_seen_has_no_length_and_no_mud(configuratio
     assert isnan(unseen.step_m) and unseen.mud == "mud"
 
 
-def test_a_way_back_that_may_have_been_missed_is_not_known(configuration: Configuration) -> None:
+def test_a_push_back_during_lost_poses_is_unknown(configuration: Configuration) -> None:
     unseen = one_stride(configuration, (*POSITIONS_M[:3], nan, *POSITIONS_M[4:]))
     assert isnan(unseen.pushed_back_m) and unseen.step_m == pytest.approx(0.10)
 
 
-def test_where_nobody_walks_there_are_no_strides(configuration: Configuration) -> None:
-    assert walked_strides(made_log(STRIDES, PHASES, POSITIONS_M, Mode.HOLD), configuration, mud_at) == []
-    assert walked_strides(made_log((), (), (), Mode.HOLD), configuration, mud_at) == []
+def test_a_log_without_walking_has_no_strides(configuration: Configuration) -> None:
+    assert walked_strides(synthetic_log(STRIDES, PHASES, POSITIONS_M, Mode.HOLD), configuration, mud_at) == []
+    assert walked_strides(synthetic_log((), (), (), Mode.HOLD), configuration, mud_at) == []
 
 
-def test_a_stride_of_which_the_end_was_lost_is_not_told(configuration: Configuration) -> None:
-    log = made_log((-1, 0, 0, 0, 0, 2, 2), PHASES, POSITIONS_M, Mode.WALKING)
+def test_a_stride_whose_end_was_lost_is_left_out(configuration: Configuration) -> None:
+    log = synthetic_log((-1, 0, 0, 0, 0, 2, 2), PHASES, POSITIONS_M, Mode.WALKING)
     assert walked_strides(log, configuration, mud_at) == []
 
 
-def test_a_recovery_is_told(configuration: Configuration) -> None:
+def test_a_recovery_is_reported(configuration: Configuration) -> None:
     phases = (*PHASES[:4], Phase.RECOVERY, *PHASES[5:])
-    (stride,) = walked_strides(made_log(STRIDES, phases, POSITIONS_M, Mode.WALKING), configuration, mud_at)
+    (stride,) = walked_strides(synthetic_log(STRIDES, phases, POSITIONS_M, Mode.WALKING), configuration, mud_at)
     assert stride.recovered and stride.failure(ARM_M) in (RECOVERED, EXTRACTION)
 
 
-def test_drop_outs_of_motion_capture_cost_strides_but_never_invent_one(
+def test_drop_outs_of_motion_capture_lose_strides_but_never_invent_one(
     tmp_path: Path, configuration: Configuration
 ) -> None:
     recorder = Recorder(tmp_path / "walk.mcap", configuration.text, {"robot": "test"})
@@ -144,7 +144,7 @@ def test_drop_outs_of_motion_capture_cost_strides_but_never_invent_one(
     record = StrideRecord(lockstep, TRACK)
     while lockstep.loop.mode is Mode.WALKING:
         lockstep.step()
-        record.look()
+        record.update()
     assert recorder.close(20.0)
     reported = walked_strides(read_log(tmp_path / "walk.mcap"), configuration, mud_at)
     assert len(reported) == 8

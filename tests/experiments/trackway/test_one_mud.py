@@ -1,4 +1,4 @@
-"""Walks in one mud: what of them counts, and the best depth."""
+"""Walks in one mud: the strides that count, and the best depth."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import pytest
 
 from experiments.trackway.depth_rule import constant_depth
 from experiments.trackway.one_mud import (
+    BestDepth,
     MudWalk,
     best_depth,
     constant_walks,
@@ -29,7 +30,7 @@ def test_the_first_stride_does_not_count() -> None:
     assert speed_cm_s(walked(0.02, 0.10, 0.14), skipped=2) == pytest.approx(7.0)
 
 
-def test_a_robot_that_a_fault_stopped_at_the_start_gets_nowhere() -> None:
+def test_a_walk_that_a_fault_stopped_at_its_start_has_no_speed() -> None:
     assert speed_cm_s(walked(0.10, fault="a motor was too hot")) == 0.0
 
 
@@ -43,7 +44,7 @@ def test_depths_go_from_1_5_to_5_cm(step_m: float, count: int) -> None:
 
 
 def test_the_best_depth_is_the_fastest() -> None:
-    assert best_depth({0.02: 5.0, 0.0275: 7.12345, 0.05: 6.0}) == {"depth_cm": 2.75, "mean": 7.123}
+    assert best_depth({0.02: 5.0, 0.0275: 7.12345, 0.05: 6.0}) == BestDepth(2.75, 7.123)
 
 
 def test_every_mud_is_walked_at_every_depth_with_every_seed() -> None:
@@ -64,6 +65,6 @@ def test_means_are_over_the_seeds_of_a_mud_and_depth() -> None:
     }
 
 
-def test_a_real_walk_has_the_strides_that_were_ordered_all_in_its_mud() -> None:
+def test_a_simulated_walk_makes_the_ordered_strides_in_its_mud() -> None:
     walk = run_mud_walk(MudWalk(FIRM, constant_depth(0.025), 1, strides=2))
     assert [(stride.mud, stride.depth_m) for stride in walk.strides] == [("firm", 0.025)] * 2

@@ -14,7 +14,7 @@ import pytest
 from experiments.flipper.report import KNOWN_BIAS, WRONG_CONSTANTS
 from experiments.reports.report_page import to_json
 from experiments.robot.lockstep_robot import LockstepRobot
-from experiments.trackway.trials import Mud, reach_of
+from experiments.trackway.bench import Mud, reach_of
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
 from experiments.trials.mud_trials import Bench, InvalidTrialError
 from experiments.trials.notebook import Entry, Notebook

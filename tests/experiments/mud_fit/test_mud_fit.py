@@ -1,4 +1,4 @@
-"""The fit recovers made-up truths; the plant that it walks is the one that it says."""
+"""The mud fit recovers synthetic truths, and walks the plant that it reports."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from typing import Any
 
 import pytest
 
-import experiments.trackway.mud_fit
-from experiments.trackway.mud_fit import (
+import experiments.mud_fit.mud_fit
+from experiments.mud_fit.mud_fit import (
     TARGETS,
     Fit,
     Ground,
     Plan,
-    cells_beside_paper,
+    best_fit,
     chi2_of,
-    fitted,
     fixed_speed_cm_s,
     present,
     run,
     strength_range_pa,
     walk_on,
 )
+from experiments.reports.report_page import to_json
 from experiments.trackway.paper_table import PAPER_TABLE, Speed
 from simulation.body.plant import PlantParameters
 from simulation.mud.clay import MUDS
@@ -33,7 +33,7 @@ TRUE_DAMPING = 5.6
 SLOPES = {0.03: 3.0, 0.05: -2.0}  # cm/s for each e-fold of strength
 
 
-def made_up_speeds(grounds: Iterable[Ground], *rest: Any) -> dict[Ground, dict[float, float]]:
+def synthetic_speeds(grounds: Iterable[Ground], *rest: Any) -> dict[Ground, dict[float, float]]:
     """A world without noise in which both depths tell strength, and only their sum tells damping."""
     return {
         ground: {
@@ -44,9 +44,9 @@ def made_up_speeds(grounds: Iterable[Ground], *rest: Any) -> dict[Ground, dict[f
     }
 
 
-def made_up_targets() -> dict[str, dict[float, Speed]]:
+def synthetic_targets() -> dict[str, dict[float, Speed]]:
     truth = [Ground(TRUE_DAMPING, strength_pa) for strength_pa in TRUTH.values()]
-    speeds = made_up_speeds(truth)
+    speeds = synthetic_speeds(truth)
     return {
         mud: {depth_m: Speed(speed, 0.3) for depth_m, speed in speeds[ground].items()}
         for mud, ground in zip(TRUTH, truth, strict=True)
@@ -54,9 +54,9 @@ def made_up_targets() -> dict[str, dict[float, Speed]]:
 
 
 @pytest.fixture
-def made_up_world(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(experiments.trackway.mud_fit, "walk_on", made_up_speeds)
-    monkeypatch.setattr(experiments.trackway.mud_fit, "TARGETS", made_up_targets())
+def synthetic_world(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(experiments.mud_fit.mud_fit, "walk_on", synthetic_speeds)
+    monkeypatch.setattr(experiments.mud_fit.mud_fit, "TARGETS", synthetic_targets())
 
 
 # what it is fitted to
@@ -91,19 +91,19 @@ def test_the_finer_grid_lies_around_the_best() -> None:
     assert {ground.strength_pa for ground in grounds} == {900.0, 1000.0, 1100.0, 1800.0, 2000.0, 2200.0}
 
 
-def test_a_made_up_truth_is_recovered(made_up_world: None) -> None:
+def test_the_fit_recovers_a_synthetic_truth(synthetic_world: None) -> None:
     """To half of the finer grid's steps: 0.25 N·s/m, and strengths that 0.1 N·s/m of misfit may shift by a step."""
-    best = run(Plan(), lambda done, total: None)["fitted"]
-    assert best["rail_damping_n_s_m"] == pytest.approx(TRUE_DAMPING, abs=0.25)
+    best = run(Plan(), lambda done, total: None).fitted
+    assert best.rail_damping_n_s_m == pytest.approx(TRUE_DAMPING, abs=0.25)
     for mud, strength_pa in TRUTH.items():
-        assert best["strength_pa"][mud] == pytest.approx(strength_pa, rel=0.045)
-    assert best["chi2"] < 1.0
+        assert best.strength_pa[mud] == pytest.approx(strength_pa, rel=0.045)
+    assert best.chi2 < 1.0
 
 
-def test_finer_is_closer(made_up_world: None) -> None:
-    targets, plan = made_up_targets(), Plan()
-    coarse = fitted(made_up_speeds(plan.grounds()), targets)
-    finer = fitted(made_up_speeds([*plan.grounds(), *plan.finer_grounds(coarse)]), targets)
+def test_the_finer_grid_fits_better(synthetic_world: None) -> None:
+    targets, plan = synthetic_targets(), Plan()
+    coarse = best_fit(synthetic_speeds(plan.grounds()), targets)
+    finer = best_fit(synthetic_speeds([*plan.grounds(), *plan.finer_grounds(coarse)]), targets)
     assert finer.chi2 < coarse.chi2
 
 
@@ -117,16 +117,14 @@ def test_the_range_of_a_strength_is_where_chi2_rises_by_one() -> None:
 # the report
 
 
-def test_the_report_has_fit_present_values_and_the_six_cells(made_up_world: None) -> None:
+def test_the_report_has_fit_present_values_and_the_six_cells(synthetic_world: None) -> None:
     report = run(Plan(), lambda done, total: None)
-    assert report["present"]["strength_pa"] == {name: clay.strength_pa for name, clay in MUDS.items()}
-    assert report["present"]["rail_damping_n_s_m"] == PlantParameters().rail_damping_n_s_m
-    assert report["fitted"]["chi2"] <= report["present"]["chi2"]
-    assert [cell[:2] for cell in cells_beside_paper(report["fitted"])] == [
-        (rule, mud) for rule in ("3 cm", "5 cm") for mud in MUDS
-    ]
-    assert min(report["chi2_of_damping"].values()) == report["fitted"]["chi2"]
-    json.dumps(report, allow_nan=False)
+    assert report.present.strength_pa == {name: clay.strength_pa for name, clay in MUDS.items()}
+    assert report.present.rail_damping_n_s_m == PlantParameters().rail_damping_n_s_m
+    assert report.fitted.chi2 <= report.present.chi2
+    assert {rule: list(row) for rule, row in report.fitted.cells.items()} == {"3 cm": list(MUDS), "5 cm": list(MUDS)}
+    assert min(report.chi2_of_damping.values()) == report.fitted.chi2
+    json.dumps(to_json(report), allow_nan=False)
 
 
 def test_present_values_are_those_of_the_repository() -> None:

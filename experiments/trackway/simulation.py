@@ -1,9 +1,9 @@
-"""Three muds in a row, walked with two fixed depths and with chosen ones: Table I and figure 8F of the paper.
+"""The simulated trackway: three muds in a row, walked at fixed and chosen depths. Table I and figure 8F of the paper.
 
-After section III-D: the trackway of 1.83 m holds mud of 48.5, 53.1 and 45.3 % of water, here in the clay of the
-simulator with the disturbances of the authors' logs. A walk ends when the plates would go down past the end, after 90 s
-in one mud, or by a fault. Beside the table stands what a constant depth could have done at best: every depth in each
-mud alone, on a long track.
+After section III-D of the paper the trackway of 1.83 m holds mud of 48.5, 53.1 and 45.3 % of water, here in the
+simulator's clay with the disturbances of the authors' logs. A walk ends when the plates would go down past the end,
+after 90 s in one mud, or with a fault. The report compares each gait with the best that a constant depth could do: the
+robot walks at every depth in each mud alone, on an endless track.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Any
 
 from experiments.trackway.depth_rule import DepthRule, chosen_by, configuration_for, constant_depth, walk_by
 from experiments.trackway.one_mud import (
     CONSTANT_STRIDES,
+    BestDepth,
     MudWalk,
     best_depth,
     constant_walks,
@@ -24,8 +24,8 @@ from experiments.trackway.one_mud import (
     mean_speeds_cm_s,
     run_mud_walk,
 )
-from experiments.trackway.paper_table import ADAPTIVE, FIXED_DEPTHS_M, PAPER_TABLE
-from experiments.trackway.speed_table import cell, mean_over_muds, within_one_sd
+from experiments.trackway.paper_table import ADAPTIVE, FIXED_DEPTHS_M
+from experiments.trackway.report import Settings, TrackwayReport, table_report
 from experiments.trackway.walk import Walk, WalkedStride, walk_of
 from experiments.trials.notebook import Notebook
 from experiments.trials.parallel_trials import run_parallel
@@ -34,8 +34,28 @@ from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import COMPARTMENT_M, Track
 
-STUCK_S = 90.0  # of walking in one mud
+STUCK_S = 90.0  # longest walking time in one mud
 FIXED = tuple(constant_depth(depth_m) for depth_m in FIXED_DEPTHS_M.values())
+
+
+@dataclass(frozen=True)
+class SimulatedSettings(Settings):
+    methods: Mapping[str, str]  # by gait
+    strength_pa: Mapping[str, float]  # by mud
+    constant_strides: int
+    constant_seeds: int
+    disturbances: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatedReport(TrackwayReport):
+    """Table I next to the best constant depth in each mud."""
+
+    settings: SimulatedSettings
+    best_constant_depth: Mapping[str, BestDepth]  # by mud
+    best_constant_mean_over_muds: float
+    over_best: Mapping[str, Mapping[str, float | None]]  # speed over that of the best constant depth, by gait and mud
+    constant_depth_cm_s: Mapping[str, Mapping[str, float]]  # by mud and depth in cm
 
 
 @dataclass(frozen=True)
@@ -43,13 +63,13 @@ class Plan:
     rules: tuple[DepthRule, ...] = (*FIXED, chosen_by("default", ADAPTIVE))
     muds: tuple[Clay, ...] = tuple(MUDS.values())
     compartment_m: float = COMPARTMENT_M
-    seeds: int = 3  # as the paper
+    seeds: int = 3  # as in the paper
     constant_depths_m: tuple[float, ...] = depths_m(0.0025)
     constant_seeds: int = 1
 
     @property
-    def kept(self) -> dict[str, Any]:
-        """What may not change where an experiment goes on."""
+    def identity(self) -> dict[str, object]:
+        """The settings that must not change when an experiment is continued."""
         return {
             "experiment": "trackway",
             "simulated": True,
@@ -59,7 +79,7 @@ class Plan:
         }
 
     def walks(self) -> dict[str, Callable[[], Walk]]:
-        """By key in the notebook; the longest begin first, so that the last ones end together."""
+        """All walks by their key in the notebook. The longest begin first, so that the last ones end together."""
         long = {
             f"{rule.name}, trial {seed}": partial(walk_trackway, rule, self.muds, self.compartment_m, seed)
             for rule in self.rules
@@ -74,9 +94,24 @@ class Plan:
     def constant_walks(self) -> list[MudWalk]:
         return constant_walks(self.muds, self.constant_depths_m, self.constant_seeds)
 
+    @property
+    def settings(self) -> SimulatedSettings:
+        return SimulatedSettings(
+            seeds=self.seeds,
+            mud_length_cm={clay.name: 100.0 * self.compartment_m for clay in self.muds},
+            methods={rule.name: rule.method for rule in self.rules if rule.method},
+            strength_pa={clay.name: clay.strength_pa for clay in self.muds},
+            constant_strides=CONSTANT_STRIDES,
+            constant_seeds=self.constant_seeds,
+            disturbances=asdict(LAB),
+        )
+
 
 def rules_of(methods: Sequence[str]) -> tuple[DepthRule, ...]:
-    """The fixed depths, the first method as "adaptive", the others by name. Raises ValueError for an unknown one."""
+    """Return the fixed depths, the first method as "adaptive", and the others by name.
+
+    Raises ValueError for an unknown method.
+    """
     first, *others = methods
     return (*FIXED, chosen_by(first, ADAPTIVE), *(chosen_by(each, f"{ADAPTIVE}, {each}") for each in others))
 
@@ -91,7 +126,7 @@ def is_over(length_m: float, strides: Sequence[WalkedStride]) -> bool:
 
 
 def is_past(length_m: float, last: WalkedStride) -> bool:
-    """Whether the plates go down behind the track next."""
+    """Return whether the plates go down past the end of the track next."""
     return last.position_m + last.step_m >= length_m
 
 
@@ -100,8 +135,8 @@ def is_stuck(strides: Sequence[WalkedStride]) -> bool:
     return sum(stride.duration_s for stride in strides if stride.mud == mud) >= STUCK_S
 
 
-def run(plan: Plan, notebook: Notebook, show: Show, processes: int | None = None) -> dict[str, Any]:
-    """The report; what was walked is in the notebook."""
+def run(plan: Plan, notebook: Notebook, show: Show, processes: int | None = None) -> SimulatedReport:
+    """Make every walk that is not in the notebook yet, write each down at once, and report all."""
     orders = plan.walks()
     left = [key for key in orders if key not in notebook.entries]
     walked = len(orders) - len(left)
@@ -109,61 +144,38 @@ def run(plan: Plan, notebook: Notebook, show: Show, processes: int | None = None
         [orders[key] for key in left],
         lambda done, _: show(walked + done, len(orders)),
         processes,
-        keep=lambda place, walk: notebook.write(left[place], walk.entry),
+        keep=lambda number, walk: notebook.write(left[number], walk.entry),
     )
     walks = [walk_of(notebook.entries[key]) for key in orders]
     by_rule = {rule.name: walks[i * plan.seeds : (i + 1) * plan.seeds] for i, rule in enumerate(plan.rules)}
     return report_of(plan, by_rule, mean_speeds_cm_s(plan.constant_walks(), walks[len(plan.rules) * plan.seeds :]))
 
 
-def report_of(plan: Plan, walks: dict[str, list[Walk]], constant_cm_s: dict[str, dict[float, float]]) -> dict[str, Any]:
-    """`walks` by rule, `constant_cm_s` by mud and depth in metres."""
+def report_of(
+    plan: Plan, walks: Mapping[str, Sequence[Walk]], constant_cm_s: Mapping[str, Mapping[float, float]]
+) -> SimulatedReport:
+    """`walks` are by gait, `constant_cm_s` by mud and depth in metres."""
     arm_m = configuration_for(plan.rules[0]).geometry.flipper_length_m
-    names = [clay.name for clay in plan.muds]
     best = {mud: best_depth(speeds) for mud, speeds in constant_cm_s.items()}
-    beside_paper = paper_report(walks, names, arm_m)
-    return beside_paper | {
-        "best_constant_depth": best,
-        "best_constant_mean_over_muds": round(sum(each["mean"] for each in best.values()) / len(best), 3),
-        "over_best": {
-            rule: {mud: _ratio(row[mud]["mean"], best[mud]["mean"]) for mud in names}
-            for rule, row in beside_paper["table"].items()
+    ends = {rule: dict(Counter(end_of(plan, trial) for trial in trials)) for rule, trials in walks.items()}
+    report = table_report(walks, arm_m, ends, plan.settings)
+    return SimulatedReport(
+        **vars(report),
+        best_constant_depth=best,
+        best_constant_mean_over_muds=round(sum(each.mean for each in best.values()) / len(best), 3),
+        over_best={
+            rule: {mud: _ratio(cell.mean, best[mud].mean) for mud, cell in row.items()}
+            for rule, row in report.table.items()
         },
-        "constant_depth_cm_s": {
+        constant_depth_cm_s={
             mud: {f"{100.0 * depth_m:g}": round(speed, 3) for depth_m, speed in speeds.items()}
             for mud, speeds in constant_cm_s.items()
         },
-        "ends": {rule: dict(Counter(end_of(plan, trial) for trial in trials)) for rule, trials in walks.items()},
-        "settings": _settings(plan),
-    }
-
-
-def paper_report(walks: Mapping[str, Sequence[Walk]], names: Sequence[str], arm_m: float) -> dict[str, Any]:
-    """Trials by rule through muds of these names, wherever they were walked, and the paper's beside them."""
-    cells = {rule: {mud: cell(trials, mud, arm_m) for mud in names} for rule, trials in walks.items()}
-    return {
-        "experiment": "trackway",
-        "table": cells,
-        "mean_over_muds": {
-            rule: {figure: mean_over_muds(row, figure) for figure in ("mean", "mean_all")}
-            for rule, row in cells.items()
-        },
-        "paper": {
-            rule: {mud: reported._asdict() for mud, reported in row.items()} for rule, row in PAPER_TABLE.items()
-        },
-        "within_one_sd": {
-            rule: {
-                mud: within_one_sd(cells[rule][mud]["mean"], reported) for mud, reported in PAPER_TABLE[rule].items()
-            }
-            for rule in FIXED_DEPTHS_M
-            if rule in cells and set(names) == set(PAPER_TABLE[rule])
-        },
-        "walks": {rule: [_strides_of(trial, arm_m) for trial in trials] for rule, trials in walks.items()},
-    }
+    )
 
 
 def end_of(plan: Plan, walk: Walk) -> str:
-    """How a walk ended."""
+    """Describe how a walk ended."""
     if walk.fault:
         return walk.fault
     last = walk.strides[-1]
@@ -172,29 +184,3 @@ def end_of(plan: Plan, walk: Walk) -> str:
 
 def _ratio(mean: float | None, best: float) -> float | None:
     return None if mean is None or best <= 0.0 else round(mean / best, 3)
-
-
-def _strides_of(walk: Walk, arm_m: float) -> list[dict[str, Any]]:
-    return [
-        {
-            "mud": stride.mud,
-            "place_cm": round(100.0 * stride.position_m, 2),
-            "depth_cm": round(100.0 * stride.depth_m, 3),
-            "step_cm": round(100.0 * stride.step_m, 2),
-            "duration_s": round(stride.duration_s, 3),
-            "failure": stride.failure(arm_m),
-        }
-        for stride in walk.strides
-    ]
-
-
-def _settings(plan: Plan) -> dict[str, Any]:
-    return {
-        "seeds": plan.seeds,
-        "mud_length_cm": {clay.name: 100.0 * plan.compartment_m for clay in plan.muds},
-        "methods": {rule.name: rule.method for rule in plan.rules if rule.method},
-        "strength_pa": {clay.name: clay.strength_pa for clay in plan.muds},
-        "constant_strides": CONSTANT_STRIDES,
-        "constant_seeds": plan.constant_seeds,
-        "disturbances": asdict(LAB),
-    }

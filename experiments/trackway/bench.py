@@ -1,19 +1,20 @@
-"""Table I at the bench: a person levels the mud, the robot walks over the trackway, and the pose says how far it came.
+"""Table I at the bench: an operator levels the mud, the robot walks over the trackway, and the pose gives its position.
 
 After section III-D of the paper. Each trial begins with the sweep axes over the beginning of the first mud; the body's
-place there is the trackway's zero. The trials of the gaits alternate, so that mud which dries or softens meanwhile
-falls on none of them alone. A walk is stopped where the plates go down behind the last mud, after 90 s in one mud, or
-by a fault. One that somebody or a fault has stopped is no trial, unless a person says so. Its strides are read from the
-log (log_strides.py), and the table is that of the simulated trackway.
+position there is the zero of the track. The trials of the gaits alternate, so that a mud that dries or softens with
+time affects all gaits alike. A walk is stopped when the plates go down past the last mud, after 90 s in one mud, or by
+a fault. A walk that the operator or a fault stopped counts only if the operator says so. Its strides are read from the
+log (log_strides.py), and the table is the same as for the simulated trackway.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import accumulate
-from math import radians, sin
-from typing import Any, NamedTuple, Protocol
+from math import isfinite, radians, sin
+from typing import NamedTuple, Protocol
 
 from experiments.robot.bench_robot import (
     RAISING_S,
@@ -29,40 +30,41 @@ from experiments.robot.bench_robot import (
     wait_until,
 )
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
-from experiments.trackway.comparison import STUCK_S, paper_report
 from experiments.trackway.depth_rule import DepthRule
 from experiments.trackway.log_strides import walked_strides
 from experiments.trackway.paper_table import ADAPTIVE, FIXED_DEPTHS_M
-from experiments.trackway.walk import Walk, speed_m_s, walk_of
+from experiments.trackway.report import Settings, TrackwayReport, table_report
+from experiments.trackway.simulation import STUCK_S
+from experiments.trackway.walk import Walk, WalkedStride, speed_m_s, walk_of
 from experiments.trials.notebook import Notebook
 from experiments.trials.session import Show
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.counted_nouns import counted
 
-PATIENCE_S = 900.0  # for a whole walk
-UNSEEN_S = 2.0  # without a pose, before a walk or on it: nobody knows where its end is
+PATIENCE_S = 900.0  # longest time of a whole walk
+UNSEEN_S = 2.0  # longest time without a pose, before or during a walk: the end of the track is unknown then
 BACKWARDS_M = 0.2  # behind the start: no mud pushes a body back so far
 LOOK_S = 0.05
-BEHIND = ""  # the last mud
-UNSEEN = "the body's place is not told any more: see that the robot is seen"
-BACKWARDS = "the body's place falls as the robot walks: turn pose.axis, or the sign of metres_per_count, round"
+PAST_END = ""  # in place of a mud's name
+UNSEEN = "the pose of the body is lost: check that the cameras see the robot's markers"
+BACKWARDS = "the measured position falls while the robot walks: reverse pose.axis, or the sign of metres_per_count"
 KEEP = "k"
 WALKED = {GO_ON: "keep it", REDO: "walk it again", SKIP: "leave it out"}
 STOPPED = {GO_ON: "walk it again", KEEP: "keep it", SKIP: "leave it out"}
 
 
 class Trackway(Protocol):
-    """What a person does between two trials."""
+    """The operator's work between two trials."""
 
     def prepare(self, trial: str) -> BenchRobot:
-        """The robot at the start, the mud levelled."""
+        """Return the robot at the start of a levelled track."""
 
-    def evaluate(self, reported: str, stopped: bool) -> str:
-        """GO_ON, SKIP to keep this trial out, or REDO it; `stopped` before its end."""
+    def evaluate(self, summary: str, stopped: bool) -> str:
+        """Return GO_ON to count the trial, SKIP to leave it out, or REDO. `stopped`: it ended early."""
 
 
-class AskedTrackway:
-    """A Trackway: a person's."""
+class PromptedTrackway:
+    """A Trackway that asks the operator on the terminal."""
 
     def __init__(self, robot: BenchRobot, operator: Operator) -> None:
         self._robot = robot
@@ -75,15 +77,15 @@ class AskedTrackway:
             f"{trial}. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud. Take"
             " the hands away: the robot walks next"
         )
-        self._operator.ask(question, {GO_ON: "the robot may walk"}, self._meanwhile)
+        self._operator.ask(question, {GO_ON: "the robot may walk"}, self._wait)
         ask_to_clear_faults(self._robot, self._operator)
         return self._robot
 
-    def evaluate(self, reported: str, stopped: bool) -> str:
-        answer = self._operator.ask(reported, STOPPED if stopped else WALKED, self._meanwhile)
+    def evaluate(self, summary: str, stopped: bool) -> str:
+        answer = self._operator.ask(summary, STOPPED if stopped else WALKED, self._wait)
         return {GO_ON: REDO, KEEP: GO_ON}.get(answer, answer) if stopped else answer
 
-    def _meanwhile(self) -> None:
+    def _wait(self) -> None:
         self._robot.wait(LOOK_S)
 
 
@@ -94,16 +96,16 @@ class Mud:
 
 
 class LoggedTime(NamedTuple):
-    """Where a walk is in the logs."""
+    """The time of a walk in the logs."""
 
-    run: str  # of a daemon
+    run: str  # of the daemon
     from_s: float
     to_s: float
 
 
 class End(NamedTuple):
-    why: str = ""  # nothing at the proper end
-    stopped: bool = False  # by somebody or a fault: a walk that comes to nothing is a result
+    why: str = ""  # empty at the proper end
+    stopped: bool = False  # by the operator or a fault; a robot that gets stuck is a result, not a stopped walk
 
 
 @dataclass(frozen=True)
@@ -113,14 +115,26 @@ class LoggedWalk(Walk):
 
 
 @dataclass(frozen=True)
+class BenchSettings(Settings):
+    muds: Sequence[Mud]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchReport(TrackwayReport):
+    settings: BenchSettings
+    left_out: int  # trials
+    strides_without_position: int = field(metadata={"key": "strides_without_place"})
+
+
+@dataclass(frozen=True)
 class Plan:
     muds: tuple[Mud, ...]
-    trials: int = 3  # of each gait, as the paper
+    trials: int = 3  # of each gait, as in the paper
     depths_m: tuple[float, ...] = tuple(FIXED_DEPTHS_M.values())
 
     @property
-    def kept(self) -> dict[str, Any]:
-        """What may not change where an experiment goes on."""
+    def identity(self) -> dict[str, object]:
+        """The settings that must not change when an experiment is continued."""
         return {
             "experiment": "trackway",
             "muds": [[mud.name, mud.length_m] for mud in self.muds],
@@ -129,24 +143,24 @@ class Plan:
 
     @property
     def rules(self) -> tuple[DepthRule, ...]:
-        """The adaptive one chooses by the method that the robot is configured with."""
+        """The fixed depths, and the adaptive gait by the method that the robot is configured with."""
         fixed = (DepthRule(f"{100.0 * depth_m:g} cm", depth_m) for depth_m in self.depths_m)
         return (*fixed, DepthRule(ADAPTIVE, 0.0, "configured"))
 
     def orders(self) -> Iterator[tuple[str, DepthRule]]:
-        """By key in the notebook."""
+        """Yield each trial's key in the notebook and its rule."""
         for trial in range(1, self.trials + 1):
             for rule in self.rules:
                 yield f"{rule.name}, trial {trial}", rule
 
     def mud_at(self, position_m: float) -> str:
-        """Where the plates go down; BEHIND the last one, and the first one also before its beginning."""
+        """Name the mud at a position of the plates: PAST_END after the last, and the first also before the start."""
         ends_m = accumulate(mud.length_m for mud in self.muds)
-        return next((mud.name for mud, end_m in zip(self.muds, ends_m, strict=True) if position_m < end_m), BEHIND)
+        return next((mud.name for mud, end_m in zip(self.muds, ends_m, strict=True) if position_m < end_m), PAST_END)
 
 
-def run(plan: Plan, trackway: Trackway, notebook: Notebook, show: Show) -> dict[str, Any]:
-    """The report. Raises BenchError where the robot cannot walk; what was walked is in the notebook."""
+def run(plan: Plan, trackway: Trackway, notebook: Notebook, show: Show) -> BenchReport:
+    """Walk every trial that is not in the notebook yet. Raises BenchError where the robot cannot walk."""
     orders = list(plan.orders())
     for done, (key, rule) in enumerate(orders):
         show(done, len(orders))
@@ -160,17 +174,17 @@ def _walk_trial(plan: Plan, key: str, rule: DepthRule, trackway: Trackway, noteb
     robot = trackway.prepare(trial)
     arm_m = robot.configuration.geometry.flipper_length_m
     walk = walk_over(robot, plan, rule)
-    verdict = trackway.evaluate(reported_of(trial, walk), walk.stopped)
+    verdict = trackway.evaluate(trial_text(trial, walk), walk.stopped)
     if verdict == REDO:
         return
     notebook.write(key, walk.entry | {"arm_m": arm_m, "skipped": verdict == SKIP, "logged": walk.logged})
 
 
 def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> LoggedWalk:
-    """One trial, from torque on to torque off. Raises BenchError, with torque off where the robot can be reached."""
-    _require_place(robot)
+    """Walk one trial, from torque on to torque off. Raises BenchError, with torque off where the robot answers."""
+    _require_pose(robot)
     arm(robot)
-    before = _require_place(robot)
+    before = _require_pose(robot)
     start_m = before["body_x_m"]
     robot.call("walk", **({} if rule.method else {"depth_m": rule.depth_m}))
     end = _follow(robot, plan, start_m)
@@ -180,48 +194,48 @@ def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> LoggedWalk:
     disarm(robot)
     log = robot.record(before["now_s"], after["now_s"])
     strides = walked_strides(log, robot.configuration, lambda position_m: plan.mud_at(position_m - start_m))
-    placed = [stride._replace(position_m=stride.position_m - start_m) for stride in strides]
+    shifted = [stride._replace(position_m=stride.position_m - start_m) for stride in strides]
     logged = LoggedTime(log.metadata["run_id"], before["now_s"], after["now_s"])
-    return LoggedWalk(placed, end.why, end.stopped, logged)
+    return LoggedWalk(shifted, end.why, end.stopped, logged)
 
 
-def _require_place(robot: BenchRobot) -> Status:
-    """The status that tells it. Raises BenchError, with torque off."""
+def _require_pose(robot: BenchRobot) -> Status:
+    """Return a status with the body's position. Raises BenchError, with torque off, where there is none."""
     status: Status = robot.call("status")
     begun_s = status["now_s"]
     while status["body_x_m"] is None:
         if status["now_s"] - begun_s > UNSEEN_S:
             disarm(robot)
-            why = status["pose"]["trouble"] or "motion capture or rail encoder tell nothing; see [pose]."
-            raise BenchError(f"the body's place is not known: {why} 'mudskipper check' says what to do")
+            why = status["pose"]["trouble"] or "no pose arrives from motion capture or rail encoder; see [pose]."
+            raise BenchError(f"the position of the body is not known: {why} 'mudskipper check' says what to do")
         robot.wait(LOOK_S)
         status = robot.call("status")
     return status
 
 
 def _follow(robot: BenchRobot, plan: Plan, start_m: float) -> End:
-    """Until the walk is over, or has to be stopped."""
+    """Wait until the walk is over, or stop it."""
     zero_m = start_m - reach_of(robot.configuration)
     end, status = follow_walk(robot, lambda now_s: Progress(plan, zero_m, now_s).evaluate)
     return End(reported_by(status), stopped=True) if end is None else end
 
 
 def reach_of(configuration: Configuration) -> float:
-    """How far in front of the body the plates go down."""
+    """Return how far in front of the body the plates go down."""
     return configuration.geometry.flipper_length_m * sin(radians(configuration.gait.sweep_angle_deg))
 
 
 class Progress:
-    """Owns which mud the plates go down in, since when, and when the body was seen."""
+    """Owns the mud that the plates are in, since when, and when the last pose arrived."""
 
     def __init__(self, plan: Plan, zero_m: float, now_s: float) -> None:
-        """`zero_m`: where the body is when the plates go down at the trackway's beginning."""
+        """`zero_m` is the position of the body at which the plates go down at the beginning of the trackway."""
         self._plan, self._zero_m = plan, zero_m
         self._mud = plan.muds[0].name
         self._begun_s = self._entered_s = self._seen_s = now_s
 
     def evaluate(self, status: Status) -> End | None:
-        """None while the walk is to go on."""
+        """Return None while the walk shall go on, else how it ends."""
         now_s, body_m = status["now_s"], status["body_x_m"]
         if body_m is None:
             return End(UNSEEN, stopped=True) if now_s - self._seen_s > UNSEEN_S else None
@@ -230,25 +244,29 @@ class Progress:
         mud = self._plan.mud_at(plates_m)
         if mud != self._mud:
             self._mud, self._entered_s = mud, now_s
-        if mud == BEHIND and status["phase"] == "insertion":
+        if mud == PAST_END and status["phase"] == "insertion":
             return End()
         if plates_m < -BACKWARDS_M:
             return End(BACKWARDS, stopped=True)
-        stuck = mud != BEHIND and now_s - self._entered_s > STUCK_S or now_s - self._begun_s > PATIENCE_S
+        stuck = mud != PAST_END and now_s - self._entered_s > STUCK_S or now_s - self._begun_s > PATIENCE_S
         return End(f"stuck in {mud or 'the end'}") if stuck else None
 
 
-def reported_of(key: str, walk: Walk) -> str:
-    """A trial in a line."""
-    seen = [stride for stride in walk.strides if stride.step_m == stride.step_m]
+def trial_text(key: str, walk: Walk) -> str:
+    """Summarise a trial in one line."""
+    seen = _with_pose(walk)
     speed = f"{100.0 * speed_m_s(seen):.1f} cm/s" if seen else "no stride with a pose"
     lost = len(walk.strides) - len(seen)
     without = f", {lost} of them without a pose" if lost else ""
     return f"{key}: {counted(len(walk.strides), 'stride')}{without}, {speed}{'; ' + walk.fault if walk.fault else ''}"
 
 
+def _with_pose(walk: Walk) -> list[WalkedStride]:
+    return [stride for stride in walk.strides if isfinite(stride.step_m)]
+
+
 def first_walks(plan: Plan, notebook: Notebook) -> dict[str, LoggedTime]:
-    """Of each gait the first one that counts, by key in the notebook."""
+    """Return the first walk of each gait that counts, by its key in the notebook."""
     first: dict[str, tuple[str, LoggedTime]] = {}
     for key, rule in plan.orders():
         entry = notebook.entries[key]
@@ -257,29 +275,21 @@ def first_walks(plan: Plan, notebook: Notebook) -> dict[str, LoggedTime]:
     return dict(first.values())
 
 
-def report_of(plan: Plan, notebook: Notebook) -> dict[str, Any]:
-    """Strides without a place or a length are told of and not counted; nor do those behind the last mud count."""
+def report_of(plan: Plan, notebook: Notebook) -> BenchReport:
+    """Report all trials. Strides without a position or a length are counted apart; those past the end are not."""
     walks: dict[str, list[Walk]] = {rule.name: [] for rule in plan.rules}
-    ends: dict[str, dict[str, int]] = {rule.name: {} for rule in plan.rules}
+    ends: dict[str, Counter[str]] = {rule.name: Counter() for rule in plan.rules}
     unseen, left_out, arm_m = 0, 0, 0.0
     for key, rule in plan.orders():
         entry = notebook.entries[key]
         if entry["skipped"]:
             left_out += 1
             continue
-        walk = walk_of(entry)
-        seen = [stride for stride in walk.strides if stride.step_m == stride.step_m]
-        unseen, arm_m = unseen + len(walk.strides) - len(seen), entry["arm_m"]
-        walks[rule.name].append(Walk([stride for stride in seen if stride.mud != BEHIND], walk.fault))
-        end = walk.fault or "past the end"
-        ends[rule.name][end] = ends[rule.name].get(end, 0) + 1
-    return paper_report(walks, [mud.name for mud in plan.muds], arm_m) | {
-        "ends": ends,
-        "left_out": left_out,
-        "strides_without_place": unseen,
-        "settings": {
-            "seeds": plan.trials,
-            "mud_length_cm": {mud.name: 100.0 * mud.length_m for mud in plan.muds},
-            "muds": [asdict(mud) for mud in plan.muds],
-        },
-    }
+        walk, arm_m = walk_of(entry), entry["arm_m"]
+        seen = _with_pose(walk)
+        unseen += len(walk.strides) - len(seen)
+        walks[rule.name].append(Walk([stride for stride in seen if stride.mud != PAST_END], walk.fault))
+        ends[rule.name][walk.fault or "past the end"] += 1
+    lengths_cm = {mud.name: 100.0 * mud.length_m for mud in plan.muds}
+    report = table_report(walks, arm_m, ends, BenchSettings(plan.trials, lengths_cm, plan.muds))
+    return BenchReport(**vars(report), left_out=left_out, strides_without_position=unseen)

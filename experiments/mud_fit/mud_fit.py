@@ -1,32 +1,33 @@
-"""What the simulator's muds and rail are fitted to: the six fixed-depth speeds of the paper's Table I.
+"""Fit the simulator's muds and rail to the six fixed-depth speeds of the paper's Table I.
 
-Four numbers are fitted, each mud's strength (simulation/mud/clay.py) and how the rail's drag grows with speed
+Four numbers are fitted, the strength of each mud (simulation/mud/clay.py) and how the rail's drag grows with speed
 (simulation/body/plant.py), so that
 
     chi² = Σ ((v - v_paper) / sd_paper)²      over two depths in three muds
 
-is least. The adaptive speeds are never used: they are what the adaptation is measured by. With six cells for four
-numbers the fit shows that the plant can be like the paper's trackway, not that it is.
+is least. The adaptive speeds are never used, because the adaptation is evaluated by them. With six cells for four
+numbers the fit shows that the plant can behave like the paper's trackway, not that it is the same.
 
-Not fitted: the rate coefficient 0.4, with which a plate that stops keeps 86 % of its load (the authors' logs: 85 to
-90 %; clay practice has about 10 % for a tenfold speed); the body's mass, assumed to be 1 kg (two simpler models came to
-1.0 and 1.7 kg when it was fitted too); bearing, adhesion, suction and the mud's give sideways, from the literature and
-the logs; disturbances, from the logs.
+Not fitted are the rate coefficient 0.4, with which a plate that stops keeps 86 % of its load (authors' logs: 85 to
+90 %; clay: about 10 % for a tenfold speed); the body's mass, assumed to be 1 kg (two simpler models came to 1.0
+and 1.7 kg when it was fitted too); bearing, adhesion, suction and the sideways compliance of the mud, from literature
+and logs; and the disturbances, from the logs.
 
-The search is a grid, which no cliff misleads: in firm mud the speed at 5 cm falls by half within a few per cent of
-strength. Every walk of it is one that all three muds may choose; then a finer grid lies around the best.
+The search is a grid, because the speed jumps: in firm mud the speed at 5 cm falls by half within a few per cent of
+strength. Each walk of the grid serves all three muds; then a finer grid lies around the best point. The fields of the
+report are the keys of the summary in JSON.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from statistics import fmean
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from experiments.trackway.depth_rule import configuration_for, constant_depth
-from experiments.trackway.one_mud import CONSTANT_STRIDES, ENDLESS_M, has, speed_cm_s
+from experiments.trackway.one_mud import CONSTANT_STRIDES, ENDLESS_M, has_strides, speed_cm_s
 from experiments.trackway.paper_table import FIXED_DEPTHS_M, PAPER_TABLE, Speed
 from experiments.trackway.walk import walk_in
 from experiments.trials.parallel_trials import run_parallel
@@ -42,7 +43,7 @@ TARGETS: Targets = {mud: {depth_m: PAPER_TABLE[rule][mud] for rule, depth_m in F
 
 
 class Ground(NamedTuple):
-    """What one walk is tried on."""
+    """The ground of one walk."""
 
     damping_n_s_m: float
     strength_pa: float
@@ -62,9 +63,9 @@ class Plan:
     dampings_n_s_m: tuple[float, ...] = (4.0, 5.0, 6.0, 7.0, 8.0)
     weakest_pa: float = 400.0
     strongest_pa: float = 5000.0
-    ratio: float = 1.12  # between neighbours
-    finer_dampings_n_s_m: tuple[float, ...] = (-0.5, 0.0, 0.5)  # beside the best
-    finer_ratios: tuple[float, ...] = (0.94, 0.97, 1.0, 1.03, 1.06)  # to the best
+    ratio: float = 1.12  # between neighbouring strengths
+    finer_dampings_n_s_m: tuple[float, ...] = (-0.5, 0.0, 0.5)  # from the best
+    finer_ratios: tuple[float, ...] = (0.94, 0.97, 1.0, 1.03, 1.06)  # to the best strength
     seeds: int = 2
     strides: int = CONSTANT_STRIDES
 
@@ -76,26 +77,54 @@ class Plan:
 
     def finer_grounds(self, fit: Fit) -> list[Ground]:
         dampings = [max(0.0, fit.damping_n_s_m + more) for more in self.finer_dampings_n_s_m]
-        strengths_pa = {
-            round(reported * ratio) for reported in fit.strengths_pa.values() for ratio in self.finer_ratios
-        }
+        strengths_pa = {round(best_pa * ratio) for best_pa in fit.strengths_pa.values() for ratio in self.finer_ratios}
         return [Ground(damping, strength_pa) for damping in dampings for strength_pa in sorted(strengths_pa)]
 
 
+@dataclass(frozen=True)
+class FittedValues:
+    """A fit with its speeds in cm/s by depth and mud, the cells of Table I."""
+
+    rail_damping_n_s_m: float
+    strength_pa: Mapping[str, float]
+    chi2: float
+    cells: Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class BestValues(FittedValues):
+    strength_range_pa: Mapping[str, Sequence[float]]  # where chi² is within 1 of the least
+
+
+@dataclass(frozen=True)
+class Settings:
+    seeds: int
+    strides: int
+    walked: int  # grounds
+
+
+@dataclass(frozen=True, kw_only=True)
+class MudFitReport:
+    experiment: str = "mud-fit"
+    fitted: BestValues
+    present: FittedValues  # the values in the repository
+    chi2_of_damping: Mapping[str, float]
+    settings: Settings
+
+
 def present() -> Fit:
-    """What stands in the repository, with no chi² yet."""
+    """Return the values in the repository, with no chi² yet."""
     strengths_pa = {name: clay.strength_pa for name, clay in MUDS.items()}
     return Fit(PlantParameters().rail_damping_n_s_m, strengths_pa, float("nan"))
 
 
-def run(plan: Plan, show: Show, processes: int | None = None) -> dict[str, Any]:
-    """The report."""
+def run(plan: Plan, show: Show, processes: int | None = None) -> MudFitReport:
     today = present()
     first = [*_grounds_of(today), *plan.grounds()]
     finer = len(plan.finer_dampings_n_s_m) * len(plan.finer_ratios) * len(MUDS)
     walks_each, walks_all = plan.seeds * len(FIXED_DEPTHS_M), (len(first) + finer) * plan.seeds * len(FIXED_DEPTHS_M)
     speeds = walk_on(first, plan, lambda done, total: show(done, walks_all), processes)
-    coarse = fitted(speeds, TARGETS)
+    coarse = best_fit(speeds, TARGETS)
     walked = len(first) * walks_each
     more = [ground for ground in plan.finer_grounds(coarse) if ground not in speeds]
     speeds |= walk_on(more, plan, lambda done, total: show(walked + done, walks_all), processes)
@@ -109,88 +138,74 @@ def _grounds_of(fit: Fit) -> list[Ground]:
 def walk_on(
     grounds: Iterable[Ground], plan: Plan, show: Show, processes: int | None = None
 ) -> dict[Ground, dict[float, float]]:
-    """Speed at each fixed depth on each ground, over the seeds."""
+    """Return the mean speed over the seeds at each fixed depth on each ground."""
     seeds = range(1, plan.seeds + 1)
     depths = tuple(FIXED_DEPTHS_M.values())
     keys = [(ground, depth_m) for ground in dict.fromkeys(grounds) for depth_m in depths]
     walks = [partial(fixed_speed_cm_s, *key, seed, plan.strides) for key in keys for seed in seeds]
-    reported = run_parallel(walks, show, processes)
+    walked = run_parallel(walks, show, processes)
     speeds: dict[Ground, dict[float, float]] = {}
     for i, (ground, depth_m) in enumerate(keys):
-        speeds.setdefault(ground, {})[depth_m] = fmean(reported[i * plan.seeds : (i + 1) * plan.seeds])
+        speeds.setdefault(ground, {})[depth_m] = fmean(walked[i * plan.seeds : (i + 1) * plan.seeds])
     return speeds
 
 
 def fixed_speed_cm_s(ground: Ground, depth_m: float, seed: int, strides: int) -> float:
-    """In one endless mud."""
+    """Walk in one endless mud."""
     rule, track = constant_depth(depth_m), Track([(ENDLESS_M, Clay("mud", ground.strength_pa))])
     configuration = configuration_for(rule)
     plant = plant_of(configuration, LAB, rail_damping_n_s_m=ground.damping_n_s_m)
     lockstep = Lockstep(configuration, track, seed, disturbances=LAB, plant=plant)
     lockstep.arm()
-    return speed_cm_s(walk_in(lockstep, track, rule.order, partial(has, strides)))
+    return speed_cm_s(walk_in(lockstep, track, rule.order, partial(has_strides, strides)))
 
 
 def chi2_of(speeds: Mapping[float, float], targets: Mapping[float, Speed]) -> float:
-    """Of one mud."""
+    """Return the chi² of one mud. `speeds` and `targets` are by depth in metres."""
     return sum(((speeds[depth_m] - paper.mean) / paper.sd) ** 2 for depth_m, paper in targets.items())
 
 
-def fitted(speeds: Speeds, targets: Targets) -> Fit:
-    """The damping with which the three muds, each at its own best strength, come closest together."""
-    fits = [fitted_with(damping, speeds, targets) for damping in sorted({ground.damping_n_s_m for ground in speeds})]
+def best_fit(speeds: Speeds, targets: Targets) -> Fit:
+    """Return the damping with the least chi² of the three muds, each at its own best strength."""
+    fits = [
+        fit_with_damping(damping, speeds, targets) for damping in sorted({ground.damping_n_s_m for ground in speeds})
+    ]
     return min(fits, key=lambda fit: fit.chi2)
 
 
-def fitted_with(damping_n_s_m: float, speeds: Speeds, targets: Targets) -> Fit:
+def fit_with_damping(damping_n_s_m: float, speeds: Speeds, targets: Targets) -> Fit:
     grounds = [ground for ground in speeds if ground.damping_n_s_m == damping_n_s_m]
-    best = {
-        mud: min(grounds, key=lambda ground: chi2_of(speeds[ground], reported)) for mud, reported in targets.items()
-    }
+    best = {mud: min(grounds, key=lambda ground: chi2_of(speeds[ground], own)) for mud, own in targets.items()}
     chi2 = sum(chi2_of(speeds[ground], targets[mud]) for mud, ground in best.items())
     return Fit(damping_n_s_m, {mud: ground.strength_pa for mud, ground in best.items()}, chi2)
 
 
 def strength_range_pa(mud: str, damping_n_s_m: float, speeds: Speeds, targets: Targets) -> list[float]:
-    """Of all that were walked with this damping, those whose chi² is within 1 of the least: about a standard error."""
-    reported = {
+    """Return the range of strengths whose chi² is within 1 of the least: about a standard error to either side."""
+    chi2_by_strength = {
         ground.strength_pa: chi2_of(of_ground, targets[mud])
         for ground, of_ground in speeds.items()
         if ground.damping_n_s_m == damping_n_s_m
     }
-    near = [strength_pa for strength_pa, chi2 in reported.items() if chi2 <= min(reported.values()) + 1.0]
+    least = min(chi2_by_strength.values())
+    near = [strength_pa for strength_pa, chi2 in chi2_by_strength.items() if chi2 <= least + 1.0]
     return [min(near), max(near)]
 
 
-def report_of(plan: Plan, speeds: Speeds, today: Fit) -> dict[str, Any]:
-    best = fitted(speeds, TARGETS)
+def report_of(plan: Plan, speeds: Speeds, today: Fit) -> MudFitReport:
+    best = best_fit(speeds, TARGETS)
     dampings = sorted({ground.damping_n_s_m for ground in speeds})
-    return {
-        "experiment": "mud-fit",
-        "fitted": _described(best, speeds)
-        | {"strength_range_pa": {mud: strength_range_pa(mud, best.damping_n_s_m, speeds, TARGETS) for mud in TARGETS}},
-        "present": _described(today, speeds),
-        "chi2_of_damping": {f"{each:g}": round(fitted_with(each, speeds, TARGETS).chi2, 3) for each in dampings},
-        "settings": {"seeds": plan.seeds, "strides": plan.strides, "walked": len(speeds)},
-    }
+    ranges_pa = {mud: strength_range_pa(mud, best.damping_n_s_m, speeds, TARGETS) for mud in TARGETS}
+    return MudFitReport(
+        fitted=BestValues(**vars(_values(best, speeds)), strength_range_pa=ranges_pa),
+        present=_values(today, speeds),
+        chi2_of_damping={f"{each:g}": round(fit_with_damping(each, speeds, TARGETS).chi2, 3) for each in dampings},
+        settings=Settings(plan.seeds, plan.strides, len(speeds)),
+    )
 
 
-def _described(fit: Fit, speeds: Speeds) -> dict[str, Any]:
+def _values(fit: Fit, speeds: Speeds) -> FittedValues:
     of_mud = {mud: speeds[Ground(fit.damping_n_s_m, strength)] for mud, strength in fit.strengths_pa.items()}
-    return {
-        "rail_damping_n_s_m": fit.damping_n_s_m,
-        "strength_pa": dict(fit.strengths_pa),
-        "chi2": round(sum(chi2_of(of_mud[mud], reported) for mud, reported in TARGETS.items()), 3),
-        "cells": {
-            rule: {mud: round(of_mud[mud][depth_m], 3) for mud in TARGETS} for rule, depth_m in FIXED_DEPTHS_M.items()
-        },
-    }
-
-
-def cells_beside_paper(described: Mapping[str, Any]) -> list[tuple[str, str, float, Speed]]:
-    """(depth, mud, speed, paper's) of the six cells."""
-    return [
-        (rule, mud, speed, PAPER_TABLE[rule][mud])
-        for rule, row in described["cells"].items()
-        for mud, speed in row.items()
-    ]
+    cells = {rule: {mud: round(of_mud[mud][depth_m], 3) for mud in TARGETS} for rule, depth_m in FIXED_DEPTHS_M.items()}
+    chi2 = round(sum(chi2_of(of_mud[mud], targets) for mud, targets in TARGETS.items()), 3)
+    return FittedValues(fit.damping_n_s_m, dict(fit.strengths_pa), chi2, cells)

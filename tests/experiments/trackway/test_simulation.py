@@ -1,4 +1,4 @@
-"""The plan of the trackway, its report of made-up walks, and a short one done for real."""
+"""The plan of the simulated trackway, its report of synthetic walks, and a short one in simulation."""
 
 from __future__ import annotations
 
@@ -12,8 +12,12 @@ from typing import Any
 
 import pytest
 
-from experiments.trackway.comparison import FIXED, Plan, end_of, is_over, report_of, rules_of, run
-from experiments.trackway.paper_table import ADAPTIVE, PAPER_TABLE
+from experiments.reports.report_page import to_json
+from experiments.trackway.one_mud import BestDepth
+from experiments.trackway.paper_table import ADAPTIVE, PAPER_TABLE, Speed
+from experiments.trackway.plots import plot_trackway
+from experiments.trackway.report import MeanOverMuds
+from experiments.trackway.simulation import FIXED, Plan, SimulatedReport, end_of, is_over, report_of, rules_of, run
 from experiments.trackway.walk import Walk, WalkedStride
 from experiments.trials.notebook import Notebook
 from simulation.mud.clay import MUDS
@@ -29,7 +33,7 @@ def stride(mud: str, position_m: float = 0.0, step_m: float = 0.12, duration_s: 
 # the plan
 
 
-def test_by_default_it_is_the_papers_trackway() -> None:
+def test_the_default_plan_is_the_papers_trackway() -> None:
     plan = Plan()
     assert [rule.name for rule in plan.rules] == ["3 cm", "5 cm", ADAPTIVE]
     assert [rule.depth_m for rule in plan.rules[:2]] == [0.03, 0.05]
@@ -48,7 +52,7 @@ def test_the_first_method_is_the_adaptive_row_and_others_have_their_names() -> N
     assert rules_of(["default"])[:2] == FIXED
 
 
-def test_a_method_that_there_is_not_is_named() -> None:
+def test_an_unknown_method_is_named() -> None:
     with pytest.raises(ValueError, match="'fog'"):
         rules_of(["default", "fog"])
 
@@ -67,17 +71,17 @@ def test_a_walk_that_has_not_begun_is_not_over() -> None:
 
 
 @pytest.mark.parametrize(("step_m", "over"), [(0.12, False), (0.14, True), (0.13, True)])
-def test_it_is_over_when_the_plates_would_go_down_past_the_end(step_m: float, over: bool) -> None:
+def test_a_walk_is_over_when_the_plates_would_go_down_past_the_end(step_m: float, over: bool) -> None:
     assert is_over(1.75, [stride("45.3", 1.62, step_m)]) is over
 
 
-def test_it_is_over_after_90_s_in_one_mud_not_in_all() -> None:
+def test_a_walk_is_over_after_90_s_in_one_mud_and_not_in_all_muds() -> None:
     slow = [stride("a", 0.1, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0)]
     assert not is_over(1.83, slow)
     assert is_over(1.83, [*slow, stride("b", 0.7, 0.0, 2.0)])
 
 
-def test_how_a_walk_ended_is_said() -> None:
+def test_the_end_of_a_walk_is_described() -> None:
     plan = Plan()
     assert end_of(plan, Walk([stride("45.3", 1.80)], "")) == "past the end"
     assert end_of(plan, Walk([stride("53.1", 0.80)], "")) == "stuck in 53.1"
@@ -87,7 +91,7 @@ def test_how_a_walk_ended_is_said() -> None:
 # the report
 
 
-def made_up(**changes: Any) -> dict[str, Any]:
+def synthetic_report(**changes: Any) -> SimulatedReport:
     """Every gait makes 6 cm/s in each mud, the best constant depth 8."""
     plan = replace(Plan(rules=rules_of(["default", "paper"]), seeds=2), **changes)
     walks = [Walk([stride(mud, 1.8) for mud in NAMES for _ in range(3)], "")] * plan.seeds
@@ -96,43 +100,47 @@ def made_up(**changes: Any) -> dict[str, Any]:
 
 
 def test_the_table_has_a_row_for_each_gait_and_a_cell_for_each_mud() -> None:
-    report = made_up()
-    assert list(report["table"]) == ["3 cm", "5 cm", "adaptive", "adaptive, paper"]
-    for row in report["table"].values():
+    report = synthetic_report()
+    assert list(report.table) == ["3 cm", "5 cm", "adaptive", "adaptive, paper"]
+    for row in report.table.values():
         assert list(row) == NAMES
         for cell in row.values():
-            assert set(cell) >= {"mean", "sd", "mean_all", "failures", "failures_after_second"}
-            assert (cell["mean"], cell["mean_all"], cell["sd"]) == (6.0, 6.0, 0.0)
-    assert report["mean_over_muds"]["adaptive"] == {"mean": 6.0, "mean_all": 6.0}
-    json.dumps(report, allow_nan=False)
+            assert (cell.mean, cell.mean_all, cell.sd) == (6.0, 6.0, 0.0)
+    assert report.mean_over_muds["adaptive"] == MeanOverMuds(6.0, 6.0)
+    assert set(json.loads(json.dumps(to_json(report), allow_nan=False))["table"]) == set(report.table)
 
 
-def test_the_best_constant_depth_stands_beside_it_with_the_share_of_it() -> None:
-    report = made_up()
-    assert report["best_constant_depth"] == {mud: {"depth_cm": 2.75, "mean": 8.0} for mud in NAMES}
-    assert report["best_constant_mean_over_muds"] == 8.0
-    assert report["over_best"]["adaptive"] == dict.fromkeys(NAMES, 0.75)
+def test_each_gait_has_its_ratio_to_the_best_constant_depth() -> None:
+    report = synthetic_report()
+    assert report.best_constant_depth == dict.fromkeys(NAMES, BestDepth(2.75, 8.0))
+    assert report.best_constant_mean_over_muds == 8.0
+    assert report.over_best["adaptive"] == dict.fromkeys(NAMES, 0.75)
 
 
-def test_only_fixed_depths_are_judged_by_the_papers_sd() -> None:
-    report = made_up()
-    assert report["within_one_sd"] == {
-        rule: {mud: abs(6.0 - reported.mean) <= reported.sd for mud, reported in PAPER_TABLE[rule].items()}
+def test_any_walks_make_a_picture(tmp_path: Path) -> None:
+    plot_trackway(synthetic_report(), tmp_path / "trackway.png")
+    assert (tmp_path / "trackway.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_only_fixed_depths_are_compared_with_the_papers_sd() -> None:
+    report = synthetic_report()
+    assert report.within_one_sd == {
+        rule: {mud: abs(6.0 - paper.mean) <= paper.sd for mud, paper in PAPER_TABLE[rule].items()}
         for rule in ("3 cm", "5 cm")
     }
-    assert report["within_one_sd"]["5 cm"] == {"48.5": False, "53.1": True, "45.3": False}
-    assert report["paper"]["adaptive"]["53.1"] == {"mean": 5.1, "sd": 0.3}
+    assert report.within_one_sd["5 cm"] == {"48.5": False, "53.1": True, "45.3": False}
+    assert report.paper["adaptive"]["53.1"] == Speed(5.1, 0.3)
 
 
-def test_a_gait_that_got_stuck_has_no_speed_further_on() -> None:
+def test_a_gait_that_got_stuck_has_no_speed_in_later_muds() -> None:
     plan = Plan(rules=FIXED[:1], seeds=1)
     stuck = Walk([stride("48.5")] * 3 + [stride("53.1", 0.7, 0.001)] * 3, "")
     report = report_of(plan, {"3 cm": [stuck]}, {mud: {0.02: 7.0} for mud in NAMES})
-    assert report["table"]["3 cm"]["45.3"]["mean"] is None
-    assert report["within_one_sd"]["3 cm"]["45.3"] is None
-    assert report["mean_over_muds"]["3 cm"]["mean"] is None
-    assert report["over_best"]["3 cm"]["45.3"] is None
-    assert report["ends"] == {"3 cm": {"stuck in 53.1": 1}}
+    assert report.table["3 cm"]["45.3"].mean is None
+    assert report.within_one_sd["3 cm"]["45.3"] is None
+    assert report.mean_over_muds["3 cm"].mean is None
+    assert report.over_best["3 cm"]["45.3"] is None
+    assert report.ends == {"3 cm": {"stuck in 53.1": 1}}
 
 
 # an interrupted one
@@ -149,7 +157,7 @@ def quick() -> Walk:
     return Walk([stride(mud, 1.8) for mud in NAMES for _ in range(3)], "")
 
 
-def test_what_was_walked_before_an_interruption_is_not_walked_again(tmp_path: Path) -> None:
+def test_a_continued_experiment_repeats_no_walk(tmp_path: Path) -> None:
     plan = Quick(seeds=1, constant_depths_m=(0.03,))
 
     def interrupt(done: int, total: int) -> None:
@@ -157,12 +165,12 @@ def test_what_was_walked_before_an_interruption_is_not_walked_again(tmp_path: Pa
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(plan, Notebook(tmp_path, plan.kept), interrupt, processes=1)
-    again, shown = Notebook(tmp_path, plan.kept), list[tuple[int, int]]()
+        run(plan, Notebook(tmp_path, plan.identity), interrupt, processes=1)
+    again, shown = Notebook(tmp_path, plan.identity), list[tuple[int, int]]()
     assert len(again.entries) == 2
     report = run(plan, again, lambda done, total: shown.append((done, total)), processes=1)
     assert shown == [(3, 6), (4, 6), (5, 6), (6, 6)]
-    assert report == run(plan, Notebook(tmp_path / "other", plan.kept), lambda done, total: None, processes=1)
+    assert report == run(plan, Notebook(tmp_path / "other", plan.identity), lambda done, total: None, processes=1)
 
 
 def test_every_walk_has_a_key_of_its_own() -> None:
@@ -170,41 +178,42 @@ def test_every_walk_has_a_key_of_its_own() -> None:
     assert len(plan.walks()) == 4 * 2 + len(plan.constant_walks()) == 4 * 2 + 3 * 15 * 2
 
 
-# for real
+# in simulation
 
 
 SHORT = Plan(compartment_m=0.2, seeds=1, constant_depths_m=(0.03,), constant_seeds=1)
 
 
 @cache
-def short() -> dict[str, Any]:
+def short() -> SimulatedReport:
     """Compartments of less than two steps, one seed, one constant depth."""
     with TemporaryDirectory() as folder:
-        return run(SHORT, Notebook(Path(folder), SHORT.kept), lambda done, total: None)
+        return run(SHORT, Notebook(Path(folder), SHORT.identity), lambda done, total: None)
 
 
 def test_a_short_trackway_is_walked_from_mud_to_mud_past_its_end() -> None:
-    for trials in short()["walks"].values():
+    for trials in short().walks.values():
         (strides,) = trials
-        assert list(dict.fromkeys(each["mud"] for each in strides)) == NAMES
-        assert strides[-1]["place_cm"] + strides[-1]["step_cm"] >= 60.0
-    assert all(ends == {"past the end": 1} for ends in short()["ends"].values())
+        assert list(dict.fromkeys(each.mud for each in strides)) == NAMES
+        assert strides[-1].position_cm + strides[-1].step_cm >= 60.0
+    assert all(ends == {"past the end": 1} for ends in short().ends.values())
 
 
 def test_fixed_gaits_keep_their_depth_and_the_adaptive_one_does_not() -> None:
-    depths = {rule: {each["depth_cm"] for each in trials[0]} for rule, trials in short()["walks"].items()}
+    depths = {rule: {each.depth_cm for each in trials[0]} for rule, trials in short().walks.items()}
     assert (depths["3 cm"], depths["5 cm"]) == ({3.0}, {5.0})
     assert len(depths["adaptive"]) > 1
 
 
 def test_three_centimetres_slip_in_the_soft_mud_and_five_do_not() -> None:
-    table = short()["table"]
-    assert table["3 cm"]["53.1"]["failures"].get("slippage", 0) > 0
-    assert table["5 cm"]["53.1"]["failures"] == {}
-    assert table["5 cm"]["53.1"]["mean"] > 2.0 * table["3 cm"]["53.1"]["mean"]
+    table = short().table
+    assert table["3 cm"]["53.1"].failures.get("slippage", 0) > 0
+    assert table["5 cm"]["53.1"].failures == {}
+    deep, shallow = table["5 cm"]["53.1"].mean, table["3 cm"]["53.1"].mean
+    assert deep and shallow and deep > 2.0 * shallow
 
 
-def test_five_centimetres_are_held_in_the_firmest_mud_and_three_are_not() -> None:
-    table = short()["table"]
-    assert "extraction" in table["5 cm"]["45.3"]["failures"]
-    assert "extraction" not in table["3 cm"]["45.3"]["failures"]
+def test_flippers_get_stuck_in_the_firmest_mud_at_five_centimetres_and_not_at_three() -> None:
+    table = short().table
+    assert "extraction" in table["5 cm"]["45.3"].failures
+    assert "extraction" not in table["3 cm"]["45.3"].failures
