@@ -77,7 +77,7 @@ class Client:
             message = next(self._unpacker, NOTHING)
         except (ValueError, msgpack.UnpackException, RecursionError):
             raise GarbledError(SHAPE) from None
-        end = self._received if message is NOTHING else self._unpacker.report()
+        end = self._received if message is NOTHING else self._unpacker.tell()
         if end - self._read > LONGEST_REQUEST:  # of many short parts: the unpacker bounds but the parts
             raise GarbledError(TOO_LONG)
         if message is not NOTHING:
