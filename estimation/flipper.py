@@ -13,9 +13,9 @@ from math import cos, hypot, isfinite, sin
 
 from control.gait.recovery import is_in_mud
 from control.geometry import FlipperGeometry
-from control.records import NO_LOAD, UNKNOWN, Estimate, FlipperLoad, Phase, StrideEstimate
+from control.records import NO_LOAD, UNKNOWN, DriveState, Estimate, FlipperLoad, Phase, StrideEstimate
 from estimation.force_map import smallest_force_n
-from estimation.joint_load import FlipperDrive, JointLoad, JointLoads, JointSample
+from estimation.joint_load import NO_COMMANDS, CommandTimes, FlipperDrive, JointLoad, JointLoads
 from estimation.stride_clock import StrideClock
 from estimation.strokes.shear import Base, Shear, find_shear
 from estimation.strokes.stroke import Batch, Stroke
@@ -84,13 +84,19 @@ class FlipperEstimator:
             self._body_at_close_m = body_m
 
     def update(
-        self, now_s: float, phase: Phase, sweep: JointSample, adduction: JointSample, body_x_m: float
+        self,
+        now_s: float,
+        phase: Phase,
+        sweep: DriveState,
+        adduction: DriveState,
+        body_x_m: float,
+        commands_s: CommandTimes = NO_COMMANDS,
     ) -> tuple[FlipperLoad, StrideEstimate | None]:
         """The load now and, on the first sample after a stride's extraction, what the stride said."""
         closed = self._change_phase(now_s, phase, body_x_m) if phase is not self._clock.phase else None
         if not isfinite(sweep.angle_rad + adduction.angle_rad + sweep.current_a + adduction.current_a):
             return NO_LOAD, closed
-        load = self._loads.update(sweep, adduction)
+        load = self._loads.update(sweep, adduction, commands_s)
         if load is not None:
             self._take_in(now_s, phase, load, body_x_m)
         return self._load, closed

@@ -23,12 +23,13 @@ from typing import NamedTuple
 from control.geometry import FlipperGeometry
 from control.joint_friction import NO_FRICTION, JointFriction
 from control.joint_pd import GRAVITY_M_S2, ArmMass
-from control.records import UNKNOWN
+from control.records import UNKNOWN, DriveState
 
 SATURATION = 0.98  # of the limit: clipped currents stay a little under it
 LONGEST_GAP_S = 0.03  # between two samples that still tell of one motion
 SHORTEST_GAP_S = 0.0005  # two frames that an adapter delivered together do not tell when they were made
-NO_COMMANDS = (UNKNOWN, UNKNOWN)
+CommandTimes = tuple[float, float]  # when the drives were given the last two commands that a sample may answer
+NO_COMMANDS: CommandTimes = (UNKNOWN, UNKNOWN)
 
 
 class FlipperDrive(NamedTuple):
@@ -55,21 +56,10 @@ class JointLoad(NamedTuple):
     saturated: bool  # a motor gives all it can: the mud may hold on to more
 
 
-class JointSample(NamedTuple):
-    """The newest of one joint; stamps are those of its messages."""
-
-    angle_rad: float = UNKNOWN
-    velocity_rad_s: float = UNKNOWN
-    current_a: float = UNKNOWN
-    angle_stamp_s: float = UNKNOWN
-    current_stamp_s: float = UNKNOWN
-    commands_s: tuple[float, float] = NO_COMMANDS  # when the drive was given the last two that this may answer
-
-
 JointMotion = tuple[float, float, float, float]  # of one joint at one moment: rad, rad/s, rad/s², A
 
 
-def motion_at(before: JointSample, now: JointSample) -> JointMotion:
+def motion_at(before: DriveState, now: DriveState, commands_s: CommandTimes = NO_COMMANDS) -> JointMotion:
     """At the newest sample, with the acceleration since the one before; zero where velocities are not known."""
     dt_s = now.angle_stamp_s - before.angle_stamp_s
     change_rad_s = now.velocity_rad_s - before.velocity_rad_s
@@ -77,10 +67,11 @@ def motion_at(before: JointSample, now: JointSample) -> JointMotion:
     return now.angle_rad, now.velocity_rad_s, acceleration_rad_s2, now.current_a
 
 
-def motion_between(before: JointSample, now: JointSample) -> JointMotion:
+def motion_between(before: DriveState, now: DriveState, commands_s: CommandTimes = NO_COMMANDS) -> JointMotion:
     """Half-way between two samples; at the newest, without acceleration, where they do not tell of one motion."""
-    angle_before_rad, before_rad_s, current_before_a, angle_before_s, current_before_s, _ = before
-    angle_rad, now_rad_s, current_a, angle_s, current_s, (earlier_s, later_s) = now
+    angle_before_rad, before_rad_s, angle_before_s, current_before_a, current_before_s = before[:5]
+    angle_rad, now_rad_s, angle_s, current_a, current_s = now[:5]
+    earlier_s, later_s = commands_s
     dt_s, change_rad_s = angle_s - angle_before_s, now_rad_s - before_rad_s
     if not (SHORTEST_GAP_S < dt_s < LONGEST_GAP_S and isfinite(change_rad_s)):
         return angle_rad, now_rad_s, 0.0, current_a
@@ -104,7 +95,7 @@ class JointLoads:
         self,
         geometry: FlipperGeometry,
         drive: FlipperDrive,
-        motion: Callable[[JointSample, JointSample], JointMotion] = motion_between,
+        motion: Callable[[DriveState, DriveState, CommandTimes], JointMotion] = motion_between,
     ) -> None:
         self.drive = drive
         self._motion = motion
@@ -116,21 +107,23 @@ class JointLoads:
         self.reset()
 
     def reset(self) -> None:
-        self._sweep = self._adduction = (JointSample(), JointSample())
+        self._sweep = self._adduction = (DriveState(), DriveState())
 
     @property
     def angles_rad(self) -> tuple[float, float]:
         """The newest of sweep and adduction; a load belongs to a moment a little earlier."""
         return self._sweep[1].angle_rad, self._adduction[1].angle_rad
 
-    def update(self, sweep: JointSample, adduction: JointSample) -> JointLoad | None:
+    def update(
+        self, sweep: DriveState, adduction: DriveState, commands_s: CommandTimes = NO_COMMANDS
+    ) -> JointLoad | None:
         """None for samples that repeat the ones before. Velocities may be unknown (NaN)."""
         if _repeats(self._sweep[1], sweep) and _repeats(self._adduction[1], adduction):
             return None
         self._sweep, self._adduction = _paired(self._sweep, sweep), _paired(self._adduction, adduction)
         drive, mass = self.drive, self.drive.mass
-        sweep_rad, sweep_rad_s, sweep_rad_s2, sweep_a = self._motion(*self._sweep)
-        adduction_rad, adduction_rad_s, adduction_rad_s2, adduction_a = self._motion(*self._adduction)
+        sweep_rad, sweep_rad_s, sweep_rad_s2, sweep_a = self._motion(*self._sweep, commands_s)
+        adduction_rad, adduction_rad_s, adduction_rad_s2, adduction_a = self._motion(*self._adduction, commands_s)
         sweep_nm = mass.sweep_inertia_kg_m2 * sweep_rad_s2 - drive.sweep_constant_nm_a * sweep_a
         adduction_nm = mass.adduction_inertia_kg_m2 * adduction_rad_s2 - drive.adduction_constant_nm_a * adduction_a
         if not self._is_smooth:
@@ -157,11 +150,11 @@ class JointLoads:
         )
 
 
-def _repeats(before: JointSample, now: JointSample) -> bool:
+def _repeats(before: DriveState, now: DriveState) -> bool:
     return now.current_a == before.current_a and now.angle_rad == before.angle_rad
 
 
-def _paired(pair: tuple[JointSample, JointSample], now: JointSample) -> tuple[JointSample, JointSample]:
+def _paired(pair: tuple[DriveState, DriveState], now: DriveState) -> tuple[DriveState, DriveState]:
     """With the last sample of another angle: where the current alone is new, the acceleration is still the last one."""
     before, last = pair
     return (before if now.angle_stamp_s == last.angle_stamp_s else last), now

@@ -14,18 +14,14 @@ from typing import Annotated, Literal, NamedTuple
 from control.bounds import Bounds, Meaning
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, MudEstimate
-from control.records import FLIPPERS, NO_LOAD, FlipperLoad, JointAngles, Phase, StrideEstimate
+from control.records import FLIPPERS, NO_LOAD, BodyPose, DriveStates, FlipperLoad, Phase, StrideEstimate
 from estimation.flipper import FlipperEstimator
-from estimation.joint_load import NO_COMMANDS, FlipperDrive, JointSample
+from estimation.joint_load import NO_COMMANDS, FlipperDrive
 from estimation.knowledge import MudKnowledge
 from estimation.mud_map import MudMap
 from estimation.paper import PaperEstimator
 from estimation.strokes.shear import Base
 
-JointVelocities = tuple[float, float, float, float]  # rad/s, in the order of JOINTS
-Currents = tuple[float, float, float, float]  # A, in the order of JOINTS
-Ages = tuple[float, float, float, float]  # s, in the order of JOINTS
-FRESH: Ages = (0.0, 0.0, 0.0, 0.0)
 PAPER_DRAG_N = 2.5  # of the body on its rail
 Method = Literal["default", "paper"]
 
@@ -74,30 +70,16 @@ class MudEstimator:
         self.map.reset()
         self.mud_estimate = NOTHING_KNOWN
 
-    def update(
-        self,
-        now_s: float,
-        phase: Phase,
-        angles_rad: JointAngles,
-        velocities_rad_s: JointVelocities,
-        currents_a: Currents,
-        body_x_m: float,
-        angle_ages_s: Ages = FRESH,
-        current_ages_s: Ages = FRESH,
-    ) -> MudReading:
-        """One sample of everything, in the order of JOINTS, with the ages of its messages; what is not known is NaN."""
+    def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> MudReading:
+        """Take in the newest state of every drive and the body's pose, in the gait's phase that they belong to."""
         commands_s, self._commands_s = self._commands_s, (self._commands_s[1], now_s)
-        a, b, c, d = map(
-            JointSample,
-            angles_rad,
-            velocities_rad_s,
-            currents_a,
-            [now_s - age_s for age_s in angle_ages_s],
-            [now_s - age_s for age_s in current_ages_s],
-            (commands_s, commands_s, commands_s, commands_s),
+        body_x_m = body.x_m
+        left, left_stride = self.left.update(
+            now_s, phase, states.left_sweep, states.left_adduction, body_x_m, commands_s
         )
-        left, left_stride = self.left.update(now_s, phase, a, b, body_x_m)
-        right, right_stride = self.right.update(now_s, phase, c, d, body_x_m)
+        right, right_stride = self.right.update(
+            now_s, phase, states.right_sweep, states.right_adduction, body_x_m, commands_s
+        )
         if left_stride is None and right_stride is None:
             return MudReading(left, right)
         strides = tuple(stride for stride in (left_stride, right_stride) if stride is not None)

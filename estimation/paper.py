@@ -17,9 +17,9 @@ from math import inf, isfinite
 
 from control.gait.recovery import is_in_mud
 from control.geometry import FlipperGeometry
-from control.records import NO_LOAD, UNKNOWN, FlipperLoad, Phase, StrideEstimate
+from control.records import NO_LOAD, UNKNOWN, DriveState, FlipperLoad, Phase, StrideEstimate
 from estimation.force_map import paper_force_n
-from estimation.joint_load import FlipperDrive, JointLoads, JointSample, motion_at
+from estimation.joint_load import NO_COMMANDS, CommandTimes, FlipperDrive, JointLoads, motion_at
 from estimation.stride_clock import StrideClock
 from estimation.strokes.line_fit import LineFit
 
@@ -73,13 +73,19 @@ class PaperEstimator:
             self._body_at_close_m = body_x_m
 
     def update(
-        self, now_s: float, phase: Phase, sweep: JointSample, adduction: JointSample, body_x_m: float
+        self,
+        now_s: float,
+        phase: Phase,
+        sweep: DriveState,
+        adduction: DriveState,
+        body_x_m: float,
+        commands_s: CommandTimes = NO_COMMANDS,
     ) -> tuple[FlipperLoad, StrideEstimate | None]:
         """The load now and, on the first sample after a stride's extraction, what the stride said."""
         closed = self._change_phase(now_s, phase, body_x_m) if phase is not self._clock.phase else None
         if not isfinite(sweep.angle_rad + adduction.angle_rad + sweep.current_a + adduction.current_a):
             return NO_LOAD, closed
-        load = self._loads.update(sweep, adduction)
+        load = self._loads.update(sweep, adduction, commands_s)
         if load is not None:
             length_m = self.geometry.flipper_length_m
             force_n = paper_force_n(load.sweep_rad, load.adduction_rad, load.sweep_nm, load.adduction_nm, length_m)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from control.controller import Controller
 from control.faults import Fault, FaultKind
-from control.records import BodyPose, DriveStates, Estimate, Joints, Phase, StrideEstimate
+from control.records import BodyPose, DriveStates, Estimate, Phase, StrideEstimate
 from estimation.mud import MudEstimator, MudReading
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.depth_methods import adaptation_of, choice_text
@@ -51,22 +51,7 @@ class MudLearning:
         self._firm_ticks = 0
 
     def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> None:
-        a, b, c, d = states
-        self.reading = self.estimator.update(
-            now_s,
-            phase,
-            Joints(a.angle_rad, b.angle_rad, c.angle_rad, d.angle_rad),
-            (a.velocity_rad_s, b.velocity_rad_s, c.velocity_rad_s, d.velocity_rad_s),
-            (a.current_a, b.current_a, c.current_a, d.current_a),
-            body.x_m,
-            (now_s - a.angle_stamp_s, now_s - b.angle_stamp_s, now_s - c.angle_stamp_s, now_s - d.angle_stamp_s),
-            (
-                now_s - a.current_stamp_s,
-                now_s - b.current_stamp_s,
-                now_s - c.current_stamp_s,
-                now_s - d.current_stamp_s,
-            ),
-        )
+        self.reading = self.estimator.update(now_s, phase, states, body)
 
     def step(self, controller: Controller) -> tuple[list[ClosedStride], list[str]]:
         """What this tick changes in the gait: the strides that closed, and sentences for the log."""

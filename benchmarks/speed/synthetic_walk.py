@@ -14,8 +14,8 @@ from control.gait.gait import Gait, GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.plate import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
-from control.records import Phase
-from estimation.joint_load import FlipperDrive, JointSample
+from control.records import DriveState, Phase
+from estimation.joint_load import FlipperDrive
 from firmware_host.ticker import PERIOD_S
 
 DEPTH_M, SURFACE_M = 0.03, 0.002
@@ -30,8 +30,8 @@ class Sample(NamedTuple):
 
     now_s: float
     phase: Phase
-    sweep: JointSample
-    adduction: JointSample
+    sweep: DriveState
+    adduction: DriveState
     body_x_m: float = 0.0
 
 
@@ -50,7 +50,7 @@ def motion() -> list[Sample]:
 
 def sample_of(now_s: float, phase: Phase, sweep: tuple[float, float], adduction: tuple[float, float]) -> Sample:
     """Of angles and velocities, with messages of this very tick."""
-    return Sample(now_s, phase, JointSample(*sweep, 0.0, now_s, now_s), JointSample(*adduction, 0.0, now_s, now_s))
+    return Sample(now_s, phase, DriveState(*sweep, now_s, 0.0, now_s), DriveState(*adduction, now_s, 0.0, now_s))
 
 
 def mud_torques_nm(sample: Sample) -> tuple[float, float]:
@@ -101,7 +101,7 @@ def later(samples: Iterable[Sample], seconds: float) -> list[Sample]:
     ]
 
 
-def _later(joint: JointSample, seconds: float) -> JointSample:
+def _later(joint: DriveState, seconds: float) -> DriveState:
     return joint._replace(angle_stamp_s=joint.angle_stamp_s + seconds, current_stamp_s=joint.current_stamp_s + seconds)
 
 

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
 from control.modes import Mode
-from control.records import FLIPPERS, FlipperLoad, StrideEstimate
+from control.records import FLIPPERS, BodyPose, FlipperLoad, StrideEstimate
 from estimation.mud import EstimationParameters, MudEstimator
+from estimation.recorded_states import recorded_states
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.row_packing import stride_row
 from firmware_host.log.rows import STRIDE
@@ -174,7 +175,9 @@ def _read_lab(lab: LabLog, flipper: str) -> _LabReading:
     columns = (lab.stamp_s, lab.phase, lab.angle_rad, lab.current_a, lab.body_x_m)
     rows = zip(*(column.tolist() for column in columns), strict=True)
     for now_s, phase, angles_rad, currents_a, body_x_m in rows:
-        reported = estimator.update(now_s, PHASES[phase], angles_rad, NO_VELOCITY, currents_a, body_x_m)
+        reported = estimator.update(
+            now_s, PHASES[phase], recorded_states(now_s, angles_rad, NO_VELOCITY, currents_a), BodyPose(now_s, body_x_m)
+        )
         reading.loads.append(reported.left if flipper == FLIPPERS[0] else reported.right)
         reading.strides.extend(stride for stride in reported.strides if stride.flipper in lab.flippers)
         if reported.strides and estimator.mud_estimate.boundary:

@@ -14,9 +14,9 @@ from typing import NamedTuple
 from control.controller import WalkOrder
 from control.gait.gait import SINGLE_FLIPPER, GaitParameters
 from control.mud_estimate import MudEstimate
-from control.records import UNKNOWN, JointAngles, Joints, Phase, StrideEstimate
+from control.records import BodyPose, DriveStates, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
-from estimation.mud import Ages, Currents, EstimationParameters, JointVelocities, MudEstimator
+from estimation.mud import EstimationParameters, MudEstimator
 from firmware_host.configuration.configuration import Configuration, parse_configuration
 from firmware_host.ticker import PERIOD_S
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
@@ -35,12 +35,8 @@ class Sample(NamedTuple):
 
     now_s: float
     phase: Phase
-    angles_rad: JointAngles
-    velocities_rad_s: JointVelocities
-    currents_a: Currents
-    body_x_m: float
-    angle_ages_s: Ages
-    current_ages_s: Ages
+    states: DriveStates
+    body: BodyPose
 
 
 @dataclass(frozen=True)
@@ -114,18 +110,8 @@ def _known_drives(configuration: Configuration, torque_error: float, seed: int) 
 
 
 def _sample_of(lockstep: Lockstep) -> Sample:
-    a, b, c, d = lockstep.loop.states
-    now_s = lockstep.now_s
-    return Sample(
-        now_s,
-        lockstep.loop.target_before.phase,
-        Joints(a.angle_rad, b.angle_rad, c.angle_rad, d.angle_rad),
-        (a.velocity_rad_s, b.velocity_rad_s, c.velocity_rad_s, d.velocity_rad_s),
-        (a.current_a, b.current_a, c.current_a, d.current_a),
-        lockstep.loop.body.x_m,
-        tuple(now_s - state.angle_stamp_s for state in lockstep.loop.states),  # type: ignore[arg-type]
-        tuple(now_s - state.current_stamp_s for state in lockstep.loop.states),  # type: ignore[arg-type]
-    )
+    loop = lockstep.loop
+    return Sample(lockstep.now_s, loop.target_before.phase, loop.states, loop.body)
 
 
 def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool = True) -> list[StrideEstimate]:
@@ -133,7 +119,7 @@ def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool =
     estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters)
     strides: list[StrideEstimate] = []
     for sample in trial.samples:
-        seen = sample if with_pose else sample._replace(body_x_m=UNKNOWN)
+        seen = sample if with_pose else sample._replace(body=BodyPose())
         strides += estimator.update(*seen).strides
     return strides
 

@@ -12,10 +12,11 @@ from pathlib import Path
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.modes import Mode
-from control.records import Phase, StrideEstimate
+from control.records import BodyPose, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
 from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstimator
 from estimation.mud_map import MapRow
+from estimation.recorded_states import recorded_states
 from firmware_host.configuration.configuration import Configuration, ConfigurationError, parse_configuration
 from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
 from firmware_host.log_reading.log_reader import (
@@ -39,7 +40,7 @@ PHASES = tuple(Phase)
 WATCHED_TICKS = 1000  # between two words on how far it is
 TICK_FIELDS = (
     "stamp_s", "mode", "phase",
-    "angle_rad", "velocity_rad_s", "current_a", "body_x_m", "angle_age_s", "current_age_s",
+    "body_x_m", "angle_rad", "velocity_rad_s", "current_a", "angle_age_s", "current_age_s",
 )  # fmt: skip
 
 
@@ -114,10 +115,10 @@ def _strides_of_log(estimator: MudEstimator, log: Log, watch: Watch) -> Iterator
     ticks = log.ticks
     walking, mode_before = int(Mode.WALKING), -1
     rows = zip(*(ticks[name].tolist() for name in TICK_FIELDS), strict=True)
-    for number, (now_s, mode, phase, *sample) in enumerate(rows):
+    for number, (now_s, mode, phase, body_x_m, *signals) in enumerate(rows):
         if number % WATCHED_TICKS == 0:
             watch("ticks replayed", number, len(ticks))
-        reading = estimator.update(now_s, PHASES[phase], *sample)
+        reading = estimator.update(now_s, PHASES[phase], recorded_states(now_s, *signals), BodyPose(now_s, body_x_m))
         yield from reading.strides
         if mode == walking and mode_before != walking:
             estimator.reset()
@@ -146,5 +147,6 @@ def _strides_of_lab(estimator: MudEstimator, lab: LabLog) -> Iterator[StrideEsti
         *(column.tolist() for column in (lab.stamp_s, lab.phase, lab.angle_rad, lab.current_a, lab.body_x_m)),
         strict=True,
     ):
-        reading = estimator.update(now_s, PHASES[phase], angles_rad, NO_VELOCITY, currents_a, body_x_m)
+        states = recorded_states(now_s, angles_rad, NO_VELOCITY, currents_a)
+        reading = estimator.update(now_s, PHASES[phase], states, BodyPose(now_s, body_x_m))
         yield from reading.strides

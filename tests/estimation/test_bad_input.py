@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from control.gait.gait import Gait, GaitParameters
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
-from control.records import NO_LOAD, Estimate, Joints, Phase, StrideEstimate
+from control.records import NO_LOAD, BodyPose, Estimate, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters, Method, MudEstimator, MudReading
+from estimation.recorded_states import recorded_states
 from estimation.strokes.depth_line import COEFFICIENTS_N_M3
 
 GEOMETRY = FlipperGeometry()
@@ -38,8 +39,9 @@ def new_estimator(method: Method) -> MudEstimator:
 def fed(mud: MudEstimator, rows: list[Row], body_m: float = 0.0) -> list[StrideEstimate]:
     strides: list[StrideEstimate] = []
     for now_s, phase, sweep, adduction, sweep_a, adduction_a in rows:
-        angles, currents = Joints(sweep, adduction, sweep, adduction), (sweep_a, adduction_a, sweep_a, adduction_a)
-        strides += mud.update(now_s, phase, angles, (nan,) * 4, currents, body_m).strides
+        angles, currents = (sweep, adduction, sweep, adduction), (sweep_a, adduction_a, sweep_a, adduction_a)
+        states = recorded_states(now_s, angles, (nan,) * 4, currents)
+        strides += mud.update(now_s, phase, states, BodyPose(now_s, body_m)).strides
     return strides
 
 
@@ -295,7 +297,7 @@ def test_velocities_and_poses_of_any_value_are_survived(values: list[float], pha
     mud = new_estimator(method)
     a, b, c, d = values[:4]
     for now_s, where in ((values[12], phase), (1.0, Phase.STANCE), (1.0, Phase.EXTRACTION), (2.0, Phase.SWING)):
-        mud.update(
-            now_s, where, Joints(0.1, 0.2, 0.3, 0.4), (a, b, c, d), (values[4], values[5], values[6], values[7]), a
-        )
-        mud.update(now_s, where, Joints(0.1, 0.2, 0.3, 0.5), (d, c, b, a), (values[8], values[9], 0.0, 0.0), values[11])
+        first = recorded_states(now_s, (0.1, 0.2, 0.3, 0.4), (a, b, c, d), values[4:8])
+        second = recorded_states(now_s, (0.1, 0.2, 0.3, 0.5), (d, c, b, a), (values[8], values[9], 0.0, 0.0))
+        mud.update(now_s, where, first, BodyPose(now_s, a))
+        mud.update(now_s, where, second, BodyPose(now_s, values[11]))

@@ -22,10 +22,10 @@ from control.geometry import FlipperGeometry
 from control.joint_friction import JointFriction
 from control.joint_pd import ArmMass
 from control.plate import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
-from control.records import NO_LOAD, Estimate, GaitTarget, Phase, StrideEstimate
+from control.records import NO_LOAD, DriveState, Estimate, GaitTarget, Phase, StrideEstimate
 from estimation.flipper import CLINGING_M, FlipperEstimator
 from estimation.force_map import smallest_force_n
-from estimation.joint_load import FlipperDrive, JointSample
+from estimation.joint_load import FlipperDrive
 from estimation.strokes.shear import Base
 from estimation.strokes.stroke_fit import MIN_VERTICAL_LEVER_M, NOT_OUT
 
@@ -72,8 +72,8 @@ class Row(NamedTuple):
 
     now_s: float
     phase: Phase
-    sweep: JointSample
-    adduction: JointSample
+    sweep: DriveState
+    adduction: DriveState
     body_m: float = 0.0
 
     @property
@@ -150,8 +150,8 @@ def rows_of(moments: Iterable[Moment], mud: Mud = MUD, drive: FlipperDrive = WEI
         lift_nm = mass.adduction_inertia_kg_m2 * lift_rad_s2 - gravity_nm[1] - load_nm[1]
         sweep_a = (sweep_nm + drive.sweep_friction.torque_nm(sweep_rad, sweep_rad_s)) / drive.sweep_constant_nm_a
         lift_a = (lift_nm + drive.adduction_friction.torque_nm(lift_rad, lift_rad_s)) / drive.adduction_constant_nm_a
-        sweep = JointSample(sweep_rad, sweep_rad_s, sweep_a, now_s, now_s)
-        rows.append(Row(now_s, phase, sweep, JointSample(lift_rad, lift_rad_s, lift_a, now_s, now_s)))
+        sweep = DriveState(sweep_rad, sweep_rad_s, now_s, sweep_a, now_s)
+        rows.append(Row(now_s, phase, sweep, DriveState(lift_rad, lift_rad_s, now_s, lift_a, now_s)))
     return rows
 
 

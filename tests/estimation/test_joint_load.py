@@ -11,14 +11,15 @@ from hypothesis import strategies as st
 from control.geometry import FlipperGeometry
 from control.joint_friction import JointFriction
 from control.joint_pd import ArmMass
+from control.records import DriveState
 from estimation.joint_load import (
     LONGEST_GAP_S,
     NO_COMMANDS,
     SATURATION,
+    CommandTimes,
     FlipperDrive,
     JointLoad,
     JointLoads,
-    JointSample,
     motion_at,
     motion_between,
 )
@@ -33,11 +34,11 @@ angles = st.floats(-pi / 3, pi / 3)
 currents = st.floats(-20.0, 20.0)
 
 
-def sample(angle_rad: float, velocity_rad_s: float, current_a: float, now_s: float) -> JointSample:
-    return JointSample(angle_rad, velocity_rad_s, current_a, now_s, now_s)
+def sample(angle_rad: float, velocity_rad_s: float, current_a: float, now_s: float) -> DriveState:
+    return DriveState(angle_rad, velocity_rad_s, now_s, current_a, now_s)
 
 
-def one(drive: FlipperDrive, sweep: JointSample, adduction: JointSample) -> JointLoad:
+def one(drive: FlipperDrive, sweep: DriveState, adduction: DriveState) -> JointLoad:
     load = JointLoads(GEOMETRY, drive).update(sweep, adduction)
     assert load is not None
     return load
@@ -134,14 +135,14 @@ def swinging(now_s: float, rate_rad_s: float, amplitude_rad: float) -> tuple[flo
 def loads_of_a_free_arm(angle_every_s: float, current_every_s: float, shift_s: float) -> list[JointLoad]:
     """Both joints swing in the air as fast as an extraction; angle and current are messages of their own."""
 
-    def joint(now_s: float, constant_nm_a: float, inertia_kg_m2: float, place: int) -> JointSample:
+    def joint(now_s: float, constant_nm_a: float, inertia_kg_m2: float, place: int) -> DriveState:
         angle_s = now_s - now_s % angle_every_s
         current_s = now_s - (now_s - shift_s) % current_every_s
         poses = [[swinging(at_s, 20.0, 0.3), swinging(at_s + 0.02, 25.0, 0.2)] for at_s in (angle_s, current_s)]
         angle_rad, velocity_rad_s, _ = poses[0][place]
         gravity_nm = MASS.gravity_torques_nm(poses[1][0][0], poses[1][1][0])[place]
         current_a = (inertia_kg_m2 * poses[1][place][2] - gravity_nm) / constant_nm_a
-        return JointSample(angle_rad, velocity_rad_s, current_a, angle_s, current_s)
+        return DriveState(angle_rad, velocity_rad_s, angle_s, current_a, current_s)
 
     loads, seen = JointLoads(GEOMETRY, DRIVE), list[JointLoad]()
     for tick in range(200):
@@ -235,8 +236,8 @@ def test_samples_that_do_not_tell_of_one_motion_are_taken_as_they_are(gap_s: flo
     ],
 )
 def test_the_current_is_that_of_the_moment_between_the_angles(stamps_s: tuple[float, float], current_a: float) -> None:
-    before = JointSample(0.0, 0.0, 2.0, 1.00, stamps_s[0])
-    now = JointSample(0.1, 1.0, 4.0, 1.01, stamps_s[1])
+    before = DriveState(0.0, 0.0, 1.00, 2.0, stamps_s[0])
+    now = DriveState(0.1, 1.0, 1.01, 4.0, stamps_s[1])
     assert motion_between(before, now)[3] == pytest.approx(current_a)
 
 
@@ -251,9 +252,9 @@ def test_the_current_is_that_of_the_moment_between_the_angles(stamps_s: tuple[fl
 def test_the_current_is_that_of_each_of_two_commands_for_its_time(
     stamps_s: tuple[float, float], commands_s: tuple[float, float], current_a: float
 ) -> None:
-    before = JointSample(0.0, 0.0, 2.0, 1.00, stamps_s[0])
-    now = JointSample(0.1, 1.0, 4.0, 1.01, stamps_s[1], commands_s)
-    assert motion_between(before, now)[3] == pytest.approx(current_a)
+    before = DriveState(0.0, 0.0, 1.00, 2.0, stamps_s[0])
+    now = DriveState(0.1, 1.0, 1.01, 4.0, stamps_s[1])
+    assert motion_between(before, now, commands_s)[3] == pytest.approx(current_a)
 
 
 @pytest.mark.parametrize(
@@ -268,9 +269,9 @@ def test_the_current_is_that_of_each_of_two_commands_for_its_time(
 def test_where_two_currents_do_not_answer_the_last_two_commands_it_is_that_of_the_line(
     commands_s: tuple[float, float],
 ) -> None:
-    before = JointSample(0.0, 0.0, 2.0, 1.00, 0.999)
-    now = JointSample(0.1, 1.0, 4.0, 1.01, 1.009, commands_s)
-    assert motion_between(before, now) == motion_between(before, now._replace(commands_s=NO_COMMANDS))
+    before = DriveState(0.0, 0.0, 1.00, 2.0, 0.999)
+    now = DriveState(0.1, 1.0, 1.01, 4.0, 1.009)
+    assert motion_between(before, now, commands_s) == motion_between(before, now, NO_COMMANDS)
 
 
 MUD_NM = -0.1
@@ -291,15 +292,15 @@ def loads_of_a_driven_arm(message_s: float, known: bool) -> list[float]:
         now_s = float(times_s[tick])
         angle_s, current_s = (now_s - (now_s - shift_s) % message_s for shift_s in (0.0003, 0.0008))
         place = int(current_s / TICK_S)
-        sample = JointSample(
-            float(np.interp(angle_s, times_s, angles_rad)),
-            float(np.interp(angle_s, times_s, speeds_rad_s)),
-            float(torques_nm[place]) / LIFT_NM_A,
-            angle_s,
-            current_s,
-            (float(times_s[tick - 2]), float(times_s[tick - 1])) if known else NO_COMMANDS,
+        sample = DriveState(
+            angle_rad=float(np.interp(angle_s, times_s, angles_rad)),
+            velocity_rad_s=float(np.interp(angle_s, times_s, speeds_rad_s)),
+            angle_stamp_s=angle_s,
+            current_a=float(torques_nm[place]) / LIFT_NM_A,
+            current_stamp_s=current_s,
         )
-        load = loads.update(JointSample(0.0, 0.0, 0.0, angle_s, current_s), sample)
+        commands_s = (float(times_s[tick - 2]), float(times_s[tick - 1])) if known else NO_COMMANDS
+        load = loads.update(DriveState(0.0, 0.0, angle_s, 0.0, current_s), sample, commands_s)
         if load is not None and tick > 10:
             reported.append(load.adduction_nm)
     return reported
@@ -355,7 +356,8 @@ def test_a_sample_that_repeats_the_one_before_is_none() -> None:
     pair = (sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0))
     assert loads.update(*pair) is not None
     assert loads.update(*pair) is None
-    assert loads.update(*(each._replace(angle_stamp_s=1.1, current_stamp_s=1.1) for each in pair)) is None
+    sweep, adduction = (each._replace(angle_stamp_s=1.1, current_stamp_s=1.1) for each in pair)
+    assert loads.update(sweep, adduction) is None
 
 
 @pytest.mark.parametrize("place", [0, 1])
@@ -363,10 +365,10 @@ def test_a_sample_that_repeats_the_one_before_is_none() -> None:
 def test_a_change_of_any_angle_or_current_is_new(place: int, field: str) -> None:
     loads = JointLoads(GEOMETRY, DRIVE)
     pair = [sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0)]
-    loads.update(*pair)
+    loads.update(pair[0], pair[1])
     change: dict[str, Any] = {field: 0.5}
     pair[place] = pair[place]._replace(**change)
-    assert loads.update(*pair) is not None
+    assert loads.update(pair[0], pair[1]) is not None
 
 
 def test_repeats_between_two_samples_change_nothing() -> None:
@@ -388,13 +390,15 @@ def test_a_reset_forgets_the_sample_before() -> None:
 
 
 anything = st.floats()
-samples = st.builds(JointSample, anything, anything, anything, anything, anything, st.tuples(anything, anything))
+samples = st.builds(DriveState, anything, anything, anything, anything, anything)
 
 
-@given(st.lists(st.tuples(samples, samples), max_size=5))
-def test_nothing_but_an_angle_without_a_sine_makes_it_raise(pairs: list[tuple[JointSample, JointSample]]) -> None:
+@given(st.lists(st.tuples(samples, samples, st.tuples(anything, anything)), max_size=5))
+def test_nothing_but_an_angle_without_a_sine_makes_it_raise(
+    rows: list[tuple[DriveState, DriveState, CommandTimes]],
+) -> None:
     """The estimator skips samples whose angle or current is not finite."""
     loads = JointLoads(GEOMETRY, DRIVE)
-    for sweep, adduction in pairs:
+    for sweep, adduction, commands_s in rows:
         if np.isfinite([sweep.angle_rad, adduction.angle_rad, sweep.current_a, adduction.current_a]).all():
-            loads.update(sweep, adduction)
+            loads.update(sweep, adduction, commands_s)

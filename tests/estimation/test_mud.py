@@ -12,15 +12,17 @@ import pytest
 from benchmarks.speed.synthetic_walk import DRIVE, GEOMETRY, K_P, Sample, later, stride_samples
 from control.joint_pd import ArmMass
 from control.mud_estimate import NOTHING_KNOWN
-from control.records import FLIPPERS, NO_LOAD, Joints, Phase, StrideEstimate, same_for_all
+from control.records import FLIPPERS, NO_LOAD, BodyPose, Joints, Phase, StrideEstimate
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import FlipperDrive
-from estimation.mud import FRESH, PAPER_DRAG_N, Ages, EstimationParameters, Method, MudEstimator, MudReading
+from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstimator, MudReading
 from estimation.mud_map import PIECE_M
 from estimation.paper import PaperEstimator
+from estimation.recorded_states import NO_AGES_S, recorded_states
 from estimation.strokes.shear import Base
 from firmware_host.ticker import PERIOD_S
 
+Four = tuple[float, float, float, float]
 STRIDES, PERIOD_OF_STRIDE_S = 3, 2.0
 
 
@@ -35,11 +37,8 @@ def estimator(method: Method = "default") -> MudEstimator:
 
 
 def update(mud: MudEstimator, left: Sample, right: Sample, body_x_m: float = 0.0) -> MudReading:
-    joints = (left.sweep, left.adduction, right.sweep, right.adduction)
-    a, b, c, d = (joint.angle_rad for joint in joints)
-    e, f, g, h = (joint.velocity_rad_s for joint in joints)
-    i, j, k, l = (joint.current_a for joint in joints)  # noqa: E741
-    return mud.update(left.now_s, left.phase, Joints(a, b, c, d), (e, f, g, h), (i, j, k, l), body_x_m)
+    states = Joints(left.sweep, left.adduction, right.sweep, right.adduction)
+    return mud.update(left.now_s, left.phase, states, BodyPose(left.now_s, body_x_m))
 
 
 def strides_of(
@@ -58,25 +57,14 @@ def flipper_estimator(flipper: str, method: Method) -> FlipperEstimator | PaperE
     return FlipperEstimator(flipper, GEOMETRY, DRIVE, Base.FIXED, PAPER_DRAG_N)
 
 
-def commanded(samples: Sequence[Sample]) -> list[Sample]:
-    """With the moments of the two samples before, after which the drives are commanded."""
-    times_s = [nan, nan, *(sample.now_s for sample in samples)]
-    return [
-        sample._replace(
-            sweep=sample.sweep._replace(commands_s=(earlier_s, later_s)),
-            adduction=sample.adduction._replace(commands_s=(earlier_s, later_s)),
-        )
-        for sample, earlier_s, later_s in zip(samples, times_s, times_s[1:], strict=False)
-    ]
-
-
 @pytest.mark.parametrize("method", ["default", "paper"])
 def test_each_flipper_is_told_what_it_would_be_told_alone(method: Method) -> None:
-    left, right, mud = commanded(walk(1)), commanded(walk(2)), estimator(method)
+    left, right, mud = walk(1), walk(2), estimator(method)
     alone = {flipper: flipper_estimator(flipper, method) for flipper in FLIPPERS}
-    for a, b in zip(left, right, strict=True):
+    times_s = [nan, nan, *(sample.now_s for sample in left)]  # a sample answers the commands of the two before it
+    for a, b, earlier_s, later_s in zip(left, right, times_s, times_s[1:], strict=False):
         reading = update(mud, a, b)
-        reported = [alone[flipper].update(*sample) for flipper, sample in (("left", a), ("right", b))]
+        reported = [alone[flipper].update(*row, (earlier_s, later_s)) for flipper, row in (("left", a), ("right", b))]
         assert repr(reading[:2]) == repr((reported[0][0], reported[1][0]))
         assert repr(reading.strides) == repr(tuple(stride for _, stride in reported if stride is not None))
 
@@ -103,14 +91,8 @@ def test_each_joint_has_its_own_torque_constant(method: Method) -> None:
     weightless = ArmMass(0.0, 0.0, 0.0, 0.0)
     drives = (FlipperDrive(weightless, 0.05, 0.06), FlipperDrive(weightless, 0.07, 0.08))
     mud = MudEstimator(GEOMETRY, drives, EstimationParameters(method=method))
-    reading = mud.update(
-        0.0,
-        Phase.REST,
-        same_for_all(0.0),
-        (0.0,) * 4,
-        (1.0, 2.0, 3.0, 4.0),
-        0.0,
-    )
+    states = recorded_states(0.0, (0.0,) * 4, (0.0,) * 4, (1.0, 2.0, 3.0, 4.0))
+    reading = mud.update(0.0, Phase.REST, states, BodyPose(0.0, 0.0))
     torques = [getattr(load, name) for load in reading[:2] for name in ("sweep_torque_nm", "adduction_torque_nm")]
     assert torques == pytest.approx([-0.05, -0.12, -0.21, -0.32])
 
@@ -238,7 +220,7 @@ def swayed(tick: int, age_s: float) -> tuple[float, float, float]:
     )
 
 
-def load_of_a_free_arm_nm(angle_ages_s: Ages, current_ages_s: Ages, reported: bool) -> list[float]:
+def load_of_a_free_arm_nm(angle_ages_s: Four, current_ages_s: Four, reported: bool) -> list[float]:
     """Largest load of each joint, of arms that sway in the air: what moves them is all inertia, so there is none.
 
     `told`: whether the estimator knows the ages.
@@ -251,30 +233,27 @@ def load_of_a_free_arm_nm(angle_ages_s: Ages, current_ages_s: Ages, reported: bo
         currents = [
             inertia * swayed(tick, age_s)[2] / 0.083 for inertia, age_s in zip(inertias, current_ages_s, strict=True)
         ]
-        ages = (angle_ages_s, current_ages_s) if reported else (FRESH, FRESH)
-        reading = mud.update(now_s, Phase.REST, four(angles), four(speeds), four(currents), 0.0, *ages)
+        ages = (angle_ages_s, current_ages_s) if reported else (NO_AGES_S, NO_AGES_S)
+        states = recorded_states(now_s, angles, speeds, currents, *ages)
+        reading = mud.update(now_s, Phase.REST, states, BodyPose(now_s, 0.0))
         loads = [getattr(load, name) for load in reading[:2] for name in ("sweep_torque_nm", "adduction_torque_nm")]
         if tick > 1:  # two samples tell an acceleration
             largest_nm = [max(a, abs(b)) for a, b in zip(largest_nm, loads, strict=True)]
     return largest_nm
 
 
-def four(values: Sequence[float]) -> Joints[float]:
-    return Joints(*values)
+ANGLES_OLD: tuple[Four, Four] = ((0.001, 0.0005, 0.0, 0.002), NO_AGES_S)
+CURRENTS_OLD: tuple[Four, Four] = (NO_AGES_S, (0.001, 0.0, 0.0005, 0.002))
+BOTH_OLD: tuple[Four, Four] = ((0.0, 0.002, 0.001, 0.0005), (0.002, 0.0005, 0.0, 0.001))
 
 
-ANGLES_OLD: tuple[Ages, Ages] = ((0.001, 0.0005, 0.0, 0.002), FRESH)
-CURRENTS_OLD: tuple[Ages, Ages] = (FRESH, (0.001, 0.0, 0.0005, 0.002))
-BOTH_OLD: tuple[Ages, Ages] = ((0.0, 0.002, 0.001, 0.0005), (0.002, 0.0005, 0.0, 0.001))
-
-
-@pytest.mark.parametrize("ages", [(FRESH, FRESH), ANGLES_OLD, CURRENTS_OLD, BOTH_OLD])
-def test_messages_of_any_age_tell_the_load_of_fresh_ones(ages: tuple[Ages, Ages]) -> None:
+@pytest.mark.parametrize("ages", [(NO_AGES_S, NO_AGES_S), ANGLES_OLD, CURRENTS_OLD, BOTH_OLD])
+def test_messages_of_any_age_tell_the_load_of_fresh_ones(ages: tuple[Four, Four]) -> None:
     assert max(load_of_a_free_arm_nm(*ages, reported=True)) < 1e-9 * LARGEST_NM
 
 
 @pytest.mark.parametrize("ages", [ANGLES_OLD, BOTH_OLD])
-def test_ages_that_are_not_told_would_be_taken_for_mud(ages: tuple[Ages, Ages]) -> None:
+def test_ages_that_are_not_told_would_be_taken_for_mud(ages: tuple[Four, Four]) -> None:
     """A millisecond of 5 Hz is 3 % of the inertia."""
     assert max(load_of_a_free_arm_nm(*ages, reported=False)) > 0.03 * LARGEST_NM
 
@@ -285,9 +264,9 @@ def test_a_current_that_is_younger_than_the_command_which_it_answers_needs_no_ag
 
 def test_ages_change_nothing_where_nothing_moves() -> None:
     mud = estimator()
-    standing = (Joints(0.1, 0.2, 0.3, 0.4), (0.0, 0.0, 0.0, 0.0), (1.0, 2.0, 3.0, 4.0))
-    fresh = mud.update(0.0, Phase.REST, *standing, 0.0)
+    standing = ((0.1, 0.2, 0.3, 0.4), (0.0,) * 4, (1.0, 2.0, 3.0, 4.0))
+    fresh = mud.update(0.0, Phase.REST, recorded_states(0.0, *standing), BodyPose())
     mud.reset()
-    old = mud.update(0.0, Phase.REST, *standing, 0.0, (0.01,) * 4, (0.02,) * 4)
+    old = mud.update(0.0, Phase.REST, recorded_states(0.0, *standing, (0.01,) * 4, (0.02,) * 4), BodyPose())
     assert old == fresh
     assert isfinite(sum(fresh.left + fresh.right))

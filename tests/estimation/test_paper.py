@@ -16,8 +16,18 @@ from control.gait.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_durat
 from control.gait.recovery import OUT_M, lowest_m
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
-from control.records import NO_LOAD, FlipperLoad, Joints, Phase, StrideEstimate, same_for_all
-from estimation.joint_load import FlipperDrive, JointSample
+from control.records import (
+    NO_LOAD,
+    BodyPose,
+    DriveState,
+    FlipperJoints,
+    FlipperLoad,
+    Joints,
+    Phase,
+    StrideEstimate,
+    same_for_all,
+)
+from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters, MudEstimator
 from estimation.paper import MOBILISED_M, STEADY_FRACTION, SURFACE_FORCE_N, PaperEstimator
 
@@ -130,12 +140,15 @@ def estimator(mass: ArmMass = WEIGHTLESS) -> PaperEstimator:
     return PaperEstimator("left", GEOMETRY, FlipperDrive(mass, SWEEP_NM_A, ADDUCTION_NM_A))
 
 
+def states_of(sample: Sample) -> FlipperJoints[DriveState]:
+    """Messages that are as new as the tick."""
+    now_s, _, sweep_rad, adduction_rad, sweep_rad_s, adduction_rad_s, sweep_a, adduction_a, _ = sample
+    sweep = DriveState(sweep_rad, sweep_rad_s, now_s, sweep_a, now_s)
+    return FlipperJoints(sweep, DriveState(adduction_rad, adduction_rad_s, now_s, adduction_a, now_s))
+
+
 def feed(flipper: PaperEstimator, sample: Sample) -> tuple[FlipperLoad, StrideEstimate | None]:
-    """As messages that are as new as the tick."""
-    now_s, phase, sweep_rad, adduction_rad, sweep_rad_s, adduction_rad_s, sweep_a, adduction_a, body_x_m = sample
-    sweep = JointSample(sweep_rad, sweep_rad_s, sweep_a, now_s, now_s)
-    adduction = JointSample(adduction_rad, adduction_rad_s, adduction_a, now_s, now_s)
-    return flipper.update(now_s, phase, sweep, adduction, body_x_m)
+    return flipper.update(sample.now_s, sample.phase, *states_of(sample), sample.body_x_m)
 
 
 def closed(samples: Iterable[Sample], flipper: PaperEstimator | None = None) -> list[StrideEstimate]:
@@ -565,10 +578,8 @@ def both(left: list[Sample], right: list[Sample]) -> list[StrideEstimate]:
         reading = mud.update(
             a.now_s,
             a.phase,
-            Joints(a.sweep_rad, a.adduction_rad, b.sweep_rad, b.adduction_rad),
-            (a.sweep_velocity_rad_s, a.adduction_velocity_rad_s, b.sweep_velocity_rad_s, b.adduction_velocity_rad_s),
-            (a.sweep_current_a, a.adduction_current_a, b.sweep_current_a, b.adduction_current_a),
-            0.0,
+            Joints(*states_of(a), *states_of(b)),
+            BodyPose(a.now_s, 0.0),
         )
         strides += reading.strides
     return strides
@@ -593,13 +604,7 @@ def test_each_joint_has_its_own_torque_constant() -> None:
     constants = (0.05, 0.06, 0.07, 0.08)
     drives = (FlipperDrive(WEIGHTLESS, *constants[:2]), FlipperDrive(WEIGHTLESS, *constants[2:]))
     mud = MudEstimator(GEOMETRY, drives, EstimationParameters(method="paper"))
-    reading = mud.update(
-        0.0,
-        Phase.REST,
-        same_for_all(0.0),
-        (0.0,) * 4,
-        (1.0, 1.0, 1.0, 1.0),
-        0.0,
-    )
+    states = same_for_all(DriveState(angle_rad=0.0, velocity_rad_s=0.0, current_a=1.0))
+    reading = mud.update(0.0, Phase.REST, states, BodyPose())
     torques = [getattr(load, name) for load in reading[:2] for name in ("sweep_torque_nm", "adduction_torque_nm")]
     assert torques == [-constant for constant in constants]

@@ -21,7 +21,8 @@ from control.geometry import FlipperGeometry
 from control.records import JointAngles, Phase
 from drivers.pose.natnet_parameters import NatNetParameters
 from drivers.pose.natnet_port import NatNetPort
-from estimation.mud import Currents, EstimationParameters, MudEstimator
+from estimation.mud import EstimationParameters, MudEstimator
+from estimation.recorded_states import recorded_states
 from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
 from firmware_host.log_reading.replay import LAB_DRIVE, NO_VELOCITY
 from simulation.devices.natnet_server import LOOPBACK, NatNetServer, RecordedPose
@@ -103,7 +104,7 @@ def walked(path: Path, latency_s: float) -> Walked:
         for row, (now_s, phase, angles_rad, currents_a) in enumerate(rows_of(lab)):
             server.step(now_s)
             body = port.read(now_s)
-            reading = estimator.update(now_s, phase, angles_rad, NO_VELOCITY, currents_a, body.x_m)
+            reading = estimator.update(now_s, phase, recorded_states(now_s, angles_rad, NO_VELOCITY, currents_a), body)
             positions_m.append(body.x_m)
             ends += [row for stride in reading.strides if stride.flipper == "left"]
             steps_m += [stride.step_m for stride in reading.strides if stride.flipper == "left"]
@@ -118,7 +119,7 @@ def connect(server: NatNetServer, port: NatNetPort) -> None:
         server.step(now_s)
 
 
-def rows_of(lab: LabLog) -> Iterator[tuple[float, Phase, JointAngles, Currents]]:
+def rows_of(lab: LabLog) -> Iterator[tuple[float, Phase, JointAngles, list[float]]]:
     columns = (lab.stamp_s, lab.phase, lab.angle_rad, lab.current_a)
     for now_s, phase, angles_rad, currents_a in zip(*(column.tolist() for column in columns), strict=True):
         yield now_s, PHASES[phase], angles_rad, currents_a
