@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
+from math import isfinite
 from typing import Generic, NamedTuple, TypeVar
 
 T = TypeVar("T")
@@ -100,6 +101,11 @@ class DriveState(NamedTuple):
     temperature_stamp_s: float = NEVER_S
     bus_voltage_v: float = UNKNOWN
     bus_voltage_stamp_s: float = NEVER_S
+
+    @property
+    def heard(self) -> bool:
+        """Every signal that control depends on has arrived at least once."""
+        return isfinite(self.angle_stamp_s + self.current_stamp_s + self.heartbeat_stamp_s)
 
 
 DriveStates = Joints[DriveState]

@@ -20,10 +20,10 @@ from pathlib import Path
 
 from control.modes import ENERGISED, Mode, Request
 from drivers.can.reopening_port import ReopeningPort
+from drivers.drive_types import make_drives
 from drivers.fault_injection.failing_port import failing_ports
 from drivers.fault_injection.failing_pose import failing_pose
 from drivers.fault_injection.failures import Failures
-from drivers.odrive.drives import OdriveDrives
 from drivers.pose.pose_port import OpenedPose, PoseSourceError
 from firmware_host.buses import BusError, reopening_ports
 from firmware_host.computer.realtime import prepare_loop
@@ -128,7 +128,7 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         failures = failures_of(configuration)
         buses = reopening_ports(configuration.bus, configuration.loop.wait_for_bus)
         ports = failing_ports(buses, configuration.drive, failures)
-        drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
+        drives = make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         stack.callback(drives.close)
         pose = open_pose(configuration.pose)
         stack.callback(pose.close)
@@ -208,9 +208,7 @@ def reopen_pose(loop: Loop, pose: OpenedPose, now_s: float) -> None:
 
 def _end_safely(loop: Loop, problem: Exception) -> int:
     """Idle the drives, whatever state the rest is in, and say what happened."""
-    for axis in loop.drives.axes * GOODBYE_FRAMES:
-        with suppress(Exception):  # what broke may be one bus; the others' drives still have to hear it
-            axis.disarm()
+    loop.drives.force_idle(GOODBYE_FRAMES)
     place = traceback.extract_tb(problem.__traceback__)[-1]
     message = f"{type(problem).__name__}: {problem} ({Path(place.filename).name}, line {place.lineno})"
     print(f"mudskipperd: stopped by a bug, the drives are idle: {message}", file=sys.stderr)

@@ -15,9 +15,7 @@ from control.modes import ENERGISED, HELD, MOVING, Mode
 from control.monitors.joint_monitor import JointFacts, JointMonitor
 from control.records import JOINTS, NEVER_S, BodyPose, DriveStates, Joints
 from drivers.can.can_port import BusState
-from drivers.odrive.axis import OdriveAxis
-from drivers.odrive.codec import error_text
-from drivers.odrive.drives import OdriveDrives
+from drivers.drive import DriveHealth, Drives
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.log_monitor import LogMonitor
 from firmware_host.log.recorder import LogReport
@@ -26,7 +24,6 @@ from firmware_host.ticker import PERIOD_S, Tick
 
 ARMING_S = 2.0  # a drive that takes longer to go into closed loop does not mean to
 REFUSED_TICKS = 3  # in a row, in each of which one bus lost a command
-FIRMWARE = (0, 6)  # major and minor version whose messages the codec knows
 BUS_TROUBLE_S = 2.0  # after the last error frame
 POSE_FORGOTTEN_S = 10.0  # a motion capture that was switched off on purpose
 BROKEN = frozenset({FaultKind.ENCODER_JUMP, FaultKind.ENCODER_STUCK})  # they show in some ticks, and last
@@ -58,7 +55,7 @@ class MonitorInput(NamedTuple):
 class FaultMonitor:
     """Owns the watches of the joints and of the loop, and what is counted over ticks."""
 
-    def __init__(self, configuration: Configuration, drives: OdriveDrives) -> None:
+    def __init__(self, configuration: Configuration, drives: Drives) -> None:
         self._drives = drives
         self.joints = tuple(
             JointMonitor(
@@ -89,8 +86,8 @@ class FaultMonitor:
         self._error_s = dict.fromkeys(self._drives.ports, NEVER_S)
         self._lost_frames = {name: port.lost_frames for name, port in self._drives.ports.items()}
         self._refused_ticks = dict.fromkeys(self._drives.ports, 0)
-        self._restarts = {axis.joint: axis.restarts for axis in self._drives.axes}
-        self._refused_commands = self._drives.gate.refused
+        self._restarts = {health.joint: health.restarts for health in self._drives.health}
+        self._refused_commands = self._drives.refused_commands
         self._pose_stamp_s: float | None = None
         self._broken: set[str] = set()  # encoders, until torque is off
         self.trusted: Joints[bool] = ALL_TRUSTED  # of the joints' encoders
@@ -124,11 +121,10 @@ class FaultMonitor:
         if monitor_input.mode is Mode.ARMING and tick.now_s - monitor_input.mode_since_s > ARMING_S:
             self._watch_arming(found, monitor_input.states)
         self._watch_gate(found)
-        for axis in self._drives.axes:
-            self._watch_axis(found, axis)
-            if axis.busy_state and monitor_input.mode not in ENERGISED:
-                activity = f"in axis state {axis.busy_state}"
-                found.append(FaultKind.DRIVE_ENERGISED.fault(axis.joint, activity=activity))
+        for health in self._drives.health:
+            self._watch_drive(found, health)
+            if health.busy_state and monitor_input.mode not in ENERGISED:
+                found.append(FaultKind.DRIVE_ENERGISED.fault(health.joint, activity=f"in {health.busy_state}"))
         self._watch_pose(found, tick.now_s, monitor_input.body)
         return found
 
@@ -153,8 +149,8 @@ class FaultMonitor:
     def _watch_joints(self, found: list[Fault], tick: Tick, monitor_input: MonitorInput) -> None:
         mode, sent_nm = monitor_input.mode, monitor_input.sent.torques_nm
         dt_s = (1 + tick.missed) * PERIOD_S
-        for joint, axis, state, torque_nm in zip(
-            self.joints, self._drives.axes, monitor_input.states, sent_nm, strict=True
+        for joint, health, state, torque_nm in zip(
+            self.joints, self._drives.health, monitor_input.states, sent_nm, strict=True
         ):
             facts = JointFacts(
                 tick.now_s,
@@ -164,7 +160,7 @@ class FaultMonitor:
                 torque_nm,
                 monitor_input.freeing or mode not in HELD,
             )
-            found += [_explained(fault, axis) for fault in joint.update(facts, state)]
+            found += [_explained(fault, health) for fault in joint.update(facts, state)]
 
     def _watch_trust(self, found: list[Fault], mode: Mode) -> None:
         """What breaks an encoder shows in some ticks only, silence in all of its own."""
@@ -180,24 +176,23 @@ class FaultMonitor:
                 found.append(FaultKind.ARMING_FAILED.fault(joint, longest_s=ARMING_S))
 
     def _watch_gate(self, found: list[Fault]) -> None:
-        gate = self._drives.gate
-        if gate.refused > self._refused_commands:
-            self._refused_commands = gate.refused
-            found.append(FaultKind.COMMAND_REFUSED.fault(reason=gate.last_refusal))
+        refused = self._drives.refused_commands
+        if refused > self._refused_commands:
+            self._refused_commands = refused
+            found.append(FaultKind.COMMAND_REFUSED.fault(reason=self._drives.last_refusal))
 
-    def _watch_axis(self, found: list[Fault], axis: OdriveAxis) -> None:
+    def _watch_drive(self, found: list[Fault], health: DriveHealth) -> None:
         """What a drive tells of itself beside its signals."""
-        joint = axis.joint
-        if axis.restarts != self._restarts[joint]:
-            self._restarts[joint] = axis.restarts
+        joint = health.joint
+        if health.restarts != self._restarts[joint]:
+            self._restarts[joint] = health.restarts
             found.append(FaultKind.DRIVE_RESTARTED.fault(joint))
-        if axis.duplicates:
+        if health.duplicate_id:
             found.append(FaultKind.DUPLICATE_NODE_ID.fault(joint))
-        if axis.version is None or (axis.version.major, axis.version.minor) != FIRMWARE:
-            version = ".".join(map(str, axis.version)) if axis.version else "unknown"
-            supported = ".".join(map(str, FIRMWARE))
+        if not health.firmware_supported:
+            version, supported = health.firmware or "unknown", health.supported_firmware
             found.append(FaultKind.DRIVE_VERSION.fault(joint, version=version, supported=supported))
-        self._watch_watchdog(found, joint, axis.watchdog_s)
+        self._watch_watchdog(found, joint, health.watchdog_s)
 
     def _watch_watchdog(self, found: list[Fault], joint: str, watchdog_s: float) -> None:
         """It alone acts when this program dies."""
@@ -218,9 +213,8 @@ class FaultMonitor:
                 self._pose_stamp_s = None
 
 
-def _explained(fault: Fault, axis: OdriveAxis) -> Fault:
+def _explained(fault: Fault, health: DriveHealth) -> Fault:
     """The fault with the drive's own error text as its reason."""
-    flags = axis.state.error_flags | axis.disarm_reason
-    if fault.kind not in EXPLAINED or not flags:
+    if fault.kind not in EXPLAINED or not health.errors:
         return fault
-    return fault.with_values(reason=error_text(flags))
+    return fault.with_values(reason=health.errors)

@@ -27,7 +27,7 @@ from control.records import (
     Torques,
     same_for_all,
 )
-from drivers.odrive.drives import OdriveDrives
+from drivers.drive import Drives
 from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
@@ -50,7 +50,7 @@ class Loop:
     def __init__(
         self,
         configuration: Configuration,
-        drives: OdriveDrives,
+        drives: Drives,
         pose: PoseSource,
         recorder: Recording,
         clock: Callable[[], float] = time.monotonic,
@@ -259,9 +259,8 @@ class Loop:
         if self.mode is Mode.BOOT:
             return
         if self.mode is Mode.IDLE:
-            self.drives.request_versions(now_s)
-            self.drives.request_watchdogs(now_s)
-        self.drives.send(self.sent.torques_nm)
+            self.drives.request_settings(now_s)
+        self.drives.send(self.sent.torques_nm, PERIOD_S)
 
     def _record(self, tick: Tick) -> None:
         tick_s = self._clock() - tick.now_s

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from drivers.drive_types import DRIVE_TYPES
 from tests.folders import ROOT
 
 LAYERS = [
@@ -167,3 +168,17 @@ def test_an_import_that_points_down_is_allowed(package: str, line: str) -> None:
 def test_a_circle_is_noticed() -> None:
     assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}})
     assert not circle({"a": {"b", "c"}, "b": {"c"}, "c": set()})
+
+
+@pytest.mark.parametrize("protocol", DRIVE_TYPES)
+def test_only_its_own_folder_and_the_tables_know_a_protocol(protocol: str) -> None:
+    """A further drive protocol touches drivers/PROTOCOL, drivers/drive_types.py and simulation/devices alone."""
+    driver, device = f"drivers.{protocol}", f"simulation.devices.{protocol}"
+    assert any(room(module) == driver for module in sources()) and device in sources()
+    knowing = {
+        module
+        for module in sources()
+        for imported in imported_modules(module)
+        if (imported == device or room(imported) == driver) and room(module) != driver
+    }
+    assert {module for module in knowing if room(module) != "simulation.devices"} == {"drivers.drive_types"}

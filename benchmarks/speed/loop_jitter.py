@@ -25,7 +25,7 @@ from typing import Any
 from benchmarks.report import Progress, new_parser, print_report, verdict
 from control.controller import WalkOrder
 from control.modes import Mode, Request
-from drivers.odrive.drives import OdriveDrives
+from drivers.drive_types import make_drives
 from drivers.pose.pose_port import PosePort
 from experiments.reports.text_tables import table
 from firmware_host.buses import open_ports
@@ -104,7 +104,7 @@ class DaemonLoop:
     """The daemon's parts and its loop's body; what it opens is closed with `stack`."""
 
     def __init__(self, configuration: Configuration, folder: Path, stack: ExitStack) -> None:
-        drives = OdriveDrives(
+        drives = make_drives(
             configuration.drive, open_ports(configuration.bus), configuration.limits, configuration.watchdog_endpoints
         )
         stack.callback(drives.close)

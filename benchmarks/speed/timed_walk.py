@@ -15,7 +15,7 @@ from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import JOINTS
 from drivers.can.can_port import CanPort
-from drivers.odrive.drives import OdriveDrives
+from drivers.drive_types import make_drives
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder, Recording
@@ -82,7 +82,7 @@ class TimedWalk:
             {joint: configuration.drive[joint].bus for joint in JOINTS},
             wiring.robot,
         )
-        drives = OdriveDrives(configuration.drive, wiring.loop, configuration.limits, configuration.watchdog_endpoints)
+        drives = make_drives(configuration.drive, wiring.loop, configuration.limits, configuration.watchdog_endpoints)
         pose, clock = self.walk.loop.pose, lambda: self.walk.now_s
         self.walk.loop = Loop(configuration, drives, pose, recorder, clock)
         self.recorder = recorder

@@ -24,13 +24,13 @@ from control.modes import Mode
 from control.records import JOINTS, Joints
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus, MockPort
+from drivers.drive_types import make_drives
 from drivers.odrive import codec
 from drivers.odrive.codec import arbitration_id
-from drivers.odrive.drives import OdriveDrives
 from experiments.reports.text_tables import table
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.ticker import Tick
+from firmware_host.ticker import PERIOD_S, Tick
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
@@ -145,22 +145,21 @@ def fuzz_drives(configuration: Configuration, frames: int, fuzzing: Fuzzing, pro
     buses = {name: MockBus() for name in configuration.bus}
     far = {name: bus.open() for name, bus in buses.items()}
     wires = {name: bus.open() for name, bus in buses.items()}
-    drives = OdriveDrives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
+    drives = make_drives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
     source = iter(FrameSource(node_ids(configuration), seed))
     for number in range(frames // FRAMES_PER_TICK):
         feed(source, far, fuzzing)
         now_s = number / 380.0
         try:
             drives.read(now_s)
-            drives.request_versions(now_s)
-            drives.request_watchdogs(now_s)
+            drives.request_settings(now_s)
             drives.disarm(now_s)
-            drives.send(Joints(0.0, 0.0, 0.0, 0.0))
+            drives.send(Joints(0.0, 0.0, 0.0, 0.0), PERIOD_S)
         except Exception as problem:  # noqa: BLE001  that none comes is what is measured
             fuzzing.exceptions.append(repr(problem))
         look(fuzzing, far, number, frames // FRAMES_PER_TICK)
         progress.show(fuzzing.frames, "drives")
-    fuzzing.refused += drives.gate.refused
+    fuzzing.refused += drives.refused_commands
 
 
 def fuzz_loop(
@@ -185,7 +184,7 @@ def fuzz_loop(
         fuzzing.left_mode += walk.loop.mode is not mode
         look(fuzzing, far, number, ticks)
         progress.show(fuzzing.frames, mode.name.lower())
-    fuzzing.refused += walk.loop.drives.gate.refused
+    fuzzing.refused += walk.loop.drives.refused_commands
 
 
 def step(walk: Lockstep, mode: Mode) -> None:

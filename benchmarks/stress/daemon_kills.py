@@ -27,11 +27,11 @@ from experiments.reports.text_tables import table
 from firmware_host.buses import open_ports
 from firmware_host.configuration.configuration import load_configuration
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
-from simulation.devices.odrive import OdriveParameters
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.peer import WATCHDOG_S
 
-REPORTED_S = OdriveParameters(0).current_period_s
+REPORTED_S = SimulatedDriveParameters(0).current_period_s
 TOLERANCE_S = 0.01  # between the kill and the robot's reading of what was sent before it
 WINDOW_S = 4.0 * WATCHDOG_S  # of listening
 PHASES = ("insertion", "stance", "extraction", "swing", "hold")

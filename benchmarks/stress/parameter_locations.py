@@ -7,6 +7,8 @@ from dataclasses import MISSING, fields, is_dataclass
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 from control.bounds import Bounds, Meaning
+from drivers.drive import DriveParameters
+from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from firmware_host.configuration.toml_records import ChangesOf
 
 
@@ -40,8 +42,10 @@ def places_of(hint: Any, document: Any, default: Any, path: tuple[str | int, ...
     elif get_origin(hint) is Literal or hint in (str, bool):
         yield Place(path, hint if hint is bool else str, None, default)
     elif get_origin(hint) is dict and is_dataclass(get_args(hint)[1]):
+        record = get_args(hint)[1]
+        record = DRIVE_TYPES[DEFAULT].parameters if record is DriveParameters else record
         for name in document or {}:
-            yield from places_of(get_args(hint)[1], document[name], None, (*path, name))
+            yield from places_of(record, document[name], None, (*path, name))
     elif get_origin(hint) is list:
         for number in range(len(document or [])):
             yield from places_of(get_args(hint)[0], document[number], None, (*path, number))

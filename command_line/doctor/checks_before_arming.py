@@ -11,7 +11,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from drivers.odrive.drives import OdriveDrives
+from control.records import JOINTS
+from drivers.drive_types import make_drives
 from drivers.pose.pose_port import PoseSourceError
 from firmware_host.buses import BusError, open_ports
 from firmware_host.computer.can_links import examine_bus, read_links
@@ -40,15 +41,16 @@ def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
         ports = open_ports(configuration.bus)
     except BusError as problem:
         return [check_item("bus", False, str(problem), "bring the interface up: docs/how-to/install.md")]
-    drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
+    drives = make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
     deadline_s = time.monotonic() + LISTENING_S
+    states = drives.read(time.monotonic())
     while not drives.heard and time.monotonic() < deadline_s:
-        drives.read(time.monotonic())
         time.sleep(0.01)
+        states = drives.read(time.monotonic())
     fix = "check its power, wiring, node id and cyclic message periods"
     items = [
-        check_item(f"drive.{axis.joint}", axis.heard, "heard" if axis.heard else "not heard", fix)
-        for axis in drives.axes
+        check_item(f"drive.{joint}", state.heard, "heard" if state.heard else "not heard", fix)
+        for joint, state in zip(JOINTS, states, strict=True)
     ]
     drives.close()
     return items
@@ -77,6 +79,6 @@ def _host_items(configuration: Configuration) -> list[dict[str, Any]]:
     findings += examine_limits(configuration.loop, process_limits(Path("/"), None))
     links = read_links()
     for name, bus in configuration.bus.items():
-        drives = sum(drive.bus == name for drive in configuration.drive.values())
+        drives = [drive for drive in configuration.drive.values() if drive.bus == name]
         findings += examine_bus(name, bus, drives, links)[1:]  # whether it opens was said
     return [finding.as_check_item for finding in findings]

@@ -59,7 +59,7 @@ def examine_all(configuration: Configuration, socket: Path, links: dict[str, Can
     priority = thread_priority(ROOT, pid) if pid else None
     yield from examine_host(ROOT, configuration.loop, limits, priority)
     for name, bus in configuration.bus.items():
-        drives = sum(drive.bus == name for drive in configuration.drive.values())
+        drives = [drive for drive in configuration.drive.values() if drive.bus == name]
         yield from examine_bus(name, bus, drives, links)
     yield from examine_storage(ROOT, configuration.log, _writer(), pid is not None)
     yield _clock()

@@ -11,29 +11,17 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from math import inf
 from random import Random
 from struct import Struct
 
 from drivers.can.can_port import BusState, CanPort
 from drivers.can.frames import DATA_MAX_BYTES, STANDARD_MASK, Frame
+from drivers.drive import DriveParameters, DriveType
+from drivers.drive_types import type_of
 from drivers.fault_injection.delay_line import DelayLine
 from drivers.fault_injection.failures import NO_NUMBERS, Failure, FailureKind, Failures
-from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, GarbledMessageError
-from drivers.odrive.drives import DriveParameters
 
-SIGNALS = {
-    codec.GET_ENCODER_ESTIMATES.command: ("position",),
-    codec.GET_IQ.command: ("current",),
-    codec.HEARTBEAT.command: ("heartbeat", "error"),
-    codec.GET_ERROR.command: ("error",),
-    codec.GET_TEMPERATURE.command: ("temperature",),
-    codec.GET_BUS_VOLTAGE_CURRENT.command: ("voltage",),
-}
-COMMANDS, LAST_COMMAND = 32, 0x1F  # of each node id
-SHOWN_ERROR = 0x20  # gate driver fault
 FAR_TURNS = 2.0  # garbage that might be true
 MOST_STRANGERS = 3  # frames out of nowhere in one read of a bus full of garbage
 SILENT = (FailureKind.OFF, FailureKind.BUS_OFF)
@@ -57,22 +45,15 @@ class FailingPort:
         self._bus = f"bus.{name}"
         self._port = port
         self._failures = failures
+        self._drive_type: DriveType = type_of(drives.values())
         joints = {drive.node_id: joint for joint, drive in drives.items() if drive.bus == name}
-        self._senders = self._components_by_id(joints)
+        self._joints = joints
         self._listeners = {node_id: (self._bus, joint, f"{joint}.command") for node_id, joint in joints.items()}
-        self._incoming, self._outgoing = DelayLine(_arbitration_id), DelayLine(_node_id)
+        self._incoming, self._outgoing = DelayLine(_arbitration_id), DelayLine(self._node_id)
         self._frozen: dict[tuple[str, int], tuple[Failure, bytes]] = {}
         self._refused_sends = self._forged_error_frames = 0
         self.last_send_error = ""
         self._count()
-
-    def _components_by_id(self, joints: Mapping[int, str]) -> dict[int, tuple[str, ...]]:
-        """Whose failures a frame from the bus suffers, in this order."""
-        return {
-            node_id << 5 | command: (self._bus, joint, *(f"{joint}.{part}" for part in SIGNALS.get(command, ())))
-            for node_id, joint in joints.items()
-            for command in range(COMMANDS)
-        }
 
     def _count(self) -> None:
         port, failure = self._port, self._failures.of(self._bus)
@@ -123,7 +104,12 @@ class FailingPort:
         return False
 
     def _senders_of(self, frame: Frame) -> tuple[str, ...]:
-        return (self._bus,) if frame.is_extended else self._senders.get(frame.arbitration_id, (self._bus,))
+        """Whose failures a frame from the bus suffers, in this order."""
+        content = self._drive_type.read_frame(frame)
+        joint = None if frame.is_extended else self._joints.get(content.node_id)
+        if joint is None:
+            return (self._bus,)
+        return (self._bus, joint, *(f"{joint}.{signal}" for signal in content.signals))
 
     @property
     def _due_s(self) -> float:
@@ -173,20 +159,16 @@ class FailingPort:
 
     def _with_error(self, frame: Frame, failure: Failure) -> bytes:
         """A heartbeat or an error report that tells of trouble. One that is garbled already stays as it is."""
-        data, kind = frame.data, failure.kind
+        kind = failure.kind
         if kind is FailureKind.INTERMITTENT and self._failures.loses():
-            return data
-        flags = 0 if kind is FailureKind.OFF else SHOWN_ERROR
+            return frame.data
+        flags = 0 if kind is FailureKind.OFF else self._drive_type.example_error
         if kind is FailureKind.GARBAGE:
             flags = self._failures.random.getrandbits(32) | 1
-        with suppress(GarbledMessageError):
-            if frame.arbitration_id & LAST_COMMAND == codec.GET_ERROR.command:
-                errors, reason = codec.GET_ERROR.decode(data)
-                return codec.GET_ERROR.encode(errors | flags, reason | flags)
-            errors, state, result, done = codec.HEARTBEAT.decode(data)
-            state = state if kind is FailureKind.GARBAGE else AxisState.IDLE
-            return codec.HEARTBEAT.encode(errors | flags, state, result, done)
-        return data
+        return self._drive_type.with_error(frame, flags, idle=kind is not FailureKind.GARBAGE)
+
+    def _node_id(self, frame: Frame) -> int:
+        return self._drive_type.read_frame(frame).node_id
 
     def send(self, frame: Frame) -> None:
         if self._untouched:
@@ -196,7 +178,7 @@ class FailingPort:
             self._send_failing(frame)
 
     def _send_failing(self, frame: Frame) -> None:
-        components = self._listeners.get(_node_id(frame), (self._bus,))
+        components = self._listeners.get(self._node_id(frame), (self._bus,))
         for component in components:
             failure = self._failures.of(component)
             if failure is None:
@@ -256,7 +238,3 @@ def _strangers(random: Random) -> list[Frame]:
 
 def _arbitration_id(frame: Frame) -> int:
     return frame.arbitration_id
-
-
-def _node_id(frame: Frame) -> int:
-    return frame.arbitration_id >> 5

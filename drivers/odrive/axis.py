@@ -13,53 +13,23 @@ build the watchdog stays unknown, since a number of another build reads some oth
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import isfinite, isnan, nan, pi
-from typing import Annotated, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
-from control.bounds import Bounds, Meaning
 from control.records import NEVER_S, UNKNOWN, DriveState
 from drivers.can.frames import Frame
+from drivers.drive import DriveHealth, WatchdogEndpoints
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, GarbledMessageError, Message, arbitration_id
 from drivers.odrive.duplicate_node_monitor import DuplicateNodeMonitor
+from drivers.odrive.parameters import OdriveParameters
 
+SUPPORTED = (0, 6)  # major and minor version of the firmware whose messages the codec knows
 RESTART_SILENCE_S = 0.3  # three heartbeats
 LONGEST_WATCHDOG_S = 3600.0  # a number beyond is no time-out
 LARGEST_FLOAT = 3.4e38  # of binary32
 TURN_RAD = 2.0 * pi
 QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)
-
-
-@dataclass(frozen=True)
-class DriveParameters:
-    bus: Annotated[str, Meaning("name of a [bus.NAME] section")]
-    node_id: Annotated[int, Bounds(0, 62), Meaning("on that bus", "id")]
-    sign: Annotated[
-        int, Bounds(-1, 1), Meaning("-1 for a mirrored motor: turns angle, velocity, current and torque round", "±1")
-    ] = 1  # 0 is refused
-    zero_turn: Annotated[float, Bounds(-1000.0, 1000.0), Meaning("encoder reading at joint angle zero")] = 0.0
-    torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0), Meaning("torque per current")] = (
-        0.083  # 60 / (2π · 115 rpm/V), as in the paper
-    )
-    velocity_limit_turn_s: Annotated[
-        float, Bounds(0.1, 200.0), Meaning("of the drive; together with the gain it also limits torque")
-    ] = 4.0
-    velocity_gain_nm_s_turn: Annotated[
-        float, Bounds(0.01, 20.0), Meaning("with which the drive cuts torque above the velocity limit")
-    ] = 0.5
-    current_limit_a: Annotated[float, Bounds(0.1, 200.0), Meaning("of the drive")] = 12.0
-    heartbeat_period_s: Annotated[float, Bounds(0.01, 1.0), Meaning("as set on the drive")] = 0.1  # its default
-
-
-@dataclass(frozen=True)
-class WatchdogEndpoints:
-    """Numbers of two parameters in one build of ODrive's firmware, out of its flat_endpoints.json."""
-
-    firmware: Annotated[str, Meaning("version of the firmware, such as 0.6.11")]
-    hardware: Annotated[str, Meaning("product line, version and variant, such as 4.4.58")]
-    enable: Annotated[int, Bounds(1, 65535), Meaning("number of axis0.config.enable_watchdog", "parameter id")]
-    timeout: Annotated[int, Bounds(1, 65535), Meaning("number of axis0.config.watchdog_timeout", "parameter id")]
 
 
 class Version(NamedTuple):
@@ -78,7 +48,7 @@ class OdriveAxis:
     """Owns what is known of one drive; every field is the newest that arrived."""
 
     def __init__(
-        self, joint: str, parameters: DriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints] = ()
+        self, joint: str, parameters: OdriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints] = ()
     ) -> None:
         self.joint = joint
         self.parameters = parameters
@@ -105,6 +75,7 @@ class OdriveAxis:
         self._forget_settings()
 
     def _forget_settings(self) -> None:
+        self._health: DriveHealth | None = None
         self.version: Version | None = None
         self.hardware = ""
         self._watchdog_enabled: bool | None = None
@@ -161,6 +132,7 @@ class OdriveAxis:
         self.closed_loop = state == AxisState.CLOSED_LOOP
         self.busy_state = 0 if state in QUIET_STATES else state
         self._heartbeat_stamp_s = now_s
+        self._health = None
 
     def _on_silence(self) -> None:
         """Of one message. Only if all others were missing as long was the drive away, not if we did not listen."""
@@ -176,6 +148,7 @@ class OdriveAxis:
 
     def _receive_error(self, data: bytes, now_s: float) -> None:
         self._error_flags, self.disarm_reason = codec.GET_ERROR.decode(data)
+        self._health = None
 
     def _receive_temperature(self, data: bytes, now_s: float) -> None:
         _, self._temperature_c = codec.GET_TEMPERATURE.decode(data)
@@ -189,6 +162,7 @@ class OdriveAxis:
         fields = codec.GET_VERSION.decode(data)
         self.version = Version(*fields[4:7])
         self.hardware = ".".join(str(field) for field in fields[1:4])
+        self._health = None
 
     def _receive_setting(self, data: bytes, now_s: float) -> None:
         endpoint, value = codec.decode_sdo(data)
@@ -202,6 +176,7 @@ class OdriveAxis:
             if not 0.0 <= timeout_s <= LONGEST_WATCHDOG_S:
                 raise GarbledMessageError("no time")
             self._watchdog_timeout_s = timeout_s
+        self._health = None
 
     @property
     def _watchdog_endpoints(self) -> WatchdogEndpoints | None:
@@ -241,9 +216,29 @@ class OdriveAxis:
         )
 
     @property
-    def heard(self) -> bool:
-        """Every signal that control depends on has come at least once."""
-        return isfinite(self._angle_stamp_s + self._current_stamp_s + self._heartbeat_stamp_s)
+    def health(self) -> DriveHealth:
+        """What the drive reports about itself, made again only where that has changed."""
+        if self._health is None or self._health.duplicate_id is not self.duplicates:
+            self._health = self._examined()
+        return self._health
+
+    def _examined(self) -> DriveHealth:
+        flags = self._error_flags | self.disarm_reason
+        return DriveHealth(
+            joint=self.joint,
+            firmware=".".join(map(str, self.version)) if self.version else "",
+            supported_firmware=".".join(map(str, SUPPORTED)),
+            firmware_supported=self.version is not None and self.version[:2] == SUPPORTED,
+            hardware=self.hardware,
+            watchdog_s=self.watchdog_s,
+            watchdog_advice=f"name the parameter numbers of firmware {self.hardware} in [[watchdog_endpoints]]",
+            watchdog_expired=bool(flags & codec.ERROR_WATCHDOG),
+            restarts=self.restarts,
+            duplicate_id=self.duplicates,
+            busy_state=f"axis state {self.busy_state}" if self.busy_state else "",
+            active_errors=codec.error_text(self._error_flags),
+            errors=codec.error_text(flags),
+        )
 
     def send_torque(self, torque_nm: float) -> None:
         if not -LARGEST_FLOAT < torque_nm < LARGEST_FLOAT:  # no bytes could hold it; the gate refuses it as NaN

@@ -59,6 +59,7 @@ class AxisState(IntEnum):
     CLOSED_LOOP = 8
 
 
+LAST_COMMAND = 0x1F
 TORQUE_CONTROL = 1  # control mode
 PASSTHROUGH = 1  # input mode
 SDO_READ = 0  # opcode; 1 would write

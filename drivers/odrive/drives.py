@@ -9,15 +9,17 @@ it, and the frames of strangers, garbled ones included, are counted and ignored.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from math import isfinite
 
 from control.limits import JointLimits
 from control.records import JOINTS, NEVER_S, DriveStates, Joints, Torques
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
-from drivers.odrive.axis import DriveParameters as DriveParameters  # for whoever configures drives
-from drivers.odrive.axis import OdriveAxis, WatchdogEndpoints
+from drivers.drive import DriveHealth, WatchdogEndpoints
+from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import GarbledMessageError
+from drivers.odrive.parameters import OdriveParameters
 from drivers.odrive.transmit_gate import TransmitGate
 
 REPEAT_S = 0.1  # between two requests to change the axis state, of which the heartbeat tells the result
@@ -32,7 +34,7 @@ class OdriveDrives:
 
     def __init__(
         self,
-        parameters: Mapping[str, DriveParameters],
+        parameters: Mapping[str, OdriveParameters],
         ports: Mapping[str, CanPort],
         limits: JointLimits | None = None,
         endpoints: Sequence[WatchdogEndpoints] = (),
@@ -89,13 +91,29 @@ class OdriveDrives:
 
     @property
     def heard(self) -> bool:
-        return all(axis.heard for axis in self.axes)
+        return all(axis.state.heard for axis in self.axes)
+
+    @property
+    def health(self) -> Joints[DriveHealth]:
+        a, b, c, d = self.axes
+        return Joints(a.health, b.health, c.health, d.health)
+
+    @property
+    def refused_commands(self) -> int:
+        return self.gate.refused
+
+    @property
+    def last_refusal(self) -> str:
+        return self.gate.last_refusal
 
     def send(self, torques_nm: Torques, elapsed_s: float = TICK_S) -> None:
         """To all four, `elapsed_s` after the torques before, which bounds by how much they may differ."""
         self.gate.allow_step(elapsed_s)
         for axis, torque_nm in zip(self.axes, torques_nm, strict=True):
             axis.send_torque(torque_nm)
+
+    def send_torque(self, joint: str, torque_nm: float) -> None:
+        self.axes[JOINTS.index(joint)].send_torque(torque_nm)
 
     def arm(self, now_s: float, at_once: bool = False) -> None:
         """Open the gate and prepare all drives `at_once`; else ask those not in it yet for closed loop, every REPEAT_S.
@@ -125,11 +143,21 @@ class OdriveDrives:
                 self._disarmed_s = now_s
                 axis.disarm()
 
+    def force_idle(self, repeats: int) -> None:
+        self.gate.close()
+        for axis in self.axes * repeats:
+            with suppress(Exception):  # one bus may be what broke; the others' drives still have to receive it
+                axis.disarm()
+
     def clear_errors(self) -> None:
         for axis in self.axes:
             axis.clear_errors()
 
-    def request_versions(self, now_s: float) -> None:
+    def request_settings(self, now_s: float) -> None:
+        self._request_versions(now_s)
+        self._request_watchdogs(now_s)
+
+    def _request_versions(self, now_s: float) -> None:
         """Every VERSION_REPEAT_S of drives that did not tell theirs yet, every REFRESH_S of all."""
         known = all(axis.version is not None for axis in self.axes)
         if now_s - self._version_asked_s < _repeat_s(known):
@@ -139,7 +167,7 @@ class OdriveDrives:
             if known or axis.version is None:
                 axis.request_version()
 
-    def request_watchdogs(self, now_s: float) -> None:
+    def _request_watchdogs(self, now_s: float) -> None:
         """The same of the watchdogs of those whose version is known."""
         known = all(isfinite(axis.watchdog_s) for axis in self.axes)
         if now_s - self._watchdog_asked_s < _repeat_s(known):

@@ -22,8 +22,8 @@ from control.limits import JointLimits
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.odrive import codec
-from drivers.odrive.axis import DriveParameters
 from drivers.odrive.codec import AxisState, arbitration_id
+from drivers.odrive.parameters import OdriveParameters
 
 ROUNDING_NM = 1e-6  # binary32 holds 5 N·m to within a quarter of that
 TORQUE = Struct("<f")
@@ -47,7 +47,7 @@ class TransmitGate:
         self._step_nm = 0.0
         self._outlets: list[GatedPort] = []
 
-    def outlet(self, port: CanPort, drives: Iterable[DriveParameters]) -> GatedPort:
+    def outlet(self, port: CanPort, drives: Iterable[OdriveParameters]) -> GatedPort:
         """The way to one bus, for the drives on it."""
         outlet = GatedPort(self, port, drives)
         self._outlets.append(outlet)
@@ -88,7 +88,7 @@ class TransmitGate:
 class GatedPort:
     """One bus behind the gate. Owns the torque that left last for each drive on it."""
 
-    def __init__(self, gate: TransmitGate, port: CanPort, drives: Iterable[DriveParameters]) -> None:
+    def __init__(self, gate: TransmitGate, port: CanPort, drives: Iterable[OdriveParameters]) -> None:
         self._gate = gate
         self._port = port
         self._sent_nm: dict[int, float] = {}  # by the id of the torque message
@@ -99,7 +99,7 @@ class GatedPort:
         for drive in drives:
             self._admit(drive)
 
-    def _admit(self, drive: DriveParameters) -> None:
+    def _admit(self, drive: OdriveParameters) -> None:
         node_id = drive.node_id
         limits = codec.SET_LIMITS.encode(drive.velocity_limit_turn_s, drive.current_limit_a)
         gains = codec.SET_VEL_GAINS.encode(drive.velocity_gain_nm_s_turn, 0.0)

@@ -19,7 +19,7 @@ from control.records import JOINTS
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus, MockPort
-from drivers.odrive.drives import OdriveDrives
+from drivers.drive_types import make_drives
 from drivers.pose.pose_port import NoPose
 from experiments.robot.bench_robot import BenchError
 from firmware_host.buses import BusError, open_ports
@@ -30,7 +30,7 @@ from firmware_host.loop import Loop
 from firmware_host.operator.status_client import NoDaemonError, NotPermittedError, StatusClient
 from firmware_host.ticker import PERIOD_S, Tick, Ticker
 from simulation.body.blocks import on_blocks
-from simulation.devices.odrive import OdriveParameters
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.robot import SimulatedRobot
 
 LISTENING_S = 1.0  # ten heartbeats
@@ -71,7 +71,7 @@ class HardwareRig:
         except BusError as problem:
             raise BenchError(f"{problem}.") from problem
         self.overheard = listen(ports)
-        drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
+        drives = make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         self.loop = Loop(configuration, drives, NoPose(), NullRecorder())
         self._processors = os.sched_getaffinity(0)
         options = configuration.loop
@@ -133,7 +133,7 @@ class SimulatedRig:
         self,
         configuration: Configuration,
         built: Configuration | None = None,
-        drives: Mapping[str, OdriveParameters] | None = None,
+        drives: Mapping[str, SimulatedDriveParameters] | None = None,
         seed: int = 1,
         others: Sequence[Callable[[SimulatedRig], None]] = (),
     ) -> None:
@@ -153,8 +153,8 @@ class SimulatedRig:
         self._tick_number = 0
         self.overheard = self._listen()
         wires = {name: bus.open() for name, bus in self.buses.items()}
-        odrives = OdriveDrives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
-        self.loop = Loop(configuration, odrives, NoPose(), NullRecorder(), self._clock, self._clock)
+        robot_drives = make_drives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
+        self.loop = Loop(configuration, robot_drives, NoPose(), NullRecorder(), self._clock, self._clock)
         self.warnings: Sequence[str] = ()
 
     @property

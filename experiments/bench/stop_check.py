@@ -16,8 +16,8 @@ from math import degrees, nan, radians
 from control.controller import ALL_TRUSTED, DAMPING_NM, RAISING_S, SOFT_STOP_S, measured_angles
 from control.joint_pd import damping_torques_nm
 from control.modes import Mode, Request
-from control.records import DriveStates, JointAngles, Joints, Phase, Torques
-from drivers.odrive.axis import OdriveAxis
+from control.records import JOINTS, DriveStates, JointAngles, Joints, Phase, Torques
+from drivers.drive import DriveParameters
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.stroke_tracking import FAST_RAD_S, order_strides
 from experiments.bench.test_rig import Law, Sample, Stand, first_lasting
@@ -90,8 +90,8 @@ def torque_off(stand: Stand) -> Readings:
     begun = stand.loop.states
     stand.loop.request(Request.DISARM, stand.rig.now_s)
     samples = [stand.tick() for _ in range(round(COASTING_S / PERIOD_S))]
-    for place, axis in enumerate(stand.drives.axes):
-        yield from _off_readings(axis, pushed, samples, place)
+    for place, joint in enumerate(JOINTS):
+        yield from _off_readings(stand.configuration.drive[joint], pushed, samples, place)
     rest_s = PERIOD_S * ticks_until(first_slow(samples), pushed[-1])
     yield Reading("torque off: until the sweep rests", rest_s, "s", 0.0, COASTING_S, "see what drives it on")
     for place, side in zip(SWEEPS, ("left", "right"), strict=True):
@@ -103,12 +103,12 @@ def torque_off(stand: Stand) -> Readings:
 
 def push(stand: Stand) -> Law:
     """Forward and up, by the same current in each motor."""
-    a, b, c, d = (PUSH_A * axis.parameters.torque_constant_nm_a for axis in stand.drives.axes)
+    a, b, c, d = (PUSH_A * constant_nm_a for constant_nm_a in stand.configuration.torque_constants_nm_a)
     return lambda held, states: Joints(a, b, c, d)
 
 
-def _off_readings(axis: OdriveAxis, pushed: Sequence[Sample], samples: Sequence[Sample], place: int) -> Readings:
-    joint, flowed_a = axis.joint, max(abs(sample.states[place].current_a) for sample in pushed)
+def _off_readings(drive: DriveParameters, pushed: Sequence[Sample], samples: Sequence[Sample], place: int) -> Readings:
+    joint, flowed_a = JOINTS[place], max(abs(sample.states[place].current_a) for sample in pushed)
     few = f"{PUSH_A:g} A were commanded: see stage 4"
     yield Reading(f"{joint}: torque off, current before", flowed_a, "A", 2.0 * QUIET_A, 100.0, few)
     quiet = first_lasting([abs(sample.states[place].current_a) < QUIET_A for sample in samples], QUIET_TICKS)
@@ -117,7 +117,7 @@ def _off_readings(axis: OdriveAxis, pushed: Sequence[Sample], samples: Sequence[
     yield Reading(f"{joint}: torque off, until no current flows", ticks, "ticks", 0, OFF_TICKS, advice)
     idle = next((sample for sample in samples if not sample.states[place].closed_loop), None)
     idle_s = PERIOD_S * ticks_until(idle, pushed[-1])
-    latest_s = axis.parameters.heartbeat_period_s + OFF_TICKS * PERIOD_S
+    latest_s = drive.heartbeat_period_s + OFF_TICKS * PERIOD_S
     yield Reading(f"{joint}: torque off, until it says so", idle_s, "s", 0.0, latest_s, advice)
 
 

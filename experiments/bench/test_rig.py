@@ -169,7 +169,7 @@ class Stand:
             self.loop.request(Request.CLEAR, self.rig.now_s)
             if self._becomes_armable():
                 return
-        silent = ", ".join(axis.joint for axis in self.drives.axes if not axis.heard)
+        silent = ", ".join(joint for joint, state in zip(JOINTS, self.loop.states, strict=True) if not state.heard)
         unheard = f"{silent}: nothing is heard; check power, wiring and node ids."
         mode = f"it is in {self.loop.mode.name.lower()}."
         raise BenchError(f"The robot cannot be armed: {reported or (unheard if silent else mode)}")
@@ -235,7 +235,7 @@ class Stand:
             sample = self.tick()
             if sample.mode not in ENERGISED and not any(state.closed_loop for state in sample.states):
                 return
-        busy = ", ".join(axis.joint for axis in self.drives.axes if axis.closed_loop)
+        busy = ", ".join(joint for joint, state in zip(JOINTS, self.loop.states, strict=True) if state.closed_loop)
         raise BenchError(f"{busy}: still in closed loop {IDLING_S:g} s after it was told to go idle: cut the power.")
 
     def clear(self) -> None:
@@ -244,11 +244,9 @@ class Stand:
         self._wait_until_armable()
 
     def end(self) -> None:
-        """However things stand: drives idle. Never raises, and needs nothing but the axes."""
+        """However things stand: drives idle. Never raises, and needs nothing but the drives."""
         self.controller.law = None
-        self.drives.gate.close()
-        for axis in self.drives.axes * GOODBYE_FRAMES:
-            axis.disarm()
+        self.drives.force_idle(GOODBYE_FRAMES)
 
 
 def first_lasting(flags: Sequence[bool], ticks: int) -> int | None:

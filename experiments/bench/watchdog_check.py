@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from math import nan
 
-from control.records import JOINTS, DriveStates, Joints, Torques
-from drivers.odrive import codec
+from control.records import DriveStates, Joints, Torques
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Sample, Stand, first_lasting
 from firmware_host.ticker import PERIOD_S
@@ -45,11 +44,11 @@ def watchdog_times(stand: Stand) -> Readings:
     pressed, silence = let_watchdogs_trip(stand)
     last_s = pressed[-1].tick.now_s
     late_s = LATE_TICKS * PERIOD_S
-    for place, axis in enumerate(stand.drives.axes):
-        timeout_s, joint = axis.watchdog_s, axis.joint
+    for place, health in enumerate(stand.drives.health):
+        timeout_s, joint = health.watchdog_s, health.joint
         advice = f"set enable_watchdog and watchdog_timeout of {joint}, and look for another program that feeds it"
         idle_s = next((s.tick.now_s - last_s for s in silence if not s.states[place].closed_loop), nan)
-        latest_s = timeout_s + late_s + axis.parameters.heartbeat_period_s
+        latest_s = timeout_s + late_s + stand.configuration.drive[joint].heartbeat_period_s
         yield Reading(f"{joint}: idle after the last command", idle_s, "s", timeout_s - late_s, latest_s, advice)
         if "adduction" in joint:
             gone_s = _gone_s(pressed, silence, place)
@@ -69,9 +68,8 @@ def _reasons(stand: Stand) -> Readings:
     """What the drives give as their reason, and that all of it can be cleared."""
     for _ in range(round(TELLING_S / PERIOD_S)):
         stand.tick()
-    flags = [axis.state.error_flags | axis.disarm_reason for axis in stand.drives.axes]
+    reported = stand.drives.health
     stand.clear()
-    for joint, reported in zip(JOINTS, flags, strict=True):
-        reason = codec.error_text(reported) or "no reason"
-        advice = f"the drive tells {reason}; its watchdog must be what let go"
-        yield Reading(f"{joint}: let go by its watchdog", bool(reported & codec.ERROR_WATCHDOG), "", 1, 1, advice)
+    for health in reported:
+        advice = f"the drive tells {health.errors or 'no reason'}; its watchdog must be what let go"
+        yield Reading(f"{health.joint}: let go by its watchdog", health.watchdog_expired, "", 1, 1, advice)

@@ -15,14 +15,14 @@ from control.monitors.winding import Winding
 from control.records import JOINTS
 from drivers.can.frames import Frame
 from drivers.fault_injection.failures import Failures, end_text
-from drivers.odrive.codec import Message, arbitration_id
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import _end_safely as end_safely
 from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK_KIND
 from firmware_host.ticker import PERIOD_S, Tick
 from simulation.body.plant import Arm
-from simulation.devices.odrive import SimulatedOdrive
+from simulation.devices.drive import SimulatedDrive
+from simulation.devices.drive_types import make_simulated_drive
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import Track
 
@@ -95,13 +95,11 @@ class FaultBench(Lockstep):
         yield
         self._acts.remove(act)
 
-    def say(self, joint: str, message: Message, *values: float, value: bytes = b"") -> None:
-        """A frame on the bus in the name of a joint's drive, or to it, that is from neither drive nor loop."""
-        drive = self.loop.configuration.drive[joint]
-        frame = Frame(arbitration_id(drive.node_id, message), message.encode(*values) + value)
-        self._strangers[drive.bus].send(frame)
+    def say(self, joint: str, frame: Frame) -> None:
+        """Sends a frame on the bus of a joint's drive that is from neither drive nor loop."""
+        self._strangers[self.loop.configuration.drive[joint].bus].send(frame)
 
-    def drive(self, joint: str) -> SimulatedOdrive:
+    def drive(self, joint: str) -> SimulatedDrive:
         return self.robot.drives[JOINTS.index(joint)]
 
     def arm_of(self, joint: str) -> Arm:
@@ -114,7 +112,7 @@ class FaultBench(Lockstep):
     def add_duplicate(self, joint: str, angle_rad: float) -> Act:
         """A second drive with the id of the joint's own, on its bus: what it does in a step."""
         port = self.buses[self.loop.configuration.drive[joint].bus].open()
-        duplicate = SimulatedOdrive(self.drive(joint).parameters, Random(f"twin {joint}"))
+        duplicate = make_simulated_drive(self.drive(joint).parameters, Random(f"twin {joint}"))
         duplicate.reset(self.now_s)
 
         def live() -> None:

@@ -13,13 +13,10 @@ from math import copysign
 from typing import Any
 
 from control.records import JOINTS
-from drivers.odrive import codec
-from drivers.odrive.codec import AxisState
 from experiments.faults.bench import FaultBench
-from simulation.devices.odrive import ENABLE_WATCHDOG_ENDPOINT
+from simulation.devices.drive import DriveError, Forgery
 
 LONGEST_S = 60.0
-OVERCURRENT = 0x400  # of the drive's supply
 BLOCKED_KG_M2 = 1e6  # nothing moves this
 
 Cause = Callable[[FaultBench, str], AbstractContextManager[None]]
@@ -56,9 +53,7 @@ def drive_with(**changes: Any) -> Cause:
 
 @contextmanager
 def overcurrent(bench: FaultBench, joint: str) -> Iterator[None]:
-    drive = bench.drive(joint)
-    drive.axis_state = AxisState.IDLE
-    drive.errors = drive.disarm_reason = OVERCURRENT
+    bench.drive(joint).trip(DriveError.OVERCURRENT)
     yield
 
 
@@ -66,20 +61,20 @@ def overcurrent(bench: FaultBench, joint: str) -> Iterator[None]:
 def watchdog_ran_out(bench: FaultBench, joint: str) -> Iterator[None]:
     """Commands do not reach the drive; the cause is that it has given up waiting."""
     with failing("JOINT.command", "off")(bench, joint):
-        bench.run_until(lambda: bool(bench.drive(joint).errors), 0.5)
+        bench.run_until(lambda: bench.drive(joint).failed, 0.5)
         yield
 
 
 @contextmanager
 def left_closed_loop(bench: FaultBench, joint: str) -> Iterator[None]:
-    bench.drive(joint).axis_state = AxisState.IDLE
+    bench.drive(joint).energised = False
     yield
 
 
 @contextmanager
 def never_in_closed_loop(bench: FaultBench, joint: str) -> Iterator[None]:
     def leave() -> None:
-        bench.drive(joint).axis_state = AxisState.IDLE
+        bench.drive(joint).energised = False
 
     with bench.acting(leave):
         yield
@@ -103,23 +98,23 @@ def duplicate(angle_rad: float) -> Cause:
 # strangers on the bus
 
 
-def said(message: codec.Message, *values: float) -> Cause:
-    """Once, in the drive's name."""
+def forged(forgery: Forgery) -> Cause:
+    """Sends the frame once."""
 
     @contextmanager
     def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        bench.say(joint, message, *values)
+        bench.say(joint, bench.drive(joint).forge(forgery))
         yield
 
     return cause
 
 
-def always_said(message: codec.Message, *values: float) -> Cause:
-    """After whatever the drive tells itself."""
+def current_reported(current_a: float) -> Cause:
+    """Reports another current after each report of the drive itself."""
 
     @contextmanager
     def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        with bench.acting(lambda: bench.say(joint, message, *values)):
+        with bench.acting(lambda: bench.say(joint, bench.drive(joint).forge_current(current_a))):
             yield
 
     return cause
@@ -130,17 +125,10 @@ def other_master(bench: FaultBench, joint: str) -> Iterator[None]:
     """Another program wants this drive in closed loop, without torque."""
 
     def command() -> None:
-        bench.say(joint, codec.SET_AXIS_STATE, AxisState.CLOSED_LOOP)
+        bench.say(joint, bench.drive(joint).forge(Forgery.CLOSE_LOOP))
 
     with bench.acting(command):
         yield
-
-
-@contextmanager
-def watchdog_reported_off(bench: FaultBench, joint: str) -> Iterator[None]:
-    """Read back as switched off."""
-    bench.say(joint, codec.TX_SDO, 0, ENABLE_WATCHDOG_ENDPOINT, 0, value=b"\0")
-    yield
 
 
 # joints
@@ -212,7 +200,7 @@ def wrong_way(bench: FaultBench, joint: str) -> Iterator[None]:
 
     def report() -> None:
         current_a = -copysign(4.0, bench.loop.sent.torques_nm[place]) * sign
-        bench.say(joint, codec.GET_IQ, current_a, current_a)
+        bench.say(joint, bench.drive(joint).forge_current(current_a))
 
     with bench.acting(report):
         yield

@@ -15,7 +15,6 @@ from typing import Any
 from control.faults import Blocks, FaultKind, Reaction
 from control.modes import ENERGISED, Mode, Request
 from control.monitors.joint_monitor import REST_S, STILL_RAD
-from drivers.odrive.codec import AxisState
 from experiments.faults.bench import FaultBench
 from experiments.faults.evaluation import LONGEST_STOP_S, Cell, problems
 from experiments.faults.injection import BY_NAME, REPORTED_S, Way
@@ -197,7 +196,7 @@ class Watch:
         """Closed loop, for longer than it takes to hear of it and to forbid it."""
         if self._disarmed_steps <= FORBIDDEN_TICKS or self._way.fault == "drive_energised":  # that is the cause itself
             return False
-        return any(drive.axis_state is AxisState.CLOSED_LOOP for drive in self._bench.robot.drives)
+        return any(drive.energised for drive in self._bench.robot.drives)
 
     @property
     def _longest_off_ticks(self) -> int:

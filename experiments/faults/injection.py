@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 from control.faults import FAULT_KINDS, FaultKind
 from control.records import JOINTS
-from drivers.odrive import codec
 from experiments.faults.causes import (
     Cause,
-    always_said,
     blocked,
+    current_reported,
     drive_with,
     duplicate,
     failing,
+    forged,
     given_up,
     left_closed_loop,
     never_in_closed_loop,
@@ -25,9 +25,7 @@ from experiments.faults.causes import (
     out_of_range,
     overcurrent,
     restart,
-    said,
     watchdog_ran_out,
-    watchdog_reported_off,
     whirled,
     wrong_way,
 )
@@ -46,6 +44,7 @@ from experiments.faults.loop_causes import (
     writer_tells,
 )
 from experiments.faults.phases import EVERYWHERE, GAIT, PHASES
+from simulation.devices.drive import Forgery
 
 REPORTED_S = 0.0  # a cause that lasts until its fault is told
 TURNING = {"insertion": "adduction", "stance": "sweep", "extraction": "adduction", "swing": "sweep"}
@@ -107,14 +106,14 @@ WAYS: tuple[Way, ...] = (
     Way("voltage_silent", failing("JOINT.voltage", "off"), 1.5),
     Way("drive_error", overcurrent, phases=PHASES),
     Way("drive_error", watchdog_ran_out, 0.5, MOVING, "by its watchdog", deaf=True),
-    Way("drive_error", said(codec.ESTOP), 0.5, MOVING, "by a stranger's stop"),
+    Way("drive_error", forged(Forgery.EMERGENCY_STOP), 0.5, MOVING, "by a stranger's stop"),
     Way("drive_disarmed", left_closed_loop, phases=MOVING),
     Way("drive_energised", other_master, 1.0, ("idle",)),
     Way("drive_restarted", restart, 2.0),
-    Way("drive_version", said(codec.GET_VERSION, 2, 4, 4, 58, 0, 5, 6, 0), phases=("idle", "stance")),
+    Way("drive_version", forged(Forgery.OLD_FIRMWARE), phases=("idle", "stance")),
     Way("duplicate_node_id", duplicate(0.3), 1.6),
-    Way("watchdog_unknown", said(codec.HEARTBEAT, codec.ERROR_INITIALIZING, 1, 0, 0), phases=("idle",)),
-    Way("watchdog_off", watchdog_reported_off, phases=("idle", "stance")),
+    Way("watchdog_unknown", forged(Forgery.STARTING), phases=("idle",)),
+    Way("watchdog_off", forged(Forgery.WATCHDOG_OFF), phases=("idle", "stance")),
     # buses
     Way("bus_warning", failing("bus.BUS", "warning")),
     Way("bus_passive", failing("bus.BUS", "passive")),
@@ -124,7 +123,7 @@ WAYS: tuple[Way, ...] = (
     Way("joint_position", out_of_range),
     Way("joint_velocity", whirled(45.0), REPORTED_S),
     Way("joint_moving", whirled(2.0), REPORTED_S, ("idle",)),
-    Way("joint_current", always_said(codec.GET_IQ, 40.0, 40.0)),
+    Way("joint_current", current_reported(40.0)),
     Way("joint_not_following", blocked, 3.0, ("hold", *GAIT)),
     Way("encoder_jump", drive_with(encoder_offset_rad=0.6), phases=PHASES),
     Way("encoder_stuck", failing("JOINT.position", "stuck"), 1.0, GAIT, turns=True),

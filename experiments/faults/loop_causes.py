@@ -73,7 +73,7 @@ def gains_of_nan(bench: FaultBench, joint: str) -> Iterator[None]:
 @contextmanager
 def five_newton_metres(bench: FaultBench, joint: str) -> Iterator[None]:
     """A bug that goes past every limit, to the wire."""
-    next(axis for axis in bench.loop.drives.axes if axis.joint == joint).send_torque(5.0)
+    bench.loop.drives.send_torque(joint, 5.0)
     yield
 
 

@@ -24,8 +24,8 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.file_recorder import FileRecorder
 from firmware_host.ticker import PERIOD_S
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
-from simulation.devices.odrive import OdriveParameters
 from simulation.harness.lockstep import Lockstep, drives_of
 from simulation.mud.disturbances import LAB, Disturbances, drive_changes
 from simulation.mud.track import Track
@@ -82,7 +82,7 @@ def _new_log(folder: Path) -> Path:
 
 def drives_with_errors(
     configuration: Configuration, disturbances: Disturbances, seed: int
-) -> dict[str, OdriveParameters]:
+) -> dict[str, SimulatedDriveParameters]:
     """Motors whose constants are known as wrongly as the paper's were."""
     random = Random(f"drives {seed}")
     drives = drives_of(configuration, **drive_changes(disturbances))

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import json
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from math import isfinite, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from drivers.can.bus_load import MOST_FRACTION, WARN_FRACTION, bus_load
+from drivers.drive import DriveParameters
+from drivers.drive_types import traffic_of
 from firmware_host.computer.findings import Finding, fail, ok, warn
 from firmware_host.configuration.configuration import BusParameters
 
@@ -103,7 +105,9 @@ def read_sys_links(root: Path) -> dict[str, CanLink]:
     return links
 
 
-def examine_bus(name: str, bus: BusParameters, drives: int, links: dict[str, CanLink]) -> list[Finding]:
+def examine_bus(
+    name: str, bus: BusParameters, drives: Sequence[DriveParameters], links: dict[str, CanLink]
+) -> list[Finding]:
     """A bus of the configuration with `drives` on it, and the interface under it."""
     link = links.get(bus.channel)
     if bus.interface != "socketcan":
@@ -148,11 +152,11 @@ def _examine_settings(name: str, bus: BusParameters, link: CanLink) -> Iterator[
         yield ok(identity, said) if good else warn(identity, said, f"'ip link set {link.name} txqueuelen 32'")
 
 
-def examine_load(name: str, bus: BusParameters, drives: int, link: CanLink | None) -> Finding:
+def examine_load(name: str, bus: BusParameters, drives: Sequence[DriveParameters], link: CanLink | None) -> Finding:
     """At the interface's bit rate where it is known, else at the one that the drives are said to have."""
     bit_s = (link.bit_rate_bit_s if link else 0) or 1000 * bus.bit_rate_kbit_s
-    load = bus_load(drives, bit_s)
-    identity, said = f"load.{name}", f"{drives} drives will take {load} of {bit_s / 1000:g} kbit/s"
+    load = bus_load(traffic_of(drives), bit_s)
+    identity, said = f"load.{name}", f"{len(drives)} drives will take {load} of {bit_s / 1000:g} kbit/s"
     fix = "raise the bit rate of interface and drives to 1 Mbit/s, or put two drives on a bus of their own"
     if load.most > MOST_FRACTION:
         return fail(identity, said, fix)

@@ -24,15 +24,16 @@ from control.limits import JointLimits, JointRange
 from control.monitors.joint_monitor import FaultBounds
 from control.monitors.winding import WindingParameters
 from control.records import JOINTS, Joints, same_for_both
+from drivers.drive import DriveParameters, WatchdogEndpoints
+from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from drivers.fault_injection.failures import FailureParameters
-from drivers.odrive.axis import DriveParameters, WatchdogEndpoints
 from drivers.pose.natnet_parameters import NatNetParameters
 from drivers.pose.rail_encoder import RailEncoderParameters
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
 from firmware_host.configuration.consistency import contradictions
 from firmware_host.configuration.toml_records import ConfigurationError as ConfigurationError  # for whoever loads one
-from firmware_host.configuration.toml_records import RecordReader, parse_document, read_text
+from firmware_host.configuration.toml_records import RecordReader, parse_document, read_text, shown
 from firmware_host.log.log_parameters import LogParameters
 
 EXIT_CONFIGURATION = 78  # EX_CONFIG of sysexits.h; systemd is told not to restart on it
@@ -120,7 +121,7 @@ class Configuration:
     status: StatusParameters = StatusParameters()
     pose: PoseParameters = PoseParameters()
     failures: FailureParameters = FailureParameters()
-    watchdog_endpoints: list[WatchdogEndpoints] = field(default_factory=list)  # of further builds of ODrive's firmware
+    watchdog_endpoints: list[WatchdogEndpoints] = field(default_factory=list)  # of more firmware builds
     text: str = ""  # the file itself, which goes into every log
 
     @property
@@ -153,7 +154,10 @@ class Configuration:
         return same_for_both(sweep, adduction)
 
 
-_READER = RecordReader(Configuration, without={"text"})
+_READERS = {
+    name: RecordReader(Configuration, without={"text"}, hints={"drive": dict[str, each.parameters]})  # type: ignore[name-defined]
+    for name, each in DRIVE_TYPES.items()
+}
 
 
 def load_configuration(path: Path) -> Configuration:
@@ -165,11 +169,28 @@ def parse_configuration(text: str, file: Path | None = None) -> Configuration:
     """Raises ConfigurationError."""
     document = parse_document(text, file)
     _apply_protocol(document)
-    configuration = Configuration(**_READER.read(document), text=text)
+    configuration = Configuration(**_READERS[_drive_type(document)].read(document), text=text)
     problems = list(contradictions(configuration))
     if problems:
         raise ConfigurationError(problems)
     return configuration
+
+
+def _drive_type(document: dict[str, Any]) -> str:
+    """Returns the type of all drives. Raises ConfigurationError where it is unknown, or not the same for all."""
+    drives = document.get("drive")
+    tables = drives if isinstance(drives, dict) else {}
+    types = {joint: table.get("type", DEFAULT) for joint, table in tables.items() if isinstance(table, dict)}
+    first = next(iter(types.values()), DEFAULT)
+    problems = []
+    for joint, name in types.items():
+        if not isinstance(name, str) or name not in DRIVE_TYPES:
+            problems.append(f"drive.{joint}.type = {shown(name)}: must be one of {', '.join(DRIVE_TYPES)}")
+        elif name != first:
+            problems.append(f"drive.{joint}.type = {name!r}: must be {first!r}, as that of the first drive")
+    if problems:
+        raise ConfigurationError(problems)
+    return str(first)
 
 
 def _apply_protocol(document: dict[str, Any]) -> None:

@@ -84,19 +84,8 @@ def _torque_problems(configuration: Configuration) -> Iterator[str]:
     """A drive must be able to give what the limits allow, or it clamps torque without a word."""
     torque_nm = configuration.limits.torque_nm
     for joint, drive in configuration.drive.items():
-        clamp_nm = drive.velocity_limit_turn_s * drive.velocity_gain_nm_s_turn
-        if clamp_nm < torque_nm:
-            yield (
-                f"drive.{joint}.velocity_gain_nm_s_turn = {drive.velocity_gain_nm_s_turn}: must be at least"
-                f" {ceil(100.0 * torque_nm / drive.velocity_limit_turn_s) / 100.0:.2f}, or with velocity_limit_turn_s ="
-                f" {drive.velocity_limit_turn_s} the drive gives less than limits.torque_nm = {torque_nm}"
-            )
-        needed_a = ceil(100.0 * torque_nm / drive.torque_constant_nm_a) / 100.0
-        if drive.current_limit_a < torque_nm / drive.torque_constant_nm_a:
-            yield (
-                f"drive.{joint}.current_limit_a = {drive.current_limit_a}: must be at least"
-                f" {needed_a:.2f} for limits.torque_nm = {torque_nm}"
-            )
+        for value, problem in drive.torque_problems(torque_nm):
+            yield f"drive.{joint}.{value}: {problem}"
 
 
 def _lead_problems(configuration: Configuration) -> Iterator[str]:

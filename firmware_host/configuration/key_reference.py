@@ -10,6 +10,8 @@ from dataclasses import MISSING, fields, is_dataclass
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 from control.bounds import Bounds, Meaning, unit_of
+from drivers.drive import DriveParameters
+from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from firmware_host.configuration.configuration import Configuration
 
 
@@ -37,6 +39,7 @@ def configuration_keys(record: type = Configuration, section: str = "") -> Itera
 
 def _record_of(hint: Any) -> type | None:
     inner = get_args(hint)[-1] if get_origin(hint) in (dict, list) else hint
+    inner = DRIVE_TYPES[DEFAULT].parameters if inner is DriveParameters else inner
     return inner if isinstance(inner, type) and is_dataclass(inner) else None
 
 

@@ -82,11 +82,14 @@ def parse_document(text: str, file: Path | None = None) -> dict[str, Any]:
 
 
 class RecordReader:
-    """Reads the fields of one record, except those that no file may hold."""
+    """Reads the fields of one record, except those that no file may hold.
 
-    def __init__(self, record: type, without: Collection[str] = ()) -> None:
-        self._hints = _hints(record, without)
-        self._model = _model_of(record, without)
+    `hints` replace the annotations of fields whose type depends on the file.
+    """
+
+    def __init__(self, record: type, without: Collection[str] = (), hints: Mapping[str, Any] | None = None) -> None:
+        self._hints = _hints(record, without) | dict(hints or {})
+        self._model = _model_of(record, self._hints)
 
     def problems(self, document: Mapping[str, Any]) -> list[str]:
         try:
@@ -109,9 +112,9 @@ def _hints(record: type, without: Collection[str] = ()) -> dict[str, Any]:
     return {name: hint for name, hint in get_type_hints(record, include_extras=True).items() if name not in without}
 
 
-def _model_of(record: type, without: Collection[str] = ()) -> type[BaseModel]:
+def _model_of(record: type, hints: Mapping[str, Any] | None = None) -> type[BaseModel]:
     """A pydantic model with a record's fields, defaults and bounds, which refuses anything else."""
-    hints = _hints(record, without)
+    hints = _hints(record) if hints is None else hints
     definitions: dict[str, Any] = {}
     for item in fields(record):
         if item.name not in hints:
@@ -126,7 +129,7 @@ def _model_of(record: type, without: Collection[str] = ()) -> type[BaseModel]:
 
 def _checked_hint(hint: Any) -> Any:
     if changes := _changes(hint):
-        return _model_of(changes.record, changes.without)
+        return _model_of(changes.record, _hints(changes.record, changes.without))
     if get_origin(hint) is Annotated:
         kind, *extras = get_args(hint)
         bounds = next((extra for extra in extras if isinstance(extra, Bounds)), None)

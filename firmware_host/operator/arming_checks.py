@@ -11,8 +11,8 @@ from math import degrees, isfinite
 from typing import Any
 
 from control.faults import Blocks, Fault, FaultKind
-from control.records import DriveState
-from drivers.odrive.axis import OdriveAxis
+from control.records import JOINTS, DriveState
+from drivers.drive import DriveHealth
 from firmware_host.loop import Loop
 from firmware_host.operator.fault_texts import fault_message, what_to_do
 from firmware_host.operator.reports import check_item
@@ -24,8 +24,8 @@ SIGNALS = ("position", "current", "heartbeat")
 def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[dict[str, Any]]:
     """All lines, the good ones too."""
     lines = {"configuration": f"accepted for {loop.configuration.robot.name}"}
-    for axis, state in zip(loop.drives.axes, loop.states, strict=True):
-        lines |= _axis_lines(axis, state)
+    for health, state in zip(loop.drives.health, loop.states, strict=True):
+        lines |= _drive_lines(health, state)
     for name, port in loop.drives.ports.items():
         lost = f", {port.lost_frames} frames lost" if port.lost_frames else ""
         lines[f"bus.{name}"] = f"{port.error_frames} error frames, {port.failed_sends} failed sends{lost}"
@@ -39,7 +39,7 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
         faults = [fault for fault in faults if fault.kind is not FaultKind.POSE_LOST]
     for fault in faults:
         lines.setdefault(fault.check_line, "")
-    unheard = {f"drive.{axis.joint}" for axis in loop.drives.axes if not axis.heard}
+    unheard = {f"drive.{joint}" for joint, state in zip(JOINTS, loop.states, strict=True) if not state.heard}
     items = [
         _line(identity, text, [fault for fault in faults if fault.check_line == identity], identity in unheard)
         for identity, text in lines.items()
@@ -60,19 +60,19 @@ def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> d
     return item | {"mandatory": any(fault.kind.blocks is Blocks.ALWAYS for fault in blocking)}
 
 
-def _axis_lines(axis: OdriveAxis, state: DriveState) -> dict[str, str]:
+def _drive_lines(health: DriveHealth, state: DriveState) -> dict[str, str]:
     """What is known of a drive, its joint and its watchdog."""
-    if not axis.heard:
-        return {f"drive.{axis.joint}": _unheard_text(axis)}
-    lines = {f"drive.{axis.joint}": _drive_text(axis, state), f"joint.{axis.joint}": _joint_text(state)}
-    if isfinite(axis.watchdog_s):
-        text = f"trips after {axis.watchdog_s:g} s" if axis.watchdog_s else "off"
-        lines[f"watchdog.{axis.joint}"] = text
+    joint = health.joint
+    if not state.heard:
+        return {f"drive.{joint}": _unheard_text(state)}
+    lines = {f"drive.{joint}": _drive_text(health, state), f"joint.{joint}": _joint_text(state)}
+    if isfinite(health.watchdog_s):
+        lines[f"watchdog.{joint}"] = f"trips after {health.watchdog_s:g} s" if health.watchdog_s else "off"
     return lines
 
 
-def _drive_text(axis: OdriveAxis, state: DriveState) -> str:
-    version = f"firmware {'.'.join(map(str, axis.version))}" if axis.version else "firmware unknown"
+def _drive_text(health: DriveHealth, state: DriveState) -> str:
+    version = f"firmware {health.firmware or 'unknown'}"
     unwatched = (
         "" if isfinite(state.temperature_stamp_s) else ", but never its temperature: the currents alone guard it"
     )
@@ -84,7 +84,7 @@ def _joint_text(state: DriveState) -> str:
     return f"at {degrees(state.angle_rad):.1f} degrees{heat}"
 
 
-def _unheard_text(axis: OdriveAxis) -> str:
-    stamps_s = (axis.state.angle_stamp_s, axis.state.current_stamp_s, axis.state.heartbeat_stamp_s)
+def _unheard_text(state: DriveState) -> str:
+    stamps_s = (state.angle_stamp_s, state.current_stamp_s, state.heartbeat_stamp_s)
     missing = [signal for signal, stamp_s in zip(SIGNALS, stamps_s, strict=True) if not isfinite(stamp_s)]
     return f"not heard: no {', '.join(missing)} yet"

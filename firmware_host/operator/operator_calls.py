@@ -14,7 +14,6 @@ from control.controller import WalkOrder
 from control.faults import Blocks, Fault
 from control.modes import Mode, Request
 from control.records import JOINTS
-from drivers.odrive.codec import error_text
 from firmware_host.log.recorder import Recording
 from firmware_host.loop import Loop
 from firmware_host.operator.arming_checks import arming_checks
@@ -106,7 +105,7 @@ class OperatorCalls:
         }
 
     def _drive(self, place: int) -> dict[str, Any]:
-        state, axis, now_s = self._loop.states[place], self._loop.drives.axes[place], self._clock()
+        state, health, now_s = self._loop.states[place], self._loop.drives.health[place], self._clock()
         return {
             "joint": JOINTS[place],
             "angle_rad": known(state.angle_rad),
@@ -114,12 +113,12 @@ class OperatorCalls:
             "current_a": known(state.current_a),
             "torque_command_nm": self._loop.sent.torques_nm[place],
             "closed_loop": state.closed_loop,
-            "errors": error_text(state.error_flags),
+            "errors": health.active_errors,
             "temperature_c": known(state.temperature_c),
             "bus_voltage_v": known(state.bus_voltage_v),
-            "firmware": ".".join(map(str, axis.version)) if axis.version else None,
-            "hardware": axis.hardware or None,
-            "watchdog_s": known(axis.watchdog_s),
+            "firmware": health.firmware or None,
+            "hardware": health.hardware or None,
+            "watchdog_s": known(health.watchdog_s),
             "winding_c": round(self._loop.temperatures_c[place], 1),
             "angle_age_s": known(now_s - state.angle_stamp_s),
             "current_age_s": known(now_s - state.current_stamp_s),
@@ -131,7 +130,7 @@ class OperatorCalls:
         return {
             "unknown_frames": drives.unknown_frames,
             "garbled_frames": drives.garbled_frames,
-            "refused_commands": drives.gate.refused,
+            "refused_commands": drives.refused_commands,
             "state": {name: port.state.name.lower() for name, port in drives.ports.items()},
             "last_error": {name: port.last_error for name, port in drives.ports.items() if port.last_error},
             "error_frames": sum(port.error_frames for port in drives.ports.values()),

@@ -15,18 +15,16 @@ Cogging is the slope of an energy that repeats n times a turn, so over a turn it
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
-from math import exp, inf, isfinite, pi, radians, sin
+from math import exp, isfinite, pi, radians, sin
 from random import Random
-from typing import Annotated
 
-from control.bounds import Bounds
 from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, GarbledMessageError, Message, arbitration_id
+from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
 from simulation.devices.late_messages import LateMessages
 
 TURN_RAD = 2.0 * pi
@@ -35,42 +33,24 @@ REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
 VERSION_FIELDS = (2, 0, 0, 0, 0, 6, 11, 0)  # protocol 2, no real board, firmware 0.6.11
 WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = 1, 2  # of hardware 0.0.0, which no real board has
 TORQUE_MODES = (codec.TORQUE_CONTROL, codec.PASSTHROUGH)
+ERROR_FLAGS = {DriveError.OVERCURRENT: 0x400, DriveError.WATCHDOG: codec.ERROR_WATCHDOG}
+OLD_FIRMWARE = (2, 4, 4, 58, 0, 5, 6, 0)
 BOOT_S = 1.0  # silence of a drive that restarts
 
 
-@dataclass(frozen=True)
-class OdriveParameters:
-    node_id: Annotated[int, Bounds(0, 62)]
-    sign: Annotated[int, Bounds(-1, 1)] = 1
-    zero_turn: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0
-    torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0)] = 0.083  # in the drive's own settings
-    torque_constant_error: Annotated[float, Bounds(-0.5, 0.5)] = 0.0  # fraction by which the true one is larger
-    cogging_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
-    cogging_per_turn: Annotated[int, Bounds(1, 1000)] = 84  # 12 slots and 14 magnets, as many small motors have
-    cogging_phase_deg: Annotated[float, Bounds(-360.0, 360.0)] = 0.0
-    current_lag_s: Annotated[float, Bounds(0.0, 0.1)] = 0.0  # time constant
-    current_noise_a: Annotated[float, Bounds(0.0, 10.0)] = 0.1
-    encoder_counts: Annotated[int, Bounds(16, 16777216)] = 16384
-    encoder_offset_rad: Annotated[float, Bounds(-pi, pi)] = 0.0  # reported minus true angle of the joint
-    encoder_noise_rad: Annotated[float, Bounds(0.0, 0.1)] = 0.0
-    watchdog_s: Annotated[float, Bounds(0.0, 60.0)] = 0.1  # 0: off, as ODrives are delivered
-    encoder_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
-    current_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
-    heartbeat_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.1
-    slow_period_s: Annotated[float, Bounds(0.001, 10.0)] = 0.1  # error, temperature, bus voltage
-    message_delay_s: Annotated[float, Bounds(0.0, 0.05)] = 0.0  # longest
-    repeated_fraction: Annotated[float, Bounds(0.0, 0.99)] = 0.0  # of the messages of angle, and of current
-    velocity_gain_nm_s_turn: Annotated[float, Bounds(0.0, 100.0)] = 1.0 / 6.0  # ODrive's default vel_gain, in the clamp
-    velocity_noise_rad_s: Annotated[float, Bounds(0.0, 5.0)] = 0.0  # of the drive's estimate
-    temperature_c: Annotated[float, Bounds(-50.0, 200.0)] = 30.0
-    bus_voltage_v: Annotated[float, Bounds(0.0, 100.0)] = 24.0
-    motor_current_limit_a: Annotated[float, Bounds(0.0, inf)] = inf  # the motor's own clip, whatever limit the bus sets
+FORGERIES: Mapping[Forgery, tuple[Message, tuple[int, ...], bytes]] = {  # message, values, and bytes after them
+    Forgery.EMERGENCY_STOP: (codec.ESTOP, (), b""),
+    Forgery.CLOSE_LOOP: (codec.SET_AXIS_STATE, (AxisState.CLOSED_LOOP,), b""),
+    Forgery.OLD_FIRMWARE: (codec.GET_VERSION, OLD_FIRMWARE, b""),
+    Forgery.STARTING: (codec.HEARTBEAT, (codec.ERROR_INITIALIZING, AxisState.IDLE, 0, 0), b""),
+    Forgery.WATCHDOG_OFF: (codec.TX_SDO, (0, ENABLE_WATCHDOG_ENDPOINT, 0), b"\0"),
+}
 
 
 class SimulatedOdrive:
     """Owns one drive's state. Callers use the joint's angles and torques; turns and signs stay inside."""
 
-    def __init__(self, parameters: OdriveParameters, random: Random) -> None:
+    def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
         self.parameters = parameters
         self._random = random
         self._late = LateMessages(random)
@@ -188,6 +168,29 @@ class SimulatedOdrive:
         self.axis_state = AxisState.IDLE
         self.errors |= reason
         self.disarm_reason = reason
+
+    @property
+    def energised(self) -> bool:
+        return self.axis_state is AxisState.CLOSED_LOOP
+
+    @energised.setter
+    def energised(self, energised: bool) -> None:
+        self.axis_state = AxisState.CLOSED_LOOP if energised else AxisState.IDLE
+
+    @property
+    def failed(self) -> bool:
+        return self.errors != 0
+
+    def trip(self, error: DriveError) -> None:
+        self._disarm(ERROR_FLAGS[error])
+
+    def forge(self, forgery: Forgery) -> Frame:
+        message, values, value = FORGERIES[forgery]
+        return Frame(arbitration_id(self.parameters.node_id, message), message.encode(*values) + value)
+
+    def forge_current(self, current_a: float) -> Frame:
+        data = codec.GET_IQ.encode(current_a, current_a)
+        return Frame(arbitration_id(self.parameters.node_id, codec.GET_IQ), data)
 
     def torque_nm(self, now_s: float) -> float:
         """Returns the torque that the motor exerts at the joint now."""

@@ -13,10 +13,10 @@ from control.controller import WalkOrder
 from control.modes import Mode, Request
 from control.records import JOINTS
 from drivers.can.mock_bus import MockBus
+from drivers.drive_types import make_drives
 from drivers.fault_injection.failing_port import failing_ports
 from drivers.fault_injection.failing_pose import failing_pose
 from drivers.fault_injection.failures import USUAL_S, Failures, begin_text, end_text
-from drivers.odrive.drives import OdriveDrives
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_injection.failing_recorder import failing_recorder
 from firmware_host.fault_injection.failing_time import Stalls, failing_clock
@@ -25,17 +25,18 @@ from firmware_host.loop import Loop
 from firmware_host.ticker import PERIOD_S, Tick
 from simulation.body.free_body import BodyShape
 from simulation.body.plant import PlantParameters
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters, SimulatedPose
-from simulation.devices.odrive import OdriveParameters
 from simulation.harness.robot import SimulatedRobot
 from simulation.mud.disturbances import NONE, Disturbances, drive_changes
 from simulation.mud.track import Track
 
 
-def drives_of(configuration: Configuration, **changes: Any) -> dict[str, OdriveParameters]:
+def drives_of(configuration: Configuration, **changes: Any) -> dict[str, SimulatedDriveParameters]:
     """Simulated drives that fit a configuration's bus: ids, signs, zeros and torque constants."""
     return {
-        joint: OdriveParameters(
+        joint: SimulatedDriveParameters(
+            type=drive.type,
             node_id=drive.node_id,
             sign=drive.sign,
             zero_turn=drive.zero_turn,
@@ -76,7 +77,7 @@ class Lockstep:
         disturbances: Disturbances = NONE,
         fixed_base: bool = False,
         plant: PlantParameters | None = None,
-        drives: Mapping[str, OdriveParameters] | None = None,
+        drives: Mapping[str, SimulatedDriveParameters] | None = None,
         motion_capture: MotionCaptureParameters = AT_EVERY_TICK,
         failures: Failures | None = None,
     ) -> None:
@@ -90,7 +91,7 @@ class Lockstep:
             seed,
         )
         wires = failing_ports({name: bus.open() for name, bus in self.buses.items()}, configuration.drive, failures)
-        ports = OdriveDrives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
+        ports = make_drives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
         pose = failing_pose(SimulatedPose(self.robot.plant, motion_capture, seed + 1), failures)
         rows = failing_recorder(recorder or NullRecorder(), failures)
         wall_clock = failing_clock(self._now_s, failures)

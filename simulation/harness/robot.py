@@ -12,7 +12,8 @@ from random import Random
 from control.records import JOINTS, Joints, Torques
 from drivers.can.can_port import CanPort
 from simulation.body.plant import STEP_S, Plant, PlantParameters
-from simulation.devices.odrive import OdriveParameters, SimulatedOdrive
+from simulation.devices.drive import SimulatedDrive, SimulatedDriveParameters
+from simulation.devices.drive_types import make_simulated_drive
 from simulation.mud.track import Track
 
 
@@ -23,7 +24,7 @@ class SimulatedRobot:
         self,
         plant: PlantParameters,
         track: Track,
-        drives: Mapping[str, OdriveParameters],
+        drives: Mapping[str, SimulatedDriveParameters],
         bus_of_joint: Mapping[str, str],
         ports: Mapping[str, CanPort],
         seed: int = 1,
@@ -31,7 +32,7 @@ class SimulatedRobot:
     ) -> None:
         random = Random(seed)
         self.plant = Plant(plant, track, Random(f"mud {seed}"))  # independent of the drives' draws
-        self.drives = Joints(*(SimulatedOdrive(drives[joint], random) for joint in JOINTS))
+        self.drives: Joints[SimulatedDrive] = Joints(*(make_simulated_drive(drives[joint], random) for joint in JOINTS))
         self._port_of_drive = tuple(ports[bus_of_joint[joint]] for joint in JOINTS)
         self._drives_on = [
             (port, [drive for drive, own in zip(self.drives, self._port_of_drive, strict=True) if own is port])

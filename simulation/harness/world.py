@@ -24,7 +24,7 @@ from firmware_host.configuration.toml_records import (
     shown,
 )
 from simulation.body.plant import PlantParameters
-from simulation.devices.odrive import OdriveParameters
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.lockstep import drives_of, plant_of
 from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, Clay, Layer, clay_of_water
 from simulation.mud.disturbances import DRIVE_FIELDS, NONE, Disturbances, drive_changes
@@ -35,7 +35,7 @@ STRONGEST_PA = 50e3  # of a segment and of its layers: ten times the paper's sti
 SAME_POSITION_M = 1e-9
 
 FIXED_OF_ROBOT = frozenset({"geometry", "arm_mass", "disturbances", "fixed_base"})
-FIXED_OF_DRIVE = frozenset({"node_id", "sign", "zero_turn", "torque_constant_nm_a"})
+FIXED_OF_DRIVE = frozenset({"type", "node_id", "sign", "zero_turn", "torque_constant_nm_a"})
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class World:
     track: Track
     disturbances: Disturbances = NONE
     robot_changes: Mapping[str, Any] = field(default_factory=dict)  # fields of PlantParameters
-    drive_changes: Mapping[str, Any] = field(default_factory=dict)  # fields of OdriveParameters, the same for all four
+    drive_changes: Mapping[str, Any] = field(default_factory=dict)  # of SimulatedDriveParameters, for all four
 
     def plant(self, configuration: Configuration) -> PlantParameters:
         """Raises ConfigurationError where the ground frees a body whose base the configuration says is fixed."""
@@ -54,7 +54,7 @@ class World:
             raise ConfigurationError(["robot.free_body = true: the configuration says estimation.fixed_base = true"])
         return plant_of(configuration, self.disturbances, **({"fixed_base": fixed_base} | dict(self.robot_changes)))
 
-    def drives(self, configuration: Configuration, **otherwise: Any) -> dict[str, OdriveParameters]:
+    def drives(self, configuration: Configuration, **otherwise: Any) -> dict[str, SimulatedDriveParameters]:
         """`otherwise`: what is not as usual where neither disturbances nor the file say anything."""
         return drives_of(configuration, **(otherwise | drive_changes(self.disturbances) | dict(self.drive_changes)))
 
@@ -88,7 +88,7 @@ class WorldText:
     random_strength: RandomStrength = UNIFORM
     disturbances: Disturbances = NONE
     robot: Annotated[dict[str, Any], ChangesOf(PlantParameters, FIXED_OF_ROBOT)] = field(default_factory=dict)
-    drives: Annotated[dict[str, Any], ChangesOf(OdriveParameters, FIXED_OF_DRIVE)] = field(default_factory=dict)
+    drives: Annotated[dict[str, Any], ChangesOf(SimulatedDriveParameters, FIXED_OF_DRIVE)] = field(default_factory=dict)
 
     @property
     def world(self) -> World:

@@ -17,6 +17,7 @@ from drivers.can.can_port import BusState
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
 from drivers.can.reopening_port import RETRY_S, NotOpenError, ReopeningPort
+from drivers.odrive.drives import OdriveDrives
 from firmware_host import buses
 from firmware_host.buses import BusError, open_bus, open_ports, reopening_ports
 from firmware_host.configuration.configuration import BusParameters, Configuration
@@ -108,6 +109,7 @@ class Plug:
 
     def __init__(self, robot: Lockstep) -> None:
         drives = robot.loop.drives
+        assert isinstance(drives, OdriveDrives)
         wire = drives.ports["left"]
         assert isinstance(wire, MockPort)
         self.inside = True

@@ -12,14 +12,14 @@ from control.modes import Mode, Request
 from control.records import NO_TORQUE, Phase, same_for_all
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
-from drivers.odrive.codec import ERROR_WATCHDOG, SET_INPUT_TORQUE, AxisState
+from drivers.odrive.codec import SET_INPUT_TORQUE
 from firmware_host.configuration.configuration import Configuration, parse_configuration
 from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE_KIND, TICK_KIND
 from firmware_host.operator.fault_texts import fault_message
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.ticker import PERIOD_S, Tick
-from simulation.devices.odrive import SimulatedOdrive
+from simulation.devices.drive import DriveError, SimulatedDrive
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
@@ -63,8 +63,8 @@ def stranger_on(robot: Lockstep, bus: str) -> MockPort:
     return port._bus.open()
 
 
-def energised_drives(robot: Lockstep) -> list[SimulatedOdrive]:
-    return [drive for drive in robot.robot.drives if drive.axis_state is AxisState.CLOSED_LOOP]
+def energised_drives(robot: Lockstep) -> list[SimulatedDrive]:
+    return [drive for drive in robot.robot.drives if drive.energised]
 
 
 def torque_frames(port: MockPort) -> list[Frame]:
@@ -137,23 +137,23 @@ def test_disarm_idles_drives_even_before_all_are_heard(configuration: Configurat
     """A daemon that starts anew beside a running motor and a dead one."""
     robot = Lockstep(configuration, FIRM)
     running = robot.robot.drives[0]
-    running.axis_state = AxisState.CLOSED_LOOP
+    running.energised = True
     robot.robot.drives = same_for_all(running)
     robot.run_for(0.02)
     assert robot.loop.mode is Mode.BOOT
     assert robot.loop.request(Request.DISARM, robot.now_s) is None
     robot.run_for(0.01)
-    assert running.axis_state is AxisState.IDLE
+    assert not running.energised
 
 
 def test_a_drive_found_in_closed_loop_is_idled_before_all_are_heard(configuration: Configuration) -> None:
     robot = Lockstep(configuration, FIRM)
     running = robot.robot.drives[0]
-    running.axis_state = AxisState.CLOSED_LOOP
+    running.energised = True
     robot.robot.drives = same_for_all(running)
     robot.run_for(0.2)
     assert robot.loop.mode is Mode.BOOT
-    assert running.axis_state is AxisState.IDLE
+    assert not running.energised
 
 
 def test_clear_transmits_nothing_before_all_are_heard(configuration: Configuration) -> None:
@@ -256,7 +256,7 @@ def test_a_drive_error_ends_in_fault_with_the_drives_own_words(robot: Lockstep) 
     robot.arm()
     robot.walk(WalkOrder(0.03))
     robot.run_for(1.5)
-    robot.robot.drives[2]._disarm(ERROR_WATCHDOG)
+    robot.robot.drives[2].trip(DriveError.WATCHDOG)
     assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
     assert robot.loop.fault is not None
     assert "right_sweep" in fault_message(robot.loop.fault) and "watchdog expired" in fault_message(robot.loop.fault)
@@ -266,7 +266,7 @@ def test_a_drive_error_ends_in_fault_with_the_drives_own_words(robot: Lockstep) 
 
 def test_a_fault_is_latched_until_somebody_clears_it(robot: Lockstep) -> None:
     robot.arm()
-    robot.robot.drives[0]._disarm(ERROR_WATCHDOG)
+    robot.robot.drives[0].trip(DriveError.WATCHDOG)
     assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
     assert not robot.run_until(lambda: robot.loop.mode is not Mode.FAULT, 1.0)
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
@@ -375,7 +375,7 @@ def test_a_log_that_is_lost_is_told(robot: Lockstep) -> None:
 
 def test_nothing_cancels_a_clear_that_waits_for_the_drives(robot: Lockstep) -> None:
     robot.arm()
-    robot.robot.drives[0]._disarm(ERROR_WATCHDOG)
+    robot.robot.drives[0].trip(DriveError.WATCHDOG)
     assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
     robot.loop.request(Request.CLEAR, robot.now_s)
     robot.step()

@@ -18,10 +18,12 @@ from control.records import JOINTS, NO_TORQUE, Phase
 from drivers.can.can_port import BusState
 from drivers.can.mock_bus import MockPort
 from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, Message
+from drivers.odrive.codec import Message
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import PERIOD_S
+from simulation.devices.drive import DriveError
 from simulation.devices.motion_capture import SimulatedPose
+from simulation.devices.odrive import SimulatedOdrive
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import LAB
@@ -117,7 +119,7 @@ def altered(place: int = 1, /, **changes: float) -> Cause:
 
 
 def idled(robot: Lockstep) -> None:
-    robot.robot.drives[1].axis_state = AxisState.IDLE
+    robot.robot.drives[1].energised = False
 
 
 def port_of(robot: Lockstep, bus: str = "left") -> MockPort:
@@ -144,7 +146,7 @@ CAUSES: dict[str, Cause] = {
     "current_silent": muted(codec.GET_IQ),
     "heartbeat_silent": muted(codec.HEARTBEAT),
     "temperature_silent": muted(codec.GET_TEMPERATURE),
-    "drive_error": lambda robot: robot.robot.drives[1]._disarm(codec.ERROR_WATCHDOG),
+    "drive_error": lambda robot: robot.robot.drives[1].trip(DriveError.WATCHDOG),
     "drive_disarmed": idled,
     "encoder_jump": altered(encoder_offset_rad=0.4),
     "joint_position": altered(encoder_offset_rad=2.0),
@@ -202,7 +204,7 @@ def test_a_drive_that_somebody_else_arms_is_told_within_its_ticks(at: Copied) ->
     drive = robot.robot.drives[1]
     drive.receive = lambda frame, now_s: []  # type: ignore[method-assign]
     altered(watchdog_s=0.0)(robot)
-    drive.axis_state = AxisState.CLOSED_LOOP
+    drive.energised = True
     ticks_until(robot, "drive_energised", FaultKind.DRIVE_ENERGISED.bound_ticks)
     assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
 
@@ -231,7 +233,7 @@ def test_a_drive_that_falls_silent_leads_to_damping_and_then_to_idle_drives(
     assert ticks[Mode.DAMPING] <= FaultKind.DRIVE_QUIET.bound_ticks
     assert ticks[Mode.DAMPING] < ticks[Mode.FAULT] <= FaultKind.DRIVE_SILENT.bound_ticks
     assert robot.loop.sent.torques_nm == NO_TORQUE
-    assert all(drive.axis_state is AxisState.IDLE for drive in robot.robot.drives)
+    assert all(not drive.energised for drive in robot.robot.drives)
     assert JOINTS[joint] in robot.loop.events.notice and "stopped by drive_silent" in robot.loop.events.notice
 
 
@@ -290,7 +292,7 @@ def test_after_a_soft_stop_the_flippers_are_up_and_the_drives_idle(at: Copied, m
     assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, SOFT_STOP_S + 0.2)
     assert all(abs(robot.robot.plant.angles_rad[joint]) < UP_RAD for joint in (1, 3))
     robot.step()
-    assert all(drive.axis_state is AxisState.IDLE for drive in robot.robot.drives)
+    assert all(not drive.energised for drive in robot.robot.drives)
 
 
 def test_a_soft_stop_in_mud_that_keeps_the_flippers_ends_in_time_as_well(at: Copied) -> None:
@@ -324,7 +326,7 @@ def test_a_fault_that_ends_with_its_cause_ends_by_itself_but_nobody_arms(at: Cop
     for _ in range(500):
         robot.step()
         assert mode_of(robot) is Mode.IDLE
-        assert not any(drive.axis_state is AxisState.CLOSED_LOOP for drive in robot.robot.drives)
+        assert not any(drive.energised for drive in robot.robot.drives)
     assert robot.loop.fault is None
     assert "stopped by voltage_under" in robot.loop.events.notice  # still told
     assert robot.loop.request(Request.ARM, robot.now_s) is None
@@ -384,7 +386,9 @@ def test_a_bug_stands_until_a_restart(at: Copied) -> None:
 def unread(configuration: Configuration) -> Lockstep:
     """A robot with a drive whose watchdog nobody could read."""
     robot = make_robot(configuration)
-    robot.robot.drives[2]._read_parameter = lambda data: []  # type: ignore[method-assign]
+    drive = robot.robot.drives[2]
+    assert isinstance(drive, SimulatedOdrive)
+    drive._read_parameter = lambda data: []  # type: ignore[method-assign]
     robot.run_for(1.5)
     assert {fault.name for fault in robot.loop.faults.blocking()} == {"watchdog_unknown"}
     return robot
@@ -495,7 +499,7 @@ def test_a_robot_that_nobody_needs_lets_go_by_itself(configuration: Configuratio
     assert mode_of(robot) is Mode.HOLD
     robot.run_for(0.2)
     assert mode_of(robot) is Mode.IDLE
-    assert not any(drive.axis_state is AxisState.CLOSED_LOOP for drive in robot.robot.drives)
+    assert not any(drive.energised for drive in robot.robot.drives)
 
 
 # no false alarms

@@ -50,5 +50,5 @@ def test_no_garbage_stops_a_loop_that_is_not_armed_or_brings_torque_to_a_drive(m
             assert walk.loop.mode in (Mode.BOOT, Mode.IDLE)
 
     examine()
-    assert walk.loop.drives.gate.refused == 0
+    assert walk.loop.drives.refused_commands == 0
     assert walk.loop.drives.unknown_frames > 0

@@ -8,11 +8,11 @@ import pytest
 from control.bounds import Bounds
 from simulation.body.free_body import BodyShape
 from simulation.body.plant import PlantParameters
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.imu import ImuParameters
 from simulation.devices.motion_capture import MotionCaptureParameters
-from simulation.devices.odrive import OdriveParameters
 
-RECORDS = [BodyShape, ImuParameters, MotionCaptureParameters, OdriveParameters, PlantParameters]
+RECORDS = [BodyShape, ImuParameters, MotionCaptureParameters, SimulatedDriveParameters, PlantParameters]
 
 
 @pytest.mark.parametrize("record", RECORDS)

@@ -18,7 +18,7 @@ def make_walk(**changes: float) -> Lockstep:
 
 def read_settings(walk: Lockstep, seconds: float) -> None:
     for _ in range(round(seconds * 380)):
-        walk.loop.drives.request_watchdogs(walk.now_s)
+        walk.loop.drives.request_settings(walk.now_s)
         walk.step()
 
 
@@ -26,21 +26,20 @@ def read_settings(walk: Lockstep, seconds: float) -> None:
 def test_the_watchdogs_of_all_drives_are_read_back_within_a_second_and_a_half(watchdog_s: float) -> None:
     walk = make_walk(watchdog_s=watchdog_s)
     assert walk.run_until(lambda: walk.loop.mode is Mode.IDLE, 2.0)
-    assert all(isnan(axis.watchdog_s) for axis in walk.loop.drives.axes)
+    assert all(isnan(health.watchdog_s) for health in walk.loop.drives.health)
     read_settings(walk, 1.5)
-    assert [axis.watchdog_s for axis in walk.loop.drives.axes] == [pytest.approx(watchdog_s)] * 4
+    assert [health.watchdog_s for health in walk.loop.drives.health] == [pytest.approx(watchdog_s)] * 4
 
 
 def test_a_drive_that_restarts_is_noticed_and_its_settings_are_asked_for_anew() -> None:
     walk = make_walk()
     read_settings(walk, 3.0)
-    assert [axis.restarts for axis in walk.loop.drives.axes] == [0, 0, 0, 0]
+    assert [health.restarts for health in walk.loop.drives.health] == [0, 0, 0, 0]
     walk.robot.restart_drive(1)
-    axis = walk.loop.drives.axes[1]
-    assert walk.run_until(lambda: axis.restarts == 1, 1.3)
-    assert axis.version is None
-    assert isnan(axis.watchdog_s)
+    assert walk.run_until(lambda: walk.loop.drives.health[1].restarts == 1, 1.3)
+    assert walk.loop.drives.health[1].firmware == ""
+    assert isnan(walk.loop.drives.health[1].watchdog_s)
     read_settings(walk, 2.0)
-    assert [axis.restarts for axis in walk.loop.drives.axes] == [0, 1, 0, 0]
-    assert axis.watchdog_s == pytest.approx(0.1)
-    assert not any(axis.duplicates for axis in walk.loop.drives.axes)
+    assert [health.restarts for health in walk.loop.drives.health] == [0, 1, 0, 0]
+    assert walk.loop.drives.health[1].watchdog_s == pytest.approx(0.1)
+    assert not any(health.duplicate_id for health in walk.loop.drives.health)

@@ -14,7 +14,7 @@ from control.modes import Mode
 from drivers.can.can_port import CanPort, open_port
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
-from drivers.odrive.drives import OdriveDrives
+from drivers.drive_types import make_drives
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import Loop
@@ -72,7 +72,7 @@ class SerialWalk(Lockstep):
         super().__init__(configuration, Track([(1.0, MUDS["48.5"])]))
         self.lines = {name: Line(port) for name, port in self.loop.drives.ports.items()}
         ports = {name: line.port for name, line in self.lines.items()}
-        drives = OdriveDrives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
+        drives = make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         self.loop = Loop(configuration, drives, self.loop.pose, NullRecorder(), self._now_s)
 
     def step(self) -> None:

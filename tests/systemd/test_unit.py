@@ -15,7 +15,7 @@ import pytest
 from control.records import JOINTS
 from drivers.can.can_port import BusState
 from drivers.can.frames import Frame
-from drivers.odrive.drives import OdriveDrives
+from drivers.drive_types import make_drives
 from firmware_host import daemon
 from firmware_host.configuration.configuration import (
     EXIT_CONFIGURATION,
@@ -23,7 +23,7 @@ from firmware_host.configuration.configuration import (
     ConfigurationError,
     StatusParameters,
 )
-from firmware_host.ticker import RATE_HZ
+from firmware_host.ticker import PERIOD_S, RATE_HZ
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 
@@ -184,10 +184,10 @@ class CountingPort:
 
 def test_the_transmit_queue_holds_the_tick_that_arms_where_linux_s_own_would_not(configuration: Configuration) -> None:
     ports = {name: CountingPort() for name in configuration.bus}
-    drives = OdriveDrives(configuration.drive, ports)
-    drives.request_versions(0.0)
+    drives = make_drives(configuration.drive, ports, configuration.limits)
+    drives.request_settings(0.0)
     drives.arm(0.0)
-    drives.send((0.0,) * len(JOINTS))  # type: ignore[arg-type]
+    drives.send((0.0,) * len(JOINTS), PERIOD_S)  # type: ignore[arg-type]
     most = max(port.sent for port in ports.values())
     assert LINUX_QUEUE_LENGTH < most <= int(only(read_settings("80-can.link"), "TransmitQueueLength"))
 

@@ -6,9 +6,16 @@ import random
 
 import pytest
 
-from drivers.can.bus_load import MESSAGES_OF_A_DRIVE, bus_load, frame_bits
+from drivers.can.bus_load import BusLoad, frame_bits
+from drivers.can.bus_load import bus_load as load_of
+from drivers.drive import DriveParameters
+from drivers.drive_types import traffic_of
 
 CRC15 = 0x4599  # of ISO 11898-1
+
+
+def bus_load(drives: int, bit_rate_bit_s: float) -> BusLoad:
+    return load_of(traffic_of([DriveParameters("left", 0)] * drives), bit_rate_bit_s)
 
 
 def bits_on_the_wire(identifier: int, data: bytes) -> int:
@@ -63,4 +70,4 @@ def test_load_goes_with_drives_and_against_bit_rate() -> None:
 
 
 def test_every_message_that_the_readme_sets_is_counted() -> None:
-    assert sum(rate_hz for _, rate_hz in MESSAGES_OF_A_DRIVE) == 380 + 2 * 500 + 4 * 10
+    assert sum(rate_hz for _, rate_hz in traffic_of([DriveParameters("left", 0)])) == 380 + 2 * 500 + 4 * 10

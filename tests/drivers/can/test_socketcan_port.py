@@ -24,6 +24,7 @@ from drivers.can.error_frames import BusState
 from drivers.can.frames import Frame, encode_frame
 from drivers.can.port_health import MOST_FRAMES_PER_READ
 from drivers.can.socketcan_port import SO_RXQ_OVFL, SO_TIMESTAMPNS, SocketcanPort
+from drivers.drive_types import make_drives
 from drivers.odrive.drives import OdriveDrives
 from firmware_host.configuration.configuration import Configuration
 
@@ -254,7 +255,9 @@ def passes(filters: bytes, word: int) -> bool:
 
 def test_the_kernel_is_asked_for_what_the_drives_send_and_for_all_error_frames(configuration: Configuration) -> None:
     benches = {name: Bench() for name in configuration.bus}
-    drives = OdriveDrives(configuration.drive, {name: bench.port for name, bench in benches.items()})
+    ports = {name: bench.port for name, bench in benches.items()}
+    drives = make_drives(configuration.drive, ports, configuration.limits)
+    assert isinstance(drives, OdriveDrives)
     for name, bench in benches.items():
         filters = bench.socket.can_options[constants.CAN_RAW_FILTER]
         wanted = {

@@ -16,7 +16,7 @@ from drivers.fault_injection.failing_port import FailingPort, garbled
 from drivers.fault_injection.failures import EFFECTS, FailureKind, Failures
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, GarbledMessageError, arbitration_id
-from drivers.odrive.drives import DriveParameters
+from drivers.odrive.parameters import OdriveParameters as DriveParameters
 
 DRIVES = {joint: DriveParameters("left" if place < 2 else "right", place) for place, joint in enumerate(JOINTS)}
 NODES = {joint: drive.node_id for joint, drive in DRIVES.items()}

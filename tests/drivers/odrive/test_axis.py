@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 from control.records import JOINTS, Joints
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
-from drivers.odrive.axis import OdriveAxis, WatchdogEndpoints
+from drivers.drive import WatchdogEndpoints
+from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import GET_ENCODER_ESTIMATES, GET_IQ, GET_VERSION, HEARTBEAT, TX_SDO, Message, arbitration_id
-from drivers.odrive.drives import REFRESH_S, VERSION_REPEAT_S, DriveParameters, OdriveDrives
+from drivers.odrive.drives import REFRESH_S, VERSION_REPEAT_S, OdriveDrives
+from drivers.odrive.parameters import OdriveParameters
 
 TICK_S = 1.0 / 380.0
 BUILD = WatchdogEndpoints("0.6.11", "4.4.58", enable=219, timeout=218)
@@ -29,7 +31,7 @@ class Bench:
         bus = MockBus()
         self.far = bus.open()
         parameters = {
-            joint: DriveParameters("one", node, heartbeat_period_s=heartbeat_period_s)
+            joint: OdriveParameters("one", node, heartbeat_period_s=heartbeat_period_s)
             for node, joint in enumerate(JOINTS)
         }
         self.drives = OdriveDrives(parameters, {"one": bus.open()}, endpoints=endpoints)
@@ -241,12 +243,12 @@ def test_a_joint_that_moves_fast_or_an_encoder_that_jumps_or_tells_garbage_is_no
 def test_the_watchdog_is_read_back_by_the_numbers_of_the_drive_s_build(
     bench: Bench, enable: str, timeout: str, watchdog_s: float
 ) -> None:
-    bench.drives.request_watchdogs(0.0)
+    bench.drives._request_watchdogs(0.0)
     assert bench.far.receive() == []  # its version is not known
     bench.report(GET_VERSION, *PRO)
     bench.read(0.1)
     assert isnan(bench.axis.watchdog_s)
-    bench.drives.request_watchdogs(1.0)
+    bench.drives._request_watchdogs(1.0)
     asked = [Frame(0x004, bytes.fromhex("00 db 00 00")), Frame(0x004, bytes.fromhex("00 da 00 00"))]
     assert bench.far.receive() == asked
     bench.tell_setting(218, timeout)
@@ -255,7 +257,7 @@ def test_the_watchdog_is_read_back_by_the_numbers_of_the_drive_s_build(
     bench.tell_setting(219, enable)
     bench.read(1.2)
     assert bench.axis.watchdog_s == pytest.approx(watchdog_s)
-    bench.drives.request_watchdogs(2.0)
+    bench.drives._request_watchdogs(2.0)
     assert bench.far.receive() == []
 
 
@@ -264,7 +266,7 @@ def test_an_unanswered_question_for_a_watchdog_is_repeated_after_a_while(bench: 
     bench.read(0.1)
     asked = []
     for number in range(10):
-        bench.drives.request_watchdogs(1.0 + 0.3 * VERSION_REPEAT_S * number)
+        bench.drives._request_watchdogs(1.0 + 0.3 * VERSION_REPEAT_S * number)
         asked.append(len(bench.far.receive()))
     assert asked == [2, 0, 0, 0, 2, 0, 0, 0, 2, 0]
 
@@ -280,7 +282,7 @@ def test_a_build_whose_numbers_are_not_known_is_not_asked_and_counts_as_not_read
     bench.tell_setting(219, "01")
     bench.tell_setting(218, "cdcccc3d")
     bench.read(0.1)
-    bench.drives.request_watchdogs(1.0)
+    bench.drives._request_watchdogs(1.0)
     assert bench.far.receive() == []
     assert isnan(bench.axis.watchdog_s)
     assert bench.drives.garbled_frames == 0
@@ -345,8 +347,8 @@ def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench
         axis._watchdog_enabled, axis._watchdog_timeout_s = True, 0.1
     asked = []
     for tick in range(round(3.0 * REFRESH_S / TICK_S)):
-        bench.drives.request_versions(tick * TICK_S)
-        bench.drives.request_watchdogs(tick * TICK_S)
+        bench.drives._request_versions(tick * TICK_S)
+        bench.drives._request_watchdogs(tick * TICK_S)
         asked.append(len(bench.far.receive()))
     assert [count for count in asked if count] == [4 + 8] * 3
     bench.tell_setting(BUILD.enable, "00")

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from control.limits import JointLimits
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
-from drivers.odrive.axis import DriveParameters
+from drivers.odrive.parameters import OdriveParameters
 from drivers.odrive.transmit_gate import GatedPort, TransmitGate
 from tests.folders import ROOT
 
@@ -49,7 +49,7 @@ class Bench:
         bus = MockBus()
         self.far = bus.open()
         self.gate = TransmitGate(limits)
-        drives = [DriveParameters("left", node, velocity_limit_turn_s=8.0, current_limit_a=6.0) for node in (2, 3)]
+        drives = [OdriveParameters("left", node, velocity_limit_turn_s=8.0, current_limit_a=6.0) for node in (2, 3)]
         self.port = self.gate.outlet(bus.open(), drives)
         self.gate.allow_step(STEP_S)
 
@@ -277,7 +277,7 @@ def test_the_bounds_themselves_belong_to_what_may_pass() -> None:
 
 def test_no_torque_passes_before_a_step_was_allowed() -> None:
     gate, bus = TransmitGate(LIMITS), MockBus()
-    far, port = bus.open(), gate.outlet(bus.open(), [DriveParameters("left", 2)])
+    far, port = bus.open(), gate.outlet(bus.open(), [OdriveParameters("left", 2)])
     gate.open()
     port.send(Frame(MOTOR, pack("<f", 1e-7)))
     assert far.receive() == [Frame(MOTOR, ZERO)]
@@ -292,7 +292,7 @@ def test_every_drive_has_its_own_torque_before(armed: Bench) -> None:
 
 def test_the_first_torque_after_arming_counts_from_zero_on_every_bus(armed: Bench) -> None:
     bus = MockBus()
-    far, second = bus.open(), armed.gate.outlet(bus.open(), [DriveParameters("right", 2)])
+    far, second = bus.open(), armed.gate.outlet(bus.open(), [OdriveParameters("right", 2)])
     second.send(Frame(MOTOR, pack("<f", 0.4)))
     assert far.receive() == [Frame(MOTOR, ZERO)]
     for torque_nm in (0.2, 0.4):

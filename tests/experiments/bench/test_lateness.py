@@ -9,7 +9,6 @@ import pytest
 
 from control.modes import Request
 from control.records import DriveState, DriveStates, same_for_all
-from drivers.odrive.codec import AxisState
 from experiments.bench.joint_zero_check import rest_pose
 from experiments.bench.lateness import LATE_S
 from experiments.bench.operator import SimulatedAttendant
@@ -22,6 +21,7 @@ from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Tick
 from simulation.body.blocks import on_blocks
+from simulation.devices.odrive import SimulatedOdrive
 from simulation.harness.peer import track_of
 from simulation.harness.world import World
 from tests.bench.staged_bench import MOST_MEASURED, BenchReport, StagedBench
@@ -102,6 +102,7 @@ def test_the_current_before_torque_goes_off_is_seen_through_late_ticks_and_messa
 
 def test_a_drive_that_keeps_its_last_torque_is_found_by_its_current(stand: Stand, rig: LateRig, briefly: None) -> None:
     drive = rig.robot.drives[2]
+    assert isinstance(drive, SimulatedOdrive)
 
     def keep(rig: SimulatedRig) -> None:
         """Deaf from the wish on, its watchdog fed by somebody else."""
@@ -130,7 +131,7 @@ def test_a_drive_is_too_slow_to_let_go_also_where_ticks_are_missed_meanwhile(
             drive.receive = lambda frame, now_s: []  # type: ignore[method-assign]
             late.begin(1.0, 0.0, 1, 1)
         elif asked and rig._tick_number >= asked[0] + 6:
-            drive.axis_state = AxisState.IDLE
+            drive.energised = False
 
     rig.others.append(dawdle)
     reported = by_name(torque_off(stand))
@@ -246,7 +247,7 @@ def test_a_measurement_that_ends_early_says_what_was_late(bench: StagedBench) ->
 def test_sums_are_made_once_torque_is_off(stand: Stand, rig: LateRig) -> None:
     """They take longer than a tick, and on a slow computer than a drive's watchdog."""
     for _ in stroke_readings(stand, "fast", FAST_RAD_S, FAST_DEG):
-        assert not any(drive.axis_state is AxisState.CLOSED_LOOP for drive in rig.robot.drives)
+        assert not any(drive.energised for drive in rig.robot.drives)
 
 
 def test_ticks_without_torque_may_be_late(stand: Stand, rig: LateRig) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from control.records import JOINTS, NO_TORQUE, Joints
-from drivers.odrive.codec import ERROR_WATCHDOG, AxisState
 from experiments.bench.joint_zero_check import level_pose, turned
 from experiments.bench.operator import AbsentAttendant, AskedAttendant, SimulatedAttendant
 from experiments.bench.reading import Reading, left_out
@@ -19,6 +18,8 @@ from experiments.bench.stroke_tracking import lag_ticks
 from experiments.bench.test_rig import Stand, first_lasting
 from experiments.robot.bench_robot import CLEAR, LEAVE, BenchError
 from firmware_host.configuration.configuration import Configuration
+from simulation.devices.drive import DriveError
+from simulation.devices.odrive import SimulatedOdrive
 from tests.bench.bench_table import HEADS, table_lines
 from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, BenchReport, StagedBench, stage_of
 from tests.scripted_operator import ScriptedOperator
@@ -34,22 +35,22 @@ def bench(rig: SimulatedRig) -> StagedBench:
     return StagedBench(Stand(rig, SimulatedAttendant(rig)), BenchReport())
 
 
-def axis_states(rig: SimulatedRig) -> set[AxisState]:
-    return {drive.axis_state for drive in rig.robot.drives}
+def energised(rig: SimulatedRig) -> set[bool]:
+    return {drive.energised for drive in rig.robot.drives}
 
 
 def test_ctrl_c_with_raised_flippers_leaves_the_drives_idle(bench: StagedBench, rig: SimulatedRig) -> None:
     with pytest.raises(KeyboardInterrupt), bench.stand.raised():
-        assert axis_states(rig) == {AxisState.CLOSED_LOOP}
+        assert energised(rig) == {True}
         raise KeyboardInterrupt
-    assert axis_states(rig) == {AxisState.IDLE}
+    assert energised(rig) == {False}
 
 
 def test_the_end_idles_the_drives_without_the_loop(bench: StagedBench, rig: SimulatedRig) -> None:
     bench.stand.arm(lambda held, states: NO_TORQUE)
     bench.stand.end()
     rig.wait()
-    assert axis_states(rig) == {AxisState.IDLE}
+    assert energised(rig) == {False}
 
 
 def test_a_fault_ends_a_measurement_with_its_sentence(bench: StagedBench, rig: SimulatedRig) -> None:
@@ -77,32 +78,34 @@ class Asked(AskedAttendant):
 @pytest.mark.parametrize("answer", [CLEAR, LEAVE])
 def test_a_fault_of_before_is_cleared_where_a_person_says_so(rig: SimulatedRig, answer: str) -> None:
     """No daemon may run beside the bench, so 'mudskipper clear' is not to be had."""
-    rig.robot.drives[1].errors = ERROR_WATCHDOG
+    rig.robot.drives[1].trip(DriveError.WATCHDOG)
     attendant = Asked(answer)
     stand = Stand(rig, attendant)
     if answer == CLEAR:
         stand.arm(lambda held, states: NO_TORQUE)
-        assert axis_states(rig) == {AxisState.CLOSED_LOOP}
+        assert energised(rig) == {True}
     else:
         with pytest.raises(BenchError, match="cannot be armed: The left_adduction drive reports error"):
             stand.arm()
-        assert rig.robot.drives[1].errors == ERROR_WATCHDOG
+        assert rig.robot.drives[1].failed
     (question,) = attendant.asked
     assert "The left_adduction drive reports error" in question and question.endswith("Is the cause gone?")
 
 
 def test_where_nobody_is_there_a_fault_of_before_stands(rig: SimulatedRig) -> None:
-    rig.robot.drives[1].errors = ERROR_WATCHDOG
+    rig.robot.drives[1].trip(DriveError.WATCHDOG)
     with pytest.raises(BenchError, match="cannot be armed: The left_adduction drive reports error"):
         Stand(rig, AbsentAttendant()).arm()
-    assert rig.robot.drives[1].errors == ERROR_WATCHDOG
+    assert rig.robot.drives[1].failed
 
 
 def test_a_drive_that_does_not_let_go_is_told(bench: StagedBench, rig: SimulatedRig) -> None:
     bench.stand.arm(lambda held, states: NO_TORQUE)
     for port in rig.buses["right"].ports[1:]:
         port.full = True
-    rig.others.append(lambda _: rig.robot.drives[3]._set_torque(0.0, rig.now_s))  # somebody feeds its watchdog
+    drive = rig.robot.drives[3]
+    assert isinstance(drive, SimulatedOdrive)
+    rig.others.append(lambda _: drive._set_torque(0.0, rig.now_s))  # somebody feeds its watchdog
     with pytest.raises(BenchError, match="right_adduction: still in closed loop"):
         bench.stand.let_go()
 

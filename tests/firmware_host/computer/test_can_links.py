@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.drive import DriveParameters
 from firmware_host.computer import can_links
 from firmware_host.computer.can_links import CanLink, examine_bus, parse_links, read_links, read_sys_links
 from firmware_host.computer.findings import Level
@@ -46,11 +47,13 @@ def changed(**details: Any) -> dict[str, CanLink]:
 
 
 def levels(links: dict[str, CanLink], drives: int = 2, bus: BusParameters = CAN0) -> dict[str, Level]:
-    return {finding.id: finding.level for finding in examine_bus("left", bus, drives, links)}
+    return {
+        finding.id: finding.level for finding in examine_bus("left", bus, [DriveParameters("left", 0)] * drives, links)
+    }
 
 
 def texts(links: dict[str, CanLink], bus: BusParameters = CAN0) -> dict[str, str]:
-    return {finding.id: finding.text for finding in examine_bus("left", bus, 2, links)}
+    return {finding.id: finding.text for finding in examine_bus("left", bus, [DriveParameters("left", 0)] * 2, links)}
 
 
 def test_all_of_a_configured_interface_is_read() -> None:
@@ -115,7 +118,7 @@ def test_an_interface_that_does_not_exist_is_one_clear_sentence() -> None:
 
 
 def test_an_interface_that_is_down_fails_with_the_command_that_brings_it_up() -> None:
-    found = examine_bus("left", BusParameters("socketcan", "can1"), 2, parse_links(UNTOUCHED))
+    found = examine_bus("left", BusParameters("socketcan", "can1"), [], parse_links(UNTOUCHED))
     assert (found[0].level, found[0].text) == (Level.FAIL, "can1 is down")
     assert "ip link set can1 up type can bitrate 1000000" in found[0].fix
     assert {finding.id: finding.level for finding in found}["queue.left"] is Level.WARN

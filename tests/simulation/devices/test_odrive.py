@@ -34,7 +34,8 @@ from drivers.odrive.codec import (
     Message,
     arbitration_id,
 )
-from simulation.devices.odrive import BOOT_S, OdriveParameters, SimulatedOdrive
+from simulation.devices.drive import SimulatedDriveParameters
+from simulation.devices.odrive import BOOT_S, SimulatedOdrive
 
 NODE = 3
 ANSWERED = [
@@ -43,7 +44,7 @@ ANSWERED = [
 
 
 def make_drive(**changes: float) -> SimulatedOdrive:
-    return SimulatedOdrive(OdriveParameters(NODE, **changes), Random(1))  # type: ignore[arg-type]
+    return SimulatedOdrive(SimulatedDriveParameters(NODE, **changes), Random(1))  # type: ignore[arg-type]
 
 
 def report(drive: SimulatedOdrive, message: Message, *values: float, now_s: float = 0.0) -> None:
@@ -229,7 +230,7 @@ def test_the_current_is_noisy_as_stated_around_the_true_one() -> None:
 
 
 def test_the_same_seed_gives_the_same_frames_and_another_one_others() -> None:
-    first, second, third = (SimulatedOdrive(OdriveParameters(NODE), Random(seed)) for seed in (7, 7, 8))
+    first, second, third = (SimulatedOdrive(SimulatedDriveParameters(NODE), Random(seed)) for seed in (7, 7, 8))
     frames = cyclic_frames(first, 0.5)
     assert frames == cyclic_frames(second, 0.5)
     assert frames != cyclic_frames(third, 0.5)

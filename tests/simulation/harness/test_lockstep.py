@@ -8,9 +8,9 @@ from control.controller import WalkOrder
 from control.modes import Mode, Request
 from control.records import JOINTS, NO_TORQUE
 from drivers.can.frames import Frame
-from drivers.odrive.codec import ERROR_WATCHDOG, AxisState
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.fault_texts import fault_message
+from simulation.devices.drive import DriveError
 from simulation.devices.motion_capture import MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
 from simulation.mud.clay import MUDS
@@ -106,7 +106,7 @@ def test_it_arms_from_power_on_and_holds_its_pose(holding: Lockstep) -> None:
     holding.run_for(3.0)
     assert holding.loop.mode is Mode.HOLD
     assert holding.loop.fault is None
-    assert all(drive.axis_state is AxisState.CLOSED_LOOP for drive in holding.robot.drives)
+    assert all(drive.energised for drive in holding.robot.drives)
     assert holding.robot.plant.angles_rad == pytest.approx(before_rad, abs=0.02)
 
 
@@ -114,7 +114,7 @@ def test_nothing_arms_by_itself(configuration: Configuration) -> None:
     lockstep = Lockstep(configuration, TRACK)
     lockstep.run_for(3.0)
     assert lockstep.loop.mode is Mode.IDLE
-    assert all(drive.axis_state is AxisState.IDLE for drive in lockstep.robot.drives)
+    assert all(not drive.energised for drive in lockstep.robot.drives)
 
 
 def test_an_order_of_three_strides_walks_three_and_holds_with_flippers_raised(holding: Lockstep) -> None:
@@ -135,10 +135,10 @@ def test_power_is_cut_when_the_loop_stops_ticking(holding: Lockstep) -> None:
     stopped_s = holding.now_s
     watchdog_s = holding.robot.drives[0].parameters.watchdog_s
     holding.robot.advance(stopped_s + 0.9 * watchdog_s)
-    assert all(drive.axis_state is AxisState.CLOSED_LOOP for drive in holding.robot.drives)
+    assert all(drive.energised for drive in holding.robot.drives)
     holding.robot.advance(stopped_s + 1.1 * watchdog_s)
     for drive in holding.robot.drives:
-        assert (drive.axis_state, drive.disarm_reason) == (AxisState.IDLE, ERROR_WATCHDOG)
+        assert not drive.energised and drive.failed
         assert drive.torque_nm(holding.robot.now_s) == 0.0
 
 
@@ -160,12 +160,12 @@ def test_a_silent_drive_is_a_fault_and_all_torques_are_zero(
     assert joint in fault_message(lockstep.loop.fault)
     assert lockstep.loop.sent.torques_nm == NO_TORQUE
     lockstep.step()
-    assert all(drive.axis_state is AxisState.IDLE for drive in lockstep.robot.drives)
+    assert all(not drive.energised for drive in lockstep.robot.drives)
     assert all(drive.torque_nm(lockstep.robot.now_s) == 0.0 for drive in lockstep.robot.drives)
 
 
 def test_a_drive_that_disarms_itself_is_a_fault_that_can_be_cleared(holding: Lockstep) -> None:
-    holding.robot.drives[2]._disarm(ERROR_WATCHDOG)
+    holding.robot.drives[2].trip(DriveError.WATCHDOG)
     assert holding.run_until(lambda: holding.loop.mode is Mode.FAULT, 0.2)
     assert holding.loop.fault is not None
     assert "right_sweep" in fault_message(holding.loop.fault)

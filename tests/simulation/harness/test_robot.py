@@ -5,7 +5,7 @@ from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus, MockPort
 from drivers.odrive.codec import ESTOP, GET_VERSION, arbitration_id
 from simulation.body.plant import PlantParameters
-from simulation.devices.odrive import OdriveParameters
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.robot import SimulatedRobot
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
@@ -18,7 +18,7 @@ def make_robot() -> tuple[SimulatedRobot, dict[str, MockPort]]:
     robot = SimulatedRobot(
         PlantParameters(),
         Track([(1.0, MUDS["48.5"])]),
-        {joint: OdriveParameters(node_id=int(joint.endswith("adduction"))) for joint in JOINTS},
+        {joint: SimulatedDriveParameters(node_id=int(joint.endswith("adduction"))) for joint in JOINTS},
         {joint: joint.split("_")[0] for joint in JOINTS},
         {name: bus.open() for name, bus in buses.items()},
     )
@@ -29,7 +29,7 @@ def test_a_command_reaches_the_node_on_its_bus_only() -> None:
     robot, far = make_robot()
     far["right"].send(Frame(arbitration_id(0, ESTOP)))
     robot.advance(0.0)
-    assert [drive.errors != 0 for drive in robot.drives] == [False, False, True, False]
+    assert [drive.failed for drive in robot.drives] == [False, False, True, False]
 
 
 def test_an_answer_goes_to_the_bus_of_the_question() -> None:

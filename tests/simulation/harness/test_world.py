@@ -15,7 +15,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.toml_records import ConfigurationError
 from simulation.body.blocks import on_blocks
 from simulation.body.plant import PlantParameters
-from simulation.devices.odrive import OdriveParameters
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.lockstep import Lockstep
 from simulation.harness.world import (
     FIXED_OF_DRIVE,
@@ -235,7 +235,7 @@ def test_robot_and_drives_may_be_given_whatever_their_records_hold() -> None:
         section: {item.name: item.default for item in fields(record) if item.name not in fixed}
         for section, record, fixed in (
             ("robot", PlantParameters, FIXED_OF_ROBOT),
-            ("drives", OdriveParameters, FIXED_OF_DRIVE),
+            ("drives", SimulatedDriveParameters, FIXED_OF_DRIVE),
         )
     }
     for section, defaults in settable.items():
@@ -248,7 +248,7 @@ def test_robot_and_drives_may_be_given_whatever_their_records_hold() -> None:
 
 def test_what_the_configuration_fixes_is_in_no_world() -> None:
     assert {item.name for item in fields(PlantParameters)} > FIXED_OF_ROBOT
-    assert {item.name for item in fields(OdriveParameters)} > FIXED_OF_DRIVE
+    assert {item.name for item in fields(SimulatedDriveParameters)} > FIXED_OF_DRIVE
 
 
 def test_a_base_is_fixed_where_the_configuration_says_so(configuration: Configuration) -> None:

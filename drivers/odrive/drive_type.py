@@ -1,0 +1,76 @@
+"""ODrive as a drive type: its parameters, its drives, and how to read and forge its frames without commanding one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import cast
+
+from control.limits import JointLimits
+from drivers.can.bus_load import COMMAND_HZ, FrameRate
+from drivers.can.can_port import CanPort
+from drivers.can.frames import Frame
+from drivers.drive import DriveParameters, FrameContent, WatchdogEndpoints
+from drivers.odrive import codec
+from drivers.odrive.codec import AxisState, GarbledMessageError
+from drivers.odrive.drives import OdriveDrives
+from drivers.odrive.parameters import OdriveParameters
+
+SIGNALS: Mapping[int, tuple[str, ...]] = {
+    codec.GET_ENCODER_ESTIMATES.command: ("position",),
+    codec.GET_IQ.command: ("current",),
+    codec.HEARTBEAT.command: ("heartbeat", "error"),
+    codec.GET_ERROR.command: ("error",),
+    codec.GET_TEMPERATURE.command: ("temperature",),
+    codec.GET_BUS_VOLTAGE_CURRENT.command: ("voltage",),
+}
+COMMANDS = frozenset(
+    message.command
+    for message in (
+        codec.ESTOP,
+        codec.SET_AXIS_STATE,
+        codec.SET_CONTROLLER_MODE,
+        codec.SET_INPUT_TORQUE,
+        codec.SET_LIMITS,
+        codec.SET_VEL_GAINS,
+        codec.CLEAR_ERRORS,
+    )
+)
+REPORT_BYTES = 8  # of every cyclic message
+FAST_HZ, SLOW_HZ = 500.0, 10.0  # cyclic messages every 2 and every 100 ms, as docs/how-to/odrive.md sets them
+GATE_DRIVER_FAULT = 0x20
+
+
+class Odrive:
+    """A DriveType."""
+
+    parameters = OdriveParameters
+    example_error = GATE_DRIVER_FAULT
+    command = FrameRate(len(codec.SET_INPUT_TORQUE.encode(0.0)), COMMAND_HZ)
+    reports = (
+        FrameRate(REPORT_BYTES, FAST_HZ),  # encoder
+        FrameRate(REPORT_BYTES, FAST_HZ),  # current
+        *(FrameRate(REPORT_BYTES, SLOW_HZ),) * 4,  # heartbeat, errors, temperature, voltage
+    )
+
+    def make_drives(
+        self,
+        parameters: Mapping[str, DriveParameters],
+        ports: Mapping[str, CanPort],
+        limits: JointLimits,
+        endpoints: Sequence[WatchdogEndpoints],
+    ) -> OdriveDrives:
+        return OdriveDrives(cast(Mapping[str, OdriveParameters], parameters), ports, limits, endpoints)
+
+    def read_frame(self, frame: Frame) -> FrameContent:
+        node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & codec.LAST_COMMAND
+        return FrameContent(node_id, command in COMMANDS, SIGNALS.get(command, ()))
+
+    def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
+        with suppress(GarbledMessageError):
+            if frame.arbitration_id & codec.LAST_COMMAND == codec.GET_ERROR.command:
+                errors, reason = codec.GET_ERROR.decode(frame.data)
+                return codec.GET_ERROR.encode(errors | flags, reason | flags)
+            errors, state, result, done = codec.HEARTBEAT.decode(frame.data)
+            return codec.HEARTBEAT.encode(errors | flags, AxisState.IDLE if idle else state, result, done)
+        return frame.data

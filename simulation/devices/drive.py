@@ -1,0 +1,97 @@
+"""What a simulated motor drive is to the simulated robot, whatever protocol it speaks on the bus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum, auto
+from math import inf, pi
+from typing import Annotated, Protocol
+
+from control.bounds import Bounds
+from drivers.can.frames import Frame
+
+
+@dataclass(frozen=True)
+class SimulatedDriveParameters:
+    """One simulated drive and its motor: what the configuration fixes, then what differs from an ideal drive."""
+
+    node_id: Annotated[int, Bounds(0, 62)]
+    sign: Annotated[int, Bounds(-1, 1)] = 1
+    zero_turn: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0
+    torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0)] = 0.083  # in the drive's own settings
+    torque_constant_error: Annotated[float, Bounds(-0.5, 0.5)] = 0.0  # fraction by which the true one is larger
+    cogging_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
+    cogging_per_turn: Annotated[int, Bounds(1, 1000)] = 84  # 12 slots and 14 magnets, as many small motors have
+    cogging_phase_deg: Annotated[float, Bounds(-360.0, 360.0)] = 0.0
+    current_lag_s: Annotated[float, Bounds(0.0, 0.1)] = 0.0  # time constant
+    current_noise_a: Annotated[float, Bounds(0.0, 10.0)] = 0.1
+    encoder_counts: Annotated[int, Bounds(16, 16777216)] = 16384
+    encoder_offset_rad: Annotated[float, Bounds(-pi, pi)] = 0.0  # reported minus true angle of the joint
+    encoder_noise_rad: Annotated[float, Bounds(0.0, 0.1)] = 0.0
+    watchdog_s: Annotated[float, Bounds(0.0, 60.0)] = 0.1  # 0: off, as ODrives are delivered
+    encoder_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
+    current_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
+    heartbeat_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.1
+    slow_period_s: Annotated[float, Bounds(0.001, 10.0)] = 0.1  # error, temperature, bus voltage
+    message_delay_s: Annotated[float, Bounds(0.0, 0.05)] = 0.0  # longest
+    repeated_fraction: Annotated[float, Bounds(0.0, 0.99)] = 0.0  # of the messages of angle, and of current
+    velocity_gain_nm_s_turn: Annotated[float, Bounds(0.0, 100.0)] = 1.0 / 6.0  # ODrive's default vel_gain, in the clamp
+    velocity_noise_rad_s: Annotated[float, Bounds(0.0, 5.0)] = 0.0  # of the drive's estimate
+    temperature_c: Annotated[float, Bounds(-50.0, 200.0)] = 30.0
+    bus_voltage_v: Annotated[float, Bounds(0.0, 100.0)] = 24.0
+    motor_current_limit_a: Annotated[float, Bounds(0.0, inf)] = inf  # the motor's own clip, whatever limit the bus sets
+    type: str = "odrive"
+
+
+class Forgery(Enum):
+    """Frames that a bus may carry in the name of a drive, or to it, though neither drive nor loop sent them."""
+
+    EMERGENCY_STOP = auto()
+    CLOSE_LOOP = auto()
+    OLD_FIRMWARE = auto()
+    STARTING = auto()
+    WATCHDOG_OFF = auto()
+
+
+class DriveError(Enum):
+    OVERCURRENT = auto()
+    WATCHDOG = auto()
+
+
+class SimulatedDrive(Protocol):
+    """One drive on the bus and its motor. Angles and torques are the joint's."""
+
+    parameters: SimulatedDriveParameters
+    energised: bool  # it follows torque commands; may be set, as if another program had commanded it
+
+    @property
+    def failed(self) -> bool:
+        """Whether the drive has an active error."""
+
+    def reset(self, now_s: float) -> None:
+        """Returns to the state after power-on."""
+
+    def restart(self, now_s: float) -> None:
+        """Loses and regains the supply; the angle stays."""
+
+    def trip(self, error: DriveError) -> None:
+        """Goes idle by itself with an error."""
+
+    def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
+        """Takes in where the joint is."""
+
+    def torque_nm(self, now_s: float) -> float:
+        """Returns the torque that the motor exerts now."""
+
+    def receive(self, frame: Frame, now_s: float) -> list[Frame]:
+        """Obeys one frame of the bus; returns the answers that it calls for."""
+
+    def cyclic_frames(self, now_s: float) -> Iterable[Frame]:
+        """Yields the messages that have come due."""
+
+    def forge(self, forgery: Forgery) -> Frame:
+        """Makes a frame for the bus that this drive does not send itself."""
+
+    def forge_current(self, current_a: float) -> Frame:
+        """Makes a report of another current than the motor has."""

@@ -1,0 +1,17 @@
+"""The simulated drives by the type that `[drive.JOINT] type` names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from random import Random
+
+from simulation.devices.drive import SimulatedDrive, SimulatedDriveParameters
+from simulation.devices.odrive import SimulatedOdrive
+
+SIMULATED_DRIVES: Mapping[str, Callable[[SimulatedDriveParameters, Random], SimulatedDrive]] = {
+    "odrive": SimulatedOdrive,
+}
+
+
+def make_simulated_drive(parameters: SimulatedDriveParameters, random: Random) -> SimulatedDrive:
+    return SIMULATED_DRIVES[parameters.type](parameters, random)
