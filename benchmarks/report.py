@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from typing import Any
 
 
-def new_parser(name: str, description: str | None) -> argparse.ArgumentParser:
+def new_parser(module: str, description: str | None) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog=f"python -m benchmarks.{name}",
+        prog=f"python -m {module}",
         description=description,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

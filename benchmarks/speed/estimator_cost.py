@@ -274,7 +274,7 @@ def fit_rows(fits: dict[str, Any], samples: int) -> list[list[str]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("estimator_cost", __doc__)
+    parser = new_parser("benchmarks.speed.estimator_cost", __doc__)
     parser.add_argument("--strides", type=int, default=200, help="timed, of each method")
     parser.add_argument("--memory-strides", type=int, default=1000, help="in which the memory may not grow")
     options = parser.parse_args(arguments)

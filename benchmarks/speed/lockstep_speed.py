@@ -55,7 +55,7 @@ def text_of(report: dict[str, Any]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("lockstep_speed", __doc__)
+    parser = new_parser("benchmarks.speed.lockstep_speed", __doc__)
     parser.add_argument("--rounds", type=int, default=5, help="walks, of which the median counts")
     parser.add_argument("--longest", type=float, default=300.0, metavar="SECONDS", help="simulated, of one walk")
     options = parser.parse_args(arguments)

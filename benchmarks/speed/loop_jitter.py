@@ -253,7 +253,7 @@ def _row(name: str, figures: dict[str, Any]) -> list[str]:
 
 
 def new_options(arguments: Sequence[str] | None) -> argparse.Namespace:
-    parser = new_parser("loop_jitter", __doc__)
+    parser = new_parser("benchmarks.speed.loop_jitter", __doc__)
     parser.add_argument("--seconds", type=float, default=30.0, help=f"of each loop, in turns of {TURN_S:g} s")
     parser.add_argument("--show-gil", action="store_true", help="also the bare loop beside a second, busy thread")
     return parser.parse_args(arguments)

@@ -98,7 +98,7 @@ def report_of(measured: dict[str, dict[str, Any]], seconds: int, socketcan: dict
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("tick_time", __doc__)
+    parser = new_parser("benchmarks.speed.tick_time", __doc__)
     parser.add_argument("--seconds", type=int, default=20, help="of simulated walking behind each figure")
     parser.add_argument("--bus", action="append", choices=VARIANTS, help="measure only this one; repeatable")
     options = parser.parse_args(arguments)

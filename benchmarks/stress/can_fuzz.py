@@ -10,7 +10,7 @@ nothing may leave for a drive but zero torque, idle, and questions for version a
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from random import Random
 from struct import pack
@@ -272,11 +272,11 @@ def text_of(parts: dict[str, dict[str, Any]]) -> str:
     return table([head, *rows])
 
 
-def main() -> int:
-    parser = new_parser("can_fuzz", __doc__)
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = new_parser("benchmarks.stress.can_fuzz", __doc__)
     parser.add_argument("--frames", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     progress = Progress(options.frames)
     parts = measure(options.frames, options.seed, progress)
     progress.clear()

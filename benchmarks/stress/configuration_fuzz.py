@@ -206,7 +206,7 @@ def text_of(report: dict[str, Any]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("configuration_fuzz", __doc__)
+    parser = new_parser("benchmarks.stress.configuration_fuzz", __doc__)
     parser.add_argument("--configurations", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)

@@ -214,7 +214,7 @@ def text_of(report: dict[str, Any]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("corrupted_logs", __doc__)
+    parser = new_parser("benchmarks.stress.corrupted_logs", __doc__)
     parser.add_argument("--logs", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)

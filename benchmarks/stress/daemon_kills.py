@@ -185,7 +185,7 @@ def text_of(report: dict[str, Any]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("daemon_kills", __doc__)
+    parser = new_parser("benchmarks.stress.daemon_kills", __doc__)
     parser.add_argument("--kills", type=int, default=40)
     options = parser.parse_args(arguments)
     progress = Progress(options.kills)

@@ -54,7 +54,7 @@ class OddConfigurations:
         example = (ROOT / "systemd" / "mudskipper.toml").read_text(encoding="utf-8")
         local = configuration_text(Path("m"), Path("m/logs"))
         self._texts = {False: [example, example + FURTHER.replace("sweep", "adduction"), local]}
-        self._texts[True] = [(ROOT / "simulation" / "example_world.toml").read_text(encoding="utf-8")]
+        self._texts[True] = [(ROOT / "simulation" / "harness" / "example_world.toml").read_text(encoding="utf-8")]
         self._makers: dict[str, tuple[int, Callable[[bool], OddFile]]] = {
             "near": (30, self._near),
             "within": (14, self._within),

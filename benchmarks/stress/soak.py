@@ -53,7 +53,7 @@ def text_of(name: str, part: dict[str, Any]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("soak", __doc__)
+    parser = new_parser("benchmarks.stress.soak", __doc__)
     parser.add_argument("--hours", type=float, default=1.0, help="simulated, in lockstep; 0: none")
     parser.add_argument("--real-time-minutes", type=float, default=0.0, metavar="MINUTES", help="of the daemon")
     parser.add_argument("--seed", type=int, default=1)

@@ -259,7 +259,7 @@ def text_of(report: dict[str, Any]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("socket_fuzz", __doc__)
+    parser = new_parser("benchmarks.stress.socket_fuzz", __doc__)
     parser.add_argument("--streams", type=int, default=200_000)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)
