@@ -9,10 +9,9 @@ from control.bounds import Bounds
 from simulation.body.free_body import BodyShape
 from simulation.body.plant import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.imu import ImuParameters
 from simulation.devices.motion_capture import MotionCaptureParameters
 
-RECORDS = [BodyShape, ImuParameters, MotionCaptureParameters, SimulatedDriveParameters, PlantParameters]
+RECORDS = [BodyShape, MotionCaptureParameters, SimulatedDriveParameters, PlantParameters]
 
 
 @pytest.mark.parametrize("record", RECORDS)
