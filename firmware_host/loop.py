@@ -32,7 +32,7 @@ from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
 from firmware_host.log.recorder import Recording
-from firmware_host.log.row_packing import Moment, stride_row, tick_row
+from firmware_host.log.row_packing import TickRecord, stride_row, tick_row
 from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
 from firmware_host.loop_events import LoopEvents, ModeChange
 from firmware_host.loop_timing import LoopTiming
@@ -264,7 +264,7 @@ class Loop:
 
     def _record(self, tick: Tick) -> None:
         tick_s = self._clock() - tick.now_s
-        moment = Moment(
+        record = TickRecord(
             tick,
             tick_s,
             self.missed_ticks,
@@ -276,7 +276,7 @@ class Loop:
             self.body,
             self.sent,
         )
-        self.recorder.put(TICK_KIND, tick_row(moment))
+        self.recorder.put(TICK_KIND, tick_row(record))
         if self.controller.recovery.events:
             self.events.report(tick.now_s, self.controller.recovery.events)
         self.timing.update(tick.now_s, tick.late_s, tick.missed, tick_s)

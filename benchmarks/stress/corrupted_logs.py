@@ -43,8 +43,8 @@ def make_sound_log(path: Path, chance: random.Random, finished: bool) -> SoundLo
     rows: list[bytes] = []
     safe = []
     for number in range(400):
-        values = [chance.random() for field in TICK.fields for _ in range(field.count)]
-        kinds = [field.kind for field in TICK.fields for _ in range(field.count)]
+        values = [chance.random() for field in TICK.fields for _ in range(field.length or 1)]
+        kinds = [field.kind for field in TICK.fields for _ in range(field.length or 1)]
         other = {"uint32": number, "int32": number}  # above all the tick's number, by which the reader sorts
         whole = [
             value if kind == "float64" else other.get(kind, number % 7)

@@ -18,8 +18,8 @@ from firmware_host.log.log_folder import (
     BROKEN,
     DONE,
     ENDING,
-    KEPT,
     PART,
+    PRESERVED,
     disk_bytes,
     free_space,
     log_files,
@@ -46,7 +46,7 @@ def list_logs(options: Options) -> int:
     if not folder.is_dir():
         complain(f"{folder}: there is no such folder")
         return exit_codes.UNHEALTHY
-    logs = [describe(path) for path in [*stored_files(folder), *log_files(folder, KEPT)]]
+    logs = [describe(path) for path in [*stored_files(folder), *log_files(folder, PRESERVED)]]
     space = free_space(folder)
     report = {
         "folder": str(folder),
@@ -79,7 +79,7 @@ def describe(path: Path) -> dict[str, Any]:
         "state": _state_of(path, duration_s is not None),
         "bytes": path.stat().st_size if path.exists() else 0,
         "duration_s": duration_s,
-        "preserved": path.parent.name == KEPT,
+        "preserved": path.parent.name == PRESERVED,
         "recovered": metadata.get("recovered") == "true",
     }
 
@@ -87,7 +87,7 @@ def describe(path: Path) -> dict[str, Any]:
 def _state_of(path: Path, has_summary: bool) -> str:
     if has_summary:
         return "whole"
-    if path.name.endswith(BROKEN) or path.parent.name in (DONE, KEPT):
+    if path.name.endswith(BROKEN) or path.parent.name in (DONE, PRESERVED):
         return "broken"
     return "unfinished" if path.name.endswith((ENDING, PART)) else "no log"
 

@@ -1,7 +1,4 @@
-"""A log that is written where its rows come about, without a writer of its own: for a loop that may wait for the disk.
-
-That is a simulated one in step with its robot, which has no clock. A daemon uses the recorder.
-"""
+"""Writes a log in the loop's own process, for a simulated loop that may wait for the disk."""
 
 from __future__ import annotations
 
@@ -20,7 +17,7 @@ class FileRecorder:
     """A Recording. Owns the file and the rows that are not in it yet. Every method may raise OSError."""
 
     def __init__(self, path: Path, configuration: Configuration, metadata: dict[str, str] | None = None) -> None:
-        """`path` must be new."""
+        """`path` must not exist yet."""
         robot = configuration.robot.name
         known = {"robot": robot, "run_id": new_run_id(robot), "segment": "0"} | (metadata or {})
         opening = {
@@ -34,8 +31,8 @@ class FileRecorder:
         self._file = LogFile(path, opening)
         self._rows: list[tuple[int, bytes]] = []
 
-    def put(self, kind_index: int, payload: bytes) -> bool:
-        self._rows.append((kind_index, payload))
+    def put(self, number: int, row: bytes) -> bool:
+        self._rows.append((number, row))
         if len(self._rows) >= ROWS_AT_ONCE:
             self._write()
         return True
@@ -45,7 +42,7 @@ class FileRecorder:
         self._rows = []
 
     def flush(self) -> None:
-        """Everything so far can be read from then on."""
+        """Makes every row so far readable."""
         self._write()
         self._file.flush()
 
@@ -53,7 +50,7 @@ class FileRecorder:
         return HEALTHY
 
     def close(self, timeout_s: float = 0.0) -> bool:
-        """Once; it takes the time that it needs."""
+        """Finishes the file, however long that takes."""
         if self.writer_alive:
             self._write()
             self.path = self._file.finish()

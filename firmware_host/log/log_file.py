@@ -1,11 +1,11 @@
-"""One MCAP file under construction, and what of it is safe.
+"""One MCAP file under construction, and how many of its rows are safe.
 
-The MCAP writer fills a buffer in memory; `flush` ends the chunk and hands the buffer to the kernel, so after a flush
-every row so far survives the death of this process, and after a `synchronise` a power cut. When the disk refuses, the
-file is cut back to the last flush: what it holds is then known to the row.
+The MCAP writer fills a buffer in memory. `flush` ends the chunk and hands the buffer to the kernel, so every row so far
+survives the death of this process; after the next synchronisation every row survives a power cut. When the disk refuses
+a write, the file is cut back to the last flush, so that the number of rows in it is known.
 
-The writer holds a lock on its file (flock), which ends with the process, whatever ended it: an unlocked file in
-active/ is one that nobody will finish.
+The writer holds a lock on its file (flock). The lock ends with the process, whatever ends the process: an unlocked file
+in active/ is one that nobody will finish.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from typing import Any
 
 from mcap.writer import CompressionType, Writer
 
-from firmware_host.log.log_folder import finished_path, make_folder, synchronise_folder, take_owner
-from firmware_host.log.recorder import STAMP
+from firmware_host.log.log_folder import copy_owner, finished_path, make_folder, synchronise_folder
 from firmware_host.log.rows import ROW_KINDS
+from firmware_host.log.schema import RowKind
 
 CHUNK_BYTES = 64 * 1024
-FLUSH_INTERVAL_S = 0.4  # what the death of the writer may cost
-SYNC_INTERVAL_S = 1.0  # what a power cut may cost
+FLUSH_INTERVAL_S = 0.4  # the death of the writer may cost as much
+SYNC_INTERVAL_S = 1.0  # a power cut may cost as much
 LATEST_NS = (1 << 63) - 1
 METADATA = "mudskipper"
 ATTACHMENT = "configuration.toml"
 
-Rows = Sequence[tuple[int, bytes]]  # index in ROW_KINDS, payload
+Rows = Sequence[tuple[int, bytes]]  # number of the row's kind, encoded row
 
 
 class _Buffer:
-    """The stream that the MCAP writer writes to."""
+    """The stream that the MCAP writer writes to. It owns the bytes that are not in the file yet."""
 
     def __init__(self) -> None:
         self.unwritten = bytearray()
@@ -51,30 +51,32 @@ class _Buffer:
         return self.length
 
     def flush(self) -> None:
-        """Part of the interface; `LogFile.flush` is what writes."""
+        """Part of a stream's interface; `LogFile.flush` writes."""
 
 
 class LogFile:
-    """Made new and locked. Every method may raise OSError; only `abandon` is of use then."""
+    """Owns a new, locked file. Every method may raise OSError; after that only `abandon` may be called."""
 
-    def __init__(self, path: Path, opening: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, opening: Mapping[str, Any], kinds: Sequence[RowKind] = ROW_KINDS) -> None:
+        """`kinds` describes the rows; a recovered log keeps the description that it had."""
         make_folder(path.parent)
         self.path = path
         self.rows = self.safe_rows = 0
-        self.slowest_s = 0.0  # write or synchronisation since somebody set this to zero
-        self._file = path.open("xb", buffering=0)  # a log is never written over
+        self.slowest_s = 0.0  # write or synchronisation since this was last set to zero
+        self._kinds = kinds
+        self._file = path.open("xb", buffering=0)  # never overwrites a log
         self._buffer = _Buffer()
-        stream: Any = self._buffer  # all of a stream that the MCAP writer uses
+        stream: Any = self._buffer  # has everything of a stream that the MCAP writer uses
         self._writer = Writer(stream, chunk_size=1 << 40, compression=CompressionType.LZ4)
         self._wall_offset_ns = int(opening["wall_minus_monotonic_ns"])
         self._latest_ns = min(max(0, self._wall_offset_ns), LATEST_NS)
-        self._sequences = [0] * len(ROW_KINDS)
+        self._sequences = [0] * len(kinds)
         self._chunk_bytes = self._safe_bytes = 0
         try:
             lock_file(self._file.fileno(), path)
-            take_owner(path)
+            copy_owner(path)
             self._write_opening(opening["configuration_text"], opening["metadata"])
-            self._channels = self._register_channels()
+            self._channels = [self._register_channel(kind) for kind in kinds]
             self._write_out()
             self._synchronise()
         except OSError:
@@ -88,47 +90,41 @@ class LogFile:
         now_ns = time.time_ns()
         self._writer.add_attachment(now_ns, now_ns, ATTACHMENT, "application/toml", configuration_text.encode())
 
-    def _register_channels(self) -> list[int]:
-        channels = []
-        for kind in ROW_KINDS:
-            schema = self._writer.register_schema(kind.schema_name, "ros2msg", kind.ros_text.encode())
-            channels.append(self._writer.register_channel(kind.topic, "cdr", schema))
-        return channels
+    def _register_channel(self, kind: RowKind) -> int:
+        schema = self._writer.register_schema(kind.schema_name, "ros2msg", kind.definition.encode())
+        return self._writer.register_channel(kind.topic, "cdr", schema)
 
     @property
     def length(self) -> int:
-        """Bytes, with those that are not on the disk yet."""
+        """Bytes, including those that are not on the disk yet."""
         return self._buffer.length + self._chunk_bytes
 
     def write(self, rows: Rows) -> None:
-        for kind_index, payload in rows:
-            log_time_ns = self._wall_time_ns(payload)
-            sequence = self._sequences[kind_index]
-            self._sequences[kind_index] += 1
-            self._writer.add_message(self._channels[kind_index], log_time_ns, payload, log_time_ns, sequence)
+        for number, row in rows:
+            log_time_ns = self._wall_time_ns(self._kinds[number].stamp_s(row))
+            self._writer.add_message(self._channels[number], log_time_ns, row, log_time_ns, self._sequences[number])
+            self._sequences[number] += 1
             self.rows += 1
-            self._chunk_bytes += len(payload)
+            self._chunk_bytes += len(row)
             if self._chunk_bytes >= CHUNK_BYTES:
                 self.flush()
-        self.keep_up()
+        self._flush_by_time()
 
-    def keep_up(self) -> None:
-        """Flush and synchronise when it is time to."""
+    def _flush_by_time(self) -> None:
         now_s = time.monotonic()
         if now_s - self._flushed_s > FLUSH_INTERVAL_S and self.rows > self.safe_rows:
             self.flush()
         if now_s - self._synchronised_s > SYNC_INTERVAL_S and self._unsynchronised:
             self._synchronise()
 
-    def _wall_time_ns(self, payload: bytes) -> int:
-        """Of the row's stamp; a row without a usable one is placed with the row before it."""
-        (stamp_s,) = STAMP.unpack_from(payload)
+    def _wall_time_ns(self, stamp_s: float) -> int:
+        """A row without a usable stamp gets the time of the row before it."""
         if math.isfinite(stamp_s) and abs(stamp_s) < 1e9:
             self._latest_ns = min(max(0, self._wall_offset_ns + round(stamp_s * 1e9)), LATEST_NS)
         return self._latest_ns
 
     def flush(self) -> None:
-        """End the chunk, so that a crash of this process no longer costs its rows."""
+        """Ends the chunk, so that a crash of this process no longer costs its rows."""
         self._writer.flush()  # type: ignore[no-untyped-call]
         self._chunk_bytes = 0
         self._write_out()
@@ -150,13 +146,13 @@ class LogFile:
     def _synchronise(self) -> None:
         started_s = time.monotonic()
         os.fsync(self._file.fileno())
-        self._require_place()
+        self._require_path()
         self._unsynchronised = False
         self._synchronised_s = time.monotonic()
         self.slowest_s = max(self.slowest_s, self._synchronised_s - started_s)
 
-    def _require_place(self) -> None:
-        """A file that was removed takes every row without a complaint."""
+    def _require_path(self) -> None:
+        """Raises FileNotFoundError for a removed file: writing into it would not fail."""
         if _is_at(self.path, self._file.fileno()):
             return
         if os.fstat(self._file.fileno()).st_nlink == 0:
@@ -164,7 +160,7 @@ class LogFile:
         raise FileNotFoundError(errno.ENOENT, "it was removed or moved away")
 
     def finish(self) -> Path:
-        """The index, and everything down to the disk, the file's name included; a file in active/ goes to done/."""
+        """Writes the index and synchronises everything, the file's name included; moves a file in active/ to done/."""
         self._writer.finish()  # type: ignore[no-untyped-call]
         self._write_out()
         self._synchronise()
@@ -174,11 +170,11 @@ class LogFile:
             self.path.rename(path)
             synchronise_folder(path.parent)
         synchronise_folder(self.path.parent)
-        self._file.close()  # and with it the lock, when nothing is left to recover
+        self._file.close()  # ends the lock, now that nothing is left to recover
         return path
 
     def abandon(self) -> None:
-        """Cut back to the last flush and let go; a file without a row is removed. Never raises OSError."""
+        """Cuts the file back to the last flush and closes it; removes a file without rows. Never raises OSError."""
         with suppress(OSError):
             os.ftruncate(self._file.fileno(), self._safe_bytes)
         if self.safe_rows == 0:
@@ -190,7 +186,7 @@ class LogFile:
 
 
 def lock_file(descriptor: int, path: Path) -> None:
-    """Raises OSError where another process holds it, or has moved it away meanwhile."""
+    """Raises OSError where another process holds the lock, or has moved the file away meanwhile."""
     flock(descriptor, LOCK_EX | LOCK_NB)
     if not _is_at(path, descriptor):
         raise FileNotFoundError(errno.ENOENT, "was moved away", str(path))

@@ -1,9 +1,9 @@
-"""The folder of the logs: active/ holds what is being written, done/ what is whole, kept/ what nobody may free.
+"""The folder of the logs: active/ for logs being written, done/ for finished ones, kept/ for preserved ones.
 
-A file goes from active/ to done/ in one rename once it is down on the disk, so whatever lies in done/ is whole.
-Preserving a log moves it to kept/: unlike an extended attribute or a list of names that survives every copy to another
-disk, it is seen with `ls`, and freeing cannot reach it, since it never looks there. A log that lies in the folder
-itself, as older versions left them, counts as one of done/.
+A file moves from active/ to done/ in one rename after it is synchronised, so every file in done/ is whole. A preserved
+log is moved to kept/: unlike an extended attribute or a list of names, a folder survives every copy to another disk and
+is visible with `ls`, and the quota cannot reach it, since it never looks there. A log in the folder itself, where older
+versions left them, counts as one of done/.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
-ACTIVE, DONE, KEPT = "active", "done", "kept"
+ACTIVE, DONE, PRESERVED = "active", "done", "kept"
 TOP = "."  # the folder itself
 ENDING = ".mcap"
 BROKEN = ".broken"  # after the name of a log that is being rewritten
@@ -31,13 +31,13 @@ class FreeSpace(NamedTuple):
     free_bytes: int
 
 
-class FreedLog(NamedTuple):
+class DeletedLog(NamedTuple):
     name: str
     size: int  # bytes
 
 
 def new_run_id(robot: str) -> str:
-    """Sorts by time, and is a file name whatever the robot is called."""
+    """Returns an id that sorts by time and is a valid file name whatever the robot's name is."""
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
     return f"{stamp}-{re.sub(r'[^A-Za-z0-9_.]+', '_', robot)[:60]}"
 
@@ -53,42 +53,43 @@ def segment_path(first: Path, segment: int) -> Path:
 
 
 def finished_path(path: Path) -> Path:
-    """Where a log goes once it is whole; one outside of active/ stays where it is."""
+    """Returns the path of the finished log; a log outside of active/ does not move."""
     moves = path.parent.name == ACTIVE and path.suffix == ENDING
     return path.parent.parent / DONE / path.name if moves else path
 
 
 def present_path(path: Path) -> Path:
-    """Of a log that was last seen in active/ and may have gone on since."""
+    """Returns where a log is now that was in active/ before."""
     folder = path.parent.parent
-    places = (path, folder / DONE / path.name, folder / KEPT / path.name)
-    return next((place for place in places if place.exists()), path)
+    paths = (path, folder / DONE / path.name, folder / PRESERVED / path.name)
+    return next((possible for possible in paths if possible.exists()), path)
 
 
-def log_files(folder: Path, *places: str) -> list[Path]:
-    """The oldest first. A place that is not there holds none."""
-    found = [path for place in places for path in (folder / place).glob(f"*{ENDING}")]
+def log_files(folder: Path, *subfolders: str) -> list[Path]:
+    """Returns the logs in these subfolders, the oldest first; a missing subfolder is empty."""
+    found = [path for subfolder in subfolders for path in (folder / subfolder).glob(f"*{ENDING}")]
     return sorted(found, key=lambda path: path.name)
 
 
 def run_files(path: Path) -> list[Path]:
-    """All segments of the run that this one is of, wherever they lie now, in their order."""
-    folder = path.parent.parent if path.parent.name in (ACTIVE, DONE, KEPT) else path.parent
+    """Returns all segments of the run that a log belongs to, wherever they are now, in their order."""
+    folder = path.parent.parent if path.parent.name in (ACTIVE, DONE, PRESERVED) else path.parent
     run = re.sub(r"-\d{4,}$", "", path.stem)
     segments = re.compile(re.escape(run) + r"-(\d{4,})")
-    found = {file.name: file for file in log_files(folder, TOP, ACTIVE, DONE, KEPT) if segments.fullmatch(file.stem)}
+    files = log_files(folder, TOP, ACTIVE, DONE, PRESERVED)
+    found = {file.name: file for file in files if segments.fullmatch(file.stem)}
     return [found[name] for name in sorted(found, key=lambda name: int(name.removesuffix(ENDING).rpartition("-")[2]))]
 
 
 def unfinished_files(folder: Path) -> list[Path]:
-    """What recovery has to look at, the files of living writers included."""
+    """Returns the files that recovery has to examine, including those of living writers."""
     found = [path for ending in (ENDING, BROKEN, PART) for path in (folder / ACTIVE).glob(f"*{ending}")]
     found += [path for ending in (BROKEN, PART) for path in folder.glob(f"*{ENDING}{ending}")]
     return sorted([*found, *(path for path in folder.glob(f"*{ENDING}") if not _has_an_end(path))])
 
 
 def _has_an_end(path: Path) -> bool:
-    """Also of one that went away or cannot be opened: there is nothing to recover."""
+    """True also for a file that was removed or cannot be opened: there is nothing to recover."""
     try:
         with path.open("rb") as file:
             file.seek(-min(len(LAST_BYTES), path.stat().st_size), os.SEEK_END)
@@ -98,54 +99,58 @@ def _has_an_end(path: Path) -> bool:
 
 
 def stored_files(folder: Path) -> list[Path]:
-    """All that takes up the logs' room, whatever lies in active/ included; what a person has preserved does not."""
-    junk = {path for path in (folder / ACTIVE).glob("*") if path.is_file()}
-    found = junk.union(unfinished_files(folder), log_files(folder, TOP, DONE))
+    """Returns all files that count towards the quota: everything in active/ does, a preserved log does not."""
+    active = {path for path in (folder / ACTIVE).glob("*") if path.is_file()}
+    found = active.union(unfinished_files(folder), log_files(folder, TOP, DONE))
     return sorted(found, key=lambda path: path.name)
 
 
 def free_space(folder: Path) -> FreeSpace:
-    """Of the disk, for whoever has no special rights. Raises OSError."""
+    """Returns the disk's free space for users without special rights. Raises OSError."""
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
     disk = os.statvfs(folder)
     return FreeSpace(disk.f_bavail / max(1, disk.f_blocks), disk.f_bavail * disk.f_frsize)
 
 
-def free_logs(folder: Path, quota_bytes: int, min_free_fraction: float, most: int = 4) -> Iterator[FreedLog]:
-    """Remove the oldest finished logs, one by one, while the logs or the disk hold too much. Raises OSError."""
+def disk_bytes(folder: Path) -> int:
+    return shutil.disk_usage(folder).total
+
+
+def delete_by_quota(folder: Path, quota_bytes: int, min_free_fraction: float, most: int = 4) -> Iterator[DeletedLog]:
+    """Deletes the oldest finished logs one by one until quota and free space are respected. Raises OSError."""
     used = sum(_size(path) for path in stored_files(folder))
-    for oldest in removable_logs(folder)[:most]:
+    for oldest in deletable_logs(folder)[:most]:
         too_much = 0 < quota_bytes < used
         if not too_much and free_space(folder).free_fraction >= min_free_fraction:
             return
-        freed = remove_log(oldest)
-        used -= freed.size
-        yield freed
+        deleted = delete_log(oldest)
+        used -= deleted.size
+        yield deleted
 
 
-def removable_logs(folder: Path) -> list[Path]:
-    """The oldest first. The newest finished log is never freed: it tells of what happened last."""
+def deletable_logs(folder: Path) -> list[Path]:
+    """Returns the finished logs, the oldest first, without the newest: it shows what happened last."""
     unfinished = unfinished_files(folder)
     return [path for path in log_files(folder, TOP, DONE) if path not in unfinished][:-1]
 
 
-def remove_log(path: Path) -> FreedLog:
-    freed = FreedLog(path.name, _size(path))
+def delete_log(path: Path) -> DeletedLog:
+    deleted = DeletedLog(path.name, _size(path))
     path.unlink()
-    return freed
+    return deleted
 
 
 def _size(path: Path) -> int:
-    """Zero for one that went away meanwhile."""
+    """Returns zero for a file that was removed meanwhile."""
     with suppress(OSError):
         return path.stat().st_size
     return 0
 
 
 def preserve(path: Path, undo: bool = False) -> Path:
-    """To kept/, or back to done/; its new place. Raises OSError, and ValueError for a log that is elsewhere."""
-    source, target = (KEPT, DONE) if undo else (DONE, KEPT)
+    """Moves a log to kept/, or back to done/. Raises OSError, and ValueError for a log that is elsewhere."""
+    source, target = (PRESERVED, DONE) if undo else (DONE, PRESERVED)
     path = path.absolute()
     if path.parent.name == target:
         return path
@@ -157,50 +162,32 @@ def preserve(path: Path, undo: bool = False) -> Path:
         raise FileNotFoundError(2, "No such file or directory", str(path))
     if moved.exists():
         raise ValueError(f"{moved} exists already")
-    make_folder(moved.parent)
-    path.rename(moved)
-    synchronise_folder(moved.parent)
-    synchronise_folder(path.parent)
+    move_file(path, moved)
     return moved
 
 
+def move_file(path: Path, target: Path) -> None:
+    """Renames a file and synchronises both folders."""
+    make_folder(target.parent)
+    path.rename(target)
+    for folder in {target.parent, path.parent}:
+        synchronise_folder(folder)
+
+
 def make_folder(folder: Path) -> None:
-    """With all above it that are not there, each with the owner of the folder that it lies in. Raises OSError."""
+    """Makes a folder and its missing parents, each with the owner of the folder that it is in. Raises OSError."""
     if not folder.exists():
         make_folder(folder.parent)
         folder.mkdir(exist_ok=True)
-        take_owner(folder)
+        copy_owner(folder)
 
 
-def take_owner(path: Path) -> None:
-    """Of its folder: what a command makes as root must not lock the daemon out."""
+def copy_owner(path: Path) -> None:
+    """Gives a file the owner of its folder: a file that a command makes as root must not lock the daemon out."""
     owner = path.parent.stat()
     for user, group in ((-1, owner.st_gid), (owner.st_uid, -1)):
-        with suppress(OSError):  # only root may give things away, and not on every disk
+        with suppress(OSError):  # only root may change the owner, and not on every disk
             os.chown(path, user, group)
-
-
-def why_not_read(path: Path, problem: OSError) -> str:
-    """With what to do, where it is a matter of rights."""
-    if not isinstance(problem, PermissionError):
-        return f"{path}: {problem.strerror or problem}"
-    shown = next((place for place in (path, *path.absolute().parents) if _can_be_seen(place)), path)
-    group = f"the group of {shown}, then log in again"
-    return f"{path}: you may not read it: have root add you to {group}, or do this as root"
-
-
-def why_not_moved(path: Path, problem: OSError) -> str:
-    if not isinstance(problem, PermissionError):
-        return f"{path}: {problem.strerror or problem}"
-    return f"{path}: only the daemon's own user and root may move logs: do this as root"
-
-
-def _can_be_seen(path: Path) -> bool:
-    try:
-        path.stat()
-    except OSError:
-        return False
-    return True
 
 
 def synchronise_folder(folder: Path) -> None:
@@ -211,5 +198,24 @@ def synchronise_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def disk_bytes(folder: Path) -> int:
-    return shutil.disk_usage(folder).total
+def why_not_read(path: Path, problem: OSError) -> str:
+    """Says why a file cannot be read and, where permission is missing, what to do."""
+    if not isinstance(problem, PermissionError):
+        return f"{path}: {problem.strerror or problem}"
+    visible = next((parent for parent in (path, *path.absolute().parents) if _is_visible(parent)), path)
+    group = f"the group of {visible}, then log in again"
+    return f"{path}: you may not read it: have root add you to {group}, or do this as root"
+
+
+def why_not_moved(path: Path, problem: OSError) -> str:
+    if not isinstance(problem, PermissionError):
+        return f"{path}: {problem.strerror or problem}"
+    return f"{path}: only the daemon's own user and root may move logs: do this as root"
+
+
+def _is_visible(path: Path) -> bool:
+    try:
+        path.stat()
+    except OSError:
+        return False
+    return True

@@ -1,11 +1,11 @@
-"""The loop's side of the log: rows leave through a pipe to the writer, and the loop never waits for a disk.
+"""The loop's side of the log: sends rows through a pipe to the writer's process, and never waits for a disk.
 
-Compressing and writing a log takes milliseconds, a memory card now and then a second. So a writer of its own
-does that (`firmware_host.log.writer`), and `put` is one non-blocking write into a pipe that holds several
-seconds of rows. A row is smaller than PIPE_BUF, so it goes in whole or not at all. When the pipe is full the
-row is dropped and counted, and an event in the log says so before the next row that gets through.
+Compressing and writing a log takes milliseconds, and a memory card sometimes takes a second. The writer
+(`firmware_host.log.writer`) does both, and `put` is one non-blocking write into a pipe that holds several seconds of
+rows. A row is smaller than PIPE_BUF, so the pipe takes it whole or not at all. When the pipe is full, the row is
+dropped and counted, and an event in the log reports the loss before the next row.
 
-A second pipe leads back: once a second the writer says how the disk is. `report` reads what is there and never waits.
+A second pipe leads back: once a second the writer reports the state of the disk. `report` never waits for it.
 """
 
 from __future__ import annotations
@@ -29,31 +29,33 @@ from firmware_host.log.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.rows import EVENT, EVENT_KIND
 
 PIPE_BYTES = 1 << 20  # 2,560 ticks, ten to a page: almost seven seconds at 380 Hz
-HEADER = struct.Struct("<BI")  # index in ROW_KINDS, length of the payload; the opening comes first, as kind 0
-STAMP = struct.Struct("<4xd")  # every row: four bytes of encapsulation, then its stamp
-REPORT_BYTES = 256  # kept free for the report of a loss, which goes in together with a row
+HEADER = struct.Struct("<BI")  # number of the row's kind, its length; the opening comes first, as kind 0
+STAMP = struct.Struct("<4xd")  # every row of this version: four bytes of encapsulation, then its stamp
+REPORT_BYTES = 256  # left free for the report of a loss, which is sent together with a row
 LARGEST_ROW = select.PIPE_BUF - HEADER.size - REPORT_BYTES
 LONGEST_TEXT = LARGEST_ROW - len(EVENT.encode(0.0, ""))  # bytes
-REPORT_CALLS = 95  # between two looks into the pipe of reports, which brings one a second: four a second at 380 Hz
+REPORT_CALLS = 95  # calls of `report` between two reads of its pipe: four reads a second at 380 Hz
 REPORT_OVERDUE_S = 3.0  # without a report: the writer waits for its disk
 
 
 class LogReport(NamedTuple):
-    """How the log is."""
+    """The state of the log and its disk."""
 
     alive: bool  # the writer
     dropped: int  # rows, by the full pipe and by the writer
-    problem: str  # a sentence, or empty
+    problem: str  # a message, or empty
     free_fraction: float  # of the disk
     free_bytes: int
-    slowest_write_s: float  # of the last ten seconds, as far as it has come
+    slowest_write_s: float  # in the last ten seconds, an unfinished one included
 
 
-HEALTHY = LogReport(True, 0, "", 1.0, 1 << 62, 0.0)  # until the writer has said more
+HEALTHY = LogReport(  # until the writer reports
+    alive=True, dropped=0, problem="", free_fraction=1.0, free_bytes=1 << 62, slowest_write_s=0.0
+)
 
 
 class Recording(Protocol):
-    """Where rows go."""
+    """Takes the rows of a loop."""
 
     dropped: int
     writer_alive: bool
@@ -61,7 +63,7 @@ class Recording(Protocol):
     @property
     def path(self) -> Path | None: ...
 
-    def put(self, kind_index: int, payload: bytes) -> bool: ...
+    def put(self, number: int, row: bytes) -> bool: ...
 
     def report(self) -> LogReport: ...
 
@@ -69,13 +71,13 @@ class Recording(Protocol):
 
 
 class NullRecorder:
-    """Takes every row and keeps none."""
+    """Drops every row."""
 
     path: Path | None = None
     dropped = 0
     writer_alive = True
 
-    def put(self, kind_index: int, payload: bytes) -> bool:
+    def put(self, number: int, row: bytes) -> bool:
         return True
 
     def report(self) -> LogReport:
@@ -91,7 +93,7 @@ class Recorder:
     def __init__(
         self, path: Path, configuration_text: str, metadata: dict[str, str], parameters: LogParameters = ONE_FILE
     ) -> None:
-        self.path = path  # of the file that is being written, or was written last
+        self.path = path  # the file that is being written, or was written last
         self.dropped = 0
         self.writer_alive = True
         self._unreported = 0
@@ -101,8 +103,8 @@ class Recorder:
         assert self._writer.stdin is not None and self._writer.stdout is not None
         self._pipe, self._reports = self._writer.stdin.fileno(), self._writer.stdout.fileno()
         self._report, self._dropped_by_writer = HEALTHY, 0
-        self._calls, self._heard_s = 0, time.monotonic()
-        self.odd_reports = 0  # which were not understood
+        self._calls, self._reported_s = 0, time.monotonic()
+        self.malformed_reports = 0
         os.set_blocking(self._reports, False)
         with suppress(PermissionError):  # beyond the user's limit: the pipe keeps its 64 KiB
             fcntl(self._pipe, F_SETPIPE_SZ, PIPE_BYTES)
@@ -111,25 +113,25 @@ class Recorder:
 
     def _send_opening(self, configuration_text: str, metadata: dict[str, str], parameters: LogParameters) -> None:
         opening = {"configuration_text": configuration_text, "metadata": metadata, "parameters": asdict(parameters)}
-        payload = json.dumps(opening).encode()
-        unsent = memoryview(HEADER.pack(0, len(payload)) + payload)
+        row = json.dumps(opening).encode()
+        unsent = memoryview(HEADER.pack(0, len(row)) + row)
         try:
             while unsent:
                 unsent = unsent[os.write(self._pipe, unsent) :]
         except BrokenPipeError:
             self.writer_alive = False
 
-    def put(self, kind_index: int, payload: bytes) -> bool:
-        """Hand one row over without waiting; False where it was lost."""
-        if len(payload) > LARGEST_ROW:
-            payload = _shorten(payload)
-        record = HEADER.pack(kind_index, len(payload)) + payload
+    def put(self, number: int, row: bytes) -> bool:
+        """Sends one row without waiting; returns False where it was lost."""
+        if len(row) > LARGEST_ROW:
+            row = _shorten(row)
+        record = HEADER.pack(number, len(row)) + row
         if self._write(self._loss_report() + record if self._unreported else record):
             self._unreported = 0
             return True
         self.dropped += 1
         self._unreported += 1
-        (self._loss_stamp_s,) = STAMP.unpack_from(payload)
+        (self._loss_stamp_s,) = STAMP.unpack_from(row)
         return False
 
     def _write(self, records: bytes) -> bool:
@@ -145,31 +147,31 @@ class Recorder:
         return True
 
     def _loss_report(self) -> bytes:
-        """Written together with the row after it: alone it would slip into gaps too small for a row."""
+        """Is sent together with the next row: alone it would fit into gaps that are too small for a row."""
         text = f"rows missing here: {self._unreported}, the log's writer did not keep up"
-        payload = EVENT.encode(self._loss_stamp_s, text)
-        return HEADER.pack(EVENT_KIND, len(payload)) + payload
+        row = EVENT.encode(self._loss_stamp_s, text)
+        return HEADER.pack(EVENT_KIND, len(row)) + row
 
     def report(self) -> LogReport:
-        """How the log is, cheap enough for every tick: the pipe is looked into now and then."""
+        """Returns the newest report; cheap enough for every tick, since it seldom reads the pipe."""
         self._calls -= 1
         if self._calls < 0:
             self._calls = REPORT_CALLS
-            self._hear()
+            self._read_reports()
         return self._report
 
-    def _hear(self) -> None:
+    def _read_reports(self) -> None:
         now_s = time.monotonic()
         try:
-            said = os.read(self._reports, PIPE_BYTES)
+            received = os.read(self._reports, PIPE_BYTES)
         except BlockingIOError:
-            said = b"\n"
-        if not said:
+            received = b"\n"
+        if not received:
             self.writer_alive = False
-        lines = said.split(b"\n")[:-1]
-        if lines and lines[-1] and self._take(lines[-1]):
-            self._heard_s = now_s
-        silent_s = now_s - self._heard_s if self.writer_alive else 0.0
+        lines = received.split(b"\n")[:-1]
+        if lines and lines[-1] and self._accept(lines[-1]):
+            self._reported_s = now_s
+        silent_s = now_s - self._reported_s if self.writer_alive else 0.0
         slowest_s = self._report.slowest_write_s
         self._report = self._report._replace(
             alive=self.writer_alive,
@@ -177,12 +179,12 @@ class Recorder:
             slowest_write_s=max(slowest_s, silent_s) if silent_s > REPORT_OVERDUE_S else slowest_s,
         )
 
-    def _take(self, line: bytes) -> bool:
-        """Whether it was a report: whatever the writer's program prints must not end the loop."""
+    def _accept(self, line: bytes) -> bool:
+        """Returns whether the line is a report: output of any other kind must not end the loop."""
         try:
             path, report = _decode_report(json.loads(line))
         except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
-            self.odd_reports += 1
+            self.malformed_reports += 1
             return False
         self.path = path
         self.dropped += report.dropped - self._dropped_by_writer
@@ -191,7 +193,7 @@ class Recorder:
         return True
 
     def close(self, timeout_s: float) -> bool:
-        """End the log; True once it is whole on the disk. A writer that needs longer finishes alone."""
+        """Ends the log; returns whether it is whole on the disk. A writer that needs longer finishes alone."""
         assert self._writer.stdin is not None and self._writer.stdout is not None
         deadline_s = time.monotonic() + timeout_s
         if self._unreported and self.writer_alive:
@@ -204,29 +206,29 @@ class Recorder:
         except subprocess.TimeoutExpired:
             return False
         if not self._writer.stdout.closed:
-            self._hear()
+            self._read_reports()
             self._writer.stdout.close()
-        if self.odd_reports:
-            print(f"The log's writer said {self.odd_reports} things that no report says.", file=sys.stderr, flush=True)
+        if self.malformed_reports:
+            print(f"The log's writer sent {self.malformed_reports} malformed reports.", file=sys.stderr, flush=True)
         self.path = present_path(self.path)
         return status == 0
 
 
-def _decode_report(said: dict[str, Any]) -> tuple[Path, LogReport]:
-    """Where the log is, and how; `dropped` is the writer's share of it."""
+def _decode_report(fields: dict[str, Any]) -> tuple[Path, LogReport]:
+    """Returns the log's path and state; `dropped` counts only the rows that the writer dropped."""
     report = LogReport(
         alive=True,
-        dropped=int(said["dropped"]),
-        problem=str(said["problem"]),
-        free_fraction=float(said["free_share"]),
-        free_bytes=int(said["free_bytes"]),
-        slowest_write_s=float(said["slowest_write_s"]),
+        dropped=int(fields["dropped"]),
+        problem=str(fields["problem"]),
+        free_fraction=float(fields["free_fraction"]),
+        free_bytes=int(fields["free_bytes"]),
+        slowest_write_s=float(fields["slowest_write_s"]),
     )
-    return Path(said["path"]), report
+    return Path(fields["path"]), report
 
 
 def _start_writer(path: Path) -> subprocess.Popen[bytes]:
-    """Ctrl-C, the service's stop and its watchdog reach the writer too, so it is born with their signals blocked."""
+    """Ctrl-C, the service's stop and its watchdog reach the writer too, so it starts with their signals blocked."""
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGABRT})
     try:
         command = [sys.executable, "-P", "-m", "firmware_host.log.writer", str(path)]
@@ -241,8 +243,8 @@ def _wait_for_room(pipe: int, timeout_s: float) -> None:
     poll.poll(timeout_s * 1e3)
 
 
-def _shorten(payload: bytes) -> bytes:
-    """Only an event can be this long."""
-    event = EVENT.decode(payload)
+def _shorten(row: bytes) -> bytes:
+    """Cuts the text of an event, the only row that can be this long."""
+    event = EVENT.decode(row)
     text = event["text"].encode()[:LONGEST_TEXT].decode(errors="ignore")
     return EVENT.encode(event["stamp_s"], text)

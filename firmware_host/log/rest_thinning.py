@@ -1,10 +1,10 @@
-"""At rest, when no torque is on, one tick in many goes to the disk; what leads to torque is there in full.
+"""Writes one tick in many while the robot rests without torque, and every tick that leads to torque.
 
-A robot that waits for its person would fill its card with rows that say nothing. So the log's writer thins the ticks
-of the modes without torque, and keeps those that it leaves out in memory for a while. When the mode changes, or torque
-comes on, the kept ones are written after all: the seconds before are as complete as what follows. They stand in the
-file after thinned rows of the same time, and the readers sort by the tick's number. A run that ends, however it ends,
-counts as such a change. Strides and events are never thinned.
+A robot that waits for its operator would fill its disk with rows that say nothing. The log's writer therefore thins the
+ticks of the modes without torque and holds the rows that it leaves out in memory for a few seconds. When the mode
+changes, or torque comes on, the held rows are written after all, so the seconds before are complete. In the file they
+follow thinned rows of the same time, and the readers sort by the tick's number. The end of a run counts as such a
+change. Strides and events are never thinned.
 """
 
 from __future__ import annotations
@@ -15,26 +15,15 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from control.modes import ENERGISED
-from firmware_host.log.rows import FORMAT_OF, TICK, TICK_KIND
+from firmware_host.log.rows import TICK, TICK_KIND
 from firmware_host.ticker import RATE_HZ
 
-
-def _place(name: str) -> int:
-    """Of a field in a tick's bytes."""
-    place = 4
-    for field in TICK.fields:
-        if field.name == name:
-            return place
-        place += field.count * struct.calcsize(f"<{FORMAT_OF[field.kind]}")
-    raise KeyError(name)
-
-
-MODE, NUMBER = _place("mode"), _place("tick")
+MODE, NUMBER = TICK.offset_of("mode"), TICK.offset_of("tick")
 
 
 class Thinned(NamedTuple):
     rows: list[tuple[int, bytes]]  # to be written
-    notice: str  # of a beginning or an end of the thinning, or empty
+    notice: str  # event text where the thinning begins or ends, or empty
 
 
 class RestThinning:
@@ -53,7 +42,7 @@ class RestThinning:
         self._resting = False
 
     def thin(self, rows: Iterable[tuple[int, bytes]]) -> Thinned:
-        """The rows to write, in the order of their coming."""
+        """Returns the rows to write, in the order in which they came."""
         if self._every == 1:
             return Thinned(list(rows), "")
         written: list[tuple[int, bytes]] = []
@@ -67,9 +56,9 @@ class RestThinning:
 
     def _add_tick(self, row: tuple[int, bytes], written: list[tuple[int, bytes]]) -> str:
         mode = row[1][MODE]
-        stirred = mode in ENERGISED or mode != self._mode
+        active = mode in ENERGISED or mode != self._mode
         self._mode = mode
-        self._rested = 0 if stirred else self._rested + 1
+        self._rested = 0 if active else self._rested + 1
         was_resting, self._resting = self._resting, self._rested > self._full_ticks
         if was_resting and not self._resting:
             held = self.release()
@@ -82,7 +71,7 @@ class RestThinning:
         return f"at rest: of the ticks, one in {self._every} is written from here on" if begins else ""
 
     def release(self) -> list[tuple[int, bytes]]:
-        """Everything that is held back, to be written after all."""
+        """Returns everything that is held back, to be written after all."""
         held = list(self._held)
         self._held.clear()
         return held

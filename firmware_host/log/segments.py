@@ -1,9 +1,9 @@
-"""The files of one run, one after the other: rotation, a disk that refuses, and room for the next one.
+"""The files of one run, one after the other: rotation, a disk that refuses, and the logs' quota.
 
-Every file of a run carries the run's id, its own number, the configuration, who wrote it where, and both clocks,
-measured again for each, so each can be read alone. A row goes into exactly one file. When the disk refuses (full,
-read-only, gone) the file is cut back to what is known to be on it and left for recovery, rows are counted instead of
-written, and every few seconds a new file is tried; it begins with the number of rows that are missing.
+Every file of a run carries the run's id, its own number, the configuration, version and host, and the offset of both
+clocks, measured again for each file, so each can be read alone. A row goes into exactly one file. When the disk refuses
+(full, read-only, removed), the file is cut back to its safe rows and left for recovery, rows are counted instead of
+written, and a new file is tried every few seconds; its first event reports the number of missing rows.
 """
 
 from __future__ import annotations
@@ -22,59 +22,58 @@ from typing import Any
 from firmware_host.log.log_file import LogFile, Rows
 from firmware_host.log.log_folder import (
     ACTIVE,
-    FreedLog,
+    DeletedLog,
+    deletable_logs,
+    delete_by_quota,
+    delete_log,
     finished_path,
-    free_logs,
     free_space,
-    removable_logs,
-    remove_log,
     segment_path,
     unfinished_files,
 )
 from firmware_host.log.log_parameters import LogParameters
-from firmware_host.log.recorder import STAMP
 from firmware_host.log.rest_thinning import RestThinning
-from firmware_host.log.rows import EVENT, EVENT_KIND
+from firmware_host.log.rows import EVENT, EVENT_KIND, ROW_KINDS
 
 RETRY_S = 3.0  # between two attempts at a disk that refuses
-FREEING_INTERVAL_S = 10.0
+QUOTA_INTERVAL_S = 10.0
 
 
 class LogSegments:
-    """Owns the file that is being written. No method raises OSError; `problem` says what is wrong."""
+    """Owns the file that is being written. No method raises OSError; `problem` is the message about the disk."""
 
     def __init__(self, first: Path, opening: dict[str, Any], parameters: LogParameters) -> None:
         self.problem = self._reason = ""
         self.dropped = 0
         self.path = first
-        self.slowest_s = 0.0  # write since somebody set this to zero
+        self.slowest_s = 0.0  # write since this was last set to zero
         self._first, self._opening, self._parameters = first, opening, parameters
         self._folder = first.parent.parent if first.parent.name == ACTIVE else None
         self._thinning = RestThinning(parameters.rest_hz, parameters.rest_full_s)
         self._file: LogFile | None = None
         self._segment = 0
         self._missing = 0  # rows that the next file has to report
-        self._full = False  # the disk was, when it refused
-        self._freeing_helps = True
-        self._freed: list[str] = []  # what the next file has to tell of
+        self._full = False  # the disk, when it refused
+        self._deleting_helps = True
+        self._deleted: list[str] = []  # messages for the next file
         self._latest_stamp_s = 0.0
         self._first_stamp_s: float | None = None  # of the ticks in this file
-        self._retry_s = self._freeing_s = 0.0
+        self._retry_s = self._quota_s = 0.0
         self._recovery: subprocess.Popen[bytes] | None = None
-        self._tried: set[Path] = set()  # to recover, once a run: what resists would be tried at every file
+        self._tried: set[Path] = set()  # to recover, once a run: a failure would be repeated at every file
         self._open()
 
     def write(self, rows: Rows) -> None:
-        """Also without rows, from time to time: a file is flushed by time."""
-        for _, payload in rows[-1:]:
-            (self._latest_stamp_s,) = STAMP.unpack_from(payload)
+        """Call this regularly, without rows too: a file is flushed by time."""
+        for number, row in rows[-1:]:
+            self._latest_stamp_s = ROW_KINDS[number].stamp_s(row)
         thinned = self._thinning.thin(rows)
         wanted = [*thinned.rows, self._event(thinned.notice)] if thinned.notice else thinned.rows
         if self._file is None and time.monotonic() >= self._retry_s:
             self._open()
         self._rotate(wanted)
         self._write(wanted)
-        self._free_room()
+        self._apply_quota()
 
     def _write(self, rows: Rows) -> None:
         if self._file is None:
@@ -86,7 +85,7 @@ class LogSegments:
         except OSError as error:
             self._give_up(error, unwritten=len(rows) - (self._file.rows - before))
         else:
-            self._on_slowness(self._file)
+            self._note_slowest(self._file)
 
     def _event(self, text: str) -> tuple[int, bytes]:
         return EVENT_KIND, EVENT.encode(self._latest_stamp_s, text)
@@ -110,19 +109,19 @@ class LogSegments:
             self._give_up(error)
             return
         self.problem = self._reason = ""
-        self._freeing_helps = True
+        self._deleting_helps = True
         self._start_recovery()
 
     def _report_gap(self, file: LogFile) -> None:
-        """What is missing before this file, and what was freed for it."""
-        texts = list(self._freed)
+        """Writes events about the rows that are missing before this file and the logs that were deleted for it."""
+        texts = list(self._deleted)
         if self._missing:
             texts.append(f"rows missing here: {self._missing}, the log could not be written: {self._reason}")
         if texts:
             file.write([self._event(text) for text in texts])
             file.flush()
             self._missing = 0
-            self._freed.clear()
+            self._deleted.clear()
 
     def _opening_of(self, segment: int) -> dict[str, Any]:
         text = self._opening["configuration_text"]
@@ -142,7 +141,7 @@ class LogSegments:
         }
 
     def _give_up(self, error: OSError, unwritten: int = 0) -> None:
-        """This file, not the log."""
+        """Gives up this file, not the log."""
         if self._file is not None:
             self._drop(self._file.rows - self._file.safe_rows + unwritten)
             self._segment -= self._file.safe_rows == 0  # such a file is removed
@@ -157,20 +156,21 @@ class LogSegments:
         self._full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         self._retry_s = time.monotonic() + RETRY_S
 
-    def _on_slowness(self, file: LogFile) -> None:
+    def _note_slowest(self, file: LogFile) -> None:
         self.slowest_s, file.slowest_s = max(self.slowest_s, file.slowest_s), 0.0
 
     def _rotate(self, rows: Rows) -> None:
-        """Before these rows, by their own time and by the size so far."""
+        """Begins a new file before these rows where the present one is too long or too large."""
         if self._file is None or not rows:
             return
         if self._first_stamp_s is None:
-            (self._first_stamp_s,) = STAMP.unpack_from(rows[0][1])
+            number, row = rows[0]
+            self._first_stamp_s = ROW_KINDS[number].stamp_s(row)
         long = self._latest_stamp_s - self._first_stamp_s >= self._parameters.segment_s
         if long or self._file.length >= self._parameters.segment_bytes:
             self._finish()
             if not self.problem:
-                self._freeing_s = 0.0
+                self._quota_s = 0.0
                 self._open()
 
     def _finish(self) -> None:
@@ -178,13 +178,13 @@ class LogSegments:
             return
         try:
             self.path = self._file.finish()
-            self._on_slowness(self._file)
+            self._note_slowest(self._file)
             self._file = None
         except OSError as error:
             self._give_up(error)
 
     def close(self) -> bool:
-        """Whether everything that came is on the disk, or said to be missing there."""
+        """Returns whether every row is on the disk, or reported there as missing."""
         if self._file is None:
             self._open()
         self._write(self._thinning.release())
@@ -192,27 +192,26 @@ class LogSegments:
         return not self.problem
 
     def _make_room(self) -> None:
-        """On a disk that was full: the oldest log gives way at once, where logs may be freed, as long as that helps."""
-        may_free = self._parameters.quota_bytes > 0 or self._parameters.min_free_fraction > 0.0
-        if self._full and self._folder is not None and may_free and self._freeing_helps:
-            for oldest in removable_logs(self._folder)[:1]:
+        """Deletes the oldest log at once where the disk was full, logs may be deleted, and deleting helped before."""
+        may_delete = self._parameters.quota_bytes > 0 or self._parameters.min_free_fraction > 0.0
+        if self._full and self._folder is not None and may_delete and self._deleting_helps:
+            for oldest in deletable_logs(self._folder)[:1]:
                 before = free_space(self._folder).free_bytes
-                freed = remove_log(oldest)
-                self._freed.append(_reported_of(freed))
-                self._freeing_helps = free_space(self._folder).free_bytes > before
+                self._deleted.append(_message(delete_log(oldest)))
+                self._deleting_helps = free_space(self._folder).free_bytes > before
         self._full = False
 
-    def _free_room(self) -> None:
-        if self._folder is None or time.monotonic() < self._freeing_s:
+    def _apply_quota(self) -> None:
+        if self._folder is None or time.monotonic() < self._quota_s:
             return
-        self._freeing_s = time.monotonic() + FREEING_INTERVAL_S
+        self._quota_s = time.monotonic() + QUOTA_INTERVAL_S
         quota_bytes, fraction = self._parameters.quota_bytes, self._parameters.min_free_fraction
-        with suppress(OSError):  # what cannot be freed shows as a disk without room
-            for freed in free_logs(self._folder, quota_bytes, fraction):
-                self._write([self._event(_reported_of(freed))])
+        with suppress(OSError):  # a log that cannot be deleted shows as a full disk
+            for deleted in delete_by_quota(self._folder, quota_bytes, fraction):
+                self._write([self._event(_message(deleted))])
 
     def _start_recovery(self) -> None:
-        """Of what others, or this run before its disk failed, have left: in a process of its own."""
+        """Recovers the files of other runs, or of this run before its disk failed, in a process of its own."""
         if self._folder is None or (self._recovery is not None and self._recovery.poll() is None):
             return
         found = set(unfinished_files(self._folder)) - {self.path}
@@ -224,5 +223,5 @@ class LogSegments:
             self._recovery = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
 
 
-def _reported_of(freed: FreedLog) -> str:
-    return f"room for logs: {freed.name} was freed, {freed.size} bytes"
+def _message(deleted: DeletedLog) -> str:
+    return f"room for logs: {deleted.name} was deleted, {deleted.size} bytes"

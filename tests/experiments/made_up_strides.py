@@ -12,7 +12,8 @@ from control.modes import Mode
 from control.records import Phase
 from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.trials.stride_profile import StrideProfile
-from firmware_host.log_reading.log_reader import Log, tick_type
+from firmware_host.log_reading.log_reader import Log
+from firmware_host.log_reading.tick_array import tick_type
 
 CONFIGURATION = simulated_configuration()
 GEOMETRY = CONFIGURATION.geometry

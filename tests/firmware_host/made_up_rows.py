@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from firmware_host.log.rows import EVENT, EVENT_KIND, TICK, TICK_KIND, RowKind
+from firmware_host.log.rows import EVENT, EVENT_KIND, TICK, TICK_KIND
+from firmware_host.log.schema import RowKind
 
 OPENING: dict[str, Any] = {
     "configuration_text": "[robot]\n",
@@ -14,11 +15,8 @@ OPENING: dict[str, Any] = {
 
 
 def encode_row(kind: RowKind, **known: Any) -> bytes:
-    values: list[Any] = []
-    for field in kind.fields:
-        value = known.get(field.name, "" if field.kind == "string" else [0] * field.count)
-        values.extend([value] if isinstance(value, str) or not hasattr(value, "__len__") else value)
-    return kind.encode(*values)
+    zeros = {field.name: (0,) * field.length if field.length else 0 for field in kind.numbers}
+    return kind.encode_named(**(zeros | known))
 
 
 def make_tick(number: int, mode: int = 0) -> tuple[int, bytes]:

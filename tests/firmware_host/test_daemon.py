@@ -104,7 +104,7 @@ def test_a_bug_idles_all_drives_that_can_be_reached(robot: Lockstep, capsys: pyt
 
 
 def test_a_bug_in_the_log_does_not_keep_the_drives_from_their_end(robot: Lockstep) -> None:
-    def broken(kind_index: int, payload: bytes) -> bool:
+    def broken(number: int, row: bytes) -> bool:
         raise DeliberateBugError
 
     robot.loop.recorder.put = broken  # type: ignore[method-assign]

@@ -14,7 +14,7 @@ from command_line import exit_codes, main
 from command_line.logs import log_folder_commands as log_care
 from command_line.screen import size_text
 from firmware_host.log.log_file import LogFile
-from firmware_host.log.log_folder import ACTIVE, DONE, KEPT
+from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED
 from firmware_host.log_reading.log_reader import read_log
 from tests.firmware_host.made_up_rows import OPENING, make_ticks
 from tests.folders import EXAMPLE_CONFIGURATION
@@ -93,7 +93,7 @@ def test_several_logs_are_preserved_whatever_becomes_of_one(folder: Path, capsys
     names = [str(folder / place / name) for place, name in ((ACTIVE, "2.mcap"), (DONE, "1.mcap"), (DONE, "3.mcap"))]
     assert main.main(["log", "preserve", *names]) == exit_codes.REFUSED
     assert "only a log in done/" in capsys.readouterr().err
-    assert sorted(path.name for path in (folder / KEPT).iterdir()) == ["1.mcap", "3.mcap"]
+    assert sorted(path.name for path in (folder / PRESERVED).iterdir()) == ["1.mcap", "3.mcap"]
 
 
 def test_recovery_that_takes_its_time_says_how_far_it_is(
@@ -129,7 +129,7 @@ def test_what_cannot_be_recovered_is_said(folder: Path, capsys: pytest.CaptureFi
 
 def test_a_preserved_log_moves_to_kept_and_back(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main.main(["log", "preserve", str(folder / DONE / "1.mcap")]) == exit_codes.OK
-    kept = folder / KEPT / "1.mcap"
+    kept = folder / PRESERVED / "1.mcap"
     assert capsys.readouterr().out == f"{kept}\n" and kept.exists()
     assert main.main(["log", "preserve", str(folder / ACTIVE / "2.mcap")]) == exit_codes.REFUSED
     assert main.main(["log", "preserve", "--undo", str(kept)]) == exit_codes.OK

@@ -18,7 +18,8 @@ from experiments.trackway.log_strides import walked_strides
 from experiments.trackway.walk import EXTRACTION, RECOVERED, StrideRecord, WalkedStride
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder
-from firmware_host.log_reading.log_reader import Log, read_log, tick_type
+from firmware_host.log_reading.log_reader import Log, read_log
+from firmware_host.log_reading.tick_array import tick_type
 from simulation.devices.motion_capture import MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay

@@ -11,12 +11,13 @@ from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import (
     ACTIVE,
     DONE,
-    KEPT,
     LAST_BYTES,
+    PRESERVED,
     TOP,
+    copy_owner,
+    delete_by_quota,
     finished_path,
     first_path,
-    free_logs,
     free_space,
     log_files,
     new_run_id,
@@ -24,7 +25,6 @@ from firmware_host.log.log_folder import (
     preserve,
     segment_path,
     stored_files,
-    take_owner,
     unfinished_files,
 )
 from tests.firmware_host.made_up_rows import OPENING
@@ -62,28 +62,28 @@ def test_a_log_is_found_where_it_has_gone(tmp_path: Path) -> None:
 
 def test_the_oldest_goes_first_and_only_as_many_as_must(tmp_path: Path) -> None:
     make_files(tmp_path, DONE, "3", "1", "2")
-    assert [freed.name for freed in free_logs(tmp_path, 250, 0.0)] == ["1.mcap"]
-    assert [freed.name for freed in free_logs(tmp_path, 250, 0.0)] == []
+    assert [freed.name for freed in delete_by_quota(tmp_path, 250, 0.0)] == ["1.mcap"]
+    assert [freed.name for freed in delete_by_quota(tmp_path, 250, 0.0)] == []
     assert [path.name for path in log_files(tmp_path, DONE)] == ["2.mcap", "3.mcap"]
 
 
 def test_what_is_being_written_or_preserved_is_never_freed(tmp_path: Path) -> None:
-    active, kept = make_files(tmp_path, ACTIVE, "0"), make_files(tmp_path, KEPT, "1")
+    active, kept = make_files(tmp_path, ACTIVE, "0"), make_files(tmp_path, PRESERVED, "1")
     make_files(tmp_path, DONE, "2", "3")
-    assert [(freed.name, freed.size) for freed in free_logs(tmp_path, 1, 0.0)] == [("2.mcap", 100)]
+    assert [(freed.name, freed.size) for freed in delete_by_quota(tmp_path, 1, 0.0)] == [("2.mcap", 100)]
     assert all(path.exists() for path in (*active, *kept))
 
 
 def test_a_disk_without_room_frees_too(tmp_path: Path) -> None:
     make_files(tmp_path, DONE, "1", "2")
-    assert list(free_logs(tmp_path, 0, 0.0)) == []
-    assert [freed.name for freed in free_logs(tmp_path, 0, 1.1)] == ["1.mcap"]
+    assert list(delete_by_quota(tmp_path, 0, 0.0)) == []
+    assert [freed.name for freed in delete_by_quota(tmp_path, 0, 1.1)] == ["1.mcap"]
 
 
 def test_a_preserved_log_comes_back(tmp_path: Path) -> None:
     (path,) = make_files(tmp_path, DONE, "1")
     kept = preserve(path)
-    assert kept == tmp_path / KEPT / "1.mcap" and kept.exists() and not path.exists()
+    assert kept == tmp_path / PRESERVED / "1.mcap" and kept.exists() and not path.exists()
     assert preserve(kept) == kept
     assert preserve(kept, undo=True) == path and path.exists()
 
@@ -97,7 +97,7 @@ def test_what_is_not_whole_cannot_be_preserved(tmp_path: Path) -> None:
 
 
 def test_a_log_of_the_same_name_is_not_replaced(tmp_path: Path) -> None:
-    (path,), _ = make_files(tmp_path, DONE, "1"), make_files(tmp_path, KEPT, "1")
+    (path,), _ = make_files(tmp_path, DONE, "1"), make_files(tmp_path, PRESERVED, "1")
     with pytest.raises(ValueError, match="exists already"):
         preserve(path)
 
@@ -110,15 +110,15 @@ def test_free_space_is_known_before_the_folder_is_made(tmp_path: Path) -> None:
 
 def test_the_newest_finished_log_is_never_freed(tmp_path: Path) -> None:
     make_files(tmp_path, DONE, "1", "2")
-    assert [freed.name for freed in free_logs(tmp_path, 1, 1.1)] == ["1.mcap"]
-    assert list(free_logs(tmp_path, 1, 1.1)) == []
+    assert [freed.name for freed in delete_by_quota(tmp_path, 1, 1.1)] == ["1.mcap"]
+    assert list(delete_by_quota(tmp_path, 1, 1.1)) == []
 
 
 def test_what_a_person_preserved_does_not_use_up_the_quota(tmp_path: Path) -> None:
     make_files(tmp_path, DONE, "3", "4")
-    make_files(tmp_path, KEPT, "1", "2")
-    assert list(free_logs(tmp_path, 250, 0.0)) == []
-    assert [freed.name for freed in free_logs(tmp_path, 150, 0.0)] == ["3.mcap"]
+    make_files(tmp_path, PRESERVED, "1", "2")
+    assert list(delete_by_quota(tmp_path, 250, 0.0)) == []
+    assert [freed.name for freed in delete_by_quota(tmp_path, 150, 0.0)] == ["3.mcap"]
 
 
 def test_whatever_lies_in_active_counts_as_logs(tmp_path: Path) -> None:
@@ -127,8 +127,8 @@ def test_whatever_lies_in_active_counts_as_logs(tmp_path: Path) -> None:
     for name in ("0.mcap.broken", "0.mcap.part", "notes.txt"):
         (tmp_path / ACTIVE / name).write_bytes(bytes(100))
     assert len(stored_files(tmp_path)) == 6
-    assert list(free_logs(tmp_path, 600, 0.0)) == []
-    assert [freed.name for freed in free_logs(tmp_path, 599, 0.0)] == ["1.mcap"]
+    assert list(delete_by_quota(tmp_path, 600, 0.0)) == []
+    assert [freed.name for freed in delete_by_quota(tmp_path, 599, 0.0)] == ["1.mcap"]
 
 
 def test_logs_of_the_older_layout_are_seen(tmp_path: Path) -> None:
@@ -137,13 +137,13 @@ def test_logs_of_the_older_layout_are_seen(tmp_path: Path) -> None:
     (done,) = make_files(tmp_path, DONE, "3")
     assert stored_files(tmp_path) == [whole, cut, done]
     assert unfinished_files(tmp_path) == [cut]
-    assert [freed.name for freed in free_logs(tmp_path, 1, 0.0)] == ["1.mcap"]  # what is cut off is not freed
+    assert [freed.name for freed in delete_by_quota(tmp_path, 1, 0.0)] == ["1.mcap"]  # what is cut off is not freed
 
 
 def test_a_log_of_the_older_layout_can_be_preserved(tmp_path: Path) -> None:
     (path,) = make_files(tmp_path, TOP, "1")
     (tmp_path / DONE).mkdir()
-    assert preserve(path) == tmp_path / KEPT / "1.mcap"
+    assert preserve(path) == tmp_path / PRESERVED / "1.mcap"
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root makes files that are somebody else's")
@@ -162,4 +162,4 @@ def test_an_owner_that_may_not_be_given_is_no_error(tmp_path: Path, monkeypatch:
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "chown", refuse)
-    take_owner(tmp_path)
+    copy_owner(tmp_path)

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from control.records import JOINTS, Phase
 from firmware_host.log_reading.lab_csv import STATE_OF_PHASE, LabLog, read_lab_csv, write_lab_csv
-from firmware_host.log_reading.log_reader import Log, LogError, tick_type
+from firmware_host.log_reading.log_reader import Log, LogError
+from firmware_host.log_reading.tick_array import tick_type
 from tests.folders import SHARED_DATA
 
 SHARED = SHARED_DATA

@@ -1,8 +1,8 @@
-"""A chunk of an MCAP file, opened without trust: what it says of itself is checked before memory is spent on it.
+"""Opens one chunk of an MCAP file without trusting its length fields.
 
-A length field that a damaged card has changed must cost neither gigabytes nor a crash, so nothing is decompressed
-beyond the size that the chunk names, that size is bounded by what the compression can reach, and the content has to
-match its checksum.
+A length that a damaged card has changed must cost neither gigabytes of memory nor a crash. The decompression therefore
+ends at the size that the chunk states, that size is limited by what LZ4 can reach, and the contents have to match their
+checksum.
 """
 
 from __future__ import annotations
@@ -25,14 +25,16 @@ MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish ti
 
 
 class Row(NamedTuple):
+    """One message of the log, still encoded."""
+
     channel_id: int
     sequence: int
     log_time_ns: int
-    payload: bytes
+    data: bytes
 
 
 def open_chunk(chunk: Chunk) -> bytes:
-    """Its records. Raises ValueError or RuntimeError where it is damaged."""
+    """Returns the chunk's records. Raises ValueError or RuntimeError where the chunk is damaged."""
     size = chunk.uncompressed_size
     if size > LARGEST_RATIO * (len(chunk.data) + 1):
         raise ValueError(f"a chunk of {len(chunk.data)} bytes cannot hold {size}")
@@ -49,20 +51,20 @@ def open_chunk(chunk: Chunk) -> bytes:
     return bytes(contents)
 
 
-def records_of(contents: bytes) -> Iterator[Row | Schema | Channel]:
-    """What an opened chunk holds. Raises ValueError, struct.error or an error of mcap where that makes no sense."""
-    place = 0
-    while place < len(contents):
-        opcode, length = RECORD_HEAD.unpack_from(contents, place)
-        start, place = place + RECORD_HEAD.size, place + RECORD_HEAD.size + length
-        if place > len(contents):
+def split_records(contents: bytes) -> Iterator[Row | Schema | Channel]:
+    """Yields the records of an opened chunk. Raises ValueError, struct.error or McapError where they are malformed."""
+    end = 0
+    while end < len(contents):
+        opcode, length = RECORD_HEAD.unpack_from(contents, end)
+        start, end = end + RECORD_HEAD.size, end + RECORD_HEAD.size + length
+        if end > len(contents):
             raise ValueError("a record reaches beyond its chunk")
         if opcode == Opcode.MESSAGE:
             if length < MESSAGE_HEAD.size:
                 raise ValueError("a row is shorter than its head")
             channel_id, sequence, log_time_ns, _ = MESSAGE_HEAD.unpack_from(contents, start)
-            yield Row(channel_id, sequence, log_time_ns, contents[start + MESSAGE_HEAD.size : place])
+            yield Row(channel_id, sequence, log_time_ns, contents[start + MESSAGE_HEAD.size : end])
         elif opcode == Opcode.SCHEMA:
-            yield Schema.read(ReadDataStream(BytesIO(contents[start:place])))
+            yield Schema.read(ReadDataStream(BytesIO(contents[start:end])))
         elif opcode == Opcode.CHANNEL:
-            yield Channel.read(ReadDataStream(BytesIO(contents[start:place])))
+            yield Channel.read(ReadDataStream(BytesIO(contents[start:end])))
