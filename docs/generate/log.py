@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from docs.generate.markdown import code, table
-from firmware_host.log.rows import ROW_KINDS, Field
+from firmware_host.log.rows import ROW_KINDS
+from firmware_host.log.schema import Field
 
 
 def topics() -> Iterator[str]:
@@ -17,4 +18,4 @@ def topics() -> Iterator[str]:
 
 
 def _row(field: Field) -> tuple[str, str, str]:
-    return code(field.name), f"{field.kind}[{field.count}]" if field.count > 1 else field.kind, field.meaning
+    return code(field.name), f"{field.kind}[{field.length}]" if field.length else field.kind, field.meaning

@@ -27,7 +27,7 @@ TICK = RowKind(
         Field("wake_late_s", "float64", "tick.late_s", "how long after its deadline the tick began"),
         Field("tick_s", "float64", "tick_s", "from the wake-up until the commands were sent"),
         Field("angle_rad", "float64", "{}.angle_rad", JOINT_ORDER, JOINTS),
-        Field("velocity_rad_s", "float64", "{}.velocity_rad_s", "", JOINTS),
+        Field("velocity_rad_s", "float64", "{}.velocity_rad_s", JOINT_ORDER, JOINTS),
         Field("current_a", "float64", "{}.current_a", "measured q current", JOINTS),
         Field("angle_age_s", "float64", "now_s - {}.angle_stamp_s", "since the position arrived", JOINTS),
         Field("current_age_s", "float64", "now_s - {}.current_stamp_s", "since the current arrived", JOINTS),

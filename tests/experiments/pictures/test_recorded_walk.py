@@ -98,7 +98,7 @@ def test_another_mud_is_noticed_where_there_is_one(tmp_path: Path, configuration
     (noticed_s,), (start_s,) = walk.noticed_s, walk.mud_starts_s
     (reported,) = [stride for stride in walk.own_strides if stride["t_start_s"] == start_s]
     assert reported["stamp_s"] == noticed_s
-    assert 0.3 - 0.12 < reported["place_m"] < 0.45  # the flippers reach half a step ahead of the body
+    assert 0.3 - 0.12 < reported["position_m"] < 0.45  # the flippers reach half a step ahead of the body
 
 
 def test_a_log_without_a_walk_says_so(tmp_path: Path, configuration: Configuration) -> None:
