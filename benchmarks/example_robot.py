@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from firmware_host.configuration.configuration import Configuration, load_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import load_configuration
 
 
 def load_example() -> Configuration:

@@ -24,7 +24,7 @@ def simulate(options: argparse.Namespace) -> int:
         return exit_codes.USAGE
     try:
         if options.world:
-            load_world(options.world)  # before anything is written or said; the peer reads it itself
+            complain(*load_world(options.world).warnings)  # before anything is written; the peer reads it itself
         path = options.config or _local_configuration(options.bus)
     except ConfigurationError as problem:
         complain(*problem.problems)

@@ -28,13 +28,9 @@ from drivers.pose.pose_port import OpenedPose, PoseSourceError
 from firmware_host.buses import BusError, reopening_ports
 from firmware_host.computer.realtime import prepare_loop
 from firmware_host.computer.sd_notify import SystemdNotifier
-from firmware_host.configuration.configuration import (
-    EXIT_CONFIGURATION,
-    Configuration,
-    ConfigurationError,
-    LoopParameters,
-    load_configuration,
-)
+from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration, LoopParameters
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.fault_injection.failing_recorder import failing_recorder
 from firmware_host.fault_injection.failing_time import failing_clock, failing_ticker
 from firmware_host.fault_injection.failure_calls import failures_of, with_failures
@@ -227,6 +223,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rights = load_rights(configuration.status)
     except ConfigurationError as problem:
         return _refuse([f"mudskipperd: {message}" for message in problem.problems], EXIT_CONFIGURATION)
+    for warning in configuration.warnings:
+        print(f"mudskipperd: warning: {warning}", file=sys.stderr)
     if options.check_config:
         return 0
     shutdown = Shutdown()

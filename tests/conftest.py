@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from firmware_host.configuration.configuration import Configuration, load_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import load_configuration
 from tests.folders import ROOT
 
 # A busy machine is not wrong, and a commit gets the same verdict every time; `--hypothesis-profile search` looks on.

@@ -31,7 +31,8 @@ from experiments.reports.text_tables import table
 from firmware_host.buses import open_ports
 from firmware_host.computer.realtime import SWITCH_INTERVAL_S, prepare_loop
 from firmware_host.computer.sd_notify import SystemdNotifier
-from firmware_host.configuration.configuration import Configuration, load_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import load_configuration
 from firmware_host.daemon import Shutdown, WatchdogFeed
 from firmware_host.log.recorder import Recorder
 from firmware_host.loop import Loop

@@ -26,7 +26,9 @@ from benchmarks.stress.can_fuzz import is_forbidden, is_ours, port_beside
 from benchmarks.stress.malformed_configurations import OddConfigurations, OddFile
 from control.controller import WalkOrder
 from control.modes import ENERGISED, Mode, Request
-from firmware_host.configuration.configuration import Configuration, ConfigurationError, load_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.operator.rights import load_rights
 from simulation.harness.lockstep import Lockstep
 from simulation.harness.world import World, load_world

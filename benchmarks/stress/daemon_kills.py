@@ -25,7 +25,7 @@ from control.records import JOINTS
 from drivers.odrive import codec
 from experiments.reports.text_tables import table
 from firmware_host.buses import open_ports
-from firmware_host.configuration.configuration import load_configuration
+from firmware_host.configuration.loading import load_configuration
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.local_setup import write_local_setup

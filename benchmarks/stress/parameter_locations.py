@@ -52,7 +52,7 @@ def places_of(hint: Any, document: Any, default: Any, path: tuple[str | int, ...
 
 
 def fields_of(
-    record: Any, document: Any, default: Any, path: tuple[str | int, ...], without: Any = ("text",)
+    record: Any, document: Any, default: Any, path: tuple[str | int, ...], without: Any = ("text", "warnings")
 ) -> Iterator[Place]:
     hints = get_type_hints(record, include_extras=True)
     for item in fields(record):

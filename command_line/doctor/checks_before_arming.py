@@ -18,7 +18,9 @@ from firmware_host.buses import BusError, open_ports
 from firmware_host.computer.can_links import examine_bus, read_links
 from firmware_host.computer.host_checks import Account, examine_folder, examine_limits
 from firmware_host.computer.host_facts import process_limits
-from firmware_host.configuration.configuration import Configuration, ConfigurationError, load_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.operator.reports import check_item
 from firmware_host.pose_sources import open_pose
 

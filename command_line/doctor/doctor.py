@@ -26,7 +26,9 @@ from firmware_host.computer.host_facts import (
     thread_priority,
     unit_limits,
 )
-from firmware_host.configuration.configuration import Configuration, ConfigurationError, load_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.operator.rights import load_rights
 from firmware_host.operator.status_client import (
     CallRefusedError,

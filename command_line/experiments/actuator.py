@@ -22,7 +22,8 @@ from experiments.reports.text_tables import text_of_tables
 from experiments.robot.bench_robot import BenchError
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.trials.session import Ending, Finding, Session
-from firmware_host.configuration.configuration import Configuration, load_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import load_configuration
 from firmware_host.configuration.toml_records import read_text
 
 DEFAULT_JOINTS = ("right_adduction", "right_sweep")

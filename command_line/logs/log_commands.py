@@ -12,7 +12,8 @@ from command_line.json_output import print_json
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of
-from firmware_host.configuration.configuration import ConfigurationError, load_configuration
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.log_folder import ACTIVE, DONE
 from firmware_host.log_reading.lab_csv import write_lab_csv
 from firmware_host.log_reading.log_reader import LogError, log_summary, read_log, read_logs

@@ -13,7 +13,8 @@ from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.screen import PATIENCE_S, Progress, complain, size_text
 from experiments.reports.text_tables import number, table
-from firmware_host.configuration.configuration import ConfigurationError, load_configuration
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.log_folder import (
     BROKEN,
     DONE,

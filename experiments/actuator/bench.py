@@ -21,7 +21,8 @@ from experiments.robot.bench_robot import BenchRobot, disarm, leave
 from experiments.robot.prompt import GO_ON, AutomaticOperator, Operator
 from experiments.trials.notebook import NAME, Notebook
 from experiments.trials.parallel_trials import run_parallel
-from firmware_host.configuration.configuration import Configuration, parse_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
 
 FALLS = (
     "What hangs falls when the torque goes off: at a fault, and within two seconds where this program dies or its"

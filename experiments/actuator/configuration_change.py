@@ -21,8 +21,8 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Table
 
 from experiments.robot.bench_robot import BenchError
-from firmware_host.configuration.configuration import parse_configuration
 from firmware_host.configuration.file_problems import why_not
+from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import ConfigurationError, read_text
 
 Changes = Mapping[tuple[str, ...], float]  # the key's path, and its new value

@@ -17,8 +17,10 @@ from typing import Any
 from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, RobotInUseError
 from experiments.robot.bench_robot import ENERGISED, UNDER_WAY, Status
 from experiments.robot.log_copies import copy_since, cut_log
-from firmware_host.configuration.configuration import Configuration, ConfigurationError, parse_configuration
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import why_not
+from firmware_host.configuration.loading import parse_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.log_folder import run_files
 from firmware_host.log_reading.log_reader import Log, LogError, read_logs
 from firmware_host.operator.lease import TAKEN_OVER

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from experiments.robot.log_copies import cut_log
-from firmware_host.configuration.configuration import Configuration, parse_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.file_recorder import FileRecorder
 from firmware_host.log_reading.log_reader import Log, read_log
 from firmware_host.operator.connection import Caller

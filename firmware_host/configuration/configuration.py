@@ -1,21 +1,19 @@
-"""The robot's configuration: one TOML file, checked once, before anything is energised.
+"""The robot's configuration as records: one section of the TOML file each.
 
-Only what differs from machine to machine is configuration. Every section is a record of the part that uses it, with
-default, unit and bounds beside each field there, by which toml_records.py refuses unknown keys and values out of
-bounds, all of them at once and by name; configuration_problems.py checks what only the whole can show.
+Only values that differ from machine to machine are configuration. Each section is a record of the part that uses it,
+with default, unit, bounds and meaning next to each field. loading.py reads the file once, before anything is energised.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from math import radians
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from control.bounds import Bounds, Meaning
 from control.controller import MotionParameters
 from control.depth.depth_choice import AdaptationParameters
-from control.gait.gait import PROTOCOLS, GaitParameters
+from control.gait.gait import GaitParameters
 from control.gait.recovery import RecoveryParameters
 from control.geometry import FlipperGeometry
 from control.joint_friction import NO_FRICTION, JointFriction
@@ -25,18 +23,14 @@ from control.monitors.joint_monitor import FaultBounds
 from control.monitors.winding import WindingParameters
 from control.records import JOINTS, Joints, same_for_both
 from drivers.drive import DriveParameters, WatchdogEndpoints
-from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from drivers.fault_injection.failures import FailureParameters
 from drivers.pose.natnet_parameters import NatNetParameters
 from drivers.pose.rail_encoder import RailEncoderParameters
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
-from firmware_host.configuration.consistency import contradictions
-from firmware_host.configuration.toml_records import ConfigurationError as ConfigurationError  # for whoever loads one
-from firmware_host.configuration.toml_records import RecordReader, parse_document, read_text, shown
 from firmware_host.log.log_parameters import LogParameters
 
-EXIT_CONFIGURATION = 78  # EX_CONFIG of sysexits.h; systemd is told not to restart on it
+EXIT_CONFIGURATION = 78  # EX_CONFIG of sysexits.h; the service's unit does not restart on it
 
 
 @dataclass(frozen=True)
@@ -46,7 +40,7 @@ class RobotIdentity:
 
 @dataclass(frozen=True)
 class BusParameters:
-    """Any python-can interface; `options` go to it as they are."""
+    """Any python-can interface; `options` are passed to it unchanged."""
 
     interface: Annotated[str, Meaning("python-can interface, such as socketcan")]
     channel: Annotated[str, Meaning("of the interface, such as can0")]
@@ -80,7 +74,7 @@ class StatusParameters:
 
 @dataclass(frozen=True)
 class PoseParameters:
-    """Where the body's place along the track is known from."""
+    """The source of the body's position along the track."""
 
     source: Annotated[
         Literal["", "none", "socket", "natnet", "rail_encoder"],
@@ -123,6 +117,7 @@ class Configuration:
     failures: FailureParameters = FailureParameters()
     watchdog_endpoints: list[WatchdogEndpoints] = field(default_factory=list)  # of more firmware builds
     text: str = ""  # the file itself, which goes into every log
+    warnings: tuple[str, ...] = ()  # about keys that the file gives under their former names
 
     @property
     def torque_constants_nm_a(self) -> Joints[float]:
@@ -130,8 +125,8 @@ class Configuration:
 
     @property
     def flipper_drives(self) -> tuple[FlipperDrive, FlipperDrive]:
-        """What the estimator knows of the left and the right flipper's motors."""
-        left, right = (self._flipper_drive(*JOINTS[place : place + 2]) for place in (0, 2))
+        """The estimator's description of the left and the right flipper's motors."""
+        left, right = (self._flipper_drive(*JOINTS[first : first + 2]) for first in (0, 2))
         return left, right
 
     def _flipper_drive(self, sweep: str, adduction: str) -> FlipperDrive:
@@ -152,53 +147,3 @@ class Configuration:
         sweep = JointRange(radians(limits.sweep_min_deg), radians(limits.sweep_max_deg))
         adduction = JointRange(radians(limits.adduction_min_deg), radians(limits.adduction_max_deg))
         return same_for_both(sweep, adduction)
-
-
-_READERS = {
-    name: RecordReader(Configuration, without={"text"}, hints={"drive": dict[str, each.parameters]})  # type: ignore[name-defined]
-    for name, each in DRIVE_TYPES.items()
-}
-
-
-def load_configuration(path: Path) -> Configuration:
-    """Raises ConfigurationError, also where the file cannot be read."""
-    return parse_configuration(read_text(path), path)
-
-
-def parse_configuration(text: str, file: Path | None = None) -> Configuration:
-    """Raises ConfigurationError."""
-    document = parse_document(text, file)
-    _apply_protocol(document)
-    configuration = Configuration(**_READERS[_drive_type(document)].read(document), text=text)
-    problems = list(contradictions(configuration))
-    if problems:
-        raise ConfigurationError(problems)
-    return configuration
-
-
-def _drive_type(document: dict[str, Any]) -> str:
-    """Returns the type of all drives. Raises ConfigurationError where it is unknown, or not the same for all."""
-    drives = document.get("drive")
-    tables = drives if isinstance(drives, dict) else {}
-    types = {joint: table.get("type", DEFAULT) for joint, table in tables.items() if isinstance(table, dict)}
-    first = next(iter(types.values()), DEFAULT)
-    problems = []
-    for joint, name in types.items():
-        if not isinstance(name, str) or name not in DRIVE_TYPES:
-            problems.append(f"drive.{joint}.type = {shown(name)}: must be one of {', '.join(DRIVE_TYPES)}")
-        elif name != first:
-            problems.append(f"drive.{joint}.type = {name!r}: must be {first!r}, as that of the first drive")
-    if problems:
-        raise ConfigurationError(problems)
-    return str(first)
-
-
-def _apply_protocol(document: dict[str, Any]) -> None:
-    """`gait.protocol` names the preset that the other keys of [gait] change."""
-    gait = document.get("gait")
-    if not isinstance(gait, dict) or "protocol" not in gait:
-        return
-    name = gait.pop("protocol")
-    if not isinstance(name, str) or name not in PROTOCOLS:
-        raise ConfigurationError([f"gait.protocol = {name!r}: must be one of {', '.join(PROTOCOLS)}"])
-    document["gait"] = asdict(PROTOCOLS[name]) | gait

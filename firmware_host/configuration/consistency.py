@@ -9,14 +9,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from math import ceil, degrees, floor, radians
-from typing import TYPE_CHECKING
 
 from control.depth.gait_choice import candidates
 from control.records import JOINTS
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.pose_consistency import pose_problems
-
-if TYPE_CHECKING:
-    from firmware_host.configuration.configuration import Configuration
 
 LONGEST_SOCKET_PATH = 107  # sun_path of unix(7) has 108 bytes with its final zero
 ROUNDING = 1e-6  # of numbers that a file gives with few digits

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import ipaddress
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from drivers.pose.natnet_parameters import parse_version
 from drivers.pose.natnet_sockets import is_address
 from drivers.pose.track_axis import parse_axis
+from firmware_host.configuration.configuration import PoseParameters
 from firmware_host.configuration.toml_records import shown
-
-if TYPE_CHECKING:
-    from firmware_host.configuration.configuration import PoseParameters
 
 LONGEST_INTERFACE = 15  # IFNAMSIZ with its final zero
 

@@ -81,6 +81,24 @@ def parse_document(text: str, file: Path | None = None) -> dict[str, Any]:
     raise ConfigurationError([f"{file}: {why}" if file else why])
 
 
+def rename_former_keys(document: dict[str, Any], former: Mapping[str, str]) -> list[str]:
+    """Renames keys such as `log.min_free_share` in place; returns a warning for each.
+
+    Raises ConfigurationError where a file gives both names.
+    """
+    warnings = []
+    for key, name in former.items():
+        section, _, former_name = key.rpartition(".")
+        table = document.get(section)
+        if not isinstance(table, dict) or former_name not in table:
+            continue
+        if name in table:
+            raise ConfigurationError([f"{key}: is the former name of {section}.{name}; remove {former_name}"])
+        table[name] = table.pop(former_name)
+        warnings.append(f"{key} is now {section}.{name}: rename it, the next version refuses the former name")
+    return warnings
+
+
 class RecordReader:
     """Reads the fields of one record, except those that no file may hold.
 

@@ -17,7 +17,9 @@ from estimation.joint_load import FlipperDrive
 from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstimator
 from estimation.mud_map import MapRow
 from estimation.recorded_states import recorded_states
-from firmware_host.configuration.configuration import Configuration, ConfigurationError, parse_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
 from firmware_host.log_reading.log_reader import (
     Log,

@@ -44,6 +44,7 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
         _line(identity, text, [fault for fault in faults if fault.check_line == identity], identity in unheard)
         for identity, text in lines.items()
     ]
+    items += [check_item("configuration", True, f"warning: {each}", "") for each in loop.configuration.warnings]
     return items + [check_item("realtime", True, f"warning: {warning}", "") for warning in warnings]
 
 

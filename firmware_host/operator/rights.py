@@ -16,7 +16,8 @@ import struct
 from enum import IntEnum
 from typing import NamedTuple
 
-from firmware_host.configuration.configuration import ConfigurationError, StatusParameters
+from firmware_host.configuration.configuration import StatusParameters
+from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.operator.rpc import FOR_MEMBERS, NOT_PERMITTED
 
 CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid

@@ -18,12 +18,9 @@ from pathlib import Path
 
 from control.records import JOINTS
 from firmware_host.buses import BusError, open_ports
-from firmware_host.configuration.configuration import (
-    EXIT_CONFIGURATION,
-    Configuration,
-    ConfigurationError,
-    load_configuration,
-)
+from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.ticker import Ticker
 from simulation.body.blocks import on_blocks
 from simulation.devices.pose_broadcast import PoseBroadcast

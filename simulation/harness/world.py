@@ -8,7 +8,7 @@ records, so what a part can be given is written there, with unit and bounds. Wha
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,6 +21,7 @@ from firmware_host.configuration.toml_records import (
     RecordReader,
     parse_document,
     read_text,
+    rename_former_keys,
     shown,
 )
 from simulation.body.plant import PlantParameters
@@ -46,6 +47,7 @@ class World:
     disturbances: Disturbances = NONE
     robot_changes: Mapping[str, Any] = field(default_factory=dict)  # fields of PlantParameters
     drive_changes: Mapping[str, Any] = field(default_factory=dict)  # of SimulatedDriveParameters, for all four
+    warnings: tuple[str, ...] = ()  # about keys that the file gives under their former names
 
     def plant(self, configuration: Configuration) -> PlantParameters:
         """Raises ConfigurationError where the ground frees a body whose base the configuration says is fixed."""
@@ -98,6 +100,7 @@ class WorldText:
 
 
 _READER = RecordReader(WorldText)
+FORMER_KEYS = {"drives.repeated_share": "repeated_fraction"}  # of version 0.1, accepted in version 0.2
 
 
 def load_world(path: Path) -> World:
@@ -108,10 +111,11 @@ def load_world(path: Path) -> World:
 def parse_world(text: str, file: Path | None = None) -> World:
     """Raises ConfigurationError with all that is wrong."""
     document = parse_document(text, file)
+    warnings = tuple(rename_former_keys(document, FORMER_KEYS))
     problems = _READER.problems(document) + list(_contradictions(document))
     if problems:
         raise ConfigurationError(problems)
-    return WorldText(**_READER.read(document)).world
+    return replace(WorldText(**_READER.read(document)).world, warnings=warnings)
 
 
 def _contradictions(document: Mapping[str, Any]) -> Iterator[str]:

@@ -19,7 +19,9 @@ from experiments.bench.operator import AbsentAttendant, AskedAttendant, Attendan
 from experiments.bench.rig import HardwareRig, Rig, SimulatedRig
 from experiments.bench.test_rig import Stand
 from experiments.robot.bench_robot import BenchError
-from firmware_host.configuration.configuration import Configuration, ConfigurationError, load_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
 from simulation.body.blocks import lying_m
 from tests.bench.staged_bench import (
     SKIPPED,

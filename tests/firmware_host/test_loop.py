@@ -13,7 +13,8 @@ from control.records import NO_TORQUE, Phase, same_for_all
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
 from drivers.odrive.codec import SET_INPUT_TORQUE
-from firmware_host.configuration.configuration import Configuration, parse_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE_KIND, TICK_KIND
 from firmware_host.operator.fault_texts import fault_message

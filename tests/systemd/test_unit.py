@@ -17,12 +17,8 @@ from drivers.can.can_port import BusState
 from drivers.can.frames import Frame
 from drivers.drive_types import make_drives
 from firmware_host import daemon
-from firmware_host.configuration.configuration import (
-    EXIT_CONFIGURATION,
-    Configuration,
-    ConfigurationError,
-    StatusParameters,
-)
+from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration, StatusParameters
+from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.ticker import PERIOD_S, RATE_HZ
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S

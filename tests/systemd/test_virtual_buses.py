@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware_host.configuration.configuration import load_configuration
+from firmware_host.configuration.loading import load_configuration
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 from virtual_machine.installed_robot import GUIDE, installation

@@ -1,7 +1,7 @@
 cd /opt/mudskipper/src/virtual_machine/guest
 
 # The simulated robot and the daemon share one emulated processor: its messages come less evenly than a drive's.
-sed -i 's/^\[faults\]/[faults]\nlate_s = 0.1\nquiet_s = 0.1\nsilence_s = 0.2\nlag_s = 0.2\nlag_share = 1.0\ncrawl_s = 0.2\njump_rad = 1.0\nfast_s = 0.1\ndisk_free_share = 0.0/' \
+sed -i 's/^\[faults\]/[faults]\nlate_s = 0.1\nquiet_s = 0.1\nsilence_s = 0.2\nlag_s = 0.2\nlag_fraction = 1.0\ncrawl_s = 0.2\njump_rad = 1.0\nfast_s = 0.1\ndisk_free_fraction = 0.0/' \
     /etc/mudskipper/mudskipper.toml
 /opt/mudskipper/venv/bin/mudskipperd --check-config
 

@@ -16,7 +16,8 @@ from command_line.doctor.doctor import examine_all, examine_daemon
 from command_line.main import main
 from control.records import JOINTS
 from firmware_host.computer.findings import Level, fail, ok, warn
-from firmware_host.configuration.configuration import Configuration, load_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
 from tests.command_line.conftest import Bench
 from tests.waiting import LONGEST_S

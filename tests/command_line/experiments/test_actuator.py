@@ -27,7 +27,7 @@ from experiments.robot.bench_robot import BenchError
 from experiments.robot.prompt import AutomaticOperator, Operator
 from experiments.trials.notebook import Notebook
 from experiments.trials.session import Ending, Session
-from firmware_host.configuration.configuration import load_configuration, parse_configuration
+from firmware_host.configuration.loading import load_configuration, parse_configuration
 from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
 from tests.experiments.actuator.test_fit import made_entries
 from tests.waiting import LONGEST_S

@@ -9,7 +9,7 @@ import pytest
 
 from experiments.actuator.configuration_change import changed_text, difference, replace_file
 from experiments.robot.bench_robot import BenchError
-from firmware_host.configuration.configuration import parse_configuration
+from firmware_host.configuration.loading import parse_configuration
 from simulation.harness.local_setup import CONFIGURATION
 
 LOCAL = CONFIGURATION.format(left='"l"', right='"r"', logs='"logs"', status='"s"', pose='""')

@@ -22,7 +22,8 @@ from experiments.bench.sign_check import nudged
 from experiments.bench.test_rig import Stand
 from experiments.bench.wiring_check import firmware, ids_heard, strangers, watchdogs
 from experiments.robot.bench_robot import BenchError
-from firmware_host.configuration.configuration import BusParameters, Configuration, StatusParameters, load_configuration
+from firmware_host.configuration.configuration import BusParameters, Configuration, StatusParameters
+from firmware_host.configuration.loading import load_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
 from simulation.harness.local_setup import write_local_setup
 from tests.bench.staged_bench import reported_of_file

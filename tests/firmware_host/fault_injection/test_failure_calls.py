@@ -10,7 +10,8 @@ import pytest
 from drivers.can.mock_bus import MockBus
 from drivers.fault_injection.failing_port import FailingPort, failing_ports
 from drivers.fault_injection.failures import FailureParameters, Failures
-from firmware_host.configuration.configuration import Configuration, parse_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
 from firmware_host.fault_injection.failure_calls import failures_of, with_failures
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.rights import Level, Peer

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from firmware_host.configuration.configuration import ConfigurationError, StatusParameters
+from firmware_host.configuration.configuration import StatusParameters
+from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.operator.rights import Level, Peer, load_rights, read_peer
 
 ANY_GROUP = grp.getgrall()[-1]

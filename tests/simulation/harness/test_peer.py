@@ -12,7 +12,7 @@ from drivers.drive import DriveParameters
 from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.parameters import OdriveParameters
 from firmware_host.buses import open_ports
-from firmware_host.configuration.configuration import load_configuration
+from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.peer import WATCHDOG_S, Peer, take_precedence, track_of
 from simulation.harness.world import World

@@ -1,0 +1,80 @@
+"""Reads a configuration file: the records, the checks of the whole, and the keys' former names."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from control.gait.gait import PROTOCOLS
+from drivers.drive_types import DEFAULT, DRIVE_TYPES
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.consistency import contradictions
+from firmware_host.configuration.toml_records import (
+    ConfigurationError,
+    RecordReader,
+    parse_document,
+    read_text,
+    rename_former_keys,
+    shown,
+)
+
+FORMER_KEYS = {  # of version 0.1, accepted in version 0.2
+    "faults.lag_share": "lag_fraction",
+    "faults.disk_free_share": "disk_free_fraction",
+    "adaptation.lifting_share": "lifting_fraction",
+    "adaptation.insertion_share": "insertion_fraction",
+    "log.min_free_share": "min_free_fraction",
+}
+NO_KEYS = frozenset({"text", "warnings"})  # fields of the configuration that no file gives
+
+_READERS = {
+    name: RecordReader(Configuration, without=NO_KEYS, hints={"drive": dict[str, each.parameters]})  # type: ignore[name-defined]
+    for name, each in DRIVE_TYPES.items()
+}
+
+
+def load_configuration(path: Path) -> Configuration:
+    """Raises ConfigurationError, for an unreadable file too."""
+    return parse_configuration(read_text(path), path)
+
+
+def parse_configuration(text: str, file: Path | None = None) -> Configuration:
+    """Raises ConfigurationError with all problems of the text."""
+    document = parse_document(text, file)
+    warnings = rename_former_keys(document, FORMER_KEYS)
+    _apply_protocol(document)
+    fields = _READERS[_drive_type(document)].read(document)
+    configuration = Configuration(**fields, text=text, warnings=tuple(warnings))
+    problems = list(contradictions(configuration))
+    if problems:
+        raise ConfigurationError(problems)
+    return configuration
+
+
+def _drive_type(document: dict[str, Any]) -> str:
+    """Returns the type of all drives. Raises ConfigurationError where it is unknown, or not the same for all."""
+    drives = document.get("drive")
+    tables = drives if isinstance(drives, dict) else {}
+    types = {joint: table.get("type", DEFAULT) for joint, table in tables.items() if isinstance(table, dict)}
+    first = next(iter(types.values()), DEFAULT)
+    problems = []
+    for joint, name in types.items():
+        if not isinstance(name, str) or name not in DRIVE_TYPES:
+            problems.append(f"drive.{joint}.type = {shown(name)}: must be one of {', '.join(DRIVE_TYPES)}")
+        elif name != first:
+            problems.append(f"drive.{joint}.type = {name!r}: must be {first!r}, as that of the first drive")
+    if problems:
+        raise ConfigurationError(problems)
+    return str(first)
+
+
+def _apply_protocol(document: dict[str, Any]) -> None:
+    """`gait.protocol` names the preset that the other keys of [gait] change."""
+    gait = document.get("gait")
+    if not isinstance(gait, dict) or "protocol" not in gait:
+        return
+    name = gait.pop("protocol")
+    if not isinstance(name, str) or name not in PROTOCOLS:
+        raise ConfigurationError([f"gait.protocol = {name!r}: must be one of {', '.join(PROTOCOLS)}"])
+    document["gait"] = asdict(PROTOCOLS[name]) | gait

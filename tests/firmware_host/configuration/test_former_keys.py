@@ -1,0 +1,60 @@
+"""Keys of version 0.1 are accepted under their former names, with a warning."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from firmware_host.configuration.loading import FORMER_KEYS, parse_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.log_reading.log_reader import read_log
+from simulation.harness.world import parse_world
+from tests.folders import ROOT
+from tests.waiting import LONGEST_S
+
+VALUE = 0.42
+
+
+def with_key(text: str, section: str, line: str) -> str:
+    return text.replace(f"[{section}]\n", f"[{section}]\n{line}\n", 1)
+
+
+@pytest.mark.parametrize("key", FORMER_KEYS)
+def test_a_former_key_sets_the_present_one_with_a_warning(example_text: str, key: str) -> None:
+    section, former = key.split(".")
+    configuration = parse_configuration(with_key(example_text, section, f"{former} = {VALUE}"))
+    assert getattr(getattr(configuration, section), FORMER_KEYS[key]) == VALUE
+    (warning,) = configuration.warnings
+    assert key in warning and f"{section}.{FORMER_KEYS[key]}" in warning
+
+
+def test_present_keys_give_no_warning(example_text: str) -> None:
+    assert parse_configuration(example_text).warnings == ()
+
+
+def test_both_names_of_a_key_are_refused(example_text: str) -> None:
+    text = with_key(with_key(example_text, "log", "min_free_share = 0.1"), "log", "min_free_fraction = 0.1")
+    with pytest.raises(ConfigurationError, match="log.min_free_share"):
+        parse_configuration(text)
+
+
+def test_a_former_key_of_a_world_is_accepted_with_a_warning() -> None:
+    world = parse_world(
+        "[[segment]]\nstart_m = 0.0\nend_m = 9.0\nwater_percent = 50.0\n[drives]\nrepeated_share = 0.1\n"
+    )
+    assert world.drive_changes == {"repeated_fraction": 0.1} and len(world.warnings) == 1
+
+
+def test_the_configuration_in_a_log_of_version_0_1_is_read() -> None:
+    assert parse_configuration(read_log(ROOT / "tests/fixtures/walk_0_1.mcap").configuration_text).robot.name
+
+
+def test_the_daemon_s_check_of_a_configuration_prints_the_warnings(short_folder: Path, example_text: str) -> None:
+    path = short_folder / "mudskipper.toml"
+    path.write_text(with_key(example_text, "log", "min_free_share = 0.1"), encoding="utf-8")
+    command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(path), "--check-config"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=True)
+    assert ended.stderr.startswith("mudskipperd: warning: log.min_free_share")
