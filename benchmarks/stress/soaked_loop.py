@@ -28,9 +28,9 @@ from benchmarks.stress.resources import holding
 from control.modes import Mode
 from drivers.fault_injection.failures import Failures
 from firmware_host.computer.realtime import freeze_garbage
+from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.fault_injection.failure_calls import with_failures
 from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files, new_run_id
-from firmware_host.log.log_parameters import LogParameters
 from firmware_host.log.recorder import LogReport, Recorder
 from firmware_host.log_reading.log_reader import read_log
 from firmware_host.operator.lease import Lease

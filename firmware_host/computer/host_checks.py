@@ -29,8 +29,8 @@ from firmware_host.computer.host_facts import (
     processors,
 )
 from firmware_host.configuration.configuration import LoopParameters
+from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import FreeSpace, free_space, unfinished_files
-from firmware_host.log.log_parameters import LogParameters
 from firmware_host.operator.counted_nouns import counted
 
 ENOUGH_MEMLOCK_BYTES = 2**30  # the loop's process maps less

@@ -28,7 +28,7 @@ from drivers.pose.natnet_parameters import NatNetParameters
 from drivers.pose.rail_encoder import RailEncoderParameters
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
-from firmware_host.log.log_parameters import LogParameters
+from firmware_host.configuration.log_parameters import LogParameters
 
 EXIT_CONFIGURATION = 78  # EX_CONFIG of sysexits.h; the service's unit does not restart on it
 

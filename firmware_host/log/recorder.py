@@ -24,8 +24,8 @@ from fcntl import F_SETPIPE_SZ, fcntl
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+from firmware_host.configuration.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.log_folder import present_path
-from firmware_host.log.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.rows import EVENT, EVENT_KIND
 
 PIPE_BYTES = 1 << 20  # 2,560 ticks, ten to a page: almost seven seconds at 380 Hz

@@ -19,6 +19,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_file import LogFile, Rows
 from firmware_host.log.log_folder import (
     ACTIVE,
@@ -31,7 +32,6 @@ from firmware_host.log.log_folder import (
     segment_path,
     unfinished_files,
 )
-from firmware_host.log.log_parameters import LogParameters
 from firmware_host.log.rest_thinning import RestThinning
 from firmware_host.log.rows import EVENT, EVENT_KIND, ROW_KINDS
 

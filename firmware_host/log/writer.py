@@ -20,8 +20,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from firmware_host.configuration.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.log_folder import FreeSpace, free_space
-from firmware_host.log.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.recorder import HEADER, PIPE_BYTES, STAMP
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.segments import LogSegments

@@ -18,8 +18,8 @@ from command_line import exit_codes, screen
 from command_line.main import main
 from experiments.pictures.recorded_walk import read_walk
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.log_parameters import ONE_FILE
 from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files
-from firmware_host.log.log_parameters import ONE_FILE
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.segments import LogSegments
 from firmware_host.log_reading.log_reader import read_log

@@ -14,9 +14,9 @@ from command_line import exit_codes
 from command_line.main import main
 from experiments.robot.log_copies import copy_since
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, first_path, run_files, segment_path
-from firmware_host.log.log_parameters import LogParameters
 from firmware_host.log.recorder import Recorder
 from firmware_host.log_reading.log_reader import read_log, read_logs
 from firmware_host.log_reading.replay import replay_files

@@ -10,8 +10,8 @@ import pytest
 from experiments.trackway.bench import LoggedTime
 from experiments.trackway.walk_figures import logged_walk, walk_figures
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import DONE, first_path, log_files
-from firmware_host.log.log_parameters import LogParameters
 from firmware_host.log.recorder import Recorder
 from firmware_host.log_reading.log_reader import read_log
 from simulation.harness.lockstep import Lockstep

@@ -35,8 +35,8 @@ from firmware_host.computer.host_facts import (
     thread_priority,
 )
 from firmware_host.configuration.configuration import LoopParameters
+from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import ACTIVE, FreeSpace
-from firmware_host.log.log_parameters import LogParameters
 from tests.folders import ROOT
 
 GOOD_LIMITS = Limits(49, inf, "in the unit")

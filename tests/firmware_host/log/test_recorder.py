@@ -23,8 +23,8 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
+from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import DONE, first_path, unfinished_files
-from firmware_host.log.log_parameters import LogParameters
 from firmware_host.log.recorder import (
     HEADER,
     HEALTHY,

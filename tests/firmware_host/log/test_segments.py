@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from control.modes import Mode
+from firmware_host.configuration.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log import log_file, log_folder
 from firmware_host.log import segments as log_segments
 from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files, unfinished_files
-from firmware_host.log.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.segments import LogSegments
 from firmware_host.log_reading.log_reader import LogError, read_log, read_logs
 from tests.firmware_host.made_up_rows import OPENING, make_event, make_ticks

@@ -12,8 +12,8 @@ from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import StrideEstimate
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import DONE, first_path, log_files
-from firmware_host.log.log_parameters import LogParameters
 from firmware_host.log.recorder import Recorder
 from firmware_host.log_reading.log_reader import LogError, read_logs
 from firmware_host.log_reading.replay import replay_file, replay_files
