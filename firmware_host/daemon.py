@@ -41,7 +41,7 @@ from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.rights import Rights, load_rights
 from firmware_host.operator.status_socket import AlreadyServedError, StatusSocket
 from firmware_host.pose_sources import open_pose
-from firmware_host.software_version import software_version
+from firmware_host.software_version import build_metadata
 from firmware_host.ticker import RATE_HZ, Tick, Ticker
 
 EXIT_FAILED = 1
@@ -108,7 +108,7 @@ def open_recorder(configuration: Configuration) -> Recorder | NullRecorder:
     if not os.access(folder, os.W_OK):
         raise PermissionError(errno.EACCES, "is not writable", str(folder))
     run_id = new_run_id(robot)
-    metadata = {"robot": robot, "run_id": run_id, "version": software_version()}
+    metadata = {"robot": robot, "run_id": run_id} | build_metadata()
     return Recorder(first_path(folder, run_id), configuration.text, metadata, configuration.log)
 
 

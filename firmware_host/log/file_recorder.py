@@ -9,6 +9,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import new_run_id
 from firmware_host.log.recorder import HEALTHY, LogReport
+from firmware_host.software_version import build_metadata
 
 ROWS_AT_ONCE = 1000
 
@@ -19,7 +20,7 @@ class FileRecorder:
     def __init__(self, path: Path, configuration: Configuration, metadata: dict[str, str] | None = None) -> None:
         """`path` must not exist yet."""
         robot = configuration.robot.name
-        known = {"robot": robot, "run_id": new_run_id(robot), "segment": "0"} | (metadata or {})
+        known = {"robot": robot, "run_id": new_run_id(robot), "segment": "0"} | build_metadata() | (metadata or {})
         opening = {
             "wall_minus_monotonic_ns": time.time_ns(),  # its loop's clock begins at zero
             "configuration_text": configuration.text,
