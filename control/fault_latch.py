@@ -36,7 +36,7 @@ class FaultLatch:
         self.worst: Fault | None = None
 
     @property
-    def standing(self) -> list[Fault]:
+    def present(self) -> list[Fault]:
         return [standing.fault for standing in self._standing.values()]
 
     @property
@@ -50,7 +50,7 @@ class FaultLatch:
     def blocking(self, forced: bool = False) -> list[Fault]:
         """What stands against arming."""
         least = Blocks.ALWAYS if forced else Blocks.UNLESS_FORCED
-        return [fault for fault in self.standing if fault.kind.blocks >= least]
+        return [fault for fault in self.present if fault.kind.blocks >= least]
 
     def update(self, present: Sequence[Fault], energised: bool, clearing: bool = False, ticks: int = 1) -> None:
         """Once a tick, with all that is seen in it, `ticks` after the last time."""
@@ -64,7 +64,7 @@ class FaultLatch:
             if standing.last_tick < self._tick and self._is_over(standing, energised, clearing):
                 self.over.append(self._standing.pop(key).fault)
         # Of equals the one that began first.
-        self.worst = max(self.standing, key=lambda fault: fault.kind.reaction, default=None)
+        self.worst = max(self.present, key=lambda fault: fault.kind.reaction, default=None)
 
     def _see(self, fault: Fault, energised: bool) -> None:
         key = (fault.name, fault.subject)

@@ -49,7 +49,7 @@ class MonitorInput(NamedTuple):
     freeing: bool  # a recovery pulls at full torque on purpose
     wall_minus_monotonic_s: float
     log: LogReport
-    lease_holder: str  # who has lost it; empty: nobody
+    lost_lease_holder: str  # the program that has lost the lease; empty: none
 
 
 class FaultMonitor:
@@ -92,6 +92,11 @@ class FaultMonitor:
         self._broken: set[str] = set()  # encoders, until torque is off
         self.trusted: Joints[bool] = ALL_TRUSTED  # of the joints' encoders
 
+    @property
+    def winding_temperatures_c(self) -> Joints[float]:
+        """The temperature of each motor, measured or estimated."""
+        return Joints(*(joint.winding.temperature_c for joint in self.joints))
+
     def with_winding_heat(self, states: DriveStates) -> DriveStates:
         """With the temperatures that the watches believe, where one is warm enough for the limits to heed it."""
         if all(joint.winding.temperature_c <= self._warm_c for joint in self.joints) and not any(
@@ -110,8 +115,8 @@ class FaultMonitor:
         found = self._loop.update(tick, monitor_input.wall_minus_monotonic_s)
         found += self._log.update(monitor_input.log)
         self._watch_buses(found, tick.now_s)
-        if monitor_input.lease_holder:
-            found.append(FaultKind.LEASE_LOST.fault(holder=monitor_input.lease_holder))
+        if monitor_input.lost_lease_holder:
+            found.append(FaultKind.LEASE_LOST.fault(holder=monitor_input.lost_lease_holder))
         if monitor_input.mode is Mode.BOOT and not self._drives.heard:
             return found
         self._watch_joints(found, tick, monitor_input)

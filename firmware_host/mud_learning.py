@@ -6,12 +6,15 @@ stride, in swing, the depth of the next one is chosen; mud that might hold a fli
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from control.controller import Controller
 from control.faults import Fault, FaultKind
+from control.mud_estimate import MudEstimate
 from control.records import BodyPose, DriveStates, Estimate, Phase, StrideEstimate
 from estimation.mud import MudEstimator, MudReading
+from estimation.mud_map import MapRow
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.depth_methods import adaptation_of, choice_text
 
@@ -52,6 +55,14 @@ class MudLearning:
 
     def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> None:
         self.reading = self.estimator.update(now_s, phase, states, body)
+
+    @property
+    def mud_estimate(self) -> MudEstimate:
+        return self.estimator.mud_estimate
+
+    def map_rows(self) -> Sequence[MapRow]:
+        """The mud along the track since the walk began."""
+        return self.estimator.map.rows()
 
     def step(self, controller: Controller) -> tuple[list[ClosedStride], list[str]]:
         """What this tick changes in the gait: the strides that closed, and sentences for the log."""

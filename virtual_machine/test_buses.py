@@ -51,7 +51,7 @@ def test_a_walk_goes_on_through_garbage(walking: Robot) -> None:
     report = walking.status()
     assert report["mode"] == "walking"
     assert report["bus"]["unknown_frames"] == before["unknown_frames"]  # the kernel keeps strangers away
-    assert report["bus"]["garbled_frames"] > before["garbled_frames"]
+    assert report["bus"]["malformed_frames"] > before["malformed_frames"]
     assert walking.unit("NRestarts") == "0"
 
 

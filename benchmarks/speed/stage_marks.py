@@ -38,7 +38,7 @@ class StageMarks:
             (loop.drives, "read"),
             (loop.pose, "read"),
             (loop.learning, "update"),
-            (loop, "_adapt"),
+            (loop, "_adapt_gait"),
             (loop, "_examine"),
             (loop.controller, "step"),
             (loop, "_limit"),

@@ -153,7 +153,7 @@ class SoakedLoop:
         for fault in loop.faults.begun:
             self.faults[fault.name] += 1
         self.visitors = [visitor for visitor in self.visitors if not self._is_gone(visitor)]
-        if self.ticks % BY_HAND_TICKS == 0 and any(fault.name == "joint_position" for fault in loop.faults.standing):
+        if self.ticks % BY_HAND_TICKS == 0 and any(fault.name == "joint_position" for fault in loop.faults.present):
             self._move_by_hand()
         if self.ticks % WISH_TICKS == 0:
             self._visit(self.attendant.wish(loop.mode.name.lower(), bool(loop.faults.blocking())))

@@ -110,7 +110,7 @@ class Demo:
             self._look_after_processes()
             report: dict[str, Any] = self.client.call("status")
             if report["mode"] == "fault":
-                raise DemoError(f"fault: {report['fault']['sentence']}")
+                raise DemoError(f"fault: {report['fault']['message']}")
             if done(report):
                 return report
             time.sleep(POLL_S)

@@ -57,7 +57,7 @@ def _conclude(report: dict[str, Any], status: int) -> int:
     fault = report["fault"]
     if report["mode"] == "hold" and not report["notice"] and (not fault or fault["reaction"] in MILD):
         return status
-    complain(report["notice"] or (fault["sentence"] if fault else "the torque was switched off"))
+    complain(report["notice"] or (fault["message"] if fault else "the torque was switched off"))
     return exit_codes.REFUSED
 
 

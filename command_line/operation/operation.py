@@ -123,7 +123,7 @@ def clear(options: Options) -> int:
                 print(report["mode"])
                 return exit_codes.OK
             time.sleep(0.05)
-        messages = [fault["sentence"] for fault in stopping_faults(report)]
+        messages = [fault["message"] for fault in stopping_faults(report)]
         complain(f"the cause persists: {' '.join(messages) or report['mode']}")
         return exit_codes.REFUSED
 
@@ -156,7 +156,7 @@ def _await(client: StatusClient, modes: tuple[str, ...], longest_s: float) -> in
                 complain(report["notice"])
             return exit_codes.OK
         if report["mode"] == "fault":
-            complain(report["fault"]["sentence"] if report["fault"] else report["notice"])
+            complain(report["fault"]["message"] if report["fault"] else report["notice"])
             return exit_codes.REFUSED
         time.sleep(0.05)
     complain(f"still {report['mode']} after {longest_s:g} s")
@@ -224,7 +224,7 @@ def _fault_line(fault: dict[str, Any]) -> str:
     colour = YELLOW if fault["reaction"] in MILD else RED
     against = ", against arming" if fault["blocks_arming"] else ""
     reaction = fault["reaction"].replace("_", " ")
-    return coloured(f"{fault['name']} ({reaction}{against}): {fault['sentence']}\n    -> {fault['what_to_do']}", colour)
+    return coloured(f"{fault['name']} ({reaction}{against}): {fault['message']}\n    -> {fault['what_to_do']}", colour)
 
 
 def _drives_table(drives: list[dict[str, Any]]) -> str:
@@ -258,7 +258,7 @@ def _loop_text(report: dict[str, Any]) -> str:
             f"loop   {loop['rate_hz']:.2f} Hz, {loop['ticks']} ticks, {loop['missed_ticks']} missed",
             f"late   {late['p50']:.0f} us median, {late['p99']:.0f} p99, {late['max']:.0f} worst",
             f"tick   {tick['p50']:.0f} us median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst",
-            f"bus    {bus['unknown_frames']} unknown, {bus['garbled_frames']} garbled,"
+            f"bus    {bus['unknown_frames']} unknown, {bus['malformed_frames']} garbled,"
             f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends"
             + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")
             + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),

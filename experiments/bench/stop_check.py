@@ -59,7 +59,7 @@ def soft_stop(stand: Stand) -> Readings:
 
 def _in_full_stance(stand: Stand, sample: Sample) -> bool:
     full_rad_s = stand.configuration.gait.stance_speed_m_s / stand.configuration.geometry.flipper_length_m
-    in_stance = stand.loop.target_before.phase is Phase.STANCE
+    in_stance = stand.loop.target.phase is Phase.STANCE
     return in_stance and all(abs(sample.states[place].velocity_rad_s) > FULL_FRACTION * full_rad_s for place in SWEEPS)
 
 

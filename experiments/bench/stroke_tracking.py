@@ -112,7 +112,7 @@ def strides(stand: Stand) -> Readings:
         missed = stand.loop.missed_ticks
         samples = walk(stand)
         fraction = 100.0 * (stand.loop.missed_ticks - missed) / len(samples)
-        reported = [fault_message(fault) for fault in stand.loop.faults.standing]
+        reported = [fault_message(fault) for fault in stand.loop.faults.present]
     yield from _walk_readings(stand, [sample for sample in samples if sample.mode is Mode.WALKING])
     yield Reading("walk: ticks missed", fraction, "%", 0.0, 100.0 * MOST_MISSED_FRACTION, BUSY)
     yield Reading("walk: faults that stand", len(reported), "", 0, 0, " ".join(reported))

@@ -107,7 +107,7 @@ class FaultBench(Lockstep):
 
     def winding(self, joint: str) -> Winding:
         """The loop's own reckoning of it, which is seconds away from any heat."""
-        return self.loop._fault_monitor.joints[JOINTS.index(joint)].winding
+        return self.loop.fault_monitor.joints[JOINTS.index(joint)].winding
 
     def add_duplicate(self, joint: str, angle_rad: float) -> Act:
         """A second drive with the id of the joint's own, on its bus: what it does in a step."""

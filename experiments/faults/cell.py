@@ -151,7 +151,7 @@ class Watch:
         if self._cell.reported_ticks is not None:
             return
         loop = self._bench.loop
-        if any(fault.kind is kind for fault in loop.faults.standing):
+        if any(fault.kind is kind for fault in loop.faults.present):
             self._cell.reported_ticks = self._ticks
             refusing = self._cell.phase == "idle" and _stands_against_arming(kind)
             if refusing and loop.request(Request.ARM, self._bench.now_s) is None:

@@ -84,7 +84,7 @@ BUGS = {
     "reading pose": "pose.read",
     "learning": "learning.update",
     "choosing depth": "learning.step",
-    "watching faults": "_fault_watch.update",
+    "watching faults": "fault_monitor.update",
     "control": "controller.step",
     "sending": "drives.send",
     "recording": "recorder.put",

@@ -122,7 +122,7 @@ def _faults_reported(status: Status) -> str:
     faults = [fault for fault in status["faults"] if fault["blocks_arming"]]
     if status["mode"] == "fault" and not faults:
         faults = [status["fault"]] if status["fault"] else []
-    reported = [f"  {fault['sentence']} ({_for(fault['for_s'])})\n    -> {fault['what_to_do']}" for fault in faults]
+    reported = [f"  {fault['message']} ({_for(fault['age_s'])})\n    -> {fault['what_to_do']}" for fault in faults]
     if status["mode"] == "fault":
         return "\n".join(["The robot is in FAULT:", *(reported or [f"  {status['notice']}"])])
     return "\n".join(["A fault stands:", *reported]) if reported else ""
@@ -174,7 +174,7 @@ def _blocked(status: Status) -> bool:
 
 def _why_not_armed(robot: BenchRobot, problem: str) -> str:
     blocking = [fault for fault in robot.call("status")["faults"] if fault["blocks_arming"]]
-    faults = [f"{fault['sentence'].rstrip('.')} ({fault['what_to_do']})" for fault in blocking]
+    faults = [f"{fault['message'].rstrip('.')} ({fault['what_to_do']})" for fault in blocking]
     return f"the robot is not armed: {'; '.join(faults) or problem}. 'mudskipper check' tells more"
 
 
@@ -206,7 +206,7 @@ def reported_by(status: Status) -> str:
     if status["mode"] == "idle":  # unasked it leaves a notice; and a flipper that falls then is a fault as well
         return "its torque was switched off"
     if status["fault"]:
-        return str(status["fault"]["sentence"])
+        return str(status["fault"]["message"])
     return "it was told to stop" if status["mode"] == "stopping" else f"it is in {status['mode']}"
 
 

@@ -47,7 +47,7 @@ class ReferenceLockstep(Lockstep):
             self._reference.reset()
             self.truths = []
         self._walked = walks
-        self.truths += self._reference.step(PERIOD_S, self.robot.plant, self.loop.target_before.phase)
+        self.truths += self._reference.step(PERIOD_S, self.robot.plant, self.loop.target.phase)
 
 
 def simulated_bench(

@@ -90,7 +90,7 @@ def run_trial(
     held, end_s = _sample_of(lockstep), lockstep.now_s + strides * LONGEST_STRIDE_S
     while len(truths) < 2 * strides and lockstep.now_s < end_s:
         lockstep.step()
-        phase = lockstep.loop.target_before.phase
+        phase = lockstep.loop.target.phase
         if lockstep.now_s >= held.now_s + setup.row_period_s:
             held = _sample_of(lockstep)
         samples.append(held._replace(now_s=lockstep.now_s, phase=phase))
@@ -112,7 +112,7 @@ def _known_drives(configuration: Configuration, torque_error: float, seed: int) 
 
 def _sample_of(lockstep: Lockstep) -> Sample:
     loop = lockstep.loop
-    return Sample(lockstep.now_s, loop.target_before.phase, loop.states, loop.body)
+    return Sample(lockstep.now_s, loop.target.phase, loop.states, loop.body)
 
 
 def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool = True) -> list[StrideEstimate]:

@@ -7,15 +7,14 @@ purpose; and `disarm` ends every failure first, so that it reaches the drives wh
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite
 from typing import Any
 
-from drivers.fault_injection.failures import EFFECTS, USUAL_S, Failure, Failures, begin_text, end_text
+from drivers.fault_injection.failures import EFFECTS, Failure, Failures, begin_text, end_text
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.connection import Caller
+from firmware_host.operator.operator_calls import validated
 from firmware_host.operator.status_socket import Methods, RefusedError
 
-LONGEST_NAME = 64
 FORBIDDEN = "nothing may fail on purpose here: set failures.allowed = true in the configuration, and start again"
 OK, ALL = "ok", "all"
 
@@ -31,13 +30,10 @@ def failures_of(configuration: Configuration) -> Failures | None:
 def with_failures(methods: Methods, failures: Failures | None, report: Report, clock: Callable[[], float]) -> Methods:
     """The methods of a daemon, and those that make it fail; the others as they are where nothing may."""
     if failures is None:
-        return {
-            **methods,
-            "fail": _refuse,
-            "failures": lambda params, caller: {"allowed": False, "failing": [], "table": []},
-        }
+        nothing = {"allowed": False, "failing": [], "table": []}
+        return {**methods, "fail": _refuse, "failures": lambda params, caller: nothing}
     calls = FailureCalls(failures, report, clock)
-    added: Methods = {"fail": calls.fail, "failures": lambda params, caller: calls.failures()}
+    added: Methods = {"fail": validated("fail", calls.fail), "failures": validated("failures", calls.failures)}
     changed: Methods = {
         "status": lambda params, caller: calls.in_status(methods["status"](params, caller)),
         "disarm": calls.ending_all_before(methods["disarm"]),
@@ -57,11 +53,11 @@ class FailureCalls:
 
     def fail(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
         """Make `component` fail as `kind` says for `for_s`; kind "ok" ends it, also for "all". What fails then."""
-        component, kind = _text(params, "component"), _text(params, "kind")
+        component, kind = params["component"], params["kind"]
         if kind == OK:
             self._end(component)
         else:
-            self._begin(component, kind, _seconds(params), str(caller))
+            self._begin(component, kind, float(params["for_s"]), str(caller))
         return self._failing()
 
     def _begin(self, component: str, kind: str, for_s: float, who: str) -> None:
@@ -79,7 +75,7 @@ class FailureCalls:
         for each in self._failures.end_all() if component == ALL else [failure] if failure else []:
             self._report(self._clock(), end_text(each))
 
-    def failures(self) -> dict[str, Any]:
+    def failures(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
         """What fails, and all that could."""
         families = self._failures.families
         table = [
@@ -115,17 +111,3 @@ class FailureCalls:
 
 def failing_text(failing: dict[str, Any]) -> str:
     return f"failing on purpose: {failing['component']} {failing['kind']}, {failing['remaining_s']:.1f} s more"
-
-
-def _text(params: dict[str, Any], name: str) -> str:
-    value = params.get(name, "")
-    if not isinstance(value, str) or len(value) > LONGEST_NAME or not value.isprintable():
-        raise RefusedError(f"{name}: must be at most {LONGEST_NAME} printable characters")
-    return value
-
-
-def _seconds(params: dict[str, Any]) -> float:
-    value = params.get("for_s", USUAL_S)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        raise RefusedError(f"for_s = {value!r}: must be a number")
-    return float(value)

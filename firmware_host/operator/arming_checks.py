@@ -22,24 +22,25 @@ SIGNALS = ("position", "current", "heartbeat")
 
 
 def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[dict[str, Any]]:
-    """All lines, the good ones too."""
+    """All lines, also those that permit arming."""
+    now = loop.snapshot()
     lines = {"configuration": f"accepted for {loop.configuration.robot.name}"}
-    for health, state in zip(loop.drives.health, loop.states, strict=True):
+    for health, state in zip(now.drives, now.states, strict=True):
         lines |= _drive_lines(health, state)
-    for name, port in loop.drives.ports.items():
-        lost = f", {port.lost_frames} frames lost" if port.lost_frames else ""
-        lines[f"bus.{name}"] = f"{port.error_frames} error frames, {port.failed_sends} failed sends{lost}"
-    lines["loop"] = f"{loop.timing.rate_hz:.1f} Hz, {loop.missed_ticks} ticks missed since the start"
+    for bus in now.buses:
+        lost = f", {bus.lost_frames} frames lost" if bus.lost_frames else ""
+        lines[f"bus.{bus.name}"] = f"{bus.error_frames} error frames, {bus.failed_sends} failed sends{lost}"
+    lines["loop"] = f"{now.rate_hz:.1f} Hz, {now.missed_ticks} ticks missed since the start"
     lines["log"] = log_text
-    pose = loop.pose.report()
+    pose = now.pose
     if pose.source:
         lines["pose"] = pose.message
-    faults = loop.faults.standing
+    faults = [present.fault for present in now.faults]
     if pose.trouble:  # the pose source's own text says more
         faults = [fault for fault in faults if fault.kind is not FaultKind.POSE_LOST]
     for fault in faults:
         lines.setdefault(fault.check_line, "")
-    unheard = {f"drive.{joint}" for joint, state in zip(JOINTS, loop.states, strict=True) if not state.heard}
+    unheard = {f"drive.{joint}" for joint, state in zip(JOINTS, now.states, strict=True) if not state.heard}
     items = [
         _line(identity, text, [fault for fault in faults if fault.check_line == identity], identity in unheard)
         for identity, text in lines.items()

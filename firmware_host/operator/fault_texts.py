@@ -11,6 +11,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
+from control.modes import Mode, Refusal, Request
 
 WIRING = "check its power, wiring, node id and message periods (docs/how-to/odrive.md)"
 FIX = "fix the cause, then 'mudskipper clear'"
@@ -274,3 +275,24 @@ def fault_advice(fault: Fault) -> str:
     """What happened, and what to do."""
     to_do = what_to_do(fault)
     return f"{fault_message(fault)} {to_do[:1].upper()}{to_do[1:]}."
+
+
+IN_MODE: dict[Mode, str] = {
+    Mode.BOOT: "not every drive was heard yet; see 'mudskipper check'",
+    Mode.IDLE: "the drives are idle; 'mudskipper arm' first",
+    Mode.ARMING: "the drives are being armed; try again in a moment",
+    Mode.HOLD: "the robot already holds its pose",
+    Mode.WALKING: "the robot walks; 'mudskipper stop' first",
+    Mode.STOPPING: "the robot is stopping; try again in a moment",
+    Mode.FAULT: "a fault is present; read 'mudskipper status', then 'mudskipper clear'",
+    Mode.DAMPING: "a fault lets the joints sink; wait until they rest",
+}
+
+
+def refusal_text(refusal: Refusal) -> str:
+    """Why the robot refuses a request in its present mode, and what to do."""
+    if refusal.faults:
+        return " ".join(fault_message(fault) for fault in refusal.faults)
+    if refusal.request is Request.CLEAR and refusal.mode is Mode.HOLD:
+        return "nothing to clear: the robot holds its pose"
+    return IN_MODE[refusal.mode]

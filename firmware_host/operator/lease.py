@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Hashable
 from math import inf
 
-SHORTEST_S, LONGEST_S = 0.1, 10.0  # of what may be promised
 TAKEN_OVER = "taken over: "  # how a refusal begins that holds for as long as the connection
 
 
@@ -40,9 +39,12 @@ class Lease:
         """Or held until just now: `lost` is what tells."""
         return self._holder is not None and not self._lost
 
+    def update(self, now_s: float) -> None:
+        """Let a lease that was not renewed in time be lost."""
+        self._lost = self.lost(now_s)
+
     def lost(self, now_s: float) -> bool:
-        self._lost = self._lost or now_s > self._until_s
-        return self._lost
+        return self._lost or now_s > self._until_s
 
     def refusal(self, caller: Hashable, now_s: float, take_over: bool = False) -> str | None:
         """Why `caller` may not move the robot at this moment, or None."""
@@ -60,6 +62,7 @@ class Lease:
 
     def renew(self, holder: Hashable, now_s: float, for_s: float) -> str | None:
         """Why it is refused, or None."""
+        self.update(now_s)
         refused = self.refusal(holder, now_s)
         if refused is None:
             self._holder, self._until_s = holder, now_s + for_s

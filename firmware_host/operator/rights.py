@@ -13,35 +13,17 @@ import grp
 import os
 import socket
 import struct
-from enum import IntEnum
 from typing import NamedTuple
 
 from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.operator.rpc import FOR_MEMBERS, NOT_PERMITTED
+from firmware_host.operator.socket_methods import METHODS
+from firmware_host.operator.socket_methods import Level as Level  # the rights of a method
 
 CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid
 SO_PEERGROUPS = 59  # asm-generic/socket.h; Python has no name for it
 GROUP_BYTES, LONGEST_ANSWER = 4, 1024  # as much as Python's getsockopt fetches: 256 groups
-
-
-class Level(IntEnum):
-    ANYONE = 0
-    READ = 1
-    DRIVE = 2
-
-
-# What is not named here is for operators.
-NEEDED = {
-    "hello": Level.ANYONE,
-    "stop": Level.ANYONE,
-    "disarm": Level.ANYONE,
-    "status": Level.READ,
-    "strides": Level.READ,
-    "map": Level.READ,
-    "check": Level.READ,
-    "failures": Level.READ,
-}
 
 
 class Peer(NamedTuple):
@@ -69,7 +51,7 @@ class Rights(NamedTuple):
         return Level.READ if self.readers.gid in peer.groups else Level.ANYONE
 
     def refusal(self, method: str, level: Level) -> str | None:
-        needed = NEEDED.get(method, Level.DRIVE)
+        needed = METHODS[method].level if method in METHODS else Level.DRIVE
         if level >= needed:
             return None
         return _for_members(method, self.operators if needed is Level.DRIVE else self.readers)

@@ -25,7 +25,7 @@ def ticks_standing(fault: Fault, energised: bool, energised_after: bool, clearin
     latch.update([fault], energised)
     for tick in range(1, 1001):
         latch.update([], energised_after, clearing)
-        if not latch.standing:
+        if not latch.present:
             return tick
     return 1001
 
@@ -78,9 +78,9 @@ def test_clearing_does_not_help_while_the_cause_lasts() -> None:
     latch.update([SILENT], True)
     for _ in range(100):
         latch.update([SILENT], False, clearing=True)
-        assert latch.standing == [SILENT]
+        assert latch.present == [SILENT]
     latch.update([], False, clearing=True)
-    assert not latch.standing
+    assert not latch.present
 
 
 def test_what_was_latched_once_stays_so_however_often_it_is_seen_without_torque() -> None:
@@ -90,7 +90,7 @@ def test_what_was_latched_once_stays_so_however_often_it_is_seen_without_torque(
         latch.update([SILENT], False)
     for _ in range(500):
         latch.update([], False)
-    assert latch.standing == [SILENT]
+    assert latch.present == [SILENT]
 
 
 def test_what_was_seen_without_torque_is_latched_once_torque_meets_it() -> None:
@@ -99,7 +99,7 @@ def test_what_was_seen_without_torque_is_latched_once_torque_meets_it() -> None:
     latch.update([SILENT], True)
     for _ in range(500):
         latch.update([], False)
-    assert latch.standing == [SILENT]
+    assert latch.present == [SILENT]
 
 
 def test_a_fault_that_comes_and_goes_is_one_fault() -> None:
@@ -127,14 +127,14 @@ def test_the_sentence_is_that_of_the_last_time_and_the_news_that_of_the_first() 
     latch.update([LATE], False)
     later = LATE.with_values(age_s=0.009)
     latch.update([later], False)
-    assert (latch.begun, latch.standing) == ([], [later])
+    assert (latch.begun, latch.present) == ([], [later])
 
 
 def test_the_same_fault_of_two_joints_is_two() -> None:
     latch = FaultLatch()
     other = fault_of("drive_late", "right_sweep")
     latch.update([LATE, other], False)
-    assert latch.standing == [LATE, other]
+    assert latch.present == [LATE, other]
 
 
 def test_the_worst_is_the_hardest_and_of_equals_the_first() -> None:
@@ -168,9 +168,9 @@ def test_missed_ticks_count_as_time() -> None:
     latch = FaultLatch()
     latch.update([LATE], False)
     latch.update([], False, ticks=GOOD_TICKS)
-    assert latch.standing == [LATE]
+    assert latch.present == [LATE]
     latch.update([], False)
-    assert not latch.standing
+    assert not latch.present
 
 
 def test_a_reset_forgets_everything_even_a_bug() -> None:
@@ -178,7 +178,7 @@ def test_a_reset_forgets_everything_even_a_bug() -> None:
     latch.update([BUG], True)
     latch.reset()
     latch.update([], True)
-    assert (latch.standing, latch.worst, latch.begun, latch.over) == ([], None, [], [])
+    assert (latch.present, latch.worst, latch.begun, latch.over) == ([], None, [], [])
 
 
 class Oracle(RuleBasedStateMachine):
@@ -236,7 +236,7 @@ class Oracle(RuleBasedStateMachine):
     @invariant()
     def they_agree(self) -> None:
         standing = set(self.last_seen)
-        assert set(self.latch.standing) == standing
+        assert set(self.latch.present) == standing
         assert self.latch.reaction == max((fault.kind.reaction for fault in standing), default=Reaction.NONE)
         assert set(self.latch.blocking()) == {fault for fault in standing if fault.kind.blocks is not Blocks.NO}
         assert self.events == {fault: int(fault in standing) for fault in ALL}

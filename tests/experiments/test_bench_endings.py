@@ -98,7 +98,7 @@ def hold_in_stance(robot: InterruptedRobot) -> None:
     arm(robot, OPERATOR)
     robot.call("walk", depth_m=0.03)
     loop = robot.lockstep.loop
-    assert robot.lockstep.run_until(lambda: loop.target_before.phase is Phase.STANCE, 10.0)
+    assert robot.lockstep.run_until(lambda: loop.target.phase is Phase.STANCE, 10.0)
     robot.wait(0.2)
     robot.lockstep.fail("left_sweep.current", "off", 0.015)
     robot.wait(0.3)

@@ -163,7 +163,7 @@ def test_a_bus_that_vanishes_in_operation_is_a_fault_and_when_it_is_back_the_rob
     plug.pull()
     plug.run(robot, 6.0)
     assert mode_of(robot) is Mode.FAULT
-    names = {fault.name: fault_message(fault) for fault in robot.loop.faults.standing}
+    names = {fault.name: fault_message(fault) for fault in robot.loop.faults.present}
     assert "there is no such interface" in names["bus_off"]
     plug.plug_in()
     plug.run(robot, 2.0 * RETRY_S)
@@ -216,7 +216,7 @@ def test_a_daemon_without_its_bus_waits_where_it_is_told_to_and_else_ends_with_s
     if wait:
         assert report["mode"] == "boot"
         assert report["fault"]["name"] == "bus_off"
-        assert "does not open" in report["fault"]["sentence"]
+        assert "does not open" in report["fault"]["message"]
         assert daemon.returncode == 0
     else:
         assert daemon.returncode == 1

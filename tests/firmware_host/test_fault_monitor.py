@@ -250,7 +250,7 @@ def test_a_place_that_is_lost_is_told_until_it_is_back_or_forgotten(bench: Bench
 
 
 def test_who_lost_the_lease_is_named(bench: Bench) -> None:
-    (fault,) = bench.tick(lease_holder="the operator's tablet")
+    (fault,) = bench.tick(lost_lease_holder="the operator's tablet")
     assert fault == FaultKind.LEASE_LOST.fault(holder="the operator's tablet")
 
 

@@ -17,8 +17,10 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE_KIND, TICK_KIND
+from firmware_host.operator.connection import Caller
 from firmware_host.operator.fault_texts import fault_message
 from firmware_host.operator.operator_calls import OperatorCalls
+from firmware_host.operator.rights import Level, Peer
 from firmware_host.ticker import PERIOD_S, Tick
 from simulation.devices.drive import DriveError, SimulatedDrive
 from simulation.harness.lockstep import Lockstep
@@ -196,7 +198,7 @@ def test_a_loop_that_stood_still_lets_go(robot: Lockstep) -> None:
     robot.robot.advance(robot.now_s)
     robot.loop.tick(Tick(robot.now_s, 200 * PERIOD_S, robot.tick_number, 199))
     assert robot.loop.mode is Mode.FAULT
-    assert "loop_stalled" in {fault.name for fault in robot.loop.faults.standing}
+    assert "loop_stalled" in {fault.name for fault in robot.loop.faults.present}
     assert robot.loop.sent.torques_nm == NO_TORQUE
 
 
@@ -232,7 +234,7 @@ def test_flippers_that_stay_in_the_mud_are_told(configuration: Configuration) ->
     robot = Lockstep(configuration, Track([(5.0, Clay("9 kPa", 9000.0))]))
     robot.arm()
     robot.walk(WalkOrder(0.05, False))
-    robot.run_until(lambda: robot.loop.target_before.phase is Phase.STANCE, 5.0)
+    robot.run_until(lambda: robot.loop.target.phase is Phase.STANCE, 5.0)
     for fraction in range(1, 101):  # deeper than the torque could have pushed them, without a jump
         for arm in robot.robot.plant.arms:
             deep_rad = configuration.geometry.adduction_rad(arm.sweep_rad, 0.05)
@@ -338,7 +340,7 @@ def test_garbage_on_the_bus_is_counted_and_changes_nothing(configuration: Config
 def test_a_missed_tick_costs_no_place_in_the_gait(robot: Lockstep) -> None:
     robot.arm()
     robot.walk(WalkOrder(0.03))
-    robot.run_until(lambda: robot.loop.target_before.stride == 0, 5.0)
+    robot.run_until(lambda: robot.loop.target.stride == 0, 5.0)
     robot.run_for(0.2)
     before = robot.loop.controller.gait._time_s
     robot.tick_number += 3
@@ -370,7 +372,9 @@ def test_a_log_that_is_lost_is_told(robot: Lockstep) -> None:
     recorder = recorder_of(robot)
     recorder.health = HEALTHY._replace(alive=False)
     robot.step()
-    reported = OperatorCalls(robot.loop, recorder, [], lambda: robot.now_s).status({})
+    reported = OperatorCalls(robot.loop, recorder, [], lambda: robot.now_s).methods["status"](
+        {}, Caller(1, Peer(1, 0, frozenset()), Level.DRIVE)
+    )
     assert reported["fault"]["name"] == "recorder_dead" and not reported["log"]["writer_alive"]
 
 

@@ -27,17 +27,17 @@ def change(before: Mode, after: Mode, faulty: bool = False, rested: bool = False
 
 
 def test_a_change_of_mode_is_told_with_its_cause(events: LoopEvents, recorder: EventRecorder) -> None:
-    events.tell_change(1.0, change(Mode.WALKING, Mode.STOPPING, faulty=True))
+    events.report_mode_change(1.0, change(Mode.WALKING, Mode.STOPPING, faulty=True))
     assert recorder.texts == ["mode walking to stopping: Anna held the lease and did not renew it."]
     assert events.notice.startswith("stopped by lease_lost: Anna held the lease and did not renew it. ")
 
 
 @pytest.mark.parametrize("mode", [Mode.ARMING, Mode.WALKING])
 def test_a_notice_stands_until_the_robot_is_moved_again(events: LoopEvents, mode: Mode) -> None:
-    events.tell_end_of_move(1.0, "stop was asked for.")
-    events.tell_change(2.0, change(Mode.HOLD, Mode.IDLE))
+    events.report_end_of_move(1.0, "stop was asked for.")
+    events.report_mode_change(2.0, change(Mode.HOLD, Mode.IDLE))
     assert events.notice == "the joints stopped on their way: stop was asked for."
-    events.tell_change(3.0, change(Mode.IDLE, mode))
+    events.report_mode_change(3.0, change(Mode.IDLE, mode))
     assert events.notice == ""
 
 
@@ -51,7 +51,7 @@ def test_a_notice_stands_until_the_robot_is_moved_again(events: LoopEvents, mode
 def test_what_a_person_should_know_is_in_the_log_as_well(
     events: LoopEvents, recorder: EventRecorder, changed: ModeChange, notice: str
 ) -> None:
-    events.tell_change(1.0, changed)
+    events.report_mode_change(1.0, changed)
     assert events.notice.startswith(notice)
     assert recorder.texts[1:] == [events.notice]
 
@@ -60,14 +60,14 @@ def test_what_a_person_should_know_is_in_the_log_as_well(
     "changed", [change(Mode.HOLD, Mode.IDLE), change(Mode.STOPPING, Mode.HOLD), change(Mode.BOOT, Mode.IDLE, True)]
 )
 def test_usual_changes_and_faults_without_torque_leave_no_notice(events: LoopEvents, changed: ModeChange) -> None:
-    events.tell_change(1.0, changed)
+    events.report_mode_change(1.0, changed)
     assert events.notice == ""
 
 
 def test_a_reset_forgets_the_notice_and_which_requests_were_told(events: LoopEvents, recorder: EventRecorder) -> None:
     for _ in range(2):
-        events.tell_end_of_move(1.0, "a fault stands.")
-        events.tell_request(1.0, Request.STOP, False, "anna", True)
+        events.report_end_of_move(1.0, "a fault stands.")
+        events.report_request(1.0, Request.STOP, False, "anna", True)
         events.reset()
-    assert (events.notice, events.requests.untold) == ("", 0)
+    assert (events.notice, events.requests.unlogged) == ("", 0)
     assert recorder.about("request") == ["request stop by anna"] * 2

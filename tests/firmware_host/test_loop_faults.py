@@ -57,7 +57,7 @@ def copy_of(robot: Lockstep) -> Lockstep:
 
 
 def until_phase(robot: Lockstep, phase: Phase, and_for_s: float) -> None:
-    assert robot.run_until(lambda: robot.loop.target_before.phase is phase, 5.0)
+    assert robot.run_until(lambda: robot.loop.target.phase is phase, 5.0)
     robot.run_for(and_for_s)
 
 
@@ -171,7 +171,7 @@ def ticks_until(robot: Lockstep, name: str, longest: int) -> int:
         robot.step()
         if name in {fault.name for fault in robot.loop.faults.begun}:
             return tick
-    raise AssertionError(f"no {name} in {longest} ticks, but {robot.loop.faults.standing}")
+    raise AssertionError(f"no {name} in {longest} ticks, but {robot.loop.faults.present}")
 
 
 @pytest.mark.parametrize("name", CAUSES)
@@ -191,7 +191,7 @@ def test_a_drive_that_starts_anew_is_told_within_its_ticks_and_needs_a_clear(at:
     ticks_until(robot, "drive_restarted", FaultKind.DRIVE_RESTARTED.bound_ticks)
     robot.run_for(2.0)
     assert mode_of(robot) is Mode.FAULT
-    by_hand = {fault.name for fault in robot.loop.faults.standing if fault.kind.clears is Clears.BY_HAND}
+    by_hand = {fault.name for fault in robot.loop.faults.present if fault.kind.clears is Clears.BY_HAND}
     assert by_hand == {"drive_silent", "drive_restarted"}
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
     assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.6)
@@ -346,7 +346,7 @@ def test_what_a_person_must_clear_stands_until_then_and_against_force(at: Copied
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
     assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.6)
     robot.run_for(0.5)
-    assert mode_of(robot) is Mode.IDLE and not robot.loop.faults.standing
+    assert mode_of(robot) is Mode.IDLE and not robot.loop.faults.present
     assert sum(text.startswith(f"fault {name} ") for text in texts_of(robot)) == 1
 
 
@@ -471,7 +471,7 @@ def test_a_fault_that_holds_is_over_by_itself_and_then_the_robot_walks_again_whe
     hold_by_a_fault(robot)
     assert robot.loop.request(Request.WALK, robot.now_s, WALK) is not None
     robot.run_for(0.2)
-    assert (mode_of(robot), robot.loop.faults.standing) == (Mode.HOLD, [])
+    assert (mode_of(robot), robot.loop.faults.present) == (Mode.HOLD, [])
     assert robot.loop.request(Request.WALK, robot.now_s, WALK) is None
     robot.step()
     assert mode_of(robot) is Mode.WALKING
@@ -488,7 +488,7 @@ def test_warnings_change_no_torque(at: Copied) -> None:
         warned.step()
         assert warned.loop.sent == well.loop.sent
     assert mode_of(warned) is Mode.WALKING
-    assert {"voltage_low", "bus_warning", "clock_step"} <= {fault.name for fault in warned.loop.faults.standing}
+    assert {"voltage_low", "bus_warning", "clock_step"} <= {fault.name for fault in warned.loop.faults.present}
 
 
 def test_a_robot_that_nobody_needs_lets_go_by_itself(configuration: Configuration) -> None:

@@ -233,6 +233,6 @@ def test_a_socket_s_poses_reach_the_loop(robot: Lockstep, short_folder: Path) ->
         assert robot.loop.body.x_m == 0.25
         robot.run_for(0.3)
         assert not isfinite(robot.loop.body.x_m)
-        assert "pose_lost" in {fault.name for fault in robot.loop.faults.standing}
+        assert "pose_lost" in {fault.name for fault in robot.loop.faults.present}
         assert f"no pose comes through {short_folder}/pose any more. Start" in pose_line(robot)["text"]
         sender.close()

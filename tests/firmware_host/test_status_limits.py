@@ -10,8 +10,9 @@ import msgpack
 import pytest
 
 from firmware_host.operator.connection import BURST, LONGEST_SENDING_S, REQUESTS_PER_S, Caller
-from firmware_host.operator.rights import NEEDED, Peer
+from firmware_host.operator.rights import Peer
 from firmware_host.operator.rpc import NOT_PERMITTED
+from firmware_host.operator.socket_methods import METHODS as SOCKET_METHODS
 from firmware_host.operator.status_socket import MOST_CLIENTS
 from tests.firmware_host.served_socket import (
     METHODS,
@@ -34,7 +35,7 @@ STOP = msgpack.packb([0, 2, "stop", {}])
 def allow_everybody(served: Served, monkeypatch: pytest.MonkeyPatch) -> list[Caller]:
     """To echo as to stop. Returns who stopped the robot."""
     stopped: list[Caller] = []
-    monkeypatch.setitem(NEEDED, "echo", NEEDED["stop"])
+    monkeypatch.setitem(SOCKET_METHODS, "echo", SOCKET_METHODS["stop"])
     served.methods = METHODS | {"stop": lambda params, caller: stopped.append(caller)}
     return stopped
 

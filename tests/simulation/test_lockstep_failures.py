@@ -58,7 +58,7 @@ def test_each_failure_shows_as_the_fault_that_it_is(
     reported = set()
     for _ in range(114):
         lockstep.step()
-        reported |= {standing.name for standing in lockstep.loop.faults.standing}
+        reported |= {standing.name for standing in lockstep.loop.faults.present}
     assert fault in reported
     assert lockstep.loop.fault is not None
 
@@ -109,7 +109,7 @@ def test_a_loop_that_stands_still_misses_ticks_while_the_robot_lives_on(configur
 def test_joints_at_their_stops_are_moved_back_by_hand_and_the_robot_arms_again(configuration: Configuration) -> None:
     """The bus goes in an extraction: until its watchdog trips a drive keeps the last torque."""
     lockstep = make_walking(configuration)
-    lockstep.run_until(lambda: lockstep.loop.target_before.phase is Phase.EXTRACTION, 5.0)
+    lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.EXTRACTION, 5.0)
     lockstep.run_for(0.02)
     lockstep.fail("bus.left", "bus-off", 0.5)
     lockstep.run_for(3.0)
@@ -121,7 +121,7 @@ def test_joints_at_their_stops_are_moved_back_by_hand_and_the_robot_arms_again(c
             lockstep.run_for(0.5)
         lockstep.loop.request(Request.CLEAR, lockstep.now_s)
         lockstep.run_for(1.0)
-        beyond = [fault.subject for fault in lockstep.loop.faults.standing if fault.name == "joint_position"]
+        beyond = [fault.subject for fault in lockstep.loop.faults.present if fault.name == "joint_position"]
         assert beyond == ([] if by_hand else ["left_sweep", "left_adduction"])
     lockstep.arm()
     assert lockstep.loop.mode is Mode.HOLD

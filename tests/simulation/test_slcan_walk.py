@@ -109,7 +109,7 @@ def test_the_robot_walks_on_serial_adapters(walk: SerialWalk) -> None:
     assert mode_of(walk) is Mode.WALKING
     assert len(walk.loop.learning.strides) >= 2
     assert walk.robot.plant.body_m > 0.01
-    assert not walk.loop.faults.standing
+    assert not walk.loop.faults.present
     for name, port in walk.loop.drives.ports.items():
         assert port.error_frames == 0, name
         assert port.failed_sends == 0, name
@@ -120,7 +120,7 @@ def test_an_adapter_that_is_unplugged_ends_the_walk_in_a_fault_and_in_no_traceba
     walk.run_for(0.5)
     walk.lines["left"].unplug()
     walk.run_for(2 / 380)
-    reported = {fault.name for fault in walk.loop.faults.standing}
+    reported = {fault.name for fault in walk.loop.faults.present}
     assert "bus_off" in reported
     assert mode_of(walk) is Mode.DAMPING
     walk.run_for(4.0)

@@ -45,11 +45,11 @@ def walking(configuration: Configuration, track: Track, depth_m: float) -> tuple
 
 
 def until_phase(robot: Lockstep, phase: Phase) -> bool:
-    return robot.run_until(lambda: robot.loop.target_before.phase is phase, 10.0)
+    return robot.run_until(lambda: robot.loop.target.phase is phase, 10.0)
 
 
 def until_swing(robot: Lockstep) -> bool:
-    return robot.run_until(lambda: robot.loop.target_before.phase is Phase.SWING, longest_s(PARAMETERS) + 5.0)
+    return robot.run_until(lambda: robot.loop.target.phase is Phase.SWING, longest_s(PARAMETERS) + 5.0)
 
 
 def recovering(configuration: Configuration, held_kilopascal: float = 40.0) -> tuple[Lockstep, EventRecorder]:
@@ -87,7 +87,7 @@ def test_without_attempts_swing_begins_with_the_flippers_in_the_mud(configuratio
     """The paper's extraction failure: nothing waits."""
     robot, recorder = walking(replace(configuration, recovery=RecoveryParameters(attempts=0)), mud(7.5), 0.05)
     start_s = robot.now_s
-    assert robot.run_until(lambda: robot.loop.target_before.stride == 2, 10.0)
+    assert robot.run_until(lambda: robot.loop.target.stride == 2, 10.0)
     stride_s = stride_duration_s(configuration.gait, configuration.geometry, 0.05)
     assert robot.now_s - start_s == pytest.approx(2.0 * stride_s, abs=2.0 * PERIOD_S)
     assert recorder.about("stuck") == []
@@ -180,7 +180,7 @@ def test_a_stop_in_a_recovery_is_obeyed(configuration: Configuration) -> None:
 def test_targets_stay_within_the_joints_limits_and_torque_within_its_own(configuration: Configuration) -> None:
     robot, _ = recovering(configuration, 9.0)
     limits = configuration.limits
-    while robot.loop.mode is Mode.WALKING and robot.loop.target_before.phase is not Phase.INSERTION:
+    while robot.loop.mode is Mode.WALKING and robot.loop.target.phase is not Phase.INSERTION:
         robot.step()
         assert all(abs(torque_nm) <= limits.torque_nm for torque_nm in robot.loop.sent.torques_nm)
         for state, span in zip(robot.loop.states, configuration.joint_ranges, strict=True):

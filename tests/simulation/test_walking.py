@@ -31,7 +31,7 @@ def walk(configuration: Configuration, clay: Clay, depth_m: float) -> tuple[floa
     lockstep.walk(WalkOrder(depth_m, adaptive=False))
     begun: list[tuple[float, float]] = []
     while len(begun) <= STRIDES:
-        lockstep.run_until(lambda: lockstep.loop.target_before.stride == len(begun), 5.0)
+        lockstep.run_until(lambda: lockstep.loop.target.stride == len(begun), 5.0)
         begun.append((lockstep.now_s, lockstep.robot.plant.body_m))
     (start_s, start_m), (end_s, end_m) = begun[2], begun[-1]
     return 100.0 * (end_m - start_m) / (STRIDES - 2), 100.0 * (end_m - start_m) / (end_s - start_s)

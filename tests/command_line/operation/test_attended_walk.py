@@ -43,7 +43,7 @@ class EndingWalk(StatusClient):
 
 
 def report(mode: str, message: str = "", notice: str = "", reaction: str = "hold") -> dict[str, Any]:
-    fault = {"sentence": message, "reaction": reaction} if message else None
+    fault = {"message": message, "reaction": reaction} if message else None
     return {"mode": mode, "fault": fault, "notice": notice, "stride": 0, "phase": "swing", "depth_m": 0, "body_x_m": 0}
 
 

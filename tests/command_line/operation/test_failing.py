@@ -24,7 +24,7 @@ def test_a_failing_drive_is_shown_stops_the_robot_and_stands_in_the_log(bench: A
     done = bench.run("fail", "left_sweep", "off", "--for", "5")
     assert done.returncode == exit_codes.OK and "left_sweep  off" in done.stdout
     report = bench.wait_for(lambda report: report["mode"] == "fault")
-    assert "left_sweep" in report["fault"]["sentence"]
+    assert "left_sweep" in report["fault"]["message"]
     assert "failing on purpose: left_sweep off" in bench.run("status").stdout
     assert bench.run("fail", "all", "ok").stdout == "nothing fails on purpose\n"
     bench.wait_for(lambda report: report["failing"] == [] and report["drives"][0]["angle_age_s"] < 0.1)

@@ -101,7 +101,7 @@ def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log(bench: Any) -> No
     report = bench.wait_for(lambda report: report["mode"] == "idle")
     assert not any(drive["closed_loop"] for drive in report["drives"])
     assert {drive["errors"] for drive in report["drives"]} == {"watchdog expired"}
-    assert "watchdog expired" in report["fault"]["sentence"]
+    assert "watchdog expired" in report["fault"]["message"]
     assert bench.run("arm").returncode == exit_codes.REFUSED
     first = min(bench.logs.glob("*/*.mcap"), key=lambda path: path.name)
     log = read_log(first)

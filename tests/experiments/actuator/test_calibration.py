@@ -42,7 +42,7 @@ class ScriptedRobot(StillRobot):
             self.mode, self.armed = "hold", self.armed + 1
         if method == "clear":
             self.mode = "idle"
-        fault = {"sentence": self.message, "what_to_do": "do this", "blocks_arming": False, "for_s": 3.0}
+        fault = {"message": self.message, "what_to_do": "do this", "blocks_arming": False, "age_s": 3.0}
         drives = [{"joint": joint, "winding_c": self.winding_c} for joint in JOINTS]
         standing: dict[str, Any] = {"mode": self.mode, "fault": fault if self.mode == "fault" else None, "notice": ""}
         standing |= {"now_s": self.now_s}

@@ -134,7 +134,7 @@ class Stumbler:
 
     def __call__(self, rig: SimulatedRig) -> None:
         walking = hasattr(rig, "loop") and rig.loop.mode is Mode.WALKING
-        if walking and rig.loop.target_before.stride == 2 and not self.done:
+        if walking and rig.loop.target.stride == 2 and not self.done:
             self.done = True
             rig.robot.restart_drive(2)
 

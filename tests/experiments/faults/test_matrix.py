@@ -178,4 +178,4 @@ def test_a_lease_that_is_lost_right_behind_an_arm_names_its_holder_and_arms_noth
     bench.loop.lease.hang_up("alice")
     bench.step()
     assert bench.loop.mode is Mode.IDLE
-    assert FaultKind.LEASE_LOST.fault(holder="alice") in bench.loop.faults.standing
+    assert FaultKind.LEASE_LOST.fault(holder="alice") in bench.loop.faults.present

@@ -248,5 +248,5 @@ def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) 
     ],
 )
 def test_why_a_robot_stopped_is_told_by_its_cause(mode: str, notice: str, reported: str) -> None:
-    fault = {"sentence": "The left_sweep joint moves."}
+    fault = {"message": "The left_sweep joint moves."}
     assert reported_by({"mode": mode, "notice": notice, "fault": fault}) == reported

@@ -44,7 +44,7 @@ class AskedRobot(StillRobot):
         if method in ("disarm", "stop"):
             self.mode = "idle"
         self.blocked = self.blocked and method != "clear"
-        reported = {"sentence": "A drive is silent.", "for_s": 150.0, "what_to_do": "check it", "blocks_arming": True}
+        reported = {"message": "A drive is silent.", "age_s": 150.0, "what_to_do": "check it", "blocks_arming": True}
         faults = [reported] if self.blocked else []
         return {"mode": self.mode, "now_s": self.now_s, "faults": faults} if method == "status" else "accepted"
 

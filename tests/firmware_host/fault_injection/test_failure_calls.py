@@ -113,7 +113,7 @@ def test_the_list_holds_all_that_can_fail(bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("params", "said"),
     [
-        ({}, "there is no ''"),
+        ({}, "component = None: must be"),
         ({"component": "left_knee", "kind": "off"}, "left_knee"),
         ({"component": "left_knee", "kind": "ok"}, "left_knee"),
         ({"component": "all", "kind": "off"}, "there is no 'all'"),
@@ -122,9 +122,9 @@ def test_the_list_holds_all_that_can_fail(bench: Bench) -> None:
         ({"component": "log", "kind": "off", "for_s": "long"}, "must be a number"),
         ({"component": "log", "kind": "off", "for_s": True}, "must be a number"),
         ({"component": "log", "kind": "off", "for_s": float("nan")}, "must be a number"),
-        ({"component": ["log"], "kind": "off"}, "component: must be"),
-        ({"component": "log", "kind": "x" * 65}, "kind: must be"),
-        ({"component": "two\nlines", "kind": "off"}, "component: must be"),
+        ({"component": ["log"], "kind": "off"}, "component = .*: must be"),
+        ({"component": "log", "kind": "x" * 65}, "kind = .*: must be"),
+        ({"component": "two\nlines", "kind": "off"}, "component = .*: must be"),
     ],
 )
 def test_nonsense_is_refused_with_a_sentence(bench: Bench, params: dict[str, Any], said: str) -> None:

@@ -23,7 +23,7 @@ SUBJECTS = {"drive": "left_sweep", "watchdog": "left_sweep", "joint": "left_swee
 def ready(configuration: Configuration) -> Lockstep:
     """A robot with nothing against it. Tests give it faults and take them away."""
     robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
-    robot.run_until(lambda: robot.loop.mode is Mode.IDLE and not robot.loop.faults.standing, 3.0)
+    robot.run_until(lambda: robot.loop.mode is Mode.IDLE and not robot.loop.faults.present, 3.0)
     return robot
 
 

@@ -12,8 +12,9 @@ from control.modes import Mode
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import NEEDED, Level, Peer
+from firmware_host.operator.rights import Level, Peer
 from firmware_host.operator.rpc import RefusedError
+from firmware_host.operator.socket_methods import METHODS
 from firmware_host.ticker import PERIOD_S
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
@@ -71,7 +72,7 @@ def test_a_stop_that_changes_nothing_does_not_fill_the_log_but_is_counted(armed:
         assert armed.ask("stop", BEN) == armed.ask("disarm", BEN) == "accepted"
         armed.steps.step()
     assert not armed.events.about("request")[2:] and len(armed.events.texts) - reported <= 2  # the mode, a lease
-    assert armed.ask("status")["untold_requests"] == 100
+    assert armed.ask("status")["unlogged_requests"] == 100
     armed.ask("arm")
     assert armed.events.texts[-1].startswith("request arm by uid 1000 (process 77); 100 before it")
 
@@ -91,7 +92,7 @@ def test_the_same_request_again_and_again_is_told_once_a_second(robot: Robot) ->
         robot.steps.step()
     assert robot.events.about("request") == [
         "request clear by uid 1000 (process 77)",
-        "request clear by uid 1000 (process 77); 379 before it changed nothing or came again",
+        "request clear by uid 1000 (process 77); 379 before it changed nothing or were repeated",
     ]
 
 
@@ -101,8 +102,16 @@ def test_a_request_that_is_refused_is_nobody_s(robot: Robot) -> None:
     assert not [text for text in robot.events.texts if "uid" in text]
 
 
-def test_whatever_moves_the_robot_is_for_operators(robot: Robot) -> None:
-    assert robot.names - NEEDED.keys() == {"arm", "walk", "move", "clear", "lease", "release", "reset_timing"}
+def test_every_method_is_in_the_table_and_those_that_move_the_robot_are_for_operators(robot: Robot) -> None:
+    assert METHODS.keys() - robot.names == {"fail", "failures"} and robot.names <= METHODS.keys()
+    for_operators = {name for name, method in METHODS.items() if method.level is Level.DRIVE}
+    assert for_operators == {"arm", "walk", "move", "clear", "lease", "release", "reset_timing", "fail"}
+
+
+def test_answers_have_the_keys_of_the_table(armed: Robot) -> None:
+    assert list(armed.ask("status")) == list(METHODS["status"].answer_keys)
+    assert list(armed.ask("hello")) == list(METHODS["hello"].answer_keys)
+    assert set(armed.ask("check")[0]) == set(METHODS["check"].answer_keys)
 
 
 def test_under_a_lease_nobody_else_arms_a_robot_that_hands_are_on(robot: Robot) -> None:
@@ -173,7 +182,7 @@ def test_whoever_overrules_a_lease_has_the_robot_and_its_holder_does_not(
     assert armed.events.about("lease of") == ["lease of uid 1000 (process 77) taken over by uid 1001 (process 78)"]
     for again in ("lease", "walk", "move", "arm"):
         with pytest.raises(RefusedError, match=r"^taken over: uid 1001 \(process 78\)"):
-            armed.ask(again, ANNA, for_s=0.5)
+            armed.ask(again, ANNA, **({"for_s": 0.5} if again == "lease" else {}))
     armed.lease.hang_up(ANNA)
     armed.steps.run_for(0.3)
     assert armed.ask("status")["notice"] == ""  # nothing was lost
@@ -294,7 +303,7 @@ def test_a_move_ends_with_hold(armed: Robot) -> None:
     armed.ask("stop", BEN)
     status = armed.ask("status")
     assert not status["moving"] and status["mode"] == "hold"
-    assert status["notice"] == "the joints stopped on their way: stop was asked for by uid 1001 (process 78)."
+    assert status["notice"] == "the joints stopped on their way: stop was requested by uid 1001 (process 78)."
     armed.steps.run_for(0.5)
     assert armed.ask("status")["drives"][0]["angle_rad"] < 0.2
     armed.ask("move", left_sweep_rad=0.3)
@@ -314,13 +323,13 @@ def test_flippers_that_may_be_in_the_mud_are_raised_before_they_are_moved(armed:
     ("angles_rad", "message"),
     [
         ({}, "no joint is named: at least one of left_sweep_rad"),
-        ({"tail_rad": 0.1}, "'tail_rad' is no joint's angle"),
-        ({"left_sweep": 0.1}, "'left_sweep' is no joint's angle"),
+        ({"tail_rad": 0.1}, "there is no parameter 'tail_rad'"),
+        ({"left_sweep": 0.1}, "there is no parameter 'left_sweep'"),
         ({"left_sweep_rad": "far"}, "left_sweep_rad = 'far': must be a number"),
         ({"left_sweep_rad": True}, "must be a number"),
         ({"left_sweep_rad": nan}, "must be a number"),
-        ({"left_sweep_rad": 3.0}, "left_sweep_rad = 3: must be from"),
-        ({"right_adduction_rad": -3.0}, "right_adduction_rad = -3: must be from"),
+        ({"left_sweep_rad": 3.0}, "left_sweep = 171.9 degrees: must be from"),
+        ({"right_adduction_rad": -3.0}, "right_adduction = -171.9 degrees: must be from"),
     ],
 )
 def test_a_move_to_nowhere_is_refused_with_its_reason(armed: Robot, angles_rad: dict[str, Any], message: str) -> None:

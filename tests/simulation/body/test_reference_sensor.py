@@ -174,7 +174,7 @@ def witnessed(lockstep: Lockstep, depth_m: float, seconds: float) -> list[Stride
     reference, truths = StrokeReference(), []
     for _ in range(round(seconds / PERIOD_S)):
         lockstep.step()
-        truths += reference.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target_before.phase)
+        truths += reference.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target.phase)
     return truths
 
 
@@ -208,7 +208,7 @@ def test_a_load_cell_that_repeats_a_stance_feels_what_the_flipper_felt(configura
 
     def recording_step() -> None:
         step()
-        if lockstep.loop.target_before.phase is Phase.STANCE and abs(arm.sweep_rad) < 0.2:
+        if lockstep.loop.target.phase is Phase.STANCE and abs(arm.sweep_rad) < 0.2:
             thrusts_n.append(arm.force.thrust_n)
 
     lockstep.step = recording_step  # type: ignore[method-assign]

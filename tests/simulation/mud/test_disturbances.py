@@ -209,7 +209,7 @@ def truths_of(lockstep: Lockstep, seconds: float) -> list[StrideTruth]:
     reference, truths = StrokeReference(), []
     for _ in range(round(seconds / PERIOD_S)):
         lockstep.step()
-        truths += reference.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target_before.phase)
+        truths += reference.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target.phase)
     return truths
 
 
@@ -217,12 +217,12 @@ def swing_currents_a(lockstep: Lockstep, strides: int) -> list[float]:
     """Mean adduction current of the left flipper in each swing, and in the air before the first one."""
     means_a = []
     for stride in range(strides):
-        lockstep.run_until(lambda: lockstep.loop.target_before.phase is Phase.INSERTION, 20.0)
+        lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.INSERTION, 20.0)
         if stride == 0:  # as raised as in swing
             means_a.append(lockstep.loop.states[1].current_a)
-        lockstep.run_until(lambda: lockstep.loop.target_before.phase is Phase.SWING, 20.0)
+        lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.SWING, 20.0)
         currents_a = []
-        while lockstep.loop.target_before.phase is Phase.SWING:
+        while lockstep.loop.target.phase is Phase.SWING:
             lockstep.step()
             currents_a.append(lockstep.loop.states[1].current_a)
         means_a.append(mean(currents_a[len(currents_a) // 2 :]))
@@ -250,9 +250,9 @@ def test_remoulded_mud_lets_the_flipper_through_more_easily_stroke_by_stroke(con
 def peak_thrusts_n(lockstep: Lockstep, strides: int) -> list[float]:
     arm, peaks_n = lockstep.robot.plant.arms[0], []
     for _ in range(strides):
-        lockstep.run_until(lambda: lockstep.loop.target_before.phase is Phase.STANCE, 20.0)
+        lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.STANCE, 20.0)
         forces_n = [0.0]
-        while lockstep.loop.target_before.phase is Phase.STANCE:
+        while lockstep.loop.target.phase is Phase.STANCE:
             lockstep.step()
             forces_n.append(arm.force.thrust_n)
         peaks_n.append(max(forces_n))
@@ -271,8 +271,8 @@ def test_repeated_stances_lose_force_as_the_logs_do(configuration: Configuration
 def held_thrust_n(lockstep: Lockstep) -> tuple[float, float]:
     """In the pause after the stance: at its beginning and a second later."""
     arm: Arm = lockstep.robot.plant.arms[0]
-    lockstep.run_until(lambda: lockstep.loop.target_before.phase is Phase.STANCE, 20.0)
-    lockstep.run_until(lambda: lockstep.loop.target_before.phase is Phase.PAUSE, 20.0)
+    lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.STANCE, 20.0)
+    lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.PAUSE, 20.0)
     lockstep.run_for(0.05)  # to come to rest
     early_n = arm.force.thrust_n
     lockstep.run_for(0.9)
@@ -324,7 +324,7 @@ def test_the_joints_stay_calm_in_the_lab(configuration: Configuration) -> None:
         rates_rad_s = []
         for _ in range(round(4.0 / PERIOD_S)):
             lockstep.step()
-            if lockstep.loop.target_before.phase is Phase.SWING:
+            if lockstep.loop.target.phase is Phase.SWING:
                 rates_rad_s.append(lockstep.robot.plant.velocities_rad_s[1])
         spreads.append(pstdev(rates_rad_s))
     none, lab, seldom = spreads
