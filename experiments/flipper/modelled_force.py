@@ -1,18 +1,18 @@
-"""The forces that fitted coefficients say there should have been, to be drawn beside those that were measured.
+"""The forces that the fitted coefficients predict, for comparison with the measured forces.
 
-The default method's laws (control/plate.py) are about the joints' torques: in insertion τ₂ = k_p Φ, in stance
-τ₁ = k_s Ψ, in extraction τ₂ = -k_e Φ, with what the plate's face bears across its motion added to τ₂. The law's torque
-takes the place of the measured one, the other joint's stays, and both go through the map from torques to forces that
-the measured ones went through: so like is compared with like. The paper's laws are about forces as they are:
-f_z = k_p A z, f_x = k_s b z²/2, f_z = -k_e A z. Each law is drawn where its coefficient is fitted: from the surface
-down, from 2.5 cm of sweep on, over the last three quarters of the way up.
+The default method's laws (control/plate.py) are about the torques of the joints: τ₂ = k_p Φ in insertion, τ₁ = k_s Ψ in
+stance, τ₂ = -k_e Φ in extraction, with the cross-coupled load on the plate's face added to τ₂. The law's torque
+replaces the measured one, the other joint's stays as measured, and both go through the same map from torques to forces
+as the measurement. The paper's laws are about the forces themselves: f_z = k_p A z, f_x = k_s b z²/2, f_z = -k_e A z.
+Each law is evaluated where its coefficient is fitted: in insertion below the surface, in stance after 2.5 cm of sweep,
+in extraction over the last three quarters of the way up.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite, nan
-from typing import NamedTuple
+from math import nan
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,13 +22,14 @@ from control.records import Phase
 from estimation.force_map import smallest_force_n
 from estimation.strokes.shear import MOBILISED_M
 from estimation.strokes.stroke_fit import REVERSAL_FRACTION
+from experiments.reports.error_table import COEFFICIENTS
 from experiments.trials.stride_profile import Floats, StrideProfile
 
 COEFFICIENT_OF = {Phase.INSERTION: "k_p", Phase.STANCE: "k_s", Phase.EXTRACTION: "k_e"}
 
 
 class ModelledForces(NamedTuple):
-    """A value for each row of the course; NaN where no law is drawn."""
+    """One value for each row of the profile; NaN where no law is evaluated."""
 
     force_x_n: Floats
     force_z_n: Floats
@@ -50,22 +51,21 @@ def modelled_forces(
     coefficients: Mapping[str, float | None],
     method: str,
 ) -> ModelledForces:
-    """`coefficients` in N/m³ by name; one that is None is not drawn."""
+    """`coefficients` are in N/m³ by name; the law of a coefficient that is None is not evaluated."""
     law = _paper_force if method == "paper" else _default_force
     forces = ModelledForces(np.full(len(profile.time_s), nan), np.full(len(profile.time_s), nan))
-    shown = _fitted_rows(profile, geometry, surface_m)
-    for i in np.flatnonzero(shown).tolist():
+    for i in np.flatnonzero(_fitted_rows(profile, geometry, surface_m)).tolist():
         phase = Phase(int(profile.phase[i]))
         k_n_m3 = coefficients.get(COEFFICIENT_OF[phase])
         if k_n_m3 is None:
             continue
         row = _Row(
-            phase,
-            float(profile.sweep_rad[i]),
-            float(profile.adduction_rad[i]),
-            float(profile.depth_m[i]) - surface_m,
-            float(profile.sweep_nm[i]),
-            float(profile.adduction_nm[i]),
+            phase=phase,
+            sweep_rad=float(profile.sweep_rad[i]),
+            adduction_rad=float(profile.adduction_rad[i]),
+            submerged_m=float(profile.depth_m[i]) - surface_m,
+            sweep_nm=float(profile.sweep_nm[i]),
+            adduction_nm=float(profile.adduction_nm[i]),
         )
         force_n = law(row, geometry, surface_m, k_n_m3)
         (forces.force_x_n if phase is Phase.STANCE else forces.force_z_n)[i] = force_n
@@ -73,17 +73,17 @@ def modelled_forces(
 
 
 def _fitted_rows(profile: StrideProfile, geometry: FlipperGeometry, surface_m: float) -> Floats:
-    """Where the coefficients are fitted, the flipper is in the mud and the loads are known."""
+    """Return the rows in which a coefficient is fitted, the flipper is in the mud, and the loads are known."""
     submerged_m = profile.depth_m - surface_m
-    shown = np.isin(profile.phase, list(COEFFICIENT_OF)) & (submerged_m > 0.0)
-    shown &= np.isfinite(profile.sweep_nm) & np.isfinite(profile.adduction_nm)
+    fitted = np.isin(profile.phase, list(COEFFICIENT_OF)) & (submerged_m > 0.0)
+    fitted &= np.isfinite(profile.sweep_nm) & np.isfinite(profile.adduction_nm)
     stance, extraction = profile.during(Phase.STANCE), profile.during(Phase.EXTRACTION)
     if stance.any():
         positions_m = geometry.flipper_length_m * np.sin(profile.sweep_rad)
-        shown &= ~stance | (positions_m[stance][0] - positions_m >= MOBILISED_M)
+        fitted &= ~stance | (positions_m[stance][0] - positions_m >= MOBILISED_M)
     if extraction.any():
-        shown &= ~extraction | (submerged_m <= (1.0 - REVERSAL_FRACTION) * submerged_m[extraction][0])
-    return np.asarray(shown)
+        fitted &= ~extraction | (submerged_m <= (1.0 - REVERSAL_FRACTION) * submerged_m[extraction][0])
+    return np.asarray(fitted)
 
 
 def _default_force(row: _Row, geometry: FlipperGeometry, surface_m: float, k_n_m3: float) -> float:
@@ -107,8 +107,12 @@ def _paper_force(row: _Row, geometry: FlipperGeometry, surface_m: float, k_n_m3:
 
 
 def misfit_n(measured_n: Floats, modelled_n: Floats) -> float | None:
-    """Root of the mean square of what a law leaves over, where it is drawn; None where it is not."""
-    left_n = measured_n - modelled_n
-    left_n = left_n[np.isfinite(left_n)]
-    value = float(np.sqrt(np.mean(left_n**2))) if len(left_n) else nan
-    return value if isfinite(value) else None
+    """Return the root mean square of the difference where the law is evaluated; None where it never is."""
+    differences_n = measured_n - modelled_n
+    differences_n = differences_n[np.isfinite(differences_n)]
+    return float(np.sqrt(np.mean(differences_n**2))) if len(differences_n) else None
+
+
+def drawn_coefficients(stride: Mapping[str, Any]) -> dict[str, float | None]:
+    """Return the coefficients with a law to draw: values, and lower bounds by the load that the mud withstood."""
+    return {name: stride[name]["value"] if stride[name]["valid"] else None for name in COEFFICIENTS}

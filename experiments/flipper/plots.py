@@ -12,8 +12,7 @@ from matplotlib.axes import Axes
 
 from control.geometry import FlipperGeometry
 from control.records import Phase
-from experiments.flipper.measurement import drawn_coefficients
-from experiments.flipper.modelled_force import ModelledForces, modelled_forces
+from experiments.flipper.modelled_force import ModelledForces, drawn_coefficients, modelled_forces
 from experiments.reports.coefficient_table import PER_CM3, MudSummary
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
@@ -38,7 +37,7 @@ MODELLED: dict[str, Any] = {"linewidth": 2.0, "linestyle": (0, (3, 1.5))}
 
 
 def plot_stride(trial: Entry, geometry: FlipperGeometry, method: str, path: Path) -> None:
-    """Depth, angles and forces of one stride against time, with the forces of the laws: figure 4."""
+    """Draw depth, angles and forces of one stride against time, with the forces by the laws: figure 4."""
     profile, stride = profile_from_row(trial["course"]), trial["strides"][method][0]
     laws = modelled_forces(profile, geometry, stride["surface_m"] or 0.0, drawn_coefficients(stride), method)
     figure, panels = plt.subplots(4, 1, figsize=(7.0, 8.2), sharex=True, constrained_layout=True)
@@ -114,16 +113,16 @@ def _plot_forward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> 
 def plot_coefficients(
     muds: Sequence[MudSummary], firsts: Mapping[str, Entry], geometry: FlipperGeometry, path: Path
 ) -> None:
-    """Above the forces of one trial a mud, then the coefficients, and beside a load cell's where there is one."""
-    beside = any(mud.truth for mud in muds)
-    rows = 3 if beside else 2
+    """Draw the forces of one trial in each mud, the coefficients, and their comparison with a load cell: figure 5."""
+    compared = any(mud.truth for mud in muds)
+    rows = 3 if compared else 2
     figure, panels = plt.subplots(rows, 3, figsize=(11.0, 3.3 * rows + 0.5), constrained_layout=True)
     looks = looks_of([mud.mud for mud in muds])
     _plot_curves(panels[0], firsts, looks)
     for column, name in enumerate(COEFFICIENTS):
         _plot_by_mud(panels[1][column], muds, name, looks)
-        if beside:
-            _plot_beside(panels[2][column], muds, name, looks)
+        if compared:
+            _plot_compared(panels[2][column], muds, name, looks)
     for letter, panel in zip("ABCDEFGHI", panels.flat, strict=False):
         panel.set_title(letter, loc="left", fontsize="medium", fontweight="bold")
     handles, labels = panels[0][0].get_legend_handles_labels()
@@ -136,7 +135,7 @@ Curve = Callable[[StrideProfile], tuple[Floats, Floats]]
 
 
 def _plot_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Mapping[str, dict[str, Any]]) -> None:
-    """f_z against depth in insertion, f_x against sweep in stance, f_z against depth in extraction."""
+    """Draw f_z against depth in insertion, f_x against sweep in stance, and f_z against depth in extraction."""
     wanted: tuple[tuple[Phase, Curve, str, str], ...] = (
         (Phase.INSERTION, lambda c: (100.0 * c.depth_m, c.force_z_n), "depth $z$ (cm)", "$f_z$ in insertion (N)"),
         (Phase.STANCE, lambda c: (np.degrees(c.sweep_rad), c.force_x_n), "sweep $\\alpha$ (°)", "$f_x$ in stance (N)"),
@@ -151,11 +150,11 @@ def _plot_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Map
         panel.set_xlabel(across)
         panel.set_ylabel(up)
         if phase is not Phase.INSERTION:
-            panel.invert_xaxis()  # as the flipper goes
+            panel.invert_xaxis()  # in the direction of the motion
 
 
 def _plot_by_mud(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapping[str, dict[str, Any]]) -> None:
-    """Mean and standard deviation over trials; a bound has an arrow up."""
+    """Draw mean and standard deviation over the trials; a lower bound has an arrow up."""
     names = [mud.mud for mud in muds]
     for water, mud in zip(waters_of(names), muds, strict=True):
         gathered, look = mud.coefficient(name), looks[mud.mud]
@@ -173,8 +172,8 @@ def _plot_by_mud(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapp
         panel.set_xticks(range(len(names)), names)
 
 
-def _plot_beside(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapping[str, dict[str, Any]]) -> None:
-    """Against a load cell's, with two standard errors, and the grey line on which both are equal."""
+def _plot_compared(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapping[str, dict[str, Any]]) -> None:
+    """Draw against a load cell's values, with two standard errors, and the grey line on which both are equal."""
     largest = 0.0
     for mud in muds:
         gathered, truth = mud.coefficient(name), (mud.truth or {}).get(name)

@@ -1,6 +1,4 @@
-"""The single flipper's bench in the simulator: the robot on a fixed base over the muds, with the laboratory's
-disturbances.
-"""
+"""The single flipper's bench in the simulator: the robot on a fixed base, with the disturbances of a laboratory."""
 
 from __future__ import annotations
 
@@ -16,7 +14,7 @@ from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB, Disturbances
 from simulation.mud.track import Track
 
-POSITION_M = 0.2  # a trial's share of the mud: no stroke finds what another left
+TRIAL_M = 0.2  # between the trials in one mud: every stroke is in fresh mud
 STRIP_M = 100.0  # of each mud
 
 SECTIONS = f"""\
@@ -43,11 +41,11 @@ def bench_configuration() -> Configuration:
 def flipper_bench(
     folder: Path, muds: Sequence[str], seed: int, disturbances: Disturbances = LAB
 ) -> tuple[LockstepRobot, CarriedBed]:
-    """Over strips of the muds, named after their water. Raises ValueError for one that there is not."""
+    """Make a robot over strips of muds, named after their water content. Raises ValueError for an unknown mud."""
     track = Track([(STRIP_M, clay_of_water(float(mud))) for mud in muds])
     robot, lockstep = simulated_bench(folder, bench_configuration(), track, seed, True, disturbances)
 
     def position_m(trial: PlannedTrial, prepared: int) -> float:
-        return STRIP_M * list(muds).index(trial.mud) + POSITION_M * (prepared + 1)
+        return STRIP_M * list(muds).index(trial.mud) + TRIAL_M * (prepared + 1)
 
     return robot, CarriedBed(robot, lockstep, position_m)

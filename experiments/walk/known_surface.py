@@ -1,10 +1,10 @@
-"""The paper's law of shear with the mud's surface known: what remains of its method when the trigger does no harm.
+"""The paper's law of shear with a known surface, to test its statements on body drag without the error of its trigger.
 
-The published method finds the surface where the upward force first passes 0.5 N. In soft mud, and under a flipper to
-which mud clings, that is far too deep, and k_s, which goes with the square of the depth below it, comes out several
-times too large: no word on body drag can then be tested. So here the surface is that of the default method, and all
-else as published: f_x = cos α τ₁ / l over the steady part of the stance, fitted to k_s b z²/2, with half of the body's
-drag added, or not, while the body advances.
+The published method finds the surface where the upward force first passes 0.5 N. In soft mud, and with mud that clings
+to the flipper, that is far too deep. k_s depends on the square of the depth below the surface and becomes several times
+too large, so that the paper's statements on body drag cannot be tested. Here the surface is the default method's, and
+the rest is as published: f_x = cos α τ₁ / l over the steady part of the stance, fitted to k_s b z²/2, with or without
+half of the body's drag added while the body advances.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ KNOWN, KNOWN_COMPENSATED = "paper's law", "paper's law with drag"
 def strides_with_known_surface(
     strides: Sequence[Mapping[str, Any]], log: Log, configuration: Configuration, flipper: str
 ) -> dict[str, list[dict[str, Any]]]:
-    """By method, with k_s alone. `strides` are those of the default method."""
+    """Return k_s by method for the strides of the default method."""
     drags_n = {KNOWN: 0.0, KNOWN_COMPENSATED: configuration.adaptation.body_drag_n}
-    courses = [profile_of(log, flipper, stride["t_start_s"]) for stride in strides]
+    profiles = [profile_of(log, flipper, stride["t_start_s"]) for stride in strides]
     return {
         method: [
             dict(stride) | {"k_p": None, "k_e": None, "k_s": k_s_of(profile, stride, configuration, drag_n)}
-            for profile, stride in zip(courses, strides, strict=True)
+            for profile, stride in zip(profiles, strides, strict=True)
         ]
         for method, drag_n in drags_n.items()
     }
@@ -43,6 +43,7 @@ def strides_with_known_surface(
 def k_s_of(
     profile: StrideProfile, stride: Mapping[str, Any], configuration: Configuration, drag_n: float
 ) -> dict[str, Any]:
+    """Fit k_s in N/m³ to one stride and report the estimate."""
     geometry, stance, fit = configuration.geometry, profile.during(Phase.STANCE), LineFit()
     submerged_m = profile.depth_m - (stride["surface_m"] or 0.0)
     steady = stance & (submerged_m > 0.0) & np.isfinite(profile.sweep_nm)

@@ -1,9 +1,9 @@
 """The robot walks over several muds and maps their coefficients, after the paper's sections II-D and III-C.
 
-Each trial is one walk at a fixed depth over all the muds, each stride beside the mud in which its plate went down and
-slipped: by the body's place since the start of the trial, or, where no pose is told, by the order of strides. Then,
-where there is a soft mud, short walks in it at 3 and 5 cm: there the paper shows that what a flipper feels while the
-body moves is the body's drag and not the mud's strength. Every method of estimation sees the same log.
+Each trial is one walk at a fixed depth over all muds. A stride is assigned to the mud in which its plate went down and
+slipped, by the position of the body since the start of the trial; without a pose, by the order of the strides. Then
+follow short walks at 3 and 5 cm in soft mud, if there is any: the paper shows there that a flipper measures the body's
+drag and not the mud's strength while the body moves. Every method of estimation gets the same log.
 """
 
 from __future__ import annotations
@@ -39,20 +39,20 @@ from experiments.walk.walk_profile import walk_profile_of, walk_profile_row
 from firmware_host.log_reading.log_reader import Log
 
 MUDS = tuple(Mud(name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
-SOFT = ("53.1", "51.2")  # figure 7 has the first, called 53.8 % there; the other yields at 3 cm and holds at 5 cm here
+SOFT = ("53.1", "51.2")  # figure 7 has the first, called 53.8 % there; the other yields here at 3 cm and not at 5 cm
 SOFT_DEPTHS_M = (0.03, 0.05)
 METHODS = (DEFAULT, PAPER, COMPENSATED)
-BORDER_M = 0.03  # a plate that comes nearer to a border than this may be in either mud
-LOST_S = 2.0  # without a pose, in a walk that began with one
+BORDER_M = 0.03  # a plate closer to a border than this may be in either mud
+LOST_S = 2.0  # longest time without a pose in a walk that began with one
 STUCK_S, ADVANCED_M = 60.0, 0.03
-SLIPPING = 4  # times as many strides as a robot needs that never slips
-SHOWN_STRIDE = 2  # of a walk in soft mud, counted from 0: the first ones start from a standing body
+SLIPPING = 4  # factor on the strides of a robot that never slips
+DRAWN_STRIDE = 2  # of a walk in soft mud, counted from 0: the first ones start from a standing body
 
 
 @dataclass(frozen=True)
 class Plan:
     muds: tuple[Mud, ...] = MUDS
-    trials: int = 3  # as the paper
+    trials: int = 3  # as in the paper
     depth_m: float = 0.03
     soft: tuple[str, ...] = ()  # muds in which to walk at SOFT_DEPTHS_M
     soft_strides: int = 4
@@ -60,8 +60,8 @@ class Plan:
     simulated: bool = False
 
     @property
-    def kept(self) -> dict[str, Any]:
-        """What may not change where an experiment goes on."""
+    def identity(self) -> dict[str, Any]:
+        """The settings that must not change when an experiment is continued."""
         return {
             "experiment": "walk",
             "muds": [[mud.name, mud.length_m] for mud in self.muds],
@@ -89,11 +89,11 @@ class Plan:
 
     @property
     def borders_m(self) -> list[float]:
-        """The ends of all muds but the last."""
+        """The ends of all muds except the last."""
         return list(accumulate(mud.length_m for mud in self.muds))[:-1]
 
     def mud_at(self, plates_m: float, slip_m: float = 0.0) -> str:
-        """Where a plate goes down and slips back; empty behind the last mud, and too near to a border."""
+        """Name the mud in which a plate goes down and slips back; empty past the last mud and too close to a border."""
         rear_m, front_m = plates_m - slip_m - BORDER_M, plates_m + BORDER_M
         if plates_m >= self.length_m or any(rear_m < border_m < front_m for border_m in self.borders_m):
             return ""
@@ -109,12 +109,12 @@ def soft_key(mud: str, depth_m: float, number: int) -> str:
 
 
 def run(bench: Bench, plan: Plan, show: Show) -> None:
-    """Every trial that is not in the notebook. Raises BenchError."""
+    """Make every trial that is not in the notebook yet. Raises BenchError."""
     conduct_trials(bench, plan.planned, lambda trial: measure(bench, plan, trial), show)
 
 
 def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
-    """One walk. Raises SpoiltTrialError, BenchError."""
+    """Make one walk. Raises InvalidTrialError, BenchError."""
     depths = {soft_key(mud, depth_m, trial.number): depth_m for mud in plan.soft for depth_m in SOFT_DEPTHS_M}
     if trial.key in depths:
         return _walk_in_soft(bench, plan, trial, depths[trial.key])
@@ -126,7 +126,7 @@ def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     arm(robot, bench.operator)
     before: Status = robot.call("status")
     start_m = before["body_x_m"]
-    remarks = [] if start_m is not None else ["no pose is told: strides are given to the muds by their order"]
+    remarks = [] if start_m is not None else ["no pose arrives: strides are assigned to the muds by their order"]
     ordered, end = _follow(bench, plan, start_m)
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     if after["mode"] != "hold":
@@ -140,12 +140,12 @@ def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     if after["notice"]:
         raise InvalidTrialError(after["notice"], entry)
     if end is None and made < ordered:
-        raise InvalidTrialError(f"somebody stopped the walk in stride {made + 1}", entry)
+        raise InvalidTrialError(f"the walk was stopped by another client in stride {made + 1}", entry)
     return entry
 
 
 def _note_slips(entry: Entry, log: Log, flipper: str, arm_m: float) -> None:
-    """Into the strides of all methods, which begin at the same moments."""
+    """Add the slip to the strides of all methods, which begin at the same times."""
     strides = list(chain.from_iterable(entry["strides"].values()))
     starts_s = {stride["t_start_s"] for stride in strides}
     slips_m = {start_s: slip_m(profile_of(log, flipper, start_s), arm_m) for start_s in starts_s}
@@ -154,9 +154,9 @@ def _note_slips(entry: Entry, log: Log, flipper: str, arm_m: float) -> None:
 
 
 def _follow(bench: Bench, plan: Plan, start_m: float | None) -> tuple[int, str | None]:
-    """Walk until the plates go down behind the last mud: how many strides at most, and what it was stopped for.
+    """Walk until the plates go down past the last mud. Return the ordered strides and why the walk was stopped.
 
-    Nothing is said of its proper end, and None where it was not stopped from here.
+    The reason is empty at the proper end, and None where the walk was not stopped from here.
     """
     robot = bench.robot
     reach_m = reach_of(robot.configuration)
@@ -169,7 +169,7 @@ def _follow(bench: Bench, plan: Plan, start_m: float | None) -> tuple[int, str |
 
 
 class Advance:
-    """Owns how far a walk has come. Without a place to begin with, it goes on until its strides are done."""
+    """Owns the progress of a walk. Without a position at its start, a walk makes all of its strides."""
 
     def __init__(self, start_m: float | None, length_m: float, now_s: float) -> None:
         self._start_m = start_m
@@ -178,12 +178,12 @@ class Advance:
         self._seen_s = self._advanced_s = now_s
 
     def evaluate(self, status: Status) -> str | None:
-        """None while the walk is to go on; then why it ends, or nothing at its proper end. Raises SpoiltTrialError."""
+        """Return None while the walk goes on, else why it ends; empty at the proper end. Raises InvalidTrialError."""
         now_s, body_m = status["now_s"], status["body_x_m"]
         if self._start_m is None:
             return None
         if body_m is None:
-            self._miss(now_s)
+            self._require_recent_pose(now_s)
             return None
         self._seen_s = now_s
         if body_m > self._farthest_m + ADVANCED_M:
@@ -191,20 +191,20 @@ class Advance:
         if body_m - self._start_m >= self._length_m and status["phase"] == "insertion":
             return ""
         if now_s - self._advanced_s > STUCK_S:
-            return f"the robot came no farther than {100.0 * (self._farthest_m - self._start_m):.0f} cm"
+            return f"the robot got stuck after {100.0 * (self._farthest_m - self._start_m):.0f} cm"
         return None
 
-    def _miss(self, now_s: float) -> None:
+    def _require_recent_pose(self, now_s: float) -> None:
         if now_s - self._seen_s > LOST_S:
-            raise InvalidTrialError("the body's place is not told any more: see that motion capture sees the robot")
+            raise InvalidTrialError("the pose of the body is lost: check that the cameras see the robot's markers")
 
 
 def require_mud(strides: Sequence[Mapping[str, Any]], flipper: str) -> None:
-    """Raises SpoiltTrialError where no stride told of any."""
+    """Raises InvalidTrialError where no stride measured any coefficient."""
     if not strides:
         raise InvalidTrialError(f"the daemon closed no stride of the {flipper} flipper")
     if not any(stride[name]["valid"] for stride in strides for name in COEFFICIENTS):
-        raise InvalidTrialError("no stride met mud: look how high the axes are (geometry.axis_height_m)")
+        raise InvalidTrialError("no stride met mud: measure the height of the axes (geometry.axis_height_m)")
 
 
 def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float) -> Entry:
@@ -215,15 +215,15 @@ def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float)
     log = robot.record(walked.from_s, walked.to_s)
     entry = _entry(bench, plan, trial, log, before["strides_closed"])
     own = entry["strides"][configured_method(robot.configuration.estimation)]
-    shown = own[min(SHOWN_STRIDE, len(own) - 1)]
+    shown = own[min(DRAWN_STRIDE, len(own) - 1)]
     profile = thinned(profile_of(log, plan.flipper, shown["t_start_s"]))
     return entry | {"depth_m": depth_m, "course": profile_row(profile), "remarks": []}
 
 
 def _entry(bench: Bench, plan: Plan, trial: PlannedTrial, log: Log, closed: int) -> Entry:
-    """What all walks have. Raises SpoiltTrialError."""
+    """Return the part of an entry that all walks have. Raises InvalidTrialError."""
     robot = bench.robot
-    rest(robot)  # what follows takes longer on a slow computer than the robot is left alone
+    rest(robot)  # on a slow computer, the estimation takes longer than the robot may be left unattended
     reported = fetch_strides(robot, closed)
     strides = strides_by_method(reported, log, robot.configuration, plan.flipper, METHODS)
     own = strides[configured_method(robot.configuration.estimation)]

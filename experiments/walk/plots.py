@@ -21,11 +21,11 @@ from experiments.trials.notebook import Entry
 from experiments.trials.stride_profile import profile_from_row
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import Plan
-from experiments.walk.report import PlacedStride
+from experiments.walk.report import LocatedStride, SoftMud
 from experiments.walk.walk_profile import WalkProfile, walk_profile_of_row
 
 THIN: dict[str, Any] = {"linewidth": 0.8}
-METHOD_LOOKS: dict[str, dict[str, Any]] = {
+METHOD_STYLES: dict[str, dict[str, Any]] = {
     DEFAULT: {"color": "tab:blue", "marker": "o"},
     PAPER: {"color": "tab:red", "marker": "x"},
     COMPENSATED: {"color": "tab:orange", "marker": "+"},
@@ -36,21 +36,21 @@ BARS = {
     DEFAULT: ("default", "tab:purple"),
 }
 LEGEND: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "fontsize": "small", "frameon": False}
-HEADROOM = 2.0  # of the largest true or own value: what lies higher is drawn at the edge
-DEPTH_LOOKS: dict[float, dict[str, Any]] = {
+HEADROOM = 2.0  # height of a panel over the largest true or own value; higher values are drawn at the edge
+DEPTH_STYLES: dict[float, dict[str, Any]] = {
     3.0: {"color": "tab:orange", "linestyle": "--"},  # as in the paper
     5.0: {"color": "tab:blue", "linestyle": "-"},
 }
 
 
-def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[PlacedStride], reach_m: float, path: Path) -> None:
-    """Place, forces and coefficients of one walk against time: figure 6."""
+def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[LocatedStride], reach_m: float, path: Path) -> None:
+    """Draw position, forces and coefficients of one walk against time: figure 6."""
     profile = walk_profile_of_row(walk["course"])
     own = [each for each in strides if each.trial == walk["trial"]]
     begun_s = float(profile.time_s[0])
     borders_s = _borders_s(plan, walk, profile, own, reach_m)
     figure, panels = plt.subplots(6, 1, figsize=(9.0, 11.0), sharex=True, constrained_layout=True)
-    _plot_place(panels[0], walk, profile, begun_s)
+    _plot_position(panels[0], walk, profile, begun_s)
     _plot_force(panels[1], profile, profile.force_x_n, begun_s, "$f_x$ forward (N)")
     upward_n = np.where(profile.phase == Phase.STANCE, np.nan, profile.force_z_n)
     _plot_force(panels[2], profile, upward_n, begun_s, "$f_z$ up (N)")
@@ -68,9 +68,9 @@ def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[PlacedStride], rea
 
 
 def _borders_s(
-    plan: Plan, walk: Entry, profile: WalkProfile, own: Sequence[PlacedStride], reach_m: float
+    plan: Plan, walk: Entry, profile: WalkProfile, own: Sequence[LocatedStride], reach_m: float
 ) -> list[float]:
-    """When the plates first went down behind each border; by the strides' order where there is no pose."""
+    """Return when the plates first went down past each border; by the order of the strides where there is no pose."""
     found = []
     for border_m in plan.borders_m:
         if walk["start_m"] is None:
@@ -88,16 +88,16 @@ def _name_muds(panel: Axes, plan: Plan, edges_s: Sequence[float], begun_s: float
         panel.annotate(mud_text(mud.name), (middle_s, 1.02), xycoords=("data", "axes fraction"), ha="center")
 
 
-def _plot_place(panel: Axes, walk: Entry, profile: WalkProfile, begun_s: float) -> None:
+def _plot_position(panel: Axes, walk: Entry, profile: WalkProfile, begun_s: float) -> None:
     panel.set_ylabel("body (cm)")
     if walk["start_m"] is None:
-        panel.text(0.5, 0.5, "no pose was told", transform=panel.transAxes, ha="center", color=GREY)
+        panel.text(0.5, 0.5, "no pose", transform=panel.transAxes, ha="center", color=GREY)
         return
     panel.plot(profile.time_s - begun_s, 100.0 * (profile.body_m - walk["start_m"]), color=INK, linewidth=1.2)
 
 
 def _plot_force(panel: Axes, profile: WalkProfile, force_n: Any, begun_s: float, label: str) -> None:
-    """Coloured by phase, as in the paper: the line is grey outside of the strokes."""
+    """Draw a force coloured by phase, as in the paper; the line is grey outside of the strokes."""
     time_s = profile.time_s - begun_s
     panel.plot(time_s, force_n, color="#bbbbbb", **THIN)
     for phase, colour, style in (
@@ -105,40 +105,40 @@ def _plot_force(panel: Axes, profile: WalkProfile, force_n: Any, begun_s: float,
         (Phase.STANCE, "tab:green", "--"),
         (Phase.EXTRACTION, "tab:orange", "-."),
     ):
-        reported = np.where(profile.phase == phase, force_n, np.nan)
-        if np.isfinite(reported).any():
-            panel.plot(time_s, reported, style, color=colour, linewidth=1.3, label=phase.name.lower())
+        stroke_n = np.where(profile.phase == phase, force_n, np.nan)
+        if np.isfinite(stroke_n).any():
+            panel.plot(time_s, stroke_n, style, color=colour, linewidth=1.3, label=phase.name.lower())
     panel.set_ylabel(label)
     panel.legend(ncols=3, **LEGEND)
 
 
-def _plot_coefficient(panel: Axes, plan: Plan, name: str, own: Sequence[PlacedStride], begun_s: float) -> None:
-    """Triangles are lower bounds; the dashed lines are the load cell's."""
-    methods = [method for method in METHOD_LOOKS if method != COMPENSATED or name == "k_s"]
-    reported = [each for each in own if each.method in methods and each.stride[name]["valid"]]
+def _plot_coefficient(panel: Axes, plan: Plan, name: str, own: Sequence[LocatedStride], begun_s: float) -> None:
+    """Draw the estimates by all methods; triangles are lower bounds, dashed lines the load cell's values."""
+    methods = [method for method in METHOD_STYLES if method != COMPENSATED or name == "k_s"]
+    valid = [each for each in own if each.method in methods and each.stride[name]["valid"]]
     truths = [each.truth.get(name) for each in own]
-    tallest = max([t for t in truths if t] or [each.stride[name]["value"] for each in reported] or [1.0])
+    tallest = max([t for t in truths if t] or [each.stride[name]["value"] for each in valid] or [1.0])
     top = HEADROOM * PER_CM3 * tallest
-    for each in reported:
-        estimate, look = each.stride[name], METHOD_LOOKS[each.method]
+    for each in valid:
+        estimate, style = each.stride[name], METHOD_STYLES[each.method]
         value = PER_CM3 * estimate["value"]
         uncertainty = 2.0 * PER_CM3 * estimate["std_error"] if each.method == DEFAULT else None
-        marker = "^" if estimate["at_least"] else ("$\\uparrow$" if value > top else look["marker"])
+        marker = "^" if estimate["at_least"] else ("$\\uparrow$" if value > top else style["marker"])
         panel.errorbar(each.stride["t_end_s"] - begun_s, min(value, 0.97 * top), uncertainty, linestyle="",
-                       color=look["color"], marker=marker, markersize=6.0, linewidth=1.0)  # fmt: skip
+                       color=style["color"], marker=marker, markersize=6.0, linewidth=1.0)  # fmt: skip
     _plot_truth(panel, plan, name, own, begun_s)
     for method in methods:
-        look = METHOD_LOOKS[method]
-        panel.plot([], [], color=look["color"], marker=look["marker"], linestyle="", label=method)
-    if any(each.stride[name]["at_least"] for each in reported):
-        panel.plot([], [], color=METHOD_LOOKS[DEFAULT]["color"], marker="^", linestyle="", label="at least")
+        style = METHOD_STYLES[method]
+        panel.plot([], [], color=style["color"], marker=style["marker"], linestyle="", label=method)
+    if any(each.stride[name]["at_least"] for each in valid):
+        panel.plot([], [], color=METHOD_STYLES[DEFAULT]["color"], marker="^", linestyle="", label="lower bound")
     panel.set_ylim(0.0, top)
     panel.set_ylabel(f"{LABELS[name]}\n(N/cm³)")
     panel.legend(ncols=5, **LEGEND)
 
 
-def _plot_truth(panel: Axes, plan: Plan, name: str, own: Sequence[PlacedStride], begun_s: float) -> None:
-    """Over each mud, from its first stride to its last."""
+def _plot_truth(panel: Axes, plan: Plan, name: str, own: Sequence[LocatedStride], begun_s: float) -> None:
+    """Draw the load cell's values over each mud, from its first stride to its last."""
     label = "load cell"
     for mud in plan.muds:
         there = [each for each in own if each.mud == mud.name and each.truth.get(name)]
@@ -153,8 +153,8 @@ def _plot_truth(panel: Axes, plan: Plan, name: str, own: Sequence[PlacedStride],
 # figure 7
 
 
-def plot_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]], path: Path) -> None:
-    """f_x in one stance at each depth, and k_s by method beside the load cell's: figure 7."""
+def plot_soft(soft: SoftMud, walks: Mapping[float, Sequence[Entry]], path: Path) -> None:
+    """Draw f_x in one stance at each depth, and k_s by method with the load cell's: figure 7."""
     figure, (forces, bars) = plt.subplots(1, 2, figsize=(11.0, 4.2), width_ratios=(1.0, 1.5), constrained_layout=True)
     for depth_cm, trials in walks.items():
         _plot_stance(forces, depth_cm, trials[0])
@@ -164,7 +164,7 @@ def plot_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]], p
     forces.set_ylabel("$f_x$ of one flipper (N)")
     forces.set_ylim(bottom=0.0)
     forces.legend(fontsize="small", loc="lower right")
-    forces.set_title(f"A   mud {mud_text(soft['mud'])}", loc="left", fontsize="medium")
+    forces.set_title(f"A   mud {mud_text(soft.mud)}", loc="left", fontsize="medium")
     _plot_bars(bars, soft)
     figure.savefig(path, dpi=DOTS_PER_INCH)
     plt.close(figure)
@@ -174,22 +174,22 @@ def _plot_stance(panel: Axes, depth_cm: float, trial: Entry) -> None:
     profile = profile_from_row(trial["course"])
     stance = profile.during(Phase.STANCE)
     time_s = profile.time_s[stance]
-    look = DEPTH_LOOKS.get(depth_cm, {"color": INK})
-    panel.plot(time_s - time_s[0], profile.force_x_n[stance], linewidth=1.4, label=f"z = {depth_cm:g} cm", **look)
+    style = DEPTH_STYLES.get(depth_cm, {"color": INK})
+    panel.plot(time_s - time_s[0], profile.force_x_n[stance], linewidth=1.4, label=f"z = {depth_cm:g} cm", **style)
 
 
-def _plot_bars(panel: Axes, soft: Mapping[str, Any]) -> None:
-    """The paper's bars, the default method's and the load cell's; a bound is hatched."""
-    deepest_first = sorted(soft["depths"], key=lambda each: -each["depth_cm"])
+def _plot_bars(panel: Axes, soft: SoftMud) -> None:
+    """Draw k_s by the paper's law, the default method and the load cell; a lower bound is hatched."""
+    deepest_first = sorted(soft.depths, key=lambda each: -each.depth_cm)
     names: list[str] = []
-    for method, (words, colour) in BARS.items():
+    for method, (label, colour) in BARS.items():
         for each in deepest_first[:1] if method == KNOWN_COMPENSATED else deepest_first:
-            own = DEPTH_LOOKS.get(each["depth_cm"], {"color": INK})["color"]
-            _plot_gathered(panel, len(names), each["k_s"].get(method), colour or own)
-            names.append(f"{words}\n{each['depth_cm']:g} cm")
+            own = DEPTH_STYLES.get(each.depth_cm, {"color": INK})["color"]
+            _plot_gathered(panel, len(names), each.k_s.get(method), colour or own)
+            names.append(f"{label}\n{each.depth_cm:g} cm")
     for each in deepest_first:
-        _plot_bar(panel, len(names), each["truth"], "#d9d9d9")
-        names.append(f"load cell\n{each['depth_cm']:g} cm")
+        _plot_bar(panel, len(names), each.truth, "#d9d9d9")
+        names.append(f"load cell\n{each.depth_cm:g} cm")
     panel.set_xticks(range(len(names)), names, fontsize="small")
     panel.set_ylabel("$k_s$ (N/cm³)")
     panel.margins(y=0.12)
@@ -197,24 +197,24 @@ def _plot_bars(panel: Axes, soft: Mapping[str, Any]) -> None:
     panel.set_title("B   $k_s$ by method", loc="left", fontsize="medium")
 
 
-def _plot_gathered(panel: Axes, place: int, gathered: GatheredCoefficient | None, colour: str) -> None:
+def _plot_gathered(panel: Axes, x: int, gathered: GatheredCoefficient | None, colour: str) -> None:
     if gathered is None:
-        _plot_bar(panel, place, None, colour)
+        _plot_bar(panel, x, None, colour)
     else:
-        _plot_bar(panel, place, gathered.value, colour, gathered.repeatability or 0.0, gathered.at_least)
+        _plot_bar(panel, x, gathered.value, colour, gathered.repeatability or 0.0, gathered.at_least)
 
 
 def _plot_bar(
-    panel: Axes, place: int, value_n_m3: float | None, colour: str, repeatability: float = 0.0, bound: bool = False
+    panel: Axes, x: int, value_n_m3: float | None, colour: str, repeatability: float = 0.0, bound: bool = False
 ) -> None:
     if value_n_m3 is None:
-        panel.text(place, 0.0, "-", ha="center", va="bottom")
+        panel.text(x, 0.0, "-", ha="center", va="bottom")
         return
     value = PER_CM3 * value_n_m3
     sd = value * repeatability
-    panel.bar(place, value, 0.7, color="white" if bound else colour, edgecolor=colour if bound else INK, linewidth=1.0,
+    panel.bar(x, value, 0.7, color="white" if bound else colour, edgecolor=colour if bound else INK, linewidth=1.0,
               hatch="//" if bound else "")  # fmt: skip
     if sd:
-        panel.errorbar(place, value, sd, color=INK, capsize=4, linestyle="")
+        panel.errorbar(x, value, sd, color=INK, capsize=4, linestyle="")
     text = f"{'≥ ' if bound else ''}{value:.3f}"
-    panel.text(place, value + sd, text, ha="center", va="bottom", fontsize="small")
+    panel.text(x, value + sd, text, ha="center", va="bottom", fontsize="small")

@@ -1,13 +1,14 @@
-"""What the walks over several muds say: coefficients by mud and method, their errors, and the paper's findings beside.
+"""The report of the walks over several muds: coefficients by mud and method, errors, and the paper's findings.
 
-The paper prints no coefficients of these walks. It tells in words that k_s was underestimated where the body moves,
-that it was half of the load cell's at 5 cm in the soft mud, close to it at 3 cm, and better at 5 cm with the body's
-drag added; and that this drag was about 2.5 N.
+The paper prints no coefficients of these walks. Its text says that k_s was underestimated where the body moves; that in
+the soft mud it was half of the load cell's at 5 cm, close to it at 3 cm, and better at 5 cm with the body's drag added;
+and that this drag was about 2.5 N. The fields of these records are the keys of the summary in JSON.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from math import isfinite
 from statistics import fmean, median
 from typing import Any, NamedTuple
@@ -18,12 +19,13 @@ from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
 from experiments.reports.coefficient_table import (
     ComparedStride,
+    GatheredCoefficient,
     MudSummary,
     error_table,
     gather_coefficient,
     gather_coefficients,
 )
-from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.error_table import COEFFICIENTS, ErrorRow
 from experiments.reports.mud_names import mud_text
 from experiments.trackway.bench import reach_of
 from experiments.trials.estimation_methods import configured_method
@@ -34,17 +36,55 @@ from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import SOFT_DEPTHS_M, Plan, soft_key, soft_name
 from firmware_host.configuration.configuration import Configuration
 
-Reported = Mapping[str, Any]
+StrideReport = Mapping[str, Any]  # as the daemon reports it
 
 
-class PlacedStride(NamedTuple):
-    """One stride of one walk, by one method."""
+@dataclass(frozen=True)
+class SoftDepth:
+    """The walks at one depth in a soft mud."""
+
+    depth_cm: float
+    k_s: Mapping[str, GatheredCoefficient]  # by method
+    truth: float | None  # the load cell's k_s
+    thrust_n: float | None  # of both flippers
+
+
+@dataclass(frozen=True)
+class SoftMud:
+    mud: str
+    depths: Sequence[SoftDepth]
+
+
+@dataclass(frozen=True)
+class PaperFinding:
+    what: str
+    paper: str
+    ours: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class WalkReport:
+    experiment: str = "walk"
+    muds: Sequence[MudSummary]
+    soft: Sequence[SoftMud]
+    errors: Sequence[ErrorRow]
+    findings: Sequence[PaperFinding] = field(metadata={"key": "beside_paper"})
+    without_pose: int  # walks
+    at_a_border: int  # strides that belong to no mud
+    remarks: Sequence[str]
+    missing_truth: str
+    settings: Mapping[str, Any]
+    left_out: Mapping[str, Entry]
+
+
+class LocatedStride(NamedTuple):
+    """One stride of one walk, by one method, with its position."""
 
     trial: int
     method: str
     mud: str  # empty where it is not certain
     plates_m: float  # from the start of the first mud
-    stride: Reported
+    stride: StrideReport
     truth: Mapping[str, float | None]
 
 
@@ -57,21 +97,21 @@ def soft_walks_of(plan: Plan, entries: Mapping[str, Entry], mud: str, depth_m: f
     return [entries[key] for key in keys if key in entries]
 
 
-def placed_strides(
+def located_strides(
     plan: Plan, entries: Mapping[str, Entry], configuration: Configuration, truth: TruthOfMud | None
-) -> list[PlacedStride]:
-    """Of the walks over all muds. `truth`: another experiment's, in place of the bed's own."""
+) -> list[LocatedStride]:
+    """Locate the strides of the walks over all muds. `truth` of another experiment replaces the bed's own."""
     return [
-        placed
+        located
         for walk in walks_of(plan, entries)
         for method, strides in walk["strides"].items()
-        for placed in _placed(plan, walk, method, strides, reach_of(configuration), truth)
+        for located in _locate(plan, walk, method, strides, reach_of(configuration), truth)
     ]
 
 
-def _placed(
-    plan: Plan, walk: Entry, method: str, strides: Sequence[Reported], reach_m: float, truth: TruthOfMud | None
-) -> Iterator[PlacedStride]:
+def _locate(
+    plan: Plan, walk: Entry, method: str, strides: Sequence[StrideReport], reach_m: float, truth: TruthOfMud | None
+) -> Iterator[LocatedStride]:
     for number, stride in enumerate(strides):
         position_m, start_m = stride["place_m"], walk["start_m"]
         if position_m is None or start_m is None:
@@ -79,14 +119,13 @@ def _placed(
         else:
             plates_m = position_m - start_m + reach_m
         mud = plan.mud_at(plates_m, stride.get("slip_m", 0.0))
-        reported = truth_in(truth, mud) if truth else walk["truths"].get(str(stride["index"]), {})
-        yield PlacedStride(walk["trial"], method, mud, plates_m, stride, reported)
+        yield LocatedStride(walk["trial"], method, mud, plates_m, stride, _truth_of(mud, walk, stride, truth))
 
 
 def soft_strides(plan: Plan, entries: Mapping[str, Entry], truth: TruthOfMud | None) -> list[ComparedStride]:
-    """Of all walks in soft muds. The first stride of each starts from a standing body and is left out."""
+    """Return the strides in soft muds, without the first of each walk, which starts from a standing body."""
     return [
-        ComparedStride(soft_name(mud, depth_m), method, stride, _soft_truth(mud, walk, stride, truth))
+        ComparedStride(soft_name(mud, depth_m), method, stride, _truth_of(mud, walk, stride, truth))
         for mud in plan.soft
         for depth_m in SOFT_DEPTHS_M
         for walk in soft_walks_of(plan, entries, mud, depth_m)
@@ -95,71 +134,73 @@ def soft_strides(plan: Plan, entries: Mapping[str, Entry], truth: TruthOfMud | N
     ]
 
 
-def _soft_truth(mud: str, walk: Entry, stride: Reported, truth: TruthOfMud | None) -> Mapping[str, float | None]:
+def _truth_of(mud: str, walk: Entry, stride: StrideReport, truth: TruthOfMud | None) -> Mapping[str, float | None]:
     if truth:
         return truth_in(truth, mud)
-    reported: Mapping[str, float | None] = walk["truths"].get(str(stride["index"]), {})
-    return reported
+    own: Mapping[str, float | None] = walk["truths"].get(str(stride["index"]), {})
+    return own
 
 
 def report_of(
-    plan: Plan, entries: Mapping[str, Entry], configuration: Configuration, truth: TruthOfMud | None
-) -> dict[str, Any]:
+    plan: Plan,
+    entries: Mapping[str, Entry],
+    configuration: Configuration,
+    truth: TruthOfMud | None,
+    left_out: Mapping[str, Entry] | None = None,
+) -> WalkReport:
     method = configured_method(configuration.estimation)
-    placed = placed_strides(plan, entries, configuration, truth)
-    certain = [ComparedStride(each.mud, each.method, each.stride, each.truth) for each in placed if each.mud]
+    located = located_strides(plan, entries, configuration, truth)
+    certain = [ComparedStride(each.mud, each.method, each.stride, each.truth) for each in located if each.mud]
     soft = soft_strides(plan, entries, truth)
-    return {
-        "experiment": "walk",
-        "muds": [_mud_report(mud.name, method, certain) for mud in plan.muds],
-        "soft": [{"mud": mud, "depths": _soft_report(plan, entries, mud, soft)} for mud in plan.soft],
-        "errors": error_table([*certain, *soft], "walking"),
-        "beside_paper": _beside_paper(plan, entries, certain, soft),
-        "without_pose": sum(walk["start_m"] is None for walk in walks_of(plan, entries)),
-        "at_a_border": sum(not each.mud for each in placed if each.method == method),
-        "remarks": [f"{key}: {remark}" for key, entry in entries.items() for remark in entry["remarks"]],
-        "missing_truth": missing_text(truth, dict.fromkeys([*(mud.name for mud in plan.muds), *plan.soft])),
-        "settings": plan.kept | {"method": method, "truth": "file" if truth else "bed"},
-    }
+    return WalkReport(
+        muds=[_mud_report(mud.name, method, certain) for mud in plan.muds],
+        soft=[SoftMud(mud, _soft_depths(plan, entries, mud, soft)) for mud in plan.soft],
+        errors=error_table([*certain, *soft], "walking"),
+        findings=_findings(plan, entries, certain, soft),
+        without_pose=sum(walk["start_m"] is None for walk in walks_of(plan, entries)),
+        at_a_border=sum(not each.mud for each in located if each.method == method),
+        remarks=[f"{key}: {remark}" for key, entry in entries.items() for remark in entry["remarks"]],
+        missing_truth=missing_text(truth, dict.fromkeys([*(mud.name for mud in plan.muds), *plan.soft])),
+        settings=plan.identity | {"method": method, "truth": "file" if truth else "bed"},
+        left_out=left_out or {},
+    )
 
 
 def _mud_report(mud: str, method: str, rows: Sequence[ComparedStride]) -> MudSummary:
     own = [row for row in rows if (row.mud, row.method) == (mud, method)]
-    return MudSummary(
-        mud=mud,
-        **gather_coefficients([row.stride for row in own]),
-        truth=truth_over(own) or None,
-    )
+    return MudSummary(mud=mud, **gather_coefficients([row.stride for row in own]), truth=median_truth(own) or None)
 
 
-def truth_over(rows: Sequence[ComparedStride]) -> dict[str, float]:
-    """The middle one of the load cell's readings."""
-    reported = {name: [row.truth.get(name) for row in rows] for name in COEFFICIENTS}
-    values = {name: [value for value in each if value is not None] for name, each in reported.items()}
+def median_truth(rows: Sequence[ComparedStride]) -> dict[str, float]:
+    """Return the median of the load cell's readings by coefficient."""
+    values = {name: [value for row in rows if (value := row.truth.get(name)) is not None] for name in COEFFICIENTS}
     return {name: median(each) for name, each in values.items() if each}
 
 
-def _soft_report(
+def _soft_depths(
     plan: Plan, entries: Mapping[str, Entry], mud: str, strides: Sequence[ComparedStride]
-) -> list[dict[str, Any]]:
-    """k_s by depth and method, beside the load cell's."""
+) -> list[SoftDepth]:
+    """Gather k_s by depth and method, with the load cell's."""
     return [
-        {
-            "depth_cm": 100.0 * depth_m,
-            "k_s": {
+        SoftDepth(
+            depth_cm=100.0 * depth_m,
+            k_s={
                 method: gather_coefficient(row.stride["k_s"] for row in own if row.method == method)
                 for method in dict.fromkeys(row.method for row in own)
             },
-            "truth": truth_over(own).get("k_s"),
-            "thrust_n": _thrust_n(soft_walks_of(plan, entries, mud, depth_m)),
-        }
+            truth=median_truth(own).get("k_s"),
+            thrust_n=_thrust_n(soft_walks_of(plan, entries, mud, depth_m)),
+        )
         for depth_m in SOFT_DEPTHS_M
         if (own := [row for row in strides if row.mud == soft_name(mud, depth_m)])
     ]
 
 
 def _thrust_n(walks: Sequence[Entry]) -> float | None:
-    """Of both flippers, over the second half of the stances shown: while the body moves it is the body's drag."""
+    """Average the thrust of both flippers over the second half of the drawn stances.
+
+    While the body moves, the thrust equals the drag on the body.
+    """
     means_n = []
     for walk in walks:
         profile = profile_from_row(walk["course"])
@@ -169,41 +210,37 @@ def _thrust_n(walks: Sequence[Entry]) -> float | None:
     return fmean(known) if known else None
 
 
-def _beside_paper(
+def _findings(
     plan: Plan, entries: Mapping[str, Entry], certain: Sequence[ComparedStride], soft: Sequence[ComparedStride]
-) -> list[dict[str, Any]]:
-    """What the paper tells in words or numbers, and ours by its law with the surface known."""
+) -> list[PaperFinding]:
+    """Pair each finding in the paper's text with ours, by its law with a known surface."""
     rows = [
-        _finding(f"k_s over the load cell's, {mud_text(mud.name)}", "well below 1", _ratio(certain, mud.name))
+        PaperFinding(f"k_s over the load cell's, {mud_text(mud.name)}", "well below 1", _ratio(certain, mud.name))
         for mud in plan.muds
     ]
-    return rows + [row for mud in plan.soft for row in _soft_beside_paper(plan, entries, mud, soft)]
+    return rows + [row for mud in plan.soft for row in _soft_findings(plan, entries, mud, soft)]
 
 
-def _soft_beside_paper(
+def _soft_findings(
     plan: Plan, entries: Mapping[str, Entry], mud: str, soft: Sequence[ComparedStride]
-) -> list[dict[str, Any]]:
+) -> list[PaperFinding]:
     """The paper's load cell measured at 3 cm."""
     at_3, at_5 = (soft_name(mud, depth_m) for depth_m in SOFT_DEPTHS_M)
-    reported_3, reported_5 = mud_text(at_3), mud_text(at_5)
-    cell = truth_over([row for row in soft if row.mud == at_3]).get("k_s")
-    added = _ratio(soft, at_5, KNOWN_COMPENSATED, cell)
+    text_3, text_5 = mud_text(at_3), mud_text(at_5)
+    cell = median_truth([row for row in soft if row.mud == at_3]).get("k_s")
+    with_drag = _ratio(soft, at_5, KNOWN_COMPENSATED, cell)
     thrust_n = _thrust_n(soft_walks_of(plan, entries, mud, SOFT_DEPTHS_M[1]))
     return [
-        _finding(f"k_s over the load cell's at 3 cm, {reported_3}", "close to 1", _ratio(soft, at_3, cell=cell)),
-        _finding(f"k_s over the load cell's at 3 cm, {reported_5}", "0.5", _ratio(soft, at_5, cell=cell)),
-        _finding(f"k_s over the load cell's at 3 cm, {reported_5}, with drag", "better", added),
-        _finding(f"k_s over the load cell's at 5 cm, {reported_5}", "-", _ratio(soft, at_5)),
-        _finding(f"thrust of both flippers in stance, {reported_5} (N)", f"{PAPER_DRAG_N:g}", thrust_n),
+        PaperFinding(f"k_s over the load cell's at 3 cm, {text_3}", "close to 1", _ratio(soft, at_3, cell=cell)),
+        PaperFinding(f"k_s over the load cell's at 3 cm, {text_5}", "0.5", _ratio(soft, at_5, cell=cell)),
+        PaperFinding(f"k_s over the load cell's at 3 cm, {text_5}, with drag", "better", with_drag),
+        PaperFinding(f"k_s over the load cell's at 5 cm, {text_5}", "-", _ratio(soft, at_5)),
+        PaperFinding(f"thrust of both flippers in stance, {text_5} (N)", f"{PAPER_DRAG_N:g}", thrust_n),
     ]
-
-
-def _finding(what: str, paper: str, ours: float | None) -> dict[str, Any]:
-    return {"what": what, "paper": paper, "ours": ours}
 
 
 def _ratio(rows: Sequence[ComparedStride], mud: str, method: str = KNOWN, cell: float | None = None) -> float | None:
-    """Median of k_s over what the load cell reads there, or over `cell`."""
+    """Return the median of k_s over the load cell's reading of the same stride, or over `cell`."""
     own = [row for row in rows if (row.mud, row.method) == (mud, method) and row.stride["k_s"]["valid"]]
     ratios = [row.stride["k_s"]["value"] / truth for row in own if (truth := cell or row.truth.get("k_s"))]
     return median(ratios) if ratios else None

@@ -1,4 +1,4 @@
-"""The walking robot's trackway in the simulator: fresh copies of it along one track, and behind them the soft muds."""
+"""The simulated bench of the walks: fresh copies of the trackway along one track, and then the soft muds."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB, Disturbances
 from simulation.mud.track import Track
 
-BEHIND_M = 0.5  # the last mud goes on behind its end, so that no stride meets the next copy
-POSITION_M, STRIP_M = 2.0, 1000.0  # of a walk in soft mud, of each such mud
+TAIL_M = 0.5  # the last mud is longer, so that no stride meets the next copy
+SOFT_WALK_M, STRIP_M = 2.0, 1000.0  # length for a walk in soft mud, length of each soft mud
 SECTIONS = f"[estimation]\nsurface_error_m = {LAB.surface_sd_m}  # as an operator would see it\n"
 
 
 def walking_bench(
     folder: Path, plan: Plan, seed: int, disturbances: Disturbances = LAB
 ) -> tuple[LockstepRobot, CarriedBed]:
-    """Over the plan's muds, named after their water. Raises ValueError for one that there is not."""
+    """Make a robot over the plan's muds, named after their water content. Raises ValueError for an unknown mud."""
     lengths_m = [mud.length_m for mud in plan.muds]
-    lengths_m[-1] += BEHIND_M
+    lengths_m[-1] += TAIL_M
     trackway = [(length_m, clay_of_water(float(mud.name))) for length_m, mud in zip(lengths_m, plan.muds, strict=True)]
     copies = MOST_ATTEMPTS * plan.trials
     soft = [(STRIP_M, clay_of_water(float(mud))) for mud in plan.soft]
@@ -41,6 +41,6 @@ def walking_bench(
         if trial.key.startswith("walk/"):
             return prepared * sum(lengths_m)
         strip = next(i for i, mud in enumerate(plan.soft) if trial.key.startswith(f"soft {mud} "))
-        return copies * sum(lengths_m) + STRIP_M * strip + POSITION_M * (prepared + 1)
+        return copies * sum(lengths_m) + STRIP_M * strip + SOFT_WALK_M * (prepared + 1)
 
     return robot, CarriedBed(robot, lockstep, position_m)

@@ -1,4 +1,4 @@
-"""A whole walk out of a log, as thin as a picture of it needs: place and forces of one flipper against time."""
+"""The profile of a whole walk from a log, thinned for a picture: position and forces of one flipper against time."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from control.records import FLIPPERS
 from experiments.trials.stride_profile import Floats, columns_of_row, row_of_columns
 from firmware_host.log_reading.log_reader import Log
 
-KEPT = 5  # one row in so many
+PERIOD_ROWS = 5  # one row of the log in five
 
 
 class WalkProfile(NamedTuple):
-    """Times by the robot's clock; NaN where nothing is known."""
+    """Times are by the robot's clock; unknown values are NaN."""
 
     time_s: Floats
     phase: NDArray[np.int64]
@@ -27,19 +27,19 @@ class WalkProfile(NamedTuple):
 
 
 def walk_profile_of(log: Log, flipper: str) -> WalkProfile:
-    place = FLIPPERS.index(flipper)
-    rows = log.ticks[log.ticks["mode"] == Mode.WALKING][::KEPT]
+    column = FLIPPERS.index(flipper)
+    rows = log.ticks[log.ticks["mode"] == Mode.WALKING][::PERIOD_ROWS]
     return WalkProfile(
         rows["stamp_s"],
         rows["phase"].astype(np.int64),
         rows["body_x_m"],
-        rows["force_x_n"][:, place],
-        rows["force_z_n"][:, place],
+        rows["force_x_n"][:, column],
+        rows["force_z_n"][:, column],
     )
 
 
 def walk_profile_row(profile: WalkProfile) -> dict[str, list[float | None]]:
-    """As JSON can hold it."""
+    """Return the columns as lists for JSON."""
     return row_of_columns(profile._asdict())
 
 

@@ -81,7 +81,7 @@ def test_a_walk_reads_the_flippers_summary_as_its_truth(first: int, folder: Path
         (["experiment", "flipper", "--simulated", "--mud", "clay"], "water in percent"),
         (["experiment", "flipper", "--simulated", "--mud", "70"], "70 % of water"),
         (["experiment", "walk", "--simulated", "--soft", "clay"], "water in percent"),
-        (["experiment", "walk", "--mud", "47.6", "--mud", "47.6=30"], "a name of its own"),
+        (["experiment", "walk", "--mud", "47.6", "--mud", "47.6=30"], "two muds have the same name"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_begins(

@@ -1,4 +1,4 @@
-"""The single flipper's trials: what they need, what spoils them, and what comes of them."""
+"""The single flipper's trials: the configuration they need, invalid trials, and the report."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ import pytest
 
 from control.records import Phase
 from experiments.flipper import measurement as flipper
-from experiments.flipper.measurement import Plan, report_of, require_fixed_base, require_mud
-from experiments.flipper.report import KNOWN_BIAS, WRONG_CONSTANTS, force_rows, sections_of, text_of
+from experiments.flipper.measurement import Plan, require_fixed_base, require_mud
+from experiments.flipper.report import FlipperReport, report_of
 from experiments.flipper.simulation import DRIVE, SECTIONS, bench_configuration, flipper_bench
+from experiments.flipper.text import KNOWN_BIAS, WRONG_CONSTANTS, force_rows, sections_of, tables_of
 from experiments.reports.report_page import to_json
 from experiments.robot.bench_robot import BenchError, leave
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
@@ -41,7 +42,7 @@ def measured() -> tuple[dict[str, Entry], list[str]]:
     with TemporaryDirectory() as name:
         folder = Path(name)
         robot, bed = flipper_bench(folder, [MUD], 1)
-        bench = Bench(robot, FaultyOnce(robot, bed), operator, Notebook(folder, SHORT.kept))
+        bench = Bench(robot, FaultyOnce(robot, bed), operator, Notebook(folder, SHORT.identity))
         flipper.run(bench, SHORT, lambda done, of: None)
         leave(bench.robot, bench.operator, folder)
     return bench.notebook.entries, operator.asked
@@ -68,11 +69,11 @@ class FaultyOnce:
             self._robot.call("disarm")
 
 
-def report(truth: dict[str, dict[str, float]] | None = None) -> dict[str, Any]:
+def report(truth: dict[str, dict[str, float]] | None = None) -> FlipperReport:
     return report_of(SHORT, measured()[0], bench_configuration(), truth)
 
 
-# what it needs
+# the configuration that it needs
 
 
 def test_a_robot_that_is_set_up_to_walk_is_refused_with_what_to_set() -> None:
@@ -95,21 +96,21 @@ def test_the_simulated_bench_is_that_of_the_other_experiments() -> None:
     }
 
 
-# what spoils a trial
+# invalid trials
 
 
 @pytest.mark.parametrize(("phase", "name"), [(Phase.INSERTION, "force_z_n"), (Phase.STANCE, "force_x_n")])
-def test_a_stroke_that_feels_something_has_met_mud(phase: Phase, name: str) -> None:
+def test_a_stroke_with_a_force_has_met_mud(phase: Phase, name: str) -> None:
     require_mud(make_profile(phase, [0.0] * 9, [0.01] * 9, **{name: [0.0] * 6 + [0.4] * 3}))
 
 
-def test_a_stroke_through_air_has_not() -> None:
+def test_a_stroke_through_air_is_invalid() -> None:
     noise_n = list(np.tile([0.3, -0.3], 9))
     with pytest.raises(InvalidTrialError, match="met no mud"):
         require_mud(make_profile(Phase.INSERTION, [0.0] * 18, [0.01] * 18, force_z_n=noise_n))
 
 
-def test_a_trial_that_a_fault_ended_is_told_and_repeated() -> None:
+def test_a_trial_that_a_fault_ended_is_reported_and_repeated() -> None:
     entries, asked = measured()
     assert list(entries) == [f"{MUD}/1"]
     assert len(asked) == 1
@@ -117,7 +118,7 @@ def test_a_trial_that_a_fault_ended_is_told_and_repeated() -> None:
 
 
 class SlidingRobot(LockstepRobot):
-    """Its base is 60 mm farther on each time that somebody asks."""
+    """A robot whose base is 60 mm further on in each status."""
 
     asked = 0
 
@@ -127,42 +128,43 @@ class SlidingRobot(LockstepRobot):
         return reported | {"body_x_m": 0.06 * self.asked} if method == "status" else reported
 
 
-def test_a_base_that_moved_far_spoils_the_trial_that_can_still_be_kept(tmp_path: Path) -> None:
+def test_a_trial_whose_base_moved_is_invalid_but_can_be_kept(tmp_path: Path) -> None:
     robot, bed = flipper_bench(tmp_path, [MUD], 1)
     robot.__class__ = SlidingRobot
-    bench = Bench(robot, bed, ScriptedOperator(), Notebook(tmp_path, SHORT.kept))
+    bench = Bench(robot, bed, ScriptedOperator(), Notebook(tmp_path, SHORT.identity))
     bed.prepare(SHORT.planned[0])
     with pytest.raises(InvalidTrialError, match="the base moved by .* mm") as invalid:
         flipper.measure(bench, SHORT, SHORT.planned[0])
     assert invalid.value.entry is not None and invalid.value.entry["remarks"] == []
 
 
-# what comes of it
+# the report
 
 
 def test_the_coefficients_are_those_of_the_load_cell() -> None:
-    """Within the doubt of a motor whose constant is known to 3.2 %, and the default method's own bias in k_e."""
-    (mud,) = report()["muds"]
+    """Within the uncertainty of a torque constant known to 3.2 %, and the default method's own bias in k_e."""
+    (mud,) = report().muds
+    assert mud.truth is not None
     for name, fraction in (("k_p", 0.1), ("k_s", 0.1), ("k_e", 0.2)):
         assert mud.coefficient(name).value == pytest.approx(mud.truth[name], rel=fraction)
     assert mud.remarks == []
 
 
-def test_the_daemons_strides_count_and_the_papers_method_stands_beside() -> None:
+def test_the_daemons_strides_count_and_the_papers_method_is_next_to_them() -> None:
     (entry,) = measured()[0].values()
     assert list(entry["strides"]) == [DEFAULT, PAPER]
-    assert report()["muds"][0].k_s.trials == [entry["strides"][DEFAULT][0]["k_s"]["value"]]
-    assert {row.method for row in report()["errors"]} == {DEFAULT, PAPER}
+    assert report().muds[0].k_s.trials == [entry["strides"][DEFAULT][0]["k_s"]["value"]]
+    assert {row.method for row in report().errors} == {DEFAULT, PAPER}
 
 
-def test_another_load_cells_truth_takes_the_place_of_the_beds() -> None:
+def test_the_truth_of_another_load_cell_replaces_the_beds() -> None:
     truth = {MUD: {"k_p": 2e6}}
     reported = report(truth)
-    assert reported["muds"][0].truth == truth[MUD]
-    assert {row.coefficient for row in reported["errors"]} == {"k_p"}
+    assert reported.muds[0].truth == truth[MUD]
+    assert {row.coefficient for row in reported.errors} == {"k_p"}
 
 
-def test_the_course_kept_is_a_whole_stride_of_three_pauses() -> None:
+def test_the_recorded_profile_is_a_whole_stride_with_three_pauses() -> None:
     profile = profile_from_row(next(iter(measured()[0].values()))["course"])
     assert profile.time_s[-1] == pytest.approx(12.4, abs=0.3)
     assert {Phase(int(phase)) for phase in profile.phase} == {
@@ -172,8 +174,8 @@ def test_the_course_kept_is_a_whole_stride_of_three_pauses() -> None:
 
 
 def test_the_law_follows_the_force_in_steady_stance() -> None:
-    misfit_n = report()["misfit_n"][MUD]["stance"]
-    assert misfit_n < 0.1 * report()["largest_forces_n"][MUD]["stance"]
+    misfit_n, largest_n = report().misfit_n[MUD]["stance"], report().largest_forces_n[MUD]["stance"]
+    assert misfit_n and largest_n and misfit_n < 0.1 * largest_n
 
 
 def test_the_summary_is_json_and_has_what_other_experiments_read() -> None:
@@ -203,47 +205,49 @@ def entries_of(**values: list[float]) -> dict[str, Entry]:
 FORCES = {"insertion_force_n": 2.0, "stance_force_n": 8.0, "extraction_force_n": -2.0}
 
 
-def test_coefficients_that_fall_with_water_are_said_to() -> None:
+def test_the_report_says_whether_coefficients_fall_with_water() -> None:
     plan, configuration = Plan(("51.2", "47.6")), bench_configuration()
     falling = report_of(plan, entries_of(w47_6=[2e6, 2.2e6], w51_2=[1e6]), configuration, None)
-    assert falling["falls_with_water"]["k_p"] is True
+    assert falling.falls_with_water["k_p"] is True
     rising = report_of(plan, entries_of(w47_6=[1e6], w51_2=[2e6]), configuration, None)
-    assert rising["falls_with_water"]["k_p"] is False
+    assert rising.falls_with_water["k_p"] is False
     named = report_of(Plan(("a", "b")), entries_of(a=[1e6], b=[2e6]), configuration, None)
-    assert named["falls_with_water"]["k_p"] is None
+    assert named.falls_with_water["k_p"] is None
 
 
 def test_muds_that_were_measured_before_stay_in_the_report() -> None:
     reported = report_of(Plan(("51.2",)), entries_of(w47_6=[2e6], w51_2=[1e6]), bench_configuration(), None)
-    assert [mud.mud for mud in reported["muds"]] == ["51.2", "47.6"]
-    assert force_rows(reported)[1][:2] == ["51.2 %", "2.00 (" + f"{reported['misfit_n']['51.2']['insertion']:.2f})"]
+    assert [mud.mud for mud in reported.muds] == ["51.2", "47.6"]
+    assert force_rows(reported)[1][:2] == ["51.2 %", "2.00 (" + f"{reported.misfit_n['51.2']['insertion']:.2f})"]
 
 
-def test_later_strides_in_the_same_hole_are_told_apart() -> None:
+def test_later_strides_in_the_same_hole_are_reported_apart() -> None:
     entries = entries_of(w47_6=[2e6])
     entries["47.6/1"]["strides"][DEFAULT].append(make_stride(k_p=make_estimate(1.6e6)))
     reported = report_of(Plan(("47.6",), strides=2), entries, bench_configuration(), None)
-    assert reported["later_strokes"]["k_p"] == pytest.approx([0.8])
-    assert reported["muds"][0].k_p.value == 2e6
+    assert reported.later_strokes["k_p"] == pytest.approx([0.8])
+    assert reported.muds[0].k_p.value == 2e6
 
 
-def test_what_scatter_does_not_show_is_told_beside_the_coefficients() -> None:
+def test_errors_that_scatter_does_not_show_are_explained_next_to_the_coefficients() -> None:
     configuration, entries, reported = bench_configuration(), entries_of(w47_6=[2e6]), {}
     for simulated in (False, True):
         plan = Plan(("47.6",), simulated=simulated)
         report = report_of(plan, entries, configuration, None)
         reported[simulated] = sections_of(report, plan, entries, configuration)[0].text
-        assert text_of(report)[0][0].endswith("see the report")
+        assert tables_of(report)[0][0].endswith("explained in the report")
     assert KNOWN_BIAS in reported[False] and WRONG_CONSTANTS not in reported[False]
     assert WRONG_CONSTANTS in reported[True]
 
 
-def test_without_a_load_cell_nothing_is_said_of_errors() -> None:
+def test_without_a_load_cell_there_are_no_errors() -> None:
     entries, plan, configuration = entries_of(w47_6=[2e6]), Plan(("47.6",)), bench_configuration()
     reported = report_of(plan, entries, configuration, None)
-    assert reported["errors"] == []
-    assert "Beside the load cell" not in [each.heading for each in sections_of(reported, plan, entries, configuration)]
-    assert len(text_of(reported)) == 2
+    assert reported.errors == []
+    assert "Comparison with the load cell" not in [
+        each.heading for each in sections_of(reported, plan, entries, configuration)
+    ]
+    assert len(tables_of(reported)) == 2
 
 
 def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> None:
@@ -251,7 +255,7 @@ def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> Non
     paper = replace(configuration, estimation=replace(configuration.estimation, method="paper"))
     reported = report_of(SHORT, measured()[0], paper, None)
     (entry,) = measured()[0].values()
-    assert reported["muds"][0].k_p.trials == [entry["strides"][PAPER][0]["k_p"]["value"]]
-    assert reported["settings"]["method"] == "paper"
-    assert KNOWN_BIAS not in text_of(reported)[0][0]
-    assert reported["misfit_n"][MUD]["insertion"] > 0.0
+    assert reported.muds[0].k_p.trials == [entry["strides"][PAPER][0]["k_p"]["value"]]
+    assert reported.settings["method"] == "paper"
+    assert KNOWN_BIAS not in tables_of(reported)[0][0]
+    assert (reported.misfit_n[MUD]["insertion"] or 0.0) > 0.0

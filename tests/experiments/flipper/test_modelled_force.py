@@ -1,4 +1,4 @@
-"""The laws beside measured forces: in mud that follows the law, both are the same."""
+"""The forces by the laws equal the measured forces in mud that follows the laws."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DEPTHS_M = [-0.01, 0.0, 0.01, 0.02, 0.03]
 
 
 def lawful(phase: Phase, sweeps_deg: list[float], depths_m: list[float], across_nm: float = 0.0) -> StrideProfile:
-    """Its loads are those of a mud with the coefficients K, and its forces the map's of them."""
+    """Return a stroke whose loads are those of a mud with the coefficients K, and whose forces are mapped from them."""
     profile = make_profile(phase, sweeps_deg, depths_m)
     for i, (sweep_rad, adduction_rad) in enumerate(zip(profile.sweep_rad, profile.adduction_rad, strict=True)):
         plate = submerged_plate(GEOMETRY, sweep_rad, adduction_rad)
@@ -33,14 +33,14 @@ def lawful(phase: Phase, sweeps_deg: list[float], depths_m: list[float], across_
     return profile
 
 
-def test_in_insertion_the_law_is_the_measured_force_from_the_surface_down() -> None:
+def test_in_insertion_the_law_equals_the_measured_force_below_the_surface() -> None:
     profile = lawful(Phase.INSERTION, [30.0] * 5, DEPTHS_M, across_nm=0.05)
     modelled_n = modelled_forces(profile, GEOMETRY, 0.0, K, "default").force_z_n
     assert modelled_n[2:] == pytest.approx(profile.force_z_n[2:])
     assert np.isnan(modelled_n[0])
 
 
-def test_in_extraction_the_law_is_the_measured_force_on_the_last_three_quarters() -> None:
+def test_in_extraction_the_law_equals_the_measured_force_on_the_last_three_quarters() -> None:
     profile = lawful(Phase.EXTRACTION, [-30.0] * 5, [0.03, 0.025, 0.02, 0.01, -0.01], across_nm=-0.1)
     modelled_n = modelled_forces(profile, GEOMETRY, 0.0, K, "default").force_z_n
     assert np.isnan(modelled_n[[0, 1, 4]]).all()
@@ -48,7 +48,7 @@ def test_in_extraction_the_law_is_the_measured_force_on_the_last_three_quarters(
     assert (modelled_n[2:4] < 0.0).all()
 
 
-def test_in_stance_the_law_is_the_measured_force_once_the_mud_is_mobilised() -> None:
+def test_in_stance_the_law_equals_the_measured_force_once_the_mud_is_mobilised() -> None:
     """2.5 cm of sweep with an arm of 12 cm: from 30° to under 17°."""
     profile = lawful(Phase.STANCE, [30.0, 20.0, 15.0, 0.0, -30.0], [0.03] * 5)
     modelled_n = modelled_forces(profile, GEOMETRY, 0.0, K, "default").force_x_n
@@ -56,7 +56,7 @@ def test_in_stance_the_law_is_the_measured_force_once_the_mud_is_mobilised() -> 
     assert modelled_n[2:] == pytest.approx(profile.force_x_n[2:])
 
 
-def test_the_papers_laws_are_about_forces_below_the_surface_found() -> None:
+def test_the_papers_laws_give_forces_from_the_depth_below_the_found_surface() -> None:
     """At 3 cm under a surface that is 1 cm deep: 2 cm of an edge of 1 cm², and half of 4 cm² of a plate 2.5 cm wide."""
     surface_m = 0.01
     inserted = make_profile(Phase.INSERTION, [30.0], [0.03])
@@ -67,17 +67,17 @@ def test_the_papers_laws_are_about_forces_below_the_surface_found() -> None:
     assert modelled_forces(raised, GEOMETRY, surface_m, K, "paper").force_z_n[1] == pytest.approx(-1.9e6 * 1e-4 * 0.01)
 
 
-def test_a_coefficient_that_is_not_known_draws_nothing() -> None:
+def test_an_unknown_coefficient_gives_no_force() -> None:
     profile = lawful(Phase.INSERTION, [30.0] * 5, DEPTHS_M)
     assert np.isnan(modelled_forces(profile, GEOMETRY, 0.0, K | {"k_p": None}, "default").force_z_n).all()
 
 
-def test_rows_without_a_load_draw_nothing() -> None:
+def test_rows_without_a_load_have_no_force() -> None:
     profile = lawful(Phase.INSERTION, [30.0] * 5, DEPTHS_M)
     profile.sweep_nm[3] = np.nan
     assert np.isnan(modelled_forces(profile, GEOMETRY, 0.0, K, "default").force_z_n[3])
 
 
-def test_what_a_law_leaves_over_is_the_root_mean_square_where_it_is_drawn() -> None:
+def test_the_misfit_is_the_root_mean_square_where_the_law_is_evaluated() -> None:
     assert misfit_n(np.array([1.0, 5.0, 0.0]), np.array([4.0, 1.0, np.nan])) == pytest.approx(np.sqrt(12.5))
     assert misfit_n(np.array([1.0]), np.array([np.nan])) is None

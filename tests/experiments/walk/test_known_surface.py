@@ -1,4 +1,4 @@
-"""The paper's law below a surface that is known: values, and bodies that advance."""
+"""The paper's law below a known surface: values, and bodies that advance."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MOMENT_M3 = GEOMETRY.plate_width_m * (DEPTH_M - SURFACE_M) ** 2 / 2.0
 
 
 def stance(advance_m: float = 0.0) -> StrideProfile:
-    """f_x = k_s b z²/2 in all of it, while the body goes `advance_m`."""
+    """Return a stance with f_x = k_s b z²/2 while the body advances by `advance_m`."""
     torques_nm = K * MOMENT_M3 * GEOMETRY.flipper_length_m / np.cos(np.radians(SWEEPS_DEG))
     positions_m = np.linspace(0.0, advance_m, len(SWEEPS_DEG))
     return make_profile(
@@ -24,22 +24,22 @@ def stance(advance_m: float = 0.0) -> StrideProfile:
     )
 
 
-def test_it_is_the_laws_coefficient_below_the_surface_that_is_known() -> None:
-    reported = k_s_of(stance(), make_stride(surface_m=SURFACE_M), CONFIGURATION, 0.0)
-    assert reported["valid"]
-    assert reported["value"] == pytest.approx(K)
+def test_the_fit_gives_the_laws_coefficient_below_the_known_surface() -> None:
+    estimate = k_s_of(stance(), make_stride(surface_m=SURFACE_M), CONFIGURATION, 0.0)
+    assert estimate["valid"]
+    assert estimate["value"] == pytest.approx(K)
 
 
 def test_half_of_the_drag_is_added_while_the_body_advances() -> None:
-    reported = k_s_of(stance(0.1), make_stride(surface_m=SURFACE_M), CONFIGURATION, 2.5)
-    assert reported["value"] == pytest.approx(K + 1.25 / MOMENT_M3)
+    estimate = k_s_of(stance(0.1), make_stride(surface_m=SURFACE_M), CONFIGURATION, 2.5)
+    assert estimate["value"] == pytest.approx(K + 1.25 / MOMENT_M3)
 
 
-def test_nothing_is_added_while_it_stands_or_its_place_is_not_known() -> None:
+def test_no_drag_is_added_while_the_body_stands_or_has_no_pose() -> None:
     for advance_m in (0.001, float("nan")):
-        reported = k_s_of(stance(advance_m), make_stride(surface_m=SURFACE_M), CONFIGURATION, 2.5)
-        assert reported["value"] == pytest.approx(K)
+        estimate = k_s_of(stance(advance_m), make_stride(surface_m=SURFACE_M), CONFIGURATION, 2.5)
+        assert estimate["value"] == pytest.approx(K)
 
 
-def test_a_stride_that_left_no_rows_says_nothing() -> None:
+def test_a_stride_without_rows_gives_no_estimate() -> None:
     assert not k_s_of(make_profile(Phase.SWING, [0.0], [-0.01]), make_stride(), CONFIGURATION, 2.5)["valid"]

@@ -1,4 +1,4 @@
-"""Walks over several muds: each stride beside its mud, with a pose or without, and the paper's findings beside ours."""
+"""Walks over several muds: the mud of each stride, with and without a pose, and the paper's findings next to ours."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from experiments.flipper.report import KNOWN_BIAS, WRONG_CONSTANTS
+from experiments.flipper.text import KNOWN_BIAS, WRONG_CONSTANTS
 from experiments.reports.report_page import to_json
 from experiments.robot.lockstep_robot import LockstepRobot
 from experiments.trackway.bench import Mud, reach_of
@@ -22,9 +22,9 @@ from experiments.trials.simulated_bed import CarriedBed
 from experiments.walk import measurement as walk_mapping
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import MUDS, Advance, Plan, measure, require_mud
-from experiments.walk.pages import sections_of, text_of
-from experiments.walk.report import placed_strides, report_of, walks_of
+from experiments.walk.report import WalkReport, located_strides, report_of, walks_of
 from experiments.walk.simulation import walking_bench
+from experiments.walk.text import sections_of, tables_of
 from tests.experiments.made_up_strides import CONFIGURATION, make_estimate, make_stride
 from tests.scripted_operator import ScriptedOperator
 
@@ -42,10 +42,10 @@ def measured() -> dict[str, Entry]:
 
 
 def bench_of(folder: Path, plan: Plan) -> Bench:
-    return Bench(*walking_bench(folder, plan, 1), ScriptedOperator(), Notebook(folder, plan.kept))
+    return Bench(*walking_bench(folder, plan, 1), ScriptedOperator(), Notebook(folder, plan.identity))
 
 
-def report(plan: Plan = SHORT, truth: dict[str, dict[str, float]] | None = None) -> dict[str, Any]:
+def report(plan: Plan = SHORT, truth: dict[str, dict[str, float]] | None = None) -> WalkReport:
     return report_of(plan, measured(), CONFIGURATION, truth)
 
 
@@ -68,17 +68,17 @@ def test_then_walks_at_both_depths_in_each_soft_mud() -> None:
     ("plates_m", "mud"),
     [(0.06, "47.6"), (0.57, "47.6"), (0.59, ""), (0.63, ""), (0.65, "49.5"), (1.5, "51.2"), (1.83, ""), (9.0, "")],
 )
-def test_a_plate_is_in_the_mud_that_it_went_down_in_or_in_none_for_certain(plates_m: float, mud: str) -> None:
+def test_a_plate_belongs_to_the_mud_in_which_it_went_down_unless_it_is_near_a_border(plates_m: float, mud: str) -> None:
     assert Plan().mud_at(plates_m) == mud
 
 
 @pytest.mark.parametrize(("slip_m", "mud"), [(0.0, "49.5"), (0.01, "49.5"), (0.03, ""), (0.07, ""), (0.6, "")])
-def test_a_plate_that_slips_back_to_a_border_or_across_it_is_in_no_mud_for_certain(slip_m: float, mud: str) -> None:
+def test_a_plate_that_slips_back_to_a_border_belongs_to_no_mud(slip_m: float, mud: str) -> None:
     """It went down 5 cm behind the border at 61 cm."""
     assert Plan().mud_at(0.66, slip_m) == mud
 
 
-def test_a_walk_that_told_nothing_is_spoilt() -> None:
+def test_a_walk_without_any_estimate_is_invalid() -> None:
     nothing = make_estimate(None)
     with pytest.raises(InvalidTrialError, match="no stride of the left flipper"):
         require_mud([], "left")
@@ -87,74 +87,75 @@ def test_a_walk_that_told_nothing_is_spoilt() -> None:
     require_mud([make_stride(k_p=nothing, k_s=nothing)], "left")
 
 
-# a short one, for real
+# a short experiment in simulation
 
 
-def test_every_walk_is_kept_with_all_methods() -> None:
+def test_every_walk_is_in_the_notebook_with_all_methods() -> None:
     assert list(measured()) == ["walk/1", "soft 51.2 at 3 cm/1", "soft 51.2 at 5 cm/1"]
     for entry in measured().values():
         assert list(entry["strides"]) == [DEFAULT, PAPER, COMPENSATED, KNOWN, KNOWN_COMPENSATED]
         assert len({len(strides) for strides in entry["strides"].values()}) == 1
 
 
-def test_the_robot_stops_behind_the_last_mud() -> None:
-    """Its plates were in both muds, and no stride went down more than a step behind the end."""
-    placed = [each for each in placed_strides(SHORT, measured(), CONFIGURATION, None) if each.method == DEFAULT]
-    positions_m = [each.plates_m for each in placed]
+def test_the_robot_stops_past_the_last_mud() -> None:
+    """Its plates were in both muds, and no stride went down more than a step past the end."""
+    located = [each for each in located_strides(SHORT, measured(), CONFIGURATION, None) if each.method == DEFAULT]
+    positions_m = [each.plates_m for each in located]
     assert positions_m == sorted(positions_m)
     assert 0.0 < positions_m[0] < 0.1
     assert SHORT.length_m - 0.13 < positions_m[-1] < SHORT.length_m
-    assert {"47.6", "51.2"} <= {each.mud for each in placed}
+    assert {"47.6", "51.2"} <= {each.mud for each in located}
 
 
 def test_in_soft_mud_a_plate_slips_back_by_half_of_its_stance_and_more() -> None:
     """A stance is 12 cm long. In the strides that belong to a mud the plate was there with all of its slip."""
-    placed = [each for each in placed_strides(SHORT, measured(), CONFIGURATION, None) if each.method == DEFAULT]
-    for each in placed:
+    located = [each for each in located_strides(SHORT, measured(), CONFIGURATION, None) if each.method == DEFAULT]
+    for each in located:
         slip_m = each.stride["slip_m"]
         assert (0.055 < slip_m < 0.09) if each.mud == "51.2" else slip_m < 0.055
         assert each.mud in ("", SHORT.mud_at(each.plates_m - slip_m))
 
 
 def test_the_coefficients_are_those_of_the_load_cell_or_bounds_below_it() -> None:
-    strong, soft = report()["muds"]
+    strong, soft = report().muds
+    assert strong.truth and soft.truth
     for mud in (strong, soft):
-        assert mud.k_p.value == pytest.approx(mud.truth["k_p"], rel=0.12)
+        assert mud.truth and mud.k_p.value == pytest.approx(mud.truth["k_p"], rel=0.12)
     assert strong.k_s.at_least
-    assert strong.k_s.value < strong.truth["k_s"]
+    assert strong.k_s.value and strong.k_s.value < strong.truth["k_s"]
 
 
 def test_without_compensation_firm_mud_seems_softer_and_less_so_with_it() -> None:
     """As the paper found."""
-    rows = [row for row in report()["errors"] if (row.mud, row.coefficient) == ("47.6", "k_s")]
-    biases = {row.method: row.bias for row in rows}
+    rows = [row for row in report().errors if (row.mud, row.coefficient) == ("47.6", "k_s")]
+    biases = {row.method: row.bias or 0.0 for row in rows}
     assert biases[KNOWN] < biases[KNOWN_COMPENSATED] < 0.0
     assert biases[PAPER] < biases[COMPENSATED] < 0.0
 
 
-def test_the_soft_mud_tells_k_s_at_both_depths_by_every_method() -> None:
-    (soft,) = report()["soft"]
-    assert (soft["mud"], [each["depth_cm"] for each in soft["depths"]]) == ("51.2", [3.0, 5.0])
-    for each in soft["depths"]:
-        assert set(each["k_s"]) == {DEFAULT, PAPER, COMPENSATED, KNOWN, KNOWN_COMPENSATED}
-        assert each["truth"] > 0.0
-        assert 2.5 < each["thrust_n"] < 20.0
+def test_the_soft_mud_has_k_s_at_both_depths_by_every_method() -> None:
+    (soft,) = report().soft
+    assert (soft.mud, [each.depth_cm for each in soft.depths]) == ("51.2", [3.0, 5.0])
+    for each in soft.depths:
+        assert set(each.k_s) == {DEFAULT, PAPER, COMPENSATED, KNOWN, KNOWN_COMPENSATED}
+        assert each.truth and each.truth > 0.0
+        assert each.thrust_n and 2.5 < each.thrust_n < 20.0
 
 
-def test_the_papers_findings_stand_beside_ours() -> None:
-    found = {row["what"]: row for row in report()["beside_paper"]}
+def test_the_papers_findings_are_next_to_ours() -> None:
+    found = {row.what: row for row in report().findings}
     half = found["k_s over the load cell's at 3 cm, 51.2 % at 5 cm"]
-    assert half["paper"] == "0.5"
-    assert 0.3 < half["ours"] < 0.8
-    assert found["thrust of both flippers in stance, 51.2 % at 5 cm (N)"]["paper"] == "2.5"
+    assert half.paper == "0.5"
+    assert half.ours and 0.3 < half.ours < 0.8
+    assert found["thrust of both flippers in stance, 51.2 % at 5 cm (N)"].paper == "2.5"
 
 
-def test_another_load_cells_truth_takes_the_place_of_the_beds() -> None:
+def test_the_truth_of_another_load_cell_replaces_the_beds() -> None:
     reported = report(truth={"47.6": {"k_p": 2e6}})
-    assert reported["muds"][0].truth == {"k_p": 2e6}
-    assert reported["muds"][1].truth is None
-    assert reported["missing_truth"].endswith("says nothing of 51.2 %.")
-    assert {(row.mud, row.coefficient) for row in reported["errors"]} == {("47.6", "k_p")}
+    assert reported.muds[0].truth == {"k_p": 2e6}
+    assert reported.muds[1].truth is None
+    assert reported.missing_truth.endswith("says nothing of 51.2 %.")
+    assert {(row.mud, row.coefficient) for row in reported.errors} == {("47.6", "k_p")}
 
 
 def test_the_report_is_json_with_a_table_and_a_picture_of_everything() -> None:
@@ -162,7 +163,7 @@ def test_the_report_is_json_with_a_table_and_a_picture_of_everything() -> None:
     assert to_json(reported)["experiment"] == "walk"
     sections = sections_of(reported, SHORT, measured(), CONFIGURATION, None)
     assert [f.name for section in sections for f in section.figures] == ["figure6_trial1", "figure7_51.2"]
-    title, rows = text_of(reported)[0]
+    title, rows = tables_of(reported)[0]
     assert title.startswith("Coefficients")
     assert rows[0][0] == "mud"
     for uncertainty in (KNOWN_BIAS, WRONG_CONSTANTS):
@@ -173,7 +174,7 @@ def test_the_report_is_json_with_a_table_and_a_picture_of_everything() -> None:
 
 
 class BlindRobot(LockstepRobot):
-    """Its status tells no place from a moment on."""
+    """A robot whose status has no pose from a given time on."""
 
     blind_from_s = 0.0
 
@@ -194,20 +195,20 @@ def blind(folder: Path, from_s: float) -> Bench:
     return bench
 
 
-def test_without_a_pose_the_robot_makes_no_more_strides_than_lead_to_the_end(tmp_path: Path) -> None:
-    """20 cm with steps of 12 cm at most; the strides are given to the muds by their order."""
+def test_without_a_pose_the_robot_makes_only_as_many_strides_as_lead_to_the_end(tmp_path: Path) -> None:
+    """20 cm with steps of 12 cm at most; the strides are assigned to the muds by their order."""
     bench = blind(tmp_path, 0.0)
     bench.bed.prepare(TINY.planned[0])
     entry = measure(bench, TINY, TINY.planned[0])
-    assert [remark for remark in entry["remarks"] if "no pose is told" in remark]
+    assert [remark for remark in entry["remarks"] if "no pose arrives" in remark]
     assert len(entry["strides"][DEFAULT]) == 2
     reported = report_of(TINY, {"walk/1": json.loads(json.dumps(entry))}, CONFIGURATION, None)
-    assert reported["without_pose"] == 1
-    assert len(reported["muds"][0].k_p.trials) == 2
+    assert reported.without_pose == 1
+    assert len(reported.muds[0].k_p.trials) == 2
 
 
 class StoppedRobot(LockstepRobot):
-    """Somebody else stops its walk once a stride is over."""
+    """A robot that another client stops after its first stride."""
 
     def call(self, method: str, **params: Any) -> Any:
         reported = super().call(method, **params)
@@ -216,27 +217,27 @@ class StoppedRobot(LockstepRobot):
         return reported
 
 
-def test_a_walk_that_somebody_else_stops_is_not_taken_for_a_whole_one(tmp_path: Path) -> None:
+def test_a_walk_that_another_client_stops_is_invalid(tmp_path: Path) -> None:
     bench = bench_of(tmp_path, TINY)
     bench.robot.__class__ = StoppedRobot
     bench.bed.prepare(TINY.planned[0])
-    with pytest.raises(InvalidTrialError, match="somebody stopped the walk in stride 2") as invalid:
+    with pytest.raises(InvalidTrialError, match="stopped by another client in stride 2") as invalid:
         measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
     assert invalid.value.entry is not None and len(invalid.value.entry["strides"][DEFAULT]) == 1
 
 
-def test_by_their_order_strides_are_spread_over_the_muds_lengths() -> None:
+def test_without_a_pose_strides_are_spread_over_the_lengths_of_the_muds() -> None:
     plan = replace(SHORT, muds=(Mud("a", 0.2), Mud("b", 0.6)))
     entry = {"trial": 1, "start_m": None, "truths": {}, "strides": {DEFAULT: [make_stride(place_m=None)] * 4}}
-    placed = placed_strides(plan, {"walk/1": entry}, CONFIGURATION, None)
-    assert [each.mud for each in placed] == ["a", "b", "b", "b"]
+    located = located_strides(plan, {"walk/1": entry}, CONFIGURATION, None)
+    assert [each.mud for each in located] == ["a", "b", "b", "b"]
     assert walks_of(plan, {"walk/1": entry, "walk/2": entry}) == [entry]
 
 
-def test_a_pose_that_is_lost_on_the_way_spoils_the_walk(tmp_path: Path) -> None:
+def test_a_pose_that_is_lost_during_a_walk_makes_it_invalid(tmp_path: Path) -> None:
     bench = blind(tmp_path, 4.0)
     bench.bed.prepare(TINY.planned[0])
-    with pytest.raises(InvalidTrialError, match="not told any more"):
+    with pytest.raises(InvalidTrialError, match="pose of the body is lost"):
         measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
 
 
@@ -247,23 +248,23 @@ def test_plates_go_down_half_an_arm_in_front() -> None:
 # how far a walk has come
 
 
-def looks(*seen: tuple[float, float | None, str]) -> list[str | None]:
-    """What is judged of a walk of 50 cm that began at 1 m."""
+def evaluate_walk(*statuses: tuple[float, float | None, str]) -> list[str | None]:
+    """Evaluate the statuses of a walk over 50 cm that began at 1 m."""
     advance = Advance(1.0, 0.5, 0.0)
-    return [advance.evaluate({"now_s": now_s, "body_x_m": body_m, "phase": phase}) for now_s, body_m, phase in seen]
+    return [advance.evaluate({"now_s": now_s, "body_x_m": body_m, "phase": phase}) for now_s, body_m, phase in statuses]
 
 
 def test_a_walk_ends_with_the_insertion_behind_the_last_mud() -> None:
-    reported = looks((1.0, 1.4, "insertion"), (2.0, 1.51, "stance"), (3.0, 1.51, "insertion"))
+    reported = evaluate_walk((1.0, 1.4, "insertion"), (2.0, 1.51, "stance"), (3.0, 1.51, "insertion"))
     assert reported == [None, None, ""]
 
 
-def test_a_robot_that_does_not_come_on_is_stopped_and_told_where() -> None:
-    reported = looks((1.0, 1.2, "stance"), (60.0, 1.22, "swing"), (61.5, 1.22, "swing"))
-    assert reported == [None, None, "the robot came no farther than 20 cm"]
+def test_a_robot_that_gets_stuck_is_stopped() -> None:
+    reported = evaluate_walk((1.0, 1.2, "stance"), (60.0, 1.22, "swing"), (61.5, 1.22, "swing"))
+    assert reported == [None, None, "the robot got stuck after 20 cm"]
 
 
-def test_a_place_that_is_missed_for_a_moment_is_waited_for() -> None:
-    assert looks((1.0, 1.2, "stance"), (2.9, None, "stance"), (3.0, 1.3, "swing")) == [None, None, None]
-    with pytest.raises(InvalidTrialError, match="not told any more"):
-        looks((1.0, 1.2, "stance"), (3.1, None, "stance"))
+def test_a_short_gap_in_the_pose_is_tolerated() -> None:
+    assert evaluate_walk((1.0, 1.2, "stance"), (2.9, None, "stance"), (3.0, 1.3, "swing")) == [None, None, None]
+    with pytest.raises(InvalidTrialError, match="pose of the body is lost"):
+        evaluate_walk((1.0, 1.2, "stance"), (3.1, None, "stance"))

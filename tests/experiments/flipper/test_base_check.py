@@ -1,4 +1,4 @@
-"""A base that moved in a trial is told of, one that did not is not."""
+"""A base that moved in a trial is reported; one that did not move is not."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 
 from control.modes import Mode
 from control.records import Phase
-from experiments.flipper.base_watch import SPOILING_M, load_remarks, moved_text, pose_remarks, surface_remarks
+from experiments.flipper.base_check import INVALID_M, load_remarks, moved_text, pose_remarks, surface_remarks
 from firmware_host.log_reading.log_reader import Log
 from tests.experiments.made_up_strides import (
     CONFIGURATION,
@@ -21,7 +21,7 @@ NM_A = CONFIGURATION.torque_constants_nm_a[RIGHT_SWEEP]
 
 
 def trial(joint: int, before_nm: float, after_nm: float) -> Log:
-    """In free air before the insertion and after the stride; far from both the joint bears 1 N·m."""
+    """In free air before the insertion and after the stride; at all other times the joint carries 1 N·m."""
     before, stride = make_ticks([Phase.REST] * 20), make_ticks([Phase.INSERTION] * 50, start_s=0.2)
     after = make_ticks([Phase.REST] * 50, start_s=0.7)
     after["mode"] = Mode.HOLD
@@ -32,7 +32,7 @@ def trial(joint: int, before_nm: float, after_nm: float) -> Log:
 
 
 @pytest.mark.parametrize(("joint", "still_nm", "moved_nm"), [(RIGHT_SWEEP, 0.04, 0.06), (RIGHT_ADDUCTION, 0.2, 0.3)])
-def test_another_load_in_free_air_is_told_of(joint: int, still_nm: float, moved_nm: float) -> None:
+def test_a_changed_load_in_free_air_is_reported(joint: int, still_nm: float, moved_nm: float) -> None:
     for sign in (1.0, -1.0):
         assert not load_remarks(trial(joint, 0.1, 0.1 + sign * still_nm), CONFIGURATION, "right")
         (remark,) = load_remarks(trial(joint, 0.1, 0.1 + sign * moved_nm), CONFIGURATION, "right")
@@ -44,22 +44,22 @@ def test_the_other_flipper_does_not_count() -> None:
     assert not load_remarks(trial(RIGHT_SWEEP, 0.0, 0.9), CONFIGURATION, "left")
 
 
-def test_a_log_without_an_insertion_says_nothing() -> None:
+def test_a_log_without_an_insertion_gives_no_remark() -> None:
     ticks = make_ticks([Phase.REST] * 5)
     assert not load_remarks(make_log(ticks), CONFIGURATION, "right")
 
 
-def test_a_pose_that_moved_is_told_of_in_millimetres() -> None:
-    assert moved_text(0.1, 0.0953, SPOILING_M) == "" != moved_text(0.1, 0.0853, SPOILING_M)
+def test_a_pose_that_moved_is_reported_in_millimetres() -> None:
+    assert moved_text(0.1, 0.0953, INVALID_M) == "" != moved_text(0.1, 0.0853, INVALID_M)
     assert pose_remarks(0.1, 0.0953) == ["the base moved by -4.7 mm: clamp it, and measure again"]
 
 
 @pytest.mark.parametrize(("before_m", "after_m"), [(0.1, 0.1015), (None, 0.1), (0.1, None), (None, None)])
-def test_a_pose_that_stayed_or_is_not_known_is_not(before_m: float | None, after_m: float | None) -> None:
+def test_a_pose_that_stayed_or_is_unknown_gives_no_remark(before_m: float | None, after_m: float | None) -> None:
     assert not pose_remarks(before_m, after_m)
 
 
-def test_mud_that_is_met_far_from_its_nominal_height_is_told_of() -> None:
+def test_mud_met_far_from_its_nominal_height_is_reported() -> None:
     assert "12 mm below" in surface_remarks(make_stride(surface_m=0.012))[0]
     assert "12 mm above" in surface_remarks(make_stride(surface_m=-0.012))[0]
     for surface_m in (0.005, None):

@@ -1,8 +1,8 @@
-"""Whether a base that is to be fixed has moved in a trial: by its pose, by the joints' loads in free air, by the mud.
+"""Checks whether the fixed base moved in a trial: by its pose, by the loads of the joints in free air, by the surface.
 
-Before its insertion and after its stride a flipper stands at the same place above the mud. What its joints carry there
-should be the same but for the mud that came along, which pulls at the adduction joint alone. Where the surface is met
-far from where the configuration has it, the base stands at another height, or the mud does.
+Before its insertion and after its stride a flipper is at the same position above the mud. The loads of its joints there
+should be equal, except for mud that clings to the flipper, which loads the adduction joint alone. A surface that is
+found far from its configured height means that the base or the mud is at another height.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.log_reading.log_reader import Log
 
 POSE_M = 0.002
-SPOILING_M = 0.01  # a tenth of a stance: 10 % of the way and of the speed, which changes what mud bears by 0.6 %
-SWEEP_NM = 0.05  # three times what the paper's motors repeat to at 0.5 N·m
-ADDUCTION_NM = 0.25  # 2 N of clinging mud, twice what the authors' logs show
+INVALID_M = 0.01  # a tenth of a stance: 10 % of travel and speed, which changes the mud's resistance by 0.6 %
+SWEEP_NM = 0.05  # three times the repeatability of the paper's motors at 0.5 N·m
+ADDUCTION_NM = 0.25  # 2 N of clinging mud, twice that of the authors' logs
 SURFACE_M = 0.01
-LOOK_S = 0.1
+WINDOW_S = 0.1
 
 
 def pose_remarks(before_m: float | None, after_m: float | None) -> list[str]:
@@ -32,14 +32,14 @@ def pose_remarks(before_m: float | None, after_m: float | None) -> list[str]:
 
 
 def moved_text(before_m: float | None, after_m: float | None, bound_m: float) -> str:
-    """Empty where the base has not moved by more, or where nobody knows."""
+    """Describe a motion of the base beyond the bound; return nothing where it is smaller or unknown."""
     if before_m is None or after_m is None or abs(after_m - before_m) <= bound_m:
         return ""
     return f"the base moved by {1000.0 * (after_m - before_m):.1f} mm: clamp it, and measure again"
 
 
 def load_remarks(log: Log, configuration: Configuration, flipper: str) -> list[str]:
-    """Between the moment before the first insertion and the end of the log, in which the robot holds its pose."""
+    """Compare the loads before the first insertion and at the end of the log, when the robot holds its pose."""
     before, after = _before_insertion(log), _at_the_end(log)
     if not (len(before) and len(after)):
         return []
@@ -50,8 +50,8 @@ def load_remarks(log: Log, configuration: Configuration, flipper: str) -> list[s
         change_nm = constant_nm_a * float(after["current_a"][:, joint].mean() - before["current_a"][:, joint].mean())
         if isfinite(change_nm) and abs(change_nm) > bound_nm:
             remarks.append(
-                f"{JOINTS[joint]} carries {abs(change_nm):.2f} N·m more or less in free air than before the stride: "
-                "clean the flipper, see whether the base is firm, and measure again"
+                f"the load of {JOINTS[joint]} in free air changed by {abs(change_nm):.2f} N·m during the stride: "
+                "clean the flipper, check that the base is firm, and measure again"
             )
     return remarks
 
@@ -62,13 +62,13 @@ def _before_insertion(log: Log) -> NDArray[np.void]:
     if not len(inserting):
         return ticks[:0]
     end_s = ticks["stamp_s"][inserting[0]]
-    rows: NDArray[np.void] = ticks[(ticks["stamp_s"] >= end_s - LOOK_S) & (ticks["stamp_s"] < end_s)]
+    rows: NDArray[np.void] = ticks[(ticks["stamp_s"] >= end_s - WINDOW_S) & (ticks["stamp_s"] < end_s)]
     return rows
 
 
 def _at_the_end(log: Log) -> NDArray[np.void]:
     held = log.ticks[log.ticks["mode"] == Mode.HOLD]
-    late: NDArray[np.void] = held[held["stamp_s"] >= log.ticks["stamp_s"][-1] - LOOK_S]
+    late: NDArray[np.void] = held[held["stamp_s"] >= log.ticks["stamp_s"][-1] - WINDOW_S]
     return late
 
 
@@ -79,5 +79,5 @@ def surface_remarks(stride: dict[str, Any]) -> list[str]:
     where = "below" if surface_m > 0.0 else "above"
     return [
         f"the mud was met {1000.0 * abs(surface_m):.0f} mm {where} its nominal height: fill it up to "
-        "geometry.axis_height_m under the axes, or measure that height anew"
+        "geometry.axis_height_m below the axes, or measure that height again"
     ]
