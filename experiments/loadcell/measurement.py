@@ -1,244 +1,299 @@
-"""The ground truth of a mud from a load cell on a linear stage (the paper's section II-E), and how a flipper compares.
+"""Measures the true coefficients of a mud with a load cell on a linear stage (the paper's section II-E).
 
-A plate is dragged 20 cm through the mud at 3 cm of depth, and in other trials let down 3 cm, held for 3 s and drawn
-out, at 0.1 m/s and five times each. The cell's amplifier is a serial port; nobody but its operator knows the stage.
+A plate is dragged 20 cm through the mud at a depth of 3 cm. In other trials it goes down 3 cm, holds for 3 s and comes
+out again. The stage moves at 0.1 m/s, and each kind of trial is repeated five times. The cell's amplifier and,
+optionally, a position encoder of the stage are serial ports; the operator moves the stage.
 """
 
 from __future__ import annotations
 
-from collections import Counter
+import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from drivers.load_cell.calibration import (
-    CalibrationError,
-    LoadCellCalibration,
-    calibrate,
-    of_unit,
-    read_calibration,
-    remarks_on,
-    weigh,
-    write_calibration,
-)
-from drivers.load_cell.line_formats import COUNTS, LineFormat
+from drivers.load_cell.calibration import LoadCellCalibration
+from drivers.load_cell.line_formats import AUTO, COUNTS, NUMBER, LineFormat
 from drivers.load_cell.load_cell_port import LoadCellPort
-from experiments.loadcell.analysis import analyse
-from experiments.loadcell.comparison import Compared, compared_with
-from experiments.loadcell.fits import COEFFICIENTS, Analysed, OfMud, bench_uncertainty, of_mud, speed_remark
-from experiments.loadcell.motion import StageSettings
-from experiments.loadcell.raw import load_all
-from experiments.loadcell.recording import CellRecorder
-from experiments.loadcell.trial_checks import examine_encoder, examine_lines
+from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings
+from drivers.serial.serial_line import SerialLineError
+from experiments.loadcell.analysis.analyse import analyse
+from experiments.loadcell.analysis.coefficients import (
+    COEFFICIENTS,
+    AnalysedTrial,
+    MudCoefficient,
+    bench_uncertainty,
+    gather_trials,
+    speed_remark,
+)
+from experiments.loadcell.analysis.force_motion import StageSettings
+from experiments.loadcell.comparison import Compared, compare_muds
+from experiments.loadcell.preparation import OR_WITHOUT, CellSettings, prepare_cell
+from experiments.loadcell.recording import CellRecorder, WallClock, load_counted
+from experiments.loadcell.stage import ManualStage, SimulatedStage, Stage, clay_truth, water_of
 from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
-from experiments.robot.bench_robot import BenchError
-from experiments.robot.prompt import GO_ON, Operator
-from experiments.trials.notebook import Notebook
-from experiments.trials.session import Show
-from firmware_host.operator.reports import known
-
-CALIBRATION = "calibration.json"
-WEIGHING_S = 2.0
-LEAST_SAMPLES = 12  # of an insertion
-STOP = "q"
+from experiments.reports.report_page import FLAT, to_json
+from experiments.robot.bench_errors import BenchError
+from experiments.trials.notebook import Entry, Notebook
+from experiments.trials.session import Session, Show
+from simulation.test_rig.load_cell_bench import EmulatedBench, clay_plate, position_link
+from simulation.test_rig.load_cell_emulator import AmplifierParameters
+from simulation.test_rig.plate_stage import StageParameters
+from simulation.test_rig.stage_encoder_emulator import StageEncoderParameters
+from simulation.test_rig.stage_motion import HandParameters
 
 
 @dataclass(frozen=True)
-class CellSettings:
-    """As the operator gave them; an empty unit is that of the lines."""
+class BenchSettings:
+    """The devices of the bench. Without a port they are emulated."""
 
-    format_name: str = "auto"
-    unit: str = ""
-    scale_n: float | None = None  # newtons per unit
-    calibration: Path | None = None
+    port: str | None
+    baud: int
+    cell: CellSettings
+    encoder: StageEncoderSettings | None
+    seed: int  # of the emulated devices
 
-
-def plan_of_notebook(settings: StageSettings) -> dict[str, Any]:
-    """What may not change between the trials of one folder; muds and trials may be added."""
-    return {"experiment": "loadcell", **asdict(settings)}
-
-
-def measure(bench: TrialBench, plan: TrialPlan, cell: CellSettings) -> None:
-    """From an open port to all trials. Raises BenchError with what to do."""
-    port = bench.recorder.port
-    bench.operator.report(f"listening to {port.path} at {port.baud} baud")
-    port.line_format = LineFormat(examine_lines(bench.recorder, cell.format_name))
-    examine_encoder(bench.recorder, bench.operator, plan.settings)
-    port.calibration = settle_calibration(bench, cell)
-    on_rate(bench.recorder, bench.operator, plan.settings)
-    measure_all(bench, plan)
-
-
-def settle_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibration:
-    """From the file that was given, the unit, this folder's earlier one, or made anew. Raises BenchError."""
-    port = bench.recorder.port
-    unit = cell.unit or _unit_of(port)
-    kept = bench.folder / CALIBRATION
-    try:
-        if cell.calibration is not None:
-            return read_calibration(cell.calibration)
-        known = of_unit(unit, cell.scale_n)
-        if known is not None:
-            return known
-        if kept.exists():
-            bench.operator.report(f"calibration from {kept}; remove it to calibrate again")
-            return read_calibration(kept)
-    except CalibrationError as problem:
-        raise BenchError(str(problem)) from problem
-    return _calibrate_anew(bench, unit, kept)
-
-
-def _unit_of(port: LoadCellPort) -> str:
-    """As most lines say, or counts."""
-    readings = [port.line_format.decode(line) for line in port.recent_lines]
-    units = Counter(reading.unit for reading in readings if reading is not None and reading.unit)
-    return units.most_common(1)[0][0] if units else COUNTS
-
-
-def _calibrate_anew(bench: TrialBench, unit: str, kept: Path) -> LoadCellCalibration:
-    """Until two weights tell the span; a person is told what is wrong and asked for other ones."""
-    recorder = bench.recorder
-    recorder.port.calibration = LoadCellCalibration(unit, 1.0)
-    while True:
-        try:
-            weighings = [weigh(bench.stage.weigh(which), _readings(recorder)) for which in (0, 1)]
-            calibration = calibrate(unit, *weighings)
-        except CalibrationError as problem:
-            bench.operator.report(str(problem))
-            if bench.operator.ask("Calibrate again?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
-                raise BenchError("the load cell is not calibrated") from problem
-            continue
-        for remark in remarks_on(calibration, *weighings):
-            bench.operator.report(remark)
-        write_calibration(kept, calibration)
-        bench.operator.report(
-            f"calibrated: {calibration.per_newton:.6g} {unit} per N, ± {100.0 * calibration.relative_error:.2g} %; "
-            f"kept in {kept}"
-        )
-        return calibration
-
-
-def _readings(recorder: CellRecorder) -> list[float]:
-    """Raises CalibrationError where the cell cannot bear the weight."""
-    recorder.drain()
-    samples = recorder.listen(WEIGHING_S)
-    readings = [sample.force_n for sample in samples if not sample.overloaded]
-    if len(readings) < len(samples) / 2.0:
-        raise CalibrationError("the load cell is overloaded by this weight: take a lighter one, or check its wires")
-    return readings
-
-
-def on_rate(recorder: CellRecorder, operator: Operator, settings: StageSettings) -> None:
-    """An amplifier too slow for the stroke is told first. Raises BenchError where that ends it."""
-    rate_hz = recorder.port.rate_hz
-    if rate_hz is None:
-        raise BenchError("too few lines come to tell their rate: check the amplifier")
-    duration_s = settings.depth_m / settings.speed_m_s
-    samples = rate_hz * duration_s
-    if samples >= LEAST_SAMPLES:
-        return
-    slower_m_s = settings.speed_m_s * samples / LEAST_SAMPLES
-    operator.report(
-        f"the amplifier sends {rate_hz:.0f} lines/s: an insertion of {duration_s:.2g} s has only {samples:.0f} samples "
-        f"and wants {LEAST_SAMPLES}. Set an HX711's RATE pin high (80 samples/s), choose a faster rate of the "
-        f"indicator, or move the stage at --speed {slower_m_s:.2g}"
-    )
-    if operator.ask("Go on all the same?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
-        raise BenchError("stopped: the amplifier is too slow for the stroke")
+    @property
+    def name(self) -> str:
+        return "simulated" if self.port is None else "load cell"
 
 
 class Results(NamedTuple):
-    trials: list[Analysed]
-    muds: dict[str, dict[str, OfMud]]  # by mud and coefficient
+    trials: list[AnalysedTrial]
+    muds: dict[str, dict[str, MudCoefficient]]  # by mud and coefficient
     remarks: list[str]
     compared: list[Compared]
-    flipper: Mapping[str, Any]  # its summary; empty where there is none
+    flipper: Mapping[str, Any]  # summary of the flipper experiment; empty where there is none
 
 
-def conclude(
-    folder: Path, notebook: Notebook, plan: TrialPlan, compare: Mapping[str, Any] | None, show: Show
+@dataclass(frozen=True)
+class MudReport:
+    mud: str
+    coefficients: Mapping[str, Mapping[str, Any]] = field(metadata=FLAT)
+
+
+@dataclass(frozen=True)
+class TrialReport:
+    key: str
+    entry: Entry = field(metadata=FLAT)  # of the notebook
+    coefficients: Mapping[str, Any] = field(metadata=FLAT)
+    speed_m_s: float | None
+    is_measured: bool
+    position_error_m: float | None = field(metadata={"key": "place_error_m"})
+    alignment: Any
+    problem: str
+    remark: str
+
+
+@dataclass(frozen=True)
+class LoadcellReport:
+    settings: Mapping[str, float]
+    cell: Mapping[str, Any]
+    stage: Mapping[str, float | None]
+    muds: Sequence[MudReport]
+    trials: Sequence[TrialReport]
+    left_out: Mapping[str, Entry]
+    remarks: Sequence[str]
+    compared: Sequence[Mapping[str, Any]]
+    truth: Mapping[str, Any]  # of simulated muds
+    experiment: str = "loadcell"
+
+
+def measure_muds(
+    session: Session, plan: TrialPlan, bench: BenchSettings, flipper: Mapping[str, Any] | None
+) -> tuple[Results, LoadcellReport]:
+    """Measure the missing trials and evaluate all of them. Raises BenchError with what to do."""
+    notebook = Notebook(session.folder, notebook_plan(plan.settings) | {"bench": bench.name})
+    missing = [trial for trial in plan.list_trials() if trial.key not in notebook.entries]
+    _report_progress(session, notebook, len(missing), bench.encoder is not None)
+    cell: dict[str, Any] = {
+        "bench": bench.name,
+        "port": bench.port,
+        "baud": bench.baud,
+        "format": bench.cell.format_name,
+    }
+    if missing:
+        cell |= _measure(session, plan, bench, notebook)
+    results = evaluate_muds(session.folder, notebook, plan, flipper, session.show)
+    if not results.trials:
+        raise BenchError("no trial counts, so there is nothing to evaluate")
+    truth = {mud: clay_truth(water_of(mud), plan.settings) for mud in results.muds} if bench.port is None else {}
+    return results, make_report(results, notebook, plan, cell, truth)
+
+
+def notebook_plan(settings: StageSettings) -> dict[str, Any]:
+    """Return the options that must be the same in all trials of one folder; muds and trials may be added."""
+    return {"experiment": "loadcell", **to_json(settings)}
+
+
+def _report_progress(session: Session, notebook: Notebook, missing: int, has_encoder: bool) -> None:
+    if not notebook.begun:
+        return
+    report = session.operator.report
+    report(f"{len(notebook.entries)} trials are in {session.folder} already, {missing} are left")
+    without = sum("file" in entry and "position" not in entry for entry in notebook.entries.values())
+    if has_encoder and without:
+        report(f"{without} of them have no measured position; their depth is found from the force")
+
+
+def _measure(session: Session, plan: TrialPlan, bench: BenchSettings, notebook: Notebook) -> dict[str, Any]:
+    """Measure the missing trials; return a description of the load cell."""
+    with ExitStack() as devices:
+        emulated = _emulate(plan, bench, devices) if bench.port is None else None
+        path = bench.port or str(emulated[1] if emulated else "")
+        port = _open_cell(path, bench)
+        devices.callback(port.close)
+        encoder = None if bench.encoder is None else _open_encoder(bench.encoder, None if bench.port else path)
+        if encoder is not None:
+            devices.callback(encoder.close)
+        clock = emulated[0] if emulated else WallClock()
+        recorder = CellRecorder(port, clock, session.operator.report, encoder)
+        stage: Stage = ManualStage(plan.settings, session.operator, recorder.drain)
+        if emulated is not None:
+            plates = {mud: clay_plate(water_of(mud), plan.settings.plate) for mud in plan.muds}
+            stage = SimulatedStage(plan.settings, emulated[0], plates, bench.seed)
+        trial_bench = TrialBench(recorder, stage, session.operator, notebook, session.folder, session.show)
+        prepare_cell(trial_bench, plan.settings, bench.cell)
+        measure_all(trial_bench, plan)
+        return _describe_cell(port, encoder)
+
+
+def _emulate(plan: TrialPlan, bench: BenchSettings, devices: ExitStack) -> tuple[EmulatedBench, Path]:
+    """Start the emulated devices; return them and the path of the load cell's port."""
+    link = Path(devices.enter_context(tempfile.TemporaryDirectory(prefix="mudskipper-"))) / "load_cell"
+    plate = clay_plate(water_of(plan.muds[0]), plan.settings.plate)
+    amplifier = AmplifierParameters(baud=bench.baud)
+    encoder, stage = None, None
+    if bench.encoder is not None:  # a stage with an encoder is pushed by hand
+        settings = bench.encoder
+        encoder = StageEncoderParameters(
+            metres_per_count=settings.metres_per_count, baud=settings.baud, label=settings.label
+        )
+        stage = StageParameters(hand=HandParameters(), seed=bench.seed)
+    emulated = EmulatedBench(plate, link, amplifier, stage, bench.seed, encoder)
+    devices.callback(emulated.close)
+    return emulated, link
+
+
+def _open_cell(path: str, bench: BenchSettings) -> LoadCellPort:
+    """Open the port with an assumed format; its lines are examined next."""
+    cell = bench.cell
+    line_format = LineFormat(NUMBER if cell.format_name == AUTO else cell.format_name)
+    try:
+        return LoadCellPort(path, bench.baud, line_format, LoadCellCalibration(cell.unit or COUNTS, 1.0))
+    except SerialLineError as problem:
+        raise BenchError(str(problem)) from problem
+
+
+def _open_encoder(settings: StageEncoderSettings, emulated_cell: str | None) -> StageEncoder:
+    if emulated_cell is not None:
+        settings = replace(settings, path=str(position_link(Path(emulated_cell))))
+    try:
+        return StageEncoder(settings)
+    except SerialLineError as problem:
+        raise BenchError(f"the stage's encoder: {problem}; {OR_WITHOUT}") from problem
+
+
+def _describe_cell(port: LoadCellPort, encoder: StageEncoder | None) -> dict[str, Any]:
+    position = None
+    if encoder is not None:
+        position = asdict(encoder.settings) | {
+            "counts": encoder.counts.believed,
+            "rate_hz": encoder.rate_hz,
+            "garbled_lines": encoder.counts.garbled,
+            "breaks": encoder.breaks,
+        }
+    return {
+        "port": port.path,
+        "format": port.line_format.name,
+        "rate_hz": port.rate_hz,
+        "lines": port.lines,
+        "garbled_lines": port.garbled_lines,
+        "last_garbled": port.last_garbled,
+        "calibration": port.calibration._asdict(),
+        "position": position,
+    }
+
+
+def evaluate_muds(
+    folder: Path, notebook: Notebook, plan: TrialPlan, flipper: Mapping[str, Any] | None, show: Show
 ) -> Results:
-    """From what is on the disk."""
-    trials = analyse(load_all(folder, notebook), plan.settings, show)
-    errors = {key: _relative_error(entry) for key, entry in notebook.entries.items() if "calibration" in entry}
+    """Evaluate the recorded trials of a folder."""
+    trials = analyse(load_counted(folder, notebook), plan.settings, show)
     muds = {}
     for mud in dict.fromkeys(trial.recorded.mud for trial in trials):
-        of_it = [trial for trial in trials if trial.recorded.mud == mud]
-        error = max(errors[trial.recorded.key] for trial in of_it)
-        measured = all(trial.is_measured for trial in of_it if trial.coefficients)
-        depth_errors_m = dict.fromkeys(COEFFICIENTS, plan.depth_error_m)
-        if measured:  # but for a shear, whose depth is the one that was set
-            depth_errors_m |= {"k_p": 0.0, "k_e": 0.0}
-        uncertainties = {
-            name: bench_uncertainty(name, plan.settings, depth_errors_m[name], error) for name in COEFFICIENTS
-        }
-        muds[mud] = {name: of_mud(of_it, name, uncertainty) for name, uncertainty in uncertainties.items()}
-    return Results(trials, muds, list_remarks(trials, plan.settings), compared_with(compare, muds), compare or {})
+        own = [trial for trial in trials if trial.recorded.mud == mud]
+        errors = _bench_errors(own, notebook, plan)
+        muds[mud] = {name: gather_trials(own, name, errors[name]) for name in COEFFICIENTS}
+    return Results(trials, muds, list_remarks(trials, plan.settings), compare_muds(flipper, muds), flipper or {})
 
 
-def _relative_error(entry: Mapping[str, Any]) -> float:
-    return LoadCellCalibration(**entry["calibration"]).relative_error
-
-
-def list_remarks(trials: Sequence[Analysed], settings: StageSettings) -> list[str]:
-    reported = [f"{trial.recorded.key}: {text}" for trial in trials for text in (trial.problem, trial.remark) if text]
-    paced = [(trial.recorded.key, trial.pace) for trial in trials if trial.pace is not None]
-    by_pace = {key: remark for key, pace in paced if (remark := speed_remark(pace, settings))}
-    if len(by_pace) > 3:
-        reported.append(f"in {len(by_pace)} trials {next(iter(by_pace.values()))}")
-    else:
-        reported += [f"{key}: {remark}" for key, remark in by_pace.items()]
-    turned = [trial for trial in trials if trial.profile is not None and trial.profile.turned]
-    if turned:
-        reported.append(f"in {len(turned)} trials the cell measured the other way round; their signs are turned")
-    return reported
-
-
-def report_of(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mapping[str, Any]) -> dict[str, Any]:
-    paces = [trial.pace for trial in results.trials if trial.pace is not None]
+def _bench_errors(trials: Sequence[AnalysedTrial], notebook: Notebook, plan: TrialPlan) -> dict[str, float]:
+    """Return the fraction by which the bench may err alike in all trials of a mud, by coefficient."""
+    calibrations = [notebook.entries[trial.recorded.key]["calibration"] for trial in trials]
+    calibration_error = max(LoadCellCalibration(**calibration).relative_error for calibration in calibrations)
+    depth_errors_m = dict.fromkeys(COEFFICIENTS, plan.depth_error_m)
+    if all(trial.is_measured for trial in trials if trial.coefficients):
+        depth_errors_m |= {"k_p": 0.0, "k_e": 0.0}  # a shear keeps the depth that the operator set
     return {
-        "experiment": "loadcell",
-        "settings": asdict(plan.settings) | {"depth_error_m": plan.depth_error_m},
-        "cell": dict(cell),
-        "stage": {
-            "speed_m_s": known(sum(p.speed_m_s for p in paces) / len(paces)) if paces else None,
-            "acceleration_m_s2": known(sum(p.acceleration_m_s2 for p in paces) / len(paces)) if paces else None,
+        name: bench_uncertainty(name, plan.settings, depth_errors_m[name], calibration_error) for name in COEFFICIENTS
+    }
+
+
+def list_remarks(trials: Sequence[AnalysedTrial], settings: StageSettings) -> list[str]:
+    remarks = [f"{trial.recorded.key}: {text}" for trial in trials for text in (trial.problem, trial.remark) if text]
+    paced = [(trial.recorded.key, trial.pace) for trial in trials if trial.pace is not None]
+    by_trial = {key: remark for key, pace in paced if (remark := speed_remark(pace, settings))}
+    if len(by_trial) > 3:
+        remarks.append(f"in {len(by_trial)} trials {next(iter(by_trial.values()))}")
+    else:
+        remarks += [f"{key}: {remark}" for key, remark in by_trial.items()]
+    turned = sum(trial.profile is not None and trial.profile.turned for trial in trials)
+    if turned:
+        remarks.append(f"in {turned} trials the cell measured with the opposite sign; their forces are turned")
+    return remarks
+
+
+def make_report(
+    results: Results, notebook: Notebook, plan: TrialPlan, cell: Mapping[str, Any], truth: Mapping[str, Any]
+) -> LoadcellReport:
+    paces = [trial.pace for trial in results.trials if trial.pace is not None]
+    return LoadcellReport(
+        settings=to_json(plan.settings) | {"depth_error_m": plan.depth_error_m},
+        cell=cell,
+        stage={
+            "speed_m_s": sum(pace.speed_m_s for pace in paces) / len(paces) if paces else None,
+            "acceleration_m_s2": sum(pace.acceleration_m_s2 for pace in paces) / len(paces) if paces else None,
         },
-        "muds": [
-            {"mud": mud, **{name: _described(reported) for name, reported in coefficients.items()}}
+        muds=[
+            MudReport(mud, {name: _describe(coefficient) for name, coefficient in coefficients.items()})
             for mud, coefficients in results.muds.items()
         ],
-        "trials": [_trial_described(trial, notebook.entries[trial.recorded.key]) for trial in results.trials],
-        "left_out": notebook.left_out,
-        "remarks": results.remarks,
-        "compared": [
-            each._asdict() | {"ratio": known(each.ratio), "ratio_std_error": known(each.ratio_std_error)}
-            for each in results.compared
+        trials=[_trial_report(trial, notebook.entries[trial.recorded.key]) for trial in results.trials],
+        left_out=notebook.left_out,
+        remarks=results.remarks,
+        compared=[
+            row._asdict() | {"ratio": row.ratio, "ratio_std_error": row.ratio_std_error} for row in results.compared
         ],
-    }
+        truth=truth,
+    )
 
 
-def _described(reported: OfMud) -> dict[str, Any]:
-    return {
-        "value": known(reported.value),
-        "std_error": known(reported.std_error),
-        "trials_error": known(reported.trials_error),
-        "shared_error": known(reported.shared_error),
-        "repeatability": known(reported.repeatability),
-        "trials": [known(value) for value in reported.trials],
-    }
+def _describe(coefficient: MudCoefficient) -> dict[str, Any]:
+    return coefficient._asdict() | {"std_error": coefficient.std_error}
 
 
-def _trial_described(trial: Analysed, entry: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "key": trial.recorded.key,
-        **entry,
-        **{name: {"value": known(c.value), "std_error": known(c.std_error)} for name, c in trial.coefficients.items()},
-        "speed_m_s": None if trial.speed_m_s is None else known(trial.speed_m_s),
-        "is_measured": trial.is_measured,
-        "place_error_m": trial.position_error_m if trial.is_measured else None,
-        "alignment": trial.alignment and {name: known(value) for name, value in trial.alignment._asdict().items()},
-        "problem": trial.problem,
-        "remark": trial.remark,
-    }
+def _trial_report(trial: AnalysedTrial, entry: Entry) -> TrialReport:
+    return TrialReport(
+        key=trial.recorded.key,
+        entry=entry,
+        coefficients=trial.coefficients,
+        speed_m_s=trial.speed_m_s,
+        is_measured=trial.is_measured,
+        position_error_m=trial.position_error_m if trial.is_measured else None,
+        alignment=trial.alignment,
+        problem=trial.problem,
+        remark=trial.remark,
+    )

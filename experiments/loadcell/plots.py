@@ -1,4 +1,4 @@
-"""The load cell's trials as pictures: force and depth against time with the fits, coefficients, and the flipper's."""
+"""Pictures of the load cell's trials: force and depth with the fits, coefficients, and a flipper's for comparison."""
 
 from __future__ import annotations
 
@@ -14,29 +14,31 @@ import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 
 from control.plate import submerged_part  # noqa: E402
-from experiments.loadcell.comparison import Compared  # noqa: E402
-from experiments.loadcell.curve_fit import Array  # noqa: E402
-from experiments.loadcell.fits import (  # noqa: E402
+from experiments.loadcell.analysis.coefficients import (  # noqa: E402
     COEFFICIENTS,
-    Analysed,
-    OfMud,
+    AnalysedTrial,
+    MudCoefficient,
     depths_of,
     volume_m3,
 )
-from experiments.loadcell.motion import REVERSAL_FRACTION, Insertion, Shear, StageSettings  # noqa: E402
+from experiments.loadcell.analysis.curve_fit import Array  # noqa: E402
+from experiments.loadcell.analysis.force_motion import REVERSAL_FRACTION, Insertion, Shear, StageSettings  # noqa: E402
+from experiments.loadcell.comparison import Compared  # noqa: E402
 from experiments.reports.mud_names import mud_text  # noqa: E402
 from experiments.reports.mud_styles import INK, LABELS, looks_of, mark_of  # noqa: E402
 from experiments.reports.value_text import N_CM3  # noqa: E402
 
 COLOURS = ("tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:cyan")
 MODEL: dict[str, Any] = {"color": "tab:red", "linestyle": (0, (5, 2)), "linewidth": 1.8, "zorder": 5}
-BEFORE_S, BEHIND_S = 0.3, 0.4
+BEFORE_S, AFTER_S = 0.3, 0.4
 SHOWN_ABOVE_M = 0.01  # the mud
 DPI = 110
 
 
-def plot_mud(trials: Sequence[Analysed], reported: Mapping[str, OfMud], settings: StageSettings, path: Path) -> None:
-    """All trials of one mud, each from its own beginning on; the model is that of the mud's coefficients."""
+def plot_mud(
+    trials: Sequence[AnalysedTrial], coefficients: Mapping[str, MudCoefficient], settings: StageSettings, path: Path
+) -> None:
+    """Plot all trials of one mud from their beginnings, with the model by the mud's coefficients."""
     figure, axes = plt.subplots(2, 2, figsize=(12.0, 7.2), constrained_layout=True, height_ratios=(1.5, 1.0))
     (vertical, shear), (depth, curve) = axes
     for panel in (vertical, shear, curve):
@@ -45,26 +47,26 @@ def plot_mud(trials: Sequence[Analysed], reported: Mapping[str, OfMud], settings
     for i, trial in enumerate(strokes):
         _plot_insertion(vertical, depth, curve, trial, settings, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
     if strokes:
-        _plot_vertical_model(vertical, curve, strokes[-1], reported, settings)
+        _plot_vertical_model(vertical, curve, strokes[-1], coefficients, settings)
     drags = [trial for trial in trials if isinstance(trial.motion, Shear)]
-    over_way = bool(drags) and all(trial.is_measured for trial in drags)
+    over_travel = bool(drags) and all(trial.is_measured for trial in drags)
     for i, trial in enumerate(drags):
-        _plot_shear(shear, trial, over_way, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
+        _plot_shear(shear, trial, over_travel, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
     if drags:
-        _plot_shear_model(shear, drags[-1], over_way, reported["k_s"], settings)
+        _plot_shear_model(shear, drags[-1], over_travel, coefficients["k_s"], settings)
     _name_axes(vertical, shear, depth, curve)
-    _name_places(shear, depth, curve, over_way, {trial.is_measured for trial in strokes})
+    _name_panels(shear, depth, curve, over_travel, {trial.is_measured for trial in strokes})
     figure.savefig(path, dpi=DPI)
     plt.close(figure)
 
 
 def _plot_insertion(
-    vertical: Axes, depth: Axes, curve: Axes, trial: Analysed, settings: StageSettings, colour: str, label: str
+    vertical: Axes, depth: Axes, curve: Axes, trial: AnalysedTrial, settings: StageSettings, colour: str, label: str
 ) -> None:
     motion, profile, depths_m = trial.motion, trial.profile, depths_of(trial, settings)
     assert isinstance(motion, Insertion) and profile is not None and depths_m is not None
     end_s = profile.times_s[-1] if trial.extraction is None else trial.extraction.out_s
-    shown = (profile.times_s > motion.surface_s - BEFORE_S) & (profile.times_s < end_s + BEHIND_S)
+    shown = (profile.times_s > motion.surface_s - BEFORE_S) & (profile.times_s < end_s + AFTER_S)
     since_s, forces_n = profile.times_s[shown] - motion.surface_s, profile.forces_n[shown] - motion.level_n
     depths_cm = 100.0 * np.where(depths_m[shown] < -SHOWN_ABOVE_M, np.nan, depths_m[shown])
     look: dict[str, Any] = {"color": colour, "linewidth": 1.0}
@@ -75,9 +77,13 @@ def _plot_insertion(
 
 
 def _plot_vertical_model(
-    vertical: Axes, curve: Axes, trial: Analysed, reported: Mapping[str, OfMud], settings: StageSettings
+    vertical: Axes,
+    curve: Axes,
+    trial: AnalysedTrial,
+    coefficients: Mapping[str, MudCoefficient],
+    settings: StageSettings,
 ) -> None:
-    """Against time along the depths of the trial."""
+    """Plot the model against time, along the depths of the trial."""
     motion, profile, trial_m = trial.motion, trial.profile, depths_of(trial, settings)
     assert isinstance(motion, Insertion) and profile is not None and trial_m is not None
     since_s, even_m = profile.times_s - motion.surface_s, np.linspace(0.0, settings.depth_m, 40)
@@ -85,33 +91,35 @@ def _plot_vertical_model(
     if trial.extraction is not None:
         strokes.append(("k_e", -1.0, 1.0 - REVERSAL_FRACTION, trial.extraction.lift_s, trial.extraction.out_s))
     for name, sign, fraction, from_s, to_s in strokes:
-        per_m3, within = sign * reported[name].value, (trial_m >= 0.0) & (trial_m <= fraction * np.nanmax(trial_m))
+        per_m3, within = sign * coefficients[name].value, (trial_m >= 0.0) & (trial_m <= fraction * np.nanmax(trial_m))
         shown = within & (profile.times_s >= from_s) & (profile.times_s <= to_s)
         label = "model" if name == "k_p" else None
         vertical.plot(since_s[shown], per_m3 * volume_m3(settings, trial_m[shown]), label=label, **MODEL)
         curve.plot(100.0 * fraction * even_m, per_m3 * volume_m3(settings, fraction * even_m), **MODEL)
 
 
-def _plot_shear(panel: Axes, trial: Analysed, over_way: bool, colour: str, label: str) -> None:
+def _plot_shear(panel: Axes, trial: AnalysedTrial, over_travel: bool, colour: str, label: str) -> None:
     motion, profile = trial.motion, trial.profile
     assert isinstance(motion, Shear) and profile is not None
     zero_n = -trial.recorded.zero_n if profile.turned else trial.recorded.zero_n
     shown = profile.times_s > motion.begin_s - BEFORE_S
-    along = _ways_cm(trial) if over_way else profile.times_s - motion.begin_s
+    along = _travel_cm(trial) if over_travel else profile.times_s - motion.begin_s
     panel.plot(along[shown], profile.forces_n[shown] - zero_n, color=colour, linewidth=1.0, label=label)
 
 
-def _ways_cm(trial: Analysed) -> Array:
+def _travel_cm(trial: AnalysedTrial) -> Array:
     return np.asarray(100.0 * trial.positions_m) if trial.positions_m is not None else np.empty(0)
 
 
-def _plot_shear_model(panel: Axes, trial: Analysed, over_way: bool, reported: OfMud, settings: StageSettings) -> None:
+def _plot_shear_model(
+    panel: Axes, trial: AnalysedTrial, over_travel: bool, k_s: MudCoefficient, settings: StageSettings
+) -> None:
     motion, profile = trial.motion, trial.profile
     assert isinstance(motion, Shear) and profile is not None
     moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
     along = np.array([motion.steady_from_s, motion.steady_to_s])
-    along = np.interp(along, profile.times_s, _ways_cm(trial)) if over_way else along - motion.begin_s
-    panel.plot(along, [reported.value * moment_m3] * 2, label="model", **MODEL)
+    along = np.interp(along, profile.times_s, _travel_cm(trial)) if over_travel else along - motion.begin_s
+    panel.plot(along, [k_s.value * moment_m3] * 2, label="model", **MODEL)
 
 
 def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:
@@ -130,27 +138,25 @@ def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:
             panel.legend(fontsize="small", loc="upper right" if panel is vertical else "lower center", ncols=2)
 
 
-def _name_places(shear: Axes, depth: Axes, curve: Axes, over_way: bool, measured: set[bool]) -> None:
+def _name_panels(shear: Axes, depth: Axes, curve: Axes, over_travel: bool, measured: set[bool]) -> None:
     found = "as measured" if measured == {True} else "as found from the force"
     found = "measured or found from the force" if len(measured) == 2 else found
     depth.set_title(f"depth, {found}", fontsize="medium")
     curve.set_title("force over the measured depth" if measured == {True} else "force over depth", fontsize="medium")
-    shear.set_xlabel("measured way of the stage (cm)" if over_way else "time since the force began (s)")
+    shear.set_xlabel("measured travel of the stage (cm)" if over_travel else "time since the force began (s)")
 
 
-def plot_coefficients(muds: Mapping[str, Mapping[str, OfMud]], path: Path) -> None:
-    """Mean with two standard errors, and every trial beside it."""
+def plot_coefficients(muds: Mapping[str, Mapping[str, MudCoefficient]], path: Path) -> None:
+    """Plot the mean with two standard errors, and every trial."""
     figure, panels = plt.subplots(1, 3, figsize=(11.0, 3.6), constrained_layout=True)
     names, looks = list(muds), looks_of(list(muds))
     for panel, name in zip(panels, COEFFICIENTS, strict=True):
-        for place, mud in enumerate(names):
-            reported = muds[mud][name]
-            values = np.array(reported.trials) / N_CM3
-            panel.plot(place + 0.18 + np.zeros(len(values)), values, ".", color="grey", markersize=4)
-            uncertainty = 2.0 * reported.std_error / N_CM3
-            panel.errorbar(
-                place, reported.value / N_CM3, uncertainty, linestyle="", ecolor=INK, capsize=3, **mark_of(looks[mud])
-            )
+        for column, mud in enumerate(names):
+            coefficient = muds[mud][name]
+            values = np.array(coefficient.trials) / N_CM3
+            panel.plot(column + 0.18 + np.zeros(len(values)), values, ".", color="grey", markersize=4)
+            value, two_errors = coefficient.value / N_CM3, 2.0 * coefficient.std_error / N_CM3
+            panel.errorbar(column, value, two_errors, ecolor=INK, capsize=3, linestyle="", **mark_of(looks[mud]))
         panel.set_xticks(range(len(names)), [mud_text(name) for name in names])
         panel.set_xlim(-0.6, len(names) - 0.4)
         panel.set_ylim(0.0, None)
@@ -161,7 +167,7 @@ def plot_coefficients(muds: Mapping[str, Mapping[str, OfMud]], path: Path) -> No
 
 
 def plot_comparison(rows: Sequence[Compared], path: Path) -> None:
-    """As the paper's figure 5 G to I: the flipper's against the load cell's, and the line on which both agree."""
+    """Plot the flipper's coefficients against the load cell's, as the paper's figure 5 G to I."""
     figure, panels = plt.subplots(1, 3, figsize=(11.0, 3.9), constrained_layout=True)
     looks = looks_of(list(dict.fromkeys(row.mud for row in rows)))
     for panel, name in zip(panels, COEFFICIENTS, strict=True):
@@ -181,7 +187,7 @@ def plot_comparison(rows: Sequence[Compared], path: Path) -> None:
 
 
 def _farthest(row: Compared) -> float:
-    """Up or to the right, with its error."""
+    """Return the larger end of the two error bars."""
     return max(row.sensed + 2.0 * row.sensed_std_error, row.truth + 2.0 * row.truth_std_error)
 
 

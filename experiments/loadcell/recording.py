@@ -1,33 +1,39 @@
-"""Recording a load cell at the bench: time that passes, samples that come or do not, and what is said about it.
+"""Records the load cell and the stage's encoder, to memory and then to a file for each trial.
 
-Everything goes through the port and a clock, so that an emulated amplifier at an emulated stage is recorded as a real
-one is, through its bytes and its tty, only faster.
+All samples come through serial ports and all times from a clock, so that emulated devices are recorded through their
+own bytes, only faster than real ones. The notebook's entry of a trial names its files.
 """
 
 from __future__ import annotations
 
+import csv
+import re
 import time
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from drivers.load_cell.load_cell_port import LoadCellPort, Sample
 from drivers.load_cell.stage_encoder import Place, StageEncoder
-from experiments.loadcell.contact import CONTACT_NOISES, LEAST_FORCE_N, QUIET_S, noise_of
-from experiments.robot.bench_robot import BenchError
+from experiments.loadcell.analysis.coefficients import Recorded
+from experiments.loadcell.analysis.contact import CONTACT_NOISES, LEAST_FORCE_N, QUIET_S, noise_of
+from experiments.loadcell.analysis.stage_track import StagePositions
+from experiments.robot.bench_errors import BenchError
+from experiments.trials.notebook import Notebook
 
 POLL_S = 0.005
 TARE_S = 1.0
 ABSENCE_S = 300.0  # for which an adapter may be away
 CONTACT_SAMPLES = 3
-AVERAGED_LIKENESS = 0.6  # of a mean over three conversions
-LEAST_REPORTED, LEAST_VALUES = 40, 8  # samples, and different ones, of which fewer tell nothing
+AVERAGED_LIKENESS = 0.6  # correlation of successive means over three conversions
+LEAST_CORRELATED, LEAST_VALUES = 40, 8  # samples, and different values, for a correlation
 AVERAGED = (
-    "the cell's samples at rest hardly differ from one to the next: its amplifier tells means over several "
-    "conversions, which smears the strokes. Set its filter to the fastest, or move the stage more slowly"
+    "the cell's samples at rest hardly differ from one to the next: its amplifier averages several conversions, which "
+    "smears the strokes. Set its filter to the fastest, or move the stage more slowly"
 )
-FOLLOWING = 0.01  # of a zero that drifts while nobody starts, per sample
+FOLLOWING = 0.01  # gain per sample of the tracking of a drifting zero
 
 
 class BenchClock(Protocol):
@@ -45,36 +51,36 @@ class WallClock:
 
 
 class Tare(NamedTuple):
-    """With the plate clear of the mud."""
+    """The zero of the force, with the plate clear of the mud."""
 
     force_n: float
     noise_n: float
     samples: int
-    likeness: float = 0.0  # of each sample and the next one: 0 where they are independent, 1 where they are the same
+    likeness: float = 0.0  # correlation of successive samples
 
     @property
     def is_averaged(self) -> bool:
-        """By a filter in the amplifier, or what shakes the cell is slow."""
-        return self.samples >= LEAST_REPORTED and self.likeness > AVERAGED_LIKENESS
+        """Whether a filter averages the samples, or something slow shakes the cell."""
+        return self.samples >= LEAST_CORRELATED and self.likeness > AVERAGED_LIKENESS
 
 
-class PlaceStretch(NamedTuple):
-    """What an encoder on the stage told meanwhile."""
+class PositionStretch(NamedTuple):
+    """The encoder's lines during a stroke."""
 
-    places: list[Place]
+    positions: list[Place]
     garbled_lines: int
     drop_outs: int
-    breaks: int  # unplugged, or begun anew: places before and behind have not the same zero
+    breaks: int  # unplugged or restarted: positions before and after have different zeros
 
 
 class Stretch(NamedTuple):
-    """What was recorded of a stroke, and what became of the lines meanwhile."""
+    """The samples of a stroke, and the problems of the line."""
 
     samples: list[Sample]
     garbled_lines: int
     drop_outs: int
     unpluggings: int
-    position: PlaceStretch | None = None  # where the stage has an encoder
+    position: PositionStretch | None = None  # where the stage has an encoder
 
     @property
     def overloads(self) -> int:
@@ -82,7 +88,7 @@ class Stretch(NamedTuple):
 
 
 class CellRecorder:
-    """Owns the places that came since it was last drained; `tell` says what a person should know at once."""
+    """Reads the ports. `report` shows a message to the operator at once."""
 
     def __init__(
         self,
@@ -91,14 +97,14 @@ class CellRecorder:
         report: Callable[[str], None],
         encoder: StageEncoder | None = None,
     ) -> None:
-        """`encoder`: of the stage; nothing waits for it."""
+        """`encoder` belongs to the stage; recording goes on without its lines."""
         self.port, self.clock, self.report, self.encoder = port, clock, report, encoder
-        self._places: list[Place] = []
+        self._positions: list[Place] = []
 
     def drain(self) -> None:
-        """What comes while nobody wants it."""
+        """Discard everything that has arrived."""
         self._read()
-        self._places = []
+        self._positions = []
 
     def listen(self, duration_s: float) -> list[Sample]:
         self.await_port()
@@ -114,23 +120,23 @@ class CellRecorder:
     def _read(self) -> list[Sample]:
         now_s = self.clock.now_s()
         if self.encoder is not None:
-            self._places += self.encoder.read(now_s)
+            self._positions += self.encoder.read(now_s)
         return self.port.read(now_s)
 
     def await_port(self) -> None:
-        """An adapter that was pulled out is waited for. Raises BenchError after a while."""
+        """Wait for an adapter that was unplugged. Raises BenchError after ABSENCE_S."""
         if self.port.is_there:
             return
-        self.report(f"the load cell is gone ({self.port.last_problem}): plug {self.port.path} in again")
+        self.report(f"the load cell is unplugged ({self.port.last_problem}): plug {self.port.path} in again")
         end_s = self.clock.now_s() + ABSENCE_S
         while not self.port.is_there:
             if self.clock.now_s() > end_s:
                 raise BenchError(f"the load cell did not come back: {self.port.last_problem}")
             self.poll()
-        self.report("the load cell is back")
+        self.report("the load cell is connected again")
 
     def tare(self) -> Tare:
-        """Raises BenchError where nothing comes."""
+        """Raises BenchError where no samples arrive."""
         forces_n = self._steady_forces_n()
         if len(forces_n) < 4 and not self.port.is_there:
             forces_n = self._steady_forces_n()
@@ -144,14 +150,14 @@ class CellRecorder:
 
     def _silence(self) -> str:
         if self.port.overloads and self.port.arrivals.readable > 0.5:
-            return "the load cell says that it is overloaded with nothing on it: check its mounting and its wires"
+            return "the load cell reports an overload with nothing on it: check its mounting and its wires"
         return (
-            f"no samples come from {self.port.path}: check the amplifier's power and cable, and that it sends by "
-            "itself and not only when asked"
+            f"no samples arrive from {self.port.path}: check the amplifier's power and cable, and that it sends "
+            "without being asked"
         )
 
     def record(self, noise_n: float, patience_s: float, stroke_s: float) -> Stretch:
-        """Until `stroke_s` after the force has left its zero, or until the patience is at an end."""
+        """Record until `stroke_s` after the contact, or until the patience ends without a contact."""
         self.await_port()
         self.drain()
         port = self.port
@@ -165,20 +171,20 @@ class CellRecorder:
             samples += fresh
             if contact.handle(fresh):
                 end_s = self.clock.now_s() + stroke_s
-        places, after = self._places, _counted(self.encoder)
-        self._places = []
+        positions, after = self._positions, _counted(self.encoder)
+        self._positions = []
         self.await_port()
         return Stretch(
             samples,
             port.garbled_lines - garbled,
             port.clock.drop_outs - drop_outs,
             port.unpluggings - unpluggings,
-            PlaceStretch(places, *(b - a for a, b in zip(before, after, strict=True))) if self.encoder else None,
+            PositionStretch(positions, *(b - a for a, b in zip(before, after, strict=True))) if self.encoder else None,
         )
 
 
 def likeness(forces_n: Sequence[float]) -> float:
-    """Correlation of each with the next one, beside a drift; 0 where a coarse step hides how they scatter."""
+    """Return the correlation of successive samples, without their drift; 0 where the resolution is too coarse."""
     if len(set(forces_n)) < LEAST_VALUES:
         return 0.0
     order = np.arange(len(forces_n))
@@ -187,12 +193,12 @@ def likeness(forces_n: Sequence[float]) -> float:
 
 
 def _counted(encoder: StageEncoder | None) -> tuple[int, int, int]:
-    """Garbled lines, drop-outs, breaks."""
+    """Return the numbers of garbled lines, drop-outs and breaks."""
     return (0, 0, 0) if encoder is None else (encoder.counts.garbled, encoder.clock.drop_outs, encoder.breaks)
 
 
 class _Contact:
-    """Owns the level of a stroke's beginning, and whether the force has left it."""
+    """Detects that the force leaves its zero, which may drift until then."""
 
     def __init__(self, noise_n: float) -> None:
         self._bound_n = max(2.0 * CONTACT_NOISES * noise_n, LEAST_FORCE_N)
@@ -200,13 +206,13 @@ class _Contact:
         self._first_s: float | None = None
         self._level_n: float | None = None
         self._away = 0
-        self._seen = False
+        self._touched = False
 
     def handle(self, samples: Sequence[Sample]) -> bool:
-        """True once, when there is contact."""
+        """Return whether these samples contain the first contact."""
         for sample in samples:
-            if not self._seen and self._is_away(sample):
-                self._seen = True
+            if not self._touched and self._is_away(sample):
+                self._touched = True
                 return True
         return False
 
@@ -223,3 +229,57 @@ class _Contact:
         if not far:
             self._level_n += FOLLOWING * (sample.force_n - self._level_n)
         return self._away >= CONTACT_SAMPLES
+
+
+RAW = "raw"
+FORCE_COLUMNS, POSITION_COLUMNS = ("t_s", "force_n", "overloaded"), ("t_s", "place_m")
+
+
+def raw_name(key: str, attempt: int, what: str = "") -> str:
+    plain = re.sub(r"[^\w.]+", "_", key)
+    return f"{RAW}/{plain}_{attempt}{what}.csv"
+
+
+def write_samples(path: Path, samples: Iterable[Sample]) -> None:
+    rows = ((f"{each.stamp_s:.6f}", f"{each.force_n:.6f}", int(each.overloaded)) for each in samples)
+    _write_rows(path, FORCE_COLUMNS, rows)
+
+
+def write_positions(path: Path, positions: Iterable[Place]) -> None:
+    rows = ((f"{each.stamp_s:.6f}", f"{each.position_m:.8f}") for each in positions)
+    _write_rows(path, POSITION_COLUMNS, rows)
+
+
+def _write_rows(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(head)
+        writer.writerows(rows)
+
+
+def load_recorded(folder: Path, key: str, entry: dict[str, Any]) -> Recorded:
+    """Read one trial. Raises OSError, ValueError for a file of another kind."""
+    with (folder / entry["file"]).open(newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["overloaded"] == "0"]
+    times_s = np.array([float(row["t_s"]) for row in rows])
+    forces_n = np.array([float(row["force_n"]) for row in rows])
+    zero_n = (entry["zero_before_n"] + entry["zero_after_n"]) / 2.0
+    return Recorded(key, entry["mud"], entry["kind"], times_s, forces_n, zero_n, _load_positions(folder, entry))
+
+
+def _load_positions(folder: Path, entry: dict[str, Any]) -> StagePositions | None:
+    """Return nothing without an encoder, or where its zero changed during the stroke."""
+    position = entry.get("position")
+    if not position or position["breaks"] or not position["places"]:
+        return None
+    with (folder / position["file"]).open(newline="", encoding="utf-8") as file:
+        rows = [(float(row["t_s"]), float(row["place_m"])) for row in csv.DictReader(file)]
+    times_s, positions_m = np.array(rows).T
+    return StagePositions(times_s, positions_m)
+
+
+def load_counted(folder: Path, notebook: Notebook) -> list[Recorded]:
+    """Read all trials that count."""
+    counted = {key: entry for key, entry in notebook.entries.items() if "file" in entry and not entry.get("skipped")}
+    return [load_recorded(folder, key, entry) for key, entry in counted.items()]

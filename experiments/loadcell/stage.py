@@ -1,7 +1,7 @@
-"""The stage that carries the plate, as the experiment needs it: somebody prepares it, starts it and lifts the plate.
+"""The linear stage that carries the plate, moved by the operator or emulated.
 
-A person does at a real bench, and says when; in simulation the emulated stage is told. The experiment cannot tell
-which, and neither says when exactly a stroke begins.
+The experiment asks for each motion and cannot tell which stage it has. Neither stage reports when a stroke begins:
+that is found from the force.
 """
 
 from __future__ import annotations
@@ -10,17 +10,22 @@ from collections.abc import Callable, Mapping
 from random import Random
 from typing import NamedTuple, Protocol
 
+from control.records import UNKNOWN
 from drivers.load_cell.line_formats import GRAVITY_M_S2
-from experiments.loadcell.fits import INSERTION, SHEAR
-from experiments.loadcell.motion import StageSettings
+from experiments.loadcell.analysis.coefficients import INSERTION, SHEAR
+from experiments.loadcell.analysis.force_motion import StageSettings
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
-from simulation.test_rig.load_cell_bench import EmulatedBench
+from experiments.trials.load_cell_truth import TrueCoefficients, true_coefficients
+from simulation.body.reference_sensor import StrideTruth, StrokeTruth
+from simulation.mud.clay import clay_of_water
+from simulation.test_rig.load_cell_bench import RELAXATION, EmulatedBench, clay_plate
 from simulation.test_rig.plate_stage import CarriedPlate
 
 HEAVIEST_G = 50000.0
-ATTENDED_PATIENCE_S, SIMULATED_PATIENCE_S = 60.0, 5.0
+MANUAL_PATIENCE_S, SIMULATED_PATIENCE_S = 60.0, 5.0
 SIMULATED_WEIGHTS_G = (0.0, 500.0)
 SETTLING_S = 0.5
+PAPER_HOLD_S = 3.0
 
 
 class Trial(NamedTuple):
@@ -34,28 +39,28 @@ class Trial(NamedTuple):
 
 
 class Stage(Protocol):
-    patience_s: float  # how long it may take until the stroke has begun
+    patience_s: float  # longest time until a stroke has begun
 
     def weigh(self, which: int) -> float:
-        """Hang the lighter (0) or the heavier (1) weight on the cell; its force in newtons."""
+        """Hang the lighter (0) or the heavier (1) weight on the cell; return its force in newtons."""
 
     def prepare(self, trial: Trial, trials: int) -> str:
-        """Fresh and level mud, the plate clear above it, the cell along the stroke: GO_ON, SKIP, or REDO the last."""
+        """Level fresh mud with the plate clear above it; return GO_ON, SKIP, or REDO for the trial before."""
 
     def lower(self) -> None:
-        """Into the mud, as deep as the shear goes."""
+        """Bring the plate to the depth of a shear."""
 
     def start(self, trial: Trial) -> None:
-        """The stroke begins any moment now."""
+        """Order the stroke, which begins after an unknown delay."""
 
     def lift(self) -> None:
-        """The plate is clear of the mud again, and clean."""
+        """Bring the plate clear of the mud and clean it."""
 
 
-class AttendedStage:
-    """A Stage that a person looks after. `meanwhile` reads what the load cell sends in the meantime."""
+class ManualStage:
+    """A Stage that the operator moves. `meanwhile` reads the load cell during each prompt."""
 
-    patience_s = ATTENDED_PATIENCE_S
+    patience_s = MANUAL_PATIENCE_S
 
     def __init__(self, settings: StageSettings, operator: Operator, meanwhile: Callable[[], None]) -> None:
         self._settings, self._operator, self._meanwhile = settings, operator, meanwhile
@@ -70,9 +75,9 @@ class AttendedStage:
         along = "along the drag" if trial.kind == SHEAR else "upright, along the stroke"
         question = (
             f"Mud {trial.mud}, {trial.kind} {trial.number} of {trials}: re-mix and level the mud, wipe the plate, hang "
-            f"it 2 cm clear above the mud, the cell {along}. Ready?"
+            f"it 2 cm above the mud, the cell {along}. Ready?"
         )
-        answers = {GO_ON: "tare and go on", SKIP: "skip this trial", REDO: "the last one again"}
+        answers = {GO_ON: "tare and start", SKIP: "skip this trial", REDO: "repeat the trial before"}
         return self._operator.ask(question, answers, self._meanwhile)
 
     def lower(self) -> None:
@@ -89,12 +94,12 @@ class AttendedStage:
         )
 
     def lift(self) -> None:
-        question = "Lift the plate clear of the mud, wipe it, and let go. Ready?"
+        question = "Lift the plate clear of the mud, wipe it, and take your hands off. Ready?"
         self._operator.ask(question, {GO_ON: "yes"}, self._meanwhile)
 
 
 class SimulatedStage:
-    """A Stage on the emulated bench: obeys at once, and starts its strokes when it likes."""
+    """A Stage on the emulated bench. Its strokes begin after a random delay."""
 
     patience_s = SIMULATED_PATIENCE_S
 
@@ -133,3 +138,24 @@ class SimulatedStage:
 
     def _finish(self) -> None:
         self._bench.pass_time(max(0.0, self._bench.stage.ends_s - self._bench.now_s()) + SETTLING_S)
+
+
+# simulated muds
+
+
+def water_of(mud: str) -> float:
+    """Return the water content that names a simulated mud. Raises ValueError for a name that is none."""
+    try:
+        water_percent = float(mud)
+    except ValueError:
+        raise ValueError(f"mud {mud!r}: a simulated one is a water content in percent, such as 48.6") from None
+    clay_plate(water_percent)
+    return water_percent
+
+
+def clay_truth(water_percent: float, settings: StageSettings) -> TrueCoefficients:
+    """Return what the plate feels in even motion, without the stage's ramps and the cell's noise."""
+    depth_m = settings.depth_m
+    stroke = StrokeTruth(0.0, 0.0, depth_m, settings.speed_m_s, UNKNOWN, depth_m)
+    stride = StrideTruth("", 0, clay_of_water(water_percent), 0.0, stroke, stroke, stroke)
+    return true_coefficients(stride, settings.plate, RELAXATION, PAPER_HOLD_S, upright=True)

@@ -1,126 +1,107 @@
-"""What a serial port sends, examined before anything is measured with it, and what to do where it is something else."""
+"""Problems of a recorded trial, for which the operator may repeat it or leave it out."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
+from typing import Any
 
-from drivers.load_cell.line_formats import LineFormat, find_format
-from drivers.serial.serial_line import COMMON_BAUDS, SerialLine, SerialLineError, text_fraction
-from experiments.loadcell.motion import StageSettings
-from experiments.loadcell.recording import POLL_S, BenchClock, CellRecorder
-from experiments.robot.bench_robot import BenchError
-from experiments.robot.prompt import Operator
+import numpy as np
 
-LISTENING_S, STARTING_S = 2.0, 4.0
-PROBE_S = 0.8
-TEXT_FRACTION, READABLE_FRACTION = 0.8, 0.6  # below it, it is another baud rate; another format
-LEAST_PLACES = 12  # of an insertion
-OR_WITHOUT = "or go on without --position"
+from experiments.loadcell.analysis.coefficients import AnalysedTrial, Recorded
+from experiments.loadcell.analysis.force_motion import Insertion, Shear
+from experiments.loadcell.recording import PositionStretch, Stretch, Tare
+
+FORCE_ALONE = "the trial is evaluated by its force alone, which assumes a stage of one speed"
+LEAST_DRIFT_N, DRIFT_FRACTION = 0.02, 0.03  # of the largest force, by which the zero may move over a trial
+GARBLED_FRACTION = 0.05
+MISSING_FRACTION = 0.15  # of the samples of a stroke
+FLAT_SAMPLES = 8  # equal samples at the largest force: a cell that saturates without a message
 
 
-def examine_lines(recorder: CellRecorder, name: str) -> str:
-    """Whether what arrives is what was expected: the name of a format that reads it. Raises BenchError with what to do.
-
-    `name`: of the wanted format, or "auto".
-    """
-    port = recorder.port
-    recorder.listen(LISTENING_S)
-    if not port.recent_lines:  # a board that starts anew when its port is opened takes its time
-        recorder.listen(STARTING_S)
-    arrivals, lines = port.arrivals, port.recent_lines
-    if not lines:
-        raise BenchError(
-            f"nothing arrives on {port.path} at {port.baud} baud: check the amplifier's power and cable, that it sends "
-            "by itself and not only when asked, and that this is its port"
+def list_problems(analysed: AnalysedTrial, stretch: Stretch, before: Tare, after: Tare) -> list[str]:
+    """Return messages on everything that makes a trial invalid or doubtful."""
+    problems, recorded = list[str](), analysed.recorded
+    if stretch.unpluggings:
+        problems.append("the load cell was unplugged during the trial")
+    if stretch.overloads or is_clipped(recorded.forces_n):
+        problems.append(
+            "the load cell was at its limit: the force is beyond its range. Take a cell of a larger range, a smaller "
+            "plate, or a lower gain of the amplifier"
         )
-    if arrivals.text < TEXT_FRACTION:
-        raise BenchError(wrong_baud(port.line, recorder, "--baud", "a load cell's amplifier"))
-    if name == "auto":
-        found = find_format(lines)
-        if found is None:
-            raise BenchError(f"no named format reads these lines: {shown(lines)}. {_columns_reported(lines)}")
-        return found.name
-    if arrivals.readable < READABLE_FRACTION:
-        found = find_format(lines)
-        advice = f"--format {found.name} does" if found else _columns_reported(lines)
-        raise BenchError(
-            f"the format {name!r} reads {100.0 * arrivals.readable:.0f} % of the lines, such as {shown(lines)}; "
-            + advice
+    lines = len(stretch.samples) + stretch.garbled_lines
+    if stretch.garbled_lines > GARBLED_FRACTION * lines:
+        problems.append(f"{stretch.garbled_lines} of {lines} lines were garbled: check cable and ground")
+    problems += [each for each in (analysed.problem, analysed.remark) if each]
+    if stretch.position is not None:
+        problems += _list_position_problems(analysed, stretch.position)
+    moved_n, largest_n = abs(after.force_n - before.force_n), _largest_n(recorded)
+    if moved_n > max(LEAST_DRIFT_N, DRIFT_FRACTION * largest_n):
+        problems.append(
+            f"the zero moved by {moved_n:.3f} N over the trial: something slipped, mud clings to the plate, or the "
+            "cell drifts. Wipe the plate, check the mounting, let the amplifier warm up"
         )
-    return name
-
-
-def examine_encoder(recorder: CellRecorder, operator: Operator, settings: StageSettings) -> None:
-    """Whether counts arrive, often enough for the stroke. Raises BenchError with what to do."""
-    encoder = recorder.encoder
-    if encoder is None:
-        return
-    if not encoder.line.recent:
-        recorder.listen(STARTING_S)
-    arrivals, path = encoder.arrivals, encoder.settings.path
-    if not arrivals.lines:
-        raise BenchError(
-            f"nothing arrives on {path} at {encoder.settings.baud} baud: check the encoder's power and cable, that it "
-            f"sends by itself, and that this is its port; {OR_WITHOUT}"
+    missing = missing_fraction(analysed)
+    if missing > MISSING_FRACTION:
+        problems.append(
+            f"{100.0 * missing:.0f} % of the samples of its strokes are missing: check cable and connectors"
         )
-    if arrivals.text < TEXT_FRACTION:
-        message = wrong_baud(encoder.line, recorder, "--position-baud", "an encoder's counter")
-        raise BenchError(f"{message}; {OR_WITHOUT}")
-    if arrivals.readable < READABLE_FRACTION:
-        label = encoder.settings.label
-        reported = f"a label {label!r} and a whole number" if label else "a whole number"
-        raise BenchError(
-            f"the lines on {path} are not {reported}, but such as {shown(list(encoder.line.recent))}: give what they "
-            f"begin with as --position-label, make the counter send its count alone, {OR_WITHOUT}"
-        )
-    between_m = settings.speed_m_s / (encoder.rate_hz or 1.0)
-    if LEAST_PLACES * between_m > settings.depth_m:
-        operator.report(
-            f"the encoder sends {encoder.rate_hz or 0.0:.0f} lines/s, one in {1000.0 * between_m:.1f} mm of way: what "
-            f"lies between is guessed. For {LEAST_PLACES} in an insertion make it send faster"
-        )
+    return problems
 
 
-def shown(lines: Sequence[bytes]) -> str:
-    return " and ".join(repr(line.decode("ascii", "replace").strip()[:60]) for line in lines[-2:])
+def _list_position_problems(analysed: AnalysedTrial, stretch: PositionStretch) -> list[str]:
+    if stretch.breaks:
+        return [f"the stage's encoder was unplugged or restarted during the trial: {FORCE_ALONE}"]
+    if not stretch.positions:
+        return [f"the stage's encoder sent no position: {FORCE_ALONE}"]
+    missing = _fraction_without_position(analysed)
+    if missing > MISSING_FRACTION:
+        return [
+            f"the stage's position is unknown for {100.0 * missing:.0f} % of its strokes ({stretch.garbled_lines} "
+            f"garbled lines, {stretch.drop_outs} gaps): check the encoder's cable and connectors"
+        ]
+    return []
 
 
-def _columns_reported(lines: Sequence[bytes]) -> str:
-    readable = [column for column in range(1, 10) if _reads(f"column{column}", lines)]
-    if readable:
-        names = " or ".join(f"--format column{column}" for column in readable)
-        return f"Choose the column of the load with {names}"
-    return (
-        "Is it a load cell's amplifier? Give --format a regular expression with (?P<value>...) that fits a whole line"
-    )
+def _fraction_without_position(analysed: AnalysedTrial) -> float:
+    if analysed.positions_m is None or analysed.profile is None:
+        return 0.0
+    times_s, fractions = analysed.profile.times_s, [0.0]
+    for begin_s, end_s in _strokes(analysed):
+        inside = (times_s >= begin_s) & (times_s < end_s)
+        fractions.append(float(np.mean(np.isnan(analysed.positions_m[inside]))) if np.any(inside) else 0.0)
+    return max(fractions)
 
 
-def _reads(name: str, lines: Sequence[bytes]) -> bool:
-    line_format = LineFormat(name)
-    return sum(line_format.decode(line) is not None for line in lines) > 0.8 * len(lines)
+def _largest_n(recorded: Recorded) -> float:
+    return float(np.max(np.abs(recorded.forces_n - recorded.zero_n), initial=0.0))
 
 
-def wrong_baud(line: SerialLine, recorder: CellRecorder, option: str, what: str) -> str:
-    """A sentence, with the rate at which it is text, where there is one: every common one is tried."""
-    recorder.report(f"what arrives on {line.path} at {line.baud} baud is no text: other rates are tried")
-    line.close()
-    for baud in COMMON_BAUDS:
-        if baud != line.baud and _is_text(line, baud, recorder.clock):
-            return f"{line.baud} is not the baud rate of {line.path}: at {baud} it sends text. Use {option} {baud}"
-    return (
-        f"what arrives on {line.path} is no text at {line.baud} baud, nor at any common rate: is it {what} that sends "
-        "lines of text?"
-    )
-
-
-def _is_text(line: SerialLine, baud: int, clock: BenchClock) -> bool:
-    try:
-        tried = SerialLine(line.path, baud, open_device=line.open_device)
-    except SerialLineError:
+def is_clipped(forces_n: np.ndarray[Any, np.dtype[np.float64]]) -> bool:
+    """Return whether the largest force repeats exactly, many times in a row, in a cell that is not always still."""
+    if len(forces_n) < FLAT_SAMPLES or len(np.unique(forces_n)) < FLAT_SAMPLES:
         return False
-    end_s = clock.now_s() + PROBE_S
-    while clock.now_s() < end_s:
-        clock.pass_time(POLL_S)
-        tried.read(clock.now_s())
-    tried.close()
-    return text_fraction(tried.recent) > TEXT_FRACTION
+    ends = (forces_n == np.max(forces_n)) | (forces_n == np.min(forces_n))
+    return any(np.all(ends[i : i + FLAT_SAMPLES]) for i in np.flatnonzero(ends))
+
+
+def missing_fraction(analysed: AnalysedTrial) -> float:
+    """Return the fraction of missing samples in the worst stroke."""
+    if analysed.profile is None or analysed.motion is None:
+        return 0.0
+    times_s = analysed.profile.times_s
+    period_s = float(np.median(np.diff(times_s)))
+    fractions = []
+    for begin_s, end_s in _strokes(analysed):
+        inside = np.count_nonzero((times_s >= begin_s) & (times_s < end_s))
+        fractions.append(1.0 - (inside + 1) * period_s / (end_s - begin_s))
+    return max(fractions)
+
+
+def _strokes(analysed: AnalysedTrial) -> Iterable[tuple[float, float]]:
+    motion, extraction = analysed.motion, analysed.extraction
+    if isinstance(motion, Shear):
+        yield motion.begin_s, motion.steady_to_s
+    if isinstance(motion, Insertion):
+        yield motion.surface_s, motion.stop_s
+    if extraction is not None:
+        yield extraction.lift_s, extraction.out_s

@@ -19,6 +19,7 @@ from experiments.reports.text_tables import Rows as Rows
 from experiments.reports.whole_files import whole_file
 from firmware_host.software_version import software_version
 
+FLAT: Mapping[str, Any] = {"flat": True}  # metadata of a field
 PAGE, SUMMARY = "report.html", "summary.json"
 STYLE = """\
 body { font: 15px/1.5 Georgia, serif; max-width: 62em; margin: 2em auto; padding: 0 1.5em; color: #111 }
@@ -72,10 +73,11 @@ def _write(path: Path, text: str) -> None:
 def to_json(report: Any) -> Any:
     """Turn records into mappings by field name, and NaN into None, since JSON has no NaN.
 
-    A field of a dataclass with `metadata={"key": ...}` has that key, a named tuple those of its fields.
+    A field of a dataclass with `metadata={"key": ...}` has that key; the entries of a FLAT field stand next to those
+    of its record.
     """
     if is_dataclass(report) and not isinstance(report, type):
-        return {each.metadata.get("key", each.name): to_json(getattr(report, each.name)) for each in fields(report)}
+        return _record_to_json(report)
     if isinstance(report, tuple) and hasattr(report, "_asdict"):
         report = report._asdict()
     if isinstance(report, Mapping):
@@ -83,6 +85,14 @@ def to_json(report: Any) -> Any:
     if isinstance(report, list | tuple):
         return [to_json(value) for value in report]
     return None if isinstance(report, float) and not isfinite(report) else report
+
+
+def _record_to_json(record: Any) -> dict[str, Any]:
+    entries: dict[str, Any] = {}
+    for each in fields(record):
+        value = to_json(getattr(record, each.name))
+        entries |= value if "flat" in each.metadata else {each.metadata.get("key", each.name): value}
+    return entries
 
 
 def _draw(figure: Figure, folder: Path) -> Path:

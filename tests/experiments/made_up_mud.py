@@ -6,9 +6,9 @@ from random import Random
 
 import numpy as np
 
-from experiments.loadcell.curve_fit import Array
-from experiments.loadcell.fits import SHEAR, Recorded
-from experiments.loadcell.stage_track import Places
+from experiments.loadcell.analysis.coefficients import SHEAR, Recorded
+from experiments.loadcell.analysis.curve_fit import Array
+from experiments.loadcell.analysis.stage_track import StagePositions
 from simulation.test_rig.plate_stage import CarriedPlate, PlateStage, StageParameters
 from simulation.test_rig.stage_motion import HandParameters
 
@@ -83,8 +83,8 @@ def feel_by_hand(
     felt = _heard(stage, kind, seed, random, 80.0, 0.008, 0.0)
     times_s = np.arange(0.003, stage.ends_s + 1.05, 1.0 / position_rate_hz)
     positions_m = count_m * np.round([stage.travelled_m(float(t)) / count_m for t in times_s])
-    reported = Places(_jittered(times_s, jitter_s, random), positions_m)
-    return felt._replace(times_s=_jittered(felt.times_s, jitter_s, random) + lag_s, places=reported)
+    reported = StagePositions(_jittered(times_s, jitter_s, random), positions_m)
+    return felt._replace(times_s=_jittered(felt.times_s, jitter_s, random) + lag_s, positions=reported)
 
 
 def _jittered(times_s: Array, jitter_s: float, random: Random) -> Array:

@@ -12,8 +12,8 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.loadcell.comparison import CompareError, compared_with, load_flipper
-from experiments.loadcell.fits import OfMud
+from experiments.loadcell.analysis.coefficients import MudCoefficient
+from experiments.loadcell.comparison import CompareError, compare_muds, load_flipper
 from simulation.mud.clay import clay_of_water
 from simulation.test_rig.load_cell import measure_shear
 from simulation.test_rig.load_cell_bench import PAPER_PLATE
@@ -171,15 +171,15 @@ def test_a_file_that_is_no_summary_is_refused_by_its_name(tmp_path: Path, text: 
 
 
 def test_muds_are_compared_by_what_their_names_mean() -> None:
-    reported = OfMud(1.0e6, 1e4, (1.0e6,), 0.0)
+    reported = MudCoefficient(1.0e6, 1e4, (1.0e6,), 0.0)
     muds = {"48.6": dict.fromkeys(("k_p", "k_s", "k_e"), reported), "Pond": {"k_p": reported}}
     flipper = {
         "muds": [{"mud": "48.60 %", "k_p": {"value": 2e6, "std_error": 0}}, {"mud": "pond", "k_p": {"value": -1}}]
     }
-    (row,) = compared_with(flipper, muds)
+    (row,) = compare_muds(flipper, muds)
     assert (row.mud, row.coefficient, row.ratio) == ("48.6", "k_p", 2.0)
     assert row.ratio_std_error == pytest.approx(0.02)
-    assert compared_with(None, muds) == []
+    assert compare_muds(None, muds) == []
 
 
 def test_a_simulated_hand_with_an_encoder_finds_the_mud_as_well(
@@ -193,7 +193,7 @@ def test_a_simulated_hand_with_an_encoder_finds_the_mud_as_well(
         assert reported[name]["value"] == pytest.approx(truth[name], rel=0.03)
     assert all(trial["is_measured"] and trial["position"]["breaks"] == 0 for trial in report["trials"])
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "place came from an encoder" in page and "known to within" in page
+    assert "encoder measured the stage" in page and "known within" in page
 
 
 def test_an_encoder_s_port_that_there_is_not_ends_with_a_sentence(
@@ -204,4 +204,4 @@ def test_an_encoder_s_port_that_there_is_not_ends_with_a_sentence(
     status, _, reported = run(capsys, "experiment", "loadcell", *ports, "--out", str(tmp_path / "out"))
     cell.close()
     assert status == exit_codes.REFUSED
-    assert "the stage's encoder: there is no serial port" in reported and "go on without --position" in reported
+    assert "the stage's encoder: there is no serial port" in reported and "continue without --position" in reported

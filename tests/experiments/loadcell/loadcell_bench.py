@@ -11,11 +11,12 @@ from drivers.load_cell.calibration import LoadCellCalibration
 from drivers.load_cell.line_formats import LineFormat
 from drivers.load_cell.load_cell_port import LoadCellPort
 from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings
-from experiments.loadcell.measurement import CellSettings, Results, conclude, measure, plan_of_notebook
-from experiments.loadcell.motion import StageSettings
+from experiments.loadcell.analysis.force_motion import StageSettings
+from experiments.loadcell.measurement import Results, evaluate_muds, notebook_plan
+from experiments.loadcell.preparation import CellSettings, prepare_cell
 from experiments.loadcell.recording import CellRecorder
 from experiments.loadcell.stage import SimulatedStage
-from experiments.loadcell.trials import TrialBench, TrialPlan
+from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
 from experiments.trials.notebook import Notebook
 from simulation.test_rig.load_cell_bench import EmulatedBench, Event
 from simulation.test_rig.load_cell_emulator import AmplifierParameters
@@ -61,7 +62,7 @@ class Laboratory:
             self.encoder = StageEncoder(settings)
         self.recorder = CellRecorder(self.port, self.bench, operator.report, self.encoder)
         self.plan = TrialPlan(tuple(muds), trials, SETTINGS)
-        self.notebook = Notebook(folder, plan_of_notebook(SETTINGS))
+        self.notebook = Notebook(folder, notebook_plan(SETTINGS))
         stage_of_it = SimulatedStage(SETTINGS, self.bench, muds, seed)
         self.trial_bench = TrialBench(
             self.recorder, stage_of_it, operator, self.notebook, folder, lambda done, total: None
@@ -72,10 +73,11 @@ class Laboratory:
         self.bench.events.append(event)
 
     def measure(self, cell: CellSettings | None = None) -> None:
-        measure(self.trial_bench, self.plan, cell or CellSettings())
+        prepare_cell(self.trial_bench, SETTINGS, cell or CellSettings())
+        measure_all(self.trial_bench, self.plan)
 
-    def conclude(self) -> Results:
-        return conclude(self.folder, self.notebook, self.plan, None, lambda done, total: None)
+    def evaluate_muds(self) -> Results:
+        return evaluate_muds(self.folder, self.notebook, self.plan, None, lambda done, total: None)
 
     def close(self) -> None:
         self.port.close()

@@ -8,11 +8,10 @@ from typing import Any
 
 import pytest
 
-from experiments.loadcell.fits import INSERTION, bench_uncertainty
-from experiments.loadcell.measurement import CellSettings
-from experiments.loadcell.raw import RAW, load_all
+from experiments.loadcell.analysis.coefficients import INSERTION, bench_uncertainty
+from experiments.loadcell.preparation import CellSettings, examine_encoder
+from experiments.loadcell.recording import RAW, load_counted
 from experiments.loadcell.stage import Trial
-from experiments.loadcell.trial_checks import examine_encoder
 from experiments.loadcell.trials import KEEP, WITHOUT, measure
 from experiments.robot.bench_robot import BenchError
 from experiments.robot.prompt import GO_ON
@@ -56,7 +55,7 @@ def examine(laboratory: Laboratory) -> None:
 def test_pushed_by_a_hand_the_known_coefficients_come_out(make: Make) -> None:
     laboratory = make(trials=2, seed=4)
     laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
-    results = laboratory.conclude()
+    results = laboratory.evaluate_muds()
     reported = results.muds["made up"]
     assert {name: each.value for name, each in reported.items()} == {
         name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
@@ -70,7 +69,7 @@ def test_pushed_by_a_hand_the_known_coefficients_come_out(make: Make) -> None:
 def test_an_amplifier_that_tells_means_of_two_costs_less_than_three_percent(make: Make) -> None:
     laboratory = make(trials=2, seed=4, amplifier=AmplifierParameters(averaged=2))
     laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
-    reported = laboratory.conclude().muds["made up"]
+    reported = laboratory.evaluate_muds().muds["made up"]
     assert {name: each.value for name, each in reported.items()} == {
         name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
     }
@@ -80,9 +79,9 @@ def test_an_encoder_unplugged_in_a_trial_costs_its_places_and_no_force(make: Mak
     laboratory = make(operator=ScriptedOperator(KEEP))
     laboratory.at(4.5, counter_of(laboratory).unplug)
     laboratory.at(6.0, counter_of(laboratory).plug_in)
-    assert any("encoder was unplugged or began anew" in each for each in try_once(laboratory))
-    (recorded,) = load_all(laboratory.folder, laboratory.notebook)
-    assert recorded.places is None and len(recorded.forces_n) > 400
+    assert any("encoder was unplugged or restarted" in each for each in try_once(laboratory))
+    (recorded,) = load_counted(laboratory.folder, laboratory.notebook)
+    assert recorded.positions is None and len(recorded.forces_n) > 400
     assert (laboratory.folder / laboratory.notebook.entries[recorded.key]["position"]["file"]).exists()
     assert laboratory.encoder is not None and laboratory.encoder.is_there
 
@@ -91,7 +90,7 @@ def test_one_that_is_gone_is_asked_for_and_then_done_without(make: Make) -> None
     laboratory = make(operator=ScriptedOperator(GO_ON, WITHOUT, KEEP))
     counter_of(laboratory).unplug()
     reported = try_once(laboratory)
-    assert [("encoder is gone" in each, "plug" in each) for each in reported[:2]] == [(True, True)] * 2
+    assert [("encoder is unplugged" in each, "plug" in each) for each in reported[:2]] == [(True, True)] * 2
     assert reported[2].startswith("going on without the position")
     assert "position" not in laboratory.notebook.entries["made up/insertion/1"]
 
@@ -101,31 +100,31 @@ def test_one_that_is_plugged_in_when_asked_for_goes_on(make: Make) -> None:
     counter_of(laboratory).unplug()
     laboratory.at(1.5, counter_of(laboratory).plug_in)
     reported = try_once(laboratory)
-    assert len(reported) == 1 and "encoder is gone" in reported[0]
-    (recorded,) = load_all(laboratory.folder, laboratory.notebook)
-    assert recorded.places is not None
+    assert len(reported) == 1 and "encoder is unplugged" in reported[0]
+    (recorded,) = load_counted(laboratory.folder, laboratory.notebook)
+    assert recorded.positions is not None
 
 
 def test_a_drop_out_in_the_stroke_is_told(make: Make) -> None:
     laboratory = make(operator=ScriptedOperator(KEEP))
     laboratory.at(3.9, lambda: setattr(counter_of(laboratory), "line_at", lambda at_s: b""))
     reported = try_once(laboratory)
-    assert any("place is not known" in each or "the place is not used" in each for each in reported)
+    assert any("position is unknown" in each or "the position is not used" in each for each in reported)
 
 
 def test_some_garbage_matters_to_nobody(make: Make) -> None:
-    laboratory = make(encoder={"garbled_share": 0.05})
+    laboratory = make(encoder={"garbled_fraction": 0.05})
     assert try_once(laboratory) == []
     assert laboratory.notebook.entries["made up/insertion/1"]["position"]["garbled_lines"] > 5
 
 
 def test_the_right_baud_rate_is_found_and_told(make: Make) -> None:
-    with pytest.raises(BenchError, match="Use --position-baud 57600; or go on without --position"):
+    with pytest.raises(BenchError, match="Use --position-baud 57600; or continue without --position"):
         examine(make(encoder={"baud": 57600}))
 
 
 def test_one_that_sends_nothing_says_what_to_check(make: Make) -> None:
-    with pytest.raises(BenchError, match="nothing arrives.*or go on without --position"):
+    with pytest.raises(BenchError, match="nothing arrives.*or continue without --position"):
         examine(make(encoder={"drop_out_rate_hz": 10.0, "rate_hz": 10.0, "drop_out_s": 10.0}))
 
 
@@ -139,14 +138,14 @@ def test_lines_that_are_no_counts_are_shown(make: Make) -> None:
 def test_one_too_slow_for_the_stroke_is_told(make: Make) -> None:
     laboratory = make(encoder={"rate_hz": 20.0})
     examine(laboratory)
-    assert "20 lines/s, one in 5.0 mm" in laboratory.operator.reported[0]
+    assert "20 lines/s, one per 5.0 mm" in laboratory.operator.reported[0]
 
 
 def test_a_cell_that_is_unplugged_does_not_cost_the_places(make: Make) -> None:
     laboratory = make(amplifier=AmplifierParameters())
     laboratory.at(4.5, laboratory.bench.amplifier.unplug)
     laboratory.at(6.5, laboratory.bench.amplifier.plug_in)
-    assert any("is back" in each for each in try_once(laboratory))
+    assert any("connected again" in each for each in try_once(laboratory))
     assert laboratory.encoder is not None and laboratory.encoder.breaks == 0
-    (recorded,) = load_all(laboratory.folder, laboratory.notebook)
-    assert recorded.places is not None
+    (recorded,) = load_counted(laboratory.folder, laboratory.notebook)
+    assert recorded.positions is not None

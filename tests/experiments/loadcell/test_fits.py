@@ -10,25 +10,25 @@ import pytest
 import statsmodels.api as sm
 
 from estimation.strokes.origin_fit import student_factor
-from experiments.loadcell.analysis import analyse, analyse_trial, common_pace
-from experiments.loadcell.contact import find_contact, without_spikes
-from experiments.loadcell.curve_fit import Array
-from experiments.loadcell.fits import (
+from experiments.loadcell.analysis.analyse import analyse, analyse_trial, common_pace
+from experiments.loadcell.analysis.coefficients import (
     COEFFICIENTS,
     INSERTION,
     SHEAR,
-    Analysed,
+    AnalysedTrial,
     Coefficient,
     Recorded,
     bench_uncertainty,
     depths_of,
+    gather_trials,
     noises_n,
-    of_mud,
     slope,
     speed_remark,
     volume_m3,
 )
-from experiments.loadcell.motion import Insertion, Pace, Shear, StageSettings, wide_pace
+from experiments.loadcell.analysis.contact import find_contact, without_spikes
+from experiments.loadcell.analysis.curve_fit import Array
+from experiments.loadcell.analysis.force_motion import Insertion, Pace, Shear, StageSettings, wide_pace
 from simulation.mud.clay import clay_of_water
 from simulation.test_rig.load_cell import LoadCurve, measure_insertion, measure_shear
 from simulation.test_rig.load_cell_bench import PAPER_PLATE, RELAXATION, clay_plate
@@ -45,7 +45,7 @@ def look(done: int, total: int) -> None:
 
 def found(trials: list[Recorded]) -> dict[str, float]:
     reported = analyse(trials, SETTINGS, look)
-    return {name: of_mud(reported, name, 0.0).value for name in COEFFICIENTS}
+    return {name: gather_trials(reported, name, 0.0).value for name in COEFFICIENTS}
 
 
 @pytest.mark.parametrize(("seed", "acceleration_m_s2"), [(1, 0.6), (2, 2.0), (3, 8.0)])
@@ -63,8 +63,8 @@ def test_an_abrupt_stage_is_not_taken_for_mud_that_bears_more_when_it_is_slower(
     mud = LawfulMud(1.3e6, 0.6e6, 1.4e6)
     trials = [feel(mud, INSERTION, 4000 + i, acceleration_m_s2=8.0, noise_n=0.01) for i in range(5)]
     reported = analyse(trials, SETTINGS, look)
-    assert of_mud(reported, "k_p", 0.0).value == pytest.approx(mud.k_p, rel=0.01)
-    assert of_mud(reported, "k_e", 0.0).value == pytest.approx(mud.k_e, rel=0.01)
+    assert gather_trials(reported, "k_p", 0.0).value == pytest.approx(mud.k_p, rel=0.01)
+    assert gather_trials(reported, "k_e", 0.0).value == pytest.approx(mud.k_e, rel=0.01)
 
 
 @pytest.mark.parametrize(("water", "acceleration_m_s2"), [(47.6, 2.0), (51.2, 0.6)])
@@ -94,14 +94,14 @@ def true_slope(curve: LoadCurve, deepest_m: float) -> float:
 
 
 @pytest.fixture(scope="module")
-def clay_trials() -> list[Analysed]:
+def clay_trials() -> list[AnalysedTrial]:
     """Of one stage, started at any moment between two samples."""
     return analyse([feel(clay_plate(49.5), INSERTION, 40 + i) for i in range(8)], SETTINGS, look)
 
 
 @pytest.mark.parametrize("name", ["k_p", "k_e"])
 def test_a_trial_errs_by_about_as_much_as_it_says_though_clay_does_not_follow_the_law(
-    clay_trials: list[Analysed], name: str
+    clay_trials: list[AnalysedTrial], name: str
 ) -> None:
     """Whatever moment it began: the ends of a stroke count by their way."""
     true = true_of_clay(49.5)[name]
@@ -142,8 +142,9 @@ def test_noises_are_those_of_the_samples_whatever_line_they_lie_on(turned: bool)
 
 
 def test_five_trials_that_scatter_are_doubted_with_students_factor() -> None:
-    trials = [Analysed(nowhere(), coefficients={"k_s": Coefficient(value, 1.0)}) for value in (1e6, 2e6, 3e6, 4e6, 5e6)]
-    reported = of_mud(trials, "k_s", 0.0)
+    values = (1e6, 2e6, 3e6, 4e6, 5e6)
+    trials = [AnalysedTrial(nowhere(), coefficients={"k_s": Coefficient(value, 1.0)}) for value in values]
+    reported = gather_trials(trials, "k_s", 0.0)
     assert reported.trials_error == pytest.approx(student_factor(4) * 5e6 / np.sqrt(10.0) / np.sqrt(5.0))
 
 
@@ -151,7 +152,7 @@ def nowhere() -> Recorded:
     return Recorded("made up/shear/1", "made up", SHEAR, np.empty(0), np.empty(0), 0.0)
 
 
-def one(recorded: Recorded) -> Analysed:
+def one(recorded: Recorded) -> AnalysedTrial:
     return analyse_trial(recorded, SETTINGS, wide_pace(SETTINGS))
 
 
@@ -181,7 +182,7 @@ def test_the_depth_found_is_that_of_the_stage(insertion: Recorded) -> None:
 def test_a_stage_slower_than_it_was_set_is_measured_and_told() -> None:
     mud = LawfulMud(**KNOWN)
     reported = analyse([feel(mud, INSERTION, seed, speed_m_s=0.08) for seed in range(4)], SETTINGS, look)
-    assert of_mud(reported, "k_p", 0.0).value == pytest.approx(KNOWN["k_p"], rel=0.04)
+    assert gather_trials(reported, "k_p", 0.0).value == pytest.approx(KNOWN["k_p"], rel=0.04)
     for trial in reported:
         assert trial.pace is not None
         assert trial.pace.speed_m_s == pytest.approx(0.08, rel=0.04)
@@ -262,11 +263,11 @@ def test_a_speed_beside_the_one_that_was_set_is_doubted_as_far_as_they_are_apart
 
 def test_the_doubt_of_a_mud_holds_scatter_calibration_and_the_speed_that_all_share(insertion: Recorded) -> None:
     reported = [replace(one(insertion), shared_uncertainty=0.02) for _ in range(4)]
-    plain = of_mud([replace(each, shared_uncertainty=0.0) for each in reported], "k_p", 0.0)
+    plain = gather_trials([replace(each, shared_uncertainty=0.0) for each in reported], "k_p", 0.0)
     assert plain.repeatability == 0.0
-    everything = of_mud(reported, "k_p", 0.03)
+    everything = gather_trials(reported, "k_p", 0.03)
     assert everything.std_error**2 == pytest.approx(plain.std_error**2 + (0.02**2 + 0.03**2) * plain.value**2)
-    assert of_mud([], "k_p", 0.0).trials == ()
+    assert gather_trials([], "k_p", 0.0).trials == ()
 
 
 def test_a_mean_is_doubted_for_what_its_trials_share_and_not_for_what_the_worst_of_them_does() -> None:
@@ -280,10 +281,12 @@ def test_a_mean_is_doubted_for_what_its_trials_share_and_not_for_what_the_worst_
     for _ in range(500):
         values = 1.0 + moves * random.standard_normal() + 0.004 * random.standard_normal(5)
         trials = [
-            Analysed(nowhere(), coefficients={"k_p": Coefficient(value, hypot(move, 0.004))}, shared_uncertainty=move)
+            AnalysedTrial(
+                nowhere(), coefficients={"k_p": Coefficient(value, hypot(move, 0.004))}, shared_uncertainty=move
+            )
             for value, move in zip(values.tolist(), moves.tolist(), strict=True)
         ]
-        reported = of_mud(trials, "k_p", 0.0)
+        reported = gather_trials(trials, "k_p", 0.0)
         errors.append(reported.value - 1.0)
         uncertainties.append(reported.trials_error)
     assert np.mean(np.abs(errors) < 2.0 * np.array(uncertainties)) > 0.95

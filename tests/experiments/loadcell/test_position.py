@@ -7,13 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.loadcell.alignment import WIDE, Alignment, common_alignment, rate_of
-from experiments.loadcell.analysis import analyse, analyse_trial
-from experiments.loadcell.curve_fit import Array
-from experiments.loadcell.fits import COEFFICIENTS, INSERTION, SHEAR, Analysed, Recorded, depths_of, of_mud
-from experiments.loadcell.motion import StageSettings, wide_pace
-from experiments.loadcell.position import moving
-from experiments.loadcell.stage_track import Places
+from experiments.loadcell.analysis.analyse import analyse, analyse_trial
+from experiments.loadcell.analysis.coefficients import (
+    COEFFICIENTS,
+    INSERTION,
+    SHEAR,
+    AnalysedTrial,
+    Recorded,
+    depths_of,
+    gather_trials,
+)
+from experiments.loadcell.analysis.curve_fit import Array
+from experiments.loadcell.analysis.force_motion import StageSettings, wide_pace
+from experiments.loadcell.analysis.measured_motion import moving
+from experiments.loadcell.analysis.stage_track import WIDE, Alignment, StagePositions, common_alignment, fit_rate
 from simulation.mud.clay import RATE_COEFFICIENT
 from simulation.test_rig.load_cell_bench import clay_plate
 from simulation.test_rig.stage_motion import HandParameters
@@ -30,7 +37,7 @@ KINDS = [(INSERTION, 1), (INSERTION, 2), (INSERTION, 3), (SHEAR, 4)]
 def found(trials: list[Recorded]) -> dict[str, float]:
     reported = analyse(trials, SETTINGS, lambda done, total: None)
     assert all(trial.is_measured for trial in reported)
-    return {name: of_mud(reported, name, 0.0).value for name in COEFFICIENTS}
+    return {name: gather_trials(reported, name, 0.0).value for name in COEFFICIENTS}
 
 
 def test_a_lawful_mud_s_coefficients_come_out_within_three_per_cent_however_the_hand_moves() -> None:
@@ -53,7 +60,7 @@ def insertion() -> Recorded:
     return feel_by_hand(clay_plate(49.5), INSERTION, 7, lag_s=LAG_S, jitter_s=0.0)
 
 
-def one(recorded: Recorded, aligned: Alignment = WIDE) -> Analysed:
+def one(recorded: Recorded, aligned: Alignment = WIDE) -> AnalysedTrial:
     return analyse_trial(recorded, SETTINGS, wide_pace(SETTINGS), aligned)
 
 
@@ -73,25 +80,25 @@ def test_the_depth_is_the_encoder_s_and_its_doubt_a_fraction_of_a_millimetre(ins
 
 
 def test_whichever_way_the_encoder_counts_the_coefficients_are_the_same(insertion: Recorded) -> None:
-    assert insertion.places is not None
-    turned = insertion._replace(places=Places(insertion.places.times_s, -insertion.places.positions_m))
+    assert insertion.positions is not None
+    turned = insertion._replace(positions=StagePositions(insertion.positions.times_s, -insertion.positions.positions_m))
     assert one(turned).coefficients == {name: pytest.approx(k) for name, k in one(insertion).coefficients.items()}
 
 
 def test_without_its_places_the_same_trial_is_in_doubt(insertion: Recorded) -> None:
-    alone = one(insertion._replace(places=None))
+    alone = one(insertion._replace(positions=None))
     assert "one speed" in alone.remark or alone.problem
     assert one(insertion).remark == ""
 
 
 def places_of(recorded: Recorded) -> tuple[Array, Array]:
-    assert recorded.places is not None
-    return recorded.places
+    assert recorded.positions is not None
+    return recorded.positions
 
 
 def test_an_encoder_on_another_axis_leaves_the_trial_to_the_force(insertion: Recorded) -> None:
     times_s, positions_m = places_of(insertion)
-    reported = one(insertion._replace(places=Places(times_s, 0.05 * positions_m)))
+    reported = one(insertion._replace(positions=StagePositions(times_s, 0.05 * positions_m)))
     assert not reported.is_measured
     assert "is the encoder on the axis that moves" in reported.remark and "--position-step" in reported.remark
     assert "k_p" in reported.coefficients or reported.problem
@@ -99,7 +106,7 @@ def test_an_encoder_on_another_axis_leaves_the_trial_to_the_force(insertion: Rec
 
 def test_a_wrong_way_per_count_is_told(insertion: Recorded) -> None:
     times_s, positions_m = places_of(insertion)
-    reported = one(insertion._replace(places=Places(times_s, 2.0 * positions_m)))
+    reported = one(insertion._replace(positions=StagePositions(times_s, 2.0 * positions_m)))
     assert "6.0 cm deep by the encoder, and 3 cm was set" in reported.remark
 
 
@@ -109,7 +116,7 @@ def test_a_gap_in_the_places_costs_its_own_samples_alone(insertion: Recorded) ->
     assert whole.motion is not None
     middle_s = times_s[int(np.argmin(np.abs(positions_m + 0.035)))]  # 1.5 cm deep
     kept = np.abs(times_s - middle_s) > 0.04
-    reported = one(insertion._replace(places=Places(times_s[kept], positions_m[kept])))
+    reported = one(insertion._replace(positions=StagePositions(times_s[kept], positions_m[kept])))
     assert reported.is_measured
     assert reported.coefficients["k_p"].value == pytest.approx(whole.coefficients["k_p"].value, rel=0.02)
 
@@ -123,7 +130,7 @@ def test_a_plate_that_was_not_drawn_out_still_tells_its_insertion(insertion: Rec
 
 def test_a_drag_that_stopped_early_is_left_to_the_force(drag: Recorded) -> None:
     times_s, positions_m = places_of(drag)
-    reported = one(drag._replace(places=Places(times_s, 0.4 * positions_m)))
+    reported = one(drag._replace(positions=StagePositions(times_s, 0.4 * positions_m)))
     assert not reported.is_measured and "the encoder saw 8.0 cm of 20 cm" in reported.remark
 
 
@@ -143,7 +150,7 @@ def test_a_rate_that_is_in_doubt_is_so_for_all_trials_alike(
     reported = one(request.getfixturevalue(kind))
     doubted = reported.shared_uncertainty * reported.coefficients[name].value
     assert doubted > reported.coefficients[name].std_error / 10.0
-    assert of_mud([reported] * 100, name, 0.0).trials_error > doubted
+    assert gather_trials([reported] * 100, name, 0.0).trials_error > doubted
 
 
 def test_a_rate_in_doubt_makes_the_doubt_of_an_insertion(insertion: Recorded) -> None:
@@ -153,7 +160,7 @@ def test_a_rate_in_doubt_makes_the_doubt_of_an_insertion(insertion: Recorded) ->
 
 
 def test_a_stage_of_one_speed_says_nothing_of_the_rate() -> None:
-    reported = rate_of(np.full(50, 3.0), np.full(50, 0.01))
+    reported = fit_rate(np.full(50, 3.0), np.full(50, 0.01))
     assert (reported.rate_fraction, reported.rate_uncertainty) == pytest.approx(
         (WIDE.rate_fraction, WIDE.rate_uncertainty)
     )

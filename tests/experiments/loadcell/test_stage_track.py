@@ -1,18 +1,18 @@
-"""Places between places: means over a time, gaps that are not guessed, and how far straight lines are off."""
+"""StagePositions between places: means over a time, gaps that are not guessed, and how far straight lines are off."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from experiments.loadcell.curve_fit import Array
-from experiments.loadcell.stage_track import Places, StageTrack
+from experiments.loadcell.analysis.curve_fit import Array
+from experiments.loadcell.analysis.stage_track import StagePositions, StageTrack
 
 TIMES_S = np.arange(0.0, 2.0, 0.01)
 
 
 def even(times_s: Array = TIMES_S) -> StageTrack:
-    return StageTrack(Places(times_s, 5.0 + 0.1 * times_s))
+    return StageTrack(StagePositions(times_s, 5.0 + 0.1 * times_s))
 
 
 def test_the_mean_of_an_even_motion_is_its_middle() -> None:
@@ -24,7 +24,7 @@ def test_the_mean_of_an_even_motion_is_its_middle() -> None:
 def test_straight_lines_are_off_by_no_more_than_is_said() -> None:
     """Half a g for a quarter of a second, in lines of 20 a second."""
     times_s = np.arange(0.0, 1.0, 0.05)
-    track = StageTrack(Places(times_s, 2.5 * times_s**2))
+    track = StageTrack(StagePositions(times_s, 2.5 * times_s**2))
     fine_s = np.linspace(0.06, 0.94, 400)
     off_m = np.max(np.abs(track.positions_m(fine_s) - 2.5 * fine_s**2))
     assert off_m == pytest.approx(5.0 * 0.05**2 / 8.0, rel=0.02)
@@ -39,7 +39,7 @@ def test_before_after_and_in_a_gap_the_place_is_not_known() -> None:
 
 def test_over_a_gap_in_which_the_stage_stood_its_place_is_known() -> None:
     gone = (TIMES_S > 0.8) & (TIMES_S < 1.0)
-    track = StageTrack(Places(TIMES_S[~gone], np.minimum(TIMES_S[~gone], 0.7)))
+    track = StageTrack(StagePositions(TIMES_S[~gone], np.minimum(TIMES_S[~gone], 0.7)))
     assert track.mean_positions_m(np.array([0.9]), 0.0125) == pytest.approx([0.7])
 
 
@@ -51,7 +51,7 @@ def test_slow_lines_are_no_gaps() -> None:
 def test_a_single_wrong_place_is_taken_out() -> None:
     positions_m = 0.1 * TIMES_S
     positions_m[70] += 0.004
-    track = StageTrack(Places(TIMES_S, positions_m))
+    track = StageTrack(StagePositions(TIMES_S, positions_m))
     assert track.positions_m(TIMES_S[70:71]) == pytest.approx([0.07])
 
 
@@ -63,4 +63,4 @@ def test_it_is_told_from_where_it_began_and_the_other_way_round() -> None:
 
 def test_an_abrupt_stop_is_no_leap() -> None:
     positions_m = np.minimum(0.2 * TIMES_S, 0.1)
-    assert StageTrack(Places(TIMES_S, positions_m)).positions_m(TIMES_S) == pytest.approx(positions_m)
+    assert StageTrack(StagePositions(TIMES_S, positions_m)).positions_m(TIMES_S) == pytest.approx(positions_m)

@@ -11,14 +11,14 @@ from statistics import fmean
 import pytest
 
 from drivers.load_cell.load_cell_port import LoadCellPort
-from experiments.loadcell.fits import INSERTION, SHEAR, Analysed
-from experiments.loadcell.measurement import CellSettings, list_remarks
-from experiments.loadcell.motion import Insertion, Pace
-from experiments.loadcell.raw import RAW, load_all
-from experiments.loadcell.recording import AVERAGED, likeness
-from experiments.loadcell.stage import AttendedStage, Trial
-from experiments.loadcell.trial_checks import examine_lines
-from experiments.loadcell.trials import KEEP, evaluate, measure, record
+from experiments.loadcell.analysis.coefficients import INSERTION, SHEAR, AnalysedTrial
+from experiments.loadcell.analysis.force_motion import Insertion, Pace
+from experiments.loadcell.measurement import list_remarks
+from experiments.loadcell.preparation import CellSettings, examine_lines
+from experiments.loadcell.recording import AVERAGED, RAW, likeness, load_counted
+from experiments.loadcell.stage import ManualStage, Trial
+from experiments.loadcell.trial_checks import list_problems
+from experiments.loadcell.trials import KEEP, measure, record
 from experiments.robot.bench_robot import BenchError
 from experiments.robot.prompt import GO_ON, REDO, SKIP
 from simulation.test_rig.load_cell_emulator import AmplifierParameters
@@ -63,7 +63,7 @@ def try_once(laboratory: Laboratory, kind: str = INSERTION) -> list[str]:
 def test_calibrated_with_two_weights_the_known_coefficients_come_out(make: Make) -> None:
     laboratory = make(trials=3, seed=4)
     laboratory.measure()
-    reported = laboratory.conclude().muds["made up"]
+    reported = laboratory.evaluate_muds().muds["made up"]
     assert {name: each.value for name, each in reported.items()} == {
         name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
     }
@@ -108,11 +108,11 @@ def test_a_trial_in_which_the_cell_is_unplugged_is_repeated_and_both_are_kept(ma
     laboratory.at(6.5, laboratory.bench.amplifier.plug_in)
     reported = try_once(laboratory)
     assert any("plug" in each and "in again" in each for each in reported)
-    assert any("is back" in each for each in reported)
-    assert any("unplugged in the middle" in each for each in reported)
+    assert any("connected again" in each for each in reported)
+    assert any("unplugged during the trial" in each for each in reported)
     assert laboratory.notebook.entries["made up/insertion/1"]["file"].endswith("_2.csv")
     assert len(list((laboratory.folder / RAW).iterdir())) == 2
-    assert len(load_all(laboratory.folder, laboratory.notebook)) == 1
+    assert len(load_counted(laboratory.folder, laboratory.notebook)) == 1
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_a_trial_in_doubt_says_why_and_is_left_out_in_the_end(
     (entry,) = laboratory.notebook.entries.values()
     assert entry["skipped"] and any(message in each for each in entry["why"])
     assert (laboratory.folder / entry["file"]).exists()
-    assert load_all(laboratory.folder, laboratory.notebook) == []
+    assert load_counted(laboratory.folder, laboratory.notebook) == []
 
 
 def test_a_stage_that_nobody_starts_is_no_contact(make: Make) -> None:
@@ -152,12 +152,12 @@ def test_enter_repeats_a_doubtful_trial_twice_and_then_leaves_it(make: Make) -> 
 def test_a_cell_that_stays_at_its_largest_force_is_at_its_limit(make: Make) -> None:
     laboratory = make()
     try_once(laboratory)
-    (recorded,) = load_all(laboratory.folder, laboratory.notebook)
+    (recorded,) = load_counted(laboratory.folder, laboratory.notebook)
     clipped = recorded._replace(forces_n=recorded.forces_n.clip(-1.0, 1.0))
     tare = laboratory.recorder.tare()
     stretch = laboratory.recorder.record(0.01, 0.1, 0.1)
-    assert any("at its limit" in each for each in evaluate(Analysed(clipped), stretch, tare, tare))
-    assert evaluate(Analysed(recorded), stretch, tare, tare) == []
+    assert any("at its limit" in each for each in list_problems(AnalysedTrial(clipped), stretch, tare, tare))
+    assert list_problems(AnalysedTrial(recorded), stretch, tare, tare) == []
 
 
 def test_a_person_skips_one_trial_and_repeats_the_one_before(make: Make) -> None:
@@ -236,7 +236,7 @@ def test_a_stage_at_another_speed_is_remarked_for_every_trial(make: Make) -> Non
     pace = Pace(0.05, 2.0, 0.01, 0.1)
     trials = [
         replace(trial, motion=trial.motion._replace(pace=pace))
-        for trial in laboratory.conclude().trials
+        for trial in laboratory.evaluate_muds().trials
         if isinstance(trial.motion, Insertion)
     ]
     reported = list_remarks(trials, SETTINGS)
@@ -263,7 +263,7 @@ def test_a_tare_in_which_the_cell_is_unplugged_is_taken_again(make: Make) -> Non
 def test_a_person_is_asked_for_everything_that_hands_do() -> None:
     operator = ScriptedOperator(GO_ON, SKIP)
     drained: list[int] = []
-    stage = AttendedStage(SETTINGS, operator, lambda: drained.append(1))
+    stage = ManualStage(SETTINGS, operator, lambda: drained.append(1))
     assert stage.weigh(0) == 0.0
     assert stage.prepare(Trial("a", SHEAR, 1), 5) == GO_ON
     assert stage.prepare(Trial("a", INSERTION, 1), 5) == SKIP

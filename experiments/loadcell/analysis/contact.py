@@ -1,4 +1,4 @@
-"""When a stroke begins: the force leaves its zero, which may have drifted while nobody started the stage."""
+"""Finds the start of a stroke: the force leaves its zero, which may drift before the stage moves."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.strokes.origin_fit import NORMAL_MAD
-from experiments.loadcell.curve_fit import Array
+from experiments.loadcell.analysis.curve_fit import Array
 
-QUIET_S = 0.4  # before a stroke, that tells zero and noise
+QUIET_S = 0.4  # before a stroke, for zero and noise
 LEAST_NOISE_N = 1e-3
 CONTACT_NOISES, CONTACT_FRACTION = 6.0, 0.03  # of the largest force
 LEAST_FORCE_N = 0.03
@@ -18,11 +18,11 @@ SPIKE_NOISES = 12.0
 
 
 class StrokeError(Exception):
-    """The force's course is no such stroke; the text says what it lacks."""
+    """The force does not look like a stroke; the text says what is missing."""
 
 
 class Profile(NamedTuple):
-    """Force against time, the cell's sign turned so that the mud resists the first motion with a positive force."""
+    """Force against time, with the sign at which mud resists the first motion with a positive force."""
 
     times_s: Array
     forces_n: Array
@@ -33,12 +33,12 @@ class Profile(NamedTuple):
 
 
 def noise_of(forces_n: Array) -> float:
-    """The standard deviation of steady forces, whatever single ones do."""
+    """Return the standard deviation of steady forces, robust to outliers."""
     return max(NORMAL_MAD * float(np.median(np.abs(forces_n - np.median(forces_n)))), LEAST_NOISE_N)
 
 
 def find_contact(times_s: Array, forces_n: Array) -> Profile:
-    """Raises StrokeError where nothing happens, or where it had begun already."""
+    """Find the first sample in contact. Raises StrokeError where there is none, or the stroke had begun before."""
     if len(times_s) < 8 or times_s[-1] - times_s[0] < 2.0 * QUIET_S:
         raise StrokeError("hardly any sample was recorded")
     quiet_n = forces_n[times_s < times_s[0] + QUIET_S]
@@ -52,7 +52,7 @@ def find_contact(times_s: Array, forces_n: Array) -> Profile:
     if noise_n > RESTLESS_FRACTION * largest_n:
         raise StrokeError(
             f"the force was restless by {noise_n:.3f} N when the recording began: the stage was moving already, or it "
-            "shakes. Start it a second or two after the recording"
+            "shakes. Start it a second or two after the recording starts"
         )
     begin, level_n = _leaves_zero(times_s, forces_n, max(CONTACT_NOISES * noise_n, CONTACT_FRACTION * largest_n))
     turned = bool(np.median(forces_n[begin : begin + 6]) < level_n)
@@ -61,16 +61,16 @@ def find_contact(times_s: Array, forces_n: Array) -> Profile:
 
 
 def _leaves_zero(times_s: Array, forces_n: Array, bound_n: float) -> tuple[int, float]:
-    """The first sample in contact, and the zero just before it, which may have drifted while nobody started."""
-    for look_s in np.arange(times_s[0] + QUIET_S, times_s[-1], QUIET_S):
-        before, after = np.searchsorted(times_s, [look_s - QUIET_S, look_s + QUIET_S])
-        here = int(np.searchsorted(times_s, look_s))
+    """Return the first sample in contact, and the zero just before it."""
+    for center_s in np.arange(times_s[0] + QUIET_S, times_s[-1], QUIET_S):
+        before, after = np.searchsorted(times_s, [center_s - QUIET_S, center_s + QUIET_S])
+        here = int(np.searchsorted(times_s, center_s))
         if here == before:
             continue
         level_n = float(np.median(forces_n[before:here]))
         away = np.abs(forces_n[here : after + 1] - level_n) > bound_n
         begins = np.flatnonzero(away[:-1] & away[1:])
-        if len(begins) and (begins[0] > 0 or look_s > times_s[0] + 1.5 * QUIET_S):
+        if len(begins) and (begins[0] > 0 or center_s > times_s[0] + 1.5 * QUIET_S):
             return here + int(begins[0]), level_n
         if len(begins):
             break
@@ -78,7 +78,7 @@ def _leaves_zero(times_s: Array, forces_n: Array, bound_n: float) -> tuple[int, 
 
 
 def without_spikes(forces_n: Array) -> Array:
-    """Single samples far from neighbours that agree: a garbled digit, a knock."""
+    """Replace single samples far from two neighbours that agree, such as a garbled digit or a knock."""
     if len(forces_n) < 5:
         return forces_n
     before, after = forces_n[:-2], forces_n[2:]

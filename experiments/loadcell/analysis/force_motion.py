@@ -1,21 +1,21 @@
-"""When a stage did what, read from nothing but the force on the plate that it carries.
+"""The motion of the stage, found from the force on its plate alone.
 
-The stage is moved by a person or by a controller of its own, so its start is not known. What its operator set is: the
-depth, the speed, the way. Into the mud the depth grows with the time since the plate met the surface,
+The start of a stroke is unknown; depth, speed and travel are what the operator set. In the mud the depth grows with the
+time since the plate met the surface at t_s,
 
     z = v (t - t_s)     down to     z = D - a (t_e - t)²/2     while the stage slows down, with z = D from t_e on
 
-and the force is fitted by a level, a rise with depth, perhaps a jump at the surface (mud that bears at once), what
-slower mud bears less, (v/v_0)^0.4 as in clay, and what it loses at rest. t_s, v and a come out of that fit: the speed
-is measured, and the one that was set is only where the search begins. Whether there is a jump the residuals decide.
+and the force is fitted by a level, a rise with depth, perhaps a jump at the surface (mud that resists at once), the
+loss of slower mud, (v/v_0)^0.4 as in clay, and the loss at rest. The fit gives t_s, v and a: the speed is measured, and
+the set one only starts the search. The residuals decide on the jump.
 
-On the way out the force ends where the plate leaves the mud; from there the way is counted back. Nothing is assumed
-of how the force depends on depth there: a chain of straight lines.
+On the way out the force ends where the plate leaves the mud, and the depth is counted back from there. The force there
+is any chain of straight lines over the depth.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -23,24 +23,24 @@ from numpy.typing import NDArray
 
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
-from experiments.loadcell.contact import CONTACT_FRACTION, CONTACT_NOISES, LEAST_FORCE_N, Profile, StrokeError
-from experiments.loadcell.curve_fit import Array, CurveFit, Prior, fit_curve, saved_by
+from experiments.loadcell.analysis.contact import CONTACT_FRACTION, CONTACT_NOISES, LEAST_FORCE_N, Profile, StrokeError
+from experiments.loadcell.analysis.curve_fit import Array, CurveFit, Prior, fit_curve, saved_by
 
 BEFORE_S, AFTER_S = 0.25, 0.2  # of the fit, around the way down
-YIELD_M = 0.001  # in which a jump comes about
+YIELD_M = 0.001  # over which a jump grows
 RATE_EXPONENT = 0.4
 RELAXING_S = 0.2
 LEVEL, RISE, _, SLOWING, JUMP = range(5)  # factors of the fit
-JUMP_PRICE, SLOWING_PRICE = 4.0, 1.0  # that they must save to be believed
+JUMP_PRICE, SLOWING_PRICE = 4.0, 1.0  # least improvement of the fit
 STARTS = tuple(
     (speed, ramp) for speed in (-0.15, 0.0, 0.15) for ramp in (-1.0, 0.7)
-)  # logarithms, beside what is expected
-NARROW = 0.05  # doubt of a speed from which one start is enough
+)  # logarithms, relative to the prior
+NARROW = 0.05  # uncertainty of a speed below which one start is enough
 AFTER_OUT_S = 0.3
 OUT_MARGIN = 1.5  # how much later the end may lie than the last sample that clearly pulls
 DIFFERENCE_S = 1e-4
-OUT_ROUNDS, OUT_PLACES = 3, 13  # of an ever finer search
-VALLEY = 2.0  # times the least square may be that of the first valley
+OUT_ROUNDS, OUT_PLACES = 3, 13  # of a search that gets finer
+VALLEY = 2.0  # by which the first minimum may exceed the least
 KNOTS = np.array([0.0, 1 / 6, 1 / 3, 1 / 2, 3 / 4])  # of the chain, in depths
 FALLEN_FRACTION, LOW_S = 0.93, 0.2  # of a steady shear: the stage has stopped
 REVERSAL_FRACTION = 0.25  # of the way up, as in the estimator
@@ -48,19 +48,19 @@ REVERSAL_FRACTION = 0.25  # of the way up, as in the estimator
 
 @dataclass(frozen=True)
 class StageSettings:
-    """What the operator set, and the plate."""
+    """The motion that the operator set, and the plate."""
 
     depth_m: Annotated[float, Bounds(0.005, 0.2)] = 0.03
     speed_m_s: Annotated[float, Bounds(0.001, 1.0)] = 0.1
     hold_s: Annotated[float, Bounds(0.5, 60.0)] = 3.0
-    shear_path_m: Annotated[float, Bounds(0.05, 2.0)] = 0.2
+    shear_path_m: Annotated[float, Bounds(0.05, 2.0)] = field(default=0.2, metadata={"key": "shear_way_m"})
     plate_width_m: Annotated[float, Bounds(0.002, 0.5)] = 0.03
     plate_height_m: Annotated[float, Bounds(0.002, 0.5)] = 0.035
     plate_thickness_m: Annotated[float, Bounds(0.0002, 0.1)] = 0.004
 
     @property
     def plate(self) -> FlipperGeometry:
-        """Its plate alone counts."""
+        """The plate; nothing else of this geometry is used."""
         return FlipperGeometry(
             plate_width_m=self.plate_width_m,
             plate_height_m=self.plate_height_m,
@@ -69,7 +69,7 @@ class StageSettings:
 
 
 class Pace(NamedTuple):
-    """How fast a stage moves and slows down, with doubts as shares."""
+    """Speed and ramp of a stage, with relative uncertainties."""
 
     speed_m_s: float
     acceleration_m_s2: float
@@ -84,7 +84,7 @@ class Insertion(NamedTuple):
     pace: Pace
     level_n: float
     jump_n: float
-    rise_n: float  # from surface to full depth, beside the jump
+    rise_n: float  # from surface to full depth, without the jump
     slowing_n: float  # by which the force changes as the stage stops, 0 or less
     residual_n: float
 
@@ -100,11 +100,11 @@ class Shear(NamedTuple):
     begin_s: float
     steady_from_s: float
     steady_to_s: float
-    speed_m_s: float  # NaN where the force does not tell when the stage stopped
+    speed_m_s: float  # NaN where the force does not show the stop
 
 
 def wide_pace(settings: StageSettings) -> Pace:
-    """Before anything was measured: the speed that was set, give or take; ramps from 0.2 to 20 m/s²."""
+    """Return the prior before any measurement: about the set speed, with ramps from 0.2 to 20 m/s²."""
     return Pace(settings.speed_m_s, 2.0, 0.15, 1.2)
 
 
@@ -117,7 +117,7 @@ def find_insertion(profile: Profile, settings: StageSettings, expected: Pace) ->
     window = (times_s > touched_s - BEFORE_S) & (times_s < top_s + AFTER_S)
     t, y = times_s[window], profile.forces_n[window]
     if np.count_nonzero((t >= touched_s) & (t <= top_s)) < 6:
-        raise StrokeError("fewer than 6 samples on the way down: a faster amplifier or a slower stage is needed")
+        raise StrokeError("fewer than 6 samples on the way down: use a faster amplifier or a slower stage")
     kink, jump = (_best_fit(t, y, touched_s, settings, expected, profile.noise_n, jumps) for jumps in (False, True))
     pays = jump.factors[JUMP] > 0.0 and saved_by(jump, kink, len(y)) > JUMP_PRICE
     return _insertion(jump if pays else kink, depth_m, len(y))
@@ -126,7 +126,7 @@ def find_insertion(profile: Profile, settings: StageSettings, expected: Pace) ->
 def _best_fit(
     t: Array, y: Array, touched_s: float, settings: StageSettings, expected: Pace, noise_n: float, jumps: bool
 ) -> CurveFit:
-    """Mud that bears less as the stage slows down looks much like a longer ramp: only where it pays, and never more."""
+    """Include the loss of slower mud only where it pays, since it looks like a longer ramp."""
     plain, slow = (_fit(t, y, touched_s, settings, expected, noise_n, jumps, slows) for slows in (False, True))
     pays = slow.factors[SLOWING] < 0.0 and saved_by(slow, plain, len(y)) > SLOWING_PRICE
     return slow if pays else plain
@@ -159,7 +159,7 @@ def _fit(
 
 
 def _pace_of(parameters: Array, depth_m: float) -> tuple[float, float]:
-    """Speed and acceleration; a ramp is never longer than the way."""
+    """Return speed and acceleration, with a ramp no longer than the stroke."""
     speed_m_s = float(np.exp(np.clip(parameters[1], -9.0, 3.0)))
     ramp_m_s2 = float(np.exp(np.clip(parameters[2], -5.0, 6.0)))
     return speed_m_s, max(ramp_m_s2, 0.55 * speed_m_s * speed_m_s / depth_m)
@@ -178,12 +178,12 @@ def _shapes(t: Array, parameters: Array, depth_m: float, jumps: bool, slows: boo
 
 
 def descent_s(speed_m_s: float, acceleration_m_s2: float, depth_m: float) -> float:
-    """From the surface to where the stage stands."""
+    """Return the time from the surface to the stop."""
     return depth_m / speed_m_s + speed_m_s / (2.0 * acceleration_m_s2)
 
 
 def descent(since_s: Array, speed_m_s: float, acceleration_m_s2: float, depth_m: float) -> tuple[Array, Array]:
-    """Depth and share of the full speed, by the time since the surface."""
+    """Return the depth, and the fraction of the full speed, by the time since the surface."""
     left_s = np.clip(descent_s(speed_m_s, acceleration_m_s2, depth_m) - since_s, 0.0, None)
     slowing = left_s < speed_m_s / acceleration_m_s2
     slow_m = depth_m - acceleration_m_s2 * left_s * left_s / 2.0
@@ -223,7 +223,7 @@ def find_extraction(profile: Profile, insertion: Insertion, settings: StageSetti
     if times_s[-1] < last_s + 0.1:
         raise StrokeError("the recording ended before the plate was out of the mud")
     pace, depth_m = insertion.pace, settings.depth_m
-    unseen_m = depth_m * OUT_MARGIN * threshold_n / -least_n  # of which the noise lets nobody know, were it a line
+    unseen_m = depth_m * OUT_MARGIN * threshold_n / -least_n  # below the noise, for a force linear in depth
     period_s = float(np.median(np.diff(times_s)))
     reach_s, level_n = (unseen_m / pace.speed_m_s + OUT_MARGIN * period_s) / 2.0, 0.0
     out_s = last_s + 0.95 * reach_s
@@ -237,14 +237,14 @@ def find_extraction(profile: Profile, insertion: Insertion, settings: StageSetti
 
 
 def _first_valley(squares: list[float]) -> int:
-    """Not the last: a chain that begins later, with a flat piece, is as good."""
+    """Return the first minimum: a chain that begins later, with a flat piece, fits as well."""
     padded = [float("inf"), *squares, float("inf")]
     valleys = [i for i, square in enumerate(squares) if padded[i] >= square <= padded[i + 2]]
     return next(i for i in valleys if squares[i] <= VALLEY * min(squares))
 
 
 class _OutFit(NamedTuple):
-    square: float  # mean of what a chain of lines leaves that ends when no time is left
+    square: float  # mean squared residual of a chain of lines that ends at the surface
     level_n: float  # after it
     std_error_s: float  # of that moment
 
@@ -265,35 +265,35 @@ def _fit_out(left_s: Array, forces_n: Array, pace: Pace, depth_m: float) -> _Out
 
 
 def _chain(depths_m: Array, depth_m: float) -> Array:
-    """Columns: a level, and one line after the other."""
+    """Return columns for a level and for one line after the other."""
     lines = [np.interp(depths_m, depth_m * KNOTS, unit) for unit in np.eye(len(KNOTS))[1:]]
     return np.stack([np.ones_like(depths_m), *lines], 1)
 
 
 def find_shear(profile: Profile, settings: StageSettings, zero_n: float) -> Shear:
-    """The second half of the way, less where the stage stopped early. Raises StrokeError."""
+    """Find the second half of the travel, shorter where the stage stopped early. Raises StrokeError."""
     times_s, forces_n = profile.times_s, profile.forces_n - zero_n
     begin_s = float(times_s[profile.begin])
-    whole_s = settings.shear_path_m / settings.speed_m_s
-    half = (times_s > begin_s + 0.35 * whole_s) & (times_s < begin_s + 0.5 * whole_s)
-    if times_s[-1] < begin_s + 0.5 * whole_s:
+    stroke_s = settings.shear_path_m / settings.speed_m_s
+    half = (times_s > begin_s + 0.35 * stroke_s) & (times_s < begin_s + 0.5 * stroke_s)
+    if times_s[-1] < begin_s + 0.5 * stroke_s:
         raise StrokeError("the recording ended before the force was steady")
     if np.count_nonzero(half) < 2:
-        raise StrokeError("hardly a sample on the way: a faster amplifier or a slower stage is needed")
+        raise StrokeError("hardly any sample in the shear: use a faster amplifier or a slower stage")
     plateau_n = float(np.median(forces_n[half]))
-    stop_s = _falls_s(times_s, forces_n < FALLEN_FRACTION * plateau_n, begin_s + 0.5 * whole_s)
-    to_s = float(np.nanmin([begin_s + 0.96 * whole_s, stop_s - 0.03]))
-    from_s = min(begin_s + 0.5 * whole_s, (begin_s + to_s) / 2.0)
+    stop_s = _falls_s(times_s, forces_n < FALLEN_FRACTION * plateau_n, begin_s + 0.5 * stroke_s)
+    to_s = float(np.nanmin([begin_s + 0.96 * stroke_s, stop_s - 0.03]))
+    from_s = min(begin_s + 0.5 * stroke_s, (begin_s + to_s) / 2.0)
     if np.count_nonzero((times_s >= from_s) & (times_s <= to_s)) < 8 or plateau_n < LEAST_FORCE_N:
         raise StrokeError(
-            "no steady shear: the force fell again before half of the way. Was the stage started before the recording, "
-            "or is its way shorter, or its speed higher, than was told?"
+            "no steady shear: the force fell before half of the travel. Was the stage started before the recording, or "
+            "is its travel shorter, or its speed higher, than the options say?"
         )
     return Shear(begin_s, from_s, to_s, settings.shear_path_m / (stop_s - begin_s))
 
 
 def _falls_s(times_s: Array, is_low: NDArray[np.bool_], from_s: float) -> float:
-    """When the force falls and stays low; NaN where it does not."""
+    """Return the time at which the force falls and stays low, or NaN."""
     for i in np.flatnonzero(is_low & (times_s > from_s)):
         if np.all(is_low[(times_s >= times_s[i]) & (times_s < times_s[i] + LOW_S)]):
             return float(times_s[i])

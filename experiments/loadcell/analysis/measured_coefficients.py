@@ -1,7 +1,7 @@
-"""The coefficients of trials whose place was measured, by the same words as those of experiments/loadcell/fits.py.
+"""Coefficients of trials with a measured position, by the definitions of coefficients.py.
 
-Depths are the encoder's, from the surface that the force tells; the depth that was set is believed only of a shear.
-Forces count as at the speed that was set.
+Depths are the encoder's, from the surface that the force shows; only a shear keeps the set depth. Forces are corrected
+to the set speed.
 """
 
 from __future__ import annotations
@@ -12,65 +12,83 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.plate import submerged_part
-from experiments.loadcell.alignment import Alignment, PlacedProfile, rate_of
-from experiments.loadcell.contact import Profile, StrokeError
-from experiments.loadcell.curve_fit import Array
-from experiments.loadcell.fits import (
-    NOT_KNOWN,
+from experiments.loadcell.analysis.coefficients import (
     RESIDUAL_FRACTION,
     RESIDUAL_NOISES,
     SHEAR,
     SHIFT,
-    Analysed,
+    UNKNOWN_COEFFICIENT,
+    AnalysedTrial,
     Coefficient,
     Recorded,
     slope,
     steadiness,
     volume_m3,
 )
-from experiments.loadcell.motion import REVERSAL_FRACTION, Extraction, Insertion, Pace, Shear, StageSettings
-from experiments.loadcell.position import LEAST_SAMPLES, Mask, MeasuredInsertion, find_insertion, find_shear
-from experiments.loadcell.stage_track import LEAST_PLACES, StageTrack
+from experiments.loadcell.analysis.contact import Profile, StrokeError
+from experiments.loadcell.analysis.curve_fit import Array
+from experiments.loadcell.analysis.force_motion import (
+    REVERSAL_FRACTION,
+    Extraction,
+    Insertion,
+    Pace,
+    Shear,
+    StageSettings,
+)
+from experiments.loadcell.analysis.measured_motion import (
+    LEAST_SAMPLES,
+    Mask,
+    MeasuredInsertion,
+    find_insertion,
+    find_shear,
+)
+from experiments.loadcell.analysis.stage_track import (
+    LEAST_POSITIONS,
+    Alignment,
+    PositionedProfile,
+    StageTrack,
+    fit_rate,
+)
 
-DEPTH_BOUND = 0.1  # from the depth that was set, beyond which it is said
+DEPTH_BOUND = 0.1  # difference from the set depth that is remarked
 EVEN_DEPTHS = 60
 LAST_FRACTION = 0.3
 
 
-def analyse_measured(trial: Recorded, profile: Profile, settings: StageSettings, expected: Alignment) -> Analysed:
-    """Raises StrokeError where the place does not tell."""
-    if trial.places is None or len(trial.places.times_s) < LEAST_PLACES:
-        raise StrokeError("the encoder told hardly any place")
-    placed = PlacedProfile(profile, StageTrack(trial.places), settings)
-    return (_shear if trial.kind == SHEAR else _insertion)(trial, placed, expected)
+def analyse_measured(trial: Recorded, profile: Profile, settings: StageSettings, expected: Alignment) -> AnalysedTrial:
+    """Raises StrokeError where the positions do not show the stroke."""
+    if trial.positions is None or len(trial.positions.times_s) < LEAST_POSITIONS:
+        raise StrokeError("the encoder measured hardly any position")
+    stroke = PositionedProfile(profile, StageTrack(trial.positions), settings)
+    return (_shear if trial.kind == SHEAR else _insertion)(trial, stroke, expected)
 
 
-def _insertion(trial: Recorded, placed: PlacedProfile, expected: Alignment) -> Analysed:
-    motion, profile, settings = find_insertion(placed, expected), placed.profile, placed.settings
-    unsure_m = hypot(motion.surface_std_error_m, placed.track.interpolation_error_m)
-    reported_n, rates = (
+def _insertion(trial: Recorded, stroke: PositionedProfile, expected: Alignment) -> AnalysedTrial:
+    motion, profile, settings = find_insertion(stroke, expected), stroke.profile, stroke.settings
+    unsure_m = hypot(motion.surface_std_error_m, stroke.track.interpolation_error_m)
+    opposing_n, rates = (
         profile.forces_n - motion.level_n,
-        expected.rate_uncertainty * placed.quickness(motion.alignment.lag_s),
+        expected.rate_uncertainty * stroke.speed_terms(motion.alignment.lag_s),
     )
-    reported = {"k_p": _slope(motion, settings, reported_n, motion.down, motion.deepest_m, unsure_m, rates)}
+    coefficients = {"k_p": _slope(motion, settings, opposing_n, motion.down, motion.deepest_m, unsure_m, rates)}
     extraction, remark = None, _insertion_remark(profile, motion, settings)
     if np.count_nonzero(motion.up) >= LEAST_SAMPLES:
         unsure_m = hypot(unsure_m, motion.mean_speed_m_s * motion.alignment.lag_uncertainty_s)
         to_m = (1.0 - REVERSAL_FRACTION) * motion.deepest_m
-        reported_n = motion.up_level_n - profile.forces_n
-        reported["k_e"] = _slope(motion, settings, reported_n, motion.up, to_m, unsure_m, rates)
+        opposing_n = motion.up_level_n - profile.forces_n
+        coefficients["k_e"] = _slope(motion, settings, opposing_n, motion.up, to_m, unsure_m, rates)
         extraction = Extraction(motion.lift_s, motion.out_s, motion.up_level_n, nan)
     else:
-        reported["k_e"], remark = (
-            NOT_KNOWN,
-            "no extraction: the encoder did not see the plate come up. Was it drawn out?",
+        coefficients["k_e"], remark = (
+            UNKNOWN_COEFFICIENT,
+            "no extraction: the encoder did not see the plate come up. Was it lifted out in time?",
         )
-    return Analysed(
+    return AnalysedTrial(
         trial,
         profile,
         _as_insertion(motion),
         extraction,
-        reported,
+        coefficients,
         remark=remark,
         shared_uncertainty=_rate_uncertainty(motion, motion.down | motion.up, rates),
         positions_m=motion.depths_m,
@@ -84,7 +102,7 @@ def _by_depth(motion: MeasuredInsertion, chosen: Mask) -> NDArray[np.intp]:
 
 
 def _rate_uncertainty(motion: MeasuredInsertion, chosen: Mask, rates: Array) -> float:
-    """Of k. `rates`: shares by which it is in doubt what the mud bears at each sample's speed."""
+    """Return the relative uncertainty of k from those of the force at each sample's speed."""
     order = _by_depth(motion, chosen)
     depths_m = motion.depths_m[order]
     return abs(float(np.average(rates[order], weights=depths_m * np.clip(np.gradient(depths_m), 1e-9, None))))
@@ -99,16 +117,16 @@ def _slope(
     unsure_m: float,
     rates: Array,
 ) -> Coefficient:
-    """From the surface to `to_m`, every piece of way alike wherever the hand has rested."""
+    """Fit k from the surface to `to_m`, with equal weight for equal travel wherever the stage rested."""
     order = _by_depth(motion, chosen)
-    depths_m, reported_n = motion.depths_m[order], forces_n[order] / motion.grips[order]
+    depths_m, corrected_n = motion.depths_m[order], forces_n[order] / motion.speed_factors[order]
     unsure = hypot(SHIFT * unsure_m / to_m, _rate_uncertainty(motion, chosen, rates))
-    uncertainty = slope(settings, depths_m, reported_n, to_m, unsure).std_error
+    uncertainty = slope(settings, depths_m, corrected_n, to_m, unsure).std_error
     even_m = to_m * (np.arange(EVEN_DEPTHS) + 0.5) / EVEN_DEPTHS
-    even_n = np.interp(even_m, np.append(0.0, depths_m), np.append(0.0, reported_n))
+    even_n = np.interp(even_m, np.append(0.0, depths_m), np.append(0.0, corrected_n))
     last = depths_m > depths_m[-1] - LAST_FRACTION * to_m
     if np.count_nonzero(last) > 2:  # down to where the stage stopped, by the line of the last piece
-        line = np.polyfit(depths_m[last], reported_n[last], 1)
+        line = np.polyfit(depths_m[last], corrected_n[last], 1)
         even_n = np.where(even_m > depths_m[-1], np.polyval(line, even_m), even_n)
     volumes_m3 = volume_m3(settings, even_m)
     return Coefficient(float(volumes_m3 @ even_n / (volumes_m3 @ volumes_m3)), uncertainty)
@@ -119,7 +137,7 @@ def _insertion_remark(profile: Profile, motion: MeasuredInsertion, settings: Sta
     if abs(motion.deepest_m / settings.depth_m - 1.0) > DEPTH_BOUND:
         return (
             f"the plate went {100.0 * motion.deepest_m:.1f} cm deep by the encoder, and {100.0 * settings.depth_m:g} "
-            "cm was set: coefficients of one mud differ with the depth, or --position-step is not its way per count"
+            "cm was set: coefficients of a mud depend on the depth; or --position-step is not its travel per count"
         )
     if motion.residual_n > max(RESIDUAL_NOISES * profile.noise_n, RESIDUAL_FRACTION * largest_n):
         return (
@@ -130,7 +148,7 @@ def _insertion_remark(profile: Profile, motion: MeasuredInsertion, settings: Sta
 
 
 def _as_insertion(motion: MeasuredInsertion) -> Insertion:
-    """As the force alone would have told it; a hand has no ramp."""
+    """Convert to the record of a stroke that was found from the force; a hand has no ramp."""
     return Insertion(
         surface_s=motion.surface_s,
         surface_std_error_s=motion.surface_std_error_m / motion.mean_speed_m_s,
@@ -144,20 +162,20 @@ def _as_insertion(motion: MeasuredInsertion) -> Insertion:
     )
 
 
-def _shear(trial: Recorded, placed: PlacedProfile, expected: Alignment) -> Analysed:
-    motion, profile, settings = find_shear(placed, expected.lag_s), placed.profile, placed.settings
+def _shear(trial: Recorded, stroke: PositionedProfile, expected: Alignment) -> AnalysedTrial:
+    motion, profile, settings = find_shear(stroke, expected.lag_s), stroke.profile, stroke.settings
     zero_n = -trial.zero_n if profile.turned else trial.zero_n
-    felt_n, quickness = (profile.forces_n - zero_n)[motion.steady], motion.quickness[motion.steady]
-    ways_m = np.clip(np.gradient(motion.ways_m[motion.steady]), 1e-9, None)
-    forces_n = felt_n / (1.0 + expected.rate_fraction * quickness)
-    mean_n = float(np.average(forces_n, weights=ways_m))
+    felt_n, speed_terms = (profile.forces_n - zero_n)[motion.steady], motion.speed_terms[motion.steady]
+    travels_m = np.clip(np.gradient(motion.travels_m[motion.steady]), 1e-9, None)
+    forces_n = felt_n / (1.0 + expected.rate_fraction * speed_terms)
+    mean_n = float(np.average(forces_n, weights=travels_m))
     if mean_n <= 0.0:
         raise StrokeError("the force does not oppose the motion")
-    rate_n = mean_n * expected.rate_uncertainty * float(np.average(quickness, weights=ways_m))
+    rate_n = mean_n * expected.rate_uncertainty * float(np.average(speed_terms, weights=travels_m))
     error_n, remark = steadiness(forces_n)
     moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
     steady_s = profile.times_s[motion.steady]
-    return Analysed(
+    return AnalysedTrial(
         trial,
         profile,
         Shear(motion.begin_s, float(steady_s[0]), float(steady_s[-1]), motion.mean_speed_m_s),
@@ -165,7 +183,7 @@ def _shear(trial: Recorded, placed: PlacedProfile, expected: Alignment) -> Analy
         {"k_s": Coefficient(mean_n / moment_m3, hypot(error_n, rate_n) / moment_m3)},
         remark=remark,
         shared_uncertainty=abs(rate_n) / mean_n,
-        positions_m=motion.ways_m,
-        position_error_m=placed.track.interpolation_error_m,
-        alignment=rate_of(felt_n, quickness),
+        positions_m=motion.travels_m,
+        position_error_m=stroke.track.interpolation_error_m,
+        alignment=fit_rate(felt_n, speed_terms),
     )

@@ -1,0 +1,244 @@
+"""Checks and calibration of the load cell before the first trial, with advice where something is wrong."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.load_cell.calibration import (
+    CalibrationError,
+    LoadCellCalibration,
+    calibrate,
+    of_unit,
+    read_calibration,
+    remarks_on,
+    weigh,
+    write_calibration,
+)
+from drivers.load_cell.line_formats import AUTO, COUNTS, LineFormat, find_format
+from drivers.load_cell.load_cell_port import LoadCellPort
+from drivers.serial.serial_line import COMMON_BAUDS, SerialLine, SerialLineError, text_fraction
+from experiments.loadcell.analysis.force_motion import StageSettings
+from experiments.loadcell.recording import POLL_S, BenchClock, CellRecorder
+from experiments.loadcell.trials import TrialBench
+from experiments.robot.bench_errors import BenchError
+from experiments.robot.prompt import GO_ON, Operator
+
+CALIBRATION = "calibration.json"
+WEIGHING_S = 2.0
+LEAST_SAMPLES, LEAST_POSITIONS = 12, 12  # of an insertion
+STOP = "q"
+LISTENING_S, STARTING_S = 2.0, 4.0  # a board that restarts when its port is opened needs the longer time
+PROBE_S = 0.8
+TEXT_FRACTION = 0.8  # less readable text means another baud rate
+READABLE_FRACTION = 0.6  # fewer decoded lines mean another format
+OR_WITHOUT = "or continue without --position"
+
+
+@dataclass(frozen=True)
+class CellSettings:
+    """The options for the amplifier; an empty unit is that of the lines."""
+
+    format_name: str = AUTO
+    unit: str = ""
+    scale_n: float | None = None  # newtons per unit
+    calibration: Path | None = None
+
+
+def prepare_cell(bench: TrialBench, settings: StageSettings, cell: CellSettings) -> None:
+    """Find the format of the lines, check the encoder, calibrate, check the rate. Raises BenchError."""
+    port, operator = bench.recorder.port, bench.operator
+    operator.report(f"listening to {port.path} at {port.baud} baud")
+    port.line_format = LineFormat(examine_lines(bench.recorder, cell.format_name))
+    examine_encoder(bench.recorder, operator, settings)
+    port.calibration = find_calibration(bench, cell)
+    check_rate(bench.recorder, operator, settings)
+
+
+# lines
+
+
+def examine_lines(recorder: CellRecorder, name: str) -> str:
+    """Return the name of the format that reads the lines; `name` is the wanted one or "auto". Raises BenchError."""
+    port = recorder.port
+    recorder.listen(LISTENING_S)
+    if not port.recent_lines:
+        recorder.listen(STARTING_S)
+    arrivals, lines = port.arrivals, port.recent_lines
+    if not lines:
+        raise BenchError(
+            f"nothing arrives on {port.path} at {port.baud} baud: check the amplifier's power and cable, that it sends "
+            "without being asked, and that this is its port"
+        )
+    if arrivals.text < TEXT_FRACTION:
+        raise BenchError(wrong_baud(port.line, recorder, "--baud", "a load cell's amplifier"))
+    found = find_format(lines)
+    if name == AUTO:
+        if found is None:
+            raise BenchError(f"no named format reads these lines: {_quote(lines)}. {_advise_column(lines)}")
+        return found.name
+    if arrivals.readable < READABLE_FRACTION:
+        advice = f"--format {found.name} does" if found else _advise_column(lines)
+        raise BenchError(
+            f"the format {name!r} reads {100.0 * arrivals.readable:.0f} % of the lines, such as {_quote(lines)}; "
+            + advice
+        )
+    return name
+
+
+def examine_encoder(recorder: CellRecorder, operator: Operator, settings: StageSettings) -> None:
+    """Check that counts arrive, and often enough for the stroke. Raises BenchError."""
+    encoder = recorder.encoder
+    if encoder is None:
+        return
+    if not encoder.line.recent:
+        recorder.listen(STARTING_S)
+    arrivals, path = encoder.arrivals, encoder.settings.path
+    if not arrivals.lines:
+        raise BenchError(
+            f"nothing arrives on {path} at {encoder.settings.baud} baud: check the encoder's power and cable, that it "
+            f"sends without being asked, and that this is its port; {OR_WITHOUT}"
+        )
+    if arrivals.text < TEXT_FRACTION:
+        message = wrong_baud(encoder.line, recorder, "--position-baud", "an encoder's counter")
+        raise BenchError(f"{message}; {OR_WITHOUT}")
+    if arrivals.readable < READABLE_FRACTION:
+        label = encoder.settings.label
+        expected = f"a label {label!r} and a whole number" if label else "a whole number"
+        raise BenchError(
+            f"the lines on {path} are not {expected}, but such as {_quote(list(encoder.line.recent))}: give their "
+            f"first characters as --position-label, make the counter send its count alone, {OR_WITHOUT}"
+        )
+    between_m = settings.speed_m_s / (encoder.rate_hz or 1.0)
+    if LEAST_POSITIONS * between_m > settings.depth_m:
+        operator.report(
+            f"the encoder sends {encoder.rate_hz or 0.0:.0f} lines/s, one per {1000.0 * between_m:.1f} mm of travel: "
+            f"make it send faster, for at least {LEAST_POSITIONS} lines in an insertion"
+        )
+
+
+def _quote(lines: Sequence[bytes]) -> str:
+    return " and ".join(repr(line.decode("ascii", "replace").strip()[:60]) for line in lines[-2:])
+
+
+def _advise_column(lines: Sequence[bytes]) -> str:
+    readable = [column for column in range(1, 10) if _can_read(f"column{column}", lines)]
+    if readable:
+        names = " or ".join(f"--format column{column}" for column in readable)
+        return f"Choose the column of the load with {names}"
+    return (
+        "Is it a load cell's amplifier? Give --format a regular expression with (?P<value>...) that fits a whole line"
+    )
+
+
+def _can_read(name: str, lines: Sequence[bytes]) -> bool:
+    line_format = LineFormat(name)
+    return sum(line_format.decode(line) is not None for line in lines) > 0.8 * len(lines)
+
+
+def wrong_baud(line: SerialLine, recorder: CellRecorder, option: str, device: str) -> str:
+    """Try all common baud rates; return a message with the one at which text arrives."""
+    recorder.report(f"no text arrives on {line.path} at {line.baud} baud: other rates are tried")
+    line.close()
+    for baud in COMMON_BAUDS:
+        if baud != line.baud and _is_text(line, baud, recorder.clock):
+            return f"{line.baud} is not the baud rate of {line.path}: at {baud} it sends text. Use {option} {baud}"
+    return (
+        f"no text arrives on {line.path} at {line.baud} baud, nor at any common rate: is it {device} that sends lines "
+        "of text?"
+    )
+
+
+def _is_text(line: SerialLine, baud: int, clock: BenchClock) -> bool:
+    try:
+        tried = SerialLine(line.path, baud, open_device=line.open_device)
+    except SerialLineError:
+        return False
+    end_s = clock.now_s() + PROBE_S
+    while clock.now_s() < end_s:
+        clock.pass_time(POLL_S)
+        tried.read(clock.now_s())
+    tried.close()
+    return text_fraction(tried.recent) > TEXT_FRACTION
+
+
+# calibration
+
+
+def find_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibration:
+    """Take the given file, the unit's own scale or the folder's file, or calibrate now. Raises BenchError."""
+    unit = cell.unit or _unit_of_lines(bench.recorder.port)
+    file = bench.folder / CALIBRATION
+    try:
+        if cell.calibration is not None:
+            return read_calibration(cell.calibration)
+        known = of_unit(unit, cell.scale_n)
+        if known is not None:
+            return known
+        if file.exists():
+            bench.operator.report(f"calibration from {file}; remove it to calibrate again")
+            return read_calibration(file)
+    except CalibrationError as problem:
+        raise BenchError(str(problem)) from problem
+    return _calibrate_now(bench, unit, file)
+
+
+def _unit_of_lines(port: LoadCellPort) -> str:
+    """Return the unit in most lines, or counts."""
+    readings = [port.line_format.decode(line) for line in port.recent_lines]
+    units = Counter(reading.unit for reading in readings if reading is not None and reading.unit)
+    return units.most_common(1)[0][0] if units else COUNTS
+
+
+def _calibrate_now(bench: TrialBench, unit: str, file: Path) -> LoadCellCalibration:
+    """Weigh two known weights, again until they give a span or the operator stops."""
+    recorder = bench.recorder
+    recorder.port.calibration = LoadCellCalibration(unit, 1.0)
+    while True:
+        try:
+            weighings = [weigh(bench.stage.weigh(which), _read_weight(recorder)) for which in (0, 1)]
+            calibration = calibrate(unit, *weighings)
+        except CalibrationError as problem:
+            bench.operator.report(str(problem))
+            if bench.operator.ask("Calibrate again?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
+                raise BenchError("the load cell is not calibrated") from problem
+            continue
+        for remark in remarks_on(calibration, *weighings):
+            bench.operator.report(remark)
+        write_calibration(file, calibration)
+        bench.operator.report(
+            f"calibrated: {calibration.per_newton:.6g} {unit} per N, ± {100.0 * calibration.relative_error:.2g} %; "
+            f"saved in {file}"
+        )
+        return calibration
+
+
+def _read_weight(recorder: CellRecorder) -> list[float]:
+    """Raises CalibrationError where the weight overloads the cell."""
+    recorder.drain()
+    samples = recorder.listen(WEIGHING_S)
+    readings = [sample.force_n for sample in samples if not sample.overloaded]
+    if len(readings) < len(samples) / 2.0:
+        raise CalibrationError("the load cell is overloaded by this weight: take a lighter one, or check its wires")
+    return readings
+
+
+def check_rate(recorder: CellRecorder, operator: Operator, settings: StageSettings) -> None:
+    """Warn of an amplifier that is too slow for the stroke. Raises BenchError where the operator stops."""
+    rate_hz = recorder.port.rate_hz
+    if rate_hz is None:
+        raise BenchError("too few lines arrive to measure their rate: check the amplifier")
+    duration_s = settings.depth_m / settings.speed_m_s
+    samples = rate_hz * duration_s
+    if samples >= LEAST_SAMPLES:
+        return
+    slower_m_s = settings.speed_m_s * samples / LEAST_SAMPLES
+    operator.report(
+        f"the amplifier sends {rate_hz:.0f} lines/s: an insertion of {duration_s:.2g} s has only {samples:.0f} samples "
+        f"and needs {LEAST_SAMPLES}. Set an HX711's RATE pin high (80 samples/s), choose a faster rate of the "
+        f"indicator, or move the stage at --speed {slower_m_s:.2g}"
+    )
+    if operator.ask("Continue with this amplifier?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
+        raise BenchError("stopped: the amplifier is too slow for the stroke")
