@@ -32,7 +32,7 @@ test-vm: .venv/test  ## run the daemon under systemd on a real kernel, in a virt
 	$(BIN)/python -m pytest -v virtual_machine $(ARGS)
 
 mutants: .venv/test  ## change the transmit gate in 204 places; its tests must notice each change
-	$(BIN)/python -m tests.drivers.odrive.gate_mutants
+	$(BIN)/python -m tests.drivers.gate_mutants
 
 lint: .venv/test .venv/docs  ## run ruff and mypy --strict
 	$(BIN)/ruff check .

@@ -98,8 +98,12 @@ class PythonCanPort(PortHealth):
             data=frame.data,
             is_extended_id=frame.is_extended,
             is_remote_frame=frame.is_remote,
+            is_fd=frame.is_fd,
+            bitrate_switch=frame.bit_rate_switch,
         )
         try:
+            if frame.is_fd and self._bus.protocol is can.CanProtocol.CAN_20:
+                raise ValueError("the interface was not opened for CAN FD")
             self._bus.send(message, 0.0)
         except PORT_ERRORS as problem:  # a full transmit queue (ENOBUFS) or an interface that is gone
             self.on_failed_send(problem)
@@ -131,8 +135,16 @@ class SlcanPort(PythonCanPort):
 
 
 def _as_frame(message: can.Message, clock_s: float) -> Frame:
-    data, is_remote, is_extended = bytes(message.data), message.is_remote_frame, message.is_extended_id
-    return Frame(message.arbitration_id, data, is_remote, False, is_extended, message.timestamp + clock_s)
+    return Frame(
+        message.arbitration_id,
+        bytes(message.data),
+        message.is_remote_frame,
+        False,
+        message.is_extended_id,
+        message.timestamp + clock_s,
+        message.is_fd,
+        message.bitrate_switch,
+    )
 
 
 def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool]) -> CanPort:

@@ -25,9 +25,9 @@ from time import time
 
 import can
 
-from drivers.can.frames import FRAME_LAYOUT, Frame, decode_frame, encode_frame
+from drivers.can.frames import FD_FORMAT, FD_FRAME_LAYOUT, FLAGS_BYTE, FRAME_LAYOUT, Frame, decode_frame, encode_frame
 
-FRAME_BYTES = FRAME_LAYOUT.size
+FRAME_BYTES, FD_FRAME_BYTES = FRAME_LAYOUT.size, FD_FRAME_LAYOUT.size
 CHUNK_BYTES = 65536
 PATH_MAX_BYTES = 107  # sun_path of unix(7) has 108 with its final zero
 BACKLOG_NODES = 4096  # that may join while one node is stopped
@@ -169,11 +169,15 @@ class LocalLink:
             pass
 
     def _split(self, peer: Peer, stream: bytes) -> None:
-        end = len(stream) - len(stream) % FRAME_BYTES
-        peer.rest = stream[end:]
-        if end:
+        begin, end = 0, _end_of_frame(stream, 0)
+        frames: list[bytes] = []
+        while end <= len(stream):
+            frames.append(stream[begin:end])
+            begin, end = end, _end_of_frame(stream, end)
+        peer.rest = stream[begin:]
+        if frames:
             os.eventfd_write(self._waiting, 1)
-            self._arrived.extend([stream[at : at + FRAME_BYTES] for at in range(0, end, FRAME_BYTES)])
+            self._arrived.extend(frames)
 
 
 class LocalBus(can.BusABC):
@@ -193,6 +197,7 @@ class LocalBus(can.BusABC):
         except (OSError, ValueError) as error:
             raise can.CanInitializationError(f"Cannot open local bus {channel}: {error}") from error
         self._channel = str(channel)
+        self._can_protocol = can.CanProtocol.CAN_FD  # which carries CAN 2.0 as well
         self.channel_info = f"local bus {channel}"
         super().__init__(channel=str(channel), can_filters=can_filters, **kwargs)
 
@@ -206,10 +211,16 @@ class LocalBus(can.BusABC):
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Never waits: without room in a node's buffer the frame is lost for that node."""
-        if msg.is_fd:
-            raise ValueError(f"A local bus carries CAN 2.0 frames only, not CAN FD: {msg}")
-        flags = msg.is_remote_frame, msg.is_error_frame, msg.is_extended_id
-        self._link.send(encode_frame(Frame(msg.arbitration_id, bytes(msg.data), *flags)))
+        frame = Frame(
+            arbitration_id=msg.arbitration_id,
+            data=bytes(msg.data),
+            is_remote=msg.is_remote_frame,
+            is_error=msg.is_error_frame,
+            is_extended=msg.is_extended_id,
+            is_fd=msg.is_fd,
+            bit_rate_switch=msg.bitrate_switch,
+        )
+        self._link.send(encode_frame(frame))
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         """Filters by itself: can.BusABC would answer a frame that does not pass as it does an empty bus."""
@@ -232,12 +243,21 @@ class LocalBus(can.BusABC):
             is_remote_frame=frame.is_remote,
             is_error_frame=frame.is_error,
             data=frame.data,
+            is_fd=frame.is_fd,
+            bitrate_switch=frame.bit_rate_switch,
             channel=self._channel,
         )
 
     def shutdown(self) -> None:
         super().shutdown()
         self._link.close()
+
+
+def _end_of_frame(stream: bytes, begin: int) -> int:
+    """Where the frame ends that begins here; beyond the stream where its length has not arrived yet."""
+    if begin + FLAGS_BYTE < len(stream) and stream[begin + FLAGS_BYTE] & FD_FORMAT:
+        return begin + FD_FRAME_BYTES
+    return begin + FRAME_BYTES
 
 
 def make_channel_folder(channel: str | Path) -> Path:

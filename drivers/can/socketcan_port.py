@@ -26,10 +26,12 @@ from drivers.can.frames import (
     ERROR_FLAG,
     EXTENDED_FLAG,
     EXTENDED_MASK,
+    FD_FRAME_LAYOUT,
     FRAME_LAYOUT,
     REMOTE_FLAG,
     STANDARD_MASK,
     Frame,
+    decode_frame,
     encode_frame,
 )
 from drivers.can.port_health import MOST_FRAMES_PER_READ, PortHealth
@@ -39,9 +41,10 @@ STAMP, COUNT = struct.Struct("@ll"), struct.Struct("@I")  # as this machine lays
 COUNT_RANGE = 1 << 32
 ANCILLARY_BYTES = socket.CMSG_SPACE(STAMP.size) + socket.CMSG_SPACE(COUNT.size)
 FRAME_BYTES, LENGTH_BYTE = FRAME_LAYOUT.size, 4
-READ_BYTES = FRAME_BYTES + 1  # so that a longer one (CAN FD) shows
+READ_BYTES = FD_FRAME_LAYOUT.size + 1  # so that a longer one shows
 FLAGS = EXTENDED_FLAG | REMOTE_FLAG | ERROR_FLAG
 ALL_BITS = STANDARD_MASK | REMOTE_FLAG  # of a filter; with these the kernel looks an id up instead of comparing
+ALL_EXTENDED_BITS = EXTENDED_MASK | REMOTE_FLAG
 
 
 class SocketcanPort(PortHealth):
@@ -57,7 +60,13 @@ class SocketcanPort(PortHealth):
 
     def listen_to(self, ids: Iterable[int]) -> None:
         """If the kernel refuses, python-can says so in the log, and strangers are heard."""
-        self._bus.set_filters([{"can_id": each, "can_mask": ALL_BITS, "extended": False} for each in ids])
+        extended = {each: each > STANDARD_MASK for each in ids}
+        self._bus.set_filters(
+            [
+                {"can_id": each, "can_mask": ALL_EXTENDED_BITS if long else ALL_BITS, "extended": long}
+                for each, long in extended.items()
+            ]
+        )
 
     def receive(self) -> list[Frame]:
         frames: list[Frame] = []
@@ -88,8 +97,7 @@ class SocketcanPort(PortHealth):
             elif kind == SO_RXQ_OVFL:
                 self._on_overflow(value)
         if len(encoded) != FRAME_BYTES or encoded[LENGTH_BYTE] > DATA_MAX_BYTES:
-            self.on_failed_read(ValueError("a frame of another length than CAN 2.0 has"))
-            return None
+            return self._on_long_frame(encoded, stamp_s)
         word, length, payload = FRAME_LAYOUT.unpack(encoded)
         if not word & FLAGS:
             return Frame(word & STANDARD_MASK, payload[:length], False, False, False, stamp_s)
@@ -99,6 +107,15 @@ class SocketcanPort(PortHealth):
         is_remote, is_extended = word & REMOTE_FLAG != 0, word & EXTENDED_FLAG != 0
         identifier = word & (EXTENDED_MASK if is_extended else STANDARD_MASK)
         return Frame(identifier, b"" if is_remote else payload[:length], is_remote, False, is_extended, stamp_s)
+
+    def _on_long_frame(self, encoded: bytes, stamp_s: float) -> Frame | None:
+        """A CAN FD frame; anything else counts as a failed read."""
+        try:
+            frame = decode_frame(encoded)
+        except ValueError as problem:
+            self.on_failed_read(problem)
+            return None
+        return frame._replace(stamp_s=stamp_s)
 
     def _on_overflow(self, value: bytes) -> None:
         """The kernel counts from the socket's opening, modulo 2³²."""

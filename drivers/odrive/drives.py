@@ -19,8 +19,9 @@ from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, WatchdogEndpoints
 from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import GarbledMessageError
+from drivers.odrive.gate_tables import gate_table
 from drivers.odrive.parameters import OdriveParameters
-from drivers.odrive.transmit_gate import TransmitGate
+from drivers.transmit_gate import TransmitGate
 
 REPEAT_S = 0.1  # between two requests to change the axis state, of which the heartbeat tells the result
 LONGEST_IN_QUEUE_S = 2.0  # a stamp older than that is of another clock
@@ -42,7 +43,7 @@ class OdriveDrives:
         self.ports = dict(ports)
         self.gate = TransmitGate(limits or JointLimits())
         outlets = {
-            name: self.gate.outlet(port, [parameters[joint] for joint in JOINTS if parameters[joint].bus == name])
+            name: self.gate.outlet(port, [gate_table(drive) for drive in parameters.values() if drive.bus == name])
             for name, port in self.ports.items()
         }
         self.axes = tuple(

@@ -33,6 +33,19 @@ def port(other: can.BusABC) -> Iterator[CanPort]:
     opened.close()
 
 
+def test_can_fd_passes_where_the_interface_was_opened_for_it_and_is_refused_elsewhere(port: CanPort) -> None:
+    frame = Frame(0x18FF0205, bytes(64), is_extended=True, is_fd=True, bit_rate_switch=True)
+    port.send(frame)
+    assert (port.failed_sends, port.last_send_error) == (1, "the interface was not opened for CAN FD")
+    near, far = (
+        PythonCanPort(can.Bus(interface="virtual", channel="fd", protocol=can.CanProtocol.CAN_FD)) for _ in range(2)
+    )
+    near.send(frame)
+    assert [each._replace(stamp_s=NEVER_S) for each in far.receive()] == [frame]
+    near.close()
+    far.close()
+
+
 class FakeBus(can.BusABC):
     """Receives the same message for ever, or fails in both directions."""
 

@@ -17,11 +17,24 @@ GOLDEN = [
 ]
 
 
+GOLDEN += [
+    (Frame(0x123, b"\x11\x22", is_fd=True), "23010000 02 04 0000 1122" + 62 * "00"),
+    (
+        Frame(0x18FEF100, bytes(range(64)), is_extended=True, is_fd=True, bit_rate_switch=True),
+        "00f1fe98 40 05 0000" + bytes(range(64)).hex(),
+    ),
+]
+
+
 @st.composite
 def frames(draw: st.DrawFn) -> Frame:
     is_remote, is_error, is_extended = draw(st.booleans()), draw(st.booleans()), draw(st.booleans())
     identifier = draw(st.integers(0, 0x1FFFFFFF if is_extended or is_error else 0x7FF))
     data = b"" if is_remote else draw(st.binary(max_size=8))
+    if draw(st.booleans()):
+        fd_data = bytes(draw(st.sampled_from([*range(9), 12, 16, 20, 24, 32, 48, 64])))
+        identifier = draw(st.integers(0, 0x1FFFFFFF if is_extended else 0x7FF))
+        return Frame(identifier, fd_data, is_extended=is_extended, is_fd=True, bit_rate_switch=draw(st.booleans()))
     return Frame(identifier, data, is_remote, is_error, is_extended)
 
 
@@ -44,9 +57,12 @@ def test_python_can_builds_the_same_bytes(frame: Frame) -> None:
         is_remote_frame=frame.is_remote,
         is_error_frame=frame.is_error,
         is_extended_id=frame.is_extended,
+        is_fd=frame.is_fd,
+        bitrate_switch=frame.bit_rate_switch,
     )
     theirs = bytearray(build_can_frame(message))
     theirs[7] = 0  # they set len8_dlc, which says something of frames with 8 bytes only
+    theirs[5] |= 4 * frame.is_fd  # they leave out CANFD_FDF, which the kernel sets
     assert encode_frame(frame) == theirs
 
 
@@ -72,6 +88,11 @@ def test_a_remote_frame_that_asks_for_eight_bytes_carries_none() -> None:
         (Frame(0x20000000, is_extended=True), "0x20000000"),
         (Frame(1, bytes(9)), "not 9"),
         (Frame(1, b"\xab", is_remote=True), "ab"),
+        (Frame(1, bytes(9), is_fd=True), "9 bytes"),
+        (Frame(1, bytes(65), is_fd=True), "65 bytes"),
+        (Frame(1, is_remote=True, is_fd=True), "remote"),
+        (Frame(1, is_error=True, is_fd=True), "error"),
+        (Frame(1, bit_rate_switch=True), "bit rate"),
     ],
 )
 def test_a_frame_that_does_not_exist_on_can_is_refused_by_value(frame: Frame, named: str) -> None:
@@ -79,7 +100,7 @@ def test_a_frame_that_does_not_exist_on_can_is_refused_by_value(frame: Frame, na
         encode_frame(frame)
 
 
-@pytest.mark.parametrize("size", [0, 15, 17, 72])
+@pytest.mark.parametrize("size", [0, 15, 17, 71, 73])
 def test_a_wrong_number_of_bytes_is_refused(size: int) -> None:
     with pytest.raises(ValueError, match=rf"not {size}\."):
         decode_frame(bytes(size))

@@ -14,6 +14,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from copy import deepcopy
+from pathlib import Path
 from types import ModuleType
 
 import hypothesis
@@ -23,9 +24,8 @@ from drivers.can import mock_bus
 from drivers.odrive import axis as odrive_axis
 from tests.folders import ROOT
 
-MODULE = "drivers.odrive.transmit_gate"
-SOURCE = ROOT / "drivers" / "odrive" / "transmit_gate.py"
-TESTS = ROOT / "tests" / "drivers" / "odrive" / "test_transmit_gate.py"
+MODULES = ("drivers.transmit_gate", "drivers.odrive.gate_tables")
+TESTS = ROOT / "tests" / "drivers" / "test_transmit_gate.py"
 LONGEST_S = 60
 COMPARISONS: dict[type[ast.cmpop], tuple[type[ast.cmpop], ...]] = {
     ast.Lt: (ast.LtE, ast.GtE),
@@ -133,9 +133,17 @@ def _is_text(node: ast.AST) -> bool:
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
-def mutants() -> Iterator[tuple[str, ast.Module]]:
+def source_of(module: str) -> Path:
+    return ROOT.joinpath(*module.split(".")).with_suffix(".py")
+
+
+def parsed(module: str) -> ast.Module:
+    return ast.parse(source_of(module).read_text(encoding="utf-8"))
+
+
+def mutants(module: str) -> Iterator[tuple[str, ast.Module]]:
     """Each with the line and what was done to it."""
-    original = ast.parse(SOURCE.read_text(encoding="utf-8"))
+    original = parsed(module)
     nodes = list(_nodes(original))
     for number, node in enumerate(nodes):
         for kind in (changes_of, omissions_of):
@@ -151,25 +159,25 @@ def mutants() -> Iterator[tuple[str, ast.Module]]:
                 )
 
 
-def is_killed(tree: ast.Module) -> bool:
+def is_killed(module: str, tree: ast.Module) -> bool:
     """Whether the gate's tests fail with it; a fork, so that nothing of the mutant stays."""
     child = os.fork()
     if child == 0:
         signal.alarm(LONGEST_S)
-        os._exit(_run_tests(tree))
+        os._exit(_run_tests(module, tree))
     _, status = os.waitpid(child, 0)
     return status != 0
 
 
-def _run_tests(tree: ast.Module) -> int:
+def _run_tests(name: str, tree: ast.Module) -> int:
     quiet = os.open(os.devnull, os.O_WRONLY)
     os.dup2(quiet, 1)
     os.dup2(quiet, 2)
-    module = ModuleType(MODULE)
-    module.__file__ = str(SOURCE)
-    sys.modules[MODULE] = module
+    module = ModuleType(name)
+    module.__file__ = str(source_of(name))
+    sys.modules[name] = module
     try:
-        exec(compile(tree, str(SOURCE), "exec"), module.__dict__)  # a mutant of our own file
+        exec(compile(tree, module.__file__, "exec"), module.__dict__)  # a mutant of our own file
     except (AttributeError, IndexError, KeyError, NameError, TypeError, ValueError):
         return 1
     skipped = "not every_branch and not periodic and not kernel and not on_a_port and not gated_outlet"
@@ -180,16 +188,17 @@ def _run_tests(tree: ast.Module) -> int:
 def main() -> int:
     os.chdir(ROOT)
     assert hypothesis and mock_bus and odrive_axis  # loaded once, for all forks
-    if is_killed(ast.parse(SOURCE.read_text(encoding="utf-8"))):
-        print("The tests fail without any change.")
-        return 2
     killed, survivors = 0, []
-    for text, tree in mutants():
-        if is_killed(tree):
-            killed += 1
-        else:
-            survivors.append(text)
-            print(f"survived  {text}", flush=True)
+    for module in MODULES:
+        if is_killed(module, parsed(module)):
+            print("The tests fail without any change.")
+            return 2
+        for text, tree in mutants(module):
+            if is_killed(module, tree):
+                killed += 1
+            else:
+                survivors.append(text)
+                print(f"survived  {module}, {text}", flush=True)
     print(f"{killed} of {killed + len(survivors)} mutants killed")
     return 1 if survivors else 0
 

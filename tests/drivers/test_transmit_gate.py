@@ -15,10 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from control.limits import JointLimits
+from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
+from drivers.odrive.gate_tables import gate_table
 from drivers.odrive.parameters import OdriveParameters
-from drivers.odrive.transmit_gate import GatedPort, TransmitGate
+from drivers.transmit_gate import FrameKind, GatedPort, GateTable, TransmitGate
 from tests.folders import ROOT
 
 LIMITS = JointLimits(torque_nm=0.75, torque_rate_nm_s=100.0)
@@ -50,7 +52,7 @@ class Bench:
         self.far = bus.open()
         self.gate = TransmitGate(limits)
         drives = [OdriveParameters("left", node, velocity_limit_turn_s=8.0, current_limit_a=6.0) for node in (2, 3)]
-        self.port = self.gate.outlet(bus.open(), drives)
+        self.port = self.gate.outlet(bus.open(), map(gate_table, drives))
         self.gate.allow_step(STEP_S)
 
     def send(self, frame: Frame) -> list[Frame]:
@@ -101,6 +103,10 @@ REFUSED = [
     Frame(0x047, IDLE, is_extended=True),
     Frame(0x047, IDLE, is_error=True),
     Frame(0x047, IDLE, is_remote=True),
+    Frame(0x047, IDLE, is_fd=True),
+    Frame(0x047, IDLE, bit_rate_switch=True),
+    Frame(0x04E, ZERO, is_fd=True),
+    Frame(0x040, is_remote=True, is_fd=True),
     Frame(0x04B, bytes.fromhex("03000000 01000000")),  # position control
     Frame(0x04B, bytes.fromhex("01000000 06000000")),  # torque ramp
     Frame(0x04B, CLOSED_LOOP),
@@ -147,6 +153,7 @@ def test_anything_else_is_not_sent_but_counted(bench: Bench, frame: Frame, is_op
         (Frame(0x04C), "0x04c"),
         (Frame(0x18FEF100, b"\2", is_extended=True), "0x18fef100 extended 02"),
         (Frame(0x004, is_error=True, is_remote=True), "0x004 error remote"),
+        (Frame(0x005, b"\3", is_fd=True, bit_rate_switch=True), "0x005 FD bit-rate-switch 03"),
     ],
 )
 def test_a_refused_frame_is_told(bench: Bench, frame: Frame, text: str) -> None:
@@ -277,7 +284,7 @@ def test_the_bounds_themselves_belong_to_what_may_pass() -> None:
 
 def test_no_torque_passes_before_a_step_was_allowed() -> None:
     gate, bus = TransmitGate(LIMITS), MockBus()
-    far, port = bus.open(), gate.outlet(bus.open(), [OdriveParameters("left", 2)])
+    far, port = bus.open(), gate.outlet(bus.open(), [gate_table(OdriveParameters("left", 2))])
     gate.open()
     port.send(Frame(MOTOR, pack("<f", 1e-7)))
     assert far.receive() == [Frame(MOTOR, ZERO)]
@@ -292,7 +299,7 @@ def test_every_drive_has_its_own_torque_before(armed: Bench) -> None:
 
 def test_the_first_torque_after_arming_counts_from_zero_on_every_bus(armed: Bench) -> None:
     bus = MockBus()
-    far, second = bus.open(), armed.gate.outlet(bus.open(), [OdriveParameters("right", 2)])
+    far, second = bus.open(), armed.gate.outlet(bus.open(), [gate_table(OdriveParameters("right", 2))])
     second.send(Frame(MOTOR, pack("<f", 0.4)))
     assert far.receive() == [Frame(MOTOR, ZERO)]
     for torque_nm in (0.2, 0.4):
@@ -361,6 +368,65 @@ def test_no_frame_raises_and_none_passes_a_closed_gate_but_harmless_ones(frame: 
     assert len(passed) <= 1
 
 
+# another protocol: 64 bytes of CAN FD with extended ids, torque at byte 4 in mN·m and a checksum in the last byte
+
+FD_MOTOR, FD_MODE = 0x18FF0205, 0x18FF0305
+FD_IDLE, FD_FOLLOW = bytes(64), b"\1" + bytes(63)
+
+
+def fd_torque(torque_mnm: int) -> bytes:
+    data = bytes(4) + torque_mnm.to_bytes(4, "little", signed=True) + bytes(55)
+    return data + bytes([sum(data) & 0xFF])
+
+
+def decode_fd_torque(data: bytes) -> float:
+    torque_mnm = int.from_bytes(data[4:8], "little", signed=True)
+    return 0.001 * torque_mnm if data == fd_torque(torque_mnm) else nan
+
+
+FD_TABLE = GateTable(
+    node_id=5,
+    torque_id=FD_MOTOR,
+    zero_torque=fd_torque(0),
+    decode_torque=decode_fd_torque,
+    always={FD_MODE: frozenset({FD_IDLE})},
+    while_open={FD_MODE: frozenset({FD_FOLLOW})},
+    checks={},
+    requests=frozenset(),
+    kind=FrameKind(is_extended=True, is_fd=True, bit_rate_switch=True),
+)
+
+
+OTHER_KINDS = [(False, NEVER_S, True, True), (True, NEVER_S, False, True), (True, NEVER_S, True, False)]
+
+
+def fd_frame(identifier: int, data: bytes) -> Frame:
+    return Frame(identifier, data, is_extended=True, is_fd=True, bit_rate_switch=True)
+
+
+def test_a_protocol_of_64_bytes_is_gated_as_strictly() -> None:
+    bench = Bench()
+    bench.port = bench.gate.outlet(MockBus().open(), [])
+    bus = MockBus()
+    bench.far, bench.port = bus.open(), bench.gate.outlet(bus.open(), [FD_TABLE])
+    follow, idle = fd_frame(FD_MODE, FD_FOLLOW), fd_frame(FD_MODE, FD_IDLE)
+    zero, small, larger = (fd_frame(FD_MOTOR, fd_torque(torque_mnm)) for torque_mnm in (0, 200, 600))
+    assert [bench.send(frame) for frame in (follow, idle, small)] == [[], [idle], [zero]]
+    bench.gate.open()
+    assert [bench.send(frame) for frame in (follow, small, larger, small)] == [[follow], [small], [zero], [small]]
+    wrong_sum = fd_frame(FD_MOTOR, small.data[:-1] + b"\xff")
+    assert bench.send(wrong_sum) == [zero]
+    assert bench.gate.last_refusal == "Node 5 got no torque in place of nan N·m: the limit is 0.75 N·m."
+    others = [Frame(*frame[:4], *flags) for frame in (small, idle) for flags in OTHER_KINDS]
+    assert [bench.send(frame) for frame in others] == [[]] * len(others)
+    assert bench.gate.refused == 4 + len(others)
+
+
+def test_an_outlet_takes_frames_of_one_kind() -> None:
+    with pytest.raises(ValueError):
+        TransmitGate(LIMITS).outlet(MockBus().open(), [FD_TABLE, gate_table(OdriveParameters("left", 2))])
+
+
 def modules_of(*packages: str) -> list[Path]:
     return [path for package in packages for path in sorted((ROOT / package).rglob("*.py"))]
 
@@ -414,12 +480,14 @@ def test_no_frame_is_repeated_by_the_kernel(word: str) -> None:
 def test_every_branch_of_the_gate_is_run_by_these_tests(tmp_path: Path) -> None:
     """In a process of its own, with the test that would start it again left out."""
     data, report = tmp_path / "coverage", tmp_path / "coverage.json"
+    include = "--include=*/transmit_gate.py,*/gate_tables.py"
     measure = [sys.executable, "-m", "coverage"]
     chosen = ["-p", "no:cacheprovider", "-k", "not every_branch", str(Path(__file__))]
-    run = [*measure, "run", "--branch", f"--data-file={data}", "--include=*/transmit_gate.py", "-m", "pytest", "-q"]
+    run = [*measure, "run", "--branch", f"--data-file={data}", include, "-m", "pytest", "-q"]
     subprocess.run([*run, *chosen], cwd=ROOT, check=True, capture_output=True)
     write = [*measure, "json", f"--data-file={data}", "-o", str(report)]
     subprocess.run(write, cwd=ROOT, check=True, capture_output=True)
-    (covered,) = json.loads(report.read_text(encoding="utf-8"))["files"].values()
-    assert covered["summary"]["num_branches"] > 10
-    assert (covered["missing_lines"], covered["missing_branches"]) == ([], [])
+    files = json.loads(report.read_text(encoding="utf-8"))["files"]
+    assert len(files) == 2 and sum(covered["summary"]["num_branches"] for covered in files.values()) > 10
+    for covered in files.values():
+        assert (covered["missing_lines"], covered["missing_branches"]) == ([], [])

@@ -1,0 +1,165 @@
+"""The only path from the program to the drives' wires: a frame that is not in the tables of the gate does not pass.
+
+Each drive has a table in the bytes of its protocol: payloads that may always leave (idle, the configured limits, the
+reading of a parameter), payloads that may leave while the gate is open (following torque), and how a torque command is
+decoded. A torque must be finite, within the limit, and within one slew step of the torque that left before for that
+drive; a torque towards zero is always allowed. It must be exactly zero while the gate is closed. The gate examines the
+bytes as they leave, so it covers signs and encodings. control/limits.py enforces the same limits earlier and more
+gently; this check is the last one and relies on nothing before it.
+
+A refused frame is not sent. It is counted, and its reason is recorded as a message, since a refusal always is a bug. In
+place of a refused torque the gate sends zero torque: the drive's watchdog stays fed and its motor without torque, until
+the loop has seen the count grow and reacts. The slew then counts from that zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
+
+from control.limits import JointLimits
+from control.records import NEVER_S
+from drivers.can.can_port import CanPort
+from drivers.can.frames import Frame
+
+ROUNDING_NM = 1e-6  # binary32 represents 5 N·m to within a quarter of that
+
+
+class FrameKind(NamedTuple):
+    """The kind of all data frames of one protocol."""
+
+    is_extended: bool = False
+    is_fd: bool = False
+    bit_rate_switch: bool = False
+
+
+class GateTable(NamedTuple):
+    """Everything that may leave for one drive. Payloads and checks are by arbitration id."""
+
+    node_id: int
+    torque_id: int  # of the frame that commands torque
+    zero_torque: bytes  # its payload
+    decode_torque: Callable[[bytes], float]  # in N·m; NaN for a payload that is not exactly one torque command
+    always: Mapping[int, frozenset[bytes]]
+    while_open: Mapping[int, frozenset[bytes]]
+    checks: Mapping[int, Callable[[bytes], bool]]  # whether a payload may always leave, where a set cannot list it
+    requests: frozenset[Frame]  # remote frames that may always leave
+    kind: FrameKind = FrameKind()
+
+
+class TransmitGate:
+    """Owns whether torque may leave at all; closed until it is opened. `refused` only grows."""
+
+    def __init__(self, limits: JointLimits) -> None:
+        self.is_open = False
+        self.refused = 0
+        self.last_refusal = ""
+        self._torque_rate_nm_s = limits.torque_rate_nm_s
+        self._largest_nm = limits.torque_nm + ROUNDING_NM
+        self._step_nm = 0.0
+        self._outlets: list[GatedPort] = []
+
+    def outlet(self, port: CanPort, tables: Iterable[GateTable]) -> GatedPort:
+        """Makes the path to one bus, for the drives on it."""
+        outlet = GatedPort(self, port, tables)
+        self._outlets.append(outlet)
+        return outlet
+
+    def open(self) -> None:
+        """Lets torque pass, for arming; the first torque counts from zero."""
+        if not self.is_open:
+            for outlet in self._outlets:
+                outlet.forget_torques()
+        self.is_open = True
+
+    def close(self) -> None:
+        """Lets only zero torque pass."""
+        self.is_open = False
+
+    def allow_step(self, elapsed_s: float) -> None:
+        """Announces a torque for each drive, `elapsed_s` after the one before."""
+        self._step_nm = self._torque_rate_nm_s * elapsed_s + ROUNDING_NM
+
+    def torque_problem(self, torque_nm: float, before_nm: float) -> str:
+        """Returns why a torque may not follow the one before; empty where it may. NaN is beyond every bound."""
+        if torque_nm == 0.0:
+            return ""
+        if not self.is_open:
+            return "the drives are not armed"
+        if not -self._largest_nm <= torque_nm <= self._largest_nm:
+            return f"the limit is {self._largest_nm:.4g} N·m"
+        if not min(before_nm - self._step_nm, 0.0) <= torque_nm <= max(before_nm + self._step_nm, 0.0):
+            return f"too far from the {before_nm:.4g} N·m before"
+        return ""
+
+    def refuse(self, message: str) -> None:
+        self.refused += 1
+        self.last_refusal = message
+
+
+class GatedPort:
+    """The gated path to one bus. Owns the torque that left last for each drive on it."""
+
+    def __init__(self, gate: TransmitGate, port: CanPort, tables: Iterable[GateTable]) -> None:
+        """Raises ValueError where the tables want frames of different kinds."""
+        self._gate = gate
+        self._port = port
+        self._tables = {table.torque_id: table for table in tables}
+        self._sent_nm = dict.fromkeys(self._tables, 0.0)  # by the id of the torque frame
+        self._always: dict[int, frozenset[bytes]] = {}
+        self._while_open: dict[int, frozenset[bytes]] = {}
+        self._checks: dict[int, Callable[[bytes], bool]] = {}
+        self._requests: set[Frame] = set()
+        for table in self._tables.values():
+            self._always.update(table.always)
+            self._while_open.update(table.while_open)
+            self._checks.update(table.checks)
+            self._requests.update(table.requests)
+        (self._kind,) = {table.kind for table in self._tables.values()} or {FrameKind()}
+
+    def forget_torques(self) -> None:
+        for identifier in self._sent_nm:
+            self._sent_nm[identifier] = 0.0
+
+    def send(self, frame: Frame) -> None:
+        identifier, data, is_remote, is_error, is_extended, _, is_fd, bit_rate_switch = frame
+        if is_remote or is_error or (is_extended, is_fd, bit_rate_switch) != self._kind:
+            passes = frame._replace(stamp_s=NEVER_S) in self._requests
+        elif identifier in self._tables:
+            self._send_torque(frame, self._tables[identifier])
+            return
+        else:
+            passes = self._may_leave(identifier, data)
+        if passes:
+            self._port.send(frame)
+        else:
+            self._gate.refuse(f"A frame that is not on the list was not sent: {_text_of(frame)}.")
+
+    def _send_torque(self, frame: Frame, table: GateTable) -> None:
+        identifier = table.torque_id
+        torque_nm = table.decode_torque(frame.data)
+        problem = self._gate.torque_problem(torque_nm, self._sent_nm[identifier])
+        if problem:
+            self._gate.refuse(f"Node {table.node_id} got no torque in place of {torque_nm:.4g} N·m: {problem}.")
+            torque_nm, frame = 0.0, frame._replace(data=table.zero_torque)
+        self._sent_nm[identifier] = torque_nm
+        self._port.send(frame)
+
+    def _may_leave(self, identifier: int, data: bytes) -> bool:
+        if data in self._always.get(identifier, ()):
+            return True
+        if data in self._while_open.get(identifier, ()):
+            return self._gate.is_open
+        return identifier in self._checks and self._checks[identifier](data)
+
+
+def _text_of(frame: Frame) -> str:
+    kinds = (
+        (frame.is_extended, "extended"),
+        (frame.is_error, "error"),
+        (frame.is_remote, "remote"),
+        (frame.is_fd, "FD"),
+        (frame.bit_rate_switch, "bit-rate-switch"),
+    )
+    marks = "".join(f" {kind}" for marked, kind in kinds if marked)
+    return f"0x{frame.arbitration_id:03x}{marks} {frame.data.hex(' ')}".rstrip()
