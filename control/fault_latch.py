@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from control.faults import Blocks, Clears, Fault, Reaction
+from control.rate import PERIOD_S
 
-GOOD_TICKS = 50  # without its cause before a fault is over
+GOOD_S = 0.132  # without its cause before a fault is over: 50 ticks
 
 
 class Standing(NamedTuple):
@@ -25,7 +26,8 @@ class Standing(NamedTuple):
 class FaultLatch:
     """Owns the faults that stand."""
 
-    def __init__(self) -> None:
+    def __init__(self, period_s: float = PERIOD_S) -> None:
+        self._good_ticks = round(GOOD_S / period_s)
         self.reset()
 
     def reset(self) -> None:
@@ -88,4 +90,4 @@ class FaultLatch:
             return False
         if latched and energised and fault.kind.reaction >= Reaction.SOFT_STOP:
             return False
-        return self._tick - last_tick > GOOD_TICKS
+        return self._tick - last_tick > self._good_ticks

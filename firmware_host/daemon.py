@@ -19,6 +19,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from control.modes import ENERGISED, Mode, Request
+from control.rate import RATE_HZ
 from drivers.can.reopening_port import ReopeningPort
 from drivers.drive_types import make_drives
 from drivers.fault_injection.failing_port import failing_ports
@@ -42,7 +43,7 @@ from firmware_host.operator.rights import Rights, load_rights
 from firmware_host.operator.status_socket import AlreadyServedError, StatusSocket
 from firmware_host.pose_sources import open_pose
 from firmware_host.software_version import build_metadata
-from firmware_host.ticker import RATE_HZ, Tick, Ticker
+from firmware_host.ticker import Tick, Ticker
 
 EXIT_FAILED = 1
 LONGEST_SHUTDOWN_S = 5.0

@@ -13,6 +13,7 @@ from control.faults import Fault, FaultKind
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
 from control.monitors.joint_monitor import JointFacts, JointMonitor
+from control.rate import PERIOD_S
 from control.records import JOINTS, NEVER_S, BodyPose, DriveStates, Joints
 from drivers.can.can_port import BusState
 from drivers.drive import DriveHealth, Drives
@@ -20,7 +21,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.log_monitor import LogMonitor
 from firmware_host.log.recorder import LogReport
 from firmware_host.loop_monitor import LoopMonitor
-from firmware_host.ticker import PERIOD_S, Tick
+from firmware_host.ticker import Tick
 
 ARMING_S = 2.0  # a drive that takes longer to go into closed loop does not mean to
 REFUSED_TICKS = 3  # in a row, in each of which one bus lost a command
@@ -55,7 +56,8 @@ class MonitorInput(NamedTuple):
 class FaultMonitor:
     """Owns the watches of the joints and of the loop, and what is counted over ticks."""
 
-    def __init__(self, configuration: Configuration, drives: Drives) -> None:
+    def __init__(self, configuration: Configuration, drives: Drives, period_s: float = PERIOD_S) -> None:
+        self._period_s = period_s
         self._drives = drives
         self.joints = tuple(
             JointMonitor(
@@ -70,7 +72,7 @@ class FaultMonitor:
             )
             for joint, span in zip(JOINTS, configuration.joint_ranges, strict=True)
         )
-        self._loop = LoopMonitor(configuration.faults)
+        self._loop = LoopMonitor(configuration.faults, period_s)
         self._log = LogMonitor(configuration.faults)
         self._longest_watchdog_s = configuration.faults.longest_watchdog_s
         self._warm_c = configuration.limits.temperature_warm_c
@@ -153,7 +155,7 @@ class FaultMonitor:
 
     def _watch_joints(self, found: list[Fault], tick: Tick, monitor_input: MonitorInput) -> None:
         mode, sent_nm = monitor_input.mode, monitor_input.sent.torques_nm
-        dt_s = (1 + tick.missed) * PERIOD_S
+        dt_s = (1 + tick.missed) * self._period_s
         for joint, health, state, torque_nm in zip(
             self.joints, self._drives.health, monitor_input.states, sent_nm, strict=True
         ):

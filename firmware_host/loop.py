@@ -18,6 +18,7 @@ from control.faults import Fault, Reaction
 from control.gait.recovery import Recovery
 from control.limits import LimitedTorques, apply_limits
 from control.modes import ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
+from control.rate import PERIOD_S
 from control.records import (
     JOINTS,
     NEVER_S,
@@ -42,7 +43,7 @@ from firmware_host.loop_timing import LoopTiming
 from firmware_host.mud_learning import MudLearning
 from firmware_host.operator.fault_texts import fault_message, refusal_text
 from firmware_host.operator.lease import Lease
-from firmware_host.ticker import PERIOD_S, Tick
+from firmware_host.ticker import Tick
 
 NOTHING_SENT = LimitedTorques(torques_nm=NO_TORQUE, limited=False, finite=True)
 CLEARING_S = 0.5  # for the drives to report that their errors are gone
@@ -58,7 +59,9 @@ class Loop:
         recorder: Recording,
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
+        period_s: float = PERIOD_S,
     ) -> None:
+        self.period_s = period_s
         self.configuration = configuration
         self.drives = drives
         self.pose = pose
@@ -68,8 +71,8 @@ class Loop:
         self.timing = LoopTiming()
         self.learning = MudLearning(configuration)
         self.controller = make_controller(configuration)
-        self.fault_monitor = FaultMonitor(configuration, drives)
-        self.faults = FaultLatch()
+        self.fault_monitor = FaultMonitor(configuration, drives, period_s)
+        self.faults = FaultLatch(period_s)
         self.mode = Mode.BOOT
         self.states: DriveStates = same_for_all(DriveState())
         self.body = BodyPose()
@@ -116,7 +119,7 @@ class Loop:
             moving=self.controller.moving,
             may_be_in_mud=self.controller.cut_short,
             fault=self.fault,
-            faults=tuple(PresentFault(fault, faults.age_ticks(fault) * PERIOD_S) for fault in faults.present),
+            faults=tuple(PresentFault(fault, faults.age_ticks(fault) * self.period_s) for fault in faults.present),
             blocking=tuple(faults.blocking()),
             notice=self.events.notice,
             unlogged_requests=self.events.requests.unlogged,
@@ -242,8 +245,8 @@ class Loop:
             self.events.report_end_of_move(now_s, reason)
 
     def _control(self, missed_ticks: int) -> Torques:
-        step_s = min(1 + missed_ticks, LONGEST_STEP_TICKS) * PERIOD_S
-        elapsed_s = (1 + missed_ticks) * PERIOD_S
+        step_s = min(1 + missed_ticks, LONGEST_STEP_TICKS) * self.period_s
+        elapsed_s = (1 + missed_ticks) * self.period_s
         trusted = self.fault_monitor.trusted if self.mode is Mode.DAMPING else ALL_TRUSTED
         return self.controller.step(step_s, self.mode, self.states, trusted, elapsed_s)
 
@@ -252,7 +255,8 @@ class Loop:
         if self.mode not in MOVING:
             return NOTHING_SENT
         states = self.fault_monitor.with_winding_heat(self.states)
-        return apply_limits(wanted, self.sent.torques_nm, states, self.configuration.limits, self._ranges, PERIOD_S)
+        limits, before_nm = self.configuration.limits, self.sent.torques_nm
+        return apply_limits(wanted, before_nm, states, limits, self._ranges, self.period_s)
 
     def _command(self, now_s: float) -> None:
         """Send the axis states that the mode needs, then the torques.
@@ -267,7 +271,7 @@ class Loop:
             return
         if self.mode is Mode.IDLE:
             self.drives.request_settings(now_s)
-        self.drives.send(self.sent.torques_nm, PERIOD_S)
+        self.drives.send(self.sent.torques_nm, self.period_s)
 
     def _record(self, tick: Tick) -> None:
         tick_s = self._clock() - tick.now_s

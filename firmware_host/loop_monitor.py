@@ -6,7 +6,8 @@ from collections import deque
 
 from control.faults import Fault, FaultKind
 from control.monitors.joint_monitor import FaultBounds
-from firmware_host.ticker import PERIOD_S, Tick
+from control.rate import PERIOD_S
+from firmware_host.ticker import Tick
 
 MEAN_TICKS = 100
 CRAWL_TICKS = 5
@@ -16,7 +17,8 @@ STEP_S = 0.1  # by which a clock on the wall does not drift between two ticks
 class LoopMonitor:
     """Owns the last stamps and the distance of the two clocks."""
 
-    def __init__(self, bounds: FaultBounds) -> None:
+    def __init__(self, bounds: FaultBounds, period_s: float = PERIOD_S) -> None:
+        self._period_s = period_s
         self._bounds = bounds
         self.reset()
 
@@ -34,7 +36,7 @@ class LoopMonitor:
 
     def _watch_beat(self, tick: Tick) -> list[Fault]:
         found: list[Fault] = []
-        missed_s = tick.missed * PERIOD_S
+        missed_s = tick.missed * self._period_s
         if missed_s > self._bounds.silence_s:
             found.append(FaultKind.LOOP_STALLED.fault(late_ms=1e3 * tick.late_s))
         elif missed_s > self._bounds.lag_s:
@@ -47,7 +49,7 @@ class LoopMonitor:
             if mean_s > self._bounds.crawl_s:
                 found.append(FaultKind.LOOP_CRAWLING.fault(tick_ms=1e3 * mean_s))
         if len(self._stamps_s) > MEAN_TICKS:
-            fraction = (tick.now_s - self._stamps_s[0]) / (MEAN_TICKS * PERIOD_S) - 1.0
+            fraction = (tick.now_s - self._stamps_s[0]) / (MEAN_TICKS * self._period_s) - 1.0
             if fraction > self._bounds.lag_fraction:
                 extent = f"its ticks take {100.0 * fraction:.0f} % too long"
                 found.append(FaultKind.LOOP_LAGGING.fault(extent=extent))

@@ -11,8 +11,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-RATE_HZ = 380.0  # the rate at which the paper's robot logged and controlled
-PERIOD_S = 1.0 / RATE_HZ
+from control.rate import PERIOD_S
 
 
 class Tick(NamedTuple):

@@ -6,8 +6,8 @@ from collections import Counter
 
 import pytest
 
+from control.rate import RATE_HZ
 from drivers.odrive.codec import GET_ENCODER_ESTIMATES, GET_IQ, HEARTBEAT, SET_INPUT_TORQUE
-from firmware_host.ticker import RATE_HZ
 from virtual_machine.robot import Robot
 
 LISTENING_S = 2

@@ -36,13 +36,13 @@ from benchmarks.speed.synthetic_walk import (
     stride_samples,
 )
 from control.plate import stroke_moment_m4, submerged_plate
+from control.rate import PERIOD_S
 from control.records import Phase, StrideEstimate
 from estimation.flipper import STEPS_M, FlipperEstimator
 from estimation.paper import PaperEstimator
 from estimation.strokes.stroke import Stroke
 from experiments.reports.text_tables import table
 from firmware_host.computer.realtime import freeze_garbage
-from firmware_host.ticker import PERIOD_S
 
 BAR_SAMPLE_US, BAR_CLOSE_US = 2.0, 150.0
 TICKS_PER_MESSAGE = 5  # as in most of the authors' logs

@@ -25,6 +25,7 @@ from typing import Any
 from benchmarks.report import Progress, new_parser, print_report, verdict
 from control.controller import WalkOrder
 from control.modes import Mode, Request
+from control.rate import PERIOD_S
 from drivers.drive_types import make_drives
 from drivers.pose.pose_port import PosePort
 from experiments.reports.text_tables import table
@@ -39,7 +40,7 @@ from firmware_host.loop import Loop
 from firmware_host.loop_timing import Histogram
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.status_socket import StatusSocket
-from firmware_host.ticker import PERIOD_S, Tick, Ticker
+from firmware_host.ticker import Tick, Ticker
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.peer import end_with_parent
 

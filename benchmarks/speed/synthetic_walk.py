@@ -14,9 +14,9 @@ from control.gait.gait import Gait, GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.plate import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.rate import PERIOD_S
 from control.records import DriveState, Phase
 from estimation.joint_load import FlipperDrive
-from firmware_host.ticker import PERIOD_S
 
 DEPTH_M, SURFACE_M = 0.03, 0.002
 K_P, K_S, K_E = 1.0e6, 0.6e6, 0.7e6  # N/m³, about the paper's middle mud

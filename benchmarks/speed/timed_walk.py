@@ -13,6 +13,7 @@ from benchmarks.speed.stage_marks import STAGES, StageMarks, marking_cost_s
 from benchmarks.speed.wirings import Wiring
 from control.controller import WalkOrder
 from control.modes import Mode
+from control.rate import PERIOD_S, RATE_HZ
 from control.records import JOINTS
 from drivers.can.can_port import CanPort
 from drivers.drive_types import make_drives
@@ -20,7 +21,7 @@ from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder, Recording
 from firmware_host.loop import Loop
-from firmware_host.ticker import PERIOD_S, RATE_HZ, Tick
+from firmware_host.ticker import Tick
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
 from simulation.harness.robot import SimulatedRobot
 from simulation.mud.track import paper_track

@@ -21,6 +21,7 @@ from benchmarks.example_robot import load_example
 from benchmarks.report import Progress, new_parser, print_report, verdict
 from benchmarks.stress.resources import resident_kib
 from control.modes import Mode
+from control.rate import PERIOD_S
 from control.records import JOINTS, Joints
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus, MockPort
@@ -30,7 +31,7 @@ from drivers.odrive.codec import arbitration_id
 from experiments.reports.text_tables import table
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.ticker import PERIOD_S, Tick
+from firmware_host.ticker import Tick
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
@@ -149,7 +150,7 @@ def fuzz_drives(configuration: Configuration, frames: int, fuzzing: Fuzzing, pro
     source = iter(FrameSource(node_ids(configuration), seed))
     for number in range(frames // FRAMES_PER_TICK):
         feed(source, far, fuzzing)
-        now_s = number / 380.0
+        now_s = number * PERIOD_S
         try:
             drives.read(now_s)
             drives.request_settings(now_s)

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.report import Progress, new_parser, print_report, verdict
+from control.rate import PERIOD_S
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK, TICK_KIND
 from firmware_host.log_reading.log_reader import Log, LogError, log_summary, read_log
@@ -50,10 +51,10 @@ def make_sound_log(path: Path, chance: random.Random, finished: bool) -> SoundLo
             value if kind == "float64" else other.get(kind, number % 7)
             for value, kind in zip(values, kinds, strict=True)
         ]
-        rows.append(TICK.encode(number / 380, *whole[1:]))
+        rows.append(TICK.encode(number * PERIOD_S, *whole[1:]))
         log.write([(TICK_KIND, rows[-1])])
         if number % 50 == 49:
-            log.write([(EVENT_KIND, EVENT.encode(number / 380, f"event {number}"))])
+            log.write([(EVENT_KIND, EVENT.encode(number * PERIOD_S, f"event {number}"))])
             log.flush()
             safe.append((path.stat().st_size, len(rows)))
     if finished:

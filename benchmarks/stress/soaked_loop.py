@@ -26,6 +26,7 @@ from benchmarks.report import Progress
 from benchmarks.stress.random_operator import Attendant, Call
 from benchmarks.stress.resources import holding
 from control.modes import Mode
+from control.rate import RATE_HZ
 from drivers.fault_injection.failures import Failures
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.log_parameters import LogParameters
@@ -37,7 +38,6 @@ from firmware_host.operator.lease import Lease
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.rights import load_rights
 from firmware_host.operator.status_socket import StatusSocket
-from firmware_host.ticker import RATE_HZ
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, clay_of_water
 from simulation.mud.track import RandomStrength, Track

@@ -28,13 +28,13 @@ from benchmarks.example_robot import load_example
 from benchmarks.report import Progress, new_parser, print_report, summary_us, verdict
 from benchmarks.stress.malformed_streams import OddStreams, Stream
 from benchmarks.stress.resources import resident_kib
+from control.rate import PERIOD_S
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.operator.lease import Lease
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.rights import Group, Peer, Rights
 from firmware_host.operator.status_socket import MOST_CLIENTS, Methods, StatusSocket
-from firmware_host.ticker import PERIOD_S
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track

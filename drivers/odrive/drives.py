@@ -27,7 +27,6 @@ REPEAT_S = 0.1  # between two requests to change the axis state, of which the he
 LONGEST_IN_QUEUE_S = 2.0  # a stamp older than that is of another clock
 VERSION_REPEAT_S = 0.5  # between two questions for the same that was not answered
 REFRESH_S = 2.0  # between two questions for what was answered: somebody may change a drive over USB
-TICK_S = 1.0 / 380.0  # of the loop
 
 
 class OdriveDrives:
@@ -107,7 +106,7 @@ class OdriveDrives:
     def last_refusal(self) -> str:
         return self.gate.last_refusal
 
-    def send(self, torques_nm: Torques, elapsed_s: float = TICK_S) -> None:
+    def send(self, torques_nm: Torques, elapsed_s: float) -> None:
         """To all four, `elapsed_s` after the torques before, which bounds by how much they may differ."""
         self.gate.allow_step(elapsed_s)
         for axis, torque_nm in zip(self.axes, torques_nm, strict=True):

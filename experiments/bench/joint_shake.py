@@ -17,11 +17,11 @@ from __future__ import annotations
 
 from math import nan
 
+from control.rate import PERIOD_S
 from control.records import NO_TORQUE, DriveStates, Joints, Torques
 from experiments.bench.reading import Reading
 from experiments.bench.test_rig import Stand, joint_place
 from experiments.robot.bench_robot import BenchError
-from firmware_host.ticker import PERIOD_S
 
 FIRST_NM, GROWTH = 0.02, 1.5
 SHAKES = {"sweep": 5, "adduction": 6}  # up to 0.10 N·m, many times the friction, and 0.15 N·m: a third for the weight

@@ -7,8 +7,9 @@ tells a drive that is late from a computer on which drives are emulated and that
 
 from __future__ import annotations
 
+from control.rate import PERIOD_S
 from control.records import DriveStates
-from firmware_host.ticker import PERIOD_S, Tick
+from firmware_host.ticker import Tick
 
 LATE_S = 2.0 * PERIOD_S  # age of a position or a current; drives send theirs more often than the loop ticks
 BUSY = "end what else runs on this computer, and give this program real-time priority (docs/how-to/install.md)"

@@ -13,11 +13,11 @@ from math import radians
 from typing import Protocol
 
 from control.controller import UP_RAD
+from control.rate import PERIOD_S
 from control.records import JOINTS
 from experiments.bench.rig import SimulatedRig
 from experiments.robot.bench_robot import CLEAR, LEAVE
 from experiments.robot.prompt import GO_ON, Operator
-from firmware_host.ticker import PERIOD_S
 from simulation.body.plant import END_STOPS_RAD
 
 WAYS = {"sweep": "swing forward", "adduction": "rise"}

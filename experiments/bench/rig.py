@@ -15,6 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from control.rate import PERIOD_S
 from control.records import JOINTS
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
@@ -28,7 +29,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import Loop
 from firmware_host.operator.status_client import NoDaemonError, NotPermittedError, StatusClient
-from firmware_host.ticker import PERIOD_S, Tick, Ticker
+from firmware_host.ticker import Tick, Ticker
 from simulation.body.blocks import on_blocks
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.robot import SimulatedRobot

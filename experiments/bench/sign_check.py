@@ -12,12 +12,12 @@ from __future__ import annotations
 from math import nan, radians
 
 from control.controller import measured_angles
+from control.rate import PERIOD_S
 from control.records import JOINTS, NO_TORQUE, DriveStates, JointAngles, Joints, Torques
 from experiments.bench.joint_shake import answer, idle, shake
 from experiments.bench.operator import WAYS, Sight
 from experiments.bench.reading import Reading, Readings, left_out
 from experiments.bench.test_rig import Sample, Stand, joint_place
-from firmware_host.ticker import PERIOD_S
 
 STEP_NM = 0.01  # a fifth of what holds an arm of the default mass level
 STEP_S = 0.03  # for the joint to begin to move before more torque comes

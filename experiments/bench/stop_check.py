@@ -16,12 +16,12 @@ from math import degrees, nan, radians
 from control.controller import ALL_TRUSTED, DAMPING_NM, RAISING_S, SOFT_STOP_S, measured_angles
 from control.joint_pd import damping_torques_nm
 from control.modes import Mode, Request
+from control.rate import PERIOD_S
 from control.records import JOINTS, DriveStates, JointAngles, Joints, Phase, Torques
 from drivers.drive import DriveParameters
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.stroke_tracking import FAST_RAD_S, order_strides
 from experiments.bench.test_rig import Law, Sample, Stand, first_lasting
-from firmware_host.ticker import PERIOD_S
 
 SWEEPS = (0, 2)  # places in JOINTS
 FULL_FRACTION = 0.9  # of the speed asked for, from which on it counts as full

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from control.controller import WalkOrder
 from control.gait.gait import stride_duration_s
 from control.modes import Mode, Request
+from control.rate import PERIOD_S
 from control.records import JOINTS, JointAngles, Joints
 from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Sample, Stand
 from experiments.robot.bench_robot import BenchError
 from firmware_host.operator.fault_texts import fault_message
-from firmware_host.ticker import PERIOD_S
 
 Vector = NDArray[np.float64]
 

@@ -14,13 +14,14 @@ from control.controller import ALL_TRUSTED, Controller, measured_angles
 from control.faults import Fault, Reaction
 from control.gait.joint_path import JointPath, still
 from control.modes import ENERGISED, Mode, Request
+from control.rate import PERIOD_S
 from control.records import JOINTS, DriveStates, JointAngles, Joints, JointTargets, Torques, same_for_all
 from experiments.bench.lateness import Lateness
 from experiments.bench.operator import Attendant
 from experiments.bench.rig import Rig
 from experiments.robot.bench_robot import BenchError
 from firmware_host.operator.fault_texts import fault_advice
-from firmware_host.ticker import PERIOD_S, Tick
+from firmware_host.ticker import Tick
 
 ARMING_S = 5.0  # for faults of before to be over, and for the drives to go into closed loop
 IDLING_S = 2.0

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from math import nan
 
+from control.rate import PERIOD_S
 from control.records import DriveStates, Joints, Torques
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Sample, Stand, first_lasting
-from firmware_host.ticker import PERIOD_S
 
 PRESSING_NM = 0.08  # down: what an arm weighs twice more; a sweep joint gets none, nothing would hold it
 PRESSING_S = 0.5

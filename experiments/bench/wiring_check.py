@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable
 from math import inf, isfinite, isnan, nan
 
+from control.rate import PERIOD_S, RATE_HZ
 from drivers.can.bus_load import MOST_FRACTION, bus_load, frame_bits
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
@@ -18,7 +19,6 @@ from drivers.drive_types import traffic_of, type_of
 from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Stand
-from firmware_host.ticker import PERIOD_S, RATE_HZ
 
 ASKING_S = 3.0  # longest, for versions and then for watchdogs: asked every 0.5 s
 STANDING_BY_S = 0.6  # six heartbeats

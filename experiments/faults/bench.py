@@ -12,6 +12,7 @@ from io import StringIO
 from random import Random
 
 from control.monitors.winding import Winding
+from control.rate import PERIOD_S
 from control.records import JOINTS
 from drivers.can.frames import Frame
 from drivers.fault_injection.failures import Failures, end_text
@@ -19,7 +20,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import _end_safely as end_safely
 from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK_KIND
-from firmware_host.ticker import PERIOD_S, Tick
+from firmware_host.ticker import Tick
 from simulation.body.plant import Arm
 from simulation.devices.drive import SimulatedDrive
 from simulation.devices.drive_types import make_simulated_drive

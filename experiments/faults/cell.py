@@ -15,11 +15,11 @@ from typing import Any
 from control.faults import Blocks, FaultKind, Reaction
 from control.modes import ENERGISED, Mode, Request
 from control.monitors.joint_monitor import REST_S, STILL_RAD
+from control.rate import PERIOD_S
 from experiments.faults.bench import FaultBench
 from experiments.faults.evaluation import LONGEST_STOP_S, Cell, problems
 from experiments.faults.injection import BY_NAME, REPORTED_S, Way
 from experiments.faults.phases import bench_for, bring
-from firmware_host.ticker import PERIOD_S
 
 HARDNESS = {  # in arming there is no torque yet
     Mode.BOOT: 4, Mode.IDLE: 4, Mode.FAULT: 4, Mode.DAMPING: 3, Mode.STOPPING: 2, Mode.HOLD: 1, Mode.ARMING: 1,

@@ -14,6 +14,7 @@ from random import Random
 from typing import Any
 
 from control.modes import Mode
+from control.rate import PERIOD_S
 from experiments.robot.bench_robot import disarm
 from experiments.robot.lockstep_robot import LockstepRobot
 from experiments.robot.prompt import GO_ON
@@ -22,7 +23,6 @@ from experiments.trials.mud_trials import PlannedTrial, Truths
 from experiments.trials.trial import TORQUE_ERROR
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.file_recorder import FileRecorder
-from firmware_host.ticker import PERIOD_S
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters

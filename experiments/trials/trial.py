@@ -14,12 +14,12 @@ from typing import NamedTuple
 from control.controller import WalkOrder
 from control.gait.gait import SINGLE_FLIPPER, GaitParameters
 from control.mud_estimate import MudEstimate
+from control.rate import PERIOD_S
 from control.records import BodyPose, DriveStates, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters, MudEstimator
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.ticker import PERIOD_S
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.harness.local_setup import CONFIGURATION
 from simulation.harness.lockstep import Lockstep

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from control.bounds import Bounds, Meaning
+from control.rate import RATE_HZ
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class LogParameters:
     min_free_fraction: Annotated[
         float, Bounds(0.0, 0.9), Meaning("of the disk; below it the oldest logs are deleted")
     ] = 0.1
-    rest_hz: Annotated[float, Bounds(0.0, 380.0), Meaning("rows per second without torque; 0: every tick")] = 10.0
+    rest_hz: Annotated[float, Bounds(0.0, RATE_HZ), Meaning("rows per second without torque; 0: every tick")] = 10.0
     rest_full_s: Annotated[
         float, Bounds(0.0, 60.0), Meaning("before and after torque, or a change of mode, recorded in full")
     ] = 5.0

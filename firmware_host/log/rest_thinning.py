@@ -15,8 +15,8 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from control.modes import ENERGISED
+from control.rate import RATE_HZ
 from firmware_host.log.rows import TICK, TICK_KIND
-from firmware_host.ticker import RATE_HZ
 
 MODE, NUMBER = TICK.offset_of("mode"), TICK.offset_of("tick")
 

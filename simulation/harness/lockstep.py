@@ -11,6 +11,7 @@ from typing import Any
 
 from control.controller import WalkOrder
 from control.modes import Mode, Request
+from control.rate import PERIOD_S
 from control.records import JOINTS
 from drivers.can.mock_bus import MockBus
 from drivers.drive_types import make_drives
@@ -22,7 +23,7 @@ from firmware_host.fault_injection.failing_recorder import failing_recorder
 from firmware_host.fault_injection.failing_time import Stalls, failing_clock
 from firmware_host.log.recorder import NullRecorder, Recording
 from firmware_host.loop import Loop
-from firmware_host.ticker import PERIOD_S, Tick
+from firmware_host.ticker import Tick
 from simulation.body.free_body import BodyShape
 from simulation.body.plant import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
@@ -80,7 +81,9 @@ class Lockstep:
         drives: Mapping[str, SimulatedDriveParameters] | None = None,
         motion_capture: MotionCaptureParameters = AT_EVERY_TICK,
         failures: Failures | None = None,
+        period_s: float = PERIOD_S,
     ) -> None:
+        self.period_s = period_s
         self.buses = {name: MockBus() for name in configuration.bus}
         self.robot = SimulatedRobot(
             plant or plant_of(configuration, disturbances, fixed_base),
@@ -95,7 +98,7 @@ class Lockstep:
         pose = failing_pose(SimulatedPose(self.robot.plant, motion_capture, seed + 1), failures)
         rows = failing_recorder(recorder or NullRecorder(), failures)
         wall_clock = failing_clock(self._now_s, failures)
-        self.loop = Loop(configuration, ports, pose, rows, self._now_s, wall_clock)
+        self.loop = Loop(configuration, ports, pose, rows, self._now_s, wall_clock, period_s)
         self._sound = failures is None
         self.failures = failures or Failures(configuration.bus)
         self._stalls = Stalls(self.failures)
@@ -103,18 +106,18 @@ class Lockstep:
 
     @property
     def now_s(self) -> float:
-        return self.tick_number * PERIOD_S
+        return self.tick_number * self.period_s
 
     def _now_s(self) -> float:
         return self.now_s
 
     def step(self) -> None:
-        missed = int(self._stalls.next_s() / PERIOD_S)
+        missed = int(self._stalls.next_s() / self.period_s)
         self.tick_number += 1 + missed
         self.robot.advance(self.now_s)
         for failure in self.failures.update(self.now_s):
             self.loop.events.report(self.now_s, end_text(failure))
-        self.loop.tick(Tick(self.now_s, missed * PERIOD_S, self.tick_number, missed))
+        self.loop.tick(Tick(self.now_s, missed * self.period_s, self.tick_number, missed))
 
     def fail(self, component: str, kind: str, for_s: float = USUAL_S) -> None:
         """From the next tick on. Raises RuntimeError where it is refused."""
@@ -125,12 +128,12 @@ class Lockstep:
         self.failures.begin(component, kind, self.now_s, for_s)
 
     def run_for(self, duration_s: float) -> None:
-        for _ in range(round(duration_s / PERIOD_S)):
+        for _ in range(round(duration_s / self.period_s)):
             self.step()
 
     def run_until(self, done: Callable[[], bool], longest_s: float) -> bool:
         """Whether it came to that within `longest_s` of simulated time."""
-        for _ in range(round(longest_s / PERIOD_S)):
+        for _ in range(round(longest_s / self.period_s)):
             if done():
                 return True
             self.step()

@@ -22,10 +22,10 @@ from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains
 from control.limits import JointRange
 from control.modes import MOVING, Mode
+from control.rate import PERIOD_S
 from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, Joints, Phase, Torques, same_for_both
 from tests.control.made_up_states import states_at
 
-TICK_S = 1.0 / 380.0
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 POSE = Joints(0.2, -0.4, 0.3, -0.5)
 RAISED = Joints(0.2, 0.0, 0.3, 0.0)
@@ -47,7 +47,7 @@ def weightless(gains: JointGains = SPRING, attempts: int = 0) -> Controller:
 
 def wanted_pose(controller: Controller, mode: Mode, pose: JointAngles = POSE) -> JointAngles:
     a, b, c, d = (
-        torque + angle for torque, angle in zip(controller.step(TICK_S, mode, states_at(pose)), pose, strict=True)
+        torque + angle for torque, angle in zip(controller.step(PERIOD_S, mode, states_at(pose)), pose, strict=True)
     )
     return Joints(a, b, c, d)
 
@@ -65,8 +65,8 @@ def test_modes_that_may_not_move_want_exactly_nothing(mode: Mode) -> None:
     controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(), recovery())
     for before in sorted(MOVING):
         for _ in range(10):
-            controller.step(TICK_S, before, states_at(POSE))
-        assert controller.step(TICK_S, mode, states_at(Joints(1.0, 1.0, 1.0, 1.0))) == NO_TORQUE
+            controller.step(PERIOD_S, before, states_at(POSE))
+        assert controller.step(PERIOD_S, mode, states_at(Joints(1.0, 1.0, 1.0, 1.0))) == NO_TORQUE
         assert controller.target is RESTING
 
 
@@ -85,22 +85,22 @@ def test_arming_again_holds_the_new_pose() -> None:
 
 def test_the_torque_after_arming_is_a_ramp_from_nothing() -> None:
     controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(fade_in_s=0.5), recovery())
-    controller.step(TICK_S, Mode.ARMING, states_at(POSE))
-    torques = [controller.step(TICK_S, Mode.HOLD, states_at(POSE)) for _ in range(300)]
+    controller.step(PERIOD_S, Mode.ARMING, states_at(POSE))
+    torques = [controller.step(PERIOD_S, Mode.HOLD, states_at(POSE)) for _ in range(300)]
     whole = torques[-1]
     assert whole[1] > 0.01  # the arm's weight
     for tick, torque in enumerate(torques, start=1):
-        fraction = min(1.0, tick * TICK_S / 0.5)
+        fraction = min(1.0, tick * PERIOD_S / 0.5)
         assert torque == pytest.approx([fraction * each for each in whole], abs=1e-12)
 
 
 def test_the_ramp_starts_again_after_every_arming() -> None:
     controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(fade_in_s=0.5), recovery())
-    first = controller.step(TICK_S, Mode.HOLD, states_at(POSE))
+    first = controller.step(PERIOD_S, Mode.HOLD, states_at(POSE))
     for _ in range(300):
-        controller.step(TICK_S, Mode.HOLD, states_at(POSE))
-    controller.step(TICK_S, Mode.FAULT, states_at(POSE))
-    assert controller.step(TICK_S, Mode.HOLD, states_at(POSE)) == first
+        controller.step(PERIOD_S, Mode.HOLD, states_at(POSE))
+    controller.step(PERIOD_S, Mode.FAULT, states_at(POSE))
+    assert controller.step(PERIOD_S, Mode.HOLD, states_at(POSE)) == first
 
 
 def test_a_walk_raises_the_flippers_then_sweeps_them_to_the_front_then_starts_the_gait() -> None:
@@ -146,12 +146,12 @@ def test_the_velocities_wanted_in_the_gait_are_those_of_the_angles() -> None:
         controller = weightless(gains)
         controller.order = WalkOrder(0.03)
         while controller.target is RESTING:
-            controller.step(TICK_S, Mode.WALKING, states_at(FRONT))
-        return [controller.step(TICK_S / 20.0, Mode.WALKING, states_at(FRONT)) for _ in range(8000)]
+            controller.step(PERIOD_S, Mode.WALKING, states_at(FRONT))
+        return [controller.step(PERIOD_S / 20.0, Mode.WALKING, states_at(FRONT)) for _ in range(8000)]
 
     angles, velocities = gait_only(SPRING), gait_only(DAMPER)
     for before, now, after in zip(angles, velocities[1:], angles[2:], strict=False):
-        slopes = [(b - a) / (2.0 * TICK_S / 20.0) for a, b in zip(before, after, strict=True)]
+        slopes = [(b - a) / (2.0 * PERIOD_S / 20.0) for a, b in zip(before, after, strict=True)]
         assert now == pytest.approx(slopes, abs=0.01)
 
 
@@ -164,7 +164,7 @@ def test_a_walk_is_finished_after_the_strides_that_were_ordered() -> None:
     while not controller.walk_finished:
         wanted_pose(controller, Mode.WALKING)
         ticks += 1
-    assert ticks * TICK_S == pytest.approx(2.0 * stride_duration_s(GAIT, GEOMETRY, 0.03), abs=TICK_S)
+    assert ticks * PERIOD_S == pytest.approx(2.0 * stride_duration_s(GAIT, GEOMETRY, 0.03), abs=PERIOD_S)
 
 
 def test_a_walk_without_a_number_of_strides_never_finishes_by_itself() -> None:
@@ -245,7 +245,7 @@ def turning_at(velocities: tuple[float, ...], for_s: float = 0.0) -> DriveStates
 def ticks_until_settled(velocities: tuple[float, ...], trusted: Joints[bool] = ALL_TRUSTED) -> int:
     controller = weightless()
     for tick in range(1, 2000):
-        controller.step(TICK_S, Mode.DAMPING, turning_at(velocities, tick * TICK_S), trusted)
+        controller.step(PERIOD_S, Mode.DAMPING, turning_at(velocities, tick * PERIOD_S), trusted)
         if controller.settled:
             return tick
     raise AssertionError("it never settled")
@@ -259,55 +259,57 @@ def test_damping_forgets_every_target_at_once(before: Mode) -> None:
     controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(), recovery())
     controller.order = WalkOrder(0.03)
     for _ in range(500):
-        controller.step(TICK_S, before, states_at(POSE))
-    assert controller.step(TICK_S, Mode.DAMPING, states_at(POSE)) == NO_TORQUE
+        controller.step(PERIOD_S, before, states_at(POSE))
+    assert controller.step(PERIOD_S, Mode.DAMPING, states_at(POSE)) == NO_TORQUE
     assert controller.target is RESTING
 
 
 def test_damping_brakes_each_joint_and_never_with_more_than_its_share() -> None:
     controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(), recovery())
-    torques = controller.step(TICK_S, Mode.DAMPING, turning_at((2.0, -2.0, 100.0, -100.0)))
+    torques = controller.step(PERIOD_S, Mode.DAMPING, turning_at((2.0, -2.0, 100.0, -100.0)))
     assert torques == pytest.approx((-0.12, 0.16, -DAMPING_NM, DAMPING_NM))
 
 
 def test_a_joint_whose_encoder_is_not_trusted_is_not_damped() -> None:
     controller = weightless(JointGains())
-    torques = controller.step(TICK_S, Mode.DAMPING, turning_at((2.0, nan, 2.0, 2.0)), Joints(False, False, True, True))
+    torques = controller.step(
+        PERIOD_S, Mode.DAMPING, turning_at((2.0, nan, 2.0, 2.0)), Joints(False, False, True, True)
+    )
     assert torques == pytest.approx((0.0, 0.0, -0.12, -0.16))
 
 
 def test_joints_have_settled_once_all_rest_for_a_while() -> None:
-    assert ticks_until_settled(REST) == pytest.approx(SETTLED_S / TICK_S, abs=1)
-    assert ticks_until_settled((0.005, -0.005, 0.005, -0.005)) == pytest.approx(SETTLED_S / TICK_S, abs=1)
+    assert ticks_until_settled(REST) == pytest.approx(SETTLED_S / PERIOD_S, abs=1)
+    assert ticks_until_settled((0.005, -0.005, 0.005, -0.005)) == pytest.approx(SETTLED_S / PERIOD_S, abs=1)
 
 
 @pytest.mark.parametrize("velocities", [(0.11, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, -0.11), (0.0, nan, 0.0, 0.0)])
 def test_joints_that_do_not_rest_are_given_up_in_bounded_time(velocities: tuple[float, ...]) -> None:
-    assert ticks_until_settled(velocities) == pytest.approx(DAMPING_S / TICK_S, abs=1)
+    assert ticks_until_settled(velocities) == pytest.approx(DAMPING_S / PERIOD_S, abs=1)
 
 
 def test_the_rest_of_a_joint_that_nobody_sees_is_not_waited_for() -> None:
     ticks = ticks_until_settled((nan, 5.0, 0.0, 0.0), Joints(False, False, True, True))
-    assert ticks == pytest.approx(SETTLED_S / TICK_S, abs=1)
+    assert ticks == pytest.approx(SETTLED_S / PERIOD_S, abs=1)
 
 
 def test_a_joint_that_moves_once_more_is_waited_for_anew() -> None:
     controller = weightless()
     for tick in range(1, 220):
         position_s = 1.0 if tick >= 100 else 0.0
-        controller.step(TICK_S, Mode.DAMPING, turning_at((0.1, 0.0, 0.0, 0.0), position_s))
-        assert not (controller.settled and tick < 100 + SETTLED_S / TICK_S)
+        controller.step(PERIOD_S, Mode.DAMPING, turning_at((0.1, 0.0, 0.0, 0.0), position_s))
+        assert not (controller.settled and tick < 100 + SETTLED_S / PERIOD_S)
     assert controller.settled
 
 
 def test_settled_is_told_only_while_damping_and_of_this_time() -> None:
     controller = weightless()
     for _ in range(200):
-        controller.step(TICK_S, Mode.DAMPING, states_at(POSE))
+        controller.step(PERIOD_S, Mode.DAMPING, states_at(POSE))
     assert controller.settled
-    controller.step(TICK_S, Mode.FAULT, states_at(POSE))
+    controller.step(PERIOD_S, Mode.FAULT, states_at(POSE))
     assert not controller.settled
-    controller.step(TICK_S, Mode.DAMPING, states_at(POSE))
+    controller.step(PERIOD_S, Mode.DAMPING, states_at(POSE))
     assert not controller.settled
 
 
@@ -327,7 +329,7 @@ def test_a_pose_that_nobody_needs_is_told_after_its_time_and_never_without_one()
         motion = MotionParameters(longest_hold_s=longest_s)
         controller = Controller(GAIT, GEOMETRY, SPRING, ArmMass(), motion, recovery())
         for tick in range(1, 1000):
-            controller.step(TICK_S, Mode.HOLD, states_at(POSE))
+            controller.step(PERIOD_S, Mode.HOLD, states_at(POSE))
             if controller.rested:
                 return tick
         return None
@@ -343,7 +345,7 @@ def test_the_time_of_holding_begins_anew_with_every_hold_and_does_not_run_elsewh
     controller.order = WalkOrder(0.03)
     for mode in (Mode.HOLD, Mode.WALKING, Mode.STOPPING, Mode.HOLD):
         for _ in range(370):
-            controller.step(TICK_S, mode, states_at(RAISED))
+            controller.step(PERIOD_S, mode, states_at(RAISED))
             assert not controller.rested
 
 
@@ -351,7 +353,7 @@ def test_the_time_of_holding_begins_anew_with_every_move() -> None:
     controller = Controller(GAIT, GEOMETRY, SPRING, ArmMass(), MotionParameters(longest_hold_s=1.0), recovery())
     for _ in range(4):
         for _ in range(370):
-            controller.step(TICK_S, Mode.HOLD, states_at(POSE))
+            controller.step(PERIOD_S, Mode.HOLD, states_at(POSE))
             assert not controller.rested
         controller.move([None, 0.0, None, None])
 
@@ -360,7 +362,7 @@ def stopping_ticks(pose: JointAngles) -> int:
     """Of flippers that stay where they are, whatever torque there is."""
     controller = weightless()
     for tick in range(1, 3000):
-        controller.step(TICK_S, Mode.STOPPING, states_at(pose))
+        controller.step(PERIOD_S, Mode.STOPPING, states_at(pose))
         if controller.raised:
             return tick
     raise AssertionError("it never ended")
@@ -369,10 +371,10 @@ def stopping_ticks(pose: JointAngles) -> int:
 @pytest.mark.parametrize("low_rad", [-0.2, -0.7, -1.3])
 def test_flippers_that_the_mud_keeps_are_waited_for_but_not_long(low_rad: float) -> None:
     ticks = stopping_ticks(Joints(0.0, low_rad, 0.0, low_rad))
-    assert ticks * TICK_S == pytest.approx(RAISING_S - low_rad, abs=0.15)
-    assert ticks * TICK_S < SOFT_STOP_S
+    assert ticks * PERIOD_S == pytest.approx(RAISING_S - low_rad, abs=0.15)
+    assert ticks * PERIOD_S < SOFT_STOP_S
 
 
 def test_a_stop_never_takes_longer_than_a_soft_stop_may() -> None:
     """Also on a path that is too long for it: of an arm that was turned far up by hand."""
-    assert stopping_ticks(Joints(0.0, 3.0, 0.0, 3.0)) * TICK_S == pytest.approx(SOFT_STOP_S, abs=0.01)
+    assert stopping_ticks(Joints(0.0, 3.0, 0.0, 3.0)) * PERIOD_S == pytest.approx(SOFT_STOP_S, abs=0.01)

@@ -5,8 +5,9 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from control.fault_latch import GOOD_TICKS, FaultLatch
+from control.fault_latch import GOOD_S, FaultLatch
 from control.faults import FAULT_KINDS, Blocks, Clears, Fault, Reaction
+from control.rate import PERIOD_S
 
 
 def fault_of(name: str, subject: str = "left_sweep") -> Fault:
@@ -41,6 +42,7 @@ def test_a_fault_is_as_old_as_its_first_tick_and_one_that_came_back_is_young() -
     assert latch.age_ticks(LATE) == 0
 
 
+GOOD_TICKS = round(GOOD_S / PERIOD_S)
 FOR_EVER, A_WHILE = 1001, GOOD_TICKS + 1
 
 

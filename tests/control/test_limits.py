@@ -15,11 +15,11 @@ from control.limits import (
     apply_limits,
     limited_torque_nm,
 )
+from control.rate import PERIOD_S
 from control.records import NO_TORQUE, DriveState, DriveStates, Joints, Torques, same_for_all
 
 LIMITS = JointLimits()
-TICK_S = 1.0 / 380.0
-SLEW_NM = LIMITS.torque_rate_nm_s * TICK_S
+SLEW_NM = LIMITS.torque_rate_nm_s * PERIOD_S
 SPAN = JointRange(radians(-60.0), radians(60.0))
 RANGES = same_for_all(SPAN)
 ROUNDING = 1e-12
@@ -60,7 +60,7 @@ def limited_like(joint: int, wanted_nm: float, measured: DriveState) -> LimitedT
     """All joints at rest without torque but one."""
     wanted, drives = list(NO_TORQUE), list(STILL)
     wanted[joint], drives[joint] = wanted_nm, measured
-    return apply_limits(Joints(*wanted), NO_TORQUE, Joints(*drives), LIMITS, RANGES, TICK_S)
+    return apply_limits(Joints(*wanted), NO_TORQUE, Joints(*drives), LIMITS, RANGES, PERIOD_S)
 
 
 # torque
@@ -89,7 +89,7 @@ def test_the_slew_rate_binds_exactly_one_step_from_the_previous_torque() -> None
     for previous in np.linspace(-0.75, 0.75, 61):
         for change in np.linspace(-2.0 * SLEW_NM, 2.0 * SLEW_NM, 81):
             wanted = float(min(max(previous + change, -0.75), 0.75))
-            torque = limited_torque_nm(wanted, float(previous), state(), LIMITS, SPAN, TICK_S)
+            torque = limited_torque_nm(wanted, float(previous), state(), LIMITS, SPAN, PERIOD_S)
             expected = min(max(wanted, previous - SLEW_NM), previous + SLEW_NM)
             assert torque == pytest.approx(expected, abs=ROUNDING)
 
@@ -106,7 +106,7 @@ def test_limits_never_exceed_the_slew_rate(
 def test_full_torque_is_reached_after_its_ratio_to_the_slew_step() -> None:
     sent = NO_TORQUE
     for tick in range(1, 4):
-        sent = apply_limits(Joints(9.0, 9.0, 9.0, 9.0), sent, STILL, LIMITS, RANGES, TICK_S).torques_nm
+        sent = apply_limits(Joints(9.0, 9.0, 9.0, 9.0), sent, STILL, LIMITS, RANGES, PERIOD_S).torques_nm
         assert sent == pytest.approx([min(0.75, tick * SLEW_NM)] * 4)
 
 
@@ -130,7 +130,7 @@ def test_beyond_the_range_outward_torque_only_shrinks_and_is_gone_within_the_sle
 ) -> None:
     outside, torque = state(side * (SPAN.max_rad + beyond)), previous
     for _ in range(3):
-        later = limited_torque_nm(wanted, torque, outside, LIMITS, SPAN, TICK_S)
+        later = limited_torque_nm(wanted, torque, outside, LIMITS, SPAN, PERIOD_S)
         assert side * later <= max(0.0, side * torque - SLEW_NM + ROUNDING)
         torque = later
     assert side * torque <= 0.0
@@ -207,7 +207,7 @@ def test_one_torque_that_is_not_finite_turns_all_four_to_zero(joint: int, bad: f
     wanted = [0.1, 0.1, 0.1, 0.1]
     wanted[joint] = bad
     a, b, c, d = wanted
-    sent = apply_limits(Joints(a, b, c, d), Joints(0.7, -0.7, 0.7, -0.7), STILL, LIMITS, RANGES, TICK_S)
+    sent = apply_limits(Joints(a, b, c, d), Joints(0.7, -0.7, 0.7, -0.7), STILL, LIMITS, RANGES, PERIOD_S)
     assert sent == LimitedTorques(NO_TORQUE, True, False)
 
 
@@ -241,14 +241,14 @@ def test_what_leaves_is_always_finite_and_says_so_when_it_had_to_give_up(
 def test_limited_is_told_exactly_when_something_changed(
     wanted: Torques, previous: Torques, measured: DriveStates
 ) -> None:
-    sent = apply_limits(wanted, previous, measured, LIMITS, RANGES, TICK_S)
+    sent = apply_limits(wanted, previous, measured, LIMITS, RANGES, PERIOD_S)
     assert sent.limited == (sent.torques_nm != wanted)
 
 
 @given(four_torques(st.floats(-0.75, 0.75)), four_torques(st.floats(-1.0, 1.0)))
 def test_a_torque_within_every_bound_passes_unchanged(wanted: Torques, fractions: Torques) -> None:
     a, b, c, d = (torque + 0.99 * fraction * SLEW_NM for torque, fraction in zip(wanted, fractions, strict=True))
-    sent = apply_limits(wanted, Joints(a, b, c, d), STILL, LIMITS, RANGES, TICK_S)
+    sent = apply_limits(wanted, Joints(a, b, c, d), STILL, LIMITS, RANGES, PERIOD_S)
     assert sent == LimitedTorques(wanted, False, True)
 
 

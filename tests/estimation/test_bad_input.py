@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from control.gait.gait import Gait, GaitParameters
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
+from control.rate import PERIOD_S
 from control.records import NO_LOAD, BodyPose, Estimate, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters, Method, MudEstimator, MudReading
@@ -18,7 +19,6 @@ from estimation.strokes.depth_line import COEFFICIENTS_N_M3
 
 GEOMETRY = FlipperGeometry()
 DRIVE = FlipperDrive(ArmMass(0.0, 0.0, 0.0, 0.0), 0.083, 0.083, current_limit_a=10.0)
-TICK_S = 1.0 / 380.0
 STRIDES = 4
 METHODS: tuple[Method, ...] = ("default", "paper")
 COEFFICIENT = {Phase.INSERTION: "k_p", Phase.STANCE: "k_s", Phase.EXTRACTION: "k_e"}
@@ -50,12 +50,12 @@ def walk() -> list[Row]:
     gait, rows = Gait(GaitParameters(), GEOMETRY), list[Row]()
     gait.reset(0.03)
     while gait.stride < STRIDES / 2:
-        target = gait.step(TICK_S)
+        target = gait.step(PERIOD_S)
         adduction = GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m)
         push = max(0.0, target.depth_m)
         sweep_a = -300.0 * push if target.phase is Phase.STANCE else 0.0
         adduction_a = {Phase.INSERTION: -150.0, Phase.EXTRACTION: 150.0}.get(target.phase, 0.0) * push
-        rows.append((len(rows) * TICK_S, target.phase, target.sweep_rad, adduction, sweep_a, adduction_a))
+        rows.append((len(rows) * PERIOD_S, target.phase, target.sweep_rad, adduction, sweep_a, adduction_a))
     return rows
 
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from control.geometry import FlipperGeometry
 from control.joint_friction import JointFriction
 from control.joint_pd import ArmMass
+from control.rate import PERIOD_S
 from control.records import DriveState
 from estimation.joint_load import (
     LONGEST_GAP_S,
@@ -28,7 +29,6 @@ GEOMETRY, MASS = FlipperGeometry(), ArmMass()
 SWEEP_NM_A, LIFT_NM_A = 0.083, 0.09
 WEIGHTLESS = ArmMass(0.0, 0.0, 0.0, 0.0)
 DRIVE = FlipperDrive(MASS, SWEEP_NM_A, LIFT_NM_A)
-TICK_S = 1.0 / 380.0
 
 angles = st.floats(-pi / 3, pi / 3)
 currents = st.floats(-20.0, 20.0)
@@ -146,7 +146,7 @@ def loads_of_a_free_arm(angle_every_s: float, current_every_s: float, shift_s: f
 
     loads, seen = JointLoads(GEOMETRY, DRIVE), list[JointLoad]()
     for tick in range(200):
-        now_s = 1.0 + tick * TICK_S
+        now_s = 1.0 + tick * PERIOD_S
         sweep = joint(now_s, SWEEP_NM_A, MASS.sweep_inertia_kg_m2, 0)
         adduction = joint(now_s, LIFT_NM_A, MASS.adduction_inertia_kg_m2, 1)
         load = loads.update(sweep, adduction)
@@ -164,20 +164,20 @@ INERTIA_NM = MASS.adduction_inertia_kg_m2 * 0.2 * 25.0**2
 
 def test_a_free_arm_in_quick_motion_bears_no_load() -> None:
     """Of the 0.08 N·m that its inertia takes, (ω dt)²/8 is left by taking lines for curves: 0.1 %."""
-    assert largest_nm(loads_of_a_free_arm(TICK_S, TICK_S, 0.0)) < 0.002 * INERTIA_NM
+    assert largest_nm(loads_of_a_free_arm(PERIOD_S, PERIOD_S, 0.0)) < 0.002 * INERTIA_NM
 
 
 @pytest.mark.parametrize("shift_s", [0.0005, 0.001, 0.0015])
 def test_a_current_that_is_measured_at_another_moment_is_brought_to_that_of_the_acceleration(shift_s: float) -> None:
     """Left where it is, a current half a tick aside would leave ω dt/2 = 3 %."""
-    loads = loads_of_a_free_arm(TICK_S, TICK_S, shift_s)
+    loads = loads_of_a_free_arm(PERIOD_S, PERIOD_S, shift_s)
     assert largest_nm(loads) < 0.01 * INERTIA_NM
 
 
 @pytest.mark.parametrize("ticks", [2, 4])
 def test_a_current_that_comes_without_a_new_angle_keeps_the_last_acceleration(ticks: int) -> None:
     """Without it all inertia would be left, several times a message. (ω dt)²/8 grows with the angle's interval."""
-    loads = loads_of_a_free_arm(ticks * TICK_S, TICK_S, 0.0005)
+    loads = loads_of_a_free_arm(ticks * PERIOD_S, PERIOD_S, 0.0005)
     assert len(loads) > 100
     assert largest_nm(loads) < 0.02 * INERTIA_NM
 
@@ -284,14 +284,14 @@ def loads_of_a_driven_arm(message_s: float, known: bool) -> list[float]:
     """
     torques_nm = np.random.default_rng(1).uniform(-0.25, 0.25, 400)
     drive = DRIVE._replace(mass=ArmMass(0.0, 0.0, 0.0004, 0.0006))
-    times_s = TICK_S * np.arange(401)
-    speeds_rad_s = np.concatenate([[0.0], np.cumsum(TICK_S * (torques_nm + MUD_NM) / 0.0006)])
-    angles_rad = np.concatenate([[0.0], np.cumsum(TICK_S * (speeds_rad_s[:-1] + speeds_rad_s[1:]) / 2.0)])
+    times_s = PERIOD_S * np.arange(401)
+    speeds_rad_s = np.concatenate([[0.0], np.cumsum(PERIOD_S * (torques_nm + MUD_NM) / 0.0006)])
+    angles_rad = np.concatenate([[0.0], np.cumsum(PERIOD_S * (speeds_rad_s[:-1] + speeds_rad_s[1:]) / 2.0)])
     loads, reported = JointLoads(GEOMETRY, drive), list[float]()
     for tick in range(5, 400):
         now_s = float(times_s[tick])
         angle_s, current_s = (now_s - (now_s - shift_s) % message_s for shift_s in (0.0003, 0.0008))
-        place = int(current_s / TICK_S)
+        place = int(current_s / PERIOD_S)
         sample = DriveState(
             angle_rad=float(np.interp(angle_s, times_s, angles_rad)),
             velocity_rad_s=float(np.interp(angle_s, times_s, speeds_rad_s)),

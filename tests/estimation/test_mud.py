@@ -12,6 +12,7 @@ import pytest
 from benchmarks.speed.synthetic_walk import DRIVE, GEOMETRY, K_P, Sample, later, stride_samples
 from control.joint_pd import ArmMass
 from control.mud_estimate import NOTHING_KNOWN
+from control.rate import PERIOD_S
 from control.records import FLIPPERS, NO_LOAD, BodyPose, Joints, Phase, StrideEstimate
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import FlipperDrive
@@ -20,7 +21,6 @@ from estimation.mud_map import PIECE_M
 from estimation.paper import PaperEstimator
 from estimation.recorded_states import NO_AGES_S, recorded_states
 from estimation.strokes.shear import Base
-from firmware_host.ticker import PERIOD_S
 
 Four = tuple[float, float, float, float]
 STRIDES, PERIOD_OF_STRIDE_S = 3, 2.0

@@ -16,6 +16,7 @@ from control.gait.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_durat
 from control.gait.recovery import OUT_M, lowest_m
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
+from control.rate import PERIOD_S
 from control.records import (
     NO_LOAD,
     BodyPose,
@@ -31,7 +32,6 @@ from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters, MudEstimator
 from estimation.paper import MOBILISED_M, STEADY_FRACTION, SURFACE_FORCE_N, PaperEstimator
 
-TICK_S = 1.0 / 380.0
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 EDGE_M2, WIDTH_M, LENGTH_M = 0.025 * 0.004, 0.025, 0.12
 SWEEP_NM_A, ADDUCTION_NM_A = 0.083, 0.09
@@ -90,14 +90,14 @@ def motion(depth_m: float = 0.03, gait: GaitParameters = GAIT, strides: int = 1)
     """Joints that follow the gait exactly, without any current."""
     walk, samples = Gait(gait, GEOMETRY), list[Sample]()
     walk.reset(depth_m)
-    for tick in range(int(strides * stride_duration_s(gait, GEOMETRY, depth_m) / TICK_S)):
-        target = walk.step(TICK_S)
+    for tick in range(int(strides * stride_duration_s(gait, GEOMETRY, depth_m) / PERIOD_S)):
+        target = walk.step(PERIOD_S)
         adduction_rad = GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m)
         velocity_rad_s = GEOMETRY.adduction_velocity_rad_s(
             target.sweep_rad, adduction_rad, target.sweep_velocity_rad_s, target.depth_velocity_m_s
         )
         angles = (target.sweep_rad, adduction_rad, target.sweep_velocity_rad_s, velocity_rad_s)
-        samples.append(Sample((tick + 1) * TICK_S, target.phase, *angles, 0.0, 0.0))
+        samples.append(Sample((tick + 1) * PERIOD_S, target.phase, *angles, 0.0, 0.0))
     return samples
 
 
@@ -214,9 +214,9 @@ def test_forces_and_durations_of_the_stride_are_told() -> None:
     assert stride.insertion_force_n == pytest.approx(MUD.k_p * EDGE_M2 * submerged_m, rel=1e-3)
     assert stride.stance_force_n == pytest.approx(MUD.k_s * WIDTH_M * submerged_m**2 / 2.0)
     assert stride.extraction_force_n == pytest.approx(-MUD.k_e * EDGE_M2 * submerged_m, rel=1e-2)
-    assert stride.insertion_s == pytest.approx(0.0445 / 0.1, abs=1.5 * TICK_S)
-    assert stride.stance_s == pytest.approx(2.0 * radians(30.0) * 0.12 / 0.5, abs=1.5 * TICK_S)
-    assert stride.extraction_s == pytest.approx(0.0445 / 0.5, abs=1.5 * TICK_S)
+    assert stride.insertion_s == pytest.approx(0.0445 / 0.1, abs=1.5 * PERIOD_S)
+    assert stride.stance_s == pytest.approx(2.0 * radians(30.0) * 0.12 / 0.5, abs=1.5 * PERIOD_S)
+    assert stride.extraction_s == pytest.approx(0.0445 / 0.5, abs=1.5 * PERIOD_S)
     assert stride.t_start_s == samples[0].now_s
     assert stride.t_end_s == next(sample.now_s for sample in samples if sample.phase is Phase.SWING)
 
@@ -250,7 +250,7 @@ def test_the_trigger_finds_the_surface_too_deep_by_its_force_over_the_slope(slop
     mud = Mud(k_p=slope_n_m / EDGE_M2, surface_m=0.0)
     stride = one(loaded(motion(), law_of(mud)))
     late_m = stride.surface_m - mud.surface_m
-    per_tick_m = 0.1 / 0.88 * TICK_S
+    per_tick_m = 0.1 / 0.88 * PERIOD_S
     assert SURFACE_FORCE_N / slope_n_m < late_m <= SURFACE_FORCE_N / slope_n_m + per_tick_m
     bias = 1.0 + 1.5 * late_m / stride.depth_m  # of a line through the wrong origin, evenly sampled
     assert stride.k_p.value / mud.k_p == pytest.approx(bias, rel=0.05)
@@ -317,7 +317,7 @@ def test_more_noise_makes_more_doubt() -> None:
 def test_a_sample_that_is_read_again_counts_once(times: int, mass: ArmMass) -> None:
     samples = noisy(triggered(motion(), MUD, mass), 2, 0.05)
     repeated = [
-        sample._replace(now_s=sample.now_s + again * TICK_S / times) for sample in samples for again in range(times)
+        sample._replace(now_s=sample.now_s + again * PERIOD_S / times) for sample in samples for again in range(times)
     ]
     assert repr(one(repeated, estimator(mass))) == repr(one(samples, estimator(mass)))
 
@@ -413,7 +413,7 @@ def test_without_compensation_no_drag_is_added() -> None:
 def test_a_stroke_cut_short_does_not_close(last: Phase) -> None:
     samples = triggered(motion(), MUD)
     begun = [sample for sample in samples if sample.phase <= last][:-10]
-    stop = begun[-1]._replace(now_s=begun[-1].now_s + TICK_S, phase=Phase.REST)
+    stop = begun[-1]._replace(now_s=begun[-1].now_s + PERIOD_S, phase=Phase.REST)
     flipper = estimator()
     assert closed([*begun, stop], flipper) == []
     assert repr(one(samples, flipper)) == repr(one(samples))
@@ -422,7 +422,7 @@ def test_a_stroke_cut_short_does_not_close(last: Phase) -> None:
 def test_an_extraction_cut_short_does_not_close() -> None:
     samples = triggered(motion(), MUD)
     begun = [sample for sample in samples if sample.phase <= Phase.EXTRACTION][:-20]
-    stop = begun[-1]._replace(now_s=begun[-1].now_s + TICK_S, phase=Phase.REST)
+    stop = begun[-1]._replace(now_s=begun[-1].now_s + PERIOD_S, phase=Phase.REST)
     assert closed([*begun, stop]) == []
 
 
@@ -504,10 +504,10 @@ def held_at(samples: Sequence[Sample], lowest_depth_m: float) -> list[Sample]:
 def recovered(samples: Sequence[Sample]) -> list[Sample]:
     """With a second of recovery at ten times the current before the swing, at whose end the flipper is up."""
     swing = next(i for i, sample in enumerate(samples) if sample.phase is Phase.SWING)
-    held, ticks = samples[swing - 1], round(1.0 / TICK_S)
+    held, ticks = samples[swing - 1], round(1.0 / PERIOD_S)
     freed = [
         held._replace(
-            now_s=held.now_s + tick * TICK_S,
+            now_s=held.now_s + tick * PERIOD_S,
             phase=Phase.RECOVERY,
             adduction_rad=held.adduction_rad * (1.0 - tick / ticks),
             adduction_current_a=10.0 * held.adduction_current_a,

@@ -9,10 +9,10 @@ from typing import Any
 
 import msgpack
 
+from control.rate import PERIOD_S
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.rights import Group, Peer, Rights
 from firmware_host.operator.status_socket import RefusedError, StatusSocket
-from firmware_host.ticker import PERIOD_S
 
 
 def refuse(params: dict[str, Any], caller: Caller) -> Any:

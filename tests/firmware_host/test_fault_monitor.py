@@ -11,6 +11,7 @@ import pytest
 from control.faults import FAULT_KINDS, Fault, FaultKind
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, Mode
+from control.rate import PERIOD_S
 from control.records import JOINTS, NO_TORQUE, BodyPose, DriveState, DriveStates, Joints, same_for_all
 from drivers.can.can_port import BusState
 from drivers.can.mock_bus import MockBus, MockPort
@@ -25,7 +26,7 @@ from firmware_host.fault_monitor import (
     MonitorInput,
 )
 from firmware_host.log.recorder import HEALTHY
-from firmware_host.ticker import PERIOD_S, Tick
+from firmware_host.ticker import Tick
 
 START_S = 100.0
 

@@ -9,6 +9,7 @@ import pytest
 
 from control.controller import WalkOrder
 from control.modes import Mode, Request
+from control.rate import PERIOD_S
 from control.records import NO_TORQUE, Phase, same_for_all
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
@@ -21,7 +22,7 @@ from firmware_host.operator.connection import Caller
 from firmware_host.operator.fault_texts import fault_message
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.rights import Level, Peer
-from firmware_host.ticker import PERIOD_S, Tick
+from firmware_host.ticker import Tick
 from simulation.devices.drive import DriveError, SimulatedDrive
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay

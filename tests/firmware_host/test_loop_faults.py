@@ -14,13 +14,13 @@ import pytest
 from control.controller import SOFT_STOP_S, WalkOrder
 from control.faults import FAULT_KINDS, Clears, FaultKind, Reaction
 from control.modes import ENERGISED, HELD, Mode, Request
+from control.rate import PERIOD_S
 from control.records import JOINTS, NO_TORQUE, Phase
 from drivers.can.can_port import BusState
 from drivers.can.mock_bus import MockPort
 from drivers.odrive import codec
 from drivers.odrive.codec import Message
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.ticker import PERIOD_S
 from simulation.devices.drive import DriveError
 from simulation.devices.motion_capture import SimulatedPose
 from simulation.devices.odrive import SimulatedOdrive

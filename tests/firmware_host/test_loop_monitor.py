@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 
 from control.faults import Fault, FaultKind
 from control.monitors.joint_monitor import FaultBounds
+from control.rate import PERIOD_S
 from firmware_host.loop_monitor import CRAWL_TICKS, MEAN_TICKS, LoopMonitor
 from firmware_host.operator.fault_texts import fault_message
-from firmware_host.ticker import PERIOD_S, Tick, Ticker
+from firmware_host.ticker import Tick, Ticker
 
 START_S = 5000.0
 DISTANCE_S = 1.7e9  # of the clock on the wall

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from control.rate import PERIOD_S
 from firmware_host.loop_timing import LONGEST_US, Histogram, LoopTiming
-from firmware_host.ticker import PERIOD_S
 
 
 def test_percentiles_are_exact_to_a_microsecond() -> None:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from firmware_host.ticker import PERIOD_S, RATE_HZ, Ticker
+from control.rate import PERIOD_S, RATE_HZ
+from firmware_host.ticker import Ticker
 
 
 @dataclass

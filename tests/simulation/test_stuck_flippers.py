@@ -12,12 +12,12 @@ from control.controller import DAMPING_S, WalkOrder
 from control.gait.gait import stride_duration_s
 from control.gait.recovery import RecoveryParameters
 from control.modes import Mode, Request
+from control.rate import PERIOD_S
 from control.records import NO_TORQUE, Phase
 from drivers.can.frames import Frame
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder
 from firmware_host.log_reading.replay import replay_file
-from firmware_host.ticker import PERIOD_S
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay
 from simulation.mud.track import Track

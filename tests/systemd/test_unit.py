@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from control.rate import PERIOD_S, RATE_HZ
 from control.records import JOINTS
 from drivers.can.can_port import BusState
 from drivers.can.frames import Frame
@@ -19,7 +20,6 @@ from drivers.drive_types import make_drives
 from firmware_host import daemon
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration, StatusParameters
 from firmware_host.configuration.toml_records import ConfigurationError
-from firmware_host.ticker import PERIOD_S, RATE_HZ
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 

@@ -22,11 +22,11 @@ from control.gait.gait import (
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.limits import JointLimits
+from control.rate import PERIOD_S
 from control.records import GaitTarget, Phase
 
 GEOMETRY = FlipperGeometry(flipper_length_m=0.12, drop_m=0.05, axis_height_m=0.0645)
 WALKING = GaitParameters()
-TICK_S = 1.0 / 380.0
 DEPTHS_M = (0.03, 0.05)
 
 
@@ -51,7 +51,7 @@ def adduction_velocity_rad_s(target: GaitTarget) -> float:
 
 @pytest.mark.parametrize("depth_m", DEPTHS_M)
 def test_a_stride_has_its_four_phases_in_order_and_once_each(depth_m: float) -> None:
-    order = [phase for phase, _ in groupby(target.phase for target in one_stride(TICK_S, depth_m))]
+    order = [phase for phase, _ in groupby(target.phase for target in one_stride(PERIOD_S, depth_m))]
     assert order == [Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING]
 
 
@@ -94,7 +94,7 @@ def test_a_swing_duration_of_zero_follows_the_swing_speed() -> None:
 
 @pytest.mark.parametrize("depth_m", DEPTHS_M)
 def test_the_depth_is_constant_through_the_stance(depth_m: float) -> None:
-    stance = [target for target in one_stride(TICK_S, depth_m) if target.phase is Phase.STANCE]
+    stance = [target for target in one_stride(PERIOD_S, depth_m) if target.phase is Phase.STANCE]
     assert {target.depth_m for target in stance} == {depth_m}
     assert {target.depth_velocity_m_s for target in stance} == {0.0}
 
@@ -104,14 +104,14 @@ def test_the_stance_sweeps_from_plus_to_minus_thirty_degrees_and_the_swing_back(
     stance, swing = rows[Phase.STANCE], rows[Phase.SWING]
     assert (degrees(stance.sweep_start_rad), degrees(stance.sweep_end_rad)) == pytest.approx((30.0, -30.0))
     assert (degrees(swing.sweep_start_rad), degrees(swing.sweep_end_rad)) == pytest.approx((-30.0, 30.0))
-    sweeps = [target.sweep_rad for target in one_stride(TICK_S, 0.03) if target.phase is Phase.STANCE]
+    sweeps = [target.sweep_rad for target in one_stride(PERIOD_S, 0.03) if target.phase is Phase.STANCE]
     assert all(later < earlier for earlier, later in pairwise(sweeps))
     assert sweeps[0] > radians(29.9)
     assert sweeps[-1] < radians(-29.9)
 
 
 def test_the_edge_swings_forward_above_the_mud() -> None:
-    swing = [target for target in one_stride(TICK_S, 0.05) if target.phase is Phase.SWING]
+    swing = [target for target in one_stride(PERIOD_S, 0.05) if target.phase is Phase.SWING]
     assert [target.depth_m for target in swing] == pytest.approx([-0.0145] * len(swing))
     assert all(target.sweep_velocity_rad_s > 0.0 for target in swing[1:-1])
 
@@ -145,7 +145,7 @@ def test_smooth_progress_moves_at_the_rate_that_it_tells(duration: float, fracti
 
 @pytest.mark.parametrize("depth_m", DEPTHS_M)
 def test_joint_velocities_are_the_derivatives_of_the_joint_angles(depth_m: float) -> None:
-    dt = TICK_S / 10.0
+    dt = PERIOD_S / 10.0
     for before, now, after in zip(*(one_stride(dt, depth_m)[i:] for i in range(3)), strict=False):
         sweep_velocity = (after.sweep_rad - before.sweep_rad) / (2.0 * dt)
         angles = [GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m) for target in (before, after)]
@@ -155,13 +155,13 @@ def test_joint_velocities_are_the_derivatives_of_the_joint_angles(depth_m: float
 
 @pytest.mark.parametrize("depth_m", DEPTHS_M)
 def test_no_joint_accelerates_between_ticks_harder_than_its_torque_limit_allows_in_air(depth_m: float) -> None:
-    stride = list(islice(targets(TICK_S, depth_m), 2000))
+    stride = list(islice(targets(PERIOD_S, depth_m), 2000))
     arm, torque_nm = ArmMass(), JointLimits().torque_nm
     for now, after in pairwise(stride):
         sweep_change = after.sweep_velocity_rad_s - now.sweep_velocity_rad_s
         adduction_change = adduction_velocity_rad_s(after) - adduction_velocity_rad_s(now)
-        assert abs(sweep_change) / TICK_S * arm.sweep_inertia_kg_m2 < torque_nm
-        assert abs(adduction_change) / TICK_S * arm.adduction_inertia_kg_m2 < torque_nm
+        assert abs(sweep_change) / PERIOD_S * arm.sweep_inertia_kg_m2 < torque_nm
+        assert abs(adduction_change) / PERIOD_S * arm.adduction_inertia_kg_m2 < torque_nm
 
 
 def test_the_sweep_accelerates_no_harder_than_half_a_cosine_over_the_ramp() -> None:
@@ -169,8 +169,8 @@ def test_the_sweep_accelerates_no_harder_than_half_a_cosine_over_the_ramp() -> N
     shortest = min(row.duration_s for row in rows if row.sweep_start_rad != row.sweep_end_rad)
     bound = radians(60.0) / (shortest - RAMP_S) * pi / (2.0 * RAMP_S)
     accelerations = [
-        abs(after.sweep_velocity_rad_s - now.sweep_velocity_rad_s) / TICK_S
-        for now, after in pairwise(islice(targets(TICK_S, 0.03), 2000))
+        abs(after.sweep_velocity_rad_s - now.sweep_velocity_rad_s) / PERIOD_S
+        for now, after in pairwise(islice(targets(PERIOD_S, 0.03), 2000))
     ]
     assert 0.9 * bound < max(accelerations) <= bound
 
@@ -188,14 +188,14 @@ def test_joints_stand_still_where_phases_meet() -> None:
 def test_a_thousand_strides_keep_their_exact_rate(depth_m: float) -> None:
     quick = GaitParameters(insertion_speed_m_s=1.0, swing_duration_s=0.1)
     duration = stride_duration_s(quick, GEOMETRY, depth_m)
-    ticks = round(1000.4 * duration / TICK_S)
+    ticks = round(1000.4 * duration / PERIOD_S)
     gait = Gait(quick, GEOMETRY)
     gait.reset(depth_m)
     for _ in range(ticks):
-        target = gait.step(TICK_S)
+        target = gait.step(PERIOD_S)
     alone = Gait(quick, GEOMETRY)
     alone.reset(depth_m)
-    expected = alone.step(ticks * TICK_S - 1000 * duration)
+    expected = alone.step(ticks * PERIOD_S - 1000 * duration)
     assert target.stride == 1000
     assert target.phase is expected.phase
     assert target[2:] == pytest.approx(expected[2:], abs=1e-6)
@@ -227,7 +227,7 @@ def test_a_new_depth_waits_for_the_next_stride() -> None:
     gait.reset(0.03)
     depths: dict[int, float] = {}
     for tick in range(1000):
-        target = gait.step(TICK_S)
+        target = gait.step(PERIOD_S)
         if tick == 100:
             gait.next_depth_m = 0.045
         if target.phase is Phase.STANCE:
@@ -241,12 +241,12 @@ def test_a_swing_that_may_not_begin_is_waited_for_at_the_rear_and_up(parameters:
     gait = Gait(parameters, GEOMETRY)
     gait.reset(0.03)
     before_swing_s = stride_duration_s(parameters, GEOMETRY, 0.03) - stride_table(parameters, GEOMETRY, 0.03)[-1][1]
-    for _ in range(round((before_swing_s + 2.0) / TICK_S)):
-        target = gait.step(TICK_S, may_swing=False)
+    for _ in range(round((before_swing_s + 2.0) / PERIOD_S)):
+        target = gait.step(PERIOD_S, may_swing=False)
     assert gait.waits
     assert target.phase in (Phase.EXTRACTION, Phase.PAUSE)
     assert target[2:] == pytest.approx((radians(-30.0), 0.0, -GEOMETRY.clearance_m, 0.0))
-    assert gait.step(TICK_S).phase is Phase.SWING
+    assert gait.step(PERIOD_S).phase is Phase.SWING
     assert not gait.waits
 
 
@@ -254,32 +254,32 @@ def test_a_swing_that_may_not_begin_hinders_nothing_before_it() -> None:
     free, held = Gait(WALKING, GEOMETRY), Gait(WALKING, GEOMETRY)
     for gait in (free, held):
         gait.reset(0.03)
-    while (target := free.step(TICK_S)).phase is not Phase.SWING:
-        assert held.step(TICK_S, may_swing=False) == target
+    while (target := free.step(PERIOD_S)).phase is not Phase.SWING:
+        assert held.step(PERIOD_S, may_swing=False) == target
 
 
 def test_a_swing_that_has_begun_is_not_held_up() -> None:
     gait = Gait(WALKING, GEOMETRY)
     gait.reset(0.03)
-    while gait.step(TICK_S).phase is not Phase.SWING:
+    while gait.step(PERIOD_S).phase is not Phase.SWING:
         pass
-    phases = [gait.step(TICK_S, may_swing=False).phase for _ in range(round(1.0 / TICK_S))]
+    phases = [gait.step(PERIOD_S, may_swing=False).phase for _ in range(round(1.0 / PERIOD_S))]
     assert phases[-1] is Phase.INSERTION
 
 
 def test_a_reset_starts_the_first_stride_again() -> None:
     gait = Gait(WALKING, GEOMETRY)
     gait.reset(0.03)
-    first = [gait.step(TICK_S) for _ in range(1000)]
+    first = [gait.step(PERIOD_S) for _ in range(1000)]
     gait.next_depth_m = 0.045
     gait.reset(0.03)
-    assert [gait.step(TICK_S) for _ in range(1000)] == first
+    assert [gait.step(PERIOD_S) for _ in range(1000)] == first
 
 
 @pytest.mark.parametrize("depth_m", DEPTHS_M)
 def test_no_joint_is_asked_for_more_than_its_velocity_limit(depth_m: float) -> None:
     limit = JointLimits().velocity_rad_s
-    for target in islice(targets(TICK_S, depth_m), 1000):
+    for target in islice(targets(PERIOD_S, depth_m), 1000):
         assert max(abs(target.sweep_velocity_rad_s), abs(adduction_velocity_rad_s(target))) < limit
 
 
@@ -347,18 +347,18 @@ def test_a_gait_whose_next_stride_is_never_set_walks_bit_for_bit_the_same() -> N
     reported.reset(0.03)
     for _ in range(3000):
         reported.next_parameters = replace(WALKING)  # equal, and another object
-        assert reported.step(TICK_S) == free.step(TICK_S)
+        assert reported.step(PERIOD_S) == free.step(PERIOD_S)
 
 
 def test_a_reset_forgets_the_gait_of_the_next_stride() -> None:
     gait = Gait(WALKING, GEOMETRY)
     gait.reset(0.03)
-    first = [gait.step(TICK_S) for _ in range(1500)]
+    first = [gait.step(PERIOD_S) for _ in range(1500)]
     gait.next_parameters = WIDE
     for _ in range(1500):
-        gait.step(TICK_S)
+        gait.step(PERIOD_S)
     gait.reset(0.03)
-    assert [gait.step(TICK_S) for _ in range(1500)] == first
+    assert [gait.step(PERIOD_S) for _ in range(1500)] == first
 
 
 def test_an_insertion_that_ends_early_leaves_the_rest_of_the_stride_at_its_depth() -> None:
@@ -392,12 +392,12 @@ def test_only_an_insertion_can_end_early_and_only_that_of_its_own_stride() -> No
 def test_a_depth_meant_for_a_narrower_sweep_that_was_told_late_stays_within_reach() -> None:
     gait = Gait(replace(WALKING, sweep_angle_deg=50.0), GEOMETRY)
     gait.reset(0.02)
-    while (target := gait.step(TICK_S)).stride == 0:
+    while (target := gait.step(PERIOD_S)).stride == 0:
         late = target.phase is Phase.SWING and target.sweep_rad > 0.5
         if late:
             gait.next_depth_m, gait.next_parameters = 0.05, WALKING
     assert gait.commanded_depth_m == GEOMETRY.deepest_m(50.0)
-    while gait.step(TICK_S).stride == 1:
+    while gait.step(PERIOD_S).stride == 1:
         pass
     assert gait.commanded_depth_m == 0.05
 

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.gait.joint_path import SHORTEST_LEG_S, JointPath, still
+from control.rate import PERIOD_S
 from control.records import JointAngles, Joints, JointTargets
 
-TICK_S = 1.0 / 380.0
 angles = st.floats(-1.5, 1.5)
 poses = st.builds(Joints, angles, angles, angles, angles)
 speeds = st.floats(0.5, 10.0)
@@ -19,7 +19,7 @@ speeds = st.floats(0.5, 10.0)
 def walked(path: JointPath) -> list[JointTargets]:
     steps = []
     while not path.finished:
-        steps.append(path.step(TICK_S))
+        steps.append(path.step(PERIOD_S))
         assert len(steps) < 10_000
     return steps
 
@@ -45,7 +45,7 @@ def test_no_joint_is_faster_than_twice_the_mean_speed(
     for before, after in pairwise(steps):
         assert all(abs(joint.velocity_rad_s) <= 2.0 * speed * (1.0 + 1e-9) for joint in after)
         moved = [abs(b - a) for a, b in zip(angles_of(before), angles_of(after), strict=True)]
-        assert max(moved) <= 2.0 * speed * TICK_S * (1.0 + 1e-9)
+        assert max(moved) <= 2.0 * speed * PERIOD_S * (1.0 + 1e-9)
 
 
 @given(poses, st.lists(poses, min_size=1, max_size=3), speeds)
@@ -54,7 +54,7 @@ def test_a_path_lasts_its_longest_ways_over_the_speed(
 ) -> None:
     ways = [max(abs(b - a) for a, b in zip(p, q, strict=True)) for p, q in pairwise([start, *way_points])]
     duration = sum(max(SHORTEST_LEG_S, way / speed) for way in ways)
-    assert len(walked(JointPath(start, way_points, speed))) * TICK_S == pytest.approx(duration, abs=1.01 * TICK_S)
+    assert len(walked(JointPath(start, way_points, speed))) * PERIOD_S == pytest.approx(duration, abs=1.01 * PERIOD_S)
 
 
 @given(poses, poses, speeds, st.integers(1, 500))
@@ -63,14 +63,14 @@ def test_after_the_end_the_last_pose_is_held_at_rest(
 ) -> None:
     path = JointPath(start, [end], speed)
     walked(path)
-    assert {path.step(TICK_S) for _ in range(ticks)} == {still(end)}
+    assert {path.step(PERIOD_S) for _ in range(ticks)} == {still(end)}
     assert path.finished
 
 
 @given(poses, speeds)
 def test_a_leg_without_way_takes_the_shortest_time_and_moves_nothing(pose: JointAngles, speed: float) -> None:
     steps = walked(JointPath(pose, [pose, pose], speed))
-    assert len(steps) * TICK_S == pytest.approx(2.0 * SHORTEST_LEG_S, abs=2.0 * TICK_S)
+    assert len(steps) * PERIOD_S == pytest.approx(2.0 * SHORTEST_LEG_S, abs=2.0 * PERIOD_S)
     assert set(steps) == {still(pose)}
 
 
@@ -107,4 +107,4 @@ def test_velocities_are_the_derivatives_of_the_angles() -> None:
 def test_a_path_without_points_is_finished_at_once() -> None:
     path = JointPath(Joints(0.1, 0.2, 0.3, 0.4), [], 1.0)
     assert path.finished
-    assert path.step(TICK_S) == still(Joints(0.1, 0.2, 0.3, 0.4))
+    assert path.step(PERIOD_S) == still(Joints(0.1, 0.2, 0.3, 0.4))

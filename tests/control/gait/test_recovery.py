@@ -21,6 +21,7 @@ from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains
 from control.limits import JointRange
 from control.modes import Mode
+from control.rate import PERIOD_S
 from control.records import (
     DriveState,
     DriveStates,
@@ -33,7 +34,6 @@ from control.records import (
 )
 from tests.control.made_up_states import states_at
 
-TICK_S = 1.0 / 380.0
 DEPTH_M = 0.04
 GEOMETRY, GAIT, PARAMETERS = FlipperGeometry(), GaitParameters(), RecoveryParameters()
 REAR_RAD = -radians(GAIT.sweep_angle_deg)
@@ -89,7 +89,7 @@ class MadeUpRobot:
 
     def step(self, mode: Mode = Mode.WALKING) -> None:
         before_rad = self.angles_rad
-        torques_nm = self.controller.step(TICK_S, mode, self.states)
+        torques_nm = self.controller.step(PERIOD_S, mode, self.states)
         wanted_rad = [angle + torque for angle, torque in zip(before_rad, torques_nm, strict=True)]
         target = self.controller.target
         self._time(target.phase, self.recovery.events)
@@ -102,12 +102,12 @@ class MadeUpRobot:
             self.moments.append(Moment(target, self.recovery.given, attempt, events, before_rad))
 
     def _time(self, phase: Phase, events: str) -> None:
-        self.attempt_s = 0.0 if events else self.attempt_s + TICK_S
+        self.attempt_s = 0.0 if events else self.attempt_s + PERIOD_S
         begun = phase is Phase.EXTRACTION or (self.waited_s > 0.0 and phase in (Phase.PAUSE, Phase.RECOVERY))
-        self.waited_s = self.waited_s + TICK_S if begun else 0.0
+        self.waited_s = self.waited_s + PERIOD_S if begun else 0.0
 
     def walk(self, seconds: float) -> MadeUpRobot:
-        for _ in range(round(seconds / TICK_S)):
+        for _ in range(round(seconds / PERIOD_S)):
             self.step()
         return self
 
@@ -161,7 +161,7 @@ def test_with_no_attempts_the_gaits_clock_does_not_wait() -> None:
 @pytest.mark.parametrize("gait", PROTOCOLS.values())
 def test_a_flipper_that_comes_out_within_the_grace_is_only_waited_for(gait: GaitParameters) -> None:
     extraction_s = (DEPTH_M + GEOMETRY.clearance_m) / gait.extraction_speed_m_s + gait.pause_s
-    late_s = extraction_s + PARAMETERS.grace_s - 5.0 * TICK_S
+    late_s = extraction_s + PARAMETERS.grace_s - 5.0 * PERIOD_S
 
     def hold(robot: MadeUpRobot) -> Sequence[str]:
         return BOTH if robot.waited_s < late_s else ()
@@ -170,8 +170,8 @@ def test_a_flipper_that_comes_out_within_the_grace_is_only_waited_for(gait: Gait
     assert Phase.RECOVERY not in robot.phases
     assert robot.events == []
     assert Phase.SWING in robot.phases
-    assert TICK_S * sum(moment.target.stride == 0 for moment in robot.moments) == pytest.approx(
-        stride_duration_s(gait, GEOMETRY, DEPTH_M) + late_s - extraction_s, abs=3.0 * TICK_S
+    assert PERIOD_S * sum(moment.target.stride == 0 for moment in robot.moments) == pytest.approx(
+        stride_duration_s(gait, GEOMETRY, DEPTH_M) + late_s - extraction_s, abs=3.0 * PERIOD_S
     )
 
 
@@ -238,7 +238,7 @@ def attempts_at(sweep_deg: float, lead_deg: float = PARAMETERS.lead_deg) -> list
     free, given = DriveState(angle_rad=0.0), list[list[JointTargets]]()
     states = Joints(DriveState(angle_rad=radians(sweep_deg)), DriveState(angle_rad=-0.6), free, free)
     while not recovery.given_up:
-        targets = recovery.step(TICK_S, ("left",), states, still(Joints(REAR_RAD, 0.0, REAR_RAD, 0.0)))
+        targets = recovery.step(PERIOD_S, ("left",), states, still(Joints(REAR_RAD, 0.0, REAR_RAD, 0.0)))
         if recovery.attempt > len(given):
             given.append([])
         if recovery.attempt:
@@ -252,7 +252,7 @@ def test_the_first_attempt_pulls_to_the_rear_and_the_others_away_from_the_middle
     ways = [-1.0, *[copysign(1.0, sweep_deg)] * (PARAMETERS.attempts - 1)]
     for way, targets in zip(ways, attempts_at(sweep_deg), strict=True):
         leads_deg = [way * (degrees(each[0].angle_rad) - sweep_deg) for each in targets]
-        pulled = leads_deg[round(PARAMETERS.pause_s / TICK_S) :]
+        pulled = leads_deg[round(PARAMETERS.pause_s / PERIOD_S) :]
         reached = max(way * (way * 60.0 - sweep_deg), 0.0)  # the joint's limit
         assert max(pulled) == pytest.approx(min(PARAMETERS.lead_deg, reached))
         assert min(pulled) == pytest.approx(-PARAMETERS.lead_deg)
@@ -284,7 +284,7 @@ def test_both_flippers_go_the_same_way_also_from_both_sides_of_the_middle() -> N
     down, left, right = DriveState(angle_rad=-0.6), DriveState(angle_rad=0.2), DriveState(angle_rad=-0.1)
     targets = still(Joints(0.0, 0.0, 0.0, 0.0))
     while recovery.attempt < 2 or targets[0].angle_rad == pytest.approx(left.angle_rad):
-        targets = recovery.step(TICK_S, BOTH, Joints(left, down, right, down), still(Joints(0.0, 0.0, 0.0, 0.0)))
+        targets = recovery.step(PERIOD_S, BOTH, Joints(left, down, right, down), still(Joints(0.0, 0.0, 0.0, 0.0)))
     lead_rad = radians(PARAMETERS.lead_deg)
     assert targets[0].angle_rad == pytest.approx(left.angle_rad + lead_rad)
     assert targets[2].angle_rad == pytest.approx(right.angle_rad + lead_rad)
@@ -301,7 +301,7 @@ def test_each_attempt_begins_with_a_pause_where_the_flippers_are() -> None:
     robot = MadeUpRobot(everybody).walk(LONGEST_S + 1.5)
     for attempt in (1, 2, 3):
         moments = robot.in_attempt(attempt)
-        for moment in moments[: round(PARAMETERS.pause_s / TICK_S) - 1]:
+        for moment in moments[: round(PARAMETERS.pause_s / PERIOD_S) - 1]:
             assert [joint.angle_rad for joint in moment.joints] == pytest.approx(moments[0].angles_rad)
             assert all(joint.velocity_rad_s == 0.0 for joint in moment.joints)
         assert moments[-1].joints[1].angle_rad > moments[0].angles_rad[1]
@@ -345,8 +345,8 @@ def test_targets_and_their_velocities_are_continuous_from_recovery_through_swing
     for before, now in pairwise(robot.moments[begin - 1 : end + 20]):
         for old, new in zip(before.joints, now.joints, strict=True):
             mean_rad_s = (old.velocity_rad_s + new.velocity_rad_s) / 2.0
-            assert new.angle_rad - old.angle_rad == pytest.approx(mean_rad_s * TICK_S, abs=1e-4)
-            assert abs(new.velocity_rad_s - old.velocity_rad_s) < 130.0 * TICK_S
+            assert new.angle_rad - old.angle_rad == pytest.approx(mean_rad_s * PERIOD_S, abs=1e-4)
+            assert abs(new.velocity_rad_s - old.velocity_rad_s) < 130.0 * PERIOD_S
 
 
 def test_the_swing_after_a_recovery_ends_where_every_swing_ends() -> None:
@@ -359,7 +359,7 @@ def test_the_swing_after_a_recovery_ends_where_every_swing_ends() -> None:
 def test_the_plates_are_clear_of_the_mud_soon_after_the_swing_began() -> None:
     robot = MadeUpRobot(until_attempt(2)).walk(9.0)
     swing = [moment for moment in robot.moments if moment.target.phase is Phase.SWING and moment.target.stride == 0]
-    for moment in swing[round(0.2 / TICK_S) :]:
+    for moment in swing[round(0.2 / PERIOD_S) :]:
         assert lowest_m(GEOMETRY, *moment.angles_rad[:2]) < -0.9 * GEOMETRY.clearance_m
 
 

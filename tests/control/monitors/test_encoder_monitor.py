@@ -9,10 +9,10 @@ from random import Random
 import pytest
 
 from control.monitors.encoder_monitor import FROZEN_S, GONE_RAD, GONE_S, EncoderMonitor
+from control.rate import PERIOD_S
 from control.records import DriveState
 
-PERIOD_S = 0.002
-TICK_S = 1.0 / 380.0
+MESSAGE_S = 0.002
 JUMP_RAD = 0.05
 COUNT_RAD = 2.0 * pi / 16384
 Messages = Iterable[tuple[float, float]]
@@ -22,8 +22,8 @@ def reported(messages: Messages, encoder: EncoderMonitor | None = None) -> list[
     """(number of the message, fault) of all that were found."""
     encoder, found = encoder or EncoderMonitor("left_sweep", JUMP_RAD), []
     for number, (angle_rad, velocity_rad_s) in enumerate(messages):
-        state = DriveState(angle_rad=angle_rad, velocity_rad_s=velocity_rad_s, angle_stamp_s=number * PERIOD_S)
-        fault = encoder.update(state, TICK_S)
+        state = DriveState(angle_rad=angle_rad, velocity_rad_s=velocity_rad_s, angle_stamp_s=number * MESSAGE_S)
+        fault = encoder.update(state, PERIOD_S)
         if fault:
             found.append((number, fault.name))
     return found
@@ -40,7 +40,7 @@ def test_the_first_message_is_no_jump_wherever_it_is() -> None:
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 @pytest.mark.parametrize("velocity_rad_s", [0.0, 5.0, -16.0])
 def test_a_jump_begins_beyond_what_the_drives_own_speed_explains(sign: float, velocity_rad_s: float) -> None:
-    path_rad, slack_rad = velocity_rad_s * PERIOD_S, JUMP_RAD + abs(velocity_rad_s) * TICK_S
+    path_rad, slack_rad = velocity_rad_s * MESSAGE_S, JUMP_RAD + abs(velocity_rad_s) * PERIOD_S
     for beyond_rad, expected in ((-1e-9, []), (1e-9, [(1, "encoder_jump")])):
         step_rad = path_rad + sign * (slack_rad + beyond_rad)
         assert reported([(0.0, velocity_rad_s), (step_rad, velocity_rad_s)]) == expected
@@ -59,21 +59,21 @@ def test_readings_that_leap_about_a_joint_at_rest_are_told_again_and_again() -> 
 @pytest.mark.parametrize(("gap_s", "expected"), [(0.029, "encoder_jump"), (0.031, None)])
 def test_after_a_long_gap_a_joint_may_be_anywhere(gap_s: float, expected: str | None) -> None:
     encoder = EncoderMonitor("left_sweep", JUMP_RAD)
-    assert encoder.update(DriveState(angle_rad=0.0, velocity_rad_s=0.0, angle_stamp_s=0.0), TICK_S) is None
-    fault = encoder.update(DriveState(angle_rad=0.75, velocity_rad_s=0.0, angle_stamp_s=gap_s), TICK_S)
+    assert encoder.update(DriveState(angle_rad=0.0, velocity_rad_s=0.0, angle_stamp_s=0.0), PERIOD_S) is None
+    fault = encoder.update(DriveState(angle_rad=0.75, velocity_rad_s=0.0, angle_stamp_s=gap_s), PERIOD_S)
     assert (fault and fault.name) == expected
 
 
 def test_after_a_short_gap_a_joint_may_be_where_its_speed_took_it() -> None:
     encoder = EncoderMonitor("left_sweep", JUMP_RAD)
-    assert encoder.update(DriveState(angle_rad=0.0, velocity_rad_s=15.0, angle_stamp_s=0.0), TICK_S) is None
-    assert encoder.update(DriveState(angle_rad=0.3, velocity_rad_s=15.0, angle_stamp_s=0.02), TICK_S) is None
+    assert encoder.update(DriveState(angle_rad=0.0, velocity_rad_s=15.0, angle_stamp_s=0.0), PERIOD_S) is None
+    assert encoder.update(DriveState(angle_rad=0.3, velocity_rad_s=15.0, angle_stamp_s=0.02), PERIOD_S) is None
 
 
 def test_a_stamp_that_goes_back_is_no_jump_by_itself() -> None:
     encoder = EncoderMonitor("left_sweep", JUMP_RAD)
-    encoder.update(DriveState(angle_rad=0.0, velocity_rad_s=0.0, angle_stamp_s=1.0), TICK_S)
-    assert encoder.update(DriveState(angle_rad=0.01, velocity_rad_s=0.0, angle_stamp_s=0.5), TICK_S) is None
+    encoder.update(DriveState(angle_rad=0.0, velocity_rad_s=0.0, angle_stamp_s=1.0), PERIOD_S)
+    assert encoder.update(DriveState(angle_rad=0.01, velocity_rad_s=0.0, angle_stamp_s=0.5), PERIOD_S) is None
 
 
 def test_the_same_message_is_judged_once() -> None:
@@ -81,7 +81,7 @@ def test_the_same_message_is_judged_once() -> None:
         EncoderMonitor("left_sweep", JUMP_RAD),
         DriveState(angle_rad=0.3, velocity_rad_s=9.0, angle_stamp_s=1.0),
     )
-    assert {encoder.update(state, TICK_S) for _ in range(1000)} == {None}
+    assert {encoder.update(state, PERIOD_S) for _ in range(1000)} == {None}
 
 
 @pytest.mark.parametrize("velocity_rad_s", [-5.0, -0.5, -1e-3, 1e-6, 0.5, 5.0])
@@ -89,7 +89,7 @@ def test_an_angle_that_hangs_is_told_by_the_way_of_its_speed_or_by_a_speed_witho
     found = reported(hanging(velocity_rad_s, 60))
     expected_s = min(max(GONE_RAD / abs(velocity_rad_s), GONE_S), FROZEN_S)
     assert {problem for _, problem in found} == {"encoder_stuck"}
-    assert found[0][0] * PERIOD_S == pytest.approx(expected_s, abs=1.5 * PERIOD_S)
+    assert found[0][0] * MESSAGE_S == pytest.approx(expected_s, abs=1.5 * MESSAGE_S)
 
 
 def test_a_joint_at_rest_whose_drive_tells_no_speed_at_all_is_not_stuck() -> None:
@@ -110,7 +110,7 @@ def test_a_slow_joint_of_few_counts_is_not_stuck() -> None:
     """One count of 16384 takes 0.4 s at 1 mrad/s."""
     random = Random(4)
     for speed_rad_s in (0.001, 0.01, 0.1, 3.0):
-        angles = (speed_rad_s * number * PERIOD_S for number in range(3000))
+        angles = (speed_rad_s * number * MESSAGE_S for number in range(3000))
         messages = ((round(a / COUNT_RAD) * COUNT_RAD, speed_rad_s + random.gauss(0.0, 1e-4)) for a in angles)
         assert reported(messages) == [], speed_rad_s
 
@@ -118,7 +118,7 @@ def test_a_slow_joint_of_few_counts_is_not_stuck() -> None:
 def test_a_quick_joint_whose_drive_repeats_itself_now_and_then_is_not_stuck() -> None:
     random, messages, shown = Random(2), [], (0.0, 2.0 * pi)
     for number in range(3000):
-        phase = 2.0 * pi * number * PERIOD_S
+        phase = 2.0 * pi * number * MESSAGE_S
         if random.random() > 0.3:
             shown = (sin(phase), 2.0 * pi * cos(phase))
         messages.append(shown)

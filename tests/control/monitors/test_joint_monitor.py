@@ -22,11 +22,11 @@ from control.monitors.joint_monitor import (
     JointMonitor,
 )
 from control.monitors.winding import WindingParameters
+from control.rate import PERIOD_S
 from control.records import NEVER_S, DriveState
 from firmware_host.operator.fault_texts import exact_message
 
 JOINT = "left_sweep"
-TICK_S = 1.0 / 380.0
 MESSAGE_S = 0.002
 START_S = 1000.0
 LIMITS, BOUNDS = JointLimits(), FaultBounds()
@@ -63,7 +63,7 @@ def make_watch() -> JointMonitor:
 
 
 def facts(now_s: float = START_S, **changes: Any) -> JointFacts:
-    return JointFacts(now_s, TICK_S, True, True, 0.0, False)._replace(**changes)
+    return JointFacts(now_s, PERIOD_S, True, True, 0.0, False)._replace(**changes)
 
 
 def seen(watch: JointMonitor, state: DriveState, now_s: float = START_S, **changes: Any) -> dict[str, str]:
@@ -98,7 +98,7 @@ def ticks_until(name: str, state_at: Callable[[float], DriveState], longest: int
     """From the first tick after START_S, at which the cause began, to the first with the fault."""
     watch = make_watch()
     for tick in range(-20, longest):
-        now_s = START_S + tick * TICK_S
+        now_s = START_S + tick * PERIOD_S
         state = state_at(now_s) if tick > 0 else fresh(now_s)
         if name in seen(watch, state, now_s, **changes):
             return tick
@@ -202,7 +202,7 @@ def test_messages_every_two_milliseconds_are_never_late_whatever_their_phase_to_
     for offset in range(20):
         watch = make_watch()
         for tick in range(1, 400):
-            now_s = START_S + tick * TICK_S
+            now_s = START_S + tick * PERIOD_S
             stamp_s = last_message_s(now_s, inf, MESSAGE_S, 1e-4 * offset)
             assert not seen(watch, fresh(now_s, angle_stamp_s=stamp_s, current_stamp_s=stamp_s), now_s)
 
@@ -212,7 +212,7 @@ def test_one_message_that_is_lost_is_at_most_late() -> None:
         watch = make_watch()
         found: set[str] = set()
         for tick in range(1, 40):
-            now_s = START_S + tick * TICK_S
+            now_s = START_S + tick * PERIOD_S
             stamp_s = last_message_s(now_s, inf, MESSAGE_S, 1e-4 * offset)
             if START_S + 0.05 <= stamp_s < START_S + 0.05 + MESSAGE_S:
                 stamp_s -= MESSAGE_S
@@ -256,7 +256,7 @@ def test_a_drive_out_of_closed_loop_is_a_fault_only_where_it_is_expected_there()
 def test_a_drive_in_closed_loop_unasked_is_told_once_it_had_time_to_obey() -> None:
     watch = make_watch()
     unasked = [tick for tick in range(200) if "drive_energised" in seen(watch, HEALTHY, energised=False, moving=False)]
-    assert unasked[0] == pytest.approx(0.2 / TICK_S, abs=1)
+    assert unasked[0] == pytest.approx(0.2 / PERIOD_S, abs=1)
     assert unasked[0] + 38 + 2 <= FaultKind.DRIVE_ENERGISED.bound_ticks  # a heartbeat tells of it
 
 
@@ -318,9 +318,9 @@ def moving_ticks(speed_rad_s: float, noise_rad_s: float = 0.0, energised: bool =
     """Of 200, in which a joint with this speed is told to move."""
     watch, random, count = make_watch(), Random(1), 0
     for tick in range(200):
-        now_s = START_S + tick * TICK_S
+        now_s = START_S + tick * PERIOD_S
         reported_rad_s = speed_rad_s + random.gauss(0.0, noise_rad_s)
-        state = fresh(now_s, angle_rad=speed_rad_s * tick * TICK_S, velocity_rad_s=reported_rad_s, closed_loop=False)
+        state = fresh(now_s, angle_rad=speed_rad_s * tick * PERIOD_S, velocity_rad_s=reported_rad_s, closed_loop=False)
         count += "joint_moving" in seen(watch, state, now_s, energised=energised, moving=False)
     return count
 
@@ -373,8 +373,8 @@ def test_a_stamp_before_the_one_before_makes_no_jump() -> None:
 def test_a_joint_at_the_velocity_limit_never_jumps() -> None:
     watch, speed_rad_s = make_watch(), LIMITS.velocity_rad_s
     for tick in range(30):
-        now_s = START_S + tick * TICK_S
-        angle_rad = -0.9 + speed_rad_s * tick * TICK_S
+        now_s = START_S + tick * PERIOD_S
+        angle_rad = -0.9 + speed_rad_s * tick * PERIOD_S
         assert not seen(watch, fresh(now_s, angle_rad=angle_rad, velocity_rad_s=speed_rad_s), now_s)
 
 
@@ -384,7 +384,7 @@ def test_a_joint_at_the_velocity_limit_never_jumps() -> None:
 def stalled_ticks(torque_nm: float, velocity_rad_s: float, excused: bool = False, ticks: int = 900) -> int | None:
     watch = make_watch()
     for tick in range(1, ticks):
-        state = HEALTHY._replace(velocity_rad_s=velocity_rad_s, angle_rad=0.1 + velocity_rad_s * tick * TICK_S)
+        state = HEALTHY._replace(velocity_rad_s=velocity_rad_s, angle_rad=0.1 + velocity_rad_s * tick * PERIOD_S)
         if "joint_not_following" in seen(watch, state, torque_nm=torque_nm, may_stand_still=excused):
             return tick
     return None
@@ -426,7 +426,7 @@ def test_missed_ticks_count_for_as_long_as_they_lasted() -> None:
     found = [
         tick
         for tick in range(1, 200)
-        if "joint_not_following" in seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=10.0 * TICK_S)
+        if "joint_not_following" in seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=10.0 * PERIOD_S)
     ]
     assert found[0] == pytest.approx(76, abs=1)
 
@@ -440,7 +440,7 @@ def test_one_sample_after_a_long_stall_is_no_proof_of_what_lasted() -> None:
 
 @pytest.mark.parametrize("missed", [1, 5, 9, 200])
 def test_a_joint_at_rest_is_not_too_fast_after_missed_ticks(missed: int) -> None:
-    assert names(HEALTHY, dt_s=(1 + missed) * TICK_S) == set()
+    assert names(HEALTHY, dt_s=(1 + missed) * PERIOD_S) == set()
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -539,7 +539,7 @@ def test_no_value_makes_it_fail_and_every_fault_has_a_sentence(
 ) -> None:
     watch = make_watch()
     for tick, state in enumerate(states):
-        now_s = START_S + tick * TICK_S
+        now_s = START_S + tick * PERIOD_S
         for name, message in seen(watch, state, now_s, energised=energised, moving=moving, torque_nm=torque_nm).items():
             assert name in FAULT_KINDS
             assert message.startswith(("The left_sweep ", "No ")) and message.endswith((".", "C", "s."))
@@ -551,10 +551,10 @@ def test_a_watch_forgets_garbage_once_the_signals_are_good_again(states: list[Dr
     """All but heat and the jump back."""
     watch = make_watch()
     for tick, state in enumerate(states):
-        seen(watch, state, START_S + tick * TICK_S)
+        seen(watch, state, START_S + tick * PERIOD_S)
     found: set[str] = set()
     for tick in range(len(states), len(states) + 5):
-        now_s = START_S + tick * TICK_S
+        now_s = START_S + tick * PERIOD_S
         found = set(seen(watch, fresh(now_s), now_s))
     assert found <= {"winding_hot", "winding_overheating"}
 
@@ -565,8 +565,8 @@ def test_a_watch_forgets_garbage_once_the_signals_are_good_again(states: list[Dr
 def missing_ticks(sent_nm: float, current_a: float, moving: bool = True) -> int | None:
     watch = make_watch()
     for tick in range(1, 200):
-        state = fresh(START_S + tick * TICK_S, current_a=current_a)
-        if "torque_missing" in seen(watch, state, START_S + tick * TICK_S, torque_nm=sent_nm, moving=moving):
+        state = fresh(START_S + tick * PERIOD_S, current_a=current_a)
+        if "torque_missing" in seen(watch, state, START_S + tick * PERIOD_S, torque_nm=sent_nm, moving=moving):
             return tick
     return None
 
@@ -582,7 +582,7 @@ def test_a_torque_is_missing_beyond_its_share_of_the_limit_and_not_before(sign: 
 def test_a_missing_torque_is_noticed_within_its_ticks() -> None:
     ticks = missing_ticks(0.7, 0.0)
     assert ticks is not None
-    assert MISSING_S / TICK_S <= ticks <= FaultKind.TORQUE_MISSING.bound_ticks
+    assert MISSING_S / PERIOD_S <= ticks <= FaultKind.TORQUE_MISSING.bound_ticks
 
 
 def test_no_torque_is_missed_of_a_drive_that_is_not_in_closed_loop() -> None:
@@ -593,7 +593,7 @@ def test_a_current_that_follows_within_ticks_is_not_missed() -> None:
     """The current told in a tick answers the torque of the tick before."""
     watch, before_nm = make_watch(), 0.0
     for tick in range(400):
-        now_s, sent_nm = START_S + tick * TICK_S, 0.7 if tick // 30 % 2 else -0.7
+        now_s, sent_nm = START_S + tick * PERIOD_S, 0.7 if tick // 30 % 2 else -0.7
         state = fresh(now_s, current_a=before_nm / 0.083, velocity_rad_s=1.0, angle_rad=0.1 + 1e-3 * (tick % 2))
         assert "torque_missing" not in seen(watch, state, now_s, torque_nm=sent_nm)
         before_nm = sent_nm

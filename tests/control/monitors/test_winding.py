@@ -10,12 +10,12 @@ from scipy.integrate import solve_ivp
 
 from control.limits import JointLimits
 from control.monitors.winding import HOTTEST_C, Winding, WindingParameters
+from control.rate import PERIOD_S
 
-TICK_S = 1.0 / 380.0
 PARAMETERS = WindingParameters()
 
 
-def heated(current_a: float, ticks: int, dt_s: float = TICK_S, parameters: WindingParameters = PARAMETERS) -> Winding:
+def heated(current_a: float, ticks: int, dt_s: float = PERIOD_S, parameters: WindingParameters = PARAMETERS) -> Winding:
     winding = Winding(parameters)
     for _ in range(ticks):
         winding.update(dt_s, current_a, nan)
@@ -38,7 +38,7 @@ def test_it_begins_as_warm_as_the_room_and_stays_so_without_current() -> None:
 @pytest.mark.parametrize("current_a", [2.0, -2.0, 5.0, 9.0])
 @pytest.mark.parametrize("time_s", [1.0, 20.0, 120.0])
 def test_a_steady_current_warms_it_as_the_closed_form_says(current_a: float, time_s: float) -> None:
-    reported_c = heated(current_a, round(time_s / TICK_S)).temperature_c
+    reported_c = heated(current_a, round(time_s / PERIOD_S)).temperature_c
     assert reported_c == pytest.approx(closed_form_c(current_a, time_s), abs=0.02)
 
 
@@ -53,8 +53,8 @@ def test_a_changing_current_warms_it_as_an_integrator_says() -> None:
 
     exact = solve_ivp(slope_k_s, (0.0, 60.0), [PARAMETERS.room_c], rtol=1e-9, atol=1e-9).y[0, -1]
     winding = Winding(PARAMETERS)
-    for tick in range(round(60.0 / TICK_S)):
-        winding.update(TICK_S, current_a((tick + 0.5) * TICK_S), nan)
+    for tick in range(round(60.0 / PERIOD_S)):
+        winding.update(PERIOD_S, current_a((tick + 0.5) * PERIOD_S), nan)
     assert winding.temperature_c == pytest.approx(float(exact), abs=0.01)
     assert exact > 40.0
 
@@ -74,26 +74,26 @@ def test_copper_that_is_hotter_heats_more() -> None:
     assert watts(85.0) / watts(25.0) == pytest.approx(1.0 + 0.0039 * 60.0, rel=1e-3)
 
 
-@pytest.mark.parametrize("dt_s", [TICK_S / 4.0, 3.0 * TICK_S, 40.0 * TICK_S])
+@pytest.mark.parametrize("dt_s", [PERIOD_S / 4.0, 3.0 * PERIOD_S, 40.0 * PERIOD_S])
 def test_the_step_makes_no_difference(dt_s: float) -> None:
-    by_ticks = heated(6.0, round(30.0 / TICK_S)).temperature_c
+    by_ticks = heated(6.0, round(30.0 / PERIOD_S)).temperature_c
     assert heated(6.0, round(30.0 / dt_s), dt_s).temperature_c == pytest.approx(by_ticks, abs=0.1)
 
 
 def test_it_cools_to_the_rooms_temperature_with_its_time_constant() -> None:
     winding = heated(9.0, 40000)
     rise_k = winding.temperature_c - PARAMETERS.room_c
-    for _ in range(round(PARAMETERS.time_constant_s / TICK_S)):
-        winding.update(TICK_S, 0.0, nan)
+    for _ in range(round(PARAMETERS.time_constant_s / PERIOD_S)):
+        winding.update(PERIOD_S, 0.0, nan)
     assert (winding.temperature_c - PARAMETERS.room_c) / rise_k == pytest.approx(exp(-1.0), rel=1e-3)
 
 
 def test_a_sensor_that_reads_higher_is_believed_and_one_that_reads_lower_is_not() -> None:
     winding = heated(5.0, 10000)
     before_c = winding.temperature_c
-    assert winding.update(TICK_S, 5.0, before_c - 10.0) == pytest.approx(before_c, abs=0.01)
-    assert winding.update(TICK_S, 5.0, before_c + 10.0) == before_c + 10.0
-    assert winding.update(TICK_S, 5.0, nan) == pytest.approx(before_c + 10.0, abs=0.01)
+    assert winding.update(PERIOD_S, 5.0, before_c - 10.0) == pytest.approx(before_c, abs=0.01)
+    assert winding.update(PERIOD_S, 5.0, before_c + 10.0) == before_c + 10.0
+    assert winding.update(PERIOD_S, 5.0, nan) == pytest.approx(before_c + 10.0, abs=0.01)
 
 
 def test_a_current_that_is_no_number_adds_no_heat() -> None:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from control.rate import PERIOD_S
 from control.records import JOINTS, Joints
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
@@ -19,7 +20,6 @@ from drivers.odrive.codec import GET_ENCODER_ESTIMATES, GET_IQ, GET_VERSION, HEA
 from drivers.odrive.drives import REFRESH_S, VERSION_REPEAT_S, OdriveDrives
 from drivers.odrive.parameters import OdriveParameters
 
-TICK_S = 1.0 / 380.0
 BUILD = WatchdogEndpoints("0.6.11", "4.4.58", enable=219, timeout=218)
 PRO = (2, 4, 4, 58, 0, 6, 11, 0)
 
@@ -176,7 +176,7 @@ def test_a_second_drive_with_the_same_reading_shows_by_its_heartbeats_within_a_s
 
 def test_a_second_drive_elsewhere_shows_by_the_readings_within_ten_ticks(bench: Bench) -> None:
     bench.live(2.0)
-    assert seconds_until_duplicates(bench, 2, (0.1, 0.4)) < 10 * TICK_S
+    assert seconds_until_duplicates(bench, 2, (0.1, 0.4)) < 10 * PERIOD_S
 
 
 def test_twins_are_forgotten_when_one_of_them_is_taken_off(bench: Bench) -> None:
@@ -331,7 +331,7 @@ def test_whatever_a_drive_tells_the_watchdog_is_unknown_or_a_time(reported: list
 @pytest.mark.parametrize("torque_nm", [nan, 1e300, -1e300, float("inf")])
 def test_a_torque_that_no_bytes_hold_raises_nothing_and_becomes_zero(bench: Bench, torque_nm: float) -> None:
     bench.drives.gate.open()
-    bench.drives.send(Joints(torque_nm, 0.0, 0.0, 0.0))
+    bench.drives.send(Joints(torque_nm, 0.0, 0.0, 0.0), PERIOD_S)
     assert {frame.data for frame in bench.far.receive()} <= {bytes(4), bytes.fromhex("00000080")}
     assert bench.drives.gate.refused == 1
 
@@ -346,9 +346,9 @@ def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench
         axis.version, axis.hardware = bench.axis.version, bench.axis.hardware
         axis._watchdog_enabled, axis._watchdog_timeout_s = True, 0.1
     asked = []
-    for tick in range(round(3.0 * REFRESH_S / TICK_S)):
-        bench.drives._request_versions(tick * TICK_S)
-        bench.drives._request_watchdogs(tick * TICK_S)
+    for tick in range(round(3.0 * REFRESH_S / PERIOD_S)):
+        bench.drives._request_versions(tick * PERIOD_S)
+        bench.drives._request_watchdogs(tick * PERIOD_S)
         asked.append(len(bench.far.receive()))
     assert [count for count in asked if count] == [4 + 8] * 3
     bench.tell_setting(BUILD.enable, "00")

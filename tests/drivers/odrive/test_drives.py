@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from control.limits import JointLimits
+from control.rate import PERIOD_S
 from control.records import JOINTS, NEVER_S, DriveStates, Joints
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus, MockPort
@@ -94,7 +95,7 @@ def test_a_sign_turns_angle_velocity_current_and_torque_alike(
     assert state.angle_rad == pytest.approx(sign * turns * 2.0 * pi)
     assert state.velocity_rad_s == pytest.approx(sign * turns_s * 2.0 * pi)
     assert state.current_a == sign * current_a
-    bench.drives.send(Joints(torque_nm, 0.0, 0.0, 0.0))
+    bench.drives.send(Joints(torque_nm, 0.0, 0.0, 0.0), PERIOD_S)
     assert bench.sent()["left"][0].data == pack("<f", sign * torque_nm)
 
 
@@ -255,7 +256,7 @@ def test_reading_transmits_nothing(bench: Bench) -> None:
 def test_torques_leave_in_the_order_of_the_joints_with_these_bytes() -> None:
     bench = Bench(limits=BOUNDLESS)
     bench.drives.gate.open()
-    bench.drives.send(Joints(0.5, 0.25, -1.0, 2.0))
+    bench.drives.send(Joints(0.5, 0.25, -1.0, 2.0), PERIOD_S)
     assert bench.sent() == {
         "left": [Frame(0x00E, bytes.fromhex("0000003f")), Frame(0x02E, bytes.fromhex("000080be"))],
         "right": [Frame(0x06E, bytes.fromhex("0000803f")), Frame(0x04E, bytes.fromhex("00000040"))],

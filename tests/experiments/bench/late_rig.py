@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from random import Random
 
+from control.rate import PERIOD_S
 from experiments.bench.rig import SimulatedRig
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.ticker import PERIOD_S, Tick
+from firmware_host.ticker import Tick
 
 
 class LateRig(SimulatedRig):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from control.joint_pd import ArmMass
+from control.rate import PERIOD_S
 from control.records import JOINTS, DriveState, same_for_all
 from experiments.bench.joint_shake import FIRST_NM, HALF_TICKS, SHAKE_TICKS, UNSEEN_RAD, Shake, shake
 from experiments.bench.operator import SimulatedAttendant
@@ -15,7 +16,7 @@ from experiments.bench.sign_check import nudged
 from experiments.bench.test_rig import Stand
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.ticker import PERIOD_S, Tick
+from firmware_host.ticker import Tick
 from simulation.body.blocks import on_blocks
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import pytest
 
 from control.modes import Mode
+from control.rate import PERIOD_S
 from control.records import NO_TORQUE, DriveState, Joints, Torques
 from experiments.bench.step_response import LONGEST_TICKS, PULSE_NM, delay_ticks
 from experiments.bench.test_rig import Sample
-from firmware_host.ticker import PERIOD_S, Tick
+from firmware_host.ticker import Tick
 
 CONSTANT_NM_A = 0.083
 STEP = 2  # the sample that sends it

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from control.modes import Mode
+from control.rate import PERIOD_S
 from experiments.reports.report_page import to_json
 from experiments.robot.bench_robot import BenchError, arm
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
@@ -34,7 +35,6 @@ from experiments.trackway.walk import StrideRecord, Walk, WalkedStride
 from experiments.trials.notebook import Notebook
 from firmware_host.log.file_recorder import FileRecorder
 from firmware_host.log_reading.log_reader import read_log
-from firmware_host.ticker import PERIOD_S
 from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS

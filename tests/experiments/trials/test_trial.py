@@ -8,6 +8,7 @@ from math import isfinite
 import numpy as np
 import pytest
 
+from control.rate import PERIOD_S
 from control.records import FLIPPERS, Phase
 from estimation.mud import EstimationParameters, MudEstimator
 from experiments.trials.trial import (
@@ -23,7 +24,6 @@ from experiments.trials.trial import (
     run_trial,
     strides_of,
 )
-from firmware_host.ticker import PERIOD_S
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB, NONE
 from simulation.mud.track import Track

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from control.rate import PERIOD_S
 from drivers.fault_injection.failures import Failures
 from firmware_host.fault_injection.failing_time import (
     CLOCK_STEP_S,
@@ -14,7 +15,7 @@ from firmware_host.fault_injection.failing_time import (
     failing_clock,
     failing_ticker,
 )
-from firmware_host.ticker import PERIOD_S, Tick, Ticker
+from firmware_host.ticker import Tick, Ticker
 
 
 class TurnedClock:

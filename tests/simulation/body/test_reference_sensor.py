@@ -7,9 +7,9 @@ import pytest
 
 from control.controller import WalkOrder
 from control.gait.gait import SINGLE_FLIPPER
+from control.rate import PERIOD_S
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.ticker import PERIOD_S
 from simulation.body.plant import Plant, PlantParameters
 from simulation.body.reference_sensor import StrideTruth, StrokeReference, StrokeTruth
 from simulation.harness.lockstep import Lockstep

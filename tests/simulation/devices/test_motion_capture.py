@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from control.controller import WalkOrder
+from control.rate import PERIOD_S
 from control.records import BodyPose
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import Plant, PlantParameters
@@ -21,7 +22,6 @@ from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 
-TICK_S = 1.0 / 380.0
 TRACK = Track([(1.0, MUDS["48.5"])])
 EXACT = MotionCaptureParameters(rate_hz=120.0, noise_m=0.0)
 
@@ -37,9 +37,9 @@ def frames_of(
 ) -> list[tuple[float, CameraFrame]]:
     """Of a body that moves evenly: when each arrives, and the frame."""
     capture, arrived = MotionCapture(parameters, seed), []
-    for tick in range(round(seconds / TICK_S)):
-        plant = make_plant(speed_m_s * tick * TICK_S, speed_m_s)
-        arrived += [(tick * TICK_S, frame) for frame in capture.step(tick * TICK_S, plant)]
+    for tick in range(round(seconds / PERIOD_S)):
+        plant = make_plant(speed_m_s * tick * PERIOD_S, speed_m_s)
+        arrived += [(tick * PERIOD_S, frame) for frame in capture.step(tick * PERIOD_S, plant)]
     return arrived
 
 
@@ -48,7 +48,7 @@ def test_frames_come_at_their_rate_whatever_the_ticks_and_tell_where_the_body_wa
     assert len(arrived) == 240
     assert np.diff([frame.exposed_s for _, frame in arrived]) == pytest.approx(1.0 / 120.0)
     for arrival_s, frame in arrived:
-        assert -1e-9 <= arrival_s - frame.exposed_s < TICK_S
+        assert -1e-9 <= arrival_s - frame.exposed_s < PERIOD_S
         assert frame.x_m == pytest.approx(0.3 * frame.exposed_s, abs=1e-12)
 
 
@@ -62,7 +62,7 @@ def test_at_a_rate_of_zero_every_tick_has_its_frame_with_noise_as_stated() -> No
 def test_frames_arrive_late_by_the_latency_and_in_order() -> None:
     arrived = frames_of(MotionCaptureParameters(rate_hz=120.0, latency_s=0.03), 1.0)
     late_s = [arrival_s - frame.exposed_s for arrival_s, frame in arrived]
-    assert 0.03 <= min(late_s) <= max(late_s) < 0.03 + 2.0 * TICK_S
+    assert 0.03 <= min(late_s) <= max(late_s) < 0.03 + 2.0 * PERIOD_S
     assert len(arrived) == pytest.approx(120 - 0.03 * 120, abs=1)
 
 
@@ -94,9 +94,9 @@ def test_a_camera_that_is_held_up_misses_frames_and_keeps_its_rate() -> None:
 
 def test_a_reset_forgets_frames_under_way_and_begins_the_noise_again() -> None:
     capture, plant = MotionCapture(MotionCaptureParameters(rate_hz=120.0, latency_s=0.01), 1), make_plant()
-    first = [frame.x_m for tick in range(100) for frame in capture.step(tick * TICK_S, plant)]
+    first = [frame.x_m for tick in range(100) for frame in capture.step(tick * PERIOD_S, plant)]
     capture.reset()
-    assert [frame.x_m for tick in range(100) for frame in capture.step(tick * TICK_S, plant)] == first
+    assert [frame.x_m for tick in range(100) for frame in capture.step(tick * PERIOD_S, plant)] == first
 
 
 def test_between_frames_the_pose_repeats_and_its_stamp_is_when_it_was_read() -> None:
@@ -104,10 +104,10 @@ def test_between_frames_the_pose_repeats_and_its_stamp_is_when_it_was_read() -> 
     pose = SimulatedPose(plant, EXACT, 1)
     read = []
     for tick in range(380):
-        plant.body.forward_m = 0.3 * tick * TICK_S
-        read.append(pose.read(tick * TICK_S))
+        plant.body.forward_m = 0.3 * tick * PERIOD_S
+        read.append(pose.read(tick * PERIOD_S))
     assert len({pose.stamp_s for pose in read}) == len({pose.x_m for pose in read}) == 120
-    assert all(tick * TICK_S - pose.stamp_s < 1.0 / 120.0 for tick, pose in enumerate(read))
+    assert all(tick * PERIOD_S - pose.stamp_s < 1.0 / 120.0 for tick, pose in enumerate(read))
 
 
 def test_a_pose_that_is_lost_for_six_frames_is_none() -> None:

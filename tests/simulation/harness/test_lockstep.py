@@ -6,6 +6,7 @@ import pytest
 
 from control.controller import WalkOrder
 from control.modes import Mode, Request
+from control.rate import RATE_HZ
 from control.records import JOINTS, NO_TORQUE
 from drivers.can.frames import Frame
 from firmware_host.configuration.configuration import Configuration
@@ -184,3 +185,21 @@ def test_a_walk_hardly_depends_on_the_step_of_the_simulation(
     fine = make_walking(configuration, 1, 5.0).robot.plant.body_m
     assert coarse > 0.2
     assert fine == pytest.approx(coarse, rel=0.03)
+
+
+@pytest.mark.parametrize("rate_hz", [200.0, RATE_HZ, 1000.0])
+def test_a_walk_at_any_rate_ends_without_a_fault_or_a_refused_command(
+    configuration: Configuration, rate_hz: float
+) -> None:
+    lockstep = Lockstep(configuration, TRACK, period_s=1.0 / rate_hz)
+    lockstep.arm()
+    lockstep.walk(WalkOrder(0.03, strides=2))
+    faults: set[str] = set()
+    while lockstep.now_s < 7.0:
+        lockstep.step()
+        faults.update(fault.name for fault in lockstep.loop.faults.present)
+    assert lockstep.loop.mode is Mode.HOLD
+    assert faults == set()
+    assert lockstep.loop.drives.refused_commands == 0
+    assert lockstep.loop.learning.strides_closed == 4
+    assert lockstep.robot.plant.body_m > 0.1

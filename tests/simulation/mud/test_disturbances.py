@@ -14,9 +14,9 @@ from control.gait.gait import SINGLE_FLIPPER
 from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.monitors.joint_monitor import FaultBounds
+from control.rate import PERIOD_S
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.ticker import PERIOD_S
 from simulation.body.plant import Arm
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.harness.lockstep import Lockstep
