@@ -39,10 +39,10 @@ from experiments.robot.bench_errors import BenchError
 from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.session import Session, Show
 from simulation.test_rig.load_cell_bench import EmulatedBench, clay_plate, position_link
-from simulation.test_rig.load_cell_emulator import AmplifierParameters
+from simulation.test_rig.emulated_instruments import AmplifierParameters
 from simulation.test_rig.plate_stage import StageParameters
-from simulation.test_rig.stage_encoder_emulator import StageEncoderParameters
-from simulation.test_rig.stage_motion import HandParameters
+from simulation.test_rig.emulated_instruments import StageEncoderParameters
+from simulation.test_rig.stage_motion import ManualMotionParameters
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def _emulate(plan: TrialPlan, bench: BenchSettings, devices: ExitStack) -> tuple
         encoder = StageEncoderParameters(
             metres_per_count=settings.metres_per_count, baud=settings.baud, label=settings.label
         )
-        stage = StageParameters(hand=HandParameters(), seed=bench.seed)
+        stage = StageParameters(manual=ManualMotionParameters(), seed=bench.seed)
     emulated = EmulatedBench(plate, link, amplifier, stage, bench.seed, encoder)
     devices.callback(emulated.close)
     return emulated, link

@@ -110,13 +110,13 @@ class SimulatedStage:
         self._random = Random(seed)
 
     def weigh(self, which: int) -> float:
-        self._bench.stage.hung_n = SIMULATED_WEIGHTS_G[which] / 1000.0 * GRAVITY_M_S2
+        self._bench.stage.hung_weight_n = SIMULATED_WEIGHTS_G[which] / 1000.0 * GRAVITY_M_S2
         self._bench.pass_time(SETTLING_S)
-        return self._bench.stage.hung_n
+        return self._bench.stage.hung_weight_n
 
     def prepare(self, trial: Trial, trials: int) -> str:
-        self._bench.stage.hung_n = 0.0
-        self._bench.stage.place_over(self._plates[trial.mud], trial.kind == SHEAR)
+        self._bench.stage.hung_weight_n = 0.0
+        self._bench.stage.move_over(self._plates[trial.mud], trial.kind == SHEAR)
         self._bench.pass_time(SETTLING_S)
         return GO_ON
 

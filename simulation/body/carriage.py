@@ -1,13 +1,13 @@
-"""How a free body carries a flipper: its plate in the mud of a world in which the body turns and rises.
+"""How a free body carries a flipper: the attitude and motion of its plate while the body turns and rises.
 
-Everything stands in the flipper's own mirrored axes, fixed to the body: x forward, y outward, z up, with the unit
-vectors of the plate, normal n = (cos α, -sin α cos β, -sin α sin β), outward r and upward s. The crossing of the joint
-axes moves with V, the body turns with Ω, and the plate turns with w = Ω + β' x - α' s. A point u outward and s upward
-stands at p = (l + u) r + (s - h) s from the crossing, so that its velocity V + w × p has the components
+All vectors are in the flipper's own mirrored axes, fixed to the body: x forward, y outward, z up, with the unit vectors
+of the plate, normal n = (cos α, -sin α cos β, -sin α sin β), outward r and upward s. The intersection of the joint axes
+moves with V, the body turns with Ω, and the plate turns with w = Ω + β' x - α' s. A point u outward and s upward lies
+at p = (l + u) r + (s - h) s from the intersection, so that its velocity V + w × p has the components
 
     v_n = V_n - w_s (l + u) + w_r (s - h)     v_r = V_r - w_n (s - h)     v_s = V_s + w_n (l + u)
 
-With V = (X', 0, 0) and Ω = 0 these are the ones of flipper_contact.py. Depth is counted along the world's vertical.
+With V = (X', 0, 0) and Ω = 0 these are those of flipper_contact.py. Depth is measured along the world's vertical.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ Vector = tuple[float, float, float]
 
 
 class Carriage(NamedTuple):
-    """One flipper's crossing of axes at one moment, in the flipper's own axes of the body."""
+    """The intersection of one flipper's joint axes at one time, in the flipper's own axes of the body."""
 
-    height_m: float  # of the crossing above the mud's nominal surface
+    height_m: float  # of the intersection above the mud's nominal surface
     up: Vector  # the world's vertical
     velocity_m_s: Vector
     turning_rad_s: Vector
@@ -41,7 +41,7 @@ def cross(one: Vector, other: Vector) -> Vector:
 
 
 def plate_directions(sweep_rad: float, adduction_rad: float) -> tuple[Vector, Vector, Vector]:
-    """n, r and s."""
+    """Returns n, r and s."""
     sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
     return (ca, -sa * cb, -sa * sb), (sa, ca * cb, ca * sb), (0.0, -sb, cb)
 

@@ -1,31 +1,31 @@
 """The body without its rail: a rigid box that lies on the mud with its belly, rises, rolls and pitches.
 
-Its coordinates are the place x along the track and the height of its centre of mass, which lies between the joints'
+Its coordinates are the position x along the track, the height of its centre of mass, which lies between the joints'
 axes, and roll φ and pitch θ about it, turned in this order. The rows of the rotation matrix are the world's directions
 in the body's axes (x forward, y to the left, z up):
 
     forward = (cos θ, sin θ sin φ, sin θ cos φ)   across = (0, cos φ, -sin φ)   up = (-sin θ, cos θ sin φ, cos θ cos φ)
 
-A point P of the body stands at x + forward·P and height + up·P, and since ∂up/∂θ = -forward, ∂up/∂φ = cos θ across,
+A point P of the body lies at x + forward·P and height + up·P, and since ∂up/∂θ = -forward, ∂up/∂φ = cos θ across,
 ∂forward/∂θ = up and ∂forward/∂φ = sin θ across, every force acts on all four coordinates by the work that it does:
 
     Q_q = F_x ∂x_P/∂q + F_z ∂z_P/∂q        m x'' = Q_x    m z'' = Q_z - m g    I_φ φ'' = Q_φ    I_θ θ'' = Q_θ
 
-with constant inertias: the box's gyroscopic terms and the joints' throwing it about are left out. It does not turn
-about the vertical nor drift sideways, as if the track led it.
+with constant inertias: the model leaves out the box's gyroscopic terms and the reaction of the arms' acceleration.
+The body neither turns about the vertical nor drifts sideways, as if the track guided it.
 
 The belly presses on the mud at the four corners of its rectangle, each for a quarter of its area A (so it tips over
 its edges, as it should, and resists small turns three times too stiffly), as an anchored elastic-plastic contact like
 the plate's:
 
-    pressure up    g(v) N_c s_u + γ d at the depth d        Prandtl's strip, and the weight of the mud beside it
-    drag           g(v) a s_u A of what is pressed on       adhesion, held elastically until it yields
+    pressure up    g(v) N_c s_u + γ d at the depth d        Prandtl's strip, and the weight of the mud next to it
+    drag           g(v) a s_u A of the pressed part         adhesion, held elastically until it yields
 
-It yields YIELD_M deep, or deeper where the body is so light that it would ring too quickly for the steps. It leaves a
-print that bears nothing until the belly is back in it or has been clear of the mud. The print goes along with the
-body: mud that it slides on to is as pressed as the mud that it comes from. There is no suction under the belly (air
-gets under it) and no mud ploughed up before it. The drag pad goes as much deeper as the belly does, and pulls at the
-belly. Nothing keeps the body from rearing or tipping over: flippers that push down with more than its weight lift it.
+It yields at a depth of YIELD_M, or deeper where the body is so light that it would ring too quickly for the steps. It
+leaves a print that carries no load until the belly is back in it or has been clear of the mud. The print moves with the
+body: mud that it slides on to is as pressed as the mud that it leaves. There is no suction under the belly (air gets
+under it), and no mud is ploughed up in front of it. The drag pad sinks with the belly, and pulls at the belly. Nothing
+keeps the body from rearing or tipping over: flippers that push down with more than its weight lift it.
 """
 
 from __future__ import annotations
@@ -44,16 +44,16 @@ from simulation.mud.flipper_contact import NO_CONTACT
 from simulation.mud.track import Track
 
 YIELD_M = 0.003  # a twentieth of a belly's width, after which footings on soft clay have failed
-LARGEST_RAD_S = 600.0  # at which the body may ring on its belly: steps of 1 ms follow that
+LARGEST_RAD_S = 600.0  # the fastest ringing of the body on its belly that steps of 1 ms resolve
 SIDES = (1.0, -1.0)  # fore, aft; left, right
 
 
 @dataclass(frozen=True)
 class BodyShape:
-    """Of a free body: a box, with the centre of mass at the height of the joints' axes."""
+    """A box, with the centre of mass at the height of the joints' axes."""
 
     length_m: Annotated[float, Bounds(0.02, 2.0)] = 0.20
-    width_m: Annotated[float, Bounds(0.02, 2.0)] = 0.06  # the joints stand at its sides
+    width_m: Annotated[float, Bounds(0.02, 2.0)] = 0.06  # the joints are at its sides
     axis_above_belly_m: Annotated[float, Bounds(0.0, 1.0)] = 0.0645
     axis_forward_m: Annotated[float, Bounds(-1.0, 1.0)] = 0.0  # of the centre of mass
     roll_inertia_kg_m2: Annotated[float, Bounds(1e-4, 100.0)] = 0.0014
@@ -74,18 +74,18 @@ def axes_of(roll_rad: float, pitch_rad: float) -> Axes:
 
 
 def mirrored(axes: Axes) -> Axes:
-    """In the axes of the right flipper, whose y points to the right."""
+    """Returns the axes of the right flipper, whose y points to the right."""
     (fx, fy, fz), (_, ay, az), (ux, uy, uz) = axes
     return Axes((fx, -fy, fz), (0.0, ay, -az), (ux, -uy, uz))
 
 
-def in_world(axes: Axes, place: Vector) -> Vector:
-    """(ahead, across, above) of the centre of mass."""
-    return dot(axes.forward, place), dot(axes.across, place), dot(axes.up, place)
+def in_world(axes: Axes, point: Vector) -> Vector:
+    """Returns (ahead, across, above) of the centre of mass."""
+    return dot(axes.forward, point), dot(axes.across, point), dot(axes.up, point)
 
 
 class BodyLoad(NamedTuple):
-    """Work done per unit of each coordinate."""
+    """Generalised force: work per unit of each coordinate."""
 
     forward_n: float
     upward_n: float
@@ -94,16 +94,16 @@ class BodyLoad(NamedTuple):
 
 
 def load_at(axes: Axes, lever_m: Vector, forward_n: float, upward_n: float) -> BodyLoad:
-    """Of a force in the world, `lever_m` from the centre of mass in the world."""
+    """Returns the load of a force in the world that acts `lever_m` from the centre of mass, in the world's axes."""
     ahead_m, across_m, above_m = lever_m
     roll_nm = (axes.forward[0] * upward_n - axes.up[0] * forward_n) * across_m
     return BodyLoad(forward_n, upward_n, roll_nm, above_m * forward_n - ahead_m * upward_n)
 
 
 def load_of_flipper(axes: Axes, joint: Vector, flipper: Pusher, side: float) -> BodyLoad:
-    """Of the mud through a flipper, in whose own axes everything stands; `side`: 1 on the left, -1 on the right.
+    """Returns the load of the mud through a flipper, in the flipper's own axes; `side`: 1 on the left, -1 on the right.
 
-    Moments about the axes that tilt with adduction are turned upright, and moved from the joints to the middle.
+    Moments about the axes that tilt with adduction are rotated upright, and moved from the joints to the middle.
     """
     force = flipper.force
     n, r, s = plate_directions(flipper.sweep_rad, flipper.adduction_rad)
@@ -124,7 +124,7 @@ class BellyQuarter:
     """Owns the print of a quarter of the belly."""
 
     def __init__(self, area_m2: float, mass_kg: float) -> None:
-        """`mass_kg`: that a push on its corner moves."""
+        """`mass_kg`: the mass that a push on its corner moves."""
         self.area_m2 = area_m2
         self.mass_kg = mass_kg
         self.reset()
@@ -134,7 +134,7 @@ class BellyQuarter:
         self.pressed = False
 
     def step(self, clay: Clay, traction: float, depth_m: float, sinking_m_s: float) -> float:
-        """Force up. The damping is half of critical."""
+        """Returns the force up. The damping is half of critical."""
         if depth_m <= 0.0:
             self.reset()
             return 0.0
@@ -150,7 +150,7 @@ class BellyQuarter:
         return floating_n + min(max(elastic_n + damping_n, 0.0), traction * slow_n)
 
     def _strain_m(self, stiffness_n_m: float, depth_m: float) -> float:
-        """Of the mud above its print. Where the mud becomes stiffer the force stays, as it does along a plate."""
+        """Returns the strain above the print. Where the mud becomes stiffer the force stays, as it does along a plate."""
         strain_m = depth_m - self._print_m
         if strain_m > 0.0 and 0.0 < self._stiffness_n_m < stiffness_n_m:
             strain_m *= self._stiffness_n_m / stiffness_n_m
@@ -159,7 +159,7 @@ class BellyQuarter:
 
 
 class FreeBody:
-    """Owns the body's place and turn, and the mud's memory of its belly."""
+    """Owns the body's position and attitude, and the mud's memory of its belly."""
 
     def __init__(self, mass_kg: float, shape: BodyShape, pad: DragPad, track: Track) -> None:
         self.mass_kg = mass_kg
@@ -200,7 +200,7 @@ class FreeBody:
         return self._carriage(axes, self.roll_rad_s), self._carriage(mirrored(axes), -self.roll_rad_s)
 
     def _carriage(self, axes: Axes, roll_rad_s: float) -> Carriage:
-        """In the flipper's own axes: on the right a roll is the other way round."""
+        """Returns the carriage in the flipper's own axes: on the right a roll has the opposite sign."""
         (fx, fy, fz), (_, ay, az), (ux, uy, uz) = axes
         turning = (roll_rad_s, ay * self.pitch_rad_s, az * self.pitch_rad_s)
         levered = cross(turning, self._joint)
@@ -230,7 +230,7 @@ class FreeBody:
         self.pitch_rad += dt_s * self.pitch_rad_s
 
     def flipper_loads(self, axes: Axes, left: Pusher, right: Pusher) -> Iterator[BodyLoad]:
-        """Of those flippers that the mud touches."""
+        """Yields the loads of the flippers that touch the mud."""
         for flipper, own_axes, side in ((left, axes, 1.0), (right, mirrored(axes), -1.0)):
             if flipper.force is not NO_CONTACT:
                 yield load_of_flipper(own_axes, self._joint, flipper, side)
@@ -253,7 +253,7 @@ class FreeBody:
         yield load_at(axes, lever_m, self._drag.step(dt_s, sliding_m_s, largest_n), 0.0)
 
     def _speeds_m_s(self, axes: Axes, lever_m: Vector) -> tuple[float, float]:
-        """(forward, up) in the world, of a place on the body that far from the centre of mass in the world."""
+        """Returns (forward, up) in the world of a point on the body, `lever_m` from the centre of mass."""
         ahead_m, across_m, above_m = lever_m
         rolling_m_s = across_m * self.roll_rad_s
         return (

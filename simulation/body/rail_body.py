@@ -1,7 +1,7 @@
-"""The body on its rail: one way to go, held elastically by dry friction until that yields.
+"""The body on its rail: one degree of freedom, held elastically by dry friction until that yields.
 
-The rail's drag and that of the pad in the mud add up to one force, which a spring carries as long as it is less. That
-spring's damping lets nothing ring: it is half of critical with the paper's body. Sliding, the drag grows with speed.
+The drags of the rail and of the pad in the mud add up to one yield force. Below it a spring carries the load, with a
+damping of half of critical for the paper's body, so that nothing rings. While the body slides, drag grows with speed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ DRAG_DAMPING_N_S_M = 71.0
 
 
 class BodyMotion(NamedTuple):
-    """Of the centre of mass in the world, and of the body about it.
+    """Motion of the centre of mass in the world, and of the body about it.
 
     Axes are x forward, y to the left, z up; turning follows the right hand, so a positive roll raises the left side
     and a positive pitch lowers the nose.
@@ -32,7 +32,7 @@ class BodyMotion(NamedTuple):
 
 
 class Pusher(Protocol):
-    """A flipper as the body feels it."""
+    """A flipper's load on the body."""
 
     force: ContactForce
     sweep_rad: float
@@ -40,7 +40,7 @@ class Pusher(Protocol):
 
 
 class Body(Protocol):
-    """What carries the flippers."""
+    """A body that carries the flippers."""
 
     forward_m: float
     forward_m_s: float
@@ -49,7 +49,7 @@ class Body(Protocol):
 
     @property
     def carriages(self) -> tuple[Carriage | None, Carriage | None]:
-        """How it carries the (left, right) flipper beyond going forward; None where that is all."""
+        """How it carries the (left, right) flipper; None for a body that only moves forward."""
 
     @property
     def motion(self) -> BodyMotion: ...
@@ -58,7 +58,7 @@ class Body(Protocol):
 
 
 class DryDrag:
-    """Owns how far a dry contact is stretched."""
+    """Owns the elastic stretch of a dry contact."""
 
     def __init__(self) -> None:
         self.reset()
@@ -67,7 +67,7 @@ class DryDrag:
         self._stretch_m = 0.0
 
     def step(self, dt_s: float, speed_m_s: float, largest_n: float) -> float:
-        """Force on what moves at `speed_m_s`."""
+        """Returns the force on a body that moves at `speed_m_s`."""
         self._stretch_m += dt_s * speed_m_s
         elastic_n = min(max(-DRAG_STIFFNESS_N_M * self._stretch_m, -largest_n), largest_n)
         self._stretch_m = -elastic_n / DRAG_STIFFNESS_N_M
@@ -81,13 +81,13 @@ class DragPad(NamedTuple):
     depth_m: float
 
     def yield_n(self, clay: Clay, deeper_m: float = 0.0) -> float:
-        """At the reference speed, with the body this much deeper than on the mud's surface."""
+        """Returns the yield force at the reference speed, with the body `deeper_m` below the mud's surface."""
         depth_m = self.depth_m + deeper_m
         return clay.lateral_n(depth_m, self.width_m) if self.width_m and depth_m > 0.0 else 0.0
 
 
 class RailBody:
-    """Owns the body's place on the rail."""
+    """Owns the body's position on the rail."""
 
     carriages = (None, None)
 

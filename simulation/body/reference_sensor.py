@@ -1,9 +1,9 @@
-"""What the flippers truly did in each stride, as far as a load cell needs it to repeat their strokes.
+"""The simulator's reference sensor: the true strokes of the flippers, for a load cell to repeat.
 
-A witness sees the plant, not the drives: true angles, velocities and surface, once in every tick of the loop, with
-the phase that was commanded while they came about. It closes a stride when swing, insertion or rest follows the last
-of its three strokes; one that rest cuts short does not count. Speeds are those of the middle of the plate's lower
-edge relative to the mud, which lies still: the body's motion counts.
+It reads the plant, not the drives: true angles, velocities and surface, once in every tick of the loop, together with
+the phase that was commanded for that tick. It closes a stride when swing, insertion or rest follows the last of its
+three strokes; a stride that a rest interrupts does not count. Speeds are those of the middle of the plate's lower edge
+relative to the mud, so they include the body's motion.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from control.records import FLIPPERS, UNKNOWN, Phase
 from simulation.body.plant import Arm, Plant
 from simulation.mud.clay import Clay
 
-SLIPPING_M_S = 0.02  # slower is the mud's give
+SLIPPING_M_S = 0.02  # slower motion is the mud's elastic yield
 STROKES = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION)
 BORDERS = (Phase.SWING, Phase.INSERTION, Phase.REST)
 
 
 class StrokeTruth(NamedTuple):
-    """Of the part of a stroke in which the lower edge was in the mud; NaN where there was none."""
+    """The part of a stroke with the lower edge in the mud; NaN where there was none."""
 
     sweep_rad: float  # mean
     adduction_rad: float  # mean
     deepest_m: float  # below the true surface
-    speed_m_s: float  # mean over the way; in stance backward along the track, in the ticks in which it slips
-    slip_m: float  # in stance: how far it went back in those ticks; NaN in the other strokes
+    speed_m_s: float  # mean over the distance; in stance backward along the track, over the ticks with slip
+    slip_m: float  # in stance: the distance in those ticks; NaN in the other strokes
     mean_depth_m: float
 
 
@@ -36,15 +36,15 @@ class StrokeTruth(NamedTuple):
 class StrideTruth:
     flipper: str
     index: int  # counts complete strides from 0
-    clay: Clay  # as firm as earlier strokes had left it when the flipper came in
+    clay: Clay  # with the firmness that earlier strokes left, when the flipper came in
     surface_m: float  # below its nominal height
     insertion: StrokeTruth
     stance: StrokeTruth
     extraction: StrokeTruth
 
 
-class Sight(NamedTuple):
-    """One flipper at one moment."""
+class FlipperSnapshot(NamedTuple):
+    """One flipper at one time."""
 
     sweep_rad: float
     adduction_rad: float
@@ -53,7 +53,7 @@ class Sight(NamedTuple):
     speed_m_s: float
 
 
-def sight_of(arm: Arm, body_m_s: float) -> Sight:
+def snapshot_of(arm: Arm, body_m_s: float) -> FlipperSnapshot:
     geometry, angles_rad = arm.parameters.geometry, (arm.sweep_rad, arm.adduction_rad)
     x_sweep, x_adduction, y_sweep, y_adduction, z_sweep, z_adduction = geometry.jacobian(*angles_rad)
     sweep_rad_s, adduction_rad_s = arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s
@@ -61,7 +61,7 @@ def sight_of(arm: Arm, body_m_s: float) -> Sight:
     outward_m_s = y_sweep * sweep_rad_s + y_adduction * adduction_rad_s
     upward_m_s = z_sweep * sweep_rad_s + z_adduction * adduction_rad_s
     speed_m_s = sqrt(forward_m_s**2 + outward_m_s**2 + upward_m_s**2)
-    return Sight(*angles_rad, geometry.depth_m(*angles_rad) - arm.surface_m, forward_m_s, speed_m_s)
+    return FlipperSnapshot(*angles_rad, geometry.depth_m(*angles_rad) - arm.surface_m, forward_m_s, speed_m_s)
 
 
 class StrokeSums:
@@ -76,15 +76,15 @@ class StrokeSums:
         self._sweep = self._adduction = self._depths_m = self._speed_m2_s = self._path_m = 0.0
         self._deepest_m = UNKNOWN
 
-    def update(self, dt_s: float, sight: Sight) -> None:
-        if sight.depth_m <= 0.0:
+    def update(self, dt_s: float, snapshot: FlipperSnapshot) -> None:
+        if snapshot.depth_m <= 0.0:
             return
         self._ticks += 1
-        self._sweep += sight.sweep_rad
-        self._adduction += sight.adduction_rad
-        self._depths_m += sight.depth_m
-        self._deepest_m = sight.depth_m if self._ticks == 1 else max(self._deepest_m, sight.depth_m)
-        speed_m_s = -sight.forward_m_s if self.phase is Phase.STANCE else sight.speed_m_s
+        self._sweep += snapshot.sweep_rad
+        self._adduction += snapshot.adduction_rad
+        self._depths_m += snapshot.depth_m
+        self._deepest_m = snapshot.depth_m if self._ticks == 1 else max(self._deepest_m, snapshot.depth_m)
+        speed_m_s = -snapshot.forward_m_s if self.phase is Phase.STANCE else snapshot.speed_m_s
         if self.phase is not Phase.STANCE or speed_m_s > SLIPPING_M_S:
             self._speed_m2_s += dt_s * speed_m_s * speed_m_s
             self._path_m += dt_s * speed_m_s
@@ -103,7 +103,7 @@ class StrokeSums:
 
 
 class FlipperReference:
-    """Owns what was seen of one flipper in the stride under way."""
+    """Owns the sums over the current stride of one flipper."""
 
     def __init__(self, flipper: str) -> None:
         self.flipper = flipper
@@ -113,51 +113,51 @@ class FlipperReference:
     def reset(self) -> None:
         for sums in self._sums.values():
             sums.reset()
-        self._met: tuple[Clay, float] | None = None
+        self._entered: tuple[Clay, float] | None = None
 
-    def look(self, dt_s: float, arm: Arm, body_m_s: float, phase: Phase) -> None:
+    def update(self, dt_s: float, arm: Arm, body_m_s: float, phase: Phase) -> None:
         sums = self._sums.get(phase)
         if sums is None:
             return
-        sight = sight_of(arm, body_m_s)
-        sums.update(dt_s, sight)
-        if self._met is None and sight.depth_m > 0.0:
-            self._met = (arm.clay, arm.surface_m)
+        snapshot = snapshot_of(arm, body_m_s)
+        sums.update(dt_s, snapshot)
+        if self._entered is None and snapshot.depth_m > 0.0:
+            self._entered = (arm.clay, arm.surface_m)
 
     def truth(self, index: int, arm: Arm) -> StrideTruth:
-        clay, surface_m = self._met or (arm.clay, arm.surface_m)
+        clay, surface_m = self._entered or (arm.clay, arm.surface_m)
         insertion, stance, extraction = (self._sums[phase].truth() for phase in STROKES)
         return StrideTruth(self.flipper, index, clay, surface_m, insertion, stance, extraction)
 
 
 class StrokeReference:
-    """Owns the count of strides, and which strokes of the one under way were seen."""
+    """Owns the count of strides, and the phases of the current stride so far."""
 
     def __init__(self) -> None:
         self._flippers = [FlipperReference(flipper) for flipper in FLIPPERS]
         self.reset()
 
     def reset(self) -> None:
-        """As at the start of a walk."""
+        """Returns to the start of a walk."""
         self.index = 0
         self._phase = Phase.REST
-        self._begin_stride()
+        self._start_stride()
 
-    def _begin_stride(self) -> None:
-        self._seen: set[Phase] = set()
+    def _start_stride(self) -> None:
+        self._phases: set[Phase] = set()
         for flipper in self._flippers:
             flipper.reset()
 
     def step(self, dt_s: float, plant: Plant, phase: Phase) -> list[StrideTruth]:
-        """Strides that this phase has closed: one of each flipper, or none."""
+        """Returns the strides that this phase has closed: one of each flipper, or none."""
         closed: list[StrideTruth] = []
         if phase is not self._phase and phase in BORDERS:
-            closed = self._close(plant) if phase is not Phase.REST and self._seen.issuperset(STROKES) else []
-            self._begin_stride()
+            closed = self._close(plant) if phase is not Phase.REST and self._phases.issuperset(STROKES) else []
+            self._start_stride()
         self._phase = phase
-        self._seen.add(phase)
+        self._phases.add(phase)
         for flipper, arm in zip(self._flippers, plant.arms, strict=True):
-            flipper.look(dt_s, arm, plant.body_m_s, phase)
+            flipper.update(dt_s, arm, plant.body_m_s, phase)
         return closed
 
     def _close(self, plant: Plant) -> list[StrideTruth]:

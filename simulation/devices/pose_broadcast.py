@@ -16,7 +16,7 @@ from firmware_host.configuration.configuration import PoseParameters
 from simulation.body.plant import Plant
 from simulation.devices.motion_capture import OF_THE_PAPER, CameraFrame, MotionCapture
 from simulation.devices.natnet_server import LOOPBACK, NEWEST_VERSION, NatNetServer, RecordedPose
-from simulation.devices.rail_encoder_emulator import RailEncoderEmulator
+from simulation.devices.rail_encoder_emulator import EmulatedRailEncoder
 
 
 class PoseLine(Protocol):
@@ -86,7 +86,7 @@ class RailEncoderLine(NoLine):
         """Raises OSError where there is something of that name."""
         encoder = pose.rail_encoder
         self._origin_m = pose.origin_m
-        self.counter = RailEncoderEmulator(Path(encoder.device), encoder.metres_per_count, encoder.label)
+        self.counter = EmulatedRailEncoder(Path(encoder.device), encoder.metres_per_count, encoder.label)
 
     def send(self, frame: CameraFrame) -> None:
         self.counter.send(frame.x_m + self._origin_m)

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 
-class RailEncoderEmulator:
+class EmulatedRailEncoder:
     """Owns the pseudo-terminal behind the link `device`, and which count is zero."""
 
     def __init__(self, device: Path, metres_per_count: float, label: str = "", line_end: str = "\r\n") -> None:

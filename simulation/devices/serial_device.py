@@ -49,7 +49,7 @@ class SerialTalker:
         self.parameters = parameters
         self.line_at = line_at
         self.link = link
-        self.awaits_delivery = True  # whoever reads does so between two steps, and finds what was written
+        self.waits_for_delivery = True  # whoever reads does so between two steps, and finds what was written
         self.lost_lines = 0  # that nobody had read in time
         self._random = random
         self._master = self._slave = -1
@@ -95,7 +95,7 @@ class SerialTalker:
             self._due_s += period_s
         if now_s >= self._burst_due_s:
             self._burst_due_s = now_s + self.parameters.burst_s
-            self.hand_over()
+            self.deliver()
 
     def _print(self, at_s: float) -> None:
         line = self.line_at(at_s)
@@ -115,7 +115,7 @@ class SerialTalker:
         """What a receiver makes of bits at another rate: any bytes, few of them ends of lines."""
         return bytes(self._random.choice((0x00, 0x80, 0xE0, 0xF8, 0xFE, 0xFF, 0x9C, 0x66, 0x1E)) for _ in range(length))
 
-    def hand_over(self) -> None:
+    def deliver(self) -> None:
         """And wait until it is there: a pseudo-terminal delivers a moment later."""
         if not self.is_plugged_in or not self.waiting:
             return
@@ -126,7 +126,7 @@ class SerialTalker:
             written = 0
         self.lost_lines += waiting[written:].count(b"\n")
         deadline_s = time.monotonic() + DELIVERED_S
-        while self.awaits_delivery and self._unread_bytes() < before + written and time.monotonic() < deadline_s:
+        while self.waits_for_delivery and self._unread_bytes() < before + written and time.monotonic() < deadline_s:
             time.sleep(0.00002)
 
     def _unread_bytes(self) -> int:

@@ -1,10 +1,10 @@
 """A load cell in a flipper's adduction joint: the plate carried along its own arc, and what the mud does to it there.
 
-A plate that a stage pushes straight down while it leans is pressed through the mud with its face, whose load has a
-share upward: nothing in 2 cm of clay, a seventh of all at 5 cm. A flipper's plate goes down another way, an arc on
-which it leans more and more, and what its face feels is no part of k_p and k_e (control/plate.py). So here the joint
-turns the plate at one sweep angle, with one speed of its lower edge and in equal steps of depth, and the cell reads
-the moment of all that acts within the plate's plane. The contact is the same as under the robot.
+A stage that pushes a leaning plate straight down presses its face through the mud, and part of that load points up:
+nothing in 2 cm of clay, a seventh of the whole at 5 cm. A flipper's plate moves down along an arc on which it leans
+more and more, and the load on its face is no part of k_p and k_e (control/plate.py). So here the joint turns the plate
+at one sweep angle, with one speed of its lower edge and in equal steps of depth, and the cell reads the moment of all
+forces within the plate's plane. The contact model is the same as under the robot.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ HOLD_STEP_S = 0.0005
 
 
 class ArcCurve(NamedTuple):
-    """One pose after the other in time."""
+    """One pose after the other, in the order of time."""
 
     depths_m: list[float]  # of the lower edge's middle below the surface
     moments_m4: list[float]  # Φ of control/plate.py
@@ -36,7 +36,7 @@ class ArcStroke(NamedTuple):
 
 
 class JointCell:
-    """Owns the plate on its arm: where it is, and its contact."""
+    """Owns the plate on its arm: its angle and its contact."""
 
     def __init__(
         self, clay: Clay, geometry: FlipperGeometry, sweep_rad: float, surface_m: float, relaxation: float
@@ -52,14 +52,14 @@ class JointCell:
 
     @property
     def deepest_m(self) -> float:
-        """Below the surface, as far as the arm reaches."""
+        """The greatest depth below the surface that the arm reaches."""
         return self._geometry.deepest_m(degrees(abs(self._sweep_rad))) - self._surface_m
 
     def _angle_at_rad(self, depth_m: float) -> float:
         return self._geometry.adduction_rad(self._sweep_rad, depth_m + self._surface_m)
 
     def move(self, to_depth_m: float, speed_m_s: float) -> ArcCurve:
-        """Down or up, in whole steps of depth."""
+        """Moves down or up, in whole steps of depth."""
         from_m, path_m = self._depth_m, to_depth_m - self._depth_m
         steps = max(1, round(abs(path_m) / STEP_M))
         curve = ArcCurve([], [], [])
@@ -104,7 +104,7 @@ def measure_arc(
     relaxation: float = 0.0,
     hold_s: float = 0.0,
 ) -> ArcStroke:
-    """From free air down to `depth_m` below the surface, or as far as the arm reaches; after a hold up again."""
+    """Measures from free air down to `depth_m` below the surface, or to the arm's reach; after a hold, up again."""
     cell = JointCell(clay, geometry, sweep_rad, surface_m, relaxation)
     down = cell.move(min(depth_m, cell.deepest_m), speed_m_s)
     cell.hold(hold_s)

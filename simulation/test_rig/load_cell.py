@@ -1,9 +1,9 @@
-"""A plate on a load cell: what a mud does to a flipper's plate, measured without the flipper.
+"""A plate on a load cell: the force of a mud on a flipper's plate, measured without the flipper.
 
-As with the reference measurements of a laboratory, a stiff carrier moves the plate straight through the mud, at a
-constant speed and in a fixed attitude, and reads force against depth; an estimate made with a flipper, its joints and
-its motors can be held against that. The contact is the same as under the robot, the motion is its own. The surface
-is at depth 0, depths are those of the middle of the lower edge, forces are the mud's on the plate.
+As in a laboratory's reference measurement, a stiff carrier moves the plate straight through the mud, at a constant
+speed and in a fixed attitude, and records force against depth. An estimate that a flipper makes with its joints and
+motors is compared with that. The contact model is the same as under the robot. The surface is at depth 0, depths are
+those of the middle of the lower edge, forces are the mud's on the plate.
 
 With x forward, y outward, z up, a plate at the sweep angle α and the adduction angle β has its normal, its lower edge
 and its height along
@@ -29,7 +29,7 @@ Vector = tuple[float, float, float]
 
 
 class LoadCurve(NamedTuple):
-    """Force upward on the plate against depth, one after the other in time."""
+    """Upward force on the plate against depth, in the order of time."""
 
     depths_m: tuple[float, ...]
     forces_n: tuple[float, ...]
@@ -42,7 +42,7 @@ class Insertion(NamedTuple):
 
 
 class LoadCell:
-    """Owns the plate on its carrier: where it is, and its contact."""
+    """Owns the plate on its carrier: its depth and its contact."""
 
     def __init__(
         self, clay: Clay, geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, relaxation: float = 0.0
@@ -60,7 +60,7 @@ class LoadCell:
         self.depth_m = self.clear_m
 
     def step(self, dt_s: float, forward_m_s: float, upward_m_s: float) -> tuple[float, float]:
-        """Force (forward, upward) at the end of a step of this motion."""
+        """Returns the force (forward, upward) at the end of a step of this motion."""
         self.depth_m -= dt_s * upward_m_s
         twist = Twist(*(axis[0] * forward_m_s + axis[2] * upward_m_s for axis in self.axes))
         wrench = self.plate.step(dt_s, self.clay, self._upright._replace(depth_m=self.depth_m), twist)
@@ -69,7 +69,7 @@ class LoadCell:
         return forward_n, sum(force_n * axis[2] for force_n, axis in zip(forces_n, self.axes, strict=True))
 
     def lower(self, to_depth_m: float, speed_m_s: float) -> LoadCurve:
-        """Or raise: straight to a depth, in whole steps."""
+        """Moves straight down or up to a depth, in whole steps."""
         path_m = to_depth_m - self.depth_m
         steps = max(1, ceil(abs(path_m) / (speed_m_s * STEP_S)))
         return self._record(steps, -path_m / (steps * STEP_S))
@@ -95,7 +95,7 @@ def measure_insertion(
     relaxation: float = 0.0,
     hold_s: float = 0.0,
 ) -> Insertion:
-    """From just above the mud down to `depth_m`, after a hold up again: everything that acts along the motion."""
+    """Measures the force from just above the mud down to `depth_m`, during a hold, and up again."""
     cell = LoadCell(clay, geometry, sweep_rad, adduction_rad, relaxation)
     down = cell.lower(depth_m, speed_m_s)
     held = cell.hold(hold_s)
@@ -111,7 +111,7 @@ def measure_shear(
     speed_m_s: float,
     distance_m: float = 0.2,
 ) -> float:
-    """Forward force on a plate that is dragged backward at a depth: the mean over the second half of the way.
+    """Returns the forward force on a plate dragged backward at a depth: the mean over the second half of the distance.
 
     Raises ValueError where the first half is too short for all the mud to yield.
     """

@@ -1,10 +1,9 @@
-"""A bench with a stage, a plate, a load cell and its amplifier, and its own time: all of II-E but the people.
+"""A bench with a stage, a plate, a load cell and its amplifier, and its own time: the paper's section II-E.
 
-Time passes when it is told to, as fast as the machine can, or with the clock on the wall where this module is run by
-itself: `python -m simulation.test_rig.load_cell_bench LINK [--mud W] [--position] [--hand]` puts an amplifier at
-LINK, to be
-opened as any serial port, and an encoder of the stage at LINK_position; it obeys words on its standard input: insert,
-lower, drag, lift, remix [W], turn, hang [G], unplug, plug, quit.
+Simulated time passes as fast as the machine computes. Run by itself, this module follows the wall clock:
+`python -m simulation.test_rig.load_cell_bench LINK [--mud W] [--position] [--hand]` puts an amplifier at LINK, which
+opens as any serial port, and an encoder of the stage at LINK_position. It executes commands from its standard input:
+insert, lower, drag, lift, remix [W], turn, hang [G], unplug, plug, quit.
 """
 
 from __future__ import annotations
@@ -19,25 +18,30 @@ from pathlib import Path
 from control.geometry import FlipperGeometry
 from drivers.load_cell.line_formats import GRAVITY_M_S2
 from simulation.mud.clay import clay_of_water
+from simulation.test_rig.emulated_instruments import (
+    STYLES,
+    AmplifierParameters,
+    EmulatedAmplifier,
+    EmulatedStageEncoder,
+    StageEncoderParameters,
+)
 from simulation.test_rig.load_cell import LoadCell
-from simulation.test_rig.load_cell_emulator import STYLES, AmplifierParameters, EmulatedAmplifier
 from simulation.test_rig.plate_stage import CarriedPlate, PlateStage, StageParameters
-from simulation.test_rig.stage_encoder_emulator import EmulatedStageEncoder, StageEncoderParameters
-from simulation.test_rig.stage_motion import HandParameters
+from simulation.test_rig.stage_motion import ManualMotionParameters
 
 STEP_S = 0.01
-RELAXATION = 0.13  # share of the load that a hold loses, as in the authors' logs
+RELAXATION = 0.13  # fraction of the load that a hold loses, as in the authors' logs
 PAPER_PLATE = FlipperGeometry(plate_width_m=0.03, plate_height_m=0.035, plate_thickness_m=0.004)
 Event = tuple[float, Callable[[], None]]
 
 
 def clay_plate(water_percent: float, plate: FlipperGeometry = PAPER_PLATE) -> LoadCell:
-    """Raises ValueError for a mud that there is not."""
+    """Raises ValueError where no mud has this water content."""
     return LoadCell(clay_of_water(water_percent), plate, 0.0, 0.0, RELAXATION)
 
 
 class EmulatedBench:
-    """Owns the time; what happens by itself at some moment stands in `events`."""
+    """Owns the time, and the `events` that happen at a set time."""
 
     def __init__(
         self,
@@ -48,7 +52,7 @@ class EmulatedBench:
         seed: int = 1,
         encoder: StageEncoderParameters | None = None,
     ) -> None:
-        """With an `encoder`, which appears beside `link` as its name and `_position`."""
+        """`encoder`: adds a stage encoder, whose link is that of the amplifier with `_position` appended."""
         self.stage = PlateStage(plate, stage)
         self.amplifier = EmulatedAmplifier(self.stage.mean_force_n, amplifier or AmplifierParameters(), link, seed)
         self.encoder: EmulatedStageEncoder | None = None
@@ -65,12 +69,12 @@ class EmulatedBench:
         end_s = self._now_s + duration_s
         while self._now_s < end_s - 1e-9:
             self._now_s = min(self._now_s + STEP_S, end_s)
-            self._happen()
+            self._run_events()
             self.amplifier.step(self._now_s)
             if self.encoder is not None:
                 self.encoder.step(self._now_s)
 
-    def _happen(self) -> None:
+    def _run_events(self) -> None:
         for event in [event for event in self.events if event[0] <= self._now_s]:
             self.events.remove(event)
             event[1]()
@@ -85,26 +89,26 @@ def position_link(link: Path) -> Path:
     return link.with_name(f"{link.name}_position")
 
 
-def obey(bench: EmulatedBench, words: list[str]) -> str:
-    """One order of a person who sits at the emulated bench; the answer."""
+def execute(bench: EmulatedBench, words: list[str]) -> str:
+    """Executes one command of the operator at the emulated bench and returns the answer."""
     stage, now_s = bench.stage, bench.now_s()
     number = float(words[1]) if len(words) > 1 else None
-    orders: dict[str, Callable[[], None]] = {
+    commands: dict[str, Callable[[], None]] = {
         "insert": lambda: stage.insert(now_s, 0.03, number or 0.1, 3.0),
         "lower": lambda: stage.lower(now_s, 0.03),
         "drag": lambda: stage.drag(now_s, 0.2, number or 0.1),
         "lift": lambda: stage.lift(now_s),
-        "remix": lambda: stage.place_over(clay_plate(number) if number else stage.plate, False),
-        "turn": lambda: stage.place_over(stage.plate, not stage.along_sideways),
-        "hang": lambda: setattr(stage, "hung_n", (number or 0.0) / 1000.0 * GRAVITY_M_S2),
+        "remix": lambda: stage.move_over(clay_plate(number) if number else stage.plate, False),
+        "turn": lambda: stage.move_over(stage.plate, not stage.measures_sideways),
+        "hang": lambda: setattr(stage, "hung_weight_n", (number or 0.0) / 1000.0 * GRAVITY_M_S2),
         "unplug": bench.amplifier.unplug,
         "plug": bench.amplifier.plug_in,
     }
     if bench.encoder is not None:
-        orders |= {"unplug-position": bench.encoder.unplug, "plug-position": bench.encoder.plug_in}
-    if words[0] not in orders:
-        return f"there are {', '.join(orders)} and quit"
-    orders[words[0]]()
+        commands |= {"unplug-position": bench.encoder.unplug, "plug-position": bench.encoder.plug_in}
+    if words[0] not in commands:
+        return f"unknown command {words[0]}: type one of {', '.join(commands)}, quit"
+    commands[words[0]]()
     return f"{words[0]} at {now_s:.1f} s"
 
 
@@ -115,23 +119,23 @@ def main() -> None:
     parser.add_argument("--style", choices=STYLES, default="counts")
     parser.add_argument("--baud", type=int, default=115200)
     parser.add_argument("--rate", type=float, default=80.0, metavar="HZ")
-    parser.add_argument("--position", action="store_true", help="an encoder beside it, at LINK_position, 10 um a count")
+    parser.add_argument("--position", action="store_true", help="add an encoder at LINK_position, 10 um a count")
     parser.add_argument("--hand", action="store_true", help="the stage is pushed by a hand")
     options = parser.parse_args()
     amplifier = AmplifierParameters(rate_hz=options.rate, style=options.style, baud=options.baud)
-    stage = StageParameters(hand=HandParameters() if options.hand else None)
+    stage = StageParameters(manual=ManualMotionParameters() if options.hand else None)
     encoder = StageEncoderParameters() if options.position else None
     bench = EmulatedBench(clay_plate(options.mud), options.link, amplifier, stage, encoder=encoder)
-    bench.amplifier.awaits_delivery = False  # somebody else reads at any moment
+    bench.amplifier.waits_for_delivery = False  # another process reads at any time
     if bench.encoder is not None:
-        bench.encoder.awaits_delivery = False
-    begin_s, words = time.monotonic(), [""]
+        bench.encoder.waits_for_delivery = False
+    start_s, words = time.monotonic(), [""]
     try:
         while words != ["quit"]:
-            bench.pass_time(max(0.0, time.monotonic() - begin_s - bench.now_s()))
+            bench.pass_time(max(0.0, time.monotonic() - start_s - bench.now_s()))
             if select.select([sys.stdin], [], [], STEP_S)[0]:
                 words = sys.stdin.readline().split() or ["quit"]
-                print(obey(bench, words) if words != ["quit"] else "", flush=True)
+                print(execute(bench, words) if words != ["quit"] else "", flush=True)
     finally:
         bench.close()
 

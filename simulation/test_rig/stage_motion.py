@@ -1,7 +1,7 @@
-"""How a stage gets along its way: by a controller with ramps, or by a hand that stutters and rests.
+"""How a stage covers a distance: driven by a controller with ramps, or pushed by hand with uneven speed and rests.
 
-A hand pushes at one speed for a few millimetres and at another for the next ones, changes between them as fast as an
-arm does, and now and then stands still. Nobody has measured such a hand here: speeds, ways and rests are assumed.
+A hand pushes at one speed for a few millimetres and at another for the next ones, changes between them with the
+acceleration of an arm, and sometimes rests. Its speeds, distances and rests are assumptions: nobody has measured one.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from control.bounds import Bounds
 
 
 class Motion(Protocol):
-    """A way from 0 to its end."""
+    """A motion from 0 to a distance."""
 
     duration_s: float
 
     def path_m(self, time_s: float) -> float:
-        """Since the beginning; before it none, after the end all."""
+        """Returns the distance covered since the start: 0 before it, all after the end."""
 
 
 class RampedMotion:
-    """Along a trapezoid of speed, or a triangle where the way is short."""
+    """A trapezoid of speed, or a triangle where the distance is short."""
 
     def __init__(self, path_m: float, speed_m_s: float, acceleration_m_s2: float) -> None:
         self._end_m, self._acceleration_m_s2 = path_m, acceleration_m_s2
@@ -45,19 +45,19 @@ class RampedMotion:
 
 
 @dataclass(frozen=True)
-class HandParameters:
+class ManualMotionParameters:
     slowest_m_s: Annotated[float, Bounds(0.001, 1.0)] = 0.05
     fastest_m_s: Annotated[float, Bounds(0.001, 1.0)] = 0.2
     acceleration_m_s2: Annotated[float, Bounds(0.1, 50.0)] = 4.0
-    shortest_m: Annotated[float, Bounds(0.001, 0.1)] = 0.002  # of one speed
+    shortest_m: Annotated[float, Bounds(0.001, 0.1)] = 0.002  # distance at one speed
     longest_m: Annotated[float, Bounds(0.001, 0.1)] = 0.01
-    rest_fraction: Annotated[float, Bounds(0.0, 1.0)] = 0.25  # of the changes of speed, a rest before the next
+    rest_fraction: Annotated[float, Bounds(0.0, 1.0)] = 0.25  # of the changes of speed that begin with a rest
     shortest_rest_s: Annotated[float, Bounds(0.0, 5.0)] = 0.05
     longest_rest_s: Annotated[float, Bounds(0.0, 5.0)] = 0.5
 
 
 class _Knot(NamedTuple):
-    """From a moment on, at a constant acceleration."""
+    """The start of a piece of constant acceleration."""
 
     time_s: float
     position_m: float
@@ -65,57 +65,53 @@ class _Knot(NamedTuple):
     acceleration_m_s2: float
 
 
-class HandMotion:
-    """Uneven, and another one each time."""
+class ManualMotion:
+    """An uneven motion, drawn anew for each stroke."""
 
-    def __init__(self, path_m: float, hand: HandParameters, random: Random) -> None:
+    def __init__(self, path_m: float, hand: ManualMotionParameters, random: Random) -> None:
         self._end_m, self._hand = path_m, hand
         self._knots = [_Knot(0.0, 0.0, 0.0, 0.0)]
-        while self._position_m() < path_m - 1e-9:
+        while self._remaining_m() > 1e-9:
             self._push(random)
         self.duration_s = self._knots[-1].time_s
         self._times_s = [knot.time_s for knot in self._knots]
 
-    def _position_m(self) -> float:
-        return self._knots[-1].position_m
+    def _remaining_m(self) -> float:
+        return self._end_m - self._knots[-1].position_m
 
     def _push(self, random: Random) -> None:
-        """To another speed and some way at it, or all that is left."""
+        """Adds a piece at another speed, or the rest of the distance."""
         hand = self._hand
         speed_m_s = random.uniform(hand.slowest_m_s, hand.fastest_m_s)
-        at_it_m = random.uniform(hand.shortest_m, hand.longest_m)
+        distance_m = random.uniform(hand.shortest_m, hand.longest_m)
         braking_m = hand.fastest_m_s**2 / (2.0 * hand.acceleration_m_s2)
-        if self._end_m - self._position_m() < at_it_m + 3.0 * braking_m:
+        if self._remaining_m() < distance_m + 3.0 * braking_m:
             self._finish(speed_m_s)
             return
-        self._change(speed_m_s)
-        self._go_on(at_it_m)
+        self._change_speed(speed_m_s)
+        self._continue(distance_m)
         if random.random() < hand.rest_fraction:
-            self._change(0.0)
+            self._change_speed(0.0)
             rest_s = random.uniform(hand.shortest_rest_s, hand.longest_rest_s)
             self._knots.append(self._knots[-1]._replace(time_s=self._knots[-1].time_s + rest_s))
 
     def _finish(self, speed_m_s: float) -> None:
-        """At most as fast as still comes to a stand at the end."""
-        a, before_m_s, left_m = (
-            self._hand.acceleration_m_s2,
-            self._knots[-1].speed_m_s,
-            self._end_m - self._position_m(),
-        )
-        speed_m_s = min(speed_m_s, sqrt(a * left_m + before_m_s**2 / 2.0))
-        self._change(speed_m_s)
-        self._go_on(max(0.0, self._end_m - self._position_m() - speed_m_s**2 / (2.0 * a)))
-        self._change(0.0)
+        """Covers the rest, at most at the speed from which it can still stop at the end."""
+        a, before_m_s = self._hand.acceleration_m_s2, self._knots[-1].speed_m_s
+        speed_m_s = min(speed_m_s, sqrt(a * self._remaining_m() + before_m_s**2 / 2.0))
+        self._change_speed(speed_m_s)
+        self._continue(max(0.0, self._remaining_m() - speed_m_s**2 / (2.0 * a)))
+        self._change_speed(0.0)
         self._knots[-1] = self._knots[-1]._replace(position_m=self._end_m)
 
-    def _change(self, to_m_s: float) -> None:
+    def _change_speed(self, to_m_s: float) -> None:
         time_s, position_m, speed_m_s, _ = self._knots[-1]
         lasts_s = abs(to_m_s - speed_m_s) / self._hand.acceleration_m_s2
         if lasts_s:
             self._knots[-1] = _Knot(time_s, position_m, speed_m_s, (to_m_s - speed_m_s) / lasts_s)
             self._knots.append(_Knot(time_s + lasts_s, position_m + lasts_s * (speed_m_s + to_m_s) / 2.0, to_m_s, 0.0))
 
-    def _go_on(self, path_m: float) -> None:
+    def _continue(self, path_m: float) -> None:
         time_s, position_m, speed_m_s, _ = self._knots[-1]
         self._knots.append(_Knot(time_s + path_m / speed_m_s, position_m + path_m, speed_m_s, 0.0))
 
@@ -124,6 +120,6 @@ class HandMotion:
             return 0.0
         if time_s >= self.duration_s:
             return self._end_m
-        begin_s, position_m, speed_m_s, acceleration_m_s2 = self._knots[bisect_right(self._times_s, time_s) - 1]
-        since_s = time_s - begin_s
+        start_s, position_m, speed_m_s, acceleration_m_s2 = self._knots[bisect_right(self._times_s, time_s) - 1]
+        since_s = time_s - start_s
         return position_m + since_s * (speed_m_s + acceleration_m_s2 * since_s / 2.0)

@@ -22,7 +22,7 @@ from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
-from simulation.body.blocks import lying_m
+from simulation.body.blocks import resting_drop_m
 from tests.bench.staged_bench import (
     SKIPPED,
     BenchReport,
@@ -136,7 +136,7 @@ def ask_before_moving(what: str, stand: Stand, report: BenchReport, stage: int) 
 
 
 def lets_move(what: str, stand: Stand, stage: int) -> bool:
-    lying_cm = 100.0 * lying_m(stand.configuration.geometry)
+    lying_cm = 100.0 * resting_drop_m(stand.configuration.geometry)
     where = (
         f"The robot stands on blocks; idle, its flippers lie on something soft, {lying_cm:.0f} cm below their axes."
         " Nobody's hands are near them, and the power switch is at hand."

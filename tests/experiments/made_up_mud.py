@@ -10,7 +10,7 @@ from experiments.loadcell.analysis.coefficients import SHEAR, Recorded
 from experiments.loadcell.analysis.curve_fit import Array
 from experiments.loadcell.analysis.stage_track import StagePositions
 from simulation.test_rig.plate_stage import CarriedPlate, PlateStage, StageParameters
-from simulation.test_rig.stage_motion import HandParameters
+from simulation.test_rig.stage_motion import ManualMotionParameters
 
 WIDTH_M, THICKNESS_M = 0.03, 0.004
 
@@ -59,7 +59,7 @@ def feel(
     random = Random(seed)
     stage = PlateStage(plate, StageParameters(acceleration_m_s2, cell_sign))
     stage.mean_force_n(0.0)
-    stage.place_over(plate, kind == SHEAR)
+    stage.move_over(plate, kind == SHEAR)
     _start(stage, plate, kind, random.uniform(1.0, 1.3), speed_m_s)
     return _heard(stage, kind, seed, random, rate_hz, noise_n, drift_n_s)
 
@@ -68,7 +68,7 @@ def feel_by_hand(
     plate: CarriedPlate,
     kind: str,
     seed: int,
-    hand: HandParameters | None = None,
+    hand: ManualMotionParameters | None = None,
     lag_s: float = 0.012,
     position_rate_hz: float = 100.0,
     jitter_s: float = 0.0015,
@@ -76,9 +76,9 @@ def feel_by_hand(
 ) -> Recorded:
     """One trial of a stage that a hand pushes, with the places of an encoder; forces are stamped later by `lag_s`."""
     random = Random(seed)
-    stage = PlateStage(plate, StageParameters(hand=hand or HandParameters(), seed=seed))
+    stage = PlateStage(plate, StageParameters(manual=hand or ManualMotionParameters(), seed=seed))
     stage.mean_force_n(0.0)
-    stage.place_over(plate, kind == SHEAR)
+    stage.move_over(plate, kind == SHEAR)
     _start(stage, plate, kind, random.uniform(1.0, 1.3), 0.1)
     felt = _heard(stage, kind, seed, random, 80.0, 0.008, 0.0)
     times_s = np.arange(0.003, stage.ends_s + 1.05, 1.0 / position_rate_hz)

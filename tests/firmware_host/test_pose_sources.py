@@ -23,7 +23,7 @@ from firmware_host.daemon import EXIT_FAILED, main, reopen_pose
 from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.pose_sources import open_pose
 from simulation.devices.natnet_server import NatNetServer, RecordedPose
-from simulation.devices.rail_encoder_emulator import RailEncoderEmulator
+from simulation.devices.rail_encoder_emulator import EmulatedRailEncoder
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
@@ -145,7 +145,7 @@ def test_motion_capture_is_read_along_the_configured_axis(example_text: str) -> 
 
 def test_a_rail_encoder_is_opened(example_text: str, tmp_path: Path) -> None:
     pytest.importorskip("serial", reason="pyserial is not installed")
-    counter = RailEncoderEmulator(tmp_path / "encoder", 1e-5)
+    counter = EmulatedRailEncoder(tmp_path / "encoder", 1e-5)
     section = f'{ENCODER}device = "{counter.device}"\nmetres_per_count = 1e-5'
     with closing(open_pose(pose_of(example_text, section))) as pose:
         assert isinstance(pose, RailEncoder)

@@ -35,7 +35,7 @@ def test_no_garbage_stops_a_loop_that_is_not_armed_or_brings_torque_to_a_drive(m
     far = [port.open_beside() for port in walk.loop.drives.ports.values() if isinstance(port, MockPort)]
     assert far
 
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=100, deadline=None)
     @given(ANY_TICKS)
     def examine(ticks: list[list[Frame]]) -> None:
         for frames in ticks:

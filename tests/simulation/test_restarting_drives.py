@@ -33,7 +33,7 @@ def test_the_watchdogs_of_all_drives_are_read_back_within_a_second_and_a_half(wa
 
 def test_a_drive_that_restarts_is_noticed_and_its_settings_are_asked_for_anew() -> None:
     walk = make_walk()
-    read_settings(walk, 3.0)
+    read_settings(walk, 1.5)
     assert [health.restarts for health in walk.loop.drives.health] == [0, 0, 0, 0]
     walk.robot.restart_drive(1)
     assert walk.run_until(lambda: walk.loop.drives.health[1].restarts == 1, 1.3)

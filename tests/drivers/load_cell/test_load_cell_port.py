@@ -10,7 +10,7 @@ import pytest
 from drivers.load_cell.calibration import LoadCellCalibration
 from drivers.load_cell.line_formats import LineFormat
 from drivers.load_cell.load_cell_port import LoadCellPort, Sample
-from simulation.test_rig.load_cell_emulator import AmplifierParameters, EmulatedAmplifier
+from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedAmplifier
 
 FORCE_N = 1.5
 COUNTS = LoadCellCalibration("counts", 42000.0, 81000.0)
@@ -119,6 +119,6 @@ def test_a_line_that_names_its_unit_is_believed(tmp_path: Path) -> None:
 def test_noise_without_an_end_does_not_grow(cable: Cable) -> None:
     for _ in range(100):
         cable.amplifier.waiting = b"\xff" * 60
-        cable.amplifier.hand_over()
+        cable.amplifier.deliver()
         cable.port.read(1.0)
     assert cable.port.garbled_lines > 20

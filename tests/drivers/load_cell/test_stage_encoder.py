@@ -9,7 +9,7 @@ import pytest
 
 from drivers.load_cell.stage_encoder import Place, StageEncoder, StageEncoderSettings
 from drivers.serial.serial_line import SerialLineError
-from simulation.test_rig.stage_encoder_emulator import EmulatedStageEncoder, StageEncoderParameters
+from simulation.test_rig.emulated_instruments import EmulatedStageEncoder, StageEncoderParameters
 
 pytest.importorskip("serial", reason="pyserial is not installed")
 

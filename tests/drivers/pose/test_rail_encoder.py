@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from drivers.pose.pose_port import STALE_S, PoseSourceError
 from drivers.pose.rail_encoder import LONGEST_LINE_BYTES, RETRY_S, RailEncoder, RailEncoderParameters
-from simulation.devices.rail_encoder_emulator import RailEncoderEmulator
+from simulation.devices.rail_encoder_emulator import EmulatedRailEncoder
 from tests.waiting import LONGEST_S
 
 pytest.importorskip("serial", reason="pyserial is not installed")
@@ -27,7 +27,7 @@ class Rail:
 
     def __init__(self, device: Path, **changes: object) -> None:
         label = str(changes.get("label", ""))
-        self.counter = RailEncoderEmulator(device, METRES, label)
+        self.counter = EmulatedRailEncoder(device, METRES, label)
         parameters = RailEncoderParameters(device=str(device), metres_per_count=METRES)
         self.encoder = RailEncoder(replace(parameters, **changes))  # type: ignore[arg-type]
         self.now_s = 0.0

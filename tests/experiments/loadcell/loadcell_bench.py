@@ -18,11 +18,10 @@ from experiments.loadcell.recording import CellRecorder
 from experiments.loadcell.stage import SimulatedStage
 from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
 from experiments.trials.notebook import Notebook
+from simulation.test_rig.emulated_instruments import AmplifierParameters, StageEncoderParameters
 from simulation.test_rig.load_cell_bench import EmulatedBench, Event
-from simulation.test_rig.load_cell_emulator import AmplifierParameters
 from simulation.test_rig.plate_stage import CarriedPlate, StageParameters
-from simulation.test_rig.stage_encoder_emulator import StageEncoderParameters
-from simulation.test_rig.stage_motion import HandParameters
+from simulation.test_rig.stage_motion import ManualMotionParameters
 from tests.experiments.made_up_mud import LawfulMud
 from tests.scripted_operator import ScriptedOperator
 
@@ -51,7 +50,7 @@ class Laboratory:
         """With an `encoder` the stage is pushed by a hand."""
         self.folder, self.operator = folder, operator
         if encoder is not None:
-            stage = StageParameters(hand=HandParameters(), seed=seed)
+            stage = StageParameters(manual=ManualMotionParameters(), seed=seed)
         self.bench = EmulatedBench(next(iter(muds.values())), folder / "cell", amplifier, stage, seed, encoder)
         self.port = LoadCellPort(
             str(folder / "cell"), baud, LineFormat(line_format), LoadCellCalibration("counts", 1.0)

@@ -15,8 +15,7 @@ from experiments.loadcell.stage import Trial
 from experiments.loadcell.trials import KEEP, WITHOUT, measure
 from experiments.robot.bench_robot import BenchError
 from experiments.robot.prompt import GO_ON
-from simulation.test_rig.load_cell_emulator import AmplifierParameters
-from simulation.test_rig.stage_encoder_emulator import EmulatedStageEncoder, StageEncoderParameters
+from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedStageEncoder, StageEncoderParameters
 from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Laboratory, Make, laboratories
 from tests.scripted_operator import ScriptedOperator
 

@@ -23,7 +23,7 @@ from experiments.loadcell.analysis.measured_motion import moving
 from experiments.loadcell.analysis.stage_track import WIDE, Alignment, StagePositions, common_alignment, fit_rate
 from simulation.mud.clay import RATE_COEFFICIENT
 from simulation.test_rig.load_cell_bench import clay_plate
-from simulation.test_rig.stage_motion import HandParameters
+from simulation.test_rig.stage_motion import ManualMotionParameters
 from tests.experiments.loadcell.test_fits import true_of_clay
 from tests.experiments.made_up_mud import LawfulMud, feel_by_hand
 
@@ -184,7 +184,7 @@ def test_after_a_rest_samples_count_again_two_millimetres_on() -> None:
 
 
 def test_a_slow_encoder_is_doubted_more() -> None:
-    hand = HandParameters(rest_fraction=0.0)
+    hand = ManualMotionParameters(rest_fraction=0.0)
     quick, slow = (
         one(feel_by_hand(clay_plate(49.5), INSERTION, 9, hand, position_rate_hz=rate_hz)) for rate_hz in (100.0, 25.0)
     )

@@ -21,7 +21,7 @@ from experiments.loadcell.trial_checks import list_problems
 from experiments.loadcell.trials import KEEP, measure, record
 from experiments.robot.bench_robot import BenchError
 from experiments.robot.prompt import GO_ON, REDO, SKIP
-from simulation.test_rig.load_cell_emulator import AmplifierParameters
+from simulation.test_rig.emulated_instruments import AmplifierParameters
 from simulation.test_rig.plate_stage import StageParameters
 from tests.experiments.loadcell.loadcell_bench import COUNTS, KNOWN, SETTINGS, Laboratory, Make, laboratories
 from tests.scripted_operator import ScriptedOperator

@@ -377,7 +377,7 @@ def walking(configuration: Configuration) -> Lockstep:
     lockstep = Lockstep(configuration, Track([(9.0, MUDS["48.5"])]), plant=plant_of(configuration, free_body=True))
     lockstep.arm()
     lockstep.walk(WalkOrder(0.03, adaptive=False))
-    lockstep.run_for(7.0)
+    lockstep.run_for(5.5)
     return lockstep
 
 
@@ -395,11 +395,11 @@ def test_a_free_body_s_joints_stand_as_high_as_the_configuration_says(configurat
 def test_a_walk_of_a_free_body_hardly_depends_on_the_step_of_the_simulation(
     configuration: Configuration, walking: Lockstep, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("simulation.harness.robot.STEP_S", 0.00025)
+    monkeypatch.setattr("simulation.harness.robot.STEP_S", 0.0005)
     fine = Lockstep(configuration, Track([(9.0, MUDS["48.5"])]), plant=plant_of(configuration, free_body=True))
     fine.arm()
     fine.walk(WalkOrder(0.03, adaptive=False))
-    fine.run_for(7.0)
+    fine.run_for(5.5)
     assert fine.robot.plant.body_m == pytest.approx(walking.robot.plant.body_m, rel=0.1)
 
 

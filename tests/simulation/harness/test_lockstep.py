@@ -37,8 +37,8 @@ def make_walking(configuration: Configuration, seed: int, seconds: float) -> Loc
 
 
 def test_the_same_seed_walks_the_same_strides_to_the_last_bit(configuration: Configuration) -> None:
-    first, second = (make_walking(configuration, 5, 5.0) for _ in range(2))
-    assert len(first.loop.learning.strides) >= 4
+    first, second = (make_walking(configuration, 5, 3.5) for _ in range(2))
+    assert len(first.loop.learning.strides) >= 2
     assert repr(first.loop.learning.strides) == repr(second.loop.learning.strides)
     assert repr(first.loop.states) == repr(second.loop.states)
     assert first.robot.plant.body_m == second.robot.plant.body_m
@@ -54,8 +54,8 @@ def test_on_a_fixed_base_the_flippers_walk_and_the_body_stays(configuration: Con
     lockstep = Lockstep(configuration, TRACK, fixed_base=True)
     lockstep.arm()
     lockstep.walk(WalkOrder(0.03))
-    lockstep.run_for(5.0)
-    assert len(lockstep.loop.learning.strides) >= 4
+    lockstep.run_for(3.5)
+    assert len(lockstep.loop.learning.strides) >= 2
     assert lockstep.robot.plant.body_m == 0.0
     assert abs(lockstep.loop.body.x_m) < 0.001  # what motion capture sees of it
 
@@ -104,7 +104,7 @@ def test_nothing_is_transmitted_before_every_drive_was_heard(configuration: Conf
 def test_it_arms_from_power_on_and_holds_its_pose(holding: Lockstep) -> None:
     assert holding.now_s < 1.0
     before_rad = holding.robot.plant.angles_rad
-    holding.run_for(3.0)
+    holding.run_for(1.5)
     assert holding.loop.mode is Mode.HOLD
     assert holding.loop.fault is None
     assert all(drive.energised for drive in holding.robot.drives)
@@ -113,20 +113,17 @@ def test_it_arms_from_power_on_and_holds_its_pose(holding: Lockstep) -> None:
 
 def test_nothing_arms_by_itself(configuration: Configuration) -> None:
     lockstep = Lockstep(configuration, TRACK)
-    lockstep.run_for(3.0)
+    lockstep.run_for(2.0)
     assert lockstep.loop.mode is Mode.IDLE
     assert all(not drive.energised for drive in lockstep.robot.drives)
 
 
-def test_an_order_of_three_strides_walks_three_and_holds_with_flippers_raised(holding: Lockstep) -> None:
-    holding.walk(WalkOrder(0.03, adaptive=False, strides=3))
+def test_an_order_of_two_strides_walks_two_and_holds_with_flippers_raised(holding: Lockstep) -> None:
+    holding.walk(WalkOrder(0.03, adaptive=False, strides=2))
     assert holding.run_until(lambda: holding.loop.mode is Mode.WALKING, 1.0)
     assert holding.run_until(lambda: holding.loop.mode is Mode.HOLD, 15.0)
-    assert [stride.estimate.index for stride in holding.loop.learning.strides if stride.estimate.flipper == "left"] == [
-        0,
-        1,
-        2,
-    ]
+    left = [stride.estimate.index for stride in holding.loop.learning.strides if stride.estimate.flipper == "left"]
+    assert left == [0, 1]
     holding.run_for(0.5)
     geometry = holding.loop.configuration.geometry
     assert geometry.depth_m(*holding.robot.plant.angles_rad[:2]) < -0.005
@@ -147,7 +144,7 @@ def test_power_is_cut_when_the_loop_stops_ticking(holding: Lockstep) -> None:
 def test_a_silent_drive_is_a_fault_and_all_torques_are_zero(
     configuration: Configuration, monkeypatch: pytest.MonkeyPatch, joint: str
 ) -> None:
-    lockstep = make_walking(configuration, 1, 2.0)
+    lockstep = make_walking(configuration, 1, 0.5)
     assert any(lockstep.loop.sent.torques_nm)
 
     def no_frames(now_s: float) -> Iterator[Frame]:
@@ -180,9 +177,9 @@ def test_a_drive_that_disarms_itself_is_a_fault_that_can_be_cleared(holding: Loc
 def test_a_walk_hardly_depends_on_the_step_of_the_simulation(
     configuration: Configuration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    coarse = make_walking(configuration, 1, 5.0).robot.plant.body_m
-    monkeypatch.setattr("simulation.harness.robot.STEP_S", 0.00025)
-    fine = make_walking(configuration, 1, 5.0).robot.plant.body_m
+    coarse = make_walking(configuration, 1, 4.5).robot.plant.body_m
+    monkeypatch.setattr("simulation.harness.robot.STEP_S", 0.0005)
+    fine = make_walking(configuration, 1, 4.5).robot.plant.body_m
     assert coarse > 0.2
     assert fine == pytest.approx(coarse, rel=0.03)
 

@@ -197,8 +197,10 @@ def test_layers_do_not_change_each_other_s_draws() -> None:
     assert surfaces_m(alone, 5) == surfaces_m(together, 5)
 
 
-def single_flipper(configuration: Configuration, disturbances: Disturbances, track: Track = SOFT) -> Lockstep:
-    gait = replace(SINGLE_FLIPPER, stance_speed_m_s=0.3, pause_s=1.0)  # short holds for a short test
+def single_flipper(
+    configuration: Configuration, disturbances: Disturbances, track: Track = SOFT, pause_s: float = 0.2
+) -> Lockstep:
+    gait = replace(SINGLE_FLIPPER, stance_speed_m_s=0.3, pause_s=pause_s)  # short holds for a short test
     lockstep = Lockstep(replace(configuration, gait=gait), track, disturbances=disturbances, fixed_base=True)
     lockstep.arm()
     lockstep.walk(WalkOrder(0.03, adaptive=False))
@@ -241,7 +243,7 @@ def test_clinging_mud_is_felt_in_swing_from_the_first_extraction_on(configuratio
 
 
 def test_remoulded_mud_lets_the_flipper_through_more_easily_stroke_by_stroke(configuration: Configuration) -> None:
-    truths = truths_of(single_flipper(configuration, Disturbances(remoulding=1.0)), 25.0)
+    truths = truths_of(single_flipper(configuration, Disturbances(remoulding=1.0)), 14.0)
     left = [truth.clay.strength_pa / MUDS["53.1"].strength_pa for truth in truths if truth.flipper == "left"]
     assert len(left) >= 4
     assert left == pytest.approx([0.5 + 0.5 * exp(-0.4 * earlier) for earlier in range(len(left))])
@@ -282,14 +284,14 @@ def held_thrust_n(lockstep: Lockstep) -> tuple[float, float]:
 @pytest.mark.parametrize("relaxation", [0.13, 0.3])
 def test_a_load_relaxes_in_the_holds(configuration: Configuration, relaxation: float) -> None:
     """Beside what the mud's rate takes from a plate that stops."""
-    early_n, late_n = held_thrust_n(single_flipper(configuration, Disturbances(relaxation=relaxation)))
-    plain_early_n, plain_late_n = held_thrust_n(single_flipper(configuration, NONE))
+    early_n, late_n = held_thrust_n(single_flipper(configuration, Disturbances(relaxation=relaxation), pause_s=1.0))
+    plain_early_n, plain_late_n = held_thrust_n(single_flipper(configuration, NONE, pause_s=1.0))
     assert early_n == pytest.approx(plain_early_n, rel=0.02)
     assert late_n == pytest.approx((1.0 - relaxation) * plain_late_n, rel=0.08)  # the servo pushes on
 
 
 def test_both_flippers_meet_their_own_surfaces_and_are_as_much_deeper(configuration: Configuration) -> None:
-    truths = truths_of(single_flipper(configuration, Disturbances(surface_sd_m=0.003)), 20.0)
+    truths = truths_of(single_flipper(configuration, Disturbances(surface_sd_m=0.003)), 12.0)
     assert len(truths) >= 6
     assert len({truth.surface_m for truth in truths}) == len(truths)
     assert max(truth.surface_m for truth in truths) - min(truth.surface_m for truth in truths) > 0.003
@@ -320,9 +322,9 @@ def test_the_joints_stay_calm_in_the_lab(configuration: Configuration) -> None:
         lockstep = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), disturbances=disturbances)
         lockstep.arm()
         lockstep.walk(WalkOrder(0.03, adaptive=False))
-        lockstep.run_for(3.0)
+        lockstep.run_for(1.0)
         rates_rad_s = []
-        for _ in range(round(4.0 / PERIOD_S)):
+        for _ in range(round(3.2 / PERIOD_S)):
             lockstep.step()
             if lockstep.loop.target.phase is Phase.SWING:
                 rates_rad_s.append(lockstep.robot.plant.velocities_rad_s[1])
@@ -338,11 +340,11 @@ def test_the_current_is_as_noisy_as_stated(configuration: Configuration) -> None
         lockstep = Lockstep(configuration, SOFT, disturbances=Disturbances(current_noise_a=noise_a))
         lockstep.run_for(0.5)
         currents_a = []
-        for _ in range(2000):  # of idle drives
+        for _ in range(1000):  # of idle drives
             lockstep.step()
             currents_a.append(lockstep.loop.states[0].current_a)
         deviations_a.append(pstdev(currents_a))
-    assert deviations_a == pytest.approx([0.1, 0.4], rel=0.07)  # 0: the drive's own
+    assert deviations_a == pytest.approx([0.1, 0.4], rel=0.1)  # 0: the drive's own
 
 
 def test_seldom_messages_are_read_again_and_again(configuration: Configuration) -> None:
@@ -376,7 +378,7 @@ def test_the_robot_walks_in_the_lab_without_a_fault(configuration: Configuration
     lockstep = Lockstep(configuration, Track([(5.0, MUDS[water])]), disturbances=LAB)
     lockstep.arm()
     lockstep.walk(WalkOrder(0.04, adaptive=False))
-    lockstep.run_for(6.0)
+    lockstep.run_for(4.0)
     assert lockstep.loop.mode is Mode.WALKING
     assert lockstep.robot.plant.body_m > 0.05
 
@@ -387,8 +389,8 @@ def test_the_lab_is_the_same_for_the_same_seed_and_another_for_another(configura
         lockstep = Lockstep(configuration, SOFT, seed, disturbances=LAB)
         lockstep.arm()
         lockstep.walk(WalkOrder(0.03, adaptive=False))
-        walks.append(truths_of(lockstep, 4.0))
-    assert len(walks[0]) >= 4
+        walks.append(truths_of(lockstep, 2.5))
+    assert len(walks[0]) >= 2
     assert repr(walks[0]) == repr(walks[1])
     surfaces = [{truth.surface_m for truth in walk} for walk in walks]
     assert not surfaces[0] & surfaces[2]

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simulation.test_rig.plate_stage import LIFTED_M, PlateStage, StageParameters
-from simulation.test_rig.stage_motion import HandMotion, HandParameters, RampedMotion
+from simulation.test_rig.stage_motion import ManualMotion, ManualMotionParameters, RampedMotion
 
 
 class Air:
@@ -59,7 +59,7 @@ def test_an_insertion_goes_down_holds_and_comes_up() -> None:
 def test_lowering_and_lifting_end_at_their_depths_and_a_drag_goes_backward() -> None:
     air = Air()
     stage = PlateStage(air)
-    stage.place_over(air, sideways=True)
+    stage.move_over(air, sideways=True)
     stage.mean_force_n(0.0)
     stage.lower(0.0, 0.03)
     stage.mean_force_n(2.0)
@@ -76,17 +76,17 @@ def test_the_cell_reads_the_mean_since_the_last_time_and_what_hangs_on_it() -> N
     stage = PlateStage(Air(), StageParameters(1e6, cell_sign=-1.0))
     stage.reset()
     stage.mean_force_n(0.0)
-    stage.hung_n = 2.0
+    stage.hung_weight_n = 2.0
     assert stage.mean_force_n(0.5) == pytest.approx(-2.0 + LIFTED_M)
-    stage.hung_n = 0.0
+    stage.hung_weight_n = 0.0
     stage.insert(0.5, 0.0, 0.1, 0.0)  # 2 cm down within 0.2 s
     assert stage.mean_force_n(0.7) == pytest.approx(LIFTED_M / 2.0, rel=0.01)
 
 
 @given(st.floats(0.003, 0.3), st.integers(0, 10**6))
 def test_a_hand_goes_all_its_way_forward_and_never_faster_than_it_can(path_m: float, seed: int) -> None:
-    hand = HandParameters()
-    motion = HandMotion(path_m, hand, Random(seed))
+    hand = ManualMotionParameters()
+    motion = ManualMotion(path_m, hand, Random(seed))
     step_s = motion.duration_s / 500.0
     positions_m = [motion.path_m(i * step_s) for i in range(501)]
     assert (positions_m[0], positions_m[-1]) == (0.0, path_m)
@@ -95,21 +95,21 @@ def test_a_hand_goes_all_its_way_forward_and_never_faster_than_it_can(path_m: fl
 
 
 def test_a_hand_stutters_and_rests() -> None:
-    motion = HandMotion(0.2, HandParameters(), Random(3))
+    motion = ManualMotion(0.2, ManualMotionParameters(), Random(3))
     speeds_m_s = [100.0 * (motion.path_m(i / 100.0) - motion.path_m((i - 1) / 100.0)) for i in range(10, 150)]
     assert sum(speed < 1e-6 for speed in speeds_m_s) > 5
     assert max(speeds_m_s) > 2.0 * 0.06
 
 
 def test_an_encoder_on_the_stage_counts_every_stroke_and_nothing_else() -> None:
-    stage = PlateStage(Air(), StageParameters(hand=HandParameters()))
+    stage = PlateStage(Air(), StageParameters(manual=ManualMotionParameters()))
     stage.mean_force_n(0.0)
     stage.insert(1.0, 0.03, 0.1, 3.0)
     down_s = stage.ends_s
     for at_s in (1.3, 1.4, 3.0, down_s):
         stage.mean_force_n(at_s)
         assert -stage.travelled_m(at_s) == pytest.approx(stage.plate.depth_m + LIFTED_M, abs=1e-6)
-    stage.place_over(stage.plate, sideways=True)
+    stage.move_over(stage.plate, sideways=True)
     stage.drag(down_s, 0.2, 0.1)
     assert stage.travelled_m(down_s) == pytest.approx(0.0, abs=1e-9)
     assert stage.travelled_m(stage.ends_s) == pytest.approx(-0.2)

@@ -11,8 +11,8 @@ from statistics import fmean, stdev
 
 import pytest
 
-from simulation.test_rig.load_cell_bench import EmulatedBench, clay_plate, obey
-from simulation.test_rig.load_cell_emulator import AmplifierParameters, EmulatedAmplifier
+from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedAmplifier
+from simulation.test_rig.load_cell_bench import EmulatedBench, clay_plate, execute
 
 
 class Listener:
@@ -87,7 +87,7 @@ def test_an_unplugged_amplifier_hangs_up_and_comes_back_by_the_same_name(tmp_pat
 
 def test_what_nobody_reads_is_lost_and_counted(tmp_path: Path) -> None:
     amplifier = EmulatedAmplifier(lambda _: 1.0, AmplifierParameters(rate_hz=1000.0), tmp_path / "cell")
-    amplifier.awaits_delivery = False
+    amplifier.waits_for_delivery = False
     for second in range(1, 60):
         amplifier.step(float(second))
     assert amplifier.lost_lines > 1000
@@ -96,14 +96,14 @@ def test_what_nobody_reads_is_lost_and_counted(tmp_path: Path) -> None:
 
 def test_a_person_at_the_emulated_bench_moves_the_plate(tmp_path: Path) -> None:
     bench = EmulatedBench(clay_plate(49.5), tmp_path / "cell")
-    bench.amplifier.awaits_delivery = False
-    assert "there are insert" in obey(bench, ["jump"])
-    assert obey(bench, ["lower"]) == "lower at 0.0 s"
+    bench.amplifier.waits_for_delivery = False
+    assert "insert" in execute(bench, ["jump"])
+    assert execute(bench, ["lower"]) == "lower at 0.0 s"
     bench.pass_time(1.0)
     assert bench.stage.plate.depth_m == pytest.approx(0.03)
-    obey(bench, ["lift"])
+    execute(bench, ["lift"])
     bench.pass_time(1.0)
     assert bench.stage.plate.depth_m < 0.0
-    obey(bench, ["hang", "100"])
-    assert bench.stage.hung_n == pytest.approx(0.980665)
+    execute(bench, ["hang", "100"])
+    assert bench.stage.hung_weight_n == pytest.approx(0.980665)
     bench.close()

@@ -1,6 +1,7 @@
-"""A load cell's amplifier as a serial port meets it: a serial talker that converts forces.
+"""The serial instruments of the load-cell test rig: the load cell's amplifier, and the linear stage's encoder.
 
-A converter integrates over its period, adds noise and drift, rounds to a step of its own, and stops at its range.
+Both print lines on a pseudo-terminal. The amplifier's converter integrates over its period, adds noise and drift,
+rounds to a step of its own, and stops at its range. The encoder's counter starts at zero wherever it gets its power.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from control.bounds import Bounds
 from simulation.devices.serial_device import SerialTalker, TalkerParameters
 
 STYLES = ("counts", "newtons", "indicator", "columns")
+LARGEST_COUNT = 2**23
 
 
 @dataclass(frozen=True)
@@ -26,14 +28,14 @@ class AmplifierParameters(TalkerParameters):
     zero_counts: Annotated[float, Bounds(-8e6, 8e6)] = 81000.0
     noise_n: Annotated[float, Bounds(0.0, 1.0)] = 0.008  # of the mounted cell: the stage shakes more than the chip
     drift_n_s: Annotated[float, Bounds(-1.0, 1.0)] = 0.0
-    averaged: Annotated[int, Bounds(1, 64)] = 1  # conversions, of which an indicator's filter tells the mean
+    averaged: Annotated[int, Bounds(1, 64)] = 1  # conversions in the mean that an indicator's filter prints
     range_n: Annotated[float, Bounds(0.0, 1e4)] = 20.0  # beyond it the cell is overloaded
 
 
 class EmulatedAmplifier(SerialTalker):
-    """Owns when it was switched on.
+    """Owns the time at which it was switched on.
 
-    `mean_force_n`, told a time, is the force on the cell on average since the last conversion.
+    `mean_force_n(time)` returns the mean force on the cell since the last conversion.
     """
 
     def __init__(
@@ -57,12 +59,41 @@ class EmulatedAmplifier(SerialTalker):
     def _line(self, force_n: float, at_s: float) -> bytes:
         amplifier = self.amplifier
         overloaded = abs(force_n) > amplifier.range_n
-        style, reported = amplifier.style, max(min(force_n, 1e6), -1e6)
+        style, shown_n = amplifier.style, max(min(force_n, 1e6), -1e6)
         if style == "indicator":
-            return b"OL,GS,+-------kg\r\n" if overloaded else f"ST,GS,{reported / 9.80665:+09.5f}kg\r\n".encode()
+            return b"OL,GS,+-------kg\r\n" if overloaded else f"ST,GS,{shown_n / 9.80665:+09.5f}kg\r\n".encode()
         if style == "newtons":
-            return b"OL\r\n" if overloaded else f"Load: {reported:.4f} N\r\n".encode()
-        end = 2**23 - 1 if force_n * amplifier.counts_per_newton > 0.0 else -(2**23)
+            return b"OL\r\n" if overloaded else f"Load: {shown_n:.4f} N\r\n".encode()
+        end = LARGEST_COUNT - 1 if force_n * amplifier.counts_per_newton > 0.0 else -LARGEST_COUNT
         counts = round(amplifier.zero_counts + amplifier.counts_per_newton * force_n)
-        counts = end if overloaded else max(-(2**23), min(counts, 2**23 - 1))
+        counts = end if overloaded else max(-LARGEST_COUNT, min(counts, LARGEST_COUNT - 1))
         return f"{round(1000 * at_s)},{counts}\r\n".encode() if style == "columns" else f"{counts}\r\n".encode()
+
+
+@dataclass(frozen=True)
+class StageEncoderParameters(TalkerParameters):
+    burst_s: Annotated[float, Bounds(0.0, 0.2)] = 0.004  # another adapter than the load cell's
+    metres_per_count: Annotated[float, Bounds(1e-8, 0.01)] = 1e-5
+    label: str = ""
+
+
+class EmulatedStageEncoder(SerialTalker):
+    """Owns its zero. `position_m(time)` returns the stage's position."""
+
+    def __init__(
+        self, position_m: Callable[[float], float], parameters: StageEncoderParameters, link: Path, seed: int = 1
+    ) -> None:
+        self.encoder = parameters
+        self.position_m = position_m
+        self._zero_m: float | None = None
+        super().__init__(self._count, parameters, link, Random(seed))
+
+    def plug_in(self) -> None:
+        self._zero_m = None
+        super().plug_in()
+
+    def _count(self, at_s: float) -> bytes:
+        position_m = self.position_m(at_s)
+        if self._zero_m is None:
+            self._zero_m = position_m
+        return f"{self.encoder.label}{round((position_m - self._zero_m) / self.encoder.metres_per_count)}\r\n".encode()
