@@ -150,7 +150,7 @@ class BellyQuarter:
         return floating_n + min(max(elastic_n + damping_n, 0.0), traction * slow_n)
 
     def _strain_m(self, stiffness_n_m: float, depth_m: float) -> float:
-        """Returns the strain above the print. Where the mud becomes stiffer the force stays, as it does along a plate."""
+        """Returns the strain above the print. Where the mud becomes stiffer the force stays, as along a plate."""
         strain_m = depth_m - self._print_m
         if strain_m > 0.0 and 0.0 < self._stiffness_n_m < stiffness_n_m:
             strain_m *= self._stiffness_n_m / stiffness_n_m

@@ -9,7 +9,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from simulation.body.blocks import LYING_RAD
+from simulation.body.blocks import RESTING_RAD
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness import peer
 from simulation.harness.local_setup import write_local_setup
@@ -89,7 +89,7 @@ def test_on_blocks_the_flippers_lie_in_reach_of_no_mud(short_folder: Path, peers
     assert main(["simulate", "--config", str(setup), "--on-blocks"]) == exit_codes.OK
     plant = peers[0].robot.plant
     assert plant.parameters.fixed_base
-    assert plant.angles_rad == pytest.approx((0.0, LYING_RAD, 0.0, LYING_RAD))
+    assert plant.angles_rad == pytest.approx((0.0, RESTING_RAD, 0.0, RESTING_RAD))
 
 
 def test_a_signal_moves_the_flippers_back_by_hand(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
