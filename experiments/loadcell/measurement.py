@@ -38,10 +38,9 @@ from experiments.reports.report_page import FLAT, to_json
 from experiments.robot.bench_errors import BenchError
 from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.session import Session, Show
+from simulation.test_rig.emulated_instruments import AmplifierParameters, StageEncoderParameters
 from simulation.test_rig.load_cell_bench import EmulatedBench, clay_plate, position_link
-from simulation.test_rig.emulated_instruments import AmplifierParameters
 from simulation.test_rig.plate_stage import StageParameters
-from simulation.test_rig.emulated_instruments import StageEncoderParameters
 from simulation.test_rig.stage_motion import ManualMotionParameters
 
 
