@@ -1,8 +1,7 @@
-"""What every benchmark prints: one JSON object for a program, or a table and a verdict for a person.
+"""The frame of every benchmark: it parses the arguments, measures, and prints one JSON object or a table and a verdict.
 
-A benchmark of figures does not judge: it ends with status 0 whatever it measured, and its verdict says which bar was
-reached. One that looks for defects ends with status 1 where its own is missed.
-While it runs, one line on a terminal says how far it is.
+A benchmark of figures does not judge them: it ends with status 0, and its verdict says whether its bar was reached. A
+benchmark that looks for defects ends with status 1 where its bar is missed. One line on a terminal shows the progress.
 """
 
 from __future__ import annotations
@@ -10,8 +9,12 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
+
+FAST_FOLDER = Path("/dev/shm")  # spares the disk
 
 
 def new_parser(module: str, description: str | None) -> argparse.ArgumentParser:
@@ -24,8 +27,24 @@ def new_parser(module: str, description: str | None) -> argparse.ArgumentParser:
     return parser
 
 
-def print_report(report: dict[str, Any], text: str, as_json: bool) -> None:
-    print(json.dumps(report) if as_json else text)
+def run_benchmark(
+    parser: argparse.ArgumentParser,
+    arguments: Sequence[str] | None,
+    measure: Callable[[argparse.Namespace, Path], dict[str, Any]],
+    text_of: Callable[[dict[str, Any]], str],
+    finds_defects: bool = False,
+) -> int:
+    """Runs `measure` with the options and an empty folder, prints its report, and returns the exit status."""
+    options = parser.parse_args(arguments)
+    with TemporaryDirectory(prefix="mud-", dir=FAST_FOLDER if FAST_FOLDER.is_dir() else None) as folder:
+        report = {"benchmark": parser.prog.split(".")[-1]} | measure(options, Path(folder))
+    Progress(1.0).clear()
+    print(json.dumps(report) if options.json else f"{text_of(report)}\n{report['verdict']}")
+    return 1 if finds_defects and not report["reached"] else 0
+
+
+def evaluated(report: dict[str, Any], bar: str, reached: bool) -> dict[str, Any]:
+    return report | {"reached": reached, "verdict": verdict(bar, reached)}
 
 
 def verdict(bar: str, reached: bool) -> str:
@@ -33,7 +52,7 @@ def verdict(bar: str, reached: bool) -> str:
 
 
 def summary_us(durations_s: Sequence[float]) -> dict[str, float]:
-    """Median, p99 and the longest in microseconds; zeros where nothing was measured."""
+    """Returns median, p99 and maximum in microseconds; zeros where nothing was measured."""
     ordered = sorted(durations_s) or [0.0]
     last = len(ordered) - 1
     fractions = {"median": 0.50, "p99": 0.99, "max": 1.0}

@@ -10,16 +10,18 @@ one insertion, all it knows of them divided by their number.
 
 from __future__ import annotations
 
+import argparse
 import gc
 import sys
 import tracemalloc
 from collections.abc import Sequence
+from pathlib import Path
 from random import Random
 from statistics import median
 from time import perf_counter
 from typing import Any
 
-from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
 from benchmarks.speed.fit_libraries import FITS
 from benchmarks.speed.synthetic_walk import (
     DRIVE,
@@ -237,8 +239,6 @@ def text_of(report: dict[str, Any]) -> str:
             f"memory over {memory['strides']} strides: {memory['growth_bytes']:+d} bytes, {peak}",
             "",
             table(fit_rows(report["fits"], report["samples"])),
-            "",
-            report["verdict"],
         ]
     )
 
@@ -273,28 +273,27 @@ def fit_rows(fits: dict[str, Any], samples: int) -> list[list[str]]:
     return rows
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("benchmarks.speed.estimator_cost", __doc__)
-    parser.add_argument("--strides", type=int, default=200, help="timed, of each method")
-    parser.add_argument("--memory-strides", type=int, default=1000, help="in which the memory may not grow")
-    options = parser.parse_args(arguments)
+def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     strides, memory_strides = options.strides, options.memory_strides
     progress = Progress(WARM_UP_STRIDES + strides + memory_strides + len(FITS))
     freeze_garbage()
-    report: dict[str, Any] = {"benchmark": "estimator_cost", "strides": strides}
-    report["methods"] = measure_strides(strides, progress)
+    report: dict[str, Any] = {"strides": strides, "methods": measure_strides(strides, progress)}
     report["repeats"] = measure_repeats(strides)
     report["stroke_us"] = measure_stroke(strides)
     report |= measure_fits(max(1, strides // 10), progress, WARM_UP_STRIDES + strides)
     report["memory"] = measure_memory(memory_strides, progress, WARM_UP_STRIDES + strides + len(FITS))
-    progress.clear()
+    report |= {"bar_sample_us": BAR_SAMPLE_US, "bar_close_us": BAR_CLOSE_US}
     ours = report["methods"]["default"]
     reached = ours["sample_mean_us"] <= BAR_SAMPLE_US and ours["close_total_us"] <= BAR_CLOSE_US
     bar = f"a sample at most {BAR_SAMPLE_US:g} us and a stride's ends at most {BAR_CLOSE_US:g} us"
-    report |= {"bar_sample_us": BAR_SAMPLE_US, "bar_close_us": BAR_CLOSE_US}
-    report |= {"reached": reached, "verdict": verdict(bar, reached)}
-    print_report(report, text_of(report), options.json)
-    return 0
+    return evaluated(report, bar, reached)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = new_parser("benchmarks.speed.estimator_cost", __doc__)
+    parser.add_argument("--strides", type=int, default=200, help="timed, of each method")
+    parser.add_argument("--memory-strides", type=int, default=1000, help="in which the memory may not grow")
+    return run_benchmark(parser, arguments, measure, text_of)
 
 
 if __name__ == "__main__":

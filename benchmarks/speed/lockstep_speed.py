@@ -7,14 +7,16 @@ counted. The figure of a round is simulated time over elapsed time.
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from statistics import median
 from time import perf_counter
 from typing import Any
 
 from benchmarks.example_robot import load_example
-from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
 from control.controller import WalkOrder
 from experiments.reports.text_tables import table
 from simulation.harness.lockstep import Lockstep
@@ -51,26 +53,24 @@ def text_of(report: dict[str, Any]) -> str:
         ]
         for number, walk in enumerate(report["rounds"], 1)
     ]
-    return "\n".join([table([head, *rows]), "", f"median {report['median_times']:.1f} times", report["verdict"]])
+    return "\n".join([table([head, *rows]), "", f"median {report['median_times']:.1f} times"])
+
+
+def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    progress, rounds = Progress(options.rounds), []
+    for number in range(options.rounds):
+        progress.show(number, "walking")
+        rounds.append(walk_once(options.longest))
+    times = median(walk["times"] for walk in rounds)
+    report: dict[str, Any] = {"rounds": rounds, "median_times": times, "bar_times": BAR_TIMES}
+    return evaluated(report, f"at least {BAR_TIMES:g} times faster than real time", times >= BAR_TIMES)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.speed.lockstep_speed", __doc__)
     parser.add_argument("--rounds", type=int, default=5, help="walks, of which the median counts")
     parser.add_argument("--longest", type=float, default=300.0, metavar="SECONDS", help="simulated, of one walk")
-    options = parser.parse_args(arguments)
-    progress, rounds = Progress(options.rounds), []
-    for number in range(options.rounds):
-        progress.show(number, "walking")
-        rounds.append(walk_once(options.longest))
-    progress.clear()
-    times = median(walk["times"] for walk in rounds)
-    reached = times >= BAR_TIMES
-    report: dict[str, Any] = {"benchmark": "lockstep_speed", "rounds": rounds, "median_times": times}
-    bar = f"at least {BAR_TIMES:g} times faster than real time"
-    report |= {"bar_times": BAR_TIMES, "reached": reached, "verdict": verdict(bar, reached)}
-    print_report(report, text_of(report), options.json)
-    return 0
+    return run_benchmark(parser, arguments, measure, text_of)
 
 
 if __name__ == "__main__":

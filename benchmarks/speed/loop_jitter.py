@@ -22,7 +22,7 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
-from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
 from control.controller import WalkOrder
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
@@ -218,7 +218,6 @@ def measure(seconds: float) -> dict[str, Any]:
             daemon.run(turn_s, real)
             progress.show(number + 0.7, "the bare loop")
             bare_loop.run(turn_s, bare)
-    progress.clear()
     seen = {"faults": daemon.faults, "dropped_rows": daemon.recorder.dropped, "warnings": warnings}
     loop = real.report() | {"work_us": real.work.summary()}
     return {"rounds": rounds, "turn_s": turn_s, "loop": loop, "bare": bare.report()} | seen
@@ -244,7 +243,6 @@ def text_of(report: dict[str, Any]) -> str:
             f"a beat's work after a sleep: p50 {work['p50']:.0f}, p99 {work['p99']:.0f}, max {work['max']:.0f} us",
             f"{report['faults']} turns ended in a fault; {report['dropped_rows']} rows dropped",
             *(f"warning: {warning}" for warning in report["warnings"]),
-            report["verdict"],
         ]
     )
 
@@ -254,25 +252,21 @@ def _row(name: str, figures: dict[str, Any]) -> list[str]:
     return [name, *(f"{late[key]:.0f}" for key in (*FRACTIONS, "max")), str(figures["beats"]), str(figures["missed"])]
 
 
-def new_options(arguments: Sequence[str] | None) -> argparse.Namespace:
-    parser = new_parser("benchmarks.speed.loop_jitter", __doc__)
-    parser.add_argument("--seconds", type=float, default=30.0, help=f"of each loop, in turns of {TURN_S:g} s")
-    parser.add_argument("--show-gil", action="store_true", help="also the bare loop beside a second, busy thread")
-    return parser.parse_args(arguments)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    options = new_options(arguments)
-    report: dict[str, Any] = {"benchmark": "loop_jitter", "seconds": options.seconds}
+def measure_all(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    report: dict[str, Any] = {"seconds": options.seconds, "bar_ratio": BAR_RATIO}
     if options.show_gil:
         report["gil"] = measure_gil(min(TURN_S, options.seconds))
     report |= measure(options.seconds)
     report["ratios"] = ratios(report["loop"], report["bare"])
-    reached = report["ratios"]["p50"] <= BAR_RATIO
     bar = f"median lateness at most {BAR_RATIO:g} times the bare loop's"
-    report |= {"bar_ratio": BAR_RATIO, "reached": reached, "verdict": verdict(bar, reached)}
-    print_report(report, text_of(report), options.json)
-    return 0
+    return evaluated(report, bar, report["ratios"]["p50"] <= BAR_RATIO)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = new_parser("benchmarks.speed.loop_jitter", __doc__)
+    parser.add_argument("--seconds", type=float, default=30.0, help=f"of each loop, in turns of {TURN_S:g} s")
+    parser.add_argument("--show-gil", action="store_true", help="also the bare loop next to a second, busy thread")
+    return run_benchmark(parser, arguments, measure_all, text_of)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ a recorder. What marking costs is measured and taken off each stage; whole ticks
 
 from __future__ import annotations
 
+import argparse
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -22,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.example_robot import load_example
-from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.report import Progress, evaluated, new_parser, run_benchmark, verdict
 from benchmarks.speed.can_paths import BAR_RATIO, compare_paths
 from benchmarks.speed.stage_marks import MEANINGS
 from benchmarks.speed.timed_walk import TimedWalk
@@ -64,7 +65,7 @@ def text_of(report: dict[str, Any]) -> str:
     )
     lines.append(f"SocketCAN, reads and sends of a tick: {own}, {python_can}, {paths['ratio']:.2f} times as much")
     lines.append(verdict(f"python-can takes at least {BAR_RATIO:g} times as long", paths["reached"]))
-    return "\n".join([*lines, report["verdict"]])
+    return "\n".join(lines)
 
 
 def _rows(figures: dict[str, Any]) -> list[list[str]]:
@@ -81,38 +82,23 @@ def _row(name: str, figures: dict[str, float], meaning: str) -> list[str]:
     return [name, *(f"{figures[key]:7.1f}" for key in ("median", "p99", "max")), meaning]
 
 
-def report_of(measured: dict[str, dict[str, Any]], seconds: int, socketcan: dict[str, Any]) -> dict[str, Any]:
-    """Judged by the virtual bus where that was measured, by the first one otherwise."""
-    evaluated = "virtual" if "virtual" in measured else next(iter(measured))
-    reached = measured[evaluated]["whole_us"]["median"] <= BAR_US
-    bar = f"median whole tick over the {evaluated} bus at most {BAR_US:.0f} us"
-    return {
-        "benchmark": "tick_time",
-        "seconds": seconds,
-        "variants": measured,
-        "socketcan": socketcan,
-        "bar_us": BAR_US,
-        "reached": reached,
-        "verdict": verdict(bar, reached),
-    }
+def measure_all(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """The verdict is that of the virtual bus where it was measured, and of the first one otherwise."""
+    variants, seconds = options.bus or list(VARIANTS), options.seconds
+    progress = Progress(len(variants) * seconds)
+    measured = {variant: measure(variant, seconds, progress, place * seconds) for place, variant in enumerate(variants)}
+    progress.show(len(variants) * seconds, "both paths to SocketCAN")
+    bus = "virtual" if "virtual" in measured else variants[0]
+    report = {"seconds": seconds, "variants": measured, "socketcan": compare_paths(), "bar_us": BAR_US}
+    reached = measured[bus]["whole_us"]["median"] <= BAR_US
+    return evaluated(report, f"median whole tick over the {bus} bus at most {BAR_US:.0f} us", reached)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.speed.tick_time", __doc__)
     parser.add_argument("--seconds", type=int, default=20, help="of simulated walking behind each figure")
     parser.add_argument("--bus", action="append", choices=VARIANTS, help="measure only this one; repeatable")
-    options = parser.parse_args(arguments)
-    variants = options.bus or list(VARIANTS)
-    progress = Progress(len(variants) * options.seconds)
-    measured = {
-        variant: measure(variant, options.seconds, progress, place * options.seconds)
-        for place, variant in enumerate(variants)
-    }
-    progress.show(len(variants) * options.seconds, "both paths to SocketCAN")
-    report = report_of(measured, options.seconds, compare_paths())
-    progress.clear()
-    print_report(report, text_of(report), options.json)
-    return 0
+    return run_benchmark(parser, arguments, measure_all, text_of)
 
 
 if __name__ == "__main__":

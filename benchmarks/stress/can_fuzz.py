@@ -9,16 +9,18 @@ nothing may leave for a drive but zero torque, idle, and questions for version a
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from random import Random
 from struct import pack
 from time import perf_counter
 from typing import Any
 
 from benchmarks.example_robot import load_example
-from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
 from benchmarks.stress.resources import resident_kib
 from control.modes import Mode
 from control.rate import PERIOD_S
@@ -228,7 +230,8 @@ def is_ours(frame: Frame) -> bool:
     return frame.is_remote or frame.arbitration_id & 0x1F not in reported
 
 
-def measure(frames: int, seed: int, progress: Progress) -> dict[str, Any]:
+def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    frames, seed, progress = options.frames, options.seed, Progress(options.frames)
     configuration = load_example()
     freeze_garbage()
     parts: dict[str, dict[str, Any]] = {}
@@ -252,10 +255,13 @@ def measure(frames: int, seed: int, progress: Progress) -> dict[str, Any]:
             "growth_kib": round(readings[-1] - readings[0], 1),
             "seconds": round(perf_counter() - started_s, 1),
         }
-    return parts
+    clean = not any(part["exceptions"] or part["forbidden"] or part["ticks_in_another_mode"] for part in parts.values())
+    flat = all(part["growth_kib"] < BAR_KIB for part in parts.values())
+    bar = f"no exception, no torque, no closed loop, memory within {BAR_KIB:g} KiB"
+    return evaluated({"parts": parts}, bar, clean and flat)
 
 
-def text_of(parts: dict[str, dict[str, Any]]) -> str:
+def text_of(report: dict[str, Any]) -> str:
     head = ["", "frames", "exceptions", "forbidden", "sent", "refused", "growth KiB", "s"]
     rows = [
         [
@@ -268,7 +274,7 @@ def text_of(parts: dict[str, dict[str, Any]]) -> str:
             f"{part['growth_kib']:+.0f}",
             f"{part['seconds']:.0f}",
         ]
-        for name, part in parts.items()
+        for name, part in report["parts"].items()
     ]
     return table([head, *rows])
 
@@ -277,16 +283,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.stress.can_fuzz", __doc__)
     parser.add_argument("--frames", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
-    progress = Progress(options.frames)
-    parts = measure(options.frames, options.seed, progress)
-    progress.clear()
-    clean = not any(part["exceptions"] or part["forbidden"] or part["ticks_in_another_mode"] for part in parts.values())
-    flat = all(part["growth_kib"] < BAR_KIB for part in parts.values())
-    said = verdict(f"no exception, no torque, no closed loop, memory within {BAR_KIB:g} KiB", clean and flat)
-    report = {"benchmark": "can_fuzz", "parts": parts, "reached": clean and flat, "verdict": said}
-    print_report(report, f"{text_of(parts)}\n\n{said}", options.json)
-    return 0 if clean and flat else 1
+    return run_benchmark(parser, arguments, measure, text_of, finds_defects=True)
 
 
 if __name__ == "__main__":

@@ -10,9 +10,9 @@ counts as too low stands against it), but no tick may raise an exception, and di
 
 from __future__ import annotations
 
+import argparse
 import resource
 import sys
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.example_robot import load_example
-from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.report import Progress, new_parser, run_benchmark, verdict
 from benchmarks.stress.can_fuzz import is_forbidden, is_ours, port_beside
 from benchmarks.stress.malformed_configurations import OddConfigurations, OddFile
 from control.controller import WalkOrder
@@ -181,7 +181,6 @@ def _stays(robot: Lockstep, mode: Mode, duration_s: float) -> bool:
 def report_of(found: Fuzzing, seed: int) -> dict[str, Any]:
     clean = not found.bugs
     return {
-        "benchmark": "configuration_fuzz",
         "configurations": sum(found.kinds.values()),
         "seed": seed,
         "kinds": dict(found.kinds),
@@ -204,21 +203,19 @@ def text_of(report: dict[str, Any]) -> str:
     ]
     lines += [f"{what:18} {count}" for what, count in report["tried"].items()]
     lines.append(f"longest {report['longest_ms']:.0f} ms ({report['longest_kind']}), most {report['most_kib']:.0f} KiB")
-    return "\n".join([*lines, *report["first_bugs"], report["verdict"]])
+    return "\n".join([*lines, *report["first_bugs"]])
+
+
+def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    count = options.configurations
+    return report_of(fuzz(count, options.seed, folder, Progress(count)), options.seed)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.stress.configuration_fuzz", __doc__)
     parser.add_argument("--configurations", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
-    progress = Progress(options.configurations)
-    with tempfile.TemporaryDirectory(prefix="mud-") as folder:
-        found = fuzz(options.configurations, options.seed, Path(folder), progress)
-    progress.clear()
-    report = report_of(found, options.seed)
-    print_report(report, text_of(report), options.json)
-    return 0
+    return run_benchmark(parser, arguments, measure, text_of)
 
 
 if __name__ == "__main__":

@@ -8,18 +8,18 @@ and must not move the robot again; that is listened to as well.
 
 from __future__ import annotations
 
+import argparse
 import os
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
 from benchmarks.stress.log_kills import start
 from control.records import JOINTS
 from drivers.odrive import codec
@@ -181,17 +181,11 @@ def text_of(report: dict[str, Any]) -> str:
     ]
     again = sum(made["moved_again"] for made in report["rounds"])
     lines = [table([["signal", "phase", "ms to zero torque", "idle"], *rows]), ""]
-    return "\n".join([*lines, f"{again} moved again when woken; {report['spoiled']} walks spoiled", report["verdict"]])
+    return "\n".join([*lines, f"{again} moved again when woken; {report['spoiled']} walks invalid"])
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("benchmarks.stress.daemon_kills", __doc__)
-    parser.add_argument("--kills", type=int, default=40)
-    options = parser.parse_args(arguments)
-    progress = Progress(options.kills)
-    with tempfile.TemporaryDirectory(prefix="mud-") as folder:
-        rounds, spoiled = kill_many(options.kills, Path(folder), progress)
-    progress.clear()
+def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    rounds, spoiled = kill_many(options.kills, folder, Progress(options.kills))
     longest_s = max((made["pushed_s"] for made in rounds), default=0.0)
     reached = (
         len(rounds) == options.kills
@@ -199,10 +193,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         and all(made["idle"] and not made["moved_again"] for made in rounds)
     )
     bar = f"zero torque within the watchdogs' {1e3 * WATCHDOG_S:g} ms and {1e3 * TOLERANCE_S:g} on the way, for good"
-    report = {"benchmark": "daemon_kills", "rounds": rounds, "spoiled": spoiled, "longest_s": longest_s}
-    report |= {"watchdog_s": WATCHDOG_S, "reached": reached, "verdict": verdict(bar, reached)}
-    print_report(report, text_of(report), options.json)
-    return 0
+    report = {"rounds": rounds, "spoiled": spoiled, "longest_s": longest_s, "watchdog_s": WATCHDOG_S}
+    return evaluated(report, bar, reached)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = new_parser("benchmarks.stress.daemon_kills", __doc__)
+    parser.add_argument("--kills", type=int, default=40)
+    return run_benchmark(parser, arguments, measure, text_of)
 
 
 if __name__ == "__main__":

@@ -8,12 +8,12 @@ inside or doubled shows; the monotonic stamp of the last row says what is missin
 
 from __future__ import annotations
 
+import argparse
 import os
 import random
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
 from benchmarks.stress.resources import children_of
 from firmware_host.log.log_folder import ACTIVE, DONE, log_files, unfinished_files
 from firmware_host.log_reading.log_reader import Log, read_log
@@ -185,25 +185,22 @@ def sums_of(kills: list[dict[str, Any]]) -> dict[str, Any]:
 def text_of(report: dict[str, Any]) -> str:
     lines = [f"{name:16} {value}" for name, value in report["sums"].items()]
     lines += [f"{kill['victim']}: {problem}" for kill in report["rounds"] for problem in kill["problems"]]
-    return "\n".join([*lines, report["verdict"]])
+    return "\n".join(lines)
+
+
+def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    rounds = kill_many(options.kills, options.seed, folder, Progress(options.kills))
+    sums = sums_of(rounds)
+    reached = not (sums["missing_inside"] or sums["doubled"] or sums["unsound"]) and sums["worst_end_s"] <= BAR_S
+    report = {"kills": len(rounds), "seed": options.seed, "sums": sums, "rounds": rounds}
+    return evaluated(report, f"every log opens, at most {BAR_S:g} s missing at its end, nothing else", reached)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.stress.log_kills", __doc__)
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
-    progress = Progress(options.kills)
-    with tempfile.TemporaryDirectory(prefix="mud-") as name:
-        rounds = kill_many(options.kills, options.seed, Path(name), progress)
-    progress.clear()
-    sums = sums_of(rounds)
-    reached = not (sums["missing_inside"] or sums["doubled"] or sums["unsound"]) and sums["worst_end_s"] <= BAR_S
-    bar = f"every log opens, at most {BAR_S:g} s missing at its end, nothing else"
-    report = {"benchmark": "log_kills", "kills": len(rounds), "seed": options.seed, "sums": sums, "rounds": rounds}
-    report |= {"reached": reached, "verdict": verdict(bar, reached)}
-    print_report(report, text_of(report), options.json)
-    return 0 if reached else 1
+    return run_benchmark(parser, arguments, measure, text_of, finds_defects=True)
 
 
 if __name__ == "__main__":

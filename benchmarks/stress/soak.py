@@ -9,13 +9,13 @@ what cyclic garbage has come together is told by a collection at the end.
 
 from __future__ import annotations
 
+import argparse
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.report import Progress, new_parser, print_report, verdict
+from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
 from benchmarks.stress.soaked_daemon import soak_daemon
 from benchmarks.stress.soaked_loop import soak_loop
 from experiments.reports.text_tables import table
@@ -25,7 +25,7 @@ WARM_UP_FRACTION = 0.2  # of the readings
 SHOWN = 12  # readings in the table
 
 
-def evaluated(part: dict[str, Any]) -> dict[str, Any]:
+def evaluated_part(part: dict[str, Any]) -> dict[str, Any]:
     """With what grew after the warm-up, and whether the part is sound."""
     after = part["readings"][int(WARM_UP_FRACTION * len(part["readings"])) :]
     growth_kib = after[-1]["resident_kib"] - after[0]["resident_kib"]
@@ -36,7 +36,7 @@ def evaluated(part: dict[str, Any]) -> dict[str, Any]:
     return part | {"growth_kib": growth_kib, "left": left, "largest_log_bytes": largest_log, "sound": sound}
 
 
-def text_of(name: str, part: dict[str, Any]) -> str:
+def part_text(name: str, part: dict[str, Any]) -> str:
     every = max(1, len(part["readings"]) // SHOWN)
     keys = ("at_s", "resident_kib", "descriptors", "threads", "writer_kib", "writer_descriptors", "log_bytes")
     rows = [[f"{reading[key]:.0f}" for key in keys] for reading in part["readings"][::every]]
@@ -52,29 +52,30 @@ def text_of(name: str, part: dict[str, Any]) -> str:
     return "\n".join([*lines, *part["bugs"]])
 
 
+def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    parts: dict[str, dict[str, Any]] = {}
+    for name, seconds, soak in (
+        ("real_time", 60.0 * options.real_time_minutes, soak_daemon),
+        ("lockstep", 3600.0 * options.hours, soak_loop),
+    ):
+        if seconds > 0.0:
+            (folder / name).mkdir()
+            parts[name] = evaluated_part(soak(seconds, options.seed, folder / name, Progress(seconds)))
+    bar = f"growth below {BAR_KIB:.0f} KiB, nothing left behind, no row lost, logs within their quota"
+    report = {"seed": options.seed, "bar_kib": BAR_KIB, "parts": list(parts)} | parts
+    return evaluated(report, bar, all(part["sound"] for part in parts.values()))
+
+
+def text_of(report: dict[str, Any]) -> str:
+    return "\n\n".join(part_text(name, report[name]) for name in report["parts"])
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.stress.soak", __doc__)
     parser.add_argument("--hours", type=float, default=1.0, help="simulated, in lockstep; 0: none")
     parser.add_argument("--real-time-minutes", type=float, default=0.0, metavar="MINUTES", help="of the daemon")
     parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
-    parts: dict[str, dict[str, Any]] = {}
-    with tempfile.TemporaryDirectory(prefix="mud-") as folder:
-        for name, seconds, soak in (
-            ("real_time", 60.0 * options.real_time_minutes, soak_daemon),
-            ("lockstep", 3600.0 * options.hours, soak_loop),
-        ):
-            if seconds > 0.0:
-                progress, place = Progress(seconds), Path(folder) / name
-                place.mkdir()
-                parts[name] = evaluated(soak(seconds, options.seed, place, progress))
-                progress.clear()
-    reached = all(part["sound"] for part in parts.values())
-    bar = f"growth below {BAR_KIB:.0f} KiB, nothing left behind, no row lost, logs within their quota"
-    report = {"benchmark": "soak", "seed": options.seed, "bar_kib": BAR_KIB} | parts
-    report |= {"reached": reached, "verdict": verdict(bar, reached)}
-    print_report(report, "\n\n".join([*map(text_of, parts, parts.values()), report["verdict"]]), options.json)
-    return 0
+    return run_benchmark(parser, arguments, measure, text_of)
 
 
 if __name__ == "__main__":

@@ -11,9 +11,9 @@ the second half, since the robot behind the socket walks now and then and fills 
 
 from __future__ import annotations
 
+import argparse
 import socket
 import sys
-import tempfile
 import time
 from array import array
 from collections import Counter
@@ -25,7 +25,7 @@ from typing import Any
 import msgpack
 
 from benchmarks.example_robot import load_example
-from benchmarks.report import Progress, new_parser, print_report, summary_us, verdict
+from benchmarks.report import Progress, evaluated, new_parser, run_benchmark, summary_us
 from benchmarks.stress.malformed_streams import OddStreams, Stream
 from benchmarks.stress.resources import resident_kib
 from control.rate import PERIOD_S
@@ -255,23 +255,20 @@ def text_of(report: dict[str, Any]) -> str:
         f"a tick's service {us['median']:.0f} us median, {us['p99']:.0f} p99, {us['longest']:.0f} longest",
         f"memory grew by {report['growth_kib']:.0f} KiB in the second half; {len(report['bugs'])} bugs",
     ]
-    return "\n".join([*lines, *report["bugs"], report["verdict"]])
+    return "\n".join([*lines, *report["bugs"]])
+
+
+def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    report = fuzz(options.streams, options.seed, folder, Progress(options.streams))
+    bar = f"every valid request answered, one a tick, no bug, memory growth below {BAR_KIB:.0f} KiB"
+    return evaluated(report, bar, reached(report))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.stress.socket_fuzz", __doc__)
     parser.add_argument("--streams", type=int, default=200_000)
     parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
-    progress = Progress(options.streams)
-    with tempfile.TemporaryDirectory(prefix="mud-") as folder:
-        measured = fuzz(options.streams, options.seed, Path(folder), progress)
-    progress.clear()
-    bar = f"every valid request answered, one a tick, no bug, memory growth below {BAR_KIB:.0f} KiB"
-    stands = reached(measured)
-    report = {"benchmark": "socket_fuzz"} | measured | {"reached": stands, "verdict": verdict(bar, stands)}
-    print_report(report, text_of(report), options.json)
-    return 0 if stands else 1
+    return run_benchmark(parser, arguments, measure, text_of, finds_defects=True)
 
 
 if __name__ == "__main__":

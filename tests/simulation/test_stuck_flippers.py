@@ -116,7 +116,7 @@ def test_it_walks_further_than_one_that_does_not_wait(configuration: Configurati
     for attempts in (0, 3):
         recovery = RecoveryParameters(attempts)
         robot, _ = walking(replace(configuration, recovery=recovery), mud(5.0), 0.05)
-        robot.run_for(5.0)
+        robot.run_for(6.5)
         advances_m.append(robot.robot.plant.body_m)
     assert advances_m[1] > 2.0 * advances_m[0]
 
