@@ -85,7 +85,7 @@ class Drives(Protocol):
 
     ports: dict[str, CanPort]  # by the name of the bus
     unknown_frames: int  # of ids that belong to none of the drives
-    garbled_frames: int  # of one of the drives, with a payload that cannot be decoded
+    malformed_frames: int  # of one of the drives, with a payload that cannot be decoded
 
     @property
     def health(self) -> Joints[DriveHealth]: ...

@@ -132,7 +132,7 @@ class Loop:
             buses=bus_reports(self.drives.ports),
             frames=FrameCounts(
                 unknown_frames=self.drives.unknown_frames,
-                malformed_frames=self.drives.garbled_frames,
+                malformed_frames=self.drives.malformed_frames,
                 refused_commands=self.drives.refused_commands,
             ),
             body=self.body,

@@ -206,7 +206,7 @@ def port_beside(walk: Lockstep, bus: str) -> MockPort:
     """A third node on a bus of the loop."""
     port = walk.loop.drives.ports[bus]
     assert isinstance(port, MockPort)
-    return port.open_beside()
+    return port.open_peer()
 
 
 def feed(source: Iterator[Frame], far: dict[str, MockPort], fuzzing: Fuzzing) -> None:

@@ -1,10 +1,10 @@
-"""One CAN bus as the drives see it: frames in, frames out, losses counted.
+"""One CAN bus as the drives see it: it receives and sends frames, and counts the lost ones.
 
 python-can opens the interface (`socketcan` on the robot, `slcan` for a serial adapter, `virtual` in tests,
 `mudskipper_local` between processes without CAN) and carries the frames, except on socketcan: see socketcan_port.py.
-Its Message objects stay on this side. Its `Bus.state` always says active on socketcan, so the state comes from error
-frames. Frames are sent one by one, never by the kernel's repetition (BCM), which would feed the drives' watchdogs with
-an old command after this process has died.
+Its Message objects stay in this module. Its `Bus.state` is always active on socketcan, so the state comes from error
+frames. Each frame is sent once. The kernel's cyclic transmission (BCM) is never used, because it would feed the drives'
+watchdogs with an old command after this process has died.
 """
 
 from __future__ import annotations
@@ -18,38 +18,36 @@ from typing import Any, Protocol
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from drivers.can.error_frames import BusState as BusState  # for whoever looks at a port
+from drivers.can.error_frames import BusState as BusState  # re-exported for users of a port
 from drivers.can.frames import Frame
 from drivers.can.port_health import MOST_FRAMES_PER_READ as MOST_FRAMES_PER_READ
 from drivers.can.port_health import PortHealth
-from drivers.can.slcan_bus import PromptSerial
+from drivers.can.slcan_serial import SlcanSerial
 from drivers.can.socketcan_port import SocketcanPort
 
-# slcan: an unplugged adapter, a garbled line. socketcan asserts that a frame has a time stamp.
+# slcan raises them for an unplugged adapter or a malformed line; socketcan asserts that a frame has a time stamp.
 PORT_ERRORS = (can.CanError, OSError, ValueError, IndexError, AssertionError)
 MOST_FAILURES_PER_READ = 32
 
 
 class CanPort(Protocol):
-    """What the drives need of a bus. `failed_sends`, `error_frames` and `lost_frames` only grow."""
+    """A bus as the drives use it. `failed_sends`, `error_frames` and `lost_frames` only grow."""
 
     state: BusState
     failed_sends: int
     error_frames: int  # and reads that failed
-    lost_frames: int  # that arrived and found no room, where the port is told
+    lost_frames: int  # that arrived and found no room, where the kernel reports it
     last_error: str  # of receiving
     last_send_error: str
 
     def listen_to(self, ids: Iterable[int]) -> None:
-        """Nothing else is wanted of the bus; a port that can keeps it away."""
+        """Keeps frames of other ids away, where the port can."""
 
     def receive(self) -> Sequence[Frame]:
-        """All data frames that have arrived, oldest first; never waits."""
+        """Returns all data frames that have arrived, oldest first; never waits."""
 
     def send(self, frame: Frame) -> None:
-        """Does not wait for room; a frame that cannot be queued is dropped and counted, the next tick brings a newer
-        one.
-        """
+        """Queues a frame without waiting. Without room it is dropped and counted; the next tick sends a newer one."""
 
     def close(self) -> None: ...
 
@@ -62,12 +60,12 @@ class PythonCanPort(PortHealth):
         self._bus = bus
 
     def listen_to(self, ids: Iterable[int]) -> None:
-        """Not here: python-can would make a Message first and compare it then."""
+        """Does nothing, because python-can would build a Message first and compare it then."""
 
     def receive(self) -> list[Frame]:
         frames: list[Frame] = []
         failures = 0
-        clock_s = time.monotonic() - time.time()  # python-can stamps with the clock on the wall
+        clock_s = time.monotonic() - time.time()  # python-can stamps with the wall clock
         for _ in range(MOST_FRAMES_PER_READ):
             try:
                 message = self._bus.recv(0.0)
@@ -75,7 +73,7 @@ class PythonCanPort(PortHealth):
                     if self._drained():
                         break
                     continue
-            except PORT_ERRORS as problem:  # garbage, with good frames behind it; or an interface that is down
+            except PORT_ERRORS as problem:  # garbage that good frames may follow, or an interface that is down
                 failures += 1
                 if self.on_failed_read(problem) or failures == MOST_FAILURES_PER_READ:
                     break
@@ -89,7 +87,7 @@ class PythonCanPort(PortHealth):
         return frames
 
     def _drained(self) -> bool:
-        """Whether `recv` that gave no frame means that there is none."""
+        """Whether a `recv` without a frame means that none has arrived."""
         return True
 
     def send(self, frame: Frame) -> None:
@@ -109,7 +107,7 @@ class PythonCanPort(PortHealth):
             self.on_failed_send(problem)
 
     def close(self) -> None:
-        with suppress(*PORT_ERRORS):  # of an adapter that is unplugged already
+        with suppress(*PORT_ERRORS):  # the adapter may be unplugged already
             self._bus.shutdown()
 
 
@@ -118,7 +116,7 @@ class SlcanPort(PythonCanPort):
 
     def __init__(self, bus: Any) -> None:  # slcanBus; its module complains where pyserial is missing
         super().__init__(bus)
-        self._serial = bus.serialPortOrig = PromptSerial(bus.serialPortOrig)
+        self._serial = bus.serialPortOrig = SlcanSerial(bus.serialPortOrig)
         self._refusals = 0
 
     def receive(self) -> list[Frame]:
@@ -130,7 +128,7 @@ class SlcanPort(PythonCanPort):
         return frames
 
     def _drained(self) -> bool:
-        """The adapter answers every frame that it is given, and python-can makes None of an answer."""
+        """The adapter answers every frame that is sent, and python-can returns None for an answer."""
         return self._serial.in_waiting == 0
 
 
@@ -148,8 +146,8 @@ def _as_frame(message: can.Message, clock_s: float) -> Frame:
 
 
 def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool]) -> CanPort:
-    """Raises what python-can raises where the interface does not open: see firmware_host/buses.py."""
-    logging.getLogger("can").setLevel(logging.WARNING)  # at level debug it would format every frame it sends
+    """Raises python-can's own errors where the interface does not open: see firmware_host/buses.py."""
+    logging.getLogger("can").setLevel(logging.WARNING)  # at level debug it would format every frame
     bus = can.Bus(interface=interface, channel=channel, **options)  # type: ignore[arg-type]
     if isinstance(bus, SocketcanBus):
         return SocketcanPort(bus)

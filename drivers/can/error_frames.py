@@ -1,9 +1,9 @@
-"""What SocketCAN's error frames tell of a bus: the controller's state, and what went wrong, in words.
+"""Decodes SocketCAN's error frames: the state of the controller, and a text that says what went wrong.
 
-Layout: linux/can/error.h. The identifier holds class bits; for CAN_ERR_CRTL byte 1 tells the controller's state, and
-where CAN_ERR_CNT is set bytes 6 and 7 are its transmit and receive error counters. ISO 11898-1 gives the bounds of
-the states: warning from 96 errors, passive from 128, bus-off above 255 transmit errors. A controller that is off takes
-no part in the bus until it is restarted: it neither sends nor receives, so whatever it reports meanwhile leaves it off.
+The layout is that of linux/can/error.h. The identifier contains class bits; for CAN_ERR_CRTL byte 1 reports the state
+of the controller, and where CAN_ERR_CNT is set bytes 6 and 7 are its transmit and receive error counters. ISO 11898-1
+gives the bounds of the states: warning from 96 errors, passive from 128, bus-off above 255 transmit errors. A
+controller that is off neither sends nor receives until it is restarted, so its other reports leave it off.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 
 class BusState(IntEnum):
-    """Of the controller at our end, worse with the number."""
+    """The state of this computer's controller; a larger number is worse."""
 
     ACTIVE = 0
     WARNING = 1
@@ -22,7 +22,7 @@ class BusState(IntEnum):
 
 
 class BusError(NamedTuple):
-    state: BusState | None  # None: the frame says nothing of it
+    state: BusState | None  # None: the frame does not report it
     text: str
 
 
@@ -80,7 +80,7 @@ def _counted_state(errors: int) -> BusState:
 
 
 def next_state(state: BusState, class_bits: int, reported: BusState | None) -> BusState:
-    """After an error frame that told this. Out of bus-off only a restart leads, whatever counters say."""
+    """Returns the state after an error frame that reports a state. Only a restart leads out of bus-off."""
     if reported is None or (state is BusState.OFF and not class_bits & RESTARTED):
         return state
     return reported

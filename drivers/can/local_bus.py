@@ -1,12 +1,13 @@
 """A CAN bus between one user's processes on a machine without CAN: python-can's interface `mudskipper_local`.
 
-A channel is a folder. Every node listens on a Unix stream socket in it and is connected to every other node.
-A frame goes to each of them as the 16 bytes of `struct can_frame` (drivers/can/frames.py), so nothing leaves the
-machine and no node hears itself. Streams, because the kernel lets only net.unix.max_dgram_qlen (10) datagrams
-wait. There is no bit rate and no arbitration, and order is kept between two nodes only. A node that does not
-read loses frames, as a full CAN controller does: it never blocks a sender, which counts what was lost.
+A channel is a folder. Every node listens on a Unix stream socket in it and is connected to every other node. A frame
+goes to each of them in the bytes of `struct can_frame` or `struct canfd_frame` (drivers/can/frames.py), so nothing
+leaves the machine and no node receives its own frames. The sockets are streams, because the kernel queues only
+net.unix.max_dgram_qlen (10) datagrams. There is no bit rate and no arbitration, and only the order between two nodes is
+preserved. A node that does not read loses frames, like a full CAN controller: it never blocks a sender, which counts
+the lost frames.
 
-`LocalLink` is the mesh of sockets, `LocalBus` its face to python-can. Neither starts a thread.
+`LocalLink` is the mesh of sockets, `LocalBus` its interface to python-can. Neither starts a thread.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ FRAME_BYTES, FD_FRAME_BYTES = FRAME_LAYOUT.size, FD_FRAME_LAYOUT.size
 CHUNK_BYTES = 65536
 PATH_MAX_BYTES = 107  # sun_path of unix(7) has 108 with its final zero
 BACKLOG_NODES = 4096  # that may join while one node is stopped
-SEND_BUFFER_BYTES = 1 << 20  # the kernel cuts it to net.core.wmem_max; 16 bytes occupy some 800 of it
+SEND_BUFFER_BYTES = 1 << 20  # the kernel limits it to net.core.wmem_max; a frame occupies some 800
 
 
 @dataclass(slots=True, eq=False)
 class Peer:
     connection: socket.socket
-    rest: bytes = b""  # the start of a frame whose end has not come yet
+    rest: bytes = b""  # the start of a frame whose end has not arrived yet
 
 
 class LocalLink:
@@ -62,7 +63,7 @@ class LocalLink:
         return self._epoll.fileno()
 
     def send(self, data: bytes) -> None:
-        """Give one frame to every other node, as far as there is room."""
+        """Sends one encoded frame to every other node that has room."""
         if self._doorbell.poll(0, 1):
             self._accept()
         for peer in tuple(self._peers.values()):
@@ -73,11 +74,11 @@ class LocalLink:
             except OSError:
                 self._read_last(peer)
             else:
-                if written != len(data):  # never seen, but all that followed would be garbage
+                if written != len(data):  # never observed; all following bytes would be garbage
                     self._drop(peer)
 
     def receive(self, timeout_s: float | None = 0.0) -> bytes | None:
-        """The next frame. None may also come early, when a node joined or left; without time-out it waits."""
+        """Returns the next encoded frame, or None after the time-out, and also when a node joined or left."""
         arrived = self._arrived
         if not arrived:
             self._read_ready(timeout_s)
@@ -147,10 +148,10 @@ class LocalLink:
                 self._read(peer)
             elif descriptor == self._listener.fileno():
                 self._accept()
-                self._read_ready(0.0)  # the newcomer may have sent already
+                self._read_ready(0.0)  # the new node may have sent already
 
     def _read(self, peer: Peer) -> bool:
-        """Take what a peer has sent so far. False if there was nothing, or the peer is gone."""
+        """Reads what a peer has sent so far. Returns False if there was nothing, or the peer is gone."""
         try:
             chunk = peer.connection.recv(CHUNK_BYTES)
         except BlockingIOError:
@@ -164,7 +165,7 @@ class LocalLink:
         return True
 
     def _read_last(self, peer: Peer) -> None:
-        """A node that left may have sent frames before."""
+        """Reads the frames that a node sent before it left."""
         while self._read(peer):
             pass
 
@@ -223,7 +224,7 @@ class LocalBus(can.BusABC):
         self._link.send(encode_frame(frame))
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        """Filters by itself: can.BusABC would answer a frame that does not pass as it does an empty bus."""
+        """Filters by itself, because can.BusABC would treat a filtered frame like an empty bus."""
         while (data := self._link.receive(timeout)) is not None:
             message = self._decode(data)
             if self._matches_filters(message):
@@ -254,14 +255,14 @@ class LocalBus(can.BusABC):
 
 
 def _end_of_frame(stream: bytes, begin: int) -> int:
-    """Where the frame ends that begins here; beyond the stream where its length has not arrived yet."""
+    """Returns where the frame ends that begins here; beyond the stream where its length has not arrived yet."""
     if begin + FLAGS_BYTE < len(stream) and stream[begin + FLAGS_BYTE] & FD_FORMAT:
         return begin + FD_FRAME_BYTES
     return begin + FRAME_BYTES
 
 
 def make_channel_folder(channel: str | Path) -> Path:
-    """The folder of a channel: an absolute path itself, a plain name in this user's own runtime folder."""
+    """Returns the folder of a channel: an absolute path itself, or a plain name in this user's runtime folder."""
     folder = Path(channel)
     if not folder.is_absolute():
         if folder.name != str(channel) or folder.name in ("", ".."):
@@ -273,14 +274,14 @@ def make_channel_folder(channel: str | Path) -> Path:
 
 def _make_own_folder(folder: Path) -> Path:
     folder.mkdir(mode=0o700, exist_ok=True)
-    owner = folder.lstat().st_uid  # of a link itself: somebody may have put one into a shared folder
+    owner = folder.lstat().st_uid  # lstat: another user may have put a link into a shared folder
     if owner != os.geteuid():
         raise PermissionError(f"{folder} belongs to user {owner}, not to user {os.geteuid()} who runs this.")
     return folder
 
 
 def _free_path(folder: Path) -> Path:
-    """A name of this process's own; the same number may be another process's in another container."""
+    """Returns an unused name; a process in another container may have the same process id."""
     paths = (folder / f"{os.getpid()}-{number}.node" for number in count())
     path = next(path for path in paths if not path.exists())
     if len(os.fsencode(path)) > PATH_MAX_BYTES:

@@ -1,8 +1,8 @@
-"""A CAN bus within one process, without python-can: what one port sends, all others receive, in order.
+"""A CAN bus within one process, without python-can: all other ports receive what one port sends, in order.
 
-For tests and for walking in lockstep faster than real time. Frames pass as they are; their payloads were encoded by
-the sender and are decoded by the receiver as on any bus. A test may fail a port: set its `state`, let it refuse what
-it is to send (`full`), or inject an error frame, which only it sees, as its own controller would report it.
+It serves tests, and walks in lockstep that are faster than real time. Frames pass as objects; the sender encodes their
+payloads and the receiver decodes them as on any bus. A test can make a port fail: it sets the port's `state`, makes it
+refuse frames to send (`full`), or injects an error frame, which only this port receives, as from its own controller.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from drivers.can.frames import Frame
 from drivers.can.port_health import PortHealth
 
-LONGEST_QUEUE = 4096  # a port that nobody reads loses its oldest frames, like a controller's receive buffer
+LONGEST_QUEUE = 4096  # an unread port loses its oldest frames, like a controller's receive buffer
 
 
 class MockPort(PortHealth):
@@ -26,7 +26,7 @@ class MockPort(PortHealth):
         self.full = False
 
     def listen_to(self, ids: Iterable[int]) -> None:
-        """A test hears everything."""
+        """Does nothing: a test receives all frames."""
 
     def receive(self) -> list[Frame]:
         frames = list(self.queue)
@@ -43,11 +43,11 @@ class MockPort(PortHealth):
                 port.queue.append(frame)
 
     def inject_error(self, class_bits: int, data: bytes = bytes(8)) -> None:
-        """One of SocketCAN's error frames."""
+        """Lets the port receive one of SocketCAN's error frames."""
         self.on_error_frame(class_bits, data)
 
-    def open_beside(self) -> MockPort:
-        """Another node on the same bus."""
+    def open_peer(self) -> MockPort:
+        """Opens another node on the same bus."""
         return self._bus.open()
 
     def close(self) -> None:

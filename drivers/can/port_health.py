@@ -1,8 +1,8 @@
-"""What every kind of CAN port knows of its own health: the bus's state, and what went wrong.
+"""The health that every kind of CAN port tracks: the bus's state, and the last errors.
 
-A bus that was off is active again once a frame of a peer arrives: a controller that is off receives none. An interface
-that was gone is back with any frame, also one of a process beside us, which is all that a virtual one carries. Whoever
-receives frames has to call `heed_frame`; the rest is here.
+A bus that was off is active again once a frame of a peer arrives, because a controller that is off receives none. An
+interface that was gone is back with any frame, including one from another process on this computer, which is all that a
+virtual interface carries. The port that receives frames calls `on_frame` while it is off.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import errno
 
 from drivers.can.error_frames import BusState, decode_error_frame, next_state
 
-MOST_FRAMES_PER_READ = 4096  # half a second of a full bus; a babbling node must not hold the loop for ever
+MOST_FRAMES_PER_READ = 4096  # half a second of a full bus; a babbling node must not block the loop
 # The interface is down, or unplugged; EIO is how a serial adapter ends.
 GONE = frozenset({errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.EIO})
 
@@ -21,7 +21,7 @@ class PortHealth:
 
     def __init__(self) -> None:
         self.state = BusState.ACTIVE
-        self._gone = False  # why it is off
+        self._gone = False  # it is off because the interface is gone
         self.failed_sends = 0
         self.error_frames = 0
         self.lost_frames = 0
@@ -35,12 +35,12 @@ class PortHealth:
         self.state = next_state(self.state, class_bits, error.state)
 
     def on_frame(self, from_peer: bool) -> None:
-        """Of a port that is off."""
+        """Handles a frame on a port that is off."""
         if from_peer or self._gone:
             self.state, self._gone = BusState.ACTIVE, False
 
     def on_failed_read(self, problem: Exception) -> bool:
-        """Whether the interface is gone."""
+        """Counts the failure; returns whether the interface is gone."""
         self.error_frames += 1
         self.last_error = _text_of(problem)
         return self._on_gone(problem)
@@ -58,7 +58,7 @@ class PortHealth:
 
 
 def _error_number(problem: BaseException | None) -> int | None:
-    """python-can's own errors have it as `error_code`, or were raised from the error that has it."""
+    """Returns the errno, which python-can's own errors carry as `error_code` or in their cause."""
     if problem is None:
         return None
     number: int | None = getattr(problem, "errno", None) or getattr(problem, "error_code", None)
@@ -67,6 +67,6 @@ def _error_number(problem: BaseException | None) -> int | None:
 
 def _text_of(problem: Exception) -> str:
     if isinstance(problem.__cause__ or problem, BlockingIOError):
-        return "Transmit buffer full"  # as python-can says it; a read that would block is none that failed
-    words = getattr(problem, "strerror", None) or str(problem)
-    return f"{words}: {problem.__cause__}" if problem.__cause__ else words
+        return "Transmit buffer full"  # in python-can's words; a read that would block has not failed
+    text = getattr(problem, "strerror", None) or str(problem)
+    return f"{text}: {problem.__cause__}" if problem.__cause__ else text

@@ -1,9 +1,9 @@
-"""A CAN port that may be gone for a while: an adapter that is unplugged, an interface that is not there yet.
+"""A CAN port whose interface may be missing for a while, such as an unplugged adapter.
 
-A socket or a serial port whose device has vanished stays dead when the device is back, so the port behind this one is
-opened anew, once in RETRY_S as long as it is off. Opening reads files and may take a second, so it is done between two
-ticks and only where the caller says that nothing moves. A port that was opened anew counts as off until a frame has
-arrived on it: its controller may still be out of the bus.
+A socket or a serial port whose device has vanished stays dead when the device is back. So this port opens its inner
+port again, every RETRY_S while it is off. Opening reads files and may take a second, so it happens between two ticks
+and only while the caller says that nothing moves. A port that was opened again counts as off until a frame has arrived
+on it, because its controller may still be off the bus.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ RETRY_S = 1.0
 
 
 class NotOpenError(Exception):
-    """A port does not open; the text says why."""
+    """The port does not open; the text says why."""
 
 
 class ReopeningPort:
-    """A CanPort. Owns the one behind it, of which there is none while it does not open."""
+    """A CanPort. Owns its inner port, which is None while it does not open."""
 
     def __init__(self, open_port: Callable[[], CanPort], wait: bool) -> None:
-        """`open_port` raises NotOpenError; without `wait`, so does this."""
+        """`open_port` may raise NotOpenError; with `wait`, the port then starts as off instead of raising it."""
         self._open_port = open_port
         self._port: CanPort | None = None
         self._awaits_frame = False
-        self._due_s: float | None = None  # the next try
-        self._failed_before = self._errors_before = self._lost_before = 0  # of the ports before
-        self._ids: Iterable[int] | None = None  # all that is listened to
+        self._due_s: float | None = None  # when to try again
+        self._failed_before = self._errors_before = self._lost_before = 0  # of the closed ports
+        self._ids: Iterable[int] | None = None  # that the drives listen to
         self.state = BusState.OFF
         self.failed_sends = self.error_frames = self.lost_frames = 0
         self.last_error = self.last_send_error = ""
@@ -41,7 +41,7 @@ class ReopeningPort:
             if not wait:
                 raise
             self.last_error = str(problem)
-        self._look()
+        self._update_counters()
 
     def listen_to(self, ids: Iterable[int]) -> None:
         self._ids = frozenset(ids)
@@ -54,7 +54,7 @@ class ReopeningPort:
         frames = self._port.receive()
         if frames:
             self._awaits_frame = False
-        self._look()
+        self._update_counters()
         return frames
 
     def send(self, frame: Frame) -> None:
@@ -66,9 +66,9 @@ class ReopeningPort:
             return
         port.send(frame)
         if self._failed_before + port.failed_sends != self.failed_sends:
-            self._look()
+            self._update_counters()
 
-    def _look(self) -> None:
+    def _update_counters(self) -> None:
         port = self._port
         if port is None:
             self.state = BusState.OFF
@@ -81,17 +81,17 @@ class ReopeningPort:
         self.last_send_error = port.last_send_error or self.last_send_error
 
     def reopen(self, now_s: float) -> bool:
-        """Where the bus has been off for RETRY_S, open it anew; whether that was done."""
+        """Opens the bus again where it has been off for RETRY_S; returns whether it did."""
         if self.state is not BusState.OFF:
             self._due_s = None
             return False
         if self._due_s is not None and now_s >= self._due_s:
             self._due_s = now_s + RETRY_S
-            return self._open_anew()
+            return self._open_again()
         self._due_s = self._due_s or now_s + RETRY_S
         return False
 
-    def _open_anew(self) -> bool:
+    def _open_again(self) -> bool:
         self.close()
         try:
             self._port = self._open_port()
@@ -101,11 +101,11 @@ class ReopeningPort:
         if self._ids is not None:
             self._port.listen_to(self._ids)
         self._awaits_frame = True
-        self._look()
+        self._update_counters()
         return True
 
     def close(self) -> None:
-        """Also where the device is gone, which serial adapters complain about."""
+        """Closes the inner port, also where its device is gone, for which serial adapters raise errors."""
         port, self._port = self._port, None
         if port is not None:
             self._failed_before, self._errors_before = self.failed_sends, self.error_frames

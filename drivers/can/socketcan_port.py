@@ -1,13 +1,14 @@
-"""The fast path on the robot: frames as 16 bytes on the socket that python-can has opened and configured.
+"""The fast path on the robot: encoded frames on the socket that python-can has opened and configured.
 
-python-can makes a Message of every frame, and asks by `select` before each call; here a frame is one `recvmsg` or one
-`send` that does not wait. Of the calls that read, only `recvmsg` tells more than the bytes: the kernel's time stamp
-(SO_TIMESTAMPNS, which python-can has asked for; a tenth of the call's cost, for ages that are true to some µs where
-the reading time errs by up to a tick), how many frames found the queue full (SO_RXQ_OVFL), and whether a process
-beside us has sent the frame (MSG_DONTROUTE). Layouts: linux/can.h, linux/can/raw.h, socket(7).
+python-can builds a Message for every frame, and calls `select` before each call; here a frame takes one `recvmsg` or
+one `send` that does not wait. `recvmsg` is the only reading call that reports more than the bytes: the kernel's time
+stamp (SO_TIMESTAMPNS, which python-can has enabled; it costs a tenth of the call and is accurate to some µs, where the
+time of reading errs by up to a tick), how many frames found the queue full (SO_RXQ_OVFL), and whether another process
+on this computer has sent the frame (MSG_DONTROUTE). Layouts: linux/can.h, linux/can/raw.h, socket(7). CAN FD frames
+pass where the bus was opened with `fd = true`; elsewhere the kernel refuses to send them.
 
-The kernel passes on what the drives send and we listen to, and all error frames, which filters do not touch. Anything
-else on the bus is neither heard nor counted: `candump` shows it.
+The kernel delivers the frames that the drives listen to, and all error frames, which filters do not affect. Other
+frames on the bus are neither received nor counted: `candump` shows them.
 """
 
 from __future__ import annotations
@@ -37,18 +38,18 @@ from drivers.can.frames import (
 from drivers.can.port_health import MOST_FRAMES_PER_READ, PortHealth
 
 SO_TIMESTAMPNS, SO_RXQ_OVFL = 35, 40  # asm-generic/socket.h
-STAMP, COUNT = struct.Struct("@ll"), struct.Struct("@I")  # as this machine lays them out: struct timespec, __u32
+STAMP, COUNT = struct.Struct("@ll"), struct.Struct("@I")  # in native layout: struct timespec, __u32
 COUNT_RANGE = 1 << 32
 ANCILLARY_BYTES = socket.CMSG_SPACE(STAMP.size) + socket.CMSG_SPACE(COUNT.size)
 FRAME_BYTES, LENGTH_BYTE = FRAME_LAYOUT.size, 4
-READ_BYTES = FD_FRAME_LAYOUT.size + 1  # so that a longer one shows
+READ_BYTES = FD_FRAME_LAYOUT.size + 1  # so that a longer frame is noticed
 FLAGS = EXTENDED_FLAG | REMOTE_FLAG | ERROR_FLAG
-ALL_BITS = STANDARD_MASK | REMOTE_FLAG  # of a filter; with these the kernel looks an id up instead of comparing
+ALL_BITS = STANDARD_MASK | REMOTE_FLAG  # of a filter; with these the kernel uses a table lookup
 ALL_EXTENDED_BITS = EXTENDED_MASK | REMOTE_FLAG
 
 
 class SocketcanPort(PortHealth):
-    """A CanPort. Owns the socket's mode, and how much of the kernel's count of lost frames was heeded."""
+    """A CanPort. Owns the socket's mode, and the kernel's last count of lost frames."""
 
     def __init__(self, bus: SocketcanBus) -> None:
         super().__init__()
@@ -56,10 +57,10 @@ class SocketcanPort(PortHealth):
         self._socket = bus.socket
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
-        self._heeded = 0
+        self._kernel_count = 0
 
     def listen_to(self, ids: Iterable[int]) -> None:
-        """If the kernel refuses, python-can says so in the log, and strangers are heard."""
+        """Sets the kernel's filters. If the kernel refuses them, python-can logs it, and all frames are received."""
         extended = {each: each > STANDARD_MASK for each in ids}
         self._bus.set_filters(
             [
@@ -71,24 +72,24 @@ class SocketcanPort(PortHealth):
     def receive(self) -> list[Frame]:
         frames: list[Frame] = []
         read = self._socket.recvmsg
-        clock_s = time.monotonic() - time.time()  # the kernel stamps with the clock on the wall
+        clock_s = time.monotonic() - time.time()  # the kernel stamps with the wall clock
         for _ in range(MOST_FRAMES_PER_READ):
             try:
                 encoded, ancillary, marks, _ = read(READ_BYTES, ANCILLARY_BYTES)
             except BlockingIOError:
                 break
-            except OSError as problem:  # what is behind it the next read takes
+            except OSError as problem:  # the next read takes the rest
                 self.on_failed_read(problem)
                 break
             frame = self._on_frame(encoded, ancillary, clock_s)
             if frame is not None:
                 frames.append(frame)
-                if self.state is BusState.OFF:
-                    self.on_frame(not marks & socket.MSG_DONTROUTE)  # which marks what a process beside us has sent
+                if self.state is BusState.OFF:  # MSG_DONTROUTE marks frames of other processes on this computer
+                    self.on_frame(not marks & socket.MSG_DONTROUTE)
         return frames
 
     def _on_frame(self, encoded: bytes, ancillary: list[tuple[int, int, bytes]], clock_s: float) -> Frame | None:
-        """The frame as our drives' code takes it; None where it tells of the bus, or of nothing."""
+        """Returns the frame, or None for an error frame and for bytes that are no frame."""
         stamp_s = NEVER_S
         for _, kind, value in ancillary:
             if kind == SO_TIMESTAMPNS:
@@ -120,8 +121,8 @@ class SocketcanPort(PortHealth):
     def _on_overflow(self, value: bytes) -> None:
         """The kernel counts from the socket's opening, modulo 2³²."""
         (count,) = COUNT.unpack(value)
-        self.lost_frames += (count - self._heeded) % COUNT_RANGE
-        self._heeded = count
+        self.lost_frames += (count - self._kernel_count) % COUNT_RANGE
+        self._kernel_count = count
 
     def send(self, frame: Frame) -> None:
         try:

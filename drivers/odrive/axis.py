@@ -1,13 +1,13 @@
-"""One ODrive as one joint: what it told last, whether it was restarted, and the frames that command it.
+"""One ODrive as one joint: the newest report of every signal, its restarts, and the frames that command it.
 
-A joint's sign turns a mirrored motor round in angle, velocity, current and torque alike. A drive counts as restarted
-when it is heard again after a silence of RESTART_SILENCE_S, or tells that it initialises, or that its axis has no
-state yet; what it forgets in that, version and watchdog settings, is unknown again. What is read in one tick arrived
-since the tick before, which is how a silence of the drive is told from a stall of ours.
+A joint's sign inverts angle, velocity, current and torque of a mirrored motor alike. A drive counts as restarted when
+it is heard again after a silence of RESTART_SILENCE_S, or reports that it initialises, or that its axis has no state
+yet. Its version and watchdog settings are then unknown again. Everything that is read in one tick arrived since the
+tick before, so a stall of this program is not taken for a silence of the drive.
 
-The drive's watchdog is read back by parameter number (SDO). ODrive numbers its parameters anew with every build, for
-each kind of board, and publishes the numbers as flat_endpoints.json beside the firmware; without those of this very
-build the watchdog stays unknown, since a number of another build reads some other parameter.
+The drive's watchdog is read back by parameter number (SDO). ODrive renumbers its parameters in every build and for each
+kind of board, and publishes the numbers as flat_endpoints.json with the firmware. Without the numbers of this very
+build the watchdog stays unknown, because a number of another build reads some other parameter.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from control.records import NEVER_S, UNKNOWN, DriveState
 from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, WatchdogEndpoints
 from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, GarbledMessageError, Message, arbitration_id
+from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
 from drivers.odrive.duplicate_node_monitor import DuplicateNodeMonitor
 from drivers.odrive.parameters import OdriveParameters
 
 SUPPORTED = (0, 6)  # major and minor version of the firmware whose messages the codec knows
 RESTART_SILENCE_S = 0.3  # three heartbeats
-LONGEST_WATCHDOG_S = 3600.0  # a number beyond is no time-out
+LONGEST_WATCHDOG_S = 3600.0  # a larger number is no time-out
 LARGEST_FLOAT = 3.4e38  # of binary32
 TURN_RAD = 2.0 * pi
 QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)
@@ -39,13 +39,13 @@ class Version(NamedTuple):
 
 
 class Outlet(Protocol):
-    """Where an axis puts its frames."""
+    """The path on which an axis sends its frames."""
 
     def send(self, frame: Frame) -> None: ...
 
 
 class OdriveAxis:
-    """Owns what is known of one drive; every field is the newest that arrived."""
+    """Owns everything that is known about one drive; every field is the newest that arrived."""
 
     def __init__(
         self, joint: str, parameters: OdriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints] = ()
@@ -66,11 +66,11 @@ class OdriveAxis:
         self._temperature_stamp_s = self._bus_voltage_stamp_s = NEVER_S
         self._read_s = self._read_before_s = NEVER_S
         self.closed_loop = False
-        self.busy_state = 0  # of a drive that calibrates, homes or does whatever else nobody here has asked for
+        self.busy_state = 0  # a calibration, homing or other axis state that this program has not asked for
         self._error_flags = 0
         self.disarm_reason = 0
         self.restarts = 0
-        self._starting = True  # until it was heard with a state
+        self._starting = True  # until it has reported a state
         self._duplicates.reset()
         self._forget_settings()
 
@@ -82,12 +82,12 @@ class OdriveAxis:
         self._watchdog_timeout_s = UNKNOWN
 
     def begin_read(self, now_s: float) -> None:
-        """What arrives until the next call came between the one before and `now_s`."""
+        """Announces frames that arrived between the previous call and `now_s`."""
         self._read_before_s, self._read_s = self._read_s, now_s
 
     @property
     def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
-        """What to do with the payload of each arbitration id that this drive sends."""
+        """The handler for the payload of each arbitration id that this drive sends."""
         table: dict[Message, Callable[[bytes, float], None]] = {
             codec.GET_ENCODER_ESTIMATES: self._receive_encoder,
             codec.GET_IQ: self._receive_current,
@@ -112,7 +112,7 @@ class OdriveAxis:
 
     def _receive_current(self, data: bytes, now_s: float) -> None:
         _, measured_a = codec.GET_IQ.decode(data)
-        if isnan(measured_a) and not self.closed_loop:  # nothing is measured where nothing flows
+        if isnan(measured_a) and not self.closed_loop:  # the drive measures no current while idle
             measured_a = 0.0
         _require_finite(measured_a)
         if now_s - self._current_stamp_s > RESTART_SILENCE_S:
@@ -135,7 +135,7 @@ class OdriveAxis:
         self._health = None
 
     def _on_silence(self) -> None:
-        """Of one message. Only if all others were missing as long was the drive away, not if we did not listen."""
+        """Counts a restart if all messages were missing for as long as one, and this program was reading meanwhile."""
         heard_s = max(self._angle_stamp_s, self._current_stamp_s, self._heartbeat_stamp_s)
         if isfinite(heard_s) and self._read_before_s - heard_s > RESTART_SILENCE_S:
             self._on_restart()
@@ -167,20 +167,20 @@ class OdriveAxis:
     def _receive_setting(self, data: bytes, now_s: float) -> None:
         endpoint, value = codec.decode_sdo(data)
         endpoints = self._watchdog_endpoints
-        if endpoints is None:  # another program asks this drive
+        if endpoints is None:  # this answers another program
             return
         if endpoint == endpoints.enable:
             self._watchdog_enabled = codec.decode_sdo_flag(value)
         elif endpoint == endpoints.timeout:
             timeout_s = codec.decode_sdo_float(value)
             if not 0.0 <= timeout_s <= LONGEST_WATCHDOG_S:
-                raise GarbledMessageError("no time")
+                raise MalformedMessageError("not a time")
             self._watchdog_timeout_s = timeout_s
         self._health = None
 
     @property
     def _watchdog_endpoints(self) -> WatchdogEndpoints | None:
-        """Those of the drive's own build, once its version is known."""
+        """The numbers of the drive's own build, once its version is known."""
         if self.version is None:
             return None
         build = (".".join(str(part) for part in self.version), self.hardware)
@@ -188,15 +188,15 @@ class OdriveAxis:
 
     @property
     def watchdog_s(self) -> float:
-        """Its time-out as the drive has it: NaN while it was not read back, 0 where it is switched off."""
+        """The time-out that the drive uses: NaN until it was read back, 0 where the watchdog is off."""
         if self._watchdog_enabled is None:
             return nan
         return self._watchdog_timeout_s if self._watchdog_enabled else 0.0
 
     @property
     def duplicates(self) -> bool:
-        """Two drives seem to share this id: see drivers/odrive/duplicate_node_monitor.py."""
-        return self._duplicates.seen
+        """Whether two drives seem to share this id: see drivers/odrive/duplicate_node_monitor.py."""
+        return self._duplicates.found
 
     @property
     def state(self) -> DriveState:
@@ -217,12 +217,12 @@ class OdriveAxis:
 
     @property
     def health(self) -> DriveHealth:
-        """What the drive reports about itself, made again only where that has changed."""
+        """The drive's report about itself, built again only when it has changed."""
         if self._health is None or self._health.duplicate_id is not self.duplicates:
-            self._health = self._examined()
+            self._health = self._build_health()
         return self._health
 
-    def _examined(self) -> DriveHealth:
+    def _build_health(self) -> DriveHealth:
         flags = self._error_flags | self.disarm_reason
         return DriveHealth(
             joint=self.joint,
@@ -241,17 +241,17 @@ class OdriveAxis:
         )
 
     def send_torque(self, torque_nm: float) -> None:
-        if not -LARGEST_FLOAT < torque_nm < LARGEST_FLOAT:  # no bytes could hold it; the gate refuses it as NaN
+        if not -LARGEST_FLOAT < torque_nm < LARGEST_FLOAT:  # binary32 cannot represent it; the gate refuses NaN
             torque_nm = nan
         data = codec.SET_INPUT_TORQUE.encode(self.parameters.sign * torque_nm)
         self._outlet.send(Frame(self._torque_id, data))
 
     def prepare(self) -> None:
-        """Torque mode, limits, velocity gain, zero torque.
+        """Sets torque mode, limits, velocity gain and zero torque.
 
-        In torque mode ODrive clamps torque to (velocity limit - velocity) times its velocity gain, silently. Both are
-        set so that the clamp lies above every torque that we command of a joint within its own velocity limit, and
-        takes the torque of a faster one, also when this program is dead and its last command still holds.
+        In torque mode ODrive clamps torque to (velocity limit - velocity) times its velocity gain without reporting
+        it. Both are set so that the clamp lies above every torque for a joint within its own velocity limit, and
+        removes the torque of a faster joint, even when this program is dead and its last command is still in force.
         """
         parameters = self.parameters
         self._transmit(codec.SET_CONTROLLER_MODE, codec.TORQUE_CONTROL, codec.PASSTHROUGH)
@@ -273,7 +273,7 @@ class OdriveAxis:
         self._request(codec.GET_VERSION)
 
     def request_watchdog(self) -> None:
-        """Where the numbers of the drive's build are known."""
+        """Asks for the watchdog's settings where their numbers in the drive's build are known."""
         endpoints = self._watchdog_endpoints
         if endpoints is None:
             return
@@ -281,7 +281,7 @@ class OdriveAxis:
             self._transmit(codec.RX_SDO, codec.SDO_READ, endpoint, 0)
 
     def _request(self, message: Message) -> None:
-        """By a remote frame."""
+        """Asks for a message by a remote frame."""
         self._outlet.send(Frame(arbitration_id(self.parameters.node_id, message), is_remote=True))
 
     def _transmit(self, message: Message, *values: float) -> None:
@@ -290,4 +290,4 @@ class OdriveAxis:
 
 def _require_finite(value: float) -> None:
     if not isfinite(value):
-        raise GarbledMessageError("not a finite number")
+        raise MalformedMessageError("not a finite number")

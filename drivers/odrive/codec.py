@@ -1,9 +1,9 @@
 """ODrive CANSimple, firmware 0.6: the bytes of each message, in both directions.
 
 An 11-bit arbitration id is (node id << 5) | command; payloads are little-endian, floats IEEE-754 binary32, positions
-in turns. A value is asked for by a remote frame of its own id. Source: ODrive's CANSimple documentation and its
-published DBC for 0.6.10, against which the tests hold this table. Some commands meant other things in 0.5, so a
-drive's version is read before it is armed.
+in turns. A remote frame with the id of a value asks for that value. Source: ODrive's CANSimple documentation and its
+published DBC for 0.6.10, with which the tests compare this table. Some commands meant other things in 0.5, so this
+program reads a drive's version before it arms it.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from struct import Struct, error
 from typing import Any
 
 
-class GarbledMessageError(ValueError):
-    """A payload of the wrong length, or with a number that is none."""
+class MalformedMessageError(ValueError):
+    """A payload has the wrong length, or contains a number that is not finite."""
 
 
 class Message:
@@ -28,18 +28,18 @@ class Message:
         return self._struct.pack(*values)
 
     def decode(self, data: bytes) -> tuple[Any, ...]:
-        """Raises GarbledMessageError where the payload is shorter or longer than the layout."""
+        """Raises MalformedMessageError where the payload is shorter or longer than the layout."""
         try:
             return self._struct.unpack(data)
         except error as problem:
-            raise GarbledMessageError(f"command 0x{self.command:02x} with {len(data)} bytes") from problem
+            raise MalformedMessageError(f"command 0x{self.command:02x} with {len(data)} bytes") from problem
 
 
 GET_VERSION = Message(0x00, "<8B")  # protocol, product line, hw version, hw variant, major, minor, revision, unreleased
 HEARTBEAT = Message(0x01, "<IBBB1x")  # axis error, axis state, procedure result, bit 0 trajectory done
 ESTOP = Message(0x02, "<")
 GET_ERROR = Message(0x03, "<II")  # active errors, disarm reason
-RX_SDO = Message(0x04, "<BHB")  # opcode, endpoint, reserved; a value follows where one is written
+RX_SDO = Message(0x04, "<BHB")  # opcode, endpoint, reserved; a written value follows
 TX_SDO = Message(0x05, "<BHB")  # the same, and the value in as many bytes as its type has: see `decode_sdo`
 SET_AXIS_STATE = Message(0x07, "<I")
 GET_ENCODER_ESTIMATES = Message(0x09, "<ff")  # turns, turns/s
@@ -99,7 +99,7 @@ ERROR_NAMES = {
 
 
 def error_text(flags: int) -> str:
-    """Active errors in words; unknown bits as a number."""
+    """Names the active errors; unknown bits appear as a number."""
     names = [name for bit, name in ERROR_NAMES.items() if flags & bit]
     unknown = flags & ~sum(ERROR_NAMES)
     return ", ".join(names + ([f"unknown flag 0x{unknown:x}"] if unknown else []))
@@ -110,21 +110,21 @@ def arbitration_id(node_id: int, message: Message) -> int:
 
 
 def decode_sdo(data: bytes) -> tuple[int, bytes]:
-    """The endpoint that a drive was asked for and its value's bytes. A frame may be padded to eight."""
+    """Returns the endpoint that a drive was asked for and the bytes of its value. Frames may be padded to eight."""
     if not SDO_HEAD_BYTES < len(data) <= 2 * SDO_HEAD_BYTES:
-        raise GarbledMessageError(f"command 0x{TX_SDO.command:02x} with {len(data)} bytes")
+        raise MalformedMessageError(f"command 0x{TX_SDO.command:02x} with {len(data)} bytes")
     _, endpoint, _ = TX_SDO.decode(data[:SDO_HEAD_BYTES])
     return endpoint, data[SDO_HEAD_BYTES:]
 
 
 def decode_sdo_flag(value: bytes) -> bool:
     if value[0] > 1:
-        raise GarbledMessageError(f"a flag of {value[0]}")
+        raise MalformedMessageError(f"a flag of {value[0]}")
     return value[0] == 1
 
 
 def decode_sdo_float(value: bytes) -> float:
     if len(value) < SDO_FLOAT.size:
-        raise GarbledMessageError(f"a number of {len(value)} bytes")
+        raise MalformedMessageError(f"a number of {len(value)} bytes")
     (number,) = SDO_FLOAT.unpack_from(value)
     return float(number)

@@ -12,7 +12,7 @@ from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.drive import DriveParameters, FrameContent, WatchdogEndpoints
 from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, GarbledMessageError
+from drivers.odrive.codec import AxisState, MalformedMessageError
 from drivers.odrive.drives import OdriveDrives
 from drivers.odrive.parameters import OdriveParameters
 
@@ -67,7 +67,7 @@ class Odrive:
         return FrameContent(node_id, command in COMMANDS, SIGNALS.get(command, ()))
 
     def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
-        with suppress(GarbledMessageError):
+        with suppress(MalformedMessageError):
             if frame.arbitration_id & codec.LAST_COMMAND == codec.GET_ERROR.command:
                 errors, reason = codec.GET_ERROR.decode(frame.data)
                 return codec.GET_ERROR.encode(errors | flags, reason | flags)

@@ -1,9 +1,8 @@
-"""The robot's four ODrives over one or two CAN ports, as joints.
+"""The robot's four ODrives on one or two CAN ports, as joints.
 
-`read` drains the ports and keeps the newest of every signal with the time it arrived; `send` commands torque, through
-the gate (drivers/odrive/transmit_gate.py) as everything that leaves. Nothing is transmitted here unless the caller
-asks for
-it, and the frames of strangers, garbled ones included, are counted and ignored.
+`read` drains the ports and stores the newest value of every signal with the time when it arrived. `send` commands
+torque, through the gate (drivers/transmit_gate.py) like everything that leaves. Nothing is transmitted unless the
+caller asks for it. Frames of unknown ids and malformed frames are counted and ignored.
 """
 
 from __future__ import annotations
@@ -18,19 +17,19 @@ from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, WatchdogEndpoints
 from drivers.odrive.axis import OdriveAxis
-from drivers.odrive.codec import GarbledMessageError
+from drivers.odrive.codec import MalformedMessageError
 from drivers.odrive.gate_tables import gate_table
 from drivers.odrive.parameters import OdriveParameters
 from drivers.transmit_gate import TransmitGate
 
-REPEAT_S = 0.1  # between two requests to change the axis state, of which the heartbeat tells the result
-LONGEST_IN_QUEUE_S = 2.0  # a stamp older than that is of another clock
-VERSION_REPEAT_S = 0.5  # between two questions for the same that was not answered
-REFRESH_S = 2.0  # between two questions for what was answered: somebody may change a drive over USB
+REPEAT_S = 0.1  # between two requests to change the axis state; the heartbeat reports the result
+LONGEST_IN_QUEUE_S = 2.0  # an older stamp belongs to another clock
+VERSION_REPEAT_S = 0.5  # between two requests for a setting that is still unknown
+REFRESH_S = 2.0  # between two requests for a known setting, which may be changed over USB
 
 
 class OdriveDrives:
-    """All four, in the order of JOINTS. `limits` are what the gate lets pass, `endpoints` more builds of firmware."""
+    """The drives of all joints: a `Drives` of drivers/drive.py."""
 
     def __init__(
         self,
@@ -58,11 +57,10 @@ class OdriveDrives:
             axis.reset()
         self.gate.close()
         self.unknown_frames = 0  # of other ids, remote or extended, where the port does not keep them away
-        self.garbled_frames = 0  # of a drive of ours, with a payload that makes no sense
+        self.malformed_frames = 0  # of these drives, with a payload that cannot be decoded
         self._armed_s = self._disarmed_s = self._version_asked_s = self._watchdog_asked_s = NEVER_S
 
     def read(self, now_s: float) -> DriveStates:
-        """The newest of every signal after draining the ports, with the stamp of its frame."""
         for axis in self.axes:
             axis.begin_read(now_s)
         for port, receivers in self._receivers:
@@ -73,8 +71,8 @@ class OdriveDrives:
                     continue
                 try:
                     receive(frame.data, _stamp_s(frame, now_s))
-                except GarbledMessageError:
-                    self.garbled_frames += 1
+                except MalformedMessageError:
+                    self.malformed_frames += 1
         a, b, c, d = self.axes
         return Joints(a.state, b.state, c.state, d.state)
 
@@ -107,7 +105,6 @@ class OdriveDrives:
         return self.gate.last_refusal
 
     def send(self, torques_nm: Torques, elapsed_s: float) -> None:
-        """To all four, `elapsed_s` after the torques before, which bounds by how much they may differ."""
         self.gate.allow_step(elapsed_s)
         for axis, torque_nm in zip(self.axes, torques_nm, strict=True):
             axis.send_torque(torque_nm)
@@ -116,9 +113,9 @@ class OdriveDrives:
         self.axes[JOINTS.index(joint)].send_torque(torque_nm)
 
     def arm(self, now_s: float, at_once: bool = False) -> None:
-        """Open the gate and prepare all drives `at_once`; else ask those not in it yet for closed loop, every REPEAT_S.
+        """Opens the gate and prepares all drives `at_once`; later asks the others for closed loop, every REPEAT_S.
 
-        A drive is prepared again before it is asked, and nothing is asked for while frames are lost on the way.
+        A drive is prepared again before it is asked, and none is asked while the bus loses frames.
         """
         self.gate.open()
         if not at_once and now_s - self._armed_s < REPEAT_S:
@@ -134,7 +131,7 @@ class OdriveDrives:
             axis.close_loop()
 
     def disarm(self, now_s: float, at_once: bool = False) -> None:
-        """Close the gate; zero torque and idle for all `at_once`, else every REPEAT_S for those in closed loop."""
+        """Closes the gate; commands zero torque and idle `at_once`, later every REPEAT_S where still in closed loop."""
         self.gate.close()
         if not at_once and now_s - self._disarmed_s < REPEAT_S:
             return
@@ -158,7 +155,7 @@ class OdriveDrives:
         self._request_watchdogs(now_s)
 
     def _request_versions(self, now_s: float) -> None:
-        """Every VERSION_REPEAT_S of drives that did not tell theirs yet, every REFRESH_S of all."""
+        """Asks drives of unknown version every VERSION_REPEAT_S, and all every REFRESH_S once all are known."""
         known = all(axis.version is not None for axis in self.axes)
         if now_s - self._version_asked_s < _repeat_s(known):
             return
@@ -168,7 +165,7 @@ class OdriveDrives:
                 axis.request_version()
 
     def _request_watchdogs(self, now_s: float) -> None:
-        """The same of the watchdogs of those whose version is known."""
+        """Asks for watchdog settings likewise, where the version is known."""
         known = all(isfinite(axis.watchdog_s) for axis in self.axes)
         if now_s - self._watchdog_asked_s < _repeat_s(known):
             return
@@ -183,10 +180,9 @@ class OdriveDrives:
 
 
 def _repeat_s(known: bool) -> float:
-    """Between two questions."""
     return REFRESH_S if known else VERSION_REPEAT_S
 
 
 def _stamp_s(frame: Frame, now_s: float) -> float:
-    """When a frame was on the bus, or now, where its port does not know or its clock is another one."""
+    """Returns when a frame was on the bus; now where its port does not know, or uses another clock."""
     return frame.stamp_s if 0.0 <= now_s - frame.stamp_s < LONGEST_IN_QUEUE_S else now_s

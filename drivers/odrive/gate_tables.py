@@ -10,7 +10,7 @@ from math import nan
 
 from drivers.can.frames import Frame
 from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, GarbledMessageError, Message, arbitration_id
+from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
 from drivers.odrive.parameters import OdriveParameters
 from drivers.transmit_gate import GateTable
 
@@ -41,7 +41,7 @@ def gate_table(drive: OdriveParameters) -> GateTable:
 def _decode_torque(data: bytes) -> float:
     try:
         (torque_nm,) = codec.SET_INPUT_TORQUE.decode(data)
-    except GarbledMessageError:
+    except MalformedMessageError:
         return nan
     return float(torque_nm)
 

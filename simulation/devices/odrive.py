@@ -23,7 +23,7 @@ from random import Random
 from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, GarbledMessageError, Message, arbitration_id
+from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
 from simulation.devices.late_messages import LateMessages
 
@@ -102,7 +102,7 @@ class SimulatedOdrive:
             return [self._frame(message) for message in self._PAYLOADS if message.command == command]
         if command == codec.RX_SDO.command:
             return self._read_parameter(frame.data)
-        with suppress(GarbledMessageError):  # a drive ignores malformed messages
+        with suppress(MalformedMessageError):  # a drive ignores malformed messages
             self._obey(command, frame.data, now_s)
         return []
 
@@ -127,7 +127,7 @@ class SimulatedOdrive:
         """Answers reads of the watchdog's settings, the only parameters of this drive; none can be written."""
         try:
             opcode, endpoint, _ = codec.RX_SDO.decode(data)
-        except GarbledMessageError:
+        except MalformedMessageError:
             return []
         values = {
             ENABLE_WATCHDOG_ENDPOINT: bytes([self.parameters.watchdog_s > 0.0]),
@@ -140,18 +140,18 @@ class SimulatedOdrive:
 
     def _set_torque(self, torque_nm: float, now_s: float) -> None:
         if not isfinite(torque_nm):
-            raise GarbledMessageError("not a finite number")
+            raise MalformedMessageError("not a finite number")
         self._setpoint_nm = torque_nm
         self._fed_s = now_s
 
     def _set_gain(self, velocity_gain_nm_s_turn: float) -> None:
         if not isfinite(velocity_gain_nm_s_turn):
-            raise GarbledMessageError("not a finite number")
+            raise MalformedMessageError("not a finite number")
         self._velocity_gain_nm_s_turn = velocity_gain_nm_s_turn
 
     def _set_limits(self, velocity_turn_s: float, current_a: float) -> None:
         if not isfinite(velocity_turn_s + current_a):
-            raise GarbledMessageError("not a finite number")
+            raise MalformedMessageError("not a finite number")
         self._velocity_limit_turn_s = velocity_turn_s
         largest_a = min(current_a, self.parameters.motor_current_limit_a)
         self._largest_nm = largest_a * self.parameters.torque_constant_nm_a

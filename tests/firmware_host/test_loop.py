@@ -333,7 +333,7 @@ def test_garbage_on_the_bus_is_counted_and_changes_nothing(configuration: Config
         garbage.send(Frame(0x009, b"\x00\x00\xc0\x7f\x00\x00\x00\x00"))  # a drive of ours that says NaN
         garbage.send(Frame(0x029, b"\x01"))
         noisy.step()
-    assert noisy.loop.drives.unknown_frames >= 1500 and noisy.loop.drives.garbled_frames >= 3000
+    assert noisy.loop.drives.unknown_frames >= 1500 and noisy.loop.drives.malformed_frames >= 3000
     assert len(quiet.loop.learning.strides) >= 2
     assert repr(noisy.loop.learning.strides) == repr(quiet.loop.learning.strides)  # NaN is not equal to itself
 

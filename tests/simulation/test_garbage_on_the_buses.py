@@ -32,7 +32,7 @@ def test_no_garbage_stops_a_loop_that_is_not_armed_or_brings_torque_to_a_drive(m
     walk = Lockstep(load_example(), Track([(1.0, MUDS["48.5"])]))
     if mode is Mode.IDLE:
         assert walk.run_until(lambda: walk.loop.mode is Mode.IDLE, 2.0)
-    far = [port.open_beside() for port in walk.loop.drives.ports.values() if isinstance(port, MockPort)]
+    far = [port.open_peer() for port in walk.loop.drives.ports.values() if isinstance(port, MockPort)]
     assert far
 
     @settings(max_examples=100, deadline=None)

@@ -15,7 +15,7 @@ from drivers.can.mock_bus import MockBus, MockPort
 from drivers.fault_injection.failing_port import FailingPort, garbled
 from drivers.fault_injection.failures import EFFECTS, FailureKind, Failures
 from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, GarbledMessageError, arbitration_id
+from drivers.odrive.codec import AxisState, MalformedMessageError, arbitration_id
 from drivers.odrive.parameters import OdriveParameters as DriveParameters
 
 DRIVES = {joint: DriveParameters("left" if place < 2 else "right", place) for place, joint in enumerate(JOINTS)}
@@ -263,7 +263,7 @@ def test_a_garbled_heartbeat_of_a_drive_with_an_error_stays_garbled() -> None:
     failures.update(0.0)
     robot.send(Frame(arbitration_id(0, codec.HEARTBEAT), b"\1"))
     (frame,) = port.receive()
-    with pytest.raises(GarbledMessageError):
+    with pytest.raises(MalformedMessageError):
         codec.HEARTBEAT.decode(frame.data)
 
 

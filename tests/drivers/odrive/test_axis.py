@@ -285,7 +285,7 @@ def test_a_build_whose_numbers_are_not_known_is_not_asked_and_counts_as_not_read
     bench.drives._request_watchdogs(1.0)
     assert bench.far.receive() == []
     assert isnan(bench.axis.watchdog_s)
-    assert bench.drives.garbled_frames == 0
+    assert bench.drives.malformed_frames == 0
 
 
 @pytest.mark.parametrize(("endpoint", "value"), [(219, "02"), (218, "0000c07f"), (218, "000080bf"), (218, "0000")])
@@ -295,7 +295,7 @@ def test_a_setting_that_makes_no_sense_is_garbled_and_stays_unknown(bench: Bench
     bench.read(0.1)
     bench.tell_setting(endpoint, value)
     bench.read(0.2)
-    assert bench.drives.garbled_frames == 1
+    assert bench.drives.malformed_frames == 1
     assert isnan(bench.axis.watchdog_s)
 
 
@@ -304,7 +304,7 @@ def test_a_setting_that_another_program_asks_for_changes_nothing(bench: Bench) -
     bench.tell_setting(7, "00000000")
     bench.read(0.1)
     assert isnan(bench.axis.watchdog_s)
-    assert bench.drives.garbled_frames == 0
+    assert bench.drives.malformed_frames == 0
 
 
 def test_a_restart_forgets_version_and_watchdog(bench: Bench) -> None:

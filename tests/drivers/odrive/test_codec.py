@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.odrive import codec as odrive_codec
-from drivers.odrive.codec import ERROR_NAMES, AxisState, GarbledMessageError, Message, arbitration_id, error_text
+from drivers.odrive.codec import ERROR_NAMES, AxisState, MalformedMessageError, Message, arbitration_id, error_text
 
 DBC: Any = cantools.database.load_file(Path(odrive_can.__file__).parent / "dbc" / "odrive-cansimple-0.6.10.dbc")
 MESSAGES = {name: value for name, value in vars(odrive_codec).items() if isinstance(value, Message)}
@@ -105,7 +105,7 @@ def test_any_bytes_of_another_length_are_garbled(name: str, data: bytes) -> None
     if len(data) == len(golden):
         assert len(MESSAGES[name].decode(data)) == len(in_dbc(name).signals)
     else:
-        with pytest.raises(GarbledMessageError, match=f"with {len(data)} bytes"):
+        with pytest.raises(MalformedMessageError, match=f"with {len(data)} bytes"):
             MESSAGES[name].decode(data)
 
 
@@ -117,7 +117,7 @@ def test_no_two_messages_of_any_two_nodes_share_an_id() -> None:
 
 @pytest.mark.parametrize("size", [0, 1, 4, 9])
 def test_a_told_parameter_without_a_value_is_garbled(size: int) -> None:
-    with pytest.raises(GarbledMessageError, match=f"with {size} bytes"):
+    with pytest.raises(MalformedMessageError, match=f"with {size} bytes"):
         odrive_codec.decode_sdo(bytes(size))
 
 
@@ -125,9 +125,9 @@ def test_a_parameter_s_value_is_a_flag_or_a_number_and_may_be_padded() -> None:
     assert [odrive_codec.decode_sdo_flag(bytes([flag, 0, 0, 9])) for flag in (0, 1)] == [False, True]
     assert odrive_codec.decode_sdo_float(bytes.fromhex("00 00 00 3f")) == 0.5
     for value in (b"\2", b"\xff"):
-        with pytest.raises(GarbledMessageError):
+        with pytest.raises(MalformedMessageError):
             odrive_codec.decode_sdo_flag(value)
-    with pytest.raises(GarbledMessageError):
+    with pytest.raises(MalformedMessageError):
         odrive_codec.decode_sdo_float(bytes(3))
 
 

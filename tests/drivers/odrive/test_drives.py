@@ -195,7 +195,7 @@ def test_garbled_and_unknown_frames_are_counted_and_change_nothing(
     for frame in frames:
         bench.far["left"].send(frame)
     assert bench.drives.read(2.0) == before
-    assert (bench.drives.garbled_frames, bench.drives.unknown_frames) == (garbled, unknown)
+    assert (bench.drives.malformed_frames, bench.drives.unknown_frames) == (garbled, unknown)
 
 
 def understood(frame: Frame, node_ids: tuple[int, int]) -> bool:
@@ -219,17 +219,17 @@ def test_two_thousand_random_frames_crash_nothing_and_leave_the_states_finite() 
     @settings(max_examples=2000, deadline=None)
     @given(ANY_FRAME)
     def examine(frame: Frame) -> None:
-        before, states = bench.drives.garbled_frames + bench.drives.unknown_frames, bench.drives.read(1.0)
+        before, states = bench.drives.malformed_frames + bench.drives.unknown_frames, bench.drives.read(1.0)
         bench.far["left"].send(frame)
         after = bench.drives.read(1.0)
-        ignored = bench.drives.garbled_frames + bench.drives.unknown_frames - before
+        ignored = bench.drives.malformed_frames + bench.drives.unknown_frames - before
         assert ignored in (0, 1) if understood(frame, (0, 1)) else ignored == 1
         assert not ignored or repr(after) == repr(states)
         assert all(isfinite(state.angle_rad + state.velocity_rad_s + state.current_a) for state in after)
         assert repr(after[2:]) == repr(states[2:])  # the other bus
 
     examine()
-    assert bench.drives.garbled_frames > 0
+    assert bench.drives.malformed_frames > 0
     assert bench.silent()
 
 
@@ -362,7 +362,7 @@ def test_a_reset_forgets_everything(bench: Bench) -> None:
     bench.drives.read(1.0)
     bench.drives.reset()
     assert not bench.drives.heard
-    assert bench.drives.garbled_frames == 0
+    assert bench.drives.malformed_frames == 0
     assert bench.drives.axes[0].version is None
     assert repr(bench.drives.read(2.0)) == repr(Bench().drives.read(2.0))
 

@@ -15,7 +15,7 @@ from drivers.can.can_port import CanPort, SlcanPort, open_port
 from drivers.can.error_frames import BusState
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
-from drivers.can.slcan_bus import PromptSerial
+from drivers.can.slcan_serial import SlcanSerial
 from simulation.devices.slcan_adapter import SlcanAdapter, decode_line, encode_line
 from tests.waiting import wait_until
 
@@ -231,7 +231,7 @@ def test_what_was_read_is_given_out_byte_by_byte(bench: Bench) -> None:
         def close(self) -> None:
             os.close(slave)
 
-    serial = PromptSerial(Port())
+    serial = SlcanSerial(Port())
     os.write(master, b"abc\n")
     wait_until(lambda: serial.in_waiting == 3)
     assert [serial.read(1) for _ in range(4)] == [b"a", b"b", b"c", b""]

@@ -208,6 +208,6 @@ def test_a_mock_port_fails_as_it_is_told() -> None:
     port.full = False
     port.send(ENCODER)
     assert (port.failed_sends, other.receive()) == (1, [ENCODER])
-    third = port.open_beside()
+    third = port.open_peer()
     third.send(ENCODER)
     assert other.receive() == port.receive() == [ENCODER]
