@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-COMMAND_HZ = 380.0
 WARN_FRACTION, MOST_FRACTION = 0.6, 0.8  # beyond, frames of low priority come late, and then not at all
 
 

@@ -7,7 +7,8 @@ from contextlib import suppress
 from typing import cast
 
 from control.limits import JointLimits
-from drivers.can.bus_load import COMMAND_HZ, FrameRate
+from control.rate import RATE_HZ
+from drivers.can.bus_load import FrameRate
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.drive import DriveParameters, FrameContent, WatchdogEndpoints
@@ -46,7 +47,7 @@ class Odrive:
 
     parameters = OdriveParameters
     example_error = GATE_DRIVER_FAULT
-    command = FrameRate(len(codec.SET_INPUT_TORQUE.encode(0.0)), COMMAND_HZ)
+    command = FrameRate(len(codec.SET_INPUT_TORQUE.encode(0.0)), RATE_HZ)
     reports = (
         FrameRate(REPORT_BYTES, FAST_HZ),  # encoder
         FrameRate(REPORT_BYTES, FAST_HZ),  # current
