@@ -27,13 +27,20 @@ Method = Literal["default", "paper"]
 
 
 @dataclass(frozen=True)
+class PaperEstimationParameters:
+    """Parameters of the method `paper` alone."""
+
+    compensation: Annotated[bool, Meaning("add the body's drag to the thrust while the body advances")] = False
+
+
+@dataclass(frozen=True)
 class EstimationParameters:
     method: Annotated[Method, Meaning("default regresses in torque space; paper is the published method")] = "default"
     fixed_base: Annotated[bool, Meaning("the flippers hang from a bench: all their travel shears mud")] = False
     surface_error_m: Annotated[
         float, Bounds(0.0001, 0.05), Meaning("std_error of the mud's nominal height at one stride")
     ] = 0.001
-    paper_compensation: Annotated[bool, Meaning("method paper adds the body's drag while the body advances")] = False
+    paper: PaperEstimationParameters = PaperEstimationParameters()
 
 
 class MudReading(NamedTuple):
@@ -92,6 +99,6 @@ def _flipper_estimator(
     flipper: str, geometry: FlipperGeometry, drive: FlipperDrive, parameters: EstimationParameters, body_drag_n: float
 ) -> FlipperEstimator | PaperEstimator:
     if parameters.method == "paper":
-        return PaperEstimator(flipper, geometry, drive, body_drag_n if parameters.paper_compensation else 0.0)
+        return PaperEstimator(flipper, geometry, drive, body_drag_n if parameters.paper.compensation else 0.0)
     base = Base.FIXED if parameters.fixed_base else Base.FREE
     return FlipperEstimator(flipper, geometry, drive, base, body_drag_n, parameters.surface_error_m)

@@ -1,21 +1,22 @@
-"""Choice of the insertion depth, once a stride in swing (paper, section III-D).
+"""Choice of the insertion depth, once a stride, in swing (paper, section III-D), and the search behind it.
 
-Two conditions bound the depth z: the flippers must not slip, 2 f_x(z) > f_r + f_a, and they must come out again,
-τ_e(z) < τ_m. Within them the robot should be fast. So of all depths that come out, the one is taken that promises the
-highest speed
+Two conditions bound the depth z: the flippers must not slip, 2 f_x(z) > f_r + f_a, and the mud must release them,
+τ_e(z) < τ_m. Within these bounds the robot should be fast. So of all candidates that come out of the mud, the search
+takes the one with the highest predicted speed
 
-    S(z)/T(z)        S: the body's step with the thrust of that depth (step_model.py)      T: the stride's duration
+    S(z)/T(z)        S: the body's step at the thrust of that depth (step_model.py)      T: the stride's duration
 
-with thrust and suction on the safe side of what is known (depth_forecast.py). A body that slips makes small steps, so
-the first condition needs no bound of its own. It is said where S is less than half an arm, the bound of the authors'
-optimiser. Where no depth comes out the shallowest is taken; where none promises a step, the deepest that comes out.
+where thrust and suction lie on the safe side of the estimates (forecast.py). A body that slips makes small steps, so
+the first condition needs no bound of its own; the choice reports a slip where S is less than half an arm's length, the
+bound of the authors' optimiser. If no candidate comes out, the search takes the shallowest; if none predicts a step,
+the deepest that comes out.
 
-A boundary is met at the depth of the mud before it. What holds a flipper can be felt on the way in: in simulated clay
-of 3 to 5 kPa, 2.5 and 3 cm deep, the hardest moment of the extraction takes 1.3 times the torque that the insertion
-took. So an insertion ends where it takes 1/1.3 of what an extraction may, and the stride goes on at the depth that was
-commanded by then. (Under the stance's load the flipper still sinks, by up to 1 cm.)
+The robot meets a boundary between two muds at the depth that suited the first one. Mud that will hold a flipper can be
+felt during the insertion: in simulated clay of 3 to 5 kPa, at 2.5 and 3 cm, the largest torque of the extraction is 1.3
+times that of the insertion. So an insertion ends at 1/1.3 of the torque that an extraction may take, and the stride
+continues at the depth commanded by then. (Under the stance's load the flipper sinks further, by up to 1 cm.)
 
-The drag pad's resistance k_s w d²/2 is counted with the body's: w and d are its width and depth.
+The drag pad's resistance k_s w d²/2 adds to the body's drag: w and d are its width and depth.
 """
 
 from __future__ import annotations
@@ -26,13 +27,29 @@ from typing import Annotated, Literal, NamedTuple, Protocol
 
 from control.bounds import Bounds, Meaning
 from control.depth.forecast import GRID_M, DepthForecast
-from control.depth.step_model import BodyDrag, Traction, step_m
+from control.depth.step_model import BodyDrag, Motion, Traction, carried_m, motion_of
 from control.gait.gait import GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.records import StrideEstimate
 
 Method = Literal["default", "paper", "gait"]
+
+
+@dataclass(frozen=True)
+class PaperAdaptationParameters:
+    """Parameters of the method `paper` alone."""
+
+    acceleration_s: Annotated[float, Bounds(0.01, 10.0), Meaning("time to reach the stance's speed")] = 0.1
+
+
+@dataclass(frozen=True)
+class GaitAdaptationParameters:
+    """Parameters of the method `gait` alone."""
+
+    min_sweep_deg: Annotated[float, Bounds(1.0, 60.0), Meaning("narrowest sweep")] = 30.0
+    max_sweep_deg: Annotated[float, Bounds(1.0, 60.0), Meaning("widest sweep")] = 50.0
+    swing_duration_s: Annotated[float, Bounds(0.2, 10.0), Meaning("of the swing")] = 0.3
 
 
 @dataclass(frozen=True)
@@ -52,9 +69,6 @@ class AdaptationParameters:
     )
     pad_depth_m: Annotated[float, Bounds(0.0, 0.5), Meaning("of the pad in the mud")] = 0.02
     body_mass_kg: Annotated[float, Bounds(0.05, 100.0), Meaning("of the whole robot")] = 1.0
-    acceleration_s: Annotated[
-        float, Bounds(0.01, 10.0), Meaning("time to reach the stance's speed, in method paper")
-    ] = 0.1
     mobilisation_n_m: Annotated[float, Bounds(10.0, 1e5), Meaning("stiffness of a flipper with its servo")] = (
         250.0  # logs: 300 to 700
     )
@@ -67,55 +81,80 @@ class AdaptationParameters:
     insertion_fraction: Annotated[
         float, Bounds(0.1, 10.0), Meaning("of the motor's torque at which an insertion ends early")
     ] = 0.73
-    min_sweep_deg: Annotated[float, Bounds(1.0, 60.0), Meaning("narrowest sweep that method gait chooses")] = 30.0
-    max_sweep_deg: Annotated[float, Bounds(1.0, 60.0), Meaning("widest sweep that method gait chooses")] = 50.0
-    swing_duration_s: Annotated[float, Bounds(0.2, 10.0), Meaning("of the swing in method gait")] = 0.3
+    paper: PaperAdaptationParameters = PaperAdaptationParameters()
+    gait: GaitAdaptationParameters = GaitAdaptationParameters()
 
 
 class DepthChoice(NamedTuple):
     depth_m: float
-    slips: bool  # less than half an arm of step is promised
+    slips: bool  # the predicted step is less than half an arm's length
     reason: str
     gait: GaitParameters | None = None  # of the next stride; None: as configured
 
 
 class Adaptation(Protocol):
-    """Owns the depth of the next stride, and its gait where the method chooses that as well."""
+    """Chooses the depth of the next stride; a method may choose the gait as well."""
 
     @property
     def largest_insertion_nm(self) -> float:
-        """Mud's torque on the adduction joint at which an insertion ends where it is."""
+        """The mud's torque on the adduction joint at which an insertion ends early."""
 
     def reset(self, depth_m: float) -> None: ...
 
-    def step(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice: ...
+    def step(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
+        """Choose from the strides that just closed at the commanded depth `walked_m`, and the estimate after them."""
+
+
+class Candidate(NamedTuple):
+    """A stride that the search may choose."""
+
+    depth_m: float
+    gait: GaitParameters
+    duration_s: float
+    motion: Motion  # of the plates in the mud
 
 
 def depth_grid(parameters: AdaptationParameters, geometry: FlipperGeometry, gait: GaitParameters) -> tuple[float, ...]:
-    """From the shallowest depth to the deepest that is within reach over the whole sweep."""
+    """Return the depths from the shallowest to the deepest that the flipper reaches over the whole sweep."""
     low_m = parameters.min_depth_m
     high_m = min(parameters.max_depth_m, geometry.deepest_m(gait.sweep_angle_deg))
     count = max(0, int((high_m - low_m) / GRID_M + 1e-9)) + 1
     return tuple(low_m + i * GRID_M for i in range(count))
 
 
+def make_candidate(geometry: FlipperGeometry, gait: GaitParameters, depth_m: float) -> Candidate:
+    motion = motion_of(gait, geometry.flipper_length_m, depth_m)
+    return Candidate(depth_m, gait, stride_duration_s(gait, geometry, depth_m), motion)
+
+
 def body_drag(parameters: AdaptationParameters, forecast: DepthForecast) -> BodyDrag:
-    """With the pad's in the mud that is forecast."""
+    """Return the drag of body and pad in the mud of the forecast."""
     depth_m = parameters.pad_depth_m
     pad_n = forecast.shear_at(depth_m) * parameters.pad_width_m * depth_m * depth_m / 2.0
     return BodyDrag(parameters.body_drag_n + pad_n, parameters.body_damping_n_s_m, parameters.body_mass_kg)
 
 
 class DepthAdaptation:
-    """Owns the depth of the next stride."""
+    """Searches the candidates, which here are the depths of the grid, for the fastest that comes out of the mud.
 
-    def __init__(self, parameters: AdaptationParameters, geometry: FlipperGeometry, gait: GaitParameters) -> None:
+    Owns the forecast and the choice. The method `gait` adds candidates and conditions.
+    """
+
+    def __init__(
+        self,
+        parameters: AdaptationParameters,
+        geometry: FlipperGeometry,
+        gait: GaitParameters,
+        candidates: Sequence[Candidate] = (),
+    ) -> None:
+        """`candidates`, if given, replace those of the depth grid: narrow before wide and shallow before deep."""
         self.parameters = parameters
         self.geometry = geometry
         self.gait = gait
-        self.grid_m = depth_grid(parameters, geometry, gait)
+        depths_m = depth_grid(parameters, geometry, gait)
+        self.candidates = candidates or tuple(make_candidate(geometry, gait, depth_m) for depth_m in depths_m)
+        self._depths_m = sorted({each.depth_m for each in self.candidates})
         self.forecast = DepthForecast(geometry, gait, parameters.motor_force_n)
-        self._durations_s = {depth_m: stride_duration_s(gait, geometry, depth_m) for depth_m in self.grid_m}
         self.reset(parameters.initial_depth_m)
 
     def reset(self, depth_m: float) -> None:
@@ -123,17 +162,14 @@ class DepthAdaptation:
         self.forecast.reset()
 
     def step(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
-        """From the strides that just closed, the depth that they were told, and the belief after them.
-
-        Where nothing is known the depth stays.
-        """
+        """Choose the next stride; without an estimate of the thrust it stays the same, unless a flipper was stuck."""
         self.forecast.update(mud_estimate, strides, walked_m)
         stuck = any(not stride.released for stride in strides)
-        speeds = self._speeds_m_s()
-        if speeds:
-            self.choice = self._fastest(speeds, "a flipper was stuck" if stuck else "")
-        elif stuck:
-            self.choice = DepthChoice(max(self._that_come_out(), default=self.grid_m[0]), False, "a flipper was stuck")
+        steps_m = self._steps_m()
+        if steps_m or stuck:
+            index, reason = self._fastest(steps_m or [0.0] * len(self.candidates))
+            slips = bool(steps_m) and steps_m[index] < self.geometry.flipper_length_m / 2.0
+            self.choice = self._choose(self.candidates[index], slips, "a flipper was stuck" if stuck else reason)
         else:
             self.choice = self.choice._replace(reason="nothing known of the thrust, depth kept")
         return self.choice
@@ -142,31 +178,37 @@ class DepthAdaptation:
     def largest_insertion_nm(self) -> float:
         return self.parameters.insertion_fraction * self.forecast.lifting_torque_nm
 
-    def _that_come_out(self) -> list[float]:
-        limit_nm = self.parameters.lifting_fraction * self.forecast.lifting_torque_nm
-        return [z for z in self.grid_m if self.forecast.extraction_nm(z) < limit_nm]
+    def _choose(self, best: Candidate, slips: bool, reason: str) -> DepthChoice:
+        return DepthChoice(best.depth_m, slips, reason)
 
-    def _speeds_m_s(self) -> dict[float, float]:
-        """Promised at every depth of the grid; empty where nothing is known of the thrust."""
+    def _steps_m(self) -> list[float]:
+        """Predict the step of every candidate; an empty list if nothing is known of the thrust.
+
+        The thrust is that in the middle of the sweep: a gait that reaches a depth at the ends reaches it there too.
+        """
         drag, stiffness_n_m = body_drag(self.parameters, self.forecast), 2.0 * self.parameters.mobilisation_n_m
-        length_m, speeds = self.geometry.flipper_length_m, dict[float, float]()
-        for depth_m in self.grid_m:
+        self.forecast.gait = self.candidates[0].gait
+        tractions = dict[float, Traction]()
+        for depth_m in self._depths_m:
             thrust_n = self.forecast.thrust_n(depth_m)
             if thrust_n is None:
-                return {}
-            traction = Traction(thrust_n, stiffness_n_m)
-            speeds[depth_m] = step_m(self.gait, length_m, drag, traction, depth_m) / self._durations_s[depth_m]
-        return speeds
+                return []
+            tractions[depth_m] = Traction(thrust_n, stiffness_n_m)
+        return [carried_m(each.motion, drag, tractions[each.depth_m]) for each in self.candidates]
 
-    def _fastest(self, speeds: dict[float, float], reason: str) -> DepthChoice:
-        out = self._that_come_out()
-        if not out:
-            return self._choice(self.grid_m[0], speeds, reason or "extraction")
-        best_m = max(out, key=lambda depth_m: speeds[depth_m])
-        if speeds[best_m] <= 0.0:
-            return self._choice(out[-1], speeds, reason or "thrust")
-        return self._choice(best_m, speeds, reason or "fastest")
+    def _fastest(self, steps_m: Sequence[float]) -> tuple[int, str]:
+        """Return the index of the fastest candidate that comes out, and the reason; of equals, the deepest.
 
-    def _choice(self, depth_m: float, speeds: dict[float, float], reason: str) -> DepthChoice:
-        promised_m = speeds[depth_m] * self._durations_s[depth_m]
-        return DepthChoice(depth_m, promised_m < self.geometry.flipper_length_m / 2.0, reason)
+        The candidates are tried from the fastest on, because the forecast of an extraction takes time.
+        """
+        pairs = zip(steps_m, self.candidates, strict=True)
+        merits = [(step_m / each.duration_s, each.depth_m) for step_m, each in pairs]
+        for index in sorted(range(len(merits)), key=merits.__getitem__, reverse=True):
+            if self._comes_out(self.candidates[index]):
+                return index, "fastest" if merits[index][0] > 0.0 else "thrust"
+        return 0, "extraction"
+
+    def _comes_out(self, stride: Candidate) -> bool:
+        self.forecast.gait = stride.gait
+        limit_nm = self.parameters.lifting_fraction * self.forecast.lifting_torque_nm
+        return self.forecast.extraction_nm(stride.depth_m) < limit_nm

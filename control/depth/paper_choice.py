@@ -85,5 +85,5 @@ class PaperAdaptation:
         """f_r + f_a, with f_a = m α l / (t_acc t_s) and the stance time t_s = 2 α l / v."""
         parameters = self.parameters
         pad_n = self._k_s.value * parameters.pad_width_m * parameters.pad_depth_m**2 / 2.0
-        inertial_n = parameters.body_mass_kg * self.gait.stance_speed_m_s / (2.0 * parameters.acceleration_s)
+        inertial_n = parameters.body_mass_kg * self.gait.stance_speed_m_s / (2.0 * parameters.paper.acceleration_s)
         return parameters.body_drag_n + pad_n + inertial_n

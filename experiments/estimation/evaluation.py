@@ -14,7 +14,7 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 from control.records import StrideEstimate
-from estimation.mud import EstimationParameters
+from estimation.mud import EstimationParameters, PaperEstimationParameters
 from experiments.estimation.boundaries import CrossCoupling, boundary_rows, crossings_of
 from experiments.reports.error_table import COEFFICIENTS, Evaluation, error_rows, plate_rows
 from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
@@ -102,7 +102,9 @@ def methods_of(setup: Setup) -> tuple[Method, ...]:
     both = (Method("default", setup.name, True, default), Method("paper", setup.name, True, paper))
     if setup.fixed_base:
         return both
-    compensated = Method("paper compensated", setup.name, True, replace(paper, paper_compensation=True))
+    compensated = Method(
+        "paper compensated", setup.name, True, replace(paper, paper=PaperEstimationParameters(compensation=True))
+    )
     return *both, compensated, Method("default", f"{setup.name} without pose", False, default)
 
 

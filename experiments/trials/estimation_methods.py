@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from estimation.mud import EstimationParameters
+from estimation.mud import EstimationParameters, PaperEstimationParameters
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log_reading.log_reader import Log
 from firmware_host.log_reading.replay import replay_log
@@ -24,7 +24,7 @@ Strides = list[dict[str, Any]]
 
 def configured_method(parameters: EstimationParameters) -> str:
     """The name of what a configuration asks for."""
-    compensated = parameters.method == "paper" and parameters.paper_compensation
+    compensated = parameters.method == "paper" and parameters.paper.compensation
     return COMPENSATED if compensated else parameters.method
 
 
@@ -32,7 +32,7 @@ def with_method(parameters: EstimationParameters, method: str) -> EstimationPara
     """By another method, all else as it was."""
     if method == DEFAULT:
         return replace(parameters, method="default")
-    return replace(parameters, method="paper", paper_compensation=method == COMPENSATED)
+    return replace(parameters, method="paper", paper=PaperEstimationParameters(method == COMPENSATED))
 
 
 def strides_by_method(

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator
 from math import ceil, degrees, floor, radians
 
-from control.depth.gait_choice import candidates
+from control.depth.gait_choice import gait_candidates
 from control.records import JOINTS
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.pose_consistency import pose_problems
@@ -182,11 +182,14 @@ def _range_problems(configuration: Configuration) -> Iterator[str]:
 def _sweep_problems(configuration: Configuration) -> Iterator[str]:
     """Of the sweeps among which the method "gait" chooses; wide ones go less deep, as far as they reach."""
     geometry, limits, adaptation = configuration.geometry, configuration.limits, configuration.adaptation
-    widest_deg, widest = adaptation.max_sweep_deg, f"adaptation.max_sweep_deg = {adaptation.max_sweep_deg}"
+    widest_deg, widest = (
+        adaptation.gait.max_sweep_deg,
+        f"adaptation.gait.max_sweep_deg = {adaptation.gait.max_sweep_deg}",
+    )
     within_deg = min(-limits.sweep_min_deg, limits.sweep_max_deg)
     reached_m = geometry.deepest_m(widest_deg)
-    if adaptation.min_sweep_deg > widest_deg:
-        yield f"adaptation.min_sweep_deg = {adaptation.min_sweep_deg}: must be at most {widest}"
+    if adaptation.gait.min_sweep_deg > widest_deg:
+        yield f"adaptation.gait.min_sweep_deg = {adaptation.gait.min_sweep_deg}: must be at most {widest}"
     if widest_deg > within_deg:
         yield f"{widest}: must be at most {within_deg:g} for limits.sweep_min_deg and sweep_max_deg"
     if adaptation.min_depth_m > reached_m:
@@ -194,11 +197,11 @@ def _sweep_problems(configuration: Configuration) -> Iterator[str]:
         return
     poses = [
         geometry.adduction_rad(radians(each.gait.sweep_angle_deg), each.depth_m)
-        for each in candidates(adaptation, geometry, configuration.gait)
+        for each in gait_candidates(adaptation, geometry, configuration.gait)
     ]
     lowest_deg = degrees(min(poses))
     if limits.adduction_min_deg > lowest_deg:
         yield (
             f"limits.adduction_min_deg = {limits.adduction_min_deg}: must be at most {lowest_deg:.1f}"
-            " for adaptation.min_sweep_deg to max_sweep_deg"
+            " for adaptation.gait.min_sweep_deg to max_sweep_deg"
         )

@@ -24,6 +24,11 @@ FORMER_KEYS = {  # of version 0.1, accepted in version 0.2
     "faults.disk_free_share": "disk_free_fraction",
     "adaptation.lifting_share": "lifting_fraction",
     "adaptation.insertion_share": "insertion_fraction",
+    "adaptation.acceleration_s": "paper.acceleration_s",
+    "adaptation.min_sweep_deg": "gait.min_sweep_deg",
+    "adaptation.max_sweep_deg": "gait.max_sweep_deg",
+    "adaptation.swing_duration_s": "gait.swing_duration_s",
+    "estimation.paper_compensation": "paper.compensation",
     "log.min_free_share": "min_free_fraction",
 }
 NO_KEYS = frozenset({"text", "warnings"})  # fields of the configuration that no file gives

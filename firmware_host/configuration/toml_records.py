@@ -92,9 +92,11 @@ def rename_former_keys(document: dict[str, Any], former: Mapping[str, str]) -> l
         table = document.get(section)
         if not isinstance(table, dict) or former_name not in table:
             continue
-        if name in table:
+        inner, _, last = name.rpartition(".")  # a key may have moved into a section of its own
+        target = table.setdefault(inner, {}) if inner else table
+        if not isinstance(target, dict) or last in target:
             raise ConfigurationError([f"{key}: is the former name of {section}.{name}; remove {former_name}"])
-        table[name] = table.pop(former_name)
+        target[last] = table.pop(former_name)
         warnings.append(f"{key} is now {section}.{name}: rename it, the next version refuses the former name")
     return warnings
 

@@ -16,7 +16,14 @@ from control.rate import PERIOD_S
 from control.records import FLIPPERS, NO_LOAD, BodyPose, Joints, Phase, StrideEstimate
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import FlipperDrive
-from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstimator, MudReading
+from estimation.mud import (
+    PAPER_DRAG_N,
+    EstimationParameters,
+    Method,
+    MudEstimator,
+    MudReading,
+    PaperEstimationParameters,
+)
 from estimation.mud_map import PIECE_M
 from estimation.paper import PaperEstimator
 from estimation.recorded_states import NO_AGES_S, recorded_states
@@ -114,7 +121,7 @@ def test_the_method_paper_gives_the_papers_estimators() -> None:
 
 
 def test_the_paper_adds_the_drag_only_where_it_is_asked_to() -> None:
-    parameters = EstimationParameters(method="paper", paper_compensation=True)
+    parameters = EstimationParameters(method="paper", paper=PaperEstimationParameters(compensation=True))
     left = MudEstimator(GEOMETRY, (DRIVE, DRIVE), parameters, 7.0).left
     assert isinstance(left, PaperEstimator)
     assert left.body_drag_n == 7.0

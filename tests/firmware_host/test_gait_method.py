@@ -43,10 +43,10 @@ def test_the_methods_own_sweeps_are_within_limits_and_reach(example_text: str) -
     [
         (
             "min_sweep_deg = 45.0\nmax_sweep_deg = 40.0",
-            "adaptation.min_sweep_deg = 45.0: must be at most adaptation.max_sweep_deg = 40.0",
+            "adaptation.gait.min_sweep_deg = 45.0: must be at most adaptation.gait.max_sweep_deg = 40.0",
         ),
-        ("swing_duration_s = 0.1", "adaptation.swing_duration_s = 0.1: must be "),
-        ("max_sweep_deg = 75.0", "adaptation.max_sweep_deg = 75.0: must be "),
+        ("swing_duration_s = 0.1", "adaptation.gait.swing_duration_s = 0.1: must be "),
+        ("max_sweep_deg = 75.0", "adaptation.gait.max_sweep_deg = 75.0: must be "),
     ],
 )
 def test_what_cannot_be_is_refused_with_key_value_and_bound(example_text: str, adaptation: str, problem: str) -> None:
@@ -56,7 +56,7 @@ def test_what_cannot_be_is_refused_with_key_value_and_bound(example_text: str, a
 def test_a_sweep_beyond_the_joints_limits_is_refused(example_text: str) -> None:
     limits = "sweep_min_deg = -48.0"
     assert problems_of(example_text, limits=limits) == [
-        "adaptation.max_sweep_deg = 50.0: must be at most 48 for limits.sweep_min_deg and sweep_max_deg"
+        "adaptation.gait.max_sweep_deg = 50.0: must be at most 48 for limits.sweep_min_deg and sweep_max_deg"
     ]
     assert problems_of(example_text, limits=limits, adaptation="max_sweep_deg = 48.0") == []
 
@@ -65,7 +65,7 @@ def test_a_sweep_over_which_not_even_the_least_depth_is_reached_is_refused(examp
     reached_m = FlipperGeometry().deepest_m(60.0)
     assert reached_m < 0.025
     assert problems_of(example_text, adaptation="min_depth_m = 0.025\nmax_sweep_deg = 60.0") == [
-        f"adaptation.max_sweep_deg = 60.0: reaches {reached_m:.4f} m, less than adaptation.min_depth_m = 0.025"
+        f"adaptation.gait.max_sweep_deg = 60.0: reaches {reached_m:.4f} m, less than adaptation.min_depth_m = 0.025"
     ]
 
 
@@ -74,7 +74,7 @@ def test_an_adduction_limit_above_a_pose_that_may_be_chosen_is_refused(example_t
     adaptation = "max_depth_m = 0.03\nmin_depth_m = 0.02\nmax_sweep_deg = 45.0"
     limits = "adduction_min_deg = -40.0"
     assert problems_of(example_text, adaptation=adaptation, limits=limits) == [
-        "limits.adduction_min_deg = -40.0: must be at most -43.1 for adaptation.min_sweep_deg to max_sweep_deg"
+        "limits.adduction_min_deg = -40.0: must be at most -43.1 for adaptation.gait.min_sweep_deg to max_sweep_deg"
     ]
 
 

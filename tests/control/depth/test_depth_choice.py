@@ -429,7 +429,7 @@ class TestRange:
     ) -> None:
         gait, parameters = GaitParameters(sweep_angle_deg=sweep_deg), AdaptationParameters(max_depth_m=max_depth_m)
         adaptation = DepthAdaptation(parameters, GEOMETRY, gait)
-        assert all(GEOMETRY.is_reachable(radians(sweep_deg), depth_m) for depth_m in adaptation.grid_m)
+        assert all(GEOMETRY.is_reachable(radians(sweep_deg), depth_m) for depth_m in adaptation._depths_m)
         adaptation.reset(parameters.min_depth_m)
         assert (
             parameters.min_depth_m
@@ -442,13 +442,13 @@ class TestRange:
         assert adapted(parameters).step(believed(FIRM, LOOSE), both(), 0.03).depth_m == 0.15
 
     def test_the_grid_holds_both_ends_of_its_range(self) -> None:
-        assert adapted().grid_m == pytest.approx(DEPTHS_M, abs=1e-12)
+        assert adapted()._depths_m == pytest.approx(DEPTHS_M, abs=1e-12)
         assert DEPTHS_M[-1] == same_depth(PARAMETERS.max_depth_m)
 
     @given(st.floats(0.01, 0.05), st.integers(0, 12), st.floats(0.01, 0.99))
     def test_the_grid_never_passes_its_greatest_depth(self, low_m: float, steps: int, fraction: float) -> None:
         high_m = low_m + (steps + fraction) * GRID_M
         assume(high_m < GEOMETRY.deepest_m(30.0))
-        grid_m = adapted(AdaptationParameters(min_depth_m=low_m, max_depth_m=high_m)).grid_m
+        grid_m = adapted(AdaptationParameters(min_depth_m=low_m, max_depth_m=high_m))._depths_m
         assert len(grid_m) == steps + 1
         assert grid_m[-1] <= high_m

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from control.depth.depth_choice import AdaptationParameters, DepthChoice, body_drag
+from control.depth.depth_choice import AdaptationParameters, DepthChoice, GaitAdaptationParameters, body_drag
 from control.depth.forecast import DepthForecast
 from control.depth.gait_choice import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptation, quickest
 from control.depth.step_model import Traction, step_m
@@ -65,9 +65,9 @@ def brute_force(
 ) -> list[tuple[float, float, float]]:
     """(speed, depth, sweep) of every pair that comes out, the fastest first."""
     found = []
-    for i in range(round((PARAMETERS.max_sweep_deg - PARAMETERS.min_sweep_deg) / SWEEP_STEP_DEG) + 1):
-        deg = PARAMETERS.min_sweep_deg + i * SWEEP_STEP_DEG
-        gait = replace(GAIT, sweep_angle_deg=deg, swing_duration_s=PARAMETERS.swing_duration_s)
+    for i in range(round((PARAMETERS.gait.max_sweep_deg - PARAMETERS.gait.min_sweep_deg) / SWEEP_STEP_DEG) + 1):
+        deg = PARAMETERS.gait.min_sweep_deg + i * SWEEP_STEP_DEG
+        gait = replace(GAIT, sweep_angle_deg=deg, swing_duration_s=PARAMETERS.gait.swing_duration_s)
         forecast = DepthForecast(GEOMETRY, walked, PARAMETERS.motor_force_n)
         forecast.update(mud_estimate, closed, PARAMETERS.initial_depth_m)
         forecast.gait = gait
@@ -119,7 +119,7 @@ def test_the_torque_of_an_extraction_is_that_of_the_pose_at_its_own_rear(deg: fl
     limit_nm = parameters.lifting_fraction * LIFTING_NM
     just = limit_nm / stroke_moment_m4(GEOMETRY, plate, rear_rad) / 1.1  # two standard errors of 5 %
     for fraction, comes_out in ((0.999, True), (1.001, False)):
-        narrowed = replace(parameters, min_sweep_deg=deg, max_sweep_deg=deg)
+        narrowed = replace(parameters, gait=GaitAdaptationParameters(deg, deg))
         adaptation = GaitAdaptation(narrowed, GEOMETRY, replace(GAIT, sweep_angle_deg=40.0))
         k_e = Coefficient(fraction * just, 0.05 * fraction * just, 0.02, 0.0, 0.0, 8)
         flipper = FlipperEstimate(None, reported(2e6), k_e)

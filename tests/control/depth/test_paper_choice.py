@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.depth.depth_choice import AdaptationParameters, DepthChoice, depth_grid
+from control.depth.depth_choice import AdaptationParameters, DepthChoice, PaperAdaptationParameters, depth_grid
 from control.depth.paper_choice import PaperAdaptation
 from control.gait.gait import GaitParameters
 from control.mud_estimate import NOTHING_KNOWN
@@ -104,7 +104,7 @@ class TestSlip:
         stance_s = 2.0 * radians(30.0) * 0.12 / 0.2
         assert 2.0 * radians(30.0) * 0.12 / (0.2 * stance_s) == pytest.approx(1.0)
         parameters, gait = (
-            AdaptationParameters(body_mass_kg=2.0, acceleration_s=0.2),
+            AdaptationParameters(body_mass_kg=2.0, paper=PaperAdaptationParameters(acceleration_s=0.2)),
             GaitParameters(stance_speed_m_s=0.2),
         )
         for k_s, slips in ((0.0587e6, True), (0.0589e6, False)):

@@ -115,9 +115,9 @@ def test_a_walk_is_also_judged_with_the_papers_drag_and_without_a_pose() -> None
     ]
     assert not any(m.parameters.fixed_base for m in methods.values())
     compensated, blind = methods["paper compensated", "walking"], methods["default", "walking without pose"]
-    assert compensated.parameters.paper_compensation and compensated.parameters.method == "paper"
+    assert compensated.parameters.paper.compensation and compensated.parameters.method == "paper"
     assert not blind.with_pose and blind.parameters.method == "default"
-    assert not methods["paper", "walking"].parameters.paper_compensation
+    assert not methods["paper", "walking"].parameters.paper.compensation
 
 
 # a short one, for real

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,12 @@ from simulation.harness.world import parse_world
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 
-VALUE = 0.42
+VALUES = {
+    "adaptation.min_sweep_deg": 35.0,
+    "adaptation.max_sweep_deg": 45.0,
+    "estimation.paper_compensation": True,
+}
+USUAL_VALUE = 0.42
 
 
 def with_key(text: str, section: str, line: str) -> str:
@@ -25,8 +31,9 @@ def with_key(text: str, section: str, line: str) -> str:
 @pytest.mark.parametrize("key", FORMER_KEYS)
 def test_a_former_key_sets_the_present_one_with_a_warning(example_text: str, key: str) -> None:
     section, former = key.split(".")
-    configuration = parse_configuration(with_key(example_text, section, f"{former} = {VALUE}"))
-    assert getattr(getattr(configuration, section), FORMER_KEYS[key]) == VALUE
+    value = VALUES.get(key, USUAL_VALUE)
+    configuration = parse_configuration(with_key(example_text, section, f"{former} = {str(value).lower()}"))
+    assert attrgetter(f"{section}.{FORMER_KEYS[key]}")(configuration) == value
     (warning,) = configuration.warnings
     assert key in warning and f"{section}.{FORMER_KEYS[key]}" in warning
 
