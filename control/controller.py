@@ -6,7 +6,7 @@ what leaves for the drives is decided by the limits, not here.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import radians
 from typing import Annotated, NamedTuple
@@ -61,6 +61,9 @@ DAMPING_NM = 0.4  # at most, of each joint: half of what the motors may do
 ALL_TRUSTED = same_for_all(True)
 
 
+HoldLaw = Callable[[Torques, DriveStates], Torques]  # from the torques that hold the pose to those wanted instead
+
+
 class WalkOrder(NamedTuple):
     depth_m: float  # of every stride, or of the first one if adaptive
     adaptive: bool = True
@@ -91,6 +94,7 @@ class Controller:
         self.motion = motion
         self.recovery = recovery
         self.order = WalkOrder(0.0)
+        self.hold_law: HoldLaw | None = None  # an experiment may replace the torques in HOLD
         self.reset()
 
     def reset(self) -> None:
@@ -106,6 +110,7 @@ class Controller:
         self._stillness = [Stillness(SETTLED_RAD) for _ in JOINTS]
         self._since_s = self._resting_s = 0.0  # the mode began, all joints rest
         self.target = RESTING
+        self.joint_targets: JointTargets | None = None  # of the last step with stiffness
 
     @property
     def walk_finished(self) -> bool:
@@ -141,7 +146,15 @@ class Controller:
         """In hold, take these joints slowly there, in the order of JOINTS; None: where it is held."""
         held = self._pose.map(lambda target: target.angle_rad)
         there = Joints(*(angle if angle is not None else here for angle, here in zip(angles, held, strict=True)))
-        self._move = JointPath(held, [there], self.motion.path_speed_rad_s)
+        self.follow_path([there], self.motion.path_speed_rad_s)
+
+    def follow_path(self, way_points: Sequence[JointAngles], speed_rad_s: float) -> None:
+        """In hold, move smoothly from the held pose through these poses, and hold the last one."""
+        self._move = JointPath(self._pose.map(lambda target: target.angle_rad), way_points, speed_rad_s)
+
+    def hold_pose(self, angles: JointAngles) -> None:
+        """In hold, replace the held pose at once."""
+        self._move, self._pose = None, still(angles)
 
     @property
     def fault(self) -> Fault | None:
@@ -178,7 +191,9 @@ class Controller:
         if mode is Mode.STOPPING and self._path is not None and self._path.finished:
             self._up = self.is_up(states)
             self._waited_s += elapsed_s
-        return joint_torques_nm(self._targets(dt_s, mode, states), states, self.gains, self.mass, self._fade)
+        self.joint_targets = self._targets(dt_s, mode, states)
+        torques_nm = joint_torques_nm(self.joint_targets, states, self.gains, self.mass, self._fade)
+        return self.hold_law(torques_nm, states) if self.hold_law and mode is Mode.HOLD else torques_nm
 
     def _damp(self, elapsed_s: float, states: DriveStates, trusted: Joints[bool]) -> Torques:
         still = [each.update(state.angle_rad, elapsed_s) for each, state in zip(self._stillness, states, strict=True)]

@@ -185,7 +185,7 @@ def _run_loop(
         notifier.send("STOPPING=1")
         if failures is not None:  # or what fails on purpose would keep the drives from hearing the end
             failures.end_all()
-        return _end_safely(loop, problem)
+        return end_safely(loop, problem)
 
 
 def reopen_buses(loop: Loop, buses: Mapping[str, ReopeningPort], now_s: float) -> None:
@@ -203,7 +203,7 @@ def reopen_pose(loop: Loop, pose: OpenedPose, now_s: float) -> None:
         loop.events.report(now_s, "the pose's source was opened again; its zero may be another one")
 
 
-def _end_safely(loop: Loop, problem: Exception) -> int:
+def end_safely(loop: Loop, problem: Exception) -> int:
     """Idle the drives, whatever state the rest is in, and say what happened."""
     loop.drives.force_idle(GOODBYE_FRAMES)
     place = traceback.extract_tb(problem.__traceback__)[-1]

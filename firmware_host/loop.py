@@ -82,7 +82,7 @@ class Loop:
         self.missed_ticks = 0  # since the start
         self.ending = False  # the daemon is about to end: nothing is armed any more
         self.forced = False  # armed by force against a present fault
-        self._request = Request.NONE  # for the next tick
+        self.pending_request = Request.NONE  # for the next tick
         self._clearing_until_s = NEVER_S
         self._mode_since_s = 0.0
         self._clock, self._wall_clock = clock, wall_clock
@@ -165,7 +165,8 @@ class Loop:
             return holder
         self.events.report(now_s, f"lease of {holder} is over")
         self.lease.reset()
-        return holder if self._request is Request.ARM else ""  # the fault refuses the request of a program that is gone
+        arms = self.pending_request is Request.ARM  # perhaps for the program that is gone: the fault prevents it
+        return holder if arms else ""
 
     def _examine(self, tick: Tick, lost_lease_holder: str) -> Health:
         """Detect and latch faults, and collect the facts that the mode depends on."""
@@ -207,7 +208,7 @@ class Loop:
 
     def _pop_request(self) -> Request:
         """The request to act on in this tick."""
-        request, self._request = self._request, Request.NONE
+        request, self.pending_request = self.pending_request, Request.NONE
         refused = self.ending and request in (Request.ARM, Request.WALK)
         return Request.NONE if refused else request
 
@@ -313,8 +314,8 @@ class Loop:
             self._overrule_faults(now_s, forced)
         if order is not None:
             self.controller.order = order
-        if self._request is not Request.DISARM:  # no later request replaces it
-            self._request = request
+        if self.pending_request is not Request.DISARM:  # no later request replaces it
+            self.pending_request = request
         return None
 
     def move(self, angles_rad: Mapping[str, float], now_s: float, by: str) -> str | None:

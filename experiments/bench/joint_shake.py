@@ -75,7 +75,7 @@ class Shake:
 def shake(stand: Stand, joint: str) -> Shake:
     """Of an armed joint. Raises BenchError where a fault or a late computer ends it."""
     place, kind = joint_place(joint), joint.split("_")[1]
-    stand.controller.law = idle
+    stand.controller.hold_law = idle
     for _ in range(TRIES):
         at_rest = [sample.states[place].angle_rad for sample in stand.run_for(REST_TICKS * PERIOD_S)]
         law = Shake(place, SHAKES[kind], max(SHAKEN_RAD, JITTERS * (max(at_rest) - min(at_rest))))
@@ -86,9 +86,9 @@ def shake(stand: Stand, joint: str) -> Shake:
 
 def _is_punctual(stand: Stand, joint: str, law: Shake) -> bool:
     """Whether the shake came to its end without a tick that was late; one ends it at once."""
-    stand.controller.law = law
+    stand.controller.hold_law = law
     samples = stand.run_until(lambda at: law.done or at.tick.missed > 0, LONGEST_S, f"The end of shaking {joint}")
-    stand.controller.law = idle
+    stand.controller.hold_law = idle
     return not samples[-1].tick.missed
 
 

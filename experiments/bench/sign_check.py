@@ -62,7 +62,7 @@ def nudged(stand: Stand, joint: str) -> Readings:
         return
     begun = stand.run_for(0.1)[-1].states
     nudge = Nudge(place, begun)
-    stand.controller.law = nudge
+    stand.controller.hold_law = nudge
     samples = stand.run_until(lambda sample: nudge.done, 10.0, f"A motion of {joint}")
     yield from _agreement(joint, begun, samples, nudge)
     stand.run_for(0.3)  # it falls back

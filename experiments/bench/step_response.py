@@ -66,7 +66,7 @@ def step_response(stand: Stand, joint: str, seed: int = 1) -> Readings:
     """Raises BenchError where a fault ends it."""
     pulses = Pulses(joint_place(joint), Random(f"{joint} {seed}"))
     stand.arm(lambda held, states: NO_TORQUE)
-    stand.controller.law = pulses
+    stand.controller.hold_law = pulses
     samples = [stand.tick_soundly() for _ in range(pulses.ticks)]
     stand.let_go()
     constant_nm_a = stand.configuration.drive[joint].torque_constant_nm_a

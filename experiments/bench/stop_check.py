@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import degrees, nan, radians
 
-from control.controller import ALL_TRUSTED, DAMPING_NM, RAISING_S, SOFT_STOP_S, measured_angles
+from control.controller import ALL_TRUSTED, DAMPING_NM, RAISING_S, SOFT_STOP_S, HoldLaw, measured_angles
 from control.joint_pd import damping_torques_nm
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
@@ -21,7 +21,7 @@ from control.records import JOINTS, DriveStates, JointAngles, Joints, Phase, Tor
 from drivers.drive import DriveParameters
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.stroke_tracking import FAST_RAD_S, order_strides
-from experiments.bench.test_rig import Law, Sample, Stand, first_lasting
+from experiments.bench.test_rig import Sample, Stand, first_lasting
 
 SWEEPS = (0, 2)  # places in JOINTS
 FULL_FRACTION = 0.9  # of the speed asked for, from which on it counts as full
@@ -66,12 +66,12 @@ def _in_full_stance(stand: Stand, sample: Sample) -> bool:
 def damping(stand: Stand) -> Readings:
     with stand.raised():
         stand.move([_swept(SWING_RAD)])
-        stand.controller.follow([_swept(-SWING_RAD)], FAST_RAD_S)
+        stand.controller.follow_path([_swept(-SWING_RAD)], FAST_RAD_S)
         last = stand.run_until(
             lambda sample: _is_fast(sample, FULL_FRACTION * FAST_RAD_S), 2.0, "The full speed of a sweep"
         )[-1]
         begun = measured_angles(stand.loop.states)
-        stand.controller.law = lambda held, states: _brake(stand, states)
+        stand.controller.hold_law = lambda held, states: _brake(stand, states)
         samples = stand.run_for(2.0 * DAMPED_REST_S)
         stand.hold_here()
     yield from _sweep_readings("damping", last, samples, begun, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
@@ -85,7 +85,7 @@ def torque_off(stand: Stand) -> Readings:
     stand.rise()
     sweep, adduction = STARTING
     stand.move([Joints(sweep, adduction, sweep, adduction)])
-    stand.controller.law = push(stand)
+    stand.controller.hold_law = push(stand)
     pushed = stand.run_for(PUSH_TICKS * PERIOD_S)
     begun = stand.loop.states
     stand.loop.request(Request.DISARM, stand.rig.now_s)
@@ -101,7 +101,7 @@ def torque_off(stand: Stand) -> Readings:
         )
 
 
-def push(stand: Stand) -> Law:
+def push(stand: Stand) -> HoldLaw:
     """Forward and up, by the same current in each motor."""
     a, b, c, d = (PUSH_A * constant_nm_a for constant_nm_a in stand.configuration.torque_constants_nm_a)
     return lambda held, states: Joints(a, b, c, d)

@@ -10,12 +10,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
-from control.controller import ALL_TRUSTED, Controller, measured_angles
+from control.controller import HoldLaw, measured_angles
 from control.faults import Fault, Reaction
-from control.gait.joint_path import JointPath, still
 from control.modes import ENERGISED, Mode, Request
 from control.rate import PERIOD_S
-from control.records import JOINTS, DriveStates, JointAngles, Joints, JointTargets, Torques, same_for_all
+from control.records import JOINTS, DriveStates, JointAngles, JointTargets, Torques, same_for_all
 from experiments.bench.lateness import Lateness
 from experiments.bench.operator import Attendant
 from experiments.bench.rig import Rig
@@ -29,8 +28,6 @@ LOOK_S = 0.1  # while a person does something
 GOODBYE_FRAMES = 5  # to each drive, where nothing else helps
 LEVEL: JointAngles = same_for_all(0.0)
 
-Law = Callable[[Torques, DriveStates], Torques]  # from what holds the pose to what is wanted in its place
-
 
 class Sample(NamedTuple):
     """One tick."""
@@ -43,41 +40,6 @@ class Sample(NamedTuple):
     limited: bool
 
 
-class BenchController(Controller):
-    """The robot's own, but for what it does in hold."""
-
-    law: Law | None = None
-    aim: JointTargets | None = None
-
-    def follow(self, way_points: Sequence[JointAngles], speed_rad_s: float) -> None:
-        """In hold, from the pose that is held through others."""
-        a, b, c, d = (target.angle_rad for target in self._pose)
-        self._move = JointPath(Joints(a, b, c, d), way_points, speed_rad_s)
-
-    def hold(self, angles: JointAngles) -> None:
-        self._move, self._pose = None, still(angles)
-
-    def step(
-        self,
-        dt_s: float,
-        mode: Mode,
-        states: DriveStates,
-        trusted: Joints[bool] = ALL_TRUSTED,
-        elapsed_s: float = 0.0,
-    ) -> Torques:
-        torques_nm = super().step(dt_s, mode, states, trusted, elapsed_s)
-        return self.law(torques_nm, states) if self.law and mode is Mode.HOLD else torques_nm
-
-    def _targets(self, dt_s: float, mode: Mode, states: DriveStates) -> JointTargets:
-        self.aim = super()._targets(dt_s, mode, states)
-        return self.aim
-
-
-def bench_controller(controller: Controller) -> BenchController:
-    parts = (controller.gait.parameters, controller.geometry, controller.gains, controller.mass, controller.motion)
-    return BenchController(*parts, controller.recovery)
-
-
 class Stand:
     """Owns the rig and whether it is energised."""
 
@@ -87,13 +49,13 @@ class Stand:
         self.configuration = rig.configuration
         self.loop = rig.loop
         self.drives = rig.loop.drives
-        self.controller = rig.loop.controller = bench_controller(rig.loop.controller)
+        self.controller = rig.loop.controller
         self._rest: JointAngles = LEVEL  # where the flippers lie without torque
         self.lateness = Lateness()  # of one measurement, while a drive tells that torque is on
         self.lateness_so_far = Lateness()  # of all
 
     def tick(self) -> Sample:
-        aim, loop = self.controller.aim, self.loop
+        aim, loop = self.controller.joint_targets, self.loop
         tick, torque_on = self.rig.wait(), self._torque_on()
         loop.tick(tick)
         if torque_on:
@@ -142,10 +104,10 @@ class Stand:
             raise BenchError(f"{fault.name}: {_reported([fault])}")
         return sample
 
-    def arm(self, law: Law | None = None) -> None:
+    def arm(self, law: HoldLaw | None = None) -> None:
         """Into hold, with a law from the first torque on."""
         self._wait_until_armable()
-        self.controller.law = law
+        self.controller.hold_law = law
         against: Sequence[Fault] = ()
         for _ in range(round(ARMING_S / PERIOD_S)):
             blocking = self.loop.faults.blocking()
@@ -187,11 +149,11 @@ class Stand:
             self.tick()
 
     def move(
-        self, way_points: Sequence[JointAngles], speed_rad_s: float | None = None, law: Law | None = None
+        self, way_points: Sequence[JointAngles], speed_rad_s: float | None = None, law: HoldLaw | None = None
     ) -> list[Sample]:
         """In hold, along a smooth path, until its end."""
-        self.controller.law = law
-        self.controller.follow(way_points, speed_rad_s or self.configuration.motion.path_speed_rad_s)
+        self.controller.hold_law = law
+        self.controller.follow_path(way_points, speed_rad_s or self.configuration.motion.path_speed_rad_s)
         return self.run_until(lambda sample: not self.controller.moving, 60.0, "The end of a path")
 
     def rise(self) -> None:
@@ -217,8 +179,8 @@ class Stand:
 
     def hold_here(self) -> None:
         """The pose that the joints have by now, in place of what was held and of any law."""
-        self.controller.hold(measured_angles(self.loop.states))
-        self.controller.law = None
+        self.controller.hold_pose(measured_angles(self.loop.states))
+        self.controller.hold_law = None
 
     def lower(self) -> None:
         """Flippers back to where they lay."""
@@ -230,7 +192,7 @@ class Stand:
 
     def let_go(self) -> None:
         """Torque off at once, and wait until every drive says so. Raises BenchError where one does not."""
-        self.controller.law = None
+        self.controller.hold_law = None
         self.loop.request(Request.DISARM, self.rig.now_s)
         for _ in range(round(IDLING_S / PERIOD_S)):
             sample = self.tick()
@@ -246,7 +208,7 @@ class Stand:
 
     def end(self) -> None:
         """However things stand: drives idle. Never raises, and needs nothing but the drives."""
-        self.controller.law = None
+        self.controller.hold_law = None
         self.drives.force_idle(GOODBYE_FRAMES)
 
 

@@ -17,7 +17,7 @@ from control.records import JOINTS
 from drivers.can.frames import Frame
 from drivers.fault_injection.failures import Failures, end_text
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.daemon import _end_safely as end_safely
+from firmware_host.daemon import end_safely
 from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK_KIND
 from firmware_host.ticker import Tick

@@ -11,7 +11,7 @@ from drivers.can.mock_bus import MockPort
 from drivers.odrive.codec import SET_AXIS_STATE
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, _end_safely
+from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, end_safely
 from firmware_host.ticker import Tick
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
@@ -95,7 +95,7 @@ def test_a_bug_idles_all_drives_that_can_be_reached(robot: Lockstep, capsys: pyt
     try:
         raise ZeroDivisionError("somewhere in a tick")
     except ZeroDivisionError as problem:
-        assert _end_safely(robot.loop, problem) == EXIT_FAILED
+        assert end_safely(robot.loop, problem) == EXIT_FAILED
     robot.robot.advance(robot.now_s + 0.01)
     assert energised(robot)[2:] == [False] * 2
     said = capsys.readouterr().err
@@ -108,7 +108,7 @@ def test_a_bug_in_the_log_does_not_keep_the_drives_from_their_end(robot: Lockste
         raise DeliberateBugError
 
     robot.loop.recorder.put = broken  # type: ignore[method-assign]
-    assert _end_safely(robot.loop, caught(DeliberateBugError())) == EXIT_FAILED
+    assert end_safely(robot.loop, caught(DeliberateBugError())) == EXIT_FAILED
     robot.robot.advance(robot.now_s + 0.01)
     assert energised(robot) == [False] * 4
 

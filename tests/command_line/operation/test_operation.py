@@ -36,7 +36,7 @@ def test_a_whole_session(bench: Any) -> None:
     assert bench.run("walk", "--depth", "3").stdout == "walking\n"
     bench.wait_for(lambda report: report["strides_closed"] >= 2)
     status = json.loads(bench.run("status", "--json").stdout)
-    assert status["schema"] == "status/1" and status["mode"] == "walking"
+    assert status["schema"] == "status/2" and status["mode"] == "walking"
     assert all(drive["closed_loop"] for drive in status["drives"])
     table = bench.run("status").stdout
     assert "walking" in table and "left_sweep" in table and "\033" not in table

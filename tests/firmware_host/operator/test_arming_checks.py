@@ -73,7 +73,7 @@ def test_the_check_and_a_refused_arm_agree(ready: Lockstep, forced: bool) -> Non
         loop.health = loop.health._replace(worst=loop.faults.worst)
         against = [line for line in lines.values() if not line["ok"] and (line["mandatory"] or not forced)]
         refused = loop.request(Request.ARM, ready.now_s, forced=forced)
-        loop._request, loop.forced = Request.NONE, False
+        loop.pending_request, loop.forced = Request.NONE, False
         loop.faults.reset()
         loop.health = loop.health._replace(worst=None)
         assert refused == (fault_message(fault) if against else None)
