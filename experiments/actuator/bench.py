@@ -1,7 +1,6 @@
-"""Where the actuator calibration happens: at a robot, one joint after the other, or at simulated benches side by side.
+"""The two benches of the actuator calibration: a robot, joint after joint, or a simulated robot for each joint.
 
-Each joint has a notebook and a folder of its own below that of the results, so that a joint that is finished is not
-touched when another one goes on.
+Each joint has a notebook and a folder of its own, so that a finished joint stays as it is when another one continues.
 """
 
 from __future__ import annotations
@@ -12,21 +11,22 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
-from experiments.actuator.calibration import TICK_S, Calibration, Show
+from experiments.actuator.calibration import TICK_S, Calibration
 from experiments.actuator.fit import Entry
 from experiments.actuator.plan import Plan, require_possible, steps_of
 from experiments.actuator.simulation import simulated_bench
-from experiments.actuator.weight_handling import PersonsHand
+from experiments.actuator.weight_handling import ManualWeights
 from experiments.robot.bench_robot import BenchRobot, disarm, leave
 from experiments.robot.prompt import GO_ON, AutomaticOperator, Operator
 from experiments.trials.notebook import NAME, Notebook
 from experiments.trials.parallel_trials import run_parallel
+from experiments.trials.session import Show
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 
 FALLS = (
-    "What hangs falls when the torque goes off: at a fault, and within two seconds where this program dies or its"
-    " terminal closes. Put something soft right below it, and keep hands and feet from there."
+    "A hanging weight falls when the torque goes off: at a fault, and within two seconds after this program or its"
+    " terminal ends. Put something soft below it, and keep hands and feet away."
 )
 REVISABLE = ("joints", "lever_tolerance_m", "weight_tolerance")
 Readings = Mapping[str, Mapping[str, Entry]]  # by joint and step
@@ -37,14 +37,14 @@ class ActuatorBench(Protocol):
     def configuration(self) -> Configuration: ...
 
     def calibrate(self, plan: Plan, folder: Path, operator: Operator, show: Show) -> Readings:
-        """Raises BenchError, NotebookError."""
+        """Return the readings by joint and step. Raises BenchError, NotebookError."""
 
     def leave(self, folder: Path, operator: Operator) -> list[Path]:
-        """Torque off, and the logs in the folder, however it has ended."""
+        """Switch torque off and return the logs, however the calibration ended."""
 
 
 class RobotBench:
-    """An ActuatorBench with a robot and a person."""
+    """An ActuatorBench with a robot and an operator."""
 
     def __init__(self, robot: BenchRobot) -> None:
         self._robot = robot
@@ -55,42 +55,42 @@ class RobotBench:
 
     def calibrate(self, plan: Plan, folder: Path, operator: Operator, show: Show) -> Readings:
         require_possible(plan, self.configuration)
-        self._let_go("The robot holds its pose", operator)
-        hand, count = PersonsHand(operator, plan), len(steps_of(plan))
+        self._switch_torque_off("The robot holds its pose", operator)
+        weights, count = ManualWeights(operator, plan), len(steps_of(plan))
         readings: dict[str, Mapping[str, Entry]] = {}
         for number, joint in enumerate(plan.joints):
-            notebook = Notebook(folder / joint, notes_of(plan, joint))
+            notebook = Notebook(folder / joint, notebook_plan(plan, joint))
             if notebook.begun:
-                operator.report(f"{joint}: {len(notebook.entries)} of {count} readings are there already.")
+                operator.report(f"{joint}: {len(notebook.entries)} of {count} readings are done already.")
             if len(notebook.entries) < count:
                 operator.report(FALLS)
 
             def show_all(done: int, total: int, before: int = number) -> None:
                 show(before * total + done, len(plan.joints) * total)
 
-            readings[joint] = Calibration(self._robot, joint, plan, hand, operator, notebook, show_all).run()
-            self._let_go(f"{joint} is done", operator)
+            readings[joint] = Calibration(self._robot, joint, plan, weights, operator, notebook, show_all).run()
+            self._switch_torque_off(f"{joint} is done", operator)
         return readings
 
-    def _let_go(self, why: str, operator: Operator) -> None:
-        """A joint is mounted with torque off, and nothing that hangs on it is dropped."""
+    def _switch_torque_off(self, why: str, operator: Operator) -> None:
+        """Ask the operator to take off the weight and hold the flipper first."""
         if self._robot.call("status")["mode"] == "hold":
-            question = f"{why}. Take off what hangs and hold the flipper: torque goes off."
+            question = f"{why}. Take off the weight and hold the flipper: torque goes off."
             operator.ask(question, {GO_ON: "it is held"}, lambda: self._robot.wait(TICK_S))
             disarm(self._robot)
 
     def leave(self, folder: Path, operator: Operator) -> list[Path]:
-        """Ctrl-C in the middle may find a weight on the arm: it is asked for first, unless Ctrl-C comes again."""
+        """A weight may hang after Ctrl-C: the operator is asked to take it off, unless Ctrl-C comes again."""
         try:
-            self._robot.wait(TICK_S)  # a robot that somebody has taken over is not let go of
-            self._let_go("It ends here; Ctrl-C again switches the torque off at once", operator)
+            self._robot.wait(TICK_S)  # raises for a robot that another program operates now
+            self._switch_torque_off("The calibration ends; Ctrl-C again switches the torque off at once", operator)
         finally:
             logs = leave(self._robot, operator, folder)
         return logs
 
 
 class SimulatedBench:
-    """An ActuatorBench with a simulated robot of its own for each joint, in a process of its own."""
+    """An ActuatorBench with a simulated robot for each joint, in a process of its own."""
 
     def __init__(self, configuration: Configuration, seed: int) -> None:
         self.configuration = configuration
@@ -101,49 +101,50 @@ class SimulatedBench:
         count = len(steps_of(plan))
         joints = [partial(_simulate, self.configuration.text, joint, plan, self._seed, folder) for joint in plan.joints]
 
-        def look() -> None:
+        def show_progress() -> None:
             show(sum(_readings_in(folder / joint / NAME) for joint in plan.joints), count * len(joints))
 
-        outcomes = run_parallel(joints, _unseen, meanwhile=look)
+        outcomes = run_parallel(joints, _discard_progress, meanwhile=show_progress)
         return dict(zip(plan.joints, outcomes, strict=True))
 
     def leave(self, folder: Path, operator: Operator) -> list[Path]:
-        """Nothing runs any more."""
+        """Return the logs; no robot runs any more."""
         return sorted(folder.glob("*.mcap"))
 
 
 def _simulate(text: str, joint: str, plan: Plan, seed: int, folder: Path) -> dict[str, Any]:
     configuration = parse_configuration(text)
-    notebook = Notebook(folder / joint, notes_of(plan, joint))
-    robot, hand = simulated_bench(configuration, joint, plan, seed, _new_log(folder, joint))
+    notebook = Notebook(folder / joint, notebook_plan(plan, joint))
+    robot, weights = simulated_bench(configuration, joint, plan, seed, _new_log(folder, joint))
     try:
-        entries = Calibration(robot, joint, plan, hand, AutomaticOperator(_unheard), notebook, _unseen).run()
+        operator = AutomaticOperator(_discard_message)
+        entries = Calibration(robot, joint, plan, weights, operator, notebook, _discard_progress).run()
     finally:
         robot.close()
     return dict(entries)
 
 
 def _readings_in(notebook: Path) -> int:
-    """As lines behind its plan: one that is measured again counts again."""
+    """Return the number of lines after the plan; a repeated reading counts again."""
     return max(0, notebook.read_bytes().count(b"\n") - 1) if notebook.exists() else 0
 
 
 def _new_log(folder: Path, joint: str) -> Path:
-    """ComparedStride those of earlier attempts."""
+    """Return a path next to the logs of earlier attempts."""
     number = 1
     while (log := folder / f"{joint}-{number}.mcap").exists():
         number += 1
     return log
 
 
-def notes_of(plan: Plan, joint: str) -> dict[str, Any]:
-    """What must be the same when a joint goes on: the other joints, and how true the bench is, need not be."""
+def notebook_plan(plan: Plan, joint: str) -> dict[str, Any]:
+    """Return the options that must be the same when a joint continues."""
     return {name: value for name, value in asdict(plan).items() if name not in REVISABLE} | {"joint": joint}
 
 
-def _unheard(message: str) -> None:
-    """Many joints at once tell of every reading; their notebooks have it."""
+def _discard_message(message: str) -> None:
+    """Many joints at once report every reading; their notebooks have it."""
 
 
-def _unseen(done: int, total: int) -> None:
-    """Progress of one joint, in a process without a screen."""
+def _discard_progress(done: int, total: int) -> None:
+    """A process without a screen shows no progress."""

@@ -1,48 +1,54 @@
-"""The actuator calibration of one joint (the paper's section II-B): a motor holds a weight level, again and again.
+"""The calibration of one joint (the paper's section II-B): a motor holds a weight level, again and again.
 
-Each reading is in the notebook before the next weight is asked for, so whatever ends the work, the same plan goes on
-behind it. A robot that lets go in the middle, after a fault or because nobody needed it for ten minutes, is told of in
-its own words, armed again, and the weight read anew. Before a weight is asked for that the winding would not bear as
-warm as it is, the empty arm waits; and where it gets warm while a weight hangs, the weight is to be taken off.
+Each reading is in the notebook before the next weight is asked for, so the same plan continues after any interruption.
+A robot that lets go, after a fault or after ten idle minutes, is reported with its own message and armed again, and the
+weight is read again. The empty arm waits until the winding is cool enough for the next weight; where it gets warm while
+a weight hangs, the operator takes the weight off.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import degrees
 from typing import Any
 
 from experiments.actuator.fit import current_per_nm
-from experiments.actuator.friction import Loop, swing
+from experiments.actuator.friction import Loop, swing_arm
+from experiments.actuator.mismatch import Mismatch, find_mismatch
 from experiments.actuator.plan import COOL_K, READING_S, Plan, Step, largest_current_a, stays_cool, steps_of
 from experiments.actuator.reading import HeldJoint, MovedError, Reading, WarmError
-from experiments.actuator.uncertainty import Uncertainty, uncertainty_of
-from experiments.actuator.weight_handling import Hand
+from experiments.actuator.weight_handling import WeightHandler
 from experiments.robot.bench_robot import BenchError, BenchRobot, arm, ask_to_clear_faults, require_hold
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.trials.notebook import Notebook
+from experiments.trials.session import Show
 from firmware_host.operator.status_client import CallRefusedError
 
 KEEP, OTHER = "k", "o"
 MOST_FAULTS = 5  # of one weight
-MOST_REPEATS = 3  # of one weight that does not come to rest, or does not fit
+MOST_REPEATS = 3  # of one weight that does not come to rest, or does not match
 COOLING_S, LONGEST_COOLING_S = 1.0, 1800.0
-TICK_S = 0.01  # of waiting for a person, in which the robot is attended
-
-Show = Callable[[int, int], None]
+TICK_S = 0.01  # of a prompt, in which the robot is attended
 
 
 class Calibration:
-    """Owns the course of one joint's calibration."""
+    """Runs the calibration of one joint."""
 
     def __init__(
-        self, robot: BenchRobot, joint: str, plan: Plan, hand: Hand, operator: Operator, notebook: Notebook, show: Show
+        self,
+        robot: BenchRobot,
+        joint: str,
+        plan: Plan,
+        weights: WeightHandler,
+        operator: Operator,
+        notebook: Notebook,
+        show: Show,
     ) -> None:
         self._robot = robot
         self._joint = joint
         self._plan = plan
-        self._hand = hand
+        self._weights = weights
         self._operator = operator
         self._notebook = notebook
         self._show = show
@@ -50,33 +56,33 @@ class Calibration:
         self._steps = steps_of(plan)
         self._held: HeldJoint | None = None
         self._faults: dict[str, int] = {}
-        self._uncertainties: dict[str, int] = {}
+        self._mismatches: dict[str, int] = {}
         self._warned = False
 
     def run(self) -> Mapping[str, Any]:
-        """What was read, by the steps' keys. Raises BenchError where the robot is gone or cannot be armed."""
-        place = 0
-        while place < len(self._steps):
-            self._show(place, len(self._steps))
-            step = self._steps[place]
-            if step.key not in self._notebook.entries and self._take(step) == REDO:
-                place = self._one_back(place)
+        """Return the readings by the steps' keys. Raises BenchError where the robot is lost or cannot be armed."""
+        index = 0
+        while index < len(self._steps):
+            self._show(index, len(self._steps))
+            step = self._steps[index]
+            if step.key not in self._notebook.entries and self._measure(step) == REDO:
+                index = self._step_back(index)
             elif step.key in self._notebook.entries:
-                place += 1
-        self._show(place, len(self._steps))
+                index += 1
+        self._show(index, len(self._steps))
         return self._notebook.entries
 
-    def _one_back(self, place: int) -> int:
-        place = max(place - 1, 0)
-        self._notebook.forget(self._steps[place].key)
-        return place
+    def _step_back(self, index: int) -> int:
+        index = max(index - 1, 0)
+        self._notebook.forget(self._steps[index].key)
+        return index
 
-    def _take(self, step: Step) -> str:
-        """What the person answered. Unless the step is then in the notebook, it is to be taken again."""
+    def _measure(self, step: Step) -> str:
+        """Return the operator's answer. A step that is not in the notebook then is measured again."""
         try:
             self._hold(step)
             self._warned = False
-            answer = self._hand.hang(step, self._watch)
+            answer = self._weights.hang(step, self._attend_hold)
             if answer == SKIP:
                 self._notebook.write(step.key, {"skipped": "on request"})
             elif answer == GO_ON:
@@ -84,7 +90,7 @@ class Calibration:
         except WarmError as problem:
             self._count(step, problem)
             self._operator.report(f"{_named(step)} was not read: {problem}.")
-            self._hand.take_off()
+            self._weights.take_off()
         except (BenchError, CallRefusedError) as problem:
             self._recover(step, problem)
         else:
@@ -92,7 +98,7 @@ class Calibration:
         return GO_ON
 
     def _count(self, step: Step, problem: Exception) -> None:
-        """Raises the problem where it does not end."""
+        """Raise the problem after too many of them."""
         self._faults[step.key] = self._faults.get(step.key, 0) + 1
         if self._faults[step.key] >= MOST_FAULTS:
             raise BenchError(f"{_named(step)} of {self._joint} cannot be read: {problem}") from problem
@@ -100,25 +106,25 @@ class Calibration:
     # the robot
 
     def _hold(self, step: Step) -> None:
-        """With torque on, an empty arm, and a winding that bears what comes."""
+        """Hold with an empty arm, and a winding that is cool enough for the next weight."""
         if self._held is None or self._robot.call("status")["mode"] != "hold":
             self._held = None
             ask_to_clear_faults(self._robot, self._operator)
-            self._hand.hold_level(self._joint, self._watch)
+            self._weights.hold_level(self._joint, self._attend_hold)
             self._cool(step)
             arm(self._robot, self._operator)
-            self._hand.let_go(self._watch)
+            self._weights.release(self._attend_hold)
             self._held = HeldJoint(self._robot, self._joint)
         elif not self._is_cool(step):
-            self._hand.take_off()
+            self._weights.take_off()
             self._cool(step)
 
     def _is_cool(self, step: Step) -> bool:
-        hangs_s = READING_S + self._hand.lingers_s
+        hangs_s = READING_S + self._weights.handling_s
         return stays_cool(self._robot.configuration, self._expected_a(step), self._winding_c(), hangs_s)
 
     def _expected_a(self, step: Step) -> float:
-        """By what the weights so far have taken."""
+        """Return the current by the readings so far."""
         per_nm = current_per_nm(self._plan, self._notebook.entries)
         if per_nm is None:
             return largest_current_a(self._plan, self._robot.configuration, self._joint, step.weight_g)
@@ -128,7 +134,7 @@ class Calibration:
         if self._is_cool(step):
             return
         self._operator.report(
-            f"The {self._joint} winding has {self._winding_c():.0f} degrees C, too warm for {_named(step)}: waiting."
+            f"The {self._joint} winding has {self._winding_c():.0f} °C, too warm for {_named(step)}: waiting."
         )
         waited_s = 0.0
         while not self._is_cool(step):
@@ -143,8 +149,8 @@ class Calibration:
         drives = self._robot.call("status")["drives"]
         return float(next(drive["winding_c"] for drive in drives if drive["joint"] == self._joint))
 
-    def _watch(self) -> None:
-        """While a person is waited for. Raises BenchError where the robot lets go meanwhile."""
+    def _attend_hold(self) -> None:
+        """Attend the robot during a prompt. Raises BenchError where it lets go."""
         self._attend()
         if self._held is not None:
             require_hold(self._robot.call("status"))
@@ -154,35 +160,35 @@ class Calibration:
         warm_c, winding_c = self._robot.configuration.limits.temperature_warm_c - COOL_K, self._winding_c()
         if not self._warned and winding_c > warm_c:
             self._warned = True
-            self._operator.report(f"The {self._joint} winding has {winding_c:.0f} degrees C: a weight would fall soon.")
-            self._hand.take_off()
+            self._operator.report(f"The {self._joint} winding has {winding_c:.0f} °C: a weight would fall soon.")
+            self._weights.take_off()
 
     def _recover(self, step: Step, problem: Exception) -> None:
-        """From a robot that let go. Raises the problem where it is another."""
+        """Recover from a robot that let go. Raises any other problem."""
         status = self._robot.call("status")
         if status["mode"] == "hold":
             raise problem
         self._count(step, problem)
         self._operator.report(f"{_named(step)} was not read: {str(problem).rstrip('.')}.")
-        self._hand.take_off()
+        self._weights.take_off()
         self._held = None
 
     # readings
 
     def _read(self, step: Step) -> None:
-        reading = self._settled(step)
+        reading = self._read_at_rest(step)
         if reading is None:
             return
-        uncertainty = uncertainty_of(self._plan, self._notebook.entries, step, reading.current_a, self._constant_nm_a)
-        if uncertainty is not None:
-            self._ask_about(uncertainty, step, reading)
+        mismatch = find_mismatch(self._plan, self._notebook.entries, step, reading.current_a, self._constant_nm_a)
+        if mismatch is not None:
+            self._ask_about_mismatch(mismatch, step, reading)
         elif step.weight_g:
             self._keep(step, reading)
         else:
-            self._keep(step, reading, loops=self._swung())
+            self._keep(step, reading, loops=self._measure_friction())
 
-    def _settled(self, step: Step) -> Reading | None:
-        """None where it is left out."""
+    def _read_at_rest(self, step: Step) -> Reading | None:
+        """Return nothing for a step that is left out."""
         assert self._held is not None
         trouble = ""
         for _ in range(MOST_REPEATS):
@@ -191,44 +197,44 @@ class Calibration:
             except MovedError as problem:
                 trouble = str(problem)
             answers = {GO_ON: "read it again", SKIP: "skip it"}
-            question = f"{_named(step)} did not come to rest: {trouble}. Let it hang still; nothing may touch it."
-            if self._operator.ask(question, answers, self._watch) == SKIP:
+            question = f"{_named(step)} did not come to rest: {trouble}. Let it hang still and touch nothing."
+            if self._operator.ask(question, answers, self._attend_hold) == SKIP:
                 break
         self._notebook.write(step.key, {"skipped": trouble})
         self._operator.report(f"{_named(step)} of trial {step.reported_trial} is left out: {trouble}.")
         return None
 
-    def _swung(self) -> Sequence[Loop]:
-        """None where it does not swing freely, which costs friction alone."""
+    def _measure_friction(self) -> Sequence[Loop]:
+        """Return no loops where the arm does not swing freely: only friction is missing then."""
         assert self._held is not None
         try:
-            return swing(self._held)
+            return swing_arm(self._held)
         except MovedError as problem:
             self._operator.report(f"friction was not measured this time: {problem}")
             return ()
 
-    def _ask_about(self, uncertainty: Uncertainty, step: Step, reading: Reading) -> None:
-        """Whoever only ever goes on does not go on for ever: it is kept as doubtful then."""
-        answers = {GO_ON: "read it anew", KEEP: "keep it, marked as doubtful"}
-        if uncertainty.other_g is not None:
-            answers[OTHER] = f"it was the {uncertainty.other_g:g} g"
-        self._uncertainties[step.key] = self._uncertainties.get(step.key, 0) + 1
+    def _ask_about_mismatch(self, mismatch: Mismatch, step: Step, reading: Reading) -> None:
+        """Ask again at most MOST_REPEATS times; then keep the reading as doubtful."""
+        answers = {GO_ON: "read it again", KEEP: "keep it, marked as doubtful"}
+        if mismatch.other_g is not None:
+            answers[OTHER] = f"it was the {mismatch.other_g:g} g"
+        self._mismatches[step.key] = self._mismatches.get(step.key, 0) + 1
         answer = self._operator.ask(
-            f"{_named(step)}: {uncertainty.message}", answers, self._attend
+            f"{_named(step)}: {mismatch.message}", answers, self._attend
         )  # a reading is at stake
-        if answer == OTHER and uncertainty.other_g is not None:
-            self._take_as(replace(step, weight_g=uncertainty.other_g), reading)
-        elif answer == KEEP or self._uncertainties[step.key] >= MOST_REPEATS:
-            self._keep(step, reading, uncertainty.message)
+        if answer == OTHER and mismatch.other_g is not None:
+            self._keep_as(replace(step, weight_g=mismatch.other_g), reading)
+        elif answer == KEEP or self._mismatches[step.key] >= MOST_REPEATS:
+            self._keep(step, reading, mismatch.message)
 
-    def _take_as(self, step: Step, reading: Reading) -> None:
+    def _keep_as(self, step: Step, reading: Reading) -> None:
         if step.key in self._notebook.entries:
-            self._operator.report(f"{_named(step)} of trial {step.trial} was read already, and stays as it is.")
+            self._operator.report(f"{_named(step)} of trial {step.trial} was read already and is not replaced.")
         else:
             self._keep(step, reading)
 
-    def _keep(self, step: Step, reading: Reading, uncertainty: str = "", loops: Sequence[Loop] = ()) -> None:
-        self._notebook.write(step.key, entry_of(reading, uncertainty, loops))
+    def _keep(self, step: Step, reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> None:
+        self._notebook.write(step.key, entry_of(reading, doubt, loops))
         held_nm = self._constant_nm_a * reading.current_a
         self._operator.report(
             f"{self._joint}, trial {step.reported_trial}, {_named(step)}: {reading.current_a:+.3f} A,"
@@ -236,8 +242,8 @@ class Calibration:
         )
 
 
-def entry_of(reading: Reading, uncertainty: str = "", loops: Sequence[Loop] = ()) -> dict[str, Any]:
-    """As the notebook keeps it; loops are those of the empty arm."""
+def entry_of(reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> dict[str, Any]:
+    """Return the notebook's entry; loops are those of the empty arm."""
     entry = {
         "current_a": reading.current_a,
         "rest_friction_a": reading.rest_friction_a,
@@ -248,7 +254,7 @@ def entry_of(reading: Reading, uncertainty: str = "", loops: Sequence[Loop] = ()
         "above": reading.above._asdict(),
     }
     entry |= {"loops": [loop._asdict() for loop in loops]} if loops else {}
-    return entry | ({"doubt": uncertainty} if uncertainty else {})
+    return entry | ({"doubt": doubt} if doubt else {})
 
 
 def _named(step: Step) -> str:

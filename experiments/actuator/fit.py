@@ -1,23 +1,26 @@
-"""What the readings of one joint say about its motor: torque constant, offset, friction, and how true its torque is.
+"""Torque constant, offset and friction of one joint's motor from its readings, and the accuracy of its torque.
 
-Every reading is the mean current I of two approaches, less the tare I₀ of its pass (the mean of the empty arm's before
+Every reading is the mean current I of two approaches, less the tare I₀ of its pass (the mean of the empty arm before
 and after), and the weight's torque is τ_ext = m g l cos θ at the measured angle. The weights are known better than the
 currents, so the line is fitted as
 
     I - I₀ = s (τ_ext / k + offset / k)          k_t = 1 / slope, its standard error by the delta method
 
-s = ±1 is the side to which the weights pull. Readings scatter around it; what errs alike in all of them does not show
-there, and is added in squares:
+s = ±1 is the direction in which the weights pull. The line is ordinary least squares. A hook that is slightly off its
+mark errs in proportion to the weight, so heavy weights scatter more: the standard errors are MacKinnon and White's
+(1985, HC3), which take each residual as the scatter of its own weight, times Student's factor, so that two of them
+cover 95 % however few the readings are. Errors that are alike in all readings do not show in the scatter and are added
+in squares:
 
     k_t         the tolerances of lever and weights
-    offset      the tare's own scatter; and what friction bears at rest, which goes out where it is alike from both
-                sides, or with and without a weight: by as much as it is not, it may hide either way
-    friction    is a current, and takes the doubt of k_t with it
+    offset      the tare's own scatter; and friction at rest, which cancels where it is equal from both sides or with
+                and without a weight: the difference may have either sign
+    friction    is a current, and takes the error of k_t with it
 
-RMSE and repeatability are the paper's. Its τ_sense is k_t I with the constant as it is configured, and its RMSE that
-of all readings; what the arm itself weighs is taken off here, which the paper does not tell of. With the fitted
-constant every trial is judged by that of the other trials: so the error is that of a torque never seen. Repeatability
-is the standard deviation over the trials of one weight, relative to its mean, averaged over the weights.
+RMSE and repeatability are the paper's. Its τ_sense is k_t I with the configured constant, and its RMSE that of all
+readings; here the weight of the arm itself is subtracted, which the paper does not mention. With the fitted constant
+every trial is evaluated by the constant of the other trials. Repeatability is the standard deviation over the trials of
+one weight, relative to its mean, averaged over the weights.
 """
 
 from __future__ import annotations
@@ -29,11 +32,50 @@ from typing import Any, NamedTuple
 
 from estimation.strokes.origin_fit import student_factor
 from experiments.actuator.friction import Friction, Loop, friction_of
-from experiments.actuator.line import FEWEST, Line, fit_line
 from experiments.actuator.plan import Plan, Step, steps_of
 
-LIGHT_NM = 0.15  # what lighter loads say of a constant is friction
+PAPER_RMSE_NM = {"adduction": 0.0134, "sweep": 0.0127}
+PAPER_REPEATABILITY = 0.032
+PAPER_CONSTANT_NM_A = 0.083
+LIGHT_NM = 0.15  # a lighter load shows friction more than the constant
+FEWEST = 3  # readings of a line
 Entry = Mapping[str, Any]
+
+
+class Line(NamedTuple):
+    """I = slope τ + intercept."""
+
+    slope_a_nm: float
+    intercept_a: float
+    slope_error: float
+    intercept_error: float
+    readings: int
+
+    @property
+    def constant_nm_a(self) -> float:
+        return 1.0 / self.slope_a_nm
+
+    @property
+    def constant_error_nm_a(self) -> float:
+        """The standard error from the scatter alone."""
+        return self.slope_error / self.slope_a_nm**2
+
+
+def fit_line(x: Sequence[float], y: Sequence[float]) -> Line:
+    """Needs FEWEST points with at least two values of x."""
+    count, x_mean = len(x), fmean(x)
+    spread = sum((each - x_mean) ** 2 for each in x)
+    slope = sum((a - x_mean) * b for a, b in zip(x, y, strict=True)) / spread
+    intercept = fmean(y) - slope * x_mean
+    slope_square = intercept_square = 0.0
+    for a, b in zip(x, y, strict=True):
+        fraction = (a - x_mean) / spread  # this point's weight in the slope
+        leverage = 1.0 / count + fraction * (a - x_mean)
+        left_out = (b - intercept - slope * a) / (1.0 - leverage)  # residual from the line of the other points
+        slope_square += (fraction * left_out) ** 2
+        intercept_square += ((1.0 / count - x_mean * fraction) * left_out) ** 2
+    student = student_factor(count - 2)
+    return Line(slope, intercept, student * sqrt(slope_square), student * sqrt(intercept_square), count)
 
 
 class Load(NamedTuple):
@@ -44,22 +86,22 @@ class Load(NamedTuple):
     torque_nm: float  # of the weight at the measured angle
     current_a: float  # without the tare
     rest_friction_a: float
-    doubtful: bool  # kept although it did not fit
+    doubtful: bool  # the operator kept it although it did not fit
 
 
 class JointFit(NamedTuple):
     joint: str
     loads: tuple[Load, ...]
     line: Line
-    torque_error: float  # of all torques alike, as a share
+    torque_error: float  # relative, of all torques alike
     configured_nm_a: float
     direction: int  # of the weights' pull: -1 as on a level arm
     rmse_configured_nm: float
-    rmse_fitted_nm: float  # each trial by the others' constant
+    rmse_fitted_nm: float  # each trial with the constant of the others
     repeatability: float
     loops: tuple[Loop, ...]
     rest_friction_a: float  # of the empty arm
-    tares_a: tuple[float, ...]  # what the empty arm takes
+    tares_a: tuple[float, ...]  # currents of the empty arm
 
     @property
     def friction(self) -> Friction:
@@ -80,12 +122,12 @@ class JointFit(NamedTuple):
     @property
     def offset_error_nm(self) -> float:
         tare_error_a = student_factor(len(self.tares_a) - 1) * self._tare_spread_a / sqrt(len(self.tares_a))
-        unlike_a = fmean(load.rest_friction_a for load in self.loads) - self.rest_friction_a
-        return hypot(self.line.intercept_error, tare_error_a, unlike_a / sqrt(3.0)) * self.constant_nm_a
+        difference_a = fmean(load.rest_friction_a for load in self.loads) - self.rest_friction_a
+        return hypot(self.line.intercept_error, tare_error_a, difference_a / sqrt(3.0)) * self.constant_nm_a
 
     @property
     def friction_nm(self) -> tuple[float, float]:
-        """Dry, with its standard error."""
+        """Dry friction and its standard error."""
         return self._in_nm(self.friction.dry_a, self.friction.dry_error_a)
 
     @property
@@ -109,7 +151,7 @@ class JointFit(NamedTuple):
         return stdev(self.tares_a) if len(self.tares_a) > 1 else nan
 
     def fitted_nm(self, load: Load) -> float:
-        """By the other trials."""
+        """Return the torque by the constant of the other trials."""
         return load.current_a * self.constant_without(load.trial)
 
     def constant_without(self, trial: int) -> float:
@@ -118,14 +160,14 @@ class JointFit(NamedTuple):
 
 
 def loads_of(plan: Plan, entries: Mapping[str, Entry]) -> list[Load]:
-    """Of all weights whose trial has a tare, positive where the motor holds the weight."""
+    """Return all weights whose trial has a tare, with a positive current where the motor holds the weight."""
     raw = raw_loads(plan, entries)
     sign = -direction_of(raw)
     return [load._replace(current_a=sign * load.current_a) for load in raw]
 
 
 def raw_loads(plan: Plan, entries: Mapping[str, Entry]) -> list[Load]:
-    """With the joint's own sign of the current."""
+    """Return the loads with the joint's own sign of the current."""
     found = []
     for step in steps_of(plan):
         entry, tare_a = entries.get(step.key), tare_of(entries, step.trial)
@@ -137,27 +179,27 @@ def raw_loads(plan: Plan, entries: Mapping[str, Entry]) -> list[Load]:
 
 
 def tare_of(entries: Mapping[str, Entry], trial: int) -> float | None:
-    """The current of the empty arm: the mean of before and after, or the nearest there is."""
-    beside = [current_a for number in (trial - 1, trial) if (current_a := _tare_a(entries, number)) is not None]
-    if beside:
-        return fmean(beside)
+    """Return the current of the empty arm: the mean of before and after, or the nearest one."""
+    neighbours = [current_a for number in (trial - 1, trial) if (current_a := _tare_a(entries, number)) is not None]
+    if neighbours:
+        return fmean(neighbours)
     earlier = (_tare_a(entries, number) for number in range(trial - 2, -1, -1))
     return next((current_a for current_a in earlier if current_a is not None), None)
 
 
 def _tare_a(entries: Mapping[str, Entry], trial: int) -> float | None:
-    """None where it was not read, or something may have hung."""
+    """Return nothing where the empty arm was not read, or something may have hung on it."""
     entry = entries.get(Step(trial, 0.0).key, {})
     return None if entry.get("doubt") else entry.get("current_a")
 
 
 def direction_of(loads: Sequence[Load]) -> int:
-    """-1 where weights pull the joint to negative angles, so that the motor's current is positive."""
+    """Return -1 where weights pull the joint to negative angles, so that the motor's current is positive."""
     return -1 if sum(load.torque_nm * load.current_a for load in loads) >= 0.0 else 1
 
 
 def current_per_nm(plan: Plan, entries: Mapping[str, Entry]) -> float | None:
-    """Of the heavier weights so far; None where there were none."""
+    """Return the mean over the heavier weights so far, or nothing."""
     loads = [load for load in raw_loads(plan, entries) if load.torque_nm >= LIGHT_NM and not load.doubtful]
     total_nm = sum(load.torque_nm for load in loads)
     return abs(sum(load.current_a for load in loads)) / total_nm if loads else None
@@ -168,12 +210,12 @@ def can_fit(loads: Sequence[Load]) -> bool:
 
 
 def line_of(loads: Sequence[Load]) -> Line:
-    """Current on torque. Needs what `can_fit` asks."""
+    """Fit current over torque. Needs what `can_fit` checks."""
     return fit_line([load.torque_nm for load in loads], [load.current_a for load in loads])
 
 
 def fit_joint(joint: str, plan: Plan, entries: Mapping[str, Entry], configured_nm_a: float) -> JointFit | None:
-    """None where too little was measured for a line."""
+    """Return nothing where the readings do not suffice for a line."""
     loads = [load for load in loads_of(plan, entries) if not load.doubtful]
     if not can_fit(loads):
         return None
@@ -197,7 +239,7 @@ def fit_joint(joint: str, plan: Plan, entries: Mapping[str, Entry], configured_n
 
 
 def _of_empty_arm(plan: Plan, entries: Mapping[str, Entry]) -> list[Entry]:
-    """What counts as tare; at least one entry where there are loads."""
+    """Return the entries that count as tare; at least one where there are loads."""
     empty = (step for step in steps_of(plan) if not step.weight_g)
     return [entries[step.key] for step in empty if _tare_a(entries, step.trial) is not None]
 
@@ -207,9 +249,13 @@ def _rmse(loads: Sequence[Load], sensed_nm: Callable[[Load], float]) -> float:
 
 
 def repeatability(loads: Sequence[Load]) -> float:
-    """See the module; NaN where no weight was read twice. The constant does not matter."""
+    """Return NaN where no weight was read twice. The constant cancels."""
     by_weight: dict[float, list[float]] = {}
     for load in loads:
         by_weight.setdefault(load.weight_g, []).append(load.current_a)
     fractions = [stdev(currents) / abs(fmean(currents)) for currents in by_weight.values() if len(currents) > 1]
     return fmean(fractions) if fractions else nan
+
+
+def paper_rmse_nm(joint: str) -> float:
+    return PAPER_RMSE_NM[joint.split("_")[1]]

@@ -1,15 +1,14 @@
-"""Friction of a joint in motion: what the current spends on swinging the empty arm to and fro.
+"""Friction of a joint in motion, from the work of the current while the empty arm swings to and fro.
 
-At rest dry friction carries anything up to its largest value, and the held joint comes to rest before that: its spring
-pulls in steps of one count of the encoder (0.4 mrad of 10 N·m/rad are 4 mN·m), and a step sets the arm free, which then
-goes on a little. What a reading at rest tells of friction is therefore too little, of 13 mN·m simulated 11. So friction
-is measured where it is whole, on the way. Over a loop that ends where it began, weight, magnets and inertia give back
-what they took, whatever they are, and the rest is friction's:
+At rest dry friction has any value up to its maximum, and the held joint comes to rest before that: its spring pulls in
+steps of one encoder count (0.4 mrad of 10 N·m/rad are 4 mN·m), and a step sets the arm free, which then moves on a
+little. A reading at rest shows too little friction, 11 of 13 mN·m in simulation. So friction is measured in motion.
+Over a closed loop, weight, magnets and inertia do no net work, and the rest is friction's:
 
     k_t ∮ I dθ = c ∮ |dθ| + d ∮ ω dθ         dry c, viscous d
 
-Loops at two speeds tell one from the other: slow ones in short moves, quick ones in a single move each way. A joint
-that stops between two short moves spends nothing meanwhile, so the stops do not count.
+Loops at two speeds separate the two: slow ones in short moves, quick ones in a single move each way. A joint that stops
+between two short moves does no work meanwhile, so the stops do not count.
 """
 
 from __future__ import annotations
@@ -26,20 +25,20 @@ from experiments.actuator.reading import QUIET_S, HeldJoint, MovedError, Sample
 SWING_RAD = radians(5.0)  # to either side: four and a half periods of the R60's cogging, and the arm stays near level
 SLOW_STEP_RAD = radians(0.6)  # of one move, which takes a tenth of a second
 SLOW, QUICK = 2, 4  # loops of each kind
-TELLING = 3.0  # times the slow loops' speed, from which on the quick ones tell viscous friction
-FEWEST = 3  # loops of a kind that tell how true they are
+SPEED_RATIO = 3.0  # least ratio of quick to slow loops for viscous friction
+FEWEST = 3  # loops of a kind for a standard error
 
 
 class Loop(NamedTuple):
-    """There and back, once."""
+    """One swing there and back."""
 
-    spent_a: float  # mean over the way
-    speed_rad_s: float  # the same mean, so that it belongs to the current
+    spent_a: float  # mean over the travel
+    speed_rad_s: float  # the same mean
     quick: bool
 
 
 class Friction(NamedTuple):
-    """NaN where it was not measured. Errors are those of the loops' scatter, widened where they are few."""
+    """NaN where it was not measured. Errors are those of the loops' scatter, with Student's factor."""
 
     dry_a: float = nan
     dry_error_a: float = nan
@@ -47,8 +46,8 @@ class Friction(NamedTuple):
     viscous_error_a_s: float = nan
 
 
-def swing(held: HeldJoint) -> list[Loop]:
-    """Loops of both speeds about where the joint is held. Raises MovedError, BenchError, WarmError."""
+def swing_arm(held: HeldJoint) -> list[Loop]:
+    """Make loops of both speeds about the held angle. Raises MovedError, BenchError, WarmError."""
     middle_rad = held.held_rad
     low_rad, high_rad = middle_rad - SWING_RAD, middle_rad + SWING_RAD
     held.stroke(low_rad, SLOW_STEP_RAD)
@@ -61,13 +60,13 @@ def swing(held: HeldJoint) -> list[Loop]:
 
 
 def loop_of(up: Sequence[Sample], down: Sequence[Sample], quick: bool) -> Loop:
-    """Of a stroke and the one back, each until it rests. Raises MovedError where it is hardly one."""
+    """Evaluate a stroke and the one back, each until it rests. Raises MovedError for a short one."""
     samples, stroke_rad = [*up, *down], _end_rad(up) - _end_rad(down)
     if stroke_rad < SWING_RAD:
-        raise MovedError(f"the empty arm swings by {degrees(stroke_rad):.1f} degrees only: is something in its way?")
+        raise MovedError(f"the empty arm swings by {degrees(stroke_rad):.1f} degrees only: is it blocked?")
     spent_rad_a = sum(
         (a.current_a + b.current_a) / 2.0 * (b.angle_rad - a.angle_rad)
-        for a, b in pairwise([*samples, samples[0]])  # closed, as the loop would be if it met its beginning
+        for a, b in pairwise([*samples, samples[0]])  # closed by a line to its beginning
     )
     brisk_rad2_s = sum(
         (b.angle_rad - a.angle_rad) ** 2 / (b.now_s - a.now_s) for a, b in pairwise(samples) if b.now_s > a.now_s
@@ -76,13 +75,13 @@ def loop_of(up: Sequence[Sample], down: Sequence[Sample], quick: bool) -> Loop:
 
 
 def _end_rad(stroke: Sequence[Sample]) -> float:
-    """Where it came to rest."""
+    """Return the angle at rest."""
     from_s = stroke[-1].now_s - QUIET_S
     return fmean(sample.angle_rad for sample in stroke if sample.now_s >= from_s)
 
 
 def friction_of(loops: Sequence[Loop]) -> Friction:
-    """Where the quick loops are hardly quicker, all of it counts as dry."""
+    """Fit both parts; all friction counts as dry where the quick loops are hardly quicker."""
     slow, quick = ([loop for loop in loops if loop.quick == kind] for kind in (False, True))
     if len(slow) < FEWEST:
         return Friction()
@@ -90,7 +89,7 @@ def friction_of(loops: Sequence[Loop]) -> Friction:
     if len(quick) < FEWEST:
         return Friction(slow_a, slow_error_a)
     quick_a, quick_error_a, quick_rad_s = _mean(quick)
-    if quick_rad_s < TELLING * slow_rad_s:
+    if quick_rad_s < SPEED_RATIO * slow_rad_s:
         return Friction(slow_a, slow_error_a)
     between_rad_s = quick_rad_s - slow_rad_s
     viscous_a_s = (quick_a - slow_a) / between_rad_s
@@ -100,7 +99,7 @@ def friction_of(loops: Sequence[Loop]) -> Friction:
 
 
 def _mean(loops: Sequence[Loop]) -> tuple[float, float, float]:
-    """Current, its standard error, and the speed."""
+    """Return current, its standard error, and speed."""
     currents_a = [loop.spent_a for loop in loops]
     error_a = student_factor(len(loops) - 1) * sqrt(variance(currents_a) / len(loops))
     return fmean(currents_a), error_a, fmean(loop.speed_rad_s for loop in loops)

@@ -1,23 +1,22 @@
-"""What of the actuator calibration is decided before it begins: joints, weights, lever, trials; whether they can be.
+"""The plan of an actuator calibration: joints, weights, lever and trials, and whether the robot can hold them.
 
 The paper hangs eight weights from 10 to 800 g on one flipper (section II-B). A trial here is one pass through all of
-them, each hung anew, and not eight weights five times over: so what repeats badly (the hook's place on the arm, the
-magnets' warmth) shows in the spread between trials. The empty arm is read before the first and after every pass: what
-it takes to hold is the tare of both its neighbours. The first pass rises, so that what is wrong with the bench shows
-with the lightest weights, and the heaviest are judged by a constant that is known. The others take heavy and light in
-turn: 800 g warm a winding by 20 K in the ten seconds of a reading, and it cools while the light ones hang.
+them, each of which is hung again, so that poorly repeated influences (the hook's position, the magnets' temperature)
+show in the spread between trials. The empty arm is read before the first and after every pass, as the tare of both
+neighbours. The first pass rises, so that a mistake at the bench shows with the lightest weights, and the heaviest are
+checked with a known constant. The other passes alternate between heavy and light: 800 g warm a winding by 20 K in the
+ten seconds of a reading, and it cools while the light ones hang.
 
-Before a weight is asked for, its torque must be within the limits that the robot is configured with. The torque that
-leaves for the drive may be larger than the weight's own by as much as the torque constant is known wrongly, and a joint
-that stands still near its limit is a fault. What the winding bears is asked again before each weight.
+The torque of each weight must be within the configured limits. The commanded torque may exceed the weight's own by the
+error of the torque constant, and a joint at rest near its limit is a fault. The winding is checked again before each
+weight.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import ceil, hypot, nan, sqrt
-from typing import Any
 
 from control.joint_pd import GRAVITY_M_S2
 from control.monitors.joint_monitor import SATURATED_FRACTION
@@ -27,40 +26,37 @@ from firmware_host.configuration.configuration import Configuration
 
 PAPER_WEIGHTS_G = (10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 600.0, 800.0)
 PAPER_TRIALS = 5
-LARGEST_ERROR = 0.2  # by which a torque constant may be known wrongly: 60/(2π KV) for 8.27/KV is 15 % of it
+LARGEST_ERROR = 0.2  # relative, of a configured torque constant: 60/(2π KV) for 8.27/KV is 15 % of it
 READING_S = 10.0  # of a heavy weight, both approaches
-OPERATOR_S = 4.0  # that it hangs besides, until Enter is pressed and until it is taken off
+OPERATOR_S = 4.0  # that it hangs in addition, until Enter is pressed and until it is taken off
 COOL_K = 2.0  # below limits.temperature_warm_c, above which torque fades and a heavy weight falls
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Of one calibration, the same whenever it goes on."""
+    """The options of one calibration, the same whenever it continues."""
 
     joints: tuple[str, ...]
     weights_g: tuple[float, ...] = PAPER_WEIGHTS_G
     trials: int = PAPER_TRIALS
     lever_m: float = 0.12
     gravity_m_s2: float = GRAVITY_M_S2
-    lever_tolerance_m: float = 0.001  # from an axle that is not seen to a hook, by a ruler
+    lever_tolerance_m: float = 0.001  # by a ruler, from a hidden axle to the hook
     weight_tolerance: float = 0.001  # of class M3 (OIML R 111) from 50 g on; kitchen weights may err ten times as much
 
     @property
     def torque_error(self) -> float:
-        """Standard error of all torques alike, as a share of them: anything within a tolerance is as likely."""
+        """The relative standard error of all torques alike, for a uniform distribution within the tolerances."""
         return hypot(self.lever_tolerance_m / self.lever_m, self.weight_tolerance) / sqrt(3.0)
 
     def torque_nm(self, weight_g: float) -> float:
-        """Of the weight on a level arm."""
+        """Return the torque of a weight on a level arm."""
         return weight_g / 1000.0 * self.gravity_m_s2 * self.lever_m
-
-    def notes(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 @dataclass(frozen=True)
 class Step:
-    """One thing to hang, or to take off, and to read."""
+    """One weight to hang and read, or the empty arm."""
 
     trial: int  # from 1; the tare before the first pass is of trial 0
     weight_g: float  # 0: the empty arm
@@ -71,7 +67,7 @@ class Step:
 
     @property
     def reported_trial(self) -> int:
-        """As people count: what comes before the first pass is part of it."""
+        """The trial as people count: the first tare is part of the first pass."""
         return max(self.trial, 1)
 
 
@@ -86,7 +82,7 @@ def steps_of(plan: Plan) -> list[Step]:
 
 
 def in_turn(weights_g: Sequence[float]) -> list[float]:
-    """The heaviest, the lightest, the next heaviest ..."""
+    """Order the heaviest, the lightest, the next heaviest ..."""
     left, ordered = sorted(weights_g), list[float]()
     while left:
         ordered.append(left.pop(-1 if len(ordered) % 2 == 0 else 0))
@@ -94,14 +90,14 @@ def in_turn(weights_g: Sequence[float]) -> list[float]:
 
 
 def require_possible(plan: Plan, configuration: Configuration) -> None:
-    """Raises BenchError with all that stands against it."""
+    """Raises BenchError with all problems."""
     problems = list(_problems(plan, configuration))
     if problems:
         raise BenchError("\n".join(problems))
 
 
 def needed_nm(plan: Plan, configuration: Configuration, weight_g: float) -> float:
-    """What limits.torque_nm must be at least for this weight and the arm."""
+    """Return the least limits.torque_nm for this weight and the arm."""
     arm = configuration.arm
     arm_nm = arm.arm_mass_kg * plan.gravity_m_s2 * arm.center_of_mass_m
     return (plan.torque_nm(weight_g) + arm_nm) * (1.0 + LARGEST_ERROR) / SATURATED_FRACTION
@@ -111,8 +107,8 @@ def _problems(plan: Plan, configuration: Configuration) -> Iterator[str]:
     limit_nm, heaviest_g = configuration.limits.torque_nm, max(plan.weights_g)
     least_nm = needed_nm(plan, configuration, heaviest_g)
     if least_nm > limit_nm:
-        borne_g = [weight_g for weight_g in plan.weights_g if needed_nm(plan, configuration, weight_g) <= limit_nm]
-        lighter = f"hang at most {max(borne_g):g} g of them" if borne_g else "hang lighter ones"
+        possible_g = [weight_g for weight_g in plan.weights_g if needed_nm(plan, configuration, weight_g) <= limit_nm]
+        lighter = f"hang at most {max(possible_g):g} g of them" if possible_g else "hang lighter ones"
         least_nm_a = min(drive.torque_constant_nm_a for drive in configuration.drive.values()) / (1.0 + LARGEST_ERROR)
         yield (
             f"limits.torque_nm = {limit_nm:g}: must be at least {least_nm:.2f} for {heaviest_g:g} g at"
@@ -131,17 +127,17 @@ def _problems(plan: Plan, configuration: Configuration) -> Iterator[str]:
 
 
 def _up(value: float, digits: int) -> float:
-    """Rounded so that a lower bound stays one."""
+    """Round up."""
     return float(ceil(value * 10.0**digits) / 10.0**digits)
 
 
 def largest_current_a(plan: Plan, configuration: Configuration, joint: str, weight_g: float) -> float:
-    """That the weight may take, as long as nothing was measured."""
+    """Return the largest current of the weight, as long as nothing was measured."""
     return plan.torque_nm(weight_g) * (1.0 + LARGEST_ERROR) / configuration.drive[joint].torque_constant_nm_a
 
 
 def stays_cool(configuration: Configuration, current_a: float, winding_c: float, hangs_s: float) -> bool:
-    """Whether a winding of this temperature bears the current as long as the weight hangs."""
+    """Return whether a winding of this temperature can hold the current as long as the weight hangs."""
     winding = Winding(configuration.winding)
     winding.temperature_c = winding_c
     for _ in range(round(hangs_s)):

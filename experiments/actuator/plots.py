@@ -13,8 +13,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from experiments.actuator.fit import JointFit
-from experiments.actuator.report import paper_rmse_nm
+from experiments.actuator.fit import JointFit, paper_rmse_nm
 from experiments.reports.value_text import value_text
 
 HEIGHT_IN, WIDTH_IN, DPI = 3.4, 3.6, 200  # two beside each other fill the width of a printed page

@@ -1,18 +1,18 @@
-"""One reading of a joint that holds a weight level: what current it takes, from below and from above.
+"""One reading of a joint that holds a weight level: its current, approached from below and from above.
 
 The motor holds by a spring without an integral, so a weight lets the arm sag: 800 g by 6 degrees, which is half a per
-cent of the lever and three periods of the magnets' cogging. Therefore the held angle is raised until the arm itself is
-level, and all weights are read in the same place, where cogging is one constant that the tare takes off. What is left
-of the angle is measured.
+cent of the lever and three periods of the magnets' cogging. The held angle is raised until the arm itself is level, and
+all weights are read at that angle, where cogging is one constant that the tare removes. The remaining angle is
+measured.
 
-Dry friction carries part of the load, at rest anything from minus to plus its largest value. So the place is
-approached in small steps of one direction only, from below and then from above: the first current holds the load and
-nearly all of the friction, the second the load without it. Their mean is the load. Half their difference is what
-friction bears at rest, which is less than it may: friction.py measures it on the way.
+Dry friction carries part of the load, at rest anything from minus to plus its maximum. So the level is approached in
+small steps of one direction only, from below and then from above: the first current holds the load and nearly all of
+the friction, the second the load without it. Their mean is the load. Half their difference is the friction at rest,
+which is less than its maximum: friction.py measures it in motion.
 
 A reading is settled when over its whole time the angle stands still and the current does not drift. The samples are
-those of the daemon's status, which is asked a hundred times a second: 100 of them leave 0.01 A of a noise of 0.1 A,
-a twentieth of what the best weight is worth. The log keeps every row for whoever wants more.
+those of the daemon's status, asked a hundred times a second: 100 of them leave 0.01 A of a noise of 0.1 A, a twentieth
+of the best weight's accuracy. The log keeps every row.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from control.records import JOINTS
 from experiments.robot.bench_robot import BenchError, BenchRobot, move, require_hold
 
 OFF_RAD = radians(1.0)  # to the side, before an approach
-STEP_RAD = radians(0.6)  # at most at once: a hanging weight must not be thrown about
+STEP_RAD = radians(0.6)  # at most at once: a hanging weight must not swing
 NEAR_RAD = radians(0.04)  # to level: two counts of the encoder
-PART = 0.35  # of the way that is left, of each step: a heavy arm goes on twice as far before friction stops it
+PART = 0.35  # of the remaining angle, per step: a heavy arm overshoots twofold before friction stops it
 SMALLEST_RAD = radians(0.03)
 MOST_STEPS, MOST_TRIES = 30, 3
 QUIET_S = 0.2  # after the last step
-REST_S, REST_RAD, MOST_RESTS = 0.04, radians(0.03), 15  # between two looks at a joint that comes to rest
+REST_S, REST_RAD, MOST_RESTS = 0.04, radians(0.03), 15  # between two samples of a joint that comes to rest
 WINDOW_S, SAMPLE_S = 1.0, 0.01
 MOST_WINDOWS = 8
 STILL_RAD = radians(0.08)
@@ -58,12 +58,12 @@ class Sample(NamedTuple):
 
 
 class Side(NamedTuple):
-    """Of one approach: means over a window at rest."""
+    """Means over a window at rest after one approach."""
 
     angle_rad: float
     current_a: float
     noise_a: float  # of one sample
-    held_rad: float  # where the motor was told to hold
+    held_rad: float  # commanded
 
 
 class Reading(NamedTuple):
@@ -78,22 +78,22 @@ class Reading(NamedTuple):
 
     @property
     def current_a(self) -> float:
-        """That holds the load, without friction."""
+        """The current that holds the load, without friction."""
         return (self.below.current_a + self.above.current_a) / 2.0
 
     @property
     def rest_friction_a(self) -> float:
-        """Half of what the direction of the approach makes: what friction bears at rest, and it may bear more."""
+        """Half the difference between the approaches: the friction at rest."""
         return (self.below.current_a - self.above.current_a) / 2.0
 
 
 class HeldJoint:
-    """Owns where one joint of the robot is told to hold."""
+    """Moves the held angle of one joint."""
 
     def __init__(self, robot: BenchRobot, joint: str) -> None:
         self._robot = robot
         self._joint = joint
-        self._place = JOINTS.index(joint)
+        self._index = JOINTS.index(joint)
         self._warm_c = robot.configuration.limits.temperature_warm_c
         self.held_rad = self.sample().angle_rad  # arming holds the pose that it finds
 
@@ -111,13 +111,13 @@ class HeldJoint:
 
     def _sample_of(self, status: dict[str, Any]) -> Sample:
         require_hold(status)
-        drive = status["drives"][self._place]
+        drive = status["drives"][self._index]
         if drive["winding_c"] >= self._warm_c:
-            raise WarmError(f"the {self._joint} winding has {drive['winding_c']:.0f} degrees C")
+            raise WarmError(f"the {self._joint} winding has {drive['winding_c']:.0f} °C")
         return Sample(status["now_s"], drive["angle_rad"], drive["current_a"], drive["winding_c"])
 
     def stroke(self, angle_rad: float, step_rad: float) -> list[Sample]:
-        """What is seen on the way to there, in moves of at most this size, until it has come to rest."""
+        """Return the samples on the way to an angle, in moves of at most this size, until it rests."""
         samples = []
         for next_rad in _path_rad(self.held_rad, angle_rad, step_rad):
             self._robot.call("move", **{f"{self._joint}_rad": next_rad})
@@ -140,7 +140,7 @@ class HeldJoint:
         return self._settled()
 
     def _go_off(self, direction: float) -> None:
-        """To the side from which the approach comes, also where the first look met a swinging arm."""
+        """Move to the side from which the approach comes, again where the arm still swung."""
         for _ in range(MOST_TRIES):
             self._hold(self.held_rad - self._resting_rad() - direction * OFF_RAD)
             self._robot.wait(QUIET_S)
@@ -151,7 +151,7 @@ class HeldJoint:
         return self.sample().angle_rad
 
     def _resting_rad(self) -> float:
-        """The angle once it hardly changes, or has had its time."""
+        """Return the angle once it hardly changes, or after a time limit."""
         before_rad = self._angle_rad()
         for _ in range(MOST_RESTS):
             self._robot.wait(REST_S)
@@ -162,23 +162,23 @@ class HeldJoint:
         return angle_rad
 
     def _hold(self, angle_rad: float) -> None:
-        """In steps that do not throw the weight about."""
+        """Move in steps that do not swing the weight."""
         if abs(angle_rad) > HIGHEST_RAD:
-            raise MovedError("the motor does not bring the arm level: does too much hang on it, or is it in the way")
+            raise MovedError("the motor cannot bring the arm level: is the weight too heavy, or the arm blocked")
         for next_rad in _path_rad(self.held_rad, angle_rad, STEP_RAD):
             self.held_rad = next_rad
             move(self._robot, {self._joint: next_rad})
 
     def _settled(self) -> Side:
-        trouble = ""
+        problem = ""
         for _ in range(MOST_WINDOWS):
             samples = self._window(WINDOW_S)
-            trouble = unrest(samples)
-            if not trouble:
+            problem = find_motion(samples)
+            if not problem:
                 currents_a = [sample.current_a for sample in samples]
                 angle_rad = fmean(sample.angle_rad for sample in samples)
                 return Side(angle_rad, fmean(currents_a), pstdev(currents_a), self.held_rad)
-        raise MovedError(trouble)
+        raise MovedError(problem)
 
     def _window(self, duration_s: float) -> list[Sample]:
         samples = [self.sample()]
@@ -189,14 +189,14 @@ class HeldJoint:
 
 
 def _path_rad(start_rad: float, end_rad: float, step_rad: float) -> Iterator[float]:
-    """In equal steps of at most this size; at least one."""
+    """Yield equal steps of at most this size, at least one."""
     steps = max(1, ceil(abs(end_rad - start_rad) / step_rad))
     for step in range(1, steps + 1):
         yield start_rad + (end_rad - start_rad) * step / steps
 
 
-def unrest(samples: list[Sample]) -> str:
-    """What moved in a window, as a sentence; empty where nothing did."""
+def find_motion(samples: list[Sample]) -> str:
+    """Return a message on what moved in a window; empty where nothing did."""
     angles_rad = [sample.angle_rad for sample in samples]
     swing_rad = max(angles_rad) - min(angles_rad)
     if swing_rad > STILL_RAD:

@@ -1,50 +1,54 @@
-"""The report of the actuator calibration: the paper's figure 3 and its numbers beside ours, and what to set where."""
+"""The report of the actuator calibration: the paper's figure 3 and its numbers next to ours, and what to set."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from math import degrees, isfinite, nan
 from statistics import fmean, stdev
-from typing import Any
 
-from experiments.actuator.fit import Entry, JointFit, repeatability
+from experiments.actuator.fit import (
+    PAPER_CONSTANT_NM_A,
+    PAPER_REPEATABILITY,
+    PAPER_RMSE_NM,
+    Entry,
+    JointFit,
+    paper_rmse_nm,
+    repeatability,
+)
 from experiments.actuator.friction import SWING_RAD
 from experiments.actuator.plan import Plan, steps_of
-from experiments.reports.report_page import Figure, Rows, Section
+from experiments.reports.report_page import Figure, Section
+from experiments.reports.text_tables import Rows, TitledRows
 from experiments.reports.value_text import fraction_text, value_text
-from firmware_host.operator.reports import known
 
 TITLE = "Actuator calibration"
 CONSTANTS = "Torque constants ± one standard error; RMSE and repeatability by the paper's definitions"
 FRICTION = "Friction and offset ± one standard error"
-PAPER_RMSE_NM = {"adduction": 0.0134, "sweep": 0.0127}
-PAPER_REPEATABILITY = 0.032
-PAPER_CONSTANT_NM_A = 0.083
 
 METHOD = """\
 A motor holds the flipper level while calibration weights hang on it (the paper's section II-B). A trial is one pass
-through all weights, each hung anew; the empty arm is read before and after each pass, and what it takes is taken off.
+through all weights, each of which is hung again; the empty arm is read before and after each pass, as the tare.
 The held angle is raised until the loaded arm itself is level, so that every weight has the same lever and meets the
-magnets' cogging in the same place. The place is approached from below and from above: the mean of the two currents is
-the load.
+same cogging of the magnets. The level is approached from below and from above: the mean of the two currents is the
+load.
 
 The line is current on torque, since the weights are known better than the currents: k_t is one over its slope.
-Friction is what the empty arm's current spends on loops of {swing_deg:.0f} degrees to either side, in which weight,
-magnets and inertia give back what they took. Slow and quick loops tell dry from viscous. Half the difference between
-the two approaches at rest is less ("at rest at least"): a joint that is held comes to rest before friction bears all
-it can.
+Friction is the work of the empty arm's current over loops of {swing_deg:.0f} degrees to either side, in which weight,
+magnets and inertia do no net work. Slow and quick loops separate dry from viscous friction. Half the difference between
+the two approaches at rest is less ("at rest at least"): a held joint comes to rest before friction reaches its maximum.
 
 ± is one standard error; the true value is within two of them in about 19 of 20 calibrations. That of k_t is from the
-scatter of the readings and from what errs alike in all of them: the lever, by at most {lever_mm:g} mm, and the weights,
-by at most {weight_percent:g} % (--lever-tolerance, --weight-tolerance). A millimetre of {lever_cm:g} cm is
-{millimetre_percent:.1f} % of k_t. That of the offset holds the tare's scatter, and what friction at rest may hide."""
+scatter of the readings and from errors that are alike in all of them: the lever, by at most {lever_mm:g} mm, and the
+weights, by at most {weight_percent:g} % (--lever-tolerance, --weight-tolerance). A millimetre of {lever_cm:g} cm is
+{millimetre_percent:.1f} % of k_t. That of the offset includes the tare's scatter and the friction at rest."""
 
 DEFINITIONS = """\
 RMSE is by the paper's definition: the root mean square of k_t I - m g l over all readings, with the constant as it is
-configured (the paper's is its manufacturer's) and nothing fitted. It is what stands beside the paper's 0.0134 and
-0.0127, printed there as N/m (section III-A). The paper does not tell whether it took off what the arm itself weighs;
-here that is done. "RMSE fitted" is stricter and not in the paper: each trial by the constant that the other trials
+configured (the paper's is its manufacturer's) and nothing fitted. Compare it with the paper's 0.0134 and
+0.0127, printed there as N/m (section III-A). The paper does not say whether it subtracted the weight of the arm;
+here it is subtracted. "RMSE fitted" is stricter and not in the paper: each trial by the constant that the other trials
 gave (a single trial by its own). Set that constant, repeat the experiment, and the first will be what the second is.
 
 Repeatability is the paper's as we read it: the standard deviation over the trials of a weight, relative to their mean,
@@ -52,83 +56,132 @@ averaged over the weights. The paper gives one number for both joints. The light
 the tables by weight show."""
 
 SETTING = """\
-The constant stands in two places, and both must say the same. torque_constant_nm_a of [drive.JOINT] in the
+The constant is set in two files, and both must agree. torque_constant_nm_a of [drive.JOINT] in the
 configuration turns the current that the drive reports into torque: every force and coefficient is proportional to it.
 odrv0.axis0.config.motor.torque_constant in the drive (over USB with odrivetool, then save_configuration) turns the
 torque that is commanded into current. The reported current itself does not depend on either. While only one of them
-is set, the robot feels forces rightly and pushes wrongly, or the other way round.
+is set, the robot measures forces correctly and applies wrong ones, or the other way round.
 
 60/(2π KV) = 0.083 N·m/A for 115 rpm/V is the constant of a motor whose current is counted as direct current. ODrive
-counts the peak of the phase current, for which the same motor gives 8.27/KV = 0.0719. Which holds for these drives is
-what this experiment tells."""
+counts the peak of the phase current, for which the same motor gives 8.27/KV = 0.0719. This
+experiment shows which of them is true for these drives."""
 
 
-def report_of(plan: Plan, readings: Mapping[str, Mapping[str, Entry]], fits: Sequence[JointFit]) -> dict[str, Any]:
-    return {
-        "experiment": "actuator",
-        "plan": plan.notes(),
-        "joints": [_joint_report(fit) for fit in fits],
-        "not_fitted": [joint for joint in plan.joints if joint not in {fit.joint for fit in fits}],
-        "left_out": left_out(plan, readings),
-        "readings": {joint: dict(entries) for joint, entries in readings.items()},
-        "paper": {
-            "rmse_nm": PAPER_RMSE_NM,
-            "repeatability": PAPER_REPEATABILITY,
-            "torque_constant_nm_a": PAPER_CONSTANT_NM_A,
-        },
-    }
+@dataclass(frozen=True)
+class JointReport:
+    """The constants of one joint; NaN where they are unknown."""
+
+    joint: str
+    readings: int
+    direction: int
+    torque_constant_nm_a: float
+    torque_constant_error_nm_a: float
+    torque_constant_scatter_nm_a: float
+    torque_constant_tolerance_nm_a: float
+    configured_nm_a: float
+    rmse_configured_nm: float
+    rmse_fitted_nm: float
+    paper_rmse_nm: float
+    repeatability: float
+    offset_nm: float
+    offset_error_nm: float
+    friction_nm: float
+    friction_error_nm: float
+    viscous_nm_s: float
+    viscous_error_nm_s: float
+    rest_friction_nm: float
+    tare_nm: float
+    tare_spread_nm: float
 
 
-def _joint_report(fit: JointFit) -> dict[str, Any]:
-    (friction_nm, friction_error_nm), (viscous_nm_s, viscous_error_nm_s) = fit.friction_nm, fit.viscous_nm_s
-    values = {
-        "torque_constant_nm_a": fit.constant_nm_a,
-        "torque_constant_error_nm_a": fit.constant_error_nm_a,
-        "torque_constant_scatter_nm_a": fit.line.constant_error_nm_a,
-        "torque_constant_tolerance_nm_a": fit.torque_error * fit.constant_nm_a,
-        "configured_nm_a": fit.configured_nm_a,
-        "rmse_configured_nm": fit.rmse_configured_nm,
-        "rmse_fitted_nm": fit.rmse_fitted_nm,
-        "paper_rmse_nm": paper_rmse_nm(fit.joint),
-        "repeatability": fit.repeatability,
-        "offset_nm": fit.offset_nm,
-        "offset_error_nm": fit.offset_error_nm,
-        "friction_nm": friction_nm,
-        "friction_error_nm": friction_error_nm,
-        "viscous_nm_s": viscous_nm_s,
-        "viscous_error_nm_s": viscous_error_nm_s,
-        "rest_friction_nm": fit.rest_friction_a * fit.constant_nm_a,
-        "tare_nm": fit.tare_nm,
-        "tare_spread_nm": fit.tare_spread_nm,
-    }
-    reported = {name: known(value) for name, value in values.items()}
-    return {"joint": fit.joint, "readings": fit.line.readings, "direction": fit.direction} | reported
+@dataclass(frozen=True)
+class LeftOut:
+    """A reading that was skipped, or kept as doubtful and not fitted."""
+
+    joint: str
+    trial: int
+    weight_g: float
+    why: str
 
 
-def left_out(plan: Plan, readings: Mapping[str, Mapping[str, Entry]]) -> list[dict[str, Any]]:
-    """What was skipped, or kept with a doubt and not fitted, and why."""
+@dataclass(frozen=True)
+class PaperNumbers:
+    rmse_nm: Mapping[str, float]
+    repeatability: float
+    torque_constant_nm_a: float
+
+
+@dataclass(frozen=True)
+class ActuatorReport:
+    plan: Plan
+    joints: Sequence[JointReport]
+    not_fitted: Sequence[str]
+    left_out: Sequence[LeftOut]
+    readings: Mapping[str, Mapping[str, Entry]]
+    applied: str | None  # a message on the configuration file
+    paper: PaperNumbers = PaperNumbers(PAPER_RMSE_NM, PAPER_REPEATABILITY, PAPER_CONSTANT_NM_A)
+    experiment: str = "actuator"
+
+
+def make_report(
+    plan: Plan, readings: Mapping[str, Mapping[str, Entry]], fits: Sequence[JointFit], applied: str | None = None
+) -> ActuatorReport:
+    fitted = {fit.joint for fit in fits}
+    return ActuatorReport(
+        plan=plan,
+        joints=[_joint_report(fit) for fit in fits],
+        not_fitted=[joint for joint in plan.joints if joint not in fitted],
+        left_out=list_left_out(plan, readings),
+        readings=readings,
+        applied=applied,
+    )
+
+
+def _joint_report(fit: JointFit) -> JointReport:
+    return JointReport(
+        joint=fit.joint,
+        readings=fit.line.readings,
+        direction=fit.direction,
+        torque_constant_nm_a=fit.constant_nm_a,
+        torque_constant_error_nm_a=fit.constant_error_nm_a,
+        torque_constant_scatter_nm_a=fit.line.constant_error_nm_a,
+        torque_constant_tolerance_nm_a=fit.torque_error * fit.constant_nm_a,
+        configured_nm_a=fit.configured_nm_a,
+        rmse_configured_nm=fit.rmse_configured_nm,
+        rmse_fitted_nm=fit.rmse_fitted_nm,
+        paper_rmse_nm=paper_rmse_nm(fit.joint),
+        repeatability=fit.repeatability,
+        offset_nm=fit.offset_nm,
+        offset_error_nm=fit.offset_error_nm,
+        friction_nm=fit.friction_nm[0],
+        friction_error_nm=fit.friction_nm[1],
+        viscous_nm_s=fit.viscous_nm_s[0],
+        viscous_error_nm_s=fit.viscous_nm_s[1],
+        rest_friction_nm=fit.rest_friction_a * fit.constant_nm_a,
+        tare_nm=fit.tare_nm,
+        tare_spread_nm=fit.tare_spread_nm,
+    )
+
+
+def list_left_out(plan: Plan, readings: Mapping[str, Mapping[str, Entry]]) -> list[LeftOut]:
     return [
-        {"joint": joint, "trial": step.trial, "weight_g": step.weight_g, "why": why}
+        LeftOut(joint, step.trial, step.weight_g, why)
         for joint, entries in readings.items()
         for step in steps_of(plan)
         if (why := entries.get(step.key, {}).get("skipped") or entries.get(step.key, {}).get("doubt"))
     ]
 
 
-def paper_rmse_nm(joint: str) -> float:
-    return PAPER_RMSE_NM[joint.split("_")[1]]
-
-
-def sections_of(plan: Plan, readings: Mapping[str, Mapping[str, Entry]], fits: Sequence[JointFit]) -> list[Section]:
+def make_sections(plan: Plan, readings: Mapping[str, Mapping[str, Entry]], fits: Sequence[JointFit]) -> list[Section]:
     sections = []
     if fits:
-        sections.append(Section("Torque constants", DEFINITIONS, rows=table_of(fits), figures=_figures(fits)))
+        sections.append(Section("Torque constants", DEFINITIONS, rows=constant_rows(fits), figures=_figures(fits)))
         figures = _friction_figures(fits)
-        sections.append(Section("Friction and offset", rows=friction_table_of(fits), figures=figures))
+        sections.append(Section("Friction and offset", rows=friction_rows(fits), figures=figures))
     sections += [Section(f"Weights on {fit.joint}", rows=_weight_rows(fit)) for fit in fits]
-    omitted = left_out(plan, readings)
+    omitted = list_left_out(plan, readings)
     if omitted:
-        rows = [[row["joint"], str(row["trial"]), f"{row['weight_g']:g} g", row["why"]] for row in omitted]
+        rows = [[row.joint, str(row.trial), f"{row.weight_g:g} g", row.why] for row in omitted]
         sections.append(Section("Left out", rows=[["joint", "trial", "weight", "why"], *rows]))
     return [*sections, Section("What to set where", SETTING), Section("How it was measured", _method(plan))]
 
@@ -143,8 +196,8 @@ def _method(plan: Plan) -> str:
     )
 
 
-def table_of(fits: Sequence[JointFit]) -> Rows:
-    """A line a joint, the paper's numbers last."""
+def constant_rows(fits: Sequence[JointFit]) -> Rows:
+    """List one line per joint, and the paper's numbers last."""
     head = [
         "joint",
         "k_t (N·m/A)",
@@ -173,7 +226,7 @@ def table_of(fits: Sequence[JointFit]) -> Rows:
     return [head, *rows, *([*row, "-"] for row in paper)]
 
 
-def friction_table_of(fits: Sequence[JointFit]) -> Rows:
+def friction_rows(fits: Sequence[JointFit]) -> Rows:
     head = [
         "joint",
         "dry friction (N·m)",
@@ -233,7 +286,7 @@ def _figures(fits: Sequence[JointFit]) -> list[Figure]:
         ),
         Figure(
             "errors",
-            "What the torque by the fitted constant misses, each trial by the constant of the others; the bar is the"
+            "Errors of the torque by the fitted constant, each trial by the constant of the others; the bar is the"
             " mean of the trials. Grey band: the paper's RMSE, which is that of its configured constant.",
             partial(plot_errors, fits),
         ),
@@ -241,7 +294,7 @@ def _figures(fits: Sequence[JointFit]) -> list[Figure]:
 
 
 def _friction_figures(fits: Sequence[JointFit]) -> list[Figure]:
-    """None of readings without loops."""
+    """Return no figure for readings without loops."""
     if not all(fit.loops for fit in fits):
         return []
     from experiments.actuator.plots import plot_friction  # matplotlib takes its time
@@ -249,14 +302,13 @@ def _friction_figures(fits: Sequence[JointFit]) -> list[Figure]:
     return [
         Figure(
             "friction",
-            "Torque that the empty arm takes on loops at two speeds, beyond what weight, magnets and inertia give back:"
+            "Torque of friction on loops of the empty arm at two speeds:"
             " each loop, and the line whose height at zero is dry friction and whose slope is viscous. Dotted: what"
-            " is borne at rest. The paper leaves friction out.",
+            " acts at rest. The paper neglects friction.",
             partial(plot_friction, fits),
         ),
     ]
 
 
-def text_of(fits: Sequence[JointFit]) -> list[tuple[str, Rows]]:
-    """Titles and tables for the screen."""
-    return [(CONSTANTS, table_of(fits)), (FRICTION, friction_table_of(fits))]
+def make_tables(fits: Sequence[JointFit]) -> list[TitledRows]:
+    return [(CONSTANTS, constant_rows(fits)), (FRICTION, friction_rows(fits))]

@@ -1,17 +1,17 @@
-"""The simulated bench of the actuator calibration: a flipper over its edge, motors as imperfect as real ones, a hand.
+"""The simulated bench of the actuator calibration: a flipper over the edge of a table, and imperfect motors.
 
 The motor's true constant is 8.27/KV of the R60, while the configuration has the paper's 60/(2π KV); the calibration
-must find that. Its imperfections are those of direct-drive motors of this size, as far as they are public:
+must find the true one. The imperfections are those of direct-drive motors of this size, as far as they are public:
 
     cogging     0.026 N·m from peak to peak of a gimbal-class motor without current, measured with a torque transducer
                 (J. Pieper, "Measuring torque ripple", jpieper.com/tag/torque), 168 periods a turn by the R60's 24 slots
                 and 28 magnets (motor_config_R60.h on os.mbed.com, users/adimmit)
-    friction    no figure is public; the paper neglects it, so it is set to as much as the cogging's amplitude
+    friction    no figure is public; the paper neglects it, so it is set to the cogging's amplitude
     current     noise of 0.1 to 0.3 A in the authors' logs (simulation/mud/disturbances.py)
     encoder     14 bits, as of the R60's public ODrive settings (YaelBenShalom/Motorized-Prosthetic-Arm)
 
-A hook is never twice in quite the same place of the arm. How far it misses is an estimate, and calibration weights of
-class M1 are truer than all of this.
+The position of the hook varies from one weight to the next by an estimate. Calibration weights of class M1 are more
+accurate than all of this.
 """
 
 from __future__ import annotations
@@ -44,14 +44,14 @@ LEVER_SD_M = 0.0003
 
 
 def bench_configuration() -> Configuration:
-    """That of the simulated robot, with the current limit of the authors' drives at their single flipper."""
+    """Return the simulated robot's configuration, with the current limit of the authors' single flipper."""
     sections = f"[limits]\ntorque_nm = {BENCH_TORQUE_NM}\n\n[recovery]\nattempts = 0  # no mud holds a flipper here\n"
     return simulated_configuration(sections, drive=f"current_limit_a = {BENCH_CURRENT_A}")
 
 
 def truth_rows(fits: Sequence[JointFit]) -> list[list[str]]:
-    """A table: what is true of the simulated motors, and by how much the fitted misses it."""
-    rows = [["joint", "true k_t (N·m/A)", "k_t misses by", "true dry friction (N·m)", "dry friction misses by"]]
+    """List the true constants of the simulated motors, and the errors of the fitted ones."""
+    rows = [["joint", "true k_t (N·m/A)", "k_t error", "true dry friction (N·m)", "dry friction error"]]
     for fit in fits:
         constant = [f"{TRUE_CONSTANT_NM_A:.5f}", miss_text(fit.constant_nm_a, TRUE_CONSTANT_NM_A)]
         rows.append([fit.joint, *constant, f"{COULOMB_NM:.4f}", miss_text(fit.friction_nm[0], COULOMB_NM)])
@@ -60,8 +60,8 @@ def truth_rows(fits: Sequence[JointFit]) -> list[list[str]]:
 
 def simulated_bench(
     configuration: Configuration, joint: str, plan: Plan, seed: int, log: Path
-) -> tuple[LockstepRobot, SimulatedHand]:
-    """A robot with a flipper over the bench's edge, and the hand beside it. `log` must be new."""
+) -> tuple[LockstepRobot, SimulatedWeights]:
+    """Make a robot with a flipper over the bench's edge, and the handler of its weights. `log` must be new."""
     random = Random(f"bench {seed} {joint}")
     recorder = FileRecorder(log, configuration)
     plant = plant_of(configuration, fixed_base=True, joint_coulomb_nm=COULOMB_NM)
@@ -78,13 +78,13 @@ def simulated_bench(
         for name, drive in configuration.drive.items()
     }
     lockstep = Lockstep(configuration, paper_track(), seed, recorder, plant=plant, drives=drives)
-    return LockstepRobot(lockstep, recorder), SimulatedHand(lockstep, joint, plan, seed)
+    return LockstepRobot(lockstep, recorder), SimulatedWeights(lockstep, joint, plan, seed)
 
 
-class SimulatedHand:
-    """A Hand. Owns what the simulated arms are mounted on."""
+class SimulatedWeights:
+    """A WeightHandler that acts on the mount of the simulated arms."""
 
-    lingers_s = 0.0
+    handling_s = 0.0
 
     def __init__(self, lockstep: Lockstep, joint: str, plan: Plan, seed: int) -> None:
         self._lockstep = lockstep
@@ -104,7 +104,7 @@ class SimulatedHand:
             arm.put_back()
         self._hold(True)
 
-    def let_go(self, meanwhile: Callable[[], None]) -> None:
+    def release(self, meanwhile: Callable[[], None]) -> None:
         self._hold(False)
 
     def _hold(self, held: bool) -> None:
@@ -113,7 +113,7 @@ class SimulatedHand:
             arm.mount.held = held
 
     def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
-        """Gently: what is dropped on the arm swings it down to its end."""
+        """Lower the weight in steps, since a dropped one swings the arm to its end."""
         before_kg, lever_m = self.mount.mass_kg, self._plan.lever_m + self._random.gauss(0.0, LEVER_SD_M)
         for part in range(1, HANGING_PARTS + 1):
             more_kg = (step.weight_g / 1000.0 - before_kg) * part / HANGING_PARTS

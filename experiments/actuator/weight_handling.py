@@ -1,7 +1,4 @@
-"""The hand at the actuator's bench: it holds the flipper level, lets go of it, and hangs weights on it.
-
-On a robot that is a person, who is asked; simulation.py has the one that acts on a simulated joint.
-"""
+"""Handling of the flipper and the weights at the bench: by the operator, or in simulation (simulation.py)."""
 
 from __future__ import annotations
 
@@ -14,32 +11,32 @@ from experiments.actuator.plan import OPERATOR_S, Plan, Step
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 
 EMPTY = (
-    "take everything off the flipper, and let it rest. Keep clear of it: after its reading it swings to and fro by"
-    f" {degrees(SWING_RAD):.0f} degrees for a quarter of a minute."
+    "take everything off the flipper, and let it rest. Keep clear: after its reading it swings by"
+    f" {degrees(SWING_RAD):.0f} degrees to each side for 15 s."
 )
 
 
-class Hand(Protocol):
+class WeightHandler(Protocol):
     @property
-    def lingers_s(self) -> float:
-        """That a weight hangs beyond its reading."""
+    def handling_s(self) -> float:
+        """The time that a weight hangs beyond its reading."""
 
     def hold_level(self, joint: str, meanwhile: Callable[[], None]) -> None:
-        """Nothing hangs, and all flippers are held near level while torque is off."""
+        """Take all weights off and hold all flippers near level while torque is off."""
 
-    def let_go(self, meanwhile: Callable[[], None]) -> None: ...
+    def release(self, meanwhile: Callable[[], None]) -> None: ...
 
     def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
-        """GO_ON when it hangs, SKIP to leave it out, REDO to go back to the one before."""
+        """Return GO_ON when it hangs, SKIP to leave it out, REDO for the one before."""
 
     def take_off(self) -> None:
-        """At once: what hangs is too much for the motor."""
+        """Take the weight off at once: it is too much for the motor."""
 
 
-class PersonsHand:
-    """A Hand."""
+class ManualWeights:
+    """A WeightHandler that prompts the operator."""
 
-    lingers_s = OPERATOR_S
+    handling_s = OPERATOR_S
 
     def __init__(self, operator: Operator, plan: Plan) -> None:
         self._operator = operator
@@ -49,13 +46,13 @@ class PersonsHand:
         axle = "sweep" if joint.endswith("sweep") else "adduction"
         self._operator.ask(
             f"Mount the robot with the {axle} axle of the {joint.split('_')[0]} flipper horizontal and the flipper out"
-            " over the edge, the other joints propped within their range. Take every weight off and hold the flipper"
-            " level: all four motors will hold.",
+            " over the edge, the other joints propped within their range. Take all weights off and hold the flipper"
+            " level: all four motors will hold their angles.",
             {GO_ON: "it is held"},
             meanwhile,
         )
 
-    def let_go(self, meanwhile: Callable[[], None]) -> None:
+    def release(self, meanwhile: Callable[[], None]) -> None:
         self._operator.ask("The motor holds. Let go of the flipper.", {GO_ON: "done"}, meanwhile)
 
     def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:

@@ -1,36 +1,32 @@
-"""`mudskipper experiment actuator`, from the command to the report, and with a person at a terminal."""
+"""`mudskipper experiment actuator`, from the command to the report, with the prompts of its operator."""
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
-import pty
-import subprocess
-import sys
-import threading
 from pathlib import Path
 
 import pytest
 
 from command_line import exit_codes
-from command_line.experiments.actuator import _applied as applied
-from command_line.experiments.actuator import _target as target_of
 from command_line.main import main
-from experiments.actuator.bench import Readings
-from experiments.actuator.calibration import Show
+from experiments.actuator import run as actuator_run
+from experiments.actuator.configuration_change import apply_fits, find_target
 from experiments.actuator.fit import fit_joint
 from experiments.actuator.friction import QUICK, SLOW
 from experiments.actuator.plan import Plan
 from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A
-from experiments.robot.bench_robot import BenchError
-from experiments.robot.prompt import AutomaticOperator, Operator
+from experiments.robot.bench_errors import BenchError
+from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.robot.prompt import AutomaticOperator
 from experiments.trials.notebook import Notebook
 from experiments.trials.session import Ending, Session
-from firmware_host.configuration.loading import load_configuration, parse_configuration
-from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.log.file_recorder import FileRecorder
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.track import paper_track
+from tests.command_line.experiments.test_conduct import typed
 from tests.experiments.actuator.test_fit import made_entries
-from tests.waiting import LONGEST_S
 
 SHORT = (
     "experiment",
@@ -101,84 +97,53 @@ def test_without_a_daemon_it_is_told_how_to_start_one(tmp_path: Path, capsys: py
     assert "no daemon answers" in capsys.readouterr().err
 
 
-def test_a_person_at_a_terminal_is_asked_and_may_skip(bench: Bench, tmp_path: Path) -> None:  # noqa: F811
-    """In real time, with a daemon, whose simulated robot nobody can hang a weight on: all but the empty arm is left."""
+def test_an_operator_at_a_terminal_is_asked_and_may_skip_weights(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The robot is simulated in step with its loop, and nobody hangs weights on it: only the empty arm is read."""
+    configuration = simulated_configuration()
+    recorder = FileRecorder(tmp_path / "robot.mcap", configuration)
+    robot = LockstepRobot(Lockstep(configuration, paper_track(), 1, recorder), recorder)
+    monkeypatch.setattr(actuator_run, "DaemonRobot", lambda socket: robot)
     command = ["experiment", "actuator", "--joint", "right_adduction", "--weights", "10,20", "--trials", "1"]
-    answers = [("take everything off", ""), ("hang 10 g", "s"), ("hang 20 g", "s"), ("take everything off", "s")]
-    shown = run_at_terminal(bench, [*command, "--out", str(tmp_path)], answers)
+    with typed(monkeypatch, "\n\n\ns\ns\ns\n\n"):
+        assert main([*command, "--out", str(tmp_path)]) == exit_codes.OK
+    questions = capsys.readouterr().err.split("[Enter")
+    expected = (
+        "Mount the robot",
+        "Let go",
+        "take everything off",
+        "hang 10 g at 12 cm",
+        "hang 20 g",
+        "everything",
+        "off",
+    )
+    assert all(part in question for part, question in zip(expected, questions, strict=False))
     entries = Notebook(tmp_path / "right_adduction", read_plan(tmp_path / "right_adduction")).entries
-    assert entries["trial 1, 10 g"] == {"skipped": "on request"}, shown
+    assert entries["trial 1, 10 g"] == {"skipped": "on request"}
     assert abs(entries["trial 0, 0 g"]["angle_rad"]) < 0.01
     assert [loop["quick"] for loop in entries["trial 0, 0 g"]["loops"]] == [False] * SLOW + [True] * QUICK
-    assert "Trial 1 of 1: hang 20 g at 12 cm from the axle, nothing else" in shown
-    assert bench.wait_for(lambda status: bool(status["mode"] == "idle"))
+    assert robot.call("status")["mode"] == "idle"
 
 
 def read_plan(folder: Path) -> dict[str, object]:
-    plan: dict[str, object] = json.loads((folder / "notebook.jsonl").read_text(encoding="utf-8").splitlines()[0])[
-        "plan"
-    ]
+    first, *_ = (folder / "notebook.jsonl").read_text(encoding="utf-8").splitlines()
+    plan: dict[str, object] = json.loads(first)["plan"]
     return plan
 
 
-def run_at_terminal(bench: Bench, command: list[str], answers: list[tuple[str, str]]) -> str:  # noqa: F811
-    """What was shown. Each question is answered by the first of `answers` that it holds, once."""
-    operator, terminal = pty.openpty()
-    environment = os.environ | {"MUDSKIPPER_SOCKET": str(bench.socket)}
-    process = subprocess.Popen(
-        [sys.executable, "-m", "command_line.main", *command],
-        stdin=terminal,
-        stderr=terminal,
-        stdout=subprocess.DEVNULL,
-        env=environment,
-    )
-    os.close(terminal)
-    killer = threading.Timer(100.0, process.kill)
-    killer.start()
-    shown, fresh = "", ""
-    try:
-        while True:
-            chunk = os.read(operator, 4096).decode(errors="replace")
-            shown, fresh = shown + chunk, fresh + chunk
-            if fresh.rstrip(" ").endswith("]"):
-                place = next((place for place, (part, _) in enumerate(answers) if part in fresh), None)
-                os.write(operator, f"{'' if place is None else answers.pop(place)[1]}\n".encode())
-                fresh = ""
-    except OSError:  # the other end is closed: it has ended
-        pass
-    finally:
-        process.wait(LONGEST_S)
-        killer.cancel()
-        os.close(operator)
-    return shown
+# the configuration
 
 
-class Plain:
-    """An ActuatorBench of which only the configuration is asked."""
-
-    def __init__(self, text: str) -> None:
-        self.configuration = parse_configuration(text)
-
-    def calibrate(self, plan: Plan, folder: Path, operator: Operator, show: Show) -> Readings:
-        raise NotImplementedError
-
-    def leave(self, folder: Path, operator: Operator) -> list[Path]:
-        return []
-
-
-def made_options(**values: object) -> argparse.Namespace:
-    return argparse.Namespace(**({"simulated": False, "apply": True, "config": None} | values))
-
-
-def made_desk(folder: Path, reported: list[str]) -> Session:
-    return Session(folder, AutomaticOperator(reported.append), lambda done, total: None)
+def made_session(folder: Path, messages: list[str]) -> Session:
+    return Session(folder, AutomaticOperator(messages.append), lambda done, total: None)
 
 
 def test_only_the_file_that_the_daemon_runs_with_is_changed(tmp_path: Path, example_text: str) -> None:
     path = tmp_path / "other.toml"
     path.write_text(example_text + "# edited\n", encoding="utf-8")
     with pytest.raises(BenchError, match=r"the daemon does not run with .*other.toml"):
-        target_of(made_options(config=path), made_desk(tmp_path, []), Plain(example_text))
+        find_target(path, example_text, made_session(tmp_path, []), simulated=False)
 
 
 def test_a_file_that_may_not_be_written_is_refused_before_the_work(
@@ -186,10 +151,10 @@ def test_a_file_that_may_not_be_written_is_refused_before_the_work(
 ) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(example_text, encoding="utf-8")
-    assert target_of(made_options(config=path), made_desk(tmp_path, []), Plain(example_text)) == path
+    assert find_target(path, example_text, made_session(tmp_path, []), simulated=False) == path
     monkeypatch.setattr(os, "access", lambda *_: False)
     with pytest.raises(BenchError, match="you may not write"):
-        target_of(made_options(config=path), made_desk(tmp_path, []), Plain(example_text))
+        find_target(path, example_text, made_session(tmp_path, []), simulated=False)
 
 
 def test_a_doubtful_constant_is_not_written_and_a_good_one_is(tmp_path: Path, example_text: str) -> None:
@@ -197,9 +162,9 @@ def test_a_doubtful_constant_is_not_written_and_a_good_one_is(tmp_path: Path, ex
     path.write_text(example_text, encoding="utf-8")
     doubtful, good = (fit_joint("right_sweep", plan, made_entries(plan, noise_a=noise), 0.083) for noise in (3.0, 0.02))
     assert doubtful is not None and good is not None
-    assert "needs no change" in applied(path, [doubtful], made_desk(tmp_path, reported))[0]
+    assert "needs no change" in apply_fits(path, [doubtful], made_session(tmp_path, reported))[0]
     assert "is not written" in reported[0] and path.read_text(encoding="utf-8") == example_text
-    assert "is changed" in applied(path, [good], made_desk(tmp_path, reported))[0]
+    assert "is changed" in apply_fits(path, [good], made_session(tmp_path, reported))[0]
     assert "+torque_constant_nm_a = 0.07" in reported[-1]
     written = load_configuration(path)
     assert written.drive["right_sweep"].torque_constant_nm_a == pytest.approx(0.0719, abs=0.001)
@@ -213,8 +178,6 @@ def test_what_cannot_be_applied_costs_no_report(tmp_path: Path, example_text: st
     entries = {key: entry | {"current_a": 2.0 * entry["current_a"]} for key, entry in made_entries(plan).items()}
     fit = fit_joint("right_sweep", plan, entries, 0.083)
     assert fit is not None
-    reported, ending = applied(path, [fit], made_desk(tmp_path, []))
-    assert (
-        reported.startswith("nothing was applied: the configuration stays as it is") and "current_limit_a" in reported
-    )
-    assert "run the same command again" in reported and ending is Ending.REFUSED
+    message, ending = apply_fits(path, [fit], made_session(tmp_path, []))
+    assert message.startswith("nothing was applied: the configuration stays as it is")
+    assert "current_limit_a" in message and "run the same command again" in message and ending is Ending.REFUSED

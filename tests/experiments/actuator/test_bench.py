@@ -15,7 +15,7 @@ from experiments.robot.bench_robot import ALONE
 from tests.experiments.still_robot import StillRobot
 from tests.scripted_operator import ScriptedOperator
 
-HOLD_IT = "Take off what hangs and hold the flipper: torque goes off."
+HOLD_IT = "Take off the weight and hold the flipper: torque goes off."
 PLAN = Plan(("right_adduction",), weights_g=(50.0,), trials=1)
 
 

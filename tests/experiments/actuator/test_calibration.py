@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -53,10 +54,10 @@ class ScriptedRobot(StillRobot):
         self.winding_c = max(30.0, self.winding_c - duration_s)
 
 
-class ScriptedHand:
-    """A Hand that hangs what it is asked for, unless the script of a step says something else."""
+class ScriptedWeights:
+    """A WeightHandler that hangs what it is asked for, unless the script of a step says something else."""
 
-    lingers_s = 2.0
+    handling_s = 2.0
 
     def __init__(self, robot: ScriptedRobot, script: Mapping[str, list[Callable[[], str]]]) -> None:
         self.robot, self.script = robot, {key: list(answers) for key, answers in script.items()}
@@ -65,7 +66,7 @@ class ScriptedHand:
     def hold_level(self, joint: str, meanwhile: Callable[[], None]) -> None:
         self.robot.hanging_g = 0.0
 
-    def let_go(self, meanwhile: Callable[[], None]) -> None:
+    def release(self, meanwhile: Callable[[], None]) -> None:
         meanwhile()
 
     def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
@@ -102,7 +103,7 @@ LOOP = Loop(0.18, 0.2, quick=False)
 @pytest.fixture(autouse=True)
 def scripted_joint(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(actuator, "HeldJoint", ScriptedJoint)
-    monkeypatch.setattr(actuator, "swing", lambda held: [LOOP])
+    monkeypatch.setattr(actuator, "swing_arm", lambda held: [LOOP])
 
 
 class Case:
@@ -112,11 +113,11 @@ class Case:
         self.folder = folder
         self.robot = ScriptedRobot()
         self.operator = ScriptedOperator()
-        self.hand = ScriptedHand(self.robot, {})
+        self.hand = ScriptedWeights(self.robot, {})
         self.shown: list[tuple[int, int]] = []
 
     def run(self) -> Mapping[str, Any]:
-        notebook = Notebook(self.folder, PLAN.notes())
+        notebook = Notebook(self.folder, asdict(PLAN))
         return Calibration(
             self.robot, JOINT, PLAN, self.hand, self.operator, notebook, lambda *at: self.shown.append(at)
         ).run()
@@ -166,14 +167,14 @@ def test_only_the_empty_arm_is_swung_and_not_where_something_may_hang(case: Case
     entries = case.run()
     assert [key for key, entry in entries.items() if "loops" in entry] == [Step(0, 0.0).key, Step(2, 0.0).key]
     assert entries[Step(0, 0.0).key]["loops"] == [LOOP._asdict()]
-    assert "still hanging" in entries[Step(1, 0.0).key]["doubt"]
+    assert "should be empty" in entries[Step(1, 0.0).key]["doubt"]
 
 
 def test_an_arm_that_does_not_swing_costs_its_friction_alone(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     def blocked(held: object) -> list[Loop]:
         raise MovedError("the empty arm swings by 1.0 degrees only: is something in its way?")
 
-    monkeypatch.setattr(actuator, "swing", blocked)
+    monkeypatch.setattr(actuator, "swing_arm", blocked)
     entries = case.run()
     assert list(entries) == KEYS and not any("loops" in entry for entry in entries.values())
     assert sum("friction was not measured" in reported for reported in case.operator.reported) == PLAN.trials + 1
@@ -220,7 +221,7 @@ def test_a_daemon_that_is_gone_ends_it_and_loses_nothing(case: Case, monkeypatch
         case.run()
     monkeypatch.undo()
     monkeypatch.setattr(actuator, "HeldJoint", ScriptedJoint)
-    monkeypatch.setattr(actuator, "swing", lambda held: [LOOP])
+    monkeypatch.setattr(actuator, "swing_arm", lambda held: [LOOP])
     case.hand.asked.clear()
     case.run()
     assert case.hand.asked == KEYS[2:]
@@ -273,7 +274,7 @@ def test_a_warm_winding_is_waited_for_before_a_weight_and_not_before_a_light_one
     case.on(Step(1, 200.0), warm)
     case.run()
     assert [reported for reported in case.operator.reported if "waiting" in reported] == [
-        "The right_adduction winding has 69 degrees C, too warm for 400 g: waiting."
+        "The right_adduction winding has 69 °C, too warm for 400 g: waiting."
     ]
 
 

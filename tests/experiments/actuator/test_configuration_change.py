@@ -89,7 +89,7 @@ def test_a_file_is_replaced_with_its_rights_and_the_old_one_is_kept(tmp_path: Pa
 def test_what_somebody_else_changed_meanwhile_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "mudskipper.toml"
     path.write_text("theirs = 1\n", encoding="utf-8")
-    with pytest.raises(BenchError, match="changed by somebody else"):
+    with pytest.raises(BenchError, match="changed during this experiment"):
         replace_file(path, "mine = 1\n", "mine = 2\n")
     assert path.read_text(encoding="utf-8") == "theirs = 1\n"
 

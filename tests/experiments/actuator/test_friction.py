@@ -10,7 +10,7 @@ from random import Random
 import pytest
 
 from experiments.actuator import simulation as actuator_simulation
-from experiments.actuator.friction import FEWEST, Loop, friction_of, loop_of, swing
+from experiments.actuator.friction import FEWEST, Loop, friction_of, loop_of, swing_arm
 from experiments.actuator.plan import Plan
 from experiments.actuator.reading import HeldJoint, MovedError, Sample
 from experiments.actuator.simulation import TRUE_CONSTANT_NM_A, bench_configuration, simulated_bench
@@ -55,7 +55,7 @@ def test_a_loop_that_stops_on_its_way_spends_nothing_there() -> None:
 
 def test_an_arm_that_is_in_the_way_makes_no_loop() -> None:
     up, down = (made_stroke(direction, 0.5, lambda *_: 0.6) for direction in (1.0, -1.0))
-    with pytest.raises(MovedError, match=r"swings by 0\.0 degrees only: is something in its way"):
+    with pytest.raises(MovedError, match=r"swings by 0\.0 degrees only: is it blocked"):
         loop_of(up, up, quick=True)
     with pytest.raises(MovedError, match=r"swings by -10\.3 degrees"):
         loop_of(down, up, quick=True)
@@ -94,10 +94,10 @@ def test_a_simulated_joint_has_the_friction_that_it_was_given(tmp_path: Path, mo
     try:
         hand.hold_level(joint, lambda: None)
         arm(robot)
-        hand.let_go(lambda: None)
+        hand.release(lambda: None)
         held = HeldJoint(robot, joint)
         middle_rad = held.held_rad
-        friction = friction_of(swing(held) + swing(held))
+        friction = friction_of(swing_arm(held) + swing_arm(held))
         assert held.held_rad == pytest.approx(middle_rad)
         viscous_nm_s = robot.lockstep.robot.plant.parameters.joint_friction_nm_s
     finally:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from experiments.actuator.plan import Plan, Step
-from experiments.actuator.reading import SAMPLE_S, HeldJoint, MovedError, Sample, Side, unrest
+from experiments.actuator.reading import SAMPLE_S, HeldJoint, MovedError, Sample, Side, find_motion
 from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A, bench_configuration, simulated_bench
 from experiments.robot.bench_robot import BenchError, arm
 
@@ -24,7 +24,7 @@ def test_a_weight_is_read_level_and_without_friction(joint: str, tmp_path: Path)
     try:
         hand.hold_level(joint, nothing)
         arm(robot)
-        hand.let_go(nothing)
+        hand.release(nothing)
         held = HeldJoint(robot, joint)
         empty = held.read()
         hand.hang(Step(1, 400.0), nothing)
@@ -45,7 +45,7 @@ def test_an_arm_that_never_rests_is_not_read(tmp_path: Path) -> None:
     try:
         hand.hold_level(joint, nothing)
         arm(robot)
-        hand.let_go(nothing)
+        hand.release(nothing)
         held, plain_wait = HeldJoint(robot, joint), robot.wait
 
         def shaken(duration_s: float) -> None:
@@ -70,7 +70,7 @@ def test_a_load_that_the_motor_does_not_lift_is_told(tmp_path: Path) -> None:
         hand.hold_level(joint, nothing)
         arm(robot)
         held = HeldJoint(robot, joint)
-        with pytest.raises(MovedError, match="does not bring the arm level"):  # a hand holds it 30 degrees down
+        with pytest.raises(MovedError, match="cannot bring the arm level"):  # a hand holds it 30 degrees down
             robot.lockstep.robot.plant.arms[1].adduction_rad = -0.55
             held.read()
     finally:
@@ -85,7 +85,7 @@ def test_a_weight_that_slips_off_between_the_approaches_is_told(
     try:
         hand.hold_level(joint, nothing)
         arm(robot)
-        hand.let_go(nothing)
+        hand.release(nothing)
         hand.hang(Step(1, 200.0), nothing)
         held = HeldJoint(robot, joint)
         settled = HeldJoint._settled
@@ -110,7 +110,7 @@ def samples(angle_slope: float = 0.0, current_slope: float = 0.0, noise_a: float
 
 
 def test_rest_is_an_angle_that_stands_and_a_current_that_does_not_drift() -> None:
-    assert unrest(samples()) == ""
-    assert unrest(samples(angle_slope=0.01)) == "the joint swings by 0.57 degrees"
-    assert unrest(samples(current_slope=1.0)) == "the current drifts by 0.50 A"
-    assert unrest(samples(current_slope=0.05)) == ""
+    assert find_motion(samples()) == ""
+    assert find_motion(samples(angle_slope=0.01)) == "the joint swings by 0.57 degrees"
+    assert find_motion(samples(current_slope=1.0)) == "the current drifts by 0.50 A"
+    assert find_motion(samples(current_slope=0.05)) == ""

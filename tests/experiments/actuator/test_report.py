@@ -1,11 +1,12 @@
-"""What the report of a calibration tells."""
+"""What the report of a calibration shows."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import isnan
 
 from experiments.actuator.fit import JointFit, fit_joint
-from experiments.actuator.report import friction_table_of, report_of, sections_of, table_of
+from experiments.actuator.report import constant_rows, friction_rows, make_report, make_sections
 from tests.experiments.actuator.test_fit import PLAN, Entries, made_entries
 
 
@@ -15,24 +16,24 @@ def made_fit(entries: Entries) -> JointFit:
     return fit
 
 
-def test_the_paper_s_numbers_stand_below_those_of_its_own_definition() -> None:
+def test_the_papers_numbers_are_below_those_of_the_same_definition() -> None:
     fit = made_fit(made_entries())
-    head, ours, _, paper = table_of([fit])
+    head, ours, _, paper = constant_rows([fit])
     place = head.index("RMSE (N·m)")
     assert ours[place] == f"{fit.rmse_configured_nm:.4f}" and paper[place] == "0.0127"
     assert paper[head.index("RMSE fitted (N·m)")] == "-" and paper[head.index("repeatability")] == "3.2 %"
-    assert {len(row) for row in table_of([fit])} == {len(head)}
+    assert {len(row) for row in constant_rows([fit])} == {len(head)}
 
 
-def test_friction_comes_with_its_doubt_and_what_rest_shows_without() -> None:
-    head, row = friction_table_of([made_fit(made_entries())])
+def test_friction_has_an_error_and_the_friction_at_rest_has_none() -> None:
+    head, row = friction_rows([made_fit(made_entries())])
     assert "±" in row[head.index("dry friction (N·m)")] and "±" in row[head.index("viscous (N·m·s)")]
     assert "±" not in row[head.index("at rest at least (N·m)")] and len(row) == len(head)
 
 
-def test_it_is_told_how_true_lever_and_weights_were_taken_to_be() -> None:
+def test_the_report_names_the_tolerances_of_lever_and_weights() -> None:
     plan = replace(PLAN, lever_m=0.1, lever_tolerance_m=0.0005, weight_tolerance=0.002)
-    method = sections_of(plan, {}, [])[-1].text
+    method = make_sections(plan, {}, [])[-1].text
     assert "the lever, by at most 0.5 mm" in method and "by at most 0.2 %" in method
     assert "A millimetre of 10 cm is\n1.0 % of k_t" in method
 
@@ -42,7 +43,7 @@ def test_without_loops_there_is_a_report_without_friction() -> None:
     for entry in entries.values():
         entry.pop("loops", None)
     fit = made_fit(entries)
-    _, friction, *_ = sections_of(PLAN, {"right_sweep": entries}, [fit])
+    _, friction, *_ = make_sections(PLAN, {"right_sweep": entries}, [fit])
     assert friction.heading == "Friction and offset" and not friction.figures
     assert friction.rows[1][1:3] == ["-", "-"]
-    assert report_of(PLAN, {"right_sweep": entries}, [fit])["joints"][0]["friction_nm"] is None
+    assert isnan(make_report(PLAN, {"right_sweep": entries}, [fit]).joints[0].friction_nm)
