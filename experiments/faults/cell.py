@@ -90,8 +90,8 @@ class Watch:
         self._travel_rad = 0.0
 
     def run(self, duration_s: float, until_reported: bool = False) -> None:
-        reported_by = self._way.kind.bound_ticks * 2 + 10 if until_reported and self._way.kind else 0
-        for _ in range(reported_by or round(duration_s / PERIOD_S)):
+        mode_reason = self._way.kind.bound_ticks * 2 + 10 if until_reported and self._way.kind else 0
+        for _ in range(mode_reason or round(duration_s / PERIOD_S)):
             self._step()
             if until_reported and self._cell.reported_ticks is not None:
                 return

@@ -1,23 +1,23 @@
-"""Why an experiment ends before its end. Each text says what was in the way, and what to do."""
+"""Reasons for which an experiment ends early. Each text says what happened and what to do."""
 
 from __future__ import annotations
 
 
 class BenchError(Exception):
-    """The experiment cannot go on."""
+    """The experiment cannot continue."""
 
 
 class DaemonLostError(BenchError):
-    """The daemon does not answer: nothing more can be asked of the robot."""
+    """The daemon does not answer."""
 
 
 class AccessDeniedError(BenchError):
-    """The daemon does not do this for whoever calls."""
+    """The daemon refuses this user."""
 
 
 class RobotInUseError(BenchError):
-    """Somebody else operates the robot."""
+    """Another program operates the robot."""
 
 
 class EndedError(Exception):
-    """A person ends the experiment; the text says how it goes on."""
+    """The operator ends the experiment, or is absent; the text says how it continues."""

@@ -1,8 +1,8 @@
-"""The robot that a daemon controls, through the daemon's socket and from the logs that it leaves on this computer.
+"""The robot of a daemon, through the daemon's socket and the logs on this computer.
 
-From its first question to its end this program holds a dead man's lease, and renews it whenever it waits: where it
-dies or hangs, the daemon stops the robot, and as long as it is there nobody else arms a robot under the hands of
-whoever levels the mud. The log is read while it is being written; the writer's last rows come half a second late.
+From its first call to its end this program holds a lease and renews it whenever it waits. If the program dies or hangs,
+the daemon stops the robot; and as long as the program runs, no other one arms a robot while its operator levels the
+mud. The log is read while the daemon writes it, and the last rows arrive half a second late.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from firmware_host.log_reading.log_reader import Log, LogError, read_logs
 from firmware_host.operator.lease import TAKEN_OVER
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
-PROMISE_S = 2.0  # of the lease, while torque may be on
-RESTING_S = 10.0  # and while it is off: reading a log may take some time, and nothing has to be stopped
+LEASE_S = 2.0  # while torque may be on
+RESTING_LEASE_S = 10.0  # while torque is off: reading a log takes some time, and nothing has to be stopped
 RENEWAL_S = 0.2
-WRITTEN_S = 10.0  # to wait for rows that are on their way to the disk
-MOTIONS = ("arm", "walk", "move")  # that begin under the lease, not before it
-ENDINGS = ("clear", "stop", "disarm")  # not of a robot that another program operates
+WRITTEN_S = 10.0  # longest delay of rows on their way to the disk
+MOTIONS = ("arm", "walk", "move")  # need the lease
+ENDINGS = ("clear", "stop", "disarm")  # refused for a robot in use
 START_IT = "Start it with 'systemctl start mudskipper', or name its socket with --socket."
 
 
 class DaemonRobot:
-    """A BenchRobot. Owns the connection."""
+    """A BenchRobot with its own connection."""
 
     def __init__(self, socket: Path) -> None:
-        """Raises BenchError where there is no daemon, it does not let this user drive, or somebody else drives.
+        """Connect and take the lease, before anything moves.
 
-        So it does where this user may drive and not read the log: before anything moves, not after.
+        Raises BenchError without a daemon, without the permission to drive or to read the log, or for a robot in use.
         """
         try:
             self._client = StatusClient(socket)
@@ -50,43 +50,43 @@ class DaemonRobot:
         except NotPermittedError as problem:
             raise AccessDeniedError(str(problem)) from problem
         self._renewed_s = -inf
-        self._seen_s = inf  # the robot's clock, as last told
-        self._used_s = inf  # by it, since when this program has moved the robot or read its log
-        self._log: Path | None = None  # as last seen
-        self._name: str | None = None  # of this program, as the daemon calls who holds a lease
+        self._robot_now_s = inf  # the robot's clock at the last status
+        self._used_s = inf  # by that clock: the first motion or log of this program
+        self._log: Path | None = None  # the last known path
+        self._holder: str | None = None  # the daemon's name of this program
         self._may_move = False
-        self._ousted = ""  # why it operates the robot no more
+        self._lost_reason = ""  # why the lease was lost
         try:
             self._require_at_rest()
             self._renew()
             self.configuration = self._read_configuration()
         except (BenchError, ConfigurationError):
-            self._give_back()
+            self._release()
             self._client.close()
             raise
 
-    def _give_back(self) -> None:
-        """The lease, where it has it: whoever's robot was armed meanwhile is left as it is."""
-        if self._name:
+    def _release(self) -> None:
+        """Release the lease if this program has it."""
+        if self._holder:
             with suppress(BenchError, CallRefusedError):
                 self.call("release")
 
     def _require_at_rest(self) -> None:
-        """Before the lease: to take it and then go away would stop a walk that somebody has begun without one."""
+        """Check before the lease: taking and releasing it would stop a walk that began without one."""
         self._require_alone()
         mode = self.call("status")["mode"]
         if mode in UNDER_WAY:
-            raise BenchError(f"the robot is {mode}: wait for its end, or 'mudskipper stop' it, then begin again")
+            raise BenchError(f"the robot is {mode}: wait for its end, or 'mudskipper stop', then start again")
 
     def _read_configuration(self) -> Configuration:
-        """As the daemon runs with it, from its log."""
-        log = self._awaited(lambda: self._read(self._segments()[-1:], from_s=inf))
+        """Return the daemon's configuration, from its log."""
+        log = self._await_rows(lambda: self._read(self._segments()[-1:], from_s=inf))
         return parse_configuration(log.configuration_text)
 
     def call(self, method: str, **params: Any) -> Any:
         if method in MOTIONS:
             self._may_move = True
-            self._promise()
+            self._lease()
         elif method in ENDINGS:
             self._require_alone()
         self._may_move = self._may_move and method != "disarm"
@@ -97,12 +97,12 @@ class DaemonRobot:
         except NotPermittedError as problem:
             raise AccessDeniedError(str(problem)) from problem
         if method in MOTIONS:  # and was not refused
-            self._used_s = min(self._used_s, self._seen_s)
+            self._used_s = min(self._used_s, self._robot_now_s)
         return answer
 
     def wait(self, duration_s: float) -> None:
-        if self._ousted:
-            raise RobotInUseError(self._ousted)
+        if self._lost_reason:
+            raise RobotInUseError(self._lost_reason)
         end_s = time.monotonic() + duration_s
         while (left_s := end_s - time.monotonic()) > 0.0:
             time.sleep(min(left_s, RENEWAL_S))
@@ -110,62 +110,67 @@ class DaemonRobot:
 
     def _renew(self) -> None:
         if time.monotonic() - self._renewed_s > RENEWAL_S:
-            self._promise()
+            self._lease()
 
-    def _promise(self) -> None:
-        """Refused where the lease was lost, which the status tells, and where another program operates the robot.
+    def _lease(self) -> None:
+        """Ask for the lease again.
 
-        Raises RobotInUseError for that.
+        Raises RobotInUseError where it was lost, which the status shows, or another program operates the robot.
         """
         self._renewed_s = time.monotonic()
         self._require_alone()
         try:
-            self.call("lease", for_s=PROMISE_S if self._may_move else RESTING_S)
-            self._name = self._name or self.call("status")["lease"]
+            self.call("lease", for_s=LEASE_S if self._may_move else RESTING_LEASE_S)
+            self._holder = self._holder or self.call("status")["lease"]
         except CallRefusedError as refusal:
             if str(refusal).startswith(TAKEN_OVER):
-                self._ousted = str(refusal)
+                self._lost_reason = str(refusal)
             self._require_alone()
 
     def _require_alone(self) -> None:
-        if self._ousted:
-            raise RobotInUseError(self._ousted)
+        if self._lost_reason:
+            raise RobotInUseError(self._lost_reason)
         status = self.call("status")
-        self._seen_s = status["now_s"]
-        if status["lease"] not in (None, self._name):
-            raise RobotInUseError(f"{status['lease']} operates the robot: wait until it has ended, then begin again")
-        if self._name and status["lease"] is None and status["mode"] in ENERGISED and not _winds_up(status):
-            self._ousted = self._why_ousted()
-            raise RobotInUseError(self._ousted)
+        self._robot_now_s = status["now_s"]
+        if status["lease"] not in (None, self._holder):
+            raise RobotInUseError(f"{status['lease']} operates the robot: wait for its end, then start again")
+        if (
+            self._holder
+            and status["lease"] is None
+            and status["mode"] in ENERGISED
+            and not _stops_without_lease(status)
+        ):
+            self._lost_reason = self._find_lost_reason()
+            raise RobotInUseError(self._lost_reason)
 
-    def _why_ousted(self) -> str:
-        """A lease that is had for the asking has only lapsed: it is given back at once, the robot left as it is."""
+    def _find_lost_reason(self) -> str:
+        """Return the reason. A lease that is free again has only expired: it is released at once."""
         try:
-            self.call("lease", for_s=RESTING_S)
+            self.call("lease", for_s=RESTING_LEASE_S)
             self.call("release")
         except CallRefusedError as refusal:
             return str(refusal)
-        return "somebody has armed the robot while this program slept: begin again when it is free"
+        return "the robot was armed by another program while this one was suspended: start again when it is free"
 
     def record(self, from_s: float, to_s: float) -> Log:
         def written() -> Log | None:
             log = self._read_since(from_s)
             return log if log is not None and len(log.ticks) and log.ticks["stamp_s"][-1] >= to_s else None
 
-        log = cut_log(self._awaited(written), from_s, to_s)
+        log = cut_log(self._await_rows(written), from_s, to_s)
         self._used_s = min(self._used_s, from_s)
         return log
 
-    def _awaited(self, written: Callable[[], Log | None]) -> Log:
+    def _await_rows(self, written: Callable[[], Log | None]) -> Log:
         deadline_s = time.monotonic() + WRITTEN_S
         while (log := written()) is None:
             if time.monotonic() > deadline_s:
-                raise BenchError("the log does not hold what was just done: 'mudskipper status' tells how it is")
+                raise BenchError("the log does not contain the last motion: check it with 'mudskipper status'")
             self.wait(RENEWAL_S)
         return log
 
     def _read_since(self, from_s: float) -> Log | None:
-        """As few of the run's last segments as hold it; None where one was just moved to its place."""
+        """Read as few of the last segments as contain the time; nothing while a segment is being moved."""
         segments = self._segments()
         for count in range(1, len(segments) + 1):
             log = self._read(segments[-count:], from_s)
@@ -174,7 +179,7 @@ class DaemonRobot:
         return log
 
     def _read(self, segments: list[Path], from_s: float) -> Log | None:
-        """None where one was only just made, or has gone: a segment that is whole moves to another folder."""
+        """Return nothing for a segment that is new, or that is being moved to another folder."""
         try:
             return read_logs(segments, lambda what, done, total: self._renew(), from_s)  # a minute's rows take a second
         except LogError as problem:
@@ -185,7 +190,7 @@ class DaemonRobot:
     def _segments(self) -> list[Path]:
         path = self.call("status")["log"]["path"]
         if path is None:
-            raise BenchError("the daemon writes no log: set log.enabled = true in its configuration")
+            raise BenchError("the daemon writes no log: set log.enabled = true in its configuration and restart it")
         self._log = Path(path)
         end_s = time.monotonic() + WRITTEN_S
         while not (segments := _files_of(Path(path))):  # its writer has only just started
@@ -195,7 +200,7 @@ class DaemonRobot:
         return segments
 
     def copy_logs(self, folder: Path) -> list[Path]:
-        """Of the daemon's run, even where it has ended meanwhile, what holds any time of this program's; else none."""
+        """Copy the segments of this program's time, even after the daemon's end."""
         if self._used_s == inf:
             return []
         segments = self._segments_at_last()
@@ -204,8 +209,8 @@ class DaemonRobot:
         except LogError as problem:
             raise BenchError(f"the daemon's log cannot be copied: {problem}") from problem
         except OSError as problem:
-            stays = f"it stays in {segments[-1].parent.parent}, copy it from there"
-            raise BenchError(f"the daemon's log cannot be copied: {why_not(problem, folder)}; {stays}") from problem
+            remains = f"it remains in {segments[-1].parent.parent}, copy it from there"
+            raise BenchError(f"the daemon's log cannot be copied: {why_not(problem, folder)}; {remains}") from problem
 
     def _segments_at_last(self) -> list[Path]:
         try:
@@ -216,7 +221,7 @@ class DaemonRobot:
             return _files_of(self._log)
 
     def close(self) -> None:
-        """A robot that somebody else operates is left to them."""
+        """Stop, disarm and release, unless another program operates the robot."""
         with suppress(BenchError, CallRefusedError):
             if self.call("status")["mode"] in ("hold", *UNDER_WAY):
                 self.call("stop")
@@ -227,7 +232,7 @@ class DaemonRobot:
         self._client.close()
 
     def _wait_for_hold(self) -> None:
-        """Flippers in the mud are raised before torque goes off."""
+        """Wait until flippers in the mud are raised."""
         end_s = time.monotonic() + WRITTEN_S
         while self.call("status")["mode"] in UNDER_WAY and time.monotonic() < end_s:
             self.wait(RENEWAL_S)
@@ -238,11 +243,11 @@ def _files_of(log: Path) -> list[Path]:
         return run_files(log)
     except PermissionError as problem:
         raise AccessDeniedError(
-            f"you may operate the robot, but not read its log, which every experiment does: have root add you to the"
+            f"you may operate the robot, but not read its log, which every experiment needs: have root add you to the"
             f" group of {problem.filename}, then log in again"
         ) from problem
 
 
-def _winds_up(status: Status) -> bool:
-    """Where a lease was lost under torque, the robot stops and is nobody's until its torque is off."""
+def _stops_without_lease(status: Status) -> bool:
+    """Return whether the robot stops after a lost lease: no program operates it until its torque is off."""
     return any(fault["name"] == "lease_lost" for fault in status["faults"])

@@ -1,4 +1,4 @@
-"""A simulated robot behind the daemon's calls, in step with the daemon's own loop: as fast as it computes."""
+"""A simulated robot with the daemon's calls, in step with the daemon's own loop, as fast as it computes."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from firmware_host.operator.status_client import CallRefusedError
 from simulation.harness.local_setup import CONFIGURATION
 from simulation.harness.lockstep import Lockstep
 
-ASKER = Caller(1, Peer(os.getpid(), os.geteuid(), frozenset()), Level.DRIVE)
+CALLER = Caller(1, Peer(os.getpid(), os.geteuid(), frozenset()), Level.DRIVE)
 
 
 def simulated_configuration(sections: str = "", drive: str = "") -> Configuration:
-    """That of the simulated robot, with further sections, and lines for each of its drives, as TOML.
+    """Return the simulated robot's configuration with more sections, and more lines for each drive, as TOML.
 
-    Made from text, so that the log carries what the robot did. Raises ConfigurationError.
+    It is parsed from text, so that the log contains it. Raises ConfigurationError.
     """
     text = CONFIGURATION.format(left='"left"', right='"right"', logs='"logs"', status='"s"', pose='""')
     lines = [f"{line}\n{drive}" if drive and line.startswith("[drive.") else line for line in text.splitlines()]
@@ -34,10 +34,10 @@ def simulated_configuration(sections: str = "", drive: str = "") -> Configuratio
 
 
 class LockstepRobot:
-    """A BenchRobot. `lockstep` is for whoever does things to the simulated robot that a person would do by hand."""
+    """A BenchRobot. `lockstep` gives access to the simulation, for actions of an operator's hands."""
 
     def __init__(self, lockstep: Lockstep, recorder: FileRecorder) -> None:
-        """`recorder` is the one that the lockstep was made with."""
+        """`recorder` is the one of the lockstep."""
         self.lockstep = lockstep
         self._recorder = recorder
         self._methods = OperatorCalls(lockstep.loop, recorder, [], lambda: lockstep.now_s).methods
@@ -49,7 +49,7 @@ class LockstepRobot:
 
     def call(self, method: str, **params: Any) -> Any:
         try:
-            return self._methods[method](params, ASKER)
+            return self._methods[method](params, CALLER)
         except RefusedError as problem:
             raise CallRefusedError(str(problem)) from problem
 
@@ -63,7 +63,7 @@ class LockstepRobot:
         return cut_log(read_log(self._log), from_s, to_s)
 
     def copy_logs(self, folder: Path) -> list[Path]:
-        """Ends the log, which otherwise `close` does."""
+        """Also ends the log."""
         self._recorder.close()
         assert self._log is not None
         copy = folder / self._log.name
@@ -73,6 +73,6 @@ class LockstepRobot:
 
     def close(self) -> None:
         if self._recorder.writer_alive:
-            self._methods["disarm"]({}, ASKER)
+            self._methods["disarm"]({}, CALLER)
             self.lockstep.run_for(0.1)
             self._recorder.close()

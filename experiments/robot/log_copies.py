@@ -1,7 +1,7 @@
-"""The logs of a daemon's run, copied beside what was measured: those segments that hold any of the experiment's time.
+"""Copies of a daemon's log segments that contain any time of an experiment.
 
 A daemon runs for weeks, and at rest its log grows by ten megabytes an hour. Every segment carries the configuration,
-its number and both clocks, so those that are copied can be read, replayed and reported without those before them.
+its number and both clocks, so the copied ones can be read, replayed and reported without the earlier ones.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from firmware_host.log_reading.recovery import recover_log
 
 
 def copy_since(segments: Sequence[Path], from_s: float, folder: Path) -> list[Path]:
-    """Those that do not end before `from_s`; the one under way is ended in the copy. Raises LogError, OSError."""
-    return [_copy(log, folder / log.name) for log in _held_since(segments, from_s)]
+    """Copy the segments that do not end before `from_s`, and complete the open one. Raises LogError, OSError."""
+    return [_copy(log, folder / log.name) for log in _segments_since(segments, from_s)]
 
 
-def _held_since(segments: Sequence[Path], from_s: float) -> list[Path]:
-    """Looked for from the last one: of what may be a thousand before them one is opened."""
-    held: list[Path] = []
+def _segments_since(segments: Sequence[Path], from_s: float) -> list[Path]:
+    """Search from the last segment, since there may be a thousand before it."""
+    found: list[Path] = []
     for log in reversed(segments):
         if _ends_before(log, from_s):
             break
-        held.insert(0, log)
-    return held
+        found.insert(0, log)
+    return found
 
 
 def _ends_before(log: Path, from_s: float) -> bool:
-    """One without a row ends nowhere; nor does one under way, whose last rows its writer still has."""
+    """Return whether a complete segment has all its rows before `from_s`."""
     rows = read_log(present_path(log), from_s=from_s)
     if not rows.complete:
         return False

@@ -1,4 +1,4 @@
-"""The person at the bench, as an experiment needs them: somebody who does what is asked and says how it went."""
+"""The operator at the bench, as an experiment asks for help: a person at a terminal, or automatic in simulation."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ GO_ON, SKIP, REDO = "", "s", "r"  # keys of answers; the first one is the Enter 
 
 class Operator(Protocol):
     def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
-        """The key of one of `answers` (key to press, what it means). `meanwhile` is called ten times a second."""
+        """Return the key of one of `answers` (key to press: meaning). `meanwhile` is called ten times a second."""
 
     def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
-        """A number within its bounds."""
+        """Return a number within its bounds."""
 
     def report(self, message: str) -> None:
-        """Something that a person should know."""
+        """Show a message."""
 
 
 class AutomaticOperator:
-    """Does everything at once and is always content: the person at a simulated bench."""
+    """An Operator that gives the first answer at once."""
 
     def __init__(self, report: Callable[[str], None]) -> None:
         self._report = report

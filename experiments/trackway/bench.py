@@ -26,7 +26,7 @@ from experiments.robot.bench_robot import (
     ask_to_clear_faults,
     disarm,
     follow_walk,
-    reported_by,
+    mode_reason,
     wait_until,
 )
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
@@ -190,7 +190,7 @@ def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> LoggedWalk:
     end = _follow(robot, plan, start_m)
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     if not end.why and after["mode"] != "hold":
-        end = End(reported_by(after), stopped=True)
+        end = End(mode_reason(after), stopped=True)
     disarm(robot)
     log = robot.record(before["now_s"], after["now_s"])
     strides = walked_strides(log, robot.configuration, lambda position_m: plan.mud_at(position_m - start_m))
@@ -217,7 +217,7 @@ def _follow(robot: BenchRobot, plan: Plan, start_m: float) -> End:
     """Wait until the walk is over, or stop it."""
     zero_m = start_m - reach_of(robot.configuration)
     end, status = follow_walk(robot, lambda now_s: Progress(plan, zero_m, now_s).evaluate)
-    return End(reported_by(status), stopped=True) if end is None else end
+    return End(mode_reason(status), stopped=True) if end is None else end
 
 
 def reach_of(configuration: Configuration) -> float:

@@ -23,7 +23,7 @@ from experiments.robot.bench_robot import (
     count_strides,
     fetch_strides,
     follow_walk,
-    reported_by,
+    mode_reason,
     rest,
     wait_until,
     walk,
@@ -130,7 +130,7 @@ def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     ordered, end = _follow(bench, plan, start_m)
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     if after["mode"] != "hold":
-        raise InvalidTrialError(reported_by(after))
+        raise InvalidTrialError(mode_reason(after))
     made = count_strides(fetch_strides(robot, before["strides_closed"]))
     log = robot.record(before["now_s"], after["now_s"])
     entry = _entry(bench, plan, trial, log, before["strides_closed"])

@@ -79,7 +79,7 @@ def test_a_robot_that_somebody_armed_meanwhile_is_left_to_them(
     robot = DaemonRobot(Path("x"))
     daemon.lapse(mode, [])
     daemon.overruled = overruled
-    reported = "taken over: uid 3" if overruled else "somebody has armed the robot while this program slept"
+    reported = "taken over: uid 3" if overruled else "the robot was armed by another program"
     for method in ("arm", "disarm", "stop"):
         with pytest.raises(RobotInUseError, match=reported):
             robot.call(method)

@@ -87,7 +87,7 @@ def test_a_robot_that_somebody_has_taken_over_is_not_let_go_of(tmp_path: Path) -
     with pytest.raises(RobotInUseError):
         RobotBench(robot).leave(tmp_path, operator)
     assert not operator.asked and robot.mode == "hold" and robot.closed
-    assert operator.reported == ["the robot is left as it is to whoever has taken it over"]
+    assert operator.reported == ["another program operates the robot now: it is left as it is"]
 
 
 def test_a_daemon_that_is_gone_is_told_once_and_what_the_robot_does_then(tmp_path: Path) -> None:

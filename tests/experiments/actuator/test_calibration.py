@@ -242,7 +242,7 @@ def test_a_robot_that_lets_go_is_told_of_armed_again_and_the_weight_is_read_anew
 def test_a_person_who_leaves_a_fault_as_it_is_ends_the_calibration(case: Case) -> None:
     case.on(Step(1, 400.0), case.letting_go("The motor is wet."))
     case.operator.answers = [LEAVE]
-    with pytest.raises(EndedError, match="the fault stands"):
+    with pytest.raises(EndedError, match="the fault remains"):
         case.run()
     assert (case.robot.mode, case.robot.armed) == ("fault", 1)
 

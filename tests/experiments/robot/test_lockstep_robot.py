@@ -23,8 +23,8 @@ from experiments.robot.bench_robot import (
     ask_to_clear_faults,
     disarm,
     fetch_strides,
+    mode_reason,
     move,
-    reported_by,
     require_hold,
     walk,
 )
@@ -187,7 +187,7 @@ def test_a_fault_is_cleared_where_a_person_says_so(faulty: LockstepRobot) -> Non
 
 
 def test_a_fault_that_a_person_leaves_ends_the_experiment_and_stands(faulty: LockstepRobot) -> None:
-    with pytest.raises(EndedError, match="the fault stands; when its cause is gone, 'mudskipper clear'"):
+    with pytest.raises(EndedError, match="the fault remains; remove its cause, then 'mudskipper clear'"):
         arm(faulty, Decided(LEAVE))
     assert faulty.call("status")["mode"] == "fault"
 
@@ -249,4 +249,4 @@ def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) 
 )
 def test_why_a_robot_stopped_is_told_by_its_cause(mode: str, notice: str, reported: str) -> None:
     fault = {"message": "The left_sweep joint moves."}
-    assert reported_by({"mode": mode, "notice": notice, "fault": fault}) == reported
+    assert mode_reason({"mode": mode, "notice": notice, "fault": fault}) == reported

@@ -151,7 +151,7 @@ def test_before_a_person_levels_mud_they_judge_the_fault_that_stands(tmp_path: P
         with pytest.raises(EndedError, match="'mudskipper clear', then the same command again"):
             bed.prepare(TRIALS[0])
     assert operator.asked[0] == (
-        "A fault stands:\n  A drive is silent. (for 2 min)\n    -> check it\nTorque stays off until this is cleared."
+        "A fault keeps the torque off:\n  A drive is silent. (for 2 min)\n    -> check it\nTorque stays off until this is cleared."
     )
     assert robot.called.count("clear") == (answer == CLEAR) and len(operator.asked) == 1 + (answer == CLEAR)
 
@@ -209,9 +209,9 @@ def test_a_robot_that_walks_on_is_stopped_before_anybody_is_asked(tmp_path: Path
 @pytest.mark.parametrize(("answer", "kept"), [(REDO, ALL), (SKIP, ALL[1:])])
 def test_a_person_may_go_on_also_after_the_third_time(tmp_path: Path, answer: str, kept: list[str]) -> None:
     session = Session(tmp_path, ScriptedOperator(GO_ON, GO_ON, answer))
-    session.outcomes = [BenchError("it was told to stop") for _ in range(3)]
+    session.outcomes = [BenchError("it was stopped") for _ in range(3)]
     session.conduct()
-    assert "went wrong 3 times; the last time: it was told to stop." in session.operator.asked[-1]
+    assert "went wrong 3 times; the last time: it was stopped." in session.operator.asked[-1]
     assert list(counted_entries(session.notebook)) == kept
 
 
