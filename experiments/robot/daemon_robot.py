@@ -134,12 +134,8 @@ class DaemonRobot:
         self._robot_now_s = status["now_s"]
         if status["lease"] not in (None, self._holder):
             raise RobotInUseError(f"{status['lease']} operates the robot: wait for its end, then start again")
-        if (
-            self._holder
-            and status["lease"] is None
-            and status["mode"] in ENERGISED
-            and not _stops_without_lease(status)
-        ):
+        is_lost = self._holder and status["lease"] is None and status["mode"] in ENERGISED
+        if is_lost and not _stops_without_lease(status):
             self._lost_reason = self._find_lost_reason()
             raise RobotInUseError(self._lost_reason)
 

@@ -228,7 +228,7 @@ def test_strides_that_the_daemon_no_longer_keeps_are_not_passed_over(
     if whole:
         assert fetch_strides(robot, 5) == strides
     else:
-        with pytest.raises(BenchError, match="more strides than the daemon keeps"):
+        with pytest.raises(BenchError, match="more strides than the daemon stores"):
             fetch_strides(robot, 5)
 
 

@@ -148,10 +148,11 @@ def test_before_a_person_levels_mud_they_judge_the_fault_that_stands(tmp_path: P
     if answer == CLEAR:
         assert bed.prepare(TRIALS[0]) == GO_ON
     else:
-        with pytest.raises(EndedError, match="'mudskipper clear', then the same command again"):
+        with pytest.raises(EndedError, match="then 'mudskipper clear' and the same command again"):
             bed.prepare(TRIALS[0])
     assert operator.asked[0] == (
-        "A fault keeps the torque off:\n  A drive is silent. (for 2 min)\n    -> check it\nTorque stays off until this is cleared."
+        "A fault keeps the torque off:\n  A drive is silent. (for 2 min)\n    -> check it\n"
+        "Torque stays off until this is cleared."
     )
     assert robot.called.count("clear") == (answer == CLEAR) and len(operator.asked) == 1 + (answer == CLEAR)
 
