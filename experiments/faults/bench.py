@@ -1,7 +1,7 @@
-"""A robot in lockstep on which more can go wrong than on its wires: strangers on the bus, a loop that stands still or
-dies, bugs, hands on its joints, a twin of a drive. A loop that raises an exception is ended as the daemon ends it.
+"""A robot in lockstep with hooks for every failure: foreign frames on a bus, a loop that stalls or dies, exceptions in
+the loop, moved joints, a duplicate node id. An exception ends the loop in the same way as in the daemon.
 
-Every step is one period of the loop, also while the loop stands still; it then misses that tick.
+Every step is one period of the loop, also while the loop is stalled; the loop then misses that tick.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Act = Callable[[], None]
 
 
 class CountingRecorder(NullRecorder):
-    """A Recording. Owns the count of the ticks' rows, the sentences of the events, and what its writer would tell."""
+    """A Recording. Owns the count of the ticks' rows, the texts of the events, and the report of its writer."""
 
     def __init__(self) -> None:
         self.ticks = 0
@@ -54,25 +54,25 @@ class FaultBench(Lockstep):
         self.rows = CountingRecorder()
         failures = Failures(configuration.bus, seed)
         super().__init__(configuration, track, seed, recorder=self.rows, failures=failures)
-        self._strangers = {name: bus.open() for name, bus in self.buses.items()}
-        self._acts: list[Act] = []  # of every step, after the robot's and before the loop's
-        self.ticks_made = 0
-        self.stands_still = 0  # periods to come in which the loop does nothing
+        self._foreign_ports = {name: bus.open() for name, bus in self.buses.items()}
+        self._acts: list[Act] = []  # called in every step, after the robot's and before the loop's
+        self.loop_ticks = 0
+        self.stalled_steps = 0  # coming periods in which the loop does nothing
         self.dead = False
         self.bug = ""  # the exception that ended the loop
         self._missed = 0
 
     def step(self) -> None:
         if not self._missed:
-            self.stands_still += int(self._stalls.next_s() / PERIOD_S)
+            self.stalled_steps += int(self._stalls.next_s() / PERIOD_S)
         self.tick_number += 1
         self.robot.advance(self.now_s)
         for act in tuple(self._acts):
             act()
         if self.dead:
             return
-        if self.stands_still:
-            self.stands_still -= 1
+        if self.stalled_steps:
+            self.stalled_steps -= 1
             self._missed += 1
             return
         self._tick()
@@ -81,24 +81,24 @@ class FaultBench(Lockstep):
         for failure in self.failures.update(self.now_s):
             self.loop.events.report(self.now_s, end_text(failure))
         missed, self._missed = self._missed, 0
-        self.ticks_made += 1
+        self.loop_ticks += 1
         try:
             self.loop.tick(Tick(self.now_s, missed * PERIOD_S, self.tick_number, missed))
-        except Exception as problem:  # noqa: BLE001 - as in the daemon, the one place where surprises end
+        except Exception as problem:  # noqa: BLE001 - the daemon catches every exception here as well
             self.bug, self.dead = f"{type(problem).__name__}: {problem}", True
             with redirect_stderr(StringIO()):
                 end_safely(self.loop, problem)
 
     @contextmanager
-    def acting(self, act: Act) -> Iterator[None]:
-        """`act` in every step meanwhile."""
+    def every_step(self, act: Act) -> Iterator[None]:
+        """Call `act` in every step within this context."""
         self._acts.append(act)
         yield
         self._acts.remove(act)
 
-    def say(self, joint: str, frame: Frame) -> None:
+    def send_foreign(self, joint: str, frame: Frame) -> None:
         """Sends a frame on the bus of a joint's drive that is from neither drive nor loop."""
-        self._strangers[self.loop.configuration.drive[joint].bus].send(frame)
+        self._foreign_ports[self.loop.configuration.drive[joint].bus].send(frame)
 
     def drive(self, joint: str) -> SimulatedDrive:
         return self.robot.drives[JOINTS.index(joint)]
@@ -107,11 +107,11 @@ class FaultBench(Lockstep):
         return self.robot.plant.arms[JOINTS.index(joint) // 2]
 
     def winding(self, joint: str) -> Winding:
-        """The loop's own reckoning of it, which is seconds away from any heat."""
+        """The loop's thermal model of the winding, which takes seconds to warm up."""
         return self.loop.fault_monitor.joints[JOINTS.index(joint)].winding
 
     def add_duplicate(self, joint: str, angle_rad: float) -> Act:
-        """A second drive with the id of the joint's own, on its bus: what it does in a step."""
+        """Connect a second drive with the joint's node id to its bus. Return its work in one step."""
         port = self.buses[self.loop.configuration.drive[joint].bus].open()
         duplicate = make_simulated_drive(self.drive(joint).parameters, Random(f"twin {joint}"))
         duplicate.reset(self.now_s)
@@ -127,5 +127,5 @@ class FaultBench(Lockstep):
         return live
 
     def torques_nm(self) -> list[float]:
-        """That the motors exert now."""
+        """The present torques of the motors."""
         return [drive.torque_nm(self.robot.now_s) for drive in self.robot.drives]

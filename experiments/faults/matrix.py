@@ -1,29 +1,31 @@
 """Every fault in every phase: how soon the robot reacts, with what torque and travel, and what it does afterwards.
 
-A cell is one fault, made at one tick of one phase by a robot of its own; cell.py says what is judged. The seed
-draws mud, joint, and the moment within the phase.
+A cell of the matrix is one failure mode, injected at one tick of one phase into a robot of its own; cell.py evaluates
+it. The seed draws the mud, the joint, and the tick within the phase. The fields of the report are the keys of the
+summary in JSON.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from experiments.faults.cell import run_cell
-from experiments.faults.injection import BY_NAME, WAYS
+from experiments.faults.evaluation import Cell
+from experiments.faults.failure_modes import BY_NAME, FAILURE_MODES
 from experiments.faults.phases import PHASES
 from experiments.trials.parallel_trials import run_parallel
 from experiments.trials.session import Show
 
-FAULTS = tuple(dict.fromkeys(way.fault for way in WAYS))
+FAULTS = tuple(dict.fromkeys(mode.fault for mode in FAILURE_MODES))
 
 
-class Place(NamedTuple):
-    """Of a cell in the table."""
+class CellKey(NamedTuple):
+    """The arguments of one cell."""
 
-    way: str
+    mode_name: str
     phase: str
     seed: int
 
@@ -35,56 +37,81 @@ class Plan:
     seeds: int = 1
 
     def __post_init__(self) -> None:
-        """Raises ValueError for a fault or a phase that there is not."""
+        """Raises ValueError for an unknown fault or phase."""
         for what, names, known in (("fault", self.faults, FAULTS), ("phase", self.phases, PHASES)):
             for name in names:
                 if name not in known:
                     raise ValueError(f"{what} {name!r}: must be one of {', '.join(known)}")
 
     @property
-    def places(self) -> list[Place]:
+    def cells(self) -> list[CellKey]:
         return [
-            Place(way.name, phase, seed)
+            CellKey(mode.name, phase, seed)
             for seed in range(1, self.seeds + 1)
-            for way in WAYS
-            if way.fault in self.faults
+            for mode in FAILURE_MODES
+            if mode.fault in self.faults
             for phase in self.phases
-            if phase in way.phases
+            if phase in mode.phases
         ]
 
 
-def run(plan: Plan, show: Show, processes: int | None = None) -> dict[str, Any]:
-    """The report. The longest cells begin first, so that the last ones end together."""
-    places = sorted(plan.places, key=lambda place: -BY_NAME[place.way].lasts_s - PHASES.index(place.phase))
-    cells = run_parallel([partial(run_cell, *place) for place in places], show, processes)
-    order = {place: i for i, place in enumerate(plan.places)}
-    cells = [cell for _, cell in sorted(zip(places, cells, strict=True), key=lambda pair: order[pair[0]])]
-    return report_of(plan, cells)
+@dataclass(frozen=True)
+class ModeSummary:
+    """One failure mode over all of its cells: the slowest reaction, the largest torque and travel."""
+
+    mode_name: str = field(metadata={"key": "way"})
+    fault: str
+    reaction: str
+    cells: int
+    ok: int
+    slowest_ticks: int | None
+    bound_ticks: int | None
+    peak_torque_nm: float
+    travel_rad: float | None
 
 
-def report_of(plan: Plan, cells: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    by_way = {name: [cell for cell in cells if cell["way"] == name] for name in BY_NAME}
-    return {
-        "experiment": "faults",
-        "cells": list(cells),
-        "faults": [_summary(name, reported) for name, reported in by_way.items() if reported],
-        "ok": sum(cell["ok"] for cell in cells),
-        "settings": {"seeds": plan.seeds, "phases": list(plan.phases)},
-    }
+@dataclass(frozen=True)
+class Settings:
+    seeds: int
+    phases: Sequence[str]
 
 
-def _summary(name: str, cells: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Over all cells of one way to a fault."""
-    reactions = [cell["reaction_ticks"] for cell in cells if cell["reaction_ticks"] is not None]
-    travels = [cell["travel_rad"] for cell in cells if cell["travel_rad"] is not None]
-    return {
-        "way": name,
-        "fault": cells[0]["fault"],
-        "reaction": cells[0]["reaction"],
-        "cells": len(cells),
-        "ok": sum(cell["ok"] for cell in cells),
-        "slowest_ticks": max(reactions, default=None),
-        "bound_ticks": cells[0]["bound_ticks"],
-        "peak_torque_nm": max(cell["peak_torque_nm"] for cell in cells),
-        "travel_rad": max(travels, default=None),
-    }
+@dataclass(frozen=True, kw_only=True)
+class FaultsReport:
+    experiment: str = "faults"
+    cells: Sequence[Cell]
+    faults: Sequence[ModeSummary]
+    ok: int
+    settings: Settings
+
+
+def run(plan: Plan, show: Show, processes: int | None = None) -> FaultsReport:
+    """Run all cells. The longest begin first, so that the last ones end together."""
+    keys = sorted(plan.cells, key=lambda key: -BY_NAME[key.mode_name].lasts_s - PHASES.index(key.phase))
+    cells = dict(zip(keys, run_parallel([partial(run_cell, *key) for key in keys], show, processes), strict=True))
+    return report_of(plan, [cells[key] for key in plan.cells])
+
+
+def report_of(plan: Plan, cells: Sequence[Cell]) -> FaultsReport:
+    by_mode = {name: [cell for cell in cells if cell.mode_name == name] for name in BY_NAME}
+    return FaultsReport(
+        cells=cells,
+        faults=[_summary(own) for own in by_mode.values() if own],
+        ok=sum(cell.ok for cell in cells),
+        settings=Settings(plan.seeds, plan.phases),
+    )
+
+
+def _summary(cells: Sequence[Cell]) -> ModeSummary:
+    first = cells[0]
+    return ModeSummary(
+        mode_name=first.mode_name,
+        fault=first.fault,
+        reaction=first.reaction,
+        cells=len(cells),
+        ok=sum(cell.ok for cell in cells),
+        slowest_ticks=max((cell.reaction_ticks for cell in cells if cell.reaction_ticks is not None), default=None),
+        bound_ticks=first.bound_ticks,
+        peak_torque_nm=max(cell.peak_torque_nm for cell in cells),
+        travel_rad=max((cell.travel_rad for cell in cells if cell.travel_rad is not None), default=None),
+    )

@@ -1,6 +1,6 @@
-"""Where in its work a robot is when something is made to fail: at rest, arming, in every phase of a stride, stopping.
+"""The phases of operation in which failures are injected: at rest, arming, every phase of a stride, stopping.
 
-Each phase brings a robot from power-on to a moment within it, later by a random number of ticks.
+Each phase has a function that operates a robot from power-on into the phase, plus a random number of ticks.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ PHASES = (*EVERYWHERE, "recovery")
 
 
 def bench_for(phase: str, random: Random, hopeless: bool = False) -> FaultBench:
-    """From power-on. In recovery the flippers are stuck; if `hopeless`, the robot soon gives them up."""
+    """Make a robot at power-on. In recovery its flippers are stuck; if `hopeless`, the robot soon gives up."""
     clay = HOLDING_CLAY if phase == "recovery" else random.choice(list(MUDS.values()))
     configuration = _configuration(hopeless)
     return FaultBench(configuration, Track([(LENGTH_M, clay)]), random.getrandbits(31))
 
 
 def _configuration(hopeless: bool) -> Configuration:
-    """With the bounds of a real robot: those of simulations in real time leave a busy machine its pauses."""
+    """Use the bounds of a real robot; simulations in real time have wider ones, for the pauses of a busy computer."""
     configuration = replace(configuration_of(WALKING), faults=FaultBounds())
     return replace(configuration, recovery=SHORT_RECOVERY) if hopeless else configuration
 
 
-def bring(bench: FaultBench, phase: str, random: Random) -> None:
-    """Raises RuntimeError where it does not come to that."""
-    _WAYS[phase](bench, random)
+def enter_phase(bench: FaultBench, phase: str, random: Random) -> None:
+    """Operate the robot into the phase. Raises RuntimeError where it does not get there."""
+    _PHASE_ENTRIES[phase](bench, random)
 
 
 def _to_idle(bench: FaultBench, random: Random) -> None:
@@ -64,7 +64,7 @@ def _to_idle(bench: FaultBench, random: Random) -> None:
 
 
 def _to_arming(bench: FaultBench, random: Random) -> None:
-    """From the tick on before the drives are asked into closed loop: some take one tick, none more than 38."""
+    """Stop in a tick before closed loop is requested, or while drives enter it, which takes 1 to 38 ticks."""
     _to_idle(bench, random)
     bench.loop.request(Request.ARM, bench.now_s)
     for _ in range(random.randint(0, 8)):
@@ -83,14 +83,14 @@ def _to_walk(bench: FaultBench, random: Random) -> None:
 
 
 def _to_phase_of_gait(phase: Phase) -> Callable[[FaultBench, Random], None]:
-    def way(bench: FaultBench, random: Random) -> None:
+    def go(bench: FaultBench, random: Random) -> None:
         _to_walk(bench, random)
         _reach(bench, phase.name.lower(), lambda: bench.loop.controller.target.phase is phase)
         delay = random.randint(0, STRIDE_TICKS[phase])
         for _ in range(delay):
             bench.step()
 
-    return way
+    return go
 
 
 def _to_stopping(bench: FaultBench, random: Random) -> None:
@@ -110,7 +110,7 @@ def _to_recovery(bench: FaultBench, random: Random) -> None:
 
 def _reach(bench: FaultBench, phase: str, there: Callable[[], bool]) -> None:
     if not bench.run_until(there, LONGEST_PATH_S):
-        raise RuntimeError(f"never came to {phase}: {bench.loop.mode.name}, {bench.loop.fault}")
+        raise RuntimeError(f"the robot did not reach {phase}: {bench.loop.mode.name}, {bench.loop.fault}")
 
 
 def _wait(bench: FaultBench, random: Random, most_ticks: int) -> None:
@@ -118,7 +118,7 @@ def _wait(bench: FaultBench, random: Random, most_ticks: int) -> None:
         bench.step()
 
 
-_WAYS: dict[str, Callable[[FaultBench, Random], None]] = {
+_PHASE_ENTRIES: dict[str, Callable[[FaultBench, Random], None]] = {
     "idle": _to_idle,
     "arming": _to_arming,
     "hold": _to_hold,

@@ -1,4 +1,4 @@
-"""The faults as a picture: how much of its bound each reaction took, by fault and phase."""
+"""The fault matrix as a picture: each reaction time as a fraction of its bound, by failure mode and phase."""
 
 from __future__ import annotations
 
@@ -13,15 +13,18 @@ import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend wi
 import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 
+from experiments.faults.evaluation import Cell  # noqa: E402
+from experiments.faults.matrix import FaultsReport, ModeSummary  # noqa: E402
+
 COLUMNS = 2  # panels side by side: there are many faults
 HIGHEST_PERCENT = 100.0
 DARK_PERCENT = 65.0  # from here on letters are white
 
 
-def plot_faults(report: dict[str, Any], path: Path) -> None:
-    """Numbers are ticks, of the slowest seed; the colour is their share of the bound; a red cross is not ok."""
-    rows = report["faults"]
-    phases = [phase for phase in report["settings"]["phases"] if any(c["phase"] == phase for c in report["cells"])]
+def plot_faults(report: FaultsReport, path: Path) -> None:
+    """Draw the ticks of the slowest seed, coloured by their fraction of the bound; a red cross is a failed cell."""
+    rows = report.faults
+    phases = [phase for phase in report.settings.phases if any(cell.phase == phase for cell in report.cells)]
     columns = min(COLUMNS, len(rows))
     per_panel = -(-len(rows) // columns)
     figure, panels = plt.subplots(
@@ -31,17 +34,17 @@ def plot_faults(report: dict[str, Any], path: Path) -> None:
         mesh = _plot_panel(panel, report, rows[i * per_panel : (i + 1) * per_panel], phases)
     bar = figure.colorbar(mesh, ax=list(panels[0]), pad=0.01, shrink=0.6, aspect=40, extend="max")
     bar.set_label("slowest reaction, % of its bound; the numbers are ticks of 2.63 ms")
-    ok, cells = report["ok"], len(report["cells"])
-    figure.suptitle(f"From the cause to the reaction: {ok} of {cells} cells within every bound", fontsize="medium")
+    ok, cells = report.ok, len(report.cells)
+    figure.suptitle(f"From the injection to the reaction: {ok} of {cells} cells within every bound", fontsize="medium")
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
 
-def _plot_panel(panel: Axes, report: dict[str, Any], rows: Sequence[dict[str, Any]], phases: Sequence[str]) -> Any:
+def _plot_panel(panel: Axes, report: FaultsReport, rows: Sequence[ModeSummary], phases: Sequence[str]) -> Any:
     percent = np.full((len(rows), len(phases)), np.nan)
     for y, row in enumerate(rows):
         for x, phase in enumerate(phases):
-            cells = [c for c in report["cells"] if (c["way"], c["phase"]) == (row["way"], phase)]
+            cells = [cell for cell in report.cells if (cell.mode_name, cell.phase) == (row.mode_name, phase)]
             if cells:
                 percent[y, x] = _write_cell(panel, x, y, cells)
     colours = plt.get_cmap("YlGnBu").with_extremes(bad="#f4f4f4")
@@ -58,19 +61,19 @@ def _plot_panel(panel: Axes, report: dict[str, Any], rows: Sequence[dict[str, An
     return mesh
 
 
-def _label(row: dict[str, Any]) -> str:
-    bound = "" if row["bound_ticks"] is None else f"  ≤ {row['bound_ticks']}"
-    return f"{row['way']}{bound}"
+def _label(row: ModeSummary) -> str:
+    bound = "" if row.bound_ticks is None else f"  ≤ {row.bound_ticks}"
+    return f"{row.mode_name}{bound}"
 
 
-def _write_cell(panel: Axes, x: int, y: int, cells: Sequence[dict[str, Any]]) -> float:
-    """The slowest reaction in ticks. Returns its share of the bound in percent; what has no bound is white."""
-    ticks, bound = max((c["reaction_ticks"] or 0 for c in cells), default=0), cells[0]["bound_ticks"]
-    fraction = 100.0 * ticks / bound if bound else 0.0
+def _write_cell(panel: Axes, x: int, y: int, cells: Sequence[Cell]) -> float:
+    """Write the slowest reaction in ticks. Return it in percent of the bound; 0 without a bound."""
+    ticks, bound = max((cell.reaction_ticks or 0 for cell in cells), default=0), cells[0].bound_ticks
+    percent = 100.0 * ticks / bound if bound else 0.0
     text = str(ticks) if bound else "·"
     panel.text(
-        x, y, text, ha="center", va="center", fontsize=6.5, color="white" if fraction > DARK_PERCENT else "#333333"
+        x, y, text, ha="center", va="center", fontsize=6.5, color="white" if percent > DARK_PERCENT else "#333333"
     )
-    if not all(cell["ok"] for cell in cells):
+    if not all(cell.ok for cell in cells):
         panel.plot(x, y, "x", color="tab:red", markersize=11, markeredgewidth=2.0)
-    return fraction
+    return percent

@@ -3,32 +3,31 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from command_line import exit_codes
 from command_line.main import main
 from experiments.faults import matrix as faults
-from experiments.faults.matrix import Plan, report_of
+from experiments.faults.evaluation import Cell
+from experiments.faults.matrix import FaultsReport, Plan, report_of
 
-CELL: dict[str, Any] = {
-    "fault": "drive_quiet", "way": "drive_quiet", "phase": "hold", "seed": 1, "reaction": "damping", "ok": True,
-    "bound_ticks": 5, "reaction_ticks": 4, "peak_torque_nm": 0.31, "travel_rad": 0.2, "why": [],
-}  # fmt: skip
-LATE = CELL | {"phase": "stance", "ok": False, "reaction_ticks": 9, "why": ["the reaction came after 9 ticks"]}
-CONTROL = CELL | {"fault": "none", "way": "none", "bound_ticks": None, "reaction_ticks": None, "travel_rad": None}
+CELL = Cell("drive_quiet", "drive_quiet", "hold", 1, "left_sweep", "damping", bound_ticks=5, reaction_ticks=4,
+            peak_torque_nm=0.31, travel_rad=0.2, ok=True)  # fmt: skip
+LATE = replace(CELL, phase="stance", ok=False, reaction_ticks=9, why=["the reaction came after 9 ticks"])
+CONTROL = replace(CELL, fault="none", mode_name="none", bound_ticks=None, reaction_ticks=None, travel_rad=None)
 
 
 @pytest.fixture
 def plans(monkeypatch: pytest.MonkeyPatch) -> list[Plan]:
-    """Those that would have been run; the report holds the three cells above, in hold the good ones alone."""
+    """Record the plans in place of a run, which reports the three cells above."""
     seen: list[Plan] = []
 
-    def run(plan: Plan, show: object) -> dict[str, Any]:
+    def run(plan: Plan, show: object) -> FaultsReport:
         seen.append(plan)
-        cells = [cell for cell in (CELL, LATE, CONTROL) if cell["phase"] in plan.phases]
+        cells = [cell for cell in (CELL, LATE, CONTROL) if cell.phase in plan.phases]
         return report_of(plan, cells)
 
     monkeypatch.setattr(faults, "run", run)
@@ -44,14 +43,14 @@ def plans(monkeypatch: pytest.MonkeyPatch) -> list[Plan]:
         (("--simulated", "--fault", "flipper_stuck", "--phase", "idle"), "none of these faults"),
     ],
 )
-def test_what_cannot_be_is_refused(
+def test_an_impossible_plan_is_refused(
     arguments: tuple[str, ...], word: str, plans: list[Plan], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["experiment", "faults", *arguments]) == exit_codes.USAGE
     assert word in capsys.readouterr().err and not plans
 
 
-def test_by_default_it_is_the_whole_plan(plans: list[Plan]) -> None:
+def test_the_default_is_the_whole_matrix(plans: list[Plan]) -> None:
     main(["experiment", "faults", "--simulated"])
     assert plans == [Plan()]
 
@@ -62,7 +61,7 @@ def test_faults_phases_and_seeds_can_be_chosen(plans: list[Plan]) -> None:
     assert plans == [Plan(("none", "bus_off"), ("hold",), 3)]
 
 
-def test_a_cell_that_is_not_ok_is_told_with_its_reason_and_the_command_fails(
+def test_a_failed_cell_is_printed_with_its_reason_and_the_command_fails(
     plans: list[Plan], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["experiment", "faults", "--simulated"]) == exit_codes.UNHEALTHY
@@ -72,7 +71,9 @@ def test_a_cell_that_is_not_ok_is_told_with_its_reason_and_the_command_fails(
     assert "drive_quiet damping 1/2 9 5" in " ".join(printed.split())
 
 
-def test_the_report_is_for_machines_too(plans: list[Plan], capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_the_report_is_printed_as_json_and_written(
+    plans: list[Plan], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     main(["experiment", "faults", "--simulated", "--json", "--out", str(tmp_path)])
     report = json.loads(capsys.readouterr().out)
     assert report["cells"][0].items() >= {"fault": "drive_quiet", "phase": "hold", "bound_ticks": 5}.items()

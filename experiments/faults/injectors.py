@@ -1,7 +1,7 @@
-"""The ways in which something is made to fail, as contexts: a cause begins at one tick and is gone after its context.
+"""Injectors of failures in drives, buses and joints: contexts in which something fails on a joint of the bench.
 
-Some are made by the failures that a robot's owner can ask for, the others in the simulated drives, with a hand on a
-joint, by strangers on the bus, and in the loop itself. Each is told the joint that it is about.
+Some use the failures of `mudskipper fail`. The others act in the simulated drive, move the joint, or send frames on the
+bus that come from neither drive nor loop. loop_injectors.py has those for the loop and the daemon.
 """
 
 from __future__ import annotations
@@ -17,38 +17,38 @@ from experiments.faults.bench import FaultBench
 from simulation.devices.drive import DriveError, Forgery
 
 LONGEST_S = 60.0
-BLOCKED_KG_M2 = 1e6  # nothing moves this
+BLOCKED_KG_M2 = 1e6  # too much inertia for any torque
 
-Cause = Callable[[FaultBench, str], AbstractContextManager[None]]
+Injector = Callable[[FaultBench, str], AbstractContextManager[None]]
 
 
-def failing(component: str, kind: str) -> Cause:
-    """By `mudskipper fail`; JOINT and BUS stand for one that is drawn."""
+def failing(component: str, kind: str) -> Injector:
+    """Inject a failure of `mudskipper fail`. JOINT and BUS in its name stand for the drawn joint and its bus."""
 
     @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
         bus = bench.loop.configuration.drive[joint].bus
         name = component.replace("JOINT", joint).replace("BUS", bus)
         bench.fail(name, kind, LONGEST_S)
         yield
         bench.failures.end(name)
 
-    return cause
+    return inject
 
 
 # in a drive
 
 
-def drive_with(**changes: Any) -> Cause:
+def drive_with(**changes: Any) -> Injector:
     @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
         drive = bench.drive(joint)
         before = drive.parameters
         drive.parameters = replace(before, **changes)
         yield
         drive.parameters = before
 
-    return cause
+    return inject
 
 
 @contextmanager
@@ -59,7 +59,7 @@ def overcurrent(bench: FaultBench, joint: str) -> Iterator[None]:
 
 @contextmanager
 def watchdog_ran_out(bench: FaultBench, joint: str) -> Iterator[None]:
-    """Commands do not reach the drive; the cause is that it has given up waiting."""
+    """Cut off the commands until the drive's watchdog has tripped; the injection begins there."""
     with failing("JOINT.command", "off")(bench, joint):
         bench.run_until(lambda: bench.drive(joint).failed, 0.5)
         yield
@@ -76,7 +76,7 @@ def never_in_closed_loop(bench: FaultBench, joint: str) -> Iterator[None]:
     def leave() -> None:
         bench.drive(joint).energised = False
 
-    with bench.acting(leave):
+    with bench.every_step(leave):
         yield
 
 
@@ -86,48 +86,48 @@ def restart(bench: FaultBench, joint: str) -> Iterator[None]:
     yield
 
 
-def duplicate(angle_rad: float) -> Cause:
+def duplicate(angle_rad: float) -> Injector:
     @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        with bench.acting(bench.add_duplicate(joint, angle_rad)):
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
+        with bench.every_step(bench.add_duplicate(joint, angle_rad)):
             yield
 
-    return cause
+    return inject
 
 
-# strangers on the bus
+# other senders on the bus
 
 
-def forged(forgery: Forgery) -> Cause:
+def forged(forgery: Forgery) -> Injector:
     """Sends the frame once."""
 
     @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        bench.say(joint, bench.drive(joint).forge(forgery))
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
+        bench.send_foreign(joint, bench.drive(joint).forge(forgery))
         yield
 
-    return cause
+    return inject
 
 
-def current_reported(current_a: float) -> Cause:
+def current_reported(current_a: float) -> Injector:
     """Reports another current after each report of the drive itself."""
 
     @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        with bench.acting(lambda: bench.say(joint, bench.drive(joint).forge_current(current_a))):
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
+        with bench.every_step(lambda: bench.send_foreign(joint, bench.drive(joint).forge_current(current_a))):
             yield
 
-    return cause
+    return inject
 
 
 @contextmanager
 def other_master(bench: FaultBench, joint: str) -> Iterator[None]:
-    """Another program wants this drive in closed loop, without torque."""
+    """Another program commands this drive into closed loop, without torque."""
 
     def command() -> None:
-        bench.say(joint, bench.drive(joint).forge(Forgery.CLOSE_LOOP))
+        bench.send_foreign(joint, bench.drive(joint).forge(Forgery.CLOSE_LOOP))
 
-    with bench.acting(command):
+    with bench.every_step(command):
         yield
 
 
@@ -154,24 +154,24 @@ def out_of_range(bench: FaultBench, joint: str) -> Iterator[None]:
     _move(bench, joint, before_rad)
 
 
-def whirled(velocity_rad_s: float) -> Cause:
+def moved_at_speed(velocity_rad_s: float) -> Injector:
     @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        way = -copysign(velocity_rad_s, _angle_rad(bench, joint))
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
+        signed_rad_s = -copysign(velocity_rad_s, _angle_rad(bench, joint))
 
-        def whirl() -> None:
-            _move(bench, joint, _angle_rad(bench, joint), way)
+        def move() -> None:
+            _move(bench, joint, _angle_rad(bench, joint), signed_rad_s)
 
-        whirl()
-        with bench.acting(whirl):
+        move()
+        with bench.every_step(move):
             yield
 
-    return cause
+    return inject
 
 
 @contextmanager
 def blocked(bench: FaultBench, joint: str) -> Iterator[None]:
-    """Pushed aside, farther than the gait goes, and held there: the cause begins when it stands."""
+    """Push a sweep joint beyond the range of the gait and block it; the injection begins when it stands still."""
     joint = joint.replace("adduction", "sweep")
     arm, start_rad = bench.arm_of(joint), _angle_rad(bench, joint)
     there_rad = copysign(0.78, start_rad)
@@ -187,20 +187,20 @@ def blocked(bench: FaultBench, joint: str) -> Iterator[None]:
 
 
 @contextmanager
-def given_up(bench: FaultBench, joint: str) -> Iterator[None]:
-    """The mud holds the flippers: the cause is that the last attempt is over."""
+def recovery_given_up(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Wait until the last attempt of a recovery has failed; the injection begins there."""
     bench.run_until(lambda: bool(bench.loop.controller.recovery.given_up), 5.0)
     yield
 
 
 @contextmanager
-def wrong_way(bench: FaultBench, joint: str) -> Iterator[None]:
-    """The current that a drive tells is against the torque that it was told."""
-    place, sign = JOINTS.index(joint), bench.drive(joint).parameters.sign
+def current_reversed(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Report a current against the commanded torque."""
+    index, sign = JOINTS.index(joint), bench.drive(joint).parameters.sign
 
     def report() -> None:
-        current_a = -copysign(4.0, bench.loop.sent.torques_nm[place]) * sign
-        bench.say(joint, bench.drive(joint).forge_current(current_a))
+        current_a = -copysign(4.0, bench.loop.sent.torques_nm[index]) * sign
+        bench.send_foreign(joint, bench.drive(joint).forge_current(current_a))
 
-    with bench.acting(report):
+    with bench.every_step(report):
         yield

@@ -1,4 +1,4 @@
-"""What goes wrong in the loop itself and beside it: heat that it reckons, bugs, stalls, the log, the daemon."""
+"""Injectors of failures in the loop and around it: modelled heat, bugs, stalls, lease, log, daemon."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from control.modes import Mode, Request
 from control.records import Estimate, StrideEstimate
 from estimation.mud import MudReading
 from experiments.faults.bench import FaultBench
-from experiments.faults.causes import Cause
+from experiments.faults.injectors import Injector
 
 
 @contextmanager
-def hung_up(bench: FaultBench, joint: str) -> Iterator[None]:
-    """Who has promised to attend the robot goes away; where torque is off, right behind an arm."""
+def lease_hung_up(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Close the connection of the lease holder; where torque is off, right after a request to arm."""
     bench.loop.lease.renew("somebody", bench.now_s, 10.0)
     if bench.loop.mode is Mode.IDLE:
         bench.loop.request(Request.ARM, bench.now_s)
@@ -25,15 +25,15 @@ def hung_up(bench: FaultBench, joint: str) -> Iterator[None]:
     yield
 
 
-def writer_tells(**changes: Any) -> Cause:
+def writer_reports(**changes: Any) -> Injector:
     @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
         before = bench.rows.reported
         bench.rows.reported = before._replace(**changes)
         yield
         bench.rows.reported = before
 
-    return cause
+    return inject
 
 
 @contextmanager
@@ -50,15 +50,15 @@ def port_lost_frames(bench: FaultBench, joint: str) -> Iterator[None]:
     yield
 
 
-def heated(temperature_c: float) -> Cause:
-    """It cools as slowly as it is reckoned to."""
+def heated(temperature_c: float) -> Injector:
+    """Set the modelled temperature, which then falls at the model's own rate."""
 
     @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
         bench.winding(joint).temperature_c = temperature_c
         yield
 
-    return cause
+    return inject
 
 
 @contextmanager
@@ -72,23 +72,23 @@ def gains_of_nan(bench: FaultBench, joint: str) -> Iterator[None]:
 
 @contextmanager
 def five_newton_metres(bench: FaultBench, joint: str) -> Iterator[None]:
-    """A bug that goes past every limit, to the wire."""
+    """Send a torque past every limit of the loop, as a bug would."""
     bench.loop.drives.send_torque(joint, 5.0)
     yield
 
 
-def stands(ticks: int) -> Cause:
+def loop_stalled(ticks: int) -> Injector:
     @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
-        bench.stands_still = ticks
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
+        bench.stalled_steps = ticks
         yield
 
-    return cause
+    return inject
 
 
 @contextmanager
-def wild_stride(bench: FaultBench, joint: str) -> Iterator[None]:
-    """The next sample closes a stride with a coefficient of 10²⁰ N/m³."""
+def absurd_stride(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Make the next sample close a stride with a coefficient of 10²⁰ N/m³."""
     estimator = bench.loop.learning.estimator
     true_update = estimator.update
     wild = Estimate(1e20, 1.0, 100, True)
@@ -122,11 +122,11 @@ class DeliberateBugError(Exception):
     pass
 
 
-def bug_in(path: str) -> Cause:
-    """The next call of what `path` names in the loop raises."""
+def bug_in(path: str) -> Injector:
+    """Make the next call of a method of the loop raise. `path` is the dotted name of the method."""
 
     @contextmanager
-    def cause(bench: FaultBench, joint: str) -> Iterator[None]:
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
         *owners, method = path.split(".")
         part: Any = bench.loop
         for owner in owners:
@@ -138,4 +138,4 @@ def bug_in(path: str) -> Cause:
         setattr(part, method, broken)
         yield
 
-    return cause
+    return inject

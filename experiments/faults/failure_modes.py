@@ -1,0 +1,204 @@
+"""The table of failure modes: how each kind of fault is injected, and in which phases.
+
+There is at least one mode for each kind in control/faults.py. Further modes are a daemon that dies, hangs, or meets a
+bug in each stage of its tick, and no failure at all as the control group.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from control.faults import FAULT_KINDS, FaultKind
+from control.records import JOINTS
+from experiments.faults.injectors import (
+    Injector,
+    blocked,
+    current_reported,
+    current_reversed,
+    drive_with,
+    duplicate,
+    failing,
+    forged,
+    left_closed_loop,
+    moved_at_speed,
+    never_in_closed_loop,
+    other_master,
+    out_of_range,
+    overcurrent,
+    recovery_given_up,
+    restart,
+    watchdog_ran_out,
+)
+from experiments.faults.loop_injectors import (
+    absurd_stride,
+    bug_in,
+    five_newton_metres,
+    gains_of_nan,
+    heated,
+    killed,
+    lease_hung_up,
+    loop_stalled,
+    nothing,
+    port_lost_frames,
+    writer_lost_rows,
+    writer_reports,
+)
+from experiments.faults.phases import EVERYWHERE, GAIT, PHASES
+from simulation.devices.drive import Forgery
+
+NO_SPACE = "Nothing can be written to the log: No space left on device."
+REPORTED_S = 0.0  # the failure lasts until its fault is reported
+TURNING = {"insertion": "adduction", "stance": "sweep", "extraction": "adduction", "swing": "sweep"}
+MOVING = ("hold", *GAIT, "stopping")
+
+
+@dataclass(frozen=True)
+class FailureMode:
+    """One way to cause a fault. `fault` is its kind or another name; the failure ends after `lasts_s`."""
+
+    fault: str
+    inject: Injector
+    lasts_s: float = 0.5
+    phases: tuple[str, ...] = EVERYWHERE
+    how: str = ""  # tells the modes of one fault apart
+    no_commands: bool = False  # commands do not reach a drive: only its watchdog removes the torque
+    ends_daemon: bool = False
+    bound_ticks: int | None = None  # where this mode is detected sooner than the kind's bound
+    turns: bool = False  # detected at a turning joint only
+
+    @property
+    def name(self) -> str:
+        return f"{self.fault}, {self.how}" if self.how else self.fault
+
+    def joints(self, phase: str) -> tuple[str, ...]:
+        """Return the joints from which one is drawn."""
+        turning = TURNING.get(phase, "") if self.turns else ""
+        return tuple(joint for joint in JOINTS if joint.endswith(turning))
+
+    @property
+    def kind(self) -> FaultKind | None:
+        return FAULT_KINDS.get(self.fault)
+
+
+BUGS = {
+    "reading drives": "drives.read",
+    "reading pose": "pose.read",
+    "learning": "learning.update",
+    "choosing depth": "learning.step",
+    "watching faults": "fault_monitor.update",
+    "control": "controller.step",
+    "sending": "drives.send",
+    "recording": "recorder.put",
+}
+DYING = ("hold", *GAIT, "recovery")
+
+FAILURE_MODES: tuple[FailureMode, ...] = (
+    FailureMode("none", nothing, 1.0, PHASES),
+    # signals of a drive
+    FailureMode("drive_late", failing("JOINT", "off"), REPORTED_S, no_commands=True),
+    FailureMode("drive_quiet", failing("JOINT", "off"), REPORTED_S, PHASES, no_commands=True),
+    FailureMode("drive_silent", failing("JOINT", "off"), 1.0, PHASES, no_commands=True),
+    FailureMode("position_stale", failing("JOINT.position", "off"), REPORTED_S),
+    FailureMode("position_silent", failing("JOINT.position", "off"), 1.0),
+    FailureMode("current_stale", failing("JOINT.current", "off"), REPORTED_S, PHASES),
+    FailureMode("current_silent", failing("JOINT.current", "off"), 1.0),
+    FailureMode("heartbeat_silent", failing("JOINT.heartbeat", "off"), 1.0),
+    FailureMode("temperature_silent", failing("JOINT.temperature", "off"), 1.5),
+    FailureMode("voltage_silent", failing("JOINT.voltage", "off"), 1.5),
+    FailureMode("drive_error", overcurrent, phases=PHASES),
+    FailureMode("drive_error", watchdog_ran_out, 0.5, MOVING, "by its watchdog", no_commands=True),
+    FailureMode("drive_error", forged(Forgery.EMERGENCY_STOP), 0.5, MOVING, "by a stranger's stop"),
+    FailureMode("drive_disarmed", left_closed_loop, phases=MOVING),
+    FailureMode("drive_energised", other_master, 1.0, ("idle",)),
+    FailureMode("drive_restarted", restart, 2.0),
+    FailureMode("drive_version", forged(Forgery.OLD_FIRMWARE), phases=("idle", "stance")),
+    FailureMode("duplicate_node_id", duplicate(0.3), 1.6),
+    FailureMode("watchdog_unknown", forged(Forgery.STARTING), phases=("idle",)),
+    FailureMode("watchdog_off", forged(Forgery.WATCHDOG_OFF), phases=("idle", "stance")),
+    # buses
+    FailureMode("bus_warning", failing("bus.BUS", "warning")),
+    FailureMode("bus_passive", failing("bus.BUS", "passive")),
+    FailureMode("bus_off", failing("bus.BUS", "bus-off"), 1.0, PHASES, no_commands=True),
+    FailureMode("bus_refuses", failing("bus.BUS", "stuck"), no_commands=True),
+    # joints and motors
+    FailureMode("joint_position", out_of_range),
+    FailureMode("joint_velocity", moved_at_speed(45.0), REPORTED_S),
+    FailureMode("joint_moving", moved_at_speed(2.0), REPORTED_S, ("idle",)),
+    FailureMode("joint_current", current_reported(40.0)),
+    FailureMode("joint_not_following", blocked, 3.0, ("hold", *GAIT)),
+    FailureMode("encoder_jump", drive_with(encoder_offset_rad=0.6), phases=PHASES),
+    FailureMode("encoder_stuck", failing("JOINT.position", "stuck"), 1.0, GAIT, turns=True),
+    FailureMode("torque_missing", current_reversed, phases=MOVING),
+    FailureMode("motor_overheating", drive_with(temperature_c=82.0), phases=PHASES),
+    FailureMode("motor_hot", drive_with(temperature_c=95.0)),
+    FailureMode("winding_overheating", heated(83.0)),
+    FailureMode("winding_hot", heated(93.0)),
+    FailureMode("voltage_low", drive_with(bus_voltage_v=19.0)),
+    FailureMode("voltage_under", drive_with(bus_voltage_v=17.0)),
+    FailureMode("flipper_stuck", recovery_given_up, phases=("recovery",)),
+    FailureMode("arming_failed", never_in_closed_loop, 3.0, ("arming",)),
+    # the loop
+    FailureMode("torque_not_finite", gains_of_nan, phases=MOVING),
+    FailureMode("command_refused", five_newton_metres, phases=PHASES),
+    FailureMode("loop_overrun", loop_stalled(1)),
+    FailureMode("loop_lagging", loop_stalled(7), bound_ticks=2),
+    FailureMode("loop_lagging", failing("loop", "slow"), 1.0, ("hold", "stance"), "every tick too long"),
+    FailureMode("loop_stalled", failing("loop", "stuck"), phases=PHASES),
+    FailureMode("loop_crawling", loop_stalled(20), phases=PHASES),
+    FailureMode("clock_step", failing("clock", "garbage")),
+    FailureMode("estimate_wild", absurd_stride, phases=GAIT),
+    FailureMode("pose_lost", failing("pose", "off")),
+    FailureMode("lease_lost", lease_hung_up, phases=PHASES),
+    # the log
+    FailureMode("disk_low", writer_reports(free_fraction=0.02)),
+    FailureMode("log_unwritable", writer_reports(problem=NO_SPACE)),
+    FailureMode("disk_slow", writer_reports(slowest_write_s=5.0)),
+    FailureMode("recorder_dead", writer_reports(alive=False)),
+    FailureMode("rows_lost", writer_lost_rows),
+    FailureMode("frames_lost", port_lost_frames),
+    # the daemon
+    FailureMode("daemon_killed", killed, 1.0, PHASES),
+    FailureMode("daemon_hung", loop_stalled(760), 2.2, PHASES),
+    *(
+        FailureMode("bug_in_the_tick", bug_in(path), 0.5, DYING, f"while {stage}", ends_daemon=True)
+        for stage, path in BUGS.items()
+    ),
+)
+BY_NAME = {mode.name: mode for mode in FAILURE_MODES}
+
+ABSENT_DRIVE = (
+    "drive_late", "current_stale", "position_stale", "drive_quiet", "drive_silent", "heartbeat_silent",
+    "temperature_silent", "voltage_silent", "drive_energised", "drive_error", "drive_restarted", "drive_version",
+    "watchdog_unknown",
+)  # fmt: skip
+IDLE_DRIVE = ("drive_error", "drive_disarmed", "torque_missing")
+CONSEQUENCES: dict[str, tuple[str, ...]] = {
+    "drive_quiet": ("drive_late", "position_stale", "current_stale"),
+    "drive_silent": ABSENT_DRIVE,
+    "position_stale": ("drive_late",),
+    "position_silent": ("drive_late", "position_stale"),
+    "current_stale": ("drive_late",),
+    "current_silent": ("drive_late", "current_stale", "torque_missing"),
+    "heartbeat_silent": ("drive_energised",),
+    "drive_error": ("drive_disarmed", "torque_missing"),
+    "drive_restarted": ABSENT_DRIVE,
+    "duplicate_node_id": (
+        "encoder_jump",
+        "joint_moving",
+        "drive_disarmed",
+        "joint_position",
+    ),  # the encoder of the other drive is elsewhere
+    "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version"),
+    "bus_off": (*ABSENT_DRIVE, *IDLE_DRIVE, "bus_refuses"),
+    "bus_refuses": IDLE_DRIVE,
+    "joint_position": ("encoder_jump",),
+    "encoder_stuck": ("encoder_jump",),  # when it continues
+    "encoder_jump": ("joint_moving",),
+    "joint_velocity": ("encoder_stuck",),  # its angle is held and its speed is not
+    "motor_overheating": ("winding_overheating",),
+    "motor_hot": ("winding_hot",),
+    "loop_lagging": ("loop_overrun",),
+    "loop_stalled": ("loop_lagging",),
+    "loop_crawling": ("loop_stalled", "loop_lagging"),
+    "daemon_hung": (*IDLE_DRIVE, "loop_stalled", "loop_crawling", "loop_lagging", "arming_failed"),
+}  # other faults that may be reported, because they are true as well
