@@ -1,4 +1,4 @@
-"""Messages that arrive late, by evenly drawn times, and in order: none overtakes another."""
+"""Messages that arrive late, by uniformly drawn times, and in order: none overtakes another."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from drivers.can.frames import Frame
 
 
 class LateMessages:
-    """Owns what is under way."""
+    """Owns the messages in transit."""
 
     def __init__(self, random: Random) -> None:
         self._random = random
         self.reset()
 
     def reset(self) -> None:
-        self._under_way: deque[tuple[float, Frame]] = deque()  # when it arrives, and what
+        self._in_transit: deque[tuple[float, Frame]] = deque()  # (arrival, frame)
 
     def update(self, frames: Iterable[Frame], now_s: float, longest_s: float) -> Iterator[Frame]:
-        """What arrives by now, after `longest_s` at the most. Stamps tell when, as a receiver's do."""
+        """Yields the frames that arrive by now, at most `longest_s` late, stamped with the time of arrival."""
         for frame in frames:
             arrival_s = now_s + longest_s * self._random.random()
-            if self._under_way:
-                arrival_s = max(arrival_s, self._under_way[-1][0])
-            self._under_way.append((arrival_s, frame))
-        while self._under_way and self._under_way[0][0] <= now_s:
-            yield self._under_way.popleft()[1]._replace(stamp_s=now_s)
+            if self._in_transit:
+                arrival_s = max(arrival_s, self._in_transit[-1][0])
+            self._in_transit.append((arrival_s, frame))
+        while self._in_transit and self._in_transit[0][0] <= now_s:
+            yield self._in_transit.popleft()[1]._replace(stamp_s=now_s)

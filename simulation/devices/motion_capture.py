@@ -1,8 +1,8 @@
-"""Motion capture of the body's place: frames at a rate, with noise, that arrive late and at times not at all.
+"""Motion capture of the body's position: frames at a rate, with noise, latency and drop-outs.
 
-A frame tells where the body was when it was exposed. Drop-outs are bursts, as when a marker is hidden: they begin at
-random, so many in a second on average, and their lengths are distributed exponentially. At a rate of 0 whoever asks
-gets a frame of that moment.
+A frame reports the body's position at its exposure. Drop-outs are bursts, as of a hidden marker: they begin at random,
+a given number per second on average, and their lengths are distributed exponentially. At a rate of 0 every reader gets
+a frame of that time.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class CameraFrame(NamedTuple):
 
 
 class MotionCapture:
-    """Owns the frames under way and the drop-out that is going on."""
+    """Owns the frames in transit and the current drop-out."""
 
     def __init__(self, parameters: MotionCaptureParameters, seed: int) -> None:
         self.parameters = parameters
@@ -51,17 +51,17 @@ class MotionCapture:
         self._random = Random(self._seed)
         self._due_s = self._exposed_s = NEVER_S
         self._hidden_until_s = NEVER_S
-        self._under_way: deque[CameraFrame] = deque()
+        self._in_transit: deque[CameraFrame] = deque()
 
     def step(self, now_s: float, plant: Plant) -> Iterator[CameraFrame]:
-        """The frames that arrive by now. Called seldom, it misses exposures, as a camera does that is held up."""
+        """Yields the frames that arrive by now. Infrequent calls miss exposures, as a delayed camera does."""
         if now_s >= self._due_s:
             self._expose(now_s, plant)
-        while self._under_way and self._under_way[0].exposed_s + self.parameters.latency_s <= now_s:
-            yield self._under_way.popleft()
+        while self._in_transit and self._in_transit[0].exposed_s + self.parameters.latency_s <= now_s:
+            yield self._in_transit.popleft()
 
     def _expose(self, now_s: float, plant: Plant) -> None:
-        """Exposures lie on a grid of time, the body's place there on the line that it moves along now."""
+        """Adds a frame. Exposures lie on a grid of time, at which the position is extrapolated."""
         period_s = self._period_s
         exposed_s = self._due_s if now_s - self._due_s < period_s else now_s
         self._due_s = exposed_s + period_s
@@ -69,7 +69,7 @@ class MotionCapture:
         if not self._is_hidden(exposed_s):
             noise_m = self.parameters.noise_m
             x_m += self._random.gauss(0.0, noise_m) if noise_m else 0.0
-            self._under_way.append(CameraFrame(exposed_s, x_m))
+            self._in_transit.append(CameraFrame(exposed_s, x_m))
         self._exposed_s = exposed_s
 
     def _is_hidden(self, exposed_s: float) -> bool:
@@ -82,7 +82,7 @@ class MotionCapture:
 
 
 class SimulatedPose:
-    """A PoseSource: the newest frame that has arrived, stamped when it was read, as a pose port keeps it."""
+    """A PoseSource that returns the newest frame that has arrived, stamped when it was read, as a pose port does."""
 
     def __init__(self, plant: Plant, parameters: MotionCaptureParameters, seed: int) -> None:
         self._plant = plant

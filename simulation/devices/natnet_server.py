@@ -1,10 +1,10 @@
-"""A motion-capture program as a NatNet client meets it: it answers on its command port, and plays recorded poses.
+"""A motion-capture program with a NatNet server: it answers on its command port and plays recorded poses.
 
-Frames are laid out as drivers/pose/natnet_codec.py describes them, but written by this file alone, field by field.
-Around
-the rigid body there may be whatever else a laboratory tracks. A client that asks to connect is told the version and
-the rate of the server's clock, and gets the frames from then on; a fixed address, such as a multicast group, gets them
-from the start. Whoever owns a server calls `step`: times are arguments, so a recording plays as fast as it is asked to.
+Frames have the layout that drivers/pose/natnet_codec.py describes; only the message kinds and the version record come
+from there. Around the rigid body a frame may hold other tracked objects, as in a laboratory. A client that asks to
+connect receives the version and the rate of the server's clock, and the frames from then on; a fixed address, such as
+a multicast group, receives frames from the start. The owner of a server calls `step` with the time, so a recording
+plays at any speed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import NamedTuple
 from drivers.pose.natnet_codec import CONNECT, FRAME, MODEL, MODELS_CHANGED, REQUEST_MODEL, SERVER_INFO, NatNetVersion
 
 TICKS_PER_S = 10_000_000  # of Windows's performance counter
-CLOCK_AHEAD_S = 1000.0  # the server's clock is its own: by so much it is ahead of the one that `step` is told
+CLOCK_AHEAD_S = 1000.0  # the server's own clock minus the time given to `step`
 NEWEST_VERSION = NatNetVersion(4, 1)
 LOOPBACK = "127.0.0.1"
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -66,7 +66,7 @@ def encode_frame(
     crowded: bool = False,
     models_changed: bool = False,
 ) -> bytes:
-    """`bodies` as encode_rigid_body makes them; `crowded`: with a skeleton, markers, force plates and devices."""
+    """`bodies`: from encode_rigid_body; `crowded`: adds a skeleton, markers, force plates and devices."""
     payload = pack("<i", number)
     for elements in _sections(version, list(bodies), crowded):
         content = b"".join(elements)
@@ -75,7 +75,7 @@ def encode_frame(
 
 
 def _sections(version: NatNetVersion, bodies: list[bytes], crowded: bool) -> list[list[bytes]]:
-    """Those that frames of this version have."""
+    """Returns the sections that frames of this version have."""
     bone = encode_rigid_body(version, 65537, RecordedPose(0.0, (9.0, 9.0, 9.0)))
     labelled = pack("<i4f", 7, 1.0, 2.0, 3.0, 0.01) + pack("<H", 2) + (pack("<f", 1e-4) if version >= (3, 0) else b"")
     asset = (
@@ -108,7 +108,7 @@ def _frame_end(version: NatNetVersion, times: FrameTimes, models_changed: bool) 
 
 
 def encode_models(version: NatNetVersion, bodies: Iterable[tuple[str, int]]) -> bytes:
-    """A marker set, then rigid bodies by name and streaming id, each with one marker."""
+    """Encodes a marker set, then rigid bodies by name and streaming id, each with one marker."""
     described = [(0, b"all\0" + pack("<i", 1) + b"Marker 1\0")]
     for name, identity in bodies:
         body = name.encode() + b"\0" + pack("<ii3f", identity, -1, 0.0, 0.0, 0.0)
@@ -122,7 +122,7 @@ def encode_models(version: NatNetVersion, bodies: Iterable[tuple[str, int]]) -> 
 
 
 class NatNetServer:
-    """Owns the command port, the clients that asked to connect, and the poses that are still to be sent."""
+    """Owns the command port, the connected clients, and the poses to send."""
 
     def __init__(
         self,
@@ -150,15 +150,15 @@ class NatNetServer:
         self.address: Address = self._socket.getsockname()
 
     def add(self, pose: RecordedPose) -> None:
-        """To be sent when it is due."""
+        """Queues a pose, to be sent when it is due."""
         self._poses.append(pose)
 
     def change_model(self, identity: int) -> None:
-        """Give the body another streaming id, and tell so in the next frame."""
+        """Gives the body another streaming id, which the next frame announces."""
         self.identity, self._models_changed = identity, True
 
     def step(self, now_s: float) -> int:
-        """Answer requests, and send the frames that are due: how many those are."""
+        """Answers requests and sends the frames that are due; returns the number of frames."""
         self._answer()
         sent = 0
         while self._poses and self._poses[0].time_s + self.latency_s <= now_s:
@@ -176,7 +176,7 @@ class NatNetServer:
         self.send_packet(encode_frame(self.version, self._number, [body], times, self.crowded, changed))
 
     def send_packet(self, packet: bytes) -> None:
-        """To all clients. What nobody takes is lost, as on any network."""
+        """Sends to all clients. A packet that a client does not take is lost, as on any network."""
         for client in self._clients:
             with suppress(ConnectionRefusedError, BlockingIOError):
                 self._socket.sendto(packet, client)

@@ -1,4 +1,4 @@
-"""The body's place as a simulated laboratory tells it: by the way that the robot's configuration listens to.
+"""The simulated laboratory's pose of the body, sent to the source that the robot's configuration names.
 
 Motion capture's frames leave through the pose socket, as NatNet packets from the address at which the robot looks for
 its server, or as counts of a rail encoder that appears where the robot looks for its device.
@@ -20,7 +20,7 @@ from simulation.devices.rail_encoder_emulator import EmulatedRailEncoder
 
 
 class PoseLine(Protocol):
-    """One way to a robot."""
+    """One connection to a robot."""
 
     def send(self, frame: CameraFrame) -> None: ...
 
@@ -52,10 +52,10 @@ class SocketLine(NoLine):
 
 
 class NatNetLine:
-    """A server on this computer."""
+    """A NatNet server on this computer."""
 
     def __init__(self, pose: PoseParameters) -> None:
-        """Raises OSError where its address is not one of this computer."""
+        """Raises OSError for an address that this computer does not have."""
         natnet = pose.natnet
         self._direction = parse_axis(pose.axis) or AXES["x"]
         self._origin_m = pose.origin_m
@@ -80,10 +80,10 @@ class NatNetLine:
 
 
 class RailEncoderLine(NoLine):
-    """On a pseudo-terminal, behind a link with the device's name."""
+    """A rail encoder on a pseudo-terminal, under the device's name."""
 
     def __init__(self, pose: PoseParameters) -> None:
-        """Raises OSError where there is something of that name."""
+        """Raises OSError where the name is taken."""
         encoder = pose.rail_encoder
         self._origin_m = pose.origin_m
         self.counter = EmulatedRailEncoder(Path(encoder.device), encoder.metres_per_count, encoder.label)
@@ -96,10 +96,10 @@ class RailEncoderLine(NoLine):
 
 
 class PoseBroadcast:
-    """Sends the body's place as motion capture sees it."""
+    """Sends the body's position as motion capture measures it."""
 
     def __init__(self, pose: PoseParameters, seed: int) -> None:
-        """Raises OSError where that cannot be done from this computer."""
+        """Raises OSError where this computer cannot provide that source."""
         self.line = _line(pose)
         self._capture = MotionCapture(OF_THE_PAPER, seed)
 

@@ -1,27 +1,23 @@
-"""A device that prints lines, as a serial port meets it: text on a pseudo-terminal, with all its faults.
+"""A device that prints lines on a serial port, emulated on a pseudo-terminal, with the faults of a real one.
 
-The other end of the pseudo-terminal is what any program opens as a serial port. Its baud rate is the kernel's, so a
-device that was opened at another rate than its own answers with noise, as a wire would. Lines may be lost for a while,
-garbled, or wait in an adapter that hands over what it has every few milliseconds. A link to the pseudo-terminal stands
-for a name below /dev/serial/by-id: unplugged, the device is gone; plugged in again, it is another one by that name.
+Any program opens the other end of the pseudo-terminal as a serial port. Its baud rate is the kernel's setting, so a
+device that was opened at another rate than its own sends noise, as over a wire. Lines may be lost for a while, be
+garbled, or wait in an adapter that delivers its buffer every few milliseconds. A link to the pseudo-terminal stands in
+for a name below /dev/serial/by-id: it disappears when the device is unplugged and points to a new one afterwards.
 """
 
 from __future__ import annotations
 
-import fcntl
-import os
-import struct
 import termios
 import time
-import tty
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 from typing import Annotated
 
 from control.bounds import Bounds
+from simulation.devices.pseudo_terminal import PseudoTerminal
 
 SPEEDS = {getattr(termios, name): int(name[1:]) for name in dir(termios) if name[0] == "B" and name[1:].isdigit()}
 DELIVERED_S = 1.0  # longest that the kernel takes to carry a line across a pseudo-terminal
@@ -38,9 +34,9 @@ class TalkerParameters:
 
 
 class SerialTalker:
-    """Owns the pseudo-terminal, what is on its way through it, and when the next line is due.
+    """Owns the pseudo-terminal, the bytes in transit, and the time at which the next line is due.
 
-    `line_at`, told a time, is the line that is printed then; it is asked once for each, in order.
+    `line_at(time)` returns the line that is printed then; it is called once for each line, in order.
     """
 
     def __init__(
@@ -49,10 +45,10 @@ class SerialTalker:
         self.parameters = parameters
         self.line_at = line_at
         self.link = link
-        self.waits_for_delivery = True  # whoever reads does so between two steps, and finds what was written
-        self.lost_lines = 0  # that nobody had read in time
+        self.waits_for_delivery = True  # the reader reads between two steps and must find all written bytes
+        self.lost_lines = 0  # that were not read in time
         self._random = random
-        self._master = self._slave = -1
+        self._terminal: PseudoTerminal | None = None
         self._due_s = self._burst_due_s = 0.0
         self._started = False
         self._silent_until_s = 0.0
@@ -61,32 +57,23 @@ class SerialTalker:
 
     @property
     def is_plugged_in(self) -> bool:
-        return self._master >= 0
+        return self._terminal is not None
 
     def plug_in(self) -> None:
-        self._master, self._slave = os.openpty()
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self._set_speed()
         self.link.unlink(missing_ok=True)
-        self.link.symlink_to(os.ttyname(self._slave))
-
-    def _set_speed(self) -> None:
+        self._terminal = PseudoTerminal(self.link)
         speed = next((code for code, baud in SPEEDS.items() if baud == self.parameters.baud), termios.B115200)
-        settings = termios.tcgetattr(self._slave)
+        settings = termios.tcgetattr(self._terminal.slave)
         settings[4] = settings[5] = speed
-        termios.tcsetattr(self._slave, termios.TCSANOW, settings)
+        termios.tcsetattr(self._terminal.slave, termios.TCSANOW, settings)
 
     def unplug(self) -> None:
-        if self.is_plugged_in:
-            os.close(self._master)
-            os.close(self._slave)
-            self._master = self._slave = -1
-            self.waiting = b""
-            self.link.unlink(missing_ok=True)
+        if self._terminal is not None:
+            self._terminal.close()
+            self._terminal, self.waiting = None, b""
 
     def step(self, now_s: float) -> None:
-        """Every line up to now, and what the adapter hands over by then."""
+        """Prints every line up to now, and delivers the adapter's buffer when it is due."""
         period_s = 1.0 / self.parameters.rate_hz
         if not self._started:
             self._started, self._due_s = True, now_s + period_s
@@ -101,38 +88,31 @@ class SerialTalker:
         line = self.line_at(at_s)
         if self._random.random() < self.parameters.drop_out_rate_hz / self.parameters.rate_hz:
             self._silent_until_s = at_s + self.parameters.drop_out_s
-        if self.is_plugged_in and at_s >= self._silent_until_s:
-            self.waiting += self._invalid(line)
+        if self._terminal is not None and at_s >= self._silent_until_s:
+            self.waiting += self._disturbed(line, self._terminal)
 
-    def _invalid(self, line: bytes) -> bytes:
+    def _disturbed(self, line: bytes, terminal: PseudoTerminal) -> bytes:
         if self._random.random() < self.parameters.garbled_fraction:
-            place = self._random.randrange(max(1, len(line) - 2))
-            line = line[:place] + bytes([self._random.randrange(128, 256)]) + line[place + 1 :]
-        opened_at = SPEEDS.get(termios.tcgetattr(self._slave)[5])
+            index = self._random.randrange(max(1, len(line) - 2))
+            line = line[:index] + bytes([self._random.randrange(128, 256)]) + line[index + 1 :]
+        opened_at = SPEEDS.get(termios.tcgetattr(terminal.slave)[5])
         return line if opened_at == self.parameters.baud else self._noise(len(line))
 
     def _noise(self, length: int) -> bytes:
-        """What a receiver makes of bits at another rate: any bytes, few of them ends of lines."""
+        """Returns what a receiver decodes at another rate: any bytes, few of them line ends."""
         return bytes(self._random.choice((0x00, 0x80, 0xE0, 0xF8, 0xFE, 0xFF, 0x9C, 0x66, 0x1E)) for _ in range(length))
 
     def deliver(self) -> None:
-        """And wait until it is there: a pseudo-terminal delivers a moment later."""
-        if not self.is_plugged_in or not self.waiting:
+        """Writes the buffer and waits until it can be read: a pseudo-terminal delivers a moment later."""
+        terminal = self._terminal
+        if terminal is None or not self.waiting:
             return
-        before, waiting, self.waiting = self._unread_bytes(), self.waiting, b""
-        try:
-            written = os.write(self._master, waiting)
-        except BlockingIOError:
-            written = 0
+        before, waiting, self.waiting = terminal.unread_bytes, self.waiting, b""
+        written = terminal.write(waiting)
         self.lost_lines += waiting[written:].count(b"\n")
         deadline_s = time.monotonic() + DELIVERED_S
-        while self.waits_for_delivery and self._unread_bytes() < before + written and time.monotonic() < deadline_s:
+        while self.waits_for_delivery and terminal.unread_bytes < before + written and time.monotonic() < deadline_s:
             time.sleep(0.00002)
 
-    def _unread_bytes(self) -> int:
-        (count,) = struct.unpack("i", fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4)))
-        return int(count)
-
     def close(self) -> None:
-        with suppress(OSError):
-            self.unplug()
+        self.unplug()

@@ -1,29 +1,23 @@
-"""A serial CAN adapter as python-can's slcan interface meets it: LAWICEL's ASCII protocol on a pseudo-terminal.
+"""A serial CAN adapter for python-can's slcan interface: LAWICEL's ASCII protocol on a pseudo-terminal.
 
-Commands and frames are lines that end with a carriage return; a good command is answered by one, a bad one by a bell.
-S0 to S8 choose the bit rate and O or L opens the channel, C closes it; t, T, r and R carry a frame in either direction
-(standard, extended, and their remote frames) and are answered by z or Z; V, N and F tell version, serial number and
-status. Source: LAWICEL CANUSB manual 1.0 and CAN232 manual v3. The other end is any CanPort, so a simulated robot is
-reached through the bytes of a real adapter; who owns it calls `step`.
+Commands and frames are lines that end with a carriage return; a valid command is answered by one, an invalid one by a
+bell. S0 to S8 choose the bit rate, O or L opens the channel, C closes it; t, T, r and R carry a frame in either
+direction (standard, extended, and their remote frames) and are answered by z or Z; V, N and F return version, serial
+number and status. Source: LAWICEL CANUSB manual 1.0 and CAN232 manual v3. The other end is any CanPort, so a simulated
+robot is reached through the bytes of a real adapter. The owner calls `step`.
 """
 
 from __future__ import annotations
 
-import fcntl
-import os
 import re
-import struct
-import termios
-import tty
-from contextlib import suppress
 
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
+from simulation.devices.pseudo_terminal import PseudoTerminal
 
 END, REFUSED = b"\r", b"\a"
 FRAME_LINE = re.compile(rb"([tr][0-7][0-9A-Fa-f]{2}|[TR][01][0-9A-Fa-f]{7})([0-8])((?:[0-9A-Fa-f]{2})*)")
 LONGEST_LINE_BYTES = 32
-MOST_BYTES = 65536
 ANSWERS = {b"V": b"V1013", b"N": b"NA123", b"F": b"F00"}
 
 
@@ -34,7 +28,7 @@ def encode_line(frame: Frame) -> bytes:
 
 
 def decode_line(line: bytes) -> Frame | None:
-    """None where it is no frame."""
+    """Returns None for a line that is not a frame."""
     match = FRAME_LINE.fullmatch(line)
     if match is None:
         return None
@@ -50,22 +44,19 @@ class SlcanAdapter:
 
     def __init__(self, port: CanPort) -> None:
         self._port = port
-        self._master, self._slave = os.openpty()
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.device = os.ttyname(self._slave)
+        self._terminal = PseudoTerminal()
+        self.device = self._terminal.device
         self.bit_rate = ""  # S0 to S8
         self.is_open = self._listens_only = False
         self.heard_lines = self.written_bytes = 0
         self.lost_lines = 0  # that found the computer's buffer full
-        self._begun = b""  # a line whose end has not come yet
+        self._partial_line = b""  # received without its end so far
 
     def step(self) -> None:
-        """Obey what the computer has written, then hand it what the bus has brought."""
-        with suppress(BlockingIOError):
-            self._begun += os.read(self._master, MOST_BYTES)
-        *lines, self._begun = self._begun.split(END)
-        self._begun = self._begun[-LONGEST_LINE_BYTES:]
+        """Executes the lines that the computer has written, then writes the frames of the bus to it."""
+        self._partial_line += self._terminal.read()
+        *lines, self._partial_line = self._partial_line.split(END)
+        self._partial_line = self._partial_line[-LONGEST_LINE_BYTES:]
         self.heard_lines += len(lines)
         for line in lines:
             self.write(self._answer(line))
@@ -74,11 +65,10 @@ class SlcanAdapter:
                 self.write(encode_line(frame))
 
     def write(self, line: bytes) -> None:
-        """To the computer."""
-        try:
-            self.written_bytes += os.write(self._master, line)
-        except BlockingIOError:
-            self.lost_lines += 1
+        """Writes a line to the computer."""
+        written = self._terminal.write(line)
+        self.written_bytes += written
+        self.lost_lines += written == 0
 
     def _answer(self, line: bytes) -> bytes:
         if line in ANSWERS:
@@ -86,7 +76,7 @@ class SlcanAdapter:
         frame = decode_line(line)
         if frame is not None:
             return self._pass(frame)
-        return END if line == b"" or self._obeys(line) else REFUSED
+        return END if line == b"" or self._executes(line) else REFUSED
 
     def _pass(self, frame: Frame) -> bytes:
         if not self.is_open or self._listens_only:
@@ -94,8 +84,8 @@ class SlcanAdapter:
         self._port.send(frame)
         return (b"Z" if frame.is_extended else b"z") + END
 
-    def _obeys(self, line: bytes) -> bool:
-        """S while closed, O and L once a bit rate is chosen, C while open."""
+    def _executes(self, line: bytes) -> bool:
+        """Accepts S while closed, O and L once a bit rate is chosen, and C while open."""
         if line == b"C":
             was_open, self.is_open = self.is_open, False
             return was_open
@@ -109,10 +99,8 @@ class SlcanAdapter:
 
     @property
     def unread_bytes(self) -> int:
-        """Of those written, which the computer may read; a pseudo-terminal delivers a moment later."""
-        (count,) = struct.unpack("i", fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4)))
-        return int(count)
+        """The number of written bytes that the computer can read; a pseudo-terminal delivers a moment later."""
+        return self._terminal.unread_bytes
 
     def unplug(self) -> None:
-        os.close(self._master)
-        os.close(self._slave)
+        self._terminal.close()

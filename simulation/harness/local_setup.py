@@ -1,8 +1,8 @@
 """A folder in which a simulated robot and a real daemon find each other on a machine without CAN.
 
 It holds the daemon's configuration, the two local buses, the status socket and the pose socket. The configuration is
-that of a robot: nothing in it says that the drives are simulated, only that the buses are local ones. Two processors
-that everything shares are less punctual than a robot's, so signals may be older before they count as lost.
+that of a robot: nothing in it says that the drives are simulated, only that the buses are local. On two processors that
+all processes share, signals arrive less punctually than on a robot, so their bounds are wider.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ viscous_nm_s = 0.002
 [friction.right_adduction]
 viscous_nm_s = 0.002
 
-# Where the simulated drives keep their watchdogs.
+# The endpoints of the watchdogs in the simulated drives.
 [[watchdog_endpoints]]
 firmware = "0.6.11"
 hardware = "0.0.0"
@@ -79,7 +79,7 @@ crawl_s = 0.5
 
 [log]
 directory = {logs}
-min_free_fraction = 0.0  # a full disk of a desk is no reason to free anybody's logs
+min_free_fraction = 0.0  # a full disk of a desktop computer deletes no logs
 
 [status]
 socket = {status}
@@ -93,19 +93,19 @@ allowed = true
 
 
 def named_folder(name: str) -> Path:
-    """The same for every process of this user: short, since the path of a Unix socket must be.
+    """Returns the same folder for every process of this user: short, as the path of a Unix socket must be.
 
-    Raises ValueError for a name that is not plain.
+    Raises ValueError for a name with a path in it.
     """
     if Path(name).name != name or name == "..":
-        raise ValueError(f"{name!r} is no plain name")
+        raise ValueError(f"{name!r} is not a plain name")
     folder = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"mudskipper-{os.geteuid()}" / name
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     return folder
 
 
 def write_local_setup(folder: Path, logs: Path) -> Path:
-    """Path of the configuration, for `mudskipperd --config` and for the simulated robot."""
+    """Returns the configuration's path, for `mudskipperd --config` and for the simulated robot."""
     for name in ("left", "right"):
         (folder / name).mkdir(mode=0o700, exist_ok=True)
     path = folder / "mudskipper.toml"
@@ -114,7 +114,7 @@ def write_local_setup(folder: Path, logs: Path) -> Path:
 
 
 def configuration_text(folder: Path, logs: Path) -> str:
-    """Paths as JSON strings, which are TOML strings too, whatever is in them."""
+    """Writes paths as JSON strings, which are TOML strings too."""
     paths = {
         "left": folder / "left",
         "right": folder / "right",

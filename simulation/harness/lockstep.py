@@ -1,6 +1,6 @@
-"""The simulated robot and the daemon's own loop in one process, in step: as fast as they compute, without a clock.
+"""The simulated robot and the daemon's own loop in one process, in step, as fast as they compute.
 
-Every tick the robot lives on until the tick's moment, then the loop runs exactly as in the daemon. All frames are
+In every tick the robot simulates until the tick's time, then the loop runs exactly as in the daemon. All frames are
 encoded and decoded.
 """
 
@@ -34,7 +34,7 @@ from simulation.mud.track import Track
 
 
 def drives_of(configuration: Configuration, **changes: Any) -> dict[str, SimulatedDriveParameters]:
-    """Simulated drives that fit a configuration's bus: ids, signs, zeros and torque constants."""
+    """Returns simulated drives with the configuration's ids, signs, zeros and torque constants."""
     return {
         joint: SimulatedDriveParameters(
             type=drive.type,
@@ -51,7 +51,7 @@ def drives_of(configuration: Configuration, **changes: Any) -> dict[str, Simulat
 def plant_of(
     configuration: Configuration, disturbances: Disturbances = NONE, fixed_base: bool = False, **changes: Any
 ) -> PlantParameters:
-    """Mechanics that fit a configuration, with changes by name: a free body's joints are as high as its flippers'."""
+    """Returns mechanics that fit a configuration, with changes by name."""
     fitting: dict[str, Any] = {
         "geometry": configuration.geometry,
         "arm_mass": configuration.arm,
@@ -63,10 +63,10 @@ def plant_of(
 
 
 class Lockstep:
-    """Owns the common time of robot and loop. Disturbances are of the mud and of the drives.
+    """Owns the common time of robot and loop. Disturbances concern the mud and the drives.
 
-    `plant` and `drives` are used as they are, in place of those that configuration, disturbances and base make.
-    `failures` make parts of the loop's side fail: begin them by `fail`.
+    `plant` and `drives` replace those made from configuration, disturbances and base. `failures` make parts of the
+    loop's side fail: `fail` starts them.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class Lockstep:
         self.loop.tick(Tick(self.now_s, missed * self.period_s, self.tick_number, missed))
 
     def fail(self, component: str, kind: str, for_s: float = USUAL_S) -> None:
-        """From the next tick on. Raises RuntimeError where it is refused."""
+        """Makes a component fail from the next tick on. Raises RuntimeError where it is refused."""
         refused = "no failures were given" if self._sound else self.failures.refusal(component, kind, for_s)
         if refused:
             raise RuntimeError(refused)
@@ -132,7 +132,7 @@ class Lockstep:
             self.step()
 
     def run_until(self, done: Callable[[], bool], longest_s: float) -> bool:
-        """Whether it came to that within `longest_s` of simulated time."""
+        """Returns whether `done` became true within `longest_s` of simulated time."""
         for _ in range(round(longest_s / self.period_s)):
             if done():
                 return True
@@ -140,14 +140,14 @@ class Lockstep:
         return done()
 
     def arm(self) -> None:
-        """From power-on to holding the pose. Raises RuntimeError with the reason where that fails."""
+        """Goes from power-on to holding the pose. Raises RuntimeError with the reason where that fails."""
         self.run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking(), 3.0)
         refused = self.loop.request(Request.ARM, self.now_s)
         if refused or not self.run_until(lambda: self.loop.mode is Mode.HOLD, 3.0):
             raise RuntimeError(refused or f"not armed: {self.loop.fault}")
 
     def walk(self, order: WalkOrder) -> None:
-        """Begin a walk. Raises RuntimeError where it is refused."""
+        """Starts a walk. Raises RuntimeError where it is refused."""
         refused = self.loop.request(Request.WALK, self.now_s, order)
         if refused:
             raise RuntimeError(refused)

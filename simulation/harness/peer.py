@@ -1,8 +1,8 @@
 """The simulated robot as a process of its own, in real time, on the buses that a configuration names.
 
-It reads of the configuration what a real robot's bench would fix: buses, node ids, signs, geometry, a fixed base. The
-body's place goes where its pose is to come from, at motion-capture rate. SIGUSR1 stands for the person who moves the
-flippers back by hand, where they came to lie at their mechanical stops, beyond the limits: no torque leads back there.
+It takes from the configuration what a real robot's bench fixes: buses, node ids, signs, geometry, a fixed base. It
+sends the body's position to the configured pose source, at motion capture's rate. SIGUSR1 stands for the operator who moves
+the flippers back by hand from their mechanical stops, beyond the limits: no torque returns from there.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from simulation.mud.clay import MUDS
 from simulation.mud.track import COMPARTMENT_M, Track
 
 STEP_S = 0.002  # the period of the drives' fastest messages
-WATCHDOG_S = 0.25  # of the simulated drives, on processors that everything shares
-LONGEST_CATCH_UP_S = 0.02  # a robot that was held up for longer has lost that time: commands waited meanwhile
+WATCHDOG_S = 0.25  # of the simulated drives, on processors that all processes share
+LONGEST_CATCH_UP_S = 0.02  # a robot that was delayed for longer skips that time: its commands waited meanwhile
 PRIORITY = 1  # of real time
 NICENESS = -10
 PR_SET_PDEATHSIG = 1
@@ -75,12 +75,12 @@ class Peer:
 
 
 def track_of(waters: Sequence[str], length_m: float = COMPARTMENT_M) -> Track:
-    """Compartments of the named water contents, one after the other."""
+    """Returns compartments of the named water contents, one after the other."""
     return Track([(length_m, MUDS[water]) for water in waters])
 
 
 def end_with_parent() -> None:
-    """Ask the kernel for SIGTERM when the starting process dies, so that no robot is left behind."""
+    """Asks the kernel for SIGTERM when the starting process dies, so that no robot is left over."""
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
@@ -103,9 +103,9 @@ def _world(options: argparse.Namespace, configuration: Configuration) -> World:
 
 
 def take_precedence() -> None:
-    """Where it is permitted: a real robot does not wait for its computer.
+    """Raises this process's priority where it is permitted: a real robot does not wait for its computer.
 
-    Not in real time on a lone processor: a simulation that cannot keep up would leave it to nobody else.
+    On a single processor it stays out of real time: a simulation that cannot keep up would block all other processes.
     """
     with suppress(PermissionError):
         if len(os.sched_getaffinity(0)) > 1:
@@ -126,7 +126,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(problem, file=sys.stderr)
         return 1
     except OSError as problem:
-        print(f"the body's place cannot be told from here: {problem.strerror or problem}", file=sys.stderr)
+        print(f"the pose source cannot be provided on this computer: {problem.strerror or problem}", file=sys.stderr)
         return 1
     signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.request_put_back())
     for number in (signal.SIGTERM, signal.SIGINT):

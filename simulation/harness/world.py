@@ -1,8 +1,8 @@
-"""Where a simulated robot walks: the ground, what disturbs it, and how robot and drives differ from the defaults.
+"""The world of a simulated robot: the ground, the disturbances, and how robot and drives differ from the defaults.
 
-A world is one TOML file, of which example_world.toml shows every section. Keys are the fields of the parts' own
-records, so what a part can be given is written there, with unit and bounds. Whatever the robot's configuration fixes
-(geometry, arm, wiring, a base that is fixed) is not in the world: the daemon knows that and does not know the world.
+A world is one TOML file; example_world.toml shows every section. Keys are the fields of the parts' own records, which
+define unit and bounds. The file leaves out what the robot's configuration fixes (geometry, arm, wiring, a fixed base),
+because the daemon knows these and does not know the world.
 """
 
 from __future__ import annotations
@@ -50,20 +50,20 @@ class World:
     warnings: tuple[str, ...] = ()  # about keys that the file gives under their former names
 
     def plant(self, configuration: Configuration) -> PlantParameters:
-        """Raises ConfigurationError where the ground frees a body whose base the configuration says is fixed."""
+        """Raises ConfigurationError where the world has a free body and the configuration a fixed base."""
         fixed_base = configuration.estimation.fixed_base
         if fixed_base and self.robot_changes.get("free_body"):
             raise ConfigurationError(["robot.free_body = true: the configuration says estimation.fixed_base = true"])
         return plant_of(configuration, self.disturbances, **({"fixed_base": fixed_base} | dict(self.robot_changes)))
 
-    def drives(self, configuration: Configuration, **otherwise: Any) -> dict[str, SimulatedDriveParameters]:
-        """`otherwise`: what is not as usual where neither disturbances nor the file say anything."""
-        return drives_of(configuration, **(otherwise | drive_changes(self.disturbances) | dict(self.drive_changes)))
+    def drives(self, configuration: Configuration, **defaults: Any) -> dict[str, SimulatedDriveParameters]:
+        """`defaults`: replace the usual values where neither disturbances nor the file set them."""
+        return drives_of(configuration, **(defaults | drive_changes(self.disturbances) | dict(self.drive_changes)))
 
 
 @dataclass(frozen=True)
 class SegmentText:
-    """One stretch of the way, with its water or its strength."""
+    """One stretch of the track, with its water content or its strength."""
 
     start_m: Annotated[float, Bounds(0.0, 1000.0)]
     end_m: Annotated[float, Bounds(0.0, 1000.0)]
@@ -73,7 +73,7 @@ class SegmentText:
 
     @property
     def clay(self) -> Clay:
-        """Named after its water, as everywhere, or else by its strength."""
+        """The clay, named after its water content or else by its strength."""
         if self.strength_pa is None:
             assert self.water_percent is not None
             return clay_of_water(self.water_percent)._replace(layers=tuple(self.layer))
@@ -104,12 +104,12 @@ FORMER_KEYS = {"drives.repeated_share": "repeated_fraction"}  # of version 0.1, 
 
 
 def load_world(path: Path) -> World:
-    """Raises ConfigurationError, also where the file cannot be read."""
+    """Reads a world file. Raises ConfigurationError, also where the file cannot be read."""
     return parse_world(read_text(path), path)
 
 
 def parse_world(text: str, file: Path | None = None) -> World:
-    """Raises ConfigurationError with all that is wrong."""
+    """Reads a world. Raises ConfigurationError with all problems at once."""
     document = parse_document(text, file)
     warnings = tuple(rename_former_keys(document, FORMER_KEYS))
     problems = _READER.problems(document) + list(_contradictions(document))
@@ -119,26 +119,26 @@ def parse_world(text: str, file: Path | None = None) -> World:
 
 
 def _contradictions(document: Mapping[str, Any]) -> Iterator[str]:
-    """What no field shows alone. The document may be wrong in other ways: what is no number contradicts nothing."""
+    """Yields contradictions between fields. A value that is not a number contradicts nothing."""
     segments = _tables(document, "segment")
     if document.get("segment") == []:
         yield "segment = []: must be at least one"
     yield from _border_problems(segments)
-    for place, segment in enumerate(segments, 1):
-        yield from _mud_problems(f"segment {place}", segment)
-        yield from _layer_problems(f"segment {place}", segment)
+    for number, segment in enumerate(segments, 1):
+        yield from _mud_problems(f"segment {number}", segment)
+        yield from _layer_problems(f"segment {number}", segment)
     yield from _stone_problems(document)
     yield from _drive_problems(document)
 
 
 def _tables(table: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
-    """Of an array; what is no table counts as an empty one, so that the places stay."""
+    """Returns the tables of an array; any other item counts as an empty table, so that the numbering stays."""
     array = table.get(key)
     return [item if isinstance(item, dict) else {} for item in array] if isinstance(array, list) else []
 
 
 def _number(table: Mapping[str, Any], key: str) -> float:
-    """NaN, with which no comparison is true, where there is none."""
+    """Returns NaN, with which no comparison is true, where there is no number."""
     value = table.get(key)
     try:
         return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else nan
@@ -148,40 +148,40 @@ def _number(table: Mapping[str, Any], key: str) -> float:
 
 def _border_problems(segments: list[dict[str, Any]]) -> Iterator[str]:
     expected_m, where = 0.0, "where the track begins"
-    for place, segment in enumerate(segments, 1):
+    for number, segment in enumerate(segments, 1):
         start_m, end_m = _number(segment, "start_m"), _number(segment, "end_m")
         if abs(start_m - expected_m) > SAME_POSITION_M:
             wrong = "overlap" if start_m < expected_m else "gap"
-            yield f"segment {place}.start_m = {start_m:g}: must be {expected_m:g}, {where}, without {wrong}"
+            yield f"segment {number}.start_m = {start_m:g}: must be {expected_m:g}, {where}, without {wrong}"
         if end_m <= start_m:
-            yield f"segment {place}.end_m = {end_m:g}: must be more than start_m = {start_m:g}"
-        expected_m, where = end_m, f"where segment {place} ends"
+            yield f"segment {number}.end_m = {end_m:g}: must be more than start_m = {start_m:g}"
+        expected_m, where = end_m, f"where segment {number} ends"
 
 
 def _mud_problems(key: str, segment: dict[str, Any]) -> Iterator[str]:
     if "water_percent" in segment and "strength_pa" in segment:
         yield (
-            f"{key}.water_percent = {shown(segment['water_percent'])}: must not stand beside"
-            f" strength_pa = {shown(segment['strength_pa'])}; one of them is enough"
+            f"{key}.water_percent = {shown(segment['water_percent'])}: cannot be combined with"
+            f" strength_pa = {shown(segment['strength_pa'])}; remove one of them"
         )
     if "water_percent" not in segment and "strength_pa" not in segment:
         yield f"{key}: water_percent or strength_pa is missing"
 
 
 def _layer_problems(key: str, segment: dict[str, Any]) -> Iterator[str]:
-    strength_pa, free_m = _strength_pa(segment), 0.0
-    for place, layer in enumerate(_tables(segment, "layer"), 1):
+    strength_pa, last_m = _strength_pa(segment), 0.0
+    for number, layer in enumerate(_tables(segment, "layer"), 1):
         top_m, bottom_m, factor = (_number(layer, name) for name in ("top_m", "bottom_m", "factor"))
-        if top_m < free_m:
-            yield f"{key}.layer {place}.top_m = {top_m:g}: must be at least {free_m:g}, where layer {place - 1} ends"
+        if top_m < last_m:
+            yield f"{key}.layer {number}.top_m = {top_m:g}: must be at least {last_m:g}, where layer {number - 1} ends"
         if bottom_m <= top_m:
-            yield f"{key}.layer {place}.bottom_m = {bottom_m:g}: must be more than top_m = {top_m:g}"
+            yield f"{key}.layer {number}.bottom_m = {bottom_m:g}: must be more than top_m = {top_m:g}"
         if factor * strength_pa > STRONGEST_PA:
             yield (
-                f"{key}.layer {place}.factor = {factor:g}: must be at most {STRONGEST_PA / strength_pa:.3g}"
+                f"{key}.layer {number}.factor = {factor:g}: must be at most {STRONGEST_PA / strength_pa:.3g}"
                 f" in mud of {strength_pa:.0f} Pa"
             )
-        free_m = bottom_m
+        last_m = bottom_m
 
 
 def _strength_pa(segment: dict[str, Any]) -> float:
@@ -194,25 +194,25 @@ def _strength_pa(segment: dict[str, Any]) -> float:
 def _stone_problems(document: Mapping[str, Any]) -> Iterator[str]:
     ridges = document.get("ridges")
     amplitude_m = _number(ridges, "amplitude_m") if isinstance(ridges, dict) else 0.0
-    free_m = -1.0
-    for place, stone in enumerate(_tables(document, "stone"), 1):
+    last_m = -1.0
+    for number, stone in enumerate(_tables(document, "stone"), 1):
         start_m, end_m, top_m = (_number(stone, name) for name in ("start_m", "end_m", "top_m"))
-        if start_m <= free_m:
-            yield f"stone {place}.start_m = {start_m:g}: must be more than {free_m:g}, where stone {place - 1} ends"
+        if start_m <= last_m:
+            yield f"stone {number}.start_m = {start_m:g}: must be more than {last_m:g}, where stone {number - 1} ends"
         if end_m <= start_m:
-            yield f"stone {place}.end_m = {end_m:g}: must be more than start_m = {start_m:g}"
+            yield f"stone {number}.end_m = {end_m:g}: must be more than start_m = {start_m:g}"
         if 0.0 <= top_m < amplitude_m:
-            yield f"stone {place}.top_m = {top_m:g}: must be at least {amplitude_m:g}, ridges.amplitude_m"
-        free_m = end_m
+            yield f"stone {number}.top_m = {top_m:g}: must be at least {amplitude_m:g}, ridges.amplitude_m"
+        last_m = end_m
 
 
 def _drive_problems(document: Mapping[str, Any]) -> Iterator[str]:
-    """Some disturbances set fields of the drives, which can have one value only."""
+    """Yields the fields of the drives that a disturbance sets too."""
     disturbances, drives = document.get("disturbances"), document.get("drives")
     if not isinstance(disturbances, dict) or not isinstance(drives, dict):
         return
     for source, names in DRIVE_FIELDS.items():
         if _number(disturbances, source) > 0.0:
             for name in drives.keys() & set(names):
-                reported = f"disturbances.{source} = {disturbances[source]}"
-                yield f"drives.{name} = {shown(drives[name])}: must not stand beside {reported}"
+                conflicting = f"disturbances.{source} = {disturbances[source]}"
+                yield f"drives.{name} = {shown(drives[name])}: cannot be combined with {conflicting}"

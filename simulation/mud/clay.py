@@ -1,27 +1,27 @@
-"""Undrained clay: the stresses at which one mud gives way, from one strength.
+"""Undrained clay: the stresses at which a mud yields, from one strength.
 
-With the undrained strength s_u, a body of width b gives way at the depth ζ under
+With the undrained strength s_u, a body of width b yields at the depth ζ under
 
     pressure across it    N_p s_u, N_p = min(3 + γ ζ/s_u + J ζ/b, 9)    Matlock (1970): γ = 17.5 kN/m³, J = 0.5
-    rubbing along it      a s_u, a = 0.25                               adhesion
-    bearing beneath it    N_c s_u, N_c = 5.14                           Prandtl's strip at the surface
-    suction beneath it    9 s_u                                         fading in the last centimetre
+    shear along it        a s_u, a = 0.25                               adhesion
+    bearing under it      N_c s_u, N_c = 5.14                           Prandtl's strip at the surface
+    suction under it      9 s_u                                         fading in the last centimetre
 
-each times g(v) = (1 + c v^0.4) / (1 + c 0.1^0.4), which is 1 at 0.1 m/s. plate_contact.py takes the sum of them over a
-plate. (Deep strips bear up to 9; with that the stiffest mud below could not be entered to 5 cm by the torque there is,
-as the robot of Table I did.) None of this is the k-law that the estimator assumes.
+each times g(v) = (1 + c v^0.4) / (1 + c 0.1^0.4), which is 1 at 0.1 m/s. plate_contact.py sums them over a plate.
+(Deep strips withstand up to 9; with that, the available torque could not insert the plate 5 cm into the stiffest mud
+below, as the robot of Table I did.) None of this is the k-law that the estimator assumes.
 
-c = 0.4: a plate that stops keeps 86 % of its load, where the authors' logs keep 85 to 90 %, and ten times the speed is
-a tenth more strength, as clay practice has it. (So a held insertion in the simulated 48.5 % mud keeps 84 % after 3 s,
-and reaches 2.7 N at 3 cm; the logs of the mud that they call 12.5N have 2.5 to 2.8 N.)
+c = 0.4: a plate that stops keeps 86 % of its load, where the authors' logs keep 85 to 90 %, and ten times the speed
+adds a tenth to the strength, as in clay practice. (So a held insertion in the simulated 48.5 % mud keeps 84 % after
+3 s, and reaches 2.7 N at 3 cm; the authors' logs of the mud that they call 12.5N show 2.5 to 2.8 N.)
 
 The three strengths are fitted to the six fixed-depth speeds of the paper's Table I, together with the damping of the
-body's rail, by experiments/trackway/mud_fit.py, which anyone can run again; the adaptive speeds are not used. Four
-numbers for six show that such mud suffices, not that it is the only one: 45.3 % comes out hardly firmer than 48.5 %,
-which the water would not suggest, since a motor that just fails at 5 cm tells no more.
+body's rail, by experiments/trackway/mud_fit.py; the adaptive speeds are not used. Four numbers for six show that such
+a mud suffices, not that it is the only one. 45.3 % comes out hardly firmer than 48.5 %, which its water content would
+not suggest: a motor that just fails at 5 cm gives only a lower bound.
 
-A mud may have layers, crusts or weak ones, in which s_u is another at another depth: the laws then hold with the
-strength where the piece of the body is, and the weight of what lies above it stays the same.
+A mud may have layers, crusts or weak ones, in which s_u differs: the laws then apply with the strength at the piece's
+own depth, and the weight of the mud above it stays the same.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Clay(NamedTuple):
     layers: tuple[Layer, ...] = ()
 
     def lateral_n(self, depth_m: float, width_m: float) -> float:
-        """Yield force sideways on an upright plate at the reference speed."""
+        """Returns the sideways yield force on an upright plate at the reference speed."""
         if not self.layers:
             return _lateral_n(self.strength_pa, depth_m, width_m)
         borders_m = {border_m for layer in self.layers for border_m in (layer.top_m, layer.bottom_m)}
@@ -71,7 +71,7 @@ class Clay(NamedTuple):
         return force_n
 
     def scaled(self, factor: float) -> Clay:
-        """The same mud, stronger or weaker in all its layers."""
+        """Returns the same mud, stronger or weaker in all its layers."""
         return Clay(self.name, factor * self.strength_pa, self.layers)
 
     def strength_at_pa(self, depth_m: float) -> float:
@@ -81,7 +81,7 @@ class Clay(NamedTuple):
         return self.strength_pa
 
     def mean_strength_pa(self, from_m: float, to_m: float) -> float:
-        """Between two depths."""
+        """Returns the mean strength between two depths."""
         fraction = 1.0
         for layer in self.layers:
             top_m = layer.top_m if layer.top_m > from_m else from_m
@@ -92,7 +92,7 @@ class Clay(NamedTuple):
 
 
 def _lateral_n(strength_pa: float, depth_m: float, width_m: float) -> float:
-    """Of mud that is equally strong from the surface to `depth_m`: the integral of Matlock's law."""
+    """Integrates Matlock's law over uniform mud from the surface to `depth_m`."""
     rise_per_m = lateral_rise_per_m(strength_pa, width_m)
     shallow_m = min(depth_m, (DEEP_FACTOR - SURFACE_FACTOR) / rise_per_m)
     factor_m = SURFACE_FACTOR * shallow_m + rise_per_m * shallow_m * shallow_m / 2.0
@@ -101,12 +101,12 @@ def _lateral_n(strength_pa: float, depth_m: float, width_m: float) -> float:
 
 
 def lateral_rise_per_m(strength_pa: float, width_m: float) -> float:
-    """How fast pressure over strength rises with depth, from 3 at the surface up to 9."""
+    """Returns the rise of pressure over strength with depth, which is 3 at the surface and at most 9."""
     return UNIT_WEIGHT_N_M3 / strength_pa + MATLOCK_J / width_m
 
 
 def rate_factor(speed_m_s: float) -> float:
-    """g(v): faster is stronger."""
+    """Returns g(v): faster is stronger."""
     return float((1.0 + RATE_COEFFICIENT * speed_m_s**RATE_EXPONENT) / _AT_REFERENCE)
 
 
@@ -118,9 +118,9 @@ DRIEST_PERCENT, WETTEST_PERCENT = 44.0, 56.0
 
 
 def clay_of_water(percent: float) -> Clay:
-    """Strength falls exponentially with water, between the three muds and beyond the outer ones as between the nearest.
+    """Interpolates the strengths of the three muds exponentially, and extrapolates them with the nearest slope.
 
-    Raises ValueError outside of the range for which they say anything.
+    Raises ValueError outside of the range that they support.
     """
     if not DRIEST_PERCENT <= percent <= WETTEST_PERCENT:
         raise ValueError(f"{percent:g} % of water: must be {DRIEST_PERCENT:g} to {WETTEST_PERCENT:g}")

@@ -1,22 +1,22 @@
-"""What the authors' logs show beyond a clay that forgets: layers to be switched on one by one, each off at 0.
+"""Disturbances that the authors' logs show and a clay without memory lacks, each switched off by 0.
 
-Measured in their raw logs (the reference's section 1.6), where not said otherwise:
+Measured in the authors' raw logs, where not stated otherwise:
 
-    clinging     the adduction motor carries 0.4 to 1 N more in swing from the first extraction on: mud that comes
-                 along. Each extraction leaves another amount, here evenly drawn within 40 % of the mean; the weight
-                 hangs in the middle of the plate's wet part, 15 mm above the edge. It has no inertia here.
-    remoulding   a stroke in the same place as n earlier ones finds 0.5 + 0.5 exp(-0.4 n) of the strength (a law of
+    clinging     the adduction motor carries 0.4 to 1 N more in swing from the first extraction on: mud sticks to the
+                 plate. Each extraction leaves another amount, here drawn uniformly within 40 % of the mean. Its weight
+                 acts in the middle of the plate's wet part, 15 mm above the edge. It has no inertia here.
+    remoulding   a stroke at the same position as n earlier ones finds 0.5 + 0.5 exp(-0.4 n) of the strength (a law of
                  the Einav-Randolph kind; the logs have 15 to 20 % a stroke and a half of the slope after five)
-    relaxation   10 to 15 % of the load are lost in a hold of 3 s after insertion, most of it in half a second
-    surface      a new height for every stride of a flipper, normally distributed; not measured
+    relaxation   a hold of 3 s after insertion loses 10 to 15 % of the load, most of it in half a second
+    surface      a new, normally distributed height for every stride of a flipper; not measured
     drives       current noise of 0.1 to 0.3 A; 50 to 210 distinct states a second; a clip of the current
 
-Seldom messages disturb more than an estimator here, where the joints' loop is closed over the bus: with the default
-gains it rings from 5 ms on and swings by itself from 7 ms on. LAB therefore leaves the period to the drives; whoever
-wants an estimator to meet repeated samples repeats them behind the loop.
+Infrequent messages disturb more than the estimator here, where the joints' loop is closed over the bus: with the
+default gains it rings from a period of 5 ms on and oscillates by itself from 7 ms on. LAB therefore leaves the period
+to the drives. A test that wants repeated samples in the estimator alone repeats them behind the loop.
 
-A stroke is a stay in the mud that reached 5 mm; when the plate has left, amounts are drawn for the next one. Draws do
-not depend on which layers are on.
+A stroke is a stay in the mud that reached 5 mm. When the plate has left the mud, new amounts are drawn for the next
+stroke. The draws do not depend on which disturbances are on.
 """
 
 from __future__ import annotations
@@ -41,16 +41,16 @@ REMOULDING_RATE = 0.4  # per stroke
 class Disturbances:
     clinging_n: Annotated[float, Bounds(0.0, 10.0)] = 0.0  # mean weight of the mud on one plate
     remoulding: Annotated[float, Bounds(0.0, 1.0)] = 0.0  # 1: as above
-    relaxation: Annotated[float, Bounds(0.0, 0.9)] = 0.0  # share of the load
+    relaxation: Annotated[float, Bounds(0.0, 0.9)] = 0.0  # fraction of the load
     surface_sd_m: Annotated[float, Bounds(0.0, 0.01)] = 0.0
     current_noise_a: Annotated[float, Bounds(0.0, 10.0)] = 0.0  # 0: the drive's own
-    sample_period_s: Annotated[float, Bounds(0.0, 1.0)] = 0.0  # of position, and of current; 0: the drive's own
+    sample_period_s: Annotated[float, Bounds(0.0, 1.0)] = 0.0  # of angle, and of current; 0: the drive's own
     current_limit_a: Annotated[float, Bounds(0.0, 200.0)] = 0.0  # of the motor, whatever the bus allows; 0: none
 
     def __post_init__(self) -> None:
-        """Raises ValueError for what cannot be."""
+        """Raises ValueError for an amount out of its range."""
         if not all(getattr(self, field.name) >= 0.0 for field in fields(self)):
-            raise ValueError(f"{self}: nothing may be negative or no number")
+            raise ValueError(f"{self}: every amount must be a number of at least 0")
         if self.remoulding > 1.0 or self.relaxation >= 1.0:
             raise ValueError(f"{self}: remoulding is at most 1, relaxation less than 1")
 
@@ -67,7 +67,7 @@ LAB = Disturbances(
 )
 
 
-# Of the drives' parameters, those that a disturbance sets.
+# The drives' parameters that each disturbance sets.
 DRIVE_FIELDS = {
     "current_noise_a": ("current_noise_a",),
     "sample_period_s": ("encoder_period_s", "current_period_s"),
@@ -76,7 +76,7 @@ DRIVE_FIELDS = {
 
 
 def drive_changes(disturbances: Disturbances) -> dict[str, float]:
-    """The drives' parameters that differ from their own."""
+    """Returns the drives' parameters that differ from their own."""
     changes = {name: getattr(disturbances, source) for source, names in DRIVE_FIELDS.items() for name in names}
     return {name: value for name, value in changes.items() if value}
 
@@ -84,14 +84,14 @@ def drive_changes(disturbances: Disturbances) -> dict[str, float]:
 def clinging_torques_nm(
     geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, weight_n: float
 ) -> tuple[float, float]:
-    """What a weight on the plate does to (sweep, adduction): -W ∂z/∂q of z = l cos α sin β + (s - h) cos β."""
+    """Returns the torque -W ∂z/∂q of a weight on (sweep, adduction), with z = l cos α sin β + (s - h) cos β."""
     length_m, below_arm_m = geometry.flipper_length_m, geometry.drop_m - CLINGING_ABOVE_EDGE_M
     lever_m = length_m * cos(sweep_rad) * cos(adduction_rad) + below_arm_m * sin(adduction_rad)
     return weight_n * length_m * sin(sweep_rad) * sin(adduction_rad), -weight_n * lever_m
 
 
 class StrokeHistory:
-    """Owns what earlier strokes of one flipper left behind, and the height at which it meets the mud."""
+    """Owns the effects of one flipper's earlier strokes, and the height at which it meets the mud."""
 
     def __init__(self, disturbances: Disturbances, seed: int) -> None:
         self.disturbances = disturbances
@@ -101,14 +101,14 @@ class StrokeHistory:
     def reset(self) -> None:
         self._random = Random(self._seed)
         self.clinging_n = 0.0
-        self.firmness = 1.0  # what is left of the strength in the place of the stroke under way
+        self.firmness = 1.0  # the remaining fraction of the strength at the position of the current stroke
         self.surface_m = self._next_surface_m = self._draw_surface_m()
-        self._worked_m: list[float] = []  # places along the track
+        self._worked_m: list[float] = []  # positions along the track
         self._in_mud = False
         self._entered_m = self._deepest_m = 0.0
 
     def step(self, lowest_m: float, position_m: float) -> None:
-        """`lowest_m`: depth of the plate's lowest point below the track's own surface; `place_m` along the track."""
+        """`lowest_m`: depth of the plate's lowest point below the track's own surface; `position_m` along the track."""
         submerged_m = lowest_m - self.surface_m
         if submerged_m > 0.0:
             if not self._in_mud:
@@ -136,5 +136,5 @@ class StrokeHistory:
         self._next_surface_m = self._draw_surface_m()
 
     def _draw_surface_m(self) -> float:
-        """Below the nominal height."""
+        """Draws how far the surface lies below the nominal height."""
         return self._random.gauss(0.0, self.disturbances.surface_sd_m)

@@ -1,18 +1,17 @@
 """Buried stones: blocks with a level top and upright flanks across the track, harder than any plate can press.
 
-A plate meets a stone with its lower edge. Of the ways out of it, upward through the top, forward or backward through
-a flank, the shortest at the first touch says which face it came against, and that face pushes back
+A plate meets a stone with its lower edge. The nearest face at the first touch, the top or a flank, is the face that the
+plate came against, and that face pushes back
 
-    F = max(K δ + C δ', 0)        δ: how far the edge is behind the face
+    F = max(K δ + C δ', 0)        δ: how far the edge has penetrated the face
 
 as a spring with a damper that can push and not pull, until the edge is out of the stone. Faces are smooth, so the
-plate slides along them. The top meets the edge's lower corner, a flank the middle of the edge; the mud around the
-stone acts on the plate as everywhere. Nothing is under the body: stones lie in the flippers' ways, and the drag pad
-passes between them.
+plate slides along them. The top touches the edge's lower corner, a flank the middle of the edge; the mud around the
+stone acts on the plate as everywhere. Stones lie in the paths of the flippers only: body and drag pad pass between.
 
-K is as stiff as the simulation's step allows with room to spare: an arm of 0.03 kg at its plate swings at 800 rad/s
-on it, where semi-implicit Euler ends at 2000 rad/s with a step of 1 ms. 14 N, more than both limits of the authors'
-drives, press the edge 0.7 mm into it. With C an arm in air comes back from its top with six tenths of its speed.
+K is as stiff as the simulation's step allows with a margin: an arm of 0.03 kg at its plate swings at 800 rad/s on it,
+where semi-implicit Euler ends at 2000 rad/s with a step of 1 ms. 14 N, more than both limits of the authors' drives,
+press the edge 0.7 mm into it. With C an arm in air rebounds from the top at six tenths of its speed.
 """
 
 from __future__ import annotations
@@ -43,21 +42,21 @@ class Stone:
     end_m: Annotated[float, Bounds(0.0, 1000.0)]
     top_m: Annotated[float, Bounds(0.0, 1.0)]  # below the mud's nominal height
 
-    def holds(self, position_m: float, depth_m: float) -> bool:
+    def contains(self, position_m: float, depth_m: float) -> bool:
         return depth_m > self.top_m and self.start_m < position_m < self.end_m
 
-    def behind_m(self, face: Face, position_m: float, depth_m: float) -> float:
-        """How far a point in the stone is behind one of its faces."""
+    def penetration_m(self, face: Face, position_m: float, depth_m: float) -> float:
+        """Returns how far a point in the stone has penetrated one of its faces."""
         if face is Face.TOP:
             return depth_m - self.top_m
         return position_m - self.start_m if face is Face.REAR else self.end_m - position_m
 
     def nearest_face(self, position_m: float, depth_m: float) -> Face:
-        return min(Face, key=lambda face: self.behind_m(face, position_m, depth_m))
+        return min(Face, key=lambda face: self.penetration_m(face, position_m, depth_m))
 
 
 class Push(NamedTuple):
-    """Of a stone on a plate's lower edge."""
+    """The force of a stone on a plate's lower edge."""
 
     forward_n: float
     upward_n: float
@@ -67,7 +66,7 @@ NO_PUSH = Push(0.0, 0.0)
 
 
 def push_wrench(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, push: Push) -> Wrench:
-    """Forward F_x on the middle of the lower edge and upward F_z on its lower corner, along the plate's directions:
+    """Resolves F_x forward on the middle of the lower edge and F_z upward on its lower corner along the plate:
 
     F_n = F_x cos α - F_z sin α sin β    F_r = F_x sin α + F_z cos α sin β    F_s = F_z cos β
     """
@@ -84,7 +83,7 @@ def push_wrench(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: floa
 
 
 class StoneContact:
-    """Owns which face of which stone one plate is pressed against, and how far."""
+    """Owns the face of the stone that one plate presses against, and how far."""
 
     def __init__(self, stones: Sequence[Stone]) -> None:
         self.stones = tuple(stones)
@@ -92,25 +91,25 @@ class StoneContact:
 
     def reset(self) -> None:
         self._touched: tuple[Stone, Face] | None = None
-        self._behind_m = 0.0
+        self._penetration_m = 0.0
 
     def step(self, dt_s: float, position_m: float, depth_m: float) -> Push:
-        """`place_m` along the track and `depth_m` below the nominal height, both of the edge."""
-        if self._touched is None or not self._touched[0].holds(position_m, depth_m):
-            self._look(position_m, depth_m)
+        """`position_m` of the edge along the track and `depth_m` below the nominal height."""
+        if self._touched is None or not self._touched[0].contains(position_m, depth_m):
+            self._find_stone(position_m, depth_m)
         if self._touched is None:
             return NO_PUSH
         stone, face = self._touched
-        before_m, self._behind_m = self._behind_m, stone.behind_m(face, position_m, depth_m)
-        speed_m_s = (self._behind_m - before_m) / dt_s
-        force_n = max(STIFFNESS_N_M * self._behind_m + DAMPING_N_S_M * speed_m_s, 0.0)
+        before_m, self._penetration_m = self._penetration_m, stone.penetration_m(face, position_m, depth_m)
+        speed_m_s = (self._penetration_m - before_m) / dt_s
+        force_n = max(STIFFNESS_N_M * self._penetration_m + DAMPING_N_S_M * speed_m_s, 0.0)
         if face is Face.TOP:
             return Push(0.0, force_n)
         return Push(-force_n if face is Face.REAR else force_n, 0.0)
 
-    def _look(self, position_m: float, depth_m: float) -> None:
-        """Whether the edge is in a stone, and through which face it came."""
+    def _find_stone(self, position_m: float, depth_m: float) -> None:
+        """Finds the stone that contains the edge, and the face through which it came."""
         self.reset()
         for stone in self.stones:
-            if stone.holds(position_m, depth_m):
+            if stone.contains(position_m, depth_m):
                 self._touched = (stone, stone.nearest_face(position_m, depth_m))

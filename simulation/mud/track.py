@@ -1,12 +1,12 @@
-"""The ground along the way: segments of mud, the last of which goes on for ever, and what makes it uneven.
+"""The ground along the track: segments of mud, the last of which has no end, and their unevenness.
 
-    ridges             the surface stands A sin(2 π x / λ) above its nominal height
+    ridges             the surface is A sin(2 π x / λ) above its nominal height
     random strength    log-normal about each segment's own, with the standard deviation `relative_spread` times the
                        mean, and a correlation that falls to 1/e over `correlation_length_m`: a chain of cells a tenth
                        of that long, each drawn from the one before it (a first-order autoregression of its logarithm)
-    stones             buried blocks: what they do to a plate is in stones.py
+    stones             buried blocks: stones.py models their forces on a plate
 
-Each is off by default. Draws depend on nothing but their own seed, so a place is the same in every run.
+Each is off by default. Draws depend on their own seed only, so the ground is the same in every run.
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ class StrengthChain:
     def factor_at(self, x_m: float) -> float:
         cell = max(0, int(x_m / self.cell_m))
         while len(self._factors) <= cell:
-            kept = exp(-1.0 / CELLS_PER_LENGTH)
-            self._deviation = kept * self._deviation + sqrt(1.0 - kept * kept) * self._random.gauss()
+            memory = exp(-1.0 / CELLS_PER_LENGTH)
+            self._deviation = memory * self._deviation + sqrt(1.0 - memory * memory) * self._random.gauss()
             self._factors.append(self._factor())
         return self._factors[cell]
 
@@ -109,12 +109,12 @@ class Track:
         return clay.scaled(self._chain.factor_at(x_m)) if self._chain else clay
 
     def surface_m(self, x_m: float) -> float:
-        """How far the ridges put the mud's surface below its nominal height."""
+        """Returns how far the mud's surface lies below its nominal height because of the ridges."""
         if not self.ridges.amplitude_m:
             return 0.0
         return -self.ridges.amplitude_m * sin(2.0 * pi * x_m / self.ridges.wavelength_m)
 
 
 def paper_track() -> Track:
-    """Section II-F: w = 48.5, 53.1 and 45.3 %."""
+    """Makes the track of section II-F: w = 48.5, 53.1 and 45.3 %."""
     return Track([(COMPARTMENT_M, clay) for clay in MUDS.values()])

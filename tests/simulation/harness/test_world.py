@@ -129,7 +129,7 @@ def test_a_mud_by_its_water_is_the_paper_s() -> None:
         ("stone = 3\n", "stone = 3: must be tables, each under [[stone]]"),
         (
             "[disturbances]\nsample_period_s = 0.004\n[drives]\nencoder_period_s = 0.002\n",
-            "drives.encoder_period_s = 0.002: must not stand beside disturbances.sample_period_s = 0.004",
+            "drives.encoder_period_s = 0.002: cannot be combined with disturbances.sample_period_s = 0.004",
         ),
         (SECOND.replace("48.5", "60"), "segment 2.water_percent = 60: must be at most 56.0"),
         (SECOND.replace("48.5", "43.9"), "segment 2.water_percent = 43.9: must be at least 44.0"),
@@ -140,7 +140,7 @@ def test_a_mud_by_its_water_is_the_paper_s() -> None:
         (SECOND.replace("48.5", "'wet'"), "segment 2.water_percent = 'wet': should be a valid number"),
         (
             SECOND + "strength_pa = 900",
-            "segment 2.water_percent = 48.5: must not stand beside strength_pa = 900; one of them is enough",
+            "segment 2.water_percent = 48.5: cannot be combined with strength_pa = 900; remove one of them",
         ),
         (SECOND.replace("water_percent = 48.5", ""), "segment 2: water_percent or strength_pa is missing"),
         (SECOND.replace("0.5", "0.4"), "segment 2.start_m = 0.4: must be 0.5, where segment 1 ends, without overlap"),
