@@ -1,8 +1,8 @@
 """The simulated robot as a process of its own, in real time, on the buses that a configuration names.
 
 It takes from the configuration what a real robot's bench fixes: buses, node ids, signs, geometry, a fixed base. It
-sends the body's position to the configured pose source, at motion capture's rate. SIGUSR1 stands for the operator who moves
-the flippers back by hand from their mechanical stops, beyond the limits: no torque returns from there.
+sends the body's position to the configured pose source, at motion capture's rate. SIGUSR1 stands for the operator who
+moves the flippers back by hand from their mechanical stops, beyond the limits: no torque returns from there.
 """
 
 from __future__ import annotations
