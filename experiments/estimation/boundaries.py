@@ -1,15 +1,17 @@
-"""How soon the robot knows that it is in another mud: walks across borders that it is not told of.
+"""How soon the robot notices another mud: walks over borders between muds that the robot does not know.
 
-A crossing begins with the first stride of a flipper whose insertion was in the next mud. It is followed once what
-that flipper believes of k_p is within FOLLOWED of the truth there; strides are counted with that one.
+A transition begins with the first stride of a flipper whose insertion is in the next mud. The estimate has followed
+once the flipper's current k_p is within FOLLOWED of the truth in that mud; the strides up to then are counted.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from control.mud_estimate import MudEstimate
 from control.records import FLIPPERS
 from experiments.trials.load_cell_truth import LoadCellTruth
 from experiments.trials.trial import Trial, mud_estimates
@@ -18,51 +20,66 @@ from simulation.body.reference_sensor import StrideTruth
 FOLLOWED = 0.2  # of the truth: half of the smallest step between the muds
 
 
-class CrossCoupling(NamedTuple):
+class Transition(NamedTuple):
+    """One flipper's step from one mud into the next."""
+
     before: str
     after: str
     flipper: str
-    strides: int | None  # until it was followed; None where it was not before the next border or the end
+    strides: int | None  # until the estimate followed; None where it did not before the next border or the end
 
 
-def crossings_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]) -> list[CrossCoupling]:
-    beliefs = mud_estimates(trial, trial.configuration.estimation)
-    return [cross_coupling for flipper in FLIPPERS for cross_coupling in _of_flipper(flipper, trial, truths, beliefs)]
+@dataclass(frozen=True)
+class BoundaryRow:
+    """All transitions between two muds."""
+
+    before: str = field(metadata={"key": "from"})
+    after: str = field(metadata={"key": "to"})
+    transitions: int = field(metadata={"key": "crossings"})
+    within_two: float  # fraction of the transitions that the estimate followed within two strides
+    most_strides: int | str
 
 
-def _of_flipper(
-    flipper: str, trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth], beliefs: Mapping[int, Any]
-) -> list[CrossCoupling]:
-    strides = [truth for truth in trial.truths if truth.flipper == flipper and truth.index in beliefs]
+def transitions_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]) -> list[Transition]:
+    estimates = mud_estimates(trial, trial.configuration.estimation)
+    return [each for flipper in FLIPPERS for each in _transitions(flipper, trial, truths, estimates)]
+
+
+def _transitions(
+    flipper: str, trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth], estimates: Mapping[int, MudEstimate]
+) -> list[Transition]:
+    strides = [truth for truth in trial.truths if truth.flipper == flipper and truth.index in estimates]
     starts = [i for i in range(1, len(strides)) if strides[i].clay.name != strides[i - 1].clay.name]
-    crossings = []
+    transitions = []
     for start, end in pairwise([*starts, len(strides)]):
-        close = [_is_close(stride, truths, beliefs) for stride in strides[start:end]]
+        close = [_is_close(stride, truths, estimates) for stride in strides[start:end]]
         if close:
             followed = close.index(True) + 1 if True in close else None
-            crossings.append(CrossCoupling(strides[start - 1].clay.name, strides[start].clay.name, flipper, followed))
-    return crossings
+            transitions.append(Transition(strides[start - 1].clay.name, strides[start].clay.name, flipper, followed))
+    return transitions
 
 
-def _is_close(stride: StrideTruth, truths: Mapping[tuple[str, int], LoadCellTruth], beliefs: Mapping[int, Any]) -> bool:
-    believed = beliefs[stride.index].of(stride.flipper).k_p
-    if believed is None:
+def _is_close(
+    stride: StrideTruth, truths: Mapping[tuple[str, int], LoadCellTruth], estimates: Mapping[int, MudEstimate]
+) -> bool:
+    estimate = estimates[stride.index].of(stride.flipper).k_p
+    if estimate is None:
         return False
-    value, _ = believed.at(max(stride.insertion.deepest_m, stride.stance.deepest_m))  # as a stride tells its depth
+    value, _ = estimate.at(max(stride.insertion.deepest_m, stride.stance.deepest_m))  # the depth that a stride reports
     return bool(abs(value / truths[stride.flipper, stride.index].leaning.k_p - 1.0) <= FOLLOWED)
 
 
-def boundary_rows(crossings: Sequence[CrossCoupling]) -> list[dict[str, Any]]:
-    groups: dict[tuple[str, str], list[CrossCoupling]] = {}
-    for cross_coupling in crossings:
-        groups.setdefault(cross_coupling[:2], []).append(cross_coupling)
+def boundary_rows(transitions: Sequence[Transition]) -> list[BoundaryRow]:
+    groups: dict[tuple[str, str], list[int | None]] = {}
+    for each in transitions:
+        groups.setdefault((each.before, each.after), []).append(each.strides)
     return [
-        {
-            "from": before,
-            "to": after,
-            "crossings": len(group),
-            "within_two": round(sum(c.strides is not None and c.strides <= 2 for c in group) / len(group), 4),
-            "most_strides": "never" if any(c.strides is None for c in group) else max(c.strides or 0 for c in group),
-        }
-        for (before, after), group in groups.items()
+        BoundaryRow(
+            before,
+            after,
+            transitions=len(strides),
+            within_two=round(sum(count is not None and count <= 2 for count in strides) / len(strides), 4),
+            most_strides="never" if None in strides else max(count or 0 for count in strides),
+        )
+        for (before, after), strides in groups.items()
     ]

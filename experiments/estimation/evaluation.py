@@ -1,22 +1,23 @@
-"""How far the mud coefficients can be believed: estimates against a virtual load cell, over muds, trials and methods.
+"""The accuracy of the mud coefficients: estimates against a virtual load cell, over muds, trials and methods.
 
 After the paper's sections III-B and III-C: a single flipper on a fixed base through five muds, the walking robot
-through three, and across their borders, in the clay of the simulator with the disturbances of the authors' logs. Each
-trial is simulated once; every method estimates from the same samples.
+through three muds and over their borders, in the simulator's clay with the disturbances of the authors' logs. Each
+trial is simulated once, and every method estimates from the same samples. The fields of the report are the keys of the
+summary in JSON.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from control.records import StrideEstimate
 from estimation.mud import EstimationParameters, PaperEstimationParameters
-from experiments.estimation.boundaries import CrossCoupling, boundary_rows, crossings_of
-from experiments.reports.error_table import COEFFICIENTS, Evaluation, error_rows, plate_rows
+from experiments.estimation.boundaries import BoundaryRow, Transition, boundary_rows, transitions_of
+from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, PlateRow, error_rows, plate_rows
 from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
 from experiments.trials.parallel_trials import run_parallel
 from experiments.trials.session import Show
@@ -43,37 +44,37 @@ FIELD_OF_LAYER = {
 
 class Method(NamedTuple):
     name: str
-    setup: str  # as the table calls it
+    setup: str  # its name in the table
     with_pose: bool
     parameters: EstimationParameters
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What to run; `repeats` are rows that come more often than new samples, `torque` constants not quite known."""
+    """The trials to run. `repeats`: rows come more often than new samples. `torque`: torque constants have errors."""
 
     single: tuple[Clay, ...] = tuple(clay_of_water(water) for water in SINGLE_WATERS)
     walking: tuple[Clay, ...] = tuple(clay_of_water(water) for water in WALKING_WATERS)
     seeds: int = 10
     single_strides: int = 2
     walking_strides: int = 8
-    cross_coupling_strides: int = 24
+    transition_strides: int = 24
     disturbances: Disturbances = LAB
     repeats: bool = True
     torque: bool = True
 
     def parts(self) -> list[Part]:
-        """Trials, the longest first, so that the last ones end together."""
+        """Return the trials, the longest first, so that the last ones end together."""
         seeds = range(1, self.seeds + 1)
         orders = (self.walking, self.walking[::-1])
-        cross_coupling = [Part(WALKING, orders[seed % 2], self.cross_coupling_strides, seed) for seed in seeds]
+        transitions = [Part(WALKING, orders[seed % 2], self.transition_strides, seed) for seed in seeds]
         single = [Part(SINGLE, (clay,), self.single_strides, seed) for clay in self.single for seed in seeds]
         walking = [Part(WALKING, (clay,), self.walking_strides, seed) for clay in self.walking for seed in seeds]
-        return (cross_coupling if len(self.walking) > 1 else []) + single + walking
+        return (transitions if len(self.walking) > 1 else []) + single + walking
 
 
 class Part(NamedTuple):
-    """One trial of a plan: over one mud, or across several."""
+    """One trial of a plan: over one mud, or over several in a row."""
 
     setup: Setup
     muds: tuple[Clay, ...]
@@ -83,11 +84,11 @@ class Part(NamedTuple):
 
 class Outcome(NamedTuple):
     evaluated: list[Evaluation]
-    crossings: list[CrossCoupling]
+    transitions: list[Transition]
 
 
 def with_layers(plan: Plan, layers: Sequence[str]) -> Plan:
-    """Only these disturbances. Raises ValueError for one that there is not."""
+    """Return the plan with these disturbances only. Raises ValueError for an unknown one."""
     unknown = [layer for layer in layers if layer not in LAYERS]
     if unknown:
         raise ValueError(f"layer {unknown[0]!r}: must be one of {', '.join(LAYERS)}, or none")
@@ -96,7 +97,7 @@ def with_layers(plan: Plan, layers: Sequence[str]) -> Plan:
 
 
 def methods_of(setup: Setup) -> tuple[Method, ...]:
-    """All are told how uneven the mud is, as an operator would see."""
+    """Return the methods to evaluate. All know how uneven the mud is, as an operator would see."""
     default = EstimationParameters(fixed_base=setup.fixed_base, surface_error_m=LAB.surface_sd_m)
     paper = replace(default, method="paper")
     both = (Method("default", setup.name, True, default), Method("paper", setup.name, True, paper))
@@ -109,16 +110,16 @@ def methods_of(setup: Setup) -> tuple[Method, ...]:
 
 
 def evaluate(plan: Plan, show: Show, processes: int | None = None) -> Outcome:
-    """All trials of a plan, side by side."""
+    """Run all trials of a plan in parallel."""
     outcomes = run_parallel([partial(run_part, part, plan) for part in plan.parts()], show, processes)
     return Outcome(
         [each for outcome in outcomes for each in outcome.evaluated],
-        [each for outcome in outcomes for each in outcome.crossings],
+        [each for outcome in outcomes for each in outcome.transitions],
     )
 
 
 def run_part(part: Part, plan: Plan) -> Outcome:
-    """Simulate one trial and judge every method on it, or follow it across the muds' borders."""
+    """Simulate one trial and evaluate every method on it, or its transitions between muds."""
     length_m = ENDLESS_M if len(part.muds) == 1 else COMPARTMENT_M
     track = Track([(length_m, clay) for clay in part.muds])
     setup = part.setup if plan.repeats else replace(part.setup, row_period_s=0.0)
@@ -131,21 +132,22 @@ def run_part(part: Part, plan: Plan) -> Outcome:
         for truth in trial.truths
     }
     if len(part.muds) > 1:
-        return Outcome([], crossings_of(trial, truths))
+        return Outcome([], transitions_of(trial, truths))
     (clay,) = part.muds
-    return Outcome([each for method in methods_of(setup) for each in _judged(method, clay.name, trial, truths)], [])
+    methods = methods_of(setup)
+    return Outcome([each for method in methods for each in _evaluate_method(method, clay.name, trial, truths)], [])
 
 
-def _judged(
+def _evaluate_method(
     method: Method, mud: str, trial: Trial, truths: dict[tuple[str, int], LoadCellTruth]
 ) -> Iterator[Evaluation]:
     for stride in strides_of(trial, method.parameters, method.with_pose):
         truth = truths.get((stride.flipper, stride.index))
         if truth is not None:
-            yield from _beside(method, mud, stride, truth)
+            yield from _evaluate_stride(method, mud, stride, truth)
 
 
-def _beside(method: Method, mud: str, stride: StrideEstimate, truth: LoadCellTruth) -> Iterator[Evaluation]:
+def _evaluate_stride(method: Method, mud: str, stride: StrideEstimate, truth: LoadCellTruth) -> Iterator[Evaluation]:
     for name in COEFFICIENTS:
         estimate, true = getattr(stride, name), getattr(truth.leaning, name)
         if isfinite(true):
@@ -153,18 +155,36 @@ def _beside(method: Method, mud: str, stride: StrideEstimate, truth: LoadCellTru
             yield Evaluation(method.setup, mud, name, method.name, estimate, true, upright)
 
 
-def report_of(plan: Plan, outcome: Outcome) -> dict[str, Any]:
-    return {
-        "experiment": "estimation",
-        "errors": error_rows(outcome.evaluated),
-        "plates": plate_rows(outcome.evaluated),
-        "boundaries": boundary_rows(outcome.crossings),
-        "settings": {
-            "seeds": plan.seeds,
-            "single_strength_pa": {clay.name: round(clay.strength_pa, 1) for clay in plan.single},
-            "walking_strength_pa": {clay.name: round(clay.strength_pa, 1) for clay in plan.walking},
-            "disturbances": asdict(plan.disturbances),
-            "repeats": plan.repeats,
-            "torque_error": TORQUE_ERROR if plan.torque else 0.0,
-        },
-    }
+@dataclass(frozen=True)
+class Settings:
+    seeds: int
+    single_strength_pa: Mapping[str, float]
+    walking_strength_pa: Mapping[str, float]
+    disturbances: Mapping[str, float]
+    repeats: bool
+    torque_error: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class EstimationReport:
+    experiment: str = "estimation"
+    errors: Sequence[ErrorRow]
+    plates: Sequence[PlateRow]
+    boundaries: Sequence[BoundaryRow]
+    settings: Settings
+
+
+def report_of(plan: Plan, outcome: Outcome) -> EstimationReport:
+    return EstimationReport(
+        errors=error_rows(outcome.evaluated),
+        plates=plate_rows(outcome.evaluated),
+        boundaries=boundary_rows(outcome.transitions),
+        settings=Settings(
+            seeds=plan.seeds,
+            single_strength_pa={clay.name: round(clay.strength_pa, 1) for clay in plan.single},
+            walking_strength_pa={clay.name: round(clay.strength_pa, 1) for clay in plan.walking},
+            disturbances=asdict(plan.disturbances),
+            repeats=plan.repeats,
+            torque_error=TORQUE_ERROR if plan.torque else 0.0,
+        ),
+    )

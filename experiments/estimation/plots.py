@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 
@@ -12,24 +11,25 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
 from matplotlib.axes import Axes  # noqa: E402
 
+from experiments.estimation.evaluation import EstimationReport  # noqa: E402
 from experiments.reports.error_table import ErrorRow  # noqa: E402
 from experiments.reports.mud_names import mud_text  # noqa: E402
 
 COLOURS = {"default": "tab:blue", "paper": "tab:red", "paper compensated": "tab:orange"}
 COEFFICIENTS = ("k_p", "k_s", "k_e")
-HIGHEST_PERCENT = 150.0  # what lies above is drawn at the edge
+HIGHEST_PERCENT = 150.0  # higher values are drawn at the edge
 
 
-def plot_errors(report: dict[str, Any], path: Path) -> None:
-    """Median and 95th percentile of the error by setup, coefficient, mud and method."""
-    errors = report["errors"]
+def plot_errors(report: EstimationReport, path: Path) -> None:
+    """Draw median and 95th percentile of the error by setup, coefficient, mud and method."""
+    errors = report.errors
     setups = list(dict.fromkeys(row.setup for row in errors))
     size = (4.0 * len(COEFFICIENTS), 2.8 * len(setups))
     figure, panels = plt.subplots(len(setups), len(COEFFICIENTS), figsize=size, squeeze=False, constrained_layout=True)
     for row, setup in enumerate(setups):
         for column, name in enumerate(COEFFICIENTS):
-            reported = [each for each in errors if (each.setup, each.coefficient) == (setup, name)]
-            _plot_panel(panels[row][column], reported)
+            own = [each for each in errors if (each.setup, each.coefficient) == (setup, name)]
+            _plot_panel(panels[row][column], own)
             panels[row][column].set_title(f"{setup}: ${name}$", fontsize="medium")
     methods = {
         name: line for panel in panels.flat for line, name in zip(*panel.get_legend_handles_labels(), strict=True)
@@ -46,15 +46,15 @@ def _plot_panel(panel: Axes, rows: Sequence[ErrorRow]) -> None:
     for method, colour in COLOURS.items():
         if method == "paper compensated" and rows and rows[0].coefficient != "k_s":
             continue  # it compensates k_s alone
-        reported = [row for row in rows if row.method == method and row.median is not None]
-        places = [muds.index(row.mud) for row in reported]
-        medians = [min(100.0 * (row.median or 0.0), HIGHEST_PERCENT) for row in reported]
-        highest = [min(100.0 * (row.p95 or 0.0), HIGHEST_PERCENT) for row in reported]
-        panel.vlines(places, medians, highest, color=colour, linewidth=2)
-        panel.plot(places, medians, "o", color=colour, label=method)
-    for place, mud in enumerate(muds):
+        known = [row for row in rows if row.method == method and row.median is not None]
+        xs = [muds.index(row.mud) for row in known]
+        medians = [min(100.0 * (row.median or 0.0), HIGHEST_PERCENT) for row in known]
+        highest = [min(100.0 * (row.p95 or 0.0), HIGHEST_PERCENT) for row in known]
+        panel.vlines(xs, medians, highest, color=colour, linewidth=2)
+        panel.plot(xs, medians, "o", color=colour, label=method)
+    for x, mud in enumerate(muds):
         if any(row.mud == mud and row.method == "default" and row.bounds and not row.strides for row in rows):
-            panel.text(place, 2.0, "bounds", ha="center", color=COLOURS["default"], fontsize="small")
+            panel.text(x, 2.0, "bounds", ha="center", color=COLOURS["default"], fontsize="small")
     _scale(panel, muds)
 
 

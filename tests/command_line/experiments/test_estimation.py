@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,9 @@ import pytest
 import command_line.experiments.estimation
 from command_line import exit_codes
 from command_line.main import main
-from experiments.estimation.evaluation import Plan
+from experiments.estimation.boundaries import BoundaryRow
+from experiments.estimation.evaluation import Outcome, Plan, report_of
+from experiments.estimation.text import estimation_text
 from experiments.reports.error_table import ErrorRow, PlateRow
 from simulation.mud.clay import MUDS, Clay
 from tests.command_line.command_lines import refusal
@@ -26,7 +29,7 @@ from tests.waiting import LONGEST_S
 
 COMMAND = ("experiment", "estimation", "--simulated")
 SHORT = (*COMMAND, "--seeds", "1", "--setup", "single", "--mud", "49.5", "--layers", "none")
-PROMISED = {"setup", "mud", "coefficient", "method", "median", "p95", "coverage", "strides"}
+DOCUMENTED = {"setup", "mud", "coefficient", "method", "median", "p95", "coverage", "strides"}
 
 
 @pytest.fixture(autouse=True)
@@ -46,14 +49,14 @@ def no_trials(monkeypatch: pytest.MonkeyPatch) -> None:
 # what is refused
 
 
-def test_without_a_simulated_load_cell_there_is_no_truth(capsys: pytest.CaptureFixture[str], no_trials: None) -> None:
+def test_the_experiment_runs_in_simulation_only(capsys: pytest.CaptureFixture[str], no_trials: None) -> None:
     message = refusal(capsys, "experiment", "estimation")
     assert message.startswith("mudskipper: ")
     assert "--simulated" in message
 
 
 @pytest.mark.parametrize("layers", ["fog", "noise,fog", "none,noise"])
-def test_a_layer_that_there_is_not_is_named(layers: str, capsys: pytest.CaptureFixture[str], no_trials: None) -> None:
+def test_an_unknown_layer_is_named(layers: str, capsys: pytest.CaptureFixture[str], no_trials: None) -> None:
     message = refusal(capsys, *COMMAND, "--layers", layers)
     assert repr("none" if "none" in layers else "fog") in message
     assert "clinging" in message
@@ -88,13 +91,13 @@ def test_a_strength_out_of_bounds_is_named_with_its_bounds(
         ("--mud", "49.5", "--strength", "1500"),
     ],
 )
-def test_other_nonsense_is_wrong_usage(
+def test_a_wrong_option_is_refused(
     options: tuple[str, ...], capsys: pytest.CaptureFixture[str], no_trials: None
 ) -> None:
     assert options[0] in refusal(capsys, *COMMAND, *options)
 
 
-def test_a_place_that_cannot_be_written_is_noticed_before_the_work(
+def test_an_impossible_output_folder_is_refused_before_the_work(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, no_trials: None
 ) -> None:
     (tmp_path / "file").write_text("")
@@ -119,7 +122,7 @@ def planned(monkeypatch: pytest.MonkeyPatch, *options: str) -> Plan:
     return plans[0]
 
 
-def test_by_default_all_muds_setups_and_layers_are_run(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_default_plan_has_all_muds_setups_and_layers(monkeypatch: pytest.MonkeyPatch) -> None:
     assert planned(monkeypatch) == Plan(single_strides=1, walking_strides=1)
 
 
@@ -140,7 +143,7 @@ def test_without_layers_nothing_is_disturbed(layers: str, monkeypatch: pytest.Mo
 # what is printed and written
 
 
-def test_json_is_one_object_with_the_promised_keys_and_is_written_too(
+def test_json_is_one_object_with_the_documented_keys_and_is_written_too(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     out = tmp_path / "made" / "here"
@@ -151,7 +154,7 @@ def test_json_is_one_object_with_the_promised_keys_and_is_written_too(
     assert set(report) >= {"errors", "plates", "boundaries", "settings"}
     assert len(report["errors"]) == 3 * 2  # coefficients and methods
     for row in report["errors"]:
-        assert set(row) >= PROMISED
+        assert set(row) >= DOCUMENTED
         assert (row["setup"], row["mud"], row["strides"]) == ("single flipper", "49.5", 2)
         assert 0.0 <= row["median"] <= row["p95"]
         assert 0.0 <= row["coverage"] <= 1.0
@@ -160,7 +163,7 @@ def test_json_is_one_object_with_the_promised_keys_and_is_written_too(
     assert "summary.json" in printed.err and "report.html" in printed.err
 
 
-def test_a_person_gets_a_table_of_errors_plates_and_boundaries(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_screen_shows_errors_plates_and_boundaries(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(SHORT) == exit_codes.OK
     errors, plates, boundaries = capsys.readouterr().out.split("\n\n")
     head, *rows = errors.splitlines()
@@ -168,19 +171,18 @@ def test_a_person_gets_a_table_of_errors_plates_and_boundaries(capsys: pytest.Ca
     assert len(rows) == 6
     assert all(row.startswith("single flipper  49.5 %") and row.count("%") >= 5 for row in rows)
     assert plates.startswith("The paper's upright plate")
-    assert boundaries.strip() == "Boundaries: none walked over"
+    assert boundaries.strip() == "Mud boundaries: no walk over any"
 
 
-def test_dashes_stand_where_nothing_was_told() -> None:
+def test_unknown_values_are_printed_as_dashes() -> None:
     row = ErrorRow(
         "walking", "49.5", "k_s", "default", None, None, None, None,
         strides=0, bounds=4, bounds_hold=1.0, bound_over_truth=0.8, not_valid=0, truth_n_m3=1000000,
     )  # fmt: skip
-    border = {"from": "49.5", "to": "51.2", "crossings": 2, "within_two": 0.5, "most_strides": "never"}
+    border = BoundaryRow("49.5", "51.2", transitions=2, within_two=0.5, most_strides="never")
     plate = PlateRow("walking", "49.5", "k_s", 0.9, None, None)
-    errors, plates, boundaries = command_line.experiments.estimation.text_of(
-        {"errors": [row], "plates": [plate], "boundaries": [border]}
-    ).split("\n\n")
+    report = replace(report_of(Plan(), Outcome([], [])), errors=[row], plates=[plate], boundaries=[border])
+    errors, plates, boundaries = estimation_text(report).split("\n\n")
     assert errors.splitlines()[1].split()[5:] == ["-", "-", "-", "-", "0", "4", "100.0", "%", "0"]
     assert plates.splitlines()[2].split()[4:] == ["0.900", "-", "-"]
     assert boundaries.splitlines()[2].split() == ["49.5", "%", "51.2", "%", "2", "50.0", "%", "never"]

@@ -153,14 +153,14 @@ def test_where_the_walking_body_moves_the_default_gives_bounds_and_they_hold() -
         assert row.bounds_hold == 1.0
 
 
-def test_each_stride_of_each_method_is_judged_once() -> None:
+def test_each_stride_of_each_method_is_evaluated_once() -> None:
     evaluated = outcome().evaluated
     assert all(isfinite(each.truth) for each in evaluated)
     for setup, methods, strides in (("single flipper", 2, 2), ("walking", 3, 4), ("walking without pose", 1, 4)):
         reported = [each for each in evaluated if each.setup == setup]
         assert len(reported) == methods * strides * len(COEFFICIENTS)
     assert {each.mud for each in evaluated} == {"47.6"}
-    assert outcome().crossings == []
+    assert outcome().transitions == []
 
 
 def test_progress_counts_all_trials() -> None:
@@ -176,7 +176,7 @@ def test_a_trial_in_another_process_is_the_same_trial() -> None:
 
 
 def trial_of(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """What a part of the plan is simulated with."""
+    """Return the arguments with which a part of the plan is simulated."""
     asked: dict[str, Any] = {}
 
     def run_trial(setup: Setup, track: Track, disturbances: Disturbances, strides: int, seed: int, error: float) -> Any:
@@ -199,17 +199,17 @@ def test_rows_and_torque_constants_are_disturbed_as_asked(
     assert asked["disturbances"] == NONE
 
 
-def test_a_walk_over_a_border_tells_how_soon_it_was_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_walk_over_a_border_reports_how_soon_the_estimate_followed(monkeypatch: pytest.MonkeyPatch) -> None:
     """From soft to strong mud after 10 cm: the first stride goes in at l sin 30° = 6 cm, and each carries the body no
-    farther than the arms' 12 cm. In three strides at most, each flipper's crossing is told.
+    farther than the arms' 12 cm. In three strides at most, each flipper's transition is reported.
     """
     monkeypatch.setattr(experiments.estimation.evaluation, "COMPARTMENT_M", 0.1)
     soft = clay_of_water(51.2)
     outcome = run_part(Part(WALKING, (soft, STRONG), 5, 1), with_layers(SHORT, ()))
     assert outcome.evaluated == []
-    assert {(each.before, each.after) for each in outcome.crossings} == {("51.2", "47.6")}
-    assert sorted(each.flipper for each in outcome.crossings) == ["left", "right"]
-    assert all(each.strides is not None and each.strides <= 3 for each in outcome.crossings)
+    assert {(each.before, each.after) for each in outcome.transitions} == {("51.2", "47.6")}
+    assert sorted(each.flipper for each in outcome.transitions) == ["left", "right"]
+    assert all(each.strides is not None and each.strides <= 3 for each in outcome.transitions)
 
 
 # the report
@@ -231,7 +231,7 @@ def test_the_report_is_json_with_errors_plates_boundaries_and_settings() -> None
 
 
 def test_the_settings_are_those_that_were_run() -> None:
-    settings = report_of(with_layers(SHORT, ("noise",)), Outcome([], []))["settings"]
-    assert (settings["torque_error"], settings["repeats"]) == (0.0, False)
-    assert settings["disturbances"]["current_noise_a"] == LAB.current_noise_a
-    assert settings["disturbances"]["clinging_n"] == 0.0
+    settings = report_of(with_layers(SHORT, ("noise",)), Outcome([], [])).settings
+    assert (settings.torque_error, settings.repeats) == (0.0, False)
+    assert settings.disturbances["current_noise_a"] == LAB.current_noise_a
+    assert settings.disturbances["clinging_n"] == 0.0
