@@ -252,7 +252,7 @@ def _drives_table(drives: list[dict[str, Any]]) -> str:
 def _loop_text(report: dict[str, Any]) -> str:
     loop, bus, log = report["loop"], report["bus"], report["log"]
     late, tick, pose = loop["wake_late_us"], loop["tick_us"], report["pose"]
-    seen = f"{pose['source']}: {pose['poses']} poses, {pose['garbled']} garbled, {pose['lost']} without the body"
+    seen = f"{pose['source']}: {pose['poses']} poses, {pose['malformed']} malformed, {pose['lost']} without the body"
     return "\n".join(
         (
             f"loop   {loop['rate_hz']:.2f} Hz, {loop['ticks']} ticks, {loop['missed_ticks']} missed",

@@ -1,4 +1,4 @@
-"""Frames on their way that are late, in their order."""
+"""A queue of delayed frames that preserves their order."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drivers.can.frames import Frame
 
 
 class DelayLine:
-    """Frames that are late. Of those that share a key none overtakes another."""
+    """Delays frames. A frame never overtakes another one with the same key."""
 
     def __init__(self, key: Callable[[Frame], int]) -> None:
         self._key = key
@@ -23,7 +23,7 @@ class DelayLine:
         return self._key(frame) in self.waiting
 
     def take(self, now_s: float) -> list[Frame]:
-        """What has arrived by now."""
+        """Removes and returns the frames that have arrived by now."""
         arrived: list[Frame] = []
         for key, line in list(self.waiting.items()):
             while line and line[0][0] <= now_s:

@@ -1,9 +1,9 @@
-"""A CAN port that fails on purpose, around one that does not.
+"""A CAN port that injects failures into another one.
 
-What a drive tells may be lost, late, repeated or garbled here. What is sent to it may only be lost or late: a frame
-that leaves is one that was sent, and those to one drive leave in their order, so no failure ever commands more than
-the loop did, nor arms what it has disarmed. Drives are told apart by their node ids. Without a failure under way, a
-frame costs one look at a dictionary.
+It may lose, delay, repeat or corrupt the frames of a drive. It may only lose or delay commands: every frame that leaves
+was sent, and the frames to one drive leave in their order. So no failure commands more than the loop did, or arms a
+drive that the loop has disarmed. Node ids distinguish the drives. Without an active failure a frame costs one check of
+a dictionary.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from drivers.drive_types import type_of
 from drivers.fault_injection.delay_line import DelayLine
 from drivers.fault_injection.failures import NO_NUMBERS, Failure, FailureKind, Failures
 
-FAR_TURNS = 2.0  # garbage that might be true
-MOST_STRANGERS = 3  # frames out of nowhere in one read of a bus full of garbage
+FAR_TURNS = 2.0  # random values that look plausible
+MOST_RANDOM_FRAMES = 3  # in one read of a bus full of garbage
 SILENT = (FailureKind.OFF, FailureKind.BUS_OFF)
 REFUSING = {
     FailureKind.OFF: os.strerror(errno.ENETDOWN),
@@ -39,7 +39,7 @@ ONE_FLOAT = Struct("<f")
 
 
 class FailingPort:
-    """A CanPort. Owns what is late on its way, and the payloads that stand still."""
+    """A CanPort. Owns the delayed frames and the frozen payloads."""
 
     def __init__(self, name: str, port: CanPort, drives: Mapping[str, DriveParameters], failures: Failures) -> None:
         self._bus = f"bus.{name}"
@@ -71,7 +71,7 @@ class FailingPort:
         self._port.listen_to(ids)
 
     def receive(self) -> Sequence[Frame]:
-        frames = self._port.receive()  # drained whatever fails: what comes meanwhile is lost, not kept
+        frames = self._port.receive()  # drained during any failure, so that frames of that time are lost and not kept
         if not self._untouched:
             self._deliver()
             frames = self._arrived(frames)
@@ -82,19 +82,19 @@ class FailingPort:
         failures, failure = self._failures, self._failures.of(self._bus)
         arrived = [frame._replace(stamp_s=failures.now_s) for frame in self._incoming.take(self._due_s)]
         for frame in frames:
-            spoiled = self._spoiled(frame)
-            if spoiled is None:
+            changed = self._after_failures(frame)
+            if changed is None:
                 continue
-            if not self._delays(spoiled, self._senders_of(spoiled), self._incoming):
-                arrived.append(spoiled)
+            if not self._delays(changed, self._senders_of(changed), self._incoming):
+                arrived.append(changed)
         if failure and failure.kind is FailureKind.GARBAGE:
-            arrived += _strangers(failures.random)
+            arrived += _random_frames(failures.random)
         if failure and failure.kind in STATES:
             self._forged_error_frames += 1
         return arrived
 
     def _delays(self, frame: Frame, components: Sequence[str], line: DelayLine) -> bool:
-        """Whether the frame is on its way now, as a late one or behind a late one."""
+        """Delays the frame where its component is slow or an earlier frame waits; returns whether it did."""
         failures = self._failures
         failing = (failures.of(component) for component in components)
         late = any(failure is not None and failure.kind is FailureKind.SLOW for failure in failing)
@@ -104,7 +104,7 @@ class FailingPort:
         return False
 
     def _senders_of(self, frame: Frame) -> tuple[str, ...]:
-        """Whose failures a frame from the bus suffers, in this order."""
+        """Returns the components whose failures change a frame from the bus, in this order."""
         content = self._drive_type.read_frame(frame)
         joint = None if frame.is_extended else self._joints.get(content.node_id)
         if joint is None:
@@ -113,52 +113,52 @@ class FailingPort:
 
     @property
     def _due_s(self) -> float:
-        """Once nothing fails any more, what is still under way arrives at once."""
+        """When nothing fails any more, all delayed frames arrive at once."""
         return self._failures.now_s if self._failures.failing else inf
 
-    def _spoiled(self, frame: Frame) -> Frame | None:
-        """What is left of a frame from the bus."""
+    def _after_failures(self, frame: Frame) -> Frame | None:
+        """Returns the frame as the active failures change it, or None where they lose it."""
         for component in self._senders_of(frame):
             failure = self._failures.of(component)
             if failure is None:
                 continue
             if component == self._bus:
-                data = self._spoiled_by_bus(frame.data, failure)
+                data = self._after_bus(frame.data, failure)
             elif component.endswith(".error"):
                 data = self._with_error(frame, failure)
             else:
-                data = self._spoiled_by_drive(frame, failure)
+                data = self._after_drive(frame, failure)
             if data is None:
                 return None
             frame = frame if data is frame.data else frame._replace(data=data)
         return frame
 
-    def _spoiled_by_bus(self, data: bytes, failure: Failure) -> bytes | None:
+    def _after_bus(self, data: bytes, failure: Failure) -> bytes | None:
         if failure.kind in SILENT or failure.kind is FailureKind.INTERMITTENT and self._failures.loses():
             return None
         if failure.kind is FailureKind.GARBAGE and self._failures.loses():
-            return garbled(data, self._failures.random)
+            return corrupted(data, self._failures.random)
         return data
 
-    def _spoiled_by_drive(self, frame: Frame, failure: Failure) -> bytes | None:
+    def _after_drive(self, frame: Frame, failure: Failure) -> bytes | None:
         if failure.kind is FailureKind.OFF or failure.kind is FailureKind.INTERMITTENT and self._failures.loses():
             return None
         if failure.kind is FailureKind.GARBAGE:
-            return garbled(frame.data, self._failures.random)
+            return corrupted(frame.data, self._failures.random)
         if failure.kind is FailureKind.STUCK:
             return self._first_since(failure, frame)
         return frame.data
 
     def _first_since(self, failure: Failure, frame: Frame) -> bytes:
-        place = failure.component, frame.arbitration_id
-        since, data = self._frozen.get(place, (None, b""))
+        key = failure.component, frame.arbitration_id
+        since, data = self._frozen.get(key, (None, b""))
         if since is not failure:
             data = frame.data
-            self._frozen[place] = failure, data
+            self._frozen[key] = failure, data
         return data
 
     def _with_error(self, frame: Frame, failure: Failure) -> bytes:
-        """A heartbeat or an error report that tells of trouble. One that is garbled already stays as it is."""
+        """Adds an error to a heartbeat or an error report; returns one that is malformed already as it is."""
         kind = failure.kind
         if kind is FailureKind.INTERMITTENT and self._failures.loses():
             return frame.data
@@ -212,27 +212,27 @@ class FailingPort:
 def failing_ports(
     ports: Mapping[str, CanPort], drives: Mapping[str, DriveParameters], failures: Failures | None
 ) -> Mapping[str, CanPort]:
-    """The ports as they are, where nothing may fail."""
+    """Returns the ports themselves where no failures may be injected."""
     if failures is None:
         return ports
     return {name: FailingPort(name, port, drives, failures) for name, port in ports.items()}
 
 
-def garbled(data: bytes, random: Random) -> bytes:
-    """Any bytes, numbers that might be true, numbers that are none or huge, or another length."""
-    what = random.randrange(4)
-    if what == 0:
+def corrupted(data: bytes, random: Random) -> bytes:
+    """Draws random bytes, plausible numbers, numbers that are not finite or huge, or another length."""
+    kind = random.randrange(4)
+    if kind == 0:
         return random.randbytes(random.choice([size for size in range(DATA_MAX_BYTES + 1) if size != len(data)]))
-    if what == 1:
+    if kind == 1:
         return random.randbytes(len(data))
-    number = random.choice(NO_NUMBERS) if what == 2 else random.uniform(-FAR_TURNS, FAR_TURNS)
+    number = random.choice(NO_NUMBERS) if kind == 2 else random.uniform(-FAR_TURNS, FAR_TURNS)
     return (2 * ONE_FLOAT.pack(number))[: len(data)]
 
 
-def _strangers(random: Random) -> list[Frame]:
+def _random_frames(random: Random) -> list[Frame]:
     return [
         Frame(random.randint(0, STANDARD_MASK), random.randbytes(random.randint(0, DATA_MAX_BYTES)))
-        for _ in range(random.randint(0, MOST_STRANGERS))
+        for _ in range(random.randint(0, MOST_RANDOM_FRAMES))
     ]
 
 

@@ -1,4 +1,4 @@
-"""A pose that fails on purpose, around one that does not."""
+"""A pose source that injects failures into another one."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from drivers.fault_injection.failures import NO_NUMBERS, Failure, FailureKind, F
 from drivers.pose.pose_port import PoseReport, PoseSource
 
 LATE_S = 0.2
-FAR_M = 100.0  # garbage that might be true
+FAR_M = 100.0  # random positions that look plausible
 
 
 class FailingPose:
-    """A PoseSource. Owns the poses that are late, and the one that stands still."""
+    """A PoseSource. Owns the delayed poses, and the frozen one."""
 
     def __init__(self, pose: PoseSource, failures: Failures) -> None:
         self._pose = pose
@@ -25,12 +25,12 @@ class FailingPose:
     def read(self, now_s: float) -> BodyPose:
         body = self._pose.read(now_s)
         failure = self._failures.of("pose")
-        return body if failure is None else self._spoiled(body, failure, now_s)
+        return body if failure is None else self._faulty(body, failure, now_s)
 
     def report(self) -> PoseReport:
         return self._pose.report()
 
-    def _spoiled(self, body: BodyPose, failure: Failure, now_s: float) -> BodyPose:
+    def _faulty(self, body: BodyPose, failure: Failure, now_s: float) -> BodyPose:
         if self._since is not failure:
             self._since, self._first = failure, body
             self._late.clear()
@@ -41,13 +41,13 @@ class FailingPose:
             case FailureKind.GARBAGE:
                 return BodyPose(now_s, random.choice((*NO_NUMBERS, random.uniform(-FAR_M, FAR_M))))
             case FailureKind.SLOW:
-                return self._late_one(body, now_s)
+                return self._delayed(body, now_s)
             case FailureKind.INTERMITTENT if not self._failures.loses():
                 return body
         return BodyPose()
 
-    def _late_one(self, body: BodyPose, now_s: float) -> BodyPose:
-        """Stamped when it is read: a late camera does not say that it is late."""
+    def _delayed(self, body: BodyPose, now_s: float) -> BodyPose:
+        """Stamps the pose when it is read, because a late camera does not report its delay."""
         self._late.append((now_s + LATE_S, body))
         while len(self._late) > 1 and self._late[1][0] <= now_s:
             self._late.popleft()
@@ -56,5 +56,5 @@ class FailingPose:
 
 
 def failing_pose(pose: PoseSource, failures: Failures | None) -> PoseSource:
-    """The pose as it is, where nothing may fail."""
+    """Returns the pose source itself where no failures may be injected."""
     return pose if failures is None else FailingPose(pose, failures)

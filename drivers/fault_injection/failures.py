@@ -1,10 +1,10 @@
-"""What is made to fail on purpose, how, and until when.
+"""The failures that an operator injects: which component fails, how, and until when.
 
-A stop that was never seen to work cannot be trusted, so parts of the robot can be told to fail: in simulation, and on
-hardware where the configuration allows it. Components and kinds follow PX4's `failure` command; what makes no sense
-together is refused with a sentence. Every failure ends by itself. Nothing here touches a wire: the `failing_*` parts
-ask this owner what fails and act on what passes through them. Time is that of the last `update`, and chance comes
-from a seed, so in lockstep the same failure is the same to the last bit.
+A stop that has never been exercised cannot be trusted, so an operator can make parts of the robot fail: in simulation,
+and on hardware where the configuration allows it. Components and kinds follow PX4's `failure` command; a component
+that cannot fail in the requested way is refused with a message. Every failure ends by itself. Nothing here touches a
+wire: the `failing_*` classes ask `Failures` what fails and change what passes through them. Time is that of the last
+`update`, and random draws come from a seed, so a failure in lockstep is reproducible to the last bit.
 """
 
 from __future__ import annotations
@@ -48,19 +48,19 @@ Effects = Mapping[FailureKind, str]
 
 def _signal(name: str) -> Effects:
     return {
-        Kind.OFF: f"its {name} does not come",
-        Kind.STUCK: f"its {name} stands still while messages keep coming",
-        Kind.GARBAGE: f"its {name} is random, no number, huge, or of a wrong length",
-        Kind.SLOW: f"its {name} comes 5 to 20 ms late",
+        Kind.OFF: f"its {name} does not arrive",
+        Kind.STUCK: f"its {name} is frozen while messages keep arriving",
+        Kind.GARBAGE: f"its {name} is random, not a number, huge, or of a wrong length",
+        Kind.SLOW: f"its {name} arrives 5 to 20 ms late",
         Kind.INTERMITTENT: f"half of the messages of its {name} are lost, at random",
     }
 
 
 EFFECTS: Mapping[str, Effects] = {  # JOINT and NAME stand for each joint and each bus
     "JOINT": {
-        Kind.OFF: "nothing comes from the drive and nothing reaches it, as if it were unplugged",
-        Kind.STUCK: "all that it tells stands still; commands reach it",
-        Kind.GARBAGE: "all that it tells is random, no number, huge, or of a wrong length; commands reach it",
+        Kind.OFF: "no frame arrives from the drive and none reaches it, as if it were unplugged",
+        Kind.STUCK: "all that it reports is frozen; commands reach it",
+        Kind.GARBAGE: "all that it reports is random, not a number, huge, or of a wrong length; commands reach it",
         Kind.SLOW: "all messages from and to it are 5 to 20 ms late",
         Kind.INTERMITTENT: "half of the messages from and to it are lost, at random",
     },
@@ -70,32 +70,32 @@ EFFECTS: Mapping[str, Effects] = {  # JOINT and NAME stand for each joint and ea
     "JOINT.temperature": _signal("temperature"),
     "JOINT.voltage": _signal("bus voltage"),
     "JOINT.error": {
-        Kind.OFF: "it tells that it left closed loop, without an error",
-        Kind.STUCK: "it tells of a gate driver fault and that it left closed loop",
-        Kind.GARBAGE: "it tells of random errors",
-        Kind.INTERMITTENT: "half of the time it tells of a gate driver fault and that it left closed loop",
+        Kind.OFF: "it reports that it left closed loop, without an error",
+        Kind.STUCK: "it reports a gate driver fault and that it left closed loop",
+        Kind.GARBAGE: "it reports random errors",
+        Kind.INTERMITTENT: "half of the time it reports a gate driver fault and that it left closed loop",
     },
     "JOINT.command": {
-        Kind.OFF: "nothing that is sent reaches it",
-        Kind.SLOW: "what is sent reaches it 5 to 20 ms late",
-        Kind.INTERMITTENT: "half of the frames that are sent to it are lost, at random",
+        Kind.OFF: "no command reaches it",
+        Kind.SLOW: "commands reach it 5 to 20 ms late",
+        Kind.INTERMITTENT: "half of the commands to it are lost, at random",
     },
     "bus.NAME": {
-        Kind.OFF: "the interface is gone: nothing comes, sending fails",
+        Kind.OFF: "the interface is gone: no frame arrives, sending fails",
         Kind.STUCK: "the transmit queue is full: sending fails",
-        Kind.GARBAGE: "half of what comes is garbled, with random frames between",
+        Kind.GARBAGE: "half of the frames are malformed, with random frames in between",
         Kind.SLOW: "all frames are 5 to 20 ms late",
         Kind.INTERMITTENT: "half of the frames are lost, at random",
-        Kind.WARNING: "error frames come, and the controller warns",
-        Kind.PASSIVE: "error frames come, and the controller is error-passive",
-        Kind.BUS_OFF: "the controller took itself off the bus: error frames, nothing else comes, sending fails",
+        Kind.WARNING: "error frames arrive, and the controller warns",
+        Kind.PASSIVE: "error frames arrive, and the controller is error-passive",
+        Kind.BUS_OFF: "the controller took itself off the bus: only error frames arrive, sending fails",
     },
     "pose": {
-        Kind.OFF: "no pose comes",
-        Kind.STUCK: "the body seems to stand",
-        Kind.GARBAGE: "the place is random, no number or huge",
-        Kind.SLOW: "the place is that of 0.2 s ago",
-        Kind.INTERMITTENT: "half of the time no pose comes, at random",
+        Kind.OFF: "no pose arrives",
+        Kind.STUCK: "the body seems to stand still",
+        Kind.GARBAGE: "the position is random, not a number or huge",
+        Kind.SLOW: "the position is that of 0.2 s ago",
+        Kind.INTERMITTENT: "half of the time no pose arrives, at random",
     },
     "log": {
         Kind.OFF: "the log's writer looks dead and takes no row",
@@ -103,12 +103,12 @@ EFFECTS: Mapping[str, Effects] = {  # JOINT and NAME stand for each joint and ea
         Kind.INTERMITTENT: "half of the rows are refused, at random",
     },
     "loop": {
-        Kind.STUCK: "the loop stands still for 30 ms, once",
+        Kind.STUCK: "the loop stalls for 30 ms, once",
         Kind.SLOW: "every tick takes 4 ms longer",
     },
     "clock": {
-        Kind.STUCK: "the clock on the wall stands still",
-        Kind.GARBAGE: "the clock on the wall is an hour ahead, and steps back in the end",
+        Kind.STUCK: "the wall clock stops",
+        Kind.GARBAGE: "the wall clock is an hour ahead, and steps back at the end",
     },
 }
 
@@ -128,7 +128,7 @@ def end_text(failure: Failure) -> str:
 
 
 class Failures:
-    """Owns what fails. `failing` is empty where nothing does, which is all that a healthy tick looks at."""
+    """Owns the active failures by component. A healthy tick only checks that `failing` is empty."""
 
     def __init__(self, buses: Iterable[str], seed: int = 1) -> None:
         self.families = _families(buses)  # of every component
@@ -141,7 +141,7 @@ class Failures:
         self.now_s = NEVER_S
 
     def begin(self, component: str, kind: str, now_s: float, for_s: float = USUAL_S) -> str | None:
-        """Instead of what fails there already. Returns why it is refused, or None."""
+        """Begins a failure in place of any other of this component. Returns why it is refused, or None."""
         refused = self.refusal(component, kind, for_s)
         if refused is None:
             self.failing[component] = Failure(component, FailureKind(kind), now_s + for_s)
@@ -149,7 +149,7 @@ class Failures:
 
     def refusal(self, component: str, kind: str, for_s: float = USUAL_S) -> str | None:
         if component not in self.families:
-            return f"there is no {component!r} that could fail; 'mudskipper fail --list' shows what can"
+            return f"there is no component {component!r}; 'mudskipper fail --list' lists those that can fail"
         effects = EFFECTS[self.families[component]]
         if kind not in set(effects):
             return f"{component} cannot be {kind!r}; it can be {', '.join(effects)}"
@@ -158,7 +158,7 @@ class Failures:
         return None
 
     def update(self, now_s: float) -> list[Failure]:
-        """Once a tick, before anything else of it. Those that have just ended by themselves."""
+        """Advances the time, first in every tick. Returns the failures that have just ended by themselves."""
         self.now_s = now_s
         if not self.failing:
             return []
@@ -180,17 +180,17 @@ class Failures:
         return self.failing.get(component)
 
     def table(self) -> Iterator[tuple[str, FailureKind, str]]:
-        """Every component, each way in which it can fail, and what that does."""
+        """Yields every component, each kind of failure that it can have, and the effect."""
         for component, family in self.families.items():
-            for kind, does in EFFECTS[family].items():
-                yield component, kind, does
+            for kind, effect in EFFECTS[family].items():
+                yield component, kind, effect
 
     def loses(self) -> bool:
-        """Whether chance takes one intermittent message."""
+        """Draws whether an intermittent message is lost."""
         return self.random.random() < LOST_FRACTION
 
     def arrival_s(self) -> float:
-        """When a slow message that left now is there."""
+        """Draws when a slow message that leaves now arrives."""
         return self.now_s + self.random.uniform(LEAST_DELAY_S, MOST_DELAY_S)
 
 
@@ -198,7 +198,7 @@ def _families(buses: Iterable[str]) -> dict[str, str]:
     named = {"JOINT": JOINTS, "NAME": tuple(buses)}
     families: dict[str, str] = {}
     for family in EFFECTS:
-        place = next((place for place in named if place in family), None)
-        for name in named[place] if place else ("",):
-            families[family.replace(place, name) if place else family] = family
+        placeholder = next((each for each in named if each in family), "")
+        for name in named.get(placeholder, ("",)):
+            families[family.replace(placeholder, name) if placeholder else family] = family
     return families

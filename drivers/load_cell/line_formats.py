@@ -1,9 +1,9 @@
-"""Lines of a load cell's amplifier: from bytes to readings, by a named format or by a pattern of one's own.
+"""Decodes the lines of a load cell's amplifier to readings, by a named format or by a pattern that the user gives.
 
-There is no standard. Boards with an HX711 or ADS1232 print one number a line, bare or after a label; weighing
-indicators print their state, gross or net, sign, weight and unit, with blanks wherever they like (A&D and its many
-followers: `ST,GS,+  12.34kg`, where ST is stable, US unstable, OL overload); loggers print columns. A cell beyond its
-range answers with letters or dashes in place of a number, or stays at the last count of its converter.
+There is no standard. Boards with an HX711 or ADS1232 print one number a line, bare or after a label. Weighing
+indicators print their state, gross or net, sign, weight and unit, with blanks in arbitrary places (A&D and compatible
+ones: `ST,GS,+  12.34kg`, where ST is stable, US unstable, OL overload). Loggers print columns. A cell beyond its range
+prints letters or dashes in place of a number, or stays at the last count of its converter.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ NEWTONS = {  # per unit of weight or force
     "kg": GRAVITY_M_S2,
     "lb": 0.45359237 * GRAVITY_M_S2,
 }
-COUNTS, RATIO = "counts", "mv/v"  # say nothing of newtons by themselves
+COUNTS, RATIO = "counts", "mv/v"  # do not determine newtons
 UNITS = (*NEWTONS, COUNTS, RATIO)
 CONVERTER_ENDS = (float(2**23 - 1), float(-(2**23)))  # of 24 bits, as nearly all of these amplifiers have
 
@@ -43,17 +43,19 @@ OVERLOADED = re.compile(
 
 class Reading(NamedTuple):
     value: float  # in the unit of the line, or in the configured one
-    unit: str = ""  # in small letters; empty where the line does not say
+    unit: str = ""  # in lower case; empty where the line has none
     overloaded: bool = False
 
 
 class LineFormat:
-    """`number`, `indicator`, `column2` (columns are separated by blanks, commas, semicolons or tabs; the first is 1),
-    or a regular expression for the whole line with a group named value, and perhaps one named unit.
+    """A format of lines: `number`, `indicator`, `column2` or a regular expression.
+
+    Columns are separated by blanks, commas, semicolons or tabs; the first is 1. A regular expression matches the whole
+    line, with a group named value and optionally one named unit.
     """
 
     def __init__(self, name: str) -> None:
-        """Raises ValueError for a format that there is not."""
+        """Raises ValueError for an unknown format."""
         self.name = name
         self._column = 0
         self._pattern = re.compile("")
@@ -68,7 +70,7 @@ class LineFormat:
             raise ValueError(f"format {name!r}: must be {describe_formats()}")
 
     def decode(self, line: bytes) -> Reading | None:
-        """None where the line is nothing of this format."""
+        """Returns the reading, or None where the line does not have this format."""
         text = printable(line)
         if text is None:
             return None
@@ -77,7 +79,7 @@ class LineFormat:
             return Reading(float("nan"), overloaded=True) if OVERLOADED.fullmatch(text) else None
         try:
             value = float(match["value"].replace(" ", ""))
-        except ValueError:  # whatever a pattern of one's own lets through
+        except ValueError:  # the user's pattern may match other text
             return None
         if not isfinite(value):
             return None
@@ -100,7 +102,7 @@ def _column(text: str, column: int) -> str:
 
 
 def printable(line: bytes) -> str | None:
-    """The line as text, stripped, or None where it holds anything else."""
+    """Returns the line as stripped text, or None where it contains other bytes."""
     try:
         text = line.decode("ascii").strip()
     except UnicodeDecodeError:
@@ -113,8 +115,9 @@ def describe_formats() -> str:
 
 
 def find_format(lines: Sequence[bytes]) -> LineFormat | None:
-    """The named format that reads most of these lines, at least half of them; columns are left to the operator, who
-    knows which one is the load.
+    """Returns the named format that decodes most of these lines, at least half; None where neither does.
+
+    Columns are never chosen, because only the operator knows which one is the load.
     """
     best, most = None, len(lines) / 2.0
     for name in (INDICATOR, NUMBER):
@@ -126,5 +129,5 @@ def find_format(lines: Sequence[bytes]) -> LineFormat | None:
 
 
 def newtons_per(unit: str) -> float | None:
-    """None for counts and for mV/V, which a calibration has to tell."""
+    """Returns None for counts and mV/V, which need a calibration."""
     return NEWTONS.get(unit.lower())

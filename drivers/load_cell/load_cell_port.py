@@ -1,7 +1,7 @@
-"""A load cell's amplifier on a serial port: samples of force, whatever becomes of the cable.
+"""A load cell's amplifier on a serial port: samples of force, also after the adapter was unplugged.
 
-The amplifier talks whenever it likes, in lines of text. Reading never waits. A line that cannot be read is counted and
-kept to be shown, and an adapter that was pulled out is opened again as soon as it is back (serial_line.py).
+The amplifier sends lines of text at its own rate. Reading never waits. A malformed line is counted and stored for
+display, and an unplugged adapter is opened again as soon as it is back (serial_line.py).
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class LoadCellPort:
         """Raises SerialLineError where it does not open."""
         self.path, self.baud = path, baud
         self.line_format, self.calibration = line_format, calibration
-        self.lines = self.garbled_lines = self.overloads = 0
-        self.last_garbled = ""
+        self.lines = self.malformed_lines = self.overloads = 0
+        self.last_malformed = ""
         self.clock = LineClock(baud)
         self.line = SerialLine(path, baud, open_device=open_device)
         self._heard_s: float | None = None
@@ -69,14 +69,14 @@ class LoadCellPort:
         return 0.0 if self._heard_s is None else now_s - self._heard_s
 
     def read(self, now_s: float) -> list[Sample]:
-        """All samples that have arrived, oldest first; never waits."""
+        """Returns all samples that have arrived, oldest first; never waits."""
         if self._heard_s is None:
             self._heard_s = now_s
         if self.line.reopen(now_s):
             self.clock.reset()
-        return self._take(self.line.read(now_s), now_s)
+        return self._samples(self.line.read(now_s), now_s)
 
-    def _take(self, lines: list[bytes], now_s: float) -> list[Sample]:
+    def _samples(self, lines: list[bytes], now_s: float) -> list[Sample]:
         if not lines:
             return []
         self._heard_s = now_s
@@ -91,8 +91,8 @@ class LoadCellPort:
     def _count(self, line: bytes, reading: Reading | None) -> None:
         self.lines += 1
         if reading is None:
-            self.garbled_lines += 1
-            self.last_garbled = printable(line[:60]) or repr(line[:30])[2:-1]
+            self.malformed_lines += 1
+            self.last_malformed = printable(line[:60]) or repr(line[:30])[2:-1]
 
     def _sample(self, stamp_s: float, reading: Reading) -> Sample:
         if reading.overloaded:
@@ -101,7 +101,7 @@ class LoadCellPort:
         return Sample(stamp_s, self.calibration.force_n(self._in_unit(reading)))
 
     def _in_unit(self, reading: Reading) -> float:
-        """A line that names its unit is believed."""
+        """Converts a reading whose line names another unit than the calibration."""
         own, wanted = reading.unit, self.calibration.unit.lower()
         if own == wanted or own not in NEWTONS or wanted not in NEWTONS:
             return reading.value

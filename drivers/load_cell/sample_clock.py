@@ -1,12 +1,12 @@
-"""When a line was measured, as far as its arrival tells.
+"""Estimates when each line was measured, from the times at which lines arrive.
 
-An amplifier converts at a steady rate of its own, and so does the counter of an encoder. Its lines then wait: in the
-adapter (an FTDI chip hands over what it has every 16 ms), in the kernel, and until somebody reads. So several come at
-once, all of them late by different times. The stamps here run at the measured period and follow the arrivals slowly; a
-constant delay remains, which moves a whole stroke and nothing within it. A line that comes more than GAP periods late
-is no late line: others are missing. Garbled lines count as well, since each took its time. A period that was learned
-while a busy computer handed over late what it had would make a gap of every few lines: where one gap follows another
-the period is learned anew.
+An amplifier converts at a steady rate of its own, and so does the counter of an encoder. Its lines then wait in the
+adapter (an FTDI chip delivers its buffer every 16 ms), in the kernel, and until the program reads. So several lines
+arrive at once, each late by a different time. The stamps run at the measured period and follow the arrivals slowly; a
+constant delay remains, which shifts a whole stroke and changes nothing within it. If a line arrives more than GAP
+periods late, other lines are missing. Malformed lines count as well, because each took its time. A period that was
+measured while a busy computer delivered late would turn every few lines into a gap: where one gap follows another, the
+period is measured again.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from collections import deque
 
 GAIN = 0.05  # of the difference between arrival and expectation
 GAP = 3.0  # periods
-LEAST_GAP_S = 0.06  # bursts of an adapter and a busy computer
-LEARNING_LINES, LEARNING_S = 16, 0.5
+LEAST_GAP_S = 0.06  # longer than the bursts of an adapter and a busy computer
+MEASURED_LINES, MEASURED_S = 16, 0.5
 REMEMBERED_READS = 512
 BITS_PER_BYTE = 10.0
 LEAST_STEP_S = 1e-6
@@ -26,44 +26,44 @@ class LineClock:
     """Owns the period of the lines and the stamp of the last one."""
 
     def __init__(self, baud: int) -> None:
-        self._line_s = 16.0 * BITS_PER_BYTE / baud  # that a line takes on the wire
+        self._line_s = 16.0 * BITS_PER_BYTE / baud  # of one line on the wire
         self.drop_outs = 0
         self.reset()
 
     def reset(self) -> None:
-        """The amplifier was away."""
-        self.period_s: float | None = None  # until a few lines have come
+        """Forgets the period, after the device was away."""
+        self.period_s: float | None = None  # until enough lines have arrived
         self._stamp_s: float | None = None
-        self._begin()
+        self._measure_again()
 
     @property
     def rate_hz(self) -> float | None:
-        """Of the lines, once a few have come."""
+        """The rate of the lines, once enough have arrived."""
         return None if self.period_s is None else 1.0 / self.period_s
 
-    def _begin(self) -> None:
-        """Learning, and keep the period meanwhile."""
-        self._has_learned = False
-        self._reads: deque[tuple[float, int]] = deque(maxlen=REMEMBERED_READS)  # when, and how many lines by then
+    def _measure_again(self) -> None:
+        """Begins to measure the period; the previous one stays in use meanwhile."""
+        self._is_measured = False
+        self._reads: deque[tuple[float, int]] = deque(maxlen=REMEMBERED_READS)  # time, and number of lines until then
         self._lines = 0
 
     def stamps_s(self, lines: int, now_s: float) -> list[float]:
-        """Of as many lines, all read at this moment, oldest first."""
-        stamps_s = [self._next_s(now_s, behind) for behind in range(lines - 1, -1, -1)]
+        """Returns the stamps of this many lines, all read now, oldest first."""
+        stamps_s = [self._next_stamp_s(now_s, later) for later in range(lines - 1, -1, -1)]
         if lines:
             self._lines += lines
             self._reads.append((now_s, self._lines))
-            self._learn()
+            self._measure_period()
         return stamps_s
 
-    def _learn(self) -> None:
+    def _measure_period(self) -> None:
         (first_s, first), (last_s, last) = self._reads[0], self._reads[-1]
-        if last - first >= LEARNING_LINES and last_s - first_s >= LEARNING_S:
-            self.period_s, self._has_learned = (last_s - first_s) / (last - first), True
+        if last - first >= MEASURED_LINES and last_s - first_s >= MEASURED_S:
+            self.period_s, self._is_measured = (last_s - first_s) / (last - first), True
 
-    def _next_s(self, now_s: float, behind: int) -> float:
+    def _next_stamp_s(self, now_s: float, later_lines: int) -> float:
         period_s, before_s = self.period_s, self._stamp_s
-        arrived_s = now_s - behind * (self._line_s if period_s is None else period_s)
+        arrived_s = now_s - later_lines * (self._line_s if period_s is None else period_s)
         if before_s is None:
             stamp_s = arrived_s
         elif period_s is None:
@@ -77,8 +77,8 @@ class LineClock:
         late_s = arrived_s - expected_s
         if late_s > max(GAP * period_s, LEAST_GAP_S):
             self.drop_outs += 1
-            if not self._has_learned:
+            if not self._is_measured:
                 self.period_s = None
-            self._begin()
+            self._measure_again()
             return arrived_s
         return min(expected_s + GAIN * late_s, now_s)

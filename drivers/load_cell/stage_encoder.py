@@ -1,8 +1,8 @@
-"""The place of a linear stage from an encoder on it: a serial port on which a counter sends its count, a line each.
+"""The position of a linear stage from its encoder: a serial port on which a counter sends one count per line.
 
-What a line may look like, and which count is believed, says encoder_counts.py. The counter sends by itself at a steady
-rate, so a line's stamp is as even as that (load_cell_clock.py); what of its way to this computer is constant stays in
-it. Reading never waits, and a device that was pulled out is opened again as soon as it is back.
+encoder_counts.py decodes the lines and rejects implausible counts. The counter sends at a steady rate of its own, so
+the stamps are as even (sample_clock.py); a constant delay remains in them. Reading never waits, and an unplugged device
+is opened again as soon as it is back.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from drivers.serial.serial_line import Arrivals, SerialLine
 @dataclass(frozen=True)
 class StageEncoderSettings:
     path: str
-    metres_per_count: Annotated[float, Bounds(1e-8, 0.01)]  # which way it counts is found from the stroke
+    metres_per_count: Annotated[float, Bounds(1e-8, 0.01)]  # its sign is found from the stroke
     baud: Annotated[int, Bounds(300, 4_000_000)] = 115_200
-    label: str = ""  # that a line begins with
+    label: str = ""  # with which each line begins
 
 
-class Place(NamedTuple):
+class StagePosition(NamedTuple):
     stamp_s: float
     position_m: float
 
@@ -47,8 +47,8 @@ class StageEncoder:
 
     @property
     def breaks(self) -> int:
-        """How often places before and behind had not the same zero."""
-        return self.line.unpluggings + self.counts.leaps
+        """How often the zero of the positions may have changed."""
+        return self.line.unpluggings + self.counts.jumps
 
     @property
     def last_problem(self) -> str:
@@ -63,21 +63,21 @@ class StageEncoder:
         return self.line.arrivals(lambda line: self.counts.decode(line) is not None)
 
     def silent_for_s(self, now_s: float) -> float:
-        """Without any count."""
+        """How long no count has arrived."""
         return 0.0 if self._heard_s is None else now_s - self._heard_s
 
-    def read(self, now_s: float) -> list[Place]:
-        """All places that have arrived, oldest first; never waits."""
+    def read(self, now_s: float) -> list[StagePosition]:
+        """Returns all positions that have arrived, oldest first; never waits."""
         if self.line.reopen(now_s):
             self.clock.reset()
             self.counts.reset()
         lines = self.line.read(now_s)
         stamps_s = self.clock.stamps_s(len(lines), now_s)
-        taken = [(stamp_s, self.counts.take(line, stamp_s)) for line, stamp_s in zip(lines, stamps_s, strict=True)]
-        places = [Place(stamp_s, position_m) for stamp_s, position_m in taken if position_m is not None]
-        if places or self._heard_s is None:
+        accepted = [(stamp_s, self.counts.accept(line, stamp_s)) for line, stamp_s in zip(lines, stamps_s, strict=True)]
+        positions = [StagePosition(stamp_s, position_m) for stamp_s, position_m in accepted if position_m is not None]
+        if positions or self._heard_s is None:
             self._heard_s = now_s
-        return places
+        return positions
 
     def close(self) -> None:
         self.line.close()

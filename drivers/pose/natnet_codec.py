@@ -1,14 +1,14 @@
-"""Messages of OptiTrack's NatNet protocol, taken out of UDP packets as far as one rigid body's pose needs.
+"""Decodes messages of OptiTrack's NatNet protocol from UDP packets, as far as the pose of one rigid body needs.
 
-Layout (little-endian), as the NatNet SDK's sample clients PacketClient and PythonClient show it: u16 message, u16 bytes
-that follow. Server information (1): 256 bytes of name, 4 of the program's version, 4 of the protocol's; from 3.0 on
+Layout (little-endian), as in the NatNet SDK's sample clients PacketClient and PythonClient: u16 message, u16 bytes that
+follow. Server information (1): 256 bytes of name, 4 of the program's version, 4 of the protocol's; from 3.0 on
 u64 ticks of the clock per second, u16 data port, a flag for multicast, 4 bytes of its address. A frame (7): i32 number,
 then sections that each begin with an i32 count, and from 4.1 on with the i32 bytes of what follows:
 
     marker sets        name, zero byte, i32 markers, 12 bytes each
     other markers      12 bytes each
     rigid bodies       i32 id, f32 x y z, f32 qx qy qz qw; before 3.0: i32 markers, 20 bytes each; f32 mean error,
-                       u16 flags, of which the lowest tells that the body is tracked
+                       u16 flags; the lowest is set while the body is tracked
     skeletons          i32 id, i32 bones, each as a rigid body
     assets             only from 4.1 on
     labelled markers   22 bytes each; from 3.0 on 26
@@ -17,10 +17,11 @@ then sections that each begin with an i32 count, and from 4.1 on with the i32 by
 
 and ends with u32 time code, u32 part of it, f64 seconds of the software (before 2.7 f32); from 3.0 on the ticks at
 which the cameras' shutters were half through, the images had arrived and the frame was sent, u64 each; from 4.1 on two
-u32 of a precision time; u16 flags, i32 zero. Versions before 2.6 do not tell whether a body is tracked: not read here.
+u32 of a precision time; u16 flags, i32 zero. Versions before 2.6 are not supported,
+because they do not report whether a body is tracked.
 
-Why not a library: those on PyPI build an object for every marker, block or bring threads of their own, and raise in the
-midst of a packet that is cut off. The best kept of them, natnet, is the tests' oracle.
+No library is used: those on PyPI build an object for every marker, block or start their own threads, and raise in the
+middle of a truncated packet. The best maintained one, natnet, serves the tests as a reference.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ QUALITY = Struct("<fH")
 TRACKED = 0x01
 MODELS_CHANGED = 0x02
 VECTOR_BYTES = 12
-MARKER_BYTES = 20  # of a rigid body before 3.0: its place, id and size
+MARKER_BYTES = 20  # of a rigid body before 3.0: its position, id and size
 CHANNEL_VALUE_BYTES = 4
 
 
@@ -61,7 +62,7 @@ OLDEST, NEWEST = NatNetVersion(2, 6), NatNetVersion(4, 255)
 class ServerInfo(NamedTuple):
     name: str
     version: NatNetVersion  # of the protocol
-    ticks_per_s: int  # of the clock of a frame's ticks; 0 where it does not tell
+    ticks_per_s: int  # of the clock of a frame's ticks; 0 where the version has none
 
 
 class RigidBody(NamedTuple):
@@ -74,51 +75,51 @@ class RigidBody(NamedTuple):
 
 class MotionFrame(NamedTuple):
     number: int
-    body: RigidBody | None  # the one that was asked for, where the frame holds it
+    body: RigidBody | None  # the requested one, where the frame contains it
     software_s: float
-    exposed_ticks: int  # 0 where the version does not tell
+    exposed_ticks: int  # 0 where the version has none
     sent_ticks: int
     models_changed: bool
 
 
-class GarbledPacketError(ValueError):
-    """No such message, or one that is cut off."""
+class MalformedPacketError(ValueError):
+    """The packet is no NatNet message, or is truncated."""
 
 
-GARBLED = (struct.error, ValueError, OverflowError)
+DECODING_ERRORS = (struct.error, ValueError, OverflowError)
 
 
 def encode_request(message: int, text: bytes = b"") -> bytes:
-    """CONNECT, REQUEST_MODEL or KEEP_ALIVE. A server answers the first by its information."""
+    """Encodes CONNECT, REQUEST_MODEL or KEEP_ALIVE. A server answers CONNECT by its information."""
     payload = b"Ping\0" if message == CONNECT else text
     return HEADER.pack(message, len(payload)) + payload
 
 
 def message_of(packet: bytes) -> int:
-    """Its kind. Raises GarbledPacketError for a packet that ends before its payload."""
+    """Returns the kind of message. Raises MalformedPacketError for a packet that ends before its payload."""
     if len(packet) < HEADER.size:
-        raise GarbledPacketError("no header")
+        raise MalformedPacketError("no header")
     message, size = HEADER.unpack_from(packet)
     if len(packet) < HEADER.size + size:
-        raise GarbledPacketError("cut off")
+        raise MalformedPacketError("truncated")
     return int(message)
 
 
 def decode_server_info(packet: bytes) -> ServerInfo:
-    """Raises GarbledPacketError."""
+    """Raises MalformedPacketError."""
     try:
         name = packet[HEADER.size : HEADER.size + NAME_BYTES].partition(b"\0")[0].decode(errors="replace")
         major, minor = SERVER_VERSIONS.unpack_from(packet, HEADER.size + NAME_BYTES)[4:6]
         ticks_per_s = 0
         if major >= 3:
             ticks_per_s = SERVER_CLOCK.unpack_from(packet, HEADER.size + NAME_BYTES + SERVER_VERSIONS.size)[0]
-    except GARBLED as problem:
-        raise GarbledPacketError(str(problem)) from None
+    except DECODING_ERRORS as problem:
+        raise MalformedPacketError(str(problem)) from None
     return ServerInfo(name, NatNetVersion(major, minor), ticks_per_s)
 
 
 class FrameLayout:
-    """How one version lays out its frames."""
+    """The layout of one version's frames."""
 
     def __init__(self, version: NatNetVersion) -> None:
         self.has_sizes = version >= (4, 1)
@@ -126,7 +127,7 @@ class FrameLayout:
         self.has_devices = version >= (2, 11)
         self.has_ticks = version >= (3, 0)
         self.bodies_have_markers = not self.has_ticks
-        self.body_bytes = POSE.size + QUALITY.size  # where its markers are not among it
+        self.body_bytes = POSE.size + QUALITY.size  # without markers
         self.labelled_bytes = 26 if version >= (3, 0) else 22
         software = "d" if version >= (2, 7) else "f"
         ticks = "QQQ" if self.has_ticks else ""
@@ -134,96 +135,96 @@ class FrameLayout:
         self.end = Struct(f"<II{software}{ticks}{precision}H")
 
     def decode_frame(self, packet: bytes, identity: int) -> MotionFrame:
-        """With the rigid body of that streaming id, or the first one for 0. Raises GarbledPacketError."""
+        """Decodes a frame with the rigid body of that streaming id; 0: the first. Raises MalformedPacketError."""
         try:
             return self._frame(packet, identity)
-        except GARBLED as problem:
-            raise GarbledPacketError(str(problem)) from None
+        except DECODING_ERRORS as problem:
+            raise MalformedPacketError(str(problem)) from None
 
     def _frame(self, packet: bytes, identity: int) -> MotionFrame:
         (number,) = INTEGER.unpack_from(packet, HEADER.size)
         place = self._skip_marker_sets(packet, HEADER.size + INTEGER.size)
-        count, place = self._open(packet, place)
+        count, place = self._begin_section(packet, place)
         body, place = self._find_body(packet, place + VECTOR_BYTES * count, identity)
         end = self.end.unpack_from(packet, self._skip_to_end(packet, place))
         if not isfinite(end[2]):
-            raise GarbledPacketError("a time that is none")
+            raise MalformedPacketError("a time that is not finite")
         exposed, sent = (end[3], end[5]) if self.has_ticks else (0, 0)
         return MotionFrame(number, body, end[2], exposed, sent, bool(end[-1] & MODELS_CHANGED))
 
-    def _open(self, packet: bytes, place: int) -> tuple[int, int]:
-        """How many there are in a section, and where the first one begins."""
+    def _begin_section(self, packet: bytes, place: int) -> tuple[int, int]:
+        """Returns the number of items in a section, and where the first one begins."""
         (count,) = INTEGER.unpack_from(packet, place)
         if count < 0:
-            raise GarbledPacketError("a negative count")
+            raise MalformedPacketError("a negative count")
         return count, place + INTEGER.size * (2 if self.has_sizes else 1)
 
     def _skip(self, packet: bytes, place: int) -> int:
-        """Behind a section that tells its size."""
+        """Returns the end of a section that contains its size."""
         count, size = TWO_INTEGERS.unpack_from(packet, place)
         if count < 0 or size < 0:
-            raise GarbledPacketError("a negative size")
+            raise MalformedPacketError("a negative size")
         return place + TWO_INTEGERS.size + int(size)
 
     def _skip_marker_sets(self, packet: bytes, place: int) -> int:
         if self.has_sizes:
             return self._skip(packet, place)
-        count, place = self._open(packet, place)
+        count, place = self._begin_section(packet, place)
         for _ in range(count):
             place = packet.index(0, place) + 1
-            markers, place = self._open(packet, place)
+            markers, place = self._begin_section(packet, place)
             place += VECTOR_BYTES * markers
         return place
 
     def _find_body(self, packet: bytes, place: int, identity: int) -> tuple[RigidBody | None, int]:
-        """The one that is looked for, and the end of the section."""
-        count, place = self._open(packet, place)
+        """Returns the requested body, and the end of the section."""
+        count, place = self._begin_section(packet, place)
         found = None
         for _ in range(count):
-            numbers = POSE.unpack_from(packet, place)  # of all, so that a wild count ends with the packet
-            place = self._behind_markers(packet, place + POSE.size)
+            numbers = POSE.unpack_from(packet, place)  # every item, so that a wrong count ends with the packet
+            place = self._skip_markers(packet, place + POSE.size)
             if found is None and identity in (0, numbers[0]):
                 found = _rigid_body(numbers, *QUALITY.unpack_from(packet, place))
             place += QUALITY.size
         return found, place
 
-    def _behind_markers(self, packet: bytes, place: int) -> int:
+    def _skip_markers(self, packet: bytes, place: int) -> int:
         if not self.bodies_have_markers:
             return place
-        markers, place = self._open(packet, place)
+        markers, place = self._begin_section(packet, place)
         return place + MARKER_BYTES * markers
 
     def _skip_to_end(self, packet: bytes, place: int) -> int:
-        """Skeletons, assets, labelled markers, force plates and devices."""
+        """Skips skeletons, assets, labelled markers, force plates and devices."""
         if self.has_sizes:
             for _ in range(5):
                 place = self._skip(packet, place)
             return place
         place = self._skip_skeletons(packet, place)
-        count, place = self._open(packet, place)
+        count, place = self._begin_section(packet, place)
         place += self.labelled_bytes * count
         for _ in range(self.has_force_plates + self.has_devices):
             place = self._skip_channels(packet, place)
         return place
 
     def _skip_skeletons(self, packet: bytes, place: int) -> int:
-        count, place = self._open(packet, place)
+        count, place = self._begin_section(packet, place)
         for _ in range(count):
-            bones, place = self._open(packet, place + INTEGER.size)
+            bones, place = self._begin_section(packet, place + INTEGER.size)
             if self.bodies_have_markers:
                 for _ in range(bones):
-                    place = self._behind_markers(packet, place + POSE.size) + QUALITY.size
+                    place = self._skip_markers(packet, place + POSE.size) + QUALITY.size
             else:
                 place += self.body_bytes * bones
         return place
 
     def _skip_channels(self, packet: bytes, place: int) -> int:
-        """Of force plates, or of devices."""
-        count, place = self._open(packet, place)
+        """Skips the channels of force plates or of devices."""
+        count, place = self._begin_section(packet, place)
         for _ in range(count):
-            channels, place = self._open(packet, place + INTEGER.size)
+            channels, place = self._begin_section(packet, place + INTEGER.size)
             for _ in range(channels):
-                values, place = self._open(packet, place)
+                values, place = self._begin_section(packet, place)
                 place += CHANNEL_VALUE_BYTES * values
         return place
 

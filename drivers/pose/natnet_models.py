@@ -1,13 +1,13 @@
-"""NatNet's description of all that is tracked: the streaming ids of rigid bodies by their names.
+"""Decodes NatNet's model description: the streaming ids of rigid bodies by their names.
 
 Layout of message 5 (see natnet_codec.py): i32 descriptions, each i32 kind, from 4.1 on i32 bytes of what follows, then
 
     marker set (0)   its name and a zero byte, i32 markers, each a name and a zero byte
     rigid body (1)   its name and a zero byte, i32 id, i32 parent, f32 x y z; from 3.0 on
-                     i32 markers, 12 bytes of a place each, 4 of a label each, from 4.0 on a name and a zero byte each
+                     i32 markers, 12 bytes of a position and 4 of a label each, from 4.0 on a name and a zero byte each
 
-Other kinds are passed over by their size. Before 4.1 they do not tell it, so there what stands behind the first of
-them is not read; Motive tells marker sets and rigid bodies first.
+Other kinds are skipped by their size. Before 4.1 they do not contain it, so there the reader stops at the first of
+them; Motive sends marker sets and rigid bodies first.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drivers.pose.natnet_codec import (
-    GARBLED,
+    DECODING_ERRORS,
     HEADER,
     INTEGER,
     TWO_INTEGERS,
     VECTOR_BYTES,
-    GarbledPacketError,
+    MalformedPacketError,
     NatNetVersion,
 )
 
@@ -28,11 +28,11 @@ MARKER_SET, RIGID_BODY = 0, 1
 
 
 def decode_bodies(packet: bytes, version: NatNetVersion) -> dict[str, int]:
-    """Streaming ids by name. Raises GarbledPacketError."""
+    """Returns streaming ids by name. Raises MalformedPacketError."""
     try:
         return dict(_bodies(packet, version))
-    except GARBLED as problem:
-        raise GarbledPacketError(str(problem)) from None
+    except DECODING_ERRORS as problem:
+        raise MalformedPacketError(str(problem)) from None
 
 
 def _bodies(packet: bytes, version: NatNetVersion) -> Iterator[tuple[str, int]]:
@@ -46,13 +46,13 @@ def _bodies(packet: bytes, version: NatNetVersion) -> Iterator[tuple[str, int]]:
             yield _name(packet, place)
         elif not has_sizes and kind != MARKER_SET:
             return
-        place = place + size if has_sizes else _behind(packet, place, kind, version)
+        place = place + size if has_sizes else _end_of(packet, place, kind, version)
 
 
 def _count(packet: bytes, place: int) -> tuple[int, int]:
     (count,) = INTEGER.unpack_from(packet, place)
     if count < 0:
-        raise GarbledPacketError("a negative count")
+        raise MalformedPacketError("a negative count")
     return count, place + INTEGER.size
 
 
@@ -62,8 +62,8 @@ def _name(packet: bytes, place: int) -> tuple[str, int]:
     return packet[place:end].decode(errors="replace"), identity
 
 
-def _behind(packet: bytes, place: int, kind: int, version: NatNetVersion) -> int:
-    """The end of a description that does not tell its size."""
+def _end_of(packet: bytes, place: int, kind: int, version: NatNetVersion) -> int:
+    """Returns the end of a description that does not contain its size."""
     place = packet.index(0, place) + 1
     if kind == RIGID_BODY:
         place += TWO_INTEGERS.size + VECTOR_BYTES

@@ -1,4 +1,4 @@
-"""Where the motion capture's NatNet frames come from, as it is configured."""
+"""The configuration of a NatNet client."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class NatNetParameters:
 
 
 def parse_version(text: str) -> NatNetVersion | None:
-    """None for what is no version that is read here."""
+    """Returns None for a text that is no version, and for unsupported versions."""
     major, dot, minor = text.partition(".")
     if not (dot and major.isdecimal() and minor.isdecimal() and len(text) < 8):
         return None

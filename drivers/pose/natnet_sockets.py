@@ -1,6 +1,6 @@
-"""The UDP sockets of a NatNet client: one that joins the group, where there is one, and one that asks the server.
+"""The UDP sockets of a NatNet client: one joins the multicast group, if there is one, and one sends requests.
 
-Where the server does not multicast, it sends its frames to the one that asks. Nothing here waits.
+A server that does not multicast sends its frames to the socket that sent the requests. Nothing here waits.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from struct import pack
 from drivers.pose.natnet_codec import LONGEST_PACKET, encode_request
 from drivers.pose.natnet_parameters import NatNetParameters
 
-MOST_PACKETS_PER_READ = 16  # of each socket: a hundred bodies at 240 Hz are one in two ticks
+MOST_PACKETS_PER_READ = 16  # of each socket; frames at 240 Hz are fewer than one in a tick
 ANY_ADDRESS = "0.0.0.0"
 
 
 class NatNetSockets:
-    """Owns the sockets."""
+    """Owns the sockets of one client."""
 
     def __init__(self, parameters: NatNetParameters) -> None:
         """Raises OSError."""
@@ -41,17 +41,17 @@ class NatNetSockets:
             asking.bind((_address_of(parameters.interface), 0))
 
     def packets(self) -> Iterator[tuple[bytes, str]]:
-        """What has arrived, and from which address."""
+        """Yields the packets that have arrived, and the address of each sender."""
         for arriving in self._sockets:
             for _ in range(MOST_PACKETS_PER_READ):
                 try:
                     packet, sender = arriving.recvfrom(LONGEST_PACKET)
-                except OSError:  # there is no more, or the network went down
+                except OSError:  # no more packets, or the network is down
                     break
                 yield packet, str(sender[0])
 
     def request(self, message: int) -> None:
-        """From the server. Where there is no network for the moment it is asked again later."""
+        """Sends a request to the server. Without a network it is lost, and the caller repeats it later."""
         with suppress(OSError):
             self._sockets[-1].sendto(encode_request(message), self._server)
 
@@ -70,10 +70,11 @@ def _udp_socket(interface: str) -> socket.socket:
 
 
 def _join(parameters: NatNetParameters) -> socket.socket:
-    """Bound to the group's own address, so that nothing else is heard. Raises OSError."""
+    """Opens a socket bound to the group's address, so it receives nothing else. Raises OSError."""
     opened = _udp_socket(parameters.interface)
     try:
-        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # others on this computer may listen as well
+        # Other programs on this computer may receive as well.
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         opened.bind((parameters.group, parameters.port))
         address = socket.inet_aton(_address_of(parameters.interface))
         named = parameters.interface and not is_address(parameters.interface)
@@ -91,7 +92,7 @@ def _address_of(interface: str) -> str:
 
 
 def is_address(text: str) -> bool:
-    """Of four numbers."""
+    """Whether a text is an IPv4 address."""
     try:
         ipaddress.IPv4Address(text)
     except ValueError:

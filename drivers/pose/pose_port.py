@@ -1,7 +1,8 @@
-"""The body's place along the track, from motion capture or a rail encoder: what a source of it is; the simplest one.
+"""The interface of a source of the body's position along the track, and the simplest source.
 
-A Unix datagram socket takes 16-byte messages from a bridge on the same machine, two little-endian doubles: the
-source's own time and the place x in metres. The newest one wins; its stamp is the time it was read.
+Sources are motion capture, a rail encoder or `PosePort`: a Unix datagram socket that receives 16-byte messages from a
+bridge on the same machine, two little-endian doubles: the source's own time and the position x in metres. The newest
+message wins; its stamp is the time when it was read.
 """
 
 from __future__ import annotations
@@ -17,29 +18,31 @@ from typing import NamedTuple, Protocol
 from control.records import NEVER_S, BodyPose
 
 POSE = Struct("<dd")
-STALE_S = 0.05  # six frames of 120 Hz: a body that seems to stand makes a bound on k_s a value
+STALE_S = 0.05  # six frames of 120 Hz; a frozen position would turn a lower bound on k_s into a value
 SOCKET_MODE = 0o660  # a bridge run by an operator may send
-MOST_MESSAGES_PER_READ = 64  # a sender gone wild must not hold the loop
+MOST_MESSAGES_PER_READ = 64  # so that a flood of messages cannot block the loop
 
 
 class PoseSourceError(Exception):
-    """A source that does not open; the text says why and what to do."""
+    """The source does not open; the text says why and what to do."""
 
 
 class PoseReport(NamedTuple):
-    """What a person is told of a source."""
+    """The state of a source for the operator."""
 
     source: str = ""  # empty: there is none
-    poses: int = 0  # taken in since the start
-    garbled: int = 0  # messages that are none of the source's, or cut off
-    lost: int = 0  # messages that say that the body is not seen
-    trouble: str = ""  # why no pose comes, in a sentence
+    poses: int = 0  # accepted since the start
+    malformed: int = 0  # malformed messages, and messages of other senders
+    lost: int = 0  # messages without a usable pose of the body
+    trouble: str = ""  # why no pose arrives
     what_to_do: str = ""
 
     @property
     def message(self) -> str:
-        """A robot walks without a pose, and knows less: trouble is a warning."""
-        counted = f"{self.source}: {self.poses} poses, {self.garbled} messages garbled, {self.lost} without the body"
+        """One line; trouble is only a warning, because the robot also walks without a pose."""
+        counted = (
+            f"{self.source}: {self.poses} poses, {self.malformed} malformed messages, {self.lost} without the body"
+        )
         if not self.trouble:
             return counted
         return f"warning: {self.trouble} {self.what_to_do[:1].upper()}{self.what_to_do[1:]}. {counted}"
@@ -50,23 +53,23 @@ NO_SOURCE = PoseReport()
 
 class PoseSource(Protocol):
     def read(self, now_s: float) -> BodyPose:
-        """The newest pose, or an empty one where none is known."""
+        """Returns the newest pose, or an empty one where none is known."""
 
     def report(self) -> PoseReport:
-        """As of the last reading, for `status` and `check`."""
+        """Returns the state at the last `read`, for `status` and `check`."""
 
 
 class OpenedPose(PoseSource, Protocol):
-    """One that was opened for the daemon."""
+    """A source that the daemon has opened."""
 
     def reopen(self, now_s: float) -> bool:
-        """Where it was lost, try again; whether it was opened anew. Only called while nothing moves."""
+        """Tries to open a lost source again; returns whether it did. Only called while nothing moves."""
 
     def close(self) -> None: ...
 
 
 class NoPose:
-    """For a robot that nobody watches."""
+    """The source of a robot without a measured position."""
 
     def read(self, now_s: float) -> BodyPose:
         return BodyPose()
@@ -82,13 +85,13 @@ class NoPose:
 
 
 class PosePort:
-    """Listens at `path`. A pose older than STALE_S counts as none."""
+    """Receives poses at `path`. A pose older than STALE_S does not count."""
 
     def __init__(self, path: Path) -> None:
         """Raises PoseSourceError."""
         self._path = path
         self._socket = _listen(path)
-        self.poses = self.garbled_messages = 0
+        self.poses = self.malformed_messages = 0
         self._now_s = NEVER_S
         self.reset()
 
@@ -111,15 +114,15 @@ class PosePort:
                 self._pose = BodyPose(now_s, x_m)
                 self.poses += 1
             else:
-                self.garbled_messages += 1
+                self.malformed_messages += 1
 
     def report(self) -> PoseReport:
-        report = PoseReport(f"socket {self._path}", self.poses, self.garbled_messages)
+        report = PoseReport(f"socket {self._path}", self.poses, self.malformed_messages)
         if self._now_s - self._pose.stamp_s <= STALE_S:
             return report
         heard = "any more" if self._pose.stamp_s > NEVER_S else "yet"
         return report._replace(
-            trouble=f"no pose comes through {self._path} {heard}.",
+            trouble=f"no pose arrives at {self._path} {heard}.",
             what_to_do='start the motion capture\'s bridge, or set pose.source = "none"',
         )
 
@@ -135,7 +138,7 @@ def _listen(path: Path) -> socket.socket:
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     listener.setblocking(False)
     try:
-        if path.is_socket():  # left behind; anything else makes bind refuse
+        if path.is_socket():  # left by an earlier process; bind refuses any other file
             path.unlink()
         listener.bind(str(path))
         os.chmod(path, SOCKET_MODE)
@@ -146,7 +149,7 @@ def _listen(path: Path) -> socket.socket:
 
 
 class PoseSender:
-    """The other end. A pose that nobody listens to is lost, as it would be on a network."""
+    """The sending end. Without a receiver a pose is lost, as on a network."""
 
     def __init__(self, path: Path) -> None:
         self._path = str(path)

@@ -1,9 +1,9 @@
-"""When a pose was true, by this computer's clock, and where the body is by now.
+"""Converts a camera's time stamps to this computer's clock, and extrapolates the body's position to now.
 
-A camera's program stamps its frames with a clock of its own. What separates that clock from ours is at most what the
-quickest frame of late shows, arrival minus sending: all others were held up somewhere, in a network or until the next
-tick read them (the least delay, as NTP filters its samples; what it cannot show is the part that every frame takes).
-Between frames a body goes on as it went over the last few.
+The motion-capture program stamps its frames with its own clock. The offset between the clocks is at most the smallest
+recent difference of arrival and sending: all other frames waited in a network, or until the next tick read them. (NTP
+filters its samples by the same least delay; the part that delays every frame stays unknown.) Between frames the body
+is assumed to keep its velocity over the last few frames.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from math import inf
 
 from control.records import NEVER_S, UNKNOWN
 
-WINDOW_S = 10.0  # in which clocks of 50 ppm part by half a millisecond
-RESTARTED_S = 1.0  # a frame later than the quickest by so much comes from a clock that was set
-SPEED_S = 0.016  # over which a speed is taken, two frames of 120 Hz: with 0.1 mm of noise it is known to 9 mm/s
-LONGEST_S = 0.1  # that a body is thought to go on as it went
-LEAP_M = 0.03  # from frame to frame: no body of ours, so nothing is known of its speed
+WINDOW_S = 10.0  # in which clocks of 50 ppm drift apart by half a millisecond
+RESTARTED_S = 1.0  # a frame that is later than the least delay by this much comes from a clock that was set
+SPEED_S = 0.016  # for the velocity, two frames of 120 Hz: 0.1 mm of noise makes an error of 9 mm/s
+LONGEST_S = 0.1  # of extrapolation
+JUMP_M = 0.03  # from frame to frame; the robot cannot move so fast, so the velocity is unknown
 
 
 class LeastDelay:
-    """Owns the quickest frames of this window and of the one before."""
+    """Owns the least delays of this window and of the one before."""
 
     def __init__(self) -> None:
         self.reset()
@@ -31,7 +31,7 @@ class LeastDelay:
         self._since_s = NEVER_S
 
     def update(self, arrival_s: float, sent_s: float) -> float:
-        """What to add to the sender's clock to have ours."""
+        """Returns the offset that converts the sender's clock to this computer's."""
         delay_s = arrival_s - sent_s
         if delay_s - min(self._least_s, self._before_s) > RESTARTED_S:
             self.reset()
@@ -42,29 +42,29 @@ class LeastDelay:
 
 
 class PoseForecast:
-    """Owns the places of late."""
+    """Owns the recent positions."""
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        self._places: deque[tuple[float, float]] = deque()
+        self._positions: deque[tuple[float, float]] = deque()
 
     def add(self, stamp_s: float, x_m: float) -> bool:
-        """Whether the body can have come there from the place before; else this one is the first."""
-        places = self._places
-        follows = bool(places) and stamp_s > places[-1][0] and abs(x_m - places[-1][1]) <= LEAP_M
+        """Adds a position; returns whether it is plausible after the previous one, else starts again from it."""
+        positions = self._positions
+        follows = bool(positions) and stamp_s > positions[-1][0] and abs(x_m - positions[-1][1]) <= JUMP_M
         if not follows:
-            places.clear()
-        places.append((stamp_s, x_m))
-        while len(places) > 2 and stamp_s - places[1][0] >= SPEED_S:
-            places.popleft()
+            positions.clear()
+        positions.append((stamp_s, x_m))
+        while len(positions) > 2 and stamp_s - positions[1][0] >= SPEED_S:
+            positions.popleft()
         return follows
 
     def at(self, now_s: float) -> float:
-        if not self._places:
+        if not self._positions:
             return UNKNOWN
-        (first_s, first_m), (last_s, last_m) = self._places[0], self._places[-1]
+        (first_s, first_m), (last_s, last_m) = self._positions[0], self._positions[-1]
         ahead_s = min(now_s - last_s, LONGEST_S)
         if last_s - first_s < SPEED_S / 2.0 or last_s - first_s > 2.0 * LONGEST_S or ahead_s <= 0.0:
             return last_m

@@ -1,8 +1,7 @@
-"""The body's place from an encoder on its rail: a serial port on which a counter sends its count, a line each.
+"""The body's position from an encoder on its rail: a serial port on which a counter sends one count per line.
 
-What a line may look like, and which count is believed, says encoder_counts.py; how the port is opened, read and found
-again after it was unplugged, serial_line.py. It is opened again between two ticks and only while nothing moves, since
-that may take milliseconds.
+encoder_counts.py decodes the lines and rejects implausible counts; serial_line.py opens and reads the port. An
+unplugged port is opened again between two ticks and only while nothing moves, because that may take milliseconds.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from drivers.serial.encoder_counts import EncoderCounts
 from drivers.serial.serial_line import SerialLine, SerialLineError
 
 LONGEST_LINE_BYTES = 64
-RETRY_S = 1.0  # between tries to open a device that is gone
+RETRY_S = 1.0  # between attempts to open a device that is gone
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class RailEncoder:
         origin_m: float = 0.0,
         open_device: Callable[[str, int], Any] | None = None,
     ) -> None:
-        """`origin_m`: the counter's place where x is zero. Raises PoseSourceError."""
+        """`origin_m` is the counter's position where x is zero. Raises PoseSourceError."""
         self.parameters = parameters
         device = parameters.device
         try:
@@ -54,23 +53,23 @@ class RailEncoder:
         self.reset()
 
     def reset(self) -> None:
-        """As after opening."""
+        """Restores the state after opening."""
         self._pose = BodyPose()
         self._counts.reset()
         self.line.reset()
 
     @property
     def poses(self) -> int:
-        return self._counts.believed
+        return self._counts.accepted
 
     @property
-    def garbled(self) -> int:
-        return self._counts.garbled
+    def malformed(self) -> int:
+        return self._counts.malformed
 
     def read(self, now_s: float) -> BodyPose:
         self._now_s, was_there = now_s, self.line.is_there
         for line in self.line.read(now_s):
-            x_m = self._counts.take(line, now_s)
+            x_m = self._counts.accept(line, now_s)
             if x_m is not None:
                 self._pose = BodyPose(now_s, x_m)
         if was_there and not self.line.is_there:
@@ -78,12 +77,12 @@ class RailEncoder:
         return self._pose if now_s - self._pose.stamp_s <= STALE_S else BodyPose()
 
     def reopen(self, now_s: float) -> bool:
-        """Where it was lost, try again once in RETRY_S; whether it was opened anew."""
+        """Tries to open a lost device again, every RETRY_S; returns whether it did."""
         return self.line.reopen(now_s)
 
     def report(self) -> PoseReport:
         device = self.parameters.device
-        report = PoseReport(f"rail encoder {device}", self.poses, self.garbled)
+        report = PoseReport(f"rail encoder {device}", self.poses, self.malformed)
         if self.line.problem is not None and not self.line.is_there:
             return report._replace(
                 trouble=f"the rail encoder is gone: {self.line.problem.why}.",
@@ -92,7 +91,7 @@ class RailEncoder:
         if self._now_s - self._pose.stamp_s <= STALE_S:
             return report
         return report._replace(
-            trouble=f"no count comes from {device}.",
+            trouble=f"no count arrives from {device}.",
             what_to_do="check its power and pose.rail_encoder.bit_rate and label",
         )
 

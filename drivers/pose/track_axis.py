@@ -1,4 +1,4 @@
-"""The direction of the track in the cameras' frame: one of its axes, or any direction in it."""
+"""Parses the direction of the track in the frame of the motion capture: one of its axes, or any vector."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ AXES: dict[str, Direction] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (
 
 
 def parse_axis(axis: object) -> Direction | None:
-    """A unit vector of "x", "-z" or three numbers; None for anything else."""
+    """Returns a unit vector from "x", "-z" or three numbers; None for anything else."""
     if isinstance(axis, str):
         direction = AXES.get(axis.removeprefix("-"))
-        return _turned(direction) if direction and axis.startswith("-") else direction
+        return _inverted(direction) if direction and axis.startswith("-") else direction
     if not isinstance(axis, list | tuple) or len(axis) != 3:
         return None
     if not all(isinstance(each, int | float) and not isinstance(each, bool) for each in axis):
@@ -22,6 +22,6 @@ def parse_axis(axis: object) -> Direction | None:
     return (x / length, y / length, z / length) if isfinite(length) and length > 0.0 else None
 
 
-def _turned(direction: Direction) -> Direction:
+def _inverted(direction: Direction) -> Direction:
     x, y, z = direction
     return -x, -y, -z

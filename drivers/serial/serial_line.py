@@ -1,10 +1,10 @@
-"""A device that talks in lines of text on a serial port: opened, heard without waiting, found again when it is back.
+"""A device that sends lines of text on a serial port: it is read without waiting, and opened again after unplugging.
 
-Nothing is ever sent. The first line after opening may have lost its beginning and is passed over; what never ends is
-given out in pieces, since bytes without an end are what a wrong baud rate looks like. A device that is pulled out is
-opened again by the same path when somebody says so (`/dev/serial/by-id/...` stays the same in another socket,
-`/dev/ttyUSB0` may not): opening may take milliseconds, which not every caller has at every moment. pyserial opens and
-sets up the device, and is imported only then; reading is one call.
+Nothing is ever sent to the device. The first line after opening may lack its beginning and is skipped. A line that does
+not end is returned in pieces, because that is how a wrong baud rate shows. An unplugged device is opened again by the
+same path when the caller says so, because opening may take milliseconds (`/dev/serial/by-id/...` stays the same in
+another socket, `/dev/ttyUSB0` may not). pyserial opens and sets up the device, and is imported only then; reading is
+one call.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from control.records import NEVER_S
 
 RETRY_S = 0.5  # between tries to open a device that is gone
 LONGEST_LINE_BYTES = 200
-MOST_BYTES_PER_READ = 4096  # as much as a tty keeps
-KEPT_LINES = 40  # by which it is judged what arrives
+MOST_BYTES_PER_READ = 4096  # the buffer of a tty
+RECENT_LINES = 40  # by which the format and the baud rate are checked
 COMMON_BAUDS = (9600, 115200, 57600, 38400, 19200, 4800, 2400, 230400)
 GONE = select.POLLHUP | select.POLLERR | select.POLLNVAL
 LINE_ENDS = re.compile(rb"[\r\n]+")
 
 
 class Arrivals(NamedTuple):
-    """Of the last lines, what share was readable, and what share of their bytes was text."""
+    """How many of the recent lines are readable, and the fraction of their bytes that is text."""
 
     lines: int
-    readable: float
-    text: float
+    readable: float  # fraction of the lines
+    text: float  # fraction of the bytes
 
 
 class SerialLineError(Exception):
-    """The port does not open, or is gone. The text says what to do, `why` only what the system says."""
+    """The port does not open, or is gone. The text says what to do; `why` is only the reason of the system."""
 
     def __init__(self, message: str, why: str = "") -> None:
         super().__init__(message)
@@ -46,7 +46,7 @@ class SerialLineError(Exception):
 
 
 class SerialLine:
-    """Owns the open device, of which there is none while it is gone, and the line that has begun."""
+    """Owns the open device, which is None while it is gone, and the incomplete line."""
 
     def __init__(
         self,
@@ -59,12 +59,12 @@ class SerialLine:
         """Raises SerialLineError where it does not open."""
         self.path, self.baud = path, baud
         self.unpluggings = 0
-        self.problem: SerialLineError | None = None  # the last one
+        self.problem: SerialLineError | None = None  # the newest one
         self.open_device = open_device or open_serial
         self._longest_bytes, self._retry_s, self._retry_at_s = longest_bytes, retry_s, NEVER_S
-        self._begin(self.open_device(path, baud))
+        self._use(self.open_device(path, baud))
 
-    def _begin(self, device: Any) -> None:
+    def _use(self, device: Any) -> None:
         self._device: Any = device
         self._file = int(device.fileno())
         os.set_blocking(self._file, False)
@@ -73,10 +73,10 @@ class SerialLine:
         self.reset()
 
     def reset(self) -> None:
-        """As after opening."""
-        self._begun = b""
-        self._whole = False  # whether the line that has begun was heard from its beginning
-        self.recent: deque[bytes] = deque(maxlen=KEPT_LINES)
+        """Restores the state after opening."""
+        self._incomplete = b""
+        self._from_its_start = False  # whether the incomplete line was received from its beginning
+        self.recent: deque[bytes] = deque(maxlen=RECENT_LINES)
 
     @property
     def is_there(self) -> bool:
@@ -88,37 +88,37 @@ class SerialLine:
         return Arrivals(len(lines), readable / len(lines) if lines else 0.0, text_fraction(lines))
 
     def read(self, now_s: float) -> list[bytes]:
-        """All lines that have come to their end, without it, oldest first; never waits. None where it is gone."""
+        """Returns all complete lines without their ends, oldest first; none where the device is gone. Never waits."""
         if self._device is None:
             return []
         try:
-            *lines, self._begun = LINE_ENDS.split(self._begun + self._fetch())
+            *lines, self._incomplete = LINE_ENDS.split(self._incomplete + self._fetch())
         except OSError as problem:
             self._lose(problem, now_s)
             return []
-        heard = [line for line in (lines if self._whole else lines[1:]) if line.strip()]
-        self._whole = self._whole or bool(lines)
-        if len(self._begun) > self._longest_bytes:
-            heard.append(self._begun)
-            self._begun, self._whole = b"", False
+        heard = [line for line in (lines if self._from_its_start else lines[1:]) if line.strip()]
+        self._from_its_start = self._from_its_start or bool(lines)
+        if len(self._incomplete) > self._longest_bytes:
+            heard.append(self._incomplete)
+            self._incomplete, self._from_its_start = b"", False
         self.recent.extend(heard)
         return heard
 
     def _fetch(self) -> bytes:
-        """All that has arrived. Raises OSError where the device is gone."""
+        """Returns all bytes that have arrived. Raises OSError where the device is gone."""
         events = self._poll.poll(0)
         if not events:
             return b""
-        if self._device.in_waiting:  # an empty read of a device set up by pyserial is no end of it
+        if self._device.in_waiting:  # an empty read does not mean that the device is gone
             return self._read_file()
-        if events[0][1] & GONE or not self._device.in_waiting:  # a device that is gone is ready, and has nothing
+        if events[0][1] & GONE or not self._device.in_waiting:  # a device that is gone is readable and has no bytes
             raise OSError(errno.EIO, os.strerror(errno.EIO))
         return b""
 
     def _read_file(self) -> bytes:
         try:
             return os.read(self._file, MOST_BYTES_PER_READ)
-        except BlockingIOError:  # somebody else has read it
+        except BlockingIOError:  # another program has read it
             return b""
 
     def _lose(self, problem: OSError, now_s: float) -> None:
@@ -128,12 +128,12 @@ class SerialLine:
         self._retry_at_s = now_s + self._retry_s
 
     def reopen(self, now_s: float) -> bool:
-        """Where it was lost, try again once in a while; whether it was opened anew."""
+        """Tries to open a lost device again, every `retry_s`; returns whether it did."""
         if self._device is not None or now_s < self._retry_at_s:
             return False
         self._retry_at_s = now_s + self._retry_s
         try:
-            self._begin(self.open_device(self.path, self.baud))
+            self._use(self.open_device(self.path, self.baud))
         except SerialLineError as problem:
             self.problem = problem
             return False
@@ -142,18 +142,18 @@ class SerialLine:
     def close(self) -> None:
         device, self._device = self._device, None
         if device is not None:
-            with suppress(OSError):  # of a device that is gone already
+            with suppress(OSError):  # the device may be gone already
                 device.close()
 
 
 def text_fraction(lines: Iterable[bytes]) -> float:
-    """How much of what arrives is text at all: at a wrong baud rate little is."""
+    """Returns the fraction of bytes that is text; it is small at a wrong baud rate."""
     letters = b"".join(lines)
     return sum(32 <= letter < 127 or letter in b"\t\r\n" for letter in letters) / len(letters) if letters else 0.0
 
 
 def open_serial(path: str, baud: int) -> Any:
-    """A port of pyserial that nobody else may open. Raises SerialLineError."""
+    """Opens a port of pyserial for exclusive use. Raises SerialLineError."""
     try:
         import serial
     except ModuleNotFoundError:
@@ -169,34 +169,34 @@ def open_serial(path: str, baud: int) -> Any:
 def _refusal(path: str, baud: int, problem: Exception) -> str:
     number = getattr(problem, "errno", None)
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        return f"there is no serial port {path}: {_ports_reported()}"
+        return f"there is no serial port {path}: {_ports_text()}"
     if number in (errno.EACCES, errno.EPERM):
         return (
             f"no permission to open {path}: add yourself to the group of serial ports with "
             "`sudo usermod -aG dialout $USER`, log out and in again"
         )
     if number in (errno.EBUSY, errno.EAGAIN) or "lock" in str(problem).lower():
-        return f"{path} is in use by another program, such as a serial monitor: close that one"
-    if number == errno.EISDIR or f"({errno.ENOTTY}," in str(problem):  # pyserial tells it in words only
-        return f"{path} is no serial port: {_ports_reported()}"
+        return f"{path} is in use by another program, such as a serial monitor: close that program"
+    if number == errno.EISDIR or f"({errno.ENOTTY}," in str(problem):  # pyserial reports it in the text only
+        return f"{path} is no serial port: {_ports_text()}"
     if isinstance(problem, ValueError):
-        return f"{path} does not take {baud} baud: {problem}"
+        return f"{path} does not support {baud} baud: {problem}"
     return f"{path} does not open: {problem}"
 
 
-def _ports_reported() -> str:
+def _ports_text() -> str:
     ports = list_ports()
     if not ports:
-        return "this computer sees none at all; is the device plugged in, and does its cable carry data?"
+        return "this computer has none; is the device plugged in, and does its cable carry data?"
     return f"there are {', '.join(ports)}; name one of them"
 
 
 def list_ports() -> list[str]:
-    """Serial ports of this computer, by their lasting names where they have one."""
+    """Lists the serial ports of this computer, by their persistent names where they have one."""
     from serial.tools import list_ports as serial_ports
 
-    lasting = {}
+    persistent = {}
     folder = "/dev/serial/by-id"
     if os.path.isdir(folder):
-        lasting = {os.path.realpath(f"{folder}/{name}"): f"{folder}/{name}" for name in sorted(os.listdir(folder))}
-    return [lasting.get(port.device, port.device) for port in sorted(serial_ports.comports())]
+        persistent = {os.path.realpath(f"{folder}/{name}"): f"{folder}/{name}" for name in sorted(os.listdir(folder))}
+    return [persistent.get(port.device, port.device) for port in sorted(serial_ports.comports())]

@@ -199,9 +199,9 @@ def _describe_cell(port: LoadCellPort, encoder: StageEncoder | None) -> dict[str
     position = None
     if encoder is not None:
         position = asdict(encoder.settings) | {
-            "counts": encoder.counts.believed,
+            "counts": encoder.counts.accepted,
             "rate_hz": encoder.rate_hz,
-            "garbled_lines": encoder.counts.garbled,
+            "garbled_lines": encoder.counts.malformed,
             "breaks": encoder.breaks,
         }
     return {
@@ -209,8 +209,8 @@ def _describe_cell(port: LoadCellPort, encoder: StageEncoder | None) -> dict[str
         "format": port.line_format.name,
         "rate_hz": port.rate_hz,
         "lines": port.lines,
-        "garbled_lines": port.garbled_lines,
-        "last_garbled": port.last_garbled,
+        "garbled_lines": port.malformed_lines,
+        "last_garbled": port.last_malformed,
         "calibration": port.calibration._asdict(),
         "position": position,
     }

@@ -11,9 +11,9 @@ from drivers.load_cell.calibration import (
     CalibrationError,
     LoadCellCalibration,
     calibrate,
-    of_unit,
+    calibration_of_unit,
     read_calibration,
-    remarks_on,
+    remarks_about,
     weigh,
     write_calibration,
 )
@@ -174,7 +174,7 @@ def find_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibrati
     try:
         if cell.calibration is not None:
             return read_calibration(cell.calibration)
-        known = of_unit(unit, cell.scale_n)
+        known = calibration_of_unit(unit, cell.scale_n)
         if known is not None:
             return known
         if file.exists():
@@ -205,7 +205,7 @@ def _calibrate_now(bench: TrialBench, unit: str, file: Path) -> LoadCellCalibrat
             if bench.operator.ask("Calibrate again?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
                 raise BenchError("the load cell is not calibrated") from problem
             continue
-        for remark in remarks_on(calibration, *weighings):
+        for remark in remarks_about(calibration, *weighings):
             bench.operator.report(remark)
         write_calibration(file, calibration)
         bench.operator.report(

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from drivers.load_cell.load_cell_port import LoadCellPort, Sample
-from drivers.load_cell.stage_encoder import Place, StageEncoder
+from drivers.load_cell.stage_encoder import StageEncoder, StagePosition
 from experiments.loadcell.analysis.coefficients import Recorded
 from experiments.loadcell.analysis.contact import CONTACT_NOISES, LEAST_FORCE_N, QUIET_S, noise_of
 from experiments.loadcell.analysis.stage_track import StagePositions
@@ -67,7 +67,7 @@ class Tare(NamedTuple):
 class PositionStretch(NamedTuple):
     """The encoder's lines during a stroke."""
 
-    positions: list[Place]
+    positions: list[StagePosition]
     garbled_lines: int
     drop_outs: int
     breaks: int  # unplugged or restarted: positions before and after have different zeros
@@ -99,7 +99,7 @@ class CellRecorder:
     ) -> None:
         """`encoder` belongs to the stage; recording goes on without its lines."""
         self.port, self.clock, self.report, self.encoder = port, clock, report, encoder
-        self._positions: list[Place] = []
+        self._positions: list[StagePosition] = []
 
     def drain(self) -> None:
         """Discard everything that has arrived."""
@@ -161,7 +161,7 @@ class CellRecorder:
         self.await_port()
         self.drain()
         port = self.port
-        garbled, drop_outs, unpluggings = port.garbled_lines, port.clock.drop_outs, port.unpluggings
+        garbled, drop_outs, unpluggings = port.malformed_lines, port.clock.drop_outs, port.unpluggings
         before = _counted(self.encoder)
         samples, begin_s = list[Sample](), self.clock.now_s()
         contact = _Contact(noise_n)
@@ -176,7 +176,7 @@ class CellRecorder:
         self.await_port()
         return Stretch(
             samples,
-            port.garbled_lines - garbled,
+            port.malformed_lines - garbled,
             port.clock.drop_outs - drop_outs,
             port.unpluggings - unpluggings,
             PositionStretch(positions, *(b - a for a, b in zip(before, after, strict=True))) if self.encoder else None,
@@ -194,7 +194,7 @@ def likeness(forces_n: Sequence[float]) -> float:
 
 def _counted(encoder: StageEncoder | None) -> tuple[int, int, int]:
     """Return the numbers of garbled lines, drop-outs and breaks."""
-    return (0, 0, 0) if encoder is None else (encoder.counts.garbled, encoder.clock.drop_outs, encoder.breaks)
+    return (0, 0, 0) if encoder is None else (encoder.counts.malformed, encoder.clock.drop_outs, encoder.breaks)
 
 
 class _Contact:
@@ -245,7 +245,7 @@ def write_samples(path: Path, samples: Iterable[Sample]) -> None:
     _write_rows(path, FORCE_COLUMNS, rows)
 
 
-def write_positions(path: Path, positions: Iterable[Place]) -> None:
+def write_positions(path: Path, positions: Iterable[StagePosition]) -> None:
     rows = ((f"{each.stamp_s:.6f}", f"{each.position_m:.8f}") for each in positions)
     _write_rows(path, POSITION_COLUMNS, rows)
 

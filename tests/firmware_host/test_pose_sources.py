@@ -208,7 +208,7 @@ def pose_line(robot: Lockstep) -> dict[str, Any]:
 def test_check_tells_of_the_source_and_of_its_trouble_but_lets_arm(robot: Lockstep) -> None:
     source = robot.loop.pose = MadeUpSource()
     line = pose_line(robot)
-    assert line["ok"] and line["text"] == "camera: 12 poses, 3 messages garbled, 4 without the body"
+    assert line["ok"] and line["text"] == "camera: 12 poses, 3 malformed messages, 4 without the body"
     source.reported = source.reported._replace(trouble="it is dark.", what_to_do="switch on the light")
     line = pose_line(robot)
     assert line["ok"] and line["text"].startswith("warning: it is dark. Switch on the light. camera: 12 poses")
@@ -234,5 +234,5 @@ def test_a_socket_s_poses_reach_the_loop(robot: Lockstep, short_folder: Path) ->
         robot.run_for(0.3)
         assert not isfinite(robot.loop.body.x_m)
         assert "pose_lost" in {fault.name for fault in robot.loop.faults.present}
-        assert f"no pose comes through {short_folder}/pose any more. Start" in pose_line(robot)["text"]
+        assert f"no pose arrives at {short_folder}/pose any more. Start" in pose_line(robot)["text"]
         sender.close()

@@ -33,7 +33,7 @@ SHARED = SHARED_DATA
 WALKS = sorted((SHARED / "flipper_in_mud").glob("walk_*.csv.gz"))
 PHASES = tuple(Phase)
 INSERTION, STANCE = 2, 3  # of turtle_state
-FROZEN_S, LEAP_M = 0.5, 0.02
+FROZEN_S, JUMP_M = 0.5, 0.02
 BOUND_M = 0.003
 LATENCIES_S = (0.0, 0.008)  # from exposure to arrival: none, and a usual one
 
@@ -74,7 +74,7 @@ def capture_of(path: Path) -> Capture:
     first = np.flatnonzero(np.any(np.diff(position_m, axis=0, prepend=np.nan) != 0.0, axis=1))
     ends = np.append(first[1:], len(time_s))
     leaps_m = np.append(np.linalg.norm(np.diff(position_m[first], axis=0), axis=1), 0.0)
-    lost = np.repeat((time_s[ends - 1] - time_s[first] > FROZEN_S) & (leaps_m > LEAP_M), ends - first)
+    lost = np.repeat((time_s[ends - 1] - time_s[first] > FROZEN_S) & (leaps_m > JUMP_M), ends - first)
     inside = (state[1:] == STANCE) & (state[:-1] == STANCE) & ~lost[1:] & ~lost[:-1]
     path_m = np.diff(position_m, axis=0)[inside].sum(axis=0)
     return Capture(time_s, state, position_m, first, lost, path_m / np.linalg.norm(path_m))
@@ -108,7 +108,7 @@ def walked(path: Path, latency_s: float) -> Walked:
             positions_m.append(body.x_m)
             ends += [row for stride in reading.strides if stride.flipper == "left"]
             steps_m += [stride.step_m for stride in reading.strides if stride.flipper == "left"]
-        assert port.garbled == 0
+        assert port.malformed == 0
     return Walked(np.array(positions_m), np.array(ends), np.array(steps_m))
 
 

@@ -35,7 +35,7 @@ def test_motion_capture_is_listened_to(configuration: Configuration) -> None:
         natnet = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
         looked_at = with_pose(configuration, PoseParameters("natnet", natnet=natnet))
         (item,) = _pose_items(looked_at)
-        assert item["ok"] and item["text"].startswith("warning: no NatNet frame comes from 127.0.0.1.")
+        assert item["ok"] and item["text"].startswith("warning: no NatNet frame arrives from 127.0.0.1.")
         ended = threading.Event()
 
         def stream() -> None:

@@ -12,7 +12,7 @@ from control.records import JOINTS
 from drivers.can.can_port import BusState
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus, MockPort
-from drivers.fault_injection.failing_port import FailingPort, garbled
+from drivers.fault_injection.failing_port import FailingPort, corrupted
 from drivers.fault_injection.failures import EFFECTS, FailureKind, Failures
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, MalformedMessageError, arbitration_id
@@ -223,7 +223,7 @@ def test_garbage_never_has_the_payload_s_length_where_it_is_of_another() -> None
     from random import Random
 
     random = Random(3)
-    assert {len(garbled(b"\1\2\3", random)) for _ in range(500)} == set(range(9))
+    assert {len(corrupted(b"\1\2\3", random)) for _ in range(500)} == set(range(9))
 
 
 def heartbeats(kind: str) -> list[tuple[int, int]]:

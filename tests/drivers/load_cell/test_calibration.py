@@ -12,9 +12,9 @@ from drivers.load_cell.calibration import (
     CalibrationError,
     LoadCellCalibration,
     calibrate,
-    of_unit,
+    calibration_of_unit,
     read_calibration,
-    remarks_on,
+    remarks_about,
     weigh,
     write_calibration,
 )
@@ -32,7 +32,7 @@ def test_two_weights_tell_span_and_zero_within_their_standard_errors() -> None:
         assert abs(reported.per_newton - 42000.0) < 4.0 * reported.per_newton_std_error
         assert abs(reported.zero - 81000.0) < 4.0 * reported.zero_std_error
         assert reported.relative_error < 0.001
-        assert remarks_on(reported, light, heavy) == []
+        assert remarks_about(reported, light, heavy) == []
 
 
 def test_a_force_is_what_was_loaded() -> None:
@@ -41,7 +41,7 @@ def test_a_force_is_what_was_loaded() -> None:
 
 
 def test_the_same_weight_twice_is_refused() -> None:
-    with pytest.raises(CalibrationError, match="another one"):
+    with pytest.raises(CalibrationError, match="must differ"):
         calibrate("counts", weigh(2.0, readings(2.0, 1)), weigh(2.0, readings(2.0, 2)))
 
 
@@ -57,8 +57,8 @@ def test_too_few_readings_are_refused() -> None:
 
 def test_a_drift_and_a_turned_cell_are_told() -> None:
     light, heavy = weigh(0.0, readings(0.0, 1, drift=60.0)), weigh(4.9, readings(4.9, 2, per_newton=-42000.0))
-    reported = remarks_on(calibrate("counts", light, heavy), light, heavy)
-    assert [("drifted" in each, "other way round" in each) for each in reported] == [(True, False), (False, True)]
+    reported = remarks_about(calibrate("counts", light, heavy), light, heavy)
+    assert [("drifted" in each, "other direction" in each) for each in reported] == [(True, False), (False, True)]
 
 
 def test_a_calibration_reads_back(tmp_path: Path) -> None:
@@ -86,8 +86,8 @@ def test_a_file_that_is_no_calibration_is_refused_by_its_name(tmp_path: Path, te
 
 
 def test_an_amplifier_that_prints_grams_needs_no_weights() -> None:
-    grams = of_unit("g", None)
+    grams = calibration_of_unit("g", None)
     assert grams is not None and grams.force_n(1000.0) == pytest.approx(9.80665)
-    scaled = of_unit("counts", 2.5e-5)
+    scaled = calibration_of_unit("counts", 2.5e-5)
     assert scaled is not None and scaled.force_n(40000.0) == pytest.approx(1.0)
-    assert of_unit("counts", None) is None
+    assert calibration_of_unit("counts", None) is None

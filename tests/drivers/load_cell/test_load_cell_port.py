@@ -51,7 +51,7 @@ def test_every_line_becomes_a_sample_of_the_force(cable: Cable) -> None:
     assert len(samples) >= 157  # of 160: the first may be cut, the last are on their way
     assert {round(sample.force_n, 4) for sample in samples} == {FORCE_N}
     assert cable.port.rate_hz == pytest.approx(80.0, rel=0.02)
-    assert cable.port.garbled_lines == cable.port.unpluggings == 0
+    assert cable.port.malformed_lines == cable.port.unpluggings == 0
 
 
 def test_reading_never_waits_where_nothing_comes(cable: Cable) -> None:
@@ -63,10 +63,10 @@ def test_garbled_lines_are_counted_and_kept_to_be_shown(tmp_path: Path) -> None:
     cable = Cable(tmp_path, garbled_fraction=0.25)
     samples = cable.run(4.0)
     port = cable.port
-    assert 40 < port.garbled_lines < 120
-    assert len(samples) == port.lines - port.garbled_lines
+    assert 40 < port.malformed_lines < 120
+    assert len(samples) == port.lines - port.malformed_lines
     assert {round(sample.force_n, 4) for sample in samples} == {FORCE_N}
-    assert "\\x" in port.last_garbled
+    assert "\\x" in port.last_malformed
     cable.close()
 
 
@@ -121,4 +121,4 @@ def test_noise_without_an_end_does_not_grow(cable: Cable) -> None:
         cable.amplifier.waiting = b"\xff" * 60
         cable.amplifier.deliver()
         cable.port.read(1.0)
-    assert cable.port.garbled_lines > 20
+    assert cable.port.malformed_lines > 20

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.load_cell.stage_encoder import Place, StageEncoder, StageEncoderSettings
+from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings, StagePosition
 from drivers.serial.serial_line import SerialLineError
 from simulation.test_rig.emulated_instruments import EmulatedStageEncoder, StageEncoderParameters
 
@@ -25,8 +25,8 @@ class Rail:
         self.encoder = StageEncoder(StageEncoderSettings(str(folder / "encoder"), 1e-5, baud, label))
         self.now_s = 0.0
 
-    def run(self, duration_s: float) -> list[Place]:
-        places, end_s = list[Place](), self.now_s + duration_s
+    def run(self, duration_s: float) -> list[StagePosition]:
+        places, end_s = list[StagePosition](), self.now_s + duration_s
         while self.now_s < end_s:
             self.now_s += 0.01
             self.counter.step(self.now_s)
@@ -57,7 +57,7 @@ def test_garbled_counts_are_counted_and_no_place(tmp_path: Path) -> None:
     rail = Rail(tmp_path, garbled_fraction=0.2, label="pos")
     rail.counter.encoder = StageEncoderParameters(label="pos=")
     places = rail.run(3.0)
-    assert 20 < rail.encoder.counts.garbled < 110
+    assert 20 < rail.encoder.counts.malformed < 110
     assert all(before.position_m < after.position_m for before, after in zip(places, places[1:], strict=False))
     rail.close()
 

@@ -19,7 +19,7 @@ from drivers.pose.natnet_codec import (
     FRAME,
     KEEP_ALIVE,
     FrameLayout,
-    GarbledPacketError,
+    MalformedPacketError,
     MotionFrame,
     NatNetVersion,
     decode_server_info,
@@ -177,7 +177,7 @@ def test_an_independent_decoder_reads_the_same_of_a_server(version: NatNetVersio
 def test_bodies_are_found_by_name(version: NatNetVersion) -> None:
     packet = encode_models(version, [("arm", 9), ("mudskipper", 3)])
     assert decode_bodies(packet, version) == {"arm": 9, "mudskipper": 3}
-    with pytest.raises(GarbledPacketError):
+    with pytest.raises(MalformedPacketError):
         decode_bodies(packet[: packet.index(b"mudskipper") + 3], version)
 
 
@@ -187,10 +187,10 @@ def test_a_packet_that_is_cut_off_anywhere_is_garbled(version: NatNetVersion) ->
     whole = packet_of(version)
     layout = FrameLayout(version)
     for length in range(len(whole)):
-        with pytest.raises(GarbledPacketError):
+        with pytest.raises(MalformedPacketError):
             message_of(whole[:length])
     for length in range(4, len(whole) - 4):
-        with pytest.raises(GarbledPacketError):
+        with pytest.raises(MalformedPacketError):
             layout.decode_frame(whole[:length], 5)
 
 
@@ -207,7 +207,7 @@ def test_garbage_is_told_and_never_raises_anything_else(data: bytes, version: Na
     ):
         try:
             decode(data)
-        except GarbledPacketError:
+        except MalformedPacketError:
             continue
 
 
@@ -222,7 +222,7 @@ def test_a_packet_of_which_bytes_were_changed_is_garbled_or_holds_numbers(versio
             packet[chance.randrange(4, len(packet))] = chance.choice((0, 1, 0x7F, 0x80, 0xFF))
         try:
             frame = frame_of(version, bytes(packet), 5)
-        except GarbledPacketError:
+        except MalformedPacketError:
             continue
         assert math.isfinite(frame.software_s)
         if frame.body is not None and frame.body.tracked:

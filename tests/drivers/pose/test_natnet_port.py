@@ -152,7 +152,7 @@ def test_frames_that_are_not_of_a_version_known_wait_for_it(open_laboratory: Ope
     blind = open_laboratory(moving(4.0))
     blind.server.answers = False
     blind.run(0.0)
-    assert "no NatNet frame comes from 127.0.0.1" in blind.port.report().trouble
+    assert "no NatNet frame arrives from 127.0.0.1" in blind.port.report().trouble
     blind.server.answers = True  # asked again a second later
     assert known(blind.run(2.0))
 
@@ -160,7 +160,7 @@ def test_frames_that_are_not_of_a_version_known_wait_for_it(open_laboratory: Ope
 def test_a_server_that_speaks_what_is_not_read_here_is_told(open_laboratory: Open) -> None:
     lab = open_laboratory(moving(1.0), version=NatNetVersion(2, 5))
     assert not known(lab.run(0.9))
-    assert lab.port.report().trouble == "Motive speaks NatNet 2.5; 2.6 to 4 are read here."
+    assert lab.port.report().trouble == "Motive speaks NatNet 2.5; 2.6 to 4 are supported."
 
 
 def test_a_body_that_is_not_tracked_is_none_and_is_counted(open_laboratory: Open) -> None:
@@ -201,17 +201,17 @@ def test_garbled_and_foreign_packets_are_counted_and_cost_nothing_else(open_labo
     assert known(lab.run(0.4))
     frame = encode_frame(lab.server.version, 1, [], FrameTimes(0.0, 0, 0, 0))
     assert isfinite(lab.send(b"", b"\x07", frame[:-30], b"\x07\x00\xff\xff" + bytes(20)).x_m)
-    assert lab.port.garbled == 4
+    assert lab.port.malformed == 4
     lab.port.parameters = replace(lab.port.parameters, server="127.0.0.9")
     lab.send(frame)
-    assert lab.port.garbled == 5
+    assert lab.port.malformed == 5
 
 
 def test_all_that_is_garbled_is_told(open_laboratory: Open) -> None:
     """As with a version that is configured wrongly."""
     lab = open_laboratory(moving(0.5), {"version": "3.0"}, version=NatNetVersion(4, 1), crowded=True)
     assert not known(lab.run(0.4))
-    assert lab.port.report().trouble == "all NatNet frames are garbled."
+    assert lab.port.report().trouble == "all NatNet frames are malformed."
 
 
 def test_a_sender_gone_wild_is_heard_in_bounded_pieces(open_laboratory: Open) -> None:
@@ -253,7 +253,7 @@ def test_without_a_network_it_is_silent_and_asks_again(open_laboratory: Open) ->
     lab.server.close()
     for now_s in (0.0, 0.5, 1.0, 1.1, 2.2, 2.3):
         assert not isfinite(lab.port.read(now_s).x_m)
-    assert lab.port.garbled == 0
+    assert lab.port.malformed == 0
 
 
 def test_a_service_that_may_use_no_network_is_told_what_to_change(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -271,5 +271,5 @@ def test_frames_of_another_computer_than_the_one_named_are_told(open_laboratory:
     laboratory.port.parameters = replace(laboratory.port.parameters, server="127.0.0.9")
     laboratory.run(0.3 + 2.0 * STALE_S)
     report = laboratory.port.report()
-    assert report.trouble == f"packets come from {LOOPBACK}, and none from 127.0.0.9."
+    assert report.trouble == f"packets arrive from {LOOPBACK}, and none from 127.0.0.9."
     assert "pose.natnet.server" in report.what_to_do

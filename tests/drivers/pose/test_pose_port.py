@@ -74,7 +74,7 @@ def test_garbage_is_counted_and_the_last_pose_stays(
     sender.send(0.0, 0.1)
     send_bytes(path, data)
     assert port.read(1.0) == (1.0, 0.1)
-    assert port.garbled_messages == 1
+    assert port.malformed_messages == 1
 
 
 def test_any_bytes_are_a_finite_pose_or_counted(tmp_path_factory: pytest.TempPathFactory) -> None:
@@ -83,11 +83,11 @@ def test_any_bytes_are_a_finite_pose_or_counted(tmp_path_factory: pytest.TempPat
 
     @given(st.binary(max_size=80) | st.binary(min_size=16, max_size=16))
     def examine(data: bytes) -> None:
-        garbled = port.garbled_messages
+        garbled = port.malformed_messages
         port.reset()
         send_bytes(path, data)
         pose = port.read(1.0)
-        assert (port.garbled_messages - garbled) + (pose.stamp_s == 1.0 and abs(pose.x_m) < float("inf")) == 1
+        assert (port.malformed_messages - garbled) + (pose.stamp_s == 1.0 and abs(pose.x_m) < float("inf")) == 1
 
     examine()
     port.close()
@@ -127,7 +127,7 @@ def test_a_socket_that_cannot_be_opened_is_told_in_one_sentence(tmp_path: Path) 
 
 def test_it_is_told_whether_poses_come(port: PosePort, sender: PoseSender, path: Path) -> None:
     port.read(0.0)
-    assert port.report().trouble == f"no pose comes through {path} yet."
+    assert port.report().trouble == f"no pose arrives at {path} yet."
     sender.send(0.0, 0.1)
     send_bytes(path, b"short")
     port.read(1.0)

@@ -7,7 +7,7 @@ from random import Random
 
 import pytest
 
-from drivers.pose.pose_timing import LEAP_M, RESTARTED_S, LeastDelay, PoseForecast
+from drivers.pose.pose_timing import JUMP_M, RESTARTED_S, LeastDelay, PoseForecast
 
 PERIOD_S = 1.0 / 120.0
 
@@ -62,7 +62,7 @@ def test_nothing_is_forecast_of_a_body_that_leapt_or_went_back_in_time() -> None
     forecast = PoseForecast()
     assert not forecast.add(1.0, 0.0)
     assert forecast.add(1.0 + PERIOD_S, 0.004) and forecast.add(1.0 + 2.0 * PERIOD_S, 0.008)
-    assert not forecast.add(1.0 + 3.0 * PERIOD_S, 0.010 + 2.0 * LEAP_M)
-    assert forecast.at(1.0 + 4.0 * PERIOD_S) == 0.010 + 2.0 * LEAP_M
+    assert not forecast.add(1.0 + 3.0 * PERIOD_S, 0.010 + 2.0 * JUMP_M)
+    assert forecast.at(1.0 + 4.0 * PERIOD_S) == 0.010 + 2.0 * JUMP_M
     assert not forecast.add(0.5, 0.1)
     assert forecast.at(0.51) == 0.1

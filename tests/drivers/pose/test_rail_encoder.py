@@ -59,7 +59,7 @@ class Rail:
 
     @property
     def heard(self) -> int:
-        return self.encoder.poses + self.encoder.garbled
+        return self.encoder.poses + self.encoder.malformed
 
     def read_until(self, done: Callable[[], bool]) -> float:
         self.now_s += 0.01
@@ -104,7 +104,7 @@ def test_the_rest_of_a_line_that_was_under_way_is_no_count(tmp_path: Path) -> No
     rail.encoder.reset()  # as after opening
     rail.counter.write(b"345\n12350\n")  # of 12345
     assert rail.read_until(lambda: rail.encoder.poses > 0) == pytest.approx(0.12350)
-    assert (rail.encoder.poses, rail.encoder.garbled) == (1, 0)
+    assert (rail.encoder.poses, rail.encoder.malformed) == (1, 0)
     rail.close()
 
 
@@ -118,33 +118,33 @@ def test_a_line_in_pieces_is_one_line(rail: Rail) -> None:
 def test_what_is_no_count_is_counted_and_changes_nothing(rail: Rail, line: bytes) -> None:
     rail.send(0.1)
     rail.counter.write(line + b"\n")
-    assert rail.read_until(lambda: rail.encoder.garbled > 0) == pytest.approx(0.1)
-    assert (rail.encoder.poses, rail.encoder.garbled) == (1, 1)
+    assert rail.read_until(lambda: rail.encoder.malformed > 0) == pytest.approx(0.1)
+    assert (rail.encoder.poses, rail.encoder.malformed) == (1, 1)
 
 
 def test_a_line_that_never_ends_is_counted_and_the_next_one_read(rail: Rail) -> None:
     rail.write(b"7" * (LONGEST_LINE_BYTES + 1))
-    rail.read_until(lambda: rail.encoder.garbled > 0)
+    rail.read_until(lambda: rail.encoder.malformed > 0)
     rail.write(b"7\n")
     assert rail.send(0.02) == pytest.approx(0.02)
-    assert rail.encoder.garbled == 1
+    assert rail.encoder.malformed == 1
 
 
 def test_a_count_that_lost_a_digit_is_not_believed_but_one_that_stays_is(rail: Rail) -> None:
     rail.send(1.23456)
     assert rail.send(0.12345) == pytest.approx(1.23456)
     assert rail.send(1.23500) == pytest.approx(1.23500)
-    assert rail.encoder.garbled == 1
+    assert rail.encoder.malformed == 1
     rail.send(0.0)  # the counter was restarted
     assert rail.send(0.001) == pytest.approx(0.001)
-    assert rail.encoder.garbled == 2
+    assert rail.encoder.malformed == 2
 
 
 def test_a_count_ends_when_it_is_stale(rail: Rail) -> None:
     rail.send(0.1)
     assert rail.encoder.read(rail.now_s + 0.9 * STALE_S).x_m == pytest.approx(0.1)
     assert isnan(rail.encoder.read(rail.now_s + 1.1 * STALE_S).x_m)
-    assert rail.encoder.report().trouble == f"no count comes from {rail.counter.device}."
+    assert rail.encoder.report().trouble == f"no count arrives from {rail.counter.device}."
 
 
 def test_an_encoder_that_is_unplugged_is_none_and_is_opened_again(rail: Rail) -> None:
@@ -195,7 +195,7 @@ def test_no_bytes_are_too_wild(tmp_path: Path) -> None:
             encoder = RailEncoder(parameters, open_device=lambda *_: Wire(file.fileno()))
             for tick in range(5):
                 assert abs(encoder.read(0.01 * tick).x_m) < 1e11 or not encoder.poses
-            assert encoder.poses + encoder.garbled <= sum(
+            assert encoder.poses + encoder.malformed <= sum(
                 piece.count(b"\n") + piece.count(b"\r") + 1 for piece in pieces
             )
 

@@ -11,26 +11,26 @@ from drivers.serial.encoder_counts import EncoderCounts
 
 @pytest.mark.parametrize("line", [b"x:250", b"x = 250", b" x 250 ", b"x+250"])
 def test_a_labelled_count_is_a_place(line: bytes) -> None:
-    assert EncoderCounts(-1e-3, "x", origin_m=1.0).take(line, 0.0) == pytest.approx(-1.25)
+    assert EncoderCounts(-1e-3, "x", origin_m=1.0).accept(line, 0.0) == pytest.approx(-1.25)
 
 
 @pytest.mark.parametrize("line", [b"250", b"x250.5", b"y:250", b"x", b"", b"x 2 5", b"\xff"])
 def test_what_is_no_count_is_garbled(line: bytes) -> None:
     counts = EncoderCounts(1e-3, "x")
-    assert counts.take(line, 0.0) is None
-    assert (counts.believed, counts.garbled) == (0, 1)
+    assert counts.accept(line, 0.0) is None
+    assert (counts.accepted, counts.malformed) == (0, 1)
 
 
 def test_a_leap_is_believed_once_it_stays_and_is_told() -> None:
     counts = EncoderCounts(1e-5)
-    reported = [counts.take(line, 0.01 * i) for i, line in enumerate([b"50000", b"5000", b"50010", b"3", b"5", b"7"])]
+    reported = [counts.accept(line, 0.01 * i) for i, line in enumerate([b"50000", b"5000", b"50010", b"3", b"5", b"7"])]
     assert reported == [pytest.approx(0.5), None, pytest.approx(0.5001), None, pytest.approx(5e-5), pytest.approx(7e-5)]
-    assert (counts.garbled, counts.leaps) == (2, 1)
+    assert (counts.malformed, counts.jumps) == (2, 1)
 
 
 @given(st.lists(st.binary(max_size=20)))
 def test_no_bytes_break_it(lines: list[bytes]) -> None:
     counts = EncoderCounts(1e-5, "n")
     for i, line in enumerate(lines):
-        counts.take(line, 0.01 * i)
-    assert counts.believed + counts.garbled == len(lines)
+        counts.accept(line, 0.01 * i)
+    assert counts.accepted + counts.malformed == len(lines)

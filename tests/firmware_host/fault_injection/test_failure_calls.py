@@ -116,7 +116,7 @@ def test_the_list_holds_all_that_can_fail(bench: Bench) -> None:
         ({}, "component = None: must be"),
         ({"component": "left_knee", "kind": "off"}, "left_knee"),
         ({"component": "left_knee", "kind": "ok"}, "left_knee"),
-        ({"component": "all", "kind": "off"}, "there is no 'all'"),
+        ({"component": "all", "kind": "off"}, "no component 'all'"),
         ({"component": "log", "kind": "slow"}, "it can be off"),
         ({"component": "log", "kind": "off", "for_s": 61}, "0.01 to 60"),
         ({"component": "log", "kind": "off", "for_s": "long"}, "must be a number"),
