@@ -9,14 +9,13 @@ cannot tell; forces are mapped for display alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, hypot, isfinite, sin
+from math import cos, hypot, sin
 
-from control.gait.recovery import is_in_mud
 from control.geometry import FlipperGeometry
-from control.records import NO_LOAD, UNKNOWN, DriveState, Estimate, FlipperLoad, Phase, StrideEstimate
+from control.records import UNKNOWN, Estimate, FlipperLoad, Phase
 from estimation.force_map import smallest_force_n
-from estimation.joint_load import NO_COMMANDS, CommandTimes, FlipperDrive, JointLoad, JointLoads
-from estimation.stride_clock import StrideClock
+from estimation.joint_load import FlipperDrive, JointLoad, motion_between
+from estimation.stride_estimator import Learned, StrideEstimator, larger
 from estimation.strokes.shear import Base, Shear, find_shear
 from estimation.strokes.stroke import Batch, Stroke
 from estimation.strokes.stroke_fit import (
@@ -36,8 +35,8 @@ FREE_FRACTION = 0.4  # of the clearance that the edge must be above the mud to c
 CLINGING_M = 0.015  # above the lower edge: the middle of what a stroke of 3 cm wets
 
 
-class FlipperEstimator:
-    """Owns what one flipper gathers in the stride under way."""
+class FlipperEstimator(StrideEstimator):
+    """Owns the strokes and the tare of one flipper."""
 
     def __init__(
         self,
@@ -48,60 +47,26 @@ class FlipperEstimator:
         body_drag_n: float = 0.0,
         surface_error_m: float = 0.001,
     ) -> None:
-        self.flipper = flipper
-        self.geometry = geometry
         self.base = base
         self.body_drag_n = body_drag_n
         self.surface_error_m = surface_error_m
         self._free_m = -FREE_FRACTION * geometry.clearance_m
-        self._loads = JointLoads(geometry, drive)
-        self._clock = StrideClock()
         self._tare = Tare()
         self._strokes = {phase: Stroke(step_m) for phase, step_m in STEPS_M.items()}
-        self.reset()
+        super().__init__(flipper, geometry, drive, motion_between)
 
     def reset(self) -> None:
-        """Forget everything, the count of strides included."""
-        self._loads.reset()
-        self._clock.reset()
         self._tare.reset()
-        self._load = NO_LOAD
         self._travel_m = UNKNOWN
-        self._body_at_close_m = UNKNOWN
-        self._begin_stride(0.0, UNKNOWN)
+        super().reset()
 
-    def _begin_stride(self, now_s: float, body_m: float) -> None:
-        self._clock.begin(now_s)
+    def _reset_stride(self) -> None:
         for stroke in self._strokes.values():
             stroke.reset()
         self._surface = combined(NO_SURFACE, self.surface_error_m, 0.0)
         self._k_p = NOT_THERE
-        self._stuck = False
-        self._deepest_m = UNKNOWN
-        self._body_at_insertion_m = UNKNOWN
-        self._insertion_n = self._stance_n = self._extraction_n = UNKNOWN
-        if self._clock.index == 0 and not isfinite(self._body_at_close_m):
-            self._body_at_close_m = body_m
 
-    def update(
-        self,
-        now_s: float,
-        phase: Phase,
-        sweep: DriveState,
-        adduction: DriveState,
-        body_x_m: float,
-        commands_s: CommandTimes = NO_COMMANDS,
-    ) -> tuple[FlipperLoad, StrideEstimate | None]:
-        """The load now and, on the first sample after a stride's extraction, what the stride said."""
-        closed = self._change_phase(now_s, phase, body_x_m) if phase is not self._clock.phase else None
-        if not isfinite(sweep.angle_rad + adduction.angle_rad + sweep.current_a + adduction.current_a):
-            return NO_LOAD, closed
-        load = self._loads.update(sweep, adduction, commands_s)
-        if load is not None:
-            self._take_in(now_s, phase, load, body_x_m)
-        return self._load, closed
-
-    def _take_in(self, now_s: float, phase: Phase, load: JointLoad, body_m: float) -> None:
+    def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
         sweep_rad, adduction_rad, depth_m, rise_sweep_m, rise_adduction_m, sweep_nm, adduction_nm, saturated = load
         rise_adduction_m -= CLINGING_M * sin(adduction_rad)
         stroke = self._strokes.get(phase)
@@ -116,35 +81,20 @@ class FlipperEstimator:
         self._load = FlipperLoad(sweep_nm, adduction_nm, force_x_n, force_z_n, depth_m)
         if stroke is not None:
             self._travel_m = self.geometry.flipper_length_m * sweep_rad if phase is Phase.STANCE else depth_m
-            stroke.update(now_s, self._travel_m, sweep_rad, adduction_rad, sweep_nm, adduction_nm, body_m, saturated)
-            self._mark(phase, self._load, body_m)
+            stroke.update(now_s, self._travel_m, sweep_rad, adduction_rad, sweep_nm, adduction_nm, body_x_m, saturated)
+            if phase is not Phase.EXTRACTION:
+                self._deepest_m = larger(depth_m, self._deepest_m)
+            self._record_extremes(phase, self._load, body_x_m)
 
-    def _mark(self, phase: Phase, load: FlipperLoad, body_m: float) -> None:
-        """Largest forces and depth of the stride."""
-        if phase is Phase.EXTRACTION:
-            self._extraction_n = -_larger(-load.force_z_n, -self._extraction_n)
-            return
-        self._deepest_m = _larger(load.depth_m, self._deepest_m)
-        if phase is Phase.STANCE:
-            self._stance_n = _larger(load.force_x_n, self._stance_n)
-        else:
-            self._insertion_n = _larger(load.force_z_n, self._insertion_n)
-            self._body_at_insertion_m = body_m
-
-    def _change_phase(self, now_s: float, phase: Phase, body_m: float) -> StrideEstimate | None:
-        change = self._clock.change(now_s, phase)
-        if change.ended in self._strokes:
-            self._strokes[change.ended].close(now_s, self._travel_m)
-        if change.ended is Phase.INSERTION:
+    def _end_phase(self, now_s: float, ended: Phase) -> None:
+        if ended in self._strokes:
+            self._strokes[ended].close(now_s, self._travel_m)
+        if ended is Phase.INSERTION:
             self._learn_insertion(self._strokes[Phase.INSERTION].moving())
-        if phase is Phase.RECOVERY or change.closes_stride:
-            self._stuck = self._stuck or is_in_mud(self.geometry, *self._loads.angles_rad)
-        closed = self._close(now_s, body_m) if change.closes_stride else None
-        if change.begins_stride:
-            self._begin_stride(now_s, body_m)
+
+    def _begin_phase(self, phase: Phase) -> None:
         if phase is Phase.INSERTION:
             self._tare.take()
-        return closed
 
     def _learn_insertion(self, batches: Sequence[Batch]) -> None:
         """Surface, what is left of the zero above it, and k_p.
@@ -169,38 +119,20 @@ class FlipperEstimator:
         """What is known of the surface's depth below its nominal height."""
         return self._surface.depth_m
 
-    def _close(self, now_s: float, body_m: float) -> StrideEstimate:
+    def _learned(self) -> Learned:
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
         shear = find_shear(self.geometry, stance.batches, self.surface_m, self.base, self.body_drag_n)
-        duration_s = self._clock.duration_s
-        estimate = StrideEstimate(
-            flipper=self.flipper,
-            index=self._clock.index,
-            t_start_s=self._clock.start_s,
-            t_end_s=now_s,
-            insertion_s=duration_s[Phase.INSERTION],
-            stance_s=duration_s[Phase.STANCE],
-            extraction_s=duration_s[Phase.EXTRACTION],
+        return Learned(
             k_p=self._k_p,
             k_s=self._shear_estimate(shear),
             k_e=self._learn_extraction(extraction),
             surface_m=self.surface_m,
+            extraction_torque_nm=max([-batch.adduction_nm for batch in extraction.batches], default=UNKNOWN),
             surface_std_error_m=self._surface.std_error_m,
-            depth_m=self._deepest_m - self.surface_m,
-            released=not self._stuck,
-            insertion_force_n=self._insertion_n,
-            stance_force_n=self._stance_n,
-            extraction_force_n=self._extraction_n,
-            step_m=body_m - self._body_at_close_m,
-            position_m=self._body_at_insertion_m,
             stance=shear.case,
             tare_n=self._tare.zero.weight_n,
             tare_drift_n=self._tare.drift_n,
-            extraction_torque_nm=max([-batch.adduction_nm for batch in extraction.batches], default=UNKNOWN),
         )
-        self._clock.index += 1
-        self._body_at_close_m = body_m
-        return estimate
 
     def _learn_extraction(self, stroke: Stroke) -> Estimate:
         reported = fit_extraction(
@@ -218,8 +150,3 @@ class FlipperEstimator:
         surface = 2.0 * shear.fit.slope * self._surface.std_error_m / depth_m if depth_m > 0.0 else 0.0
         estimate = evaluated(shear.fit, surface, shear.samples)
         return estimate._replace(at_least=shear.at_least, reason=estimate.reason or shear.reason)
-
-
-def _larger(value: float, largest: float) -> float:
-    """The larger one, also while there is none yet (NaN)."""
-    return largest if largest >= value else value

@@ -1,0 +1,160 @@
+"""The shell of both estimators: it follows one flipper through its strides and closes each of them in swing.
+
+A method learns coefficients from the samples of a stride; the shell does the rest. It turns currents into loads, counts
+phases and strides, records the largest forces, and assembles the estimate of a stride on the first sample after its
+extraction. The methods are `FlipperEstimator` (flipper.py) and `PaperEstimator` (paper.py).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from math import isfinite
+from typing import NamedTuple
+
+from control.gait.recovery import is_in_mud
+from control.geometry import FlipperGeometry
+from control.records import NO_LOAD, UNKNOWN, DriveState, Estimate, FlipperLoad, Phase, StrideEstimate
+from estimation.joint_load import NO_COMMANDS, CommandTimes, FlipperDrive, JointLoad, JointLoads, JointMotion
+from estimation.stride_clock import StrideClock
+
+
+class Learned(NamedTuple):
+    """The result of a method for one stride."""
+
+    k_p: Estimate
+    k_s: Estimate
+    k_e: Estimate
+    surface_m: float
+    extraction_torque_nm: float
+    surface_std_error_m: float = UNKNOWN
+    stance: str = "unknown"
+    tare_n: float = UNKNOWN
+    tare_drift_n: float = UNKNOWN
+
+
+class StrideEstimator(ABC):
+    """Owns phase, load and extremes of the stride under way of one flipper."""
+
+    def __init__(
+        self,
+        flipper: str,
+        geometry: FlipperGeometry,
+        drive: FlipperDrive,
+        motion: Callable[[DriveState, DriveState, CommandTimes], JointMotion],
+    ) -> None:
+        self.flipper = flipper
+        self.geometry = geometry
+        self._loads = JointLoads(geometry, drive, motion)
+        self._clock = StrideClock()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything, the count of strides included."""
+        self._loads.reset()
+        self._clock.reset()
+        self._load = NO_LOAD
+        self._body_at_close_m = UNKNOWN
+        self._begin_stride(0.0, UNKNOWN)
+
+    def _begin_stride(self, now_s: float, body_x_m: float) -> None:
+        self._clock.begin(now_s)
+        self._stuck = False
+        self._deepest_m = self._body_at_insertion_m = UNKNOWN
+        self._insertion_n = self._stance_n = self._extraction_n = UNKNOWN
+        if self._clock.index == 0 and not isfinite(self._body_at_close_m):
+            self._body_at_close_m = body_x_m
+        self._reset_stride()
+
+    def update(
+        self,
+        now_s: float,
+        phase: Phase,
+        sweep: DriveState,
+        adduction: DriveState,
+        body_x_m: float,
+        commands_s: CommandTimes = NO_COMMANDS,
+    ) -> tuple[FlipperLoad, StrideEstimate | None]:
+        """Return the load now and, on the first sample after a stride's extraction, the estimate of that stride."""
+        closed = self._change_phase(now_s, phase, body_x_m) if phase is not self._clock.phase else None
+        if not isfinite(sweep.angle_rad + adduction.angle_rad + sweep.current_a + adduction.current_a):
+            return NO_LOAD, closed
+        load = self._loads.update(sweep, adduction, commands_s)
+        if load is not None:
+            self._learn(now_s, phase, load, body_x_m)
+        return self._load, closed
+
+    def _change_phase(self, now_s: float, phase: Phase, body_x_m: float) -> StrideEstimate | None:
+        change = self._clock.change(now_s, phase)
+        self._end_phase(now_s, change.ended)
+        if phase is Phase.RECOVERY or change.closes_stride:
+            self._stuck = self._stuck or is_in_mud(self.geometry, *self._loads.angles_rad)
+        closed = self._close(now_s, body_x_m) if change.closes_stride else None
+        if change.begins_stride:
+            self._begin_stride(now_s, body_x_m)
+        self._begin_phase(phase)
+        return closed
+
+    def _close(self, now_s: float, body_x_m: float) -> StrideEstimate:
+        learned, duration_s = self._learned(), self._clock.duration_s
+        estimate = StrideEstimate(
+            flipper=self.flipper,
+            index=self._clock.index,
+            t_start_s=self._clock.start_s,
+            t_end_s=now_s,
+            insertion_s=duration_s[Phase.INSERTION],
+            stance_s=duration_s[Phase.STANCE],
+            extraction_s=duration_s[Phase.EXTRACTION],
+            k_p=learned.k_p,
+            k_s=learned.k_s,
+            k_e=learned.k_e,
+            surface_m=learned.surface_m,
+            surface_std_error_m=learned.surface_std_error_m,
+            depth_m=self._deepest_m - learned.surface_m,
+            released=not self._stuck,
+            insertion_force_n=self._insertion_n,
+            stance_force_n=self._stance_n,
+            extraction_force_n=self._extraction_n,
+            step_m=body_x_m - self._body_at_close_m,
+            position_m=self._body_at_insertion_m,
+            stance=learned.stance,
+            tare_n=learned.tare_n,
+            tare_drift_n=learned.tare_drift_n,
+            extraction_torque_nm=learned.extraction_torque_nm,
+        )
+        self._clock.index += 1
+        self._body_at_close_m = body_x_m
+        return estimate
+
+    def _record_extremes(self, phase: Phase, load: FlipperLoad, body_x_m: float) -> None:
+        """Record the largest forces of the stride, and where the body was at the end of the insertion."""
+        if phase is Phase.EXTRACTION:
+            self._extraction_n = -larger(-load.force_z_n, -self._extraction_n)
+        elif phase is Phase.STANCE:
+            self._stance_n = larger(load.force_x_n, self._stance_n)
+        elif phase is Phase.INSERTION:
+            self._insertion_n = larger(load.force_z_n, self._insertion_n)
+            self._body_at_insertion_m = body_x_m
+
+    @abstractmethod
+    def _reset_stride(self) -> None:
+        """Forget the stride before."""
+
+    @abstractmethod
+    def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
+        """Take in a new load: set `_load` and `_deepest_m`, and call `_record_extremes`."""
+
+    @abstractmethod
+    def _learned(self) -> Learned:
+        """Return the result of the stride that closes."""
+
+    def _end_phase(self, now_s: float, ended: Phase) -> None:  # noqa: B027  a method may ignore it
+        """React to the end of a phase."""
+
+    def _begin_phase(self, phase: Phase) -> None:  # noqa: B027
+        """React to the beginning of a phase, after a stride that ends with it has closed."""
+
+
+def larger(value: float, largest: float) -> float:
+    """Return the larger of two values; `largest` may still be NaN."""
+    return largest if largest >= value else value
