@@ -1,4 +1,4 @@
-"""The parsers of `mudskipper experiment NAME`: what each can be told."""
+"""The parsers of `mudskipper experiment NAME`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def add_experiments(commands: Commands) -> None:
     estimation = add(
         names, "estimation", "experiments.estimation.estimation", "Estimated coefficients against a load cell."
     )
-    _add_report(estimation, "the load cell is a virtual one", "write JSON and picture there")
+    _add_report(estimation, "the load cell is virtual", "write JSON and picture there")
     estimation.add_argument("--setup", choices=("single", "walking", "both"), default="both")
     estimation.add_argument("--seeds", type=SEEDS, default=10, metavar="N", help="trials of each mud (default: 10)")
     muds = estimation.add_mutually_exclusive_group()
@@ -62,8 +62,8 @@ def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -
 
 
 def _add_bench(experiment: argparse.ArgumentParser) -> None:
-    """Options of an experiment that a person makes at a robot, or nobody at a simulated one."""
-    _add_report(experiment, "robot and muds are simulated, nothing is asked", "for report, logs and what was measured")
+    """Add the options of an experiment at a robot with an operator, or in simulation without one."""
+    _add_report(experiment, "robot and muds are simulated, without prompts", "for report, logs and measurements")
     add_socket(experiment)
 
 
@@ -71,7 +71,7 @@ def _add_actuator(names: Commands) -> None:
     actuator = add(
         names, "actuator", "experiments.actuator.run_actuator", "Weights on a joint: torque constants and friction."
     )
-    _add_report(actuator, "a simulated motor holds the weights, and nobody is asked", "for report, pictures and log")
+    _add_report(actuator, "a simulated motor holds the weights, without prompts", "for report, pictures and log")
     add_socket(actuator)
     actuator.add_argument(
         "--joint", action="append", choices=JOINTS, help="repeatable (default: right_adduction, right_sweep)"
@@ -85,7 +85,7 @@ def _add_actuator(names: Commands) -> None:
         default=1.0,
         metavar="MM",
         dest="lever_tolerance_mm",
-        help="by which it may be wrong (default: %(default)g)",
+        help="of the lever (default: %(default)g)",
     )
     actuator.add_argument("--weights", type=weights_g, metavar="G,G,...", help="in grams (default: the paper's)")
     actuator.add_argument(
@@ -94,12 +94,12 @@ def _add_actuator(names: Commands) -> None:
         default=0.1,
         metavar="PERCENT",
         dest="weight_tolerance_percent",
-        help="by which they may be wrong (default: %(default)g)",
+        help="of the weights (default: %(default)g)",
     )
     actuator.add_argument("--trials", type=TRIALS, default=5, metavar="N", help="passes through them (default: 5)")
-    actuator.add_argument("--gravity", type=GRAVITY_M_S2, metavar="M/S2", help="of this place (default: 9.81)")
+    actuator.add_argument("--gravity", type=GRAVITY_M_S2, metavar="M/S2", help="local gravity (default: 9.81)")
     actuator.add_argument(
-        "--apply", action="store_true", help="write what was fitted to the configuration, if you agree"
+        "--apply", action="store_true", help="write the fitted constants to the configuration, after a prompt"
     )
     actuator.add_argument("--config", type=Path, metavar="FILE", help=f"to change (default: {DEFAULT_CONFIG})")
     actuator.add_argument("--seed", type=int, default=1, help="of the simulated motor")
@@ -119,23 +119,21 @@ def _add_flipper(names: Commands) -> None:
 
 
 def _add_walk(names: Commands) -> None:
-    walk = add(
-        names, "walk", "experiments.walk.run_walk", "The walking robot over several muds: coefficients on the way."
-    )
+    walk = add(names, "walk", "experiments.walk.run_walk", "The walking robot over several muds: their coefficients.")
     _add_bench(walk)
     walk.add_argument(
         "--mud",
         type=mud_length,
         action="append",
         metavar="NAME[=CM]",
-        help="as its water in percent, and its length (default: 61), one after the other along the way",
+        help="as its water in percent, and its length (default: 61), in the order of the trackway",
     )
     walk.add_argument("--trials", type=TRIALS, default=3, metavar="N", help="over the muds (default: 3)")
     walk.add_argument("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: 3)")
     walk.add_argument(
-        "--soft", action="append", metavar="NAME", help="mud in which to walk at 3 and at 5 cm besides, repeatable"
+        "--soft", action="append", metavar="NAME", help="mud for additional walks at 3 and at 5 cm, repeatable"
     )
-    walk.add_argument("--flipper", choices=("left", "right"), default="right", help="to look at (default: right)")
+    walk.add_argument("--flipper", choices=("left", "right"), default="right", help="to evaluate (default: right)")
     walk.add_argument("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
 
 
@@ -143,7 +141,9 @@ def _add_loadcell(names: Commands) -> None:
     loadcell = add(
         names, "loadcell", "experiments.loadcell.loadcell", "A mud's coefficients from a load cell on a linear stage."
     )
-    _add_report(loadcell, "stage and load cell are emulated", "for report, pictures and samples; goes on where it was")
+    _add_report(
+        loadcell, "stage and load cell are emulated", "for report, pictures and samples; continues the trials there"
+    )
     _add_amplifier(loadcell)
     loadcell.add_argument(
         "--mud", action="append", metavar="NAME", help="repeatable; simulated: water content in percent"
@@ -155,7 +155,7 @@ def _add_loadcell(names: Commands) -> None:
         type=between(0.0, 20.0, "mm"),
         default=0.5,
         metavar="MM",
-        help="one standard error of the depth that was set (default: %(default)s)",
+        help="one standard error of the set depth (default: %(default)s)",
     )
     loadcell.add_argument(
         "--plate", type=plate_cm, default=(3.0, 3.5, 0.4), metavar="WxH", help="or WxHxT, in cm (default: 3x3.5x0.4)"
@@ -170,7 +170,7 @@ def _add_loadcell(names: Commands) -> None:
 
 def _add_amplifier(loadcell: argparse.ArgumentParser) -> None:
     loadcell.add_argument(
-        "--port", metavar="PATH", help="of the cell's amplifier: /dev/serial/by-id/... is the same always"
+        "--port", metavar="PATH", help="of the cell's amplifier; /dev/serial/by-id/... does not change"
     )
     loadcell.add_argument(
         "--baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)"
@@ -179,33 +179,39 @@ def _add_amplifier(loadcell: argparse.ArgumentParser) -> None:
         "--format", default="auto", metavar="NAME", help="of its lines: auto, number, indicator, column2, or a pattern"
     )
     loadcell.add_argument(
-        "--unit", default="", metavar="U", help="of its numbers: counts, g, kg, N ... (default: as it says)"
+        "--unit", default="", metavar="U", help="of its numbers: counts, g, kg, N ... (default: that of the lines)"
     )
     loadcell.add_argument("--scale", type=positive, metavar="X", help="newtons per unit, instead of a calibration")
-    loadcell.add_argument("--calibration", type=Path, metavar="FILE", help="made earlier, instead of two weights")
+    loadcell.add_argument("--calibration", type=Path, metavar="FILE", help="an earlier one, instead of two weights")
 
 
 def _add_stage_encoder(loadcell: argparse.ArgumentParser) -> None:
     loadcell.add_argument(
-        "--position", nargs="?", const="", metavar="PATH", help="an encoder of the stage, which a hand may push then"
+        "--position",
+        nargs="?",
+        const="",
+        metavar="PATH",
+        help="port of an encoder of the stage, which may be pushed by hand then",
     )
     loadcell.add_argument(
         "--position-step",
         type=between(0.01, 10000.0, "um"),
         metavar="UM",
-        help="way per count, whatever its sign",
+        help="travel per count, of either sign",
     )
     loadcell.add_argument(
         "--position-baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)"
     )
-    loadcell.add_argument("--position-label", default="", metavar="TEXT", help="that each of its lines begins with")
+    loadcell.add_argument("--position-label", default="", metavar="TEXT", help="at the beginning of each of its lines")
 
 
 def _add_trackway(names: Commands) -> None:
     trackway = add(
-        names, "trackway", "experiments.trackway.run_trackway", "Three muds in a row, at fixed and at chosen depths."
+        names, "trackway", "experiments.trackway.run_trackway", "Three muds in a row, at fixed and at adapted depths."
     )
-    _add_report(trackway, "robot and muds are simulated; else a daemon's robot walks", "for report, pictures and log")
+    _add_report(
+        trackway, "robot and muds are simulated; without it the daemon's robot walks", "for report, pictures and log"
+    )
     add_socket(trackway)
     trackway.add_argument(
         "--trials", "--seeds", type=SEEDS, metavar="N", help="of each gait (default: 3, as the paper)"
@@ -234,8 +240,10 @@ def _add_sweep(names: Commands) -> None:
 
 
 def _add_faults(names: Commands) -> None:
-    faults = add(names, "faults", "experiments.faults.run_faults", "Every fault in every phase, against its bounds.")
-    _add_report(faults, "what fails is a simulated robot", "write JSON and picture there")
+    faults = add(
+        names, "faults", "experiments.faults.run_faults", "Every fault in every phase, with the bounds of its reaction."
+    )
+    _add_report(faults, "the faults happen to a simulated robot", "write JSON and picture there")
     faults.add_argument("--seeds", type=SEEDS, default=1, metavar="N", help="cells of each pair (default: 1)")
     faults.add_argument("--fault", action="append", metavar="NAME", help="repeatable (default: all)")
     faults.add_argument("--phase", action="append", metavar="NAME", help="repeatable (default: all)")

@@ -1,4 +1,4 @@
-"""What muds are called: most by their water in percent, some by their strength with the unit, a person's at will."""
+"""Names of muds: most are their water in percent, some their strength with the unit, others free."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ WATER = re.compile(r"(?:w\s*=?\s*)?(\d+(?:\.\d+)?)\s*%?")  # 47.6, 47.6%, w47.6 
 
 
 def mud_name(name: str) -> str:
-    """However a water content is written, its number; any other name as it is."""
+    """Return the number of a water content however it is written, and any other name as it is."""
     water = WATER.fullmatch(name.strip())
     return water[1] if water else name.strip() or name
 
 
 def mud_key(name: str) -> str:
-    """By what one mud is found in two files: 48.60 and "w = 48.6 %" are one, and so are Pond and pond."""
+    """Return a key for comparison: 48.60 and "w = 48.6 %" are one mud, and so are Pond and pond."""
     water = WATER.fullmatch(name.strip())
     return f"{float(water[1]):g}" if water else name.strip().casefold()
 
 
 def mud_label(name: str) -> str:
-    """For a table's head or an axis."""
+    """Format for a table's head or an axis."""
     water = WATER.fullmatch(name)
     return f"w = {water[1]} %" if water else name
 
 
 def mud_text(name: str) -> str:
-    """Within a sentence; some say where they lie."""
-    mud, at, place = name.partition(" at ")
+    """Format within text; some names have a position."""
+    mud, at, position = name.partition(" at ")
     water = WATER.fullmatch(mud)
-    return f"{water[1]} %{at}{place}" if water else name
+    return f"{water[1]} %{at}{position}" if water else name

@@ -1,4 +1,4 @@
-"""How muds and phases look in all pictures of the trials: a colour, a line and a mark each, so that print is enough."""
+"""Colours, lines and markers of muds and phases in all pictures, distinct in black and white too."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LABELS = {"k_p": "$k_p$ penetration", "k_s": "$k_s$ shear", "k_e": "$k_e$ extrac
 
 
 def looks_of(muds: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Colour, line and mark of each, from dark to light."""
+    """Return colour, line and marker of each mud, from dark to light."""
     colours = plt.get_cmap("viridis")
     fraction = max(len(muds) - 1, 1) / 0.85
     return {
@@ -40,11 +40,11 @@ def mark_of(look: dict[str, Any]) -> dict[str, Any]:
 
 
 def waters_of(muds: Sequence[str]) -> list[float]:
-    """Where each stands on an axis: at its water content, or one after the other."""
+    """Return positions on an axis: the water contents, or 0, 1, 2, ..."""
     try:
         return [float(mud) for mud in muds]
     except ValueError:
-        return [float(place) for place in range(len(muds))]
+        return [float(index) for index in range(len(muds))]
 
 
 def are_waters(muds: Sequence[str]) -> bool:
@@ -55,5 +55,5 @@ def are_waters(muds: Sequence[str]) -> bool:
 
 
 def file_name(mud: str) -> str:
-    """As a part of one."""
+    """Return a name that is safe as a part of a file's."""
     return "".join(letter if letter.isalnum() or letter in ".-" else "_" for letter in mud)

@@ -1,4 +1,4 @@
-"""What came of an experiment, in one folder: a page that needs nothing beside it, its pictures, its numbers, its logs.
+"""The results of an experiment in one folder: a page, its pictures, its numbers and its logs.
 
 The page is plain HTML with the pictures inside, so it can be sent as one file and printed in black and white.
 """
@@ -48,7 +48,7 @@ class Figure:
 class Section:
     heading: str
     text: str = ""  # paragraphs are separated by an empty line
-    screen: str = ""  # as it looks on a terminal
+    screen: str = ""  # preformatted text
     rows: Rows = ()  # of a table, the head first
     figures: Sequence[Figure] = ()
 
@@ -56,7 +56,7 @@ class Section:
 def write_report(
     folder: Path, report: Any, title: str, sections: Sequence[Section], logs: Sequence[Path] = ()
 ) -> list[Path]:
-    """Everything that was written. `report` becomes the summary. Raises OSError."""
+    """Write everything and return the paths. `report` becomes the summary. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     summary, page = folder / SUMMARY, folder / PAGE
     _write(summary, json.dumps(to_json(report), indent=1, allow_nan=False) + "\n")
@@ -66,8 +66,8 @@ def write_report(
 
 
 def _write(path: Path, text: str) -> None:
-    with whole_file(path) as beside:
-        beside.write_text(text, encoding="utf-8", errors="replace")  # names of any bytes
+    with whole_file(path) as hidden:
+        hidden.write_text(text, encoding="utf-8", errors="replace")  # file names may be any bytes
 
 
 def to_json(report: Any) -> Any:
@@ -96,13 +96,13 @@ def _record_to_json(record: Any) -> dict[str, Any]:
 
 
 def _draw(figure: Figure, folder: Path) -> Path:
-    path = _place(figure, folder)
-    with whole_file(path) as beside:
-        figure.draw(beside)
+    path = _picture_path(figure, folder)
+    with whole_file(path) as hidden:
+        figure.draw(hidden)
     return path
 
 
-def _place(figure: Figure, folder: Path) -> Path:
+def _picture_path(figure: Figure, folder: Path) -> Path:
     return folder / f"{figure.name}.png"
 
 
@@ -113,17 +113,17 @@ def _page(folder: Path, title: str, sections: Sequence[Section], logs: Sequence[
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>\n'
         f"<style>\n{STYLE}</style></head><body>\n<h1>{escape(title)}</h1>\n"
         f'<p class="when">{made}, mudskipper {escape(software_version())}</p>\n{body}\n'
-        f"<footer>Numbers: {SUMMARY}. {_reported_logs(logs)}</footer>\n</body></html>\n"
+        f"<footer>Numbers: {SUMMARY}. {_logs_text(logs)}</footer>\n</body></html>\n"
     )
 
 
-def _reported_logs(logs: Sequence[Path]) -> str:
+def _logs_text(logs: Sequence[Path]) -> str:
     return f"Logs: {', '.join(escape(log.name) for log in logs)}." if logs else ""
 
 
 def _section(section: Section, folder: Path) -> str:
     paragraphs = [f"<p>{escape(part)}</p>" for part in section.text.split("\n\n") if part]
-    figures = [_figure(figure, _place(figure, folder)) for figure in section.figures]
+    figures = [_figure(figure, _picture_path(figure, folder)) for figure in section.figures]
     screen = [f"<pre>{escape(section.screen)}</pre>"] if section.screen else []
     parts = [f"<h2>{escape(section.heading)}</h2>", *paragraphs, *([_table(section.rows)] if section.rows else [])]
     return "\n".join([*parts, *screen, *figures])

@@ -1,4 +1,4 @@
-"""How reports tell a value with its errors: no digit that the errors do not bear.
+"""Values with their errors as text, with no more digits than the errors justify.
 
 Each error has two significant digits, and the value ends where the finest error ends. Without an error a value has
 four significant digits; with errors it never has more than six.
@@ -10,33 +10,33 @@ from math import isfinite
 
 N_CM3 = 1e6  # N/m³
 OF_ERROR, OF_VALUE, MOST = 2, 4, 6  # significant digits
-FINEST = 3  # places of a percentage
+FINEST = 3  # decimals of a percentage
 
 
 def value_text(value: float | None, *errors: float | None, per: float = 1.0) -> str:
-    """In units of `per`; a dash where there is no value. Errors that nobody knows are left out."""
+    """Format in units of `per`; a dash for no value. Unknown errors are left out."""
     if value is None or not isfinite(value):
         return "-"
     value, most = value / per, _places(value / per, MOST)
     uncertainties = [error / per for error in errors if error is not None and isfinite(error)]
     places = [min(most, _places(uncertainty, OF_ERROR)) for uncertainty in uncertainties if uncertainty]
     ends = max(places, default=_places(value, OF_VALUE))
-    reported = [
+    errors_text = [
         f"{uncertainty:.{min(most, _places(uncertainty, OF_ERROR)) if uncertainty else ends}f}"
         for uncertainty in uncertainties
     ]
-    return " ± ".join([f"{value:.{ends}f}", *reported])
+    return " ± ".join([f"{value:.{ends}f}", *errors_text])
 
 
 def fraction_text(fraction: float | None) -> str:
-    """In percent, to two significant digits or a thousandth; a dash where there is none."""
+    """Format in percent, to two significant digits or a thousandth; a dash for none."""
     if fraction is None or not isfinite(fraction):
         return "-"
     return f"{100.0 * fraction:.{min(FINEST, _places(100.0 * fraction, OF_ERROR))}f} %"
 
 
 def miss_text(value: float, true: float) -> str:
-    """By how much of the true one it is more; a dash where there is no value."""
+    """Format the relative error of a value; a dash for none."""
     return f"{100.0 * (value / true - 1.0):+z.2f} %" if isfinite(value) else "-"
 
 
@@ -45,5 +45,5 @@ def repeatability_text(fraction: float | None, trials: int) -> str:
 
 
 def _places(number: float, digits: int) -> int:
-    """Behind the point, of which so many digits count."""
+    """Return the decimals of a number with so many significant digits."""
     return max(0, digits - 1 - int(f"{number:.{digits - 1}e}".partition("e")[2]))

@@ -1,6 +1,6 @@
-"""Files that are there whole or not at all: written beside their place under a hidden name, and then renamed.
+"""Atomic files: written under a hidden name in the same folder, then renamed.
 
-A disk that fills up while a report is made again leaves the one that was there before.
+A disk that fills up while a report is written again leaves the earlier one.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from pathlib import Path
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Where to write it to, with the same ending; it takes its place where nothing was raised. Raises OSError."""
-    beside = path.with_name(f".{path.name}")
+    """Yield a path with the same ending to write to; rename it where nothing was raised. Raises OSError."""
+    hidden = path.with_name(f".{path.name}")
     try:
-        yield beside
-        beside.replace(path)
+        yield hidden
+        hidden.replace(path)
     except BaseException:
         with suppress(OSError):
-            beside.unlink()
+            hidden.unlink()
         raise
 
 
 def copy_whole(file: Path, copy: Path) -> None:
     """Raises OSError."""
-    with whole_file(copy) as beside:
-        shutil.copyfile(file, beside)
+    with whole_file(copy) as hidden:
+        shutil.copyfile(file, hidden)

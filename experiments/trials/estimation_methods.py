@@ -1,6 +1,6 @@
-"""The same strides by several methods of estimation: the daemon's own, and others over the log that it left.
+"""Several estimation methods on the same strides: the daemon's own, and others in a replay of its log.
 
-default             in torque space, with bounds where the mud holds (estimation/flipper.py)
+default             in torque space, with bounds where the mud does not yield (estimation/flipper.py)
 paper               the published one, without compensation (estimation/paper.py)
 paper compensated   the same, with half of the body's drag added to the thrust while the body advances
 """
@@ -23,13 +23,13 @@ Strides = list[dict[str, Any]]
 
 
 def configured_method(parameters: EstimationParameters) -> str:
-    """The name of what a configuration asks for."""
+    """Return the name of the configured method."""
     compensated = parameters.method == "paper" and parameters.paper.compensation
     return COMPENSATED if compensated else parameters.method
 
 
 def with_method(parameters: EstimationParameters, method: str) -> EstimationParameters:
-    """By another method, all else as it was."""
+    """Return the same parameters with another method."""
     if method == DEFAULT:
         return replace(parameters, method="default")
     return replace(parameters, method="paper", paper=PaperEstimationParameters(method == COMPENSATED))
@@ -38,13 +38,13 @@ def with_method(parameters: EstimationParameters, method: str) -> EstimationPara
 def strides_by_method(
     own: Strides, log: Log, configuration: Configuration, flipper: str, methods: Sequence[str]
 ) -> dict[str, Strides]:
-    """Of one walk and one flipper; `own` are the daemon's, of which the configured method's are taken as they are."""
+    """Return one flipper's strides of one walk; `own` are the daemon's, by the configured method."""
     configured = configured_method(configuration.estimation)
-    reported = {configured: own} | {
+    by_method = {configured: own} | {
         method: _replayed(log, configuration, method) for method in methods if method != configured
     }
     return {
-        method: [stride for stride in strides if stride["flipper"] == flipper] for method, strides in reported.items()
+        method: [stride for stride in strides if stride["flipper"] == flipper] for method, strides in by_method.items()
     }
 
 

@@ -1,13 +1,12 @@
-"""The true coefficients of a stride: its own strokes repeated by a plate on a load cell.
+"""The true coefficients of a stride: its own strokes, repeated by a plate on a virtual load cell.
 
-Insertion and extraction are repeated along the flipper's own arc, with a cell in the joint that does not feel the
-plate's face (simulation/test_rig/joint_cell.py), shear sideways in the stance's mean attitude; to the same depth and
-at the same
-speed. The coefficients are fitted by the laws of control/plate.py: τ = k Φ for insertion and for the last three
-quarters of the way up, and F = k_s ∫ζ dA for shear. Beside it stands the paper's plate (section II-E), upright and
-moved straight, with F = k V. (A leaning plate that is pushed straight down is neither: its face bears a part of the
-load, one lean stands for one that grows, and the cell reads 4 % more k_p at 3 cm, 13 % at 4 cm, 31 % at 5 cm. Along
-the arc it is 1 to 6 % more than the upright plate's at each of these depths.)
+Insertion and extraction follow the flipper's own arc, with a cell in the joint that does not feel the plate's face
+(simulation/test_rig); shear goes sideways at the stance's mean attitude; all to the same depth and at the same speed.
+The coefficients are fitted by the laws of control/plate.py: τ = k Φ for insertion and for the last three quarters of
+the way up, and F = k_s ∫ζ dA for shear. The second set is of the paper's plate (section II-E), upright and moved
+straight, with F = k V. (A leaning plate that is pushed straight down is neither: its face carries a part of the load,
+one lean stands for a growing one, and the cell reads 4 % more k_p at 3 cm, 13 % at 4 cm, 31 % at 5 cm. Along the arc it
+is 1 to 6 % more than the upright plate's at each of these depths.)
 """
 
 from __future__ import annotations
@@ -23,13 +22,13 @@ from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.test_rig.joint_cell import ArcCurve, ArcStroke, measure_arc
 from simulation.test_rig.load_cell import LoadCurve, measure_insertion, measure_shear
 
-PAPER_SPEED_M_S = 0.1  # of its load cell; for a plate that did not slip, which has no speed of its own
+PAPER_SPEED_M_S = 0.1  # of its load cell; for a plate that did not slip
 SHEAR_PATH_M = 0.08
-REVERSAL_FRACTION = 0.25  # of the way up, in which mud that held the plate up turns to hold it down
+REVERSAL_FRACTION = 0.25  # of the way up, in which the force of the mud reverses
 
 
 class TrueCoefficients(NamedTuple):
-    """N/m³; NaN where the stroke did not happen."""
+    """Coefficients in N/m³; NaN where the stroke did not happen."""
 
     k_p: float
     k_s: float
@@ -37,8 +36,8 @@ class TrueCoefficients(NamedTuple):
 
 
 class LoadCellTruth(NamedTuple):
-    leaning: TrueCoefficients  # the plate as the flipper carried it
-    upright: TrueCoefficients  # as the paper's load cell carried it
+    leaning: TrueCoefficients  # the plate as the flipper carries it
+    upright: TrueCoefficients  # the plate as the paper's load cell carries it
 
 
 def load_cell_truth(stride: StrideTruth, geometry: FlipperGeometry, relaxation: float, hold_s: float) -> LoadCellTruth:
@@ -49,7 +48,7 @@ def load_cell_truth(stride: StrideTruth, geometry: FlipperGeometry, relaxation: 
 def true_coefficients(
     stride: StrideTruth, geometry: FlipperGeometry, relaxation: float, hold_s: float, upright: bool
 ) -> TrueCoefficients:
-    """By one of the two plates."""
+    """Return the coefficients of one of the two plates."""
     return TrueCoefficients(
         _insertion(stride, geometry, relaxation, upright),
         _shear(stride, geometry, upright),
@@ -84,8 +83,8 @@ def _extraction(
 def _arc(
     stride: StrideTruth, stroke: StrokeTruth, geometry: FlipperGeometry, relaxation: float, hold_s: float
 ) -> ArcStroke:
-    way = (stroke.sweep_rad, stride.surface_m, stroke.deepest_m, stroke.speed_m_s)
-    return measure_arc(stride.clay, geometry, *way, relaxation, hold_s)
+    motion = (stroke.sweep_rad, stride.surface_m, stroke.deepest_m, stroke.speed_m_s)
+    return measure_arc(stride.clay, geometry, *motion, relaxation, hold_s)
 
 
 def _shear(stride: StrideTruth, geometry: FlipperGeometry, upright: bool) -> float:
@@ -99,19 +98,19 @@ def _shear(stride: StrideTruth, geometry: FlipperGeometry, upright: bool) -> flo
 
 
 def _plate(geometry: FlipperGeometry, adduction_rad: float, depth_m: float) -> SubmergedPlate:
-    """Square to its way."""
+    """Return the plate perpendicular to its motion."""
     return submerged_part(geometry, depth_m, -sin(adduction_rad), cos(adduction_rad))
 
 
 def _straight_stiffness(curve: LoadCurve, sign: float, geometry: FlipperGeometry, to_depth_m: float) -> float:
-    """k of F = k V by least squares, over the part between surface and `to_depth_m`."""
+    """Fit k of F = k V by least squares, between the surface and `to_depth_m`."""
     rows = [row for row in zip(curve.depths_m, curve.forces_n, strict=True) if 0.0 < row[0] <= to_depth_m]
     volumes = [geometry.plate_thickness_m * _plate(geometry, 0.0, depth_m).area_m2 for depth_m, _ in rows]
     return _slope(volumes, [sign * force_n for _, force_n in rows])
 
 
 def _arc_stiffness(curve: ArcCurve, sign: float, to_depth_m: float) -> float:
-    """k of τ = k Φ by least squares, over the same part."""
+    """Fit k of τ = k Φ by least squares, over the same part."""
     rows = [row for row in zip(*curve, strict=True) if 0.0 < row[0] <= to_depth_m]
     return _slope([moment_m4 for _, moment_m4, _ in rows], [sign * moment_nm for _, _, moment_nm in rows])
 

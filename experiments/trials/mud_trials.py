@@ -1,10 +1,9 @@
-"""Trials in mud, one after another: the bed is prepared, the robot strides, and a person says what to do where it went
-wrong.
+"""Trials in mud, one after another: the bed is prepared, the robot walks, and the operator decides on invalid trials.
 
-Each trial is in the notebook before the next begins, so whatever ends an experiment costs the trial under way and no
-other. A trial that a fault ended, or that is worth nothing, is repeated, after the third time only where a person wants
-it so; one that is only doubtful is kept or repeated as they decide. One that is left out is written down as well, and
-not asked for again. Torque is off whenever hands may be in the mud.
+Each trial is in the notebook before the next begins, so an interruption costs the current trial only. A trial that a
+fault ended, or that is invalid, is repeated, after the third time only where the operator wants it; a doubtful one is
+kept or repeated as the operator decides. A trial that is left out is written down and not asked for again. Torque is
+off whenever hands may be in the mud.
 """
 
 from __future__ import annotations
@@ -26,8 +25,8 @@ from simulation.mud.clay import clay_of_water
 MOST_ATTEMPTS = 3
 SEED = 1  # of a simulated bench
 KEEP = "k"
-LOOK_S = 0.05  # of waiting for a person, in which nobody else arms the robot
-ASKED = {GO_ON: "go on", SKIP: "leave this trial out", REDO: "measure the last one again"}
+POLL_S = 0.05  # of a prompt, in which the lease is renewed
+PREPARED = {GO_ON: "go on", SKIP: "leave this trial out", REDO: "measure the last one again"}
 INVALID = {GO_ON: "repeat it", SKIP: "leave it out"}
 INVALID_OFTEN = {GO_ON: "end here", REDO: "repeat it", SKIP: "leave it out"}
 KEPT = {KEEP: "keep it as it is"}
@@ -47,7 +46,7 @@ class PlannedTrial(NamedTuple):
 
 
 class InvalidTrialError(Exception):
-    """A trial is worth nothing; the text says why. Where it has an entry, somebody may keep it all the same."""
+    """A trial is invalid; the text says why. If it has an entry, the operator may keep it."""
 
     def __init__(self, why: str, entry: Entry | None = None) -> None:
         super().__init__(why)
@@ -58,14 +57,14 @@ class MudBed(Protocol):
     """The mud under the robot."""
 
     def prepare(self, trial: PlannedTrial) -> str:
-        """Fresh mud in front of the robot: GO_ON, SKIP this trial, or REDO the one before."""
+        """Level fresh mud in front of the robot; return GO_ON, SKIP this trial, or REDO the one before."""
 
     def truths(self, flipper: str) -> Truths:
-        """What a load cell reads in the strides of the last walk; empty where there is none."""
+        """Return the load cell's readings in the strides of the last walk; nothing without a load cell."""
 
 
 class PromptedBed:
-    """A person's: asked for each trial, with torque off."""
+    """A MudBed that the operator prepares, with torque off."""
 
     def __init__(self, robot: BenchRobot, operator: Operator, instructions: Callable[[PlannedTrial], str]) -> None:
         self._robot = robot
@@ -75,14 +74,14 @@ class PromptedBed:
     def prepare(self, trial: PlannedTrial) -> str:
         disarm(self._robot)
         ask_to_clear_faults(self._robot, self._operator)
-        return self._operator.ask(f"{trial}. {self._instructions(trial)}", ASKED, partial(self._robot.wait, LOOK_S))
+        return self._operator.ask(f"{trial}. {self._instructions(trial)}", PREPARED, partial(self._robot.wait, POLL_S))
 
     def truths(self, flipper: str) -> Truths:
         return {}
 
 
 class Bench(NamedTuple):
-    """Where trials are made, and where they are written down."""
+    """The robot with its mud, its operator and its notebook."""
 
     robot: BenchRobot
     bed: MudBed
@@ -90,41 +89,41 @@ class Bench(NamedTuple):
     notebook: Notebook
 
 
-Measure = Callable[[PlannedTrial], Entry]  # raises SpoiltTrialError, BenchError; an entry has "remarks"
+Measure = Callable[[PlannedTrial], Entry]  # raises InvalidTrialError, BenchError; an entry has "remarks"
 
 
 def conduct_trials(
     bench: Bench, planned: Sequence[PlannedTrial], measure: Measure, show: Callable[[int, int], None]
 ) -> None:
-    """All that are not in the notebook yet. Raises BenchError where one cannot be measured."""
-    entries, place, attempts = bench.notebook.entries, 0, 0
-    while place < len(planned):
-        trial = planned[place]
+    """Measure all trials that are not in the notebook. Raises BenchError where one cannot be measured."""
+    entries, index, attempts = bench.notebook.entries, 0, 0
+    while index < len(planned):
+        trial = planned[index]
         show(sum(each.key in entries for each in planned), len(planned))
         answer = GO_ON if trial.key in entries else bench.bed.prepare(trial)
         if answer == REDO:
-            place = _forget_last(bench, planned[:place])
+            index = _forget_last(bench, planned[:index])
         elif answer == SKIP:
             _leave_out(bench, trial)
         elif trial.key in entries or _is_done(bench, trial, measure, attempts + 1):
-            place, attempts = place + 1, 0
+            index, attempts = index + 1, 0
         else:
             attempts += 1
     show(len(planned), len(planned))
 
 
 def _forget_last(bench: Bench, before: Sequence[PlannedTrial]) -> int:
-    """The place of the last one that was measured or left out, which is open again."""
-    for place in reversed(range(len(before))):
-        if before[place].key in bench.notebook.entries:
-            bench.notebook.forget(before[place].key)
-            return place
-    bench.operator.report("nothing was measured before this one")
+    """Open the last measured or skipped trial again; return its index."""
+    for index in reversed(range(len(before))):
+        if before[index].key in bench.notebook.entries:
+            bench.notebook.forget(before[index].key)
+            return index
+    bench.operator.report("no trial was measured before this one")
     return len(before)
 
 
 def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) -> bool:
-    """Measured, or left out. Raises BenchError after too many attempts."""
+    """Measure a trial, or leave it out. Raises BenchError after too many attempts."""
     try:
         entry = measure(trial)
     except (InvalidTrialError, BenchError) as problem:
@@ -142,13 +141,13 @@ def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) 
 
 
 def _is_done_with_invalid(bench: Bench, trial: PlannedTrial, problem: Exception, attempt: int) -> bool:
-    """Left out, or kept. Raises BenchError where nobody wants it again after too many attempts."""
+    """Leave an invalid trial out, or keep it. Raises BenchError where nobody wants it after too many attempts."""
     entry = problem.entry if isinstance(problem, InvalidTrialError) else None
     often = attempt >= MOST_ATTEMPTS
-    reported = f"{trial} went wrong{f' {attempt} times; the last time' if often else ''}: {str(problem).rstrip('.')}."
-    answer = _ask(bench, reported, (INVALID_OFTEN if often else INVALID) | ({} if entry is None else KEPT))
+    message = f"{trial} went wrong{f' {attempt} times; the last time' if often else ''}: {str(problem).rstrip('.')}."
+    answer = _ask(bench, message, (INVALID_OFTEN if often else INVALID) | ({} if entry is None else KEPT))
     if often and answer == GO_ON:
-        raise BenchError(reported) from problem
+        raise BenchError(message) from problem
     if answer == SKIP:
         _leave_out(bench, trial, [str(problem)])
     elif answer == KEEP and entry is not None:
@@ -157,7 +156,7 @@ def _is_done_with_invalid(bench: Bench, trial: PlannedTrial, problem: Exception,
 
 
 def _ask(bench: Bench, question: str, answers: Mapping[str, str]) -> str:
-    return bench.operator.ask(question, answers, partial(bench.robot.wait, LOOK_S))
+    return bench.operator.ask(question, answers, partial(bench.robot.wait, POLL_S))
 
 
 def _leave_out(bench: Bench, trial: PlannedTrial, why: Sequence[str] = ()) -> None:
@@ -207,7 +206,7 @@ def make_trials(
 
 
 def counted_entries(notebook: Notebook) -> dict[str, Entry]:
-    """The trials that count. Raises BenchError for an experiment that has nothing to report."""
+    """Return the trials that count. Raises BenchError where none does."""
     left_out = notebook.left_out
     measured = {key: entry for key, entry in notebook.entries.items() if key not in left_out}
     if not measured:

@@ -1,4 +1,4 @@
-"""Many trials at once, in as many processes as there are processors: a trial is a function without arguments."""
+"""Runs many trials in as many processes as there are processors. A trial is a function without arguments."""
 
 from __future__ import annotations
 
@@ -12,39 +12,39 @@ from typing import TypeVar
 
 from experiments.trials.session import Show
 
-LOOK_S = 0.5
-Outcome = TypeVar("Outcome")
+POLL_S = 0.5
+Result = TypeVar("Result")
 
 
 def run_parallel(
-    trials: Sequence[Callable[[], Outcome]],
+    trials: Sequence[Callable[[], Result]],
     show: Show,
     processes: int | None = None,
     meanwhile: Callable[[], None] = lambda: None,
-    keep: Callable[[int, Outcome], None] = lambda place, outcome: None,
-) -> list[Outcome]:
-    """What each trial returned, in their order. Trials cross a process border: `functools.partial` does, lambda not.
+    keep: Callable[[int, Result], None] = lambda index, result: None,
+) -> list[Result]:
+    """Return each trial's result, in their order. Trials cross a process border: `functools.partial` does, lambda not.
 
-    `meanwhile` is called twice a second, for progress within long trials; `keep` with each outcome as it comes, and its
-    trial's place among them.
+    `meanwhile` is called twice a second, for progress within long trials; `keep` with the index and the result of each
+    trial as it ends.
     """
-    outcomes: dict[int, Outcome] = {}
+    results: dict[int, Result] = {}
     with _workers(processes or os.cpu_count()) as pool:
-        places = {pool.submit(trial): place for place, trial in enumerate(trials)}
-        pending = set(places)
+        indices = {pool.submit(trial): index for index, trial in enumerate(trials)}
+        pending = set(indices)
         while pending:
-            finished, pending = wait(pending, LOOK_S, FIRST_COMPLETED)
+            finished, pending = wait(pending, POLL_S, FIRST_COMPLETED)
             for future in finished:
-                outcomes[places[future]] = future.result()
-                keep(places[future], future.result())
-                show(len(outcomes), len(trials))
+                results[indices[future]] = future.result()
+                keep(indices[future], future.result())
+                show(len(results), len(trials))
             meanwhile()
-    return [outcomes[place] for place in range(len(trials))]
+    return [results[index] for index in range(len(trials))]
 
 
 @contextmanager
 def _workers(count: int | None) -> Iterator[ProcessPoolExecutor]:
-    """They end with the work, also where that ends early: after Ctrl-C nobody waits for the trials under way."""
+    """Make processes that end with the work, also after Ctrl-C."""
     pool = ProcessPoolExecutor(count, initializer=_ignore_interrupts)
     try:
         yield pool
@@ -57,5 +57,5 @@ def _workers(count: int | None) -> Iterator[ProcessPoolExecutor]:
 
 
 def _ignore_interrupts() -> None:
-    """Ctrl-C reaches every process of a terminal; a worker would take it for the trial's result and begin the next."""
+    """Ctrl-C reaches every process of a terminal; a worker would end its trial and begin the next."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,7 +1,7 @@
-"""Mud under a simulated robot, prepared as a person would do it, and a virtual load cell in every stride.
+"""Mud under a simulated robot, prepared as an operator would do it, with a virtual load cell in every stride.
 
-A fresh place is another place along a track that is long enough: the robot, with torque off, is carried there and its
-flippers are laid on the mud. What earlier strokes left stays where it was.
+Fresh mud is another position along a track that is long enough: the robot, with torque off, is carried there and its
+flippers are laid on the mud. Earlier strokes leave their marks where they were.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from simulation.mud.track import Track
 
 
 class ReferenceLockstep(Lockstep):
-    """Owns what the flippers truly did since the last walk began."""
+    """A lockstep robot with the true motion of its flippers since the last walk began."""
 
     def __init__(self, configuration: Configuration, track: Track, seed: int, **rest: Any) -> None:
         super().__init__(configuration, track, seed, **rest)
@@ -59,7 +59,7 @@ def simulated_bench(
     disturbances: Disturbances,
     motion_capture: MotionCaptureParameters = AT_EVERY_TICK,
 ) -> tuple[LockstepRobot, ReferenceLockstep]:
-    """A robot with its log in `folder`, which may hold those of earlier ones."""
+    """Make a robot with its log in `folder`, next to those of earlier ones."""
     recorder = FileRecorder(_new_log(folder), configuration)
     drives = drives_with_errors(configuration, disturbances, seed)
     lockstep = ReferenceLockstep(
@@ -83,7 +83,7 @@ def _new_log(folder: Path) -> Path:
 def drives_with_errors(
     configuration: Configuration, disturbances: Disturbances, seed: int
 ) -> dict[str, SimulatedDriveParameters]:
-    """Motors whose constants are known as wrongly as the paper's were."""
+    """Return motors whose constants differ from the configured ones by the paper's repeatability."""
     random = Random(f"drives {seed}")
     drives = drives_of(configuration, **drive_changes(disturbances))
     fraction = TORQUE_ERROR if disturbances == LAB else 0.0
@@ -94,12 +94,12 @@ def drives_with_errors(
 
 
 class CarriedBed:
-    """A MudBed: the robot is carried to the place along the track that each trial has."""
+    """A MudBed: the robot is carried to each trial's position along the track."""
 
     def __init__(
         self, robot: LockstepRobot, lockstep: ReferenceLockstep, position_m: Callable[[PlannedTrial, int], float]
     ) -> None:
-        """`place_m` of a trial, and of how many were prepared before it."""
+        """`position_m` takes a trial and the number of earlier preparations."""
         self._robot = robot
         self._lockstep = lockstep
         self._position_m = position_m
@@ -119,7 +119,7 @@ class CarriedBed:
         return {stride.index: self._truth(stride) for stride in own}
 
     def _truth(self, stride: StrideTruth) -> dict[str, float | None]:
-        """By the plate as the flipper carried it."""
+        """Return the coefficients of the plate as the flipper carries it."""
         configuration, plant = self._robot.configuration, self._lockstep.robot.plant
         relaxation, pause_s = plant.parameters.disturbances.relaxation, configuration.gait.pause_s
         truth = true_coefficients(stride, configuration.geometry, relaxation, pause_s, upright=False)

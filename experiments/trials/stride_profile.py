@@ -1,7 +1,7 @@
-"""One stride of one flipper out of a log, row by row: angles, depths, loads and forces, as the daemon recorded them.
+"""One stride of one flipper from a log, row by row: angles, depths, loads and forces, as the daemon recorded them.
 
-Forces and loads are those that the daemon's estimator showed at the time, with the zero that it had taken by then.
-Rows in which nothing moves are thinned, so that the course of a stride with pauses of 3 s stays small beside its log.
+Forces and loads are the estimator's at that time, with the zero that it had then. Rows without motion are thinned, so
+that a stride with pauses of 3 s stays small.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
 
 STROKES = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION)
-KEPT_OF_STROKE, KEPT_OF_REST = 2, 20  # one row in so many
-DIGITS = 6  # behind the point: a microsecond, a micrometre, a micronewton
+STROKE_PERIOD, REST_PERIOD = 2, 20  # rows per row that stays
+DIGITS = 6  # after the point: a microsecond, a micrometre, a micronewton
 
 
 class StrideProfile(NamedTuple):
@@ -33,7 +33,7 @@ class StrideProfile(NamedTuple):
     adduction_rad: Floats
     depth_m: Floats  # measured, below the nominal surface
     depth_command_m: Floats
-    sweep_nm: Floats  # what the mud does to the joint
+    sweep_nm: Floats  # load of the mud on the joint
     adduction_nm: Floats
     force_x_n: Floats  # forward
     force_z_n: Floats  # up
@@ -44,7 +44,7 @@ class StrideProfile(NamedTuple):
 
 
 def profile_of(log: Log, flipper: str, start_s: float) -> StrideProfile:
-    """Of the stride that was under way at `start_s`; without rows where there was none."""
+    """Return the stride under way at `start_s`; no rows where there is none."""
     ticks, place = log.ticks, FLIPPERS.index(flipper)
     ticks = ticks[ticks["mode"] == Mode.WALKING]
     begun = np.flatnonzero(ticks["stamp_s"] >= start_s)
@@ -66,22 +66,22 @@ def profile_of(log: Log, flipper: str, start_s: float) -> StrideProfile:
 
 
 def slip_m(profile: StrideProfile, arm_m: float) -> float:
-    """How far back through the mud the plate came in its stance; 0 where no pose tells the body's place."""
+    """Return the plate's slip backwards through the mud in its stance; 0 without a body pose."""
     positions_m = (profile.body_m + arm_m * np.sin(profile.sweep_rad))[profile.during(Phase.STANCE)]
-    seen_m = positions_m[np.isfinite(positions_m)]
-    return float(seen_m[0] - seen_m.min()) if len(seen_m) else 0.0
+    known_m = positions_m[np.isfinite(positions_m)]
+    return float(known_m[0] - known_m.min()) if len(known_m) else 0.0
 
 
 def thinned(profile: StrideProfile) -> StrideProfile:
-    """With fewer rows, but the first of every phase."""
+    """Keep fewer rows, and the first of every phase."""
     phases, numbers = profile.phase, np.arange(len(profile.phase))
-    period = np.where(np.isin(phases, STROKES), KEPT_OF_STROKE, KEPT_OF_REST)
+    period = np.where(np.isin(phases, STROKES), STROKE_PERIOD, REST_PERIOD)
     kept = (numbers % period == 0) | np.diff(phases, prepend=-1).astype(bool)
     return StrideProfile(*(column[kept] for column in profile))
 
 
 def profile_row(profile: StrideProfile) -> dict[str, list[float | None]]:
-    """As JSON can hold it."""
+    """Convert to JSON lists."""
     return row_of_columns(profile._asdict())
 
 
@@ -94,7 +94,7 @@ def row_of_columns(columns: Mapping[str, NDArray[Any]]) -> dict[str, list[float 
 
 
 def columns_of_row(row: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
-    """Phases are whole numbers, all others are not."""
+    """Convert from JSON lists; phases are integers."""
     return {name: np.array(row[name], np.int64 if name == "phase" else np.float64) for name in names}
 
 

@@ -1,7 +1,7 @@
-"""One simulated trial as an estimator would have met it: every tick's samples, and the truth about every stride.
+"""A simulated trial as an estimator meets it: every tick's samples, and the true motion of every stride.
 
-The robot, its drives and its mud run in lockstep with the daemon's own loop, frames and all; the samples are those
-that the loop's estimator got. So any number of methods can be judged on the same trial.
+Robot, drives and mud run in lockstep with the daemon's own loop, frames included; the samples are those of the loop's
+estimator. So any number of methods can be evaluated on the same trial.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TORQUE_ERROR = 0.032  # of a motor's constant: the paper's repeatability
 
 
 class Sample(NamedTuple):
-    """What the estimator got in one tick."""
+    """The estimator's input in one tick."""
 
     now_s: float
     phase: Phase
@@ -42,7 +42,7 @@ class Sample(NamedTuple):
 
 @dataclass(frozen=True)
 class Setup:
-    """One way to meet mud."""
+    """A gait and a base for trials."""
 
     name: str
     gait: GaitParameters
@@ -65,7 +65,7 @@ class Trial:
 
 
 def configuration_of(setup: Setup) -> Configuration:
-    """That of the simulated robot, with this setup's gait and base."""
+    """Return the simulated robot's configuration with a setup's gait and base."""
     text = CONFIGURATION.format(left='"left"', right='"right"', logs='"logs"', status='"s"', pose='""')
     configuration = parse_configuration(text)
     estimation = EstimationParameters(fixed_base=setup.fixed_base)
@@ -81,7 +81,7 @@ def _with_bench_drives(configuration: Configuration) -> Configuration:
 def run_trial(
     setup: Setup, track: Track, disturbances: Disturbances, strides: int, seed: int, torque_error: float = 0.0
 ) -> Trial:
-    """`torque_error`: share by which each motor's constant is known wrongly, one standard deviation."""
+    """`torque_error` is the relative standard deviation of each motor's constant from the known one."""
     configuration = configuration_of(setup)
     lockstep = Lockstep(configuration, track, seed, disturbances=disturbances, fixed_base=setup.fixed_base)
     lockstep.arm()
@@ -116,7 +116,7 @@ def _sample_of(lockstep: Lockstep) -> Sample:
 
 
 def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool = True) -> list[StrideEstimate]:
-    """What an estimator says about the trial."""
+    """Return an estimator's strides of the trial."""
     estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters)
     strides: list[StrideEstimate] = []
     for sample in trial.samples:
@@ -126,7 +126,7 @@ def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool =
 
 
 def mud_estimates(trial: Trial, parameters: EstimationParameters) -> dict[int, MudEstimate]:
-    """What was believed after each stride, by its index."""
+    """Return the estimate after each stride, by the stride's index."""
     estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters)
     beliefs: dict[int, MudEstimate] = {}
     for sample in trial.samples:

@@ -32,7 +32,7 @@ def test_every_entry_is_on_the_disk_at_once(tmp_path: Path) -> None:
 
 def test_another_plan_is_refused_with_what_differs(tmp_path: Path) -> None:
     Notebook(tmp_path, PLAN).write("10 g", {})
-    with pytest.raises(NotebookError, match=r"joint = right_sweep, and joint = left_sweep was asked for: go on with"):
+    with pytest.raises(NotebookError, match=r"joint = right_sweep, and the options ask for joint = left_sweep: use"):
         Notebook(tmp_path, PLAN | {"joint": "left_sweep"})
 
 
@@ -52,7 +52,7 @@ def test_a_line_that_was_cut_off_costs_itself_alone(tmp_path: Path, cut: int) ->
 @pytest.mark.parametrize("contents", ["hello\n", "\nhello\n", "[1]\n", '{"key": "10 g", "entry": {}}\n'])
 def test_a_file_that_is_no_notebook_is_left_alone(tmp_path: Path, contents: str) -> None:
     (tmp_path / NAME).write_text(contents, encoding="utf-8")
-    with pytest.raises(NotebookError, match="no notebook of an experiment; choose another folder"):
+    with pytest.raises(NotebookError, match="no notebook of an experiment: choose another folder"):
         Notebook(tmp_path, PLAN)
     assert (tmp_path / NAME).read_text(encoding="utf-8") == contents
 
