@@ -162,8 +162,8 @@ class DriveType(Protocol):
         endpoints: Sequence[WatchdogEndpoints],
     ) -> Drives: ...
 
-    def read_frame(self, frame: Frame) -> FrameContent:
-        """Tells what a data frame with a standard id is, without looking at its payload."""
+    def read_frame(self, frame: Frame) -> FrameContent | None:
+        """Returns the content of a frame by its id; None for frames of another kind than the protocol uses."""
 
     def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
         """The payload of a frame that carries `error` with these error flags added, from a drive that is `idle`.

@@ -22,6 +22,7 @@ from drivers.drive_types import type_of
 from drivers.fault_injection.delay_line import DelayLine
 from drivers.fault_injection.failures import NO_NUMBERS, Failure, FailureKind, Failures
 
+NO_NODE = -1
 FAR_TURNS = 2.0  # random values that look plausible
 MOST_RANDOM_FRAMES = 3  # in one read of a bus full of garbage
 SILENT = (FailureKind.OFF, FailureKind.BUS_OFF)
@@ -106,8 +107,8 @@ class FailingPort:
     def _senders_of(self, frame: Frame) -> tuple[str, ...]:
         """Returns the components whose failures change a frame from the bus, in this order."""
         content = self._drive_type.read_frame(frame)
-        joint = None if frame.is_extended else self._joints.get(content.node_id)
-        if joint is None:
+        joint = self._joints.get(content.node_id) if content else None
+        if content is None or joint is None:
             return (self._bus,)
         return (self._bus, joint, *(f"{joint}.{signal}" for signal in content.signals))
 
@@ -168,7 +169,8 @@ class FailingPort:
         return self._drive_type.with_error(frame, flags, idle=kind is not FailureKind.GARBAGE)
 
     def _node_id(self, frame: Frame) -> int:
-        return self._drive_type.read_frame(frame).node_id
+        content = self._drive_type.read_frame(frame)
+        return content.node_id if content else NO_NODE
 
     def send(self, frame: Frame) -> None:
         if self._untouched:

@@ -63,7 +63,9 @@ class Odrive:
     ) -> OdriveDrives:
         return OdriveDrives(cast(Mapping[str, OdriveParameters], parameters), ports, limits, endpoints)
 
-    def read_frame(self, frame: Frame) -> FrameContent:
+    def read_frame(self, frame: Frame) -> FrameContent | None:
+        if frame.is_extended or frame.is_error or frame.is_fd:
+            return None
         node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & codec.LAST_COMMAND
         return FrameContent(node_id, command in COMMANDS, SIGNALS.get(command, ()))
 

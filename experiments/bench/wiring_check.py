@@ -53,11 +53,7 @@ def _messages_of(stand: Stand, bus: str, node_id: int) -> int:
     return sum(_is_ours(stand, frame, {node_id}) for frame in stand.rig.overheard.frames[bus])
 
 
-def _is_plain(frame: Frame) -> bool:
-    return not (frame.is_extended or frame.is_error or frame.is_remote)
-
-
-def _content(stand: Stand, frame: Frame) -> FrameContent:
+def _content(stand: Stand, frame: Frame) -> FrameContent | None:
     return type_of(stand.configuration.drive.values()).read_frame(frame)
 
 
@@ -80,17 +76,18 @@ def strangers(stand: Stand) -> Readings:
 
 def _is_ours(stand: Stand, frame: Frame, node_ids: set[int]) -> bool:
     """Whether one of these drives sent it."""
-    content = _content(stand, frame)
-    return _is_plain(frame) and content.node_id in node_ids and not content.is_command
+    content = None if frame.is_remote else _content(stand, frame)
+    return content is not None and content.node_id in node_ids and not content.is_command
 
 
 def _name_of(stand: Stand, frame: Frame) -> str:
     if frame.is_error:
         return "error frames (check wiring, termination and bit rate)"
-    if frame.is_extended:
-        return f"extended id 0x{frame.arbitration_id:x}"
-    node_id, is_command, _ = _content(stand, frame)
-    return f"commands to node {node_id} from another program" if is_command else f"node {node_id}"
+    content = _content(stand, frame)
+    if content is None:
+        return f"{'extended ' if frame.is_extended else ''}id 0x{frame.arbitration_id:x}"
+    by_a_program = f"commands to node {content.node_id} from another program"
+    return by_a_program if content.is_command else f"node {content.node_id}"
 
 
 def message_rates(stand: Stand) -> Readings:
@@ -108,8 +105,10 @@ def message_rates(stand: Stand) -> Readings:
 def _rate_hz(stand: Stand, drive: DriveParameters, signal: str) -> float:
     """The rate of the messages whose main signal this is."""
     overheard = stand.rig.overheard
-    contents = [_content(stand, frame) for frame in overheard.frames[drive.bus] if _is_plain(frame)]
-    count = sum(content.node_id == drive.node_id and content.signals[:1] == (signal,) for content in contents)
+    contents = [_content(stand, frame) for frame in overheard.frames[drive.bus] if not frame.is_remote]
+    count = sum(
+        each is not None and (each.node_id, each.signals[:1]) == (drive.node_id, (signal,)) for each in contents
+    )
     return count / overheard.duration_s
 
 
