@@ -1,4 +1,4 @@
-"""Whether a refactoring changed what the robot does: record everything before it and after it, then compare.
+"""Checks that a refactoring keeps the robot's behaviour: record everything before it and after it, then compare.
 
 `record DIR` writes the replay of every measured log by each method, Table I by trial, the fault matrix, the other
 simulated experiments, the rows that a lockstep walk logs, and the socket's answers during that walk. All of it is
@@ -46,8 +46,8 @@ SIMULATED: dict[str, tuple[str, ...]] = {
     "actuator": ("--trials", "2", "--seed", "1"),
 }
 
-# What is asked of the robot, and for how long it then runs: requests that are accepted and requests that are refused.
-LOOK = ("hello", "status", "check", "map", "strides")
+# Requests to the robot, accepted and refused ones, and for how long it then runs.
+QUERIES = ("hello", "status", "check", "map", "strides")
 REFUSED: tuple[tuple[str, dict[str, Any]], ...] = (
     ("walk", {"strides": 3}),
     ("move", {"left_sweep_rad": 0.1}),
@@ -75,7 +75,7 @@ SCHEDULE: tuple[tuple[tuple[tuple[str, dict[str, Any]], ...], float], ...] = (
 
 
 class RowList(NullRecorder):
-    """A recorder that keeps the rows."""
+    """A recorder that stores the rows."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -87,15 +87,15 @@ class RowList(NullRecorder):
 
 
 def record_lockstep(folder: Path) -> None:
-    """Operate one robot by SCHEDULE; keep its rows and every answer."""
+    """Operates one robot by SCHEDULE and writes its rows and every answer."""
     rows = RowList()
     robot = Lockstep(load_example(), paper_track(), seed=3, recorder=rows)
     methods = OperatorCalls(robot.loop, rows, [], lambda: robot.now_s).methods
     caller = Caller(0, Peer(0, 0, frozenset()), Level.DRIVE)
     answers = []
     for requests, run_s in SCHEDULE:
-        asked = (*requests, *((name, {}) for name in LOOK))
-        for name, params in asked:
+        calls = (*requests, *((name, {}) for name in QUERIES))
+        for name, params in calls:
             try:
                 answer = methods[name](dict(params), caller)
             except RefusedError as refusal:
@@ -108,7 +108,7 @@ def record_lockstep(folder: Path) -> None:
 
 
 def commands_of(data: Path, results: Path) -> Iterator[tuple[str, list[str]]]:
-    """The name and the arguments of every command whose output is recorded."""
+    """Yields the name and the arguments of every recorded command."""
     for path in sorted(data.glob("flipper_in_mud/*.csv.gz")):
         for method in ("default", "paper"):
             yield f"replay_{path.name.split('.csv')[0]}_{method}", ["replay", str(path), "--json", "--method", method]
@@ -145,7 +145,7 @@ def _write(path: Path, content: Any) -> None:
 
 
 def differences(old: Any, new: Any, ignored: frozenset[str], path: str = "") -> Iterator[str]:
-    """Every value that is missing, added or changed, by its path."""
+    """Yields every value that is missing, added or changed, by its path."""
     if isinstance(old, dict) and isinstance(new, dict):
         for name in sorted((old.keys() | new.keys()) - ignored):
             where = f"{path}.{name}"
@@ -160,7 +160,7 @@ def differences(old: Any, new: Any, ignored: frozenset[str], path: str = "") -> 
             yield f"{path}: {len(new)} entries, before {len(old)}"
         for number, (before, after) in enumerate(zip(old, new, strict=False)):
             yield from differences(before, after, ignored, f"{path}[{number}]")
-    elif repr(old) != repr(new):  # also tells 1 from 1.0, and NaN equals NaN
+    elif repr(old) != repr(new):  # 1 differs from 1.0, and NaN equals NaN
         yield f"{path}: {new!r}, before {old!r}"
 
 
@@ -171,7 +171,7 @@ def renamed(content: Any, names: dict[str, str]) -> Any:
 
 
 def compare(old: Path, new: Path, names: dict[str, str], ignored: frozenset[str]) -> int:
-    """0 where nothing differs."""
+    """Prints the differences of each file; returns 0 where nothing differs."""
     failed = 0
     for path in sorted(old.glob("*.json")):
         if not (new / path.name).exists():

@@ -1,8 +1,8 @@
-"""Debian 12 as a robot has it before the project comes: kernel, systemd, Python, and what the project depends on.
+"""The base system of a robot before the installation: Debian 12 with kernel, systemd, Python, and the dependencies.
 
-mmdebstrap makes it from Debian's own packages, as root or with user namespaces, and it is kept as a tar archive until
-the list of packages or the project's dependencies change. The guest has no network, so the dependencies are fetched
-here, for the guest's Python, and installed from a folder.
+mmdebstrap makes it from Debian's own packages, as root or with user namespaces. A tar archive stores it until the list
+of packages or the project's dependencies change. The guest has no network, so the dependencies are downloaded on the
+host, for the guest's Python, and installed from a folder.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parent.parent
 STORE = PROJECT / ".virtual_machine"
-NEEDED_HERE = {  # Debian package: the program that it brings
+HOST_PACKAGES = {  # Debian package: the program that it brings
     "qemu-system-x86": "qemu-system-x86_64",
     "mmdebstrap": "mmdebstrap",
     "debian-archive-keyring": "",
@@ -41,7 +41,7 @@ PACKAGES = (
     ),
     *("iproute2", "procps", "adduser", "python3", "python3-venv", "can-utils"),
 )
-LEFT_OUT = ("/usr/share/doc/*", "/usr/share/man/*", "/usr/share/locale/*") + tuple(
+EXCLUDED_PATHS = ("/usr/share/doc/*", "/usr/share/man/*", "/usr/share/locale/*") + tuple(
     f"/lib/modules/*/kernel/{folder}/*"  # two thirds of the kernel's package, for hardware that is not emulated
     for folder in (
         *("sound", "drivers/gpu", "drivers/media", "drivers/staging", "drivers/infiniband", "drivers/scsi"),
@@ -64,9 +64,9 @@ class BuildError(Exception):
     """The image cannot be built; the text says why and what to do."""
 
 
-def install_what_is_missing() -> None:
-    """The only thing that is ever installed outside of the project's folder, and only after it was named."""
-    missing = [package for package in NEEDED_HERE if not _installed(package)]
+def install_missing_packages() -> None:
+    """Installs missing host packages, the only installation outside of the project's folder, and prints their names."""
+    missing = [package for package in HOST_PACKAGES if not _installed(package)]
     if not missing:
         return
     command = ["apt-get", "install", "--yes", "--no-install-recommends", *missing]
@@ -79,16 +79,16 @@ def install_what_is_missing() -> None:
 
 
 def _installed(package: str) -> bool:
-    program = NEEDED_HERE[package]
+    program = HOST_PACKAGES[package]
     return shutil.which(program) is not None if program else Path("/usr/share/keyrings/" + package + ".gpg").exists()
 
 
 def run(command: Sequence[str | Path]) -> None:
-    """Its words are shown only where it fails."""
+    """Runs a command and shows its output only where it fails."""
     done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     if done.returncode != 0:
-        words = done.stdout.decode(errors="replace")
-        raise BuildError(f"{words}\n{command[0]} failed with status {done.returncode}: the last lines above say why.")
+        output = done.stdout.decode(errors="replace")
+        raise BuildError(f"{output}\n{command[0]} failed with status {done.returncode}: the last lines above say why.")
 
 
 def _requirements() -> list[str]:
@@ -104,7 +104,7 @@ def fingerprint(*texts: bytes) -> str:
 
 
 def base_system() -> Path:
-    """The archive, built where there is none of these packages and dependencies."""
+    """Returns the archive with these packages and dependencies, and builds it where it does not exist."""
     key = fingerprint(" ".join([*_debian_command(), *INITRAMFS.values(), *PLATFORMS]).encode())
     archive = STORE / f"base-{key}.tar"
     if not archive.exists():
@@ -135,7 +135,7 @@ def _write_initramfs_settings() -> None:
 
 def _debian_command() -> list[str]:
     command = ["mmdebstrap", "--variant=minbase", "--format=tar", f"--include={','.join(PACKAGES)}"]
-    command += [f"--dpkgopt=path-exclude={pattern}" for pattern in LEFT_OUT]
+    command += [f"--dpkgopt=path-exclude={pattern}" for pattern in EXCLUDED_PATHS]
     command += [f"--essential-hook=copy-in {STORE / 'settings' / 'etc'} /"]  # before the kernel makes its initramfs
     command += [f"--customize-hook=copy-in {STORE / 'wheels'} /opt"]
     command += [f"--customize-hook={IN_THE_GUEST} python3 -m venv /opt/mudskipper/venv"]

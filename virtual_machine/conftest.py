@@ -23,7 +23,7 @@ def machine() -> Iterator[Machine]:
 
 @pytest.fixture(scope="session")
 def booted(machine: Machine) -> Robot:
-    """As it is after the boot, without anybody's help."""
+    """The robot after the boot, without an operator's help."""
     robot = Robot(machine)
     robot.wait_until_ready()
     return robot
@@ -31,15 +31,15 @@ def booted(machine: Machine) -> Robot:
 
 @pytest.fixture
 def robot(booted: Robot) -> Robot:
-    """At rest, without faults."""
+    """The robot at rest, without faults."""
     booted.rest()
     return booted
 
 
 @pytest.fixture
 def walking(booted: Robot) -> Robot:
-    """In a walk, where need be that of the check before: every second of the guest costs several of ours."""
-    if not booted.walks_well():
+    """The robot in a walk, possibly that of the previous check: a second of the guest costs several of the host."""
+    if not booted.walks_without_faults():
         booted.rest()
         booted.walk()
     return booted

@@ -1,7 +1,7 @@
 """The disk of a robot: the base system, with the project installed by the commands of docs/how-to/install.md.
 
-They run in the disk's folder while no systemd runs there: `systemctl enable` works so, and what only asks a running
-system to look again (udevadm, networkctl) is answered by `true`, since the first boot looks anyway.
+They run in the disk's folder while no systemd runs there. `systemctl enable` works in that state. `true` replaces the
+commands that ask a running system to reload (udevadm, networkctl), because the first boot loads everything.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from virtual_machine.base_system import (
     BuildError,
     base_system,
     fingerprint,
-    install_what_is_missing,
+    install_missing_packages,
     run,
 )
 
@@ -29,7 +29,7 @@ GUEST_FILES = Path(__file__).parent / "guest"
 GUIDE = "docs/how-to/install.md"
 HEADINGS = ("## On the robot", "## Without CAN hardware")  # of the guide, whose commands are run
 DONE_ALREADY = ("apt install", "git clone")  # by base_system.py, and by a copy of this working tree
-WANTS_A_RUNNING_ROBOT = ("systemctl status", "mudskipper ")
+NEEDS_A_RUNNING_ROBOT = ("systemctl status", "mudskipper ")
 DISK_MIB = 1500
 
 
@@ -40,8 +40,8 @@ class Disk(NamedTuple):
 
 
 def installed_robot() -> Disk:
-    """A disk that has never been booted; copy it before it is."""
-    install_what_is_missing()
+    """Returns a disk that was never booted; copy it before booting."""
+    install_missing_packages()
     archive = base_system()
     disk = Disk(STORE / "robot.ext4", STORE / "kernel", STORE / "initramfs")
     key, mark = _key(archive), STORE / "robot.key"
@@ -58,7 +58,7 @@ def _key(archive: Path) -> str:
 
 
 def _project_files() -> list[Path]:
-    """What git knows or would add: the working tree as it is, and nothing that was built in it."""
+    """Returns the files that git tracks or would add: the working tree without build products."""
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     names = subprocess.run(command, cwd=PROJECT, check=True, capture_output=True, text=True).stdout
     paths = (PROJECT / name for name in sorted(names.split("\0")) if name)
@@ -85,9 +85,9 @@ def _owned_by_root(member: tarfile.TarInfo) -> tarfile.TarInfo:
 
 
 def installation() -> str:
-    """The script that runs in the disk's folder."""
+    """Returns the script that runs in the disk's folder."""
     lines = [line for heading in HEADINGS for line in _guide_commands(heading)]
-    wanted = [line for line in lines if not line.startswith((*DONE_ALREADY, *WANTS_A_RUNNING_ROBOT))]
+    wanted = [line for line in lines if not line.startswith((*DONE_ALREADY, *NEEDS_A_RUNNING_ROBOT))]
     before = (GUEST_FILES / "before_installation.sh").read_text(encoding="utf-8")
     after = (GUEST_FILES / "after_installation.sh").read_text(encoding="utf-8")
     # `&&` inside a line must not hide a failure: sh -e does not stop for the first part of one.
@@ -96,10 +96,10 @@ def installation() -> str:
 
 
 def _guide_commands(heading: str) -> Iterator[str]:
-    """The lines of the first shell block below a heading."""
+    """Yields the lines of the first shell block below a heading."""
     _, found, below = (PROJECT / GUIDE).read_text(encoding="utf-8").partition(f"\n{heading}\n")
-    _, begun, rest = below.partition("```sh\n")
-    if not found or not begun:
+    _, opening, rest = below.partition("```sh\n")
+    if not found or not opening:
         raise BuildError(f"{GUIDE} has no commands below {heading!r}: the image is installed by them.")
     yield from (line for line in rest.partition("```")[0].splitlines() if line.strip())
 
@@ -115,7 +115,7 @@ def _install(archive: Path, work: Path) -> None:
 
 
 def _write_image(work: Path, disk: Disk) -> None:
-    """mke2fs fills the file system from a folder; fakeroot remembers its owners where nobody is root."""
+    """mke2fs fills the file system from a folder; fakeroot keeps its owners without root."""
     folder = work / "root"
     script = (
         f"mkdir {folder} && tar --extract --file={work / 'robot.tar'} --directory={folder}"

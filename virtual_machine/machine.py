@@ -1,11 +1,11 @@
 """A virtual machine that boots a copy of a robot's disk: commands go in over a virtio port, their answers come out.
 
-QEMU emulates one processor. Where KVM works the guest runs in real time. Elsewhere its clock counts executed
-instructions (`-icount`): it stands still while the emulator works and leaps ahead while the guest waits (`sleep=off`),
-so the guest is as punctual as a robot's computer, whatever the machine around it does. One instruction a nanosecond is
-QEMU's fastest, and too slow for the loop and a simulated robot on one processor. So the kernel is told that the time
-stamp counter runs at 3 GHz where it runs at 1: the guest's second then has three times the instructions. Sentences
-about time are therefore asked inside; time-outs out here are only there to end.
+QEMU emulates one processor. With KVM the guest runs in real time. Without it the guest's clock counts executed
+instructions (`-icount`): it stops while the emulator works and jumps ahead while the guest waits (`sleep=off`), so the
+guest is as punctual as a robot's computer on a busy machine too. One instruction per nanosecond is QEMU's fastest
+rate, and too slow for the loop and a simulated robot on one processor. The kernel is therefore given 3 GHz as the rate
+of a time stamp counter that runs at 1 GHz, and a second of the guest has three times the instructions. Checks of
+durations run inside the guest; time-outs on the host only end a hanging run.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ STRETCHED_CLOCK = "tsc_early_khz=3000000 tsc=reliable"
 
 
 class MachineError(Exception):
-    """The machine does not do what every machine does; the text ends with its last words."""
+    """The machine does not boot or answer; the text ends with its last output."""
 
 
 class Answer(NamedTuple):
@@ -57,7 +57,7 @@ class Machine:
         self._received = b""
 
     def boot(self) -> None:
-        """Until the guest takes commands."""
+        """Boots, and returns when the guest takes commands."""
         port = self._folder / "commands"
         port.unlink(missing_ok=True)
         with (self._folder / "console").open("ab") as console:
@@ -80,7 +80,7 @@ class Machine:
         return [*command, *(COUNTED_CLOCK if emulated else ())]
 
     def run(self, command: str, user: str = "", longest_s: float = 30.0) -> Answer:
-        """As root, or as `user` from a new login; `longest_s` of the guest's own time."""
+        """Runs a command as root, or as `user` in a new login, for at most `longest_s` of the guest's time."""
         if user:
             command = f"runuser --login {user} --command {shlex.quote(command)}"
         assert self._connection is not None
@@ -89,7 +89,7 @@ class Machine:
         return Answer(int(answer["status"]), str(answer["output"]), str(answer["errors"]))
 
     def read(self, path: str) -> bytes:
-        """A file of the guest."""
+        """Reads a file of the guest."""
         answer = self.run(f"base64 {shlex.quote(path)}", longest_s=60.0)
         if answer.status != 0:
             raise MachineError(answer.errors)
@@ -130,14 +130,14 @@ class Machine:
 
 
 def _bare_machine(accelerator: str, kernel: Path) -> list[str]:
-    command = ["setpriv", "--pdeathsig", "KILL"]  # nobody leaves a machine behind
+    command = ["setpriv", "--pdeathsig", "KILL"]  # no machine outlives its tests
     command += ["qemu-system-x86_64", "-machine", "q35", "-accel", accelerator, "-cpu", "max", "-smp", "1"]
     command += ["-m", str(MEMORY_MIB), "-nodefaults", "-display", "none", "-no-reboot", "-kernel", str(kernel)]
     return command
 
 
 def _kvm_works(kernel: Path) -> bool:
-    """A device file promises nothing: a kernel without a disk must panic, and so end, in a blink."""
+    """Boots a kernel without a disk, which must panic and end at once: a device file alone proves nothing."""
     if not os.access("/dev/kvm", os.R_OK | os.W_OK):
         return False
     probe = [*_bare_machine("kvm", kernel), "-append", "panic=-1 quiet"]

@@ -1,4 +1,4 @@
-"""The robot inside the virtual machine, as a person with a shell on it sees it."""
+"""The robot inside the virtual machine, for an operator with a shell on it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from virtual_machine.machine import Answer, Machine
 
-OPERATOR, STRANGER = "alice", "mallory"  # only the first is in the group
+OPERATOR, UNAUTHORISED = "alice", "mallory"  # only the first is in the group
 LOGS = "/var/lib/mudskipper/logs"
 CONFIGURATION = "/etc/mudskipper/mudskipper.toml"
 REST = """\
@@ -32,18 +32,18 @@ class Robot:
         self.machine = machine
 
     def shell(self, command: str, longest_s: float = 60.0) -> str:
-        """What root sees. Fails where the command does."""
+        """Runs a command as root and returns its output. Fails where the command fails."""
         answer = self.machine.run(command, longest_s=longest_s)
         assert answer.status == 0, f"{command}\n{answer.output}{answer.errors}{self.journal()}"
         return answer.output
 
-    def operate(self, *words: str, user: str = OPERATOR) -> Answer:
-        """`mudskipper WORDS`, whatever comes of it."""
-        return self.machine.run(" ".join(("mudskipper", *words)), user=user)
+    def operate(self, *arguments: str, user: str = OPERATOR) -> Answer:
+        """Runs `mudskipper ARGUMENTS`, whether it succeeds or not."""
+        return self.machine.run(" ".join(("mudskipper", *arguments)), user=user)
 
-    def succeed(self, *words: str) -> str:
-        answer = self.operate(*words)
-        assert answer.status == 0, f"{words}: {answer}\n{self.journal()}"
+    def succeed(self, *arguments: str) -> str:
+        answer = self.operate(*arguments)
+        assert answer.status == 0, f"{arguments}: {answer}\n{self.journal()}"
         return answer.output
 
     def status(self) -> dict[str, Any]:
@@ -51,33 +51,33 @@ class Robot:
         return report
 
     def checks(self) -> dict[str, dict[str, Any]]:
-        """Lines of `mudskipper check` by their identity."""
+        """Returns the lines of `mudskipper check` by their identity."""
         return {item["id"]: item for item in json.loads(self.operate("check", "--json").output)}
 
     def unit(self, name: str) -> str:
-        """A property of the service, as systemd has it."""
+        """Returns a property of the service from systemd."""
         return self.shell(f"systemctl show --value --property={name} mudskipper").strip()
 
     def journal(self) -> str:
         return self.machine.run("journalctl --boot --unit=mudskipper --no-pager --output=cat --lines=40").output
 
     def wait_for(self, condition: str, longest_s: float = 20.0) -> None:
-        """Until a shell command succeeds."""
+        """Waits until a shell command succeeds."""
         self.shell(f"until {condition}; do sleep 0.5; done", longest_s)
 
     def wait_until_answers(self) -> None:
         self.wait_for("mudskipper status --json | grep -q closed_loop")
 
     def wait_until_ready(self) -> None:
-        """To be armed."""
+        """Waits until the robot can be armed."""
         self.wait_for("mudskipper check >/dev/null")
 
     def walk(self) -> None:
-        """From idle; returns in the first stride."""
+        """Walks from idle; returns in the first stride."""
         assert self.succeed("arm") == "hold\n"
         self.succeed("walk", "--depth", "3")
 
-    def walks_well(self) -> bool:
+    def walks_without_faults(self) -> bool:
         answer = self.operate("status", "--json")
         if answer.status != 0:
             return False
@@ -85,7 +85,7 @@ class Robot:
         return report["mode"] == "walking" and not report["faults"]
 
     def rest(self) -> None:
-        """From whatever a check has left behind: idle, without faults, as after a start."""
+        """Returns the robot to idle without faults, as after a start."""
         self.shell(REST)
         self.wait_until_ready()
 

@@ -1,4 +1,4 @@
-"""What the daemon sends and understands on the kernel's own CAN buses, looked at with can-utils."""
+"""The daemon's frames on the kernel's own CAN buses, observed with can-utils."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from virtual_machine.robot import Robot
 LISTENING_S = 2
 DRIVE_HZ = {GET_ENCODER_ESTIMATES.command: 500.0, GET_IQ.command: 500.0, HEARTBEAT.command: 10.0}  # by the guide
 NODES = {"vcan0": (0, 1), "vcan1": (2, 3)}
-GARBAGE = (
-    *("123#", "7FF#1122334455667788", "00000123#DEADBEEF", "1FFFFFFF#FF"),  # nobody's
+MALFORMED = (
+    *("123#", "7FF#1122334455667788", "00000123#DEADBEEF", "1FFFFFFF#FF"),  # of no drive
     *("009#", "009#0011", "001#00", "029#000000000000"),  # too short for what a drive would send
-    *("009#FFFFFFFFFFFFFFFF", "034#0000C07F0000C07F"),  # no numbers
+    *("009#FFFFFFFFFFFFFFFF", "034#0000C07F0000C07F"),  # not finite numbers
     *("009#R", "7E0#R8"),  # requests to a drive
 )
 WARNING, PASSIVE, OFF, RESTARTED = "20000004#0004", "20000004#0010", "20000040#", "20000100#"  # linux/can/error.h
 
 
 def rates_hz(robot: Robot) -> dict[str, dict[int, float]]:
-    """By bus and identifier, from the stamps of candump."""
+    """Returns the rate by bus and identifier, from the stamps of candump."""
     text = robot.shell(f"timeout {LISTENING_S} candump -L vcan0 vcan1; true")
     frames = [line.split() for line in text.splitlines()]
     stamps_s = [float(stamp.strip("()")) for stamp, _, _ in frames]
@@ -45,17 +45,17 @@ def test_the_expected_messages_are_on_the_buses_at_their_rates(walking: Robot) -
         assert {name >> 5 for name in seen_hz} == set(NODES[bus])
 
 
-def test_a_walk_goes_on_through_garbage(walking: Robot) -> None:
+def test_a_walk_continues_through_malformed_frames(walking: Robot) -> None:
     before = walking.status()["bus"]
-    inject(walking, *GARBAGE * 5)
+    inject(walking, *MALFORMED * 5)
     report = walking.status()
     assert report["mode"] == "walking"
-    assert report["bus"]["unknown_frames"] == before["unknown_frames"]  # the kernel keeps strangers away
+    assert report["bus"]["unknown_frames"] == before["unknown_frames"]  # the kernel filters unknown ids
     assert report["bus"]["malformed_frames"] > before["malformed_frames"]
     assert walking.unit("NRestarts") == "0"
 
 
-def test_a_bus_that_warns_is_told_and_stops_nothing(walking: Robot) -> None:
+def test_a_bus_warning_is_reported_and_stops_nothing(walking: Robot) -> None:
     inject(walking, WARNING)
     report = walking.status()
     assert report["mode"] == "walking"
@@ -72,7 +72,7 @@ def test_a_passive_bus_blocks_arming(robot: Robot) -> None:
     assert robot.succeed("arm") == "hold\n"
 
 
-def test_a_controller_that_left_the_bus_takes_the_torque_away_until_a_person_clears_it(walking: Robot) -> None:
+def test_a_controller_that_left_the_bus_takes_the_torque_away_until_an_operator_clears_it(walking: Robot) -> None:
     inject(walking, OFF)
     walking.wait_for('mudskipper status --json | grep -q \'"mode": "fault"\'')
     assert walking.status()["fault"]["name"] == "bus_off"

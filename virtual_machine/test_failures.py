@@ -1,4 +1,4 @@
-"""The daemon is killed, stopped or badly configured: what systemd does about it, and that nothing arms by itself."""
+"""The daemon is killed, stopped or misconfigured: systemd's reaction, and no robot that arms by itself."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_a_daemon_that_hangs_is_ended_by_the_watchdog_and_started_again_disarmed
 
 
 def test_the_robot_s_own_watchdogs_take_the_torque_away_while_the_daemon_hangs(walking: Robot) -> None:
-    """Heartbeats tell the drives' state: 8 is closed loop, 1 is idle."""
+    """Heartbeats report the drives' state: 8 is closed loop, 1 is idle."""
     walking.shell(f"kill -STOP {walking.unit('MainPID')}; sleep 1")
     heartbeats = walking.shell("timeout 0.5 candump -L vcan0,001:7FF; true").splitlines()
     assert heartbeats

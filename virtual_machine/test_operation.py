@@ -1,11 +1,11 @@
-"""What people may ask of the robot through its socket, by who they are."""
+"""The requests that users may make through the robot's socket."""
 
 from __future__ import annotations
 
 import pytest
 
 from command_line import exit_codes
-from virtual_machine.robot import STRANGER, Robot
+from virtual_machine.robot import UNAUTHORISED, Robot
 
 
 def test_an_operator_arms_walks_stops_and_disarms(robot: Robot) -> None:
@@ -20,19 +20,19 @@ def test_an_operator_arms_walks_stops_and_disarms(robot: Robot) -> None:
     assert robot.torque_is_off()
 
 
-@pytest.mark.parametrize("words", ["arm", "walk", "status", "clear"])
-def test_a_stranger_is_refused(booted: Robot, words: str) -> None:
-    answer = booted.operate(words, user=STRANGER)
+@pytest.mark.parametrize("command", ["arm", "walk", "status", "clear"])
+def test_an_unauthorised_user_is_refused(booted: Robot, command: str) -> None:
+    answer = booted.operate(command, user=UNAUTHORISED)
     assert answer.status == exit_codes.NOT_PERMITTED
     assert "group mudskipper" in answer.errors
 
 
-def test_a_stranger_may_stop_a_walk(walking: Robot) -> None:
-    walking.operate("stop", user=STRANGER)
+def test_an_unauthorised_user_may_stop_a_walk(walking: Robot) -> None:
+    walking.operate("stop", user=UNAUTHORISED)
     walking.wait_for('mudskipper status --json | grep -q \'"mode": "hold"\'')
 
 
-def test_a_stranger_reads_neither_log_nor_state(booted: Robot) -> None:
-    answer = booted.machine.run("ls /var/lib/mudskipper/logs", user=STRANGER)
+def test_an_unauthorised_user_reads_neither_log_nor_state(booted: Robot) -> None:
+    answer = booted.machine.run("ls /var/lib/mudskipper/logs", user=UNAUTHORISED)
     assert answer.status != 0
     assert "Permission denied" in answer.errors

@@ -1,4 +1,4 @@
-"""What systemd makes of the installed service: ready, real-time, without rights, and readable in the journal."""
+"""The installed service under systemd: ready, real-time, without privileges, and readable in the journal."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_the_daemon_s_memory_is_locked(booted: Robot) -> None:
     assert int(process_status(booted)["VmLck"].split()[0]) > LOWEST_LOCKED_KIB
 
 
-def test_the_daemon_has_no_right_that_it_could_misuse(booted: Robot) -> None:
+def test_the_daemon_has_no_privileges(booted: Robot) -> None:
     status = process_status(booted)
     assert "0" not in status["Uid"].split()
     assert {int(status[name], 16) for name in ("CapEff", "CapPrm", "CapBnd", "CapAmb")} == {0}

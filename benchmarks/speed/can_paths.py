@@ -1,6 +1,6 @@
 """What SocketCAN costs in a tick by python-can's own send and recv, and by the socket's own frames.
 
-Both drive python-can's SocketcanBus, whose socket is one end of a datagram pair, so no CAN is needed; a frame's way
+Both drive python-can's SocketcanBus, whose socket is one end of a datagram pair, so no CAN is needed; a frame's path
 through the kernel's CAN code and the driver is in neither figure. A tick of one bus is one read of what two drives
 send and two torques; ticks of the two paths alternate. Opening is python-can's: what it asks of CAN_RAW alone, such as
 filters, the stand-in for its socket takes and ignores.
@@ -35,7 +35,7 @@ MORE_EVERY_TICKS = 3
 
 
 class StandIn(socket.socket):
-    """Takes the options of a CAN_RAW socket, and keeps them for whoever wants to see."""
+    """Accepts the options of a CAN_RAW socket and stores them."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)

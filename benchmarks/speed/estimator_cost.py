@@ -1,4 +1,4 @@
-"""What the estimator of one flipper costs: a sample, a stride's close, its memory, and libraries beside its fits.
+"""The cost of one flipper's estimator: a sample, a stride's close, its memory, and its fits compared with libraries.
 
 The flipper walks strides of 3 cm (benchmarks/speed/synthetic_walk.py). Every figure is the median over the strides
 of one run
@@ -116,7 +116,7 @@ def measure_strides(strides: int, progress: Progress) -> dict[str, Any]:
 
 
 def measure_repeats(strides: int) -> dict[str, float]:
-    """What a tick costs whose message came before, and the share of such ticks in a walk of slow messages."""
+    """Measures a tick without a new message, and the fraction of such ticks in a walk of slow messages."""
     flipper, samples = new_flippers()["default"], held(stride_samples(), TICKS_PER_MESSAGE)
     new_us, again_us = list[float](), list[float]()
     for stride in range(strides):
@@ -136,7 +136,7 @@ def measure_repeats(strides: int) -> dict[str, float]:
         "ticks_per_message": TICKS_PER_MESSAGE,
         "again_us": round(median(again_us), 3),
         "new_us": round(median(new_us), 3),
-        "share": round(fraction, 3),
+        "fraction": round(fraction, 3),
     }
 
 
@@ -227,7 +227,7 @@ def text_of(report: dict[str, Any]) -> str:
     repeats, memory = report["repeats"], report["memory"]
     again = f"a tick without a new message: {repeats['again_us']:.2f} us"
     fraction = (
-        f"{repeats['share']:.0%} of the estimator's time where a message lasts {repeats['ticks_per_message']} ticks"
+        f"{repeats['fraction']:.0%} of the estimator's time where a message lasts {repeats['ticks_per_message']} ticks"
     )
     peak = f"{memory['peak_bytes'] / 1024.0:.0f} KiB at most"
     return "\n".join(

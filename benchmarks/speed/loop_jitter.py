@@ -1,9 +1,9 @@
-"""How punctually the daemon's loop wakes up, beside the most punctual loop that the same machine allows.
+"""How punctually the daemon's loop wakes up, compared with the most punctual loop that the same machine allows.
 
 The loop is the daemon's own body: ticker, whole tick over two local buses, recorder and status socket, while it
 walks a simulated robot that lives in a process of its own. The bare loop only calls the C library's clock_nanosleep
 with absolute deadlines. Both run at 380 Hz in this process, under the scheduling that the daemon asks for, in turns
-of a few seconds, so both see the same machine; the simulated robot goes on living beside either. Lateness counts
+of a few seconds, so both see the same machine; the simulated robot keeps running next to either. Lateness counts
 from the first deadline that was due, so a missed deadline shows as more than a period. Before each turn of the loop
 the robot is armed and led to its first stride, outside of every figure.
 """
@@ -71,7 +71,7 @@ class Punctuality:
 
     def report(self) -> dict[str, Any]:
         return {
-            "beats": self.late.count,
+            "ticks": self.late.count,
             "missed": self.missed,
             "late_us": {name: self.late.percentile_us(fraction) for name, fraction in FRACTIONS.items()}
             | {"max": round(self.late.max_us, 1)},
@@ -143,7 +143,7 @@ class DaemonLoop:
         self._run_until(lambda: not any(state.closed_loop for state in self.loop.states))
 
     def _begin_walk(self) -> None:
-        """From whatever was before: nobody drained the buses while the bare loop ran."""
+        """Restores the loop after the bare loop's turn, in which the buses were not read."""
         self._run_until(lambda: self.loop.mode in (Mode.IDLE, Mode.FAULT))
         self.loop.request(Request.CLEAR, time.monotonic())
         self._run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking())
@@ -190,7 +190,7 @@ def busy_thread() -> Iterator[None]:
 
 
 def measure_gil(seconds: float) -> dict[str, Any]:
-    """The bare loop beside a second thread, at Python's switch interval and at ours."""
+    """Measures the bare loop next to a second thread, at Python's switch interval and at ours."""
     report: dict[str, Any] = {}
     for name, interval_s in (("5 ms", PYTHON_SWITCH_INTERVAL_S), ("0.1 ms", SWITCH_INTERVAL_S)):
         sys.setswitchinterval(interval_s)
@@ -231,7 +231,7 @@ def ratios(real: dict[str, Any], bare: dict[str, Any]) -> dict[str, float]:
 
 
 def text_of(report: dict[str, Any]) -> str:
-    rows = [["late by us", "p50", "p99", "p99.9", "max", "beats", "missed"]]
+    rows = [["late by us", "p50", "p99", "p99.9", "max", "ticks", "missed"]]
     rows += [_row("the daemon's loop", report["loop"]), _row("bare clock_nanosleep", report["bare"])]
     rows += [_row(f"  and a busy thread, {name}", turn) for name, turn in report.get("gil", {}).items()]
     work, over = report["loop"]["work_us"], report["ratios"]
@@ -240,7 +240,7 @@ def text_of(report: dict[str, Any]) -> str:
             table(rows),
             "",
             f"loop over bare: {over['p50']:.2f} at the median, {over['p99']:.2f} at p99",
-            f"a beat's work after a sleep: p50 {work['p50']:.0f}, p99 {work['p99']:.0f}, max {work['max']:.0f} us",
+            f"a tick's work after a sleep: p50 {work['p50']:.0f}, p99 {work['p99']:.0f}, max {work['max']:.0f} us",
             f"{report['faults']} turns ended in a fault; {report['dropped_rows']} rows dropped",
             *(f"warning: {warning}" for warning in report["warnings"]),
         ]
@@ -249,7 +249,7 @@ def text_of(report: dict[str, Any]) -> str:
 
 def _row(name: str, figures: dict[str, Any]) -> list[str]:
     late = figures["late_us"]
-    return [name, *(f"{late[key]:.0f}" for key in (*FRACTIONS, "max")), str(figures["beats"]), str(figures["missed"])]
+    return [name, *(f"{late[key]:.0f}" for key in (*FRACTIONS, "max")), str(figures["ticks"]), str(figures["missed"])]
 
 
 def measure_all(options: argparse.Namespace, folder: Path) -> dict[str, Any]:

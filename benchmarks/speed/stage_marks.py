@@ -30,7 +30,7 @@ STAGES = tuple(MEANINGS)  # in their order
 
 
 class StageMarks:
-    """Owns the moments of the tick under way."""
+    """Owns the times of the current tick's stages."""
 
     def __init__(self, loop: Loop) -> None:
         self.moments_s: list[float] = []

@@ -5,7 +5,7 @@ buses. The robot computes between the ticks and outside of every figure; no tick
 and caches are warmer than on a robot (benchmarks.speed.loop_jitter shows ticks that begin asleep). Five kinds of
 buses carry
 the frames: python-can's in-process `virtual` interface, our mock bus without python-can, the local bus's sockets, and
-SocketCAN on pairs of sockets by both of its paths, which benchmarks/speed/can_paths.py also puts beside each other
+SocketCAN on pairs of sockets by both of its paths, which benchmarks/speed/can_paths.py also compares
 alone.
 
 Blocks of 1 s alternate between whole ticks, ticks marked at the beginning of every stage, and marked ticks without

@@ -1,4 +1,4 @@
-"""A robot that walks in lockstep over given wiring, and the clock beside its ticks."""
+"""A robot that walks in lockstep over given wiring, with its ticks timed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from simulation.harness.robot import SimulatedRobot
 from simulation.mud.track import paper_track
 
 BLOCK_TICKS = round(RATE_HZ)
-WARM_UP_S = 4.0  # the flippers are on their way to the start of the first stride for some of it
+WARM_UP_S = 4.0  # part of it moves the flippers to the start of the first stride
 
 
 class Traffic:
@@ -61,7 +61,7 @@ class Traffic:
 
 
 class Samples:
-    """Durations in seconds. Only ticks that close a stride choose a depth: their `adapt` is kept apart."""
+    """Durations in seconds. Only ticks that close a stride choose a depth: their `adapt` is separate."""
 
     def __init__(self) -> None:
         self.whole: list[float] = []

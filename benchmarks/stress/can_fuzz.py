@@ -1,10 +1,10 @@
-"""Garbage on the buses: random and mutated CAN frames through the drives and through whole ticks, disarmed.
+"""Malformed and unexpected CAN frames on the buses: random and mutated ones, through drives and whole ticks.
 
-Frames are those of four drives with bits turned, bytes cut off or added, numbers that are none, other ids, remote,
-extended or error marks; random ones; and bursts of one frame, as a babbling node sends. Half of them go through
-`OdriveDrives.read`, half through `Loop.tick`: half of these in boot, where one drive's heartbeats never come, and
-half in idle, among the true messages of simulated drives. No exception may come out, resident memory must not grow, and
-nothing may leave for a drive but zero torque, idle, and questions for version and settings.
+Frames are those of four drives with flipped bits, removed or added bytes, non-finite numbers, other ids, remote,
+extended or error marks; random ones; and bursts of one frame, as a babbling node sends. Half of them pass through
+`OdriveDrives.read`, half through `Loop.tick`: half of these in boot, where one drive's heartbeats never come, and half
+in idle, among the true messages of simulated drives. No exception may be raised, resident memory must not grow, and the
+only frames that may leave for a drive are zero torque, idle, and requests for version and settings.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ FRAMES_PER_TICK = 40  # three times what four drives send
 BABBLE_FRAMES = 400
 BABBLE_FRACTION = 0.001
 BAR_KIB = 1024.0
-WARM_UP_FRACTION = 0.1  # of the frames, before memory is looked at first
+WARM_UP_FRACTION = 0.1  # of the frames, before the first reading of memory
 NUMBERS = [float("nan"), float("inf"), float("-inf"), 0.0, -0.0, 1e38, -3.4e38, 1e-45, 0.5]
 REPORTED = [
     (codec.GET_ENCODER_ESTIMATES, (0.1, 0.0)),
@@ -67,7 +67,7 @@ def true_frames(node_ids: list[int]) -> list[Frame]:
 
 
 class FrameSource:
-    """Garbage without end, the same for a seed."""
+    """Endless malformed frames; the same seed gives the same frames."""
 
     def __init__(self, node_ids: list[int], seed: int, without: int = -1) -> None:
         self._random = Random(seed)
@@ -112,7 +112,7 @@ class FrameSource:
 
 @dataclass
 class Fuzzing:
-    """What came of it."""
+    """The results of one part."""
 
     frames: int = 0
     exceptions: list[str] = field(default_factory=list)
@@ -130,7 +130,7 @@ class Fuzzing:
 
 
 def is_forbidden(frame: Frame) -> bool:
-    """A disarmed robot's frame that could move a drive: any but zero torque, idle and questions."""
+    """Returns whether a disarmed robot's frame could move a drive: any but zero torque, idle and requests."""
     command = frame.arbitration_id & 0x1F
     if frame.is_extended or frame.is_error:
         return True
@@ -144,7 +144,7 @@ def is_forbidden(frame: Frame) -> bool:
 
 
 def fuzz_drives(configuration: Configuration, frames: int, fuzzing: Fuzzing, progress: Progress, seed: int) -> None:
-    """The drives alone."""
+    """Feeds the drives alone."""
     buses = {name: MockBus() for name in configuration.bus}
     far = {name: bus.open() for name, bus in buses.items()}
     wires = {name: bus.open() for name, bus in buses.items()}
@@ -160,7 +160,7 @@ def fuzz_drives(configuration: Configuration, frames: int, fuzzing: Fuzzing, pro
             drives.send(Joints(0.0, 0.0, 0.0, 0.0), PERIOD_S)
         except Exception as problem:  # noqa: BLE001  that none comes is what is measured
             fuzzing.exceptions.append(repr(problem))
-        look(fuzzing, far, number, frames // FRAMES_PER_TICK)
+        inspect(fuzzing, far, number, frames // FRAMES_PER_TICK)
         progress.show(fuzzing.frames, "drives")
     fuzzing.refused += drives.refused_commands
 
@@ -168,9 +168,9 @@ def fuzz_drives(configuration: Configuration, frames: int, fuzzing: Fuzzing, pro
 def fuzz_loop(
     configuration: Configuration, frames: int, mode: Mode, fuzzing: Fuzzing, progress: Progress, seed: int
 ) -> None:
-    """Whole ticks: in idle beside a simulated robot that lives on, in boot with one drive's heartbeats missing."""
+    """Feeds whole ticks: in idle next to a running simulated robot, in boot with one drive's heartbeats missing."""
     walk = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]), seed)
-    far = {name: port_beside(walk, name) for name in configuration.bus}
+    far = {name: open_third_node(walk, name) for name in configuration.bus}
     missing = arbitration_id(node_ids(configuration)[0], codec.HEARTBEAT) if mode is Mode.BOOT else -1
     source = iter(FrameSource(node_ids(configuration), seed, missing))
     ticks = frames // FRAMES_PER_TICK
@@ -185,7 +185,7 @@ def fuzz_loop(
         except Exception as problem:  # noqa: BLE001
             fuzzing.exceptions.append(repr(problem))
         fuzzing.left_mode += walk.loop.mode is not mode
-        look(fuzzing, far, number, ticks)
+        inspect(fuzzing, far, number, ticks)
         progress.show(fuzzing.frames, mode.name.lower())
     fuzzing.refused += walk.loop.drives.refused_commands
 
@@ -202,8 +202,8 @@ def node_ids(configuration: Configuration) -> list[int]:
     return [configuration.drive[joint].node_id for joint in JOINTS]
 
 
-def port_beside(walk: Lockstep, bus: str) -> MockPort:
-    """A third node on a bus of the loop."""
+def open_third_node(walk: Lockstep, bus: str) -> MockPort:
+    """Opens a third node on a bus of the loop."""
     port = walk.loop.drives.ports[bus]
     assert isinstance(port, MockPort)
     return port.open_peer()
@@ -211,13 +211,13 @@ def port_beside(walk: Lockstep, bus: str) -> MockPort:
 
 def feed(source: Iterator[Frame], far: dict[str, MockPort], fuzzing: Fuzzing) -> None:
     ports = list(far.values())
-    for place in range(FRAMES_PER_TICK):
-        ports[place % len(ports)].send(next(source))
+    for index in range(FRAMES_PER_TICK):
+        ports[index % len(ports)].send(next(source))
     fuzzing.frames += FRAMES_PER_TICK
 
 
-def look(fuzzing: Fuzzing, far: dict[str, MockPort], number: int, ticks: int) -> None:
-    """At what left, and ten times at the memory."""
+def inspect(fuzzing: Fuzzing, far: dict[str, MockPort], number: int, ticks: int) -> None:
+    """Inspects the frames that left, and ten times the memory."""
     for port in far.values():
         fuzzing.on_sent([frame for frame in port.receive() if is_ours(frame)])
     if number >= WARM_UP_FRACTION * ticks and number % max(1, ticks // 10) == 0:
@@ -225,7 +225,7 @@ def look(fuzzing: Fuzzing, far: dict[str, MockPort], number: int, ticks: int) ->
 
 
 def is_ours(frame: Frame) -> bool:
-    """The simulated drives speak on the same bus: theirs are answers and cyclic messages."""
+    """Returns whether the loop sent a frame; the simulated drives send answers and cyclic messages on the same bus."""
     reported = {message.command for message, _ in REPORTED} | {codec.TX_SDO.command}
     return frame.is_remote or frame.arbitration_id & 0x1F not in reported
 
@@ -235,14 +235,14 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     configuration = load_example()
     freeze_garbage()
     parts: dict[str, dict[str, Any]] = {}
-    for place, (name, fraction, mode) in enumerate(
+    for index, (name, fraction, mode) in enumerate(
         (("drives", 0.5, None), ("boot", 0.25, Mode.BOOT), ("idle", 0.25, Mode.IDLE))
     ):
         fuzzing, started_s, number = Fuzzing(), perf_counter(), round(fraction * frames)
         if mode is None:
-            fuzz_drives(configuration, number, fuzzing, progress, seed + place)
+            fuzz_drives(configuration, number, fuzzing, progress, seed + index)
         else:
-            fuzz_loop(configuration, number, mode, fuzzing, progress, seed + place)
+            fuzz_loop(configuration, number, mode, fuzzing, progress, seed + index)
         readings = fuzzing.readings_kib or [0.0]
         parts[name] = {
             "frames": fuzzing.frames,

@@ -1,11 +1,10 @@
-"""Odd configuration and world files: each is refused with sentences, or accepted and the robot really works with it.
+"""Malformed configuration and world files: each is refused with a message, or accepted and the robot works with it.
 
-Files of benchmarks.stress.malformed_configurations go through the readers that the daemon and the simulated robot
-use. Nothing
-may come out but what was asked for or a ConfigurationError whose sentences name the wrong key, and its bound where it
-has one; none may take long or much memory. With what is accepted a robot is built in lockstep and idles; every tenth of
-them arms, holds, walks for a while and disarms. Whether such a robot may be armed is its own affair (a supply that
-counts as too low stands against it), but no tick may raise an exception, and disarmed nothing may leave that moves.
+Files of benchmarks.stress.malformed_configurations pass through the readers of the daemon and the simulated robot. The
+only permitted exception is a ConfigurationError whose messages name the wrong key, and its bound where it has one; no
+file may take long or much memory. With each accepted file a robot is built in lockstep and idles; every tenth of them
+arms, holds, walks for a while and disarms. Such a robot may refuse to arm (its supply may count as too low, for
+example), but no tick may raise an exception, and a disarmed robot may send no frame that moves a drive.
 """
 
 from __future__ import annotations
@@ -22,8 +21,8 @@ from typing import Any
 
 from benchmarks.example_robot import load_example
 from benchmarks.report import Progress, new_parser, run_benchmark, verdict
-from benchmarks.stress.can_fuzz import is_forbidden, is_ours, port_beside
-from benchmarks.stress.malformed_configurations import OddConfigurations, OddFile
+from benchmarks.stress.can_fuzz import is_forbidden, is_ours, open_third_node
+from benchmarks.stress.malformed_configurations import CandidateFile, MalformedConfigurations
 from control.controller import WalkOrder
 from control.modes import ENERGISED, Mode, Request
 from firmware_host.configuration.configuration import Configuration
@@ -43,52 +42,52 @@ TRACK = Track([(1.0, MUDS["48.5"])])
 
 @dataclass
 class Fuzzing:
-    """What came of it."""
+    """The results of all files."""
 
     kinds: Counter[str] = field(default_factory=Counter)
     accepted: Counter[str] = field(default_factory=Counter)
     bugs: list[str] = field(default_factory=list)
-    tried: Counter[str] = field(default_factory=Counter)  # how far the ones that were armed came
+    tried: Counter[str] = field(default_factory=Counter)  # the last mode that each armed robot reached
     longest_s: float = 0.0
     longest_kind: str = ""
     most_kib: float = 0.0
 
-    def note(self, odd: OddFile, what: str) -> None:
-        self.bugs.append(f"{odd.kind}: {what[:300]}")
+    def note(self, file: CandidateFile, what: str) -> None:
+        self.bugs.append(f"{file.kind}: {what[:300]}")
 
 
 def fuzz(count: int, seed: int, folder: Path, progress: Progress) -> Fuzzing:
-    source, found, path = OddConfigurations(seed), Fuzzing(), folder / "odd.toml"
+    source, found, path = MalformedConfigurations(seed), Fuzzing(), folder / "candidate.toml"
     for number in range(count):
-        odd = source.next_file()
-        path.write_bytes(odd.data)
-        found.kinds[odd.kind] += 1
-        read = load(odd, path, found)
+        file = source.next_file()
+        path.write_bytes(file.data)
+        found.kinds[file.kind] += 1
+        read = load(file, path, found)
         if read is not None:
-            found.accepted[odd.kind] += 1
-            try_out(odd, read, sum(found.accepted.values()) % ARMED_FRACTION == 0, found)
+            found.accepted[file.kind] += 1
+            try_out(file, read, sum(found.accepted.values()) % ARMED_FRACTION == 0, found)
         progress.show(number, "files")
     return found
 
 
-def load(odd: OddFile, path: Path, found: Fuzzing) -> Configuration | World | None:
-    """As the daemon or the simulated robot does."""
+def load(file: CandidateFile, path: Path, found: Fuzzing) -> Configuration | World | None:
+    """Reads a file as the daemon or the simulated robot does."""
     peak_kib, begin_s = _peak_kib(), time.thread_time()
     read: Configuration | World | None = None
     try:
-        read = load_world(path) if odd.is_world else load_configuration(path)
+        read = load_world(path) if file.is_world else load_configuration(path)
         if isinstance(read, Configuration):
             load_rights(read.status)
     except ConfigurationError as problem:
         read = None
-        evaluate(odd, problem.problems, found)
+        evaluate(file, problem.problems, found)
     except Exception as problem:  # noqa: BLE001  that none comes is what is measured
         read = None
-        found.note(odd, f"{type(problem).__name__}: {problem}")
+        found.note(file, f"{type(problem).__name__}: {problem}")
     else:
-        if odd.wrong_key:
-            found.note(odd, f"{odd.wrong_key} was accepted")
-    _measure(odd, time.thread_time() - begin_s, _peak_kib() - peak_kib, found)
+        if file.wrong_key:
+            found.note(file, f"{file.wrong_key} was accepted")
+    _measure(file, time.thread_time() - begin_s, _peak_kib() - peak_kib, found)
     return read
 
 
@@ -96,43 +95,43 @@ def _peak_kib() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
-def _measure(odd: OddFile, duration_s: float, memory_kib: float, found: Fuzzing) -> None:
+def _measure(file: CandidateFile, duration_s: float, memory_kib: float, found: Fuzzing) -> None:
     if duration_s > found.longest_s:
-        found.longest_s, found.longest_kind = duration_s, odd.kind
+        found.longest_s, found.longest_kind = duration_s, file.kind
     found.most_kib = max(found.most_kib, memory_kib)
     if duration_s > LONGEST_S or memory_kib > MOST_KIB:
-        found.note(odd, f"took {duration_s:.1f} s and {memory_kib:.0f} KiB")
+        found.note(file, f"took {duration_s:.1f} s and {memory_kib:.0f} KiB")
 
 
-def evaluate(odd: OddFile, problems: list[str], found: Fuzzing) -> None:
-    """A refusal in sentences, of which one names what is wrong."""
+def evaluate(file: CandidateFile, problems: list[str], found: Fuzzing) -> None:
+    """Checks that a refusal names the wrong key and its bound."""
     if not problems or not all(isinstance(problem, str) and problem for problem in problems):
-        found.note(odd, f"refused without a sentence: {problems!r}")
+        found.note(file, f"refused without a message: {problems!r}")
     longest = max(map(len, problems), default=0)
     if longest > LONGEST_MESSAGE:
-        found.note(odd, f"a sentence of {longest} characters")
-    reported = [problem for problem in problems if problem.startswith(odd.wrong_key[:80])]
+        found.note(file, f"a message of {longest} characters")
+    reported = [problem for problem in problems if problem.startswith(file.wrong_key[:80])]
     if not reported:
-        found.note(odd, f"{odd.wrong_key} is not named: {problems[:3]}")
-    elif not any(odd.bound in problem for problem in reported):
-        found.note(odd, f"{odd.wrong_key}: the bound {odd.bound} is not named: {reported}")
+        found.note(file, f"{file.wrong_key} is not named: {problems[:3]}")
+    elif not any(file.bound in problem for problem in reported):
+        found.note(file, f"{file.wrong_key}: the bound {file.bound} is not named: {reported}")
 
 
-def try_out(odd: OddFile, read: Configuration | World, armed: bool, found: Fuzzing) -> None:
+def try_out(file: CandidateFile, read: Configuration | World, armed: bool, found: Fuzzing) -> None:
     try:
         robot = build(read)
         for problem in idle(robot):
-            found.note(odd, problem)
+            found.note(file, problem)
         if armed:
             found.tried[walk(robot)] += 1
             for problem in idle(robot):
-                found.note(odd, f"after disarming: {problem}")
+                found.note(file, f"after disarming: {problem}")
     except Exception as problem:  # noqa: BLE001
         place = problem.__traceback__
         while place is not None and place.tb_next is not None:
             place = place.tb_next
         where = f"{Path(place.tb_frame.f_code.co_filename).name}, line {place.tb_lineno}" if place else ""
-        found.note(odd, f"accepted, then {type(problem).__name__}: {problem} ({where})")
+        found.note(file, f"accepted, then {type(problem).__name__}: {problem} ({where})")
 
 
 def build(read: Configuration | World) -> Lockstep:
@@ -143,11 +142,11 @@ def build(read: Configuration | World) -> Lockstep:
 
 
 def idle(robot: Lockstep) -> list[str]:
-    """What is wrong with a robot that nobody armed, or not any more."""
+    """Returns what is wrong with a robot that is not armed."""
     if robot.loop.mode in ENERGISED:
         robot.loop.request(Request.DISARM, robot.now_s)
         robot.step()
-    beside = [port_beside(robot, bus) for bus in robot.loop.configuration.bus]
+    beside = [open_third_node(robot, bus) for bus in robot.loop.configuration.bus]
     for _ in range(IDLE_TICKS):
         robot.step()
     sent = [frame for port in beside for frame in port.receive() if is_ours(frame) and is_forbidden(frame)]
@@ -158,7 +157,7 @@ def idle(robot: Lockstep) -> list[str]:
 
 
 def walk(robot: Lockstep) -> str:
-    """How far it comes."""
+    """Returns the last mode that the robot reaches."""
     loop = robot.loop
     robot.run_until(lambda: loop.mode is Mode.IDLE and not loop.faults.blocking(), 2.0)
     if loop.request(Request.ARM, robot.now_s):
@@ -185,7 +184,7 @@ def report_of(found: Fuzzing, seed: int) -> dict[str, Any]:
         "seed": seed,
         "kinds": dict(found.kinds),
         "accepted": {kind: found.accepted[kind] for kind in found.kinds},
-        "accepted_share": round(sum(found.accepted.values()) / max(1, sum(found.kinds.values())), 3),
+        "accepted_fraction": round(sum(found.accepted.values()) / max(1, sum(found.kinds.values())), 3),
         "tried": dict(found.tried),
         "longest_ms": round(1e3 * found.longest_s, 1),
         "longest_kind": found.longest_kind,
@@ -193,7 +192,7 @@ def report_of(found: Fuzzing, seed: int) -> dict[str, Any]:
         "bugs": len(found.bugs),
         "first_bugs": found.bugs[:20],
         "reached": clean,
-        "verdict": verdict("refused with sentences or accepted and working, within 1 s and 64 MiB each", clean),
+        "verdict": verdict("refused with messages or accepted and working, within 1 s and 64 MiB each", clean),
     }
 
 

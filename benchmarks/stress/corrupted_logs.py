@@ -1,9 +1,9 @@
-"""What reading and recovery make of corrupted logs: flipped bits, cuts, garbage, doubled pieces, tails of zeros.
+"""Reading and recovery of corrupted logs: flipped bits, cuts, garbage, doubled pieces, tails of zeros.
 
-Each log is a sound one with one to three such changes, by a seeded generator. Reading it must give a log or one
-sentence of refusal. Recovery must keep every row of the chunks that end before the first changed byte, must invent
-none and double none, and what it writes must be a whole log. Memory is the process's peak above that before the first
-log, in units of the largest log; the slowest of all tells whether anything hangs.
+Each log is a sound one with one to three such changes, by a seeded generator. Reading it must give a log or a one-line
+refusal. Recovery must preserve every row of the chunks that end before the first changed byte, must invent none and
+double none, and must write a complete log. Memory is the process's peak above that before the first log, in units of
+the largest log; the slowest log shows whether anything hangs.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ BAR_MEMORY = 40.0  # times the largest log
 class SoundLog(NamedTuple):
     contents: bytes
     rows: frozenset[bytes]
-    safe: tuple[tuple[int, int], ...]  # (bytes of the file, ticks that stand before them)
+    safe: tuple[tuple[int, int], ...]  # (bytes of the file, ticks before them)
 
 
 def make_sound_log(path: Path, chance: random.Random, finished: bool) -> SoundLog:
-    """Eight chunks of ticks, each with an event."""
+    """Writes eight chunks of ticks, each with an event."""
     opening = {"configuration_text": "[robot]\n" * 40, "metadata": {"robot": "x"}, "wall_minus_monotonic_ns": 10**18}
     log = LogFile(path, opening)
     rows: list[bytes] = []
@@ -64,49 +64,49 @@ def make_sound_log(path: Path, chance: random.Random, finished: bool) -> SoundLo
 
 
 def flip(contents: bytearray, chance: random.Random) -> int:
-    place = chance.randrange(len(contents))
-    contents[place] ^= 1 << chance.randrange(8)
-    return place
+    index = chance.randrange(len(contents))
+    contents[index] ^= 1 << chance.randrange(8)
+    return index
 
 
 def cut(contents: bytearray, chance: random.Random) -> int:
-    place = chance.randrange(len(contents))
-    del contents[place:]
-    return place
+    index = chance.randrange(len(contents))
+    del contents[index:]
+    return index
 
 
 def insert_garbage(contents: bytearray, chance: random.Random) -> int:
-    place = chance.randrange(len(contents))
-    contents[place:place] = chance.randbytes(chance.choice((1, 8, 100, 5000)))
-    return place
+    index = chance.randrange(len(contents))
+    contents[index:index] = chance.randbytes(chance.choice((1, 8, 100, 5000)))
+    return index
 
 
 def double_piece(contents: bytearray, chance: random.Random) -> int:
     start = chance.randrange(len(contents))
     end = start + chance.randrange(1, len(contents) // 2)
     piece = contents[start:end]
-    place = min(end, len(contents))
-    contents[place:place] = piece
-    return place
+    index = min(end, len(contents))
+    contents[index:index] = piece
+    return index
 
 
 def zero_tail(contents: bytearray, chance: random.Random) -> int:
-    place = chance.randrange(len(contents))
-    contents[place:] = bytes(len(contents) - place)
-    return place
+    index = chance.randrange(len(contents))
+    contents[index:] = bytes(len(contents) - index)
+    return index
 
 
 def zero_page(contents: bytearray, chance: random.Random) -> int:
-    place = chance.randrange(len(contents))
-    contents[place : place + 4096] = bytes(len(contents[place : place + 4096]))
-    return place
+    index = chance.randrange(len(contents))
+    contents[index : index + 4096] = bytes(len(contents[index : index + 4096]))
+    return index
 
 
 def huge_length(contents: bytearray, chance: random.Random) -> int:
-    place = chance.randrange(len(contents))
+    index = chance.randrange(len(contents))
     length = chance.choice((2**60, 2**63, 2**64 - 1, 2**31, 2**32 - 1)).to_bytes(8, "little")
-    contents[place : place + 8] = length[: len(contents) - place]
-    return place
+    contents[index : index + 8] = length[: len(contents) - index]
+    return index
 
 
 def empty(contents: bytearray, chance: random.Random) -> int:
@@ -120,7 +120,7 @@ CHANGES: tuple[Callable[[bytearray, random.Random], int], ...] = (
 
 
 def corrupt(log: SoundLog, chance: random.Random) -> tuple[bytes, int, str]:
-    """(the corrupted bytes, the first changed one, how it was done)."""
+    """Returns (the corrupted bytes, the index of the first changed one, the names of the changes)."""
     contents, first, names = bytearray(log.contents), len(log.contents), []
     for _ in range(chance.choice((1, 1, 2, 3))):
         if contents:
@@ -131,7 +131,7 @@ def corrupt(log: SoundLog, chance: random.Random) -> tuple[bytes, int, str]:
 
 
 def try_log(path: Path, sound: SoundLog, contents: bytes, first: int) -> tuple[str, str]:
-    """(what came of it, what is wrong with that or nothing)."""
+    """Returns (the outcome, what is wrong with it or an empty text)."""
     path.write_bytes(contents)
     try:
         log_summary(read_log(path))
@@ -148,9 +148,9 @@ def try_log(path: Path, sound: SoundLog, contents: bytes, first: int) -> tuple[s
 
 
 def _wrong_with(log: Log, sound: SoundLog, first: int) -> str:
-    """What a recovered log should not be, or nothing."""
+    """Returns what is wrong with a recovered log, or an empty text."""
     stored, size = log.ticks.tobytes(), TICK.layout.size
-    ticks = [stored[place : place + size] for place in range(0, len(stored), size)]
+    ticks = [stored[index : index + size] for index in range(0, len(stored), size)]
     if not log.complete:
         return "recovered, but not whole"
     if len(ticks) != len(set(ticks)):
@@ -169,7 +169,7 @@ def peak_bytes() -> int:
 
 
 def _tried(path: Path, sound: SoundLog, contents: bytes, first: int) -> tuple[str, str]:
-    """As `try_log`, whatever comes of it."""
+    """Runs `try_log` and reports exceptions as an outcome."""
     try:
         return try_log(path, sound, contents, first)
     except Exception:  # noqa: BLE001 - which must not happen is what is looked for

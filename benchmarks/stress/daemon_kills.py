@@ -1,9 +1,9 @@
-"""How long motors push on after the daemon was killed or stopped: by SIGKILL and SIGSTOP, in each phase of the gait.
+"""How long motors exert torque after the daemon was killed or stopped: SIGKILL and SIGSTOP, in each phase of the gait.
 
-Daemon and simulated robot are processes on local buses, on which a third node listens. The drives tell their currents
-every 2 ms of their own time, so the messages that still tell one after the kill are the time to zero torque, whatever
-else this machine does meanwhile. Nothing but the drives' watchdogs can end it. A daemon that was stopped is then woken,
-and must not move the robot again; that is listened to as well.
+Daemon and simulated robot are processes on local buses, on which a third node listens. The drives report their currents
+every 2 ms of their own time, so the number of reports of a current after the kill is the time to zero torque, on a busy
+machine too. Only the drives' watchdogs can end the torque. A stopped daemon is then continued, and must not move the
+robot again; the third node checks that as well.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ WINDOW_S = 4.0 * WATCHDOG_S  # of listening
 PHASES = ("insertion", "stance", "extraction", "swing", "hold")
 SIGNALS = (signal.SIGKILL, signal.SIGSTOP)
 LONGEST_WAIT_S = 60.0
-ATTEMPTS = 5  # at a walk, which a busy machine may spoil
+ATTEMPTS = 5  # at a walk, which may fail on a busy machine
 
 
 class Listener:
-    """Owns a node on each bus, and how long each drive has told of a current."""
+    """Owns a node on each bus, and for how long each drive has reported a current."""
 
     def __init__(self, configuration_path: Path) -> None:
         configuration = load_configuration(configuration_path)
@@ -70,7 +70,7 @@ class Listener:
             self.closed_loop[joint] = codec.HEARTBEAT.decode(data)[1] == codec.AxisState.CLOSED_LOOP
 
     def listen_for(self, drive_time_s: float) -> None:
-        """By the drives' own messages."""
+        """Listens for a duration by the drives' own messages."""
         deadline_s = time.monotonic() + LONGEST_WAIT_S
         end = max(self.reported.values()) + round(drive_time_s / REPORTED_S)
         while min(self.reported.values()) < end and time.monotonic() < deadline_s:
@@ -83,7 +83,7 @@ class Listener:
 
 
 class Session:
-    """Owns a robot, its daemon and who listens."""
+    """Owns a robot, its daemon and the listening node."""
 
     def __init__(self, folder: Path) -> None:
         self._socket = folder / "mudskipper.sock"
@@ -100,7 +100,7 @@ class Session:
             client.close()
 
     def wait_for(self, *modes_or_phases: str) -> bool:
-        """Whether it came to one of them before there was a fault."""
+        """Returns whether one of them was reached before a fault."""
         deadline_s = time.monotonic() + LONGEST_WAIT_S
         while time.monotonic() < deadline_s:
             self.listener.listen()
@@ -132,7 +132,7 @@ class Session:
 
 
 def kill_once(folder: Path, number: signal.Signals, phase: str) -> dict[str, Any] | None:
-    """None where the robot did not come into that phase."""
+    """Returns None where the robot did not reach that phase."""
     session = Session(folder)
     listener = session.listener
     try:
@@ -158,20 +158,20 @@ def _moves_when_woken(daemon: subprocess.Popen[bytes], listener: Listener) -> bo
 
 
 def kill_many(count: int, folder: Path, progress: Progress) -> tuple[list[dict[str, Any]], int]:
-    """And how many walks were spoiled."""
+    """Returns the rounds, and the number of invalid walks."""
     rounds: list[dict[str, Any]] = []
-    spoiled = 0
-    while len(rounds) < count and spoiled < ATTEMPTS * count:
+    invalid_walks = 0
+    while len(rounds) < count and invalid_walks < ATTEMPTS * count:
         progress.show(len(rounds), "kills")
         number, phase = SIGNALS[len(rounds) % 2], PHASES[len(rounds) // 2 % len(PHASES)]
-        place = folder / str(len(rounds) + spoiled)
-        place.mkdir()
-        made = kill_once(place, number, phase)
+        subfolder = folder / str(len(rounds) + invalid_walks)
+        subfolder.mkdir()
+        made = kill_once(subfolder, number, phase)
         if made is None:
-            spoiled += 1
+            invalid_walks += 1
         else:
             rounds.append(made)
-    return rounds, spoiled
+    return rounds, invalid_walks
 
 
 def text_of(report: dict[str, Any]) -> str:
@@ -181,11 +181,11 @@ def text_of(report: dict[str, Any]) -> str:
     ]
     again = sum(made["moved_again"] for made in report["rounds"])
     lines = [table([["signal", "phase", "ms to zero torque", "idle"], *rows]), ""]
-    return "\n".join([*lines, f"{again} moved again when woken; {report['spoiled']} walks invalid"])
+    return "\n".join([*lines, f"{again} moved again when woken; {report['invalid_walks']} walks invalid"])
 
 
 def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    rounds, spoiled = kill_many(options.kills, folder, Progress(options.kills))
+    rounds, invalid_walks = kill_many(options.kills, folder, Progress(options.kills))
     longest_s = max((made["pushed_s"] for made in rounds), default=0.0)
     reached = (
         len(rounds) == options.kills
@@ -193,7 +193,7 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         and all(made["idle"] and not made["moved_again"] for made in rounds)
     )
     bar = f"zero torque within the watchdogs' {1e3 * WATCHDOG_S:g} ms and {1e3 * TOLERANCE_S:g} on the way, for good"
-    report = {"rounds": rounds, "spoiled": spoiled, "longest_s": longest_s, "watchdog_s": WATCHDOG_S}
+    report = {"rounds": rounds, "invalid_walks": invalid_walks, "longest_s": longest_s, "watchdog_s": WATCHDOG_S}
     return evaluated(report, bar, reached)
 
 

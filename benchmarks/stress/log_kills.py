@@ -1,9 +1,9 @@
-"""What a log loses when its writer, the daemon, or everything is killed: SIGKILL at random moments, then recovery.
+"""The rows that a log loses when its writer, the daemon, or all processes are killed: SIGKILL, then recovery.
 
-A real daemon records a simulated robot with short segments, every tick of it. After each kill the folder is recovered
-by the next daemon's own recovery or by the command's, and every log of the run is opened by three readers that share
-no code: ours, rosbags and mcap-ros2-support. Ticks are numbered and count the missed ones, so a row that is missing
-inside or doubled shows; the monotonic stamp of the last row says what is missing at the end.
+A real daemon records a simulated robot with short segments, every tick of it. After each kill the next daemon or the
+recovery command recovers the folder, and three independent readers open every log of the run: ours, rosbags and
+mcap-ros2-support. Ticks are numbered and count the missed ones, so a missing or doubled row shows; the monotonic stamp
+of the last row shows how much is missing at the end.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from simulation.harness.local_setup import write_local_setup
 
 BAR_S = 1.0  # of rows at a log's end
 LONGEST_WAIT_S = 30.0
-VICTIMS = ("daemon", "writer", "both", "all")  # all: the whole session, with a recovery that may be under way
+VICTIMS = ("daemon", "writer", "both", "all")  # all: the whole session, with a recovery that may be running
 
 
 def write_setup(folder: Path) -> Path:
@@ -49,7 +49,7 @@ def start(module: str, configuration: Path) -> subprocess.Popen[bytes]:
 
 
 def wait_for_log(folder: Path, known: set[str]) -> None:
-    """Until the daemon answers and a file of its run is there."""
+    """Waits until the daemon answers and a file of its run exists."""
     deadline_s = time.monotonic() + LONGEST_WAIT_S
     while time.monotonic() < deadline_s:
         with suppress(NoDaemonError, OSError):
@@ -61,7 +61,7 @@ def wait_for_log(folder: Path, known: set[str]) -> None:
 
 
 def kill(victim: str, daemon: subprocess.Popen[bytes]) -> float:
-    """When it happened, on the monotonic clock."""
+    """Kills the victim and returns the time on the monotonic clock."""
     writers = children_of(daemon.pid)
     killed_s = time.monotonic()
     if victim in ("writer", "both"):
@@ -90,9 +90,7 @@ def _wait_for_end(process: int) -> None:
 
 
 def examine(paths: Sequence[Path], seen_s: float, killed_s: float) -> dict[str, Any]:
-    """What the logs of one run hold, and what is wrong with that. Of a log without a tick, all since it was seen is
-    missing.
-    """
+    """Returns the content of one run's logs, and their problems. A log without a tick lost all since it was seen."""
     logs = [read_log(path) for path in paths]
     problems = [f"{path.name} is not whole" for path, log in zip(paths, logs, strict=True) if not log.complete]
     problems += [complaint for path, log in zip(paths, logs, strict=True) if (complaint := _by_others(path, log))]
@@ -112,7 +110,7 @@ def examine(paths: Sequence[Path], seen_s: float, killed_s: float) -> dict[str, 
 
 
 def _by_others(path: Path, log: Log) -> str:
-    """What two readers of others say of a log, where it differs from ours."""
+    """Returns how two independent readers differ from ours, or an empty text."""
     from mcap.reader import make_reader
     from mcap_ros2.decoder import DecoderFactory
     from rosbags.highlevel import AnyReader

@@ -1,6 +1,6 @@
-"""Byte streams that a hostile, broken or hurried client may send: made up from valid requests, or from nothing.
+"""Byte streams that a hostile, broken or hasty client may send, derived from valid requests or drawn at random.
 
-Each begins with requests that are valid and must be answered, whatever follows them.
+Each begins with valid requests, which must be answered whether or not the rest is valid.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class Stream(NamedTuple):
     data: bytes
 
 
-class OddStreams:
-    """Owns the chance; the same seed makes the same streams."""
+class MalformedStreams:
+    """Owns the random numbers; the same seed makes the same streams."""
 
     def __init__(self, seed: int) -> None:
         self._chance = random.Random(seed)
@@ -46,7 +46,7 @@ class OddStreams:
             "truncated": self._truncated,
             "concatenated": lambda: self._requests(2, 6) + self._mutate(self._requests(1, 6)),
             "nested": self._nested,
-            "odd values": lambda: msgpack.packb(self._odd_message()),
+            "malformed values": lambda: msgpack.packb(self._malformed_message()),
             "valid": lambda: b"",
         }
 
@@ -61,7 +61,7 @@ class OddStreams:
         return Stream(kind, valid, prefix + self._makers[kind]())
 
     def pieces(self, data: bytes) -> list[bytes]:
-        """As it may arrive."""
+        """Splits a stream as it may arrive."""
         if self._chance.random() < 0.7:
             return [data]
         cuts = sorted(self._chance.randrange(len(data) + 1) for _ in range(self._chance.randint(1, 3)))
@@ -79,7 +79,7 @@ class OddStreams:
         params = {name: self._chance.choice((0, 1, 5, 0.02, 0.5, None)) for name in names}
         return [0, self._chance.randrange(100, 2**32), self._chance.choice(METHODS), params]
 
-    def _odd_message(self) -> Any:
+    def _malformed_message(self) -> Any:
         message = self._request()
         message[3] = {name: self._chance.choice(VALUES) for name in PARAMS}
         if self.choose(0.3):
@@ -91,14 +91,14 @@ class OddStreams:
     def _mutate(self, data: bytes) -> bytes:
         changed = bytearray(data)
         for _ in range(self._chance.randint(1, 5)):
-            place = self._chance.randrange(len(changed) + 1)
+            index = self._chance.randrange(len(changed) + 1)
             match self._chance.randrange(3):
                 case 0:
-                    changed[place : place + 1] = self._chance.randbytes(1)
+                    changed[index : index + 1] = self._chance.randbytes(1)
                 case 1:
-                    changed[place:place] = self._chance.randbytes(self._chance.randint(1, 4))
+                    changed[index:index] = self._chance.randbytes(self._chance.randint(1, 4))
                 case _:
-                    del changed[place : place + self._chance.randint(1, 4)]
+                    del changed[index : index + self._chance.randint(1, 4)]
         return bytes(changed)
 
     def _truncated(self) -> bytes:

@@ -1,4 +1,4 @@
-"""What a person does with a robot all day, by chance: arms, walks, stops, disarms, clears, and makes it fail."""
+"""A random operator of a robot: arms, walks, stops, disarms, clears, and makes parts of it fail."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.fault_injection.failures import Failures
 
 QUESTIONS = ("status", "strides", "map", "check", "hello", "failures")
 DEPTHS_M = (0.02, 0.03, 0.04, 0.05)
-UNHARMED = "log"  # what fails there is meant to lose rows
+UNHARMED = "log"  # its failures lose rows on purpose
 
 
 class Call(NamedTuple):
@@ -18,8 +18,8 @@ class Call(NamedTuple):
     params: dict[str, Any]
 
 
-class Attendant:
-    """Owns the chance; the same seed does the same."""
+class RandomOperator:
+    """Owns the random numbers; the same seed gives the same calls."""
 
     def __init__(self, buses: Sequence[str], seed: int) -> None:
         self.chance = Random(seed)
@@ -35,8 +35,8 @@ class Attendant:
         for_s = round(self.chance.choice((0.02, 0.1, 0.5, 1.0)) * self.chance.uniform(0.5, 1.5), 3)
         return Call("fail", {"component": component, "kind": kind, "for_s": for_s})
 
-    def wish(self, mode: str, blocked: bool) -> Call:
-        """What the mode lets a person want next; a question where that is nothing."""
+    def next_call(self, mode: str, blocked: bool) -> Call:
+        """Returns the next call that makes sense in this mode, or a question."""
         draw = self.chance.random()
         if mode in ("fault", "damping") or (mode == "idle" and blocked):
             return Call("clear", {})

@@ -1,4 +1,4 @@
-"""What a process holds, as the kernel counts it: resident memory, descriptors, threads, children."""
+"""The resources of a process, as the kernel counts them: resident memory, descriptors, threads, children."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""Whether anything grows in a long operation: an hour in accelerated lockstep, and minutes of the daemon in real time.
+"""A long operation without growth: an hour in accelerated lockstep, and minutes of the daemon in real time.
 
-A robot is operated by chance, fails by chance, and clients come and go; see soaked_loop.py and soaked_daemon.py. After
-the warm-up (the loop keeps its last 200 strides, Python its free lists, up to bounds of their own) resident memory
-must not grow by more than the bar, no descriptor and no thread may be left behind, the logs stay within quota and the
-file that is being written, and of the files that the quota has left no tick is missing. Nothing traces allocations;
-what cyclic garbage has come together is told by a collection at the end.
+A random operator works with the robot, parts of it fail at random, and clients come and go; see soaked_loop.py and
+soaked_daemon.py. After the warm-up (the loop keeps its last 200 strides, Python its free lists, each up to a bound)
+resident memory must not grow by more than the bar, every descriptor and thread must be released, the logs must stay
+within quota plus the file that is being written, and the files that the quota has preserved must contain every tick.
+Nothing traces allocations; a collection at the end counts the cyclic garbage.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SHOWN = 12  # readings in the table
 
 
 def evaluated_part(part: dict[str, Any]) -> dict[str, Any]:
-    """With what grew after the warm-up, and whether the part is sound."""
+    """Adds the growth after the warm-up, and whether the part is sound."""
     after = part["readings"][int(WARM_UP_FRACTION * len(part["readings"])) :]
     growth_kib = after[-1]["resident_kib"] - after[0]["resident_kib"]
     left = {name: after[-1][name] - after[0][name] for name in ("descriptors", "threads", "writer_descriptors")}
@@ -45,7 +45,7 @@ def part_text(name: str, part: dict[str, Any]) -> str:
         table([[key.replace("_", " ") for key in keys], *rows]),
         f"{name}: {part['strides']} strides, {sum(part['faults'].values())} faults of {len(part['faults'])} kinds, "
         f"{asked} requests, {part['refused']} refused",
-        f"grew by {part['growth_kib']:.0f} KiB after the warm-up; left behind: {part['left']}",
+        f"grew by {part['growth_kib']:.0f} KiB after the warm-up; left over: {part['left']}",
         f"{part['dropped']} rows dropped, {part['ticks_missing']} ticks missing in {part['files']} files of "
         f"{part['ticks_in_files']} ticks; {len(part['bugs'])} bugs",
     ]
@@ -61,7 +61,7 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         if seconds > 0.0:
             (folder / name).mkdir()
             parts[name] = evaluated_part(soak(seconds, options.seed, folder / name, Progress(seconds)))
-    bar = f"growth below {BAR_KIB:.0f} KiB, nothing left behind, no row lost, logs within their quota"
+    bar = f"growth below {BAR_KIB:.0f} KiB, nothing left over, no row lost, logs within their quota"
     report = {"seed": options.seed, "bar_kib": BAR_KIB, "parts": list(parts)} | parts
     return evaluated(report, bar, all(part["sound"] for part in parts.values()))
 

@@ -1,7 +1,7 @@
-"""A long operation in real time: the daemon as a process, the simulated robot as another one, and whoever operates it.
+"""A long operation in real time: the daemon as a process, the simulated robot as another one, and random clients.
 
-Clients come and go: most ask and leave, one attends the robot as in lockstep, and now and then something fails on
-purpose. Memory, descriptors and threads are the kernel's word on the daemon and on its log's writer.
+Most clients ask and leave, one operates the robot as in lockstep, and at random times a part fails on purpose. The
+kernel reports memory, descriptors and threads of the daemon and of its log's writer.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 from benchmarks.report import Progress
 from benchmarks.stress.log_kills import start
-from benchmarks.stress.random_operator import Attendant, Call
+from benchmarks.stress.random_operator import Call, RandomOperator
 from benchmarks.stress.resources import children_of
 from benchmarks.stress.soaked_loop import reading_of, rows_of
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
@@ -23,10 +23,10 @@ from simulation.harness.local_setup import write_local_setup
 
 QUOTA_BYTES, SEGMENT_BYTES = 20_000_000, 4_000_000
 ASK_S = 0.1  # between two clients
-WISHES = 10  # clients to one that attends
+CLIENTS_PER_OPERATOR = 10  # clients between two calls of the operator
 FAILURE_FRACTION = 1.0 / 150.0  # of the clients, so every 15 s
 LONGEST_START_S = 60.0
-PATIENCE_LOOKS = 5  # at a joint out of its range, before somebody moves it by hand
+PATIENCE_READINGS = 5  # of a joint out of its range, before it is moved back by hand
 READINGS = 40
 BUSES = ("left", "right")
 
@@ -40,17 +40,17 @@ def write_setup(folder: Path) -> Path:
 
 
 class Client:
-    """Owns what was asked and answered; every call is a connection of its own."""
+    """Owns the calls and their answers; every call has a connection of its own."""
 
     def __init__(self, path: Path, seed: int) -> None:
         self._path = path
-        self.attendant = Attendant(BUSES, seed)
+        self.operator = RandomOperator(BUSES, seed)
         self.asked: Counter[str] = Counter()
         self.faults: Counter[str] = Counter()
         self.refused = self.unanswered = 0
         self.report: dict[str, Any] = {}
         self._standing: set[str] = set()
-        self.helpless = 0  # looks in a row at a joint out of its range
+        self.helpless = 0  # readings in a row with a joint out of its range
 
     def ask(self, call: Call) -> Any:
         self.asked[call.method] += 1
@@ -66,25 +66,25 @@ class Client:
             self.unanswered += 1
         return None
 
-    def look(self) -> None:
+    def read_status(self) -> None:
         self.report = self.ask(Call("status", {})) or self.report
         standing = {fault["name"] for fault in self.report.get("faults", [])}
         self.faults.update(standing - self._standing)
         self._standing = standing
 
-    def attend(self) -> None:
-        self.look()
+    def operate(self) -> None:
+        self.read_status()
         self.helpless = self.helpless + 1 if "joint_position" in self._standing else 0
         blocked = any(fault["blocks_arming"] for fault in self.report["faults"])
-        self.ask(self.attendant.wish(self.report["mode"], blocked))
+        self.ask(self.operator.next_call(self.report["mode"], blocked))
 
     def step(self, number: int) -> None:
-        if self.attendant.chance.random() < FAILURE_FRACTION:
-            self.ask(self.attendant.failure())
-        elif number % WISHES == 0:
-            self.attend()
+        if self.operator.chance.random() < FAILURE_FRACTION:
+            self.ask(self.operator.failure())
+        elif number % CLIENTS_PER_OPERATOR == 0:
+            self.operate()
         else:
-            self.ask(self.attendant.question())
+            self.ask(self.operator.question())
 
 
 def wait_until_idle(path: Path) -> None:
@@ -110,7 +110,7 @@ class Session:
         self.robots = 1
 
     def move_by_hand(self) -> None:
-        """Another robot in place of this one: its joints are where they should be, its drives start anew."""
+        """Replaces the robot by a new one: its joints are in range and its drives start again."""
         self._robot.kill()
         self._robot.wait()
         self._robot = start("simulation.harness.peer", self._configuration)
@@ -129,7 +129,7 @@ def soak_daemon(seconds: float, seed: int, folder: Path, progress: Progress) -> 
     try:
         wait_until_idle(folder / "mudskipper.sock")
         readings = _readings(client, session, seconds, folder / "logs", progress)
-        client.look()
+        client.read_status()
         session.daemon.send_signal(signal.SIGTERM)
         status = session.daemon.wait(LONGEST_START_S)
     finally:
@@ -160,11 +160,11 @@ def _readings(
     while (at_s := time.monotonic() - begin_s) < seconds:
         client.step(number)
         number += 1
-        if client.helpless >= PATIENCE_LOOKS:
+        if client.helpless >= PATIENCE_READINGS:
             session.move_by_hand()
             client.helpless = 0
         if at_s >= seconds * len(readings) / READINGS:
-            time.sleep(ASK_S)  # for the last client to be let go
+            time.sleep(ASK_S)  # until the last client is closed
             progress.show(at_s, "in real time")
             (writer,) = children_of(daemon)[:1]
             readings.append(reading_of(at_s, daemon, writer, logs))

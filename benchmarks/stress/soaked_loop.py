@@ -1,9 +1,9 @@
 """A long operation in lockstep: the loop, its status socket and a real recorder, as fast as they compute.
 
-The robot walks over ever other muds; somebody arms, walks, stops, disarms and clears through the socket, others ask
-and leave, some at once and some without ever reading, and parts of the robot fail at random moments. As in the daemon
-no garbage is collected. The simulated robot and the clients live in the same process, so their memory counts too. The
-recorder is fed as fast as its pipe takes rows, which is many times faster than on a robot.
+The robot walks over a long sequence of muds. A random operator arms, walks, stops, disarms and clears through the
+socket; other clients ask and leave, some at once and some without reading; parts of the robot fail at random times. As
+in the daemon no garbage is collected. The simulated robot and the clients are in the same process, so their memory
+counts too. Rows reach the recorder as fast as its pipe takes them, many times faster than on a robot.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.example_robot import load_example
 from benchmarks.report import Progress
-from benchmarks.stress.random_operator import Attendant, Call
+from benchmarks.stress.random_operator import Call, RandomOperator
 from benchmarks.stress.resources import holding
 from control.modes import Mode
 from control.rate import RATE_HZ
@@ -43,8 +43,8 @@ from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, clay_of_water
 from simulation.mud.track import RandomStrength, Track
 
 LOG = LogParameters(segment_bytes=8_000_000, quota_bytes=40_000_000, min_free_fraction=0.0, rest_hz=0.0)
-WISH_TICKS = 190  # between two wishes of the attendant
-BY_HAND_TICKS = 1900  # between two looks for joints out of their range
+CALL_TICKS = 190  # between two calls of the operator
+BY_HAND_TICKS = 1900  # between two checks for joints out of their range
 FAILURE_S = 15.0  # between two failures, on average
 SEGMENTS, SEGMENT_M = 100, 3.0
 PATIENCE_TICKS = 200  # of a client that waits for an answer
@@ -65,7 +65,7 @@ class PatientRecorder(Recorder):
         self._room.register(self._pipe, select.POLLOUT)
 
     def report(self) -> LogReport:
-        """Without the age of the writer's words, which is of another clock."""
+        """Omits the age of the writer's reports, which has another clock."""
         return super().report()._replace(slowest_write_s=0.0)
 
 
@@ -80,12 +80,12 @@ class Visitor:
             self._connection.send(msgpack.packb([0, number, method, params]))
         self._unpacker = msgpack.Unpacker(raw=False)
         self._waits_for, self._patience = len(calls), PATIENCE_TICKS
-        self._reads = chance.random() > 0.1  # or keeps its connection and never looks
+        self._reads = chance.random() > 0.1  # or keeps its connection and never reads
         self._hurried = chance.random() < 0.05  # and gone before the answer
         self.refused: list[str] = []
 
     def step(self) -> bool:
-        """Whether it is gone."""
+        """Returns whether the client has left."""
         self._patience -= 1
         if self._reads:
             with suppress(BlockingIOError, ConnectionResetError):
@@ -100,12 +100,12 @@ class Visitor:
 
 
 class SoakedLoop:
-    """Owns robot, socket and recorder, and what was seen."""
+    """Owns robot, socket and recorder, and the counts."""
 
     def __init__(self, folder: Path, seed: int) -> None:
         configuration = replace(load_example(), log=LOG)
-        self.attendant = Attendant(list(configuration.bus), seed)
-        self.chance = self.attendant.chance
+        self.operator = RandomOperator(list(configuration.bus), seed)
+        self.chance = self.operator.chance
         self.logs = folder / "logs"
         run = new_run_id("soak")
         metadata = {"robot": "soak", "run_id": run}
@@ -135,7 +135,7 @@ class SoakedLoop:
         return track
 
     def _move_by_hand(self) -> None:
-        """Joints that a fault has thrown out of their range."""
+        """Resets joints that a fault has moved out of their range."""
         for arm in self.robot.robot.plant.arms:
             arm.reset()
         self.moved_by_hand += 1
@@ -155,13 +155,13 @@ class SoakedLoop:
         self.visitors = [visitor for visitor in self.visitors if not self._is_gone(visitor)]
         if self.ticks % BY_HAND_TICKS == 0 and any(fault.name == "joint_position" for fault in loop.faults.present):
             self._move_by_hand()
-        if self.ticks % WISH_TICKS == 0:
-            self._visit(self.attendant.wish(loop.mode.name.lower(), bool(loop.faults.blocking())))
+        if self.ticks % CALL_TICKS == 0:
+            self._visit(self.operator.next_call(loop.mode.name.lower(), bool(loop.faults.blocking())))
         if self.chance.random() < 1.0 / (FAILURE_S * RATE_HZ):
-            self._visit(self.attendant.failure())
+            self._visit(self.operator.failure())
 
     def _visit(self, call: Call) -> None:
-        calls = [call, *(self.attendant.question() for _ in range(self.chance.randrange(3)))]
+        calls = [call, *(self.operator.question() for _ in range(self.chance.randrange(3)))]
         self.visitors.append(Visitor(self.socket.path, calls, self.chance))
         self.visits += 1
         for each in calls:
@@ -174,7 +174,7 @@ class SoakedLoop:
         return gone
 
     def settle(self) -> None:
-        """Until nobody is connected."""
+        """Runs until no client is connected."""
         while self.visitors or self.socket.counters["clients"]:
             self.robot.step()
             self.socket.serve(self.robot.now_s)
@@ -239,7 +239,7 @@ def reading_of(at_s: float, loop: int | str, writer: int, logs: Path) -> dict[st
 
 
 def _garbage() -> dict[str, Any]:
-    """What only a collection would free: cycles that were left behind since collections ended."""
+    """Counts the reference cycles since collections ended, which only a collection frees."""
     gc.set_debug(gc.DEBUG_SAVEALL)
     gc.collect()
     kinds = Counter(type(each).__name__ for each in gc.garbage)
@@ -249,7 +249,7 @@ def _garbage() -> dict[str, Any]:
 
 
 def rows_of(logs: Path) -> dict[str, Any]:
-    """Of the files that the quota has left: their ticks are numbered, and count the missed ones."""
+    """Counts the rows in the files that the quota preserved: ticks are numbered, and count the missed ones."""
     files = log_files(logs, ACTIVE, DONE)
     ticks, missing, not_whole, last = 0, 0, 0, None
     for path in files:

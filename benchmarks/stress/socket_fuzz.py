@@ -1,12 +1,11 @@
-"""Random and mutated byte streams through the status socket of a real loop: does it stand, and does it still answer?
+"""Random and mutated byte streams through the status socket of a real loop: it must survive and still answer.
 
-Each stream has a Unix connection of its own, of an operator, a reader, a stranger or root, fifteen at a time; some
-arrive in pieces, some hang up at once. It begins with valid requests, which must be answered, and goes on with whatever
-benchmarks.stress.malformed_streams makes up. Beside them a witness asks again and again and must be heard within as
-many ticks as
-there are clients, and one more. An exception ends the run. Times are the thread's own, so other programs do not count.
-Memory is that of the whole process with garbage collection off, as in the daemon, read ten times; the growth is that of
-the second half, since the robot behind the socket walks now and then and fills its bounded lists in the first.
+Each stream has a Unix connection of its own, of an operator, a reader, an unauthorised user or root, fifteen at a time;
+some arrive in pieces, some hang up at once. A stream starts with valid requests, which must be answered, and continues
+with bytes from benchmarks.stress.malformed_streams. A reference client next to them asks repeatedly and must be
+answered within one more tick than there are clients. An exception ends the run. Times are the thread's own, so other
+programs do not count. Memory is that of the whole process with garbage collection off, as in the daemon, read ten
+times; the growth is that of the second half, because the walking robot fills its bounded lists in the first.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ import msgpack
 
 from benchmarks.example_robot import load_example
 from benchmarks.report import Progress, evaluated, new_parser, run_benchmark, summary_us
-from benchmarks.stress.malformed_streams import OddStreams, Stream
+from benchmarks.stress.malformed_streams import MalformedStreams, Stream
 from benchmarks.stress.resources import resident_kib
 from control.rate import PERIOD_S
 from firmware_host.computer.realtime import freeze_garbage
@@ -40,10 +39,10 @@ from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 
 BAR_KIB = 1024.0
-AT_ONCE = MOST_CLIENTS - 1  # the witness has the last place
+AT_ONCE = MOST_CLIENTS - 1  # the reference client has the last connection
 LONGEST_WAIT_TICKS = 1 + MOST_CLIENTS
 LONGEST_BATCH_TICKS = 600
-SAMPLES = 100_000  # of durations that are kept
+SAMPLES = 100_000  # of durations that are stored
 RIGHTS = Rights(readers=Group("viewers", 70), operators=Group("pilots", 71), own_uid=1)
 REFERENCE = Peer(400, 2000, frozenset({71}))
 PEERS = (
@@ -55,15 +54,15 @@ PEERS = (
 
 
 class Bench:
-    """Owns the socket, the robot behind it, the time, and what was seen."""
+    """Owns the socket, its robot, the time, and the counts."""
 
     def __init__(self, folder: Path, seed: int) -> None:
-        self.streams = OddStreams(seed)
+        self.streams = MalformedStreams(seed)
         self.robot = Lockstep(load_example(), Track([(1000.0, MUDS["48.5"])]))
         lease = Lease()
         calls = OperatorCalls(self.robot.loop, NullRecorder(), [], lambda: self.now_s)
-        self._coming = [REFERENCE]
-        self.socket = StatusSocket(folder / "s", {}, RIGHTS, lambda connection: self._coming.pop(0))
+        self._next_peers = [REFERENCE]
+        self.socket = StatusSocket(folder / "s", {}, RIGHTS, lambda connection: self._next_peers.pop(0))
         self.socket.methods = self._counted(calls.methods)
         self.socket.on_hang_up = lease.hang_up
         self.bugs: list[str] = []
@@ -96,19 +95,19 @@ class Bench:
     def tick(self) -> None:
         self.now_s += PERIOD_S
         self._calls = 0
-        begin_s = time.thread_time()
+        start_s = time.thread_time()
         self.socket.serve(self.now_s)
-        duration_s = time.thread_time() - begin_s
+        duration_s = time.thread_time() - start_s
         self.durations_s[self.ticks % SAMPLES] = duration_s
         self.longest_s = max(self.longest_s, duration_s)
         self.most_calls_a_tick = max(self.most_calls_a_tick, self._calls)
         self.ticks += 1
 
     def run_batch(self, count: int) -> None:
-        self.robot.step()  # so that it takes in what was asked of it
+        self.robot.step()  # so that it executes the requests
         senders = []
-        for place in range(count):
-            self._coming.append(PEERS[place % len(PEERS)])
+        for number in range(count):
+            self._next_peers.append(PEERS[number % len(PEERS)])
             senders.append(Sender(self._connect(), self.streams.next_stream(), self.streams))
         for _ in range(count):
             self.tick()
@@ -118,12 +117,12 @@ class Bench:
                 break
             self.tick()
         for sender in senders:
-            self._note(sender)
+            self._count(sender)
         while self.socket.counters["clients"] > 1:
             self.tick()
 
     def _ask_reference(self, senders: list[Sender]) -> None:
-        """Amid what the others send."""
+        """Asks as the reference client while the others send."""
         for sender in senders:
             sender.send()
         self.reference.send(msgpack.packb([0, 1, "status", {}]))
@@ -136,10 +135,10 @@ class Bench:
             with suppress(BlockingIOError):
                 answer.feed(self.reference.recv(65536))
             if waited > LONGEST_BATCH_TICKS:
-                raise RuntimeError("the witness is not answered any more")
+                raise RuntimeError("the reference client is not answered any more")
         self.longest_wait_ticks = max(self.longest_wait_ticks, waited)
 
-    def _note(self, sender: Sender) -> None:
+    def _count(self, sender: Sender) -> None:
         self.kinds[sender.stream.kind] += 1
         self.answers += len(sender.answered)
         if not sender.hurried:
@@ -153,9 +152,9 @@ class Bench:
 
 
 class Sender:
-    """Owns one stream on its way, and the numbers that were answered."""
+    """Owns one stream in transit, and the numbers of its answered requests."""
 
-    def __init__(self, client: socket.socket, stream: Stream, streams: OddStreams) -> None:
+    def __init__(self, client: socket.socket, stream: Stream, streams: MalformedStreams) -> None:
         self.client = client
         self.stream = stream
         self.hurried = streams.choose(0.1)  # hangs up as soon as it has sent all
@@ -165,7 +164,7 @@ class Sender:
         self._closed = False
 
     def send(self) -> None:
-        """The next piece."""
+        """Sends the next piece."""
         if not self._pieces:
             return
         with suppress(BrokenPipeError, ConnectionResetError, BlockingIOError):
@@ -175,7 +174,7 @@ class Sender:
             self._closed = True
 
     def is_done(self) -> bool:
-        """All is sent, and each valid request answered, or the connection gone."""
+        """Returns whether all is sent and answered, or the connection closed."""
         self.send()
         if not self._closed:
             self._receive()
@@ -197,16 +196,16 @@ class Sender:
 def fuzz(streams: int, seed: int, folder: Path, progress: Progress) -> dict[str, Any]:
     bench = Bench(folder, seed)
     freeze_garbage()
-    begin_s = time.monotonic()
+    start_s = time.monotonic()
     try:
         readings = _send(bench, streams, progress)
     finally:
         bench.close()
-    kept = min(bench.ticks, SAMPLES)
+    samples = min(bench.ticks, SAMPLES)
     return {
         "streams": streams,
         "seed": seed,
-        "seconds": round(time.monotonic() - begin_s, 1),
+        "seconds": round(time.monotonic() - start_s, 1),
         "kinds": dict(bench.kinds),
         "ticks": bench.ticks,
         "answers": bench.answers,
@@ -216,14 +215,14 @@ def fuzz(streams: int, seed: int, folder: Path, progress: Progress) -> dict[str,
         "counters": bench.socket.counters,
         "most_calls_a_tick": bench.most_calls_a_tick,
         "longest_wait_ticks": bench.longest_wait_ticks,
-        "serve_us": summary_us(bench.durations_s[:kept]) | {"longest": round(1e6 * bench.longest_s, 1)},
+        "serve_us": summary_us(bench.durations_s[:samples]) | {"longest": round(1e6 * bench.longest_s, 1)},
         "readings": readings,
         "growth_kib": readings[-1]["resident_kib"] - readings[len(readings) // 2]["resident_kib"],
     }
 
 
 def _send(bench: Bench, streams: int, progress: Progress) -> list[dict[str, float]]:
-    """The memory that the process holds, ten times on the way."""
+    """Sends all streams; returns ten readings of the process's memory."""
     sent, readings = 0, list[dict[str, float]]()
     while sent < streams:
         count = min(AT_ONCE, streams - sent)
@@ -251,7 +250,7 @@ def text_of(report: dict[str, Any]) -> str:
     lines = [
         f"{report['streams']} streams in {report['seconds']:g} s: {kinds}",
         f"{report['answers']} answers; of {report['valid_requests']} valid requests {report['unanswered']} unanswered",
-        f"{report['most_calls_a_tick']} request a tick at most; the witness waited {report['longest_wait_ticks']}",
+        f"{report['most_calls_a_tick']} a tick at most; the reference client waited {report['longest_wait_ticks']}",
         f"a tick's service {us['median']:.0f} us median, {us['p99']:.0f} p99, {us['longest']:.0f} longest",
         f"memory grew by {report['growth_kib']:.0f} KiB in the second half; {len(report['bugs'])} bugs",
     ]

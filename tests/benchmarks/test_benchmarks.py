@@ -92,7 +92,7 @@ def test_loop_jitter() -> None:
     assert set(report["gil"]) == {"5 ms", "0.1 ms"}
     for loop in (report["loop"], report["bare"]):
         assert set(loop["late_us"]) == {"p50", "p99", "p99.9", "max"}
-        assert loop["beats"] > 0
+        assert loop["ticks"] > 0
         assert loop["missed"] >= 0
     assert report.keys() >= {"warnings", "faults", "dropped_rows", "bar_ratio"}
 
@@ -157,14 +157,14 @@ def test_daemon_kills() -> None:
     assert [made["signal"] for made in report["rounds"]] == ["SIGKILL", "SIGSTOP"]
     for made in report["rounds"]:
         assert (made["phase"], made["idle"], made["moved_again"]) == ("insertion", True, False)
-    assert report.keys() >= {"longest_s", "watchdog_s", "spoiled"}
+    assert report.keys() >= {"longest_s", "watchdog_s", "invalid_walks"}
 
 
 def test_configuration_fuzz() -> None:
     report = report_of("configuration_fuzz", "--configurations", "90")
     assert report["first_bugs"] == []
     assert sum(report["kinds"].values()) == report["configurations"] == 90
-    assert 0.2 < report["accepted_share"] < 0.6
+    assert 0.2 < report["accepted_fraction"] < 0.6
     assert report["tried"]["walked"] > 0
 
 
@@ -218,7 +218,7 @@ def test_estimator_cost(estimator_cost: dict[str, Any]) -> None:
         assert set(figures["sample_us"]) == set(figures["close_us"]) == set(figures["samples"]) == phases
         assert figures.keys() >= {"sample_mean_us", "close_total_us"}
     assert report["methods"]["default"]["k_n_cm3"] == pytest.approx({"k_p": 1.0, "k_s": 0.6, "k_e": 0.7}, rel=0.1)
-    assert 0.0 < report["repeats"]["share"] < 1.0
+    assert 0.0 < report["repeats"]["fraction"] < 1.0
     assert report["memory"].keys() == {"strides", "held_bytes", "peak_bytes", "growth_bytes"}
     assert report.keys() >= {"stroke_us", "bar_sample_us", "bar_close_us"}
 

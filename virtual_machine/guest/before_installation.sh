@@ -1,5 +1,5 @@
-# The system is a folder and does not run: units are enabled and not started, and who is asked to look again need not,
-# since the first boot looks at everything.
+# The system is a folder and does not run: units are enabled and not started, and commands that make a running system
+# reload do nothing, since the first boot loads everything.
 for asker in udevadm networkctl ip; do
     ln -s /bin/true "/usr/local/bin/$asker"
 done
