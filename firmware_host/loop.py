@@ -3,7 +3,7 @@
 `Loop.tick` is the whole control path and reads in the order in which it happens. The same object runs in the daemon,
 in simulation and in tests, with the drives, the pose source and the recorder that it is given. It owns the mode, the
 present faults and the last command. Its parts are public for the daemon and for fault injection; everything that only
-reads takes a `snapshot`.
+reads takes a snapshot (loop_snapshot.py).
 """
 
 from __future__ import annotations
@@ -11,11 +11,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 
-from control.controller import ALL_TRUSTED, RESTING, Controller, WalkOrder
-from control.depth.gait_choice import quickest
+from control.controller import ALL_TRUSTED, RESTING, WalkOrder
 from control.fault_latch import FaultLatch
 from control.faults import Fault, Reaction
-from control.gait.recovery import Recovery
 from control.limits import LimitedTorques, apply_limits
 from control.modes import ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
 from control.rate import PERIOD_S
@@ -33,12 +31,12 @@ from control.records import (
 from drivers.drive import Drives
 from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.control_setup import make_controller
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
 from firmware_host.log.recorder import Recording
 from firmware_host.log.row_packing import TickRecord, stride_row, tick_row
 from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
 from firmware_host.loop_events import LoopEvents, ModeChange
-from firmware_host.loop_snapshot import FrameCounts, LoopSnapshot, PresentFault, bus_reports
 from firmware_host.loop_timing import LoopTiming
 from firmware_host.mud_learning import MudLearning
 from firmware_host.operator.fault_texts import fault_message, refusal_text
@@ -98,7 +96,8 @@ class Loop:
         self.learning.update(now_s, self.target.phase, self.states, self.body)
         self._adapt_gait(now_s)
         self.health = self._examine(tick, self._end_lost_lease(now_s))
-        self._change_mode(next_mode(self.mode, self._pop_request(), self.health), now_s)
+        self._enter(next_mode(self.mode, self._pop_request(), self.health), now_s)
+        self.forced = self.forced and self.mode in ENERGISED
         self._stop_move_on_fault(now_s)
         wanted = self._control(tick.missed)
         self.sent = self._limit(wanted)
@@ -109,43 +108,6 @@ class Loop:
     def fault(self) -> Fault | None:
         """The worst present fault that is more than a warning."""
         return self.faults.worst if self.faults.reaction >= Reaction.HOLD else None
-
-    def snapshot(self) -> LoopSnapshot:
-        """The state of the loop since its last tick."""
-        faults, learning = self.faults, self.learning
-        return LoopSnapshot(
-            mode=self.mode,
-            forced=self.forced,
-            moving=self.controller.moving,
-            may_be_in_mud=self.controller.cut_short,
-            fault=self.fault,
-            faults=tuple(PresentFault(fault, faults.age_ticks(fault) * self.period_s) for fault in faults.present),
-            blocking=tuple(faults.blocking()),
-            notice=self.events.notice,
-            unlogged_requests=self.events.requests.unlogged,
-            lease_holder=str(self.lease.holder) if self.lease.held else None,
-            phase=self.target.phase,
-            stride=self.target.stride,
-            depth_m=self.controller.gait.commanded_depth_m,
-            states=self.states,
-            drives=self.drives.health,
-            buses=bus_reports(self.drives.ports),
-            frames=FrameCounts(
-                unknown_frames=self.drives.unknown_frames,
-                malformed_frames=self.drives.malformed_frames,
-                refused_commands=self.drives.refused_commands,
-            ),
-            body=self.body,
-            pose=self.pose.report(),
-            sent=self.sent,
-            winding_temperatures_c=self.fault_monitor.winding_temperatures_c,
-            strides=tuple(learning.strides),
-            strides_closed=learning.strides_closed,
-            mud=learning.mud_estimate,
-            rate_hz=self.timing.rate_hz,
-            missed_ticks=self.missed_ticks,
-            log=self.recorder.report(),
-        )
 
     def _adapt_gait(self, now_s: float) -> None:
         """Choose the next stride's depth once a stride, in swing; end an insertion that meets solid mud."""
@@ -212,12 +174,9 @@ class Loop:
         refused = self.ending and request in (Request.ARM, Request.WALK)
         return Request.NONE if refused else request
 
-    def _change_mode(self, mode: Mode, now_s: float) -> None:
-        if mode is not self.mode:
-            self._enter_mode(mode, now_s)
-        self.forced = self.forced and self.mode in ENERGISED
-
-    def _enter_mode(self, mode: Mode, now_s: float) -> None:
+    def _enter(self, mode: Mode, now_s: float) -> None:
+        if mode is self.mode:
+            return
         change = ModeChange(
             before=self.mode,
             after=mode,
@@ -293,8 +252,6 @@ class Loop:
             self.events.report(tick.now_s, self.controller.recovery.events)
         self.timing.update(tick.now_s, tick.late_s, tick.missed, tick_s)
 
-    # requests of operators, between two ticks
-
     def request(
         self, request: Request, now_s: float, order: WalkOrder | None = None, forced: bool = False, by: str = ""
     ) -> str | None:
@@ -311,24 +268,21 @@ class Loop:
             self.drives.clear_errors()
             self._clearing_until_s = now_s + CLEARING_S
         elif request is Request.ARM:
-            self._overrule_faults(now_s, forced)
+            overruled = self.faults.blocking() if forced else []
+            self.events.report_overruled(now_s, overruled)
+            self.forced = bool(overruled)
         if order is not None:
             self.controller.order = order
         if self.pending_request is not Request.DISARM:  # no later request replaces it
             self.pending_request = request
         return None
 
-    def move(self, angles_rad: Mapping[str, float], now_s: float, by: str) -> str | None:
-        """Move joints slowly to these angles while the pose is held, or return why this is refused."""
-        if self.controller.cut_short:
-            return "the flippers may be in the mud: 'mudskipper stop' raises them first"
-        if self.fault:
-            return fault_message(self.fault)
+    def move(self, angles_rad: Mapping[str, float], now_s: float, by: str) -> None:
+        """Move joints slowly to these angles, while the pose is held."""
         path = ", ".join(f"{joint} to {angle_rad:.4f} rad" for joint, angle_rad in angles_rad.items())
         self.events.report(now_s, f"move {path} by {by}")
         self.events.notice = ""
         self.controller.move([angles_rad.get(joint) for joint in JOINTS])
-        return None
 
     def _report_request(self, request: Request, now_s: float, forced: bool, by: str) -> None:
         """Log a request; a stop or disarm that changes nothing is only counted, since every user may send those."""
@@ -336,36 +290,12 @@ class Loop:
         changes = changed or request not in (Request.STOP, Request.DISARM)
         self.events.report_request(now_s, request, forced, by, changes)
 
-    def _overrule_faults(self, now_s: float, forced: bool) -> None:
-        overruled = self.faults.blocking() if forced else []
-        self.events.report_overruled(now_s, overruled)
-        self.forced = bool(overruled)
-
     def _refusal(self, request: Request, order: WalkOrder | None, forced: bool) -> str | None:
         if self.ending and request in (Request.ARM, Request.WALK):
             return "the daemon is ending"
-        if order is not None and not self._reaches(order.depth_m):
+        deepest_m = self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
+        if order is not None and not 0.0 < order.depth_m <= deepest_m:
             return f"depth {order.depth_m:g} m: out of the flippers' reach over the sweep"
         health = self.health._replace(blocking=tuple(self.faults.blocking(forced)))
         refused = refusal(self.mode, request, health)
         return refusal_text(refused) if refused else None
-
-    def _reaches(self, depth_m: float) -> bool:
-        return 0.0 < depth_m <= self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
-
-
-def make_controller(configuration: Configuration) -> Controller:
-    recovery = Recovery(
-        configuration.recovery,
-        configuration.geometry,
-        quickest(configuration.adaptation, configuration.geometry, configuration.gait),
-        configuration.joint_ranges,
-    )
-    return Controller(
-        configuration.gait,
-        configuration.geometry,
-        configuration.gains,
-        configuration.arm,
-        configuration.motion,
-        recovery,
-    )

@@ -7,6 +7,7 @@ robot is moved again.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import inf
 from typing import NamedTuple
 
 from control.faults import Fault
@@ -14,7 +15,6 @@ from control.modes import ENERGISED, Mode, Request
 from firmware_host.log.recorder import Recording
 from firmware_host.log.rows import EVENT, EVENT_KIND
 from firmware_host.operator.fault_texts import fault_advice, fault_message
-from firmware_host.request_events import RequestEvents
 
 
 class ModeChange(NamedTuple):
@@ -23,6 +23,38 @@ class ModeChange(NamedTuple):
     fault: Fault | None  # the worst present fault that is more than a warning
     rested: bool  # the pose was held for the longest permitted time
     flippers_up: bool
+
+
+REQUEST_PERIOD_S = 1.0
+MAX_REQUESTS = 64  # texts to remember; each names its sender
+
+
+class RequestEvents:
+    """Limits the log to requests that change something, and to one a second of the same kind.
+
+    A client may send 200 requests for a stop in a second. Requests that are left out are counted: the next logged
+    request says how many preceded it, and the status gives the total.
+    """
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        self.unlogged = 0  # since the start
+        self._unlogged_before = 0  # since the last request that was logged
+        self._logged_s: dict[str, float] = {}
+
+    def update(self, text: str, changes: bool, now_s: float) -> str:
+        """Return the message for the log, or an empty text."""
+        if not changes or now_s - self._logged_s.get(text, -inf) < REQUEST_PERIOD_S:
+            self.unlogged += 1
+            self._unlogged_before += 1
+            return ""
+        if len(self._logged_s) >= MAX_REQUESTS:
+            self._logged_s.clear()
+        self._logged_s[text] = now_s
+        before, self._unlogged_before = self._unlogged_before, 0
+        return f"{text}; {before} before it changed nothing or were repeated" if before else text
 
 
 class LoopEvents:

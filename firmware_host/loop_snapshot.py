@@ -1,22 +1,23 @@
 """The state of the loop between two ticks, as one immutable record.
 
-`Loop.snapshot` builds it on demand; the status socket, the checks before arming, experiments and tests read it.
+`take_snapshot` builds it on demand; the status socket, the checks before arming, experiments and tests read it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 from control.faults import Fault
 from control.limits import LimitedTorques
 from control.modes import Mode
 from control.mud_estimate import MudEstimate
+from control.rate import PERIOD_S
 from control.records import BodyPose, DriveStates, Joints, Phase
 from drivers.can.can_port import BusState, CanPort
 from drivers.drive import DriveHealth
 from drivers.pose.pose_port import PoseReport
 from firmware_host.log.recorder import LogReport
+from firmware_host.loop import Loop
 from firmware_host.mud_learning import ClosedStride
 
 
@@ -74,15 +75,46 @@ class LoopSnapshot(NamedTuple):
     log: LogReport
 
 
-def bus_reports(ports: Mapping[str, CanPort]) -> tuple[BusReport, ...]:
-    return tuple(
-        BusReport(
-            name=name,
-            state=port.state,
-            last_error=port.last_error,
-            error_frames=port.error_frames,
-            failed_sends=port.failed_sends,
-            lost_frames=port.lost_frames,
-        )
-        for name, port in ports.items()
+def take_snapshot(loop: Loop) -> LoopSnapshot:
+    """The state of the loop since its last tick."""
+    faults, learning, drives = loop.faults, loop.learning, loop.drives
+    return LoopSnapshot(
+        mode=loop.mode,
+        forced=loop.forced,
+        moving=loop.controller.moving,
+        may_be_in_mud=loop.controller.cut_short,
+        fault=loop.fault,
+        faults=tuple(PresentFault(fault, faults.age_ticks(fault) * PERIOD_S) for fault in faults.present),
+        blocking=tuple(faults.blocking()),
+        notice=loop.events.notice,
+        unlogged_requests=loop.events.requests.unlogged,
+        lease_holder=str(loop.lease.holder) if loop.lease.held else None,
+        phase=loop.target.phase,
+        stride=loop.target.stride,
+        depth_m=loop.controller.gait.commanded_depth_m,
+        states=loop.states,
+        drives=drives.health,
+        buses=tuple(_bus_report(name, port) for name, port in drives.ports.items()),
+        frames=FrameCounts(drives.unknown_frames, drives.malformed_frames, drives.refused_commands),
+        body=loop.body,
+        pose=loop.pose.report(),
+        sent=loop.sent,
+        winding_temperatures_c=loop.fault_monitor.winding_temperatures_c,
+        strides=tuple(learning.strides),
+        strides_closed=learning.strides_closed,
+        mud=learning.mud_estimate,
+        rate_hz=loop.timing.rate_hz,
+        missed_ticks=loop.missed_ticks,
+        log=loop.recorder.report(),
+    )
+
+
+def _bus_report(name: str, port: CanPort) -> BusReport:
+    return BusReport(
+        name=name,
+        state=port.state,
+        last_error=port.last_error,
+        error_frames=port.error_frames,
+        failed_sends=port.failed_sends,
+        lost_frames=port.lost_frames,
     )

@@ -16,7 +16,7 @@ from control.records import BodyPose, DriveStates, Estimate, Phase, StrideEstima
 from estimation.mud import MudEstimator, MudReading
 from estimation.mud_map import MapRow
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.depth_methods import adaptation_of, choice_text
+from firmware_host.control_setup import choice_text, make_adaptation
 
 FIRM_TICKS = 3  # of a load that ends an insertion: one odd sample says nothing
 KEPT_STRIDES = 200  # for clients that ask what happened
@@ -41,7 +41,7 @@ class MudLearning:
             configuration.estimation,
             configuration.adaptation.body_drag_n,
         )
-        self.adaptation = adaptation_of(configuration)
+        self.adaptation = make_adaptation(configuration)
         self.reading = MudReading()
         self.strides: list[ClosedStride] = []
         self.strides_closed = 0  # since the start

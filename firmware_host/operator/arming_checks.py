@@ -14,6 +14,7 @@ from control.faults import Blocks, Fault, FaultKind
 from control.records import JOINTS, DriveState
 from drivers.drive import DriveHealth
 from firmware_host.loop import Loop
+from firmware_host.loop_snapshot import take_snapshot
 from firmware_host.operator.fault_texts import fault_message, what_to_do
 from firmware_host.operator.reports import check_item
 
@@ -23,7 +24,7 @@ SIGNALS = ("position", "current", "heartbeat")
 
 def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[dict[str, Any]]:
     """All lines, also those that permit arming."""
-    now = loop.snapshot()
+    now = take_snapshot(loop)
     lines = {"configuration": f"accepted for {loop.configuration.robot.name}"}
     for health, state in zip(now.drives, now.states, strict=True):
         lines |= _drive_lines(health, state)

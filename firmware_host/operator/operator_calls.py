@@ -17,7 +17,7 @@ from control.modes import Mode, Request
 from control.records import JOINTS
 from firmware_host.log.recorder import Recording
 from firmware_host.loop import Loop
-from firmware_host.loop_snapshot import LoopSnapshot
+from firmware_host.loop_snapshot import LoopSnapshot, take_snapshot
 from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.fault_texts import fault_message, what_to_do
@@ -67,7 +67,7 @@ class OperatorCalls:
         return {"name": self._loop.configuration.robot.name, "version": self._version}
 
     def status(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
-        loop, now = self._loop, self._loop.snapshot()
+        loop, now = self._loop, take_snapshot(self._loop)
         shown = now.fault or next(iter(now.blocking), None)
         faults = {present.fault: _fault_report(present.fault, present.age_s) for present in now.faults}
         return {
@@ -109,7 +109,7 @@ class OperatorCalls:
 
     def strides(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
         """The first STRIDES_PER_ANSWER strides from number `since` on, as far back as they are stored."""
-        wanted = [closed for closed in self._loop.learning.strides if closed.number >= params["since"]]
+        wanted = [closed for closed in take_snapshot(self._loop).strides if closed.number >= params["since"]]
         return [
             stride_report(closed.estimate) | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
             for closed in wanted[:STRIDES_PER_ANSWER]
@@ -150,7 +150,12 @@ class OperatorCalls:
                 raise RefusedError(
                     f"{joint} = {degrees(angle_rad):.1f} degrees: must be from {low_deg:.1f} to {high_deg:.1f} degrees"
                 )
-        return _accepted(loop.move(angles_rad, self._clock(), str(caller)))
+        if loop.controller.cut_short:
+            raise RefusedError("the flippers may be in the mud: 'mudskipper stop' raises them first")
+        if loop.fault:
+            raise RefusedError(fault_message(loop.fault))
+        loop.move(angles_rad, self._clock(), str(caller))
+        return "accepted"
 
     def lease(self, params: dict[str, Any], caller: Caller) -> str:
         return self._renew_lease(caller, params["for_s"])
