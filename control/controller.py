@@ -1,7 +1,7 @@
-"""From a mode to the torques that it wants: hold a pose, walk, raise the flippers, or only brake the joints.
+"""The controller turns a mode into wanted torques: hold a pose, walk, raise the flippers, or brake the joints.
 
-Owns the gait, the recovery of stuck flippers, and the paths into and out of the gait. Modes without torque want none;
-what leaves for the drives is decided by the limits, not here.
+It owns the gait, the recovery of stuck flippers, and the paths into and out of the gait. In modes without torque it
+wants none. The limits decide which torques leave for the drives (control/limits.py).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from control.records import (
 
 @dataclass(frozen=True)
 class MotionParameters:
-    """Of everything that is not the gait."""
+    """Parameters of motions outside the gait."""
 
     path_speed_rad_s: Annotated[
         float, Bounds(0.05, 10.0), Meaning("of joints that move to a pose outside of the gait")
@@ -52,12 +52,12 @@ class MotionParameters:
 
 
 UP_RAD = 0.12  # from level: the edge of a 12 cm arm is then 1.4 cm lower, still out of the mud
-RAISING_S = 1.0  # to wait for flippers that the mud holds
-SOFT_STOP_S = 3.0  # for raising them altogether
-DAMPING_S = 3.0  # longest, for joints that do not come to rest
-SETTLED_S = 0.3  # that all joints have to rest
-SETTLED_RAD = 0.02  # and stay where they are to within
-DAMPING_NM = 0.4  # at most, of each joint: half of what the motors may do
+RAISING_S = 1.0  # longest wait for flippers that are stuck in the mud
+SOFT_STOP_S = 3.0  # longest duration of a soft stop
+DAMPING_S = 3.0  # longest damping, for joints that do not come to rest
+SETTLED_S = 0.3  # rest of all joints after which damping ends
+SETTLED_RAD = 0.02  # motion that still counts as rest
+DAMPING_NM = 0.4  # largest damping torque of a joint: half of the motors' limit
 ALL_TRUSTED = same_for_all(True)
 
 
@@ -65,9 +65,9 @@ HoldLaw = Callable[[Torques, DriveStates], Torques]  # from the torques that hol
 
 
 class WalkOrder(NamedTuple):
-    depth_m: float  # of every stride, or of the first one if adaptive
+    depth_m: float  # of every stride; of the first one if adaptive
     adaptive: bool = True
-    strides: int = 0  # 0: until told to stop
+    strides: int = 0  # 0: until a stop is requested
 
 
 def measured_angles(states: DriveStates) -> JointAngles:
@@ -114,36 +114,36 @@ class Controller:
 
     @property
     def walk_finished(self) -> bool:
-        """The strides of the order are done."""
+        """All ordered strides are complete."""
         return 0 < self.order.strides <= self.target.stride
 
     @property
     def raised(self) -> bool:
-        """The flippers are up at the end of a walk, or would be by now if the mud let them."""
+        """The flippers are up at the end of a walk, or the wait for them is over."""
         waited = self._waited_s > RAISING_S or self._since_s > SOFT_STOP_S
         return self._mode is Mode.STOPPING and (self._up or waited)
 
     @property
     def settled(self) -> bool:
-        """Damped joints have come to rest, or do not mean to."""
+        """Damped joints are at rest, or the longest damping is over."""
         return self._mode is Mode.DAMPING and (self._resting_s > SETTLED_S or self._since_s > DAMPING_S)
 
     @property
     def rested(self) -> bool:
-        """The pose was held for so long that nobody seems to need it."""
+        """The pose was held for the configured longest time without a request."""
         return self._mode is Mode.HOLD and 0.0 < self.motion.longest_hold_s < self._since_s
 
     @property
     def moving(self) -> bool:
-        """On the way to a pose that was asked for."""
+        """The joints move to a requested pose."""
         return self._move is not None
 
     def end_move(self) -> None:
-        """Joints on their way stay where they are."""
+        """Stop a move; the joints hold their present targets."""
         self._move = None
 
     def move(self, angles: Sequence[float | None]) -> None:
-        """In hold, take these joints slowly there, in the order of JOINTS; None: where it is held."""
+        """Move the joints slowly to these angles, in the order of JOINTS; None leaves a joint at its held angle."""
         held = self._pose.map(lambda target: target.angle_rad)
         there = Joints(*(angle if angle is not None else here for angle, here in zip(angles, held, strict=True)))
         self.follow_path([there], self.motion.path_speed_rad_s)
@@ -158,7 +158,7 @@ class Controller:
 
     @property
     def fault(self) -> Fault | None:
-        """The mud keeps a flipper, whatever was tried."""
+        """The fault of flippers that every attempt of the recovery left stuck."""
         held = self.recovery.given_up
         return _held_by_the_mud(held, self.recovery.parameters.attempts) if held else None
 
@@ -173,10 +173,10 @@ class Controller:
         trusted: Joints[bool] = ALL_TRUSTED,
         elapsed_s: float = 0.0,
     ) -> Torques:
-        """Torques wanted of the four joints; `target` then says where in the stride they belong to.
+        """Return the wanted torques; `target` then holds the gait's target that they belong to.
 
-        Joints whose encoder is not `trusted` are not damped: their speed may be made up. `elapsed_s`, where it is more
-        than `dt_s`, is the time that has really passed; paths and gait do not hurry after a gap.
+        Joints whose encoder is not `trusted` are not damped, because their speed may be wrong. `elapsed_s` is the time
+        since the last step if that is more than `dt_s`; paths and gait do not catch up after a gap.
         """
         if mode is not self._mode:
             self._enter(mode, states)
@@ -222,7 +222,7 @@ class Controller:
         self._mode = mode
 
     def _raised(self, angles: JointAngles) -> JointAngles:
-        """Arms level: the lower edge clears the mud by H - h."""
+        """Return the pose with level arms, in which the lower edge is H - h above the mud."""
         return angles._replace(left_adduction=0.0, right_adduction=0.0)
 
     def _path_to_start(self, here: JointAngles) -> JointPath:
@@ -241,13 +241,13 @@ class Controller:
     def _held_pose(self, dt_s: float) -> JointTargets:
         if self._move is not None:
             self._pose = self._move.step(dt_s)
-            self._since_s = 0.0  # somebody needs it
+            self._since_s = 0.0  # the pose is in use
             if self._move.finished:
                 self._move = None
         return self._pose
 
     def _gait_targets(self, dt_s: float, states: DriveStates) -> JointTargets:
-        """The gait's own, or those that free the flippers for which it waits with the swing."""
+        """Return the gait's targets, or those of the recovery while flippers are stuck before the swing."""
         stuck = self.recovery.stuck(states) if self.gait.swing_is_next else ()
         self.target = self.gait.step(dt_s, may_swing=not stuck)
         waits_for = stuck if self.gait.waits else ()
@@ -257,7 +257,7 @@ class Controller:
         return targets
 
     def _follow(self, target: GaitTarget) -> JointTargets:
-        """The gait's target as joint targets: the same for both flippers."""
+        """Return the joint targets of a gait target, the same for both flippers."""
         sweep = JointTarget(target.sweep_rad, target.sweep_velocity_rad_s)
         angle_rad = self.geometry.adduction_rad(target.sweep_rad, target.depth_m)
         velocity_rad_s = self.geometry.adduction_velocity_rad_s(

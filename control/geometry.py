@@ -7,9 +7,9 @@ the lower edge's middle lies at
     p = R_x(β) · [l sin α, l cos α, -h]
       = (l sin α, l cos α cos β + h sin β, l cos α sin β - h cos β)        x forward, y outward, z up
 
-from the crossing of the axes, which is the height H above the mud. The paper gives this robot without its drop
+from the intersection of the axes, at the height H above the mud. The paper describes this robot without its drop
 (figure 2); with h = 0 its force matrix is rows x and z of J / l². Drop and height are from the authors' controller.
-The published lengths disagree (0.115 m in the paper, 0.120 m in the controller): measure your own.
+The published lengths disagree (0.115 m in the paper, 0.120 m in the controller): measure your robot.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class FlipperGeometry:
         return self.axis_height_m - self.drop_m
 
     def edge_position(self, sweep_rad: float, adduction_rad: float) -> tuple[float, float, float]:
-        """(x, y, z) in metres from the crossing of the axes."""
+        """Return (x, y, z) in metres from the intersection of the axes."""
         l, h = self.flipper_length_m, self.drop_m  # noqa: E741
         sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
         return l * sa, l * ca * cb + h * sb, l * ca * sb - h * cb
@@ -66,14 +66,14 @@ class FlipperGeometry:
         return Jacobian(l * ca, 0.0, -l * sa * cb, h * cb - l * ca * sb, -l * sa * sb, h * sb + l * ca * cb)
 
     def depth_m(self, sweep_rad: float, adduction_rad: float) -> float:
-        """Of the lower edge below the nominal surface: h cos β - l cos α sin β - H."""
+        """Return the depth of the lower edge below the nominal surface: h cos β - l cos α sin β - H."""
         tilted_drop = self.drop_m * cos(adduction_rad)
         return tilted_drop - self.flipper_length_m * cos(sweep_rad) * sin(adduction_rad) - self.axis_height_m
 
     def adduction_rad(self, sweep_rad: float, depth_m: float) -> float:
-        """The adduction angle that puts the lower edge at `depth_m`: the depth law solved for β.
+        """Return the adduction angle with the lower edge at `depth_m`: the depth law solved for β.
 
-        -β = asin((z + H) / √((l cos α)² + h²)) - atan2(h, l cos α). Raises ValueError where the arm does not reach.
+        -β = asin((z + H) / √((l cos α)² + h²)) - atan2(h, l cos α). Raises ValueError if the flipper does not reach.
         """
         reach_m = self.flipper_length_m * cos(sweep_rad)
         radius_m = hypot(reach_m, self.drop_m)
@@ -85,26 +85,27 @@ class FlipperGeometry:
     def adduction_velocity_rad_s(
         self, sweep_rad: float, adduction_rad: float, sweep_velocity_rad_s: float, depth_velocity_m_s: float
     ) -> float:
-        """The depth law differentiated: ż = l sin α sin β · α̇ - (l cos α cos β + h sin β) · β̇."""
+        """Return β̇ from the derivative of the depth law: ż = l sin α sin β · α̇ - (l cos α cos β + h sin β) · β̇."""
         lever_m = self.vertical_lever_m(sweep_rad, adduction_rad)
         sinking_m = self.flipper_length_m * sin(sweep_rad) * sin(adduction_rad)
         return (sinking_m * sweep_velocity_rad_s - depth_velocity_m_s) / lever_m
 
     def vertical_lever_m(self, sweep_rad: float, adduction_rad: float) -> float:
-        """Metres that the lower edge rises per radian of adduction: the lever of a vertical force."""
+        """Return the rise of the lower edge in metres per radian of adduction: the lever of a vertical force."""
         return self.flipper_length_m * cos(sweep_rad) * cos(adduction_rad) + self.drop_m * sin(adduction_rad)
 
     def deepest_m(self, sweep_angle_deg: float) -> float:
-        """The greatest depth that can be held over a sweep of ±`sweep_angle_deg`."""
+        """Return the greatest depth that the flipper can hold over a sweep of ±`sweep_angle_deg`."""
         return self._deepest_at_m(radians(sweep_angle_deg))
 
     def is_reachable(self, sweep_rad: float, depth_m: float) -> bool:
-        """Whether the pose exists and leaves the adduction joint a vertical lever of at least MIN_LEVER_M."""
+        """Return whether the pose exists and leaves the adduction joint a vertical lever of at least MIN_LEVER_M."""
         return abs(depth_m + self.axis_height_m) <= self._deepest_at_m(sweep_rad) + self.axis_height_m
 
     def _deepest_at_m(self, sweep_rad: float) -> float:
-        """Raising and lowering, the edge moves on a circle of radius √((l cos α)² + h²); where the vertical lever is
-        still d, it hangs √(radius² - d²) below the axis.
+        """Return the depth √(r² - d²) - H at which the vertical lever is still d.
+
+        Adduction moves the edge on a circle of radius r = √((l cos α)² + h²).
         """
         radius_m = hypot(self.flipper_length_m * cos(sweep_rad), self.drop_m)
         return sqrt(max(0.0, radius_m * radius_m - MIN_LEVER_M * MIN_LEVER_M)) - self.axis_height_m

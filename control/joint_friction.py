@@ -1,10 +1,10 @@
-"""What a motor's bearings and magnets take of its torque, where a calibration has measured it.
+"""Friction and cogging of a joint's motor, if a calibration has measured them.
 
-Direct-drive motors have little of it (the paper leaves it out), so everything is zero unless configured:
+Direct-drive motors have little of either (the paper neglects both), so everything is zero unless configured:
 
     τ = c tanh(ω / ω₀) + d ω + A sin(n θ + φ)          Coulomb, viscous, cogging
 
-is what the motor spends on itself at the angle θ and the velocity ω. Bounds are those of motors of this size.
+is the torque that the motor loses at the angle θ and the velocity ω. The bounds suit motors of this size.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Annotated
 
 from control.bounds import Bounds, Meaning
 
-SLOW_RAD_S = 0.05  # below it dry friction may point either way
+SLOW_RAD_S = 0.05  # below it the direction of dry friction is uncertain
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Joint PD control with gravity feed-forward: τ = k (θ* - θ) + d (ω* - ω) - τ_gravity(α, β).
 
-The drives run in torque mode, so this law and its limits are all that moves the robot.
+The drives run in torque mode, so only this law and its limits move the robot.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class JointGains:
 
 @dataclass(frozen=True)
 class ArmMass:
-    """Of one flipper arm with all that its adduction joint lifts: a point on the arm, and inertia about the axes."""
+    """Mass and inertia of one flipper arm with all parts that its adduction joint lifts: a point mass on the arm."""
 
     arm_mass_kg: Annotated[float, Bounds(0.0, 20.0), Meaning("everything that one adduction joint lifts")] = 0.08
     center_of_mass_m: Annotated[float, Bounds(0.0, 1.0), Meaning("from the axes, along the arm")] = 0.06
@@ -49,7 +49,7 @@ class ArmMass:
     )
 
     def gravity_torques_nm(self, sweep_rad: float, adduction_rad: float) -> tuple[float, float]:
-        """What gravity does to (sweep, adduction): -∂/∂q of m g r cos α sin β."""
+        """Return gravity's torques on (sweep, adduction): -∂/∂q of m g r cos α sin β."""
         moment_nm = self.arm_mass_kg * GRAVITY_M_S2 * self.center_of_mass_m
         sweep_nm = moment_nm * sin(sweep_rad) * sin(adduction_rad)
         return sweep_nm, -moment_nm * cos(sweep_rad) * cos(adduction_rad)
@@ -64,7 +64,7 @@ def pd_torque_nm(target: JointTarget, state: DriveState, stiffness_nm_rad: float
 def joint_torques_nm(
     targets: JointTargets, states: DriveStates, gains: JointGains, mass: ArmMass, fade: float
 ) -> Torques:
-    """Of all four joints; `fade` goes from 0 to 1 after arming, so that nothing jerks."""
+    """Return the torques of all joints; `fade` rises from 0 to 1 after arming, so that the joints start smoothly."""
     left_sweep, left_adduction, right_sweep, right_adduction = states  # cheaper on every tick than `states.left`
     left = _flipper_torques_nm(targets.left_sweep, targets.left_adduction, left_sweep, left_adduction, gains, mass)
     right = _flipper_torques_nm(targets.right_sweep, targets.right_adduction, right_sweep, right_adduction, gains, mass)
@@ -72,7 +72,7 @@ def joint_torques_nm(
 
 
 def damping_torques_nm(states: DriveStates, gains: JointGains, trusted: Joints[bool], largest_nm: float) -> Torques:
-    """Of four joints that are braked and not held: τ = -d ω, at most `largest_nm`, and none by an untrusted encoder."""
+    """Return braking torques τ = -d ω of at most `largest_nm`, and none for a joint whose encoder is not trusted."""
     dampings = same_for_both(gains.sweep_damping_nm_s_rad, gains.adduction_damping_nm_s_rad)
     return Joints(
         *(

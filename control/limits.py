@@ -1,8 +1,8 @@
 """`apply_limits`, the last pure function before the wire.
 
-Whatever the controller wants, each torque that leaves is finite, within the torque limit, and no more than one slew
-step from the one sent before. Torque that would push a joint past its position limit is cut, near the velocity limit
-and in a hot motor it fades; each as fast as the slew rate lets it. Only what is not a number goes to zero at once.
+Each torque that leaves is finite, within the torque limit, and at most one slew step from the torque sent before.
+Torque that would push a joint past its position limit is cut; near the velocity limit and in a hot motor it fades. The
+slew rate limits these reductions too. Only a torque that is not a number goes to zero at once.
 """
 
 from __future__ import annotations
@@ -54,14 +54,14 @@ class JointRange(NamedTuple):
 
 class LimitedTorques(NamedTuple):
     torques_nm: Torques
-    limited: bool  # not what was wanted, or given up for want of numbers
+    limited: bool  # a torque differs from the wanted one
     finite: bool  # False: a torque was NaN or infinite, which is a bug; all four are zero
 
 
 def limited_torque_nm(
     wanted_nm: float, previous_nm: float, state: DriveState, limits: JointLimits, span: JointRange, dt_s: float
 ) -> float:
-    """One joint's torque, given the one sent `dt_s` ago. A joint whose state is unknown gets none."""
+    """Return the torque of one joint, given the one sent `dt_s` ago. All values must be finite."""
     largest_nm = limits.torque_nm * _cool_fraction(state.temperature_c, limits)
     upward_nm = largest_nm if state.angle_rad < span.max_rad else 0.0
     downward_nm = largest_nm if state.angle_rad > span.min_rad else 0.0
@@ -73,7 +73,7 @@ def limited_torque_nm(
 
 
 def _cool_fraction(temperature_c: float, limits: JointLimits) -> float:
-    """1 when cool, falling to 0 when hot. Drives without a thermistor report NaN or 0, which counts as cool."""
+    """Return 1 for a cool motor, falling to 0 for a hot one. A drive without thermistor reports NaN or 0: cool."""
     if not temperature_c > limits.temperature_warm_c:
         return 1.0
     span_c = max(limits.temperature_hot_c - limits.temperature_warm_c, 1e-9)
@@ -81,7 +81,7 @@ def _cool_fraction(temperature_c: float, limits: JointLimits) -> float:
 
 
 def _slow_fraction(velocity_rad_s: float, limit_rad_s: float) -> float:
-    """1 while slower than the fade, 0 from the limit on: for torque in the direction of `velocity_rad_s`."""
+    """Return 1 below the fade and 0 from the limit on, for torque in the direction of `velocity_rad_s`."""
     if velocity_rad_s <= (1.0 - VELOCITY_FADE) * limit_rad_s:
         return 1.0
     if velocity_rad_s >= limit_rad_s:
@@ -97,7 +97,7 @@ def apply_limits(
     ranges: Joints[JointRange],
     dt_s: float,
 ) -> LimitedTorques:
-    """See the module. Anything that is not a finite number, wanted or measured, turns all four torques to zero."""
+    """Limit the wanted torques. If one torque, angle or velocity is not finite, all four torques are zero."""
     a, b, c, d = (
         limited_torque_nm(wanted, previous, state, limits, span, dt_s)
         if isfinite(wanted) and isfinite(state.angle_rad) and isfinite(state.velocity_rad_s)

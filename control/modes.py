@@ -1,8 +1,8 @@
 """Modes of the robot, and the table of transitions between them.
 
-`next_mode` is a pure function: of the rows that begin in the present mode, the first one whose cause holds counts. A
-fault acts by its reaction alone (faults.py), so a new fault needs no new row. docs/faults.md is drawn from this table.
-Nothing arms by itself: the only way to torque leads over `arm`.
+`next_mode` is a pure function: it applies the first row of the present mode whose cause is true. A fault acts only by
+its reaction (faults.py), so a new fault needs no new row. The documentation's diagram is drawn from this table.
+Nothing arms by itself: torque needs the request `arm`.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from control.faults import Fault, Reaction
 
 
 class Mode(IntEnum):
-    BOOT = 0  # not every drive was heard yet
+    BOOT = 0  # not every drive has sent a message yet
     IDLE = 1  # drives without torque
     ARMING = 2  # drives asked into closed loop, with zero torque
     HOLD = 3  # the measured pose is held
     WALKING = 4
     STOPPING = 5  # flippers are raised out of the mud
     FAULT = 6  # drives without torque until the fault is over
-    DAMPING = 7  # joints are braked but not held, after a fault
+    DAMPING = 7  # after a fault: joints are braked but not held
 
 
 class Request(IntEnum):
@@ -40,15 +40,15 @@ HELD = MOVING - {Mode.DAMPING}  # those with stiffness
 
 
 class Health(NamedTuple):
-    """What the transitions depend on."""
+    """The state of the robot that transitions depend on."""
 
     drives_heard: bool = False
     closed_loop: bool = False  # all four drives
-    walk_finished: bool = False  # the strides asked for are done
+    walk_finished: bool = False  # all ordered strides are complete
     raised: bool = False  # the flippers are up, or the wait for them is over
     settled: bool = False  # damped joints are at rest, or the wait for that is over
-    cut_short: bool = False  # the pose that is held is one out of a walk
-    rested: bool = False  # the pose was held for so long that nobody seems to need it
+    cut_short: bool = False  # the held pose is from the middle of a walk
+    rested: bool = False  # the pose was held for the longest time without a request
     worst: Fault | None = None
     blocking: tuple[Fault, ...] = ()  # against arming
 
@@ -58,7 +58,7 @@ class Health(NamedTuple):
 
 
 class Cause(NamedTuple):
-    """Why a mode is left, in words for the diagram."""
+    """The condition of a transition, with its text for the diagram."""
 
     text: str
     holds: Callable[[Request, Health], bool]
@@ -103,7 +103,7 @@ def _well(health: Health) -> bool:
     return health.drives_heard and not health.blocking and health.reaction < Reaction.HOLD
 
 
-# In each mode the first row whose cause holds counts. A disarm comes before everything that goes on with torque.
+# In each mode the first row whose cause is true applies. A disarm precedes every row that continues with torque.
 TRANSITIONS: tuple[Transition, ...] = (
     Transition(ENERGISED, _at_least(Reaction.DRIVES_IDLE), Mode.FAULT),
     Transition(ENERGISED, _asked(Request.DISARM), Mode.IDLE),
@@ -132,7 +132,7 @@ _ROWS_OF: dict[Mode, tuple[tuple[Callable[[Request, Health], bool], Mode], ...]]
 
 
 def next_mode(mode: Mode, request: Request, health: Health) -> Mode:
-    """The mode of the next tick. A request that does not fit the mode changes nothing: see `refusal`."""
+    """Return the mode of the next tick. A request that the mode does not accept changes nothing: see `refusal`."""
     for holds, target in _ROWS_OF[mode]:
         if holds(request, health):
             return target

@@ -1,20 +1,20 @@
-"""How much of a flipper's plate is in the mud, and with what leverage: the geometry of the coefficients.
+"""The submerged part of a flipper's plate and its moments about the joints: the geometry of the coefficients.
 
-The plate of width b and height hangs under the arm. The point u outward and s up from the middle of its lower edge
-stands at depth
+The plate of width b hangs under the arm. The point u outward and s up from the middle of its lower edge lies at the
+depth
 
     ζ(u, s) = z - u cos α sin β - s cos β         z: depth of the edge's middle
 
-so the mud's plane cuts it along a straight line, and the submerged part is a polygon: between the columns where the
-edge is under, from s = 0 up to s = D(u) / cos β with D(u) = ζ(u, 0), or up to the plate's top where that is under
-too. With D linear in u, the integrals of 1, u, s, ζ, ζu and ζs over it are polynomials in the depths D₁, D₂ of the
-edge's two ends (or of zero, where an end is out), on the width w' between them. With q = cos β and ū its middle:
+so the mud's surface cuts the plate along a straight line, and the submerged part is a polygon: over the submerged
+length of the edge, from s = 0 up to s = D(u) / cos β with D(u) = ζ(u, 0), or up to the plate's top if that is submerged
+too. D is linear in u, so the integrals of 1, u, s, ζ, ζu and ζs over the polygon are polynomials in the depths D₁,
+D₂ of the edge's two ends (zero for an end above the mud) and the width w' between them. With q = cos β, ū the middle:
 
     ∫dA   = w' (D₁ + D₂) / 2q                 ∫ζ dA  = w' (D₁² + D₁D₂ + D₂²) / 6q
     ∫u dA = ū ∫dA + w'² (D₂ - D₁) / 12q       ∫ζu dA = ū ∫ζ dA + w'² (D₂² - D₁²) / 24q
     ∫s dA = w' (D₁² + D₁D₂ + D₂²) / 6q²       ∫ζs dA = w' (D₁ + D₂)(D₁² + D₂²) / 24q²
 
-The part above a submerged top is the same polygon for depths less by the plate's height, and is taken off.
+The part above a submerged top is the same polygon at depths reduced by the plate's height, and is subtracted.
 
 The coefficients are stiffnesses per volume, N/m³, in the paper's sense (section III-B):
 
@@ -22,9 +22,9 @@ The coefficients are stiffnesses per volume, N/m³, in the paper's sense (sectio
     insertion, extraction    F = k V on the submerged volume V = t A,    τ₂ = k Φ      Φ = V cos α √((l+ū)² + (h-s̄)²)
                              against the motion of its centre (ū, s̄)
 
-The root is the way of that centre per radian of adduction, within the plate's plane. (What the face feels across it
-is known from the sweep joint: see `crossing`.) A plate that moves straight down in the same attitude has F_z = k V by
-the same law, so a flipper and a load cell can be compared.
+The root is the path of that centre per radian of adduction, within the plate's plane. (The sweep joint measures the
+load across the face: see `cross_coupling`.) A plate that moves straight down in the same attitude has F_z = k V by
+the same law, so a flipper and a load cell are comparable.
 """
 
 from __future__ import annotations
@@ -52,14 +52,14 @@ DRY = SubmergedPlate(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 def submerged_plate(
     geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, surface_m: float = 0.0
 ) -> SubmergedPlate:
-    """`surface_m`: how far the mud's surface lies below its nominal height."""
+    """Return the integrals in a pose; `surface_m` is the depth of the mud's surface below its nominal height."""
     lean, q = cos(sweep_rad) * sin(adduction_rad), cos(adduction_rad)
     depth_m = geometry.drop_m * q - geometry.flipper_length_m * lean - geometry.axis_height_m - surface_m
     return submerged_part(geometry, depth_m, -lean, q)
 
 
 def submerged_part(geometry: FlipperGeometry, depth_m: float, per_outward: float, per_upward: float) -> SubmergedPlate:
-    """From the depth of the edge's middle and its change outward and (as a loss) upward along the plate."""
+    """Return the integrals from the depth of the edge's middle, its gain outward and its loss upward."""
     below = _below(depth_m, per_outward, per_upward, geometry.plate_width_m)
     top_m = geometry.plate_height_m
     if depth_m + abs(per_outward) * geometry.plate_width_m / 2.0 <= top_m * per_upward:
@@ -76,7 +76,7 @@ def submerged_part(geometry: FlipperGeometry, depth_m: float, per_outward: float
 
 
 def _below(depth_m: float, per_outward: float, q: float, width_m: float) -> SubmergedPlate:
-    """Of a plate without a top."""
+    """Return the integrals of a plate that extends upward without end."""
     half_m = width_m / 2.0
     low_m, high_m = depth_m - per_outward * half_m, depth_m + per_outward * half_m
     inner_m, outer_m = -half_m, half_m
@@ -103,12 +103,12 @@ def _below(depth_m: float, per_outward: float, q: float, width_m: float) -> Subm
 
 
 def stance_moment_m4(geometry: FlipperGeometry, plate: SubmergedPlate) -> float:
-    """Ψ: the sweep torque per unit of k_s."""
+    """Return Ψ, the sweep torque per unit of k_s."""
     return geometry.flipper_length_m * plate.depth_moment_m3 + plate.depth_moment_outward_m4
 
 
 def stroke_moment_m4(geometry: FlipperGeometry, plate: SubmergedPlate, sweep_rad: float) -> float:
-    """Φ: the adduction torque per unit of k_p or k_e."""
+    """Return Φ, the adduction torque per unit of k_p or k_e."""
     if plate.area_m2 <= 0.0:
         return 0.0
     outward_m = geometry.flipper_length_m + plate.area_outward_m3 / plate.area_m2
@@ -118,10 +118,11 @@ def stroke_moment_m4(geometry: FlipperGeometry, plate: SubmergedPlate, sweep_rad
 
 
 def cross_coupling(geometry: FlipperGeometry, plate: SubmergedPlate, sweep_rad: float) -> float:
-    """Adduction torque per sweep torque of a load across the plate's face, -e sin α / (l + u) at its pressure centre.
+    """Return the adduction torque per sweep torque of a load across the plate's face: -e sin α / (l + u).
 
-    Such a load f_n turns the sweep joint by (l + u) f_n and the adduction joint by -e sin α f_n, where e is how far
-    below the arm it acts: what the sweep joint feels in insertion and extraction tells what to take off the other.
+    A load f_n at the pressure centre acts on the sweep joint with (l + u) f_n and on the adduction joint with
+    -e sin α f_n, where e is its distance below the arm. In insertion and extraction the sweep torque therefore gives
+    the part of the adduction torque to subtract.
     """
     stance_m4 = stance_moment_m4(geometry, plate)
     below_m, outward_m = geometry.drop_m, geometry.flipper_length_m

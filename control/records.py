@@ -2,8 +2,8 @@
 
 Everything here is immutable and carries its unit in its name. Angles follow the paper (section II-A): the sweep
 angle is positive with the flipper in front of its joint, the adduction angle is positive with the flipper raised,
-for the left and the right flipper alike; a mirrored motor is turned round where its bytes are decoded. Stamps are
-seconds of the monotonic clock. A value that was never measured is NaN, a stamp that was never set is -inf.
+for the left and the right flipper alike; the driver reverses the sign of a mirrored motor. Stamps are seconds of the
+monotonic clock. A value that was never measured is NaN, a stamp that was never set is -inf.
 """
 
 from __future__ import annotations
@@ -72,9 +72,9 @@ def same_for_both(sweep: T, adduction: T) -> Joints[T]:
 
 
 class Phase(IntEnum):
-    """Where in the stride a flipper is. REST is outside of any stride, PAUSE a still moment between two phases.
+    """The phase of a stride. REST is outside of any stride, PAUSE is a short rest between two phases.
 
-    RECOVERY comes before the swing where the mud holds a flipper on.
+    RECOVERY comes before the swing if a flipper is still stuck in the mud.
     """
 
     REST = 0
@@ -87,7 +87,7 @@ class Phase(IntEnum):
 
 
 class DriveState(NamedTuple):
-    """One joint as its drive last reported it; each signal with the time at which it arrived."""
+    """The newest signals of one drive, each with the time at which it arrived."""
 
     angle_rad: float = UNKNOWN
     velocity_rad_s: float = UNKNOWN
@@ -123,7 +123,7 @@ JointAngles = Joints[float]  # rad
 
 
 class GaitTarget(NamedTuple):
-    """What the gait wants of both flippers at one moment."""
+    """The target of the gait for both flippers in one tick."""
 
     phase: Phase
     stride: int
@@ -134,7 +134,7 @@ class GaitTarget(NamedTuple):
 
 
 class FlipperLoad(NamedTuple):
-    """What the mud does to one flipper: torques about its joints, the force by the paper's map, and the depth."""
+    """The mud's load on one flipper: torques about its joints, the force of the configured map, and the depth."""
 
     sweep_torque_nm: float
     adduction_torque_nm: float
@@ -147,19 +147,19 @@ NO_LOAD = FlipperLoad(UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN)
 
 
 class Estimate(NamedTuple):
-    """One coefficient with its doubt. `reason` says why it is not valid, or why it is only a lower bound."""
+    """One coefficient with its standard error. `reason` says why it is invalid or only a lower bound."""
 
     value: float  # N/m³
     std_error: float  # N/m³
     samples: int  # distinct ones
     valid: bool
     reason: str = ""
-    at_least: bool = False  # the mud did not yield: its coefficient is this or more
+    at_least: bool = False  # the mud did not yield: the value is a lower bound
 
 
 @dataclass(frozen=True, slots=True)
 class StrideEstimate:
-    """All that one flipper learned from one stride."""
+    """The result of one stride of one flipper."""
 
     flipper: str
     index: int
@@ -183,11 +183,11 @@ class StrideEstimate:
     stance: str = "unknown"  # yield, body, mixed, saturated or unknown: whether the mud sheared or the body moved
     tare_n: float = UNKNOWN  # weight of what clings to the flipper
     tare_drift_n: float = UNKNOWN  # since the stride before
-    extraction_torque_nm: float = UNKNOWN  # of the mud on the adduction joint, at the hardest moment of the extraction
+    extraction_torque_nm: float = UNKNOWN  # largest of the mud on the adduction joint during the extraction
 
 
 class BodyPose(NamedTuple):
-    """The body's place along the track, from motion capture or a rail encoder."""
+    """The body's position along the track, from motion capture or a rail encoder."""
 
     stamp_s: float = NEVER_S
     x_m: float = UNKNOWN

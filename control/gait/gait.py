@@ -3,8 +3,8 @@
 Both flippers follow the same target. The edge goes down at the front of the sweep, holds its depth through the
 stance while the flipper sweeps back, comes up at the back and swings forward above the mud. A phase's duration is
 its path length over its speed, as in the authors' controller, so stride times equal theirs; within a phase the
-speed rises and falls as half a cosine, so joint velocities are continuous and zero where phases meet (but for an
-insertion that is ended early, which stops within a tick).
+speed rises and falls as half a cosine, so joint velocities are continuous and zero where phases meet (except for an
+insertion that ends early, which stops within a tick).
 """
 
 from __future__ import annotations
@@ -54,19 +54,19 @@ class PhaseRow(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """A change of the angle at which a swing ends: a path of its own on top, over what is left of the swing."""
+    """A change of the angle at which a swing ends: an additional path over the rest of the swing."""
 
     start_s: float
     span_rad: float
 
     def after(self, time_s: float, duration_s: float) -> tuple[float, float]:
-        """Angle and velocity that it adds to a swing of `duration_s`."""
+        """Return the angle and velocity that it adds to a swing of `duration_s`."""
         fraction, rate = smooth_progress(time_s - self.start_s, duration_s - self.start_s)
         return self.span_rad * fraction, self.span_rad * rate
 
 
 def stride_table(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -> tuple[PhaseRow, ...]:
-    """One stride at `depth_m` below the nominal surface, row by row in time."""
+    """Return the phases of one stride at `depth_m` below the nominal surface, in time order."""
     front = radians(gait.sweep_angle_deg)
     raised_m = -geometry.clearance_m
     travel_m = depth_m - raised_m
@@ -96,7 +96,7 @@ def stride_duration_s(gait: GaitParameters, geometry: FlipperGeometry, depth_m: 
 
 
 def smooth_progress(time_s: float, duration_s: float) -> tuple[float, float]:
-    """Fraction of a path covered after `time_s`, and its rate per second.
+    """Return the fraction of a path covered after `time_s`, and its rate per second.
 
     The rate is u(t) = ½ (1 - cos(π t/r)) · v over the first r seconds, v between, and the mirror image at the end,
     with v = 1 / (T - r) so that the whole path takes T. r is RAMP_S, or half of a shorter path.
@@ -121,10 +121,11 @@ def _first_half(time_s: float, ramp_s: float, rate: float) -> tuple[float, float
 
 
 class Gait:
-    """Owns the place in the stride.
+    """Owns the phase and the time in the stride.
 
-    The depth of the next stride may be set until its insertion begins. Its gait may be set until half of the swing
-    before it is over, since that swing ends where the next stride's sweep begins; later it counts for the one after.
+    The depth of the next stride may be set until its insertion begins. Its gait may be set until half of the preceding
+    swing is over, because that swing ends at the angle where the next stride's sweep begins; after that it applies to
+    the stride after the next one.
     """
 
     def __init__(self, parameters: GaitParameters, geometry: FlipperGeometry) -> None:
@@ -133,14 +134,14 @@ class Gait:
         self.reset(0.0)
 
     def reset(self, depth_m: float) -> None:
-        """Back to the start of stride 0, at `depth_m` and by the gait's own parameters."""
+        """Return to the start of stride 0, at `depth_m` and with the gait's own parameters."""
         self.next_depth_m = depth_m
         self.next_parameters = self._aim = self.parameters
         self.stride = 0
         self._begin_stride()
 
     def _begin_stride(self) -> None:
-        """No deeper than this stride's sweep allows: a gait told late leaves its depth with the one before."""
+        """Begin a stride no deeper than its sweep allows: the depth may have been chosen for another sweep."""
         depth_m = min(self.next_depth_m, self.geometry.deepest_m(self._aim.sweep_angle_deg))
         self._rows = stride_table(self._aim, self.geometry, depth_m)
         self._row = 0
@@ -149,12 +150,12 @@ class Gait:
 
     @property
     def commanded_depth_m(self) -> float:
-        """Of the stride under way."""
+        """The insertion depth of the stride under way."""
         return self._rows[0].depth_end_m
 
     @property
     def swing_is_next(self) -> bool:
-        """After the phase under way, in which the flippers are to come out of the mud."""
+        """The swing follows the phase under way, in which the flippers come out of the mud."""
         return self._row == len(self._rows) - 2
 
     @property
@@ -163,9 +164,9 @@ class Gait:
         return self.swing_is_next and self._time_s >= self._rows[self._row].duration_s
 
     def step(self, dt_s: float, may_swing: bool = True) -> GaitTarget:
-        """Advance by `dt_s`, but not into a swing that may not begin.
+        """Advance by `dt_s`, but not into a swing that may not begin yet.
 
-        Time left over at the end of a phase counts for the next, so strides keep their rate.
+        The time left over at the end of a phase counts for the next one, so the stride rate does not drift.
         """
         if self.next_parameters is not self._aim and self._rows[self._row].phase is Phase.SWING:
             self._turn()
@@ -178,7 +179,7 @@ class Gait:
         return self._target()
 
     def end_insertion(self) -> bool:
-        """The stride goes on at the depth that is commanded now, if that is in the mud. Whether it does."""
+        """End the insertion at the depth commanded now, if that is in the mud; return whether it ended."""
         depth_m = self._target().depth_m
         if self._rows[self._row].phase is not Phase.INSERTION or depth_m <= 0.0:
             return False

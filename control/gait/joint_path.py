@@ -1,7 +1,7 @@
-"""A slow, smooth way from the pose a robot is found in to another one, joint by joint through way-points.
+"""A slow, smooth path in joint space from the measured pose through way-points.
 
-Used to come to the start of a stride and to raise the flippers when a walk ends; no geometry, so it works from any
-pose that the joints can have.
+The controller uses it to reach the start of a stride and to raise the flippers when a walk ends. It needs no geometry,
+so it works from any pose that the joints can have.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ SHORTEST_LEG_S = 0.1
 
 
 class JointPath:
-    """All joints of a leg start and arrive together; the one with the longest way moves at `speed_rad_s` on average."""
+    """All joints of a leg start and arrive together; the joint with the longest path sets the duration."""
 
     def __init__(self, start: JointAngles, way_points: Sequence[JointAngles], speed_rad_s: float) -> None:
         self._points = [start, *way_points]
@@ -48,5 +48,5 @@ class JointPath:
 
 
 def still(angles: JointAngles) -> JointTargets:
-    """Targets that hold a pose."""
+    """Return targets that hold a pose."""
     return angles.map(lambda angle_rad: JointTarget(angle_rad, 0.0))

@@ -1,25 +1,26 @@
-"""Freeing a flipper that the mud still holds when its extraction is over.
+"""Recovery of a flipper that is still stuck in the mud after its extraction.
 
-A stride goes on to swing when the lower edges of both plates are out, by the measured joint angles. One that is late
-gets a short grace under full torque; then it is recovered, or swing would push the body back with the plate in the
-mud (the paper's extraction failure). Each attempt first lets go, so that the mud relaxes, and then lifts from where
-the flipper is while the sweep rocks: at full torque, most of each round one way and the rest of it back.
+A stride continues with its swing when the lower edges of both plates are out, by the measured joint angles. A late
+flipper gets a short grace period at full torque; then it is recovered, because the swing would push the body back with
+the plate in the mud (the paper's extraction failure). Each attempt first releases the torque, so that the mud relaxes,
+and then lifts from the present pose while the sweep rocks: at full torque, most of each period in one direction and the
+rest of it back.
 
-A steady pull at full torque comes to rest where mud, joints and body balance. A torque that is suddenly reversed throws
-the plate against the mud's spring by half beyond that balance, and off the middle (by the sine of the sweep angle) what
-presses on its face lifts as well. Each such peak lifts the plate a little; for it to sink as much again, the mud would
-have to yield the other way. The first attempt goes to the rear, as the stance did, and takes the body along. The later
-ones go away from the middle on the side where the flipper is; there the lever l cos α of what sticks to the plate is
-shorter, too.
+A steady pull at full torque comes to rest where mud, joints and body balance. A torque that reverses suddenly throws
+the plate against the mud's spring by half beyond that balance, and away from the middle of the sweep the load on the
+plate's face has a lifting component too (by the sine of the sweep angle). Each such peak lifts the plate a little; to
+sink by as much, the mud would have to yield in the other direction. The first attempt rocks to the rear, as the stance
+did, and takes the body along. The later ones rock away from the middle on the flipper's side, where the lever l cos α
+of the mud that sticks to the plate is shorter too.
 
-In simulated clay of up to 9 kPa, commanded to between 3 and 5 cm, all came out within 12 s; the body went 8 to 11 cm
-forward meanwhile, and never more than 4 mm back. A steady pull freed nothing from 6 kPa and 5 cm on; rocking at half
-the rate, or as long back as forth, did not free 9 kPa, and with bodies of half or three times the mass some of 7.5 kPa
-and more stayed in. Real mud may differ: nobody has tried it there.
+In simulated clay of up to 9 kPa, at commanded depths of 3 to 5 cm, every flipper came out within 12 s; the body moved
+8 to 11 cm forward meanwhile, and never more than 4 mm back. A steady pull freed no flipper from 6 kPa and 5 cm on;
+rocking at half the rate, or equally long in both directions, did not free 9 kPa, and with bodies of half or three times
+the mass some flippers stayed stuck from 7.5 kPa on. Real mud may differ: nobody has tried it there.
 
-A rocked joint's target stands still before it, so that a plate that comes free is braked. The lift's target leads by no
-more, so that it does not fly. Swing begins where the recovery leaves off, and what separates the two fades out without
-a jump of position or speed.
+The target of a rocked joint leads it at rest, so that a plate that comes free is braked. The target of the lift leads
+by no more, so that the flipper does not fly up. The swing begins where the recovery ends, and the gap between their
+targets fades out without a jump of position or velocity.
 """
 
 from __future__ import annotations
@@ -60,25 +61,25 @@ class RecoveryParameters:
     ] = 8.0
 
 
-def lowest_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> float:
-    """Depth of the plate's lower corner below the nominal surface."""
+def lowest_point_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> float:
+    """Return the depth of the plate's lower corner below the nominal surface."""
     slope = cos(sweep_rad) * sin(adduction_rad)
     return geometry.depth_m(sweep_rad, adduction_rad) + abs(slope) * geometry.plate_width_m / 2.0
 
 
 def is_in_mud(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> bool:
-    return lowest_m(geometry, sweep_rad, adduction_rad) > OUT_M
+    return lowest_point_m(geometry, sweep_rad, adduction_rad) > OUT_M
 
 
 class Gap(NamedTuple):
-    """What separates two targets at one moment, and how long it takes to fade."""
+    """The difference of two targets, and the time over which it fades."""
 
     angle_rad: float
     velocity_rad_s: float
     duration_s: float
 
     def after(self, time_s: float) -> JointTarget:
-        """The cubic e(s) = (1 - s)² (e₀ (1 + 2s) + T e₀' s) with s = t/T: at its end there is no gap and no speed."""
+        """Evaluate e(s) = (1 - s)² (e₀ (1 + 2s) + T e₀' s), s = t/T, which ends at zero with zero velocity."""
         if time_s >= self.duration_s:
             return JointTarget(0.0, 0.0)
         s, run_rad = time_s / self.duration_s, self.velocity_rad_s * self.duration_s
@@ -88,7 +89,7 @@ class Gap(NamedTuple):
 
 
 class Recovery:
-    """Owns the attempts of the stride under way, and what is left of them in its swing."""
+    """Owns the attempts in the stride under way, and the gap that they leave in its swing."""
 
     def __init__(
         self,
@@ -109,13 +110,13 @@ class Recovery:
         self.given_up: Sequence[str] = ()  # flippers that the last attempt has not freed
         self.events = ""  # of this step, for the log
         self._waits = False
-        self._time_s = 0.0  # since the wait, the attempt or the swing after it began
+        self._time_s = 0.0  # since the wait, the attempt or the following swing began
         self._targets: JointTargets = still(same_for_all(0.0))
-        self._way = -1.0  # the way of the sweep: 1 forward, -1 to the rear
+        self._direction = -1.0  # of the rocking sweep: 1 forward, -1 to the rear
         self._gaps: tuple[Gap, ...] = ()
 
     def stuck(self, states: DriveStates) -> tuple[str, ...]:
-        """The flippers in the mud, or none where the gait does not wait for them."""
+        """Return the flippers in the mud; none if the recovery is configured off."""
         if not self.parameters.attempts:
             return ()
         return tuple(
@@ -125,25 +126,25 @@ class Recovery:
         )
 
     def step(self, dt_s: float, stuck: Sequence[str], states: DriveStates, wanted: JointTargets) -> JointTargets:
-        """The gait's targets, or others while it waits for the flippers that are `stuck`."""
+        """Return the gait's targets, or those of an attempt while flippers are `stuck`."""
         self.events = ""
         if self._waits is not bool(stuck):
             self._waits, self._time_s = bool(stuck), 0.0
             if self.attempt:
-                self._leave(wanted)
+                self._end(wanted)
         self._time_s += dt_s
         if not stuck:
             return self._faded(wanted)
         if self._time_s > self._allowed_s:
-            self._begin(stuck, states)
+            self._begin_attempt(stuck, states)
         return self._pull(dt_s, stuck, states) if self.attempt else wanted
 
     @property
     def _allowed_s(self) -> float:
         return self.parameters.pause_s + self.parameters.attempt_s if self.attempt else self.parameters.grace_s
 
-    def _begin(self, stuck: Sequence[str], states: DriveStates) -> None:
-        """The next attempt, from where the flippers are; after the last one, nothing."""
+    def _begin_attempt(self, stuck: Sequence[str], states: DriveStates) -> None:
+        """Begin the next attempt from the present pose; after the last one, give up."""
         if self.attempt == self.parameters.attempts:
             self.given_up = stuck
             return
@@ -152,38 +153,40 @@ class Recovery:
         angles_rad = states.map(lambda state: state.angle_rad)
         self._targets = still(angles_rad)
         positions_rad = {"left": angles_rad.left_sweep, "right": angles_rad.right_sweep}
-        self._way = -1.0 if self.attempt == 1 else copysign(1.0, sum(positions_rad[name] for name in stuck))
+        self._direction = -1.0 if self.attempt == 1 else copysign(1.0, sum(positions_rad[name] for name in stuck))
         self.events = f"{_are_stuck(stuck)}, attempt {self.attempt} of {self.parameters.attempts}"
 
     def _pull(self, dt_s: float, stuck: Sequence[str], states: DriveStates) -> JointTargets:
-        """Lift all flippers and rock the stuck ones, the same way, so that the body is not turned."""
+        """Lift all flippers and rock the stuck ones in the same direction, so that the body does not turn."""
         pulled_s = self._time_s - self.parameters.pause_s
         if pulled_s < 0.0:
             return self._targets
-        way = self._way if pulled_s / self.parameters.rock_s % 1.0 < AWAY_FRACTION else -self._way
+        direction = self._direction if pulled_s / self.parameters.rock_s % 1.0 < AWAY_FRACTION else -self._direction
         speed_rad_s = min(pulled_s / RAMP_S, 1.0) * self.parameters.lift_rad_s
         step_rad, targets = dt_s * speed_rad_s, self._targets
         self._targets = Joints(
-            self._before(way, states.left_sweep.angle_rad) if "left" in stuck else targets.left_sweep,
+            self._ahead(direction, states.left_sweep.angle_rad) if "left" in stuck else targets.left_sweep,
             self._raised(step_rad, dt_s, targets.left_adduction, states.left_adduction.angle_rad),
-            self._before(way, states.right_sweep.angle_rad) if "right" in stuck else targets.right_sweep,
+            self._ahead(direction, states.right_sweep.angle_rad) if "right" in stuck else targets.right_sweep,
             self._raised(step_rad, dt_s, targets.right_adduction, states.right_adduction.angle_rad),
         )
         return self._targets
 
-    def _before(self, way: float, here_rad: float) -> JointTarget:
-        """Full torque, up to the joint's limit."""
-        return JointTarget(_within(here_rad + way * radians(self.parameters.lead_deg), *self._ranges.left_sweep), 0.0)
+    def _ahead(self, direction: float, here_rad: float) -> JointTarget:
+        """Return a target far enough ahead for full torque, within the joint's limits."""
+        return JointTarget(
+            _within(here_rad + direction * radians(self.parameters.lead_deg), *self._ranges.left_sweep), 0.0
+        )
 
     def _raised(self, step_rad: float, dt_s: float, target: JointTarget, here_rad: float) -> JointTarget:
-        """One step on the way to a level arm, close to where the joint is and within its limits."""
+        """Return the next target towards a level arm, close to the joint's angle and within its limits."""
         lead_rad = radians(self.parameters.lead_deg)
         angle_rad = _within(0.0, target.angle_rad - step_rad, target.angle_rad + step_rad)
         angle_rad = _within(_within(angle_rad, here_rad - lead_rad, here_rad + lead_rad), *self._ranges.left_adduction)
         return JointTarget(angle_rad, _within((angle_rad - target.angle_rad) / dt_s, -step_rad / dt_s, step_rad / dt_s))
 
-    def _leave(self, wanted: JointTargets) -> None:
-        """All flippers are out."""
+    def _end(self, wanted: JointTargets) -> None:
+        """End the recovery: all flippers are out."""
         self.events = f"the flippers came out after {self.attempt} attempt{'s' if self.attempt > 1 else ''}"
         self.attempt = 0
         self._gaps = tuple(
@@ -192,7 +195,7 @@ class Recovery:
         )
 
     def _faded(self, wanted: JointTargets) -> JointTargets:
-        """The gait's targets with what is left of the gaps."""
+        """Return the gait's targets plus the rest of the gaps."""
         if not self._gaps:
             return wanted
         rests = [gap.after(self._time_s) for gap in self._gaps]

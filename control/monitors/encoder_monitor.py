@@ -1,10 +1,9 @@
-"""Whether an encoder tells of a joint: positions that jump, and positions that stand still while the joint moves.
+"""Detects an encoder that fails: angles that jump, and angles that freeze while the joint moves.
 
-From one message to the next a joint goes as far as the speeds say that the drive tells with its angles; and what these
-speeds sum up to must be seen in the angle. A magnet that slips or a cable that breaks shows in the first way, a sensor
-that hangs in the second: with a made-up angle the position loop would drive the joint to its stop at full torque. Of a
-sensor that hangs while the joint rests, its speed betrays it: a live one that is not zero does not stay the same to the
-last bit.
+Between two messages the angle must change by the mean of the two reported velocities times the interval, and the angle
+must follow the integral of the velocity. A slipping magnet or a broken cable violates the first condition, a frozen
+sensor the second: on a wrong angle the position loop would drive the joint to its stop at full torque. A sensor that
+freezes while the joint rests shows in the velocity: a live velocity that is not zero does not repeat to the last bit.
 """
 
 from __future__ import annotations
@@ -14,15 +13,15 @@ from math import degrees
 from control.faults import Fault, FaultKind
 from control.records import NEVER_S, UNKNOWN, DriveState
 
-GONE_RAD = 0.03  # by the joint's own speed, while its angle stayed the same to the last bit
-GONE_S = 0.02  # drives tell an old value once more, now and then
-LONGEST_GAP_S = 0.03  # between two messages, over which two speeds say where a joint has gone
-RESTS_RAD_S = 1e-9  # far below any encoder's noise: a speed that has died away may keep its last bit
-FROZEN_S = 0.1  # in which not even the last bit of angle and of a speed that is not zero changes
+MOVED_RAD = 0.03  # integral of the velocity while the angle stays the same to the last bit
+MOVED_S = 0.02  # drives repeat an old value now and then
+LONGEST_GAP_S = 0.03  # between two messages; over more, two velocities do not determine the path
+RESTS_RAD_S = 1e-9  # far below any encoder's noise: a velocity that has decayed may keep its last bit
+FROZEN_S = 0.1  # without a change of even the last bit of angle and non-zero velocity
 
 
 class EncoderMonitor:
-    """Owns the last message, and what the speed has summed up to since the angle last changed."""
+    """Owns the last message, and the integral of the velocity since the angle last changed."""
 
     def __init__(self, joint: str, jump_rad: float) -> None:
         self._joint = joint
@@ -31,44 +30,44 @@ class EncoderMonitor:
 
     def reset(self) -> None:
         self._angle_rad, self._velocity_rad_s, self._stamp_s = UNKNOWN, UNKNOWN, NEVER_S
-        self._begin_count()
+        self._reset_frozen()
 
-    def _begin_count(self) -> None:
-        self._gone_s = self._gone_rad = self._frozen_s = 0.0
+    def _reset_frozen(self) -> None:
+        self._moved_s = self._moved_rad = self._frozen_s = 0.0
 
     def update(self, state: DriveState, dt_s: float) -> Fault | None:
-        """The fault that a new position shows, if any. A stamp may be late by `dt_s`."""
+        """Return the fault that a new angle shows, if any. A stamp may be late by `dt_s`."""
         if state.angle_stamp_s == self._stamp_s:
             return None
         gap_s = max(state.angle_stamp_s - self._stamp_s, 0.0)
         if state.angle_rad == self._angle_rad:
-            fault = self._count(state, gap_s)
+            fault = self._check_frozen(state, gap_s)
         else:
-            fault = self._measure(state, gap_s, dt_s)
-            self._begin_count()
+            fault = self._check_jump(state, gap_s, dt_s)
+            self._reset_frozen()
         self._angle_rad, self._velocity_rad_s, self._stamp_s = (
             state.angle_rad, state.velocity_rad_s, state.angle_stamp_s
         )  # fmt: skip
         return fault
 
-    def _measure(self, state: DriveState, gap_s: float, dt_s: float) -> Fault | None:
-        """By how much the way differs from that of the mean speed, beyond what a late stamp makes of the higher one."""
+    def _check_jump(self, state: DriveState, gap_s: float, dt_s: float) -> Fault | None:
+        """Return a fault if the step differs from the mean velocity's by more than a late stamp explains."""
         if gap_s > LONGEST_GAP_S:  # also that before the first one
             return None
         step_rad = state.angle_rad - self._angle_rad
-        odd_rad = abs(step_rad - (state.velocity_rad_s + self._velocity_rad_s) / 2.0 * gap_s)
+        error_rad = abs(step_rad - (state.velocity_rad_s + self._velocity_rad_s) / 2.0 * gap_s)
         late_rad = max(abs(state.velocity_rad_s), abs(self._velocity_rad_s)) * dt_s
-        if not odd_rad > self._jump_rad + late_rad:
+        if not error_rad > self._jump_rad + late_rad:
             return None
         return FaultKind.ENCODER_JUMP.fault(self._joint, step_deg=degrees(abs(step_rad)), gap_ms=gap_s * 1e3)
 
-    def _count(self, state: DriveState, gap_s: float) -> Fault | None:
-        """With its sign, since a speed at rest is noise about zero."""
-        self._gone_s += gap_s
-        self._gone_rad += state.velocity_rad_s * gap_s
+    def _check_frozen(self, state: DriveState, gap_s: float) -> Fault | None:
+        """Return a fault if the angle is frozen. The integral is signed: a velocity at rest is noise about zero."""
+        self._moved_s += gap_s
+        self._moved_rad += state.velocity_rad_s * gap_s
         frozen = state.velocity_rad_s == self._velocity_rad_s and abs(state.velocity_rad_s) > RESTS_RAD_S
         self._frozen_s = self._frozen_s + gap_s if frozen else 0.0
-        moved = abs(self._gone_rad) > GONE_RAD and self._gone_s > GONE_S
+        moved = abs(self._moved_rad) > MOVED_RAD and self._moved_s > MOVED_S
         if not moved and self._frozen_s <= FROZEN_S:
             return None
         return FaultKind.ENCODER_STUCK.fault(self._joint)

@@ -1,4 +1,4 @@
-"""For how long a joint has stood still, by its angle: its speed is an estimate with noise, also of a joint at rest."""
+"""Measures how long a joint has been still, by its angle: a drive's velocity estimate is noisy even at rest."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from control.records import UNKNOWN
 
 
 class Stillness:
-    """Owns the place at which a joint was last seen to arrive."""
+    """Owns the angle about which a joint rests."""
 
     def __init__(self, band_rad: float) -> None:
         self._band_rad = band_rad
@@ -16,10 +16,10 @@ class Stillness:
 
     def reset(self) -> None:
         self._position_rad = UNKNOWN
-        self.still_s = inf  # within the band about the place; infinite: never seen to leave one
+        self.still_s = inf  # within the band about that angle; infinite until the joint first moves
 
     def update(self, angle_rad: float, dt_s: float) -> bool:
-        """Whether the joint is still where it was, or was seen for the first time."""
+        """Return whether the joint is within its band, or reports its first angle."""
         if abs(angle_rad - self._position_rad) <= self._band_rad:
             self.still_s += dt_s
             return True

@@ -1,13 +1,13 @@
-"""The temperature of a motor's winding, reckoned from its current where no sensor tells it quickly enough.
+"""The temperature of a motor's winding, estimated from its current, because sensors are slow or absent.
 
-One heat capacity that the copper loss warms and the room cools:
+The model is one heat capacity, heated by the copper loss and cooled by the room:
 
     τ dT/dt = R_th P + T_room - T        P = 3/2 R (1 + 0.0039 (T - 25 °C)) i_q²
 
-with i_q the peak of the phase current, as ODrive and moteus tell it; 0.0039 per kelvin is copper's. The resistance is
-the R60's; its thermal resistance is a placeholder in the only public source, and the time constant is an estimate on
-the quick side: measure yours. A sensor that reads higher corrects the model. Neither is believed beyond HOTTEST_C, or
-one absurd message would stand for hours.
+with i_q the peak of the phase current, as ODrive and moteus report it; 0.0039 per kelvin is copper's coefficient. The
+resistance is the R60's; its thermal resistance is a placeholder in the only public source, and the time constant is a
+low estimate: measure your motors. A sensor that reads higher corrects the model. Both are clipped at HOTTEST_C, because
+the model would take hours to cool from one absurd reading.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Winding:
         self.temperature_c = self.parameters.room_c
 
     def update(self, dt_s: float, current_a: float, measured_c: float) -> float:
-        """Without a finite current the last one's heat is left out; the hotter of model and sensor counts."""
+        """Advance the model and return the temperature, the higher of model and sensor; a NaN current adds no heat."""
         parameters, temperature_c = self.parameters, self.temperature_c
         rise_k = 0.0
         if isfinite(current_a):

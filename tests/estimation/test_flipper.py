@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from control.gait.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_duration_s
-from control.gait.recovery import OUT_M, is_in_mud, lowest_m
+from control.gait.recovery import OUT_M, is_in_mud, lowest_point_m
 from control.geometry import FlipperGeometry
 from control.joint_friction import JointFriction
 from control.joint_pd import ArmMass
@@ -662,7 +662,7 @@ def edge_depth_m(lowest_depth_m: float) -> float:
     """Of the edge's middle, at the rear, where the plate's lowest corner is so deep."""
     rear_rad, edge_m = radians(-GAIT.sweep_angle_deg), lowest_depth_m
     for _ in range(20):
-        edge_m += lowest_depth_m - lowest_m(GEOMETRY, rear_rad, GEOMETRY.adduction_rad(rear_rad, edge_m))
+        edge_m += lowest_depth_m - lowest_point_m(GEOMETRY, rear_rad, GEOMETRY.adduction_rad(rear_rad, edge_m))
     return edge_m
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from control.gait.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_duration_s
-from control.gait.recovery import OUT_M, lowest_m
+from control.gait.recovery import OUT_M, lowest_point_m
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.rate import PERIOD_S
@@ -494,7 +494,7 @@ def held_at(samples: Sequence[Sample], lowest_depth_m: float) -> list[Sample]:
         low_rad, high_rad = -1.0, 0.3
         for _ in range(60):
             middle_rad = (low_rad + high_rad) / 2.0
-            deeper = lowest_m(GEOMETRY, sample.sweep_rad, middle_rad) > lowest_depth_m
+            deeper = lowest_point_m(GEOMETRY, sample.sweep_rad, middle_rad) > lowest_depth_m
             low_rad, high_rad = (middle_rad, high_rad) if deeper else (low_rad, middle_rad)
         return sample._replace(adduction_rad=min(sample.adduction_rad, low_rad))
 

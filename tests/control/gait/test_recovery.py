@@ -16,7 +16,7 @@ from control.controller import Controller, MotionParameters, WalkOrder
 from control.faults import FaultKind
 from control.gait.gait import PROTOCOLS, GaitParameters, stride_duration_s
 from control.gait.joint_path import still
-from control.gait.recovery import AWAY_FRACTION, OUT_M, Gap, Recovery, RecoveryParameters, is_in_mud, lowest_m
+from control.gait.recovery import AWAY_FRACTION, OUT_M, Gap, Recovery, RecoveryParameters, is_in_mud, lowest_point_m
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains
 from control.limits import JointRange
@@ -360,7 +360,7 @@ def test_the_plates_are_clear_of_the_mud_soon_after_the_swing_began() -> None:
     robot = MadeUpRobot(until_attempt(2)).walk(9.0)
     swing = [moment for moment in robot.moments if moment.target.phase is Phase.SWING and moment.target.stride == 0]
     for moment in swing[round(0.2 / PERIOD_S) :]:
-        assert lowest_m(GEOMETRY, *moment.angles_rad[:2]) < -0.9 * GEOMETRY.clearance_m
+        assert lowest_point_m(GEOMETRY, *moment.angles_rad[:2]) < -0.9 * GEOMETRY.clearance_m
 
 
 angles = st.floats(-1.0, 1.0)
@@ -394,11 +394,11 @@ def test_the_lowest_point_is_the_deeper_corner(sweep_rad: float, adduction_rad: 
         GEOMETRY.drop_m * cos(adduction_rad) - length_m * cos(sweep_rad) * sin(adduction_rad) - GEOMETRY.axis_height_m
         for length_m in (GEOMETRY.flipper_length_m - 0.0125, GEOMETRY.flipper_length_m + 0.0125)
     ]
-    assert lowest_m(GEOMETRY, sweep_rad, adduction_rad) == pytest.approx(max(ends_m), abs=1e-12)
+    assert lowest_point_m(GEOMETRY, sweep_rad, adduction_rad) == pytest.approx(max(ends_m), abs=1e-12)
 
 
 def test_a_level_flipper_is_out_and_one_at_the_surface_is_not_while_its_corner_is_deeper() -> None:
     assert not is_in_mud(GEOMETRY, REAR_RAD, 0.0)
-    assert lowest_m(GEOMETRY, 0.0, GEOMETRY.adduction_rad(0.0, 0.001)) > OUT_M - 0.001
+    assert lowest_point_m(GEOMETRY, 0.0, GEOMETRY.adduction_rad(0.0, 0.001)) > OUT_M - 0.001
     assert is_in_mud(GEOMETRY, 0.0, GEOMETRY.adduction_rad(0.0, OUT_M))
     assert degrees(GEOMETRY.adduction_rad(0.0, 0.0)) < -5.0

@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from control.monitors.encoder_monitor import FROZEN_S, GONE_RAD, GONE_S, EncoderMonitor
+from control.monitors.encoder_monitor import FROZEN_S, MOVED_RAD, MOVED_S, EncoderMonitor
 from control.rate import PERIOD_S
 from control.records import DriveState
 
@@ -87,7 +87,7 @@ def test_the_same_message_is_judged_once() -> None:
 @pytest.mark.parametrize("velocity_rad_s", [-5.0, -0.5, -1e-3, 1e-6, 0.5, 5.0])
 def test_an_angle_that_hangs_is_told_by_the_way_of_its_speed_or_by_a_speed_without_noise(velocity_rad_s: float) -> None:
     found = reported(hanging(velocity_rad_s, 60))
-    expected_s = min(max(GONE_RAD / abs(velocity_rad_s), GONE_S), FROZEN_S)
+    expected_s = min(max(MOVED_RAD / abs(velocity_rad_s), MOVED_S), FROZEN_S)
     assert {problem for _, problem in found} == {"encoder_stuck"}
     assert found[0][0] * MESSAGE_S == pytest.approx(expected_s, abs=1.5 * MESSAGE_S)
 
