@@ -1,4 +1,4 @@
-"""The person at the bench, for tests: answers as it was told to, and remembers what it was asked and told."""
+"""An operator for tests: gives scripted answers, and records questions and messages."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 
 class ScriptedOperator:
-    """A Person who answers with what is left of `answers`, then with the first answer that there is."""
+    """An Operator with a list of `answers`, and after them the first answer of each question."""
 
     def __init__(self, *answers: str) -> None:
         self.answers = list(answers)

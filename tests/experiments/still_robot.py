@@ -1,4 +1,4 @@
-"""A robot at the bench that is still, for tests: time passes for it, and it records nothing."""
+"""A robot at rest, for tests: time passes for it, and it records nothing."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from pathlib import Path
 
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log_reading.log_reader import Log
-from tests.experiments.made_up_strides import CONFIGURATION
+from tests.experiments.synthetic_strides import CONFIGURATION
 
 
 class StillRobot:
-    """All of a BenchRobot but what it answers, which each test says by a `call` of its own."""
+    """A BenchRobot without its `call`, which each test defines."""
 
     configuration: Configuration = CONFIGURATION
 

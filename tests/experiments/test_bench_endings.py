@@ -106,7 +106,7 @@ def hold_in_stance(robot: InterruptedRobot) -> None:
     assert status["mode"] == "hold" and status["drives"][1]["angle_rad"] < -UP_RAD
 
 
-def test_flippers_that_a_fault_holds_in_the_mud_are_raised_before_the_torque_goes_off(
+def test_flippers_in_the_mud_are_raised_before_the_torque_goes_off_after_a_fault(
     robot: InterruptedRobot, tmp_path: Path
 ) -> None:
     hold_in_stance(robot)
@@ -141,7 +141,7 @@ def test_a_flipper_that_always_sinks_keeps_the_torque_off(robot: InterruptedRobo
 
 
 @pytest.mark.parametrize("ended_by", ["disarm", "stop"])
-def test_torque_that_somebody_ends_as_it_comes_is_not_asked_for_again(robot: InterruptedRobot, ended_by: str) -> None:
+def test_torque_that_was_switched_off_at_once_is_not_asked_for_again(robot: InterruptedRobot, ended_by: str) -> None:
     robot.ended_by = ended_by
     with pytest.raises(BenchError, match=r"the robot is not armed: its torque was switched off\."):
         arm(robot)

@@ -12,7 +12,7 @@ from experiments.robot import daemon_robot
 from experiments.robot.bench_errors import AccessDeniedError, RobotInUseError
 from experiments.robot.daemon_robot import DaemonRobot
 from firmware_host.operator.status_client import CallRefusedError
-from tests.experiments.made_up_strides import make_log, make_ticks
+from tests.experiments.synthetic_strides import make_log, make_ticks
 
 ME = "uid 1 (process 2)"
 LOST = {"name": "lease_lost"}
@@ -72,9 +72,7 @@ def test_who_may_not_read_the_log_is_refused_before_anything_moves_and_leaves_no
 
 @pytest.mark.parametrize("overruled", [False, True])
 @pytest.mark.parametrize("mode", ["arming", "hold", "walking"])
-def test_a_robot_that_somebody_armed_meanwhile_is_left_to_them(
-    daemon: ScriptedDaemon, mode: str, overruled: bool
-) -> None:
+def test_a_robot_that_another_program_armed_is_left_alone(daemon: ScriptedDaemon, mode: str, overruled: bool) -> None:
     """Hands are in the mud, and the question on the screen says that torque is off."""
     robot = DaemonRobot(Path("x"))
     daemon.lapse(mode, [])
@@ -90,7 +88,7 @@ def test_a_robot_that_somebody_armed_meanwhile_is_left_to_them(
 
 
 @pytest.mark.parametrize(("mode", "faults"), [("idle", []), ("fault", []), ("stopping", [LOST]), ("hold", [LOST])])
-def test_a_robot_that_nobody_wanted_meanwhile_is_operated_again(
+def test_an_expired_lease_of_a_free_robot_is_taken_again(
     daemon: ScriptedDaemon, mode: str, faults: list[dict[str, str]]
 ) -> None:
     robot = DaemonRobot(Path("x"))

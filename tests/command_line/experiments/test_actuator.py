@@ -26,7 +26,7 @@ from firmware_host.log.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from tests.command_line.experiments.test_conduct import typed
-from tests.experiments.actuator.test_fit import made_entries
+from tests.experiments.actuator.test_fit import make_entries
 
 SHORT = (
     "experiment",
@@ -91,7 +91,7 @@ def test_what_makes_no_plan_is_bad_usage(options: list[str], capsys: pytest.Capt
     assert options[0] in capsys.readouterr().err
 
 
-def test_without_a_daemon_it_is_told_how_to_start_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_daemon_is_reported_with_how_to_start_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["experiment", "actuator", "--socket", str(tmp_path / "none.sock"), "--out", str(tmp_path)]
     assert main(command) == exit_codes.NO_DAEMON
     assert "no daemon answers" in capsys.readouterr().err
@@ -135,7 +135,7 @@ def read_plan(folder: Path) -> dict[str, object]:
 # the configuration
 
 
-def made_session(folder: Path, messages: list[str]) -> Session:
+def make_session(folder: Path, messages: list[str]) -> Session:
     return Session(folder, AutomaticOperator(messages.append), lambda done, total: None)
 
 
@@ -143,7 +143,7 @@ def test_only_the_file_that_the_daemon_runs_with_is_changed(tmp_path: Path, exam
     path = tmp_path / "other.toml"
     path.write_text(example_text + "# edited\n", encoding="utf-8")
     with pytest.raises(BenchError, match=r"the daemon does not run with .*other.toml"):
-        find_target(path, example_text, made_session(tmp_path, []), simulated=False)
+        find_target(path, example_text, make_session(tmp_path, []), simulated=False)
 
 
 def test_a_file_that_may_not_be_written_is_refused_before_the_work(
@@ -151,20 +151,20 @@ def test_a_file_that_may_not_be_written_is_refused_before_the_work(
 ) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(example_text, encoding="utf-8")
-    assert find_target(path, example_text, made_session(tmp_path, []), simulated=False) == path
+    assert find_target(path, example_text, make_session(tmp_path, []), simulated=False) == path
     monkeypatch.setattr(os, "access", lambda *_: False)
     with pytest.raises(BenchError, match="you may not write"):
-        find_target(path, example_text, made_session(tmp_path, []), simulated=False)
+        find_target(path, example_text, make_session(tmp_path, []), simulated=False)
 
 
-def test_a_doubtful_constant_is_not_written_and_a_good_one_is(tmp_path: Path, example_text: str) -> None:
+def test_an_uncertain_constant_is_not_written_and_a_good_one_is(tmp_path: Path, example_text: str) -> None:
     path, plan, reported = tmp_path / "mudskipper.toml", Plan(("right_sweep",), trials=4), list[str]()
     path.write_text(example_text, encoding="utf-8")
-    doubtful, good = (fit_joint("right_sweep", plan, made_entries(plan, noise_a=noise), 0.083) for noise in (3.0, 0.02))
+    doubtful, good = (fit_joint("right_sweep", plan, make_entries(plan, noise_a=noise), 0.083) for noise in (3.0, 0.02))
     assert doubtful is not None and good is not None
-    assert "needs no change" in apply_fits(path, [doubtful], made_session(tmp_path, reported))[0]
+    assert "needs no change" in apply_fits(path, [doubtful], make_session(tmp_path, reported))[0]
     assert "is not written" in reported[0] and path.read_text(encoding="utf-8") == example_text
-    assert "is changed" in apply_fits(path, [good], made_session(tmp_path, reported))[0]
+    assert "is changed" in apply_fits(path, [good], make_session(tmp_path, reported))[0]
     assert "+torque_constant_nm_a = 0.07" in reported[-1]
     written = load_configuration(path)
     assert written.drive["right_sweep"].torque_constant_nm_a == pytest.approx(0.0719, abs=0.001)
@@ -175,9 +175,9 @@ def test_a_doubtful_constant_is_not_written_and_a_good_one_is(tmp_path: Path, ex
 def test_what_cannot_be_applied_costs_no_report(tmp_path: Path, example_text: str) -> None:
     plan, path = Plan(("right_sweep",), trials=4), tmp_path / "mudskipper.toml"
     path.write_text(example_text, encoding="utf-8")
-    entries = {key: entry | {"current_a": 2.0 * entry["current_a"]} for key, entry in made_entries(plan).items()}
+    entries = {key: entry | {"current_a": 2.0 * entry["current_a"]} for key, entry in make_entries(plan).items()}
     fit = fit_joint("right_sweep", plan, entries, 0.083)
     assert fit is not None
-    message, ending = apply_fits(path, [fit], made_session(tmp_path, []))
+    message, ending = apply_fits(path, [fit], make_session(tmp_path, []))
     assert message.startswith("nothing was applied: the configuration stays as it is")
     assert "current_limit_a" in message and "run the same command again" in message and ending is Ending.REFUSED

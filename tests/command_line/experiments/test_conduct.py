@@ -54,7 +54,7 @@ def test_a_number_is_asked_for_until_it_is_within_its_bounds(monkeypatch: pytest
         assert TerminalPrompt().ask_number("How far?", 1.0, 5.0, nothing) == 2.5
 
 
-def test_the_robot_is_looked_after_while_a_person_thinks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_robot_is_attended_during_a_prompt(monkeypatch: pytest.MonkeyPatch) -> None:
     source, sink = os.pipe()
     looks: list[int] = []
 
@@ -86,7 +86,7 @@ def test_an_enter_that_was_pressed_before_a_question_does_not_answer_it(monkeypa
     assert looks == [1]
 
 
-def test_where_nobody_can_answer_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_end_of_the_input_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     with typed(monkeypatch, ""), pytest.raises(EndedError, match="run this on a terminal"):
         TerminalPrompt().ask("Well?", ANSWERS, nothing)
 
@@ -139,7 +139,7 @@ def test_without_a_folder_it_makes_one_of_its_name(tmp_path: Path, monkeypatch: 
         (KeyboardInterrupt(), exit_codes.INTERRUPTED, "interrupted"),
     ],
 )
-def test_what_was_measured_is_kept_whatever_ends_it(
+def test_measurements_remain_however_the_experiment_ends(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], problem: BaseException, status: int, message: str
 ) -> None:
     def run(session: Session) -> Finding:
@@ -170,7 +170,7 @@ def test_questions_go_where_data_does_not(monkeypatch: pytest.MonkeyPatch, capsy
     assert not said.out and "Well?" in said.err
 
 
-def test_a_disk_that_is_full_is_told_with_how_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_full_disk_is_reported_with_how_to_continue(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def run(session: Session) -> Finding:
         Notebook(session.folder, {}).write("one", {})
         raise OSError(ENOSPC, "No space left on device")
@@ -181,7 +181,7 @@ def test_a_disk_that_is_full_is_told_with_how_to_go_on(tmp_path: Path, capsys: p
     assert "the same command continues from there" in reported
 
 
-def test_another_plan_is_not_told_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_another_plan_is_refused_without_advice_to_continue(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Notebook(tmp_path, {"depth_m": 0.03}).write("one", {})
 
     def run(session: Session) -> Finding:

@@ -50,7 +50,7 @@ def report(folder: Path) -> dict[str, Any]:
     return reported
 
 
-def test_the_true_coefficients_stand_beside_those_of_a_simulated_mud(report: dict[str, Any]) -> None:
+def test_the_measured_coefficients_of_a_simulated_mud_are_the_true_ones(report: dict[str, Any]) -> None:
     (reported,) = report["muds"]
     truth = report["truth"]["48.6"]
     for name in ("k_p", "k_s", "k_e"):
@@ -77,14 +77,14 @@ def test_the_coefficients_are_those_of_the_mud(report: dict[str, Any]) -> None:
     assert all(0.0 < mud[name]["std_error"] < 0.1 * mud[name]["value"] for name in ("k_p", "k_e"))
 
 
-def test_the_flipper_stands_beside_it_where_it_has_a_value(report: dict[str, Any]) -> None:
+def test_the_flipper_is_compared_where_it_has_a_value(report: dict[str, Any]) -> None:
     (row,) = report["compared"]
     (mud,) = report["muds"]
     assert (row["mud"], row["coefficient"]) == ("48.6", "k_p")
     assert row["ratio"] == pytest.approx(1.1e6 / mud["k_p"]["value"])
 
 
-def test_whoever_reads_the_ratio_reads_of_both_plates_and_depths(report: dict[str, Any], folder: Path) -> None:
+def test_the_comparison_names_both_plates_and_depths(report: dict[str, Any], folder: Path) -> None:
     page = (folder / "out" / "report.html").read_text()
     for reported in (
         "3 x 3.5 cm, 4 mm thick, upright",
@@ -95,7 +95,7 @@ def test_whoever_reads_the_ratio_reads_of_both_plates_and_depths(report: dict[st
         assert reported in page
 
 
-def test_what_all_trials_have_alike_is_part_of_the_doubt(report: dict[str, Any]) -> None:
+def test_the_error_contains_the_part_that_all_trials_share(report: dict[str, Any]) -> None:
     (mud,) = report["muds"]
     reported = mud["k_s"]
     assert reported["shared_error"] == pytest.approx(2.0 * 0.5 / 30.0 * reported["value"], rel=0.01)
@@ -156,7 +156,7 @@ def test_an_argument_out_of_bounds_is_refused(arguments: list[str], capsys: pyte
     assert arguments[0] in capsys.readouterr().err
 
 
-def test_a_port_that_there_is_not_ends_with_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_port_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     port = str(tmp_path / "ttyNONE")
     status, _, reported = run(capsys, "experiment", "loadcell", "--port", port, "--out", str(tmp_path / "out"))
     assert status == exit_codes.REFUSED
@@ -182,7 +182,7 @@ def test_muds_are_compared_by_what_their_names_mean() -> None:
     assert compare_muds(None, muds) == []
 
 
-def test_a_simulated_hand_with_an_encoder_finds_the_mud_as_well(
+def test_a_simulated_manual_stage_with_an_encoder_finds_the_mud_as_well(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     status, data, _ = run(capsys, *SHORT, "--position", "--seed", "3", "--out", str(tmp_path / "out"))
@@ -196,9 +196,7 @@ def test_a_simulated_hand_with_an_encoder_finds_the_mud_as_well(
     assert "encoder measured the stage" in page and "known within" in page
 
 
-def test_an_encoder_s_port_that_there_is_not_ends_with_a_sentence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_missing_port_of_an_encoder_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     cell = EmulatedAmplifier(lambda _: 0.0, AmplifierParameters(), tmp_path / "cell")
     ports = ["--port", str(tmp_path / "cell"), "--position", str(tmp_path / "none"), "--position-step", "10"]
     status, _, reported = run(capsys, "experiment", "loadcell", *ports, "--out", str(tmp_path / "out"))

@@ -1,4 +1,4 @@
-"""A weight on an arm that a motor holds: however a calibration ends, it is asked for before the torque goes off."""
+"""The operator is asked to take a weight off before the torque goes off, however a calibration ends."""
 
 from __future__ import annotations
 
@@ -75,14 +75,14 @@ def test_who_presses_ctrl_c_again_has_the_torque_off_at_once(tmp_path: Path) -> 
     assert robot.mode == "idle" and robot.closed
 
 
-def test_of_a_robot_that_holds_nothing_nobody_is_asked(tmp_path: Path) -> None:
+def test_an_idle_robot_makes_no_prompt(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(), ScriptedOperator()
     robot.mode = "idle"
     RobotBench(robot).leave(tmp_path, operator)
     assert not operator.asked and robot.closed
 
 
-def test_a_robot_that_somebody_has_taken_over_is_not_let_go_of(tmp_path: Path) -> None:
+def test_the_torque_of_a_robot_that_was_taken_over_stays_on(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(RobotInUseError("taken over: uid 1")), ScriptedOperator()
     with pytest.raises(RobotInUseError):
         RobotBench(robot).leave(tmp_path, operator)
@@ -90,14 +90,14 @@ def test_a_robot_that_somebody_has_taken_over_is_not_let_go_of(tmp_path: Path) -
     assert operator.reported == ["another program operates the robot now: it is left as it is"]
 
 
-def test_a_daemon_that_is_gone_is_told_once_and_what_the_robot_does_then(tmp_path: Path) -> None:
+def test_a_lost_daemon_is_reported_once(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(DaemonLostError("the daemon is gone")), ScriptedOperator()
     with pytest.raises(DaemonLostError):
         RobotBench(robot).leave(tmp_path, operator)
     assert operator.reported == [ALONE] and not operator.asked
 
 
-def test_that_what_hangs_may_fall_is_told_before_a_joint_is_mounted_on_which_something_will_hang(
+def test_the_operator_is_warned_of_falling_weights_before_a_joint_is_mounted(
     tmp_path: Path,
 ) -> None:
     robot, operator = HoldingRobot(), Impatient()
@@ -107,7 +107,7 @@ def test_that_what_hangs_may_fall_is_told_before_a_joint_is_mounted_on_which_som
     assert operator.reported == [FALLS] and "Mount the robot" in operator.asked[0]
 
 
-def test_a_robot_that_holds_already_lets_go_before_a_joint_is_mounted(tmp_path: Path) -> None:
+def test_torque_goes_off_before_a_joint_is_mounted(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(), Impatient()
     with pytest.raises(KeyboardInterrupt):
         RobotBench(robot).calibrate(PLAN, tmp_path, operator, lambda done, total: None)

@@ -1,4 +1,4 @@
-"""The course of a calibration: what a person may answer, what goes wrong, and how it goes on behind what was read."""
+"""The course of a calibration: the operator's answers, failures, and continuation."""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ def test_there_is_nothing_before_the_first(case: Case) -> None:
     assert len(case.run()) == len(KEYS)
 
 
-def test_an_interrupted_calibration_goes_on_behind_what_was_read(case: Case) -> None:
+def test_an_interrupted_calibration_continues(case: Case) -> None:
     def interrupt() -> str:
         raise KeyboardInterrupt
 
@@ -208,7 +208,7 @@ def test_an_interrupted_calibration_goes_on_behind_what_was_read(case: Case) -> 
     assert case.hand.asked == KEYS[3:] and sorted(entries) == sorted(KEYS)
 
 
-def test_a_daemon_that_is_gone_ends_it_and_loses_nothing(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lost_daemon_ends_the_calibration_and_costs_no_reading(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     def gone(method: str, **params: Any) -> Any:
         raise BenchError("the daemon on /run/x does not answer")
 
@@ -227,7 +227,7 @@ def test_a_daemon_that_is_gone_ends_it_and_loses_nothing(case: Case, monkeypatch
     assert case.hand.asked == KEYS[2:]
 
 
-def test_a_robot_that_lets_go_is_told_of_armed_again_and_the_weight_is_read_anew(case: Case) -> None:
+def test_a_robot_that_lets_go_is_reported_and_armed_and_the_weight_read_again(case: Case) -> None:
     message = "The right_adduction motor has 80 degrees C."
     case.on(Step(1, 400.0), case.letting_go(message))
     entries = case.run()
@@ -239,7 +239,7 @@ def test_a_robot_that_lets_go_is_told_of_armed_again_and_the_weight_is_read_anew
     ]
 
 
-def test_a_person_who_leaves_a_fault_as_it_is_ends_the_calibration(case: Case) -> None:
+def test_a_fault_that_the_operator_leaves_ends_the_calibration(case: Case) -> None:
     case.on(Step(1, 400.0), case.letting_go("The motor is wet."))
     case.operator.answers = [LEAVE]
     with pytest.raises(EndedError, match="the fault remains"):
@@ -247,7 +247,7 @@ def test_a_person_who_leaves_a_fault_as_it_is_ends_the_calibration(case: Case) -
     assert (case.robot.mode, case.robot.armed) == ("fault", 1)
 
 
-def test_a_robot_that_lets_go_while_a_person_thinks_is_told_at_once(case: Case) -> None:
+def test_a_robot_that_lets_go_during_a_prompt_is_reported_at_once(case: Case) -> None:
     def doze() -> str:
         case.robot.mode, case.robot.message = "fault", "The supply is low."
         case.hand.meanwhile()
@@ -259,7 +259,7 @@ def test_a_robot_that_lets_go_while_a_person_thinks_is_told_at_once(case: Case) 
     assert sorted(entries) == sorted(KEYS)
 
 
-def test_a_robot_that_always_lets_go_ends_it_in_its_own_words(case: Case) -> None:
+def test_a_robot_that_always_lets_go_ends_the_calibration_with_its_message(case: Case) -> None:
     case.on(Step(1, 400.0), *[case.letting_go("The encoder is loose.")] * 9)
     with pytest.raises(BenchError, match="The encoder is loose"):
         case.run()
@@ -278,7 +278,7 @@ def test_a_warm_winding_is_waited_for_before_a_weight_and_not_before_a_light_one
     ]
 
 
-def test_a_weight_that_gets_too_hot_while_a_person_thinks_is_to_be_taken_off(case: Case) -> None:
+def test_a_weight_is_taken_off_when_the_winding_gets_warm_during_a_prompt(case: Case) -> None:
     case.robot.winding_c = 69.0
     case.run()
     assert any("a weight would fall soon" in reported for reported in case.operator.reported)
@@ -294,27 +294,27 @@ def test_weights_in_the_wrong_order_are_named_and_may_be_swapped(case: Case) -> 
     assert entries[Step(1, 400.0).key]["current_a"] > entries[Step(1, 200.0).key]["current_a"]
 
 
-def test_what_was_read_already_is_not_replaced_by_a_mistake(case: Case) -> None:
+def test_an_earlier_reading_is_not_replaced_by_a_mistake(case: Case) -> None:
     case.operator.answers = [OTHER]
     case.on(Step(1, 200.0), case.hanging(100.0))
     case.run()
     assert any("100 g of trial 1 was read already" in reported for reported in case.operator.reported)
 
 
-def test_a_reading_that_does_not_fit_is_read_anew_or_kept_as_doubtful(case: Case) -> None:
+def test_a_mismatched_reading_is_repeated_or_kept_as_doubtful(case: Case) -> None:
     case.operator.answers = [GO_ON, KEEP]
     case.on(Step(2, 400.0), case.hanging(0.0), case.hanging(0.0))
     entry = case.run()[Step(2, 400.0).key]
     assert "slip off" in entry["doubt"] and len(case.operator.asked) == 2
 
 
-def test_whoever_only_goes_on_comes_to_an_end(case: Case) -> None:
+def test_pressing_enter_only_comes_to_an_end(case: Case) -> None:
     case.on(Step(2, 400.0), *[case.hanging(0.0)] * 9)
     assert "slip off" in case.run()[Step(2, 400.0).key]["doubt"]
     case.on(Step(2, 400.0))
 
 
-def test_a_trial_that_moved_is_told_and_repeated(case: Case) -> None:
+def test_a_reading_that_moved_is_reported_and_repeated(case: Case) -> None:
     case.on(Step(1, 200.0), case.hanging(-1.0))
     entry = case.run()[Step(1, 200.0).key]
     assert "200 g did not come to rest: the joint swings by 3.00 degrees" in case.operator.asked[0]

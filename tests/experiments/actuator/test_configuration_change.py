@@ -24,7 +24,7 @@ def test_a_value_is_changed_and_nothing_else(example_text: str) -> None:
     assert parse_configuration(after).drive["right_sweep"].torque_constant_nm_a == 0.0721
 
 
-def test_a_new_key_stands_with_its_own_table_above_what_is_said_of_the_next_one() -> None:
+def test_a_new_key_is_in_its_own_table_above_the_comments_of_the_next_one() -> None:
     lines = changed_text(LOCAL, {("drive", "right_adduction", "torque_constant_nm_a"): 0.072}).splitlines()
     place = lines.index("torque_constant_nm_a = 0.072")
     assert lines[place - 1] == "sign = 1" and lines[place + 1 : place + 3] == [
@@ -68,7 +68,7 @@ def test_the_difference_shows_old_and_new(example_text: str) -> None:
     assert shown.startswith("--- mudskipper.toml\n+++ mudskipper.toml, changed")
 
 
-def test_a_file_is_replaced_with_its_rights_and_the_old_one_is_kept(tmp_path: Path, example_text: str) -> None:
+def test_a_file_is_replaced_with_its_permissions_and_the_old_one_remains(tmp_path: Path, example_text: str) -> None:
     path = tmp_path / "mudskipper.toml"
     path.write_text(example_text, encoding="utf-8")
     path.chmod(0o640)
@@ -86,7 +86,7 @@ def test_a_file_is_replaced_with_its_rights_and_the_old_one_is_kept(tmp_path: Pa
     ]
 
 
-def test_what_somebody_else_changed_meanwhile_is_not_overwritten(tmp_path: Path) -> None:
+def test_a_file_that_changed_meanwhile_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "mudskipper.toml"
     path.write_text("theirs = 1\n", encoding="utf-8")
     with pytest.raises(BenchError, match="changed during this experiment"):

@@ -22,7 +22,7 @@ DRY_A, VISCOUS_A_S, REST_A, LESS_A = 0.18, 0.03, 0.15, 0.02
 Entries = dict[str, dict[str, Any]]
 
 
-def made_entries(
+def make_entries(
     plan: Plan = PLAN,
     sign: float = 1.0,
     noise_a: float = 0.02,
@@ -55,7 +55,7 @@ def made_loop(random: Random, quick: bool) -> dict[str, Any]:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_line_is_that_of_an_independent_fit(sign: float) -> None:
-    entries = made_entries(sign=sign)
+    entries = make_entries(sign=sign)
     fit = fit_joint("right_sweep", PLAN, entries, 0.083)
     assert fit is not None and fit.direction == -sign
     x = np.array([load.torque_nm for load in fit.loads])
@@ -69,7 +69,7 @@ def within_two(reported: list[tuple[float, float]]) -> float:
     return sum(abs(wrong) <= 2.0 * error for wrong, error in reported) / len(reported)
 
 
-def test_the_told_errors_hold_what_scatter_lever_weights_and_friction_at_rest_do() -> None:
+def test_the_errors_contain_scatter_lever_weights_and_friction_at_rest() -> None:
     """Each of 400 benches has a lever and weights that are anywhere within their tolerances, and a friction at rest
     that hides anything of what it bears less with a weight."""
     random, plan = Random(4), replace(PLAN, lever_tolerance_m=0.002, weight_tolerance=0.005)
@@ -77,7 +77,7 @@ def test_the_told_errors_hold_what_scatter_lever_weights_and_friction_at_rest_do
     for seed in range(400):
         lever = 1.0 + random.uniform(-1.0, 1.0) * plan.lever_tolerance_m / plan.lever_m
         truth = lever * (1.0 + random.uniform(-1.0, 1.0) * plan.weight_tolerance)
-        entries = made_entries(plan, seed=seed, truth=truth, hidden=random.uniform(-1.0, 1.0))
+        entries = make_entries(plan, seed=seed, truth=truth, hidden=random.uniform(-1.0, 1.0))
         fit = fit_joint("right_sweep", plan, entries, 0.083)
         assert fit is not None
         constants.append((fit.constant_nm_a - TRUE_NM_A, fit.constant_error_nm_a))
@@ -91,7 +91,7 @@ def test_the_told_errors_hold_what_scatter_lever_weights_and_friction_at_rest_do
 
 def test_a_millimetre_of_lever_is_in_the_error_of_the_constant() -> None:
     fits = [
-        fit_joint("right_sweep", replace(PLAN, lever_tolerance_m=lever_m, weight_tolerance=0.0), made_entries(), 0.083)
+        fit_joint("right_sweep", replace(PLAN, lever_tolerance_m=lever_m, weight_tolerance=0.0), make_entries(), 0.083)
         for lever_m in (0.0, 0.001)
     ]
     exact, coarse = (fit.constant_error_nm_a / fit.constant_nm_a for fit in fits if fit)
@@ -100,7 +100,7 @@ def test_a_millimetre_of_lever_is_in_the_error_of_the_constant() -> None:
 
 
 def test_a_wrong_constant_shows_in_the_error_and_the_fitted_one_does_not() -> None:
-    fit = fit_joint("right_sweep", PLAN, made_entries(noise_a=0.0), 0.083)
+    fit = fit_joint("right_sweep", PLAN, make_entries(noise_a=0.0), 0.083)
     assert fit is not None
     x = np.array([load.torque_nm for load in fit.loads])
     assert fit.rmse_configured_nm == pytest.approx(
@@ -112,21 +112,21 @@ def test_a_wrong_constant_shows_in_the_error_and_the_fitted_one_does_not() -> No
 
 
 def test_the_tare_of_a_pass_is_the_mean_of_before_and_after() -> None:
-    entries = made_entries(noise_a=0.0)
+    entries = make_entries(noise_a=0.0)
     entries[Step(0, 0.0).key]["current_a"] += 0.2
     first, later = (load for load in loads_of(PLAN, entries) if load.weight_g == 100.0 and load.trial in (1, 2))
     assert later.current_a - first.current_a == pytest.approx(0.1, abs=1e-4)
 
 
 def test_a_trial_without_any_tare_before_it_is_not_used() -> None:
-    entries = made_entries()
+    entries = make_entries()
     for trial in (0, 1):
         entries[Step(trial, 0.0).key] = {"skipped": "on request"}
     assert {load.trial for load in loads_of(PLAN, entries)} == {2, 3, 4}
 
 
 def test_an_arm_that_may_not_have_been_empty_is_no_tare() -> None:
-    entries = made_entries(noise_a=0.0)
+    entries = make_entries(noise_a=0.0)
     before = loads_of(PLAN, entries)
     entries[Step(1, 0.0).key] |= {"current_a": 3.0, "doubt": "the motor holds 100 g although the arm should be empty"}
     after = loads_of(PLAN, entries)
@@ -136,14 +136,14 @@ def test_an_arm_that_may_not_have_been_empty_is_no_tare() -> None:
 
 
 def test_repeatability_is_the_mean_relative_deviation_over_the_trials() -> None:
-    loads = loads_of(PLAN, made_entries())
+    loads = loads_of(PLAN, make_entries())
     table = np.array([[load.current_a for load in loads if load.weight_g == w] for w in PLAN.weights_g])
     assert repeatability(loads) == pytest.approx(float(np.mean(np.std(table, axis=1, ddof=1) / np.mean(table, axis=1))))
     assert isnan(repeatability(loads[:3]))
 
 
-def test_friction_is_that_of_the_loops_and_carries_the_doubt_of_the_constant() -> None:
-    fit = fit_joint("right_sweep", PLAN, made_entries(), 0.083)
+def test_friction_is_that_of_the_loops_with_the_error_of_the_constant() -> None:
+    fit = fit_joint("right_sweep", PLAN, make_entries(), 0.083)
     assert fit is not None and len(fit.loops) == 4 * (PLAN.trials + 1)
     dry_nm, error_nm = fit.friction_nm
     assert dry_nm == pytest.approx(fit.friction.dry_a * fit.constant_nm_a)
@@ -153,7 +153,7 @@ def test_friction_is_that_of_the_loops_and_carries_the_doubt_of_the_constant() -
 
 
 def test_without_loops_there_is_no_friction() -> None:
-    entries = made_entries()
+    entries = make_entries()
     for entry in entries.values():
         entry.pop("loops", None)
     fit = fit_joint("right_sweep", PLAN, entries, 0.083)
@@ -161,8 +161,8 @@ def test_without_loops_there_is_no_friction() -> None:
     assert fit.offset_error_nm > 0.0
 
 
-def test_what_was_kept_with_a_doubt_is_not_fitted() -> None:
-    entries = made_entries(noise_a=0.0)
+def test_a_reading_kept_as_doubtful_is_not_fitted() -> None:
+    entries = make_entries(noise_a=0.0)
     entries[Step(1, 800.0).key] |= {"current_a": 3.0, "doubt": "the motor holds 180 g"}
     fit = fit_joint("right_sweep", PLAN, entries, 0.083)
     assert fit is not None and fit.line.readings == 31
@@ -170,7 +170,7 @@ def test_what_was_kept_with_a_doubt_is_not_fitted() -> None:
 
 
 def test_one_weight_makes_no_line() -> None:
-    entries = made_entries()
+    entries = make_entries()
     kept = {key: entry for key, entry in entries.items() if key.endswith((", 0 g", ", 100 g"))}
     assert fit_joint("right_sweep", PLAN, kept, 0.083) is None
     assert fit_joint("right_sweep", PLAN, {}, nan) is None
@@ -183,14 +183,14 @@ TORQUES_NM = [0.0011772 * weight_g for weight_g in PAPER_WEIGHTS_G]
 SLOPE, INTERCEPT = 13.9, 0.02
 
 
-def made_currents(x: list[float], random: Random) -> list[float]:
+def make_currents(x: list[float], random: Random) -> list[float]:
     """A hook off its mark errs in proportion to the weight, a reading does not."""
     return [SLOPE * nm * (1.0 + random.gauss(0.0, 0.003)) + INTERCEPT + random.gauss(0.0, 0.02) for nm in x]
 
 
 def test_line_and_errors_are_those_of_statsmodels() -> None:
     x = TORQUES_NM * 5
-    y = made_currents(x, Random(1))
+    y = make_currents(x, Random(1))
     line, oracle = fit_line(x, y), sm.OLS(np.array(y), sm.add_constant(np.array(x))).fit(cov_type="HC3")
     assert (line.intercept_a, line.slope_a_nm) == pytest.approx(tuple(oracle.params), rel=1e-9)
     widened = oracle.bse * student_t.ppf(0.975, 38) / 1.96
@@ -201,7 +201,7 @@ def test_line_and_errors_are_those_of_statsmodels() -> None:
 @pytest.mark.parametrize(("trials", "low"), [(1, 0.9), (2, 0.92), (5, 0.92)])
 def test_two_errors_contain_the_truth_in_nineteen_of_twenty(trials: int, low: float) -> None:
     random, x = Random(2), TORQUES_NM * trials
-    lines = [fit_line(x, made_currents(x, random)) for _ in range(600)]
+    lines = [fit_line(x, make_currents(x, random)) for _ in range(600)]
     assert low < np.mean([abs(line.slope_a_nm - SLOPE) < 2.0 * line.slope_error for line in lines]) < 0.98
     assert low < np.mean([abs(line.intercept_a - INTERCEPT) < 2.0 * line.intercept_error for line in lines]) < 0.99
 

@@ -38,7 +38,7 @@ def weight_magnets_and_inertia(angle_rad: float, acceleration_rad_s2: float) -> 
 
 
 @pytest.mark.parametrize("duration_s", [0.3, 2.0])
-def test_a_loop_tells_friction_and_not_what_is_given_back(duration_s: float) -> None:
+def test_a_loop_shows_friction_and_no_reversible_work(duration_s: float) -> None:
     up, down = (made_stroke(direction, duration_s, weight_magnets_and_inertia) for direction in (1.0, -1.0))
     loop = loop_of(up, down, quick=False)
     speed_rad_s = pi / 4.0 * HALF_RAD * pi / duration_s  # mean over the way, of half a cosine
@@ -46,14 +46,14 @@ def test_a_loop_tells_friction_and_not_what_is_given_back(duration_s: float) -> 
     assert loop.spent_a == pytest.approx(DRY_A + VISCOUS_A_S * speed_rad_s, rel=1e-3)
 
 
-def test_a_loop_that_stops_on_its_way_spends_nothing_there() -> None:
+def test_a_stop_within_a_loop_does_no_work() -> None:
     up, down = (made_stroke(direction, 0.5, lambda *_: 0.6) for direction in (1.0, -1.0))
     stops = [sample._replace(current_a=0.6) for sample in up[200:201]] * 300
     stopped = loop_of([*up[:201], *stops, *up[200:]], down, quick=False)
     assert stopped.spent_a == pytest.approx(loop_of(up, down, quick=False).spent_a, rel=1e-6)
 
 
-def test_an_arm_that_is_in_the_way_makes_no_loop() -> None:
+def test_a_blocked_arm_makes_no_loop() -> None:
     up, down = (made_stroke(direction, 0.5, lambda *_: 0.6) for direction in (1.0, -1.0))
     with pytest.raises(MovedError, match=r"swings by 0\.0 degrees only: is it blocked"):
         loop_of(up, up, quick=True)
@@ -78,7 +78,7 @@ def test_the_truth_is_within_two_errors_in_nineteen_of_twenty(trials: int) -> No
     assert 0.935 < sum(viscous) / len(viscous) < 0.98
 
 
-def test_what_cannot_be_told_is_no_number() -> None:
+def test_an_unknown_value_is_no_number() -> None:
     random = Random(1)
     slow, quick = (made_loops(FEWEST, speed_rad_s, speed_rad_s > 1.0, 0.01, random) for speed_rad_s in (0.19, 1.33))
     assert all(isnan(value) for value in friction_of([*slow[1:], *quick]))

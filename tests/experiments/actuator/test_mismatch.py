@@ -6,7 +6,7 @@ import pytest
 
 from experiments.actuator.mismatch import find_mismatch
 from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan, Step
-from tests.experiments.actuator.test_fit import TARE_A, TRUE_NM_A, Entries, made_entries
+from tests.experiments.actuator.test_fit import TARE_A, TRUE_NM_A, Entries, make_entries
 
 PLAN = Plan(("right_sweep",), trials=2)
 CONFIGURED_NM_A = 0.083
@@ -18,7 +18,7 @@ def current_a(grams: float, sign: float = 1.0) -> float:
 
 def before(step: Step, sign: float = 1.0) -> Entries:
     """Return the entries of earlier steps."""
-    entries = made_entries(PLAN, sign)
+    entries = make_entries(PLAN, sign)
     keys = list(entries)
     return {key: entries[key] for key in keys[: keys.index(step.key)]}
 

@@ -63,7 +63,7 @@ def test_an_arm_that_never_rests_is_not_read(tmp_path: Path) -> None:
         robot.close()
 
 
-def test_a_load_that_the_motor_does_not_lift_is_told(tmp_path: Path) -> None:
+def test_a_load_that_the_motor_does_not_lift_is_reported(tmp_path: Path) -> None:
     joint, plan = "right_adduction", Plan(("right_adduction",))
     robot, hand = simulated_bench(bench_configuration(), joint, plan, 4, tmp_path / "log.mcap")
     try:
@@ -77,7 +77,7 @@ def test_a_load_that_the_motor_does_not_lift_is_told(tmp_path: Path) -> None:
         robot.close()
 
 
-def test_a_weight_that_slips_off_between_the_approaches_is_told(
+def test_a_weight_that_slips_off_between_the_approaches_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     joint, plan = "left_adduction", Plan(("left_adduction",))
@@ -109,7 +109,7 @@ def samples(angle_slope: float = 0.0, current_slope: float = 0.0, noise_a: float
     ]
 
 
-def test_rest_is_an_angle_that_stands_and_a_current_that_does_not_drift() -> None:
+def test_rest_is_a_steady_angle_and_a_steady_current() -> None:
     assert find_motion(samples()) == ""
     assert find_motion(samples(angle_slope=0.01)) == "the joint swings by 0.57 degrees"
     assert find_motion(samples(current_slope=1.0)) == "the current drifts by 0.50 A"

@@ -7,17 +7,17 @@ from math import isnan
 
 from experiments.actuator.fit import JointFit, fit_joint
 from experiments.actuator.report import constant_rows, friction_rows, make_report, make_sections
-from tests.experiments.actuator.test_fit import PLAN, Entries, made_entries
+from tests.experiments.actuator.test_fit import PLAN, Entries, make_entries
 
 
-def made_fit(entries: Entries) -> JointFit:
+def make_fit(entries: Entries) -> JointFit:
     fit = fit_joint("right_sweep", PLAN, entries, 0.083)
     assert fit is not None
     return fit
 
 
 def test_the_papers_numbers_are_below_those_of_the_same_definition() -> None:
-    fit = made_fit(made_entries())
+    fit = make_fit(make_entries())
     head, ours, _, paper = constant_rows([fit])
     place = head.index("RMSE (N·m)")
     assert ours[place] == f"{fit.rmse_configured_nm:.4f}" and paper[place] == "0.0127"
@@ -26,7 +26,7 @@ def test_the_papers_numbers_are_below_those_of_the_same_definition() -> None:
 
 
 def test_friction_has_an_error_and_the_friction_at_rest_has_none() -> None:
-    head, row = friction_rows([made_fit(made_entries())])
+    head, row = friction_rows([make_fit(make_entries())])
     assert "±" in row[head.index("dry friction (N·m)")] and "±" in row[head.index("viscous (N·m·s)")]
     assert "±" not in row[head.index("at rest at least (N·m)")] and len(row) == len(head)
 
@@ -39,10 +39,10 @@ def test_the_report_names_the_tolerances_of_lever_and_weights() -> None:
 
 
 def test_without_loops_there_is_a_report_without_friction() -> None:
-    entries = made_entries()
+    entries = make_entries()
     for entry in entries.values():
         entry.pop("loops", None)
-    fit = made_fit(entries)
+    fit = make_fit(entries)
     _, friction, *_ = make_sections(PLAN, {"right_sweep": entries}, [fit])
     assert friction.heading == "Friction and offset" and not friction.figures
     assert friction.rows[1][1:3] == ["-", "-"]

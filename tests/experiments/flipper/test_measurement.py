@@ -26,7 +26,7 @@ from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.simulated_bed import CarriedBed
 from experiments.trials.stride_profile import profile_from_row
 from experiments.trials.trial import SINGLE, configuration_of
-from tests.experiments.made_up_strides import make_estimate, make_profile, make_stride
+from tests.experiments.synthetic_strides import make_estimate, make_profile, make_stride
 from tests.scripted_operator import ScriptedOperator
 
 MUD = "51.2"

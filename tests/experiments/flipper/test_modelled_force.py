@@ -10,7 +10,7 @@ from control.records import Phase
 from estimation.force_map import smallest_force_n
 from experiments.flipper.modelled_force import misfit_n, modelled_forces
 from experiments.trials.stride_profile import StrideProfile
-from tests.experiments.made_up_strides import GEOMETRY, make_profile
+from tests.experiments.synthetic_strides import GEOMETRY, make_profile
 
 K = {"k_p": 1.1e6, "k_s": 0.4e6, "k_e": 1.9e6}
 DEPTHS_M = [-0.01, 0.0, 0.01, 0.02, 0.03]

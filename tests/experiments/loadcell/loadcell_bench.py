@@ -1,4 +1,4 @@
-"""An emulated bench with everything that an experiment with a load cell needs, and a person who answers as told."""
+"""An emulated bench with everything that an experiment with a load cell needs, and a scripted operator."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from simulation.test_rig.emulated_instruments import AmplifierParameters, StageE
 from simulation.test_rig.load_cell_bench import EmulatedBench, Event
 from simulation.test_rig.plate_stage import CarriedPlate, StageParameters
 from simulation.test_rig.stage_motion import ManualMotionParameters
-from tests.experiments.made_up_mud import LawfulMud
+from tests.experiments.loadcell.lawful_mud import LawfulMud
 from tests.scripted_operator import ScriptedOperator
 
 SETTINGS = StageSettings()
@@ -96,7 +96,7 @@ def laboratories(folder: Path) -> Iterator[Make]:
     def build(operator: ScriptedOperator | None = None, **options: Any) -> Laboratory:
         own_folder = folder / str(len(made))
         own_folder.mkdir()
-        laboratory = Laboratory(own_folder, {"made up": LawfulMud(**KNOWN)}, operator or ScriptedOperator(), **options)
+        laboratory = Laboratory(own_folder, {"lawful": LawfulMud(**KNOWN)}, operator or ScriptedOperator(), **options)
         laboratory.port.calibration = COUNTS
         made.append(laboratory)
         return laboratory

@@ -20,7 +20,7 @@ def test_rate_and_factors_of_a_decay_come_out() -> None:
     assert fit.factors == pytest.approx([2.0, 3.0], rel=1e-3)
 
 
-def test_the_standard_error_is_the_scatter_over_many_tries() -> None:
+def test_the_standard_error_is_the_scatter_over_many_fits() -> None:
     random = np.random.default_rng(1)
     fits = [
         fit_curve(

@@ -1,4 +1,4 @@
-"""An encoder of the stage beside the load cell, over both ttys: what is measured, what is doubted, what goes on."""
+"""An encoder of the stage and the load cell, over both serial ports: measurement, remarks, and continuation."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def counter_of(laboratory: Laboratory) -> EmulatedStageEncoder:
 
 def try_once(laboratory: Laboratory) -> list[str]:
     """One insertion, and what was said of it."""
-    trial = Trial("made up", INSERTION, 1)
+    trial = Trial("lawful", INSERTION, 1)
     laboratory.recorder.listen(1.0)
     laboratory.trial_bench.stage.prepare(trial, 1)
     measure(laboratory.trial_bench, trial, laboratory.plan)
@@ -51,11 +51,11 @@ def examine(laboratory: Laboratory) -> None:
     examine_encoder(laboratory.recorder, laboratory.operator, SETTINGS)
 
 
-def test_pushed_by_a_hand_the_known_coefficients_come_out(make: Make) -> None:
+def test_the_known_coefficients_are_found_on_a_manual_stage(make: Make) -> None:
     laboratory = make(trials=2, seed=4)
     laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
     results = laboratory.evaluate_muds()
-    reported = results.muds["made up"]
+    reported = results.muds["lawful"]
     assert {name: each.value for name, each in reported.items()} == {
         name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
     }
@@ -65,16 +65,16 @@ def test_pushed_by_a_hand_the_known_coefficients_come_out(make: Make) -> None:
     assert len(list((laboratory.folder / RAW).glob("*_position.csv"))) == 4
 
 
-def test_an_amplifier_that_tells_means_of_two_costs_less_than_three_percent(make: Make) -> None:
+def test_an_amplifier_that_averages_two_samples_costs_less_than_three_percent(make: Make) -> None:
     laboratory = make(trials=2, seed=4, amplifier=AmplifierParameters(averaged=2))
     laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
-    reported = laboratory.evaluate_muds().muds["made up"]
+    reported = laboratory.evaluate_muds().muds["lawful"]
     assert {name: each.value for name, each in reported.items()} == {
         name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
     }
 
 
-def test_an_encoder_unplugged_in_a_trial_costs_its_places_and_no_force(make: Make) -> None:
+def test_an_encoder_unplugged_in_a_trial_costs_its_positions_and_no_force(make: Make) -> None:
     laboratory = make(operator=ScriptedOperator(KEEP))
     laboratory.at(4.5, counter_of(laboratory).unplug)
     laboratory.at(6.0, counter_of(laboratory).plug_in)
@@ -85,16 +85,16 @@ def test_an_encoder_unplugged_in_a_trial_costs_its_places_and_no_force(make: Mak
     assert laboratory.encoder is not None and laboratory.encoder.is_there
 
 
-def test_one_that_is_gone_is_asked_for_and_then_done_without(make: Make) -> None:
+def test_an_unplugged_encoder_is_asked_for_and_then_left_out(make: Make) -> None:
     laboratory = make(operator=ScriptedOperator(GO_ON, WITHOUT, KEEP))
     counter_of(laboratory).unplug()
     reported = try_once(laboratory)
     assert [("encoder is unplugged" in each, "plug" in each) for each in reported[:2]] == [(True, True)] * 2
     assert reported[2].startswith("going on without the position")
-    assert "position" not in laboratory.notebook.entries["made up/insertion/1"]
+    assert "position" not in laboratory.notebook.entries["lawful/insertion/1"]
 
 
-def test_one_that_is_plugged_in_when_asked_for_goes_on(make: Make) -> None:
+def test_an_encoder_that_is_plugged_in_when_asked_for_continues(make: Make) -> None:
     laboratory = make()
     counter_of(laboratory).unplug()
     laboratory.at(1.5, counter_of(laboratory).plug_in)
@@ -104,20 +104,20 @@ def test_one_that_is_plugged_in_when_asked_for_goes_on(make: Make) -> None:
     assert recorded.positions is not None
 
 
-def test_a_drop_out_in_the_stroke_is_told(make: Make) -> None:
+def test_a_drop_out_in_the_stroke_is_reported(make: Make) -> None:
     laboratory = make(operator=ScriptedOperator(KEEP))
     laboratory.at(3.9, lambda: setattr(counter_of(laboratory), "line_at", lambda at_s: b""))
     reported = try_once(laboratory)
     assert any("position is unknown" in each or "the position is not used" in each for each in reported)
 
 
-def test_some_garbage_matters_to_nobody(make: Make) -> None:
+def test_a_few_garbled_lines_do_no_harm(make: Make) -> None:
     laboratory = make(encoder={"garbled_fraction": 0.05})
     assert try_once(laboratory) == []
-    assert laboratory.notebook.entries["made up/insertion/1"]["position"]["garbled_lines"] > 5
+    assert laboratory.notebook.entries["lawful/insertion/1"]["position"]["garbled_lines"] > 5
 
 
-def test_the_right_baud_rate_is_found_and_told(make: Make) -> None:
+def test_the_right_baud_rate_is_found_and_reported(make: Make) -> None:
     with pytest.raises(BenchError, match="Use --position-baud 57600; or continue without --position"):
         examine(make(encoder={"baud": 57600}))
 
@@ -134,13 +134,13 @@ def test_lines_that_are_no_counts_are_shown(make: Make) -> None:
         examine(laboratory)
 
 
-def test_one_too_slow_for_the_stroke_is_told(make: Make) -> None:
+def test_an_encoder_too_slow_for_the_stroke_is_reported(make: Make) -> None:
     laboratory = make(encoder={"rate_hz": 20.0})
     examine(laboratory)
     assert "20 lines/s, one per 5.0 mm" in laboratory.operator.reported[0]
 
 
-def test_a_cell_that_is_unplugged_does_not_cost_the_places(make: Make) -> None:
+def test_an_unplugged_cell_does_not_cost_the_positions(make: Make) -> None:
     laboratory = make(amplifier=AmplifierParameters())
     laboratory.at(4.5, laboratory.bench.amplifier.unplug)
     laboratory.at(6.5, laboratory.bench.amplifier.plug_in)

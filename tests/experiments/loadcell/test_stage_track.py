@@ -1,4 +1,4 @@
-"""StagePositions between places: means over a time, gaps that are not guessed, and how far straight lines are off."""
+"""Positions between the encoder's lines: means, gaps, and the error of interpolation."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ def test_straight_lines_are_off_by_no_more_than_is_said() -> None:
     assert off_m <= 1.01 * track.interpolation_error_m
 
 
-def test_before_after_and_in_a_gap_the_place_is_not_known() -> None:
+def test_the_position_is_unknown_before_after_and_in_a_gap() -> None:
     gone = (TIMES_S > 0.8) & (TIMES_S < 1.0)
     reported = even(TIMES_S[~gone]).mean_positions_m(np.array([0.005, 0.5, 0.9, 1.005, 1.1, 2.1]), 0.0125)
     assert np.isnan(reported).tolist() == [True, False, True, True, False, True]
 
 
-def test_over_a_gap_in_which_the_stage_stood_its_place_is_known() -> None:
+def test_the_position_is_known_over_a_gap_in_which_the_stage_stood_still() -> None:
     gone = (TIMES_S > 0.8) & (TIMES_S < 1.0)
     track = StageTrack(StagePositions(TIMES_S[~gone], np.minimum(TIMES_S[~gone], 0.7)))
     assert track.mean_positions_m(np.array([0.9]), 0.0125) == pytest.approx([0.7])
@@ -48,14 +48,14 @@ def test_slow_lines_are_no_gaps() -> None:
     assert not np.any(np.isnan(even(slow_s).mean_positions_m(np.array([0.5, 1.0]), 0.0125)))
 
 
-def test_a_single_wrong_place_is_taken_out() -> None:
+def test_a_single_wrong_position_is_removed() -> None:
     positions_m = 0.1 * TIMES_S
     positions_m[70] += 0.004
     track = StageTrack(StagePositions(TIMES_S, positions_m))
     assert track.positions_m(TIMES_S[70:71]) == pytest.approx([0.07])
 
 
-def test_it_is_told_from_where_it_began_and_the_other_way_round() -> None:
+def test_positions_are_relative_to_the_first_and_can_be_turned() -> None:
     track = even().turned()
     assert track.farthest_m == pytest.approx(-0.199)
     assert track.turned().farthest_m == pytest.approx(0.199)

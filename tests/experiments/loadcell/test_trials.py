@@ -1,4 +1,4 @@
-"""The trials over an emulated amplifier's tty: what is measured, what is doubted, what is never lost."""
+"""The trials over an emulated amplifier's serial port: measurement, checks, and recovery."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Idle:
 
 def try_once(laboratory: Laboratory, kind: str = INSERTION) -> list[str]:
     """One trial, and what was said of it."""
-    trial = Trial("made up", kind, 1)
+    trial = Trial("lawful", kind, 1)
     laboratory.recorder.listen(1.0)
     laboratory.trial_bench.stage.prepare(trial, 1)
     measure(laboratory.trial_bench, trial, laboratory.plan)
@@ -63,7 +63,7 @@ def try_once(laboratory: Laboratory, kind: str = INSERTION) -> list[str]:
 def test_calibrated_with_two_weights_the_known_coefficients_come_out(make: Make) -> None:
     laboratory = make(trials=3, seed=4)
     laboratory.measure()
-    reported = laboratory.evaluate_muds().muds["made up"]
+    reported = laboratory.evaluate_muds().muds["lawful"]
     assert {name: each.value for name, each in reported.items()} == {
         name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
     }
@@ -72,13 +72,13 @@ def test_calibrated_with_two_weights_the_known_coefficients_come_out(make: Make)
     assert len(list((laboratory.folder / RAW).iterdir())) == 6
 
 
-def test_an_amplifier_that_tells_means_of_four_is_told_once_and_one_that_does_not_is_not(make: Make) -> None:
+def test_an_amplifier_that_averages_four_samples_is_reported_once(make: Make) -> None:
     smeared, sharp = make(amplifier=AmplifierParameters(averaged=4)), make()
     for laboratory in (smeared, sharp):
         bench = replace(laboratory.trial_bench, stage=Idle())
         for number in (1, 2):
-            record(bench, Trial("made up", INSERTION, number), laboratory.plan, 1)
-    assert [each for each in smeared.operator.reported if AVERAGED in each] == [f"made up/insertion/1: {AVERAGED}"]
+            record(bench, Trial("lawful", INSERTION, number), laboratory.plan, 1)
+    assert [each for each in smeared.operator.reported if AVERAGED in each] == [f"lawful/insertion/1: {AVERAGED}"]
     assert sharp.operator.reported == []
 
 
@@ -102,7 +102,7 @@ def test_what_is_in_the_notebook_is_not_measured_again(make: Make) -> None:
     assert "calibration from" in laboratory.operator.reported[-1]
 
 
-def test_a_trial_in_which_the_cell_is_unplugged_is_repeated_and_both_are_kept(make: Make) -> None:
+def test_a_trial_with_an_unplugged_cell_is_repeated_and_both_files_remain(make: Make) -> None:
     laboratory = make()
     laboratory.at(4.5, laboratory.bench.amplifier.unplug)
     laboratory.at(6.5, laboratory.bench.amplifier.plug_in)
@@ -110,7 +110,7 @@ def test_a_trial_in_which_the_cell_is_unplugged_is_repeated_and_both_are_kept(ma
     assert any("plug" in each and "in again" in each for each in reported)
     assert any("connected again" in each for each in reported)
     assert any("unplugged during the trial" in each for each in reported)
-    assert laboratory.notebook.entries["made up/insertion/1"]["file"].endswith("_2.csv")
+    assert laboratory.notebook.entries["lawful/insertion/1"]["file"].endswith("_2.csv")
     assert len(list((laboratory.folder / RAW).iterdir())) == 2
     assert len(load_counted(laboratory.folder, laboratory.notebook)) == 1
 
@@ -125,7 +125,7 @@ def test_a_trial_in_which_the_cell_is_unplugged_is_repeated_and_both_are_kept(ma
         (AmplifierParameters(rate_hz=10.0), None, INSERTION, "fewer than 6 samples"),
     ],
 )
-def test_a_trial_in_doubt_says_why_and_is_left_out_in_the_end(
+def test_an_invalid_trial_is_reported_and_left_out(
     make: Make, amplifier: AmplifierParameters, stage: StageParameters | None, kind: str, message: str
 ) -> None:
     laboratory = make(amplifier=amplifier, stage=stage, operator=ScriptedOperator(SKIP))
@@ -136,17 +136,17 @@ def test_a_trial_in_doubt_says_why_and_is_left_out_in_the_end(
     assert load_counted(laboratory.folder, laboratory.notebook) == []
 
 
-def test_a_stage_that_nobody_starts_is_no_contact(make: Make) -> None:
+def test_a_stage_that_is_not_started_makes_no_contact(make: Make) -> None:
     laboratory = make(operator=ScriptedOperator(KEEP))
     laboratory.trial_bench.stage.start = lambda trial: None  # type: ignore[method-assign]
     assert any("no contact" in each for each in try_once(laboratory))
-    assert "kept_in_spite_of" in laboratory.notebook.entries["made up/insertion/1"]
+    assert "kept_in_spite_of" in laboratory.notebook.entries["lawful/insertion/1"]
 
 
-def test_enter_repeats_a_doubtful_trial_twice_and_then_leaves_it(make: Make) -> None:
+def test_enter_repeats_an_invalid_trial_twice_and_then_leaves_it_out(make: Make) -> None:
     laboratory = make(amplifier=AmplifierParameters(range_n=2.0))
     try_once(laboratory)
-    assert laboratory.notebook.entries["made up/insertion/1"]["file"].endswith("_3.csv")
+    assert laboratory.notebook.entries["lawful/insertion/1"]["file"].endswith("_3.csv")
 
 
 def test_a_cell_that_stays_at_its_largest_force_is_at_its_limit(make: Make) -> None:
@@ -160,7 +160,7 @@ def test_a_cell_that_stays_at_its_largest_force_is_at_its_limit(make: Make) -> N
     assert list_problems(AnalysedTrial(recorded), stretch, tare, tare) == []
 
 
-def test_a_person_skips_one_trial_and_repeats_the_one_before(make: Make) -> None:
+def test_the_operator_skips_a_trial_and_repeats_the_one_before(make: Make) -> None:
     laboratory = make(trials=2)
     stage, asked = laboratory.trial_bench.stage, list[str]()
     answers = [GO_ON, REDO, GO_ON, SKIP, GO_ON, GO_ON]
@@ -188,7 +188,7 @@ def test_the_lines_are_examined_first(make: Make) -> None:
         examine_lines(make(amplifier=AmplifierParameters(style="columns")).recorder, "auto")
 
 
-def test_the_right_baud_rate_is_found_and_told(make: Make) -> None:
+def test_the_right_baud_rate_is_found_and_reported(make: Make) -> None:
     laboratory = make(amplifier=AmplifierParameters(baud=57600))
     with pytest.raises(BenchError, match="Use --baud 57600"):
         laboratory.measure()
@@ -207,7 +207,7 @@ def test_a_cell_that_sends_nonsense_is_shown(make: Make) -> None:
         laboratory.measure()
 
 
-def test_an_amplifier_too_slow_for_the_stroke_is_told_before_anything_is_measured(make: Make) -> None:
+def test_an_amplifier_too_slow_for_the_stroke_is_reported_first(make: Make) -> None:
     laboratory = make(amplifier=AmplifierParameters(rate_hz=10.0), operator=ScriptedOperator("q"))
     with pytest.raises(BenchError, match="too slow"):
         laboratory.measure(CellSettings(scale_n=1.0))
@@ -223,7 +223,7 @@ def test_weights_that_say_nothing_are_asked_for_again(make: Make) -> None:
     assert "both weights are" in laboratory.operator.reported[1]
 
 
-def test_a_weight_that_the_cell_cannot_bear_is_told_as_one(make: Make) -> None:
+def test_a_weight_that_overloads_the_cell_is_reported(make: Make) -> None:
     laboratory = make(operator=ScriptedOperator("q"), amplifier=AmplifierParameters(range_n=1.0))
     with pytest.raises(BenchError, match="not calibrated"):
         laboratory.measure()
@@ -240,10 +240,10 @@ def test_a_stage_at_another_speed_is_remarked_for_every_trial(make: Make) -> Non
         if isinstance(trial.motion, Insertion)
     ]
     reported = list_remarks(trials, SETTINGS)
-    assert [remark.split(":")[0] for remark in reported] == ["made up/insertion/1", "made up/insertion/2"]
+    assert [remark.split(":")[0] for remark in reported] == ["lawful/insertion/1", "lawful/insertion/2"]
 
 
-def test_a_cell_that_stays_away_ends_it_with_a_sentence(make: Make) -> None:
+def test_a_cell_that_stays_unplugged_ends_the_recording(make: Make) -> None:
     laboratory = make()
     laboratory.recorder.listen(0.5)
     laboratory.bench.amplifier.unplug()
@@ -260,7 +260,7 @@ def test_a_tare_in_which_the_cell_is_unplugged_is_taken_again(make: Make) -> Non
     assert laboratory.port.unpluggings == 1
 
 
-def test_a_person_is_asked_for_everything_that_hands_do() -> None:
+def test_the_manual_stage_prompts_for_every_step() -> None:
     operator = ScriptedOperator(GO_ON, SKIP)
     drained: list[int] = []
     stage = ManualStage(SETTINGS, operator, lambda: drained.append(1))

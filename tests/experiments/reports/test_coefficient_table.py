@@ -23,7 +23,7 @@ from experiments.reports.coefficient_table import (
 from experiments.reports.mud_names import mud_name
 from experiments.robot.bench_robot import BenchError
 from experiments.trials.truth_file import load_truth, missing_text, truth_in
-from tests.experiments.made_up_strides import make_estimate, make_stride
+from tests.experiments.synthetic_strides import make_estimate, make_stride
 
 
 def test_trials_make_a_mean_with_its_error_and_scatter() -> None:
@@ -34,7 +34,7 @@ def test_trials_make_a_mean_with_its_error_and_scatter() -> None:
     assert reported.trials == [1.0e6, 1.2e6, 1.4e6]
 
 
-def test_what_the_scatter_does_not_show_of_an_estimator_s_doubt_is_shared_by_all_trials() -> None:
+def test_the_part_of_an_estimators_error_beyond_the_scatter_is_shared() -> None:
     """Of 10 % in all, trials that scatter by 6 % share 8 %."""
     scattered = gather_coefficient(make_estimate(value, std_error=1e5) for value in (0.94e6, 1e6, 1.06e6))
     assert scattered.shared_error == pytest.approx(8e4)
@@ -42,15 +42,13 @@ def test_what_the_scatter_does_not_show_of_an_estimator_s_doubt_is_shared_by_all
     assert scattered.std_error == pytest.approx(hypot(scattered.trials_error, 8e4))
 
 
-def test_trials_that_scatter_more_than_was_foreseen_still_share_the_motors_doubt() -> None:
+def test_trials_with_large_scatter_still_share_the_motors_error() -> None:
     reported = gather_coefficient(make_estimate(value, std_error=1e4) for value in (0.8e6, 1e6, 1.2e6))
     assert reported.shared_error == pytest.approx(0.032e6)
 
 
-def test_two_standard_errors_hold_the_truth_19_times_in_20_where_all_trials_have_one_part_of_their_error_alike() -> (
-    None
-):
-    """Made-up trials, each off by 4 % of its own and by 4 % that all share, and doubted so."""
+def test_two_standard_errors_contain_the_truth_19_times_in_20_with_a_shared_error() -> None:
+    """Synthetic trials, each off by 4 % of its own and by 4 % that all share, and doubted so."""
     random, held = np.random.default_rng(1), 0
     for _ in range(1000):
         values = 1e6 * (1.0 + 0.04 * random.standard_normal() + 0.04 * random.standard_normal(3))
@@ -60,7 +58,7 @@ def test_two_standard_errors_hold_the_truth_19_times_in_20_where_all_trials_have
     assert 940 <= held <= 995
 
 
-def test_one_trial_has_the_doubt_of_its_own_estimate() -> None:
+def test_one_trial_has_the_error_of_its_own_estimate() -> None:
     reported = gather_coefficient([make_estimate(1e6, std_error=7e4)])
     assert (reported.value, reported.std_error, reported.repeatability) == (1e6, 7e4, None)
     assert (reported.trials_error, reported.shared_error) == (None, None)
@@ -84,7 +82,7 @@ def strides_in_mud_that_gives_way_at(limit: float) -> list[dict[str, Any]]:
     ]
 
 
-def test_a_few_strides_in_which_mud_gave_way_that_mostly_holds_do_not_speak_for_it() -> None:
+def test_a_few_strides_in_which_solid_mud_yielded_do_not_count() -> None:
     """Alone they would tell 7 % too little, and their scatter would not show it."""
     strides = strides_in_mud_that_gives_way_at(0.95e6)
     alone = gather_coefficient(each for each in strides if not each["at_least"])
@@ -94,7 +92,7 @@ def test_a_few_strides_in_which_mud_gave_way_that_mostly_holds_do_not_speak_for_
     assert (reported.value, reported.at_least, reported.std_error) == (0.95e6, True, None)
 
 
-def test_mud_that_gives_way_in_most_strides_is_known_by_them() -> None:
+def test_mud_that_yields_in_most_strides_is_known_by_them() -> None:
     reported = gather_coefficient(strides_in_mud_that_gives_way_at(1.05e6))
     assert not reported.at_least
     assert reported.bounds > 10
@@ -108,7 +106,7 @@ def test_a_median_of_bounds_has_no_error() -> None:
     assert coefficient_text(bounds) == "≥ 2.000"
 
 
-def test_a_trial_that_does_not_tell_its_doubt_is_not_taken_for_exact() -> None:
+def test_a_trial_without_a_standard_error_is_not_taken_as_exact() -> None:
     uncertainties = (1e5, nan, 1e5)
     reported = gather_coefficient(
         make_estimate(1e6 + k, std_error=uncertainty) for k, uncertainty in enumerate(uncertainties)
@@ -116,7 +114,7 @@ def test_a_trial_that_does_not_tell_its_doubt_is_not_taken_for_exact() -> None:
     assert reported.shared_error == pytest.approx(1e5, rel=1e-3)
 
 
-def test_what_is_not_valid_counts_for_nothing_but_is_told() -> None:
+def test_an_invalid_estimate_does_not_count_but_is_reported() -> None:
     reported = gather_coefficient([make_estimate(1e6), make_estimate(None, reason="too short")])
     assert (reported.value, reported.not_valid) == (1e6, ["too short"])
     nothing = gather_coefficient([make_estimate(None, reason="too short")])
@@ -184,7 +182,7 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
 # tables
 
 
-def test_errors_are_those_of_values_and_bounds_are_told_as_bounds() -> None:
+def test_errors_are_of_values_and_bounds_are_printed_as_bounds() -> None:
     truth = {"k_p": 1e6, "k_s": 1e6, "k_e": None}
     strides = [
         make_stride(k_p=make_estimate(1.1e6), k_s=make_estimate(0.8e6, at_least=True)),
@@ -201,7 +199,7 @@ def test_a_method_that_says_nothing_of_a_coefficient_has_no_row_of_it() -> None:
     assert [row.coefficient for row in errors] == ["k_s"]
 
 
-def test_a_table_of_muds_has_the_load_cell_beside() -> None:
+def test_a_table_of_muds_has_a_column_of_the_load_cell() -> None:
     reported = gather_coefficient([make_estimate(1.5e6), make_estimate(1.7e6)])
     muds = [MudSummary("47.6", k_p=reported, k_s=reported, k_e=reported, truth={"k_p": 1.55e6})]
     head, row = mud_rows(muds)
@@ -210,7 +208,7 @@ def test_a_table_of_muds_has_the_load_cell_beside() -> None:
     assert row[6] == "-"
 
 
-def test_methods_of_one_mud_stand_together() -> None:
+def test_methods_of_one_mud_are_adjacent() -> None:
     rows = [ComparedStride(mud, method, make_stride(), {"k_p": 1e6}) for method in ("one", "two") for mud in ("b", "a")]
     table = error_text_rows(error_table(rows, "walking"))
     assert [row[:2] for row in table[1:]] == [["b", "one"], ["b", "two"], ["a", "one"], ["a", "two"]]

@@ -1,4 +1,4 @@
-"""Tables of errors from estimates and truths that are made up, with numbers that anyone can check."""
+"""Tables of errors from estimates and truths that are synthetic, with numbers that anyone can check."""
 
 from math import nan
 from typing import Any, TypeVar
@@ -56,7 +56,7 @@ def test_the_interval_is_1_96_standard_errors_to_either_side(std_error: float, c
         assert only(error_rows([evaluated(value, std_error)])).coverage == coverage
 
 
-def test_the_coverage_is_a_share() -> None:
+def test_the_coverage_is_a_fraction() -> None:
     rows = error_rows([evaluated(101.0, 1.0), evaluated(105.0, 1.0), evaluated(99.0, 1.0), evaluated(100.0, 1.0)])
     assert only(rows).coverage == 0.75
 
@@ -68,7 +68,7 @@ def test_bounds_have_no_error_and_are_counted_apart() -> None:
 
 
 @pytest.mark.parametrize(("std_error", "hold"), [(5.0, 0.0), (5.2, 1.0)])
-def test_a_bound_holds_if_its_lower_end_does(std_error: float, hold: float) -> None:
+def test_a_bound_is_right_if_its_lower_end_is(std_error: float, hold: float) -> None:
     assert only(error_rows([bound(110.0, std_error)])).bounds_hold == hold
 
 
@@ -111,7 +111,7 @@ def test_there_is_a_row_for_each_setup_mud_coefficient_and_method_in_their_order
     assert [row.strides for row in rows] == [2, 1, 1, 1]
 
 
-def test_nothing_judged_is_no_row() -> None:
+def test_no_evaluations_make_no_row() -> None:
     assert error_rows([]) == []
     assert plate_rows([]) == []
 
@@ -119,7 +119,7 @@ def test_nothing_judged_is_no_row() -> None:
 # the upright plate
 
 
-def test_a_difference_is_shared_between_the_lean_and_the_estimate() -> None:
+def test_a_difference_is_divided_between_the_lean_and_the_estimate() -> None:
     """The leaning plate reads 1.25 of the upright one, the estimate 1.30: 0.25 of 0.30 is the plate's lean."""
     row = only(plate_rows([evaluated(104.0)]))
     assert (row.upright_over_leaning, row.estimate_over_upright, row.lean_fraction) == (0.8, 1.3, 0.8333)

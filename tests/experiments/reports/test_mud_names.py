@@ -8,7 +8,7 @@ from experiments.reports.mud_names import mud_key, mud_label, mud_name, mud_text
 
 
 @pytest.mark.parametrize("name", ["wet", "w", "bay=3", "watery clay", "kaolin 2", "1500 Pa"])
-def test_a_persons_name_for_a_mud_stays_as_it_is(name: str) -> None:
+def test_a_free_name_of_a_mud_does_not_change(name: str) -> None:
     assert mud_name(name) == mud_label(name) == mud_text(name) == name
 
 

@@ -51,7 +51,7 @@ class Elements(HTMLParser):
         self.text += data
 
 
-def test_the_page_holds_its_pictures_and_asks_for_nothing(tmp_path: Path) -> None:
+def test_the_page_contains_its_pictures_and_loads_nothing(tmp_path: Path) -> None:
     log = tmp_path / "a.mcap"
     written = write_report(tmp_path / "out", {"experiment": "x", "value": 1.5}, "Title", [SECTION], [log])
     assert [path.name for path in written] == ["report.html", "summary.json", "dots.png", "a.mcap"]
@@ -87,7 +87,7 @@ def test_a_disk_that_fills_up_leaves_the_report_that_was_there_and_nothing_cut(
     assert (tmp_path / "dots.png").read_bytes() == DOT
 
 
-def test_whatever_is_told_is_shown_as_it_is(tmp_path: Path) -> None:
+def test_text_is_shown_as_it_is(tmp_path: Path) -> None:
     page = write_report(tmp_path, {}, "A < B", [SECTION])[0].read_text(encoding="utf-8")
     elements = Elements()
     elements.feed(page)

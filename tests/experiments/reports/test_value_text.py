@@ -31,7 +31,7 @@ def test_units_apply_to_value_and_errors() -> None:
 
 
 @pytest.mark.parametrize("error", [None, nan, inf])
-def test_an_error_that_nobody_knows_is_left_out(error: float | None) -> None:
+def test_an_unknown_error_is_left_out(error: float | None) -> None:
     assert value_text(1.5, error) == "1.500"
     assert value_text(1.5, error, 0.02) == "1.500 ± 0.020"
 
@@ -42,7 +42,7 @@ def test_trials_that_are_all_the_same_have_an_error_of_nothing() -> None:
 
 
 @pytest.mark.parametrize("value", [None, nan])
-def test_where_there_is_no_value_stands_a_dash(value: float | None) -> None:
+def test_a_missing_value_is_a_dash(value: float | None) -> None:
     assert value_text(value, 0.1) == fraction_text(value) == "-"
 
 
@@ -50,5 +50,5 @@ def test_where_there_is_no_value_stands_a_dash(value: float | None) -> None:
     ("fraction", "text"),
     [(0.0321, "3.2 %"), (0.000321, "0.032 %"), (0.321, "32 %"), (0.0, "0.0 %"), (1e-16, "0.000 %")],
 )
-def test_a_share_is_told_in_percent_with_two_digits(fraction: float, text: str) -> None:
+def test_a_fraction_is_printed_in_percent_with_two_digits(fraction: float, text: str) -> None:
     assert fraction_text(fraction) == text

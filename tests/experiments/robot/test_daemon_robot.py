@@ -83,12 +83,12 @@ def test_an_experiment_that_is_killed_with_its_flippers_in_the_mud_leaves_them_r
     assert not rows["torque_command_nm"][rows["mode"] == Mode.IDLE].any()
 
 
-def test_without_a_daemon_it_is_told_how_to_start_one(tmp_path: Path) -> None:
+def test_a_missing_daemon_is_reported_with_how_to_start_it(tmp_path: Path) -> None:
     with pytest.raises(BenchError, match=r"no daemon answers on .*Start it with 'systemctl start mudskipper'"):
         DaemonRobot(tmp_path / "none.sock")
 
 
-def test_a_daemon_that_ends_is_told_and_its_log_is_there(bench: Bench, tmp_path: Path) -> None:  # noqa: F811
+def test_the_end_of_a_daemon_is_reported_and_its_log_remains(bench: Bench, tmp_path: Path) -> None:  # noqa: F811
     robot = DaemonRobot(bench.socket)
     arm(robot)
     bench.daemon.terminate()
@@ -100,7 +100,7 @@ def test_a_daemon_that_ends_is_told_and_its_log_is_there(bench: Bench, tmp_path:
     robot.close()
 
 
-def test_no_log_is_copied_before_the_robot_obeys_and_a_copy_that_fails_is_told(
+def test_no_log_is_copied_before_the_robot_obeys_and_a_failed_copy_is_reported(
     bench: Bench,  # noqa: F811
     tmp_path: Path,
 ) -> None:
@@ -135,7 +135,7 @@ def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> No
     assert bench.run("arm").returncode == exit_codes.OK
 
 
-def test_a_robot_that_was_taken_over_is_left_to_whoever_did(bench: Bench) -> None:  # noqa: F811
+def test_a_robot_that_another_program_took_over_is_left_alone(bench: Bench) -> None:  # noqa: F811
     robot = DaemonRobot(bench.socket)
     arm(robot)
     assert run_beside(robot, bench, "move", "--take-over", "left_sweep=3").returncode == exit_codes.OK

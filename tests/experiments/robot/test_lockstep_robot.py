@@ -71,7 +71,7 @@ def test_a_joint_is_where_it_was_moved_to(robot: LockstepRobot) -> None:
     assert robot.call("status")["drives"][3]["angle_rad"] == pytest.approx(0.2, abs=0.02)
 
 
-def test_a_walk_that_somebody_else_stops_is_not_taken_for_a_whole_one(
+def test_a_walk_that_another_program_stops_is_not_complete(
     robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     arm(robot)
@@ -87,7 +87,7 @@ def test_a_walk_that_somebody_else_stops_is_not_taken_for_a_whole_one(
         walk(robot, 0.03, 4)
 
 
-def test_a_robot_that_was_held_too_long_tells_why_it_let_go(robot: LockstepRobot) -> None:
+def test_a_robot_that_was_held_too_long_reports_why_it_let_go(robot: LockstepRobot) -> None:
     robot.lockstep.loop.controller.motion = MotionParameters(longest_hold_s=1.0)
     arm(robot)
     robot.wait(0.8)
@@ -126,14 +126,14 @@ def test_whatever_the_robot_does_arming_leads_to_hold(robot: LockstepRobot) -> N
     assert robot.call("status")["mode"] == "hold"
 
 
-def test_the_daemon_s_sentence_comes_back_where_it_refuses(robot: LockstepRobot) -> None:
+def test_a_refusal_has_the_daemons_message(robot: LockstepRobot) -> None:
     with pytest.raises(CallRefusedError):
         robot.call("walk", depth_m=0.03)
     with pytest.raises(BenchError, match="no longer holds its pose"):
         move(robot, {"right_adduction": 0.2})
 
 
-def test_a_fault_that_ends_a_walk_is_told_in_its_own_words(
+def test_a_fault_that_ends_a_walk_is_reported_with_its_message(
     robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     arm(robot)
@@ -150,7 +150,7 @@ def test_a_fault_that_ends_a_walk_is_told_in_its_own_words(
 
 
 class Decided:
-    """A Person who says the same of every fault."""
+    """An Operator who says the same of every fault."""
 
     def __init__(self, answer: str) -> None:
         self.answer = answer
@@ -178,7 +178,7 @@ def faulty(robot: LockstepRobot) -> LockstepRobot:
     return robot
 
 
-def test_a_fault_is_cleared_where_a_person_says_so(faulty: LockstepRobot) -> None:
+def test_a_fault_is_cleared_where_the_operator_agrees(faulty: LockstepRobot) -> None:
     operator = Decided(CLEAR)
     arm(faulty, operator)
     assert faulty.call("status")["mode"] == "hold"
@@ -186,13 +186,13 @@ def test_a_fault_is_cleared_where_a_person_says_so(faulty: LockstepRobot) -> Non
     assert question.startswith("The robot is in FAULT:\n") and "right_sweep" in question and "(for 4 s)\n" in question
 
 
-def test_a_fault_that_a_person_leaves_ends_the_experiment_and_stands(faulty: LockstepRobot) -> None:
+def test_a_fault_that_the_operator_leaves_ends_the_experiment(faulty: LockstepRobot) -> None:
     with pytest.raises(EndedError, match="the fault remains; remove its cause, then 'mudskipper clear'"):
         arm(faulty, Decided(LEAVE))
     assert faulty.call("status")["mode"] == "fault"
 
 
-def test_where_nobody_is_there_a_fault_stands(faulty: LockstepRobot) -> None:
+def test_a_fault_remains_without_an_operator(faulty: LockstepRobot) -> None:
     with pytest.raises(BenchError, match="(?s)The robot is in FAULT:.*right_sweep.*'mudskipper clear'"):
         arm(faulty)
     assert faulty.call("status")["mode"] == "fault"
@@ -208,7 +208,7 @@ def test_a_fault_that_comes_back_is_cleared_three_times_at_most(
     assert len(operator.asked) == 3
 
 
-def test_of_what_is_over_by_itself_nobody_is_asked(robot: LockstepRobot) -> None:
+def test_a_transient_fault_makes_no_prompt(robot: LockstepRobot) -> None:
     robot.wait(1.0)
     robot.lockstep.fail("left_sweep.position", "off", 2.0)
     robot.wait(1.9)
@@ -247,6 +247,6 @@ def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) 
         ("fault", "", "The left_sweep joint moves."),
     ],
 )
-def test_why_a_robot_stopped_is_told_by_its_cause(mode: str, notice: str, reported: str) -> None:
+def test_a_stop_is_reported_with_its_cause(mode: str, notice: str, reported: str) -> None:
     fault = {"message": "The left_sweep joint moves."}
     assert mode_reason({"mode": mode, "notice": notice, "fault": fault}) == reported

@@ -165,7 +165,7 @@ def test_along_the_flippers_arc_penetration_is_of_edge_sides_and_adhesion(depth_
 
 @pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(53.1)])
 @pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.04, 0.05])
-def test_at_any_depth_the_flippers_way_and_the_upright_plates_tell_nearly_the_same(depth_m: float, clay: Clay) -> None:
+def test_flipper_arc_and_upright_plate_agree_at_any_depth(depth_m: float, clay: Clay) -> None:
     """Straight down in the mean attitude the leaning plate's face bears a part: at 5 cm k_p was a third more."""
     reported = truth(stride(clay, insertion=leaning(depth_m), extraction=leaning(depth_m)))
     assert 1.0 < reported.leaning.k_p / reported.upright.k_p < 1.07
@@ -180,7 +180,7 @@ def test_the_surface_may_lie_below_its_nominal_height() -> None:
 
 
 @pytest.mark.parametrize("depth_m", [0.03, 0.05])
-def test_what_a_walk_says_of_k_p_holds_the_truth_at_any_depth(depth_m: float) -> None:
+def test_k_p_of_a_walk_covers_the_truth_at_any_depth(depth_m: float) -> None:
     setup = replace(WALKING, row_period_s=0.0, depth_m=depth_m)
     walk = run_trial(setup, Track([(10.0, clay_of_water(53.1))]), NONE, 2, 1)
     truths = {(each.flipper, each.index): truth(each).leaning.k_p for each in walk.truths}
@@ -213,7 +213,7 @@ def test_a_plate_that_never_slipped_is_dragged_at_the_papers_speed() -> None:
     assert held.leaning.k_s == truth(stride(stance=stroke(speed_m_s=PAPER_SPEED_M_S))).leaning.k_s
 
 
-def test_relaxation_in_a_hold_is_forgotten_on_the_way_up() -> None:
+def test_relaxation_in_a_hold_is_over_on_the_way_up() -> None:
     """It takes the load that holds the plate up at rest; mud that holds it down has to be sheared anew anyway."""
     at_once, held = truth(stride(), 0.13, 0.0).leaning.k_e, truth(stride(), 0.13, 3.0).leaning.k_e
     assert held == pytest.approx(at_once, rel=1e-3)  # 7 mm of the way up: seven times what makes it forget

@@ -25,7 +25,7 @@ from tests.experiments.still_robot import StillRobot
 from tests.scripted_operator import ScriptedOperator
 
 TRIALS = [PlannedTrial(f"47.6/{number}", "47.6", number, 3) for number in (1, 2, 3)]
-PLAN = {"experiment": "made up"}
+PLAN = {"experiment": "synthetic"}
 
 
 class AskedRobot(StillRobot):
@@ -99,7 +99,7 @@ def test_torque_is_off_after_every_trial(tmp_path: Path) -> None:
     assert session.robot.called.count("disarm") == len(TRIALS)
 
 
-def test_an_experiment_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_an_interrupted_experiment_continues(tmp_path: Path) -> None:
     first = Session(tmp_path)
     first.outcomes = [{"remarks": []}, KeyboardInterrupt()]
     with pytest.raises(KeyboardInterrupt):
@@ -132,7 +132,7 @@ def test_before_the_first_there_is_none_to_measure_again(tmp_path: Path) -> None
     assert "no trial was measured" in session.operator.reported[0]
 
 
-def test_a_fault_is_told_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> None:
+def test_a_fault_is_reported_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> None:
     session = Session(tmp_path)
     session.outcomes = [BenchError("the walk ended early: a drive is silent.")]
     session.conduct()
@@ -141,7 +141,7 @@ def test_a_fault_is_told_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("answer", [CLEAR, LEAVE])
-def test_before_a_person_levels_mud_they_judge_the_fault_that_stands(tmp_path: Path, answer: str) -> None:
+def test_the_operator_decides_on_a_fault_before_levelling_the_mud(tmp_path: Path, answer: str) -> None:
     robot, operator = AskedRobot(), ScriptedOperator(answer)
     robot.blocked = True
     bed = PromptedBed(robot, operator, lambda trial: "Level it")
@@ -165,7 +165,7 @@ def test_a_trial_that_went_wrong_clears_nothing_by_itself(tmp_path: Path) -> Non
     assert "clear" not in session.robot.called
 
 
-def test_a_person_who_ends_the_experiment_is_not_asked_whether_to_repeat(tmp_path: Path) -> None:
+def test_no_repetition_is_offered_after_the_operator_ends_the_experiment(tmp_path: Path) -> None:
     session = Session(tmp_path)
     session.outcomes = [{"remarks": []}, EndedError("the fault stands")]
     with pytest.raises(EndedError):
@@ -173,7 +173,7 @@ def test_a_person_who_ends_the_experiment_is_not_asked_whether_to_repeat(tmp_pat
     assert session.operator.asked == [] and list(session.notebook.entries) == ALL[:1]
 
 
-def test_a_spoilt_trial_can_be_left_out(tmp_path: Path) -> None:
+def test_an_invalid_trial_can_be_left_out(tmp_path: Path) -> None:
     session = Session(tmp_path, ScriptedOperator(SKIP))
     session.outcomes = [InvalidTrialError("no mud")]
     session.conduct()
@@ -182,7 +182,7 @@ def test_a_spoilt_trial_can_be_left_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("answer", "measured"), [(GO_ON, [ALL[0], *ALL]), (KEEP, ALL)])
-def test_a_worthless_trial_is_repeated_by_enter_and_kept_by_a_key(
+def test_an_invalid_trial_is_repeated_by_enter_and_kept_by_a_key(
     tmp_path: Path, answer: str, measured: list[str]
 ) -> None:
     session = Session(tmp_path, ScriptedOperator(answer))
@@ -192,7 +192,7 @@ def test_a_worthless_trial_is_repeated_by_enter_and_kept_by_a_key(
     assert session.notebook.entries[ALL[0]]["remarks"] == kept
 
 
-def test_a_trial_that_left_nothing_cannot_be_kept(tmp_path: Path) -> None:
+def test_a_trial_without_an_entry_cannot_be_kept(tmp_path: Path) -> None:
     session = Session(tmp_path)
     session.outcomes = [InvalidTrialError("no mud")]
     session.conduct()
@@ -208,7 +208,7 @@ def test_a_robot_that_walks_on_is_stopped_before_anybody_is_asked(tmp_path: Path
 
 
 @pytest.mark.parametrize(("answer", "kept"), [(REDO, ALL), (SKIP, ALL[1:])])
-def test_a_person_may_go_on_also_after_the_third_time(tmp_path: Path, answer: str, kept: list[str]) -> None:
+def test_the_operator_may_continue_after_the_third_attempt(tmp_path: Path, answer: str, kept: list[str]) -> None:
     session = Session(tmp_path, ScriptedOperator(GO_ON, GO_ON, answer))
     session.outcomes = [BenchError("it was stopped") for _ in range(3)]
     session.conduct()
@@ -216,7 +216,7 @@ def test_a_person_may_go_on_also_after_the_third_time(tmp_path: Path, answer: st
     assert list(counted_entries(session.notebook)) == kept
 
 
-def test_what_goes_wrong_three_times_ends_where_nobody_wants_it_repeated(tmp_path: Path) -> None:
+def test_a_third_failure_ends_the_experiment_unless_the_operator_repeats_it(tmp_path: Path) -> None:
     session = Session(tmp_path)
     session.outcomes = [{"remarks": []}, *(InvalidTrialError("no mud") for _ in range(3))]
     with pytest.raises(BenchError, match="trial 2 of 3 went wrong 3 times; the last time: no mud"):
@@ -225,7 +225,7 @@ def test_what_goes_wrong_three_times_ends_where_nobody_wants_it_repeated(tmp_pat
 
 
 @pytest.mark.parametrize(("answer", "kept"), [(GO_ON, ALL), (SKIP, ALL[1:]), (REDO, ALL)])
-def test_a_doubtful_trial_counts_as_the_person_says(tmp_path: Path, answer: str, kept: list[str]) -> None:
+def test_a_doubtful_trial_counts_as_the_operator_decides(tmp_path: Path, answer: str, kept: list[str]) -> None:
     session = Session(tmp_path, ScriptedOperator(answer))
     session.outcomes = [{"remarks": ["the base moved by 5.0 mm"]}]
     session.conduct()

@@ -41,7 +41,7 @@ def test_no_trials_have_no_outcomes() -> None:
     assert run_parallel(list[partial[float]](), ignore, processes=1) == []
 
 
-def test_a_trials_problem_reaches_whoever_asked() -> None:
+def test_an_exception_of_a_trial_reaches_the_caller() -> None:
     with pytest.raises(ValueError, match="cannot be"):
         run_parallel([partial(broken), partial(late, 0.0)], ignore, processes=1)
 

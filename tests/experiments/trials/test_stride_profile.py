@@ -10,7 +10,7 @@ from control.modes import Mode
 from control.records import Phase
 from experiments.trials.stride_profile import profile_from_row, profile_of, profile_row, slip_m, thinned
 from experiments.walk.walk_profile import PERIOD_ROWS, walk_profile_of, walk_profile_of_row, walk_profile_row
-from tests.experiments.made_up_strides import make_log, make_profile, make_ticks
+from tests.experiments.synthetic_strides import make_log, make_profile, make_ticks
 
 STROKE = [Phase.INSERTION] * 30 + [Phase.PAUSE] * 100 + [Phase.STANCE] * 30
 
@@ -43,7 +43,7 @@ def test_after_the_last_stride_there_is_no_course() -> None:
     assert len(profile_of(make_log(make_ticks(STROKE)), "left", 99.0).time_s) == 0
 
 
-def test_a_plate_s_slip_is_its_way_back_in_the_world_and_not_on_the_robot() -> None:
+def test_slip_is_the_plates_travel_backwards_in_the_world_not_on_the_robot() -> None:
     """It sweeps back by 6 cm of 12 while the body comes on by 2, then rests on a body that goes on."""
     swept = make_profile(Phase.STANCE, [30.0, 0.0, 0.0], [0.03] * 3, body_m=[1.0, 1.02, 1.05])
     assert slip_m(swept, 0.12) == pytest.approx(0.04)

@@ -8,7 +8,7 @@ import pytest
 from control.records import Phase
 from experiments.trials.stride_profile import StrideProfile
 from experiments.walk.known_surface import k_s_of
-from tests.experiments.made_up_strides import CONFIGURATION, GEOMETRY, make_profile, make_stride
+from tests.experiments.synthetic_strides import CONFIGURATION, GEOMETRY, make_profile, make_stride
 
 SWEEPS_DEG = list(np.linspace(30.0, -30.0, 61))
 K, DEPTH_M, SURFACE_M = 0.3e6, 0.03, 0.005

@@ -25,7 +25,7 @@ from experiments.walk.measurement import MUDS, Advance, Plan, measure, require_m
 from experiments.walk.report import WalkReport, located_strides, report_of, walks_of
 from experiments.walk.simulation import walking_bench
 from experiments.walk.text import sections_of, tables_of
-from tests.experiments.made_up_strides import CONFIGURATION, make_estimate, make_stride
+from tests.experiments.synthetic_strides import CONFIGURATION, make_estimate, make_stride
 from tests.scripted_operator import ScriptedOperator
 
 SHORT = Plan((Mud("47.6", 0.3), Mud("51.2", 0.3)), trials=1, soft=("51.2",), soft_strides=2, simulated=True)

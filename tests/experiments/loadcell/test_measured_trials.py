@@ -1,4 +1,4 @@
-"""Coefficients of a stage that a hand pushes, with an encoder on it: muds with known ones, and clay."""
+"""Coefficients of a manual stage with an encoder: muds with known ones, and clay."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from experiments.loadcell.analysis.stage_track import WIDE, Alignment, StagePosi
 from simulation.mud.clay import RATE_COEFFICIENT
 from simulation.test_rig.load_cell_bench import clay_plate
 from simulation.test_rig.stage_motion import ManualMotionParameters
-from tests.experiments.loadcell.test_fits import true_of_clay
-from tests.experiments.made_up_mud import LawfulMud, feel_by_hand
+from tests.experiments.loadcell.lawful_mud import LawfulMud, feel_by_hand
+from tests.experiments.loadcell.test_force_trials import true_of_clay
 
 SETTINGS = StageSettings()
 KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
@@ -40,7 +40,7 @@ def found(trials: list[Recorded]) -> dict[str, float]:
     return {name: gather_trials(reported, name, 0.0).value for name in COEFFICIENTS}
 
 
-def test_a_lawful_mud_s_coefficients_come_out_within_three_per_cent_however_the_hand_moves() -> None:
+def test_coefficients_of_a_lawful_mud_are_found_within_three_per_cent_by_hand() -> None:
     trials = [feel_by_hand(LawfulMud(**KNOWN), kind, i, lag_s=LAG_S) for kind, i in KINDS]
     assert found(trials) == {name: pytest.approx(value, rel=BOUND) for name, value in KNOWN.items()}
 
@@ -71,7 +71,7 @@ def test_the_lag_between_the_devices_is_found_from_the_stroke(insertion: Recorde
         assert reported.alignment.lag_s == pytest.approx(lag_s, abs=0.002)
 
 
-def test_the_depth_is_the_encoder_s_and_its_doubt_a_fraction_of_a_millimetre(insertion: Recorded) -> None:
+def test_the_depth_is_the_encoders_within_a_fraction_of_a_millimetre(insertion: Recorded) -> None:
     reported = one(insertion)
     depths_m = depths_of(reported, SETTINGS)
     assert depths_m is not None
@@ -79,13 +79,13 @@ def test_the_depth_is_the_encoder_s_and_its_doubt_a_fraction_of_a_millimetre(ins
     assert 0.0 < reported.position_error_m < 3e-4
 
 
-def test_whichever_way_the_encoder_counts_the_coefficients_are_the_same(insertion: Recorded) -> None:
+def test_the_coefficients_do_not_depend_on_the_encoders_direction(insertion: Recorded) -> None:
     assert insertion.positions is not None
     turned = insertion._replace(positions=StagePositions(insertion.positions.times_s, -insertion.positions.positions_m))
     assert one(turned).coefficients == {name: pytest.approx(k) for name, k in one(insertion).coefficients.items()}
 
 
-def test_without_its_places_the_same_trial_is_in_doubt(insertion: Recorded) -> None:
+def test_without_its_positions_the_same_trial_is_remarked(insertion: Recorded) -> None:
     alone = one(insertion._replace(positions=None))
     assert "one speed" in alone.remark or alone.problem
     assert one(insertion).remark == ""
@@ -104,13 +104,13 @@ def test_an_encoder_on_another_axis_leaves_the_trial_to_the_force(insertion: Rec
     assert "k_p" in reported.coefficients or reported.problem
 
 
-def test_a_wrong_way_per_count_is_told(insertion: Recorded) -> None:
+def test_a_wrong_travel_per_count_is_reported(insertion: Recorded) -> None:
     times_s, positions_m = places_of(insertion)
     reported = one(insertion._replace(positions=StagePositions(times_s, 2.0 * positions_m)))
     assert "6.0 cm deep by the encoder, and 3 cm was set" in reported.remark
 
 
-def test_a_gap_in_the_places_costs_its_own_samples_alone(insertion: Recorded) -> None:
+def test_a_gap_in_the_positions_costs_its_own_samples_only(insertion: Recorded) -> None:
     times_s, positions_m = places_of(insertion)
     whole = one(insertion)
     assert whole.motion is not None
@@ -121,7 +121,7 @@ def test_a_gap_in_the_places_costs_its_own_samples_alone(insertion: Recorded) ->
     assert reported.coefficients["k_p"].value == pytest.approx(whole.coefficients["k_p"].value, rel=0.02)
 
 
-def test_a_plate_that_was_not_drawn_out_still_tells_its_insertion(insertion: Recorded) -> None:
+def test_a_plate_that_was_not_lifted_still_shows_its_insertion(insertion: Recorded) -> None:
     early = insertion.times_s < 4.0
     reported = one(insertion._replace(times_s=insertion.times_s[early], forces_n=insertion.forces_n[early]))
     assert "no extraction" in reported.remark
@@ -143,9 +143,7 @@ def test_how_clay_follows_the_speed_is_read_from_the_drags(drag: Recorded) -> No
 
 
 @pytest.mark.parametrize(("kind", "name"), [("drag", "k_s"), ("insertion", "k_p"), ("insertion", "k_e")])
-def test_a_rate_that_is_in_doubt_is_so_for_all_trials_alike(
-    kind: str, name: str, request: pytest.FixtureRequest
-) -> None:
+def test_an_uncertain_rate_is_shared_by_all_trials(kind: str, name: str, request: pytest.FixtureRequest) -> None:
     """No number of them takes it away."""
     reported = one(request.getfixturevalue(kind))
     doubted = reported.shared_uncertainty * reported.coefficients[name].value
@@ -153,7 +151,7 @@ def test_a_rate_that_is_in_doubt_is_so_for_all_trials_alike(
     assert gather_trials([reported] * 100, name, 0.0).trials_error > doubted
 
 
-def test_a_rate_in_doubt_makes_the_doubt_of_an_insertion(insertion: Recorded) -> None:
+def test_an_uncertain_rate_makes_an_insertion_uncertain(insertion: Recorded) -> None:
     sure, unsure = (one(insertion, Alignment(LAG_S, 0.1, 0.002, uncertainty)) for uncertainty in (0.01, 0.3))
     for name in ("k_p", "k_e"):
         assert unsure.coefficients[name].std_error > 1.2 * sure.coefficients[name].std_error
@@ -183,7 +181,7 @@ def test_after_a_rest_samples_count_again_two_millimetres_on() -> None:
     assert np.flatnonzero(moving(positions_m, speeds_m_s, 0.01, 0.002, in_air)).tolist() == [1, 2, 6, 7, 8]
 
 
-def test_a_slow_encoder_is_doubted_more() -> None:
+def test_a_slow_encoder_is_less_certain() -> None:
     hand = ManualMotionParameters(rest_fraction=0.0)
     quick, slow = (
         one(feel_by_hand(clay_plate(49.5), INSERTION, 9, hand, position_rate_hz=rate_hz)) for rate_hz in (100.0, 25.0)

@@ -74,7 +74,7 @@ def feel_by_hand(
     jitter_s: float = 0.0015,
     count_m: float = 1e-5,
 ) -> Recorded:
-    """One trial of a stage that a hand pushes, with the places of an encoder; forces are stamped later by `lag_s`."""
+    """Return one trial of a manual stage with an encoder; forces are stamped later by `lag_s`."""
     random = Random(seed)
     stage = PlateStage(plate, StageParameters(manual=hand or ManualMotionParameters(), seed=seed))
     stage.mean_force_n(0.0)
@@ -105,4 +105,4 @@ def _heard(
 ) -> Recorded:
     times_s: Array = np.arange(1.0 / rate_hz, stage.ends_s + 1.0, 1.0 / rate_hz)
     forces_n = [stage.mean_force_n(float(t)) + random.gauss(0.0, noise_n) + drift_n_s * t for t in times_s]
-    return Recorded(f"made up/{kind}/{seed}", "made up", kind, times_s, np.array(forces_n), 0.0)
+    return Recorded(f"lawful/{kind}/{seed}", "lawful", kind, times_s, np.array(forces_n), 0.0)

@@ -32,7 +32,7 @@ from experiments.loadcell.analysis.force_motion import Insertion, Pace, Shear, S
 from simulation.mud.clay import clay_of_water
 from simulation.test_rig.load_cell import LoadCurve, measure_insertion, measure_shear
 from simulation.test_rig.load_cell_bench import PAPER_PLATE, RELAXATION, clay_plate
-from tests.experiments.made_up_mud import THICKNESS_M, WIDTH_M, LawfulMud, feel
+from tests.experiments.loadcell.lawful_mud import THICKNESS_M, WIDTH_M, LawfulMud, feel
 
 SETTINGS = StageSettings()
 KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
@@ -103,7 +103,7 @@ def clay_trials() -> list[AnalysedTrial]:
 def test_a_trial_errs_by_about_as_much_as_it_says_though_clay_does_not_follow_the_law(
     clay_trials: list[AnalysedTrial], name: str
 ) -> None:
-    """Whatever moment it began: the ends of a stroke count by their way."""
+    """Whatever the start of the stage: the ends of a stroke count by their way."""
     true = true_of_clay(49.5)[name]
     reported = [trial.coefficients[name] for trial in clay_trials]
     errs = float(np.sqrt(np.mean([(each.value - true) ** 2 for each in reported])))
@@ -112,7 +112,7 @@ def test_a_trial_errs_by_about_as_much_as_it_says_though_clay_does_not_follow_th
     assert says / 3.0 < errs < 1.5 * says
 
 
-def test_the_doubt_of_a_slope_is_the_scatter_of_slopes_and_that_of_weighted_least_squares() -> None:
+def test_the_error_of_a_slope_is_the_scatter_of_slopes_and_that_of_weighted_least_squares() -> None:
     """Of a force that bends from the law; an oracle with the bend as a second column."""
     random, depths_m = np.random.default_rng(1), np.linspace(0.0, 0.03, 25)
     volumes_m3 = volume_m3(SETTINGS, depths_m)
@@ -141,7 +141,7 @@ def test_noises_are_those_of_the_samples_whatever_line_they_lie_on(turned: bool)
     assert np.max(np.abs(noises_n(depths_m, profile_n(depths_m)))) < 1e-9
 
 
-def test_five_trials_that_scatter_are_doubted_with_students_factor() -> None:
+def test_the_error_of_five_trials_has_students_factor() -> None:
     values = (1e6, 2e6, 3e6, 4e6, 5e6)
     trials = [AnalysedTrial(nowhere(), coefficients={"k_s": Coefficient(value, 1.0)}) for value in values]
     reported = gather_trials(trials, "k_s", 0.0)
@@ -149,7 +149,7 @@ def test_five_trials_that_scatter_are_doubted_with_students_factor() -> None:
 
 
 def nowhere() -> Recorded:
-    return Recorded("made up/shear/1", "made up", SHEAR, np.empty(0), np.empty(0), 0.0)
+    return Recorded("lawful/shear/1", "lawful", SHEAR, np.empty(0), np.empty(0), 0.0)
 
 
 def one(recorded: Recorded) -> AnalysedTrial:
@@ -161,7 +161,7 @@ def insertion() -> Recorded:
     return feel(LawfulMud(**KNOWN), INSERTION, 7)
 
 
-def test_a_cell_that_is_mounted_the_other_way_round_tells_the_same(insertion: Recorded) -> None:
+def test_a_cell_of_the_opposite_sign_gives_the_same_coefficients(insertion: Recorded) -> None:
     turned = one(insertion._replace(forces_n=-insertion.forces_n))
     straight = one(insertion)
     assert turned.profile is not None and turned.profile.turned
@@ -179,7 +179,7 @@ def test_the_depth_found_is_that_of_the_stage(insertion: Recorded) -> None:
     assert reported.motion.pace.speed_m_s == pytest.approx(0.1, rel=0.08)
 
 
-def test_a_stage_slower_than_it_was_set_is_measured_and_told() -> None:
+def test_a_stage_slower_than_its_setting_is_measured_and_reported() -> None:
     mud = LawfulMud(**KNOWN)
     reported = analyse([feel(mud, INSERTION, seed, speed_m_s=0.08) for seed in range(4)], SETTINGS, look)
     assert gather_trials(reported, "k_p", 0.0).value == pytest.approx(KNOWN["k_p"], rel=0.04)
@@ -213,7 +213,7 @@ def test_a_recording_that_begins_in_the_stroke_says_so(insertion: Recorded) -> N
     assert "moving already" in reported.problem
 
 
-def test_a_plate_that_was_not_drawn_out_still_tells_its_insertion(insertion: Recorded) -> None:
+def test_a_plate_that_was_not_lifted_still_shows_its_insertion(insertion: Recorded) -> None:
     early = insertion.times_s < 4.0
     reported = one(insertion._replace(times_s=insertion.times_s[early], forces_n=insertion.forces_n[early]))
     assert "no extraction" in reported.remark
@@ -231,7 +231,7 @@ def test_ten_samples_a_second_are_enough_for_a_shear() -> None:
     assert reported.coefficients["k_s"].value == pytest.approx(KNOWN["k_s"], rel=BOUND)
 
 
-def test_a_zero_that_drifts_while_nobody_starts_is_no_contact() -> None:
+def test_a_drifting_zero_is_no_contact() -> None:
     times_s = np.arange(0.0, 40.0, 0.0125)
     ramp_n = np.where(times_s > 35.0, np.minimum((times_s - 35.0) * 10.0, 2.0), 0.0)
     noise_n = np.random.default_rng(1).normal(0.0, 0.005, len(times_s))
@@ -240,7 +240,7 @@ def test_a_zero_that_drifts_while_nobody_starts_is_no_contact() -> None:
     assert profile.level_n == pytest.approx(0.14, abs=0.01)
 
 
-def test_a_spike_is_taken_out_and_an_edge_is_kept() -> None:
+def test_a_spike_is_removed_and_an_edge_remains() -> None:
     forces_n = np.array([0.0, 0.01, 0.0, 9.0, 0.01, 0.0, 0.01, 5.0, 5.01, 5.0, 5.02])
     assert without_spikes(forces_n).tolist() == pytest.approx([0, 0.01, 0, 0.005, 0.01, 0, 0.01, 5, 5.01, 5, 5.02])
 
@@ -251,7 +251,7 @@ def test_a_millimetre_of_depth_is_seven_per_cent_of_the_shear_and_three_of_the_o
     assert bench_uncertainty("k_s", SETTINGS, 0.0, 0.05) == pytest.approx(0.05, rel=0.01)
 
 
-def test_a_speed_beside_the_one_that_was_set_is_doubted_as_far_as_they_are_apart() -> None:
+def test_a_speed_off_its_setting_is_as_uncertain_as_the_two_are_apart() -> None:
     """Trials that agree at 0.097 m/s, and a stage set to 0.1: the truth may be either."""
     agreed, far = (
         common_pace([Pace(speed * factor, 2.0, 0.005, 0.1) for factor in (0.99, 1.0, 1.01)], SETTINGS)
@@ -261,7 +261,7 @@ def test_a_speed_beside_the_one_that_was_set_is_doubted_as_far_as_they_are_apart
     assert abs(far[0].speed_m_s / 0.097 - 1.0) < 2.0 * far[1] and abs(far[0].speed_m_s / 0.1 - 1.0) < 2.0 * far[1]
 
 
-def test_the_doubt_of_a_mud_holds_scatter_calibration_and_the_speed_that_all_share(insertion: Recorded) -> None:
+def test_the_error_of_a_mud_contains_scatter_calibration_and_shared_speed(insertion: Recorded) -> None:
     reported = [replace(one(insertion), shared_uncertainty=0.02) for _ in range(4)]
     plain = gather_trials([replace(each, shared_uncertainty=0.0) for each in reported], "k_p", 0.0)
     assert plain.repeatability == 0.0
@@ -270,8 +270,8 @@ def test_the_doubt_of_a_mud_holds_scatter_calibration_and_the_speed_that_all_sha
     assert gather_trials([], "k_p", 0.0).trials == ()
 
 
-def test_a_mean_is_doubted_for_what_its_trials_share_and_not_for_what_the_worst_of_them_does() -> None:
-    """Made-up trials, one pushed far quicker than the others: a rate that is wrong moves each by its own share."""
+def test_the_error_of_a_mean_contains_the_mean_of_the_shared_errors() -> None:
+    """Synthetic trials, one pushed far quicker than the others: a rate that is wrong moves each by its own share."""
     random, moves, errors, uncertainties = (
         np.random.default_rng(1),
         np.array([0.004, 0.004, 0.004, 0.004, 0.03]),
@@ -293,7 +293,7 @@ def test_a_mean_is_doubted_for_what_its_trials_share_and_not_for_what_the_worst_
     assert np.linalg.norm(uncertainties) < 1.5 * np.linalg.norm(errors)
 
 
-def test_a_stage_that_stutters_is_doubted(insertion: Recorded) -> None:
+def test_a_stage_that_stutters_is_remarked(insertion: Recorded) -> None:
     """It stood still for 0.1 s, half-way down."""
     reported = one(insertion)
     assert isinstance(reported.motion, Insertion) and reported.remark == ""
