@@ -117,7 +117,7 @@ class Drives(Protocol):
         """Commands zero torque and idle: all drives `at_once`, later those that still follow torque."""
 
     def force_idle(self, repeats: int) -> None:
-        """Commands zero torque and idle to every drive, `repeats` times. Never raises, whatever else is broken."""
+        """Commands zero torque and idle to every drive, `repeats` times. Never raises."""
 
     def clear_errors(self) -> None: ...
 

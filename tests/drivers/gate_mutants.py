@@ -180,7 +180,7 @@ def _run_tests(name: str, tree: ast.Module) -> int:
         exec(compile(tree, module.__file__, "exec"), module.__dict__)  # a mutant of our own file
     except (AttributeError, IndexError, KeyError, NameError, TypeError, ValueError):
         return 1
-    skipped = "not every_branch and not periodic and not kernel and not on_a_port and not gated_outlet"
+    skipped = "not every_branch and not kernel and not on_a_port"
     options = ["-x", "-q", "-p", "no:cacheprovider", "--hypothesis-seed=1", "-k", skipped]
     return int(pytest.main([*options, str(TESTS)]))
 

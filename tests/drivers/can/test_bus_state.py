@@ -30,7 +30,7 @@ RESTARTED = Frame(0x100, bytes(8), is_error=True)
 
 @pytest.fixture
 def kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
-    """The far end of the socket behind the next bus that python-can opens."""
+    """The far end of the socket of the next bus that python-can opens."""
     far, near = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     monkeypatch.setattr(socketcan, "create_socket", lambda: near)
     monkeypatch.setattr(socketcan, "bind_socket", lambda *arguments: None)
@@ -81,7 +81,7 @@ def test_a_peer_s_frame_ends_bus_off_but_no_warning(port: CanPort, kernel: socke
     assert states == [BusState.WARNING, BusState.OFF, BusState.ACTIVE]
 
 
-def test_a_frame_of_a_process_beside_us_does_not_end_bus_off() -> None:
+def test_a_frame_of_another_local_process_does_not_end_bus_off() -> None:
     class Local(can.BusABC):
         reported = [
             can.Message(arbitration_id=0x040, is_error_frame=True, is_extended_id=False, data=bytes(8)),
@@ -118,7 +118,7 @@ class Gone(can.BusABC):
 
 @pytest.mark.parametrize("number", [errno.ENETDOWN, errno.ENODEV, errno.ENXIO])
 @pytest.mark.parametrize("kind", [OSError, can.CanOperationError])
-def test_an_interface_that_is_gone_is_told_and_asked_once_a_read(number: int, kind: type[Exception]) -> None:
+def test_an_interface_that_is_gone_is_reported_and_tried_once_a_read(number: int, kind: type[Exception]) -> None:
     problem = OSError(number, "gone") if kind is OSError else can.CanOperationError("gone", number)
     bus = Gone(problem)
     port = PythonCanPort(bus)
@@ -127,7 +127,7 @@ def test_an_interface_that_is_gone_is_told_and_asked_once_a_read(number: int, ki
     assert "gone" in port.last_error
 
 
-def test_a_send_into_an_interface_that_is_gone_tells_the_state_and_a_full_queue_does_not() -> None:
+def test_a_send_into_a_missing_interface_changes_the_state_and_a_full_queue_does_not() -> None:
     full = PythonCanPort(Gone(can.CanOperationError("No buffer space available", errno.ENOBUFS)))
     full.send(ENCODER)
     assert (full.failed_sends, full.state) == (1, BusState.ACTIVE)
@@ -158,7 +158,7 @@ def test_sending_makes_the_kernel_s_bytes_and_no_entry_in_any_log(
 
 
 def test_sending_into_a_full_queue_does_not_wait(port: CanPort) -> None:
-    for _ in range(2000):  # nobody reads: the socket takes a few hundred
+    for _ in range(2000):  # unread, the socket stores a few hundred
         port.send(ENCODER)
     assert port.failed_sends > 0
     assert port.last_send_error == "Transmit buffer full"
@@ -181,7 +181,7 @@ def test_no_broadcast_manager_is_asked_for(kernel: socket.socket, monkeypatch: p
 
 @settings(max_examples=500, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.lists(st.binary(min_size=16, max_size=16), max_size=8))
-def test_whatever_sixteen_bytes_the_kernel_gives_nothing_is_raised_and_every_frame_counts(
+def test_any_sixteen_bytes_raise_nothing_and_every_frame_counts(
     port: CanPort, kernel: socket.socket, data: list[bytes]
 ) -> None:
     errors_before = port.error_frames
@@ -192,7 +192,7 @@ def test_whatever_sixteen_bytes_the_kernel_gives_nothing_is_raised_and_every_fra
     assert not any(frame.is_error for frame in frames)
 
 
-def test_a_mock_port_fails_as_it_is_told() -> None:
+def test_a_mock_port_fails_as_the_test_sets_it() -> None:
     bus = MockBus()
     port, other = bus.open(), bus.open()
     port.inject_error(0x204, bytes.fromhex("00 10 00 00 00 00 00 80"))

@@ -153,7 +153,7 @@ def test_a_failed_receive_is_counted_and_does_not_raise() -> None:
     assert "garbage" in port.last_error
 
 
-def test_garbage_does_not_hide_the_good_frames_behind_it() -> None:
+def test_garbage_does_not_hide_the_good_frames_after_it() -> None:
     class Noisy(FakeBus):
         def recv(self, timeout: float | None = None) -> can.Message | None:
             self.answers -= 1

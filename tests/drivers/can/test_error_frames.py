@@ -41,7 +41,7 @@ GOLDEN: list[tuple[int, str, BusState | None, str]] = [
 
 
 @pytest.mark.parametrize(("class_bits", "data", "state", "text"), GOLDEN)
-def test_error_frames_tell_this(class_bits: int, data: str, state: BusState | None, text: str) -> None:
+def test_error_frames_decode_to_state_and_text(class_bits: int, data: str, state: BusState | None, text: str) -> None:
     assert decode_error_frame(class_bits, bytes.fromhex(data)) == (state, text)
 
 

@@ -84,7 +84,7 @@ def fill(bus: LocalBus) -> int:
     raise AssertionError("no frame was ever counted as lost")
 
 
-def test_frames_keep_their_order_and_nobody_hears_itself(open_bus: Open) -> None:
+def test_frames_arrive_in_order_and_no_node_receives_its_own(open_bus: Open) -> None:
     sender, receiver = open_bus(), open_bus()
     for number in range(100):
         sender.send(make_message(number))
@@ -282,7 +282,7 @@ def test_python_can_opens_it_by_name_with_filters(tmp_path: Path, monkeypatch: p
     assert [path.name for path in folder.iterdir()] == ["lock"]
 
 
-def test_a_receive_with_a_timeout_waits_that_long_whatever_wakes_it(open_bus: Open) -> None:
+def test_a_receive_waits_for_its_whole_timeout_despite_other_events(open_bus: Open) -> None:
     bus, start_s = open_bus(), time.monotonic()
     open_bus()  # wakes the first one, without a frame
     assert bus.recv(0.05) is None
@@ -339,7 +339,7 @@ def test_a_channel_that_is_neither_name_nor_path_is_refused(channel: str) -> Non
         LocalBus(channel)
 
 
-def test_a_folder_of_somebody_else_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_of_another_user_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: 54321)
     with pytest.raises(can.CanInitializationError, match="belongs to user"):
         LocalBus(tmp_path)

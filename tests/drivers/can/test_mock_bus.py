@@ -4,7 +4,7 @@ from drivers.can.frames import Frame
 from drivers.can.mock_bus import LONGEST_QUEUE, MockBus
 
 
-def test_all_others_hear_frames_in_order_and_nobody_hears_himself() -> None:
+def test_all_other_ports_receive_frames_in_order_and_no_port_its_own() -> None:
     bus = MockBus()
     sender, first, second = bus.open(), bus.open(), bus.open()
     sent = [Frame(0x10, b"\x01"), Frame(0x20, is_remote=True), Frame(0x18FEF100, b"\x02", is_extended=True)]
@@ -28,7 +28,7 @@ def test_two_buses_do_not_hear_each_other() -> None:
     assert stranger.receive() == []
 
 
-def test_a_port_that_nobody_reads_loses_its_oldest_frames() -> None:
+def test_an_unread_port_loses_its_oldest_frames() -> None:
     bus = MockBus()
     sender, listener = bus.open(), bus.open()
     for number in range(LONGEST_QUEUE + 3):

@@ -32,7 +32,7 @@ OPTIONS: dict[str, str | int | float | bool] = {"bitrate": 1000000, "sleep_after
 
 
 class Bench:
-    """The daemon's port, the adapter, and a node on the bus behind it."""
+    """The daemon's port, the adapter, and a node on its bus."""
 
     def __init__(self) -> None:
         bus = MockBus()
@@ -152,7 +152,7 @@ def test_an_empty_read_does_not_wait(bench: Bench) -> None:
         start_s = time.perf_counter()
         bench.port.receive()
         durations_s.append(time.perf_counter() - start_s)
-    assert min(durations_s) < 0.0005  # pyserial alone waits for 1 ms whatever the machine
+    assert min(durations_s) < 0.0005  # pyserial alone waits for 1 ms on any machine
 
 
 def test_a_frame_that_the_adapter_refuses_is_a_failed_send(bench: Bench) -> None:
@@ -207,7 +207,7 @@ def test_an_adapter_that_takes_no_more_does_not_hold_the_sender_and_gets_whole_l
     assert kept[: kept.index(FRAMES[1])] == taken
 
 
-def test_an_unplugged_adapter_is_told_and_raises_nothing(bench: Bench) -> None:
+def test_an_unplugged_adapter_is_reported_and_raises_nothing(bench: Bench) -> None:
     other = Bench()
     other.adapter.unplug()
     other.port.receive()

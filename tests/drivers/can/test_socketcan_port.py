@@ -41,7 +41,7 @@ GOLDEN = {  # the 16 bytes of struct can_frame, written down by hand
 
 
 class KernelSocket(StandIn):
-    """Tells what a test gives it in front of what has really arrived; an exception is raised."""
+    """Returns what the test sets before the frames that have arrived; it raises an exception that the test sets."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -96,7 +96,7 @@ def bench() -> Iterator[Bench]:
 
 
 def message(frame: Frame, marks: int = 0, lost: int | None = None) -> tuple[bytes, list[Any], int, None]:
-    """What `recvmsg` tells of a frame; the kernel counts lost frames from the first one on."""
+    """The result of `recvmsg` for a frame; the kernel counts lost frames from the first one on."""
     ancillary = [(socket.SOL_SOCKET, SO_TIMESTAMPNS, struct.pack("@ll", 1_700_000_000, 250_000_000))]
     if lost is not None:
         ancillary.append((socket.SOL_SOCKET, SO_RXQ_OVFL, struct.pack("@I", lost)))
@@ -129,7 +129,7 @@ def test_frames_keep_their_order_and_nothing_is_waited_for(bench: Bench) -> None
     assert bench.receive() == []
 
 
-def test_an_error_frame_is_told_apart_before_its_class_bits_look_like_an_id(bench: Bench) -> None:
+def test_an_error_frame_is_recognised_before_its_class_bits_look_like_an_id(bench: Bench) -> None:
     looks_like_the_encoder = Frame(0x009, bytes(8), is_error=True)
     bench.report(looks_like_the_encoder, ENCODER)
     bench.kernel.send(bytes.fromhex("040000e0 08000000 0008000000000000"))  # with the bits of a remote extended frame
@@ -170,13 +170,13 @@ def test_the_kernel_s_count_may_go_round(bench: Bench) -> None:
     assert bench.port.lost_frames == 2**32 + 1
 
 
-def test_an_error_frame_tells_of_lost_frames_as_well(bench: Bench) -> None:
+def test_an_error_frame_also_carries_the_count_of_lost_frames(bench: Bench) -> None:
     bench.socket.reported = [message(OFF, lost=5)]
     assert bench.port.receive() == []
     assert (bench.port.lost_frames, bench.port.error_frames) == (5, 1)
 
 
-def test_a_frame_of_a_process_beside_us_does_not_end_bus_off_and_one_of_a_peer_does(bench: Bench) -> None:
+def test_a_frame_of_another_local_process_does_not_end_bus_off_and_one_of_a_peer_does(bench: Bench) -> None:
     states = []
     for reported in (message(OFF), message(ENCODER, marks=socket.MSG_DONTROUTE), message(ENCODER)):
         bench.socket.reported = [reported]
@@ -190,7 +190,7 @@ def test_a_frame_of_a_process_beside_us_does_not_end_bus_off_and_one_of_a_peer_d
     [(errno.ENOBUFS, BusState.ACTIVE), (errno.EAGAIN, BusState.ACTIVE)]
     + [(number, BusState.OFF) for number in (errno.ENETDOWN, errno.ENODEV, errno.ENXIO)],
 )
-def test_a_send_that_fails_is_counted_at_once_and_tells_if_the_interface_is_gone(
+def test_a_failed_send_is_counted_at_once_and_shows_whether_the_interface_is_gone(
     bench: Bench, number: int, state: BusState
 ) -> None:
     bench.socket.send_problem = OSError(number, os.strerror(number))
@@ -202,7 +202,7 @@ def test_a_send_that_fails_is_counted_at_once_and_tells_if_the_interface_is_gone
     assert (bench.port.failed_sends, len(bench.kernel.recv(64))) == (1, 16)
 
 
-def test_a_queue_that_nobody_empties_does_not_hold_the_sender(bench: Bench) -> None:
+def test_a_full_queue_does_not_block_the_sender(bench: Bench) -> None:
     for _ in range(2000):
         bench.port.send(ENCODER)
     assert bench.port.failed_sends > 0
@@ -218,7 +218,7 @@ def test_a_frame_that_has_no_bytes_is_a_failed_send(bench: Bench, frame: Frame) 
 
 
 @pytest.mark.parametrize("number", [errno.ENETDOWN, errno.ENODEV, errno.ENXIO])
-def test_an_interface_that_went_down_is_told_and_is_back_with_the_first_frame(bench: Bench, number: int) -> None:
+def test_an_interface_that_went_down_is_reported_and_is_back_with_the_first_frame(bench: Bench, number: int) -> None:
     bench.socket.reported = [OSError(number, os.strerror(number))]
     bench.report(ENCODER)
     assert bench.receive() == []
@@ -289,7 +289,7 @@ def test_without_wishes_everything_is_heard(bench: Bench) -> None:
     assert all(passes(filters, word) for word in (0x7FF, 0x9FFFFFFF, 0x40000009))
 
 
-def test_a_kernel_that_refuses_filters_only_lets_strangers_through(
+def test_a_kernel_that_refuses_filters_only_lets_unknown_ids_through(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(self: StandIn, level: int, number: int, value: Any, *more: Any) -> None:
@@ -313,7 +313,7 @@ ANY_FRAME = st.builds(struct.Struct("<IB11s").pack, WORDS, st.integers(0, 8), st
 
 @settings(max_examples=150)
 @given(reads=st.lists(st.lists(ANY_FRAME, max_size=8), max_size=4))
-def test_whatever_the_kernel_gives_both_paths_make_the_same_of_it(reads: list[list[bytes]]) -> None:
+def test_both_paths_decode_any_bytes_of_the_kernel_alike(reads: list[list[bytes]]) -> None:
     (first, near), (second, beside) = open_pair(), open_pair()
     own, python_can = SocketcanPort(open_bus(near)), PythonCanPort(open_bus(beside))
     for read in reads:
@@ -346,11 +346,11 @@ def test_both_paths_put_the_same_frame_on_the_wire(
     for port in (own, python_can):
         port.send(Frame(identifier, b"" if is_remote else data, is_remote, is_extended=is_extended))
     ours, theirs = first.recv(64), second.recv(64)
-    assert ours[:5] + ours[8:] == theirs[:5] + theirs[8:]  # python-can repeats the length in a byte that nobody reads
+    assert ours[:5] + ours[8:] == theirs[:5] + theirs[8:]  # python-can repeats the length in an unused byte
     close_all(own, python_can, first, second)
 
 
-def test_a_bus_that_is_closed_is_told_and_nothing_is_raised(bench: Bench) -> None:
+def test_a_closed_bus_is_reported_and_raises_nothing(bench: Bench) -> None:
     bench.port.close()
     assert bench.port.receive() == []
     bench.port.send(ENCODER)

@@ -1,4 +1,4 @@
-"""A failing port beside a sound one on the same traffic: what fails is seen, and nothing else is touched."""
+"""A failing port next to a sound one on the same traffic: only the injected failure makes a difference."""
 
 from __future__ import annotations
 
@@ -236,11 +236,11 @@ def errors(kind: str) -> list[tuple[int, int]]:
     return [codec.GET_ERROR.decode(data) for _, data in frames]
 
 
-def test_a_drive_can_tell_that_it_left_closed_loop_and_of_no_error() -> None:
+def test_a_drive_can_report_that_it_left_closed_loop_without_an_error() -> None:
     assert set(heartbeats("off")) == {(0, AxisState.IDLE)} and set(errors("off")) == {(0, 0)}
 
 
-def test_a_drive_can_tell_of_an_error() -> None:
+def test_a_drive_can_report_an_error() -> None:
     assert codec.error_text(0x20) == "gate driver fault"
     assert set(heartbeats("stuck")) == {(0x20, AxisState.IDLE)} and set(errors("stuck")) == {(0x20, 0x20)}
 
@@ -289,12 +289,12 @@ def test_a_stuck_transmit_queue_still_receives() -> None:
     assert run("bus.left", "stuck").received == SOUND.received
 
 
-def test_a_bus_full_of_garbage_brings_frames_of_strangers_and_leaves_commands_alone() -> None:
+def test_a_bus_full_of_garbage_adds_random_frames_and_leaves_commands_unchanged() -> None:
     seen = run("bus.left", "garbage")
     assert len(seen.received) > 50 and seen.sent == SOUND.sent
 
 
-def test_frames_of_strangers_and_other_formats_suffer_only_from_the_bus() -> None:
+def test_frames_of_unknown_ids_and_other_formats_suffer_only_from_failures_of_the_bus() -> None:
     odd = [
         Frame(arbitration_id(9, codec.GET_IQ), b"\0" * 8),
         Frame(arbitration_id(0, codec.GET_IQ), b"\0" * 8, is_extended=True),
@@ -331,7 +331,7 @@ def test_the_trouble_of_the_wrapped_port_shows_through() -> None:
 
 
 def test_late_commands_arrive_at_once_and_in_order_when_all_failures_are_ended() -> None:
-    """So a disarm behind them is not held up."""
+    """A disarm that follows them is not delayed."""
     failures, bus = Failures(("left",)), MockBus()
     robot, inner = bus.open(), bus.open()
     port = FailingPort("left", inner, DRIVES, failures)

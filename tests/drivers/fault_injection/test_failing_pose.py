@@ -62,13 +62,13 @@ def test_a_stuck_body_stands_with_fresh_stamps() -> None:
     assert all(body.stamp_s == now_s for now_s, body in during("stuck"))
 
 
-def test_a_garbled_place_is_true_looking_no_number_or_huge() -> None:
+def test_a_corrupted_position_is_plausible_or_not_finite_or_huge() -> None:
     places = [body.x_m for _, body in during("garbage")]
     assert any(isnan(x_m) for x_m in places) and any(abs(x_m) > 1e30 for x_m in places)
     assert any(isfinite(x_m) and 0.0 < abs(x_m) < 100.0 for x_m in places)
 
 
-def test_a_late_place_is_that_of_before_with_a_fresh_stamp() -> None:
+def test_a_delayed_position_is_an_earlier_one_with_a_fresh_stamp() -> None:
     early = [body for now_s, body in during("slow") if now_s < BEGIN_S + LATE_S - 0.5 * PERIOD_S]
     later = [(now_s, body) for now_s, body in during("slow") if now_s > BEGIN_S + LATE_S + 0.5 * PERIOD_S]
     assert all(isnan(body.x_m) for body in early) and len(early) == 20

@@ -19,7 +19,7 @@ def test_every_kind_makes_sense_somewhere() -> None:
     assert {kind for effects in EFFECTS.values() for kind in effects} == set(FailureKind)
 
 
-def test_each_effect_is_told_in_one_line_of_its_own() -> None:
+def test_each_effect_has_one_line_of_its_own() -> None:
     for effects in EFFECTS.values():
         assert len(set(effects.values())) == len(effects)
         assert all(10 < len(text) < 100 and not text.endswith(".") for text in effects.values())
@@ -64,7 +64,7 @@ def test_nothing_fails_for_longer_than_a_minute(failures: Failures, for_s: float
     assert not failures.failing
 
 
-def test_every_failure_ends_by_itself_and_is_told_once(failures: Failures) -> None:
+def test_every_failure_ends_by_itself_and_is_reported_once(failures: Failures) -> None:
     for component, kind, _ in failures.table():
         assert failures.begin(component, kind, 1.0, 2.0) is None
         assert failures.update(2.99) == []
@@ -74,7 +74,7 @@ def test_every_failure_ends_by_itself_and_is_told_once(failures: Failures) -> No
         assert not failures.failing
 
 
-def test_a_failure_takes_the_place_of_the_one_before_at_the_same_part_only(failures: Failures) -> None:
+def test_a_failure_replaces_only_the_previous_one_of_the_same_component(failures: Failures) -> None:
     failures.begin("pose", "off", 1.0, 2.0)
     failures.begin("log", "off", 1.0, 2.0)
     failures.begin("pose", "stuck", 2.0, 2.0)

@@ -1,4 +1,4 @@
-"""Two weights on a cell: what they tell, and when they tell nothing."""
+"""Two weights on a cell: the calibration that they determine, and weights that determine none."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def readings(force_n: float, seed: int, drift: float = 0.0, per_newton: float = 
     return [81000.0 + per_newton * force_n + random.gauss(0.0, 400.0) + drift * i for i in range(160)]
 
 
-def test_two_weights_tell_span_and_zero_within_their_standard_errors() -> None:
+def test_two_weights_determine_span_and_zero_within_their_standard_errors() -> None:
     for seed in range(20):
         light, heavy = weigh(0.0, readings(0.0, seed)), weigh(4.9, readings(4.9, seed + 100))
         reported = calibrate("counts", light, heavy)
@@ -55,7 +55,7 @@ def test_too_few_readings_are_refused() -> None:
         weigh(0.0, [1.0, 2.0, 3.0])
 
 
-def test_a_drift_and_a_turned_cell_are_told() -> None:
+def test_a_drift_and_an_inverted_cell_are_reported() -> None:
     light, heavy = weigh(0.0, readings(0.0, 1, drift=60.0)), weigh(4.9, readings(4.9, 2, per_newton=-42000.0))
     reported = remarks_about(calibrate("counts", light, heavy), light, heavy)
     assert [("drifted" in each, "other direction" in each) for each in reported] == [(True, False), (False, True)]

@@ -1,4 +1,4 @@
-"""A load cell's serial port over a real tty, whatever happens to the amplifier at its other end."""
+"""A load cell's serial port over a real tty, with failures of the amplifier at its other end."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_reading_never_waits_where_nothing_comes(cable: Cable) -> None:
     assert cable.port.silent_for_s(3.0) == 2.0
 
 
-def test_garbled_lines_are_counted_and_kept_to_be_shown(tmp_path: Path) -> None:
+def test_malformed_lines_are_counted_and_the_last_one_is_stored(tmp_path: Path) -> None:
     cable = Cable(tmp_path, garbled_fraction=0.25)
     samples = cable.run(4.0)
     port = cable.port
@@ -109,7 +109,7 @@ def test_an_overload_is_a_sample_without_a_force(tmp_path: Path, style: str, nam
     cable.close()
 
 
-def test_a_line_that_names_its_unit_is_believed(tmp_path: Path) -> None:
+def test_the_unit_of_a_line_is_converted(tmp_path: Path) -> None:
     cable = Cable(tmp_path, name="indicator", style="indicator")
     cable.port.calibration = LoadCellCalibration("N", 1.0)
     assert cable.run(1.0)[-1].force_n == pytest.approx(FORCE_N, abs=1e-3)

@@ -42,7 +42,7 @@ def test_a_gap_stays_a_gap_and_is_counted() -> None:
     assert clock.period_s == pytest.approx(PERIOD_S, rel=0.01)
 
 
-def test_lines_that_a_busy_computer_handed_over_late_do_not_spoil_the_period() -> None:
+def test_lines_that_a_busy_computer_delivered_late_do_not_falsify_the_period() -> None:
     """Two hundred milliseconds late, then one line, then the others at once, whenever that happens."""
     for stalled in (6, 20, 300):
         clock, stamps_s = LineClock(115200), list[float]()

@@ -1,4 +1,4 @@
-"""A stage's encoder over a real tty, whatever happens to the counter at its other end."""
+"""A stage's encoder over a real tty, with failures of the counter at its other end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SPEED_M_S = 0.1
 
 
 class Rail:
-    """A stage that moves evenly, its counter, and whoever listens."""
+    """A stage that moves evenly, its counter, and the encoder that reads it."""
 
     def __init__(self, folder: Path, baud: int = 115200, label: str = "", **changes: float | str) -> None:
         parameters = StageEncoderParameters(**changes)  # type: ignore[arg-type]
@@ -26,12 +26,12 @@ class Rail:
         self.now_s = 0.0
 
     def run(self, duration_s: float) -> list[StagePosition]:
-        places, end_s = list[StagePosition](), self.now_s + duration_s
+        positions, end_s = list[StagePosition](), self.now_s + duration_s
         while self.now_s < end_s:
             self.now_s += 0.01
             self.counter.step(self.now_s)
-            places += self.encoder.read(self.now_s)
-        return places
+            positions += self.encoder.read(self.now_s)
+        return positions
 
     def close(self) -> None:
         self.encoder.close()
@@ -45,32 +45,32 @@ def rail(tmp_path: Path) -> Iterator[Rail]:
     made.close()
 
 
-def test_places_come_at_the_times_they_were_taken_but_for_a_constant(rail: Rail) -> None:
-    places = rail.run(3.0)[100:]
-    late_s = [place.stamp_s - place.position_m / SPEED_M_S for place in places]
-    assert len(places) > 190
+def test_positions_are_stamped_with_their_times_except_for_a_constant_delay(rail: Rail) -> None:
+    positions = rail.run(3.0)[100:]
+    late_s = [place.stamp_s - place.position_m / SPEED_M_S for place in positions]
+    assert len(positions) > 190
     assert max(late_s) - min(late_s) < 0.002
     assert rail.encoder.rate_hz == pytest.approx(100.0, rel=0.01)
 
 
-def test_garbled_counts_are_counted_and_no_place(tmp_path: Path) -> None:
+def test_malformed_counts_are_counted_and_give_no_position(tmp_path: Path) -> None:
     rail = Rail(tmp_path, garbled_fraction=0.2, label="pos")
     rail.counter.encoder = StageEncoderParameters(label="pos=")
-    places = rail.run(3.0)
+    positions = rail.run(3.0)
     assert 20 < rail.encoder.counts.malformed < 110
-    assert all(before.position_m < after.position_m for before, after in zip(places, places[1:], strict=False))
+    assert all(before.position_m < after.position_m for before, after in zip(positions, positions[1:], strict=False))
     rail.close()
 
 
-def test_an_encoder_that_was_away_has_another_zero_and_says_so(rail: Rail) -> None:
+def test_an_encoder_that_was_unplugged_reports_that_its_zero_changed(rail: Rail) -> None:
     rail.run(1.0)
     rail.counter.unplug()
     assert rail.run(1.0) == [] and not rail.encoder.is_there
     assert rail.encoder.last_problem == "No such file or directory"
     rail.counter.plug_in()
-    places = rail.run(1.5)
+    positions = rail.run(1.5)
     assert rail.encoder.breaks == 1
-    assert places[0].position_m < 0.5 * SPEED_M_S  # a counter begins at zero
+    assert positions[0].position_m < 0.5 * SPEED_M_S  # a counter begins at zero
 
 
 def test_one_that_says_nothing_is_silent(tmp_path: Path) -> None:
@@ -87,6 +87,6 @@ def test_another_baud_rate_is_no_text(tmp_path: Path) -> None:
     rail.close()
 
 
-def test_a_port_that_there_is_not_is_told(tmp_path: Path) -> None:
+def test_a_missing_port_is_reported(tmp_path: Path) -> None:
     with pytest.raises(SerialLineError, match="no serial port"):
         StageEncoder(StageEncoderSettings(str(tmp_path / "nothing"), 1e-5))

@@ -1,4 +1,4 @@
-"""What one drive tells of itself over time: restarts, a twin under its id, its watchdog's settings."""
+"""What one drive reports about itself over time: restarts, a duplicate node id, the settings of its watchdog."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Bench:
     def report(self, message: Message, *values: float, stamp_s: float = -1.0) -> None:
         self.far.send(Frame(arbitration_id(0, message), message.encode(*values), stamp_s=stamp_s))
 
-    def tell_setting(self, endpoint: int, value: str) -> None:
+    def report_setting(self, endpoint: int, value: str) -> None:
         self.far.send(Frame(0x005, TX_SDO.encode(0, endpoint, 0) + bytes.fromhex(value)))
 
     def read(self, now_s: float) -> None:
@@ -96,7 +96,7 @@ def test_a_stall_of_ours_is_no_silence_of_the_drive(bench: Bench) -> None:
     assert (bench.axis.restarts, bench.axis.duplicates) == (0, False)
 
 
-def test_frames_with_stamps_of_another_clock_make_no_restart_and_no_twin(bench: Bench) -> None:
+def test_frames_with_stamps_of_another_clock_make_no_restart_and_no_duplicate(bench: Bench) -> None:
     for number in range(2000):
         bench.report(GET_IQ, 0.0, 0.0, stamp_s=1e9 * (1 + number % 3))
         if number % 50 == 0:
@@ -179,7 +179,7 @@ def test_a_second_drive_elsewhere_shows_by_the_readings_within_ten_ticks(bench: 
     assert seconds_until_duplicates(bench, 2, (0.1, 0.4)) < 10 * PERIOD_S
 
 
-def test_twins_are_forgotten_when_one_of_them_is_taken_off(bench: Bench) -> None:
+def test_a_duplicate_is_forgotten_when_one_of_the_drives_is_removed(bench: Bench) -> None:
     bench.live(2.0, drives=2, turns=(0.1, 0.4))
     assert bench.axis.duplicates
     bench.live(5.0)
@@ -200,7 +200,7 @@ def test_the_heartbeat_s_period_is_the_configured_one(period_s: float) -> None:
 
 
 @pytest.mark.parametrize("stall_s", [0.05, 0.3, 1.0, 3.0, 10.0])
-def test_heartbeats_that_we_fetch_late_in_a_bunch_are_no_twins(bench: Bench, stall_s: float) -> None:
+def test_heartbeats_that_are_read_late_in_a_burst_are_no_duplicate(bench: Bench, stall_s: float) -> None:
     """Ten stalls one after the other, with a second of ticks between."""
     for _ in range(10):
         start_s = bench.now_s
@@ -210,7 +210,7 @@ def test_heartbeats_that_we_fetch_late_in_a_bunch_are_no_twins(bench: Bench, sta
         assert (bench.axis.restarts, bench.axis.duplicates) == (0, False)
 
 
-def test_heartbeats_that_an_adapter_holds_back_for_half_a_second_are_no_twins(bench: Bench) -> None:
+def test_heartbeats_that_an_adapter_delays_by_half_a_second_are_no_duplicate(bench: Bench) -> None:
     for number in range(1, 4000):
         now_s = number * 0.005
         bench.report(GET_IQ, 0.0, 0.0)
@@ -227,7 +227,7 @@ def readings(bench: Bench, turns: Iterable[float]) -> None:
         bench.read(bench.now_s + 0.002)
 
 
-def test_a_joint_that_moves_fast_or_an_encoder_that_jumps_or_tells_garbage_is_no_twin(bench: Bench) -> None:
+def test_a_fast_joint_or_a_jumping_or_faulty_encoder_is_no_duplicate(bench: Bench) -> None:
     random = Random(1)
     readings(bench, (0.01 * number for number in range(500)))  # 5 turns/s
     readings(bench, (0.0, 0.5, 0.5, 0.5, 0.0, 0.0))
@@ -251,10 +251,10 @@ def test_the_watchdog_is_read_back_by_the_numbers_of_the_drive_s_build(
     bench.drives._request_watchdogs(1.0)
     asked = [Frame(0x004, bytes.fromhex("00 db 00 00")), Frame(0x004, bytes.fromhex("00 da 00 00"))]
     assert bench.far.receive() == asked
-    bench.tell_setting(218, timeout)
+    bench.report_setting(218, timeout)
     bench.read(1.1)
     assert isnan(bench.axis.watchdog_s)
-    bench.tell_setting(219, enable)
+    bench.report_setting(219, enable)
     bench.read(1.2)
     assert bench.axis.watchdog_s == pytest.approx(watchdog_s)
     bench.drives._request_watchdogs(2.0)
@@ -279,8 +279,8 @@ def test_a_build_whose_numbers_are_not_known_is_not_asked_and_counts_as_not_read
     bench: Bench, version: tuple[int, ...]
 ) -> None:
     bench.report(GET_VERSION, *version)
-    bench.tell_setting(219, "01")
-    bench.tell_setting(218, "cdcccc3d")
+    bench.report_setting(219, "01")
+    bench.report_setting(218, "cdcccc3d")
     bench.read(0.1)
     bench.drives._request_watchdogs(1.0)
     assert bench.far.receive() == []
@@ -291,9 +291,9 @@ def test_a_build_whose_numbers_are_not_known_is_not_asked_and_counts_as_not_read
 @pytest.mark.parametrize(("endpoint", "value"), [(219, "02"), (218, "0000c07f"), (218, "000080bf"), (218, "0000")])
 def test_a_setting_that_makes_no_sense_is_garbled_and_stays_unknown(bench: Bench, endpoint: int, value: str) -> None:
     bench.report(GET_VERSION, *PRO)
-    bench.tell_setting(219, "01")
+    bench.report_setting(219, "01")
     bench.read(0.1)
-    bench.tell_setting(endpoint, value)
+    bench.report_setting(endpoint, value)
     bench.read(0.2)
     assert bench.drives.malformed_frames == 1
     assert isnan(bench.axis.watchdog_s)
@@ -301,7 +301,7 @@ def test_a_setting_that_makes_no_sense_is_garbled_and_stays_unknown(bench: Bench
 
 def test_a_setting_that_another_program_asks_for_changes_nothing(bench: Bench) -> None:
     bench.report(GET_VERSION, *PRO)
-    bench.tell_setting(7, "00000000")
+    bench.report_setting(7, "00000000")
     bench.read(0.1)
     assert isnan(bench.axis.watchdog_s)
     assert bench.drives.malformed_frames == 0
@@ -310,7 +310,7 @@ def test_a_setting_that_another_program_asks_for_changes_nothing(bench: Bench) -
 def test_a_restart_forgets_version_and_watchdog(bench: Bench) -> None:
     bench.live(0.4)
     bench.report(GET_VERSION, *PRO)
-    bench.tell_setting(219, "00")
+    bench.report_setting(219, "00")
     bench.read(0.5)
     assert bench.axis.watchdog_s == 0.0
     bench.report(HEARTBEAT, 0x1, 1, 0, 0)
@@ -320,7 +320,7 @@ def test_a_restart_forgets_version_and_watchdog(bench: Bench) -> None:
 
 
 @given(st.lists(st.tuples(st.sampled_from([0x000, 0x001, 0x005, 0x009]), st.binary(max_size=8)), max_size=40))
-def test_whatever_a_drive_tells_the_watchdog_is_unknown_or_a_time(reported: list[tuple[int, bytes]]) -> None:
+def test_the_watchdog_is_unknown_or_a_time_after_any_answer(reported: list[tuple[int, bytes]]) -> None:
     bench = Bench()
     for number, (identifier, data) in enumerate(reported):
         bench.far.send(Frame(identifier, data))
@@ -338,8 +338,8 @@ def test_a_torque_that_no_bytes_hold_raises_nothing_and_becomes_zero(bench: Benc
 
 def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench) -> None:
     bench.report(GET_VERSION, *PRO)
-    bench.tell_setting(BUILD.enable, "01")
-    bench.tell_setting(BUILD.timeout, "cdcccc3d")
+    bench.report_setting(BUILD.enable, "01")
+    bench.report_setting(BUILD.timeout, "cdcccc3d")
     bench.read(0.0)
     assert bench.axis.watchdog_s == pytest.approx(0.1)
     for axis in bench.drives.axes[1:]:  # all are known: no question is left over
@@ -351,7 +351,7 @@ def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench
         bench.drives._request_watchdogs(tick * PERIOD_S)
         asked.append(len(bench.far.receive()))
     assert [count for count in asked if count] == [4 + 8] * 3
-    bench.tell_setting(BUILD.enable, "00")
+    bench.report_setting(BUILD.enable, "00")
     bench.read(6.0)
     assert bench.axis.watchdog_s == 0.0
 

@@ -14,7 +14,7 @@ from drivers.odrive.codec import ERROR_NAMES, AxisState, MalformedMessageError, 
 
 DBC: Any = cantools.database.load_file(Path(odrive_can.__file__).parent / "dbc" / "odrive-cansimple-0.6.10.dbc")
 MESSAGES = {name: value for name, value in vars(odrive_codec).items() if isinstance(value, Message)}
-WHOLE = [name for name in MESSAGES if name not in ("RX_SDO", "TX_SDO")]  # those two have a value of any type behind
+WHOLE = [name for name in MESSAGES if name not in ("RX_SDO", "TX_SDO")]  # in those two a value of any type follows
 GOLDEN: list[tuple[str, tuple[float, ...], int, str]] = [  # of node 3
     ("GET_VERSION", (2, 4, 4, 58, 0, 6, 11, 0), 0x060, "02 04 04 3a 00 06 0b 00"),
     ("HEARTBEAT", (0x01020304, 8, 5, 1), 0x061, "04 03 02 01 08 05 01 00"),
@@ -116,7 +116,7 @@ def test_no_two_messages_of_any_two_nodes_share_an_id() -> None:
 
 
 @pytest.mark.parametrize("size", [0, 1, 4, 9])
-def test_a_told_parameter_without_a_value_is_garbled(size: int) -> None:
+def test_an_answer_without_the_value_of_a_parameter_is_malformed(size: int) -> None:
     with pytest.raises(MalformedMessageError, match=f"with {size} bytes"):
         odrive_codec.decode_sdo(bytes(size))
 
@@ -131,7 +131,7 @@ def test_a_parameter_s_value_is_a_flag_or_a_number_and_may_be_padded() -> None:
         odrive_codec.decode_sdo_float(bytes(3))
 
 
-def test_errors_are_named_and_unknown_flags_are_told_as_numbers() -> None:
+def test_errors_are_named_and_unknown_flags_appear_as_numbers() -> None:
     assert error_text(0) == ""
     assert error_text(0x1000000) == "watchdog expired"
     assert error_text(0x200 | 0x80 | 0x20000000) == "bus under-voltage, unknown flag 0x20000080"

@@ -64,7 +64,7 @@ class Bench:
         frame = Frame(arbitration_id(drive.node_id, message), message.encode(*values), stamp_s=stamp_s)
         self.far[drive.bus].send(frame)
 
-    def tell_everything(self, now_s: float, closed_loop: bool = True) -> DriveStates:
+    def report_everything(self, now_s: float, closed_loop: bool = True) -> DriveStates:
         for joint in JOINTS:
             for message, values in SIGNALS + SLOW_SIGNALS:
                 self.report(joint, message, *values)
@@ -136,7 +136,7 @@ def test_the_newest_frame_wins(bench: Bench) -> None:
 
 
 def test_every_field_comes_from_its_message(bench: Bench) -> None:
-    bench.tell_everything(1.0)
+    bench.report_everything(1.0)
     bench.report("right_sweep", HEARTBEAT, 0x1000000, 1, 0, 0)
     state = bench.drives.read(2.0)[2]
     assert (state.closed_loop, state.error_flags, state.heartbeat_stamp_s) == (False, 0x1000000, 2.0)
@@ -146,8 +146,8 @@ def test_every_field_comes_from_its_message(bench: Bench) -> None:
     assert bench.drives.axes[2].disarm_reason == 0x1000000
 
 
-def test_a_node_id_on_the_wrong_bus_is_a_stranger(bench: Bench) -> None:
-    before = bench.tell_everything(1.0)
+def test_a_node_id_on_the_wrong_bus_is_unknown(bench: Bench) -> None:
+    before = bench.report_everything(1.0)
     bench.far["right"].send(Frame(arbitration_id(0, GET_IQ), GET_IQ.encode(0.0, 99.0)))
     assert bench.drives.read(2.0) == before
     assert bench.drives.unknown_frames == 1
@@ -191,7 +191,7 @@ UNKNOWN = [
 def test_garbled_and_unknown_frames_are_counted_and_change_nothing(
     bench: Bench, frames: list[Frame], garbled: int, unknown: int
 ) -> None:
-    before = bench.tell_everything(1.0)
+    before = bench.report_everything(1.0)
     for frame in frames:
         bench.far["left"].send(frame)
     assert bench.drives.read(2.0) == before
@@ -214,7 +214,7 @@ ANY_FRAME = st.builds(Frame, ANY_ID, st.binary(max_size=8) | ANY_FLOATS, st.bool
 
 def test_two_thousand_random_frames_crash_nothing_and_leave_the_states_finite() -> None:
     bench = Bench()
-    bench.tell_everything(0.0)
+    bench.report_everything(0.0)
 
     @settings(max_examples=2000, deadline=None)
     @given(ANY_FRAME)
@@ -249,7 +249,7 @@ def test_the_drives_are_heard_once_every_signal_of_all_has_come(bench: Bench, jo
 
 def test_reading_transmits_nothing(bench: Bench) -> None:
     bench.drives.read(0.0)
-    bench.tell_everything(1.0)
+    bench.report_everything(1.0)
     assert bench.silent()
 
 
@@ -264,7 +264,7 @@ def test_torques_leave_in_the_order_of_the_joints_with_these_bytes() -> None:
 
 
 def test_arming_sends_mode_limits_gain_zero_torque_and_closed_loop_in_that_order(bench: Bench) -> None:
-    bench.tell_everything(1.0, closed_loop=False)
+    bench.report_everything(1.0, closed_loop=False)
     bench.drives.arm(1.0)
     right = [frame for frame in bench.sent()["right"] if frame.arbitration_id >> 5 == 2]
     assert right == [
@@ -277,7 +277,7 @@ def test_arming_sends_mode_limits_gain_zero_torque_and_closed_loop_in_that_order
 
 
 def test_at_once_drives_are_prepared_and_not_yet_asked(bench: Bench) -> None:
-    bench.tell_everything(1.0, closed_loop=False)
+    bench.report_everything(1.0, closed_loop=False)
     bench.drives.arm(1.0, at_once=True)
     assert all(frame.arbitration_id & 0x1F != 0x07 for frames in bench.sent().values() for frame in frames)
     bench.drives.arm(1.0)
@@ -285,7 +285,7 @@ def test_at_once_drives_are_prepared_and_not_yet_asked(bench: Bench) -> None:
 
 
 def test_no_drive_is_asked_for_closed_loop_while_what_prepares_it_is_lost(bench: Bench) -> None:
-    bench.tell_everything(1.0, closed_loop=False)
+    bench.report_everything(1.0, closed_loop=False)
     port = bench.drives.ports["left"]
     assert isinstance(port, MockPort)
     port.full = True
@@ -297,7 +297,7 @@ def test_no_drive_is_asked_for_closed_loop_while_what_prepares_it_is_lost(bench:
 
 
 def test_arming_is_repeated_after_a_while_and_only_for_drives_not_in_closed_loop(bench: Bench) -> None:
-    bench.tell_everything(1.0, closed_loop=False)
+    bench.report_everything(1.0, closed_loop=False)
     bench.drives.arm(1.0)
     assert {name: len(frames) for name, frames in bench.sent().items()} == {"left": 10, "right": 10}
     for joint in JOINTS[:3]:
@@ -312,7 +312,7 @@ def test_arming_is_repeated_after_a_while_and_only_for_drives_not_in_closed_loop
 
 
 def test_disarming_at_once_goes_to_all_with_zero_torque_and_idle(bench: Bench) -> None:
-    bench.tell_everything(1.0, closed_loop=False)
+    bench.report_everything(1.0, closed_loop=False)
     bench.drives.arm(1.0)
     bench.sent()
     bench.drives.disarm(1.0, at_once=True)
@@ -323,7 +323,7 @@ def test_disarming_at_once_goes_to_all_with_zero_torque_and_idle(bench: Bench) -
 
 
 def test_disarming_is_repeated_for_drives_still_in_closed_loop(bench: Bench) -> None:
-    bench.tell_everything(1.0, closed_loop=False)
+    bench.report_everything(1.0, closed_loop=False)
     bench.report("left_adduction", HEARTBEAT, 0, 8, 0, 0)
     bench.drives.read(1.0)
     for _ in range(3):
@@ -341,7 +341,7 @@ def test_errors_are_cleared_on_all_drives(bench: Bench) -> None:
     }
 
 
-def test_versions_are_asked_for_by_remote_frame_until_they_are_told(bench: Bench) -> None:
+def test_versions_are_requested_by_remote_frame_until_they_are_known(bench: Bench) -> None:
     bench.drives._request_versions(1.0)
     assert bench.sent() == {
         "left": [Frame(0x000, is_remote=True), Frame(0x020, is_remote=True)],
@@ -357,7 +357,7 @@ def test_versions_are_asked_for_by_remote_frame_until_they_are_told(bench: Bench
 
 
 def test_a_reset_forgets_everything(bench: Bench) -> None:
-    bench.tell_everything(1.0)
+    bench.report_everything(1.0)
     bench.far["left"].send(GARBLED[0])
     bench.drives.read(1.0)
     bench.drives.reset()

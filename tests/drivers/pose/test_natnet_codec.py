@@ -94,7 +94,7 @@ GOLDEN_4_1 = """
 
 
 def written(text: str) -> bytes:
-    """Of lines of hexadecimal bytes, each with what it means behind three blanks."""
+    """Reads lines of hexadecimal bytes, each with its meaning after three blanks."""
     return bytes.fromhex("".join(line.strip().split("   ")[0] for line in text.strip().splitlines()))
 
 
@@ -198,7 +198,7 @@ def test_a_packet_that_is_cut_off_anywhere_is_garbled(version: NatNetVersion) ->
 @example(b"\x07\x00\x04\x00" + bytes(4) + b"\xff\xff\xff\x7f" * 60, NatNetVersion(3, 0))
 @example(b"\x07\x00\x04\x00" + bytes(12) + b"\xff\xff\xff\x7f" + bytes(60), NatNetVersion(4, 0))
 @example(b"\x07\x00\x04\x00" + b"\xff" * 300, NatNetVersion(4, 1))
-def test_garbage_is_told_and_never_raises_anything_else(data: bytes, version: NatNetVersion) -> None:
+def test_garbage_raises_only_the_error_for_malformed_packets(data: bytes, version: NatNetVersion) -> None:
     for decode in (
         message_of,
         decode_server_info,
@@ -213,7 +213,7 @@ def test_garbage_is_told_and_never_raises_anything_else(data: bytes, version: Na
 
 @each_version
 def test_a_packet_of_which_bytes_were_changed_is_garbled_or_holds_numbers(version: NatNetVersion) -> None:
-    """And is done with at once, whatever count was made of it."""
+    """It also ends quickly, with any count in it."""
     chance = random.Random(1)
     whole = packet_of(version)
     for _ in range(500):
@@ -229,7 +229,7 @@ def test_a_packet_of_which_bytes_were_changed_is_garbled_or_holds_numbers(versio
             assert all(map(math.isfinite, frame.body.position_m))
 
 
-def test_a_body_whose_place_is_no_number_is_not_tracked() -> None:
+def test_a_body_whose_position_is_not_finite_is_not_tracked() -> None:
     version = NatNetVersion(3, 0)
     body = encode_rigid_body(version, 1, RecordedPose(0.0, (0.0, math.nan, 0.0)))
     frame = frame_of(version, encode_frame(version, 1, [body], TIMES))

@@ -1,4 +1,4 @@
-"""Motion capture over UDP on the loopback: time is told, nothing waits."""
+"""Motion capture over UDP on the loopback; the tests pass the time, so nothing waits."""
 
 from __future__ import annotations
 
@@ -98,8 +98,10 @@ def known(seen: Sequence[tuple[float, BodyPose]]) -> list[tuple[float, BodyPose]
 
 
 @pytest.mark.parametrize("version", [(2, 7), (3, 0), (4, 0), (4, 1)])
-def test_the_place_now_is_told_and_when_it_was_exposed(open_laboratory: Open, version: tuple[int, int]) -> None:
-    """From 3.0 on a frame tells its own age; before, it has to be configured."""
+def test_the_present_position_is_stamped_with_the_time_of_exposure(
+    open_laboratory: Open, version: tuple[int, int]
+) -> None:
+    """From 3.0 on a frame contains its own age; before, it has to be configured."""
     configured = {"latency_s": 0.012} if version < (3, 0) else NOTHING
     lab = open_laboratory(moving(2.0), configured, version=NatNetVersion(*version), latency_s=0.012, crowded=True)
     reported = known(lab.run(2.0))[40:]
@@ -129,7 +131,7 @@ def test_a_body_is_found_by_name_or_by_id(open_laboratory: Open) -> None:
         assert trouble == ("there is no rigid body named 'somebody'." if "body" in how else NOT_SEEN)
 
 
-def test_a_body_that_is_defined_anew_is_looked_for_by_its_name_again(open_laboratory: Open) -> None:
+def test_a_body_that_is_defined_again_is_found_by_its_name(open_laboratory: Open) -> None:
     lab = open_laboratory(moving(3.0), {"body": "mudskipper"}, identity=7)
     assert known(lab.run(1.0))
     lab.server.change_model(8)
@@ -157,7 +159,7 @@ def test_frames_that_are_not_of_a_version_known_wait_for_it(open_laboratory: Ope
     assert known(blind.run(2.0))
 
 
-def test_a_server_that_speaks_what_is_not_read_here_is_told(open_laboratory: Open) -> None:
+def test_a_server_with_an_unsupported_version_is_reported(open_laboratory: Open) -> None:
     lab = open_laboratory(moving(1.0), version=NatNetVersion(2, 5))
     assert not known(lab.run(0.9))
     assert lab.port.report().trouble == "Motive speaks NatNet 2.5; 2.6 to 4 are supported."
@@ -181,7 +183,7 @@ def test_the_same_digits_again_and_again_are_no_pose(open_laboratory: Open) -> N
     assert "frozen" in lab.port.report().trouble
 
 
-def test_a_pose_after_a_long_gap_or_a_leap_is_believed_when_a_second_one_follows(open_laboratory: Open) -> None:
+def test_a_pose_after_a_gap_or_a_jump_is_accepted_when_a_second_one_follows(open_laboratory: Open) -> None:
     lab = open_laboratory([*moving(0.5), RecordedPose(0.75, (0.3, 0.2, 1.0)), *moving(0.5, 1.5)])
     lab.run(0.74)
     assert not known(lab.run(1.5))  # the one of 0.75 s had leapt
@@ -207,7 +209,7 @@ def test_garbled_and_foreign_packets_are_counted_and_cost_nothing_else(open_labo
     assert lab.port.malformed == 5
 
 
-def test_all_that_is_garbled_is_told(open_laboratory: Open) -> None:
+def test_malformed_packets_are_reported(open_laboratory: Open) -> None:
     """As with a version that is configured wrongly."""
     lab = open_laboratory(moving(0.5), {"version": "3.0"}, version=NatNetVersion(4, 1), crowded=True)
     assert not known(lab.run(0.4))
@@ -243,7 +245,7 @@ def test_a_server_that_comes_back_with_another_version_is_understood(open_labora
         ({"group": GROUP, "interface": "nothing0"}, f"in group {GROUP}, port 1511 on nothing0: No such device"),
     ],
 )
-def test_an_interface_that_is_not_there_is_told(changes: dict[str, Any], message: str) -> None:
+def test_a_missing_interface_is_reported(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(PoseSourceError, match=message):
         NatNetPort(replace(NatNetParameters(server=LOOPBACK, group=""), **changes), ALONG_X)
 
@@ -256,7 +258,7 @@ def test_without_a_network_it_is_silent_and_asks_again(open_laboratory: Open) ->
     assert lab.port.malformed == 0
 
 
-def test_a_service_that_may_use_no_network_is_told_what_to_change(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_service_without_network_access_is_reported_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(family: int, kind: int) -> None:
         raise OSError(EAFNOSUPPORT, "Address family not supported by protocol")
 
@@ -265,7 +267,7 @@ def test_a_service_that_may_use_no_network_is_told_what_to_change(monkeypatch: p
         NatNetPort(NatNetParameters(server=LOOPBACK), ALONG_X)
 
 
-def test_frames_of_another_computer_than_the_one_named_are_told(open_laboratory: Open) -> None:
+def test_frames_of_another_computer_than_the_server_are_reported(open_laboratory: Open) -> None:
     laboratory = open_laboratory(moving(1.0))
     laboratory.run(0.3)
     laboratory.port.parameters = replace(laboratory.port.parameters, server="127.0.0.9")

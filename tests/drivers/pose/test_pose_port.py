@@ -120,12 +120,12 @@ def test_a_socket_left_by_a_killed_process_is_replaced(path: Path) -> None:
     port.close()
 
 
-def test_a_socket_that_cannot_be_opened_is_told_in_one_sentence(tmp_path: Path) -> None:
+def test_a_socket_that_cannot_be_opened_is_reported_in_one_message(tmp_path: Path) -> None:
     with pytest.raises(PoseSourceError, match="^the pose socket .*/missing/pose cannot be opened: No such file"):
         PosePort(tmp_path / "missing" / "pose")
 
 
-def test_it_is_told_whether_poses_come(port: PosePort, sender: PoseSender, path: Path) -> None:
+def test_the_report_says_whether_poses_arrive(port: PosePort, sender: PoseSender, path: Path) -> None:
     port.read(0.0)
     assert port.report().trouble == f"no pose arrives at {path} yet."
     sender.send(0.0, 0.1)

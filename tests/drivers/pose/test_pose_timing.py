@@ -12,8 +12,8 @@ from drivers.pose.pose_timing import JUMP_M, RESTARTED_S, LeastDelay, PoseForeca
 PERIOD_S = 1.0 / 120.0
 
 
-def test_the_quickest_frame_tells_what_separates_the_clocks() -> None:
-    """Delays of 1 ms and more, a clock that is 50 s behind and runs slow by 50 millionths."""
+def test_the_least_delay_gives_the_offset_of_the_clocks() -> None:
+    """Delays of 1 ms and more, a clock that lags by 50 s and runs slow by 50 ppm."""
     chance, delay = Random(2), LeastDelay()
     for frame in range(120 * 60):
         now_s = frame * PERIOD_S
@@ -42,7 +42,7 @@ def test_a_body_goes_on_as_it_went() -> None:
     assert forecast.at(last_s + 10.0) < 0.3 * last_s + 0.05  # but not for ever
 
 
-def test_a_forecast_misses_by_less_than_the_place_that_is_old() -> None:
+def test_an_extrapolated_position_is_closer_than_the_last_one() -> None:
     """A step of the walk, as a sine, seen 10 ms late."""
     forecast, missed_m, old_m = PoseForecast(), 0.0, 0.0
     for frame in range(240):

@@ -23,7 +23,7 @@ METRES = 1e-5
 
 
 class Rail:
-    """A counter, and the encoder that reads it; `now_s` is told."""
+    """A counter, and the encoder that reads it, with the time given as `now_s`."""
 
     def __init__(self, device: Path, **changes: object) -> None:
         label = str(changes.get("label", ""))
@@ -99,7 +99,7 @@ def test_lines_may_look_like_this(tmp_path: Path, label: str, line: bytes) -> No
     rail.close()
 
 
-def test_the_rest_of_a_line_that_was_under_way_is_no_count(tmp_path: Path) -> None:
+def test_the_rest_of_an_incomplete_line_is_no_count(tmp_path: Path) -> None:
     rail = Rail(tmp_path / "encoder")
     rail.encoder.reset()  # as after opening
     rail.counter.write(b"345\n12350\n")  # of 12345
@@ -130,7 +130,7 @@ def test_a_line_that_never_ends_is_counted_and_the_next_one_read(rail: Rail) -> 
     assert rail.encoder.malformed == 1
 
 
-def test_a_count_that_lost_a_digit_is_not_believed_but_one_that_stays_is(rail: Rail) -> None:
+def test_a_count_that_lost_a_digit_is_rejected_and_one_that_stays_is_accepted(rail: Rail) -> None:
     rail.send(1.23456)
     assert rail.send(0.12345) == pytest.approx(1.23456)
     assert rail.send(1.23500) == pytest.approx(1.23500)
@@ -165,7 +165,7 @@ def test_an_encoder_that_is_unplugged_is_none_and_is_opened_again(rail: Rail) ->
     assert rail.encoder.report().trouble == ""
 
 
-def test_a_device_that_does_not_open_is_told(tmp_path: Path) -> None:
+def test_a_device_that_does_not_open_is_reported(tmp_path: Path) -> None:
     parameters = RailEncoderParameters(device=str(tmp_path / "nothing"), metres_per_count=METRES)
     with pytest.raises(PoseSourceError, match="^the rail encoder .*/nothing does not open: No such file or directory$"):
         RailEncoder(parameters)

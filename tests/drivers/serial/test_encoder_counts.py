@@ -1,4 +1,4 @@
-"""Counts that are places, and counts that nothing on a rail could have made."""
+"""Counts that are positions, and counts that no body on a rail can have reached."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.serial.encoder_counts import EncoderCounts
 
 
 @pytest.mark.parametrize("line", [b"x:250", b"x = 250", b" x 250 ", b"x+250"])
-def test_a_labelled_count_is_a_place(line: bytes) -> None:
+def test_a_labelled_count_is_a_position(line: bytes) -> None:
     assert EncoderCounts(-1e-3, "x", origin_m=1.0).accept(line, 0.0) == pytest.approx(-1.25)
 
 
@@ -21,7 +21,7 @@ def test_what_is_no_count_is_garbled(line: bytes) -> None:
     assert (counts.accepted, counts.malformed) == (0, 1)
 
 
-def test_a_leap_is_believed_once_it_stays_and_is_told() -> None:
+def test_a_jump_is_accepted_once_it_stays_and_is_counted() -> None:
     counts = EncoderCounts(1e-5)
     reported = [counts.accept(line, 0.01 * i) for i, line in enumerate([b"50000", b"5000", b"50010", b"3", b"5", b"7"])]
     assert reported == [pytest.approx(0.5), None, pytest.approx(0.5001), None, pytest.approx(5e-5), pytest.approx(7e-5)]

@@ -18,7 +18,7 @@ pytest.importorskip("serial", reason="pyserial is not installed")
 
 
 class Cable:
-    """A device that writes what it is told, behind a link that stays the same."""
+    """A device that writes given bytes, under a link that stays the same."""
 
     def __init__(self, folder: Path) -> None:
         self.link = folder / "device"
@@ -71,7 +71,7 @@ def test_reading_never_waits(cable: Cable) -> None:
     assert time.monotonic() - before_s < 0.5
 
 
-def test_a_device_that_is_gone_is_opened_again_once_in_a_while_and_begins_anew(cable: Cable) -> None:
+def test_a_device_that_is_gone_is_opened_again_periodically_and_starts_fresh(cable: Cable) -> None:
     cable.hear(b"\nbegun", 0)
     cable.unplug()
     assert cable.line.read(1.0) == []
