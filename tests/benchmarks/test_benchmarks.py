@@ -139,7 +139,7 @@ def test_the_fuzz_knows_what_a_disarmed_robot_must_not_send(frame: Frame, forbid
 
 
 def test_soak() -> None:
-    """Memory is not asserted, in so short a time; that nothing is left behind and no row lost is."""
+    """Released resources and complete rows are asserted, memory is not in so short a time."""
     report = report_of("soak", "--hours", "0.004", "--real-time-minutes", "0.05")
     for name in ("lockstep", "real_time"):
         part = report[name]

@@ -21,7 +21,7 @@ SOFT_M = 0.35
 
 
 def firm_mud_ahead(configuration: Configuration, pascal: float, adaptive: bool = True) -> Iterator[Lockstep]:
-    """Tick by tick until the robot is well in the firm mud, or stands still."""
+    """Walks tick by tick until the robot is well in the firm mud, or stops."""
     track = Track([(SOFT_M, Clay("soft", 600.0)), (5.0, Clay("firm", pascal))])
     robot = Lockstep(configuration, track, 1, EventRecorder(), LAB)
     robot.arm()
@@ -47,9 +47,9 @@ def test_it_ends_the_insertion_before_the_mud_would_hold_it(configuration: Confi
     assert recorder.about("insertion ended")
 
 
-def test_without_that_heed_it_would_be_held(configuration: Configuration) -> None:
-    heedless = replace(configuration, adaptation=replace(configuration.adaptation, insertion_fraction=10.0))
-    phases, recorder = phases_in(firm_mud_ahead(heedless, 6000.0))
+def test_without_the_early_end_the_mud_would_hold_it(configuration: Configuration) -> None:
+    patient = replace(configuration, adaptation=replace(configuration.adaptation, insertion_fraction=10.0))
+    phases, recorder = phases_in(firm_mud_ahead(patient, 6000.0))
     assert Phase.RECOVERY in phases
     assert not recorder.about("insertion ended")
 

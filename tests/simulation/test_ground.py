@@ -41,7 +41,7 @@ def lowest_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) 
 
 @pytest.mark.parametrize("lift_nm", [-0.2, -0.75, -1.66])
 def test_a_flipper_that_comes_down_on_a_stone_stops_there(lift_nm: float) -> None:
-    """Up to the torque of 20 A, which sinks it far deeper beside the stone; a millimetre is 20 N on its spring."""
+    """Up to the torque of 20 A, which sinks it far deeper next to the stone; a millimetre is 20 N on its spring."""
     soft = [(9.0, MUDS["53.1"])]
     beside, arm = (pressed_arm(Track(soft, [Stone(start_m, 9.0, 0.02)]), lift_nm) for start_m in (0.01, -0.01))
     assert depth_m(beside) > 0.025
@@ -51,7 +51,7 @@ def test_a_flipper_that_comes_down_on_a_stone_stops_there(lift_nm: float) -> Non
 
 @pytest.mark.parametrize("sweep_nm", [-0.2, -0.75])
 def test_a_flipper_that_sweeps_against_a_stone_is_held_and_pushes_the_robot(sweep_nm: float) -> None:
-    """In mud so soft that it alone gives way: 0.75 N·m are 6 N at the plate."""
+    """In mud too soft to hold the flipper alone: 0.75 N·m are 6 N at the plate."""
     stone = Stone(-0.2, -0.02, 0.01)
     plant = Plant(PlantParameters(fixed_base=True), Track([(9.0, Clay("soup", 100.0))], [stone]))
     arm, geometry = plant.arms[0], plant.parameters.geometry
@@ -79,8 +79,8 @@ def test_an_arm_that_falls_on_a_stone_comes_to_rest_and_never_rises_as_high_agai
     assert depth_m(arm) == pytest.approx(0.005, abs=0.0001)  # its own weight is 0.4 N at the plate: 20 um
 
 
-def test_a_stone_acts_beside_the_mud_and_only_where_it_is() -> None:
-    """On an arm that stands half a millimetre under its top, in mud and in a trough so deep that there is none."""
+def test_a_stone_acts_in_addition_to_the_mud_and_only_at_its_position() -> None:
+    """On an arm half a millimetre under its top, in mud and in a trough so deep that there is none."""
     geometry, sunk_rad = PlantParameters().geometry, -0.4
     stone = Stone(0.5, 0.6, lowest_m(geometry, 0.0, sunk_rad) - 0.0005)
 
@@ -111,8 +111,10 @@ def test_a_reset_arm_has_met_no_stone() -> None:
     assert arm.force.upward_n > 0.0
 
 
-def test_ridges_lift_the_mud_under_the_flipper_by_its_own_place() -> None:
-    track = Track([(9.0, MUDS["48.5"])], ridges=Ridges(0.005, 0.48))  # flippers a quarter of a ridge before and behind
+def test_ridges_lift_the_mud_under_each_flipper_by_its_own_position() -> None:
+    track = Track(
+        [(9.0, MUDS["48.5"])], ridges=Ridges(0.005, 0.48)
+    )  # flippers a quarter of a ridge to the front and the rear
     plant = Plant(PlantParameters(), track)
     for arm, sweep_rad in zip(plant.arms, (pi / 2.0, -pi / 2.0), strict=True):
         arm.sweep_rad = sweep_rad
@@ -135,7 +137,7 @@ def test_ridges_come_on_top_of_the_unevenness_from_stride_to_stride() -> None:
 
 
 def test_a_flipper_comes_to_rest_as_far_below_a_crest_as_below_a_trough() -> None:
-    """On firm mud 1 cm below both, of which half an edge bears 3 N where the flipper presses with 2.5.
+    """On firm mud 1 cm below both, where half an edge withstands 3 N and the flipper presses with 2.5 N.
 
     Within 1 mm, in which mud under an edge yields; the joints are so stiff that the arm comes down slowly. The lower
     corner, by which depth is told, is up to 2 mm deeper than the point at which its half of the edge is carried.
@@ -150,7 +152,7 @@ def test_a_flipper_comes_to_rest_as_far_below_a_crest_as_below_a_trough() -> Non
     assert depths_m[0] == pytest.approx(depths_m[1], abs=0.001)
 
 
-def test_random_strength_is_that_of_the_flipper_s_own_place() -> None:
+def test_random_strength_is_that_at_the_flipper_s_own_position() -> None:
     track = Track([(9.0, MUDS["48.5"])], random_strength=RandomStrength(0.3, 0.05, 7))
     plant = Plant(PlantParameters(), track)
     plant.arms[0].sweep_rad = radians(30.0)

@@ -98,7 +98,7 @@ def test_begin_and_end_stand_in_the_log(configuration: Configuration) -> None:
     ]
 
 
-def test_a_loop_that_stands_still_misses_ticks_while_the_robot_lives_on(configuration: Configuration) -> None:
+def test_a_stalled_loop_misses_ticks_while_the_robot_continues(configuration: Configuration) -> None:
     lockstep = make_walking(configuration)
     ticks = lockstep.tick_number
     lockstep.fail("loop", "stuck")
@@ -127,7 +127,7 @@ def test_joints_at_their_stops_are_moved_back_by_hand_and_the_robot_arms_again(c
     assert lockstep.loop.mode is Mode.HOLD
 
 
-def test_what_cannot_fail_is_refused(configuration: Configuration) -> None:
+def test_an_unknown_component_cannot_fail(configuration: Configuration) -> None:
     lockstep = Lockstep(configuration, TRACK, failures=Failures(configuration.bus))
     with pytest.raises(RuntimeError, match="--list"):
         lockstep.fail("left_knee", "off")

@@ -1,4 +1,4 @@
-"""The authors' walks through the whole way of a pose: captured places as NatNet frames over UDP, read tick by tick
+"""The authors' walks through the whole path of a pose: captured positions as NatNet frames over UDP, read tick by tick
 beside the joints, against what their log says directly.
 
 What the capture says is worked out here, from the log's own columns.
@@ -128,7 +128,7 @@ def rows_of(lab: LabLog) -> Iterator[tuple[float, Phase, JointAngles, list[float
 @each_latency
 @each_walk
 def test_steps_from_insertion_to_insertion_are_those_of_the_capture(path: Path, latency_s: float) -> None:
-    """None is missing where the capture saw both ends, and none is made up where it did not."""
+    """None is missing where the capture has both ends, and none is invented where it lacks one."""
     capture, starts = capture_of(path), capture_of(path).insertions
     true_m, reported_m = np.diff(capture.x_m[starts]), np.diff(walked(path, latency_s).x_m[starts])
     assert len(true_m) >= 2
@@ -151,7 +151,7 @@ def test_the_estimator_s_steps_are_those_of_the_capture(path: Path, latency_s: f
 
 
 @each_walk
-def test_the_place_is_that_of_the_capture_at_all_times(path: Path) -> None:
+def test_the_position_is_that_of_the_capture_at_all_times(path: Path) -> None:
     capture, known = capture_of(path), walked(path, 0.0)
     error_m = np.abs(known.x_m - capture.x_m)
     error_m = error_m[np.isfinite(error_m)]
@@ -159,8 +159,8 @@ def test_the_place_is_that_of_the_capture_at_all_times(path: Path) -> None:
     assert np.sqrt(np.mean(error_m**2)) < 0.0005 and error_m.max() < 0.01
 
 
-def test_where_the_capture_was_lost_no_pose_is_told() -> None:
-    """In one walk it shows two old places for 6.6 s."""
+def test_a_lost_capture_gives_no_pose() -> None:
+    """In one walk it repeats two old positions for 6.6 s."""
     for path in WALKS:
         capture = capture_of(path)
         assert not np.any(np.isfinite(walked(path, 0.0).x_m[capture.lost])), path.name

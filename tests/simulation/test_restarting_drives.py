@@ -31,7 +31,7 @@ def test_the_watchdogs_of_all_drives_are_read_back_within_a_second_and_a_half(wa
     assert [health.watchdog_s for health in walk.loop.drives.health] == [pytest.approx(watchdog_s)] * 4
 
 
-def test_a_drive_that_restarts_is_noticed_and_its_settings_are_asked_for_anew() -> None:
+def test_a_restarted_drive_is_noticed_and_its_settings_are_read_again() -> None:
     walk = make_walk()
     read_settings(walk, 1.5)
     assert [health.restarts for health in walk.loop.drives.health] == [0, 0, 0, 0]

@@ -66,7 +66,7 @@ class Line:
 
 
 class SerialWalk(Lockstep):
-    """In place of the mock bus's own port, the loop has one over the line."""
+    """A lockstep whose loop reaches the bus over the serial lines."""
 
     def __init__(self, configuration: Configuration) -> None:
         super().__init__(configuration, Track([(1.0, MUDS["48.5"])]))

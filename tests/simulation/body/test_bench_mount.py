@@ -55,7 +55,7 @@ def test_a_released_weight_falls_without_making_energy(on_side: bool) -> None:
     assert 0.5 * inertia * speed**2 == pytest.approx(fallen_j, rel=0.02)
 
 
-def test_a_held_arm_stays_whatever_pulls() -> None:
+def test_a_held_arm_stays_under_any_torque() -> None:
     arm = Plant(PlantParameters(), paper_track()).arms[0]
     arm.mount = BenchMount(held=True)
     arm.put_back()
@@ -65,7 +65,7 @@ def test_a_held_arm_stays_whatever_pulls() -> None:
     assert (arm.sweep_rad, arm.adduction_rad, arm.adduction_velocity_rad_s) == (0.0, 0.0, 0.0)
 
 
-def test_what_is_taken_off_pulls_no_more() -> None:
+def test_a_removed_weight_exerts_no_torque() -> None:
     mount = BenchMount()
     mount.hang(MASS_KG, LEVER_M)
     mount.take_off()

@@ -1,4 +1,4 @@
-"""The free body, held against its own geometry by rotation matrices and differences, and against what must be."""
+"""The free body, compared with rotation matrices and differences, and with the laws of mechanics."""
 
 from dataclasses import replace
 from math import cos, hypot, pi, sin
@@ -46,7 +46,7 @@ SIDES = st.sampled_from([1.0, -1.0])
 
 
 class Still:
-    """A flipper that the mud does nothing to, or always the same."""
+    """A flipper with a constant force of the mud, or none."""
 
     sweep_rad = adduction_rad = 0.0
 
@@ -73,7 +73,7 @@ def turned(roll_rad: float, pitch_rad: float) -> np.ndarray:
 
 
 def plate_in_body(sweep_rad: float, adduction_rad: float, side: float) -> np.ndarray:
-    """Columns: the plate's n, r, s, and the crossing of the joints' axes, y to the left for either flipper."""
+    """Columns: the plate's n, r, s, and the intersection of the joints' axes, y to the left for either flipper."""
     ca, sa = np.cos(sweep_rad), np.sin(sweep_rad)
     tilted = turned(adduction_rad, 0.0) @ np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])
     cross_coupling = np.array([[AHEAD_M], [SHAPE.width_m / 2.0], [0.0]])
@@ -102,7 +102,7 @@ SPEEDS = st.tuples(*[RATES] * 6).map(np.array)
 
 
 @given(STATES, SIDES)
-def test_a_carried_plate_is_as_deep_as_rotation_matrices_say(state: np.ndarray, side: float) -> None:
+def test_a_carried_plate_has_the_depth_of_rotation_matrices(state: np.ndarray, side: float) -> None:
     carriage = body_in(state, np.zeros(6)).carriages[side < 0.0]
     attitude = carried_attitude(GEOMETRY, carriage, state[4], state[5], 0.004)
     if attitude.per_upward == LEAST_UPRIGHT:  # lies flat, which no plate in this model does
@@ -121,7 +121,7 @@ def test_a_plate_on_a_tipped_body_never_lies_flat() -> None:
 
 
 @given(STATES, SPEEDS, SIDES)
-def test_a_carried_plate_moves_as_differences_of_its_places_say(
+def test_a_carried_plate_moves_by_the_differences_of_its_positions(
     state: np.ndarray, rates: np.ndarray, side: float
 ) -> None:
     twist = carried_twist(GEOMETRY, body_in(state, rates).carriages[side < 0.0], *state[4:], *rates[4:])
@@ -206,7 +206,7 @@ def test_at_rest_it_lies_where_the_mud_s_bearing_carries_its_weight(water: str) 
     assert (body.roll_rad, body.forward_m) == (0.0, 0.0)
 
 
-def test_on_mud_that_cannot_bear_it_it_sinks_until_it_floats() -> None:
+def test_on_mud_that_cannot_carry_it_the_body_sinks_until_it_floats() -> None:
     weak = Clay("weak", 120.0)
     body = make_body(weak)
     live(body, 5.0)
@@ -214,12 +214,12 @@ def test_on_mud_that_cannot_bear_it_it_sinks_until_it_floats() -> None:
     least_m = (WEIGHT_N - bearing_n) / (17.5e3 * AREA_M2)
     assert least_m > 0.01  # far beyond its elastic depth
     assert abs(body.upward_m_s) < 0.001
-    # Let go on the surface it overshoots, at most as a weight that is let go on an undamped spring: to twice that.
+    # Released on the surface it overshoots, at most to twice the depth, as a weight on an undamped spring.
     assert least_m < SHAPE.axis_above_belly_m - body.height_m < 2.0 * least_m
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_mud_never_gives_a_falling_sliding_rolling_body_more_than_it_got(seed: int) -> None:
+def test_mud_never_returns_more_energy_to_a_falling_sliding_rolling_body_than_it_received(seed: int) -> None:
     random, dt_s = Random(seed), 0.0001
     tracks = (Track([(9.0, MUDS["53.1"])]), Track([(0.06, MUDS["53.1"]), (9.0, MUDS["45.3"])]))
     body = FreeBody(MASS_KG, SHAPE, DragPad(0.015, 0.02), tracks[seed % 2])
@@ -292,7 +292,7 @@ def test_mud_sticks_only_to_a_belly_that_presses_on_it() -> None:
     assert body.forward_m_s == pytest.approx(0.2)
 
 
-def test_a_print_bears_nothing_until_the_belly_is_back_in_it_or_was_clear_of_the_mud() -> None:
+def test_a_print_carries_no_load_until_the_belly_is_back_in_it_or_was_clear_of_the_mud() -> None:
     clay, quarter = Clay("any", 1000.0), BellyQuarter(0.004, 0.25)
     floating_n = 17.5e3 * 0.004 * 0.004
     assert quarter.step(clay, 1.0, 0.005, 0.0) == pytest.approx(5.14 * 1000.0 * 0.004 + 17.5e3 * 0.004 * 0.005)
@@ -316,7 +316,7 @@ def test_both_flippers_pushed_down_in_front_lift_the_nose_and_behind_the_tail() 
     assert pitches_rad[1] > 0.02
 
 
-def test_both_flippers_pushed_down_beside_the_body_lift_it() -> None:
+def test_both_flippers_pushed_down_at_the_sides_lift_the_body() -> None:
     plant = Plant(FREE, Track([(9.0, Clay("stiff", 8000.0))]))
     body = plant.body
     assert isinstance(body, FreeBody)
@@ -387,7 +387,7 @@ def test_a_free_body_walks_forward_on_firm_mud(walking: Lockstep) -> None:
     assert walking.robot.plant.body_m > 0.08
 
 
-def test_a_free_body_s_joints_stand_as_high_as_the_configuration_says(configuration: Configuration) -> None:
+def test_a_free_body_s_joints_have_the_configured_height(configuration: Configuration) -> None:
     higher = replace(configuration, geometry=replace(configuration.geometry, axis_height_m=0.07))
     assert plant_of(higher).body.axis_above_belly_m == 0.07
 

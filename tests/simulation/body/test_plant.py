@@ -1,4 +1,4 @@
-"""Arms and body as mechanics: what can be said of them without the program that drives them."""
+"""The mechanics of arms and body, without the controller."""
 
 from dataclasses import replace
 from math import exp, pi, radians, sin, sqrt
@@ -23,7 +23,7 @@ MOMENT_NM = 0.08 * 9.81 * 0.06
 
 
 class ConstantThrust(FlipperContact):
-    """Mud that pushes with the same force whatever the flipper does."""
+    """Mud that always pushes with the same force."""
 
     thrust_n = 0.0
 
@@ -118,7 +118,7 @@ def test_dry_friction_slows_an_arm_down_evenly_until_it_stands() -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_dry_friction_holds_a_joint_until_more_torque_turns_it_and_takes_its_share_then(sign: float) -> None:
+def test_dry_friction_holds_a_joint_up_to_its_torque_and_then_opposes_its_motion(sign: float) -> None:
     plant = make_air_plant(DRY)
     for _ in range(100):
         plant.step(STEP_S, Joints(sign * 0.0199, sign * 0.0199, 0.0, 0.0))
@@ -261,7 +261,7 @@ def test_a_flipper_feels_the_mud_from_its_own_surface_on() -> None:
     assert right.force == NO_CONTACT
 
 
-def test_an_arm_tells_the_clay_under_its_flipper_as_firm_as_it_was_left() -> None:
+def test_an_arm_reports_the_remoulded_clay_under_its_flipper() -> None:
     plant = Plant(
         PlantParameters(disturbances=Disturbances(remoulding=1.0), fixed_base=True), Track([(9.0, Clay("any", 1000.0))])
     )

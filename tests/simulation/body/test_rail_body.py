@@ -1,4 +1,4 @@
-"""The body on its rail, apart from the flippers: how dry contacts hold it, and what it tells of its motion."""
+"""The body on its rail without flippers: dry contacts hold it, and it reports its motion."""
 
 import pytest
 
@@ -17,7 +17,7 @@ def test_a_dry_contact_is_a_spring_until_it_yields_and_remembers_how_far() -> No
     for _ in range(1000):
         assert drag.step(DT_S, 0.1, 5.0) >= -5.0
     assert drag.step(DT_S, 0.0, 5.0) == -5.0
-    assert drag.step(DT_S, 0.0, 2.0) == -2.0  # a weaker contact lets go of what it cannot hold
+    assert drag.step(DT_S, 0.0, 2.0) == -2.0  # a weaker contact yields
     assert drag.step(DT_S, 0.0, 5.0) == -2.0
 
 
@@ -35,7 +35,7 @@ def test_the_pad_resists_as_deep_as_it_is_and_only_in_the_mud() -> None:
     assert pad.yield_n(clay, -0.02) == DragPad(0.0, 0.02).yield_n(clay) == 0.0
 
 
-def test_it_tells_its_speed_and_that_it_lies_level() -> None:
+def test_it_reports_its_speed_and_a_level_attitude() -> None:
     body = RailBody(1.0, 2.5, 0.0, DragPad(0.0, 0.0), Track([(1.0, MUDS["48.5"])]))
     body.forward_m_s = 0.3
     assert body.motion == BodyMotion((0.3, 0.0, 0.0))

@@ -1,4 +1,4 @@
-"""What the witness tells of strokes, with arms moved by hand and in whole walks."""
+"""The reference sensor's strokes, with arms that the test moves and in whole walks."""
 
 from dataclasses import replace
 from math import isfinite, isnan, radians, sin
@@ -124,7 +124,7 @@ def test_in_stance_only_backward_slip_counts() -> None:
         plant.body.forward_m_s = 0.2
         watch(reference, plant, Phase.STANCE)
     left, right = watch(reference, plant, Phase.EXTRACTION, Phase.SWING)
-    assert left.stance.speed_m_s == pytest.approx(0.1 * 0.25 + 0.3 * 0.75)  # of each place its own: by its way
+    assert left.stance.speed_m_s == pytest.approx(0.1 * 0.25 + 0.3 * 0.75)  # weighted by distance
     assert left.stance.slip_m == pytest.approx(DT_S * 0.4)
     assert isnan(right.stance.speed_m_s)  # it went forward with the body
     assert right.stance.slip_m == 0.0
@@ -160,7 +160,7 @@ def test_depths_and_surface_are_those_of_the_ridge_that_the_flipper_met() -> Non
     assert left.insertion.deepest_m == pytest.approx(0.03 + 0.004)
 
 
-def test_a_reset_witness_counts_from_zero() -> None:
+def test_a_reset_reference_sensor_counts_from_zero() -> None:
     reference, plant = StrokeReference(), make_plant()
     watch(reference, plant, *STRIDE, Phase.INSERTION, Phase.STANCE)
     reference.reset()
@@ -168,7 +168,7 @@ def test_a_reset_witness_counts_from_zero() -> None:
     assert [truth.index for truth in watch(reference, plant, *STRIDE)] == [0, 0]
 
 
-def witnessed(lockstep: Lockstep, depth_m: float, seconds: float) -> list[StrideTruth]:
+def observe_walk(lockstep: Lockstep, depth_m: float, seconds: float) -> list[StrideTruth]:
     lockstep.arm()
     lockstep.walk(WalkOrder(depth_m, adaptive=False))
     reference, truths = StrokeReference(), []
@@ -180,7 +180,7 @@ def witnessed(lockstep: Lockstep, depth_m: float, seconds: float) -> list[Stride
 
 def test_a_walk_has_the_strides_that_the_loop_closes(configuration: Configuration) -> None:
     lockstep = Lockstep(configuration, Track([(1.0, MUDS["53.1"])]))
-    truths = witnessed(lockstep, 0.03, 6.0)
+    truths = observe_walk(lockstep, 0.03, 6.0)
     assert len(truths) >= 6
     closed = [(stride.estimate.flipper, stride.estimate.index) for stride in lockstep.loop.learning.strides]
     assert [(truth.flipper, truth.index) for truth in truths] == closed
@@ -189,13 +189,13 @@ def test_a_walk_has_the_strides_that_the_loop_closes(configuration: Configuratio
 
 def test_in_soft_mud_slip_and_advance_make_up_the_sweep(configuration: Configuration) -> None:
     lockstep = Lockstep(configuration, Track([(1.0, MUDS["53.1"])]))
-    truths = [truth for truth in witnessed(lockstep, 0.03, 8.0) if truth.flipper == "left"]
+    truths = [truth for truth in observe_walk(lockstep, 0.03, 8.0) if truth.flipper == "left"]
     steps_m = lockstep.robot.plant.body_m / len(truths)
     arc_m = 2.0 * configuration.geometry.flipper_length_m * sin(radians(configuration.gait.sweep_angle_deg))
     assert truths[-1].stance.slip_m + steps_m == pytest.approx(arc_m, abs=0.02)  # the body goes on a bit in extraction
 
 
-def test_a_load_cell_that_repeats_a_stance_feels_what_the_flipper_felt(configuration: Configuration) -> None:
+def test_a_load_cell_that_repeats_a_stance_measures_the_flipper_s_load(configuration: Configuration) -> None:
     lockstep = Lockstep(
         replace(configuration, gait=SINGLE_FLIPPER),
         Track([(1.0, MUDS["53.1"])]),
@@ -212,7 +212,7 @@ def test_a_load_cell_that_repeats_a_stance_feels_what_the_flipper_felt(configura
             thrusts_n.append(arm.force.thrust_n)
 
     lockstep.step = recording_step  # type: ignore[method-assign]
-    first = next(truth for truth in witnessed(lockstep, 0.03, 20.0) if truth.flipper == "left")
+    first = next(truth for truth in observe_walk(lockstep, 0.03, 20.0) if truth.flipper == "left")
     stance = first.stance
     assert isfinite(stance.speed_m_s)
     shear_n = measure_shear(

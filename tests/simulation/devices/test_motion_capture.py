@@ -1,4 +1,4 @@
-"""Motion capture: how often, how late and how well the body's place is known."""
+"""Motion capture: rate, latency and accuracy of the body's position."""
 
 from math import isfinite, isnan
 
@@ -43,7 +43,7 @@ def frames_of(
     return arrived
 
 
-def test_frames_come_at_their_rate_whatever_the_ticks_and_tell_where_the_body_was() -> None:
+def test_frames_come_at_their_rate_at_any_tick_and_report_the_body_s_position() -> None:
     arrived = frames_of(EXACT, 2.0, speed_m_s=0.3)
     assert len(arrived) == 240
     assert np.diff([frame.exposed_s for _, frame in arrived]) == pytest.approx(1.0 / 120.0)
@@ -56,7 +56,9 @@ def test_at_a_rate_of_zero_every_tick_has_its_frame_with_noise_as_stated() -> No
     arrived = frames_of(MotionCaptureParameters(noise_m=0.002), 10.0)
     assert [arrival_s for arrival_s, _ in arrived] == [frame.exposed_s for _, frame in arrived]
     assert len(arrived) == 3800
-    assert np.std([frame.x_m for _, frame in arrived]) == pytest.approx(0.002, rel=0.05)  # 3800 draws tell it to 1.2 %
+    assert np.std([frame.x_m for _, frame in arrived]) == pytest.approx(
+        0.002, rel=0.05
+    )  # standard error of 3800 draws: 1.2 %
 
 
 def test_frames_arrive_late_by_the_latency_and_in_order() -> None:
@@ -73,11 +75,11 @@ def test_drop_outs_are_bursts_of_the_stated_length_and_frequency() -> None:
     gaps_s = np.diff(exposed_s)
     bursts_s = gaps_s[gaps_s > 0.015] - 0.01
     seen_s = 1000.0 - bursts_s.sum()
-    assert len(bursts_s) / seen_s == pytest.approx(0.5, rel=0.15)  # 450 bursts tell it to 5 %
+    assert len(bursts_s) / seen_s == pytest.approx(0.5, rel=0.15)  # standard error of 450 bursts: 5 %
     assert np.mean(bursts_s) == pytest.approx(0.2 + 0.005, rel=0.15)  # whole frames: half of one more on average
 
 
-def test_noise_is_the_same_for_the_same_seed_and_what_is_off_draws_nothing() -> None:
+def test_noise_is_the_same_for_the_same_seed_and_disabled_noise_draws_nothing() -> None:
     assert frames_of(OF_THE_PAPER, 1.0) == frames_of(OF_THE_PAPER, 1.0) != frames_of(OF_THE_PAPER, 1.0, seed=2)
     late = frames_of(MotionCaptureParameters(rate_hz=120.0, latency_s=0.01), 1.0)
     prompt = frames_of(OF_THE_PAPER, 1.0)
@@ -92,7 +94,7 @@ def test_a_camera_that_is_held_up_misses_frames_and_keeps_its_rate() -> None:
     assert len(list(capture.step(5.009, plant))) == 1
 
 
-def test_a_reset_forgets_frames_under_way_and_begins_the_noise_again() -> None:
+def test_a_reset_deletes_frames_in_transit_and_restarts_the_noise() -> None:
     capture, plant = MotionCapture(MotionCaptureParameters(rate_hz=120.0, latency_s=0.01), 1), make_plant()
     first = [frame.x_m for tick in range(100) for frame in capture.step(tick * PERIOD_S, plant)]
     capture.reset()
@@ -118,7 +120,7 @@ def test_a_pose_that_is_lost_for_six_frames_is_none() -> None:
     assert isfinite(pose.read(1.0).x_m)
 
 
-def test_the_loop_sees_120_places_a_second_where_it_is_told_so(configuration: Configuration) -> None:
+def test_the_loop_gets_120_positions_a_second_from_such_cameras(configuration: Configuration) -> None:
     seen: dict[MotionCaptureParameters, set[float]] = {AT_EVERY_TICK: set(), OF_THE_PAPER: set()}
     for parameters, positions_m in seen.items():
         lockstep = Lockstep(configuration, TRACK, motion_capture=parameters)

@@ -79,7 +79,7 @@ def test_a_drive_is_idle_and_without_torque_after_power_on() -> None:
     assert ask(drive, HEARTBEAT)[:2] == (0, AxisState.IDLE)
 
 
-def test_an_armed_drive_exerts_what_it_is_told_until_it_is_idle() -> None:
+def test_an_armed_drive_exerts_its_setpoint_until_it_is_idle() -> None:
     drive = make_armed_drive()
     report(drive, SET_INPUT_TORQUE, 0.25)
     assert drive.torque_nm(0.0) == 0.25
@@ -148,7 +148,7 @@ def test_the_velocity_limit_clamps_torque_silently(turns_s: float, largest_nm: f
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_the_current_limit_bounds_torque_both_ways(sign: int) -> None:
+def test_the_current_limit_bounds_torque_in_both_directions(sign: int) -> None:
     drive = make_armed_drive(current_limit_a=5.0, current_noise_a=0.0)
     report(drive, SET_INPUT_TORQUE, sign * 3.0)
     assert drive.torque_nm(0.0) == pytest.approx(sign * 5.0 * 0.083)
@@ -175,11 +175,11 @@ def test_a_mirrored_motor_turns_angle_velocity_and_torque() -> None:
 
 
 @given(st.floats(-10.0, 10.0), st.sampled_from([100, 4096, 16384]))
-def test_the_encoder_tells_whole_counts(angle_rad: float, counts: int) -> None:
+def test_the_encoder_reports_whole_counts(angle_rad: float, counts: int) -> None:
     drive = make_drive(encoder_counts=counts)
     drive.measure(angle_rad, 0.0)
     turns, _ = ask(drive, GET_ENCODER_ESTIMATES)
-    assert turns * counts == pytest.approx(round(turns * counts), abs=1e-2)  # as far as 32 bits tell
+    assert turns * counts == pytest.approx(round(turns * counts), abs=1e-2)  # to the resolution of 32 bits
     assert abs(turns - angle_rad / (2.0 * pi)) <= 0.5 / counts + 1e-6
 
 
@@ -194,7 +194,7 @@ def test_cyclic_messages_keep_their_periods() -> None:
         assert abs(counted[arbitration_id(NODE, message)] - number) <= 1
 
 
-def test_messages_that_were_held_up_are_not_made_up_for() -> None:
+def test_delayed_messages_are_not_sent_later() -> None:
     drive = make_drive()
     assert len(list(drive.cyclic_frames(10.0))) == 6
     assert list(drive.cyclic_frames(10.0)) == []
@@ -205,7 +205,7 @@ def test_remote_requests_are_answered(message: Message) -> None:
     assert len(ask(make_drive(), message)) == len(message.decode(bytes(8)))
 
 
-def test_a_version_of_0_6_is_told() -> None:
+def test_the_drive_reports_firmware_0_6() -> None:
     assert ask(make_drive(), GET_VERSION)[4:7] == (0, 6, 11)
 
 
@@ -283,7 +283,7 @@ def test_cogging_has_the_stated_amplitude_and_number_per_turn_and_gives_no_energ
     assert torques_nm[1] < 0.0 < torques_nm[-1]  # a detent holds the joint where it is
 
 
-def test_cogging_adds_to_what_the_motor_is_told_and_is_not_reported() -> None:
+def test_cogging_adds_to_the_setpoint_and_is_not_reported() -> None:
     drive = make_armed_drive(cogging_nm=0.02, cogging_phase_deg=90.0, current_noise_a=0.0)
     report(drive, SET_INPUT_TORQUE, 0.3)
     assert drive.torque_nm(0.0) == pytest.approx(0.28)
@@ -321,7 +321,7 @@ def test_an_encoder_s_offset_is_read_as_an_angle_of_the_joint(sign: int) -> None
 def test_encoder_noise_is_as_stated_and_comes_in_whole_counts() -> None:
     drive = make_drive(encoder_noise_rad=0.01)
     turns = np.array([ask(drive, GET_ENCODER_ESTIMATES)[0] for _ in range(4000)])
-    assert np.std(turns) * 2.0 * pi == pytest.approx(0.01, rel=0.05)  # 4000 draws tell it to 1 %
+    assert np.std(turns) * 2.0 * pi == pytest.approx(0.01, rel=0.05)  # standard error of 4000 draws: 1 %
     assert turns * 16384 == pytest.approx(np.round(turns * 16384), abs=1e-2)
 
 
@@ -334,7 +334,7 @@ def test_the_cogging_is_where_the_joint_is_not_where_the_encoder_reads_it() -> N
     assert reported_nm[0] == reported_nm[1] != 0.0
 
 
-def test_late_messages_keep_their_order_and_number_and_tell_of_an_earlier_moment() -> None:
+def test_late_messages_keep_their_order_and_number_and_report_an_earlier_state() -> None:
     drive, late_ms = make_drive(message_delay_s=0.01), []
     for step in range(2000):
         drive.measure(2.0 * pi * step / 4096.0, 0.0)
@@ -343,12 +343,12 @@ def test_late_messages_keep_their_order_and_number_and_tell_of_an_earlier_moment
                 turns, _ = GET_ENCODER_ESTIMATES.decode(frame.data)
                 assert frame.stamp_s == step / 1000.0
                 late_ms.append(step - turns * 4096.0)
-    assert len(late_ms) == pytest.approx(1000, abs=6)  # one each 2 ms; the last 10 ms of them are still under way
+    assert len(late_ms) == pytest.approx(1000, abs=6)  # one each 2 ms; the last 10 ms of them are still in transit
     assert 0.0 <= min(late_ms) < 3.0
     assert 9.0 < max(late_ms) <= 11.0  # the bound, and the millisecond in which they are looked for
 
 
-def test_the_stated_share_of_messages_repeats_the_one_before_to_the_last_bit() -> None:
+def test_the_stated_fraction_of_messages_repeats_the_previous_one_to_the_last_bit() -> None:
     drive, payloads = make_drive(repeated_fraction=0.6), []
     for step in range(10000):
         drive.measure(step / 1000.0, 0.0)
@@ -358,7 +358,7 @@ def test_the_stated_share_of_messages_repeats_the_one_before_to_the_last_bit() -
             if frame.arbitration_id == arbitration_id(NODE, GET_IQ)
         ]
     repeated = np.mean([one == other for one, other in pairwise(payloads)])
-    assert repeated == pytest.approx(0.6, abs=0.03)  # 5000 messages tell it to 0.007
+    assert repeated == pytest.approx(0.6, abs=0.03)  # standard error of 5000 messages: 0.007
 
 
 def test_a_heartbeat_is_never_an_old_one() -> None:
@@ -369,7 +369,7 @@ def test_a_heartbeat_is_never_an_old_one() -> None:
     assert [HEARTBEAT.decode(tick.data)[0] for tick in beats] == [ERROR_ESTOP]
 
 
-def test_what_is_off_draws_nothing() -> None:
+def test_disabled_imperfections_draw_nothing() -> None:
     plain, dressed = make_drive(), make_drive(torque_constant_error=0.1, cogging_nm=0.1, current_lag_s=0.01)
     assert cyclic_frames(plain, 0.5) == cyclic_frames(dressed, 0.5)
 
@@ -383,18 +383,18 @@ def reported_setting(drive: SimulatedOdrive, endpoint: int) -> bytes:
 
 
 @pytest.mark.parametrize(("watchdog_s", "enabled", "timeout"), [(0.1, "01", "cdcccc3d"), (0.0, "00", "00000000")])
-def test_the_watchdog_s_settings_are_told_byte_for_byte(watchdog_s: float, enabled: str, timeout: str) -> None:
+def test_the_watchdog_s_settings_are_answered_byte_for_byte(watchdog_s: float, enabled: str, timeout: str) -> None:
     drive = make_drive(watchdog_s=watchdog_s)
     assert reported_setting(drive, 2) == bytes.fromhex(enabled)
     assert reported_setting(drive, 1) == bytes.fromhex(timeout)
 
 
 @pytest.mark.parametrize("data", ["01 02 00 00", "00 03 00 00", "00 02 00", "00 02 00 00 00", ""])
-def test_no_other_parameter_is_told_and_none_is_written(data: str) -> None:
+def test_no_other_parameter_is_answered_and_none_is_written(data: str) -> None:
     assert make_drive().receive(Frame(arbitration_id(NODE, RX_SDO), bytes.fromhex(data)), 0.0) == []
 
 
-def test_a_drive_that_restarts_is_silent_and_deaf_then_tells_once_that_it_initialises() -> None:
+def test_a_restarting_drive_is_silent_and_deaf_then_reports_its_initialisation_once() -> None:
     drive = make_armed_drive()
     drive.measure(1.0, 0.0)
     report(drive, SET_INPUT_TORQUE, 0.25, now_s=5.0)

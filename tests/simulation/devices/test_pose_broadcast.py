@@ -1,4 +1,4 @@
-"""The simulated body's place on its way to a robot: every source of a pose, and what its delay does to estimates."""
+"""The simulated pose at every source, and the effect of its delay on estimates."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def poses_of(folder: Path) -> Iterator[PoseParameters]:
 
 
 @pytest.mark.parametrize("which", range(3), ids=["socket", "unicast", "multicast"])
-def test_what_is_broadcast_arrives_by_the_configured_way(short_folder: Path, which: int) -> None:
+def test_poses_arrive_at_the_configured_source(short_folder: Path, which: int) -> None:
     pose = list(poses_of(short_folder))[which]
     broadcast = PoseBroadcast(pose, 1)
     received: list[BodyPose] = []
@@ -83,7 +83,7 @@ def test_counts_arrive_from_the_device_of_the_configuration(short_folder: Path) 
             assert body.x_m == pytest.approx(0.001 * step)
 
 
-def test_what_cannot_be_broadcast_from_here_is_an_error_of_the_system(short_folder: Path) -> None:
+def test_a_pose_source_that_cannot_be_provided_raises_an_os_error(short_folder: Path) -> None:
     elsewhere = NatNetParameters(server="192.0.2.1", group="")
     with pytest.raises(OSError, match="Cannot assign"):
         PoseBroadcast(PoseParameters("natnet", natnet=elsewhere), 1)
@@ -94,7 +94,7 @@ def test_what_cannot_be_broadcast_from_here_is_an_error_of_the_system(short_fold
 
 
 class StreamedPose:
-    """A PoseSource: the plant's body, seen by motion capture and told by NatNet over the loopback."""
+    """A PoseSource: the plant's body, captured and sent by NatNet over the loopback."""
 
     def __init__(self, plant: Plant, latency_s: float) -> None:
         self._plant, self._capture = plant, MotionCapture(MotionCaptureParameters(rate_hz=120.0), 1)
@@ -123,9 +123,10 @@ def strides_of(robot: Lockstep) -> list[StrideEstimate]:
     return [closed.estimate for closed in robot.loop.learning.strides]
 
 
-def test_a_late_camera_that_tells_how_late_it_is_biases_no_bound(configuration: Configuration) -> None:
-    """Firm mud holds the plates and the body moves. Seen 20 ms late and not told so, the plates seem to slip, and what
-    is a bound of k_s becomes a value below it."""
+def test_a_late_camera_that_reports_its_latency_biases_no_bound(configuration: Configuration) -> None:
+    """Firm mud holds the plates and the body moves. Captured 20 ms late without a reported latency, the plates seem to
+    slip, and a lower bound of k_s becomes a value below it.
+    """
     strong = {joint: replace(drive, current_limit_a=20.0) for joint, drive in configuration.drive.items()}
     limits = replace(configuration.limits, torque_nm=1.65)
     adaptation = replace(configuration.adaptation, motor_force_n=10.0)

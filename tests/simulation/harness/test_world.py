@@ -56,7 +56,7 @@ def problems_of(text: str) -> list[str]:
     return caught.value.problems
 
 
-def test_the_example_says_what_it_says() -> None:
+def test_the_example_has_the_values_that_it_documents() -> None:
     world = load_world(EXAMPLE)
     crusted = Clay("1500 Pa", 1500.0, (Layer(0.0, 0.004, 1.5), Layer(0.025, 0.035, 0.5)))
     assert [segment.clay for segment in world.track.segments] == [clay_of_water(48.5), crusted, clay_of_water(46.0)]
@@ -152,7 +152,7 @@ def test_a_mud_by_its_water_is_the_paper_s() -> None:
         (SECOND + LAYER.replace("3.0", "20"), "segment 2.layer 1.factor = 20: must be at most 17.9 in mud of 2800 Pa"),
     ],
 )
-def test_what_cannot_be_is_refused_with_key_value_and_bound(added: str, reported: str) -> None:
+def test_an_invalid_value_is_refused_with_key_value_and_bound(added: str, reported: str) -> None:
     before = added + SHORTEST if added.startswith("stone =") else SHORTEST + added
     assert problems_of(before) == [reported]
 
@@ -168,7 +168,7 @@ def test_a_world_without_mud_is_refused() -> None:
     assert "must be tables, each under [[segment]]" in problems_of("[segment]\nstart_m = 0\n")[0]
 
 
-def test_all_problems_are_told_at_once_whatever_their_kind() -> None:
+def test_all_problems_of_any_kind_are_reported_at_once() -> None:
     wrong = (
         "depth_m = 3\n"
         + SHORTEST.replace("2000", "-1")
@@ -188,7 +188,7 @@ def test_the_strongest_mud_may_be_reached_by_a_layer_and_not_surpassed() -> None
     assert problems_of(firm + LAYER.replace("3.0", "2.01"))
 
 
-def test_a_file_that_is_no_world_is_told_by_its_name_or_line(tmp_path: Path) -> None:
+def test_a_file_that_is_no_world_is_reported_by_its_name_or_line(tmp_path: Path) -> None:
     path = tmp_path / "world.toml"
     with pytest.raises(ConfigurationError, match=r"world\.toml: No such file"):
         load_world(path)
@@ -229,7 +229,7 @@ def test_every_number_of_a_world_has_bounds(record: type) -> None:
             assert isinstance(kinds[1], Bounds), item.name
 
 
-def test_robot_and_drives_may_be_given_whatever_their_records_hold() -> None:
+def test_robot_and_drives_accept_all_fields_of_their_records() -> None:
     """So that a field which is added there can be set here."""
     settable: dict[str, dict[str, Any]] = {
         section: {item.name: item.default for item in fields(record) if item.name not in fixed}
@@ -246,12 +246,12 @@ def test_robot_and_drives_may_be_given_whatever_their_records_hold() -> None:
         assert {"robot": world.robot_changes, "drives": world.drive_changes}[section] == numbers
 
 
-def test_what_the_configuration_fixes_is_in_no_world() -> None:
+def test_a_world_refuses_keys_that_the_configuration_fixes() -> None:
     assert {item.name for item in fields(PlantParameters)} > FIXED_OF_ROBOT
     assert {item.name for item in fields(SimulatedDriveParameters)} > FIXED_OF_DRIVE
 
 
-def test_a_base_is_fixed_where_the_configuration_says_so(configuration: Configuration) -> None:
+def test_a_base_is_fixed_where_the_configuration_fixes_it(configuration: Configuration) -> None:
     on_a_bench = replace(configuration, estimation=replace(configuration.estimation, fixed_base=True))
     world, free = parse_world(SHORTEST), parse_world(SHORTEST + "[robot]\nfree_body = true\n")
     assert world.plant(on_a_bench).fixed_base and not world.plant(configuration).fixed_base
@@ -262,7 +262,7 @@ def test_a_base_is_fixed_where_the_configuration_says_so(configuration: Configur
     assert caught.value.problems == ["robot.free_body = true: the configuration says estimation.fixed_base = true"]
 
 
-def test_a_lockstep_lives_in_a_world(configuration: Configuration) -> None:
+def test_a_lockstep_runs_in_a_world(configuration: Configuration) -> None:
     world = parse_world(
         SHORTEST.replace("2000", "20000")
         + "[robot]\nbody_mass_kg = 2.0\n[drives]\nencoder_counts = 4096\n[disturbances]\ncurrent_noise_a = 0.3\n"

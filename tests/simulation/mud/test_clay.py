@@ -102,8 +102,8 @@ def test_half_way_between_two_muds_lies_their_geometric_mean(dry: str, wet: str)
 
 
 @pytest.mark.parametrize(("end", "inner", "outer"), [("45.3", 46.5, 44.1), ("53.1", 51.0, 55.2)])
-def test_the_slope_goes_on_beyond_the_outer_muds(end: str, inner: float, outer: float) -> None:
-    """The ends lie half way between these."""
+def test_the_slope_continues_beyond_the_outer_muds(end: str, inner: float, outer: float) -> None:
+    """The outer muds lie in the middle between these."""
     product = clay_of_water(inner).strength_pa * clay_of_water(outer).strength_pa
     assert product == pytest.approx(MUDS[end].strength_pa ** 2)
 
@@ -114,7 +114,7 @@ def test_a_mud_is_named_after_its_water() -> None:
 
 
 @pytest.mark.parametrize("percent", [43.99, 56.01, -1.0, nan])
-def test_water_contents_of_which_the_fit_says_nothing_are_refused(percent: float) -> None:
+def test_water_contents_outside_of_the_fit_are_refused(percent: float) -> None:
     with pytest.raises(ValueError, match="44 to 56"):
         clay_of_water(percent)
 

@@ -1,4 +1,4 @@
-"""Each layer on its own: what it does to the mud, to the arm or to the drives, and nothing where it is off."""
+"""Each disturbance alone: its effect on the mud, the arm or the drives, and none where it is off."""
 
 from dataclasses import fields, replace
 from itertools import pairwise
@@ -69,7 +69,7 @@ def test_negative_amounts_and_no_numbers_are_refused(field: str, value: float) -
         Disturbances(**{field: value})
 
 
-def test_shares_of_more_than_everything_are_refused() -> None:
+def test_fractions_above_one_are_refused() -> None:
     assert Disturbances(remoulding=1.0, relaxation=0.99).remoulding == 1.0
     with pytest.raises(ValueError, match="at most 1"):
         Disturbances(remoulding=1.01)
@@ -124,27 +124,27 @@ def test_a_touch_of_less_than_half_a_centimetre_is_no_stroke(depth_m: float, cli
     assert (lowered(history).firmness < 1.0) is clings
 
 
-def test_strokes_in_the_same_place_find_softer_mud() -> None:
+def test_strokes_at_the_same_position_find_softer_mud() -> None:
     history = StrokeHistory(Disturbances(remoulding=1.0), 1)
     for earlier in range(8):
         assert lowered(history).firmness == pytest.approx(0.5 + 0.5 * exp(-0.4 * earlier))
         raise_again(history)
 
 
-def test_a_share_of_remoulding_softens_by_that_share() -> None:
+def test_half_the_remoulding_softens_by_half() -> None:
     history = StrokeHistory(Disturbances(remoulding=0.5), 1)
     stroke(history)
     assert lowered(history).firmness == pytest.approx(1.0 - 0.25 * (1.0 - exp(-0.4)))
 
 
 @pytest.mark.parametrize(("position_m", "earlier"), [(0.0, 1), (0.014, 1), (-0.014, 1), (0.016, 0), (-0.12, 0)])
-def test_the_same_place_ends_after_a_centimetre_and_a_half(position_m: float, earlier: int) -> None:
+def test_strokes_within_a_centimetre_and_a_half_share_their_mud(position_m: float, earlier: int) -> None:
     history = StrokeHistory(Disturbances(remoulding=1.0), 1)
     stroke(history)
     assert lowered(history, position_m).firmness == pytest.approx(0.5 + 0.5 * exp(-0.4 * earlier))
 
 
-def test_a_place_is_where_the_flipper_came_in_and_its_mud_stays_the_same_through_the_stroke() -> None:
+def test_a_stroke_s_position_is_that_of_its_entry_and_its_mud_stays_the_same() -> None:
     history = StrokeHistory(Disturbances(remoulding=1.0), 1)
     stroke(history)
     history.step(0.02, 0.0)
@@ -182,7 +182,7 @@ def test_the_surface_stays_through_a_stroke_and_never_rises_over_a_plate_outside
             assert lowest_m <= history.surface_m
 
 
-def test_a_seed_gives_the_same_history_also_after_a_reset_and_another_one_another() -> None:
+def test_a_seed_repeats_its_history_after_a_reset_and_another_seed_differs() -> None:
     first, second, other = (StrokeHistory(LAB, seed) for seed in (1, 1, 2))
     found_m = surfaces_m(first, 5)
     assert surfaces_m(second, 5) == found_m
@@ -283,7 +283,7 @@ def held_thrust_n(lockstep: Lockstep) -> tuple[float, float]:
 
 @pytest.mark.parametrize("relaxation", [0.13, 0.3])
 def test_a_load_relaxes_in_the_holds(configuration: Configuration, relaxation: float) -> None:
-    """Beside what the mud's rate takes from a plate that stops."""
+    """In addition to the loss by the mud's rate when a plate stops."""
     early_n, late_n = held_thrust_n(single_flipper(configuration, Disturbances(relaxation=relaxation), pause_s=1.0))
     plain_early_n, plain_late_n = held_thrust_n(single_flipper(configuration, NONE, pause_s=1.0))
     assert early_n == pytest.approx(plain_early_n, rel=0.02)

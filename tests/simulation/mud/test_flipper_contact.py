@@ -38,7 +38,7 @@ def in_world(adduction_rad: float, x: float, y: float, z: float) -> np.ndarray:
 
 
 def position_m(sweep_rad: float, adduction_rad: float, outward_m: float, above_edge_m: float) -> np.ndarray:
-    """Of a point on the plate, from the crossing of the axes."""
+    """Returns a point on the plate, from the intersection of the axes."""
     arm_m = GEOMETRY.flipper_length_m + outward_m
     return in_world(adduction_rad, arm_m * sin(sweep_rad), arm_m * cos(sweep_rad), above_edge_m - GEOMETRY.drop_m)
 
@@ -61,7 +61,7 @@ def hold(
 
 
 @given(SWEEPS, ADDUCTIONS)
-def test_the_attitude_tells_the_depth_of_every_point_of_the_plate(sweep_rad: float, adduction_rad: float) -> None:
+def test_the_attitude_gives_the_depth_of_every_point_of_the_plate(sweep_rad: float, adduction_rad: float) -> None:
     attitude = attitude_of(GEOMETRY, sweep_rad, adduction_rad, surface_m=0.004)
     for u, s in POSITIONS_M:
         depth_m = -GEOMETRY.axis_height_m - 0.004 - position_m(sweep_rad, adduction_rad, u, s)[2]
@@ -124,7 +124,7 @@ def test_the_plate_yields_sideways_at_the_limit_of_the_clay(direction: float) ->
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-def test_mud_lifts_a_flipper_on_its_way_down_and_holds_it_on_its_way_up(direction: float) -> None:
+def test_mud_pushes_an_inserted_flipper_up_and_an_extracted_one_down(direction: float) -> None:
     force = hold(FlipperContact(GEOMETRY), 0.0, 0.02, (0.0, 0.5 * direction, 0.0), 1.0)
     assert direction * force.upward_n < -0.5
     assert direction * force.adduction_nm < -0.05
@@ -148,7 +148,7 @@ def test_a_loaded_plate_at_rest_does_not_creep() -> None:
     assert at_rest.normal_n == pytest.approx(rate_factor(0.0) / rate_factor(speed_m_s) * moving.normal_n)
 
 
-def test_a_relaxing_plate_at_rest_loses_the_stated_share() -> None:
+def test_a_relaxing_plate_at_rest_loses_the_stated_fraction() -> None:
     contact = FlipperContact(GEOMETRY, relaxation=0.3)
     hold(contact, 0.3, 0.03, (-1.0, 0.0, 0.0), 0.5)
     at_rest = hold(contact, 0.3, 0.03, (0.0, 0.0, 0.0), DT_S)

@@ -105,7 +105,7 @@ DIRECTIONS = st.sampled_from([-1.0, 1.0])
 
 @settings(max_examples=50)
 @given(ATTITUDES, st.sampled_from(list(MUDS.values())), st.tuples(DIRECTIONS, DIRECTIONS, DIRECTIONS))
-def test_strips_give_what_a_dense_sum_gives(
+def test_strips_give_the_force_of_a_dense_sum(
     attitude: Attitude, clay: Clay, directions: tuple[float, float, float]
 ) -> None:
     """Within 3 % of the whole force, and of that at half of the plate's height: one where the law bends at 9, two
@@ -151,7 +151,7 @@ def steady_n(depth_m: float, clay: Clay) -> float:
     return -move(PlateContact(SIZE), Twist(normal_m_s=0.1), 0.3, Attitude(depth_m, 0.0, 1.0), clay).normal_n
 
 
-def test_a_crust_is_felt_before_what_lies_under_it() -> None:
+def test_a_crust_acts_before_the_mud_under_it() -> None:
     """Bearing under the edge: three times as much in the crust, as without it below."""
     crusted = CLAY._replace(layers=(Layer(0.0, 0.01, 3.0),))
     plate, plain = PlateContact(SIZE), PlateContact(SIZE)
@@ -166,7 +166,7 @@ def test_a_crust_is_felt_before_what_lies_under_it() -> None:
     assert bearing_n[190] == pytest.approx(stuck_n)
 
 
-def test_a_weak_layer_takes_its_share_of_the_force_and_no_more() -> None:
+def test_a_weak_layer_reduces_the_force_by_its_own_part() -> None:
     """The layer from 1 to 2 cm, with a tenth of the strength: 3 to 9 times that are left of what was there."""
     weak = CLAY._replace(layers=(Layer(0.01, 0.02, 0.1),))
     assert steady_n(0.01, weak) == steady_n(0.01, CLAY)
@@ -247,7 +247,7 @@ def test_sticking_does_not_prefer_a_direction_in_the_plate_s_plane() -> None:
 
 @pytest.mark.parametrize("attitude", [UPRIGHT, attitude_of(0.03, 0.5, 0.5), attitude_of(0.001, -0.5, 0.7)])
 def test_before_it_yields_mud_is_a_spring_with_a_symmetric_stiffness(attitude: Attitude) -> None:
-    """What a push one way does another way, a push that way does this way: Betti's theorem."""
+    """The work of one push on another's displacement is mutual: Betti's theorem."""
     push = 1e-4
     stiffness = np.array([PlateContact(SIZE).step(1.0, CLAY, attitude, Twist(*row)) for row in push * np.eye(7)])
     assert stiffness == pytest.approx(stiffness.T, abs=1e-9)
@@ -291,10 +291,10 @@ def test_outward_and_inward_are_mirror_images(attitude: Attitude, twists: list[T
     st.lists(st.tuples(ATTITUDES, TWISTS, st.sampled_from(GROUNDS), st.integers(1, 30)), max_size=12),
     st.sampled_from([0.0, 0.3]),
 )
-def test_mud_never_gives_more_work_than_it_was_given(
+def test_mud_never_returns_more_work_than_it_received(
     motions: list[tuple[Attitude, Twist, Clay, int]], relaxation: float
 ) -> None:
-    """Along any way, also one that no plate could go, with jumps between depths, muds and speeds."""
+    """Along any path, also an impossible one, with jumps between depths, muds and speeds."""
     plate, given_j = PlateContact(SIZE, relaxation), 0.0
     for attitude, twist, clay, steps in motions:
         for _ in range(steps):
@@ -303,7 +303,7 @@ def test_mud_never_gives_more_work_than_it_was_given(
 
 
 @pytest.mark.parametrize("slow_m_s", [0.003, 0.01])
-def test_what_was_loaded_slowly_gives_nothing_more_when_it_is_released_fast(slow_m_s: float) -> None:
+def test_slow_loading_returns_no_extra_work_when_released_fast(slow_m_s: float) -> None:
     plate, given_j = PlateContact(SIZE), 0.0
     for speed_m_s in (slow_m_s, -1.0):
         twist = Twist(normal_m_s=speed_m_s)
@@ -312,7 +312,7 @@ def test_what_was_loaded_slowly_gives_nothing_more_when_it_is_released_fast(slow
     assert -1e-2 < given_j < 0.0
 
 
-def test_a_push_into_deeper_mud_keeps_its_force_and_a_way_up_takes_it_along() -> None:
+def test_a_push_into_deeper_mud_keeps_its_force_and_a_lift_reduces_it() -> None:
     plate = PlateContact(SIZE)
     pushed = move(plate, Twist(normal_m_s=0.1), 0.05, Attitude(0.01, 0.0, 1.0))  # a third of the yield
     deeper = move(plate, STOP, DT_S, Attitude(0.05, 0.0, 1.0))
@@ -334,7 +334,7 @@ def test_a_small_push_springs_back(way: str, yield_m: float) -> None:
     assert back == pytest.approx(NO_WRENCH, abs=1e-12)
 
 
-def test_at_the_reference_speed_the_load_is_full_after_the_stated_way() -> None:
+def test_at_the_reference_speed_the_load_is_full_after_the_stated_distance() -> None:
     plate = PlateContact(SIZE)
     half, full, beyond = (move(plate, Twist(normal_m_s=0.1), SIDEWAYS_YIELD_M / 0.1 / 2.0) for _ in range(3))
     assert half.normal_n == pytest.approx(beyond.normal_n / 2.0, rel=0.02)  # one of 75 steps
@@ -349,7 +349,7 @@ def test_a_loaded_plate_at_rest_does_not_creep() -> None:
     assert move(plate, STOP, 30.0) == pytest.approx(at_rest, rel=1e-9)
 
 
-def test_a_load_relaxes_at_rest_by_the_stated_share_within_half_a_second() -> None:
+def test_a_load_relaxes_at_rest_by_the_stated_fraction_within_half_a_second() -> None:
     plate = PlateContact(SIZE, relaxation=0.2)
     move(plate, Twist(0.05, 0.0, -0.1), 0.5)
     loads_n = [move(plate, STOP, seconds) for seconds in (DT_S, 0.5, 10.0)]

@@ -18,7 +18,7 @@ STONE = Stone(0.10, 0.16, 0.02)
 
 
 def pushed(*places: tuple[float, float]) -> tuple[float, float]:
-    """The push at the last of some (place, depth), each held for long enough that nothing moves any more."""
+    """Returns the push at the last of some (position, depth), each held until nothing moves."""
     contact, push = StoneContact([STONE]), NO_PUSH
     for position_m, depth_m in places:
         for _ in range(2):
@@ -42,7 +42,7 @@ def test_a_stone_pushes_back_where_the_plate_came_from(
 
 
 @pytest.mark.parametrize("place", [(0.13, 0.02), (0.13, 0.0), (0.10, 0.03), (0.16, 0.03), (0.2, 0.05)])
-def test_beside_and_above_a_stone_there_is_no_push(place: tuple[float, float]) -> None:
+def test_next_to_and_above_a_stone_there_is_no_push(place: tuple[float, float]) -> None:
     assert pushed((0.13, 0.03), place) == (0.0, 0.0)
 
 
@@ -62,7 +62,7 @@ def test_a_plate_that_is_lifted_and_put_down_again_meets_the_face_that_it_then_c
     assert upward_n > 0.0
 
 
-def test_of_several_stones_the_one_in_the_way_counts() -> None:
+def test_of_several_stones_the_one_at_the_plate_counts() -> None:
     contact = StoneContact([STONE, Stone(0.3, 0.4, 0.01)])
     assert contact.step(DT_S, 0.35, 0.0105).upward_n > 0.0
     assert contact.step(DT_S, 0.25, 0.0105) == (0.0, 0.0)
@@ -82,7 +82,7 @@ def test_a_reset_contact_has_met_no_stone() -> None:
 
 
 @given(st.floats(0.028, 2.0), st.floats(0.01, 3.0), st.floats(0.0, 1.0))
-def test_what_falls_on_a_stone_comes_back_slower(mass_kg: float, speed_m_s: float, start_fraction: float) -> None:
+def test_a_mass_that_falls_on_a_stone_rebounds_slower(mass_kg: float, speed_m_s: float, start_fraction: float) -> None:
     """From the sweep inertia of an arm at its plate up to a body; wherever within a step it arrives."""
     contact, depth_m = StoneContact([STONE]), STONE.top_m - start_fraction * speed_m_s * DT_S
     velocity_m_s, deepest_m = speed_m_s, -inf

@@ -1,4 +1,4 @@
-"""Which mud lies where, how high it stands, and how its strength wanders."""
+"""The mud along the track: its kind, the height of its surface, and its random strength."""
 
 from math import exp
 
@@ -17,7 +17,7 @@ LONG = [(400.0, Clay("any", 1000.0, (Layer(0.0, 0.01, 2.0),)))]
 @pytest.mark.parametrize(
     ("x_m", "name"), [(-0.1, "48.5"), (0.0, "48.5"), (0.6, "48.5"), (0.61, "53.1"), (1.3, "45.3"), (9.0, "45.3")]
 )
-def test_the_paper_s_track_has_three_muds_and_the_last_goes_on(x_m: float, name: str) -> None:
+def test_the_paper_s_track_has_three_muds_and_the_last_has_no_end(x_m: float, name: str) -> None:
     assert paper_track().clay_at(x_m) == MUDS[name]
 
 
@@ -27,7 +27,7 @@ def test_a_track_is_as_long_as_its_segments() -> None:
 
 
 @given(st.floats(-1.0, 10.0))
-def test_a_track_is_level_uniform_and_without_stones_unless_it_is_told(x_m: float) -> None:
+def test_a_track_is_level_uniform_and_without_stones_by_default(x_m: float) -> None:
     track = Track([(1.0, MUDS["48.5"])])
     assert (track.stones, track.surface_m(x_m), track.clay_at(x_m)) == ((), 0.0, MUDS["48.5"])
 
@@ -43,7 +43,7 @@ def strengths_pa(parameters: RandomStrength, positions_m: np.ndarray) -> np.ndar
     return np.array([track.clay_at(float(x_m)).strength_pa for x_m in positions_m])
 
 
-def test_random_strength_has_the_mean_and_the_spread_that_were_asked_for() -> None:
+def test_random_strength_has_the_requested_mean_and_spread() -> None:
     """8000 lengths of 5 cm count as about 4000 independent draws, so 1 % is three standard errors of the mean, and
     0.01 as many of the spread.
     """
@@ -64,7 +64,7 @@ def test_random_strength_forgets_itself_over_its_correlation_length() -> None:
         assert correlation == pytest.approx(exp(-lengths), abs=0.05)  # 4000 lengths: three standard errors
 
 
-def test_random_strength_is_the_same_for_a_seed_in_whatever_order_it_is_looked_at() -> None:
+def test_random_strength_is_the_same_for_a_seed_in_any_order_of_access() -> None:
     parameters, positions_m = RandomStrength(0.3, 0.1, 3), np.linspace(-0.5, 5.0, 200)
     forward, backward = strengths_pa(parameters, positions_m), strengths_pa(parameters, positions_m[::-1])
     assert forward.tolist() == backward[::-1].tolist()

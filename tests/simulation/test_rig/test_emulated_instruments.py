@@ -85,7 +85,7 @@ def test_an_unplugged_amplifier_hangs_up_and_comes_back_by_the_same_name(tmp_pat
     listener.close()
 
 
-def test_what_nobody_reads_is_lost_and_counted(tmp_path: Path) -> None:
+def test_unread_lines_are_lost_and_counted(tmp_path: Path) -> None:
     amplifier = EmulatedAmplifier(lambda _: 1.0, AmplifierParameters(rate_hz=1000.0), tmp_path / "cell")
     amplifier.waits_for_delivery = False
     for second in range(1, 60):
@@ -94,7 +94,7 @@ def test_what_nobody_reads_is_lost_and_counted(tmp_path: Path) -> None:
     amplifier.close()
 
 
-def test_a_person_at_the_emulated_bench_moves_the_plate(tmp_path: Path) -> None:
+def test_an_operator_at_the_emulated_bench_moves_the_plate(tmp_path: Path) -> None:
     bench = EmulatedBench(clay_plate(49.5), tmp_path / "cell")
     bench.amplifier.waits_for_delivery = False
     assert "insert" in execute(bench, ["jump"])

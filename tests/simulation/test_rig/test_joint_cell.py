@@ -29,14 +29,14 @@ def test_nothing_is_read_in_free_air() -> None:
             assert (moment_m4, moment_nm) == (0.0, 0.0)
 
 
-def test_mud_lifts_a_plate_that_goes_down_and_holds_one_that_comes_up() -> None:
+def test_mud_pushes_an_inserted_plate_up_and_an_extracted_one_down() -> None:
     down, up = measure_arc(CLAY, GEOMETRY, SWEEP_RAD, 0.0, 0.03, 0.1, hold_s=0.1)
     assert down.depths_m[-1] == pytest.approx(0.03)
     assert min(down.moments_nm[-100:]) > 0.0
     assert max(nm for z, nm in zip(up.depths_m, up.moments_nm, strict=True) if 0.0 < z < 0.02) < 0.0
 
 
-def test_what_is_deeper_than_the_arm_reaches_ends_there() -> None:
+def test_a_depth_beyond_the_arm_s_reach_ends_at_its_reach() -> None:
     """Below the surface, which lies 2 mm below its nominal height."""
     down, _ = measure_arc(CLAY, GEOMETRY, SWEEP_RAD, 0.002, 0.08, 0.1)
     assert down.depths_m[-1] == pytest.approx(GEOMETRY.deepest_m(degrees(SWEEP_RAD)) - 0.002)

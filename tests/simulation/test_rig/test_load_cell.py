@@ -38,7 +38,7 @@ def test_the_axes_are_those_of_the_flipper_s_plate(sweep_rad: float, adduction_r
     assert (outward[2], upward[2]) == pytest.approx((-attitude.per_outward, attitude.per_upward))
 
 
-def test_an_upright_plate_meets_bearing_and_adhesion_on_its_way_down() -> None:
+def test_an_upright_plate_meets_bearing_and_adhesion_while_it_is_lowered() -> None:
     down = measure_insertion(CLAY, GEOMETRY, 0.0, 0.0, 0.04, 0.1).down
     for depth_m, force_n in zip(down.depths_m, down.forces_n, strict=True):
         if depth_m > 0.01:
@@ -46,7 +46,7 @@ def test_an_upright_plate_meets_bearing_and_adhesion_on_its_way_down() -> None:
             assert force_n == pytest.approx(limit_n, rel=0.03)  # the mud of the last millimetre has not yielded yet
 
 
-def test_an_upright_plate_meets_suction_and_adhesion_on_its_way_up() -> None:
+def test_an_upright_plate_meets_suction_and_adhesion_while_it_is_lifted() -> None:
     up = measure_insertion(CLAY, GEOMETRY, 0.0, 0.0, 0.04, 0.1).up
     for depth_m, force_n in zip(up.depths_m, up.forces_n, strict=True):
         if 0.002 < depth_m < 0.035:
@@ -81,7 +81,7 @@ def test_a_sweep_to_the_front_and_to_the_back_are_inserted_alike_and_harder_than
     assert front.down.forces_n[-1] > 1.2 * measure_insertion(CLAY, GEOMETRY, 0.0, 0.0, 0.03, 0.1).down.forces_n[-1]
 
 
-def test_a_hold_of_half_a_second_loses_the_stated_share() -> None:
+def test_a_hold_of_half_a_second_loses_the_stated_fraction() -> None:
     held = measure_insertion(CLAY, GEOMETRY, 0.0, 0.0, 0.03, 0.1, relaxation=0.13, hold_s=3.0).held
     assert len(held.forces_n) == 6000
     assert set(held.depths_m) == {held.depths_m[0]}
@@ -115,13 +115,13 @@ def test_the_shear_does_not_depend_on_how_far_it_is_dragged() -> None:
     assert near_n == pytest.approx(far_n)
 
 
-def test_a_way_on_which_the_mud_does_not_yield_is_refused() -> None:
+def test_a_distance_too_short_for_the_mud_to_yield_is_refused() -> None:
     with pytest.raises(ValueError, match="distance_m"):
         measure_shear(CLAY, GEOMETRY, 0.0, 0.0, 0.03, 0.5, distance_m=0.02)
 
 
 def test_twice_the_strength_is_a_bit_less_than_twice_the_shear() -> None:
-    """Since a part of the pressure is the weight of the mud, whatever its strength."""
+    """A part of the pressure is the weight of the mud, which does not depend on its strength."""
     weak_n, strong_n = (
         measure_shear(Clay("any", strength_pa), GEOMETRY, 0.0, radians(-20.0), 0.03, 0.1)
         for strength_pa in (2000.0, 4000.0)
@@ -130,8 +130,9 @@ def test_twice_the_strength_is_a_bit_less_than_twice_the_shear() -> None:
 
 
 def test_a_load_cell_finds_a_crust_where_it_is() -> None:
-    """Down to its bottom the edge bears 3 times as much, below it what it bore without; the sides stay in the crust.
+    """Down to the bottom of the crust the edge carries 3 times the load, below it the load without a crust.
 
+    The sides stay in the crust.
     A strip that has just come into the mud is loaded within its first millimetre or two: up to 5 % are missing.
     """
     plain = measure_insertion(CLAY, GEOMETRY, 0.0, 0.0, 0.03, 0.1).down

@@ -1,4 +1,4 @@
-"""The stage: where it is when, whatever the steps it is asked in."""
+"""The stage's position against time, in steps of any length."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from simulation.test_rig.stage_motion import ManualMotion, ManualMotionParameter
 
 
 class Air:
-    """A CarriedPlate that feels how deep it is, in newtons a metre; forward it feels its way."""
+    """A CarriedPlate whose upward force is its depth in newtons a metre, and whose forward force is its travel."""
 
     def __init__(self) -> None:
         self.reset()
@@ -29,7 +29,9 @@ class Air:
 
 
 @given(st.floats(0.001, 0.5), st.floats(0.005, 0.5), st.floats(0.1, 20.0))
-def test_a_ramped_way_ends_where_and_when_it_should(path_m: float, speed_m_s: float, acceleration: float) -> None:
+def test_a_ramped_motion_ends_at_the_right_distance_and_time(
+    path_m: float, speed_m_s: float, acceleration: float
+) -> None:
     motion = RampedMotion(path_m, speed_m_s, acceleration)
     duration_s = motion.duration_s
     assert motion.path_m(0.0) == 0.0
@@ -42,7 +44,7 @@ def test_a_ramped_way_ends_where_and_when_it_should(path_m: float, speed_m_s: fl
     assert min(speeds) >= 0.0 and max(speeds) <= speed_m_s * (1.0 + 1e-6)
 
 
-def test_an_insertion_goes_down_holds_and_comes_up() -> None:
+def test_an_insertion_lowers_holds_and_lifts() -> None:
     stage = PlateStage(Air(), StageParameters(2.0))
     stage.reset()
     stage.mean_force_n(0.0)
@@ -56,7 +58,7 @@ def test_an_insertion_goes_down_holds_and_comes_up() -> None:
     assert stage.ends_s == pytest.approx(1.0 + 2.0 * stroke_s + 3.0)
 
 
-def test_lowering_and_lifting_end_at_their_depths_and_a_drag_goes_backward() -> None:
+def test_lowering_and_lifting_end_at_their_depths_and_a_drag_moves_backward() -> None:
     air = Air()
     stage = PlateStage(air)
     stage.move_over(air, sideways=True)
@@ -72,7 +74,7 @@ def test_lowering_and_lifting_end_at_their_depths_and_a_drag_goes_backward() -> 
     assert air.depth_m == pytest.approx(-LIFTED_M)
 
 
-def test_the_cell_reads_the_mean_since_the_last_time_and_what_hangs_on_it() -> None:
+def test_the_cell_reads_the_mean_since_the_last_reading_and_a_hanging_weight() -> None:
     stage = PlateStage(Air(), StageParameters(1e6, cell_sign=-1.0))
     stage.reset()
     stage.mean_force_n(0.0)
@@ -84,7 +86,7 @@ def test_the_cell_reads_the_mean_since_the_last_time_and_what_hangs_on_it() -> N
 
 
 @given(st.floats(0.003, 0.3), st.integers(0, 10**6))
-def test_a_hand_goes_all_its_way_forward_and_never_faster_than_it_can(path_m: float, seed: int) -> None:
+def test_a_manual_motion_covers_its_distance_forward_within_its_fastest_speed(path_m: float, seed: int) -> None:
     hand = ManualMotionParameters()
     motion = ManualMotion(path_m, hand, Random(seed))
     step_s = motion.duration_s / 500.0
