@@ -1,13 +1,12 @@
-"""What a motor drive is to the rest of the project, whatever protocol it speaks.
+"""The interface of motor drives, independent of the protocol that they speak.
 
-Four drives, one for each joint, are commanded together as `Drives`: read their states, send torques, arm, disarm. What
-a drive reports about itself, as opposed to its joint, is one `DriveHealth`. A `DriveType` is everything that one
-protocol brings along: the parameters that the configuration states, the drives that speak it, and how to read its
-frames without commanding a drive (the bench and the fault injection listen like that). drivers/drive_types.py lists
-the types that exist.
+Four drives, one for each joint, are commanded together as `Drives`: read their states, send torques, arm, disarm. A
+`DriveHealth` contains what a drive reports about itself, as opposed to its joint. A `DriveType` describes one protocol:
+the parameters that the configuration states, the drives that speak it, and how to read its frames without commanding a
+drive, as the bench and the fault injection do. drivers/drive_types.py lists the types that exist.
 
-`Drives` are the only object that may put commands on the drives' buses, and what leaves passes a gate
-(drivers/transmit_gate.py), which refuses and counts any command that the limits forbid.
+Only `Drives` send commands on the drives' buses. Every frame passes a gate (drivers/transmit_gate.py), which refuses
+and counts any command that the limits forbid.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from drivers.can.frames import Frame
 
 @dataclass(frozen=True)
 class DriveParameters:
-    """What the configuration states about the drive of any type; a type adds its own keys in a subclass."""
+    """The configuration of a drive of any type; a type adds its own keys in a subclass."""
 
     bus: Annotated[str, Meaning("name of a [bus.NAME] section")]
     node_id: Annotated[int, Bounds(0, 62), Meaning("on that bus", "id")]
@@ -43,7 +42,7 @@ class DriveParameters:
     heartbeat_period_s: Annotated[float, Bounds(0.01, 1.0), Meaning("as set on the drive")] = 0.1  # its default
 
     def torque_problems(self, torque_nm: float) -> Iterator[tuple[str, str]]:
-        """Reasons why this drive cannot exert `torque_nm`: the key with its value, and what it must be."""
+        """Yields reasons why this drive cannot exert `torque_nm`: the key with its value, and what it must be."""
         if self.current_limit_a < torque_nm / self.torque_constant_nm_a:
             needed_a = ceil(100.0 * torque_nm / self.torque_constant_nm_a) / 100.0
             yield (
@@ -63,7 +62,7 @@ class WatchdogEndpoints:
 
 
 class DriveHealth(NamedTuple):
-    """What one drive reports about itself. Texts are for people; an empty one says that there is nothing to report."""
+    """One drive's report about itself. Texts are for people; an empty one means that there is nothing to report."""
 
     joint: str
     firmware: str = ""  # version; empty until the drive has reported it
@@ -128,7 +127,7 @@ class Drives(Protocol):
 
 
 class FrameContent(NamedTuple):
-    """What a frame is in a drive's protocol."""
+    """The meaning of a frame in a drive's protocol."""
 
     node_id: int  # of the drive that sends it or is addressed
     is_command: bool = False  # a drive obeys it and never sends it
@@ -136,7 +135,7 @@ class FrameContent(NamedTuple):
 
 
 class DriveType(Protocol):
-    """One protocol."""
+    """One protocol, and the drives that speak it."""
 
     @property
     def parameters(self) -> type[DriveParameters]:
@@ -148,11 +147,11 @@ class DriveType(Protocol):
 
     @property
     def command(self) -> FrameRate:
-        """What this program sends to each drive all the time."""
+        """The command that this program sends to each drive in every tick."""
 
     @property
     def reports(self) -> tuple[FrameRate, ...]:
-        """What each drive sends all the time, at the rates that docs/how-to/odrive.md sets."""
+        """The messages that each drive sends cyclically, at the rates that the set-up instructions give."""
 
     def make_drives(
         self,

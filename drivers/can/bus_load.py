@@ -30,7 +30,7 @@ class BusLoad(NamedTuple):
 
 
 def frame_bits(data_bytes: int) -> tuple[int, int]:
-    """Returns the length without any stuffing, and with as much as there can be."""
+    """Returns the number of bits without any stuffing, and with as much as there can be."""
     stuffed = 34 + 8 * data_bytes
     least = stuffed + 13
     return least, least + (stuffed - 1) // 4

@@ -1,4 +1,4 @@
-"""What may pass the transmit gate for one ODrive: the messages that this program uses, and of each only its payloads.
+"""Lists what may pass the transmit gate for one ODrive: the messages that this program uses, with their payloads only.
 
 Idle, torque mode, the configured limits and the clearing of errors may always leave, and so may the reading of any
 parameter. Closed loop may be asked for only while the gate is open.

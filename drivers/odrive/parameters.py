@@ -1,4 +1,4 @@
-"""What the configuration states about one ODrive."""
+"""The configuration of one ODrive."""
 
 from __future__ import annotations
 
