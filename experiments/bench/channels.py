@@ -1,6 +1,6 @@
-"""Which CAN interfaces the bench uses in place of those of the configuration: `can0` for all, or `left=can0` for one.
+"""The CAN interfaces of the bench in place of the configured ones: `can0` for all buses, or `left=can0` for one.
 
-Buses that share a channel are one bus: its drives must then have ids of their own.
+Buses that share a channel are one bus: its drives then need different node ids.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ INTERFACE = "socketcan"
 
 
 def on_channels(configuration: Configuration, given: Sequence[str]) -> Configuration:
-    """Raises BenchError."""
-    channels = {name: channel for word in given for name, channel in _named(configuration, word).items()}
+    """Replace the channels of the buses. Raises BenchError."""
+    channels = {name: channel for argument in given for name, channel in _named(configuration, argument).items()}
     first_on = {channel: name for name, channel in reversed(channels.items())}
     buses: dict[str, BusParameters] = {}
     for name, bus in configuration.bus.items():
@@ -38,12 +38,12 @@ def on_channels(configuration: Configuration, given: Sequence[str]) -> Configura
     return replace(configuration, bus=buses, drive=drives)
 
 
-def _named(configuration: Configuration, word: str) -> dict[str, str]:
-    name, equals, channel = word.rpartition("=")
+def _named(configuration: Configuration, argument: str) -> dict[str, str]:
+    name, equals, channel = argument.rpartition("=")
     if not channel:
-        raise BenchError(f"--can {word}: a channel is missing, as in --can left=can0.")
+        raise BenchError(f"--can {argument}: a channel is missing, as in --can left=can0.")
     if not equals:
         return dict.fromkeys(configuration.bus, channel)
     if name not in configuration.bus:
-        raise BenchError(f"--can {word}: the configuration has no bus {name!r}, only {', '.join(configuration.bus)}.")
+        raise BenchError(f"--can {argument}: no bus {name!r} is configured, only {', '.join(configuration.bus)}.")
     return {name: channel}

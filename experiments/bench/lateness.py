@@ -1,8 +1,8 @@
-"""How late ticks and messages were while torque was on: what a measurement at the bench may be spoiled by.
+"""Counts late ticks and messages while torque is on, because they can invalidate a measurement at the bench.
 
-A tick that is missed lets every drive go on with the last torque, and a message that is late lets the loop command by
-what was: joints then stray from their path, and currents are seen late, though robot and drives may be well. Nothing
-tells a drive that is late from a computer on which drives are emulated and that has too much to do.
+In a missed tick every drive holds its last torque, and after a late message the loop commands from old states: joints
+leave their path and currents appear late, although robot and drives may be in order. A late drive cannot be
+distinguished from an overloaded computer that emulates drives.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Lateness:
         self.reset()
 
     def reset(self) -> None:
-        self.ticks = 0  # the missed ones included
+        self.ticks = 0  # including the missed ones
         self.missed = 0
         self.oldest_s = 0.0
 
@@ -35,7 +35,7 @@ class Lateness:
 
     @property
     def message(self) -> str:
-        """Empty where all was in time."""
+        """Describe the lateness; empty without any."""
         reported = []
         if self.missed:
             reported.append(f"this computer missed {self.missed} of {self.ticks} ticks")

@@ -1,7 +1,7 @@
-"""Who stands beside the robot at the bench: lets it move, holds and turns its flippers, and sees which one moves.
+"""The operator at the bench: allows motion, holds and turns the flippers, and observes which one moves.
 
-No drive can tell on which joint it sits: angle, torque and current of a drive agree with one another wherever it is.
-So eyes and hands are needed once. At a simulated robot they look at the mechanics and not at what the drives say.
+No drive knows on which joint it is mounted: its angle, torque and current agree with each other on any joint. So the
+operator's eyes and hands are needed once. The simulated operator observes the mechanics and not the drives.
 """
 
 from __future__ import annotations
@@ -21,151 +21,156 @@ from experiments.robot.prompt import GO_ON, Operator
 from simulation.body.plant import END_STOPS_RAD
 
 WAYS = {"sweep": "swing forward", "adduction": "rise"}
-TURNING_S = 0.25  # of a simulated hand, from the middle to a stop
-SEEN_RAD = radians(4.0)  # what eyes notice
+TURNING_S = 0.25  # for a simulated hand, from the middle to a stop
+SEEN_RAD = radians(4.0)  # visible motion
 
 
-class Sight(Enum):
-    """What somebody saw, with what to do then."""
+class Observation(Enum):
+    """The observed motion, with the advice for each."""
 
     RIGHT = ""
-    WRONG_WAY = "it moved the other way: change drive.{joint}.sign, and check its zero then"
+    OPPOSITE = "it moved in the opposite direction: change drive.{joint}.sign, and check its zero then"
     OTHER = "another joint moved: exchange the node ids (or the bus) of {joint} and of that joint"
-    NOTHING = "nothing was seen to move: check the coupling of motor and arm"
-    UNSEEN = "nobody looked"
+    NOTHING = "nothing moved: check the coupling of motor and arm"
+    UNSEEN = "there was no observer"
 
 
-class Attendant(Protocol):
-    def consents(self, what: str, meanwhile: Callable[[], None]) -> bool:
-        """Before anything moves. `meanwhile` is called again and again, here and below."""
+class BenchOperator(Protocol):
+    def allows_motion(self, what: str, meanwhile: Callable[[], None]) -> bool:
+        """Ask before anything moves. Every method calls `meanwhile` repeatedly while it waits."""
 
-    def clears(self, faults: str, meanwhile: Callable[[], None]) -> bool:
-        """Whether faults that stand before the first torque, such as a drive's last watchdog, are to be cleared."""
+    def allows_clearing(self, faults: str, meanwhile: Callable[[], None]) -> bool:
+        """Ask whether to clear faults from before the first torque, such as a tripped watchdog."""
 
-    def watch(self) -> None:
-        """One joint is about to move; then it is at its farthest (`look`), and back (`saw`)."""
+    def start_observing(self) -> None:
+        """Start before one joint moves; `observe_farthest` follows at its farthest position."""
 
-    def look(self) -> None: ...
+    def observe_farthest(self) -> None: ...
 
-    def saw(self, joint: str, meanwhile: Callable[[], None]) -> Sight: ...
+    def observed_motion(self, joint: str, meanwhile: Callable[[], None]) -> Observation: ...
 
-    def holds_level(self, meanwhile: Callable[[], None]) -> bool:
-        """Both flippers straight out and level, by hand, until `lets_go`. False: nobody is there."""
+    def hold_level(self, meanwhile: Callable[[], None]) -> bool:
+        """Hold both flippers straight out and level until `release_flippers`. False: there is no operator."""
 
-    def turns(self, joint: str, meanwhile: Callable[[], None]) -> bool:
-        """One joint from stop to stop, by hand."""
+    def turn_joint(self, joint: str, meanwhile: Callable[[], None]) -> bool:
+        """Turn one joint by hand from stop to stop."""
 
-    def lets_go(self) -> None: ...
+    def release_flippers(self) -> None: ...
 
 
-class AskedAttendant:
-    """A person who is asked. `sure`: nobody asks whether the robot may move."""
+class PromptedBenchOperator:
+    """An operator who is prompted. `sure`: motion is allowed in advance."""
 
     def __init__(self, operator: Operator, sure: bool) -> None:
         self._operator = operator
         self._sure = sure
 
-    def consents(self, what: str, meanwhile: Callable[[], None]) -> bool:
+    def allows_motion(self, what: str, meanwhile: Callable[[], None]) -> bool:
         if self._sure:
             self._operator.report(what)
             return True
         return self._operator.ask(what, {GO_ON: "go on", "n": "no, end here"}, meanwhile) == GO_ON
 
-    def clears(self, faults: str, meanwhile: Callable[[], None]) -> bool:
-        """Also who is sure that the robot may move did not know of these."""
+    def allows_clearing(self, faults: str, meanwhile: Callable[[], None]) -> bool:
+        """Ask even if motion is allowed in advance: the faults were not known then."""
         answers = {CLEAR: "clear it and go on", LEAVE: "end here"}
         return self._operator.ask(f"{faults} Is the cause gone?", answers, meanwhile) == CLEAR
 
-    def watch(self) -> None: ...
+    def start_observing(self) -> None: ...
 
-    def look(self) -> None: ...
+    def observe_farthest(self) -> None: ...
 
-    def saw(self, joint: str, meanwhile: Callable[[], None]) -> Sight:
+    def observed_motion(self, joint: str, meanwhile: Callable[[], None]) -> Observation:
         side, kind = joint.split("_")
         answers = {GO_ON: "yes", "w": "the other way", "o": "another joint moved", "n": "nothing moved"}
-        sights = {GO_ON: Sight.RIGHT, "w": Sight.WRONG_WAY, "o": Sight.OTHER, "n": Sight.NOTHING}
+        observations = {
+            GO_ON: Observation.RIGHT,
+            "w": Observation.OPPOSITE,
+            "o": Observation.OTHER,
+            "n": Observation.NOTHING,
+        }
         question = f"Did the {side} flipper {WAYS[kind]} and come back, and nothing else move?"
-        return sights[self._operator.ask(question, answers, meanwhile)]
+        return observations[self._operator.ask(question, answers, meanwhile)]
 
-    def holds_level(self, meanwhile: Callable[[], None]) -> bool:
+    def hold_level(self, meanwhile: Callable[[], None]) -> bool:
         return self._done("Hold both flippers level and straight out, as a spirit level has it.", meanwhile)
 
-    def turns(self, joint: str, meanwhile: Callable[[], None]) -> bool:
+    def turn_joint(self, joint: str, meanwhile: Callable[[], None]) -> bool:
         side, kind = joint.split("_")
-        ways = "fore and aft" if kind == "sweep" else "up and down"
-        return self._done(f"Move the {side} flipper slowly {ways}, from stop to stop and back.", meanwhile)
+        directions = "fore and aft" if kind == "sweep" else "up and down"
+        return self._done(f"Move the {side} flipper slowly {directions}, from stop to stop and back.", meanwhile)
 
-    def lets_go(self) -> None:
-        self._operator.report("Let go of the flippers, and lay them down.")
+    def release_flippers(self) -> None:
+        self._operator.report("Release the flippers and lay them down.")
 
     def _done(self, what: str, meanwhile: Callable[[], None]) -> bool:
         return self._operator.ask(what, {GO_ON: "done", "s": "skip"}, meanwhile) == GO_ON
 
 
-class AbsentAttendant:
-    """Nobody: the robot may move, and what needs hands or eyes is left out."""
+class AbsentBenchOperator:
+    """No operator: the robot may move, and checks that need hands or eyes are left out."""
 
-    def consents(self, what: str, meanwhile: Callable[[], None]) -> bool:
+    def allows_motion(self, what: str, meanwhile: Callable[[], None]) -> bool:
         return True
 
-    def clears(self, faults: str, meanwhile: Callable[[], None]) -> bool:
-        """Nobody has looked why it stopped: it may be wet, or held by something."""
+    def allows_clearing(self, faults: str, meanwhile: Callable[[], None]) -> bool:
+        """Never clear: the cause is unknown, perhaps water or a blocked flipper."""
         return False
 
-    def watch(self) -> None: ...
+    def start_observing(self) -> None: ...
 
-    def look(self) -> None: ...
+    def observe_farthest(self) -> None: ...
 
-    def saw(self, joint: str, meanwhile: Callable[[], None]) -> Sight:
-        return Sight.UNSEEN
+    def observed_motion(self, joint: str, meanwhile: Callable[[], None]) -> Observation:
+        return Observation.UNSEEN
 
-    def holds_level(self, meanwhile: Callable[[], None]) -> bool:
+    def hold_level(self, meanwhile: Callable[[], None]) -> bool:
         return False
 
-    def turns(self, joint: str, meanwhile: Callable[[], None]) -> bool:
+    def turn_joint(self, joint: str, meanwhile: Callable[[], None]) -> bool:
         return False
 
-    def lets_go(self) -> None: ...
+    def release_flippers(self) -> None: ...
 
 
-class SimulatedAttendant:
-    """Eyes and hands at a simulated robot's mechanics."""
+class SimulatedBenchOperator:
+    """An operator who observes and moves the mechanics of a simulated robot."""
 
     def __init__(self, rig: SimulatedRig) -> None:
         self._plant = rig.robot.plant
         self._from_rad = self._farthest_rad = self._plant.angles_rad
         self._held_rad: list[float] | None = None
-        self._turning = 0  # the place of the joint that is turned, along the course
+        self._turning = 0  # index of the joint that is turned along the profile
         self._profile: deque[float] = deque()
         rig.others.append(lambda _: self._hold())
 
-    def consents(self, what: str, meanwhile: Callable[[], None]) -> bool:
+    def allows_motion(self, what: str, meanwhile: Callable[[], None]) -> bool:
         return True
 
-    def clears(self, faults: str, meanwhile: Callable[[], None]) -> bool:
-        """A simulated robot that begins with a fault is one that a test has made so."""
+    def allows_clearing(self, faults: str, meanwhile: Callable[[], None]) -> bool:
+        """Never clear: a test has caused the fault."""
         return False
 
-    def watch(self) -> None:
+    def start_observing(self) -> None:
         self._from_rad = self._plant.angles_rad
 
-    def look(self) -> None:
+    def observe_farthest(self) -> None:
         self._farthest_rad = self._plant.angles_rad
 
-    def saw(self, joint: str, meanwhile: Callable[[], None]) -> Sight:
+    def observed_motion(self, joint: str, meanwhile: Callable[[], None]) -> Observation:
         moved_rad = [there - here for here, there in zip(self._from_rad, self._farthest_rad, strict=True)]
-        seen = [place for place, path_rad in enumerate(moved_rad) if abs(path_rad) > SEEN_RAD]
+        seen = [index for index, path_rad in enumerate(moved_rad) if abs(path_rad) > SEEN_RAD]
         if not seen:
-            return Sight.NOTHING
+            return Observation.NOTHING
         if seen != [JOINTS.index(joint)]:
-            return Sight.OTHER
-        return Sight.RIGHT if moved_rad[seen[0]] > 0.0 else Sight.WRONG_WAY
+            return Observation.OTHER
+        return Observation.RIGHT if moved_rad[seen[0]] > 0.0 else Observation.OPPOSITE
 
-    def holds_level(self, meanwhile: Callable[[], None]) -> bool:
+    def hold_level(self, meanwhile: Callable[[], None]) -> bool:
         self._held_rad = [0.0] * len(JOINTS)
         return True
 
-    def turns(self, joint: str, meanwhile: Callable[[], None]) -> bool:
+    def turn_joint(self, joint: str, meanwhile: Callable[[], None]) -> bool:
         self._held_rad = [0.0, UP_RAD, 0.0, UP_RAD]
         self._turning = JOINTS.index(joint)
         stop_rad = END_STOPS_RAD[self._turning % 2]
@@ -176,7 +181,7 @@ class SimulatedAttendant:
             meanwhile()
         return True
 
-    def lets_go(self) -> None:
+    def release_flippers(self) -> None:
         self._held_rad = None
         for arm in self._plant.arms:
             arm.put_back()

@@ -1,4 +1,4 @@
-"""One measured figure of the bench with its unit and bounds, and what to do where it lies outside of them."""
+"""One measured value of the bench with its unit, its bounds, and the advice for a value outside of them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 class Reading(NamedTuple):
     what: str
-    value: float  # NaN: it could not be measured, which is never good
+    value: float  # NaN: not measurable, which is never good
     unit: str = ""
     low: float = -inf
     high: float = inf
     advice: str = ""
-    left_out: bool = False  # nobody was there to do it: neither good nor bad, and the stages go on
+    left_out: bool = False  # no operator was there: the check neither passes nor fails
 
     @property
     def good(self) -> bool:
@@ -46,7 +46,7 @@ class Reading(NamedTuple):
 
     @property
     def as_json(self) -> dict[str, Any]:
-        """Without NaN and infinities, which JSON does not have."""
+        """The fields for JSON, with None in place of NaN and infinity."""
         numbers = {"value": self.value, "low": self.low, "high": self.high}
         kept = {name: number if isfinite(number) else None for name, number in numbers.items()}
         return {"what": self.what, "unit": self.unit, **kept, "good": self.good, "left_out": self.left_out,

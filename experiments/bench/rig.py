@@ -1,8 +1,8 @@
-"""The buses of a robot and the daemon's own loop on them, in this process: a real robot's, or a simulated one's.
+"""The buses of a robot and the daemon's own loop on them, in this process, for a real or a simulated robot.
 
-A `Rig` is all that differs between the two: how the next tick comes about. On hardware the ticker sleeps until it; on
-the simulated robot time is stepped. Before the loop takes the buses over, both listen to them for a second, as bare
-frames: once the drives' ports know which ids are wanted, SocketCAN keeps everybody else's frames away.
+The two rigs differ in how the next tick comes: on hardware the ticker sleeps until it, in simulation time is stepped.
+Before the loop opens the drives, both record all frames on the buses for a second, because SocketCAN filters frames of
+other ids as soon as the drives' ports have set their filters.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.robot import SimulatedRobot
 
 LISTENING_S = 1.0  # ten heartbeats
-LOOK_S = 0.001  # between two looks at a bus that is listened to
+LOOK_S = 0.001  # between two reads of a bus
 
 
 class Overheard(NamedTuple):
@@ -47,13 +47,13 @@ class Rig(Protocol):
     configuration: Configuration
     loop: Loop
     overheard: Overheard
-    warnings: Sequence[str]  # of the operating system, that a person should know
+    warnings: Sequence[str]  # about the operating system, for the operator
 
     @property
     def now_s(self) -> float: ...
 
     def wait(self) -> Tick:
-        """The next tick comes."""
+        """Wait for the next tick."""
 
     def close(self) -> None: ...
 
@@ -61,7 +61,7 @@ class Rig(Protocol):
 class HardwareRig:
     """Real buses and real time. Raises BenchError where a daemon runs or a bus does not open.
 
-    The process is as punctual as the daemon while the rig is open. Memory is not locked: that could not be undone.
+    The process has the daemon's priority while the rig is open. Memory is not locked, because it cannot be unlocked.
     """
 
     def __init__(self, configuration: Configuration) -> None:
@@ -99,13 +99,13 @@ class HardwareRig:
 
 
 def refuse_beside_daemon(socket: Path) -> None:
-    """Two programs that command the same drives would fight over them. Raises BenchError."""
+    """Raises BenchError where a daemon runs: two programs must not command the same drives."""
     why = f"The daemon runs (it answers on {socket}) and commands the drives: 'systemctl stop mudskipper' first."
     try:
         StatusClient(socket).close()
     except NoDaemonError:
         return
-    except NotPermittedError as problem:  # whether one runs cannot be known
+    except NotPermittedError as problem:  # it is unknown whether one runs
         raise BenchError(f"{problem}; run this as its owner.") from problem
     raise BenchError(why)
 
@@ -114,7 +114,7 @@ def listen(ports: Mapping[str, CanPort]) -> Overheard:
     frames: dict[str, list[Frame]] = {name: [] for name in ports}
     begun_s = now_s = time.monotonic()
     for port in ports.values():
-        port.receive()  # what waited there is of before
+        port.receive()  # discard older frames
     while now_s - begun_s < LISTENING_S:
         for name, port in ports.items():
             frames[name] += port.receive()
@@ -124,10 +124,10 @@ def listen(ports: Mapping[str, CanPort]) -> Overheard:
 
 
 class SimulatedRig:
-    """A robot on blocks, built as `built` says, and a loop that knows of it what `configuration` says.
+    """A robot on blocks that is built by `built`, and a loop with `configuration`, which may differ.
 
-    `drives` replace what `built` would make. `others` are called before each step with the time: what else is on the
-    buses, and whose hands are on the flippers.
+    `drives` replace the drives of `built`. `others` are called before each step, for other senders on the buses and
+    hands on the flippers.
     """
 
     def __init__(

@@ -1,11 +1,10 @@
-"""From the tick of a command to the tick in which the answering current is seen, and how large it is.
+"""Measures the delay from a torque command to the current that answers it, and the size of that current.
 
-The flippers lie, and nothing holds them: before the delay is known, stiffness may make a joint tremble. Now and then,
-at a phase that chance shifts against the drives' own clocks, the joint under test gets a quick +T, -T, -T, +T, which
-leaves it about where it was. The steps from +T to -T and back are twice T, so half of them stands far above the
-current's noise. A delay of one tick is the least there is: what is sent at the end of a tick can be answered in the
-next. Plateaus are compared with the torque that was commanded, by the configured torque constant: the drive converts by
-its own, so the two must agree.
+The flippers lie and are not held, because stiffness may make a joint oscillate before the delay is known. At random
+times, and so at random phases of the drives' clocks, the joint gets a quick +T, -T, -T, +T, which leaves it about where
+it was. The steps between +T and -T are 2 T, so half of a step is far above the noise of the current. The least delay is
+one tick: a command sent at the end of a tick can be answered in the next. The plateaus are compared with the commanded
+torque by the configured torque constant, which must agree with the drive's own.
 """
 
 from __future__ import annotations
@@ -16,17 +15,17 @@ from typing import NamedTuple
 
 from control.records import NO_TORQUE, DriveStates, Joints, Torques
 from experiments.bench.reading import Reading, Readings
-from experiments.bench.test_rig import Sample, Stand, joint_place
+from experiments.bench.test_rig import Sample, TestRig, joint_index
 
-PULSE_NM = 0.08  # a tenth of what the motors may do: some ten times a current's noise
-QUARTER_TICKS = 4  # 11 ms: the joint comes to 2 rad/s and moves by 2 degrees
-SETTLED_TICKS = 2  # at the end of a plateau, when a slow current has come as well
+PULSE_NM = 0.08  # a tenth of the torque limit, and about ten times the noise of the current
+QUARTER_TICKS = 4  # 11 ms: the joint reaches 2 rad/s and moves by 2 degrees
+SETTLED_TICKS = 2  # at the end of a plateau, when a slow current has settled
 PULSES = 16  # two steps each
-LEAST_WAIT_TICKS, MOST_WAIT_TICKS = 25, 45  # between two of them: for the joint to come to rest
+LEAST_WAIT_TICKS, MOST_WAIT_TICKS = 25, 45  # between two pulses, for the joint to come to rest
 LONGEST_TICKS = 2 * QUARTER_TICKS  # after which an answer belongs to another step
 MEDIAN_TICKS = 2  # of the delay, with which the joints' damping is stable
 WORST_TICKS = 3  # beyond, a drive counts as silent
-RATIO_FRACTION = 0.1  # by which current and command may disagree
+RATIO_FRACTION = 0.1  # allowed difference between current and command
 
 
 class Pulse(NamedTuple):
@@ -35,10 +34,10 @@ class Pulse(NamedTuple):
 
 
 class Pulses:
-    """A law: quick doublets on one joint, no torque on the others."""
+    """A hold law: quick doublets on one joint, no torque on the others."""
 
-    def __init__(self, place: int, random: Random) -> None:
-        self.place = place
+    def __init__(self, index: int, random: Random) -> None:
+        self.index = index
         self.schedule: list[Pulse] = []
         tick = 0
         for _ in range(PULSES):
@@ -51,7 +50,7 @@ class Pulses:
     def __call__(self, held: Torques, states: DriveStates) -> Torques:
         pulse_nm = self._pulse_nm(self._tick)
         self._tick += 1
-        a, b, c, d = (pulse_nm if place == self.place else 0.0 for place in range(4))
+        a, b, c, d = (pulse_nm if index == self.index else 0.0 for index in range(4))
         return Joints(a, b, c, d)
 
     def _pulse_nm(self, tick: int) -> float:
@@ -62,16 +61,16 @@ class Pulses:
         return 0.0
 
 
-def step_response(stand: Stand, joint: str, seed: int = 1) -> Readings:
-    """Raises BenchError where a fault ends it."""
-    pulses = Pulses(joint_place(joint), Random(f"{joint} {seed}"))
-    stand.arm(lambda held, states: NO_TORQUE)
-    stand.controller.hold_law = pulses
-    samples = [stand.tick_soundly() for _ in range(pulses.ticks)]
-    stand.let_go()
-    constant_nm_a = stand.configuration.drive[joint].torque_constant_nm_a
+def check_step_response(test_rig: TestRig, joint: str, seed: int = 1) -> Readings:
+    """Check the delay and size of one joint's current. Raises BenchError where a fault ends it."""
+    pulses = Pulses(joint_index(joint), Random(f"{joint} {seed}"))
+    test_rig.arm(lambda held, states: NO_TORQUE)
+    test_rig.controller.hold_law = pulses
+    samples = [test_rig.tick_checked() for _ in range(pulses.ticks)]
+    test_rig.switch_off()
+    constant_nm_a = test_rig.configuration.drive[joint].torque_constant_nm_a
     delays = [
-        delay_ticks(samples, pulses.place, pulse.begins + quarter * QUARTER_TICKS, constant_nm_a)
+        delay_ticks(samples, pulses.index, pulse.begins + quarter * QUARTER_TICKS, constant_nm_a)
         for pulse in pulses.schedule
         for quarter in (1, 3)
     ]
@@ -83,23 +82,23 @@ def step_response(stand: Stand, joint: str, seed: int = 1) -> Readings:
     yield Reading(f"{joint}: current over command", ratio, "", 1.0 - RATIO_FRACTION, 1.0 + RATIO_FRACTION, stated)
 
 
-def delay_ticks(samples: list[Sample], place: int, step: int, constant_nm_a: float) -> float:
-    """Of the step that was sent in sample `step`: until the current has gone half of its way, missed ticks included."""
-    before_nm, after_nm = (samples[tick].sent_nm[place] for tick in (step - 1, step))
+def delay_ticks(samples: list[Sample], index: int, step: int, constant_nm_a: float) -> float:
+    """Return the ticks from the command in sample `step` until the current has made half of its change."""
+    before_nm, after_nm = (samples[tick].sent_nm[index] for tick in (step - 1, step))
     half_nm, upward = (before_nm + after_nm) / 2.0, after_nm > before_nm
     for sample in samples[step + 1 : step + LONGEST_TICKS]:
-        given_nm = sample.states[place].current_a * constant_nm_a
+        given_nm = sample.states[index].current_a * constant_nm_a
         if (given_nm > half_nm) == upward:
             return min(sample.tick.number - samples[step].tick.number, LONGEST_TICKS)
     return LONGEST_TICKS
 
 
 def size_ratio(samples: list[Sample], pulses: Pulses, constant_nm_a: float) -> float:
-    """Of the long plateaus' ends against what was sent; bias and noise go out by the pulses' two signs."""
+    """Return current over command at the ends of the long plateaus; the two signs of the pulses cancel a bias."""
     given_nm = sent_nm = 0.0
     for pulse in pulses.schedule:
         end, way = pulse.begins + 3 * QUARTER_TICKS, -pulse.sign
         for tick in range(end - SETTLED_TICKS + 1, end + 1):  # the answer to a command is in the tick after it
-            given_nm += way * samples[tick].states[pulses.place].current_a * constant_nm_a
-            sent_nm += way * samples[tick - 1].sent_nm[pulses.place]
+            given_nm += way * samples[tick].states[pulses.index].current_a * constant_nm_a
+            sent_nm += way * samples[tick - 1].sent_nm[pulses.index]
     return given_nm / sent_nm

@@ -1,4 +1,4 @@
-"""What can be said of a robot's wiring without moving anything: who talks on the buses, how often, how they are set.
+"""Checks the wiring without any motion: the ids on the buses, their message rates, and the settings of the drives.
 
 Ids and rates come from what was overheard before the loop took the buses over. Then the loop stands by, asks for
 versions and watchdogs, and feeds zero torque to idle drives, as the daemon does.
@@ -18,7 +18,7 @@ from drivers.drive import DriveHealth, DriveParameters, FrameContent
 from drivers.drive_types import traffic_of, type_of
 from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings
-from experiments.bench.test_rig import Stand
+from experiments.bench.test_rig import TestRig
 
 ASKING_S = 3.0  # longest, for versions and then for watchdogs: asked every 0.5 s
 STANDING_BY_S = 0.6  # six heartbeats
@@ -35,94 +35,98 @@ MOST_MISSED_FRACTION = 0.01  # of ticks: more, and this computer is too slow or 
 SETTING_UP = "see docs/how-to/odrive.md"
 
 
-def ids_heard(stand: Stand) -> Readings:
-    """Every drive under its id on its bus."""
-    for joint, drive in stand.configuration.drive.items():
-        rate_hz = _messages_of(stand, drive.bus, drive.node_id) / stand.rig.overheard.duration_s
+def check_ids(test_rig: TestRig) -> Readings:
+    """Check that every drive is heard under its id on its bus."""
+    for joint, drive in test_rig.configuration.drive.items():
+        rate_hz = _messages_of(test_rig, drive.bus, drive.node_id) / test_rig.rig.overheard.duration_s
         yield Reading(
             f"{joint}: messages of node {drive.node_id} on {drive.bus}",
             rate_hz,
             "Hz",
             1.0,
             inf,
-            _whereabouts(stand, drive),
+            _whereabouts(test_rig, drive),
         )
 
 
-def _messages_of(stand: Stand, bus: str, node_id: int) -> int:
-    return sum(_is_ours(stand, frame, {node_id}) for frame in stand.rig.overheard.frames[bus])
+def _messages_of(test_rig: TestRig, bus: str, node_id: int) -> int:
+    return sum(_is_ours(test_rig, frame, {node_id}) for frame in test_rig.rig.overheard.frames[bus])
 
 
-def _content(stand: Stand, frame: Frame) -> FrameContent | None:
-    return type_of(stand.configuration.drive.values()).read_frame(frame)
+def _content(test_rig: TestRig, frame: Frame) -> FrameContent | None:
+    return type_of(test_rig.configuration.drive.values()).read_frame(frame)
 
 
-def _whereabouts(stand: Stand, drive: DriveParameters) -> str:
-    elsewhere = [bus for bus in stand.configuration.bus if bus != drive.bus and _messages_of(stand, bus, drive.node_id)]
+def _whereabouts(test_rig: TestRig, drive: DriveParameters) -> str:
+    elsewhere = [
+        bus for bus in test_rig.configuration.bus if bus != drive.bus and _messages_of(test_rig, bus, drive.node_id)
+    ]
     if elsewhere:
         return f"it is heard on {elsewhere[0]}: exchange the buses' channels, or correct the drive's bus"
     return f"check its power, wiring and termination, bit rate and node id; {SETTING_UP}"
 
 
-def strangers(stand: Stand) -> Readings:
-    """Nobody else on the buses, neither drives nor whoever commands them."""
-    for bus, frames in stand.rig.overheard.frames.items():
-        ours = {drive.node_id for drive in stand.configuration.drive.values() if drive.bus == bus}
-        strange = Counter(_name_of(stand, frame) for frame in frames if not _is_ours(stand, frame, ours))
+def check_unknown_ids(test_rig: TestRig) -> Readings:
+    """Check that no other drive or program sends on the buses."""
+    for bus, frames in test_rig.rig.overheard.frames.items():
+        ours = {drive.node_id for drive in test_rig.configuration.drive.values() if drive.bus == bus}
+        strange = Counter(_name_of(test_rig, frame) for frame in frames if not _is_ours(test_rig, frame, ours))
         most = ", ".join(name for name, _ in strange.most_common(3))
         advice = f"{most}: take it off the bus, or correct its node id" if strange else ""
-        yield Reading(f"{bus}: frames of strangers", sum(strange.values()), "", 0, 0, advice)
+        yield Reading(f"{bus}: frames of unknown senders", sum(strange.values()), "", 0, 0, advice)
 
 
-def _is_ours(stand: Stand, frame: Frame, node_ids: set[int]) -> bool:
-    """Whether one of these drives sent it."""
-    content = None if frame.is_remote else _content(stand, frame)
+def _is_ours(test_rig: TestRig, frame: Frame, node_ids: set[int]) -> bool:
+    """Return whether one of these drives sent the frame."""
+    content = None if frame.is_remote else _content(test_rig, frame)
     return content is not None and content.node_id in node_ids and not content.is_command
 
 
-def _name_of(stand: Stand, frame: Frame) -> str:
+def _name_of(test_rig: TestRig, frame: Frame) -> str:
     if frame.is_error:
         return "error frames (check wiring, termination and bit rate)"
-    content = _content(stand, frame)
+    content = _content(test_rig, frame)
     if content is None:
         return f"{'extended ' if frame.is_extended else ''}id 0x{frame.arbitration_id:x}"
     by_a_program = f"commands to node {content.node_id} from another program"
     return by_a_program if content.is_command else f"node {content.node_id}"
 
 
-def message_rates(stand: Stand) -> Readings:
-    """Fresh position and current in each tick, the rest often enough to be watched."""
-    for joint, drive in stand.configuration.drive.items():
+def check_message_rates(test_rig: TestRig) -> Readings:
+    """Check that position and current are new in each tick, and other messages frequent enough for monitoring."""
+    for joint, drive in test_rig.configuration.drive.items():
         for name, (signal, least_hz) in RATES.items():
             advice = f"set the drive's message period; {SETTING_UP}"
-            yield Reading(f"{joint}: {name}", _rate_hz(stand, drive, signal), "Hz", least_hz, inf, advice)
+            yield Reading(f"{joint}: {name}", _rate_hz(test_rig, drive, signal), "Hz", least_hz, inf, advice)
         usual_hz = 1.0 / drive.heartbeat_period_s
         low_hz, high_hz = (1.0 - HEARTBEAT_FRACTION) * usual_hz, (1.0 + HEARTBEAT_FRACTION) * usual_hz
         advice = f"correct drive.{joint}.heartbeat_period_s, or look for a second drive with this node id"
-        yield Reading(f"{joint}: heartbeats", _rate_hz(stand, drive, "heartbeat"), "Hz", low_hz, high_hz, advice)
+        yield Reading(f"{joint}: heartbeats", _rate_hz(test_rig, drive, "heartbeat"), "Hz", low_hz, high_hz, advice)
 
 
-def _rate_hz(stand: Stand, drive: DriveParameters, signal: str) -> float:
+def _rate_hz(test_rig: TestRig, drive: DriveParameters, signal: str) -> float:
     """The rate of the messages whose main signal this is."""
-    overheard = stand.rig.overheard
-    contents = [_content(stand, frame) for frame in overheard.frames[drive.bus] if not frame.is_remote]
+    overheard = test_rig.rig.overheard
+    contents = [_content(test_rig, frame) for frame in overheard.frames[drive.bus] if not frame.is_remote]
     count = sum(
         each is not None and (each.node_id, each.signals[:1]) == (drive.node_id, (signal,)) for each in contents
     )
     return count / overheard.duration_s
 
 
-def loads(stand: Stand) -> Readings:
-    """What was overheard, and the torque commands to come, each frame with as much stuffing as there can be."""
-    overheard = stand.rig.overheard
-    for name, bus in stand.configuration.bus.items():
-        drives = [drive for drive in stand.configuration.drive.values() if drive.bus == name]
+def check_bus_loads(test_rig: TestRig) -> Readings:
+    """Check the load of the recorded frames and the coming torque commands, with the largest bit stuffing."""
+    overheard = test_rig.rig.overheard
+    for name, bus in test_rig.configuration.bus.items():
+        drives = [drive for drive in test_rig.configuration.drive.values() if drive.bus == name]
         commands = [type_of(drives).command for _ in drives]
         bits_s = sum(_bits(frame) for frame in overheard.frames[name]) / overheard.duration_s
         bits_s += sum(command.rate_hz * frame_bits(command.data_bytes)[1] for command in commands)
         fraction = bits_s / (1e3 * bus.bit_rate_kbit_s)
         reported = bus_load(traffic_of(drives), 1e3 * bus.bit_rate_kbit_s)
-        advice = f"its drives should make {reported}: take strangers off, or raise the bit rate or the message periods"
+        advice = (
+            f"its drives should cause {reported}: remove other senders, or raise the bit rate or the message periods"
+        )
         yield Reading(f"{name}: load with commands", 100.0 * fraction, "%", 0.0, 100.0 * MOST_FRACTION, advice)
 
 
@@ -131,10 +135,10 @@ def _bits(frame: Frame) -> int:
     return frame_bits(len(frame.data))[1] + 20 * frame.is_extended
 
 
-def firmware(stand: Stand) -> Readings:
-    """That whose messages are known."""
-    _ask(stand, lambda health: bool(health.firmware))
-    for health in stand.drives.health:
+def check_firmware(test_rig: TestRig) -> Readings:
+    """Check that the firmware version is supported."""
+    _ask(test_rig, lambda health: bool(health.firmware))
+    for health in test_rig.drives.health:
         version, supported = _major_and_minor(health.firmware), float(health.supported_firmware)
         advice = f"install firmware {supported}; where it is unknown, see whether requests arrive"
         yield Reading(f"{health.joint}: firmware", version, "", supported, supported, advice)
@@ -145,37 +149,37 @@ def _major_and_minor(version: str) -> float:
     return float(".".join(version.split(".")[:2])) if version else nan
 
 
-def _ask(stand: Stand, known: Callable[[DriveHealth], bool]) -> None:
-    """Until all have answered, or will not."""
+def _ask(test_rig: TestRig, known: Callable[[DriveHealth], bool]) -> None:
+    """Run until all drives have answered, or for the longest time."""
     for _ in range(round(ASKING_S / PERIOD_S)):
-        if all(known(health) for health in stand.drives.health):
+        if all(known(health) for health in test_rig.drives.health):
             return
-        stand.tick_soundly()
+        test_rig.tick_checked()
 
 
-def watchdogs(stand: Stand) -> Readings:
-    """On, and quick enough, by the drives' own word."""
-    _ask(stand, lambda health: isfinite(health.watchdog_s))
-    longest_s = stand.configuration.faults.longest_watchdog_s
-    for health in stand.drives.health:
+def check_watchdogs(test_rig: TestRig) -> Readings:
+    """Check that the drives report a watchdog with a short enough timeout."""
+    _ask(test_rig, lambda health: isfinite(health.watchdog_s))
+    longest_s = test_rig.configuration.faults.longest_watchdog_s
+    for health in test_rig.drives.health:
         set_it = "set enable_watchdog and watchdog_timeout = 0.1, and save"
         advice = f"{health.watchdog_advice if isnan(health.watchdog_s) else set_it}; {SETTING_UP}"
         yield Reading(f"{health.joint}: watchdog", health.watchdog_s, "s", 0.001, longest_s, advice)
 
 
-def quiet_buses(stand: Stand) -> Readings:
-    """Nothing lost in either direction, no drive in error, and a computer that keeps up."""
-    stand.tick()  # whatever came before it: questions, another test
-    before = {name: _trouble(port) for name, port in stand.drives.ports.items()}
-    missed, samples = stand.loop.missed_ticks, stand.run_for(STANDING_BY_S)
-    missed = stand.loop.missed_ticks - missed
+def check_quiet_buses(test_rig: TestRig) -> Readings:
+    """Check for lost frames, drive errors and missed ticks."""
+    test_rig.tick()  # whatever came before it: questions, another test
+    before = {name: _trouble(port) for name, port in test_rig.drives.ports.items()}
+    missed, samples = test_rig.loop.missed_ticks, test_rig.run_for(STANDING_BY_S)
+    missed = test_rig.loop.missed_ticks - missed
     wires = "check wiring, termination and bit rate; 'ip -s -d link show' tells more"
-    for name, port in stand.drives.ports.items():
+    for name, port in test_rig.drives.ports.items():
         lost = _trouble(port) - before[name]
         reported = port.last_error or port.last_send_error
         yield Reading(f"{name}: errors and losses", lost, "", 0, 0, f"{reported}: {wires}" if reported else wires)
-    for health, state in zip(stand.drives.health, stand.loop.states, strict=True):
-        advice = f"{health.active_errors}: mend the cause, clear it with odrivetool or 'mudskipper clear'"
+    for health, state in zip(test_rig.drives.health, test_rig.loop.states, strict=True):
+        advice = f"{health.active_errors}: fix the cause, clear it with odrivetool or 'mudskipper clear'"
         yield Reading(f"{health.joint}: error flags", state.error_flags, "", 0, 0, advice)
     yield Reading("ticks missed", 100.0 * missed / len(samples), "%", 0.0, 100.0 * MOST_MISSED_FRACTION, BUSY)
 

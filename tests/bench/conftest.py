@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 
 from experiments.bench.channels import on_channels
-from experiments.bench.operator import AbsentAttendant, AskedAttendant, Attendant, SimulatedAttendant
+from experiments.bench.operator import AbsentBenchOperator, BenchOperator, PromptedBenchOperator, SimulatedBenchOperator
 from experiments.bench.rig import HardwareRig, Rig, SimulatedRig
-from experiments.bench.test_rig import Stand
+from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
@@ -45,13 +45,13 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def report_of(config: pytest.Config) -> BenchReport:
-    """This file may have been found only after pytest was configured."""
+    """Return the report, which is new if this file was found only after pytest was configured."""
     return config.stash.setdefault(REPORT, BenchReport())
 
 
 @pytest.fixture(scope="session")
-def opened(request: pytest.FixtureRequest) -> Iterator[Stand | str]:
-    """The stand, or why there is none."""
+def opened(request: pytest.FixtureRequest) -> Iterator[TestRig | str]:
+    """Yield the test rig, or the reason why there is none."""
     options, robot = request.config.option, report_of(request.config).robot
     if not (options.simulated or options.can or options.config):
         pytest.skip(NOT_ASKED_FOR)
@@ -61,35 +61,35 @@ def opened(request: pytest.FixtureRequest) -> Iterator[Stand | str]:
     robot |= {"rig": kind, "begun": stamp, "configuration": str(path), "warnings": []}
     try:
         configuration = load_configuration(path)
-        rig, attendant = open_rig(request.config, on_channels(configuration, options.can or []))
+        rig, bench_operator = open_rig(request.config, on_channels(configuration, options.can or []))
     except (ConfigurationError, BenchError) as problem:
         yield reported_of_file(path, problem.problems) if isinstance(problem, ConfigurationError) else str(problem)
         return
     robot |= {"robot": configuration.robot.name, "warnings": list(rig.warnings)}
-    stand = Stand(rig, attendant)
+    test_rig = TestRig(rig, bench_operator)
     try:
-        yield stand
+        yield test_rig
     finally:
-        stand.end()
+        test_rig.force_idle()
         rig.close()
-        robot["lateness"] = vars(stand.lateness_so_far)
+        robot["lateness"] = vars(test_rig.lateness_so_far)
 
 
 def configuration_path(simulated: bool) -> Path:
     return INSTALLED if INSTALLED.exists() and not simulated else EXAMPLE
 
 
-def open_rig(config: pytest.Config, configuration: Configuration) -> tuple[Rig, Attendant]:
+def open_rig(config: pytest.Config, configuration: Configuration) -> tuple[Rig, BenchOperator]:
     """Raises BenchError."""
     if config.option.simulated:
         simulated = SimulatedRig(configuration)
-        return simulated, SimulatedAttendant(simulated)
-    attendant = attendant_at(config)
-    return HardwareRig(configuration), attendant
+        return simulated, SimulatedBenchOperator(simulated)
+    bench_operator = operator_at(config)
+    return HardwareRig(configuration), bench_operator
 
 
-def attendant_at(config: pytest.Config) -> Attendant:
-    """Raises BenchError where nobody can be asked and nobody has said yes beforehand."""
+def operator_at(config: pytest.Config) -> BenchOperator:
+    """Return the operator. Raises BenchError where there is no terminal and no --yes."""
     capture = config.pluginmanager.getplugin("capturemanager")
     if capture is not None:
         capture.suspend(in_=True)
@@ -97,18 +97,20 @@ def attendant_at(config: pytest.Config) -> Attendant:
     if capture is not None:
         capture.resume()
     if somebody:
-        return AskedAttendant(UncapturedOperator(config), config.option.yes)
+        return PromptedBenchOperator(UncapturedOperator(config), config.option.yes)
     if config.option.yes:
-        return AbsentAttendant()
-    raise BenchError("The robot will move, and nobody can be asked: run this on a terminal, or with --yes.")
+        return AbsentBenchOperator()
+    raise BenchError(
+        "The robot will move, and there is no terminal to ask for permission: run this on a terminal, or with --yes."
+    )
 
 
 @pytest.fixture
-def bench(request: pytest.FixtureRequest, opened: Stand | str) -> Iterator[StagedBench]:
+def bench(request: pytest.FixtureRequest, opened: TestRig | str) -> Iterator[StagedBench]:
     report, stage = report_of(request.config), stage_of(request.path)
     report.begin(stage, request.node.name)
     moves = getattr(request.module, "MOVES", "")
-    obstacle = report.obstacle(stage) or (moves and report.stumble(stage, request.node.name))
+    obstacle = report.obstacle(stage) or (moves and report.own_obstacle(stage, request.node.name))
     if obstacle:
         pytest.skip(obstacle)
     if isinstance(opened, str):
@@ -119,39 +121,41 @@ def bench(request: pytest.FixtureRequest, opened: Stand | str) -> Iterator[Stage
         ask_before_moving(moves, opened, report, stage)
     yield StagedBench(opened, report)
     try:
-        opened.let_go()
+        opened.switch_off()
     except BenchError as problem:
-        opened.end()
-        report.out_of_hand = str(problem)
-        pytest.fail(report.out_of_hand, pytrace=False)
+        opened.force_idle()
+        report.keeps_torque = str(problem)
+        pytest.fail(report.keeps_torque, pytrace=False)
 
 
-def ask_before_moving(what: str, stand: Stand, report: BenchReport, stage: int) -> None:
-    """Once for each stage that moves something, whatever the answer."""
+def ask_before_moving(what: str, test_rig: TestRig, report: BenchReport, stage: int) -> None:
+    """Ask once for each stage that moves something, whatever the answer is."""
     if stage not in report.consents:
-        report.consents[stage] = False  # where no answer comes
-        report.consents[stage] = lets_move(what, stand, stage)
+        report.consents[stage] = False  # in case no answer comes
+        report.consents[stage] = lets_move(what, test_rig, stage)
     if not report.consents[stage]:
-        pytest.skip("a person did not want the robot to move")
+        pytest.skip("the operator did not allow motion")
 
 
-def lets_move(what: str, stand: Stand, stage: int) -> bool:
-    lying_cm = 100.0 * resting_drop_m(stand.configuration.geometry)
+def lets_move(what: str, test_rig: TestRig, stage: int) -> bool:
+    lying_cm = 100.0 * resting_drop_m(test_rig.configuration.geometry)
     where = (
         f"The robot stands on blocks; idle, its flippers lie on something soft, {lying_cm:.0f} cm below their axes."
         " Nobody's hands are near them, and the power switch is at hand."
     )
-    return stand.attendant.consents(f"{stage_name(stage).capitalize()}: {what}\n{where}", stand.look_on)
+    return test_rig.operator.allows_motion(
+        f"{stage_name(stage).capitalize()}: {what}\n{where}", test_rig.run_during_prompt
+    )
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
-    """What ends a measurement is a sentence for people, not a traceback."""
+    """Turn a BenchError into a message without a traceback."""
     try:
         return (yield)
     except BenchError as problem:
         reported = str(problem)
-    pytest.fail(reported, pytrace=False)  # out here pytest tells it once
+    pytest.fail(reported, pytrace=False)  # outside of the handler, so that pytest prints it once
 
 
 @pytest.hookimpl(wrapper=True)
@@ -166,7 +170,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 
 
 def why_of(reported: pytest.TestReport) -> str:
-    """Of one that was skipped, pytest has a place before its reason, which begins with a word of pytest's own."""
+    """Return why a test did not pass; pytest puts a location and a prefix before the reason of a skipped one."""
     return (
         reported.longrepr[2].removeprefix("Skipped: ")
         if isinstance(reported.longrepr, tuple)

@@ -1,4 +1,4 @@
-"""What the stages of the bench share: the stand, the figures they measure, and the report of all of them."""
+"""Shared by the stages of the bench: the test rig, the measured values, and the report of all stages."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ import pytest
 
 from command_line.experiments.terminal_prompt import TerminalPrompt
 from experiments.bench.reading import Reading, Readings
-from experiments.bench.test_rig import Stand
+from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import EndedError
 from experiments.robot.bench_robot import BenchError
 from tests.bench.bench_table import table_lines
 
 STAGES = ("wiring", "signs", "zeros", "currents", "watchdogs", "strokes", "stops", "strides")
-MOST_MEASURED = 3  # times, one claim
+MOST_MEASURED = 3  # attempts for one claim
 P = ParamSpec("P")
 PASSED, FAILED, SKIPPED = "passed", "failed", "skipped"
 
 
 def stage_of(path: Path) -> int:
-    """By the name of its file: test_3_zeros.py is of stage 3. Other files are of none: 0."""
+    """Return the stage from the name of a file: 3 for test_3_zeros.py, 0 for other files."""
     number = path.stem.split("_")[1]
     return int(number) if number.isdigit() else 0
 
 
 def claim_of(test: str) -> str:
-    """Its name without the joint."""
+    """Return the name of a test without its joint."""
     return test.partition("[")[0]
 
 
@@ -39,75 +39,75 @@ def stage_name(stage: int) -> str:
 
 
 def reported_of_file(path: Path, problems: Iterable[str]) -> str:
-    """Each behind the file's name, once."""
+    """List the problems of a file, each with its name once."""
     named = f"{path}: "
     return "\n".join(named + problem.removeprefix(named) for problem in problems)
 
 
 class BenchReport:
-    """Owns what every test of the bench came to."""
+    """Owns the results of all tests of the bench."""
 
     def __init__(self) -> None:
         self.robot: dict[str, Any] = {}
         self.tests: list[dict[str, Any]] = []
-        self.consents: dict[int, bool] = {}  # by stage: whether a person lets the robot move
-        self.out_of_hand = ""  # why no test may begin any more: a drive kept its torque
+        self.consents: dict[int, bool] = {}  # by stage: whether the operator allows motion
+        self.keeps_torque = ""  # why no further test may begin: a drive kept its torque
         self._test: dict[str, Any] | None = None  # under way
 
     def begin(self, stage: int, test: str) -> None:
         names = {"stage": stage, "name": STAGES[stage - 1], "test": test}
         self._test = names | {"outcome": PASSED, "why": "", "spoiled": [], "readings": []}
 
-    def keep(self, reading: Reading) -> None:
-        """Of the test under way."""
+    def add(self, reading: Reading) -> None:
+        """Add a reading of the running test."""
         if self._test is not None:
             self._test["readings"].append(reading)
 
-    def spoil(self, why: str) -> None:
-        """What was out of its bounds in the test under way before it was measured anew."""
+    def note_repeat(self, why: str) -> None:
+        """Record readings of the running test that were out of bounds before it was repeated."""
         if self._test is not None:
             self._test["spoiled"].append(why)
 
     def worsen(self, outcome: str, why: str) -> None:
-        """What was told first of the test under way remains."""
+        """Set the outcome of the running test; the first one remains."""
         if self._test is not None and self._test["outcome"] == PASSED:
             self._test |= {"outcome": outcome, "why": why}
 
     def end(self) -> None:
-        """The test under way, if there is one."""
+        """End the running test, if there is one."""
         if self._test is not None:
             self.tests.append(self._test)
         self._test = None
 
     def outcome_of(self, stage: int) -> str:
-        """Passed only where all of its tests were run and passed."""
+        """Return PASSED only if all tests of the stage were run and passed."""
         outcomes = [test["outcome"] for test in self.tests if test["stage"] == stage]
         if FAILED in outcomes:
             return FAILED
         return PASSED if outcomes and SKIPPED not in outcomes else SKIPPED
 
     def obstacle(self, stage: int) -> str:
-        """Why a stage may not begin; empty where it may."""
-        if self.out_of_hand:
-            return self.out_of_hand
+        """Return why a stage may not begin; empty where it may."""
+        if self.keeps_torque:
+            return self.keeps_torque
         for earlier in range(1, stage):
             outcome = self.outcome_of(earlier)
             if outcome == FAILED:
-                return f"{stage_name(earlier)}, failed: mend that first"
+                return f"{stage_name(earlier)}, failed: fix that first"
             if outcome == SKIPPED:
-                return f"{stage_name(earlier)}, was not passed in this run: the stages go one after the other"
+                return f"{stage_name(earlier)}, was not passed in this run: the stages run one after the other"
         return ""
 
-    def stumble(self, stage: int, test: str) -> str:
-        """Why a stage that moves something may not go on with this test; empty where it may.
+    def own_obstacle(self, stage: int, test: str) -> str:
+        """Return why a stage that moves something may not continue with this test; empty where it may.
 
-        The same claim about another joint may still be tried: it tells more, and moves that joint alone.
+        The same claim for another joint may still be tested: it gives more information and moves only that joint.
         """
         for earlier in self.tests:
             if (earlier["stage"], earlier["outcome"]) == (stage, FAILED) and claim_of(earlier["test"]) != claim_of(
                 test
             ):
-                return f"{earlier['test']} failed: mend that before anything else moves"
+                return f"{earlier['test']} failed: fix that before anything else moves"
         return ""
 
     @property
@@ -121,69 +121,71 @@ class BenchReport:
         path.write_text(json.dumps(self.as_json, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
     def lines(self, brief: bool) -> Iterator[tuple[str, bool]]:
-        """Of a table, with whether all is well there. `brief`: of the figures only those that are not."""
+        """Yield the lines of the report, and whether each is good. `brief` leaves out good readings."""
         for number, name in enumerate(STAGES, 1):
             readings = [reading for test in self.tests if test["stage"] == number for reading in test["readings"]]
             yield from table_lines(f"stage {number}, {name}", [each for each in readings if not (brief and each.good)])
         for test in self.tests:
-            yield from ((f"{test['test']}, before it was measured anew: {why}", True) for why in test["spoiled"])
+            yield from ((f"{test['test']}, before it was repeated: {why}", True) for why in test["spoiled"])
         for number, name in enumerate(STAGES, 1):
             outcome = self.outcome_of(number)
             reported = self._reason(number) if outcome == SKIPPED else self._omissions(number)
             yield f"stage {number}, {name}: {outcome}{reported}", outcome == PASSED
 
     def _reason(self, stage: int) -> str:
-        """What was told first; why a test failed stands above."""
+        """Return the first reason why tests of the stage were skipped."""
         reasons = [test["why"] for test in self.tests if (test["stage"], test["outcome"]) == (stage, SKIPPED)]
         return f": {reasons[0]}" if reasons else ""
 
     def _omissions(self, stage: int) -> str:
-        """What nobody was there for is no part of what was passed."""
+        """Count the checks that were left out without an operator."""
         of_stage = [test for test in self.tests if test["stage"] == stage]
         count = sum(reading.left_out for test in of_stage for reading in test["readings"])
-        return f", without {count} checks that need a person" if count else ""
+        return f", without {count} checks that need an operator" if count else ""
 
 
 class StagedBench:
-    """What a test of the bench is given."""
+    """The test rig and the report, for one test of the bench."""
 
-    def __init__(self, stand: Stand, report: BenchReport) -> None:
-        self.stand = stand
+    def __init__(self, test_rig: TestRig, report: BenchReport) -> None:
+        self.test_rig = test_rig
         self.report = report
 
-    def check(self, measure: Callable[Concatenate[Stand, P], Readings], *arguments: P.args, **named: P.kwargs) -> None:
-        """Keep what it measures, and fail with a sentence for each reading that is out of its bounds.
+    def check(
+        self, measure: Callable[Concatenate[TestRig, P], Readings], *arguments: P.args, **named: P.kwargs
+    ) -> None:
+        """Record the readings, and fail with a message for each one out of bounds.
 
-        What late ticks or messages may have spoiled is measured anew, and the report keeps what it was; where they come
-        again, the failure says so.
+        A check that late ticks or messages may have disturbed is repeated, and the report lists the first result; if
+        they occur again, the failure says so.
         """
         for left in reversed(range(MOST_MEASURED)):
-            readings = self._readings(measure(self.stand, *arguments, **named))
-            late = self.stand.lateness.message
+            readings = self._readings(measure(self.test_rig, *arguments, **named))
+            late = self.test_rig.lateness.message
             wrong = [reading.message for reading in readings if not reading.good]
             if not (wrong and late and left):
                 break
-            self.report.spoil(" ".join([*wrong, late]))
+            self.report.note_repeat(" ".join([*wrong, late]))
         for reading in readings:
-            self.report.keep(reading)
+            self.report.add(reading)
         if wrong:
             pytest.fail("\n".join([*wrong, late]).rstrip(), pytrace=False)
 
     def _readings(self, measured: Readings) -> list[Reading]:
-        self.stand.lateness.reset()
+        self.test_rig.lateness.reset()
         reported: list[Reading] = []
         try:
             for reading in measured:
                 reported.append(reading)
         except BenchError as problem:
             for reading in reported:
-                self.report.keep(reading)
-            raise BenchError(f"{problem} {self.stand.lateness.message}".rstrip()) from None
+                self.report.add(reading)
+            raise BenchError(f"{problem} {self.test_rig.lateness.message}".rstrip()) from None
         return reported
 
 
 class UncapturedOperator:
-    """A person on the terminal, from whom pytest holds neither questions nor answers back."""
+    """A prompt on the terminal, with pytest's capturing suspended."""
 
     def __init__(self, config: pytest.Config) -> None:
         self._capture = config.pluginmanager.getplugin("capturemanager")

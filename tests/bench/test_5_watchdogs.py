@@ -1,10 +1,10 @@
-"""Stage 5: this program falls silent, and the drives must let go."""
+"""Stage 5: commands stop, and the drives must switch off."""
 
-from experiments.bench.watchdog_check import watchdog_times
+from experiments.bench.watchdog_check import check_watchdog_times
 from tests.bench.staged_bench import StagedBench
 
-MOVES = "the flippers press down with 0.08 N·m, then commands stop, and every drive must let go by itself."
+MOVES = "the flippers press down with 0.08 N·m, then commands stop, and every drive must switch off by itself."
 
 
-def test_drives_let_go_when_commands_stop(bench: StagedBench) -> None:
-    bench.check(watchdog_times)
+def test_drives_switch_off_when_commands_stop(bench: StagedBench) -> None:
+    bench.check(check_watchdog_times)

@@ -9,11 +9,11 @@ import pytest
 from control.joint_pd import ArmMass
 from control.rate import PERIOD_S
 from control.records import JOINTS, DriveState, same_for_all
-from experiments.bench.joint_shake import FIRST_NM, HALF_TICKS, SHAKE_TICKS, UNSEEN_RAD, Shake, shake
-from experiments.bench.operator import SimulatedAttendant
+from experiments.bench.joint_shake import FIRST_NM, HALF_TICKS, SHAKE_TICKS, UNSEEN_RAD, Shake, shake_joint
+from experiments.bench.operator import SimulatedBenchOperator
 from experiments.bench.rig import SimulatedRig
-from experiments.bench.sign_check import nudged
-from experiments.bench.test_rig import Stand
+from experiments.bench.sign_check import check_nudge
+from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Tick
@@ -24,7 +24,7 @@ class Bench:
     """A simulated robot, and how far one of its joints has truly been from where it was."""
 
     def __init__(self, configuration: Configuration, joint: str, inertia: float = 1.0, noise_rad: float = 0.0) -> None:
-        place, arm = JOINTS.index(joint), configuration.arm
+        index, arm = JOINTS.index(joint), configuration.arm
         mass = ArmMass(
             arm.arm_mass_kg,
             arm.center_of_mass_m,
@@ -34,15 +34,15 @@ class Bench:
         drives = on_blocks(configuration).drives(configuration)
         drives[joint] = replace(drives[joint], encoder_noise_rad=noise_rad)
         self.rig = SimulatedRig(configuration, replace(configuration, arm=mass), drives)
-        self.stand = Stand(self.rig, SimulatedAttendant(self.rig))
-        self.drive = self.rig.robot.drives[place]
+        self.test_rig = TestRig(self.rig, SimulatedBenchOperator(self.rig))
+        self.drive = self.rig.robot.drives[index]
         self.farthest_rad = 0.0
-        before_rad = self.rig.robot.plant.angles_rad[place]
+        before_rad = self.rig.robot.plant.angles_rad[index]
 
-        def look(rig: SimulatedRig) -> None:
-            self.farthest_rad = max(self.farthest_rad, abs(rig.robot.plant.angles_rad[place] - before_rad))
+        def observe_farthest(rig: SimulatedRig) -> None:
+            self.farthest_rad = max(self.farthest_rad, abs(rig.robot.plant.angles_rad[index] - before_rad))
 
-        self.rig.others.append(look)
+        self.rig.others.append(observe_farthest)
 
     def hang(self) -> None:
         """Its encoder tells the same angle and a speed of exactly zero, from the start."""
@@ -60,7 +60,7 @@ def test_a_joint_whose_encoder_hangs_goes_nowhere_and_is_told(
 ) -> None:
     bench = Bench(configuration, joint)
     bench.hang()
-    readings = list(nudged(bench.stand, joint))
+    readings = list(check_nudge(bench.test_rig, joint))
     assert bench.farthest_rad < farthest_rad < UNSEEN_RAD
     (reading,) = readings  # nothing more is tried on it
     assert not reading.good and f"{joint}: answer to a shake is 0 rad" in reading.message
@@ -74,13 +74,13 @@ def test_nor_does_one_of_half_the_inertia_and_without_friction(configuration: Co
     bench.without_friction()
     bench.hang()
     assert not shake_of(bench, joint).answered
-    bench.stand.run_for(0.3)  # nothing is left of its speed
+    bench.test_rig.run_for(0.3)  # nothing is left of its speed
     assert bench.farthest_rad < UNSEEN_RAD
 
 
 def shake_of(bench: Bench, joint: str) -> Shake:
-    bench.stand.arm()
-    return shake(bench.stand, joint)
+    bench.test_rig.arm()
+    return shake_joint(bench.test_rig, joint)
 
 
 def test_noise_is_no_answer(configuration: Configuration) -> None:
@@ -101,7 +101,7 @@ def test_a_late_tick_ends_a_shake_and_it_begins_anew(
     configuration: Configuration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bench = Bench(configuration, "left_sweep")
-    bench.stand.arm()
+    bench.test_rig.arm()
     wait, ticks = bench.rig.wait, [0]
 
     def late_at(*missing: int) -> None:
@@ -113,10 +113,10 @@ def test_a_late_tick_ends_a_shake_and_it_begins_anew(
         monkeypatch.setattr(bench.rig, "wait", tick)
 
     late_at(45)  # in the first shake
-    assert shake(bench.stand, "left_sweep").answered
+    assert shake_joint(bench.test_rig, "left_sweep").answered
     late_at(45, 90, 135)
     with pytest.raises(BenchError, match="Ticks are missed while a joint is shaken: end other programs"):
-        shake(bench.stand, "left_sweep")
+        shake_joint(bench.test_rig, "left_sweep")
 
 
 def test_a_shake_leaves_a_free_joint_at_rest_where_it_was() -> None:

@@ -9,14 +9,14 @@ import pytest
 
 from control.modes import Request
 from control.records import DriveState, DriveStates, same_for_all
-from experiments.bench.joint_zero_check import rest_pose
+from experiments.bench.joint_zero_check import check_rest_pose
 from experiments.bench.lateness import LATE_S
-from experiments.bench.operator import SimulatedAttendant
+from experiments.bench.operator import SimulatedBenchOperator
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.rig import SimulatedRig
-from experiments.bench.stop_check import OFF_TICKS, QUIET_A, torque_off
-from experiments.bench.stroke_tracking import FAST_DEG, FAST_RAD_S, stroke_readings
-from experiments.bench.test_rig import Stand
+from experiments.bench.stop_check import OFF_TICKS, QUIET_A, check_torque_off
+from experiments.bench.stroke_tracking import FAST_DEG, FAST_RAD_S, check_stroke
+from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Tick
@@ -41,8 +41,8 @@ def rig(patient: Configuration) -> LateRig:
 
 
 @pytest.fixture
-def stand(rig: LateRig) -> Stand:
-    return Stand(rig, SimulatedAttendant(rig))
+def opened_rig(rig: LateRig) -> TestRig:
+    return TestRig(rig, SimulatedBenchOperator(rig))
 
 
 def by_name(readings: Readings) -> dict[str, Reading]:
@@ -64,43 +64,45 @@ class Sinking:
             rig.robot.plant.arms[0].adduction_rad += 0.05
 
 
-def sinking_stand(configuration: Configuration, sinking: Sinking) -> Stand:
+def sinking_stand(configuration: Configuration, sinking: Sinking) -> TestRig:
     """Its drives tell a motion in the tick in which it begins."""
     drives = on_blocks(configuration).drives(configuration)
     prompt = {joint: replace(each, message_delay_s=0.0) for joint, each in drives.items()}
     rig = SimulatedRig(configuration, drives=prompt, others=[sinking])
-    return Stand(rig, SimulatedAttendant(rig))
+    return TestRig(rig, SimulatedBenchOperator(rig))
 
 
 def test_a_flipper_that_sinks_as_the_robot_is_armed_only_delays_it(configuration: Configuration) -> None:
     sinking = Sinking(2)
-    stand = sinking_stand(configuration, sinking)
-    stand.arm()
+    opened_rig = sinking_stand(configuration, sinking)
+    opened_rig.arm()
     assert sinking.wishes == 3
-    assert all(state.closed_loop for state in stand.loop.states)
+    assert all(state.closed_loop for state in opened_rig.loop.states)
 
 
 def test_what_stands_against_arming_is_told(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
-    stand = sinking_stand(configuration, Sinking(1000))
+    opened_rig = sinking_stand(configuration, Sinking(1000))
     monkeypatch.setattr("experiments.bench.test_rig.ARMING_S", 1.0)
     with pytest.raises(BenchError, match=r"Closed loop .* within 1 s\. The left_adduction joint moves"):
-        stand.arm()
+        opened_rig.arm()
 
 
 @pytest.mark.parametrize(("missing_fraction", "waiting_fraction"), [(0.05, 0.0), (0.0, 0.1)])
 def test_the_current_before_torque_goes_off_is_seen_through_late_ticks_and_messages(
-    stand: Stand, rig: LateRig, briefly: None, missing_fraction: float, waiting_fraction: float
+    opened_rig: TestRig, rig: LateRig, briefly: None, missing_fraction: float, waiting_fraction: float
 ) -> None:
-    stand.arm()
-    stand.let_go()
+    opened_rig.arm()
+    opened_rig.switch_off()
     rig.begin(missing_fraction, waiting_fraction, 2, 1)
-    reported = by_name(torque_off(stand))
-    assert stand.lateness.message
+    reported = by_name(check_torque_off(opened_rig))
+    assert opened_rig.lateness.message
     before = [reading for what, reading in reported.items() if what.endswith("current before")]
     assert len(before) == 4 and all(reading.value > 3.0 * QUIET_A for reading in before)
 
 
-def test_a_drive_that_keeps_its_last_torque_is_found_by_its_current(stand: Stand, rig: LateRig, briefly: None) -> None:
+def test_a_drive_that_holds_its_torque_is_found_by_its_current(
+    opened_rig: TestRig, rig: LateRig, briefly: None
+) -> None:
     drive = rig.robot.drives[2]
     assert isinstance(drive, SimulatedOdrive)
 
@@ -111,7 +113,7 @@ def test_a_drive_that_keeps_its_last_torque_is_found_by_its_current(stand: Stand
         drive._fed_s = rig.now_s
 
     rig.others.append(keep)
-    reported = by_name(torque_off(stand))
+    reported = by_name(check_torque_off(opened_rig))
     ends = {what.split(":")[0]: each for what, each in reported.items() if what.endswith("until no current flows")}
     kept = ends.pop("right_sweep")
     assert not kept.good and "does not obey 'idle'" in kept.message
@@ -119,7 +121,7 @@ def test_a_drive_that_keeps_its_last_torque_is_found_by_its_current(stand: Stand
 
 
 def test_a_drive_is_too_slow_to_let_go_also_where_ticks_are_missed_meanwhile(
-    stand: Stand, rig: LateRig, briefly: None
+    opened_rig: TestRig, rig: LateRig, briefly: None
 ) -> None:
     """Six ticks too late, of which this computer sees three."""
     drive, late = rig.robot.drives[2], rig
@@ -134,11 +136,11 @@ def test_a_drive_is_too_slow_to_let_go_also_where_ticks_are_missed_meanwhile(
             drive.energised = False
 
     rig.others.append(dawdle)
-    reported = by_name(torque_off(stand))
+    reported = by_name(check_torque_off(opened_rig))
     ends = {what.split(":")[0]: each for what, each in reported.items() if what.endswith("until no current flows")}
     assert ends.pop("right_sweep").value >= 6 > OFF_TICKS
     assert all(reading.good for reading in ends.values())
-    assert stand.lateness.missed  # so the bench measures anew
+    assert opened_rig.lateness.missed  # so the bench measures anew
 
 
 @pytest.fixture
@@ -148,10 +150,10 @@ def briefly(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def bench(stand: Stand) -> StagedBench:
+def bench(opened_rig: TestRig) -> StagedBench:
     report = BenchReport()
     report.begin(6, "test")
-    return StagedBench(stand, report)
+    return StagedBench(opened_rig, report)
 
 
 def readings_kept(bench: StagedBench) -> dict[str, Reading]:
@@ -162,9 +164,9 @@ def readings_kept(bench: StagedBench) -> dict[str, Reading]:
 def test_a_stroke_that_late_messages_spoil_is_measured_anew(bench: StagedBench, rig: LateRig) -> None:
     spoiled: list[float] = []
 
-    def measure(stand: Stand) -> Readings:
+    def measure(opened_rig: TestRig) -> Readings:
         rig.begin(0.0, 0.0 if spoiled else 0.2, 6, 1)
-        readings = list(stroke_readings(stand, "fast", FAST_RAD_S, FAST_DEG))
+        readings = list(check_stroke(opened_rig, "fast", FAST_RAD_S, FAST_DEG))
         spoiled.append(max(reading.value for reading in readings if "largest" in reading.what))
         yield from readings
 
@@ -179,14 +181,14 @@ def test_what_was_out_of_its_bounds_stays_in_the_report_though_it_is_well_when_m
 ) -> None:
     values = [7.0, 5.0]
 
-    def measure(stand: Stand) -> Readings:
-        stand.lateness.update(*late(3, 0.0))
+    def measure(opened_rig: TestRig) -> Readings:
+        opened_rig.lateness.update(*late(3, 0.0))
         yield Reading("error", values.pop(0), "deg", 0.0, 6.0, "check the gains")
 
     bench.check(measure)
     assert readings_kept(bench)["error"].value == 5.0
     reported = (
-        r"test, before it was measured anew: error is 7 deg, must be 0 to 6: check the gains\. Meanwhile .* 3 of 4"
+        r"test, before it was repeated: error is 7 deg, must be 0 to 6: check the gains\. Meanwhile .* 3 of 4"
     )
     assert any(re.match(reported, line) for line, good in bench.report.lines(brief=True))
     assert "error is 7 deg" in bench.report.as_json["tests"][0]["spoiled"][0]
@@ -205,9 +207,9 @@ def test_what_stays_late_is_told_with_what_is_out_of_its_bounds(
 ) -> None:
     measured = []
 
-    def measure(stand: Stand) -> Readings:
+    def measure(opened_rig: TestRig) -> Readings:
         measured.append(1)
-        stand.lateness.update(*late(missed, age_s))
+        opened_rig.lateness.update(*late(missed, age_s))
         yield Reading("error", 7.0, "deg", 0.0, 6.0, "check the gains")
 
     with pytest.raises(pytest.fail.Exception, match=rf"error is 7 deg, .* check the gains\.\n.*{message}"):
@@ -223,9 +225,9 @@ def late(missed: int, age_s: float) -> tuple[Tick, DriveStates]:
 def test_what_is_out_of_its_bounds_in_time_is_measured_once(bench: StagedBench) -> None:
     measured = []
 
-    def measure(stand: Stand) -> Readings:
+    def measure(opened_rig: TestRig) -> Readings:
         measured.append(1)
-        stand.lateness.update(*late(0, 0.9 * LATE_S))
+        opened_rig.lateness.update(*late(0, 0.9 * LATE_S))
         yield Reading("error", 7.0, "deg", 0.0, 6.0, "check the gains")
 
     with pytest.raises(pytest.fail.Exception, match=r"check the gains\.$"):
@@ -234,8 +236,8 @@ def test_what_is_out_of_its_bounds_in_time_is_measured_once(bench: StagedBench) 
 
 
 def test_a_measurement_that_ends_early_says_what_was_late(bench: StagedBench) -> None:
-    def measure(stand: Stand) -> Readings:
-        stand.lateness.update(*late(2, 0.0))
+    def measure(opened_rig: TestRig) -> Readings:
+        opened_rig.lateness.update(*late(2, 0.0))
         yield Reading("speed", 1.0)
         raise BenchError("The end of a path did not come within 60 s.")
 
@@ -244,25 +246,25 @@ def test_a_measurement_that_ends_early_says_what_was_late(bench: StagedBench) ->
     assert "speed" in readings_kept(bench)
 
 
-def test_sums_are_made_once_torque_is_off(stand: Stand, rig: LateRig) -> None:
+def test_sums_are_made_once_torque_is_off(opened_rig: TestRig, rig: LateRig) -> None:
     """They take longer than a tick, and on a slow computer than a drive's watchdog."""
-    for _ in stroke_readings(stand, "fast", FAST_RAD_S, FAST_DEG):
+    for _ in check_stroke(opened_rig, "fast", FAST_RAD_S, FAST_DEG):
         assert not any(drive.energised for drive in rig.robot.drives)
 
 
-def test_ticks_without_torque_may_be_late(stand: Stand, rig: LateRig) -> None:
+def test_ticks_without_torque_may_be_late(opened_rig: TestRig, rig: LateRig) -> None:
     rig.begin(0.5, 0.0, 3, 1)
-    stand.run_for(0.2)
-    assert stand.lateness.message == ""
-    assert stand.loop.missed_ticks > 20
+    opened_rig.run_for(0.2)
+    assert opened_rig.lateness.message == ""
+    assert opened_rig.loop.missed_ticks > 20
 
 
-def test_a_pause_that_trips_the_drives_watchdogs_is_told_with_the_fault(stand: Stand, rig: LateRig) -> None:
-    stand.arm()
+def test_a_pause_that_trips_the_drives_watchdogs_is_told_with_the_fault(opened_rig: TestRig, rig: LateRig) -> None:
+    opened_rig.arm()
     rig.begin(1.0, 0.0, 400, 1)
     with pytest.raises(BenchError, match="watchdog"):
-        stand.run_for(1.0)
-    assert re.search(r"this computer missed \d+ of \d+ ticks", stand.lateness.message)
+        opened_rig.run_for(1.0)
+    assert re.search(r"this computer missed \d+ of \d+ ticks", opened_rig.lateness.message)
 
 
 def test_a_robot_that_stands_in_mud_is_sent_onto_blocks(
@@ -271,6 +273,6 @@ def test_a_robot_that_stands_in_mud_is_sent_onto_blocks(
     """Where its strides would not be in air, and the mud would take more torque than there is."""
     monkeypatch.setattr("experiments.bench.rig.on_blocks", lambda configuration: World(track_of(["48.5"])))
     rig = SimulatedRig(patient)
-    reported = by_name(rest_pose(Stand(rig, SimulatedAttendant(rig))))
+    reported = by_name(check_rest_pose(TestRig(rig, SimulatedBenchOperator(rig))))
     lying = reported["left flipper: edge above the axis, at rest"]
     assert not lying.good and "put the robot on blocks" in lying.message

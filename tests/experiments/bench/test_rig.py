@@ -15,12 +15,12 @@ import pytest
 
 from control.records import JOINTS
 from experiments.bench.channels import on_channels
-from experiments.bench.operator import AbsentAttendant
+from experiments.bench.operator import AbsentBenchOperator
 from experiments.bench.reading import Reading
 from experiments.bench.rig import HardwareRig, SimulatedRig, refuse_beside_daemon
-from experiments.bench.sign_check import nudged
-from experiments.bench.test_rig import Stand
-from experiments.bench.wiring_check import firmware, ids_heard, strangers, watchdogs
+from experiments.bench.sign_check import check_nudge
+from experiments.bench.test_rig import TestRig
+from experiments.bench.wiring_check import check_firmware, check_ids, check_unknown_ids, check_watchdogs
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import BusParameters, Configuration, StatusParameters
 from firmware_host.configuration.loading import load_configuration
@@ -81,7 +81,7 @@ def test_each_problem_of_a_configuration_names_its_file_once(text: str, tmp_path
 
 
 def test_a_joint_whose_encoder_counts_backwards_is_never_held(tmp_path: Path) -> None:
-    """It would run away. All joints are still nudged, and nothing moves after that."""
+    """It would run away. All joints are still check_nudge, and nothing moves after that."""
     report = tmp_path / "report.json"
     flipped = ["-p", "tests.experiments.bench.flipped_encoder"]
     command = [sys.executable, "-m", "pytest", "tests/bench", *flipped, "--simulated", "--bench-report", str(report)]
@@ -109,15 +109,15 @@ def local_robot(short_folder: Path, tmp_path: Path) -> Iterator[Configuration]:
 
 
 @pytest.fixture
-def stand(local_robot: Configuration) -> Iterator[Stand]:
+def opened_rig(local_robot: Configuration) -> Iterator[TestRig]:
     rig = HardwareRig(local_robot)
     while not any(rig.overheard.frames.values()):
         rig.close()
         rig = HardwareRig(local_robot)
     rig.close()  # it may have heard no more than the robot's start
-    made = Stand(rig := HardwareRig(local_robot), AbsentAttendant())
+    made = TestRig(rig := HardwareRig(local_robot), AbsentBenchOperator())
     yield made
-    made.end()
+    made.force_idle()
     rig.close()
 
 
@@ -125,23 +125,29 @@ def bad(readings: Iterable[Reading]) -> list[str]:
     return [reading.message for reading in readings if not reading.good]
 
 
-def test_on_real_buses_in_real_time_every_drive_is_heard(stand: Stand) -> None:
+def test_every_drive_is_heard_on_real_buses(opened_rig: TestRig) -> None:
     """What a busy computer cannot spoil: rates and delays are for one that has nothing else to do."""
-    readings = [reading for check in (ids_heard, strangers, firmware, watchdogs) for reading in check(stand)]
+    readings = [
+        reading
+        for check in (check_ids, check_unknown_ids, check_firmware, check_watchdogs)
+        for reading in check(opened_rig)
+    ]
     assert len(readings) > 3 * len(JOINTS)
     assert bad(readings) == []
 
 
-def test_on_real_buses_in_real_time_a_joint_is_nudged_or_the_computer_was_late_and_that_is_told(stand: Stand) -> None:
+def test_on_real_buses_a_joint_is_nudged_or_the_late_computer_is_reported(
+    opened_rig: TestRig,
+) -> None:
     """A torque that comes late proves nothing, so a busy computer ends the nudge, and with a sentence."""
     problems = []
     try:
-        readings = list(nudged(stand, "left_sweep"))
+        readings = list(check_nudge(opened_rig, "left_sweep"))
         problems = bad(readings)
         assert problems or len(readings) == 4 + len(JOINTS)
     except BenchError as problem:
         problems = [str(problem)]
-    assert problems == [] or stand.lateness_so_far.message
+    assert problems == [] or opened_rig.lateness_so_far.message
 
 
 def test_one_channel_for_all_makes_one_bus(configuration: Configuration) -> None:
@@ -164,10 +170,10 @@ def test_drives_with_the_same_id_do_not_share_a_channel(configuration: Configura
         on_channels(replace(configuration, drive=drive), ["can0"])
 
 
-@pytest.mark.parametrize("word", ["middle=can0", "left=", ""])
-def test_a_channel_that_fits_no_bus_is_refused(configuration: Configuration, word: str) -> None:
+@pytest.mark.parametrize("given", ["middle=can0", "left=", ""])
+def test_a_channel_that_fits_no_bus_is_refused(configuration: Configuration, given: str) -> None:
     with pytest.raises(BenchError, match="--can"):
-        on_channels(configuration, [word])
+        on_channels(configuration, [given])
 
 
 def test_idle_flippers_of_the_simulated_bench_stay_where_they_lie(configuration: Configuration) -> None:

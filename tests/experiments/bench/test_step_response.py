@@ -23,12 +23,12 @@ def made_up(answer: int, numbers: list[int]) -> list[Sample]:
         Sample(
             Tick(number * PERIOD_S, 0.0, number, 0),
             Mode.HOLD,
-            Joints(following if place >= answer else rest, rest, rest, rest),
+            Joints(following if index >= answer else rest, rest, rest, rest),
             None,
-            SENT if place >= STEP else NO_TORQUE,
+            SENT if index >= STEP else NO_TORQUE,
             False,
         )
-        for place, number in enumerate(numbers)
+        for index, number in enumerate(numbers)
     ]
 
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from control.records import JOINTS, NO_TORQUE, Joints
-from experiments.bench.joint_zero_check import level_pose, turned
-from experiments.bench.operator import AbsentAttendant, AskedAttendant, SimulatedAttendant
+from experiments.bench.joint_zero_check import check_level_pose, check_turning
+from experiments.bench.operator import AbsentBenchOperator, PromptedBenchOperator, SimulatedBenchOperator
 from experiments.bench.reading import Reading, left_out
 from experiments.bench.rig import SimulatedRig
-from experiments.bench.sign_check import MOST_NM, gently, nudged, shown
+from experiments.bench.sign_check import MOST_NM, check_nudge, check_shown_motion, hold_gently
 from experiments.bench.stroke_tracking import lag_ticks
-from experiments.bench.test_rig import Stand, first_lasting
+from experiments.bench.test_rig import TestRig, first_lasting
 from experiments.robot.bench_robot import CLEAR, LEAVE, BenchError
 from firmware_host.configuration.configuration import Configuration
 from simulation.devices.drive import DriveError
@@ -32,7 +32,7 @@ def rig(configuration: Configuration) -> SimulatedRig:
 
 @pytest.fixture
 def bench(rig: SimulatedRig) -> StagedBench:
-    return StagedBench(Stand(rig, SimulatedAttendant(rig)), BenchReport())
+    return StagedBench(TestRig(rig, SimulatedBenchOperator(rig)), BenchReport())
 
 
 def energised(rig: SimulatedRig) -> set[bool]:
@@ -40,33 +40,33 @@ def energised(rig: SimulatedRig) -> set[bool]:
 
 
 def test_ctrl_c_with_raised_flippers_leaves_the_drives_idle(bench: StagedBench, rig: SimulatedRig) -> None:
-    with pytest.raises(KeyboardInterrupt), bench.stand.raised():
+    with pytest.raises(KeyboardInterrupt), bench.test_rig.flippers_raised():
         assert energised(rig) == {True}
         raise KeyboardInterrupt
     assert energised(rig) == {False}
 
 
 def test_the_end_idles_the_drives_without_the_loop(bench: StagedBench, rig: SimulatedRig) -> None:
-    bench.stand.arm(lambda held, states: NO_TORQUE)
-    bench.stand.end()
+    bench.test_rig.arm(lambda held, states: NO_TORQUE)
+    bench.test_rig.force_idle()
     rig.wait()
     assert energised(rig) == {False}
 
 
 def test_a_fault_ends_a_measurement_with_its_sentence(bench: StagedBench, rig: SimulatedRig) -> None:
-    bench.stand.arm(lambda held, states: NO_TORQUE)
+    bench.test_rig.arm(lambda held, states: NO_TORQUE)
     rig.robot.restart_drive(1)
     with pytest.raises(BenchError, match=r"left_adduction.*\."):
-        bench.stand.run_for(1.0)
+        bench.test_rig.run_for(1.0)
 
 
 def test_a_robot_that_is_not_idle_is_not_armed_again(bench: StagedBench) -> None:
-    bench.stand.arm(lambda held, states: NO_TORQUE)
+    bench.test_rig.arm(lambda held, states: NO_TORQUE)
     with pytest.raises(BenchError, match=r"cannot be armed: it is in hold\."):
-        bench.stand.arm()
+        bench.test_rig.arm()
 
 
-class Asked(AskedAttendant):
+class Asked(PromptedBenchOperator):
     """With a person who says the same of every fault."""
 
     def __init__(self, answer: str) -> None:
@@ -79,45 +79,49 @@ class Asked(AskedAttendant):
 def test_a_fault_of_before_is_cleared_where_a_person_says_so(rig: SimulatedRig, answer: str) -> None:
     """No daemon may run beside the bench, so 'mudskipper clear' is not to be had."""
     rig.robot.drives[1].trip(DriveError.WATCHDOG)
-    attendant = Asked(answer)
-    stand = Stand(rig, attendant)
+    bench_operator = Asked(answer)
+    opened_rig = TestRig(rig, bench_operator)
     if answer == CLEAR:
-        stand.arm(lambda held, states: NO_TORQUE)
+        opened_rig.arm(lambda held, states: NO_TORQUE)
         assert energised(rig) == {True}
     else:
         with pytest.raises(BenchError, match="cannot be armed: The left_adduction drive reports error"):
-            stand.arm()
+            opened_rig.arm()
         assert rig.robot.drives[1].failed
-    (question,) = attendant.asked
+    (question,) = bench_operator.asked
     assert "The left_adduction drive reports error" in question and question.endswith("Is the cause gone?")
 
 
 def test_where_nobody_is_there_a_fault_of_before_stands(rig: SimulatedRig) -> None:
     rig.robot.drives[1].trip(DriveError.WATCHDOG)
     with pytest.raises(BenchError, match="cannot be armed: The left_adduction drive reports error"):
-        Stand(rig, AbsentAttendant()).arm()
+        TestRig(rig, AbsentBenchOperator()).arm()
     assert rig.robot.drives[1].failed
 
 
 def test_a_drive_that_does_not_let_go_is_told(bench: StagedBench, rig: SimulatedRig) -> None:
-    bench.stand.arm(lambda held, states: NO_TORQUE)
+    bench.test_rig.arm(lambda held, states: NO_TORQUE)
     for port in rig.buses["right"].ports[1:]:
         port.full = True
     drive = rig.robot.drives[3]
     assert isinstance(drive, SimulatedOdrive)
     rig.others.append(lambda _: drive._set_torque(0.0, rig.now_s))  # somebody feeds its watchdog
     with pytest.raises(BenchError, match="right_adduction: still in closed loop"):
-        bench.stand.let_go()
+        bench.test_rig.switch_off()
 
 
 def test_what_holds_gently_never_exceeds_a_tiny_torque(bench: StagedBench) -> None:
     held = Joints(1.0, -1.0, 0.1, -0.1)
-    assert gently(held, bench.stand.loop.states) == (MOST_NM, -MOST_NM, 0.1, -0.1)
+    assert hold_gently(held, bench.test_rig.loop.states) == (MOST_NM, -MOST_NM, 0.1, -0.1)
 
 
 def test_where_nobody_is_there_hands_are_not_needed_and_eyes_not_claimed(configuration: Configuration) -> None:
-    stand = Stand(SimulatedRig(configuration), AbsentAttendant())
-    readings = [*level_pose(stand), *turned(stand, "left_sweep"), *shown(stand, "left_sweep")]
+    opened_rig = TestRig(SimulatedRig(configuration), AbsentBenchOperator())
+    readings = [
+        *check_level_pose(opened_rig),
+        *check_turning(opened_rig, "left_sweep"),
+        *check_shown_motion(opened_rig, "left_sweep"),
+    ]
     assert [(reading.left_out, reading.good, reading.value_text) for reading in readings] == [
         (True, True, "left out")
     ] * 3
@@ -126,40 +130,40 @@ def test_where_nobody_is_there_hands_are_not_needed_and_eyes_not_claimed(configu
 def test_what_nobody_was_there_for_is_not_told_as_passed() -> None:
     report = BenchReport()
     report.begin(3, "test")
-    report.keep(left_out("left_sweep: turned by hand"))
+    report.add(left_out("left_sweep: turned by hand"))
     report.end()
     lines = [line for line, _ in report.lines(brief=False)]
-    assert "stage 3, zeros: passed, without 1 checks that need a person" in lines
+    assert "stage 3, zeros: passed, without 1 checks that need an operator" in lines
     assert report.as_json["tests"][0]["readings"][0]["left_out"] is True
 
 
-@pytest.mark.parametrize("place", range(4))
-def test_an_encoder_that_counts_against_its_motor_never_closes_a_loop(rig: SimulatedRig, place: int) -> None:
+@pytest.mark.parametrize("index", range(4))
+def test_an_encoder_that_counts_against_its_motor_never_closes_a_loop(rig: SimulatedRig, index: int) -> None:
     """Feedback would be positive there: each joint's nudge ends by itself, and nothing may hold a pose after it."""
-    drive, report = rig.robot.drives[place], BenchReport()
+    drive, report = rig.robot.drives[index], BenchReport()
     measure = drive.measure
     drive.measure = lambda angle_rad, velocity_rad_s: measure(-angle_rad, -velocity_rad_s)  # type: ignore[method-assign]
-    stand = Stand(rig, SimulatedAttendant(rig))
+    opened_rig = TestRig(rig, SimulatedBenchOperator(rig))
     before = rig.robot.plant.angles_rad
     farthest_rad = 0.0
     for joint in JOINTS:
         test = f"test_a_tiny_torque[{joint}]"
-        assert report.stumble(2, test) == ""
+        assert report.own_obstacle(2, test) == ""
         report.begin(2, test)
-        good = all([reading.good for reading in nudged(stand, joint)])
+        good = all([reading.good for reading in check_nudge(opened_rig, joint)])
         report.worsen(PASSED if good else FAILED, "")
         report.end()
         moved = (abs(there - here) for here, there in zip(before, rig.robot.plant.angles_rad, strict=True))
         farthest_rad = max(farthest_rad, *moved)
     assert farthest_rad < 0.15
-    assert report.stumble(2, "test_eyes_see[left_sweep]") == (
-        f"test_a_tiny_torque[{JOINTS[place]}] failed: mend that before anything else moves"
+    assert report.own_obstacle(2, "test_eyes_see[left_sweep]") == (
+        f"test_a_tiny_torque[{JOINTS[index]}] failed: fix that before anything else moves"
     )
-    assert report.stumble(6, "test_joints_follow_a_slow_stroke") == ""
+    assert report.own_obstacle(6, "test_joints_follow_a_slow_stroke") == ""
 
 
 def test_joints_stand_side_by_side_in_the_table() -> None:
-    well = [Reading(f"{joint}: lag", 1.0 + place, "ms", -9.0, 9.0) for place, joint in enumerate(JOINTS)]
+    well = [Reading(f"{joint}: lag", 1.0 + index, "ms", -9.0, 9.0) for index, joint in enumerate(JOINTS)]
     lines = list(
         table_lines("stage 6", [*well[:3], well[3]._replace(value=20.0), Reading("load", 35.0, "%", 0.0, 80.0)])
     )
@@ -176,7 +180,7 @@ def test_a_reading_out_of_its_bounds_fails_with_what_to_do(bench: StagedBench) -
     bench.report.begin(1, "test")
     good, bad = Reading("speed", 1.0, "m/s", 0.0, 2.0), Reading("load", 90.0, "%", 0.0, 80.0, "take strangers off")
     with pytest.raises(pytest.fail.Exception) as failure:
-        bench.check(lambda stand: iter([good, bad]))
+        bench.check(lambda opened_rig: iter([good, bad]))
     assert str(failure.value) == "load is 90 %, must be 0 to 80: take strangers off."
     bench.report.end()
     assert bench.report.as_json["tests"][0]["readings"] == [good.as_json, bad.as_json]
@@ -228,7 +232,7 @@ def test_a_stage_that_was_not_done_says_why() -> None:
 
 def test_nothing_begins_after_a_drive_that_kept_its_torque() -> None:
     report = report_with(PASSED)
-    report.out_of_hand = "left_sweep: cut the power"
+    report.keeps_torque = "left_sweep: cut the power"
     assert [report.obstacle(stage) for stage in (1, 2)] == ["left_sweep: cut the power"] * 2
 
 

@@ -18,9 +18,9 @@ from control.records import JOINTS
 from drivers.can.frames import Frame
 from drivers.odrive import codec
 from drivers.odrive.codec import arbitration_id
-from experiments.bench.operator import SimulatedAttendant
+from experiments.bench.operator import SimulatedBenchOperator
 from experiments.bench.rig import SimulatedRig
-from experiments.bench.test_rig import Stand
+from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.blocks import on_blocks
@@ -63,7 +63,7 @@ def claims() -> Iterator[tuple[str, Callable[[StagedBench], None]]]:
 
 def first_complaint(rig: SimulatedRig, begin: str) -> tuple[str, str]:
     """The stage and its sentence, from a stage on."""
-    bench = StagedBench(Stand(rig, SimulatedAttendant(rig)), BenchReport())
+    bench = StagedBench(TestRig(rig, SimulatedBenchOperator(rig)), BenchReport())
     for name, claim in claims():
         if STAGES.index(name) < STAGES.index(begin):
             continue
@@ -71,7 +71,7 @@ def first_complaint(rig: SimulatedRig, begin: str) -> tuple[str, str]:
             claim(bench)
         except (pytest.fail.Exception, BenchError) as complaint:
             return name, str(complaint)
-        bench.stand.let_go()
+        bench.test_rig.switch_off()
     return "", ""
 
 
