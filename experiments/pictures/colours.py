@@ -1,12 +1,12 @@
-"""The colours of all pictures of a walk: the same thing has the same one everywhere."""
+"""The colours of all pictures of a walk, the same for the same thing in each."""
 
 from __future__ import annotations
 
 from experiments.pictures.stride_choice import Outcome
 
 INK = "#33302c"
-FAINT = "#8c867d"  # what only helps the eye
-MUDS = ("#f1e8da", "#dfcfb6", "#c9b290")  # one after another along the way
+FAINT = "#8c867d"  # helper lines and small text
+MUDS = ("#f1e8da", "#dfcfb6", "#c9b290")  # one after the other along the track
 MUD, SURFACE = "#cdb48f", "#8a6d45"  # seen from the side
 BODY = "#ece8e1"
 FLIPPERS = {"left": "#8fbfd2", "right": "#1f6f8b"}

@@ -1,8 +1,8 @@
-"""One walk out of a log as the pictures need it: the course of one flipper, and what both learned stride by stride.
+"""One walk from a log, for the pictures: the time series of one flipper, and the strides of both.
 
-A log of ours holds all of it, for as many walks as there were while the daemon ran. The authors' CSV holds angles,
-currents and the body's place; forces and strides are what the estimator makes of them, as in `mudskipper replay`. What
-a log does not hold is NaN here, and named in `missing`.
+A log of the daemon has all of it, for every walk of its run. The authors' CSV has angles, currents and the position of
+the body; forces and strides are estimated from them, as in `mudskipper replay`. Values that a log does not have are NaN
+and are listed in `missing`.
 """
 
 from __future__ import annotations
@@ -61,36 +61,36 @@ class RecordedWalk(NamedTuple):
     force_z_n: Floats
     body_x_m: Floats
     strides: list[dict[str, Any]]  # rows of log_rows.STRIDE, of both flippers
-    noticed_s: list[float]  # when the robot said that it was in another mud
-    walks: int = 1  # that the log holds
-    begun_s: float = 0.0  # since the log's begin
-    complete: bool = True  # False where the writer of the log was cut off, or still writes
-    cut: str = ""  # how the walk may reach beyond this log, in words
+    noticed_s: list[float]  # when the robot noticed another mud
+    walks: int = 1  # in the log
+    begun_s: float = 0.0  # since the beginning of the log
+    complete: bool = True  # False if the writer of the log was interrupted, or still writes
+    cut: str = ""  # how the walk may extend beyond this log
 
     @property
     def geometric_step_m(self) -> float:
-        """That of a plate which stands still in the mud while it sweeps: 2 l sin α."""
+        """The step with a plate that does not move in the mud during the sweep: 2 l sin α."""
         return 2.0 * self.geometry.flipper_length_m * sin(self.sweep_rad)
 
     @property
     def own_strides(self) -> list[dict[str, Any]]:
-        """Those of `flipper`."""
+        """The strides of `flipper`."""
         return [stride for stride in self.strides if FLIPPERS[stride["flipper"]] == self.flipper]
 
     @property
     def mud_starts_s(self) -> list[float]:
-        """Where each mud after the first began: with the stride that told of it."""
+        """The start of each mud after the first: the start of the stride in which the robot noticed it."""
         begun_s = [(stride["stamp_s"], stride["t_start_s"]) for stride in self.own_strides]
         return [max((start for close, start in begun_s if close <= now), default=now) for now in self.noticed_s]
 
     @property
     def missing(self) -> list[str]:
-        """What the log does not hold, in words."""
+        """Descriptions of the values that the log does not have."""
         return [words for name, words in WORDS.items() if not np.any(np.isfinite(getattr(self, name)))]
 
 
 def read_walk(path: Path, number: int = 0, more: Sequence[Path] = (), watch: Watch = unwatched) -> RecordedWalk:
-    """Walk `number` of a log, counted from 1; the last one for 0. With `more` segments of its run. Raises LogError."""
+    """Read walk `number` of a log from 1; 0 is the last one. `more` are segments of the same run. Raises LogError."""
     if more:
         return numbered_walk(path, read_logs([path, *more], watch), number)
     if path.name.endswith((".csv", ".csv.gz")):
@@ -101,7 +101,7 @@ def read_walk(path: Path, number: int = 0, more: Sequence[Path] = (), watch: Wat
 
 
 def numbered_walk(path: Path, log: Log, number: int = 0) -> RecordedWalk:
-    """Of a log that was read already; `path` stands in what is refused. Raises LogError."""
+    """Return a walk of a log that was read already; `path` is for messages. Raises LogError."""
     configuration = configuration_of(path, log)
     borders = np.flatnonzero(np.diff(log.ticks["mode"] == Mode.WALKING, prepend=False, append=False))
     starts, ends = borders[::2], borders[1::2]
@@ -115,7 +115,7 @@ def numbered_walk(path: Path, log: Log, number: int = 0) -> RecordedWalk:
 
 
 def _cut_of(log: Log, from_the_first: bool, to_the_last: bool) -> str:
-    """A run is cut into segments wherever the robot is."""
+    """Describe how the walk may extend beyond this segment of its run."""
     number = segment_of(log)
     before = [f"begun before segment {number}"] * (from_the_first and number > 0)
     after = ["gone on in the next segment"] * (to_the_last and log.complete and "segment" in log.metadata)
@@ -124,33 +124,33 @@ def _cut_of(log: Log, from_the_first: bool, to_the_last: bool) -> str:
 
 def _refuse_number(path: Path, number: int, walks: int) -> None:
     if not walks:
-        raise LogError(f"{path}: nobody walked in this log")
+        raise LogError(f"{path}: there is no walk in this log")
     if number > walks:
         raise LogError(f"{path}: it has no walk {number}, only {walks}")
 
 
 def _walk_of_log(log: Log, configuration: Configuration, rows: slice, until_s: float) -> RecordedWalk:
-    """Strides and events count up to the walk after, at `until_s`."""
-    ticks, place = log.ticks[rows], len(FLIPPERS) - 1
+    """Return the walk in some rows. Strides and events belong to it up to the next walk at `until_s`."""
+    ticks, shown = log.ticks[rows], len(FLIPPERS) - 1
     start_s = float(ticks["stamp_s"][0])
-    reported = [stride for stride in log.strides if start_s <= stride["stamp_s"] < until_s]
+    strides = [stride for stride in log.strides if start_s <= stride["stamp_s"] < until_s]
     events = [event for event in log.events if start_s <= event["stamp_s"] < until_s]
     summary = log_summary(log)
     return RecordedWalk(
         title=f"{summary['robot']}  {summary['started']}",
         geometry=configuration.geometry,
         sweep_rad=radians(configuration.gait.sweep_angle_deg),
-        flipper=FLIPPERS[place],
+        flipper=FLIPPERS[shown],
         time_s=ticks["stamp_s"] - start_s,
         phase=ticks["phase"].astype(np.int64),
-        sweep_angle_rad=ticks["angle_rad"][:, 2 * place],
-        adduction_angle_rad=ticks["angle_rad"][:, 2 * place + 1],
-        depth_m=ticks["depth_m"][:, place],
+        sweep_angle_rad=ticks["angle_rad"][:, 2 * shown],
+        adduction_angle_rad=ticks["angle_rad"][:, 2 * shown + 1],
+        depth_m=ticks["depth_m"][:, shown],
         depth_command_m=ticks["depth_command_m"],
-        force_x_n=ticks["force_x_n"][:, place],
-        force_z_n=ticks["force_z_n"][:, place],
+        force_x_n=ticks["force_x_n"][:, shown],
+        force_z_n=ticks["force_z_n"][:, shown],
         body_x_m=ticks["body_x_m"],
-        strides=[_since(start_s, stride) for stride in reported],
+        strides=[_since(start_s, stride) for stride in strides],
         noticed_s=[event["stamp_s"] - start_s for event in events if event["text"] == ANOTHER_MUD],
     )
 
@@ -160,7 +160,7 @@ def _since(start_s: float, stride: dict[str, Any]) -> dict[str, Any]:
 
 
 class _LabReading(NamedTuple):
-    """What the estimator says of one of the authors' runs."""
+    """The estimator's results for one of the authors' runs."""
 
     loads: list[FlipperLoad]  # of the flipper shown, a row each
     strides: list[StrideEstimate]
@@ -168,7 +168,7 @@ class _LabReading(NamedTuple):
 
 
 def _read_lab(lab: LabLog, flipper: str) -> _LabReading:
-    """With what `replay_lab` assumes of a robot of which nothing else is known."""
+    """Estimate one run with the assumptions of `replay_lab` on the authors' robot."""
     drive = LAB_DRIVE._replace(current_limit_a=lab.current_limit_a)
     parameters = EstimationParameters(fixed_base=len(lab.flippers) == 1)
     estimator, reading = MudEstimator(FlipperGeometry(), (drive, drive), parameters), _LabReading([], [], [])
@@ -188,7 +188,7 @@ def _read_lab(lab: LabLog, flipper: str) -> _LabReading:
 def _only_walk(path: Path, lab: LabLog, number: int) -> RecordedWalk:
     _refuse_number(path, number, 1 if lab.flippers else 0)
     flipper, start_s = lab.flippers[-1], float(lab.stamp_s[0])
-    place, reading = FLIPPERS.index(flipper), _read_lab(lab, flipper)
+    shown, reading = FLIPPERS.index(flipper), _read_lab(lab, flipper)
     rows = [STRIDE.decode(stride_row(stride.t_end_s, stride, nan)) for stride in reading.strides]
     return RecordedWalk(
         title=path.name,
@@ -197,8 +197,8 @@ def _only_walk(path: Path, lab: LabLog, number: int) -> RecordedWalk:
         flipper=flipper,
         time_s=lab.stamp_s - start_s,
         phase=lab.phase,
-        sweep_angle_rad=lab.angle_rad[:, 2 * place],
-        adduction_angle_rad=lab.angle_rad[:, 2 * place + 1],
+        sweep_angle_rad=lab.angle_rad[:, 2 * shown],
+        adduction_angle_rad=lab.angle_rad[:, 2 * shown + 1],
         depth_m=np.array([load.depth_m for load in reading.loads]),
         depth_command_m=np.full(len(lab.stamp_s), lab.gait.get("insertion_angle", nan)),
         force_x_n=np.array([load.force_x_n for load in reading.loads]),

@@ -1,4 +1,4 @@
-"""The robot from the side at one moment of a walk: body, arm and plate, where joints and body were measured to be."""
+"""Draws the robot from the side at one row of a walk: body, arm and plate at their measured positions."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from experiments.pictures.colours import BODY, FAINT, FLIPPERS, INK, MUD, SURFAC
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.side_view import SideView, view_from_side
 
-BODY_LENGTH_M, BODY_HEIGHT_M, CORNER_M = 0.13, 0.052, 0.018  # no log knows the body
+BODY_LENGTH_M, BODY_HEIGHT_M, CORNER_M = 0.13, 0.052, 0.018  # not in any log
 EYE_M = 0.0045
-VEIL = 0.45  # how much of the mud lies over what is in it
+VEIL = 0.45  # opacity of the mud over the plate
 
 
 def prepare(panel: Axes, left_m: float, right_m: float, deepest_m: float, highest_m: float) -> None:
-    """Mud with its surface, and air."""
+    """Prepare a panel with mud, its surface, and air."""
     panel.set(xlim=(left_m, right_m), ylim=(-deepest_m, highest_m), aspect="equal")
     panel.axis("off")
     panel.add_patch(Rectangle((left_m, -deepest_m), right_m - left_m, deepest_m, color=MUD, linewidth=0))
@@ -24,7 +24,7 @@ def prepare(panel: Axes, left_m: float, right_m: float, deepest_m: float, highes
 
 
 def body_position_m(walk: RecordedWalk, row: int) -> float:
-    """On the line between two known places where it was not measured, and zero where it never was."""
+    """Return the position of the body, interpolated between known ones; zero without any pose."""
     if np.isfinite(walk.body_x_m[row]):
         return float(walk.body_x_m[row])
     known = np.flatnonzero(np.isfinite(walk.body_x_m))
@@ -32,7 +32,7 @@ def body_position_m(walk: RecordedWalk, row: int) -> float:
 
 
 def view_of(walk: RecordedWalk, row: int, origin_m: float) -> SideView:
-    """`origin_m`: where the beginning of the track is drawn."""
+    """Return the side view of a row. `origin_m` is where the beginning of the track is drawn."""
     sweep_rad, adduction_rad = float(walk.sweep_angle_rad[row]), float(walk.adduction_angle_rad[row])
     return view_from_side(walk.geometry, sweep_rad, adduction_rad, body_position_m(walk, row) + origin_m)
 
@@ -41,7 +41,7 @@ def draw_robot(panel: Axes, walk: RecordedWalk, row: int, origin_m: float) -> No
     view, colour = view_of(walk, row, origin_m), FLIPPERS[walk.flipper]
     _draw_body(panel, *view.shoulder)
     panel.add_patch(Polygon(view.plate, facecolor=colour, edgecolor=colour, linewidth=1.0, joinstyle="round"))
-    panel.plot(*zip(view.shoulder, view.hand, strict=True), color=INK, linewidth=3.0, solid_capstyle="round")
+    panel.plot(*zip(view.shoulder, view.wrist, strict=True), color=INK, linewidth=3.0, solid_capstyle="round")
     panel.plot(*view.shoulder, "o", color=INK, markersize=6)
     veil = Polygon(view.plate, facecolor=MUD, alpha=VEIL, linewidth=0, zorder=3)
     panel.add_patch(veil)
@@ -50,7 +50,7 @@ def draw_robot(panel: Axes, walk: RecordedWalk, row: int, origin_m: float) -> No
 
 
 def _draw_body(panel: Axes, x_m: float, z_m: float) -> None:
-    """Around its shoulder, with an eye in front."""
+    """Draw the body around its shoulder, with an eye in front."""
     left_m, low_m = x_m - BODY_LENGTH_M / 2.0, z_m - BODY_HEIGHT_M / 2.0
     outline = FancyBboxPatch(
         (left_m + CORNER_M, low_m + CORNER_M),
@@ -67,6 +67,6 @@ def _draw_body(panel: Axes, x_m: float, z_m: float) -> None:
 
 
 def draw_trail(panel: Axes, walk: RecordedWalk, rows: range, origin_m: float) -> None:
-    """The way of the plate's lower edge."""
+    """Draw the path of the plate's lower edge."""
     edges = [view_of(walk, row, origin_m).edge for row in rows]
     panel.plot(*zip(*edges, strict=True), color=TRAIL, linewidth=1.3, zorder=4)

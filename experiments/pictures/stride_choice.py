@@ -1,6 +1,6 @@
-"""Which strides of a walk are worth a picture, and which moments of them.
+"""Chooses the strides of a walk for a picture, and the moments of each stride to draw.
 
-A stride fails in one of the paper's two ways (section III-A): the mud gives way and the body stays behind, or the
+A stride fails in one of the paper's two ways (section III-A): the mud yields and the body does not advance, or the
 flipper does not come out of the mud.
 """
 
@@ -17,7 +17,7 @@ from experiments.pictures.recorded_walk import RecordedWalk
 Stride = dict[str, Any]  # a row of log_rows.STRIDE
 
 FULL_FRACTION = 0.5  # of the geometric step; below it a stride slips
-MOMENTS = (  # worth a picture: how they are called, the phase, and the share of it that has passed
+MOMENTS = (  # caption, phase, and the elapsed fraction of the phase
     ("insertion", Phase.INSERTION, 0.0),
     ("insertion ends", Phase.INSERTION, 1.0),
     ("stance", Phase.STANCE, 0.5),
@@ -33,7 +33,7 @@ class Outcome(StrEnum):
     SLIPPING = "slipping"
     STUCK = "stuck"
     GOOD = "good"
-    UNKNOWN = "unknown"  # without a pose nobody knows how far it went
+    UNKNOWN = "unknown"  # its length is not known without a pose
 
 
 class Moment(NamedTuple):
@@ -50,7 +50,7 @@ def outcome_of(stride: Stride, geometric_step_m: float) -> Outcome:
 
 
 def choose_strides(walk: RecordedWalk) -> list[Stride]:
-    """The clearest one of each outcome that there is."""
+    """Return the clearest stride of each outcome."""
     chosen = []
     for outcome in Outcome:
         strides = [stride for stride in walk.own_strides if outcome_of(stride, walk.geometric_step_m) is outcome]
@@ -61,16 +61,14 @@ def choose_strides(walk: RecordedWalk) -> list[Stride]:
 
 
 def _rank(walk: RecordedWalk, stride: Stride, outcome: Outcome) -> tuple[bool, float]:
-    """Lowest for the longest of the good ones and the shortest failure; one that begins above the mud comes before one
-    that was stuck already.
-    """
+    """Rank strides that begin above the mud first, then the longest good stride or the shortest failure."""
     step_m = float(np.nan_to_num(stride["step_m"]))
     began_in_mud = bool(walk.depth_m[rows_of(walk, stride).start] > 0.0)
     return began_in_mud, -step_m if outcome is Outcome.GOOD else step_m
 
 
 def rows_of(walk: RecordedWalk, stride: Stride) -> range:
-    """From the start of its insertion to the end of the swing after it."""
+    """Return the rows from the start of the insertion to the end of the next swing."""
     first, close = (int(np.searchsorted(walk.time_s, stride[name])) for name in ("t_start_s", "stamp_s"))
     beyond = close + np.flatnonzero(np.isin(walk.phase[close:], (Phase.INSERTION, Phase.REST)))
     return range(first, int(beyond[0]) if len(beyond) else len(walk.time_s))
@@ -82,7 +80,7 @@ def duration_s(walk: RecordedWalk, stride: Stride) -> float:
 
 
 def moments_of(walk: RecordedWalk, stride: Stride) -> list[Moment]:
-    """Those of MOMENTS that the stride has: a log may break off before the swing has ended."""
+    """Return the MOMENTS of the stride that are in the log, which may end before the swing."""
     rows = rows_of(walk, stride)
     phase, moments = walk.phase[rows.start : rows.stop], []
     for caption, wanted, fraction in MOMENTS:

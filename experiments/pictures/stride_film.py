@@ -1,6 +1,4 @@
-"""A walk as a moving picture, seen from the side in real time. The camera goes along with the body; the scale stands
-still in the mud.
-"""
+"""A walk as an animated GIF from the side in real time. The camera moves with the body, the scale with the mud."""
 
 from __future__ import annotations
 
@@ -36,11 +34,11 @@ ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": FORCE, "shrinkA": 0.0, "s
 Show = Callable[[int, int], None]  # frames done and to do
 
 
-Frame = tuple[Stride, int]  # a row of the walk, with the stride that it belongs to
+Frame = tuple[Stride, int]  # a row of the walk, with its stride
 
 
 def film_frames(walk: RecordedWalk, strides: Sequence[Stride]) -> list[Frame]:
-    """In real time, one stride after another."""
+    """Return the frames in real time, stride after stride."""
     frames: list[Frame] = []
     for stride in strides:
         rows = rows_of(walk, stride)
@@ -50,7 +48,7 @@ def film_frames(walk: RecordedWalk, strides: Sequence[Stride]) -> list[Frame]:
 
 
 class Camera:
-    """Owns the figure on which one frame after another is drawn."""
+    """Owns the figure on which all frames are drawn."""
 
     def __init__(self, walk: RecordedWalk) -> None:
         self.walk = walk
@@ -70,7 +68,7 @@ class Camera:
 
 
 def draw_film(walk: RecordedWalk, strides: Sequence[Stride], path: Path, show: Show) -> None:
-    """A GIF that begins again when it has ended."""
+    """Write a looping GIF."""
     frames, camera, film = film_frames(walk, strides), Camera(walk), BytesIO()
     palette = _palette([camera.picture(frame) for frame in _fullest_frames(walk, strides)])
 
@@ -86,19 +84,19 @@ def draw_film(walk: RecordedWalk, strides: Sequence[Stride], path: Path, show: S
 
 
 def _fullest_frames(walk: RecordedWalk, strides: Sequence[Stride]) -> list[Frame]:
-    """One of each outcome, with its greatest force: together they have all colours of the film."""
+    """Return the frame with the largest force of each outcome; together they have all colours of the film."""
     one_of_each = {outcome_of(stride, walk.geometric_step_m): stride for stride in strides}.values()
     return [(stride, max(rows_of(walk, stride), key=lambda row: hypot(*_force_n(walk, row)))) for stride in one_of_each]
 
 
 def _palette(pictures: Sequence[Image.Image]) -> Image.Image:
-    """The same for the whole film, so that nothing flickers."""
-    beside = Image.fromarray(np.hstack([np.asarray(picture) for picture in pictures]))
-    return beside.quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+    """Return one palette for the whole film, so that colours do not flicker."""
+    joined = Image.fromarray(np.hstack([np.asarray(picture) for picture in pictures]))
+    return joined.quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
 
 
 def _force_n(walk: RecordedWalk, row: int) -> tuple[float, float]:
-    """Forward and up; zero where it is not known, as upward in stance."""
+    """Return the forward and upward force; zero where it is unknown, such as upward in stance."""
     return float(np.nan_to_num(walk.force_x_n[row])), float(np.nan_to_num(walk.force_z_n[row]))
 
 
@@ -109,19 +107,19 @@ def _draw_frame(panel: Axes, walk: RecordedWalk, stride: Stride, row: int) -> No
     draw_robot(panel, walk, row, 0.0)
     draw_trail(panel, walk, range(rows_of(walk, stride).start, row + 1), 0.0)
     _draw_force(panel, walk, row)
-    _draw_words(panel, walk, stride, row)
+    _draw_texts(panel, walk, stride, row)
 
 
 def _draw_marks(panel: Axes, position_m: float) -> None:
     first, last = ceil((position_m - HALF_WIDTH_M) / MARK_M), floor((position_m + HALF_WIDTH_M) / MARK_M)
     for number in range(first, last + 1):
         panel.plot([number * MARK_M] * 2, [-DEEPEST_M, 0.012 - DEEPEST_M], color=SURFACE, linewidth=1.2)
-        place = (number * MARK_M + 0.004, 0.003 - DEEPEST_M)
-        panel.text(*place, f"{100.0 * number * MARK_M:.0f} cm", size=9, color=SURFACE, clip_on=True)
+        corner = (number * MARK_M + 0.004, 0.003 - DEEPEST_M)
+        panel.text(*corner, f"{100.0 * number * MARK_M:.0f} cm", size=9, color=SURFACE, clip_on=True)
 
 
 def _draw_force(panel: Axes, walk: RecordedWalk, row: int) -> None:
-    """Of the mud on the flipper, drawn at its lower edge."""
+    """Draw the force of the mud on the flipper at its lower edge."""
     force_n = _force_n(walk, row)
     if not (walk.depth_m[row] > 0.0 and hypot(*force_n) > LEAST_FORCE_N):
         return
@@ -130,16 +128,16 @@ def _draw_force(panel: Axes, walk: RecordedWalk, row: int) -> None:
     panel.annotate("", tip, (x_m, z_m), arrowprops=ARROW, zorder=5)
 
 
-def _draw_words(panel: Axes, walk: RecordedWalk, stride: Stride, row: int) -> None:
+def _draw_texts(panel: Axes, walk: RecordedWalk, stride: Stride, row: int) -> None:
     outcome = outcome_of(stride, walk.geometric_step_m)
     name = "stride" if outcome is Outcome.UNKNOWN else f"{outcome} stride"
     phase = Phase(int(walk.phase[row])).name.lower()
-    words = {
+    texts = {
         0.02: (f"{name} {stride['index']}", OUTCOMES[outcome]),
         0.30: (phase, INK),
         0.48: (f"depth {100.0 * walk.depth_m[row]:.1f} cm", INK),
         0.70: (f"force {hypot(*_force_n(walk, row)):.1f} N", FORCE),
         0.88: (f"{walk.time_s[row]:.1f} s", INK),
     }
-    for place, (text, colour) in words.items():
-        panel.text(place, 0.93, text, size=11, color=colour, transform=panel.transAxes, va="center")
+    for x, (text, colour) in texts.items():
+        panel.text(x, 0.93, text, size=11, color=colour, transform=panel.transAxes, va="center")

@@ -1,6 +1,4 @@
-"""Strides side by side as strips of pictures: how the flipper stands in the mud from insertion to the next one, and how
-far the body has come.
-"""
+"""Strides as strips of pictures: the flipper in the mud from one insertion to the next, and the advance of the body."""
 
 from __future__ import annotations
 
@@ -21,22 +19,22 @@ from experiments.pictures.recorded_walk import RecordedWalk  # noqa: E402
 from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare  # noqa: E402
 from experiments.pictures.stride_choice import MOMENTS, Outcome, Stride, moments_of, outcome_of, rows_of  # noqa: E402
 
-DEEPEST_M, HIGHEST_M = 0.106, 0.146  # of what a row shows, below and above the surface
-APART_M = 0.235  # from one moment to the next
+DEEPEST_M, HIGHEST_M = 0.106, 0.146  # range of a row below and above the surface
+SPACING_M = 0.235  # from one moment to the next
 MARGIN_M = 0.09
 LEAST_ARROW_M = 0.015
 WIDTH_IN, HEAD_IN, FOOT_IN, DOTS_PER_INCH = 12.0, 0.36, 0.34, 150
 ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": INK, "shrinkA": 0.0, "shrinkB": 0.0, "linewidth": 1.2}
-WITH_PLACE = "Arrow: how far the body has come since the insertion began.  Red line: the way of the plate's lower edge."
-WITHOUT_PLACE = "Red line: the way of the plate's lower edge.  Where the body was is not in this log."
+WITH_POSE = "Arrow: advance of the body since the start of the insertion.  Red line: path of the plate's lower edge."
+WITHOUT_POSE = "Red line: path of the plate's lower edge.  This log has no position of the body."
 
 
 def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> None:
-    """A row a stride, each a series of moments."""
+    """Draw one row for each stride, with its moments from left to right."""
     shown = {moment.caption for stride in strides for moment in moments_of(walk, stride)}
     captions = [caption for caption, *_ in MOMENTS if caption in shown]
     farthest_m = max(_farthest_m(walk, stride) for stride in strides)
-    width_m = 2.0 * MARGIN_M + APART_M * (len(captions) - 1) + farthest_m
+    width_m = 2.0 * MARGIN_M + SPACING_M * (len(captions) - 1) + farthest_m
     height_in = WIDTH_IN * (DEEPEST_M + HIGHEST_M) / width_m * len(strides) + HEAD_IN + FOOT_IN
     figure, panels = plt.subplots(len(strides), 1, figsize=(WIDTH_IN, height_in), squeeze=False)
     figure.subplots_adjust(0.0, FOOT_IN / height_in, 1.0, 1.0 - HEAD_IN / height_in, hspace=0.0)
@@ -44,7 +42,7 @@ def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> Non
         prepare(panel, -MARGIN_M, width_m - MARGIN_M, DEEPEST_M, HIGHEST_M)
         _draw_row(panel, walk, stride, captions)
     _write_captions(figure, captions, width_m, height_in)
-    legend = WITH_PLACE if np.any(np.isfinite(walk.body_x_m)) else WITHOUT_PLACE
+    legend = WITH_POSE if np.any(np.isfinite(walk.body_x_m)) else WITHOUT_POSE
     figure.text(0.012, 0.45 * FOOT_IN / height_in, legend, size=12, va="center", color=INK)
     figure.savefig(path, dpi=DOTS_PER_INCH)
     plt.close(figure)
@@ -52,23 +50,23 @@ def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> Non
 
 def _write_captions(figure: Figure, captions: Sequence[str], width_m: float, height_in: float) -> None:
     for column, caption in enumerate(captions):
-        place = (MARGIN_M + column * APART_M) / width_m, 1.0 - 0.65 * HEAD_IN / height_in
-        figure.text(*place, caption, size=13, ha="center", va="center", color=INK)
+        centre = (MARGIN_M + column * SPACING_M) / width_m, 1.0 - 0.65 * HEAD_IN / height_in
+        figure.text(*centre, caption, size=13, ha="center", va="center", color=INK)
 
 
 def _farthest_m(walk: RecordedWalk, stride: Stride) -> float:
-    """That the body gets in a stride."""
+    """Return the largest advance of the body in a stride."""
     rows = rows_of(walk, stride)
     return max(body_position_m(walk, row) for row in rows) - body_position_m(walk, rows.start)
 
 
 def _draw_row(panel: Axes, walk: RecordedWalk, stride: Stride, captions: Sequence[str]) -> None:
-    """Each moment under its caption."""
+    """Draw each moment of a stride below its caption."""
     first = rows_of(walk, stride).start
     start_m = body_position_m(walk, first)
     _draw_title(panel, walk, stride)
     for caption, row in moments_of(walk, stride):
-        begin_m = captions.index(caption) * APART_M
+        begin_m = captions.index(caption) * SPACING_M
         draw_robot(panel, walk, row, begin_m - start_m)
         draw_trail(panel, walk, range(first, row + 1), begin_m - start_m)
         if np.all(np.isfinite(walk.body_x_m[[first, row]])):
@@ -76,12 +74,12 @@ def _draw_row(panel: Axes, walk: RecordedWalk, stride: Stride, captions: Sequenc
 
 
 def _draw_title(panel: Axes, walk: RecordedWalk, stride: Stride) -> None:
-    outcome, place = outcome_of(stride, walk.geometric_step_m), (0.018 - MARGIN_M, HIGHEST_M - 0.03)
+    outcome, corner = outcome_of(stride, walk.geometric_step_m), (0.018 - MARGIN_M, HIGHEST_M - 0.03)
     name = "stride" if outcome is Outcome.UNKNOWN else f"{outcome} stride"
-    reported = f"number {stride['index']}, {100.0 * stride['depth_m']:.1f} cm deep, at {stride['t_start_s']:.1f} s"
-    title = panel.annotate(name, place, weight="bold", size=15, color=OUTCOMES[outcome])
+    details = f"number {stride['index']}, {100.0 * stride['depth_m']:.1f} cm deep, at {stride['t_start_s']:.1f} s"
+    title = panel.annotate(name, corner, weight="bold", size=15, color=OUTCOMES[outcome])
     after: dict[str, Any] = {"xycoords": (title, "data"), "xytext": (10, 0), "textcoords": "offset points"}
-    panel.annotate(reported, (1, place[1]), size=12, color=INK, **after)
+    panel.annotate(details, (1, corner[1]), size=12, color=INK, **after)
 
 
 def _draw_advance(panel: Axes, start_m: float, advance_m: float) -> None:

@@ -1,7 +1,7 @@
-"""A walk against time, after the paper's figure 8: forces, coefficients, depth, place and steps, muds shaded.
+"""A walk against time, after the paper's figure 8: forces, coefficients, depth, position and steps, with shaded muds.
 
-The paper's own figure shades the muds that the experimenters had laid; so does the demo, which knows its track. From a
-log alone a mud begins with the stride after which the robot said so.
+The paper's own figure shades the muds that the experimenters had prepared, and so does the demo, which knows its track.
+From a log alone, a mud begins with the stride after which the robot noticed it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ WIDTH_IN, PANEL_IN, DOTS_PER_INCH = 10.0, 1.55, 120
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 NOTICED = (0, (2, 2))  # dashes
 SHORTEST_S = 0.1
-FULL_VIEW = 1.6  # of the largest value: error bars may reach beyond what is shown
+FULL_VIEW = 1.6  # height of a panel over its largest value; error bars may be cut
 LEGEND: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.97), "fontsize": "small", "frameon": False}
 STYLE: dict[Any, Any] = {
     "axes.edgecolor": FAINT,
@@ -47,7 +47,7 @@ Draw = Callable[[Axes, RecordedWalk], None]
 
 
 def plot_walk(walk: RecordedWalk, path: Path, track: Track | None = None) -> None:
-    """`track`: the muds that were really there."""
+    """Draw a walk. `track` has the real muds where they are known."""
     wanted, regions = _panels(walk), mud_regions(walk, track)
     size = (WIDTH_IN, PANEL_IN * len(wanted) + 0.4)
     with plt.rc_context(STYLE):
@@ -67,17 +67,17 @@ def plot_walk(walk: RecordedWalk, path: Path, track: Track | None = None) -> Non
 
 
 def _panels(walk: RecordedWalk) -> list[tuple[str, Draw]]:
-    """Those of which the log holds anything."""
+    """Return the panels for which the log has values."""
     panels: list[tuple[str, Draw]] = [("force (N)", _plot_forces)]
     panels += [(f"${name}$ (N/cm³)", partial(_plot_coefficient, name=name)) for name in COEFFICIENTS]
     panels.append(("depth (cm)", _plot_depth))
     if np.any(np.isfinite(walk.body_x_m)):
-        panels += [("body (m)", _plot_place), ("step (cm)", _plot_steps)]
+        panels += [("body (m)", _plot_position), ("step (cm)", _plot_steps)]
     return panels
 
 
 def mud_regions(walk: RecordedWalk, track: Track | None) -> list[MudRegion]:
-    """Along the time axis: from the first arrival of the body in one mud to that in the next, or as the robot said."""
+    """Return the muds along the time axis: by the arrival of the body on the track, or as the robot noticed them."""
     end_s = float(walk.time_s[-1])
     if track is None:
         starts_s = [0.0, *walk.mud_starts_s]
@@ -94,7 +94,7 @@ def mud_regions(walk: RecordedWalk, track: Track | None) -> list[MudRegion]:
 
 
 def _arrival_s(walk: RecordedWalk, position_m: float) -> float:
-    """At the end of the walk where it never came so far."""
+    """Return when the body first arrived at a position; the end of the walk where it never did."""
     beyond = np.flatnonzero(walk.body_x_m >= position_m)
     return float(walk.time_s[beyond[0] if len(beyond) else -1])
 
@@ -107,7 +107,7 @@ def _shade(panel: Axes, regions: list[MudRegion], noticed_s: list[float]) -> Non
 
 
 def _name_muds(panel: Axes, regions: list[MudRegion]) -> None:
-    """Above the panel's legend."""
+    """Write the names of the muds above the panel's legend."""
     above: dict[str, Any] = {
         "xycoords": ("data", "axes fraction"),
         "xytext": (0.0, 18.0),
@@ -124,7 +124,7 @@ def _plot_forces(panel: Axes, walk: RecordedWalk) -> None:
 
 
 def _explain_coefficients(panel: Axes, walk: RecordedWalk) -> None:
-    """What the marks in all panels of coefficients mean, as far as they occur."""
+    """Explain the marks in the panels of coefficients that occur."""
     for flipper in dict.fromkeys(NAMES[stride["flipper"]] for stride in walk.strides):
         panel.plot([], [], "o", color=FLIPPERS[flipper], label=flipper)
     if any(stride[f"{name}_at_least"] for name in COEFFICIENTS for stride in walk.strides):
@@ -138,9 +138,9 @@ def _explain_coefficients(panel: Axes, walk: RecordedWalk) -> None:
 
 
 def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
-    """Full dots are values, triangles lower bounds, hollow ones not valid; bars are two standard errors."""
-    reported = [stride for stride in walk.strides if np.isfinite(stride[name])]
-    for stride in reported:
+    """Draw values as dots, lower bounds as triangles, invalid ones hollow; bars are two standard errors."""
+    known = [stride for stride in walk.strides if np.isfinite(stride[name])]
+    for stride in known:
         colour = FLIPPERS[NAMES[stride["flipper"]]]
         panel.errorbar(
             stride["stamp_s"],
@@ -153,7 +153,7 @@ def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
             markerfacecolor=colour if stride[f"{name}_valid"] else "white",
             label="_",
         )
-    largest = max((stride[name] / 1e6 for stride in reported), default=0.0)
+    largest = max((stride[name] / 1e6 for stride in known), default=0.0)
     panel.set_ylim(0.0, FULL_VIEW * largest if largest > 0.0 else 1.0)
     if name == COEFFICIENTS[0]:
         _explain_coefficients(panel, walk)
@@ -175,19 +175,19 @@ def _plot_depth(panel: Axes, walk: RecordedWalk) -> None:
     panel.legend(ncols=4, **LEGEND)
 
 
-def _plot_place(panel: Axes, walk: RecordedWalk) -> None:
+def _plot_position(panel: Axes, walk: RecordedWalk) -> None:
     panel.plot(walk.time_s, walk.body_x_m, color=INK, linewidth=1.2)
 
 
 def _plot_steps(panel: Axes, walk: RecordedWalk) -> None:
-    """A bar from the start of a stride to its close, in the colour of how it went."""
+    """Draw a bar from the start of each stride to its end, in the colour of its outcome."""
     known = [stride for stride in walk.own_strides if np.isfinite(stride["step_m"])]
     for outcome in Outcome:
-        went = [stride for stride in known if outcome_of(stride, walk.geometric_step_m) is outcome]
-        starts_s = [stride["t_start_s"] for stride in went]
-        lengths_s = [stride["stamp_s"] - stride["t_start_s"] for stride in went]
-        steps_cm = [100.0 * stride["step_m"] for stride in went]
-        if went:
+        own = [stride for stride in known if outcome_of(stride, walk.geometric_step_m) is outcome]
+        starts_s = [stride["t_start_s"] for stride in own]
+        lengths_s = [stride["stamp_s"] - stride["t_start_s"] for stride in own]
+        steps_cm = [100.0 * stride["step_m"] for stride in own]
+        if own:
             panel.bar(starts_s, steps_cm, lengths_s, align="edge", color=OUTCOMES[outcome], label=str(outcome))
     panel.axhline(0.0, color=FAINT, linewidth=0.8)
     if np.isfinite(walk.geometric_step_m):

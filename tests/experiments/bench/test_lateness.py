@@ -54,17 +54,17 @@ class Sinking:
 
     def __init__(self, times: int) -> None:
         self._times = times
-        self.wishes = 0
+        self.requests = 0
 
     def __call__(self, rig: SimulatedRig) -> None:
         if not hasattr(rig, "loop") or rig.loop.pending_request is not Request.ARM:
             return
-        self.wishes += 1
-        if self.wishes <= self._times:
+        self.requests += 1
+        if self.requests <= self._times:
             rig.robot.plant.arms[0].adduction_rad += 0.05
 
 
-def sinking_stand(configuration: Configuration, sinking: Sinking) -> TestRig:
+def sinking_rig(configuration: Configuration, sinking: Sinking) -> TestRig:
     """Its drives tell a motion in the tick in which it begins."""
     drives = on_blocks(configuration).drives(configuration)
     prompt = {joint: replace(each, message_delay_s=0.0) for joint, each in drives.items()}
@@ -72,18 +72,20 @@ def sinking_stand(configuration: Configuration, sinking: Sinking) -> TestRig:
     return TestRig(rig, SimulatedBenchOperator(rig))
 
 
-def test_a_flipper_that_sinks_as_the_robot_is_armed_only_delays_it(configuration: Configuration) -> None:
+def test_a_flipper_that_sinks_during_arming_only_delays_it(configuration: Configuration) -> None:
     sinking = Sinking(2)
-    opened_rig = sinking_stand(configuration, sinking)
+    opened_rig = sinking_rig(configuration, sinking)
     opened_rig.arm()
-    assert sinking.wishes == 3
+    assert sinking.requests == 3
     assert all(state.closed_loop for state in opened_rig.loop.states)
 
 
-def test_what_stands_against_arming_is_told(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
-    opened_rig = sinking_stand(configuration, Sinking(1000))
+def test_a_fault_that_prevents_arming_is_reported(
+    configuration: Configuration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened_rig = sinking_rig(configuration, Sinking(1000))
     monkeypatch.setattr("experiments.bench.test_rig.ARMING_S", 1.0)
-    with pytest.raises(BenchError, match=r"Closed loop .* within 1 s\. The left_adduction joint moves"):
+    with pytest.raises(BenchError, match=r"closed loop within 1 s\. The left_adduction joint moves"):
         opened_rig.arm()
 
 
@@ -187,9 +189,7 @@ def test_what_was_out_of_its_bounds_stays_in_the_report_though_it_is_well_when_m
 
     bench.check(measure)
     assert readings_kept(bench)["error"].value == 5.0
-    reported = (
-        r"test, before it was repeated: error is 7 deg, must be 0 to 6: check the gains\. Meanwhile .* 3 of 4"
-    )
+    reported = r"test, before it was repeated: error is 7 deg, must be 0 to 6: check the gains\. Meanwhile .* 3 of 4"
     assert any(re.match(reported, line) for line, good in bench.report.lines(brief=True))
     assert "error is 7 deg" in bench.report.as_json["tests"][0]["spoiled"][0]
 

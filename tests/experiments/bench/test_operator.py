@@ -1,4 +1,4 @@
-"""Who stands beside the robot: asked in words on a bench, looked up in the mechanics of a simulated one."""
+"""The operator at the bench: prompted on a real one, reading the mechanics of a simulated one."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ def nothing() -> None: ...
 
 
 @pytest.mark.parametrize(("answer", "consents"), [("", True), ("n", False)])
-def test_nothing_moves_without_a_yes(answer: str, consents: bool) -> None:
+def test_nothing_moves_without_permission(answer: str, consents: bool) -> None:
     operator = ScriptedOperator(answer)
     assert PromptedBenchOperator(operator, sure=False).allows_motion("It moves.", nothing) is consents
     assert operator.asked == ["It moves."]
 
 
-def test_who_has_said_yes_is_told_and_not_asked() -> None:
+def test_permission_in_advance_is_reported_and_not_asked_for() -> None:
     operator = ScriptedOperator("n")
     assert PromptedBenchOperator(operator, sure=True).allows_motion("It moves.", nothing)
     assert (operator.asked, operator.reported) == ([], ["It moves."])
@@ -31,21 +31,21 @@ def test_who_has_said_yes_is_told_and_not_asked() -> None:
     ("answer", "observation"),
     [("", Observation.RIGHT), ("w", Observation.OPPOSITE), ("o", Observation.OTHER), ("n", Observation.NOTHING)],
 )
-def test_what_was_seen_is_taken_as_told(answer: str, observation: Observation) -> None:
+def test_the_answer_is_the_observation(answer: str, observation: Observation) -> None:
     operator = ScriptedOperator(answer)
     assert PromptedBenchOperator(operator, sure=True).observed_motion("right_adduction", nothing) is observation
     assert "the right flipper rise" in operator.asked[0]
 
 
 @pytest.mark.parametrize(("answer", "done"), [("", True), ("s", False)])
-def test_hands_may_be_refused(answer: str, done: bool) -> None:
+def test_manual_checks_can_be_skipped(answer: str, done: bool) -> None:
     bench_operator = PromptedBenchOperator(ScriptedOperator(answer, answer), sure=True)
     assert bench_operator.hold_level(nothing) is done
     assert bench_operator.turn_joint("left_sweep", nothing) is done
 
 
 @pytest.mark.parametrize(
-    ("ways_rad", "observation"),
+    ("motions_rad", "observation"),
     [
         ((0.2, 0.0, 0.0, 0.0), Observation.RIGHT),
         ((-0.2, 0.0, 0.0, 0.0), Observation.OPPOSITE),
@@ -54,13 +54,13 @@ def test_hands_may_be_refused(answer: str, done: bool) -> None:
         ((0.0, 0.0, 0.0, 0.0), Observation.NOTHING),
     ],
 )
-def test_simulated_eyes_see_where_the_joints_go(
-    configuration: Configuration, ways_rad: tuple[float, ...], observation: Observation
+def test_the_simulated_operator_observes_the_mechanics(
+    configuration: Configuration, motions_rad: tuple[float, ...], observation: Observation
 ) -> None:
     rig = SimulatedRig(configuration)
     bench_operator = SimulatedBenchOperator(rig)
     bench_operator.start_observing()
-    for arm, (sweep_rad, adduction_rad) in zip(rig.robot.plant.arms, (ways_rad[:2], ways_rad[2:]), strict=True):
+    for arm, (sweep_rad, adduction_rad) in zip(rig.robot.plant.arms, (motions_rad[:2], motions_rad[2:]), strict=True):
         arm.sweep_rad += sweep_rad
         arm.adduction_rad += adduction_rad
     bench_operator.observe_farthest()

@@ -41,16 +41,16 @@ def answering(short_folder: Path) -> Iterator[Path]:
         yield path
 
 
-def test_beside_a_daemon_the_bench_does_not_open(configuration: Configuration, answering: Path) -> None:
+def test_the_bench_does_not_open_while_a_daemon_runs(configuration: Configuration, answering: Path) -> None:
     with pytest.raises(BenchError, match="'systemctl stop mudskipper' first"):
         HardwareRig(replace(configuration, status=StatusParameters(str(answering))))
 
 
-def test_a_socket_that_nobody_answers_on_is_no_daemon(short_folder: Path) -> None:
+def test_a_socket_without_an_answer_is_no_daemon(short_folder: Path) -> None:
     refuse_beside_daemon(short_folder / "mudskipper.sock")
 
 
-def test_a_bus_that_does_not_open_is_told_in_a_sentence(configuration: Configuration, short_folder: Path) -> None:
+def test_a_bus_that_does_not_open_is_reported(configuration: Configuration, short_folder: Path) -> None:
     changed = replace(on_channels(configuration, ["nocan9"]), status=StatusParameters(str(short_folder / "s")))
     with pytest.raises(BenchError, match=r"bus.left \(socketcan nocan9\) does not open: .*\."):
         HardwareRig(changed)
@@ -80,7 +80,7 @@ def test_each_problem_of_a_configuration_names_its_file_once(text: str, tmp_path
     assert all(line.startswith(f"{path}: ") and line.count("bad.toml") == 1 for line in reported)
 
 
-def test_a_joint_whose_encoder_counts_backwards_is_never_held(tmp_path: Path) -> None:
+def test_a_joint_whose_encoder_counts_backwards_never_gets_stiffness(tmp_path: Path) -> None:
     """It would run away. All joints are still check_nudge, and nothing moves after that."""
     report = tmp_path / "report.json"
     flipped = ["-p", "tests.experiments.bench.flipped_encoder"]
@@ -126,7 +126,7 @@ def bad(readings: Iterable[Reading]) -> list[str]:
 
 
 def test_every_drive_is_heard_on_real_buses(opened_rig: TestRig) -> None:
-    """What a busy computer cannot spoil: rates and delays are for one that has nothing else to do."""
+    """Only checks that a busy computer cannot disturb; rates and delays need an idle one."""
     readings = [
         reading
         for check in (check_ids, check_unknown_ids, check_firmware, check_watchdogs)
@@ -139,7 +139,7 @@ def test_every_drive_is_heard_on_real_buses(opened_rig: TestRig) -> None:
 def test_on_real_buses_a_joint_is_nudged_or_the_late_computer_is_reported(
     opened_rig: TestRig,
 ) -> None:
-    """A torque that comes late proves nothing, so a busy computer ends the nudge, and with a sentence."""
+    """A late torque proves nothing, so a busy computer ends the nudge with a message."""
     problems = []
     try:
         readings = list(check_nudge(opened_rig, "left_sweep"))
@@ -176,7 +176,7 @@ def test_a_channel_that_fits_no_bus_is_refused(configuration: Configuration, giv
         on_channels(configuration, [given])
 
 
-def test_idle_flippers_of_the_simulated_bench_stay_where_they_lie(configuration: Configuration) -> None:
+def test_idle_flippers_of_the_simulated_bench_do_not_move(configuration: Configuration) -> None:
     rig = SimulatedRig(configuration)
     before = rig.robot.plant.angles_rad
     for _ in range(380):

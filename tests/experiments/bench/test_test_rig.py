@@ -46,14 +46,14 @@ def test_ctrl_c_with_raised_flippers_leaves_the_drives_idle(bench: StagedBench, 
     assert energised(rig) == {False}
 
 
-def test_the_end_idles_the_drives_without_the_loop(bench: StagedBench, rig: SimulatedRig) -> None:
+def test_force_idle_works_without_the_loop(bench: StagedBench, rig: SimulatedRig) -> None:
     bench.test_rig.arm(lambda held, states: NO_TORQUE)
     bench.test_rig.force_idle()
     rig.wait()
     assert energised(rig) == {False}
 
 
-def test_a_fault_ends_a_measurement_with_its_sentence(bench: StagedBench, rig: SimulatedRig) -> None:
+def test_a_fault_ends_a_measurement_with_its_message(bench: StagedBench, rig: SimulatedRig) -> None:
     bench.test_rig.arm(lambda held, states: NO_TORQUE)
     rig.robot.restart_drive(1)
     with pytest.raises(BenchError, match=r"left_adduction.*\."):
@@ -67,7 +67,7 @@ def test_a_robot_that_is_not_idle_is_not_armed_again(bench: StagedBench) -> None
 
 
 class Asked(PromptedBenchOperator):
-    """With a person who says the same of every fault."""
+    """Use an operator with the same answer to every fault."""
 
     def __init__(self, answer: str) -> None:
         operator = ScriptedOperator(answer)
@@ -76,7 +76,7 @@ class Asked(PromptedBenchOperator):
 
 
 @pytest.mark.parametrize("answer", [CLEAR, LEAVE])
-def test_a_fault_of_before_is_cleared_where_a_person_says_so(rig: SimulatedRig, answer: str) -> None:
+def test_an_earlier_fault_is_cleared_if_the_operator_says_so(rig: SimulatedRig, answer: str) -> None:
     """No daemon may run beside the bench, so 'mudskipper clear' is not to be had."""
     rig.robot.drives[1].trip(DriveError.WATCHDOG)
     bench_operator = Asked(answer)
@@ -92,14 +92,14 @@ def test_a_fault_of_before_is_cleared_where_a_person_says_so(rig: SimulatedRig, 
     assert "The left_adduction drive reports error" in question and question.endswith("Is the cause gone?")
 
 
-def test_where_nobody_is_there_a_fault_of_before_stands(rig: SimulatedRig) -> None:
+def test_an_earlier_fault_remains_without_an_operator(rig: SimulatedRig) -> None:
     rig.robot.drives[1].trip(DriveError.WATCHDOG)
     with pytest.raises(BenchError, match="cannot be armed: The left_adduction drive reports error"):
         TestRig(rig, AbsentBenchOperator()).arm()
     assert rig.robot.drives[1].failed
 
 
-def test_a_drive_that_does_not_let_go_is_told(bench: StagedBench, rig: SimulatedRig) -> None:
+def test_a_drive_that_does_not_go_idle_is_reported(bench: StagedBench, rig: SimulatedRig) -> None:
     bench.test_rig.arm(lambda held, states: NO_TORQUE)
     for port in rig.buses["right"].ports[1:]:
         port.full = True
@@ -110,12 +110,12 @@ def test_a_drive_that_does_not_let_go_is_told(bench: StagedBench, rig: Simulated
         bench.test_rig.switch_off()
 
 
-def test_what_holds_gently_never_exceeds_a_tiny_torque(bench: StagedBench) -> None:
+def test_the_gentle_hold_law_limits_the_torque(bench: StagedBench) -> None:
     held = Joints(1.0, -1.0, 0.1, -0.1)
     assert hold_gently(held, bench.test_rig.loop.states) == (MOST_NM, -MOST_NM, 0.1, -0.1)
 
 
-def test_where_nobody_is_there_hands_are_not_needed_and_eyes_not_claimed(configuration: Configuration) -> None:
+def test_checks_that_need_an_operator_are_left_out_without_one(configuration: Configuration) -> None:
     opened_rig = TestRig(SimulatedRig(configuration), AbsentBenchOperator())
     readings = [
         *check_level_pose(opened_rig),
@@ -127,7 +127,7 @@ def test_where_nobody_is_there_hands_are_not_needed_and_eyes_not_claimed(configu
     ] * 3
 
 
-def test_what_nobody_was_there_for_is_not_told_as_passed() -> None:
+def test_left_out_checks_are_not_reported_as_passed() -> None:
     report = BenchReport()
     report.begin(3, "test")
     report.add(left_out("left_sweep: turned by hand"))
@@ -162,7 +162,7 @@ def test_an_encoder_that_counts_against_its_motor_never_closes_a_loop(rig: Simul
     assert report.own_obstacle(6, "test_joints_follow_a_slow_stroke") == ""
 
 
-def test_joints_stand_side_by_side_in_the_table() -> None:
+def test_the_table_has_one_column_for_each_joint() -> None:
     well = [Reading(f"{joint}: lag", 1.0 + index, "ms", -9.0, 9.0) for index, joint in enumerate(JOINTS)]
     lines = list(
         table_lines("stage 6", [*well[:3], well[3]._replace(value=20.0), Reading("load", 35.0, "%", 0.0, 80.0)])
@@ -186,7 +186,7 @@ def test_a_reading_out_of_its_bounds_fails_with_what_to_do(bench: StagedBench) -
     assert bench.report.as_json["tests"][0]["readings"] == [good.as_json, bad.as_json]
 
 
-def test_what_could_not_be_measured_is_never_good_and_is_null_in_json() -> None:
+def test_an_unknown_value_is_never_good_and_is_null_in_json() -> None:
     reading = Reading("delay", nan, "s")
     assert not reading.good
     assert reading.value_text == "unknown"
@@ -221,7 +221,7 @@ def test_a_stage_begins_where_all_before_it_have_passed() -> None:
     assert report_with().obstacle(1) == ""
 
 
-def test_a_stage_that_was_not_done_says_why() -> None:
+def test_a_skipped_stage_says_why() -> None:
     report = report_with(PASSED)
     report.begin(2, "test")
     report.worsen(SKIPPED, "interrupted")
@@ -230,13 +230,13 @@ def test_a_stage_that_was_not_done_says_why() -> None:
     assert lines[:3] == ["stage 1, wiring: passed", "stage 2, signs: skipped: interrupted", "stage 3, zeros: skipped"]
 
 
-def test_nothing_begins_after_a_drive_that_kept_its_torque() -> None:
+def test_no_test_begins_after_a_drive_kept_its_torque() -> None:
     report = report_with(PASSED)
     report.keeps_torque = "left_sweep: cut the power"
     assert [report.obstacle(stage) for stage in (1, 2)] == ["left_sweep: cut the power"] * 2
 
 
-def test_what_was_told_first_of_a_test_remains() -> None:
+def test_the_first_outcome_of_a_test_remains() -> None:
     report = BenchReport()
     report.begin(1, "test")
     report.worsen(FAILED, "first")
@@ -258,9 +258,9 @@ def test_the_lag_of_a_shifted_motion_is_found(shift: float) -> None:
 
 
 @pytest.mark.parametrize(("flags", "first"), [("1100111", 4), ("0111", 1), ("0110", None), ("", None)])
-def test_what_lasts_begins_where_enough_follow(flags: str, first: int | None) -> None:
+def test_the_first_lasting_flag_is_followed_by_enough_others(flags: str, first: int | None) -> None:
     assert first_lasting([flag == "1" for flag in flags], 3) == first
 
 
-def test_where_nothing_moves_there_is_no_lag() -> None:
+def test_without_motion_there_is_no_lag() -> None:
     assert np.isnan(lag_ticks(np.zeros(100), np.zeros(100)))

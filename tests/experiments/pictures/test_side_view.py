@@ -52,11 +52,11 @@ def test_the_edge_is_where_the_kinematics_put_it(sweep_rad: float, adduction_rad
 def test_arm_and_plate_keep_their_lengths_seen_square_on(sweep_rad: float, adduction_rad: float) -> None:
     """The arm lies in the frame that tilts: seen along y, l sin α of it goes forward and l cos α sin β upward."""
     view = view_from_side(GEOMETRY, sweep_rad, adduction_rad)
-    forward_m, up_m = (hand - shoulder for hand, shoulder in zip(view.hand, view.shoulder, strict=True))
+    forward_m, up_m = (wrist - shoulder for wrist, shoulder in zip(view.wrist, view.shoulder, strict=True))
     outward_m = GEOMETRY.flipper_length_m * cos(sweep_rad)
     assert forward_m == pytest.approx(GEOMETRY.flipper_length_m * sin(sweep_rad), abs=1e-12)
     assert up_m == pytest.approx(outward_m * sin(adduction_rad), abs=1e-12)
-    assert view.hand[1] - view.edge[1] == pytest.approx(GEOMETRY.drop_m * cos(adduction_rad), abs=1e-12)
+    assert view.wrist[1] - view.edge[1] == pytest.approx(GEOMETRY.drop_m * cos(adduction_rad), abs=1e-12)
 
 
 @given(SWEEPS, ADDUCTIONS, st.integers(0, 2**32 - 1))
