@@ -80,7 +80,7 @@ def test_a_flipper_that_sinks_during_arming_only_delays_it(configuration: Config
     assert all(state.closed_loop for state in opened_rig.loop.states)
 
 
-def test_a_fault_that_prevents_arming_is_reported(
+def test_a_fault_against_arming_is_reported(
     configuration: Configuration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened_rig = sinking_rig(configuration, Sinking(1000))
