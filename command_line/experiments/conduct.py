@@ -27,11 +27,7 @@ from firmware_host.configuration.file_problems import why_not
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.operator.status_client import CallRefusedError
 
-EXIT_STATUS = {
-    Ending.DONE: exit_codes.OK,
-    Ending.UNHEALTHY: exit_codes.UNHEALTHY,
-    Ending.REFUSED: exit_codes.REFUSED,
-}
+EXIT_STATUS = {Ending.DONE: exit_codes.OK, Ending.UNHEALTHY: exit_codes.UNHEALTHY, Ending.REFUSED: exit_codes.REFUSED}
 Result = TypeVar("Result")
 
 

@@ -194,10 +194,7 @@ def _add_stage_encoder(loadcell: argparse.ArgumentParser) -> None:
         help="port of an encoder of the stage, which may be pushed by hand then",
     )
     loadcell.add_argument(
-        "--position-step",
-        type=between(0.01, 10000.0, "um"),
-        metavar="UM",
-        help="travel per count, of either sign",
+        "--position-step", type=between(0.01, 10000.0, "um"), metavar="UM", help="travel per count, of either sign"
     )
     loadcell.add_argument(
         "--position-baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)"

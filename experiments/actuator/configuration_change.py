@@ -80,9 +80,7 @@ def changes_of(fit: JointFit) -> dict[tuple[str, ...], float]:
     constant_nm_a, error_nm_a = fit.constant_nm_a, fit.constant_error_nm_a
     if not 0.0 < error_nm_a <= LARGEST_UNCERTAINTY * constant_nm_a:
         return {}
-    changes: dict[tuple[str, ...], float] = {
-        ("drive", fit.joint, "torque_constant_nm_a"): round(constant_nm_a, 5),
-    }
+    changes: dict[tuple[str, ...], float] = {("drive", fit.joint, "torque_constant_nm_a"): round(constant_nm_a, 5)}
     for name, (value, error) in (("coulomb_nm", fit.friction_nm), ("viscous_nm_s", fit.viscous_nm_s)):
         if value > 2.0 * error:  # only a value that was measured
             changes["friction", fit.joint, name] = round(value, 4)

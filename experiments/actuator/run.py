@@ -11,8 +11,9 @@ from experiments.actuator.bench import ActuatorBench, RobotBench, SimulatedBench
 from experiments.actuator.configuration_change import apply_fits, find_target
 from experiments.actuator.fit import JointFit, fit_joint
 from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan
-from experiments.actuator.report import TITLE, list_left_out, make_report, make_sections, make_tables
+from experiments.actuator.report import TITLE, make_sections, make_tables
 from experiments.actuator.simulation import bench_configuration, truth_rows
+from experiments.actuator.summary import list_left_out, make_report
 from experiments.reports.report_page import Section
 from experiments.reports.text_tables import text_of_tables
 from experiments.robot.daemon_robot import DaemonRobot

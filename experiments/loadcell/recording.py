@@ -91,11 +91,7 @@ class CellRecorder:
     """Reads the ports. `report` shows a message to the operator at once."""
 
     def __init__(
-        self,
-        port: LoadCellPort,
-        clock: BenchClock,
-        report: Callable[[str], None],
-        encoder: StageEncoder | None = None,
+        self, port: LoadCellPort, clock: BenchClock, report: Callable[[str], None], encoder: StageEncoder | None = None
     ) -> None:
         """`encoder` belongs to the stage; recording goes on without its lines."""
         self.port, self.clock, self.report, self.encoder = port, clock, report, encoder

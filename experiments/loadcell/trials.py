@@ -12,13 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.loadcell.analysis.analyse import analyse_trial
-from experiments.loadcell.analysis.coefficients import (
-    INSERTION,
-    KINDS,
-    SINGLE_SPEED_BOUND,
-    AnalysedTrial,
-    speed_remark,
-)
+from experiments.loadcell.analysis.coefficients import INSERTION, KINDS, SINGLE_SPEED_BOUND, AnalysedTrial, speed_remark
 from experiments.loadcell.analysis.force_motion import StageSettings, wide_pace
 from experiments.loadcell.recording import (
     AVERAGED,

@@ -97,9 +97,7 @@ def test_a_lost_daemon_is_reported_once(tmp_path: Path) -> None:
     assert operator.reported == [ALONE] and not operator.asked
 
 
-def test_the_operator_is_warned_of_falling_weights_before_a_joint_is_mounted(
-    tmp_path: Path,
-) -> None:
+def test_the_operator_is_warned_of_falling_weights_before_a_joint_is_mounted(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(), Impatient()
     robot.mode = "idle"
     with pytest.raises(KeyboardInterrupt):

@@ -23,12 +23,7 @@ Entries = dict[str, dict[str, Any]]
 
 
 def make_entries(
-    plan: Plan = PLAN,
-    sign: float = 1.0,
-    noise_a: float = 0.02,
-    seed: int = 1,
-    truth: float = 1.0,
-    hidden: float = 0.0,
+    plan: Plan = PLAN, sign: float = 1.0, noise_a: float = 0.02, seed: int = 1, truth: float = 1.0, hidden: float = 0.0
 ) -> Entries:
     """`truth`: of the weights' torques, as a share of what they are thought to be. `hidden`: by friction at rest, as a
     share of what it bears less with a weight than without."""

@@ -6,7 +6,8 @@ from dataclasses import replace
 from math import isnan
 
 from experiments.actuator.fit import JointFit, fit_joint
-from experiments.actuator.report import constant_rows, friction_rows, make_report, make_sections
+from experiments.actuator.report import constant_rows, friction_rows, make_sections
+from experiments.actuator.summary import make_report
 from tests.experiments.actuator.test_fit import PLAN, Entries, make_entries
 
 
