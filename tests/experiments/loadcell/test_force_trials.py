@@ -187,9 +187,6 @@ def test_a_stage_slower_than_its_setting_is_measured_and_reported() -> None:
         assert trial.pace is not None
         assert trial.pace.speed_m_s == pytest.approx(0.08, rel=0.04)
         assert "0.100 m/s was set" in speed_remark(trial.pace, SETTINGS)
-
-
-def test_a_stage_as_fast_as_it_was_set_is_not_remarked() -> None:
     assert speed_remark(Pace(0.102, 2.0, 0.01, 0.1), SETTINGS) == ""
 
 

@@ -1,0 +1,136 @@
+"""A calibration with scripted robot, joint, weights and operator, for tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from control.records import JOINTS
+from experiments.actuator.calibration import Calibration
+from experiments.actuator.friction import Loop
+from experiments.actuator.plan import Plan, Step
+from experiments.actuator.reading import MovedError, Reading, Side
+from experiments.actuator.simulation import bench_configuration
+from experiments.robot.bench_robot import BenchError
+from experiments.robot.prompt import GO_ON
+from experiments.trials.notebook import Notebook
+from firmware_host.configuration.configuration import Configuration
+from tests.experiments.still_robot import StillRobot
+from tests.scripted_operator import ScriptedOperator
+
+JOINT = "right_adduction"
+PLAN = Plan((JOINT,), weights_g=(100.0, 200.0, 400.0), trials=2)
+TRUE_NM_A = 0.0719
+
+
+class ScriptedRobot(StillRobot):
+    """A BenchRobot whose winding warms by what hangs, and which lets go when it is told to."""
+
+    configuration: Configuration = bench_configuration()
+
+    def __init__(self) -> None:
+        super().__init__("idle")
+        self.winding_c, self.hanging_g, self.armed, self.message = 30.0, 0.0, 0, ""
+
+    def call(self, method: str, **params: Any) -> Any:
+        if method == "arm":
+            self.mode, self.armed = "hold", self.armed + 1
+        if method == "clear":
+            self.mode = "idle"
+        fault = {"message": self.message, "what_to_do": "do this", "blocks_arming": False, "age_s": 3.0}
+        drives = [{"joint": joint, "winding_c": self.winding_c} for joint in JOINTS]
+        standing: dict[str, Any] = {"mode": self.mode, "fault": fault if self.mode == "fault" else None, "notice": ""}
+        standing |= {"now_s": self.now_s}
+        return standing | {"drives": drives, "faults": [fault] if self.mode == "fault" else [], "moving": False}
+
+    def wait(self, duration_s: float) -> None:
+        super().wait(duration_s)
+        self.winding_c = max(30.0, self.winding_c - duration_s)
+
+
+class ScriptedWeights:
+    """A WeightHandler that hangs what it is asked for, unless the script of a step says something else."""
+
+    handling_s = 2.0
+
+    def __init__(self, robot: ScriptedRobot, script: Mapping[str, list[Callable[[], str]]]) -> None:
+        self.robot, self.script = robot, {key: list(answers) for key, answers in script.items()}
+        self.asked: list[str] = []
+
+    def hold_level(self, joint: str, meanwhile: Callable[[], None]) -> None:
+        self.robot.hanging_g = 0.0
+
+    def release(self, meanwhile: Callable[[], None]) -> None:
+        meanwhile()
+
+    def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
+        self.meanwhile = meanwhile
+        meanwhile()
+        self.asked.append(step.key)
+        self.robot.hanging_g = step.weight_g
+        answers = self.script.get(step.key, [])
+        return answers.pop(0)() if answers else GO_ON
+
+    def take_off(self) -> None:
+        self.robot.hanging_g = 0.0
+
+
+class ScriptedJoint:
+    """A HeldJoint that reads what hangs, to the last digit; a negative weight never comes to rest."""
+
+    def __init__(self, robot: Any, joint: str) -> None:
+        self.robot: ScriptedRobot = robot
+
+    def read(self) -> Reading:
+        if self.robot.mode != "hold":
+            raise BenchError(f"the robot no longer holds its pose: {self.robot.message}")
+        if self.robot.hanging_g < 0.0:
+            raise MovedError("the joint swings by 3.00 degrees")
+        current_a = PLAN.torque_nm(self.robot.hanging_g) / TRUE_NM_A + 0.6
+        side = Side(0.0, current_a, 0.2, 0.0)
+        return Reading(0.0, side, side, self.robot.winding_c)
+
+
+LOOP = Loop(0.18, 0.2, quick=False)
+
+
+class Case:
+    """One calibration; `run` again goes on with it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.robot = ScriptedRobot()
+        self.operator = ScriptedOperator()
+        self.hand = ScriptedWeights(self.robot, {})
+        self.shown: list[tuple[int, int]] = []
+
+    def run(self) -> Mapping[str, Any]:
+        notebook = Notebook(self.folder, asdict(PLAN))
+        return Calibration(
+            self.robot, JOINT, PLAN, self.hand, self.operator, notebook, lambda *at: self.shown.append(at)
+        ).run()
+
+    def on(self, step: Step, *answers: Callable[[], str]) -> None:
+        self.hand.script[step.key] = list(answers)
+
+    def hanging(self, grams: float) -> Callable[[], str]:
+        """Something else hangs than what was asked for."""
+
+        def hang() -> str:
+            self.robot.hanging_g = grams
+            return GO_ON
+
+        return hang
+
+    def letting_go(self, message: str) -> Callable[[], str]:
+        def fail() -> str:
+            self.robot.mode, self.robot.message = "fault", message
+            return GO_ON
+
+        return fail
+
+
+def say(answer: str) -> Callable[[], str]:
+    return lambda: answer
