@@ -60,7 +60,7 @@ class RobotBench:
         readings: dict[str, Mapping[str, Entry]] = {}
         for number, joint in enumerate(plan.joints):
             notebook = Notebook(folder / joint, notebook_plan(plan, joint))
-            if notebook.begun:
+            if notebook.has_entries:
                 operator.report(f"{joint}: {len(notebook.entries)} of {count} readings are done already.")
             if len(notebook.entries) < count:
                 operator.report(FALLS)

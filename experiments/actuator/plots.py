@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from experiments.actuator.fit import JointFit, paper_rmse_nm
 from experiments.reports.value_text import value_text
 
-HEIGHT_IN, WIDTH_IN, DPI = 3.4, 3.6, 200  # two beside each other fill the width of a printed page
+HEIGHT_IN, WIDTH_IN, DPI = 3.4, 3.6, 200  # two next to each other fill the width of a printed page
 SENSED, EXTERNAL = r"$\tau_\mathrm{sense}$", r"$\tau_\mathrm{ext}$"
 GREY, LIGHT_GREY = "0.45", "0.85"
 BLUE, RED = "#1f5fa8", "#b5322c"
@@ -58,8 +58,8 @@ def plot_errors(fits: Sequence[JointFit], path: Path) -> None:
         label = f"paper's RMSE, ±{bound_mnm:g} mN·m"
         axis.axhspan(-bound_mnm, bound_mnm, color=LIGHT_GREY, linewidth=0.0, zorder=0, label=label)
         axis.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
-        for place, weight_g in enumerate(weights_g):
-            _plot_weight(axis, fit, place, weight_g, last=place == len(weights_g) - 1)
+        for column, weight_g in enumerate(weights_g):
+            _plot_weight(axis, fit, column, weight_g, last=column == len(weights_g) - 1)
         axis.set_xticks(range(len(weights_g)), [f"{weight_g:g}" for weight_g in weights_g])
         axis.set_title(f"{_titled(fit)}\nRMSE fitted {1e3 * fit.rmse_fitted_nm:.1f} mN·m")
         axis.set_xlabel("weight (g)")
@@ -68,13 +68,13 @@ def plot_errors(fits: Sequence[JointFit], path: Path) -> None:
     figure.savefig(path, dpi=DPI)
 
 
-def _plot_weight(axis: Any, fit: JointFit, place: int, weight_g: float, last: bool) -> None:
+def _plot_weight(axis: Any, fit: JointFit, column: int, weight_g: float, last: bool) -> None:
     errors = zip(fit.loads, _errors_nm(fit), strict=True)
     errors_mnm = [1e3 * error_nm for load, error_nm in errors if load.weight_g == weight_g]
     label = "their mean" if last else None
-    axis.plot([place - 0.28, place + 0.28], [fmean(errors_mnm)] * 2, color="black", linewidth=1.8, label=label)
-    label = None if place else "a trial, fitted constant"
-    axis.plot([place] * len(errors_mnm), errors_mnm, zorder=2, label=label, **_style(fit))
+    axis.plot([column - 0.28, column + 0.28], [fmean(errors_mnm)] * 2, color="black", linewidth=1.8, label=label)
+    label = None if column else "a trial, fitted constant"
+    axis.plot([column] * len(errors_mnm), errors_mnm, zorder=2, label=label, **_style(fit))
 
 
 def _errors_nm(fit: JointFit) -> list[float]:

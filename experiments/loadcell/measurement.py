@@ -128,7 +128,7 @@ def notebook_plan(settings: StageSettings) -> dict[str, Any]:
 
 
 def _report_progress(session: Session, notebook: Notebook, missing: int, has_encoder: bool) -> None:
-    if not notebook.begun:
+    if not notebook.has_entries:
         return
     report = session.operator.report
     report(f"{len(notebook.entries)} trials are in {session.folder} already, {missing} are left")

@@ -19,7 +19,7 @@ FLAT_SAMPLES = 8  # equal samples at the largest force: a cell that saturates wi
 
 
 def list_problems(analysed: AnalysedTrial, stretch: Stretch, before: Tare, after: Tare) -> list[str]:
-    """Return messages on everything that makes a trial invalid or doubtful."""
+    """Return messages on everything that may make a trial invalid."""
     problems, recorded = list[str](), analysed.recorded
     if stretch.unpluggings:
         problems.append("the load cell was unplugged during the trial")

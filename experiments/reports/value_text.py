@@ -17,12 +17,12 @@ def value_text(value: float | None, *errors: float | None, per: float = 1.0) -> 
     """Format in units of `per`; a dash for no value. Unknown errors are left out."""
     if value is None or not isfinite(value):
         return "-"
-    value, most = value / per, _places(value / per, MOST)
+    value, most = value / per, _decimals(value / per, MOST)
     uncertainties = [error / per for error in errors if error is not None and isfinite(error)]
-    places = [min(most, _places(uncertainty, OF_ERROR)) for uncertainty in uncertainties if uncertainty]
-    ends = max(places, default=_places(value, OF_VALUE))
+    decimals = [min(most, _decimals(uncertainty, OF_ERROR)) for uncertainty in uncertainties if uncertainty]
+    ends = max(decimals, default=_decimals(value, OF_VALUE))
     errors_text = [
-        f"{uncertainty:.{min(most, _places(uncertainty, OF_ERROR)) if uncertainty else ends}f}"
+        f"{uncertainty:.{min(most, _decimals(uncertainty, OF_ERROR)) if uncertainty else ends}f}"
         for uncertainty in uncertainties
     ]
     return " ± ".join([f"{value:.{ends}f}", *errors_text])
@@ -32,7 +32,7 @@ def fraction_text(fraction: float | None) -> str:
     """Format in percent, to two significant digits or a thousandth; a dash for none."""
     if fraction is None or not isfinite(fraction):
         return "-"
-    return f"{100.0 * fraction:.{min(FINEST, _places(100.0 * fraction, OF_ERROR))}f} %"
+    return f"{100.0 * fraction:.{min(FINEST, _decimals(100.0 * fraction, OF_ERROR))}f} %"
 
 
 def miss_text(value: float, true: float) -> str:
@@ -44,6 +44,6 @@ def repeatability_text(fraction: float | None, trials: int) -> str:
     return f"{fraction_text(fraction)} of {trials}"
 
 
-def _places(number: float, digits: int) -> int:
+def _decimals(number: float, digits: int) -> int:
     """Return the decimals of a number with so many significant digits."""
     return max(0, digits - 1 - int(f"{number:.{digits - 1}e}".partition("e")[2]))

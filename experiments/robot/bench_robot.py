@@ -84,8 +84,8 @@ def wait_until(robot: BenchRobot, done: Callable[[Status], bool], longest_s: flo
 def ask_to_clear_faults(robot: BenchRobot, operator: Operator) -> None:
     """Show the faults that keep the torque off, and clear them where the operator agrees.
 
-    Somebody must have looked at the robot: the drive may be wet, or a finger be in the flipper. Without an operator at
-    the terminal the faults stay. The automatic operator clears them, since its robot is simulated.
+    The operator must look at the robot first: the drive may be wet, or a finger be in the flipper. Without an operator
+    at the terminal the faults stay. The automatic operator clears them, since its robot is simulated.
 
     Raises EndedError where the operator leaves a fault, BenchError where it comes back.
     """

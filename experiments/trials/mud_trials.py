@@ -1,7 +1,7 @@
 """Trials in mud, one after another: the bed is prepared, the robot walks, and the operator decides on invalid trials.
 
 Each trial is in the notebook before the next begins, so an interruption costs the current trial only. A trial that a
-fault ended, or that is invalid, is repeated, after the third time only where the operator wants it; a doubtful one is
+fault ended, or that is invalid, is repeated, after the third time only if the operator wants it; a doubtful one is
 kept or repeated as the operator decides. A trial that is left out is written down and not asked for again. Torque is
 off whenever hands may be in the mud.
 """
@@ -141,7 +141,7 @@ def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) 
 
 
 def _is_done_with_invalid(bench: Bench, trial: PlannedTrial, problem: Exception, attempt: int) -> bool:
-    """Leave an invalid trial out, or keep it. Raises BenchError where nobody wants it after too many attempts."""
+    """Leave an invalid trial out, or keep it. Raises BenchError where the operator gives up after too many attempts."""
     entry = problem.entry if isinstance(problem, InvalidTrialError) else None
     often = attempt >= MOST_ATTEMPTS
     message = f"{trial} went wrong{f' {attempt} times; the last time' if often else ''}: {str(problem).rstrip('.')}."

@@ -1,4 +1,4 @@
-"""The measurements so far, on the disk before the experiment goes on, so that an interrupted one can continue.
+"""The measurements so far, on the disk before the experiment continues, so that an interrupted one can continue.
 
 The file has JSON lines: the plan first, then one entry per line with its key. A later entry of a key replaces the
 earlier one, and a line that was cut off costs only itself.
@@ -36,7 +36,7 @@ class Notebook:
             self._read(contents)
 
     @property
-    def begun(self) -> bool:
+    def has_entries(self) -> bool:
         """Whether there is any measurement."""
         return bool(self.entries)
 
@@ -71,10 +71,10 @@ class Notebook:
         for line in lines[1:]:
             self._apply(line)
 
-    def _require_plan(self, begun: Entry) -> None:
-        different = sorted(name for name in {*begun, *self.plan} if begun.get(name) != self.plan.get(name))
+    def _require_plan(self, earlier: Entry) -> None:
+        different = sorted(name for name in {*earlier, *self.plan} if earlier.get(name) != self.plan.get(name))
         if different:
-            then, now = ({name: plan.get(name) for name in different} for plan in (begun, self.plan))
+            then, now = ({name: plan.get(name) for name in different} for plan in (earlier, self.plan))
             raise NotebookError(
                 f"{self.path.parent} has measurements with {_list_values(then)}, and the options ask for "
                 f"{_list_values(now)}: use the same options, or choose another folder with --out"

@@ -45,22 +45,22 @@ class StrideProfile(NamedTuple):
 
 def profile_of(log: Log, flipper: str, start_s: float) -> StrideProfile:
     """Return the stride under way at `start_s`; no rows where there is none."""
-    ticks, place = log.ticks, FLIPPERS.index(flipper)
+    ticks, side = log.ticks, FLIPPERS.index(flipper)
     ticks = ticks[ticks["mode"] == Mode.WALKING]
-    begun = np.flatnonzero(ticks["stamp_s"] >= start_s)
-    rows = ticks[ticks["stride"] == ticks["stride"][begun[0]]] if len(begun) else ticks[:0]
+    later = np.flatnonzero(ticks["stamp_s"] >= start_s)
+    rows = ticks[ticks["stride"] == ticks["stride"][later[0]]] if len(later) else ticks[:0]
     rows = rows[rows["stride"] >= 0]
     return StrideProfile(
         rows["stamp_s"] - (rows["stamp_s"][0] if len(rows) else 0.0),
         rows["phase"].astype(np.int64),
-        rows["angle_rad"][:, 2 * place],
-        rows["angle_rad"][:, 2 * place + 1],
-        rows["depth_m"][:, place],
+        rows["angle_rad"][:, 2 * side],
+        rows["angle_rad"][:, 2 * side + 1],
+        rows["depth_m"][:, side],
         rows["depth_command_m"],
-        rows["sweep_load_nm"][:, place],
-        rows["adduction_load_nm"][:, place],
-        rows["force_x_n"][:, place],
-        rows["force_z_n"][:, place],
+        rows["sweep_load_nm"][:, side],
+        rows["adduction_load_nm"][:, side],
+        rows["force_x_n"][:, side],
+        rows["force_z_n"][:, side],
         rows["body_x_m"],
     )
 

@@ -120,8 +120,8 @@ def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool =
     estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters)
     strides: list[StrideEstimate] = []
     for sample in trial.samples:
-        seen = sample if with_pose else sample._replace(body=BodyPose())
-        strides += estimator.update(*seen).strides
+        known = sample if with_pose else sample._replace(body=BodyPose())
+        strides += estimator.update(*known).strides
     return strides
 
 

@@ -212,7 +212,7 @@ def test_an_amplifier_too_slow_for_the_stroke_is_reported_first(make: Make) -> N
     with pytest.raises(BenchError, match="too slow"):
         laboratory.measure(CellSettings(scale_n=1.0))
     assert "RATE pin" in laboratory.operator.reported[1] and "--speed 0.02" in laboratory.operator.reported[1]
-    assert not laboratory.notebook.begun
+    assert not laboratory.notebook.has_entries
 
 
 def test_weights_that_say_nothing_are_asked_for_again(make: Make) -> None:
