@@ -24,7 +24,7 @@ from drivers.transmit_gate import TransmitGate
 
 REPEAT_S = 0.1  # between two requests to change the axis state; the heartbeat reports the result
 LONGEST_IN_QUEUE_S = 2.0  # an older stamp belongs to another clock
-VERSION_REPEAT_S = 0.5  # between two requests for a setting that is still unknown
+REPEAT_UNKNOWN_S = 0.5  # between two requests for a setting that is still unknown
 REFRESH_S = 2.0  # between two requests for a known setting, which may be changed over USB
 
 
@@ -58,7 +58,8 @@ class OdriveDrives:
         self.gate.close()
         self.unknown_frames = 0  # of other ids, remote or extended, where the port does not keep them away
         self.malformed_frames = 0  # of these drives, with a payload that cannot be decoded
-        self._armed_s = self._disarmed_s = self._version_asked_s = self._watchdog_asked_s = NEVER_S
+        self._armed_s = self._disarmed_s = NEVER_S
+        self._requested_s = {"version": NEVER_S, "watchdog": NEVER_S}
 
     def read(self, now_s: float) -> DriveStates:
         for axis in self.axes:
@@ -151,36 +152,23 @@ class OdriveDrives:
             axis.clear_errors()
 
     def request_settings(self, now_s: float) -> None:
-        self._request_versions(now_s)
-        self._request_watchdogs(now_s)
+        self._request(now_s, "version", lambda axis: axis.version is not None, OdriveAxis.request_version)
+        self._request(now_s, "watchdog", lambda axis: isfinite(axis.watchdog_s), OdriveAxis.request_watchdog)
 
-    def _request_versions(self, now_s: float) -> None:
-        """Asks drives of unknown version every VERSION_REPEAT_S, and all every REFRESH_S once all are known."""
-        known = all(axis.version is not None for axis in self.axes)
-        if now_s - self._version_asked_s < _repeat_s(known):
+    def _request(
+        self, now_s: float, setting: str, is_known: Callable[[OdriveAxis], bool], request: Callable[[OdriveAxis], None]
+    ) -> None:
+        """Asks the drives with the setting unknown every REPEAT_UNKNOWN_S, and all every REFRESH_S once it is known."""
+        unknown = [axis for axis in self.axes if not is_known(axis)]
+        if now_s - self._requested_s[setting] < (REPEAT_UNKNOWN_S if unknown else REFRESH_S):
             return
-        self._version_asked_s = now_s
-        for axis in self.axes:
-            if known or axis.version is None:
-                axis.request_version()
-
-    def _request_watchdogs(self, now_s: float) -> None:
-        """Asks for watchdog settings likewise, where the version is known."""
-        known = all(isfinite(axis.watchdog_s) for axis in self.axes)
-        if now_s - self._watchdog_asked_s < _repeat_s(known):
-            return
-        self._watchdog_asked_s = now_s
-        for axis in self.axes:
-            if known or not isfinite(axis.watchdog_s):
-                axis.request_watchdog()
+        self._requested_s[setting] = now_s
+        for axis in unknown or self.axes:
+            request(axis)
 
     def close(self) -> None:
         for port in self.ports.values():
             port.close()
-
-
-def _repeat_s(known: bool) -> float:
-    return REFRESH_S if known else VERSION_REPEAT_S
 
 
 def _stamp_s(frame: Frame, now_s: float) -> float:

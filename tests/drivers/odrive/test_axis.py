@@ -17,7 +17,7 @@ from drivers.can.mock_bus import MockBus
 from drivers.drive import WatchdogEndpoints
 from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import GET_ENCODER_ESTIMATES, GET_IQ, GET_VERSION, HEARTBEAT, TX_SDO, Message, arbitration_id
-from drivers.odrive.drives import REFRESH_S, VERSION_REPEAT_S, OdriveDrives
+from drivers.odrive.drives import REFRESH_S, REPEAT_UNKNOWN_S, OdriveDrives
 from drivers.odrive.parameters import OdriveParameters
 
 BUILD = WatchdogEndpoints("0.6.11", "4.4.58", enable=219, timeout=218)
@@ -43,6 +43,11 @@ class Bench:
 
     def report(self, message: Message, *values: float, stamp_s: float = -1.0) -> None:
         self.far.send(Frame(arbitration_id(0, message), message.encode(*values), stamp_s=stamp_s))
+
+    def request_watchdogs(self, now_s: float) -> list[Frame]:
+        """The requests for parameters; versions are requested by remote frames."""
+        self.drives.request_settings(now_s)
+        return [frame for frame in self.far.receive() if not frame.is_remote]
 
     def report_setting(self, endpoint: int, value: str) -> None:
         self.far.send(Frame(0x005, TX_SDO.encode(0, endpoint, 0) + bytes.fromhex(value)))
@@ -243,22 +248,19 @@ def test_a_fast_joint_or_a_jumping_or_faulty_encoder_is_no_duplicate(bench: Benc
 def test_the_watchdog_is_read_back_by_the_numbers_of_the_drive_s_build(
     bench: Bench, enable: str, timeout: str, watchdog_s: float
 ) -> None:
-    bench.drives._request_watchdogs(0.0)
-    assert bench.far.receive() == []  # its version is not known
+    assert bench.request_watchdogs(0.0) == []  # its version is not known
     bench.report(GET_VERSION, *PRO)
     bench.read(0.1)
     assert isnan(bench.axis.watchdog_s)
-    bench.drives._request_watchdogs(1.0)
     asked = [Frame(0x004, bytes.fromhex("00 db 00 00")), Frame(0x004, bytes.fromhex("00 da 00 00"))]
-    assert bench.far.receive() == asked
+    assert bench.request_watchdogs(1.0) == asked
     bench.report_setting(218, timeout)
     bench.read(1.1)
     assert isnan(bench.axis.watchdog_s)
     bench.report_setting(219, enable)
     bench.read(1.2)
     assert bench.axis.watchdog_s == pytest.approx(watchdog_s)
-    bench.drives._request_watchdogs(2.0)
-    assert bench.far.receive() == []
+    assert bench.request_watchdogs(2.0) == []
 
 
 def test_an_unanswered_question_for_a_watchdog_is_repeated_after_a_while(bench: Bench) -> None:
@@ -266,8 +268,7 @@ def test_an_unanswered_question_for_a_watchdog_is_repeated_after_a_while(bench: 
     bench.read(0.1)
     asked = []
     for number in range(10):
-        bench.drives._request_watchdogs(1.0 + 0.3 * VERSION_REPEAT_S * number)
-        asked.append(len(bench.far.receive()))
+        asked.append(len(bench.request_watchdogs(1.0 + 0.3 * REPEAT_UNKNOWN_S * number)))
     assert asked == [2, 0, 0, 0, 2, 0, 0, 0, 2, 0]
 
 
@@ -282,8 +283,7 @@ def test_a_build_whose_numbers_are_not_known_is_not_asked_and_counts_as_not_read
     bench.report_setting(219, "01")
     bench.report_setting(218, "cdcccc3d")
     bench.read(0.1)
-    bench.drives._request_watchdogs(1.0)
-    assert bench.far.receive() == []
+    assert bench.request_watchdogs(1.0) == []
     assert isnan(bench.axis.watchdog_s)
     assert bench.drives.malformed_frames == 0
 
@@ -347,8 +347,7 @@ def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench
         axis._watchdog_enabled, axis._watchdog_timeout_s = True, 0.1
     asked = []
     for tick in range(round(3.0 * REFRESH_S / PERIOD_S)):
-        bench.drives._request_versions(tick * PERIOD_S)
-        bench.drives._request_watchdogs(tick * PERIOD_S)
+        bench.drives.request_settings(tick * PERIOD_S)
         asked.append(len(bench.far.receive()))
     assert [count for count in asked if count] == [4 + 8] * 3
     bench.report_setting(BUILD.enable, "00")

@@ -24,7 +24,7 @@ from drivers.odrive.codec import (
     Message,
     arbitration_id,
 )
-from drivers.odrive.drives import REPEAT_S, VERSION_REPEAT_S, OdriveDrives
+from drivers.odrive.drives import REPEAT_S, REPEAT_UNKNOWN_S, OdriveDrives
 from drivers.odrive.parameters import OdriveParameters
 
 PARAMETERS = {
@@ -342,7 +342,7 @@ def test_errors_are_cleared_on_all_drives(bench: Bench) -> None:
 
 
 def test_versions_are_requested_by_remote_frame_until_they_are_known(bench: Bench) -> None:
-    bench.drives._request_versions(1.0)
+    bench.drives.request_settings(1.0)
     assert bench.sent() == {
         "left": [Frame(0x000, is_remote=True), Frame(0x020, is_remote=True)],
         "right": [Frame(0x060, is_remote=True), Frame(0x040, is_remote=True)],
@@ -350,9 +350,9 @@ def test_versions_are_requested_by_remote_frame_until_they_are_known(bench: Benc
     bench.far["left"].send(Frame(0x000, bytes.fromhex("02 04 04 3a 00 06 0b 00")))
     bench.drives.read(1.1)
     assert bench.drives.axes[0].version == (0, 6, 11)
-    bench.drives._request_versions(1.0 + 0.99 * VERSION_REPEAT_S)
+    bench.drives.request_settings(1.0 + 0.99 * REPEAT_UNKNOWN_S)
     assert bench.silent()
-    bench.drives._request_versions(1.01 + VERSION_REPEAT_S)
+    bench.drives.request_settings(1.01 + REPEAT_UNKNOWN_S)
     assert [frame.arbitration_id for frame in bench.sent()["left"]] == [0x020]
 
 
