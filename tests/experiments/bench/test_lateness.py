@@ -80,9 +80,7 @@ def test_a_flipper_that_sinks_during_arming_only_delays_it(configuration: Config
     assert all(state.closed_loop for state in opened_rig.loop.states)
 
 
-def test_a_fault_against_arming_is_reported(
-    configuration: Configuration, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_fault_against_arming_is_reported(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
     opened_rig = sinking_rig(configuration, Sinking(1000))
     monkeypatch.setattr("experiments.bench.test_rig.ARMING_S", 1.0)
     with pytest.raises(BenchError, match=r"closed loop within 1 s\. The left_adduction joint moves"):

@@ -132,27 +132,23 @@ def test_the_table_from_the_log_is_that_of_the_plant(tmp_path: Path) -> None:
     assert "Table I" in trackway_text(report)
 
 
-def test_a_repeated_trial_counts_once_and_a_skipped_one_not_at_all(tmp_path: Path) -> None:
-    trackway, notebook = SimulatedTrackway(tmp_path, iter([REDO, GO_ON, SKIP])), Notebook(tmp_path, {})
-    report = run(TINY, trackway, notebook, silent)
+def test_a_repeated_trial_counts_once_a_skipped_one_never_and_a_continued_experiment_repeats_none(
+    tmp_path: Path,
+) -> None:
+    trackway, notebook = SimulatedTrackway(tmp_path, iter([REDO, GO_ON])), Notebook(tmp_path, {})
+    with pytest.raises(StopIteration):  # the operator has gone
+        run(TINY, trackway, notebook, silent)
+    assert trackway.prepared == ["3 cm, trial 1 of 1", "3 cm, trial 1 of 1", "adaptive, trial 1 of 1"]
+    again, notebook = SimulatedTrackway(tmp_path / "again", always(SKIP)), Notebook(tmp_path, {})
+    report = run(TINY, again, notebook, silent)
+    assert again.prepared == ["adaptive, trial 1 of 1"]
     ((key, logged),) = first_walks(TINY, notebook).items()
     counted = read_log(tmp_path / "2.mcap")
     assert (key, logged.run) == ("3 cm, trial 1", counted.metadata["run_id"])
     walked_s = counted.ticks["stamp_s"][counted.ticks["mode"] == Mode.WALKING]
     assert logged.from_s < walked_s[0] < walked_s[-1] < logged.to_s
-    assert trackway.prepared == ["3 cm, trial 1 of 1", "3 cm, trial 1 of 1", "adaptive, trial 1 of 1"]
     assert len(report.walks["3 cm"]) == 1 and report.walks["adaptive"] == []
     assert report.table["adaptive"]["48.5"].mean is None
-
-
-def test_a_continued_experiment_repeats_no_walk(tmp_path: Path) -> None:
-    trackway = SimulatedTrackway(tmp_path, iter([GO_ON]))
-    with pytest.raises(StopIteration):  # the operator has gone
-        run(TINY, trackway, Notebook(tmp_path, {}), silent)
-    again = SimulatedTrackway(tmp_path / "again", always(GO_ON))
-    report = run(TINY, again, Notebook(tmp_path, {}), silent)
-    assert again.prepared == ["adaptive, trial 1 of 1"]
-    assert len(report.walks["3 cm"]) == 1
 
 
 def test_the_robot_does_not_walk_without_a_pose(tmp_path: Path) -> None:
@@ -206,9 +202,9 @@ def altered_walk(
 
 
 def test_a_robot_whose_pose_is_lost_stops(tmp_path: Path) -> None:
-    walk, over_s = altered_walk(tmp_path, lambda now_s, x_m: x_m if now_s < 6.0 else None)
+    walk, over_s = altered_walk(tmp_path, lambda now_s, x_m: x_m if now_s < 4.0 else None)
     assert "pose of the body is lost" in walk.fault
-    assert over_s < 6.0 + UNSEEN_S + 5.0
+    assert over_s < 4.0 + UNSEEN_S + 5.0
     assert walk.strides  # from its log
 
 
