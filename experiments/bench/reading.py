@@ -48,8 +48,8 @@ class Reading(NamedTuple):
     def as_json(self) -> dict[str, Any]:
         """The fields for JSON, with None in place of NaN and infinity."""
         numbers = {"value": self.value, "low": self.low, "high": self.high}
-        kept = {name: number if isfinite(number) else None for name, number in numbers.items()}
-        return {"what": self.what, "unit": self.unit, **kept, "good": self.good, "left_out": self.left_out,
+        known = {name: number if isfinite(number) else None for name, number in numbers.items()}
+        return {"what": self.what, "unit": self.unit, **known, "good": self.good, "left_out": self.left_out,
                 "advice": self.advice}  # fmt: skip
 
 

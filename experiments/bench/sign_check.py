@@ -113,7 +113,7 @@ def check_shown_motion(test_rig: TestRig, joint: str) -> Readings:
     test_rig.switch_off()
     observation = bench_operator.observed_motion(joint, test_rig.run_during_prompt)
     side, kind = joint.split("_")
-    what = f"{joint}: the {side} flipper was seen to {WAYS[kind]}"
+    what = f"{joint}: the {side} flipper was observed to {WAYS[kind]}"
     if observation is Observation.UNSEEN:
         yield left_out(what)
         return

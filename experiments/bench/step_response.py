@@ -97,8 +97,8 @@ def size_ratio(samples: list[Sample], pulses: Pulses, constant_nm_a: float) -> f
     """Return current over command at the ends of the long plateaus; the two signs of the pulses cancel a bias."""
     given_nm = sent_nm = 0.0
     for pulse in pulses.schedule:
-        end, way = pulse.begins + 3 * QUARTER_TICKS, -pulse.sign
+        end, sign = pulse.begins + 3 * QUARTER_TICKS, -pulse.sign
         for tick in range(end - SETTLED_TICKS + 1, end + 1):  # the answer to a command is in the tick after it
-            given_nm += way * samples[tick].states[pulses.index].current_a * constant_nm_a
-            sent_nm += way * samples[tick - 1].sent_nm[pulses.index]
+            given_nm += sign * samples[tick].states[pulses.index].current_a * constant_nm_a
+            sent_nm += sign * samples[tick - 1].sent_nm[pulses.index]
     return given_nm / sent_nm

@@ -59,8 +59,8 @@ def check_watchdog_times(test_rig: TestRig) -> Readings:
 def _gone_s(pressed: list[Sample], silence: list[Sample], index: int) -> float:
     """Return the time until the current stays below half of its earlier value."""
     flowed_a = sum(sample.states[index].current_a for sample in pressed[-40:]) / 40.0
-    gone = [sample.states[index].current_a / flowed_a < GONE_FRACTION for sample in silence]
-    first = first_lasting(gone, GONE_TICKS)
+    low = [sample.states[index].current_a / flowed_a < GONE_FRACTION for sample in silence]
+    first = first_lasting(low, GONE_TICKS)
     return nan if first is None else silence[first].tick.now_s - pressed[-1].tick.now_s
 
 
@@ -71,5 +71,5 @@ def _reasons(test_rig: TestRig) -> Readings:
     reported = test_rig.drives.health
     test_rig.clear_fault()
     for health in reported:
-        advice = f"the drive tells {health.errors or 'no reason'}; its watchdog must be what let go"
-        yield Reading(f"{health.joint}: let go by its watchdog", health.watchdog_expired, "", 1, 1, advice)
+        advice = f"the drive reports {health.errors or 'no reason'}, not its watchdog: see the watchdog in stage 1"
+        yield Reading(f"{health.joint}: switched off by its watchdog", health.watchdog_expired, "", 1, 1, advice)

@@ -1,6 +1,6 @@
 """Checks the wiring without any motion: the ids on the buses, their message rates, and the settings of the drives.
 
-Ids and rates come from what was overheard before the loop took the buses over. Then the loop stands by, asks for
+Ids and rates come from the frames recorded before the loop opened the buses. Then the loop waits, requests
 versions and watchdogs, and feeds zero torque to idle drives, as the daemon does.
 """
 
@@ -169,11 +169,11 @@ def check_watchdogs(test_rig: TestRig) -> Readings:
 
 def check_quiet_buses(test_rig: TestRig) -> Readings:
     """Check for lost frames, drive errors and missed ticks."""
-    test_rig.tick()  # whatever came before it: questions, another test
+    test_rig.tick()  # ends the pause of a prompt or of another test
     before = {name: _trouble(port) for name, port in test_rig.drives.ports.items()}
     missed, samples = test_rig.loop.missed_ticks, test_rig.run_for(STANDING_BY_S)
     missed = test_rig.loop.missed_ticks - missed
-    wires = "check wiring, termination and bit rate; 'ip -s -d link show' tells more"
+    wires = "check wiring, termination and bit rate; see 'ip -s -d link show'"
     for name, port in test_rig.drives.ports.items():
         lost = _trouble(port) - before[name]
         reported = port.last_error or port.last_send_error

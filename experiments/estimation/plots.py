@@ -1,4 +1,4 @@
-"""The errors of the coefficients as a picture."""
+"""The errors of the estimated coefficients as a picture, by setup, coefficient, mud and method."""
 
 from __future__ import annotations
 

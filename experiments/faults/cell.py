@@ -137,7 +137,7 @@ class Measurement:
             cell.stop_s = (self._steps - self._stopping_since) * PERIOD_S
 
     def _has_reacted(self, kind: FaultKind, mode: Mode) -> bool:
-        """Return whether the mode is strict enough, or the fault is reported where the mode does not tell."""
+        """Return whether the mode is strict enough, or the fault is reported where the mode says nothing."""
         if self._only_reported(kind):
             return self._cell.reported_ticks is not None
         return STRICTNESS[mode] >= _needed_strictness(kind)

@@ -60,7 +60,7 @@ class FailureMode:
     inject: Injector
     lasts_s: float = 0.5
     phases: tuple[str, ...] = EVERYWHERE
-    how: str = ""  # tells the modes of one fault apart
+    how: str = ""  # distinguishes the modes of one fault
     no_commands: bool = False  # commands do not reach a drive: only its watchdog removes the torque
     ends_daemon: bool = False
     bound_ticks: int | None = None  # where this mode is detected sooner than the kind's bound

@@ -44,7 +44,7 @@ def writer_lost_rows(bench: FaultBench, joint: str) -> Iterator[None]:
 
 @contextmanager
 def port_lost_frames(bench: FaultBench, joint: str) -> Iterator[None]:
-    """Of the port behind the one that may fail on purpose."""
+    """Lose frames in the port below the one that injects failures."""
     port = bench.loop.drives.ports[bench.loop.configuration.drive[joint].bus]
     vars(port).get("_port", port).lost_frames += 3
     yield

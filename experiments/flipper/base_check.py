@@ -44,8 +44,8 @@ def load_remarks(log: Log, configuration: Configuration, flipper: str) -> list[s
     if not (len(before) and len(after)):
         return []
     remarks = []
-    place = 2 * FLIPPERS.index(flipper)
-    for joint, bound_nm in ((place, SWEEP_NM), (place + 1, ADDUCTION_NM)):
+    sweep = 2 * FLIPPERS.index(flipper)
+    for joint, bound_nm in ((sweep, SWEEP_NM), (sweep + 1, ADDUCTION_NM)):
         constant_nm_a = configuration.torque_constants_nm_a[joint]
         change_nm = constant_nm_a * float(after["current_a"][:, joint].mean() - before["current_a"][:, joint].mean())
         if isfinite(change_nm) and abs(change_nm) > bound_nm:

@@ -31,7 +31,7 @@ from firmware_host.configuration.configuration import Configuration
 AUTHORS_MUD, AUTHORS_N = "12.5N", {"insertion": (2.5, 2.8), "stance": (7.4, 8.3), "extraction": (1.9, 2.3)}
 INSTRUCTIONS = (
     "Torque is off and the flippers are down. Level the mud to its nominal height and put the flipper over a fresh "
-    "spot, or re-mix the mud: the same hole loses 15 to 20 % with each stroke. Take the hands away: the flipper moves "
+    "spot, or re-mix the mud: the same hole loses 15 to 20 % with each stroke. Take your hands away: the flipper moves "
     "next"
 )
 TRUTHS = {
@@ -44,7 +44,7 @@ KNOWN_BIAS = (
     "On a simulated fixed base without disturbances, k_e by the default method is 1 to 5 % above the load cell; for a "
     "simulated robot that walks it is off by -8 to +14 %, more in softer mud. On the fixed base about 1 % each comes "
     "from the load on the face, whose pressure is assumed to grow from zero at the surface; from the tare, which "
-    "counts the way down while the plate's lower corner is in the mud; and from the surface, found 0.2 mm too deep. "
+    "counts the insertion while the plate's lower corner is in the mud; and from the surface, found 0.2 mm too deep. "
     "k_p is 0 to 4 % too high at 3 to 5 cm, because of the same surface. The bias in real mud is not known."
 )
 WRONG_CONSTANTS = (

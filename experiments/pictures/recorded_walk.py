@@ -41,7 +41,11 @@ Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
 
 ANOTHER_MUD = "another mud"  # the loop's event after a stride that did not fit what was known
-WORDS = {"body_x_m": "the body's place, so no steps", "depth_command_m": "the commanded depth", "force_z_n": "forces"}
+DESCRIPTIONS = {
+    "body_x_m": "the position of the body, so no steps",
+    "depth_command_m": "the commanded depth",
+    "force_z_n": "forces",
+}
 
 
 class RecordedWalk(NamedTuple):
@@ -49,7 +53,7 @@ class RecordedWalk(NamedTuple):
 
     title: str
     geometry: FlipperGeometry
-    sweep_rad: float  # commanded, in front and behind
+    sweep_rad: float  # commanded, at the front and at the rear
     flipper: str
     time_s: Floats
     phase: NDArray[np.int64]  # commanded
@@ -86,7 +90,7 @@ class RecordedWalk(NamedTuple):
     @property
     def missing(self) -> list[str]:
         """Descriptions of the values that the log does not have."""
-        return [words for name, words in WORDS.items() if not np.any(np.isfinite(getattr(self, name)))]
+        return [text for name, text in DESCRIPTIONS.items() if not np.any(np.isfinite(getattr(self, name)))]
 
 
 def read_walk(path: Path, number: int = 0, more: Sequence[Path] = (), watch: Watch = unwatched) -> RecordedWalk:
@@ -118,7 +122,7 @@ def _cut_of(log: Log, from_the_first: bool, to_the_last: bool) -> str:
     """Describe how the walk may extend beyond this segment of its run."""
     number = segment_of(log)
     before = [f"begun before segment {number}"] * (from_the_first and number > 0)
-    after = ["gone on in the next segment"] * (to_the_last and log.complete and "segment" in log.metadata)
+    after = ["continued in the next segment"] * (to_the_last and log.complete and "segment" in log.metadata)
     return " and ".join(before + after)
 
 

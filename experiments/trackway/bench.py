@@ -75,7 +75,7 @@ class PromptedTrackway:
         ask_to_clear_faults(self._robot, self._operator)
         question = (
             f"{trial}. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud. Take"
-            " the hands away: the robot walks next"
+            " your hands away: the robot walks next"
         )
         self._operator.ask(question, {GO_ON: "the robot may walk"}, self._wait)
         ask_to_clear_faults(self._robot, self._operator)

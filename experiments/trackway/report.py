@@ -65,7 +65,7 @@ class TrackwayReport:
     paper: Mapping[str, Mapping[str, Speed]]
     within_one_sd: Mapping[str, Mapping[str, bool | None]]
     walks: Mapping[str, Sequence[Sequence[StrideReport]]]
-    ends: Mapping[str, Mapping[str, int]]  # how often a walk ended in which way
+    ends: Mapping[str, Mapping[str, int]]  # how many walks ended in each way
     settings: Settings
 
 

@@ -33,11 +33,11 @@ from firmware_host.operator.counted_nouns import counted
 
 TRACKWAY_INSTRUCTIONS = (
     "Torque is off. Re-mix the surface of all muds and level it to its nominal height, and put the robot so that the "
-    "sweep axes are over the beginning of the first mud. Take the hands away: the robot walks next"
+    "sweep axes are over the beginning of the first mud. Take your hands away: the robot walks next"
 )
 SOFT_INSTRUCTIONS = (
-    "Torque is off. Re-mix and level the soft mud, and put the robot where it has at least 80 cm of it ahead. Take the "
-    "hands away: the robot walks next"
+    "Torque is off. Re-mix and level the soft mud, and put the robot where it has at least 80 cm of it ahead. Take "
+    "your hands away: the robot walks next"
 )
 SIMULATED_DRAG = (
     "The drag on the simulated body grows with speed, to more than twice the paper's 2.5 N. So the mud that yields at "

@@ -113,7 +113,7 @@ def test_segments_of_a_run_are_drawn_and_counted_as_one_log(walk: Path, tmp_path
 def test_a_walk_over_a_border_is_told(walk: Path, tmp_path: Path) -> None:
     paths = make_segments(walk, tmp_path)
     drawn = run("plot", str(paths[1]), "--out", str(tmp_path / "walk.png")).stderr
-    assert "the walk may have begun before segment 1 and gone on in the next segment; give those files too" in drawn
+    assert "the walk may have begun before segment 1 and continued in the next segment; give those files too" in drawn
     assert "the run's segments before 1 are not given" in run("replay", str(paths[1])).stderr
     assert "not given" not in run("replay", str(paths[0])).stderr
 

@@ -162,7 +162,7 @@ def test_what_the_authors_form_does_not_hold_is_named(as_csv: Path, tmp_path: Pa
     table = [",".join(row[number] for number in kept) for row in [names, *rows]]
     path.write_text("\n".join(["# gait header: scenario | turtle", *table]), encoding="utf-8")
     walk = read_walk(path)
-    assert walk.missing == ["the body's place, so no steps", "the commanded depth"]
+    assert walk.missing == ["the position of the body, so no steps", "the commanded depth"]
     assert np.isnan(walk.geometric_step_m)
     assert read_walk(as_csv).missing == []
     assert read_walk(as_csv).geometric_step_m == pytest.approx(0.12)

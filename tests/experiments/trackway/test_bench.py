@@ -100,7 +100,7 @@ def test_torque_is_off_while_the_operator_levels_the_mud(tmp_path: Path) -> None
     PromptedTrackway(robot, operator).prepare("3 cm, trial 1 of 3")
     assert operator.asked == [
         "3 cm, trial 1 of 3. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud."
-        " Take the hands away: the robot walks next"
+        " Take your hands away: the robot walks next"
     ]
     robot.close()
 
