@@ -15,7 +15,7 @@ import argparse
 import json
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from os import cpu_count, environ
@@ -144,30 +144,22 @@ def _write(path: Path, content: Any) -> None:
     path.write_text(json.dumps(content, indent=0, sort_keys=True, default=str) + "\n", encoding="utf-8")
 
 
-def differences(old: Any, new: Any, ignored: frozenset[str], path: str = "") -> Iterator[str]:
-    """Yields every value that is missing, added or changed, by its path."""
+def differences(old: Any, new: Any, names: Mapping[str, str], ignored: frozenset[str], path: str = "") -> Iterator[str]:
+    """Yields every value that is missing, added or changed, by its path. `names`: new names by the old ones."""
     if isinstance(old, dict) and isinstance(new, dict):
+        old = {name if name in new else names.get(name, name): value for name, value in old.items()}
         for name in sorted((old.keys() | new.keys()) - ignored):
-            where = f"{path}.{name}"
-            if name not in new:
-                yield f"{where}: missing"
-            elif name not in old:
-                yield f"{where}: added"
+            if name in new and name in old:
+                yield from differences(old[name], new[name], names, ignored, f"{path}.{name}")
             else:
-                yield from differences(old[name], new[name], ignored, where)
+                yield f"{path}.{name}: {'added' if name in new else 'missing'}"
     elif isinstance(old, list) and isinstance(new, list):
         if len(old) != len(new):
             yield f"{path}: {len(new)} entries, before {len(old)}"
         for number, (before, after) in enumerate(zip(old, new, strict=False)):
-            yield from differences(before, after, ignored, f"{path}[{number}]")
+            yield from differences(before, after, names, ignored, f"{path}[{number}]")
     elif repr(old) != repr(new):  # 1 differs from 1.0, and NaN equals NaN
         yield f"{path}: {new!r}, before {old!r}"
-
-
-def renamed(content: Any, names: dict[str, str]) -> Any:
-    if isinstance(content, dict):
-        return {names.get(name, name): renamed(value, names) for name, value in content.items()}
-    return [renamed(value, names) for value in content] if isinstance(content, list) else content
 
 
 def compare(old: Path, new: Path, names: dict[str, str], ignored: frozenset[str]) -> int:
@@ -178,8 +170,8 @@ def compare(old: Path, new: Path, names: dict[str, str], ignored: frozenset[str]
             print(f"{path.name}: not recorded")
             failed += 1
             continue
-        before = renamed(json.loads(path.read_text(encoding="utf-8")), names)
-        found = list(differences(before, json.loads((new / path.name).read_text(encoding="utf-8")), ignored))
+        before, after = (json.loads((folder / path.name).read_text(encoding="utf-8")) for folder in (old, new))
+        found = list(differences(before, after, names, ignored))
         failed += bool(found)
         print(f"{path.name}: {f'{len(found)} differences' if found else 'identical'}")
         print("".join(f"  {line}\n" for line in found[:DIFFERENCES_SHOWN]), end="")

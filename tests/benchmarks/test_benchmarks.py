@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from benchmarks.behaviour import differences
 from benchmarks.report import Progress, evaluated, new_parser, run_benchmark, summary_us, verdict
 from benchmarks.speed import lockstep_speed
 from benchmarks.speed.estimator_cost import fit_rows, measure_fits
@@ -279,3 +280,11 @@ def test_progress_is_silent_without_a_terminal(capsys: pytest.CaptureFixture[str
     progress.show(1.0, "walking")
     progress.clear()
     assert capsys.readouterr().err == ""
+
+
+def test_behaviour_reports_every_difference_and_accepts_new_names() -> None:
+    old = {"place_m": 1.0, "rows": [{"a": 1}, {"a": 2}], "version": "0.1", "gone": 0}
+    new = {"position_m": 1.0, "rows": [{"a": 1.0}], "version": "0.2", "came": 0}
+    found = list(differences(old, new, {"place_m": "position_m"}, frozenset({"version"})))
+    assert found == [".came: added", ".gone: missing", ".rows: 1 entries, before 2", ".rows[0].a: 1.0, before 1"]
+    assert list(differences({"place_m": 1}, {"place_m": 1}, {"place_m": "position_m"}, frozenset())) == []

@@ -17,7 +17,7 @@ from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
 from tests.recorded_events import EventRecorder
 
-SOFT_M = 0.35
+SOFT_M = 0.2
 
 
 def firm_mud_ahead(configuration: Configuration, pascal: float, adaptive: bool = True) -> Iterator[Lockstep]:
@@ -27,7 +27,7 @@ def firm_mud_ahead(configuration: Configuration, pascal: float, adaptive: bool =
     robot.arm()
     robot.walk(WalkOrder(0.05, adaptive))
     end_s = robot.now_s + 20.0
-    while robot.loop.mode is Mode.WALKING and robot.robot.plant.body_m < SOFT_M + 0.25 and robot.now_s < end_s:
+    while robot.loop.mode is Mode.WALKING and robot.robot.plant.body_m < SOFT_M + 0.2 and robot.now_s < end_s:
         robot.step()
         yield robot
 

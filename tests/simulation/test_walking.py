@@ -19,7 +19,7 @@ from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import COMPARTMENT_M, Track, paper_track
 
-STRIDES = 5
+STRIDES = 4
 StepCm = Callable[[Clay, float], float]
 
 
