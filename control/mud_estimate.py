@@ -1,9 +1,9 @@
-"""What is believed of the mud between strides: each coefficient with its doubt, and with how it changes with depth.
+"""The estimate of the mud between strides: each coefficient with its standard error and its depth law.
 
 The coefficients of control/plate.py stand for forces that grow with the depth squared (k_s) or with the submerged
 volume (k_p, k_e). Mud's forces grow more slowly, so the same mud reads softer in a deeper stride: by the clay practice
 of Matlock (1970) k_s at 5 cm is a third lower than at 3 cm. Near the depth z₀ of the strides it came from, k ∝ z^m.
-The exponent is learned too, and what is not known of it counts the more, the farther a force is predicted:
+The exponent is learned too, and its error grows with the distance of the prediction from z₀:
 
     ln k(z) = ln k + m ln(z/z₀)        (std_error/k)² at z  =  (std_error/k)² + ln²(z/z₀) · (exponent_std_error)²
 
@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from control.records import UNKNOWN
 
-LARGEST_LOG_RATIO = 300.0  # nonsense stays a number: exp() and a few products of it do not overflow
+LARGEST_LOG_RATIO = 300.0  # keeps exp() and a few products of it finite
 
 
 class Coefficient(NamedTuple):
@@ -26,11 +26,11 @@ class Coefficient(NamedTuple):
     depth_m: float  # below the mud's surface
     exponent: float  # k ∝ z^exponent near depth_m
     exponent_std_error: float
-    strides: int  # that support it
+    strides: int  # behind the estimate
     at_least: bool = False  # the mud never yielded: a lower bound
 
     def at(self, depth_m: float) -> tuple[float, float]:
-        """Value and standard error at another depth; NaN where there is no mud."""
+        """Return value and standard error at another depth; NaN above the mud."""
         if not (depth_m > 0.0 and self.depth_m > 0.0):
             return UNKNOWN, UNKNOWN
         log_depths = log(depth_m) - log(self.depth_m)
@@ -41,7 +41,7 @@ class Coefficient(NamedTuple):
 
 
 class FlipperEstimate(NamedTuple):
-    """What one flipper's strides say; None where they said nothing yet."""
+    """The coefficients from one flipper's strides; None if unknown."""
 
     k_p: Coefficient | None = None
     k_s: Coefficient | None = None
@@ -49,8 +49,9 @@ class FlipperEstimate(NamedTuple):
 
 
 class MudEstimate(NamedTuple):
-    """Each flipper apart, and both together where they agree. They go through two muds at times: then there is no
-    such thing as the mud's coefficient, and together it is None.
+    """The coefficients of each flipper, and of both together where they agree.
+
+    A common coefficient is None while the flippers are in two different muds.
     """
 
     k_p: Coefficient | None = None
@@ -58,7 +59,7 @@ class MudEstimate(NamedTuple):
     k_e: Coefficient | None = None
     left: FlipperEstimate = FlipperEstimate()
     right: FlipperEstimate = FlipperEstimate()
-    boundary: bool = False  # this stride did not fit what was remembered, which was dropped: another mud
+    boundary: bool = False  # this stride did not fit the memory, which was dropped: the mud changed
 
     def of(self, flipper: str) -> FlipperEstimate:
         return self.left if flipper == "left" else self.right

@@ -1,9 +1,9 @@
-"""What one flipper learns from one stride, in torque space.
+"""The default method of estimation: one flipper's stride, fitted in torque space.
 
-Each stroke is kept as batches of equal travel (stroke.py). When the insertion ends, the surface is found (surface.py)
-and k_p fitted; when the stride closes, k_s or its bound (shear.py) and k_e (stroke_fit.py). The zero is taken anew in
-every swing (tare.py). Coefficients are linear in the joints' torques, so no force has to be known that two torques
-cannot tell; forces are mapped for display alone.
+Each stroke is stored as batches of equal travel (stroke.py). At the end of the insertion the estimator finds the
+surface (surface.py) and fits k_p; when the stride closes it fits k_e (stroke_fit.py), and fits or bounds k_s
+(shear.py). The zero is measured again in every swing (tare.py). The coefficients are linear in the joint torques, so
+the fits need no third force component, which two torques cannot determine; forces are mapped for display only.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from estimation.strokes.surface import NO_SURFACE, combined, find_surface
 from estimation.strokes.tare import Tare
 
 STEPS_M = {Phase.INSERTION: 0.0015, Phase.STANCE: 0.006, Phase.EXTRACTION: 0.002}
-OWN_ERROR_M = 0.002  # by which a stroke's own force may seem to begin elsewhere than at the mud's surface
-FREE_FRACTION = 0.4  # of the clearance that the edge must be above the mud to count as free air
-CLINGING_M = 0.015  # above the lower edge: the middle of what a stroke of 3 cm wets
+OWN_ERROR_M = 0.002  # offset between the mud's surface and the depth where a stroke's own force begins
+FREE_FRACTION = 0.4  # of the clearance: an edge this far above the mud is in free air
+CLINGING_M = 0.015  # above the lower edge: the middle of the part that a stroke of 3 cm wets
 
 
 class FlipperEstimator(StrideEstimator):
@@ -94,12 +94,12 @@ class FlipperEstimator(StrideEstimator):
 
     def _begin_phase(self, phase: Phase) -> None:
         if phase is Phase.INSERTION:
-            self._tare.take()
+            self._tare.set_zero()
 
     def _learn_insertion(self, batches: Sequence[Batch]) -> None:
-        """Surface, what is left of the zero above it, and k_p.
+        """Find the surface, correct the zero by the force above it, and fit k_p.
 
-        k_p is counted from where this stroke's own force began: a lag between angle and current shifts both alike.
+        k_p counts from the depth where the stroke's own force begins: a lag between angle and current shifts both.
         """
         length_m, arm_m = self.geometry.flipper_length_m, hypot(self.geometry.flipper_length_m, self.geometry.drop_m)
         depths_m = [b.travel_m for b in batches]
@@ -116,7 +116,7 @@ class FlipperEstimator(StrideEstimator):
 
     @property
     def surface_m(self) -> float:
-        """What is known of the surface's depth below its nominal height."""
+        """The estimated depth of the surface below its nominal height."""
         return self._surface.depth_m
 
     def _learned(self) -> Learned:
@@ -143,7 +143,7 @@ class FlipperEstimator(StrideEstimator):
         return bound_extraction(self.geometry, stroke.batches, self._surface)
 
     def _shear_estimate(self, shear: Shear) -> Estimate:
-        """With the doubt about the surface: dk = 2 k dδ / z of a pressure that grows with depth."""
+        """Add the error of the surface: dk = 2 k dδ / z, since the pressure grows with depth."""
         if shear.fit is None:
             return NOT_THERE._replace(samples=shear.samples, reason=shear.reason or NOT_THERE.reason)
         depth_m = self._deepest_m - self.surface_m

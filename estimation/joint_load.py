@@ -1,17 +1,17 @@
-"""From motor currents to what the mud does to a flipper's two joints.
+"""The mud's load on a flipper's two joints, from motor currents.
 
-Of a direct-drive joint the motor's torque k_t I, gravity, friction and the mud's load together make the arm's inertia
-J turn faster: the load is J ω' - k_t I - τ_gravity + τ_friction. (The paper leaves out all but -k_t I; with inertia,
-gravity and friction configured as zero this is the paper's.) Messages come slower than ticks: a sample that repeats
-the one before says nothing new.
+In a direct-drive joint the motor torque k_t I, gravity, friction and the mud's load together accelerate the arm's
+inertia J: the load is J ω' - k_t I - τ_gravity + τ_friction. (The paper neglects all terms but -k_t I; with inertia,
+gravity and friction configured as zero the load is the paper's.) Messages arrive more slowly than ticks: a sample that
+repeats the one before adds nothing.
 
-In a quick stroke inertia is larger than the mud's load, so both must be of the same time. Two velocities tell the mean
-acceleration between the moments at which they were measured; the angle is taken half-way, and the current as its mean
-over that time. A drive holds each command until the next, so its current is a stair with a step at each command; where
-the last two samples answer the last two commands, that mean is known. Where messages come more slowly than commands,
-or nothing is known of these, it is taken along the line through both samples. (Across a step the line errs by up to
-half of it: in a walk's quick extraction from soft mud, by a seventh of k_e.) Drives send angle and current separately,
-and slower or faster than the loop ticks, so each has its age.
+In a quick stroke the inertial torque exceeds the mud's load, so all terms must belong to the same time. Two velocities
+give the mean acceleration between their measurements; the angle is taken half-way, and the current as its mean over
+that interval. A drive holds each command until the next, so its current is a staircase with a step at each command; if
+the last two samples answer the last two commands, that mean is known. If messages come more slowly than commands, or
+the times of the commands are unknown, the current is taken along the line through both samples. (Across a step the line
+errs by up to half of it: in a walk's quick extraction from soft mud, by a seventh of k_e.) Drives send angle and
+current separately, and faster or slower than the loop, so each has its own stamp.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from control.joint_friction import NO_FRICTION, JointFriction
 from control.joint_pd import GRAVITY_M_S2, ArmMass
 from control.records import UNKNOWN, DriveState
 
-SATURATION = 0.98  # of the limit: clipped currents stay a little under it
-LONGEST_GAP_S = 0.03  # between two samples that still tell of one motion
-SHORTEST_GAP_S = 0.0005  # two frames that an adapter delivered together do not tell when they were made
+SATURATION = 0.98  # of the current limit: clipped currents stay slightly below it
+LONGEST_GAP_S = 0.03  # between two samples of one motion
+SHORTEST_GAP_S = 0.0005  # two frames delivered together by an adapter have no usable stamps
 CommandTimes = tuple[float, float]  # when the drives were given the last two commands that a sample may answer
 NO_COMMANDS: CommandTimes = (UNKNOWN, UNKNOWN)
 
 
 class FlipperDrive(NamedTuple):
-    """What turns the currents of one flipper's joints into torques."""
+    """The properties of one flipper's drives that turn currents into loads."""
 
     mass: ArmMass
     sweep_constant_nm_a: float
@@ -44,7 +44,7 @@ class FlipperDrive(NamedTuple):
 
 
 class JointLoad(NamedTuple):
-    """Of one moment: the pose, and what the mud does to the joints there."""
+    """The pose of one flipper and the mud's load on its joints."""
 
     sweep_rad: float
     adduction_rad: float
@@ -53,14 +53,14 @@ class JointLoad(NamedTuple):
     rise_adduction_m: float
     sweep_nm: float
     adduction_nm: float
-    saturated: bool  # a motor gives all it can: the mud may hold on to more
+    saturated: bool  # a motor is at its limit: the mud may withstand more
 
 
 JointMotion = tuple[float, float, float, float]  # of one joint at one moment: rad, rad/s, rad/s², A
 
 
 def motion_at(before: DriveState, now: DriveState, commands_s: CommandTimes = NO_COMMANDS) -> JointMotion:
-    """At the newest sample, with the acceleration since the one before; zero where velocities are not known."""
+    """Return the motion at the newest sample, with the acceleration since the one before; zero without velocities."""
     dt_s = now.angle_stamp_s - before.angle_stamp_s
     change_rad_s = now.velocity_rad_s - before.velocity_rad_s
     acceleration_rad_s2 = change_rad_s / dt_s if dt_s > 0.0 and isfinite(change_rad_s) else 0.0
@@ -68,7 +68,7 @@ def motion_at(before: DriveState, now: DriveState, commands_s: CommandTimes = NO
 
 
 def motion_between(before: DriveState, now: DriveState, commands_s: CommandTimes = NO_COMMANDS) -> JointMotion:
-    """Half-way between two samples; at the newest, without acceleration, where they do not tell of one motion."""
+    """Return the motion half-way between two samples; at the newest, without acceleration, if their gap is unusable."""
     angle_before_rad, before_rad_s, angle_before_s, current_before_a, current_before_s = before[:5]
     angle_rad, now_rad_s, angle_s, current_a, current_s = now[:5]
     earlier_s, later_s = commands_s
@@ -111,13 +111,13 @@ class JointLoads:
 
     @property
     def angles_rad(self) -> tuple[float, float]:
-        """The newest of sweep and adduction; a load belongs to a moment a little earlier."""
+        """The newest angles of sweep and adduction; a load belongs to a slightly earlier time."""
         return self._sweep[1].angle_rad, self._adduction[1].angle_rad
 
     def update(
         self, sweep: DriveState, adduction: DriveState, commands_s: CommandTimes = NO_COMMANDS
     ) -> JointLoad | None:
-        """None for samples that repeat the ones before. Velocities may be unknown (NaN)."""
+        """Return the load; None for samples that repeat the ones before. Velocities may be unknown (NaN)."""
         if _repeats(self._sweep[1], sweep) and _repeats(self._adduction[1], adduction):
             return None
         self._sweep, self._adduction = _paired(self._sweep, sweep), _paired(self._adduction, adduction)
@@ -135,7 +135,7 @@ class JointLoads:
     def _without_gravity(
         self, sweep_rad: float, adduction_rad: float, sweep_nm: float, adduction_nm: float, saturated: bool
     ) -> JointLoad:
-        """The arm's weight as in ArmMass.gravity_torques_nm, with the sines that depth and levers need too."""
+        """Subtract gravity as in ArmMass.gravity_torques_nm, sharing its sines with depth and levers."""
         sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
         length_m, drop_m, moment_nm = self._length_m, self._drop_m, self._moment_nm
         return JointLoad(
@@ -155,7 +155,7 @@ def _repeats(before: DriveState, now: DriveState) -> bool:
 
 
 def _paired(pair: tuple[DriveState, DriveState], now: DriveState) -> tuple[DriveState, DriveState]:
-    """With the last sample of another angle: where the current alone is new, the acceleration is still the last one."""
+    """Pair a sample with the last one of another angle: a new current alone leaves the acceleration unchanged."""
     before, last = pair
     return (before if now.angle_stamp_s == last.angle_stamp_s else last), now
 

@@ -1,9 +1,8 @@
-"""The estimator that the loop, the replay and the experiments share: both flippers, one sample a tick, and what is
-known of the mud from stride to stride.
+"""The estimator that the loop, the replay and the experiments share: both flippers, and the mud from stride to stride.
 
-It sees angles, currents, the gait's phase and the body's place, and nothing else: no bus, no clock. The same samples
-give the same numbers to the last digit, live or from a log. Two methods share its interface: `default`, in torque
-space, and `paper`, the published one, with its biases.
+Its input is drive states, the gait's phase and the body's position, one sample a tick; it uses no bus and no clock. The
+same samples give the same numbers to the last digit, live or from a log. Two methods share its interface: `default`, in
+torque space, and `paper`, the published one, with its biases.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from estimation.mud_map import MudMap
 from estimation.paper import PaperEstimator
 from estimation.strokes.shear import Base
 
-PAPER_DRAG_N = 2.5  # of the body on its rail
+PAPER_DRAG_N = 2.5  # the body's drag on its rail in the paper
 Method = Literal["default", "paper"]
 
 
@@ -50,7 +49,7 @@ class MudReading(NamedTuple):
 
 
 class MudEstimator:
-    """Owns both flippers' estimators, the memory from stride to stride, and the map along the way."""
+    """Owns both flippers' estimators, the memory from stride to stride, and the map along the track."""
 
     def __init__(
         self,
@@ -59,13 +58,13 @@ class MudEstimator:
         parameters: EstimationParameters = EstimationParameters(),
         body_drag_n: float = PAPER_DRAG_N,
     ) -> None:
-        """`drives`: of the left and the right flipper; `body_drag_n`: less thrust cannot have moved the body."""
+        """`drives` are the left and the right flipper's; a thrust below `body_drag_n` cannot move the body."""
         self.left, self.right = (
             _flipper_estimator(flipper, geometry, drive, parameters, body_drag_n)
             for flipper, drive in zip(FLIPPERS, drives, strict=True)
         )
         self._knowledge = MudKnowledge()
-        self._commands_s = NO_COMMANDS  # the drives are given new ones after each sample
+        self._commands_s = NO_COMMANDS  # the loop sends new commands after each sample
         self.map = MudMap()
         self.mud_estimate: MudEstimate = NOTHING_KNOWN
 

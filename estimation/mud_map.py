@@ -1,10 +1,10 @@
-"""The mud along the distance travelled: each coefficient over pieces of 5 cm, about half a step, where there is a pose.
+"""A map of the mud: each coefficient over pieces of 5 cm along the track, about half a step, if there is a pose.
 
 A piece's coefficient is the weighted mean of ln k over all strides of both flippers there, with the weights 1/r² of
-estimation/knowledge.py. Its doubt is that of the mean, times √(χ²/(n - 1)) where the strides differ by more than their
-own doubts allow (Birge's ratio: a boundary within the piece, a hole walked through again). The strides' depths differ
-too, so a mean depth stands beside it. A lower bound is not averaged; where nothing else was told the greatest stands.
-The pieces that were not walked on for longest are given up, so a long walk does not fill the memory.
+estimation/strokes/depth_line.py. Its standard error is that of the mean, times √(χ²/(n - 1)) if the strides differ by
+more than their own errors explain (Birge's ratio: a boundary within the piece, or a hole entered a second time). The
+strides' depths differ too, so each coefficient has a mean depth. Lower bounds are not averaged: the greatest counts
+while the piece has no value. The map drops the pieces that were entered longest ago, so its memory is bounded.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class MapRow(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """Of the strides in one piece, weighted; squares about the mean."""
+    """Weighted sums over the strides in one piece; squares about the mean."""
 
     weight: float
     log_k: float
@@ -78,7 +78,7 @@ Piece = tuple[Sums | None, Sums | None, Sums | None]  # of k_p, k_s, k_e
 
 
 class MudMap:
-    """Owns the pieces, in the order in which they were last walked on."""
+    """Owns the pieces, in the order in which they were last entered."""
 
     def __init__(self) -> None:
         self._pieces: dict[int, Piece] = {}
@@ -87,7 +87,7 @@ class MudMap:
         self._pieces.clear()
 
     def update(self, position_m: float, strides: Sequence[StrideEstimate]) -> None:
-        """The strides that closed with the body at `place_m`, NaN without a pose."""
+        """Add the strides that closed with the body at `position_m`, NaN without a pose."""
         if not isfinite(position_m / PIECE_M):
             return
         number = floor(position_m / PIECE_M)
@@ -101,7 +101,7 @@ class MudMap:
             del self._pieces[next(iter(self._pieces))]
 
     def rows(self) -> tuple[MapRow, ...]:
-        """In the order of places."""
+        """Return the pieces in the order of their positions."""
         return tuple(
             MapRow((number + 0.5) * PIECE_M, *(sums.mapped() if sums else None for sums in self._pieces[number]))
             for number in sorted(self._pieces)

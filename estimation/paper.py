@@ -1,14 +1,14 @@
-"""The paper's method (sections III-B and III-C), kept under its name beside the truthful one.
+"""The paper's method of estimation (sections III-B and III-C), with its biases, for comparison.
 
-The published force map turns joint torques into forces. The surface is where the upward force first passes 0.5 N. From
-there on, over the distinct samples of the stride,
+The published force map turns joint torques into forces. The surface is the depth where the upward force first exceeds
+0.5 N. Below it, over the distinct samples of the stride,
 
     insertion     f_z =  k_p · A z        A: the plate's edge, width times thickness
     steady stance f_x =  k_s · b z²/2     b: the plate's width
     extraction   -f_z =  k_e · A z
 
-are fitted by least squares, a few running sums each, and closed when swing begins. Where the body advances on solid
-mud the paper adds the body's drag to f_x; half of it is this flipper's, if `compensated`.
+are fitted by least squares with a few running sums each, and closed when swing begins. If the body advances on solid
+mud the paper adds the body's drag to f_x; with `compensation`, half of it is added to each flipper's force.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from estimation.strokes.line_fit import LineFit
 SURFACE_FORCE_N = 0.5  # the paper's trigger, chosen above its noise
 STEADY_FRACTION = 0.6  # of the sweep's half range around the middle: the force has reached its plateau by then
 MOBILISED_M = 0.002  # rise after which the mud under an extracted flipper yields instead of springing back
-ADVANCED_M = 0.002  # from which the body has moved
+ADVANCED_M = 0.002  # from here on the body counts as advancing
 
 
 class PaperEstimator(StrideEstimator):
@@ -89,7 +89,7 @@ class PaperEstimator(StrideEstimator):
 
     @property
     def surface_m(self) -> float:
-        """The detected surface, or the nominal one while none was found."""
+        """The detected surface, or the nominal one before it is detected."""
         return self._surface_m if isfinite(self._surface_m) else 0.0
 
     def _learned(self) -> Learned:

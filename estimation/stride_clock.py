@@ -1,8 +1,8 @@
-"""The order of phases that makes a stride, told apart from what is learned in it.
+"""The order of phases that makes a stride, apart from the estimation in it.
 
 A stride begins with swing, insertion or rest, and is complete when insertion, stance and extraction have followed. It
-closes on the first sample of the phase after; one that rest cuts short does not close. Pauses and a recovery lie
-between its phases: a flipper that was recovered has its stride closed by the swing that follows.
+closes on the first sample of the next phase; a stride that rest interrupts does not close. Pauses and a recovery may
+lie between its phases: after a recovery the following swing closes the stride.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ BORDERS = (Phase.SWING, Phase.INSERTION, Phase.REST)
 
 
 class Change(NamedTuple):
-    """What a change of phase brings with it."""
+    """The result of a change of phase."""
 
     ended: Phase
     begins_stride: bool
@@ -35,12 +35,12 @@ class StrideClock:
         self.begin(0.0)
 
     def begin(self, now_s: float) -> None:
-        """A stride."""
+        """Begin a stride."""
         self.start_s = self._phase_start_s = now_s
         self.duration_s = {phase: 0.0 for phase in STROKES}
 
     def change(self, now_s: float, phase: Phase) -> Change:
-        """To be called when the phase is another one."""
+        """Record a new phase; called only when the phase differs."""
         ended = self.phase
         if ended in self.duration_s:
             self.duration_s[ended] = now_s - self._phase_start_s

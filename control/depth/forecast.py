@@ -1,20 +1,20 @@
-"""What a stride at another depth would find: the flippers' thrust and the torque that pulls them out, on the safe side.
+"""Forecast of a stride at another depth, on the safe side: the flippers' thrust, and the torque of their extraction.
 
-Thrust of one flipper, straight out, is f_x = k_s(z) ∫ζ dA (control/plate.py), and no more than its motor can push. A
-mud that yielded told its k_s. One that did not told only that it bears so much, but the insertion told its k_p, and
-both come from the one strength of the mud: k_s = ρ k_p. ρ is 0.69 in the authors' log whose insertion can be read
-(their 12.5N mud, 1.8 cm), and 0.43 to 0.63 by the clay practice of Matlock and Prandtl from 0.5 to 4.5 kPa and 1.8 to
-3 cm. So it starts between, is corrected wherever k_s and k_p are both known, and is never trusted to better than a
-fifth. The larger one of both tellings holds, since each is on the safe side.
+The thrust of one flipper at the middle of the sweep is f_x = k_s(z) ∫ζ dA (control/plate.py), limited by its motor. Mud
+that yielded gives a value of k_s; mud that did not gives only a lower bound, but the insertion gives k_p, and both
+depend on the one strength of the mud: k_s = ρ k_p. ρ is 0.69 in the authors' log with a readable insertion (their 12.5N
+mud, 1.8 cm), and 0.43 to 0.63 by the clay practice of Matlock and Prandtl from 0.5 to 4.5 kPa and 1.8 to 3 cm. So the
+ratio starts between, is corrected whenever k_s and k_p are both known, and is never trusted to better than a fifth. The
+larger of both estimates counts, since each is on the safe side.
 
-The torque of an extraction is k_e(z) Φ in the pose at the rear end of the sweep, times the share of it that is felt
-at most at one moment: k_e is that of a whole stroke, and mud's force grows more slowly with depth than the law, so the
-hardest moment falls short of k_e Φ at the deepest point. The share is learned from the hardest moment of every
-extraction, and from 1, which is safe. Where k_e is not known, k_p Φ stands for that torque: k_e is 1.3 to 1.8 times
-k_p by clay practice (0.8 in the log above) and the share about a half. A flipper that came out proves what it took, in
-every shallower place too, and no more than in proportion to Φ in a deeper one, since k_e falls with depth. One that
-stuck proves τ_e ≥ τ_m there, whatever was believed, and elsewhere in proportion to depth (Φ k_e is near that); this is
-remembered until it comes out of there, or the mud changes.
+The torque of an extraction is k_e(z) Φ in the pose at the rear end of the sweep, times the fraction of it at the peak:
+k_e is that of a whole stroke, and mud's force grows more slowly with depth than the law, so the peak is less than k_e Φ
+at the deepest point. The fraction is learned from the peak of every extraction, starting at 1, which is safe. Without
+k_e, k_p Φ stands for that torque: k_e is 1.3 to 1.8 times k_p by clay practice (0.8 in the log above) and the fraction
+about a half. A flipper that came out proves the torque it took, at every shallower depth too, and at a deeper one at
+most in proportion to Φ, since k_e falls with depth. A flipper that stuck proves τ_e ≥ τ_m at its depth, despite
+the estimate, and elsewhere in proportion to depth (k_e Φ is nearly so); this is remembered until a flipper comes out from
+there, or the mud changes.
 """
 
 from __future__ import annotations
@@ -28,24 +28,25 @@ from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
 from control.plate import stroke_moment_m4, submerged_plate
 from control.records import StrideEstimate
 
-SHEAR_RATIO = 0.55  # k_s over k_p before any mud told both
+SHEAR_RATIO = 0.55  # k_s over k_p before any mud gave both
 RATIO_UNCERTAINTY = 0.2
-SUCTION_RATIO = 1.0  # of the hardest moment's torque over k_p Φ, where k_e is not known
-LEARNING = 0.25  # weight of a new stride in what is learned from many
-FRACTIONS = (0.2, 1.5)  # bounds of what can be learned of each
+SUCTION_RATIO = 1.0  # peak extraction torque over k_p Φ, without k_e
+LEARNING = 0.25  # weight of a new stride
+FRACTIONS = (0.2, 1.5)  # bounds of the learned values
 RATIOS = (0.2, 1.5)
 THRUST_UNCERTAINTY, SUCTION_UNCERTAINTY = (
     1.0,
     2.0,
 )  # standard errors: a slip costs half a step, a stuck flipper the walk
-SAG_FRACTION = 0.25  # of the deepest moment's, on average over the stance
-GRID_M = 0.0025  # depths that are told apart; the joints do not follow more finely in mud
+SAG_FRACTION = 0.25  # of the deepest sag, on average over the stance
+GRID_M = 0.0025  # resolution of depths; the joints do not follow more finely in mud
 
 
 class DepthForecast:
-    """Owns what outlives a belief: ratio, share, and how deep each flipper was in this mud when it stuck.
+    """Owns the learned ratio and fraction, and the depth at which each flipper stuck in this mud.
 
-    `gait` is that of the strides that are told of and asked about. A method that varies it sets it before either.
+    `gait` is the gait of the strides that it learns from and forecasts; a method that varies the gait sets it before
+    either.
     """
 
     def __init__(self, geometry: FlipperGeometry, gait: GaitParameters, motor_force_n: float) -> None:
@@ -56,7 +57,7 @@ class DepthForecast:
 
     def reset(self) -> None:
         self.shear_ratio, self.felt_fraction = SHEAR_RATIO, 1.0
-        self._fractions_reported = 0
+        self._fractions_learned = 0
         self._mud_estimate = NOTHING_KNOWN
         self._strides: Sequence[StrideEstimate] = ()
         self._stuck_m: dict[str, float] = {}
@@ -64,7 +65,7 @@ class DepthForecast:
         self._walked_m4: dict[str, float] = {}  # Φ of each flipper's last stride
 
     def update(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> None:
-        """The strides that just closed, one of each flipper, the depth they were told, and the belief after them."""
+        """Learn from the strides that just closed, at most one a flipper, their commanded depth, and the estimate."""
         self._mud_estimate, self._strides = mud_estimate, strides
         sags_m = [stride.depth_m + stride.surface_m - walked_m for stride in strides]
         self._sag_m = SAG_FRACTION * max(0.0, min([sag_m for sag_m in sags_m if isfinite(sag_m)], default=0.0))
@@ -86,14 +87,14 @@ class DepthForecast:
             del self._stuck_m[stride.flipper]
 
     def _learn_fraction(self, stride: StrideEstimate) -> None:
-        """From an extraction that told k_e and was not held: there the motor's limit, not the mud, sets the torque."""
+        """Learn the fraction from an extraction with a k_e that came out: if stuck, the motor sets the torque."""
         reported = stride.k_e.valid and not stride.k_e.at_least and isfinite(stride.surface_m)
         if not (stride.released and reported and stride.depth_m > 0.0):
             return
         whole_nm = stride.k_e.value * self._walked_m4[stride.flipper]
         if whole_nm > 0.0 and stride.extraction_torque_nm > 0.0:
-            self._fractions_reported += 1
-            weight = max(LEARNING, 1.0 / self._fractions_reported)
+            self._fractions_learned += 1
+            weight = max(LEARNING, 1.0 / self._fractions_learned)
             fraction = stride.extraction_torque_nm / whole_nm
             self.felt_fraction = _within(self.felt_fraction * (fraction / self.felt_fraction) ** weight, FRACTIONS)
 
@@ -107,11 +108,11 @@ class DepthForecast:
             self.shear_ratio = _within(exp(log(self.shear_ratio) + LEARNING * log(ratio / self.shear_ratio)), RATIOS)
 
     def reached_m(self, commanded_m: float) -> float:
-        """Under load the flippers go deeper than they are told, as deep as they can."""
+        """Return the depth reached under load, which is more than commanded, within the flipper's reach."""
         return min(commanded_m + self._sag_m, self.geometry.deepest_m(self.gait.sweep_angle_deg))
 
     def thrust_n(self, commanded_m: float) -> float | None:
-        """Of both flippers; None where nothing is known of what the mud bears."""
+        """Return the thrust of both flippers; None if the mud's shear resistance is unknown."""
         depth_m = self.reached_m(commanded_m)
         reported = [self._thrust_n(stride, depth_m) for stride in self._strides]
         known = [thrust_n for thrust_n in reported if thrust_n is not None]
@@ -128,7 +129,7 @@ class DepthForecast:
         return min(k_s * plate.depth_moment_m3, self.motor_force_n)
 
     def _shear(self, flipper: str, submerged_m: float) -> float | None:
-        """k_s, less its doubt."""
+        """Return k_s less its uncertainty; None if unknown."""
         mud_estimate = self._mud_estimate
         k_s, k_p = mud_estimate.k_s or mud_estimate.of(flipper).k_s, mud_estimate.k_p or mud_estimate.of(flipper).k_p
         reported = None if k_s is None else _less(k_s, submerged_m)
@@ -138,12 +139,12 @@ class DepthForecast:
         return felt if reported is None else max(felt, reported)
 
     def shear_at(self, depth_m: float) -> float:
-        """k_s of the body's own pad, as the mean of the flippers; 0 where it is not known."""
+        """Return k_s at the depth of the body's pad, the mean of the flippers; 0 if unknown."""
         reported = [self._shear(stride.flipper, depth_m) or 0.0 for stride in self._strides]
         return sum(reported) / len(reported) if reported and depth_m > 0.0 else 0.0
 
     def extraction_nm(self, commanded_m: float) -> float:
-        """For the flipper that the mud holds harder."""
+        """Return the extraction torque of the flipper that needs more."""
         depth_m = self.reached_m(commanded_m)
         return max((self._extraction_nm(stride, depth_m) for stride in self._strides), default=0.0)
 
@@ -153,30 +154,30 @@ class DepthForecast:
         if submerged_m <= 0.0:
             return 0.0
         moment_m4 = self._lift_moment_m4(depth_m, surface_m)
-        reported_nm = self._reported_nm(stride, submerged_m, moment_m4)
+        estimated_nm = self._estimated_nm(stride, submerged_m, moment_m4)
         if stride.released and stride.extraction_torque_nm > 0.0 and stride.depth_m > 0.0:
-            reported_nm = min(reported_nm, self._proven_nm(stride, moment_m4))
+            estimated_nm = min(estimated_nm, self._proven_nm(stride, moment_m4))
         held_nm = self.lifting_torque_nm * submerged_m / self._stuck_m.get(stride.flipper, inf)
-        return max(reported_nm, held_nm)
+        return max(estimated_nm, held_nm)
 
     def _proven_nm(self, stride: StrideEstimate, moment_m4: float) -> float:
-        """What it took, or would take deeper if k_e did not fall with depth, as it does."""
+        """Return the torque that the last extraction took, scaled to a deeper one as if k_e did not fall with depth."""
         walked_m4 = self._walked_m4[stride.flipper]
         return stride.extraction_torque_nm * max(1.0, moment_m4 / walked_m4) if walked_m4 > 0.0 else inf
 
-    def _reported_nm(self, stride: StrideEstimate, submerged_m: float, moment_m4: float) -> float:
-        """By k_e, or by k_p where that is not known; by neither, all that there is below where the flipper has been."""
+    def _estimated_nm(self, stride: StrideEstimate, submerged_m: float, moment_m4: float) -> float:
+        """Return the torque by k_e, else by k_p; without either, the motor's limit below the depth reached so far."""
         flipper = self._mud_estimate.of(stride.flipper)
         k_e, k_p = self._mud_estimate.k_e or flipper.k_e, self._mud_estimate.k_p or flipper.k_p
-        reported_nm = self.felt_fraction * _more(k_e, submerged_m) * moment_m4 if k_e is not None else 0.0
+        estimated_nm = self.felt_fraction * _more(k_e, submerged_m) * moment_m4 if k_e is not None else 0.0
         if k_e is not None and not k_e.at_least:
-            return reported_nm
+            return estimated_nm
         if k_p is not None:
-            return max(reported_nm, SUCTION_RATIO * _more(k_p, submerged_m) * moment_m4)
-        return self.lifting_torque_nm if submerged_m > _known(stride.depth_m) + GRID_M else reported_nm
+            return max(estimated_nm, SUCTION_RATIO * _more(k_p, submerged_m) * moment_m4)
+        return self.lifting_torque_nm if submerged_m > _known(stride.depth_m) + GRID_M else estimated_nm
 
     def _lift_moment_m4(self, depth_m: float, surface_m: float) -> float:
-        """Φ in the pose in which the flipper is pulled out; 0 where a fitted surface puts that out of reach."""
+        """Return Φ in the pose of the extraction; 0 if a fitted surface puts it out of reach."""
         reached_m = min(depth_m, self.geometry.deepest_m(self.gait.sweep_angle_deg))
         if not self.geometry.is_reachable(self.rear_rad, reached_m):
             return 0.0

@@ -1,16 +1,15 @@
-"""The paper's own choice of depth (section III-D), kept under its name beside the default one.
+"""The paper's choice of depth (section III-D), for comparison with the default one.
 
 From the last stride's coefficients, by the laws of the plate's edge, b its width and t its thickness:
 
     no slip       2 f_x(z) > f_r + f_a      f_x = k_s b z²/2     f_r = drag + k_s · pad     f_a = m v / t_acc / 2
     extraction    f_e(z) < f_m              f_e = k_e b t z
 
-The paper names both conditions, not which depth between them it takes. Its adaptive speed in the firm mud (6.4 cm/s,
-that of a depth of 5 cm: 6.6) shows that it was the deepest that comes out, and so it is here. The estimates are taken
-as they are, without doubt; like the paper's robot, the right flipper decides while it knows anything. A motor at its
-limit feels no more than f_m, so its force cannot tell that f_e is greater. The body can: a flipper that was late in
-coming out and pulled the body back (or no pose says that it did not) proves f_e ≥ f_m at its depth, until the mud
-changes.
+The paper names both conditions, but not the depth that it takes between them. Its adaptive speed in the firm mud
+(6.4 cm/s; at a depth of 5 cm: 6.6) suggests the deepest that comes out, which this method takes. The estimates are used
+without their uncertainty; as on the paper's robot, the right flipper decides while it has an estimate. A motor at its
+limit measures no more than f_m, so its force cannot show that f_e is greater. The body's motion can: a flipper that
+came out late and pulled the body back (or no pose excludes that) proves f_e ≥ f_m at its depth, until the mud changes.
 """
 
 from __future__ import annotations
@@ -59,11 +58,11 @@ class PaperAdaptation:
 
     @property
     def largest_insertion_nm(self) -> float:
-        """The paper's robot goes to the depth that it chose."""
+        """Infinite: the paper's robot always inserts to the chosen depth."""
         return inf
 
     def _remember(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> None:
-        """The step that has just been measured holds the swing of the stride before."""
+        """Record a stuck stride; the step just measured includes the swing of the stride before."""
         if mud_estimate.boundary:
             self._stuck_m = inf
         if not all(stride.step_m >= self.geometry.flipper_length_m / 2.0 for stride in strides):
@@ -82,7 +81,7 @@ class PaperAdaptation:
         return 2.0 * thrust_n <= self._resistance_n()
 
     def _resistance_n(self) -> float:
-        """f_r + f_a, with f_a = m α l / (t_acc t_s) and the stance time t_s = 2 α l / v."""
+        """Return f_r + f_a, with f_a = m α l / (t_acc t_s) and the stance time t_s = 2 α l / v."""
         parameters = self.parameters
         pad_n = self._k_s.value * parameters.pad_width_m * parameters.pad_depth_m**2 / 2.0
         inertial_n = parameters.body_mass_kg * self.gait.stance_speed_m_s / (2.0 * parameters.paper.acceleration_s)

@@ -1,13 +1,13 @@
-"""How far one stride carries the body: its equation of motion through the stance, and on until it stands.
+"""The body's step in one stride: its equation of motion through the stance until it stands again.
 
 The arms sweep y(t) backward while the body, which they push, goes forward by x. Mud and servo give way like a spring
 of the stiffness k until the mud yields at the thrust F, from where on the plates shear through it; then the body
-slides on by itself against the drag f_r + b v of its rail or belly:
+continues to slide against the drag f_r + b v of its rail or belly:
 
     m x'' = f - (f_r + b x')       f = k (y - x - slip), and slip so that |f| ≤ F       y(t) = 2 l sin α · progress(t)
 
-From the end of the stance on, F fades to nothing while the plates are pulled out; what the spring still holds throws
-the body ahead until then. Afterwards it coasts (m/b) (v - (f_r/b) ln(1 + b v/f_r)).
+From the end of the stance on, F fades to zero while the plates are pulled out; the energy left in the spring throws the
+body ahead until then. Afterwards it coasts (m/b) (v - (f_r/b) ln(1 + b v/f_r)).
 
 The authors' optimiser has S = 2 l min(α, √(1 - ((f_r + f_a)/2 f_s)²)) instead, with one inertial force for the whole
 stance. That balance of forces at one angle has no step at all where thrust is less than drag and inertia together,
@@ -23,13 +23,13 @@ from typing import NamedTuple
 
 from control.gait.gait import GaitParameters, smooth_progress
 
-LONGEST_S = 1.0  # of a stance or an extraction: in a slower one inertia says nothing more
+LONGEST_S = 1.0  # of a stance or an extraction: in a slower one inertia is negligible
 STEP_S = 0.01  # 1 kg on 500 N/m swings in 0.28 s
 NEGLIGIBLE = 1e-6
 
 
 class BodyDrag(NamedTuple):
-    """Of the body: what it takes to slide it slowly, how that grows with speed, and its mass."""
+    """The body's dry friction, viscous damping and mass."""
 
     dry_n: float
     damping_n_s_m: float
@@ -37,23 +37,25 @@ class BodyDrag(NamedTuple):
 
 
 class Traction(NamedTuple):
-    """Of both flippers together."""
+    """The thrust and stiffness of both flippers together."""
 
     thrust_n: float  # at which the mud yields, or the motors do
     stiffness_n_m: float  # until then
 
 
-Motion = tuple[tuple[float, float], ...]  # a step of time each: how far the plates swept, the share of thrust left
+Motion = tuple[
+    tuple[float, float], ...
+]  # for each time step: the plates' swept distance, the remaining fraction of thrust
 
 
 def step_m(gait: GaitParameters, flipper_length_m: float, drag: BodyDrag, traction: Traction, depth_m: float) -> float:
-    """With the flippers at `depth_m`, from which they are pulled out at the gait's speed of extraction."""
+    """Return the step with the flippers at `depth_m`, extracted at the gait's speed."""
     return carried_m(motion_of(gait, flipper_length_m, depth_m), drag, traction)
 
 
 @lru_cache(maxsize=256)
 def motion_of(gait: GaitParameters, flipper_length_m: float, depth_m: float) -> Motion:
-    """Of the plates, from the start of the stance until they are out."""
+    """Return the motion of the plates from the start of the stance until they are out."""
     front_rad = radians(gait.sweep_angle_deg)
     stance_s = min(2.0 * front_rad * flipper_length_m / gait.stance_speed_m_s, LONGEST_S)
     leaving_s = min(max(depth_m, 0.0) / gait.extraction_speed_m_s, LONGEST_S)
@@ -66,7 +68,7 @@ def motion_of(gait: GaitParameters, flipper_length_m: float, depth_m: float) -> 
 
 
 def carried_m(motion: Motion, drag: BodyDrag, traction: Traction) -> float:
-    """The body goes forward only: it slides back less than dry friction lets it."""
+    """Integrate the body's motion over a stride; dry friction keeps the body from sliding back."""
     dry_n, damping_n_s_m, mass_kg = drag
     stiffness_n_m, damped = traction.stiffness_n_m, 1.0 + STEP_S * damping_n_s_m / mass_kg
     if traction.thrust_n <= dry_n:
@@ -84,7 +86,7 @@ def carried_m(motion: Motion, drag: BodyDrag, traction: Traction) -> float:
 
 
 def coast_m(drag: BodyDrag, speed_m_s: float) -> float:
-    """How far the body slides by itself. Where drag hardly grows with speed, the logarithm would round it away."""
+    """Return the coasting distance; with negligible damping the logarithm would lose its digits."""
     viscous_n = drag.damping_n_s_m * speed_m_s
     if viscous_n < NEGLIGIBLE * drag.dry_n:
         return drag.mass_kg * speed_m_s * speed_m_s / (2.0 * drag.dry_n)

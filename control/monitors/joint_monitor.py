@@ -1,7 +1,7 @@
-"""What one joint's signals say against having torque on it: silence, errors, positions, speeds, currents and heat.
+"""Detects the faults of one joint and its drive: silence, errors, positions, velocities, currents and temperatures.
 
-`JointWatch.update` runs every tick for each joint and gives all faults that it sees. It owns the few counts that a
-single sample cannot tell. Bounds that depend on the machine are in FaultBounds, the others stand here.
+`JointMonitor.update` runs every tick for each joint and returns all faults that it detects. It owns the durations that
+a single sample cannot show. Bounds that depend on the machine are in FaultBounds, all others are constants here.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from control.monitors.stillness import Stillness
 from control.monitors.winding import Winding, WindingParameters
 from control.records import UNKNOWN, DriveState
 
-MOST_SEEN_S = 0.03  # that one tick adds to any duration: a loop that stood still for longer did not look
+MOST_SEEN_S = 0.03  # largest time that one tick adds to a duration: the joint was not observed during a longer gap
 MISSING_HEARTBEATS = 5  # in a row
-SLOW_SILENCE_S = 1.0  # of temperature and bus voltage, once they were told
-ENERGISED_S = 0.2  # two heartbeats, in which a drive that was told to go idle may say that it has not yet
-FAST_FRACTION = 1.25  # of the velocity limit, above which no torque of ours drives a joint
+SLOW_SILENCE_S = 1.0  # of temperature and bus voltage, once they were reported
+ENERGISED_S = 0.2  # two heartbeats, within which a drive may still report closed loop after a command to idle
+FAST_FRACTION = 1.25  # of the velocity limit, above which the limits allow no driving torque
 CURRENT_FRACTION = 1.25  # of the drive's current limit
 CURRENT_TICKS = 3
 STILL_RAD = 0.03
-REST_S = 0.1  # within STILL_RAD, and a joint is at rest
+REST_S = 0.1  # within STILL_RAD: the joint is at rest
 SATURATED_FRACTION = 0.95  # of the torque limit
 STALLED_S = 2.0  # longer than an insertion, a stance or an extraction of the paper's gait takes
-MISSING_FRACTION = 0.3  # of the torque limit, by which the current differs from the torque that was sent
+MISSING_FRACTION = 0.3  # of the torque limit: difference between commanded and measured torque
 MISSING_S = 0.1
-TWO_MESSAGES_S = 0.15  # of those that come every 0.1 s: a single odd one proves nothing
+TWO_MESSAGES_S = 0.15  # two messages at an interval of 0.1 s: a single outlier is no fault
 
 
 @dataclass(frozen=True)
 class FaultBounds:
-    """Where a fault begins that depends on the machine. T is the loop's period of 2.63 ms."""
+    """The bounds of faults that depend on the machine. T is the loop's period of 2.63 ms."""
 
     late_s: Annotated[float, Bounds(0.003, 2.0), Meaning("without position or current: reported")] = 0.0053  # 2 T
     quiet_s: Annotated[float, Bounds(0.005, 2.0), Meaning("without position or current: damping")] = 0.0079  # 3 T
@@ -64,14 +64,14 @@ class FaultBounds:
 
 
 class JointFacts(NamedTuple):
-    """What the loop knows of the moment."""
+    """The state of the loop in one tick."""
 
     now_s: float
     dt_s: float
     energised: bool  # torque is or may be on
     moving: bool  # closed loop is expected of the drive
     torque_nm: float  # sent in the tick before
-    may_stand_still: bool  # whatever the torque: no stiffness, or a recovery that pulls on purpose
+    may_stand_still: bool  # at any torque: without stiffness, or in a recovery that pulls on purpose
 
 
 class JointMonitor:
@@ -104,7 +104,7 @@ class JointMonitor:
         self.reset()
 
     def reset(self) -> None:
-        """But not the winding: it stays as warm as it is."""
+        """Clear all durations, but not the winding's temperature."""
         self._current_ticks = 0
         self._fast_s = self._stalled_s = self._energised_s = self._missing_s = 0.0
         self._low_s = self._under_s = self._hot_s = 0.0
@@ -113,7 +113,7 @@ class JointMonitor:
 
     def update(self, facts: JointFacts, state: DriveState) -> list[Fault]:
         found: list[Fault] = []
-        # One sample after a gap says nothing of what was in the gap.
+        # One sample after a gap does not show the state during the gap.
         seen = facts if facts.dt_s <= MOST_SEEN_S else facts._replace(dt_s=MOST_SEEN_S)
         self._watch_signals(found, facts, state)
         self._watch_drive(found, seen, state)
@@ -142,7 +142,7 @@ class JointMonitor:
             found.append(self._fault(FaultKind.VOLTAGE_SILENT, age_s=now_s - state.bus_voltage_stamp_s))
 
     def _late(self, position_s: float, current_s: float) -> Fault:
-        """The hardest of what two ages say: both signals gone, one of them, or a frame that is late."""
+        """Return the most severe fault of two ages: both signals silent, one of them, or a late frame."""
         bounds = self._bounds
         both_s = min(position_s, current_s)
         if both_s > bounds.silence_s:
@@ -219,7 +219,7 @@ class JointMonitor:
             found.append(self._fault(FaultKind.JOINT_NOT_FOLLOWING, stalled_s=self._stalled_s))
 
     def _watch_torque(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
-        """A drive that is told to exert a torque and does not: a frozen current, lost commands, a silent clamp."""
+        """Detect a drive that does not exert the commanded torque: a frozen current, lost commands, a silent clamp."""
         differs = abs(facts.torque_nm - state.current_a * self._constant_nm_a) > self._missing_nm
         self._missing_s = self._missing_s + facts.dt_s if differs and facts.moving else 0.0
         if self._missing_s > MISSING_S:
@@ -234,8 +234,8 @@ class JointMonitor:
         self._hot_s = self._hot_s + facts.dt_s if self._nearly_hot_c <= measured_c else 0.0
         if not measured_c < self._nearly_hot_c and not self._hot_s > TWO_MESSAGES_S:
             measured_c = UNKNOWN
-        current_a = state.current_a if abs(state.current_a) < 2.0 * self._most_a else UNKNOWN  # no motor takes more
-        if facts.now_s - state.current_stamp_s > self._bounds.silence_s:  # an old one does not warm for ever
+        current_a = state.current_a if abs(state.current_a) < 2.0 * self._most_a else UNKNOWN  # more is no measurement
+        if facts.now_s - state.current_stamp_s > self._bounds.silence_s:  # an old current does not heat for ever
             current_a = facts.torque_nm / self._constant_nm_a
         winding_c = self.winding.update(facts.dt_s, current_a, measured_c)
         if winding_c < self._nearly_hot_c:

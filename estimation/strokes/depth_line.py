@@ -1,15 +1,15 @@
-"""A line through what strides in one mud said of one coefficient: ln k against ln z.
+"""A line through the readings of one coefficient in one mud: ln k against ln z.
 
-Its level x̄ (information W = Σ 1/r², at the strides' weighted mean h̄ of ln z) and its slope m, the exponent of the depth
-law. Seen from that mean the 2×2 normal equations are diagonal, so a stride that told x = ln k at h = ln z is a few
+The line has a level x̄ (information W = Σ 1/r², at the strides' weighted mean h̄ of ln z) and a slope m, the exponent of
+the depth law. About that mean the 2×2 normal equations are diagonal, so a stride with x = ln k at h = ln z takes a few
 scalar updates,
 
     m += g (x - x̄ - m (h - h̄)) / I     I += g (h - h̄)     with g = W w (h - h̄) / (W + w) and w = 1/r²
     x̄ += w (x - x̄) / (W + w)           h̄ likewise          W += w
 
 which is weighted least squares with a prior on m. r² = (std_error/k)² + 0.08²: strides in the same mud differ by 8 %
-beyond their own doubt, as in the authors' logs. W fades once it holds eight strides, so slow change is followed. What
-errs alike in every stride (a torque constant, the plate's measures) is in no doubt given here.
+beyond their standard errors, as in the authors' logs. W fades once it holds eight strides, so the line follows slow
+change. Errors common to all strides (a torque constant, the plate's dimensions) are not included.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from control.records import Estimate
 
 REPEATABILITY = 0.08  # of k, from stride to stride in the same mud
 REMEMBERED_STRIDES = 8
-SURE_EXPONENT = 0.1  # its doubt never gets smaller: mud's law is no exact power
-DEPTHS_M = (0.005, 0.5)  # a stride shallower than that tells of the surface, not of the mud
+SURE_EXPONENT = 0.1  # its smallest standard error: mud's law is no exact power
+DEPTHS_M = (0.005, 0.5)  # a shallower stride measures the surface, not the mud
 COEFFICIENTS_N_M3 = (1e2, 1e10)  # 0.0001 to 10000 N/cm³: what lies outside is not mud
 
 
 class DepthLaw(NamedTuple):
-    """The exponent as far as it is known before any stride."""
+    """The prior of the exponent."""
 
     exponent: float
     std_error: float
@@ -44,7 +44,7 @@ class Reading(NamedTuple):
 
 
 def reading_of(estimate: Estimate, depth_m: float) -> Reading | None:
-    """None where it says nothing, or nothing that can be true."""
+    """Return the logarithms of an estimate; None if it is invalid or outside the range of muds."""
     k, std_error = estimate.value, estimate.std_error
     if not ((estimate.valid or estimate.at_least) and DEPTHS_M[0] <= depth_m <= DEPTHS_M[1]):
         return None
@@ -55,7 +55,7 @@ def reading_of(estimate: Estimate, depth_m: float) -> Reading | None:
 
 
 class Line(NamedTuple):
-    """ln k against ln z: what some strides in one mud say."""
+    """The weighted line of ln k against ln z through some strides in one mud."""
 
     weight: float
     log_k: float
@@ -83,12 +83,12 @@ class Line(NamedTuple):
         )
 
     def expected(self, log_depth: float) -> tuple[float, float]:
-        """ln k at another depth and its variance."""
+        """Return ln k at another depth and its variance."""
         deeper = log_depth - self.log_depth
         return self.log_k + self.exponent * deeper, 1.0 / self.weight + deeper * deeper / self.exponent_weight
 
     def agrees(self, reading: Reading | None, deviations: float) -> bool:
-        """A lower bound disagrees only from above; what says nothing agrees with everything."""
+        """Return whether a reading fits the line. A lower bound disagrees only from above; no reading always agrees."""
         if reading is None or self.strides == 0:
             return True
         log_k, variance = self.expected(reading.log_depth)

@@ -12,7 +12,7 @@ from math import inf, isfinite, sqrt
 from control.records import UNKNOWN, Estimate
 
 MIN_SAMPLES = 5
-LARGEST_UNCERTAINTY = 0.5  # a coefficient whose standard error is more than this share of it says nothing
+LARGEST_UNCERTAINTY = 0.5  # a coefficient whose standard error is more than this fraction of it is invalid
 
 
 class LineFit:

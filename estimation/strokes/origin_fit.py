@@ -1,17 +1,17 @@
-"""Least squares of y = k x over one stroke, with a doubt that holds for samples that hang together.
+"""Least squares of y = k x over one stroke, with a standard error that allows for correlated residuals.
 
-A stroke arrives as batches of equal travel, so every piece of the way counts alike, however long the flipper stayed
-there and however often a message was read. Single bad batches count less (Huber 1964, weight min(1, c s / |r|) with
-c = HUBER; the scale s is the median absolute residual of a robust first slope, and stays: a scale that followed the
-fit would let many bad batches pull it after them). The standard error is Newey and West's (1987), which counts
-residuals that run together by their autocovariances,
+A stroke arrives as batches of equal travel, so every piece of the travel counts alike, however long the flipper stayed
+there and however often a message was read. Outlying batches count less (Huber 1964, weight min(1, c s / |r|) with
+c = HUBER; the scale s is the median absolute residual of a robust first slope and is not updated: a scale that followed
+the fit would let many outliers pull it after them). The standard error is Newey and West's (1987), which counts
+correlated residuals by their autocovariances,
 
     var k = [Γ₀ + 2 Σ (1 - j/(L+1)) Γ_j] / (Σ w x²)² · n/(n-2)       Γ_j = Σ g_i g_{i-j},  g = w x r
 
-with r what is left of the residuals beside a line through them: that line is how mud bends from the law, not how
-samples scatter. It is never less than that of independent residuals, and carries Student's factor. Two of them cover
-95 % where residuals are independent, and with twenty batches 87, 72 and 36 % where neighbours correlate by 0.3, 0.6
-and 0.9 (measured in the tests): the slower the noise, the more of it goes for a bend.
+with r the residuals after a line is subtracted from them: that line is mud's deviation from the law, not scatter. The
+error is never less than that of independent residuals, and includes Student's factor. Two of them cover 95 % with
+independent residuals, and with twenty batches 87, 72 and 36 % when neighbours correlate by 0.3, 0.6 and 0.9 (measured
+in the tests): the slower the noise, the more of it counts as deviation from the law.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from math import inf, isfinite, sqrt
 from operator import mul
 from typing import NamedTuple
 
-HUBER = 3.0  # with the usual 1.345 the ends of strokes in mud that bends from the law would count as bad
+HUBER = 3.0  # with the usual 1.345 the ends of strokes in mud that deviates from the law would be outliers
 NORMAL_MAD = 1.4826
 LAGS = 4
 ROUNDS = 20
@@ -38,7 +38,7 @@ class OriginFit(NamedTuple):
 
 
 def fit_through_origin(x: Sequence[float], y: Sequence[float]) -> OriginFit | None:
-    """None where there are too few batches, none with a regressor, or numbers too large to square."""
+    """Fit the slope; None with too few batches, without a positive regressor, or with numbers too large to square."""
     square = sum([u * u for u in x])
     if len(x) < MIN_BATCHES or not (0.0 < square < inf and max(x) > 0.0 and isfinite(sum(y))):
         return None
@@ -59,7 +59,7 @@ def median(values: Sequence[float]) -> float:
 
 
 def _median_slope(x: Sequence[float], y: Sequence[float]) -> float:
-    """A start that single bad batches cannot move: of the batches with more than a third of the largest regressor."""
+    """Return a robust first slope, from the batches with more than a third of the largest regressor."""
     large = max(x) / 3.0
     return median([b / a for a, b in zip(x, y, strict=True) if a > large])
 
@@ -72,8 +72,9 @@ def _weighted_slope(x: Sequence[float], y: Sequence[float], weights: Sequence[fl
 
 
 def _std_error(x: Sequence[float], y: Sequence[float], weights: Sequence[float], slope: float) -> float:
-    """Newey and West's, whose weighted lags are the squared sums of all L + 1 batches in a row; but never less than
-    that of independent residuals: of few batches theirs is too small.
+    """Return Newey and West's standard error, but never less than that of independent residuals.
+
+    Their weighted lags are the squared sums of all L + 1 batches in a row; from few batches they are too small.
     """
     n, (offset, tilt) = len(x), _bend(x, y, weights, slope)
     residuals = [v - offset - (slope + tilt) * u for u, v in zip(x, y, strict=True)]
@@ -87,8 +88,9 @@ def _std_error(x: Sequence[float], y: Sequence[float], weights: Sequence[float],
 
 
 def student_factor(freedom: int) -> float:
-    """By how much a standard error from few values is too small for two of it to cover 95 %; infinite where nothing
-    tells the scatter.
+    """Return the factor by which a standard error from few values must grow for two of it to cover 95 %.
+
+    It is infinite without any degree of freedom.
     """
     if freedom < 1:
         return inf
@@ -96,7 +98,7 @@ def student_factor(freedom: int) -> float:
 
 
 def _bend(x: Sequence[float], y: Sequence[float], weights: Sequence[float], slope: float) -> tuple[float, float]:
-    """The line a + c x through the residuals, which is how mud bends from the law and not how samples scatter."""
+    """Return the line (a, c) of a + c x through the residuals: the mud's deviation from the law, not scatter."""
     sw = sx = sy = sxx = sxy = 0.0
     for u, v, w in zip(x, y, weights, strict=True):
         r = v - slope * u

@@ -1,16 +1,16 @@
-"""What a stance says about the mud's shear strength: the value k_s, or only that it is at least so much.
+"""The mud's shear resistance from one stance: the value of k_s, or a lower bound.
 
-The plate's pressure is k_s ζ only where the mud yields. A body that the flippers can move makes three cases (section
-III-C of the paper), told apart batch by batch from the plate's slip, its way back through the mud in the world's frame:
+The plate's pressure is k_s ζ only where the mud yields. Because the flippers can move the body, there are three cases
+(section III-C of the paper), distinguished batch by batch by the plate's slip, its path back through the mud:
 
     yield   the body stands, the plate shears through the mud: τ₁ = k_s Ψ
-    body    the body advances and the mud holds: the force is the body's drag, and k_s at least what it bore
-    mixed   the plate slips while the body advances: k_s from where it slips
+    body    the body advances and the mud does not yield: the force is the body's drag, a lower bound of k_s
+    mixed   the plate slips while the body advances: k_s from the batches that slip
 
-A batch counts as yielding once the plate has slipped MOBILISED_M since the stance began and still slips. A base that is
-fixed makes all travel slip. Without a pose, the force's own size decides: as long as both flippers together stay
-under the body's drag the body cannot have moved; otherwise the largest force held is a bound. A motor at its limit
-bounds k_s in the same way.
+A batch counts as yielding once the plate has slipped MOBILISED_M since the stance began and still slips. With a fixed
+base all travel is slip. Without a pose the size of the force decides: while both flippers together push less than the
+body's drag the body cannot have moved; otherwise the largest force withstood is a lower bound. So is the force of a
+motor at its limit.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_or
 from estimation.strokes.stroke import Batch
 
 MOBILISED_M = 0.025  # in the authors' logs the force is on its plateau after 2 to 3 cm
-SLIPPING = 0.2  # of the flipper's own travel, from which a batch still slips
-QUICK_UNCERTAINTY = 0.05  # of a bound: it was borne in a quick push, and mud bears a tenth more at twice the speed
-STANDS = 0.8  # of the body's drag, under which the body certainly stands
-HELD = (3, 5)  # batches in a row that must have borne a bound: at most 3 cm, less where the stance is shorter
+SLIPPING = 0.2  # of the flipper's own travel; a batch with more slips
+QUICK_UNCERTAINTY = 0.05  # of a bound: mud withstands a tenth more at twice the speed
+STANDS = 0.8  # of the body's drag; with less thrust the body certainly stands
+HELD = (3, 5)  # batches in a row that must withstand a bound: at most 3 cm, fewer in a short stance
 
 
 class Base(Enum):
-    """What carries the flippers."""
+    """The base that the flippers are mounted on."""
 
     FIXED = "fixed"
     FREE = "free"
@@ -51,7 +51,7 @@ class Shear(NamedTuple):
 def find_shear(
     geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, base: Base, body_drag_n: float
 ) -> Shear:
-    """From the batches of one stance."""
+    """Fit k_s, or find a lower bound, from the batches of one stance."""
     moments = [_moment_m4(geometry, batch, surface_m) for batch in batches]
     if not any(moment > 0.0 for moment in moments):
         return Shear(None, False, "unknown", 0, "no depth in any batch")
@@ -67,7 +67,7 @@ def find_shear(
 
 
 def _moment_m4(geometry: FlipperGeometry, batch: Batch, surface_m: float) -> float:
-    """Ψ."""
+    """Return Ψ of a batch."""
     plate = submerged_plate(geometry, batch.sweep_rad, batch.adduction_rad, surface_m)
     return stance_moment_m4(geometry, plate)
 
@@ -78,7 +78,7 @@ def _value(case: str, steady: Sequence[int], batches: Sequence[Batch], moments: 
 
 
 def slips_m(geometry: FlipperGeometry, batches: Sequence[Batch], base: Base) -> list[float] | None:
-    """Way of the plate back through the mud from batch to batch; None where the body's place is not known."""
+    """Return the plate's slip through the mud from batch to batch; None if the body's position is unknown."""
     fixed = base is Base.FIXED
     if not fixed and not all(isfinite(b.body_m) for b in batches):
         return None
@@ -87,7 +87,7 @@ def slips_m(geometry: FlipperGeometry, batches: Sequence[Batch], base: Base) -> 
 
 
 def _yielding(geometry: FlipperGeometry, batches: Sequence[Batch], slips: list[float] | None) -> list[int]:
-    """The batches before whose end the mud was mobilised, and in which the plate slips."""
+    """Return the batches in which the plate slips after the mud was mobilised."""
     steady, slipped_m = [], 0.0
     for i, slip_m in enumerate(slips or ()):
         slipped_m += slip_m
@@ -105,7 +105,7 @@ def _case(geometry: FlipperGeometry, batches: Sequence[Batch], slips: Sequence[f
 def _without_pose(
     geometry: FlipperGeometry, batches: Sequence[Batch], moments: Sequence[float], drag_n: float
 ) -> Shear:
-    """Two flippers that together push less than the body's drag cannot have moved it."""
+    """Fit or bound k_s without a pose: flippers that push less than the body's drag cannot have moved it."""
     thrusts_n = [2.0 * cos(b.sweep_rad) * b.sweep_nm / geometry.flipper_length_m for b in batches]
     if len(batches) > HELD[0] and sorted(thrusts_n)[-HELD[0]] < STANDS * drag_n:
         steady = _yielding(geometry, batches, slips_m(geometry, batches, Base.FIXED))
@@ -115,10 +115,10 @@ def _without_pose(
 
 
 def _bound(case: str, reason: str, batches: Sequence[Batch], moments: Sequence[float]) -> Shear:
-    """The largest k_s that HELD batches in a row have borne: a first quick push is borne better than what follows."""
-    borne = [b.sweep_nm / moment if moment > 0.0 else UNKNOWN for b, moment in zip(batches, moments, strict=True)]
-    run = min(max(len(borne) // 3, HELD[0]), HELD[1])
-    runs = [borne[i : i + run] for i in range(len(borne) - run + 1)]
+    """Return the largest k_s that HELD batches in a row withstood; mud withstands a first quick push better."""
+    withstood = [b.sweep_nm / moment if moment > 0.0 else UNKNOWN for b, moment in zip(batches, moments, strict=True)]
+    run = min(max(len(withstood) // 3, HELD[0]), HELD[1])
+    runs = [withstood[i : i + run] for i in range(len(withstood) - run + 1)]
     held = [(median(each), max(each) - min(each)) for each in runs if all(isfinite(k) for k in each)]
     samples = sum(batch.samples for batch in batches)
     if not held:

@@ -1,8 +1,8 @@
-"""One stroke as batches of equal travel: the constant memory from which its coefficient is fitted.
+"""One stroke as batches of equal travel: the bounded memory from which its coefficient is fitted.
 
-Samples are averaged until the flipper has travelled `step_m` further; a flipper that stands still adds to one batch
-however long it stands, and one that moves leaves the same batches at any rate of messages. Batch means are what
-residuals are computed from, so a standard error rests on pieces of way and not on rows.
+Samples are averaged until the flipper has travelled `step_m` further. A flipper at rest adds to one batch however long
+it rests, and a moving flipper leaves the same batches at any message rate. Residuals are computed from batch means, so
+a standard error depends on travelled distance and not on the number of messages.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 from control.records import UNKNOWN
 
-LONGEST = 60  # batches: twice what the longest stroke leaves; what comes after is not kept
-MOVING = 0.6  # of the median speed, under which the flipper is starting or stopping
-MOSTLY = 0.3  # share of saturated samples from which a batch counts as saturated
+LONGEST = 60  # batches: twice those of the longest stroke; later ones are dropped
+MOVING = 0.6  # of the median speed; below it the flipper starts or stops
+MOSTLY = 0.3  # fraction of saturated samples from which a batch counts as saturated
 
 
 class Batch(NamedTuple):
-    """Means over one piece of the way."""
+    """Means over one piece of the travel."""
 
     travel_m: float
     sweep_rad: float
@@ -64,7 +64,7 @@ class Stroke:
         body_m: float,
         saturated: bool,
     ) -> None:
-        """`travel_m`: the place along the stroke, in either direction."""
+        """Add a sample at the position `travel_m` along the stroke, which may move in either direction."""
         if self._n == 0:
             self._start_m, self._start_s = travel_m, now_s
             if not self.batches:
@@ -102,7 +102,7 @@ class Stroke:
         self._empty()
 
     def moving(self) -> list[Batch]:
-        """Without the slow pieces at either end, where the flipper starts and stops: mud resists slow motion less."""
+        """Return the batches without the slow ones at both ends: mud resists slow motion less."""
         speeds_m_s = sorted([batch.speed_m_s for batch in self.batches])
         least_m_s = MOVING * speeds_m_s[len(speeds_m_s) // 2] if speeds_m_s else 0.0
         quick = [i for i, batch in enumerate(self.batches) if batch.speed_m_s >= least_m_s]

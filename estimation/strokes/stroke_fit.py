@@ -1,12 +1,12 @@
-"""Insertion and extraction: from the batches of one stroke to k_p or k_e, with what is known of their doubt.
+"""Insertion and extraction: k_p or k_e with its standard error, from the batches of one stroke.
 
-    insertion     τ₂ - crossing =  k_p Φ        from the surface down
-    extraction    τ₂ - crossing = -k_e Φ        over the last three quarters of the way up
+    insertion     τ₂ - cross-coupling =  k_p Φ        from the surface down
+    extraction    τ₂ - cross-coupling = -k_e Φ        over the last three quarters of the rise
 
-Φ is the leverage of the submerged volume in each pose (control/plate.py); the crossing is what the plate's face bears
-across its motion, which the sweep joint has felt. Every piece of way counts by its length within these limits, where
-the adduction joint feels an upward force at all. On the first quarter of the way up, mud that held the flipper up
-turns to hold it down.
+Φ is the moment of the submerged volume in each pose, and the cross-coupling is the adduction torque of the load across
+the plate's face, which the sweep joint measures (both in control/plate.py). Each piece of the travel counts by its
+length within these limits, unless the adduction joint has no vertical lever there. Over the first quarter of the rise
+the mud's force on the plate reverses from supporting it to holding it down.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_or
 from estimation.strokes.stroke import Batch
 from estimation.strokes.surface import Surface
 
-REVERSAL_FRACTION = 0.25  # of the way up
-SHORTEST_M = 1e-9  # a piece of way that is less is rounding, or none
-MIN_VERTICAL_LEVER_M = 0.03  # under it the adduction joint hardly feels an upward force
+REVERSAL_FRACTION = 0.25  # of the rise
+SHORTEST_M = 1e-9  # a shorter piece of travel is rounding
+MIN_VERTICAL_LEVER_M = 0.03  # below it an upward force hardly loads the adduction joint
 TORQUE_REPEATABILITY = 0.032  # of a torque, as the paper measured it
-CROSS_COUPLING_UNCERTAINTY = 0.25  # of what is taken off: its centre of pressure is that of the law, not the mud's
-LARGEST_UNCERTAINTY = 0.75  # of a coefficient: from there on even its 80 % interval reaches zero, and it says nothing
+CROSS_COUPLING_UNCERTAINTY = 0.25  # of the cross-coupling: its centre of pressure is that of the law, not the mud's
+LARGEST_UNCERTAINTY = 0.75  # of a coefficient: beyond it even the 80 % interval reaches zero
 TOO_SHORT = f"fewer than {MIN_BATCHES} pieces of way in the mud"
 NOT_THERE = Estimate(UNKNOWN, UNKNOWN, 0, False, TOO_SHORT)
 NOT_OUT = "the flipper did not come out"
@@ -43,22 +43,22 @@ def fit_insertion(
 def fit_extraction(
     geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, zero_error_n: float, start_m: float
 ) -> Estimate:
-    """`start_m`: depth from which the flipper rose."""
+    """Fit k_e; `start_m` is the depth from which the flipper rises."""
     deepest_m = surface.depth_m + (1.0 - REVERSAL_FRACTION) * (start_m - surface.depth_m)
     return _fit(geometry, batches, surface, zero_error_n, -1.0, deepest_m)
 
 
 def bound_extraction(geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface) -> Estimate:
-    """Of a flipper that did not come out: the largest k_e that the mud has borne."""
-    borne = [_borne(geometry, batch, surface) for batch in batches]
+    """Return the lower bound of k_e from a flipper that did not come out: the largest that the mud withstood."""
+    withstood = [_withstood(geometry, batch, surface) for batch in batches]
     samples = sum(batch.samples for batch in batches)
-    bound = max(borne, default=0.0)
+    bound = max(withstood, default=0.0)
     if not (bound > 0.0 and isfinite(2.0 * bound)):
         return NOT_THERE._replace(samples=samples)
     return Estimate(bound, TORQUE_REPEATABILITY * bound, samples, True, NOT_OUT, at_least=True)
 
 
-def _borne(geometry: FlipperGeometry, batch: Batch, surface: Surface) -> float:
+def _withstood(geometry: FlipperGeometry, batch: Batch, surface: Surface) -> float:
     plate = submerged_plate(geometry, batch.sweep_rad, batch.adduction_rad, surface.depth_m)
     moment_m4 = stroke_moment_m4(geometry, plate, batch.sweep_rad)
     across_nm = cross_coupling(geometry, plate, batch.sweep_rad) * batch.sweep_nm
@@ -66,14 +66,14 @@ def _borne(geometry: FlipperGeometry, batch: Batch, surface: Surface) -> float:
 
 
 class _Pieces(NamedTuple):
-    """Of one stroke, each times the root of its way: least squares then counts each square by its way."""
+    """The pieces of one stroke, scaled by the root of their length, so that least squares weights them by length."""
 
     moments: list[float]  # Φ
-    torques: list[float]  # that resisted the stroke
-    crossed_nm: list[float]  # taken off
+    torques: list[float]  # that resist the stroke
+    crossed_nm: list[float]  # cross-coupling, already subtracted
     depths_m: list[float]
     samples: int
-    lever_m: float  # the shortest vertical one of the whole stroke
+    lever_m: float  # shortest vertical lever of the whole stroke
 
 
 def _fit(
@@ -102,7 +102,7 @@ def _pieces(
     geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, sign: float, deepest_m: float
 ) -> _Pieces:
     moments, torques, crossed_nm, depths_m, samples, lever_m = [], [], [], [], 0, inf
-    for batch, path_m in zip(batches, ways_m(batches, surface.depth_m, deepest_m), strict=True):
+    for batch, path_m in zip(batches, travels_m(batches, surface.depth_m, deepest_m), strict=True):
         vertical_m = geometry.vertical_lever_m(batch.sweep_rad, batch.adduction_rad)
         lever_m = min(lever_m, vertical_m)
         if path_m < SHORTEST_M or vertical_m < MIN_VERTICAL_LEVER_M:
@@ -118,8 +118,8 @@ def _pieces(
     return _Pieces(moments, torques, crossed_nm, depths_m, samples, lever_m)
 
 
-def ways_m(batches: Sequence[Batch], shallowest_m: float, deepest_m: float) -> list[float]:
-    """How much of each batch's way lies between two depths; batches meet half-way between their means."""
+def travels_m(batches: Sequence[Batch], shallowest_m: float, deepest_m: float) -> list[float]:
+    """Return the part of each batch's travel between two depths; batches meet half-way between their means."""
     depths_m = [batch.travel_m for batch in batches]
     if len(depths_m) < 2:
         return [0.0] * len(depths_m)
@@ -135,7 +135,7 @@ def _slope(x: Sequence[float], y: Sequence[float]) -> float:
 def _slope_per_surface(
     fit: OriginFit, moments: Sequence[float], torques: Sequence[float], depths_m: Sequence[float]
 ) -> float:
-    """dk/dδ for a surface that is deeper by dδ: Φ falls by about Φ dδ / z, so with k = Σ τΦ / ΣΦ²
+    """Return dk/dδ for a surface deeper by dδ: Φ falls by about Φ dδ / z, so with k = Σ τΦ / ΣΦ²
 
     dk/dδ = (2 k Σ Φ²/z - Σ τΦ/z) / ΣΦ², which is 3/2 k/z where τ = k Φ.
     """
@@ -147,7 +147,7 @@ def _slope_per_surface(
 
 
 def evaluated(fit: OriginFit, systematic: float, samples: int) -> Estimate:
-    """A fit as an estimate, with all its doubt, or why it is none."""
+    """Turn a fit into an estimate with its full standard error, or with the reason why it is invalid."""
     k = fit.slope
     std_error = hypot(fit.std_error, systematic, TORQUE_REPEATABILITY * k)
     if not isfinite(k + std_error):
@@ -160,5 +160,5 @@ def evaluated(fit: OriginFit, systematic: float, samples: int) -> Estimate:
 
 
 def level_free(batches: Sequence[Batch], level_nm: float) -> list[Batch]:
-    """With a level taken off that stands on a straight arm; it shrinks with its reach forward, cos α."""
+    """Subtract a torque level, given for a straight arm; it shrinks with the arm's lateral reach, cos α."""
     return [b._replace(adduction_nm=b.adduction_nm - level_nm * cos(b.sweep_rad)) for b in batches]

@@ -425,7 +425,7 @@ def test_one_wild_sample_moves_no_coefficient_out_of_its_interval(phase: Phase, 
 
 @pytest.mark.parametrize("wild_a", [-10.0, 10.0])
 def test_one_wild_sample_in_the_insertion_moves_no_coefficient_out_of_its_interval(wild_a: float) -> None:
-    """Untamed, one at 8 mm would move the surface by 6 mm and all coefficients by a third to a half."""
+    """Unfiltered, one at 8 mm would move the surface by 6 mm and all coefficients by a third to a half."""
     assert_wild_samples_are_borne(noisy(rows_of(motion()), 4), Phase.INSERTION, wild_a)
 
 

@@ -27,7 +27,7 @@ from estimation.strokes.stroke_fit import (
     fit_extraction,
     fit_insertion,
     level_free,
-    ways_m,
+    travels_m,
 )
 from estimation.strokes.surface import Surface
 
@@ -168,24 +168,24 @@ def counted_alike(batches: Sequence[Batch]) -> float:
     st.floats(0.0, 0.05),
     st.booleans(),
 )
-def test_the_ways_between_two_depths_add_up_to_what_lies_between_them(
+def test_the_travel_of_all_batches_between_two_depths_adds_up_to_the_distance(
     steps_m: list[float], shallowest_m: float, height_m: float, upward: bool
 ) -> None:
     """Batches meet half-way between their means, and reach as far beyond the first and the last one."""
-    travels_m = list(np.cumsum(steps_m) - 0.012)
-    first_m, last_m = travels_m[0] - steps_m[1] / 2.0, travels_m[-1] + steps_m[-1] / 2.0
-    ordered = reversed(travels_m) if upward else travels_m
+    means_m = list(np.cumsum(steps_m) - 0.012)
+    first_m, last_m = means_m[0] - steps_m[1] / 2.0, means_m[-1] + steps_m[-1] / 2.0
+    ordered = reversed(means_m) if upward else means_m
     batches = [batch_at(0.0)._replace(travel_m=float(travel_m)) for travel_m in ordered]
     deepest_m = shallowest_m + height_m
     inside_m = max(0.0, min(last_m, deepest_m) - max(first_m, shallowest_m))
-    ways = ways_m(batches, shallowest_m, deepest_m)
-    assert len(ways) == len(batches)
-    assert sum(max(path_m, 0.0) for path_m in ways) == pytest.approx(inside_m, abs=1e-12)
+    parts_m = travels_m(batches, shallowest_m, deepest_m)
+    assert len(parts_m) == len(batches)
+    assert sum(max(path_m, 0.0) for path_m in parts_m) == pytest.approx(inside_m, abs=1e-12)
 
 
-def test_one_batch_has_no_way() -> None:
-    assert ways_m([batch_at(0.01)], -1.0, 1.0) == [0.0]
-    assert ways_m([], -1.0, 1.0) == []
+def test_one_batch_has_no_travel() -> None:
+    assert travels_m([batch_at(0.01)], -1.0, 1.0) == [0.0]
+    assert travels_m([], -1.0, 1.0) == []
 
 
 @pytest.mark.parametrize("limit", ["surface", "start"])

@@ -18,7 +18,7 @@ from estimation.strokes.surface import (
     Surface,
     combined,
     find_surface,
-    tamed,
+    hampel_filtered,
 )
 
 Array = NDArray[np.float64]
@@ -287,7 +287,7 @@ def test_forces_without_wild_batches_are_left_as_they_are(jump_n: float) -> None
         forces_n = (
             100.0 * np.maximum(depths_m, 0.0) + jump_n * (depths_m > 0.0) + 0.05 * noise(seed, len(depths_m))
         ).tolist()
-        changed += sum(a != b for a, b in zip(forces_n, tamed(forces_n), strict=True))
+        changed += sum(a != b for a, b in zip(forces_n, hampel_filtered(forces_n), strict=True))
     assert changed < 0.001 * 100 * BATCH_COUNT
 
 

@@ -34,7 +34,7 @@ def swing(count: int = 100) -> list[tuple[float, float]]:
 def taken(poses: list[tuple[float, float]], weight_n: float, noise_nm: float = 0.0, seed: int = 1) -> Tare:
     tare = Tare()
     hang(tare, poses, weight_n, noise_nm, seed)
-    tare.take()
+    tare.set_zero()
     return tare
 
 
@@ -55,7 +55,7 @@ def test_the_zero_takes_effect_when_it_is_taken() -> None:
     tare = Tare()
     hang(tare, swing(), WEIGHT_N)
     assert tare.zero == Zero()
-    tare.take()
+    tare.set_zero()
     assert tare.zero.weight_n == pytest.approx(WEIGHT_N)
 
 
@@ -90,7 +90,7 @@ def test_mud_that_drips_off_is_followed() -> None:
     tare = Tare()
     hang(tare, [(0.0, 0.1)] * 100, 2.0)
     hang(tare, [(0.0, 0.1)] * 3 * MEMORY, 0.5)
-    tare.take()
+    tare.set_zero()
     assert 0.5 < tare.zero.weight_n < 0.5 + 1.5 * 0.06
 
 
@@ -99,16 +99,16 @@ def test_a_stride_with_hardly_any_air_keeps_the_zero_of_the_one_before(count: in
     tare = taken(swing(), WEIGHT_N)
     before = tare.zero
     hang(tare, swing()[:count], 5.0)
-    tare.take()
+    tare.set_zero()
     assert tare.zero == before
 
 
 def test_what_was_too_little_air_does_not_count_for_the_next_stride() -> None:
     tare = taken(swing(), WEIGHT_N)
     hang(tare, swing()[:3], 100.0)
-    tare.take()
+    tare.set_zero()
     hang(tare, swing(), 0.3)
-    tare.take()
+    tare.set_zero()
     assert tare.zero.weight_n == pytest.approx(0.3)
 
 
@@ -117,7 +117,7 @@ def test_the_drift_is_the_change_from_stride_to_stride() -> None:
     assert not isfinite(tare.drift_n)
     for weight_n, drift_n in ((1.1, -0.4), (1.2, 0.1)):
         hang(tare, swing(), weight_n)
-        tare.take()
+        tare.set_zero()
         assert tare.drift_n == pytest.approx(drift_n)
 
 
@@ -125,7 +125,7 @@ def test_the_drift_is_of_the_air_whatever_the_way_down_corrected() -> None:
     tare = taken(swing(), 1.0)
     tare.correct(0.5, 0.001)
     hang(tare, swing(), 1.0)
-    tare.take()
+    tare.set_zero()
     assert tare.drift_n == pytest.approx(0.0, abs=EXACT)
 
 
@@ -153,7 +153,7 @@ def test_a_reset_forgets_the_zero_and_what_is_gathered() -> None:
     hang(tare, swing(), 5.0)
     tare.reset()
     assert tare.zero == Zero()
-    tare.take()
+    tare.set_zero()
     assert tare.zero == Zero()
     assert not isfinite(tare.drift_n)
 
@@ -163,6 +163,6 @@ def test_no_torque_makes_it_raise(rows: list[tuple[float, float]], weight_n: flo
     tare = Tare()
     for rise_m, torque_nm in rows:
         tare.update(-rise_m, rise_m, torque_nm, torque_nm)
-    tare.take()
+    tare.set_zero()
     tare.correct(weight_n, std_error_n)
     tare.update(0.1, 0.1, nan, nan)
