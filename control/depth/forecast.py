@@ -12,8 +12,8 @@ k_e is that of a whole stroke, and mud's force grows more slowly with depth than
 at the deepest point. The fraction is learned from the peak of every extraction, starting at 1, which is safe. Without
 k_e, k_p Φ stands for that torque: k_e is 1.3 to 1.8 times k_p by clay practice (0.8 in the log above) and the fraction
 about a half. A flipper that came out proves the torque it took, at every shallower depth too, and at a deeper one at
-most in proportion to Φ, since k_e falls with depth. A flipper that stuck proves τ_e ≥ τ_m at its depth, despite
-the estimate, and elsewhere in proportion to depth (k_e Φ is nearly so); this is remembered until a flipper comes out from
+most in proportion to Φ, since k_e falls with depth. A flipper that stuck proves τ_e ≥ τ_m at its depth, despite the
+estimate, and elsewhere in proportion to depth (k_e Φ is nearly so); this is remembered until a flipper comes out from
 there, or the mud changes.
 """
 
