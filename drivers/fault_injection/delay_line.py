@@ -22,7 +22,7 @@ class DelayLine:
     def holds_back(self, frame: Frame) -> bool:
         return self._key(frame) in self.waiting
 
-    def take(self, now_s: float) -> list[Frame]:
+    def pop_arrived(self, now_s: float) -> list[Frame]:
         """Removes and returns the frames that have arrived by now."""
         arrived: list[Frame] = []
         for key, line in list(self.waiting.items()):

@@ -81,7 +81,7 @@ class FailingPort:
 
     def _arrived(self, frames: Sequence[Frame]) -> list[Frame]:
         failures, failure = self._failures, self._failures.of(self._bus)
-        arrived = [frame._replace(stamp_s=failures.now_s) for frame in self._incoming.take(self._due_s)]
+        arrived = [frame._replace(stamp_s=failures.now_s) for frame in self._incoming.pop_arrived(self._due_s)]
         for frame in frames:
             changed = self._after_failures(frame)
             if changed is None:
@@ -197,7 +197,7 @@ class FailingPort:
         self._count()
 
     def _deliver(self) -> None:
-        for frame in self._outgoing.take(self._due_s):
+        for frame in self._outgoing.pop_arrived(self._due_s):
             self._pass(frame)
 
     def _pass(self, frame: Frame) -> None:

@@ -143,90 +143,90 @@ class FrameLayout:
 
     def _frame(self, packet: bytes, identity: int) -> MotionFrame:
         (number,) = INTEGER.unpack_from(packet, HEADER.size)
-        place = self._skip_marker_sets(packet, HEADER.size + INTEGER.size)
-        count, place = self._begin_section(packet, place)
-        body, place = self._find_body(packet, place + VECTOR_BYTES * count, identity)
-        end = self.end.unpack_from(packet, self._skip_to_end(packet, place))
+        offset = self._skip_marker_sets(packet, HEADER.size + INTEGER.size)
+        count, offset = self._begin_section(packet, offset)
+        body, offset = self._find_body(packet, offset + VECTOR_BYTES * count, identity)
+        end = self.end.unpack_from(packet, self._skip_to_end(packet, offset))
         if not isfinite(end[2]):
             raise MalformedPacketError("a time that is not finite")
         exposed, sent = (end[3], end[5]) if self.has_ticks else (0, 0)
         return MotionFrame(number, body, end[2], exposed, sent, bool(end[-1] & MODELS_CHANGED))
 
-    def _begin_section(self, packet: bytes, place: int) -> tuple[int, int]:
+    def _begin_section(self, packet: bytes, offset: int) -> tuple[int, int]:
         """Returns the number of items in a section, and where the first one begins."""
-        (count,) = INTEGER.unpack_from(packet, place)
+        (count,) = INTEGER.unpack_from(packet, offset)
         if count < 0:
             raise MalformedPacketError("a negative count")
-        return count, place + INTEGER.size * (2 if self.has_sizes else 1)
+        return count, offset + INTEGER.size * (2 if self.has_sizes else 1)
 
-    def _skip(self, packet: bytes, place: int) -> int:
+    def _skip(self, packet: bytes, offset: int) -> int:
         """Returns the end of a section that contains its size."""
-        count, size = TWO_INTEGERS.unpack_from(packet, place)
+        count, size = TWO_INTEGERS.unpack_from(packet, offset)
         if count < 0 or size < 0:
             raise MalformedPacketError("a negative size")
-        return place + TWO_INTEGERS.size + int(size)
+        return offset + TWO_INTEGERS.size + int(size)
 
-    def _skip_marker_sets(self, packet: bytes, place: int) -> int:
+    def _skip_marker_sets(self, packet: bytes, offset: int) -> int:
         if self.has_sizes:
-            return self._skip(packet, place)
-        count, place = self._begin_section(packet, place)
+            return self._skip(packet, offset)
+        count, offset = self._begin_section(packet, offset)
         for _ in range(count):
-            place = packet.index(0, place) + 1
-            markers, place = self._begin_section(packet, place)
-            place += VECTOR_BYTES * markers
-        return place
+            offset = packet.index(0, offset) + 1
+            markers, offset = self._begin_section(packet, offset)
+            offset += VECTOR_BYTES * markers
+        return offset
 
-    def _find_body(self, packet: bytes, place: int, identity: int) -> tuple[RigidBody | None, int]:
+    def _find_body(self, packet: bytes, offset: int, identity: int) -> tuple[RigidBody | None, int]:
         """Returns the requested body, and the end of the section."""
-        count, place = self._begin_section(packet, place)
+        count, offset = self._begin_section(packet, offset)
         found = None
         for _ in range(count):
-            numbers = POSE.unpack_from(packet, place)  # every item, so that a wrong count ends with the packet
-            place = self._skip_markers(packet, place + POSE.size)
+            numbers = POSE.unpack_from(packet, offset)  # every item, so that a wrong count ends with the packet
+            offset = self._skip_markers(packet, offset + POSE.size)
             if found is None and identity in (0, numbers[0]):
-                found = _rigid_body(numbers, *QUALITY.unpack_from(packet, place))
-            place += QUALITY.size
-        return found, place
+                found = _rigid_body(numbers, *QUALITY.unpack_from(packet, offset))
+            offset += QUALITY.size
+        return found, offset
 
-    def _skip_markers(self, packet: bytes, place: int) -> int:
+    def _skip_markers(self, packet: bytes, offset: int) -> int:
         if not self.bodies_have_markers:
-            return place
-        markers, place = self._begin_section(packet, place)
-        return place + MARKER_BYTES * markers
+            return offset
+        markers, offset = self._begin_section(packet, offset)
+        return offset + MARKER_BYTES * markers
 
-    def _skip_to_end(self, packet: bytes, place: int) -> int:
+    def _skip_to_end(self, packet: bytes, offset: int) -> int:
         """Skips skeletons, assets, labelled markers, force plates and devices."""
         if self.has_sizes:
             for _ in range(5):
-                place = self._skip(packet, place)
-            return place
-        place = self._skip_skeletons(packet, place)
-        count, place = self._begin_section(packet, place)
-        place += self.labelled_bytes * count
+                offset = self._skip(packet, offset)
+            return offset
+        offset = self._skip_skeletons(packet, offset)
+        count, offset = self._begin_section(packet, offset)
+        offset += self.labelled_bytes * count
         for _ in range(self.has_force_plates + self.has_devices):
-            place = self._skip_channels(packet, place)
-        return place
+            offset = self._skip_channels(packet, offset)
+        return offset
 
-    def _skip_skeletons(self, packet: bytes, place: int) -> int:
-        count, place = self._begin_section(packet, place)
+    def _skip_skeletons(self, packet: bytes, offset: int) -> int:
+        count, offset = self._begin_section(packet, offset)
         for _ in range(count):
-            bones, place = self._begin_section(packet, place + INTEGER.size)
+            bones, offset = self._begin_section(packet, offset + INTEGER.size)
             if self.bodies_have_markers:
                 for _ in range(bones):
-                    place = self._skip_markers(packet, place + POSE.size) + QUALITY.size
+                    offset = self._skip_markers(packet, offset + POSE.size) + QUALITY.size
             else:
-                place += self.body_bytes * bones
-        return place
+                offset += self.body_bytes * bones
+        return offset
 
-    def _skip_channels(self, packet: bytes, place: int) -> int:
+    def _skip_channels(self, packet: bytes, offset: int) -> int:
         """Skips the channels of force plates or of devices."""
-        count, place = self._begin_section(packet, place)
+        count, offset = self._begin_section(packet, offset)
         for _ in range(count):
-            channels, place = self._begin_section(packet, place + INTEGER.size)
+            channels, offset = self._begin_section(packet, offset + INTEGER.size)
             for _ in range(channels):
-                values, place = self._begin_section(packet, place)
-                place += CHANNEL_VALUE_BYTES * values
-        return place
+                values, offset = self._begin_section(packet, offset)
+                offset += CHANNEL_VALUE_BYTES * values
+        return offset
 
 
 def _rigid_body(numbers: tuple[float, ...], mean_error_m: float, flags: int) -> RigidBody:

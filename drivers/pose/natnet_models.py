@@ -37,41 +37,41 @@ def decode_bodies(packet: bytes, version: NatNetVersion) -> dict[str, int]:
 
 def _bodies(packet: bytes, version: NatNetVersion) -> Iterator[tuple[str, int]]:
     has_sizes = version >= (4, 1)
-    count, place = _count(packet, HEADER.size)
+    count, offset = _count(packet, HEADER.size)
     for _ in range(count):
-        (kind,) = INTEGER.unpack_from(packet, place)
-        place += INTEGER.size
-        size, place = _count(packet, place) if has_sizes else (0, place)
+        (kind,) = INTEGER.unpack_from(packet, offset)
+        offset += INTEGER.size
+        size, offset = _count(packet, offset) if has_sizes else (0, offset)
         if kind == RIGID_BODY:
-            yield _name(packet, place)
+            yield _name(packet, offset)
         elif not has_sizes and kind != MARKER_SET:
             return
-        place = place + size if has_sizes else _end_of(packet, place, kind, version)
+        offset = offset + size if has_sizes else _end_of(packet, offset, kind, version)
 
 
-def _count(packet: bytes, place: int) -> tuple[int, int]:
-    (count,) = INTEGER.unpack_from(packet, place)
+def _count(packet: bytes, offset: int) -> tuple[int, int]:
+    (count,) = INTEGER.unpack_from(packet, offset)
     if count < 0:
         raise MalformedPacketError("a negative count")
-    return count, place + INTEGER.size
+    return count, offset + INTEGER.size
 
 
-def _name(packet: bytes, place: int) -> tuple[str, int]:
-    end = packet.index(0, place)
+def _name(packet: bytes, offset: int) -> tuple[str, int]:
+    end = packet.index(0, offset)
     (identity,) = INTEGER.unpack_from(packet, end + 1)
-    return packet[place:end].decode(errors="replace"), identity
+    return packet[offset:end].decode(errors="replace"), identity
 
 
-def _end_of(packet: bytes, place: int, kind: int, version: NatNetVersion) -> int:
+def _end_of(packet: bytes, offset: int, kind: int, version: NatNetVersion) -> int:
     """Returns the end of a description that does not contain its size."""
-    place = packet.index(0, place) + 1
+    offset = packet.index(0, offset) + 1
     if kind == RIGID_BODY:
-        place += TWO_INTEGERS.size + VECTOR_BYTES
+        offset += TWO_INTEGERS.size + VECTOR_BYTES
         if version < (3, 0):
-            return place
-    markers, place = _count(packet, place)
+            return offset
+    markers, offset = _count(packet, offset)
     if kind == RIGID_BODY:
-        place += (VECTOR_BYTES + INTEGER.size) * markers
+        offset += (VECTOR_BYTES + INTEGER.size) * markers
     for _ in range(markers if kind == MARKER_SET or version >= (4, 0) else 0):
-        place = packet.index(0, place) + 1
-    return place
+        offset = packet.index(0, offset) + 1
+    return offset
