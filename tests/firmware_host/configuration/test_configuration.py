@@ -246,6 +246,18 @@ KEYS = st.sampled_from(
 )  # fmt: skip
 
 
+@pytest.mark.parametrize("name", ['"odrive"', '"moteus"', "7"])
+def test_the_type_of_a_drive_is_one_of_the_table(example_text: str, name: str) -> None:
+    text = example_text.replace("[drive.left_sweep]\n", f"[drive.left_sweep]\ntype = {name}\n")
+    if name == '"odrive"':
+        assert parse_configuration(text).drive == parse_configuration(example_text).drive
+        return
+    with pytest.raises(ConfigurationError) as refused:
+        parse_configuration(text)
+    (problem,) = refused.value.problems
+    assert problem.startswith("drive.left_sweep.type = ") and problem.endswith("must be one of odrive")
+
+
 @given(KEYS, TOML_VALUES)
 def test_any_value_anywhere_is_accepted_or_refused_by_name(key: str, value: str) -> None:
     """Never another exception than ConfigurationError."""
