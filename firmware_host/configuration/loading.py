@@ -62,16 +62,20 @@ def _drive_type(document: dict[str, Any]) -> str:
     drives = document.get("drive")
     tables = drives if isinstance(drives, dict) else {}
     types = {joint: table.get("type", DEFAULT) for joint, table in tables.items() if isinstance(table, dict)}
-    first = next(iter(types.values()), DEFAULT)
+    first = next((name for name in types.values() if _is_drive_type(name)), DEFAULT)
     problems = []
     for joint, name in types.items():
-        if not isinstance(name, str) or name not in DRIVE_TYPES:
+        if not _is_drive_type(name):
             problems.append(f"drive.{joint}.type = {shown(name)}: must be one of {', '.join(DRIVE_TYPES)}")
         elif name != first:
             problems.append(f"drive.{joint}.type = {name!r}: must be {first!r}, as that of the first drive")
     if problems:
         raise ConfigurationError(problems)
     return str(first)
+
+
+def _is_drive_type(name: object) -> bool:
+    return isinstance(name, str) and name in DRIVE_TYPES
 
 
 def _apply_protocol(document: dict[str, Any]) -> None:
