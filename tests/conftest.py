@@ -13,6 +13,7 @@ from hypothesis import settings
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 from tests.folders import ROOT
+from tests.recorded_walks import record_walks
 
 # A busy machine is not wrong, and a commit gets the same verdict every time; `--hypothesis-profile search` looks on.
 settings.register_profile("search", deadline=None)
@@ -55,3 +56,11 @@ def short_folder() -> Iterator[Path]:
     """A folder whose path leaves room for the name of a Unix socket."""
     with tempfile.TemporaryDirectory(prefix="mud-") as folder:
         yield Path(folder)
+
+
+@pytest.fixture(scope="session")
+def two_walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
+    """A log in which the robot walked two strides, held, and walked one more."""
+    path = tmp_path_factory.mktemp("logs") / "two.mcap"
+    record_walks(path, configuration, 2, 1)
+    return path

@@ -12,11 +12,9 @@ from typing import Any
 
 import pytest
 
-from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.status_client import NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
 from tests.command_line.command_lines import run
-from tests.recorded_walks import record_walks
 from tests.waiting import LONGEST_S
 
 
@@ -73,11 +71,3 @@ def bench(short_folder: Path, tmp_path: Path) -> Iterator[Bench]:
         yield made
     finally:
         made.end()
-
-
-@pytest.fixture(scope="session")
-def two_walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
-    """A log in which the robot walked two strides, held, and walked one more."""
-    path = tmp_path_factory.mktemp("logs") / "two.mcap"
-    record_walks(path, configuration, 2, 1)
-    return path

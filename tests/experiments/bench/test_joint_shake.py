@@ -55,7 +55,7 @@ class Bench:
 
 
 @pytest.mark.parametrize(("joint", "farthest_rad"), [("left_sweep", 0.02), ("right_adduction", 0.08)])
-def test_a_joint_whose_encoder_hangs_goes_nowhere_and_is_told(
+def test_a_joint_with_a_stuck_encoder_hardly_moves_and_is_reported(
     configuration: Configuration, joint: str, farthest_rad: float
 ) -> None:
     bench = Bench(configuration, joint)
@@ -69,7 +69,9 @@ def test_a_joint_whose_encoder_hangs_goes_nowhere_and_is_told(
 
 
 @pytest.mark.parametrize("joint", ["right_sweep", "left_adduction"])
-def test_nor_does_one_of_half_the_inertia_and_without_friction(configuration: Configuration, joint: str) -> None:
+def test_a_joint_with_half_the_inertia_and_no_friction_hardly_moves_either(
+    configuration: Configuration, joint: str
+) -> None:
     bench = Bench(configuration, joint, inertia=0.5)
     bench.without_friction()
     bench.hang()
@@ -91,13 +93,13 @@ def test_noise_is_no_answer(configuration: Configuration) -> None:
     assert law.answer_rad > 0.003 and not law.answered
 
 
-def test_an_encoder_that_lives_answers_a_weak_shake(configuration: Configuration) -> None:
+def test_a_working_encoder_answers_a_weak_shake(configuration: Configuration) -> None:
     bench = Bench(configuration, "left_sweep", noise_rad=0.0004)
     assert shake_of(bench, "left_sweep").answered
     assert bench.farthest_rad < 0.01
 
 
-def test_a_late_tick_ends_a_shake_and_it_begins_anew(
+def test_a_late_tick_ends_a_shake_which_starts_again(
     configuration: Configuration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bench = Bench(configuration, "left_sweep")

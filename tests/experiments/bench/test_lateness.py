@@ -120,7 +120,7 @@ def test_a_drive_that_holds_its_torque_is_found_by_its_current(
     assert len(ends) == 3 and all(reading.value <= OFF_TICKS for reading in ends.values())
 
 
-def test_a_drive_is_too_slow_to_let_go_also_where_ticks_are_missed_meanwhile(
+def test_a_drive_that_goes_idle_too_late_is_found_in_spite_of_missed_ticks(
     opened_rig: TestRig, rig: LateRig, briefly: None
 ) -> None:
     """Six ticks too late, of which this computer sees three."""
@@ -161,7 +161,7 @@ def readings_kept(bench: StagedBench) -> dict[str, Reading]:
     return {reading.what: reading for reading in bench.report.tests[-1]["readings"]}
 
 
-def test_a_stroke_that_late_messages_spoil_is_measured_anew(bench: StagedBench, rig: LateRig) -> None:
+def test_a_stroke_that_late_messages_disturb_is_repeated(bench: StagedBench, rig: LateRig) -> None:
     spoiled: list[float] = []
 
     def measure(opened_rig: TestRig) -> Readings:
@@ -176,7 +176,7 @@ def test_a_stroke_that_late_messages_spoil_is_measured_anew(bench: StagedBench, 
     assert len(bench.report.tests[-1]["spoiled"]) == 1
 
 
-def test_what_was_out_of_its_bounds_stays_in_the_report_though_it_is_well_when_measured_anew(
+def test_the_report_keeps_a_bad_reading_that_was_repeated(
     bench: StagedBench,
 ) -> None:
     values = [7.0, 5.0]
@@ -200,7 +200,7 @@ def test_what_was_out_of_its_bounds_stays_in_the_report_though_it_is_well_when_m
         (3, 0.04, r"missed 3 of 4 ticks and the drives' messages were up to 40 ms old: end what else"),
     ],
 )
-def test_what_stays_late_is_told_with_what_is_out_of_its_bounds(
+def test_repeated_lateness_is_reported_with_the_bad_reading(
     bench: StagedBench, missed: int, age_s: float, message: str
 ) -> None:
     measured = []
@@ -220,7 +220,7 @@ def late(missed: int, age_s: float) -> tuple[Tick, DriveStates]:
     return Tick(1.0 + age_s, 0.0, 1, missed), same_for_all(state)
 
 
-def test_what_is_out_of_its_bounds_in_time_is_measured_once(bench: StagedBench) -> None:
+def test_a_bad_reading_without_lateness_is_measured_once(bench: StagedBench) -> None:
     measured = []
 
     def measure(opened_rig: TestRig) -> Readings:
@@ -233,7 +233,7 @@ def test_what_is_out_of_its_bounds_in_time_is_measured_once(bench: StagedBench) 
     assert measured == [1]
 
 
-def test_a_measurement_that_ends_early_says_what_was_late(bench: StagedBench) -> None:
+def test_a_measurement_that_ends_early_reports_the_lateness(bench: StagedBench) -> None:
     def measure(opened_rig: TestRig) -> Readings:
         opened_rig.lateness.update(*late(2, 0.0))
         yield Reading("speed", 1.0)
@@ -244,7 +244,7 @@ def test_a_measurement_that_ends_early_says_what_was_late(bench: StagedBench) ->
     assert "speed" in readings_kept(bench)
 
 
-def test_sums_are_made_once_torque_is_off(opened_rig: TestRig, rig: LateRig) -> None:
+def test_readings_are_computed_after_torque_is_off(opened_rig: TestRig, rig: LateRig) -> None:
     """They take longer than a tick, and on a slow computer than a drive's watchdog."""
     for _ in check_stroke(opened_rig, "fast", FAST_RAD_S, FAST_DEG):
         assert not any(drive.energised for drive in rig.robot.drives)
@@ -257,7 +257,7 @@ def test_ticks_without_torque_may_be_late(opened_rig: TestRig, rig: LateRig) -> 
     assert opened_rig.loop.missed_ticks > 20
 
 
-def test_a_pause_that_trips_the_drives_watchdogs_is_told_with_the_fault(opened_rig: TestRig, rig: LateRig) -> None:
+def test_a_pause_that_trips_the_watchdogs_is_reported_with_the_fault(opened_rig: TestRig, rig: LateRig) -> None:
     opened_rig.arm()
     rig.begin(1.0, 0.0, 400, 1)
     with pytest.raises(BenchError, match="watchdog"):
@@ -265,9 +265,7 @@ def test_a_pause_that_trips_the_drives_watchdogs_is_told_with_the_fault(opened_r
     assert re.search(r"this computer missed \d+ of \d+ ticks", opened_rig.lateness.message)
 
 
-def test_a_robot_that_stands_in_mud_is_sent_onto_blocks(
-    patient: Configuration, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_robot_in_mud_must_go_onto_blocks(patient: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where its strides would not be in air, and the mud would take more torque than there is."""
     monkeypatch.setattr("experiments.bench.rig.on_blocks", lambda configuration: World(track_of(["48.5"])))
     rig = SimulatedRig(patient)

@@ -81,7 +81,7 @@ def test_each_problem_of_a_configuration_names_its_file_once(text: str, tmp_path
 
 
 def test_a_joint_whose_encoder_counts_backwards_never_gets_stiffness(tmp_path: Path) -> None:
-    """It would run away. All joints are still check_nudge, and nothing moves after that."""
+    """It would run away. All joints are still nudged, and nothing moves after that."""
     report = tmp_path / "report.json"
     flipped = ["-p", "tests.experiments.bench.flipped_encoder"]
     command = [sys.executable, "-m", "pytest", "tests/bench", *flipped, "--simulated", "--bench-report", str(report)]

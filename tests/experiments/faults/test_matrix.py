@@ -164,7 +164,7 @@ def make_bench() -> FaultBench:
     return bench_for("hold", Random(1))
 
 
-def test_a_loop_that_stalled_steps_misses_those_ticks_and_the_robot_moves_on() -> None:
+def test_a_stalled_loop_misses_its_ticks_while_the_robot_moves_on() -> None:
     bench = make_bench()
     bench.run_for(0.1)
     made, missed = bench.loop_ticks, bench.loop.missed_ticks

@@ -213,7 +213,7 @@ def test_a_pose_of_the_wrong_sign_stops_the_walk(tmp_path: Path) -> None:
     assert "reverse pose.axis" in walk.fault
 
 
-@pytest.mark.parametrize(("asked", "reported"), [("stop", "told to stop"), ("disarm", "torque was switched off")])
+@pytest.mark.parametrize(("asked", "reported"), [("stop", "was stopped"), ("disarm", "torque was switched off")])
 def test_a_walk_that_another_client_stops_is_marked_as_stopped(tmp_path: Path, asked: str, reported: str) -> None:
     walk, _ = altered_walk(tmp_path, lambda now_s, x_m: x_m, (5.0, asked))
     assert reported in walk.fault and walk.stopped
