@@ -98,7 +98,7 @@ def test_a_log_without_a_walk_says_so(
     assert main(["log", "report", "rest.mcap"]) == exit_codes.OK
     assert capsys.readouterr().out == "rest-report/report.html\n"
     page = Path("rest-report/report.html").read_text(encoding="utf-8")
-    assert "No complete stride." in page and "nobody walked in this log" in page
+    assert "No complete stride." in page and "there is no walk in this log" in page
 
 
 def test_a_log_that_cannot_be_read_is_told_in_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -106,7 +106,7 @@ def test_a_log_without_a_walk_says_so(tmp_path: Path, configuration: Configurati
     recorder = Recorder(path, configuration.text, {"robot": "test"})
     Lockstep(configuration, paper_track(), recorder=recorder).run_for(0.1)
     assert recorder.close(20.0)
-    with pytest.raises(LogError, match="nobody walked"):
+    with pytest.raises(LogError, match="there is no walk"):
         read_walk(path)
 
 
